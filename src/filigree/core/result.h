@@ -1,0 +1,61 @@
+// How things go wrong: a named code and one sentence that says where, why, and what to do.
+#pragma once
+
+#include <cassert>
+#include <string>
+#include <utility>
+#include <variant>
+
+namespace filigree {
+
+/// The kinds of failure a caller can tell apart. The command line's exit code is the number (docs/conventions.md).
+enum class ErrorCode {
+    usage = 2,       ///< an argument makes no sense
+    not_found = 3,   ///< a file cannot be opened or read
+    bad_file = 4,    ///< a file's content is damaged or not what its name says
+    unsupported = 5, ///< a format or feature we do not have
+    unwritable = 6,  ///< the output cannot be written
+    unsuitable = 7,  ///< the input is fine, but this method cannot work on it (the message says what can)
+    mismatch = 8,    ///< two inputs do not belong together (a pose of another model)
+    out_of_memory = 9,
+    cancelled = 130, ///< the user changed their mind
+};
+
+/// What went wrong. `message` is one sentence for a person: the place ("cow.obj:214"), the cause, what to do.
+struct Error {
+    ErrorCode code = ErrorCode::usage;
+    std::string message;
+};
+
+/// A value or an Error.
+template <class T>
+class [[nodiscard]] Result {
+public:
+    Result(T value) : content_(std::in_place_index<0>, std::move(value)) {}
+    Result(Error error) : content_(std::in_place_index<1>, std::move(error)) {}
+
+    bool ok() const { return content_.index() == 0; }
+    explicit operator bool() const { return ok(); }
+
+    /// The value; only when ok().
+    T& value() & { return assert(ok()), *std::get_if<0>(&content_); }
+    const T& value() const& { return assert(ok()), *std::get_if<0>(&content_); }
+    T&& value() && { return assert(ok()), std::move(*std::get_if<0>(&content_)); }
+    T& operator*() & { return value(); }
+    const T& operator*() const& { return value(); }
+    T&& operator*() && { return std::move(*this).value(); }
+    T* operator->() { return &value(); }
+    const T* operator->() const { return &value(); }
+
+    /// The error; only when not ok().
+    const Error& error() const { return assert(!ok()), *std::get_if<1>(&content_); }
+
+private:
+    std::variant<T, Error> content_;
+};
+
+/// Success without a value: `return Success{};`
+struct Success {};
+using Status = Result<Success>;
+
+} // namespace filigree

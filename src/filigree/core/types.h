@@ -1,0 +1,50 @@
+// The words everything else is written in: indices, vectors, boxes.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+namespace filigree {
+
+using Index = std::uint32_t; ///< of a vertex, a face or a corner; see docs/conventions.md
+inline constexpr Index kNoIndex = std::numeric_limits<Index>::max();
+
+using Vec2f = Eigen::Vector2f;
+using Vec3f = Eigen::Vector3f;
+using Vec4f = Eigen::Matrix<float, 4, 1, Eigen::DontAlign>;
+using Vec3d = Eigen::Vector3d;
+using Mat3f = Eigen::Matrix3f; ///< a deformation gradient; column-major in memory, row-major in files
+using Mat3d = Eigen::Matrix3d;
+
+/// Axis-aligned bounding box. Empty until it is extended.
+struct Box {
+    Vec3d min = Vec3d::Constant(std::numeric_limits<double>::infinity());
+    Vec3d max = Vec3d::Constant(-std::numeric_limits<double>::infinity());
+
+    bool empty() const { return !(min.array() <= max.array()).all(); }
+    void extend(const Vec3d& p) {
+        min = min.cwiseMin(p);
+        max = max.cwiseMax(p);
+    }
+    Vec3d size() const { return empty() ? Vec3d::Zero() : Vec3d(max - min); }
+    Vec3d centre() const { return empty() ? Vec3d::Zero() : Vec3d(0.5 * (min + max)); }
+    double diagonal() const { return size().norm(); }
+};
+
+/// The box of `positions`; empty for no positions. Cost O(V).
+inline Box bounds(std::span<const Vec3f> positions) {
+    Vec3f lo = Vec3f::Constant(std::numeric_limits<float>::infinity()), hi = -lo;
+    for (const Vec3f& p : positions) {
+        lo = lo.cwiseMin(p);
+        hi = hi.cwiseMax(p);
+    }
+    Box box;
+    box.min = lo.cast<double>();
+    box.max = hi.cast<double>();
+    return box;
+}
+
+} // namespace filigree

@@ -1,0 +1,50 @@
+// As-rigid-as-possible handles: some vertices are put somewhere, the rest follows with as little strain as it can.
+#pragma once
+
+#include "filigree/core/result.h"
+#include "filigree/core/run_context.h"
+#include "filigree/hierarchy/pose.h"
+#include "filigree/mesh/mesh.h"
+
+#include <memory>
+
+namespace filigree {
+
+struct HandleOptions {
+    unsigned iterations = 100;   ///< at most this many local-global rounds
+    double tolerance = 1e-5;     ///< stop when no vertex moves further in a round; fraction of the diagonal
+};
+
+struct HandleResult {
+    Pose pose;               ///< positions, and the vertices' rotations as gradients
+    unsigned iterations = 0; ///< rounds done
+    double last_move = 0;    ///< largest move of the last round, fraction of the diagonal
+};
+
+/// The local-global solver for one rest shape and one set of handles; the global step's matrix is factored once
+/// [Sorkine 2007] with cotangent weights (clamped to be non-negative), and the local step keeps each vertex's rotation
+/// from the round before as its start [Mueller 2016].
+class HandleSolver {
+public:
+    /// positions: V rest points; triangles: over them, any quality (degenerate ones have no weight; a vertex that is
+    /// connected to no handle stays where it is). handles: distinct vertices whose positions are given.
+    /// Errors: usage (a handle out of range, repeated, or none at all), out_of_memory.
+    static Result<HandleSolver> create(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
+                                       std::span<const Index> handles);
+    HandleSolver(HandleSolver&&) noexcept;
+    HandleSolver& operator=(HandleSolver&&) noexcept;
+    ~HandleSolver();
+
+    /// targets: one position a handle, in the order of `handles`. Starts from the last solution, so dragging is cheap.
+    /// Cost O(iterations (V + fill)). Errors: mismatch, cancelled.
+    Result<HandleResult> solve(std::span<const Vec3f> targets, const HandleOptions& options, const RunContext& context);
+    /// Forgets the last solution: the next solve starts from the rest shape.
+    void reset();
+
+private:
+    struct Solver;
+    explicit HandleSolver(std::unique_ptr<Solver> solver);
+    std::unique_ptr<Solver> solver_;
+};
+
+} // namespace filigree

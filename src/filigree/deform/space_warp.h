@@ -1,0 +1,52 @@
+// Deformations of space with their exact gradients: stretch, squeeze, bend, twist, taper, smooth random, and chains.
+#pragma once
+
+#include "filigree/core/result.h"
+#include "filigree/core/run_context.h"
+#include "filigree/mesh/mesh.h"
+
+#include <memory>
+#include <optional>
+
+namespace filigree {
+
+/// Where a point went, and how its neighbourhood was deformed: gradient(r, c) = d position_r / d point_c.
+struct Warped {
+    Vec3d position;
+    Mat3d gradient;
+};
+
+/// A deformation of space. Implementations are pure functions: safe from many threads.
+class SpaceWarp {
+public:
+    virtual ~SpaceWarp() = default;
+    virtual Vec3d position(const Vec3d& point) const = 0;
+    virtual Warped warp(const Vec3d& point) const = 0;
+};
+
+enum class Axis { x, y, z };
+
+/// Scales by `factor` along the axis about the box's centre. factor != 0.
+std::unique_ptr<SpaceWarp> make_stretch(const Box& box, Axis axis, double factor);
+/// Scales by `factor` along the axis and by 1 / sqrt(factor) across it, so that volume stays. factor > 0.
+std::unique_ptr<SpaceWarp> make_squeeze(const Box& box, Axis axis, double factor);
+/// Bends the axis into an arc of `degrees` over the box's length, keeping the length of its centre line; the box's
+/// middle stays where it is. Beyond the box's ends the body continues straight. Towards the next axis (x to y to z to x).
+std::unique_ptr<SpaceWarp> make_bend(const Box& box, Axis axis, double degrees);
+/// Turns cross-sections about the axis through the box's centre, by -degrees/2 to +degrees/2 from end to end.
+std::unique_ptr<SpaceWarp> make_twist(const Box& box, Axis axis, double degrees);
+/// Scales cross-sections linearly along the axis, from 1 at the low end to `factor` at the high end. factor > 0.
+std::unique_ptr<SpaceWarp> make_taper(const Box& box, Axis axis, double factor);
+/// A sum of eight Gaussian bumps with random centres in the box and random displacements, whose largest length is
+/// `amplitude` times the box's diagonal; the bumps are 0.35 diagonals wide. Seeded.
+std::unique_ptr<SpaceWarp> make_smooth_random(const Box& box, double amplitude, std::uint64_t seed);
+/// The warps one after the other; the gradient by the chain rule.
+std::unique_ptr<SpaceWarp> make_chain(std::vector<std::unique_ptr<SpaceWarp>> warps);
+
+/// Warps world positions: out[i] = warp(mesh.origin + positions[i]) - mesh.origin, on all threads.
+std::vector<Vec3f> warp_positions(const SpaceWarp& warp, std::span<const Vec3f> positions, const Vec3d& origin,
+                                  const RunContext& context);
+/// Deforms every vertex of a mesh, and its normals by the cofactor of the gradient (as unit vectors).
+void warp_mesh(const SpaceWarp& warp, Mesh& mesh, const RunContext& context);
+
+} // namespace filigree

@@ -1,0 +1,31 @@
+// What happens to detail height when its surroundings change size.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string_view>
+
+namespace filigree {
+
+/// The factor s on the height of detail, from a size of its surroundings at rest and now.
+enum class Law {
+    keep,         ///< s = 1
+    inverse,      ///< s = old width / new width (the report, eq. 2.14)
+    proportional, ///< s = sqrt(new area / old area): exact under uniform scale
+    volume,       ///< s = old area / new area
+};
+
+/// Every law's s is held in [1 / kMaxLawScale, kMaxLawScale]; without it `inverse` and `volume` have no bound as the
+/// surroundings collapse (blend.md, 2.2: 260 diagonals).
+inline constexpr float kMaxLawScale = 4;
+
+inline constexpr std::array<std::string_view, 4> kLawNames = {"keep", "inverse", "proportional", "volume"};
+
+inline std::string_view law_name(Law law) { return kLawNames[static_cast<std::size_t>(law)]; }
+inline std::optional<Law> law_from_name(std::string_view name) {
+    for (std::size_t i = 0; i < kLawNames.size(); ++i)
+        if (kLawNames[i] == name) return static_cast<Law>(i);
+    return std::nullopt;
+}
+
+} // namespace filigree

@@ -1,0 +1,18 @@
+// Where a driver is now.
+#pragma once
+
+#include "filigree/core/types.h"
+
+namespace filigree {
+
+/// Positions of a model's driver (level 0), in its vertex order and relative to the mesh's origin, and optionally how
+/// the space around each vertex is deformed: gradients from the deformer, or one ghost point a vertex.
+struct Pose {
+    std::vector<Vec3f> positions;
+    std::vector<Mat3f> gradients; ///< empty or one a driver vertex
+    /// Empty or one a driver vertex: where the point one driver-edge length off the surface went, that is
+    /// rest position + ghost_offset (BlendDetail::ghost_offset) times the rest normal.
+    std::vector<Vec3f> ghosts;
+};
+
+} // namespace filigree

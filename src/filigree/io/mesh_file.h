@@ -1,0 +1,49 @@
+// Meshes in files: OBJ, PLY, STL, OFF.
+#pragma once
+
+#include "filigree/core/result.h"
+#include "filigree/core/run_context.h"
+#include "filigree/mesh/mesh.h"
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace filigree {
+
+enum class MeshFormat { obj, ply, stl, off };
+
+/// A mesh and what could not be kept or had to be mended while reading it, one sentence each.
+struct MeshFile {
+    Mesh mesh;
+    std::vector<std::string> warnings;
+};
+
+/// The format a file name's ending stands for (any case), or `unsupported` with the list of those we know.
+Result<MeshFormat> mesh_format(const std::filesystem::path& path);
+
+/// Reads a mesh; "-" reads standard input (the format is then found from the content). The format comes from the
+/// content where it can be told, else from the ending. Vertex and face order are the file's. A mesh without faces is
+/// read (as points) with a warning. What comes back passes check_mesh.
+/// Errors: not_found, bad_file ("cow.obj:214: ..."), unsupported, out_of_memory, cancelled.
+/// Cost: one pass; memory a small multiple of the file.
+Result<MeshFile> read_mesh(const std::filesystem::path& path, const RunContext& context);
+
+/// The same from bytes in memory; `name` stands in messages, and its ending decides where the content cannot.
+Result<MeshFile> read_mesh(std::string_view bytes, const std::string& name, const RunContext& context);
+
+struct WriteMeshOptions {
+    bool ascii = false; ///< PLY and STL: text instead of binary
+    bool big_endian = false; ///< PLY: binary, most significant byte first
+};
+
+/// Writes a mesh through a temporary file beside `path` and a rename, so that `path` is either whole or untouched;
+/// "-" writes standard output and needs `format`. Returns the warnings: one sentence that lists what the format cannot
+/// hold. Errors: unsupported, unwritable, cancelled.
+Result<std::vector<std::string>> write_mesh(const Mesh& mesh, const std::filesystem::path& path,
+                                            const RunContext& context, const WriteMeshOptions& options = {});
+/// The bytes of a file of that format. Same warnings.
+Result<std::vector<std::string>> write_mesh(const Mesh& mesh, MeshFormat format, std::string& bytes,
+                                            const WriteMeshOptions& options = {});
+
+} // namespace filigree

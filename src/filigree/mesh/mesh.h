@@ -1,0 +1,90 @@
+// A polygon mesh as plain arrays: what every file is read into and every algorithm takes.
+#pragma once
+
+#include "filigree/core/types.h"
+
+#include <array>
+#include <string>
+#include <vector>
+
+namespace filigree {
+
+/// Values that corners refer to. Corner c has values[corners[c]], as in OBJ; when `corners` is empty there is one
+/// value a vertex, in vertex order.
+template <class T>
+struct CornerAttribute {
+    std::vector<T> values;
+    std::vector<Index> corners;
+
+    bool empty() const { return values.empty(); }
+    bool per_vertex() const { return corners.empty(); }
+};
+
+/// A name for each face, such as its group or its material. `of_face` is empty or holds one index into `names` a
+/// face, kNoIndex where a face has none.
+struct FaceLabels {
+    std::vector<std::string> names;
+    std::vector<Index> of_face;
+
+    bool empty() const { return of_face.empty(); }
+};
+
+/// One number a vertex, under the name a file gave it ("quality", "confidence", "f00").
+struct VertexScalar {
+    std::string name;
+    std::vector<float> values;
+};
+
+/// Polygons over shared vertices. Face f has the corners face_offsets[f] .. face_offsets[f + 1] - 1, each at least
+/// three, counter-clockwise seen from outside. Vertex and face order is the file's and is never changed.
+/// What holds between the arrays is said by `check_mesh`.
+struct Mesh {
+    std::vector<Vec3f> positions; ///< model units, relative to `origin`
+    Vec3d origin = Vec3d::Zero(); ///< added to every position; not zero only far from the world's origin
+    std::vector<Index> face_offsets = {0}; ///< F + 1 offsets into `corners`, ascending
+    std::vector<Index> corners;            ///< vertex of each corner
+
+    CornerAttribute<Vec2f> uvs;
+    CornerAttribute<Vec3f> normals;    ///< as the file has them: not always of unit length
+    std::vector<Vec4f> colors;         ///< empty or one RGBA a vertex, 0 to 1
+    bool colors_have_alpha = false;    ///< whether the fourth channel came with the file
+    std::vector<VertexScalar> scalars; ///< further numbers a vertex
+    FaceLabels objects, groups, materials;
+    std::vector<Index> smoothing;             ///< empty or one smoothing group a face; 0 is "off"
+    std::vector<std::string> material_files;  ///< names of material libraries, as the file gave them
+
+    std::size_t vertex_count() const { return positions.size(); }
+    std::size_t face_count() const { return face_offsets.size() - 1; }
+    std::size_t corner_count() const { return corners.size(); }
+    Index face_size(std::size_t face) const { return face_offsets[face + 1] - face_offsets[face]; }
+    std::span<const Index> face(std::size_t face) const {
+        return std::span(corners).subspan(face_offsets[face], face_size(face));
+    }
+    /// Position in the world, in double.
+    Vec3d world_position(std::size_t vertex) const { return origin + positions[vertex].cast<double>(); }
+
+    void add_face(std::span<const Index> face_corners) {
+        corners.insert(corners.end(), face_corners.begin(), face_corners.end());
+        face_offsets.push_back(static_cast<Index>(corners.size()));
+    }
+};
+
+using Triangle = std::array<Index, 3>;
+
+/// Positions with their origin split off, so that float keeps their digits far from the world's origin.
+struct SplitPositions {
+    std::vector<Vec3f> positions;
+    Vec3d origin;
+};
+
+/// Chooses the origin for `world` positions: zero unless their box is more than twice its own diagonal away from
+/// the world's origin; then the box's centre, rounded so that adding it back is exact for float input. Cost O(V).
+SplitPositions split_origin(std::span<const Vec3d> world);
+/// The same for float positions, in place: moves mesh.positions and sets mesh.origin (which must be zero).
+void split_origin(Mesh& mesh);
+
+/// The first thing wrong with the arrays, as a sentence, or "" when all that `Mesh` promises holds: offsets ascend,
+/// faces have three corners or more, every index is in range, attribute sizes fit, positions are finite. Cost O(size).
+std::string check_mesh(const Mesh& mesh);
+
+} // namespace filigree

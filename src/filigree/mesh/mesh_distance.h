@@ -1,0 +1,38 @@
+// How far one mesh is from another: vertex by vertex, or surface to surface.
+#pragma once
+
+#include "filigree/core/run_context.h"
+#include "filigree/mesh/mesh.h"
+
+#include <optional>
+
+namespace filigree {
+
+/// Vertex i of one mesh against vertex i of the other. Distances in model units.
+struct VertexDistance {
+    double rms = 0, max = 0;
+    Index max_vertex = kNoIndex;
+    /// Angle between vertex normals computed from the positions (not those stored), degrees; vertices without a
+    /// normal in either mesh are left out.
+    double normal_mean_deg = 0, normal_p95_deg = 0, normal_max_deg = 0;
+    std::vector<float> per_vertex; ///< the distance of each vertex, for heat maps
+};
+
+/// Surface against surface, both ways, through samples: every vertex, and points spread over the faces by area.
+struct SurfaceDistance {
+    double hausdorff = 0; ///< the larger of the two maxima
+    double mean_distance = 0, rms_distance = 0; ///< over the samples of both ways
+    double max_a_to_b = 0, max_b_to_a = 0;
+};
+
+struct MeshDistance {
+    std::optional<VertexDistance> vertices; ///< when both have the same number of vertices
+    std::optional<SurfaceDistance> surfaces; ///< when both have faces
+    double diagonal = 0; ///< of b's box: what fractions are taken of
+};
+
+/// a against b. samples: points spread over each surface besides its vertices (seeded by the context).
+/// Cost O((V + samples) log F). Origins are respected. Cancellable.
+Result<MeshDistance> mesh_distance(const Mesh& a, const Mesh& b, std::size_t samples, const RunContext& context);
+
+} // namespace filigree
