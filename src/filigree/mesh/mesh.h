@@ -9,8 +9,8 @@
 
 namespace filigree {
 
-/// Values that corners refer to. Corner c has values[corners[c]], as in OBJ; when `corners` is empty there is one
-/// value a vertex, in vertex order.
+/// Values that corners refer to. Corner c has values[corners[c]], as in OBJ, or none where corners[c] is kNoIndex;
+/// when `corners` is empty there is one value a vertex, in vertex order.
 template <class T>
 struct CornerAttribute {
     std::vector<T> values;
@@ -39,8 +39,8 @@ struct VertexScalar {
 /// three, counter-clockwise seen from outside. Vertex and face order is the file's and is never changed.
 /// What holds between the arrays is said by `check_mesh`.
 struct Mesh {
-    std::vector<Vec3f> positions; ///< model units, relative to `origin`
-    Vec3d origin = Vec3d::Zero(); ///< added to every position; not zero only far from the world's origin
+    std::vector<Vec3f> positions;          ///< model units, relative to `origin`
+    Vec3d origin = Vec3d::Zero();          ///< added to every position; not zero only far from the world's origin
     std::vector<Index> face_offsets = {0}; ///< F + 1 offsets into `corners`, ascending
     std::vector<Index> corners;            ///< vertex of each corner
 
@@ -50,8 +50,8 @@ struct Mesh {
     bool colors_have_alpha = false;    ///< whether the fourth channel came with the file
     std::vector<VertexScalar> scalars; ///< further numbers a vertex
     FaceLabels objects, groups, materials;
-    std::vector<Index> smoothing;             ///< empty or one smoothing group a face; 0 is "off"
-    std::vector<std::string> material_files;  ///< names of material libraries, as the file gave them
+    std::vector<Index> smoothing;            ///< empty or one smoothing group a face; 0 is "off"
+    std::vector<std::string> material_files; ///< names of material libraries, as the file gave them
 
     std::size_t vertex_count() const { return positions.size(); }
     std::size_t face_count() const { return face_offsets.size() - 1; }
@@ -78,13 +78,15 @@ struct SplitPositions {
 };
 
 /// Chooses the origin for `world` positions: zero unless their box is more than twice its own diagonal away from
-/// the world's origin; then the box's centre, rounded so that adding it back is exact for float input. Cost O(V).
+/// the world's origin; then the box's centre (0 on axes where the box is close), rounded so that taking it off is exact
+/// for float input. Cost O(V).
 SplitPositions split_origin(std::span<const Vec3d> world);
 /// The same for float positions, in place: moves mesh.positions and sets mesh.origin (which must be zero).
 void split_origin(Mesh& mesh);
 
 /// The first thing wrong with the arrays, as a sentence, or "" when all that `Mesh` promises holds: offsets ascend,
-/// faces have three corners or more, every index is in range, attribute sizes fit, positions are finite. Cost O(size).
+/// faces have three corners or more, every index is in range, attribute sizes fit, all numbers are finite.
+/// Cost O(size).
 std::string check_mesh(const Mesh& mesh);
 
 } // namespace filigree
