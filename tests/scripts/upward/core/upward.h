@@ -1,0 +1,2 @@
+// Breaks the layer rule on purpose: scripts/layers has to notice (tests/CMakeLists.txt).
+#include "filigree/mesh/mesh.h"
