@@ -1,0 +1,55 @@
+#include "filigree/mesh/normals.h"
+
+#include "filigree/core/parallel_for.h"
+
+#include <Eigen/Geometry>
+#include <cassert>
+
+namespace filigree {
+namespace {
+
+constexpr std::size_t kGrain = 16384;
+
+/// Adds twice the area vector of a face to the sums of its vertices. Newell's formula, from the first corner so that
+/// a small face far from the origin keeps its digits.
+void add_face(std::span<const Index> face, std::span<const Vec3f> positions, std::vector<Vec3d>& sums) {
+    const Vec3d origin = positions[face[0]].cast<double>();
+    Vec3d normal = Vec3d::Zero(), previous = positions[face[1]].cast<double>() - origin;
+    for (std::size_t i = 2; i < face.size(); ++i) {
+        const Vec3d current = positions[face[i]].cast<double>() - origin;
+        normal += previous.cross(current);
+        previous = current;
+    }
+    for (const Index vertex : face) sums[vertex] += normal;
+}
+
+std::vector<Vec3f> normalised(const std::vector<Vec3d>& sums, const RunContext& context) {
+    std::vector<Vec3f> normals(sums.size());
+    parallel_for(context, sums.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t v = begin; v < end; ++v) {
+            const double length = sums[v].norm();
+            normals[v] = length > 0 ? Vec3f((sums[v] / length).cast<float>()) : Vec3f::Zero();
+        }
+    });
+    return normals;
+}
+
+} // namespace
+
+// The sums are made on one thread: they wait for memory, and gathering by vertex needs a table that costs more.
+
+std::vector<Vec3f> vertex_normals(const Mesh& mesh, std::span<const Vec3f> positions, const RunContext& context) {
+    assert(positions.size() == mesh.vertex_count());
+    std::vector<Vec3d> sums(positions.size(), Vec3d::Zero());
+    for (std::size_t f = 0; f < mesh.face_count(); ++f) add_face(mesh.face(f), positions, sums);
+    return normalised(sums, context);
+}
+
+std::vector<Vec3f> vertex_normals(std::span<const Triangle> triangles, std::span<const Vec3f> positions,
+                                  const RunContext& context) {
+    std::vector<Vec3d> sums(positions.size(), Vec3d::Zero());
+    for (const Triangle& triangle : triangles) add_face(triangle, positions, sums);
+    return normalised(sums, context);
+}
+
+} // namespace filigree
