@@ -11,8 +11,8 @@
 namespace filigree {
 
 struct HandleOptions {
-    unsigned iterations = 100;   ///< at most this many local-global rounds
-    double tolerance = 1e-5;     ///< stop when no vertex moves further in a round; fraction of the diagonal
+    unsigned iterations = 100; ///< at most this many local-global rounds
+    double tolerance = 1e-5;   ///< stop when no vertex moves further in a round; fraction of the diagonal
 };
 
 struct HandleResult {
@@ -23,20 +23,22 @@ struct HandleResult {
 
 /// The local-global solver for one rest shape and one set of handles; the global step's matrix is factored once
 /// [Sorkine 2007] with cotangent weights (clamped to be non-negative), and the local step keeps each vertex's rotation
-/// from the round before as its start [Mueller 2016].
+/// from the round before as its start [Mueller 2016]. Rotations are proper (determinant 1) whatever the targets are.
 class HandleSolver {
 public:
-    /// positions: V rest points; triangles: over them, any quality (degenerate ones have no weight; a vertex that is
-    /// connected to no handle stays where it is). handles: distinct vertices whose positions are given.
-    /// Errors: usage (a handle out of range, repeated, or none at all), out_of_memory.
+    /// positions: V rest points; triangles: over them, any quality (degenerate ones only just hold their vertices
+    /// together; a vertex that is connected to no handle stays where it is). handles: distinct vertices whose positions
+    /// are given. Errors: usage (a handle out of range, repeated, or none at all), out_of_memory.
     static Result<HandleSolver> create(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
                                        std::span<const Index> handles);
     HandleSolver(HandleSolver&&) noexcept;
     HandleSolver& operator=(HandleSolver&&) noexcept;
     ~HandleSolver();
 
-    /// targets: one position a handle, in the order of `handles`. Starts from the last solution, so dragging is cheap.
-    /// Cost O(iterations (V + fill)). Errors: mismatch, cancelled.
+    /// targets: one position a handle, in the order of `handles`. Starts from the last solution, moved along with the
+    /// handles as a rigid body: dragging is cheap, and a rigid motion exact. Same bytes for any thread count.
+    /// Cost O(iterations (V + fill)). Errors: mismatch, usage (a target that is not finite), cancelled (the last
+    /// solution stays).
     Result<HandleResult> solve(std::span<const Vec3f> targets, const HandleOptions& options, const RunContext& context);
     /// Forgets the last solution: the next solve starts from the rest shape.
     void reset();

@@ -1,12 +1,14 @@
 // Deformations of space with their exact gradients: stretch, squeeze, bend, twist, taper, smooth random, and chains.
 #pragma once
 
-#include "filigree/core/result.h"
 #include "filigree/core/run_context.h"
+#include "filigree/hierarchy/pose.h"
 #include "filigree/mesh/mesh.h"
 
+#include <cstdint>
 #include <memory>
-#include <optional>
+#include <span>
+#include <vector>
 
 namespace filigree {
 
@@ -26,27 +28,41 @@ public:
 
 enum class Axis { x, y, z };
 
+// Bend, twist and taper vary between the ends of the box. Positions go on smoothly beyond an end, but gradients jump
+// there; a point exactly on an end has the gradient of the inside. Along an axis in which the box has no length
+// (below 1e-9 of its diagonal) these three are the identity.
+
 /// Scales by `factor` along the axis about the box's centre. factor != 0.
 std::unique_ptr<SpaceWarp> make_stretch(const Box& box, Axis axis, double factor);
 /// Scales by `factor` along the axis and by 1 / sqrt(factor) across it, so that volume stays. factor > 0.
 std::unique_ptr<SpaceWarp> make_squeeze(const Box& box, Axis axis, double factor);
 /// Bends the axis into an arc of `degrees` over the box's length, keeping the length of its centre line; the box's
-/// middle stays where it is. Beyond the box's ends the body continues straight. Towards the next axis (x to y to z to x).
+/// middle stays where it is. Beyond the box's ends the body continues straight. Towards the next axis (x to y to z to
+/// x).
 std::unique_ptr<SpaceWarp> make_bend(const Box& box, Axis axis, double degrees);
-/// Turns cross-sections about the axis through the box's centre, by -degrees/2 to +degrees/2 from end to end.
+/// Turns cross-sections about the axis through the box's centre, by -degrees/2 to +degrees/2 from end to end, and
+/// rigidly beyond.
 std::unique_ptr<SpaceWarp> make_twist(const Box& box, Axis axis, double degrees);
-/// Scales cross-sections linearly along the axis, from 1 at the low end to `factor` at the high end. factor > 0.
+/// Scales cross-sections linearly along the axis, from 1 at the low end to `factor` at the high end; constant beyond.
+/// factor > 0.
 std::unique_ptr<SpaceWarp> make_taper(const Box& box, Axis axis, double factor);
-/// A sum of eight Gaussian bumps with random centres in the box and random displacements, whose largest length is
-/// `amplitude` times the box's diagonal; the bumps are 0.35 diagonals wide. Seeded.
+/// A sum of eight Gaussian bumps with random centres in the box and random displacements, the longest of which is
+/// `amplitude` times the box's diagonal; the bumps' standard deviation is 0.35 diagonals. Seeded.
 std::unique_ptr<SpaceWarp> make_smooth_random(const Box& box, double amplitude, std::uint64_t seed);
-/// The warps one after the other; the gradient by the chain rule.
+/// Moves each centre by its displacement and everything else smoothly along: cubic radial basis functions and an
+/// affine part [Carr 2001], so affine displacements are reproduced everywhere. One displacement a centre; few or
+/// coplanar centres are fine, coincident ones get the mean of their displacements. Cost O(n^3) once, then O(n) a point.
+std::unique_ptr<SpaceWarp> make_rbf(std::span<const Vec3d> centres, std::span<const Vec3d> displacements);
+/// The warps one after the other; the gradient by the chain rule. None at all: the identity.
 std::unique_ptr<SpaceWarp> make_chain(std::vector<std::unique_ptr<SpaceWarp>> warps);
 
 /// Warps world positions: out[i] = warp(mesh.origin + positions[i]) - mesh.origin, on all threads.
 std::vector<Vec3f> warp_positions(const SpaceWarp& warp, std::span<const Vec3f> positions, const Vec3d& origin,
                                   const RunContext& context);
-/// Deforms every vertex of a mesh, and its normals by the cofactor of the gradient (as unit vectors).
+/// The same with gradients: the pose that a driver with these rest positions takes.
+Pose warp_pose(const SpaceWarp& warp, std::span<const Vec3f> positions, const Vec3d& origin, const RunContext& context);
+/// Deforms every vertex of a mesh, and its normals by the cofactor of the gradient, to unit vectors. A normal that
+/// several vertices share becomes one value for each of them, the further ones at the end of normals.values.
 void warp_mesh(const SpaceWarp& warp, Mesh& mesh, const RunContext& context);
 
 } // namespace filigree
