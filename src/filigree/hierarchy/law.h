@@ -15,8 +15,8 @@ enum class Law {
     volume,       ///< s = old area / new area
 };
 
-/// Every law's s is held in [1 / kMaxLawScale, kMaxLawScale]; without it `inverse` and `volume` have no bound as the
-/// surroundings collapse (blend.md, 2.2: 260 diagonals).
+/// `inverse` and `volume` are held in [1 / kMaxLawScale, kMaxLawScale]: without it they have no bound as the
+/// surroundings collapse (260 diagonals were measured). `proportional` needs none: it shrinks with its surroundings.
 inline constexpr float kMaxLawScale = 4;
 
 inline constexpr std::array<std::string_view, 4> kLawNames = {"keep", "inverse", "proportional", "volume"};

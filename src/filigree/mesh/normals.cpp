@@ -4,6 +4,8 @@
 
 #include <Eigen/Geometry>
 #include <cassert>
+#include <numeric>
+#include <unordered_map>
 
 namespace filigree {
 namespace {
@@ -50,6 +52,29 @@ std::vector<Vec3f> vertex_normals(std::span<const Triangle> triangles, std::span
     std::vector<Vec3d> sums(positions.size(), Vec3d::Zero());
     for (const Triangle& triangle : triangles) add_face(triangle, positions, sums);
     return normalised(sums, context);
+}
+
+std::vector<Index> split_shared_normals(Mesh& mesh) {
+    CornerAttribute<Vec3f>& normals = mesh.normals;
+    std::vector<Index> vertex_of(normals.values.size(), kNoIndex);
+    if (normals.per_vertex()) {
+        std::iota(vertex_of.begin(), vertex_of.end(), 0);
+        return vertex_of;
+    }
+    std::unordered_map<std::uint64_t, Index> copies; // (value, vertex) to the copy made for it
+    for (std::size_t c = 0; c < mesh.corner_count(); ++c) {
+        const Index value = normals.corners[c], vertex = mesh.corners[c];
+        if (vertex_of[value] == kNoIndex) vertex_of[value] = vertex;
+        if (vertex_of[value] == vertex) continue;
+        const auto [copy, is_new] =
+            copies.try_emplace(std::uint64_t{value} << 32 | vertex, static_cast<Index>(normals.values.size()));
+        if (is_new) {
+            normals.values.push_back(Vec3f(normals.values[value]));
+            vertex_of.push_back(vertex);
+        }
+        normals.corners[c] = copy->second;
+    }
+    return vertex_of;
 }
 
 } // namespace filigree

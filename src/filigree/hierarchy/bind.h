@@ -1,0 +1,35 @@
+// Which driver triangle each vertex belongs to.
+#pragma once
+
+#include "filigree/core/run_context.h"
+#include "filigree/mesh/mesh.h"
+
+namespace filigree {
+
+/// Where a vertex hangs: on triangle `cell` at (1 - u - v, u, v), all three >= 0.
+struct Bond {
+    Index cell = kNoIndex;
+    float u = 0, v = 0;
+};
+
+/// A bond a vertex, and what could not be bound the good way.
+struct Binding {
+    std::vector<Bond> bonds;
+    /// Not connected along the surface to any driver vertex (a dropped part, a loose vertex): bound to the closest
+    /// driver triangle across the gap. Ascending vertex ids.
+    std::vector<Index> across_gap;
+    /// No triangle nearby along the surface faces the same way; bound to the closest that does not. Ascending.
+    std::vector<Index> facing_away;
+};
+
+/// Binds every vertex to the closest point of a driver triangle that it belongs to along the surface and that faces the
+/// same way: labels spread from the driver's vertices over the mesh's edges, then each vertex walks from its label's
+/// triangles downhill to the closest one. Plain closest points would take the other side of thin parts.
+/// positions: V points; triangles: over welded ids; normals: V, unit or zero; cells: driver triangles over the same ids
+/// (at least one). representative: weld_map(positions); a vertex gets its representative's bond.
+/// Cost O(V log V); same bytes for any thread count. Errors: cancelled.
+Result<Binding> bind_to_driver(std::span<const Vec3f> positions, std::span<const Index> representative,
+                               std::span<const Triangle> triangles, std::span<const Vec3f> normals,
+                               std::span<const Triangle> cells, const RunContext& context);
+
+} // namespace filigree

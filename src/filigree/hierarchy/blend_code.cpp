@@ -1,0 +1,200 @@
+#include "filigree/hierarchy/blend_code.h"
+
+#include "filigree/core/parallel_for.h"
+#include "filigree/hierarchy/blend_kernel.h"
+
+#include <cmath>
+
+namespace filigree {
+
+namespace {
+
+constexpr float kWeightStep = 1.0f / 32767.0f; // of an int16 weight
+
+/// Weights of the cell's corners; the fourth is zero in triangles.
+std::array<double, 4> corner_weights(const std::array<Index, 4>& cell, double u, double v) {
+    if (cell[3] == kNoIndex) return {1 - u - v, u, v, 0};
+    return {(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v};
+}
+
+/// m: the point of the cell that a record hangs on.
+Vec3d anchor(const std::array<Index, 4>& cell, double u, double v, std::span<const Vec3f> positions,
+             std::span<const Index> driver) {
+    const std::array<double, 4> weights = corner_weights(cell, u, v);
+    Vec3d m = Vec3d::Zero();
+    for (int k = 0; k < 4; ++k)
+        if (cell[k] != kNoIndex) m += weights[k] * positions[driver[cell[k]]].cast<double>();
+    return m;
+}
+
+float round_weight(float w) { return std::round(w * 32767.0f) * kWeightStep; }
+
+void quantise_offsets(BlendDetail& detail, std::span<const Vec3f> positions, std::span<const Index> driver) {
+    detail.offsets.resize(detail.order.size());
+    detail.cell_scales.assign(detail.cells.size(), 0);
+    std::vector<Vec3d> offsets;
+    for (std::size_t c = 0; c < detail.cells.size(); ++c) {
+        offsets.clear();
+        double largest = 0;
+        for (Index r = detail.cell_offsets[c]; r < detail.cell_offsets[c + 1]; ++r) {
+            offsets.push_back(positions[detail.order[r]].cast<double>() -
+                              anchor(detail.cells[c], detail.u[r], detail.v[r], positions, driver));
+            largest = std::max(largest, offsets.back().cwiseAbs().maxCoeff());
+        }
+        const float scale = detail.cell_scales[c] = static_cast<float>(largest / 32767.0);
+        for (std::size_t k = 0; k < offsets.size(); ++k)
+            for (int axis = 0; axis < 3; ++axis)
+                detail.offsets[detail.cell_offsets[c] + k][axis] =
+                    scale > 0 ? static_cast<std::int16_t>(
+                                    std::clamp(std::round(offsets[k][axis] / scale), -32767.0, 32767.0))
+                              : std::int16_t{0};
+    }
+}
+
+} // namespace
+
+BlendDetail encode_blend(std::span<const Vec3f> positions, std::span<const Index> driver,
+                         std::vector<std::array<Index, 4>> cells, const Binding& binding, Precision precision) {
+    BlendDetail detail;
+    detail.cells = std::move(cells);
+    detail.precision = precision;
+    detail.across_gap = binding.across_gap;
+    detail.facing_away = binding.facing_away;
+
+    const std::size_t count = positions.size();
+    detail.cell_offsets.assign(detail.cells.size() + 1, 0);
+    for (const Bond& bond : binding.bonds) ++detail.cell_offsets[bond.cell + 1];
+    for (std::size_t c = 0; c < detail.cells.size(); ++c) detail.cell_offsets[c + 1] += detail.cell_offsets[c];
+    std::vector<Index> next(detail.cell_offsets.begin(), detail.cell_offsets.end() - 1);
+    detail.order.resize(count);
+    detail.u.resize(count);
+    detail.v.resize(count);
+    for (Index vertex = 0; vertex < count; ++vertex) {
+        const Bond& bond = binding.bonds[vertex];
+        const Index r = next[bond.cell]++;
+        const bool rounded = precision == Precision::int16;
+        detail.order[r] = vertex;
+        detail.u[r] = rounded ? round_weight(bond.u) : bond.u;
+        detail.v[r] = rounded ? round_weight(bond.v) : bond.v;
+    }
+    if (precision == Precision::int16) quantise_offsets(detail, positions, driver);
+    return detail;
+}
+
+void decode_rest(const BlendDetail& detail, std::span<const Index> driver, std::span<Vec3f> positions) {
+    std::vector<Vec3f> driver_rest;
+    for (Index v : driver) driver_rest.push_back(positions[v]);
+    for (std::size_t c = 0; c < detail.cells.size(); ++c)
+        for (Index r = detail.cell_offsets[c]; r < detail.cell_offsets[c + 1]; ++r) {
+            const auto& d = detail.offsets[r];
+            const Vec3d offset = double(detail.cell_scales[c]) * Vec3d(d[0], d[1], d[2]);
+            positions[detail.order[r]] =
+                (anchor(detail.cells[c], detail.u[r], detail.v[r], positions, driver) + offset).cast<float>();
+        }
+    for (std::size_t i = 0; i < driver.size(); ++i) positions[driver[i]] = driver_rest[i];
+}
+
+struct BlendRestorer::Content {
+    blend_kernel::Records records;
+    std::vector<Vec3d> rest; ///< of the driver's vertices, relative to the centre and scaled
+    double scale = 1;        ///< of everything inside; a power of two, other than 1 only for extreme sizes
+};
+
+BlendRestorer::BlendRestorer(BlendRestorer&&) noexcept = default;
+BlendRestorer& BlendRestorer::operator=(BlendRestorer&&) noexcept = default;
+BlendRestorer::~BlendRestorer() = default;
+
+BlendRestorer::BlendRestorer(const BlendDetail& detail, std::span<const Vec3f> positions, std::span<const Index> driver,
+                             std::span<const Item> items, std::span<const Vec3f> normals)
+    : content_(std::make_unique<Content>()) {
+    const Box box = bounds(positions);
+    const double diagonal = box.diagonal();
+    const Vec3d centre = box.centre();
+    if (diagonal > 0 && (diagonal < 1e-15 || diagonal > 1e15)) content_->scale = std::exp2(-std::round(std::log2(diagonal)));
+    const double scale = content_->scale;
+    for (Index v : driver) content_->rest.push_back(scale * (positions[v].cast<double>() - centre));
+
+    // Which records are wanted, in record order, and by which items (a vertex may have several).
+    std::vector<Index> first_item(positions.size(), kNoIndex), next_item(items.size(), kNoIndex);
+    for (Index i = static_cast<Index>(items.size()); i-- > 0;) {
+        next_item[i] = first_item[items[i].vertex];
+        first_item[items[i].vertex] = i;
+    }
+
+    blend_kernel::Records& records = content_->records;
+    const bool int16 = detail.precision == Precision::int16;
+    records.count = items.size();
+    records.cells = detail.cells;
+    for (const auto& cell : detail.cells) records.has_quads |= cell[3] != kNoIndex;
+    const std::size_t padded = items.size() + blend_kernel::kPadding;
+    if (int16) {
+        records.u16.assign(padded, 0);
+        records.v16.assign(padded, 0);
+        for (auto& o : records.offset) o.assign(padded, 0);
+        for (float s : detail.cell_scales) records.scale.push_back(static_cast<float>(s * scale));
+    } else {
+        records.u.assign(padded, 0);
+        records.v.assign(padded, 0);
+        for (auto& q : records.q) q.assign(padded, 0);
+    }
+    if (!normals.empty())
+        for (auto& n : records.normal) n.assign(padded, 0);
+    records.slot.reserve(items.size());
+
+    for (Index c = 0; c < detail.cells.size(); ++c) {
+        const auto& cell = detail.cells[c];
+        for (Index r = detail.cell_offsets[c]; r < detail.cell_offsets[c + 1]; ++r) {
+            const Index vertex = detail.order[r];
+            for (Index i = first_item[vertex]; i != kNoIndex; i = next_item[i]) {
+                const Index at = static_cast<Index>(records.slot.size());
+                if (records.runs.empty() || records.runs.back().cell != c ||
+                    records.runs.back().count == blend_kernel::kMaxRun)
+                    records.runs.push_back({c, at, 0});
+                ++records.runs.back().count;
+                records.slot.push_back(items[i].slot);
+                if (!normals.empty())
+                    for (int k = 0; k < 3; ++k) records.normal[k][at] = normals[i][k];
+                if (int16) {
+                    records.u16[at] = static_cast<std::int16_t>(std::round(detail.u[r] * 32767.0f));
+                    records.v16[at] = static_cast<std::int16_t>(std::round(detail.v[r] * 32767.0f));
+                    for (int k = 0; k < 3; ++k) records.offset[k][at] = detail.offsets[r][k];
+                    continue;
+                }
+                records.u[at] = detail.u[r];
+                records.v[at] = detail.v[r];
+                const Vec3d m = scale * (anchor(cell, detail.u[r], detail.v[r], positions, driver) - centre);
+                const Vec3d q = scale * (positions[vertex].cast<double>() - centre) - 0.5 * m;
+                for (int k = 0; k < 3; ++k) records.q[k][at] = static_cast<float>(q[k]);
+            }
+        }
+    }
+}
+
+std::span<const Index> BlendRestorer::slots() const { return content_->records.slot; }
+
+void BlendRestorer::restore(std::span<const Vec3f> driver_positions, std::span<const Mat3f> gradients,
+                            std::span<Vec3f> out_positions, std::span<Vec3f> out_normals, bool in_order,
+                            const RunContext& context) const {
+    const std::vector<Vec3d>& rest = content_->rest;
+    std::vector<blend_kernel::VertexTransform> transforms(rest.size());
+    parallel_for(context, rest.size(), 4096, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            const Vec3d half = 0.5 * rest[i];
+            const Vec3d t = content_->scale * driver_positions[i].cast<double>() - gradients[i].cast<double>() * half;
+            blend_kernel::VertexTransform& transform = transforms[i];
+            for (int k = 0; k < 3; ++k) {
+                transform.t[k] = static_cast<float>(t[k]);
+                transform.half_rest[k] = static_cast<float>(half[k]);
+            }
+            std::copy_n(gradients[i].data(), 9, transform.a);
+        }
+    });
+    blend_kernel::Output output;
+    if (!out_positions.empty()) output.positions = out_positions.data();
+    if (!out_normals.empty()) output.normals = out_normals.data();
+    output.in_order = in_order;
+    output.scale = static_cast<float>(1 / content_->scale);
+    if (output.positions || output.normals) blend_kernel::restore(content_->records, transforms, output, context);
+}
+
+} // namespace filigree

@@ -1,0 +1,73 @@
+// Our detail code: each vertex hangs on one driver cell and follows its gradients.
+//
+// Driver vertex i rests at c_i and goes to c_i' with gradient A_i; a vertex p hangs at m = sum b_i c_i. The Hermite blend
+//     p' = sum b_i [c_i' + 1/2 (A_i + A_p)(p - c_i)],  A_p = sum b_i A_i
+// is linear-blend skinning of a shifted rest point:
+//     q = p - m / 2,  t_i = c_i' - A_i c_i / 2,  p' = sum b_i t_i + (sum b_i A_i) q
+// Affine deformations are exact; for curved ones the error is of second order in |p - m|, the detail's own height.
+#pragma once
+
+#include "filigree/core/run_context.h"
+#include "filigree/hierarchy/bind.h"
+
+#include <array>
+#include <cstdint>
+#include <memory>
+
+namespace filigree {
+
+/// float32: 20 bytes a vertex. int16: 10 bytes, error below 1e-6 of the diagonal, faster where memory is the bound.
+enum class Precision { float32, int16 };
+
+/// Records in the order of their cells, so that restoring gathers nothing. Record r is vertex order[r] of the mesh.
+struct BlendDetail {
+    /// Driver vertices (positions in the driver level's list) of each cell: a triangle, with kNoIndex as the fourth, or
+    /// a quad with bilinear weights (1-u)(1-v), u(1-v), uv, (1-u)v.
+    std::vector<std::array<Index, 4>> cells;
+    std::vector<Index> cell_offsets = {0}; ///< records of cell c: cell_offsets[c] .. cell_offsets[c + 1] - 1
+    std::vector<Index> order;              ///< a permutation of the mesh's vertices
+    std::vector<float> u, v;               ///< weights of each record; multiples of 1/32767 for int16
+    Precision precision = Precision::float32;
+    std::vector<std::array<std::int16_t, 3>> offsets; ///< int16 only: (p - m) / cell_scales[cell]
+    std::vector<float> cell_scales;                   ///< int16 only: model units of one step
+
+    std::vector<Index> across_gap, facing_away; ///< see Binding; ascending vertex ids
+};
+
+/// Sorts bonds into records; for int16 rounds the weights first, then the offsets from them, so that rounding the
+/// weights costs nothing. positions: the mesh's; driver: the driver's vertex ids. Cost O(V).
+BlendDetail encode_blend(std::span<const Vec3f> positions, std::span<const Index> driver,
+                         std::vector<std::array<Index, 4>> cells, const Binding& binding, Precision precision);
+
+/// The positions an int16 detail decodes to at rest: those of the driver are given, the rest is written. Cost O(V).
+void decode_rest(const BlendDetail& detail, std::span<const Index> driver, std::span<Vec3f> positions);
+
+/// Restores chosen vertices, and normals, from positions and gradients, again and again.
+class BlendRestorer {
+public:
+    /// One thing to restore: a vertex's position into `slot`, and with `normals` its rest normal into the same slot.
+    struct Item {
+        Index vertex, slot;
+    };
+    /// positions: the mesh's at rest. items: what to restore. normals: empty or the unit rest normal of each item.
+    BlendRestorer(const BlendDetail& detail, std::span<const Vec3f> positions, std::span<const Index> driver,
+                  std::span<const Item> items, std::span<const Vec3f> normals = {});
+    ~BlendRestorer();
+    BlendRestorer(BlendRestorer&&) noexcept;
+    BlendRestorer& operator=(BlendRestorer&&) noexcept;
+
+    /// The slot of each record, in record order: what a vertex buffer in record order is indexed through.
+    std::span<const Index> slots() const;
+
+    /// driver_positions, gradients: one a driver vertex. out_positions, out_normals: empty (not wanted) or one an item;
+    /// by slot when in_order, else in record order, which is faster. Same bytes for any thread count.
+    void restore(std::span<const Vec3f> driver_positions, std::span<const Mat3f> gradients,
+                 std::span<Vec3f> out_positions, std::span<Vec3f> out_normals, bool in_order,
+                 const RunContext& context) const;
+
+private:
+    struct Content;
+    std::unique_ptr<Content> content_;
+};
+
+} // namespace filigree

@@ -1,0 +1,57 @@
+// The inner loop of the blend code: records of many cells, sixteen (or eight, or four) vertices at a time.
+#pragma once
+
+#include "filigree/core/run_context.h"
+#include "filigree/core/types.h"
+
+namespace filigree::blend_kernel {
+
+/// What a driver vertex gives to every vertex it carries, in one cache line: t, the columns of A, and half its rest
+/// position (which only int16 records need).
+struct alignas(64) VertexTransform {
+    float t[3];
+    float a[9];
+    float half_rest[3];
+    float unused = 0;
+};
+
+/// Records of one cell, end to end.
+struct Run {
+    Index cell = 0, first = 0, count = 0;
+};
+
+/// Arrays are padded so that 16 values can be read from any record; `runs` have at most kMaxRun records each.
+inline constexpr Index kMaxRun = 512;
+inline constexpr std::size_t kPadding = 16;
+
+/// Everything about the records that does not change from pose to pose. Per record either q or offset is filled.
+struct Records {
+    std::vector<Run> runs;
+    std::vector<std::array<Index, 4>> cells; ///< driver vertices; the fourth is kNoIndex in triangles
+    bool has_quads = false;
+    std::vector<float> u, v;                                   ///< float records
+    std::vector<float> q[3];                                   ///< float records: p - m / 2
+    std::vector<std::int16_t> u16, v16;                        ///< int16 records: 32767 is 1
+    std::vector<std::int16_t> offset[3];                       ///< int16 records: (p - m) / scale of the cell
+    std::vector<float> scale;                                  ///< int16 records: one a cell
+    std::vector<float> normal[3];                              ///< empty or unit rest normals
+    std::vector<Index> slot;                                   ///< where record r goes when order is asked for
+
+    bool is_int16() const { return !u16.empty(); }
+    std::size_t count = 0;
+};
+
+/// Where results go. Null pointers: not wanted. in_order: record r is written to slot[r], else to r.
+struct Output {
+    Vec3f* positions = nullptr;
+    Vec3f* normals = nullptr;
+    bool in_order = false;
+    float scale = 1; ///< multiplies positions; a power of two
+};
+
+/// p' = sum b t + (sum b A) q for every record, and n' = unit(cofactor(sum b A) n). Same bytes for any thread count and
+/// any processor. Cost: bounded by memory.
+void restore(const Records& records, std::span<const VertexTransform> transforms, const Output& output,
+             const RunContext& context);
+
+} // namespace filigree::blend_kernel

@@ -1,0 +1,43 @@
+// A stripped mesh: its levels and how the detail between them is stored.
+#pragma once
+
+#include "filigree/hierarchy/blend_code.h"
+#include "filigree/hierarchy/reference_code.h"
+#include "filigree/mesh/mesh.h"
+
+#include <string>
+#include <variant>
+
+namespace filigree {
+
+enum class DetailCode { reference, blend };
+
+/// One resolution of a mesh.
+struct Level {
+    std::vector<Index> vertices;           ///< ids in the finest mesh, ascending
+    std::vector<Index> face_offsets = {0}; ///< as in Mesh
+    std::vector<Index> corners;            ///< positions in `vertices`
+
+    std::size_t face_count() const { return face_offsets.size() - 1; }
+};
+
+/// Everything needed to restore a mesh from a pose of its driver.
+struct Model {
+    Mesh mesh;                 ///< the finest level, as it came in
+    std::vector<Level> levels; ///< coarse to fine, without the finest; levels[0] is the driver
+    std::variant<ReferenceDetail, BlendDetail> detail;
+
+    DetailCode code() const { return static_cast<DetailCode>(detail.index()); }
+    /// The number of the finest level; levels 0 .. finest_level() exist.
+    unsigned finest_level() const { return static_cast<unsigned>(levels.size()); }
+    const Level& driver() const { return levels.front(); }
+};
+
+/// Level k as a mesh of its own, 0 <= k <= finest_level(). Attributes of vertices come along, attributes of corners and
+/// faces only at the finest level (the caller can see which are empty). Cost O(size of the mesh).
+Mesh level_mesh(const Model& model, unsigned level);
+
+/// The driver's rest positions, in the driver's order.
+std::vector<Vec3f> driver_positions(const Model& model);
+
+} // namespace filigree

@@ -1,0 +1,164 @@
+#include "filigree/hierarchy/restore.h"
+
+#include "filigree/mesh/normals.h"
+
+namespace filigree {
+
+struct Restorer::Content {
+    const Model* model = nullptr;
+    RestoreOptions options;
+    unsigned level = 0;
+    Law law = Law::proportional;
+    Mesh rest;                            ///< the level at rest, with split normals
+    std::vector<Index> vertices;          ///< ids in the finest mesh; empty at the finest level
+    std::vector<Index> vertex_of_normal;  ///< of rest.normals.values, in the level's own ids
+
+    // blend code
+    std::optional<GradientFit> gradient_fit;
+    std::optional<BlendRestorer> blend;         ///< positions, and normals where there is one a vertex
+    std::optional<BlendRestorer> blend_normals; ///< normals alone, where corners have their own
+
+    // reference code
+    std::optional<ReferenceRestorer> reference;
+
+    bool has_vertex_normals() const { return !rest.normals.empty() && rest.normals.per_vertex(); }
+    void prepare_blend(const RunContext& context);
+};
+
+namespace {
+
+std::vector<Vec3f> unit(std::vector<Vec3f> normals) {
+    for (Vec3f& n : normals) n = n.cast<double>().normalized().cast<float>();
+    return normals;
+}
+
+} // namespace
+
+void Restorer::Content::prepare_blend(const RunContext& context) {
+    const BlendDetail& detail = std::get<BlendDetail>(model->detail);
+    gradient_fit.emplace(level_mesh(*model, 0), context);
+    const std::span<const Vec3f> positions = model->mesh.positions;
+    const std::span<const Index> driver = model->driver().vertices;
+
+    std::vector<BlendRestorer::Item> items(rest.vertex_count());
+    const auto finest_id = [&](Index v) { return vertices.empty() ? v : vertices[v]; };
+    for (Index v = 0; v < items.size(); ++v) items[v] = {finest_id(v), v};
+    blend.emplace(detail, positions, driver, items,
+                  has_vertex_normals() ? unit(rest.normals.values) : std::vector<Vec3f>{});
+    if (rest.normals.empty() || has_vertex_normals()) return;
+
+    items.clear();
+    std::vector<Vec3f> normals;
+    for (Index i = 0; i < vertex_of_normal.size(); ++i) {
+        if (vertex_of_normal[i] == kNoIndex) continue;
+        items.push_back({finest_id(vertex_of_normal[i]), i});
+        normals.push_back(rest.normals.values[i]);
+    }
+    blend_normals.emplace(detail, positions, driver, items, unit(std::move(normals)));
+}
+
+Restorer::Restorer(std::unique_ptr<Content> content) : content_(std::move(content)) {}
+Restorer::Restorer(Restorer&&) noexcept = default;
+Restorer& Restorer::operator=(Restorer&&) noexcept = default;
+Restorer::~Restorer() = default;
+
+Result<Restorer> Restorer::create(const Model& model, const RestoreOptions& options, const RunContext& context) {
+    if (options.level && *options.level > model.finest_level())
+        return Error{ErrorCode::usage, "The model has levels 0 to " + std::to_string(model.finest_level()) +
+                                           "; there is no level " + std::to_string(*options.level) + "."};
+    auto content = std::make_unique<Content>();
+    content->model = &model;
+    content->options = options;
+    content->level = options.level.value_or(model.finest_level());
+    content->rest = level_mesh(model, content->level);
+    if (content->level < model.finest_level()) content->vertices = model.levels[content->level].vertices;
+    content->vertex_of_normal = split_shared_normals(content->rest);
+    if (model.code() == DetailCode::blend) {
+        content->law = options.law.value_or(Law::proportional);
+        content->prepare_blend(context);
+    } else {
+        content->law = options.law.value_or(Law::inverse);
+        content->reference.emplace(std::get<ReferenceDetail>(model.detail), content->law);
+    }
+    return Restorer(std::move(content));
+}
+
+std::size_t Restorer::vertex_count() const { return content_->rest.vertex_count(); }
+
+std::vector<Vec3f> Restorer::rest_ghosts() const {
+    return content_->gradient_fit ? content_->gradient_fit->rest_ghosts() : std::vector<Vec3f>{};
+}
+
+std::vector<Mat3f> Restorer::gradients(const Pose& pose, const RunContext& context) const {
+    const Content& content = *content_;
+    if (!content.gradient_fit) return {};
+    const GradientFit& fit = *content.gradient_fit;
+    if (pose.gradients.empty() && pose.ghosts.empty())
+        return fit.fit(pose.positions, content.options.thin_shell ? NormalColumn::shell : NormalColumn::fitted,
+                       content.law, context);
+    std::vector<Mat3f> gradients =
+        pose.gradients.empty() ? fit.fit_to_ghosts(pose.positions, pose.ghosts, context) : pose.gradients;
+    if (content.options.thin_shell) fit.make_shell(gradients, content.law);
+    return gradients;
+}
+
+namespace {
+
+std::optional<Error> check_pose(const Model& model, const Pose& pose) {
+    const std::size_t driver = model.driver().vertices.size();
+    const auto wrong = [&](std::size_t count, const char* what) -> std::optional<Error> {
+        return Error{ErrorCode::mismatch, "The pose has " + std::to_string(count) + " " + what +
+                                              " and the model's driver " + std::to_string(driver) +
+                                              " vertices: export the driver again (filigree level MODEL 0) and move that."};
+    };
+    if (pose.positions.size() != driver) return wrong(pose.positions.size(), "vertices");
+    if (!pose.gradients.empty() && pose.gradients.size() != driver) return wrong(pose.gradients.size(), "gradients");
+    if (!pose.ghosts.empty() && pose.ghosts.size() != driver) return wrong(pose.ghosts.size(), "ghost points");
+    return std::nullopt;
+}
+
+} // namespace
+
+Result<std::vector<Vec3f>> Restorer::positions(const Pose& pose, const RunContext& context) const {
+    const Content& content = *content_;
+    if (std::optional<Error> error = check_pose(*content.model, pose)) return *error;
+    if (context.is_cancelled()) return cancelled_error();
+    std::vector<Vec3f> positions(vertex_count());
+    if (content.blend) {
+        content.blend->restore(pose.positions, gradients(pose, context), positions, {}, true, context);
+        return positions;
+    }
+    std::vector<Vec3f> all(content.model->mesh.vertex_count());
+    content.reference->restore(pose.positions, content.level, all, context);
+    if (content.vertices.empty()) return all;
+    for (std::size_t v = 0; v < positions.size(); ++v) positions[v] = all[content.vertices[v]];
+    return positions;
+}
+
+Result<Mesh> Restorer::mesh(const Pose& pose, const RunContext& context) const {
+    const Content& content = *content_;
+    if (std::optional<Error> error = check_pose(*content.model, pose)) return *error;
+    if (context.is_cancelled()) return cancelled_error();
+    Mesh mesh = content.rest;
+    if (content.blend) {
+        const std::vector<Mat3f> a = gradients(pose, context);
+        const bool with_normals = content.has_vertex_normals();
+        content.blend->restore(pose.positions, a, mesh.positions,
+                               with_normals ? std::span(mesh.normals.values) : std::span<Vec3f>{}, true, context);
+        if (content.blend_normals)
+            content.blend_normals->restore(pose.positions, a, {}, mesh.normals.values, true, context);
+        return mesh;
+    }
+    Result<std::vector<Vec3f>> restored = positions(pose, context);
+    if (!restored) return restored.error();
+    mesh.positions = std::move(*restored);
+    if (!mesh.normals.empty()) {
+        const std::vector<Vec3f> normals = vertex_normals(mesh, mesh.positions, context);
+        for (std::size_t i = 0; i < mesh.normals.values.size(); ++i)
+            if (content.vertex_of_normal[i] != kNoIndex)
+                mesh.normals.values[i] = normals[content.vertex_of_normal[i]];
+    }
+    return mesh;
+}
+
+} // namespace filigree

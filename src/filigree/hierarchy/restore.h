@@ -1,0 +1,52 @@
+// From a pose of the driver to the mesh: put the detail back.
+#pragma once
+
+#include "filigree/hierarchy/gradient_fit.h"
+#include "filigree/hierarchy/model.h"
+#include "filigree/hierarchy/pose.h"
+
+#include <optional>
+
+namespace filigree {
+
+struct RestoreOptions {
+    /// Unset: proportional for the blend code (uniform scale is exact), inverse for the reference code (the report).
+    /// With the blend code a law matters where gradients are estimated, and for thin shells.
+    std::optional<Law> law;
+    bool thin_shell = false;       ///< blend code: bumps keep their shape (cloth, skin) instead of stretching with the body
+    std::optional<unsigned> level = {}; ///< restore up to this level; unset: the finest
+};
+
+/// Restores one model at one level, pose after pose. Everything that does not depend on the pose is prepared once.
+class Restorer {
+public:
+    /// The model must outlive the restorer. Errors: usage (no such level).
+    static Result<Restorer> create(const Model& model, const RestoreOptions& options, const RunContext& context);
+    Restorer(Restorer&&) noexcept;
+    Restorer& operator=(Restorer&&) noexcept;
+    ~Restorer();
+
+    /// Vertices of the restored level; the finest mesh's own, in its order, when no level was asked for.
+    std::size_t vertex_count() const;
+
+    /// The gradients that `pose` is restored with: its own, or estimated from its ghosts or positions (blend code).
+    std::vector<Mat3f> gradients(const Pose& pose, const RunContext& context) const;
+
+    /// Positions of the level's vertices. Errors: mismatch (the pose has another number of vertices than the driver),
+    /// cancelled. Same bytes for any thread count.
+    Result<std::vector<Vec3f>> positions(const Pose& pose, const RunContext& context) const;
+
+    /// The level as a mesh: positions, and the normals where the mesh came with normals (by the cofactor of the blended
+    /// gradient; computed anew from the faces for the reference code); every other attribute as it came.
+    Result<Mesh> mesh(const Pose& pose, const RunContext& context) const;
+
+    /// Where the driver's ghost points are at rest (blend code; empty else).
+    std::vector<Vec3f> rest_ghosts() const;
+
+private:
+    struct Content;
+    explicit Restorer(std::unique_ptr<Content> content);
+    std::unique_ptr<Content> content_;
+};
+
+} // namespace filigree

@@ -1,0 +1,31 @@
+// Levels for any mesh: edge collapses in the order of their error, keeping a subset of the vertices.
+#pragma once
+
+#include "filigree/core/run_context.h"
+#include "filigree/mesh/mesh.h"
+
+#include <optional>
+
+namespace filigree {
+
+/// When to stop; the first that is reached. With neither, nothing is removed.
+struct SimplifyOptions {
+    std::optional<std::size_t> target_vertices = {}; ///< at most about this many (within 2 %), whatever the mesh
+    std::optional<double> max_error = {};            ///< fraction of the bounding-box diagonal
+};
+
+/// What is left: triangles over the input's own vertex ids.
+struct Simplified {
+    std::vector<Triangle> triangles;
+    std::size_t vertex_count = 0; ///< distinct vertices in `triangles`
+    double error = 0;             ///< the largest quadric error of a collapse, fraction of the diagonal
+    bool clustered = false;       ///< collapses alone could not reach the target (many parts, non-manifold places), so
+                                  ///< small parts were dropped or vertices clustered
+};
+
+/// Quadric edge collapses [Garland 1997] by meshoptimizer. triangles must be over welded vertices (one id a position),
+/// else seams hold them back. Cost O(F log F), about 2 M triangles a second; deterministic.
+Simplified simplify(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
+                    const SimplifyOptions& options);
+
+} // namespace filigree

@@ -1,0 +1,233 @@
+#include "filigree/hierarchy/strip.h"
+
+#include "filigree/hierarchy/simplify.h"
+#include "filigree/mesh/normals.h"
+#include "filigree/mesh/triangulate.h"
+#include "filigree/mesh/weld.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+namespace filigree {
+
+namespace {
+
+class Stopwatch {
+public:
+    double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+
+private:
+    std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+constexpr double kLevelFactor = 4; // vertices of a level as a multiple of the next coarser one's, as in subdivision
+
+std::size_t default_base(std::size_t vertices) {
+    if (vertices >= 20'000) return 1'000;
+    return std::min(vertices, std::max<std::size_t>(50, vertices / 20));
+}
+
+/// The mesh as the blend code sees it: around the origin and about one unit large, so that no product leaves float's
+/// range; one vertex a position; triangles.
+struct WorkingMesh {
+    std::vector<Vec3f> positions;
+    std::vector<Index> representative;
+    std::vector<Triangle> triangles;
+    std::vector<Vec3f> normals;
+};
+
+WorkingMesh make_working_mesh(const Mesh& mesh, const RunContext& context) {
+    WorkingMesh work;
+    const Box box = bounds(mesh.positions);
+    const double diagonal = box.diagonal();
+    const double scale = diagonal > 0 ? 1 / diagonal : 1;
+    work.positions.resize(mesh.vertex_count());
+    for (std::size_t v = 0; v < mesh.vertex_count(); ++v)
+        work.positions[v] = (scale * (mesh.positions[v].cast<double>() - box.centre())).cast<float>();
+    work.representative = weld_map(mesh.positions);
+    for (Triangle t : triangulate(mesh).triangles) {
+        for (Index& v : t) v = work.representative[v];
+        if (t[0] != t[1] && t[1] != t[2] && t[2] != t[0]) work.triangles.push_back(t);
+    }
+    work.normals = vertex_normals(work.triangles, work.positions, context);
+    return work;
+}
+
+Level make_level(std::vector<Triangle> triangles, std::size_t vertex_count) {
+    Level level;
+    std::vector<Index> local(vertex_count, kNoIndex);
+    for (const Triangle& t : triangles)
+        for (Index v : t) local[v] = 0;
+    for (Index v = 0; v < vertex_count; ++v)
+        if (local[v] == 0) {
+            local[v] = static_cast<Index>(level.vertices.size());
+            level.vertices.push_back(v);
+        }
+    level.corners.reserve(triangles.size() * 3);
+    level.face_offsets.reserve(triangles.size() + 1);
+    for (const Triangle& t : triangles) {
+        for (Index v : t) level.corners.push_back(local[v]);
+        level.face_offsets.push_back(static_cast<Index>(level.corners.size()));
+    }
+    return level;
+}
+
+/// A driver for a mesh without a triangle: every so many-th of its distinct points, and no faces.
+Level make_point_level(const WorkingMesh& work, std::size_t target) {
+    std::vector<Index> distinct;
+    for (Index v = 0; v < work.positions.size(); ++v)
+        if (work.representative[v] == v) distinct.push_back(v);
+    Level level;
+    const std::size_t count = std::min(target, distinct.size());
+    for (std::size_t i = 0; i < count; ++i) level.vertices.push_back(distinct[i * distinct.size() / count]);
+    return level;
+}
+
+/// How many vertices each level should have, coarse to fine, without the finest.
+std::vector<std::size_t> level_targets(std::size_t vertices, const StripOptions& options) {
+    std::vector<std::size_t> targets;
+    if (options.levels) {
+        double count = double(vertices);
+        for (unsigned k = 0; k < *options.levels; ++k) {
+            count /= kLevelFactor;
+            targets.insert(targets.begin(), std::max<std::size_t>(3, static_cast<std::size_t>(count)));
+        }
+        return targets;
+    }
+    const double base = double(options.error ? 3 : options.base.value_or(default_base(vertices)));
+    for (double count = base; targets.empty() || count * 2 < double(vertices); count *= kLevelFactor)
+        targets.push_back(static_cast<std::size_t>(count));
+    return targets;
+}
+
+/// The levels of a blend model, coarse to fine, each simplified from the next finer one.
+std::vector<Level> simplify_levels(const WorkingMesh& work, const StripOptions& options, StripReport& report,
+                                   const RunContext& context) {
+    const std::vector<std::size_t> targets = level_targets(work.positions.size(), options);
+    std::vector<Level> levels;
+    if (work.triangles.empty()) {
+        levels.push_back(make_point_level(work, targets.front()));
+        return levels;
+    }
+    std::vector<Triangle> current = work.triangles;
+    for (std::size_t k = targets.size(); k-- > 0 && !context.is_cancelled();) {
+        context.report("simplify", 1 - double(k + 1) / double(targets.size()));
+        SimplifyOptions simplify_options{.target_vertices = targets[k]};
+        if (options.error) {
+            simplify_options.max_error = *options.error - report.simplify_error;
+            if (*simplify_options.max_error <= 0 && !levels.empty()) break;
+        }
+        Simplified simplified = simplify(work.positions, current, simplify_options);
+        const bool stuck = simplified.triangles.size() == current.size();
+        report.simplify_error += simplified.error;
+        report.clustered |= simplified.clustered;
+        current = std::move(simplified.triangles);
+        if (stuck && !levels.empty()) continue; // a level that removes nothing is none
+        levels.insert(levels.begin(), make_level(current, work.positions.size()));
+    }
+    return levels;
+}
+
+/// The driver's cells over its own vertices, and as triangles over the mesh's.
+struct Cells {
+    std::vector<std::array<Index, 4>> local;
+    std::vector<Triangle> global;
+};
+
+Cells make_cells(const Level& driver) {
+    Cells cells;
+    for (std::size_t f = 0; f < driver.face_count(); ++f) {
+        const Index* c = &driver.corners[driver.face_offsets[f]];
+        cells.local.push_back({c[0], c[1], c[2], kNoIndex});
+    }
+    if (cells.local.empty()) // points: each is a cell of its own
+        for (Index i = 0; i < driver.vertices.size(); ++i) cells.local.push_back({i, i, i, kNoIndex});
+    for (const auto& cell : cells.local)
+        cells.global.push_back({driver.vertices[cell[0]], driver.vertices[cell[1]], driver.vertices[cell[2]]});
+    return cells;
+}
+
+Result<Stripped> strip_blend(Mesh mesh, const StripOptions& options, const RunContext& context) {
+    Stripped result;
+    const Stopwatch simplify_time;
+    const WorkingMesh work = make_working_mesh(mesh, context);
+    for (Index v = 0; v < mesh.vertex_count(); ++v) result.report.welded_vertices += work.representative[v] != v;
+    if (context.is_cancelled()) return cancelled_error();
+    std::vector<Level> levels = simplify_levels(work, options, result.report, context);
+    if (context.is_cancelled()) return cancelled_error();
+    result.report.simplify_seconds = simplify_time.seconds();
+
+    const Stopwatch bind_time;
+    Cells cells = make_cells(levels.front());
+    Result<Binding> binding =
+        bind_to_driver(work.positions, work.representative, work.triangles, work.normals, cells.global, context);
+    if (!binding) return binding.error();
+    result.report.across_gap = binding->across_gap.size();
+    result.report.facing_away = binding->facing_away.size();
+    result.report.bind_seconds = bind_time.seconds();
+
+    const Stopwatch encode_time;
+    result.model.detail = encode_blend(mesh.positions, levels.front().vertices, std::move(cells.local), *binding,
+                                       options.precision);
+    result.model.levels = std::move(levels);
+    result.model.mesh = std::move(mesh);
+    split_shared_normals(result.model.mesh);
+    result.report.encode_seconds = encode_time.seconds();
+    return result;
+}
+
+Result<Stripped> strip_reference(Mesh mesh, const StripOptions& options, const RunContext& context) {
+    Stripped result;
+    const Stopwatch time;
+    ReferenceOptions reference_options{.references = options.references};
+    if (options.levels) reference_options.max_levels = *options.levels;
+    if (options.base) { // the number of levels whose driver comes closest to the vertices asked for
+        const double ratio = double(mesh.vertex_count()) / double(std::max<std::size_t>(*options.base, 1));
+        reference_options.max_levels = static_cast<unsigned>(std::lround(std::max(0.0, std::log2(ratio) / 2)));
+        reference_options.max_levels = std::max(1u, reference_options.max_levels);
+    }
+    Result<ReferenceDetail> detail = encode_reference(mesh, reference_options, context);
+    if (!detail) return detail.error();
+    const ReferenceRestorer restorer(*detail, Law::keep);
+    std::vector<Index> local(mesh.vertex_count(), kNoIndex);
+    for (unsigned k = 0; k < detail->patches.levels; ++k) {
+        Level level;
+        level.vertices = restorer.level_vertices(k);
+        for (Index i = 0; i < level.vertices.size(); ++i) local[level.vertices[i]] = i;
+        for (const auto& quad : restorer.level_quads(k)) {
+            for (Index v : quad) level.corners.push_back(local[v]);
+            level.face_offsets.push_back(static_cast<Index>(level.corners.size()));
+        }
+        result.model.levels.push_back(std::move(level));
+    }
+    result.model.detail = std::move(*detail);
+    result.model.mesh = std::move(mesh);
+    split_shared_normals(result.model.mesh);
+    result.report.encode_seconds = time.seconds();
+    return result;
+}
+
+std::optional<Error> check_options(const Mesh& mesh, const StripOptions& options) {
+    if (int(options.base.has_value()) + int(options.levels.has_value()) + int(options.error.has_value()) > 1)
+        return Error{ErrorCode::usage, "Give at most one of base, levels and error: each says how coarse the driver is."};
+    if (options.base && *options.base < 3) return Error{ErrorCode::usage, "base must be 3 or more vertices."};
+    if (options.levels && (*options.levels < 1 || *options.levels > 16))
+        return Error{ErrorCode::usage, "levels must be 1 to 16."};
+    if (options.error && !(*options.error > 0 && *options.error <= 1))
+        return Error{ErrorCode::usage, "error must be above 0 and at most 1: it is a fraction of the diagonal."};
+    if (options.code == DetailCode::reference && options.error)
+        return Error{ErrorCode::usage, "The reference code removes whole levels: give base or levels, not error."};
+    if (mesh.vertex_count() == 0) return Error{ErrorCode::unsuitable, "The mesh has no vertices: nothing to strip."};
+    return std::nullopt;
+}
+
+} // namespace
+
+Result<Stripped> strip(Mesh mesh, const StripOptions& options, const RunContext& context) {
+    if (std::optional<Error> error = check_options(mesh, options)) return *error;
+    return options.code == DetailCode::blend ? strip_blend(std::move(mesh), options, context)
+                                             : strip_reference(std::move(mesh), options, context);
+}
+
+} // namespace filigree
