@@ -1,0 +1,63 @@
+"""Prints the peers' figures, and ours beside them as ratios: above 1 is in our favour.
+
+    compare.py PEERS [OURS]
+
+PEERS: lines "name value unit". OURS: what `filigree bench --json` prints, {"results": [{"name", "value", "unit"}, ...]}.
+Rates (…/s) are better high, all else (s, bytes) better low; a pair is shown when both sides were measured.
+"""
+import json
+import sys
+
+# what, ours, theirs
+PAIRS = [
+    ("restore, float / stencils", "restore.float", "opensubdiv.stencils"),
+    ("restore, float / level by level", "restore.float", "opensubdiv.levels"),
+    ("restore, float / Surface Deform, a frame", "restore.float", "blender.surface_deform_frame"),
+    ("restore, float / Surface Deform, its own part", "restore.float", "blender.surface_deform"),
+    ("restore, float / decode float (a ceiling)", "restore.float", "meshoptimizer.decode_float"),
+    ("restore, int16 / decode int16 (a ceiling)", "restore.int16", "meshoptimizer.decode_int16"),
+    ("restore, regular, reference code / stencils", "restore.reference", "opensubdiv.stencils"),
+    ("restore, regular, reference code / level by level", "restore.reference", "opensubdiv.levels"),
+    ("simplify / simplify", "strip.simplify", "meshoptimizer.simplify"),
+    ("simplify / Lindstrom-Turk", "strip.simplify", "cgal.simplify_lindstrom_turk"),
+    ("simplify / Garland-Heckbert", "strip.simplify", "cgal.simplify_garland_heckbert"),
+    ("strip / decimate + bind", "strip.total", "blender.decimate_and_bind"),
+    ("handles, set-up", "handles.setup", "cgal.arap_setup"),
+    ("handles, an iteration", "handles.iteration", "cgal.arap_iteration"),
+]
+
+
+def read_peers(path):
+    figures = {}
+    with open(path, encoding="utf-8") as lines:
+        for name, value, unit in (line.split() for line in lines):
+            figures[name] = (float(value), unit)
+    if {"blender.decimate", "blender.bind"} <= figures.keys():
+        figures["blender.decimate_and_bind"] = (figures["blender.decimate"][0] + figures["blender.bind"][0], "s")
+    return figures
+
+
+def read_ours(path):
+    with open(path, encoding="utf-8") as file:
+        return {figure["name"]: (figure["value"], figure["unit"]) for figure in json.load(file)["results"]}
+
+
+def main():
+    peers = read_peers(sys.argv[1])
+    ours = read_ours(sys.argv[2]) if len(sys.argv) > 2 else {}
+
+    print(f"{'peer':<34} {'figure':>12}")
+    for name, (value, unit) in peers.items():
+        print(f"{name:<34} {value:>12.4g} {unit}")
+    shown = [(what, ours[mine], peers[theirs]) for what, mine, theirs in PAIRS if mine in ours and theirs in peers]
+    if not shown:
+        return
+    print(f"\n{'ours / theirs':<52} {'ours':>10} {'theirs':>10} {'ratio':>8}")
+    for what, (mine, unit), (theirs, their_unit) in shown:
+        if unit != their_unit:
+            sys.exit(f"{what}: ours is in {unit}, theirs in {their_unit}")
+        ratio = mine / theirs if unit.endswith("/s") else theirs / mine
+        print(f"{what:<52} {mine:>10.4g} {theirs:>10.4g} {ratio:>8.3g}  {unit}")
+
+
+main()
