@@ -8,6 +8,7 @@
 
 #include "filigree/core/parallel_for.h"
 
+#include <Eigen/Geometry>
 #include <Eigen/QR>
 #include <array>
 #include <cassert>
@@ -148,9 +149,12 @@ void RbfWarp::solve(std::span<const Vec3d> centres, std::span<const Vec3d> displ
 
     const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> split(affine);
     const Eigen::MatrixXd q = split.householderQ();
-    const auto z = q.rightCols(n - split.rank());
-    const Eigen::MatrixXd inner = z.transpose() * kernel * z;
-    const Eigen::MatrixX3d weights = z * inner.completeOrthogonalDecomposition().solve(z.transpose() * d);
+    Eigen::MatrixX3d weights = Eigen::MatrixX3d::Zero(n, 3);
+    if (split.rank() < n) { // else so few centres that an affine map does it
+        const auto z = q.rightCols(n - split.rank());
+        const Eigen::MatrixXd inner = z.transpose() * kernel * z;
+        weights = z * inner.completeOrthogonalDecomposition().solve(z.transpose() * d);
+    }
     const Eigen::MatrixX3d coefficients = split.solve(d - kernel * weights);
     linear_ = coefficients.topRows(3).transpose();
     constant_ = coefficients.row(3).transpose();
