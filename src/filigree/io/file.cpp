@@ -40,20 +40,33 @@ private:
 /// What the system says about `error_number`, the same in every locale.
 std::string cause(int error_number) {
     switch (error_number) {
-    case ENOENT: return "there is no such file or folder";
-    case ENOTDIR: return "a part of its path is not a folder";
-    case EISDIR: return "it is a folder";
+    case ENOENT:
+        return "there is no such file or folder";
+    case ENOTDIR:
+        return "a part of its path is not a folder";
+    case EISDIR:
+        return "it is a folder";
     case EACCES:
-    case EPERM: return "permission is denied";
-    case EROFS: return "the file system is read-only";
-    case ENOSPC: return "the disk is full; make room or write elsewhere";
-    case EDQUOT: return "the disk quota is used up; make room or write elsewhere";
-    case EFBIG: return "the file is larger than allowed here";
-    case ENAMETOOLONG: return "the name is too long";
-    case ELOOP: return "its symbolic links go round in a circle";
-    case EPIPE: return "the reader has gone away";
-    case EIO: return "the device failed";
-    default: return "the system says error " + std::to_string(error_number);
+    case EPERM:
+        return "permission is denied";
+    case EROFS:
+        return "the file system is read-only";
+    case ENOSPC:
+        return "the disk is full; make room or write elsewhere";
+    case EDQUOT:
+        return "the disk quota is used up; make room or write elsewhere";
+    case EFBIG:
+        return "the file is larger than allowed here";
+    case ENAMETOOLONG:
+        return "the name is too long";
+    case ELOOP:
+        return "its symbolic links go round in a circle";
+    case EPIPE:
+        return "the reader has gone away";
+    case EIO:
+        return "the device failed";
+    default:
+        return "the system says error " + std::to_string(error_number);
     }
 }
 
@@ -69,7 +82,8 @@ Result<std::string> read_descriptor(int descriptor, const fs::path& path) {
     struct stat status {};
     if (::fstat(descriptor, &status) != 0) return cannot_read(path, errno);
     if (S_ISDIR(status.st_mode)) return cannot_read(path, EISDIR);
-    // The size is a hint: pipes have none, and files grow and shrink. One byte more finds the end without another round.
+    // The size is a hint: pipes have none, and files grow and shrink. One byte more finds the end without another
+    // round.
     std::string bytes(S_ISREG(status.st_mode) ? static_cast<std::size_t>(status.st_size) + 1 : kPipePiece, '\0');
     for (std::size_t used = 0;;) {
         if (used == bytes.size()) bytes.resize(2 * bytes.size());
@@ -112,8 +126,7 @@ fs::path follow_links(fs::path path) {
 /// Beside the target, so that the rename stays in one file system; of another process and call than any other.
 fs::path temporary_name(const fs::path& target) {
     static std::atomic<unsigned> next{0};
-    return target.parent_path() /
-           (".filigree-" + std::to_string(::getpid()) + "-" + std::to_string(next++) + ".tmp");
+    return target.parent_path() / (".filigree-" + std::to_string(::getpid()) + "-" + std::to_string(next++) + ".tmp");
 }
 
 int open_temporary(const fs::path& target, fs::path& temporary) {

@@ -6,7 +6,9 @@
 #include "filigree/mesh/mesh.h"
 
 #include <filesystem>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace filigree {
@@ -33,16 +35,17 @@ Result<MeshFile> read_mesh(const std::filesystem::path& path, const RunContext& 
 Result<MeshFile> read_mesh(std::string_view bytes, const std::string& name, const RunContext& context);
 
 struct WriteMeshOptions {
-    bool ascii = false; ///< PLY and STL: text instead of binary
-    bool big_endian = false; ///< PLY: binary, most significant byte first
+    std::optional<MeshFormat> format; ///< unset: from the file name's ending
+    bool ascii = false;               ///< PLY and STL: text instead of binary
+    bool big_endian = false;          ///< PLY: binary, most significant byte first
 };
 
 /// Writes a mesh through a temporary file beside `path` and a rename, so that `path` is either whole or untouched;
-/// "-" writes standard output and needs `format`. Returns the warnings: one sentence that lists what the format cannot
-/// hold. Errors: unsupported, unwritable, cancelled.
+/// "-" writes standard output and needs `options.format`. Returns the warnings: one sentence that lists what the format
+/// cannot hold. Errors: unsupported, unwritable, out_of_memory, cancelled.
 Result<std::vector<std::string>> write_mesh(const Mesh& mesh, const std::filesystem::path& path,
                                             const RunContext& context, const WriteMeshOptions& options = {});
-/// The bytes of a file of that format. Same warnings.
+/// The bytes of a file of that format (options.format does not count here). Same warnings.
 Result<std::vector<std::string>> write_mesh(const Mesh& mesh, MeshFormat format, std::string& bytes,
                                             const WriteMeshOptions& options = {});
 

@@ -1,0 +1,240 @@
+#include "filigree/io/mesh_file.h"
+#include "filigree/io/file.h"
+#include "filigree/io/mesh_formats.h"
+
+#include <algorithm>
+#include <array>
+#include <new>
+#include <stdexcept>
+
+namespace filigree {
+
+namespace {
+
+constexpr std::string_view kKnownFormats = "use .obj, .ply, .stl or .off";
+
+std::string lower_case(std::string text) {
+    for (char& c : text)
+        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+    return text;
+}
+
+/// Content that is recognised, and what to say about it.
+struct Foreign {
+    std::string_view start;
+    ErrorCode code;
+    std::string_view what;
+};
+
+constexpr std::array kForeign = {
+    Foreign{"\x1f\x8b", ErrorCode::unsupported, "is compressed with gzip; unpack it first"},
+    Foreign{"PK\x03\x04", ErrorCode::unsupported, "is a zip archive; unpack it first"},
+    Foreign{"BZh", ErrorCode::unsupported, "is compressed with bzip2; unpack it first"},
+    Foreign{"\xfd"
+            "7zXZ",
+            ErrorCode::unsupported, "is compressed with xz; unpack it first"},
+    Foreign{"\x28\xb5\x2f\xfd", ErrorCode::unsupported, "is compressed with zstd; unpack it first"},
+    Foreign{"\x89PNG", ErrorCode::bad_file, "is a PNG picture, not a mesh"},
+    Foreign{"\xff\xd8\xff", ErrorCode::bad_file, "is a JPEG picture, not a mesh"},
+    Foreign{"glTF", ErrorCode::unsupported, "is glTF, which is not read; export it as OBJ or PLY"},
+    Foreign{"Kaydara FBX", ErrorCode::unsupported, "is FBX, which is not read; export it as OBJ or PLY"},
+    Foreign{"<", ErrorCode::unsupported, "holds XML or a web page, which is not read; export it as OBJ or PLY"},
+    Foreign{"{", ErrorCode::unsupported, "holds JSON (perhaps glTF), which is not read; export it as OBJ or PLY"},
+    Foreign{"version https://git-lfs", ErrorCode::bad_file,
+            "is only a Git LFS pointer; fetch the real file with 'git lfs pull'"},
+    Foreign{"\xff\xfe", ErrorCode::bad_file, "is text in UTF-16; save it as UTF-8"},
+    Foreign{"\xfe\xff", ErrorCode::bad_file, "is text in UTF-16; save it as UTF-8"},
+};
+
+const Foreign* find_foreign(std::string_view bytes) {
+    static constexpr Foreign kWideText{"", ErrorCode::bad_file, "is text in UTF-16; save it as UTF-8"};
+    const auto* found =
+        std::find_if(kForeign.begin(), kForeign.end(), [&](const Foreign& f) { return bytes.starts_with(f.start); });
+    if (found != kForeign.end()) return found;
+    const auto is_text = [](char c) { return (c >= ' ' && c <= '~') || c == '\n' || c == '\r' || c == '\t'; };
+    const bool wide = bytes.size() >= 4 && ((is_text(bytes[0]) && !bytes[1] && is_text(bytes[2]) && !bytes[3]) ||
+                                            (!bytes[0] && is_text(bytes[1]) && !bytes[2] && is_text(bytes[3])));
+    return wide ? &kWideText : nullptr;
+}
+
+/// The format the content tells of.
+std::optional<MeshFormat> sniff_format(std::string_view bytes) {
+    if (bytes.starts_with("ply\n") || bytes.starts_with("ply\r") || bytes.starts_with("ply ")) return MeshFormat::ply;
+    if (is_ascii_stl(bytes) || is_binary_stl(bytes)) return MeshFormat::stl;
+    if (is_off(bytes)) return MeshFormat::off;
+    return {};
+}
+
+Result<MeshFormat> decide_format(std::string_view bytes, const std::string& name) {
+    if (const auto format = sniff_format(bytes)) return *format;
+    const Result<MeshFormat> by_name = mesh_format(name);
+    if (by_name.ok()) return by_name;
+    if (is_obj(bytes)) return MeshFormat::obj;
+    return Error{ErrorCode::unsupported, name + ": neither its content nor its ending is of a mesh format we read; " +
+                                             std::string(kKnownFormats) + "."};
+}
+
+Result<MeshFile> parse(const MeshSource& source, MeshFormat format) {
+    switch (format) {
+    case MeshFormat::obj:
+        return read_obj(source);
+    case MeshFormat::ply:
+        return read_ply(source);
+    case MeshFormat::stl:
+        return read_stl(source);
+    case MeshFormat::off:
+        return read_off(source);
+    }
+    return source.unsupported("this format is not read.");
+}
+
+/// Sets what is not a finite number to zero and counts it.
+template <class Vector>
+std::size_t mend(std::vector<Vector>& values) {
+    std::size_t mended = 0;
+    for (Vector& value : values) {
+        if (value.allFinite()) continue;
+        value.setZero();
+        ++mended;
+    }
+    return mended;
+}
+
+std::size_t mend(std::vector<float>& values) {
+    const auto is_bad = [](float x) { return !fits_float(static_cast<double>(x)); };
+    const auto mended = std::count_if(values.begin(), values.end(), is_bad);
+    if (mended > 0) std::replace_if(values.begin(), values.end(), is_bad, 0.0f);
+    return static_cast<std::size_t>(mended);
+}
+
+void mend_attributes(MeshFile& file) {
+    const auto warn = [&](std::size_t mended, const std::string& what) {
+        if (mended > 0)
+            file.warnings.push_back(std::to_string(mended) + " " + what + " were not finite and became zero.");
+    };
+    warn(mend(file.mesh.uvs.values), "UVs");
+    warn(mend(file.mesh.normals.values), "normals");
+    warn(mend(file.mesh.colors), "colours");
+    for (VertexScalar& scalar : file.mesh.scalars)
+        warn(mend(scalar.values), "values of the scalar '" + scalar.name + "'");
+}
+
+/// Colours from 0 to 255 as numbers, which some programs write, become 0 to 1.
+void scale_colors(MeshFile& file) {
+    std::vector<Vec4f>& colors = file.mesh.colors;
+    const bool bytes =
+        std::any_of(colors.begin(), colors.end(), [](const Vec4f& c) { return c.head<3>().maxCoeff() > 1; });
+    if (!bytes) return;
+    for (Vec4f& c : colors) c.head(file.mesh.colors_have_alpha ? 4 : 3) /= 255.0f;
+    file.warnings.emplace_back("Colours go beyond 1 and were taken as 0 to 255.");
+}
+
+Result<MeshFile> read_checked(std::string_view bytes, const std::string& name, const RunContext& context) {
+    const MeshSource source{bytes, name, context};
+    if (context.is_cancelled()) return cancelled_error();
+    if (bytes.empty()) return source.error("is empty.");
+    if (const Foreign* foreign = find_foreign(bytes))
+        return Error{foreign->code, name + ": " + std::string(foreign->what) + "."};
+    const std::string_view byte_order_mark = "\xef\xbb\xbf";
+    const std::string_view text = bytes.starts_with(byte_order_mark) ? bytes.substr(byte_order_mark.size()) : bytes;
+    const Result<MeshFormat> format = decide_format(text, name);
+    if (!format.ok()) return format.error();
+    Result<MeshFile> file = parse({text, name, context}, *format);
+    if (!file.ok()) return file;
+    if (file->mesh.positions.empty()) return source.error("has no vertices.");
+    if (file->mesh.face_count() == 0)
+        file->warnings.push_back("There are no faces: read as " + std::to_string(file->mesh.vertex_count()) +
+                                 " points.");
+    mend_attributes(*file);
+    scale_colors(*file);
+    assert(check_mesh(file->mesh).empty());
+    context.report("Reading", 1);
+    return file;
+}
+
+std::string join(const std::vector<std::string>& words) {
+    std::string joined;
+    for (std::size_t i = 0; i < words.size(); ++i)
+        joined += (i == 0 ? "" : i + 1 < words.size() ? ", " : " and ") + words[i];
+    return joined;
+}
+
+Error out_of_memory(const std::string& name) {
+    return {ErrorCode::out_of_memory, name + ": does not fit into memory."};
+}
+
+} // namespace
+
+Result<MeshFormat> mesh_format(const std::filesystem::path& path) {
+    const std::string ending = lower_case(path.extension().string());
+    if (ending == ".obj") return MeshFormat::obj;
+    if (ending == ".ply") return MeshFormat::ply;
+    if (ending == ".stl") return MeshFormat::stl;
+    if (ending == ".off") return MeshFormat::off;
+    return Error{ErrorCode::unsupported, path.string() + ": " + (ending.empty() ? "a name without an ending" : ending) +
+                                             " is not of a mesh format we know; " + std::string(kKnownFormats) + "."};
+}
+
+Result<MeshFile> read_mesh(std::string_view bytes, const std::string& name, const RunContext& context) {
+    try {
+        return read_checked(bytes, name, context);
+    } catch (const std::bad_alloc&) {
+        return out_of_memory(name);
+    } catch (const std::length_error&) {
+        return out_of_memory(name);
+    }
+}
+
+Result<MeshFile> read_mesh(const std::filesystem::path& path, const RunContext& context) {
+    const Result<std::string> bytes = read_file(path);
+    if (!bytes.ok()) return bytes.error();
+    return read_mesh(*bytes, path == "-" ? "standard input" : path.string(), context);
+}
+
+Result<std::vector<std::string>> write_mesh(const Mesh& mesh, MeshFormat format, std::string& bytes,
+                                            const WriteMeshOptions& options) {
+    assert(check_mesh(mesh).empty());
+    bytes.clear();
+    std::vector<std::string> lost;
+    const char* name = "";
+    try {
+        switch (format) {
+        case MeshFormat::obj:
+            name = "OBJ", lost = write_obj(mesh, bytes);
+            break;
+        case MeshFormat::ply:
+            name = "PLY", lost = write_ply(mesh, options, bytes);
+            break;
+        case MeshFormat::stl:
+            name = "STL", lost = write_stl(mesh, options, bytes);
+            break;
+        case MeshFormat::off:
+            name = "OFF", lost = write_off(mesh, bytes);
+            break;
+        }
+    } catch (const std::bad_alloc&) {
+        return out_of_memory(name);
+    } catch (const std::length_error&) {
+        return out_of_memory(name);
+    }
+    std::vector<std::string> warnings;
+    if (!lost.empty()) warnings.push_back(std::string(name) + " cannot hold " + join(lost) + "; left out.");
+    return warnings;
+}
+
+Result<std::vector<std::string>> write_mesh(const Mesh& mesh, const std::filesystem::path& path,
+                                            const RunContext& context, const WriteMeshOptions& options) {
+    const Result<MeshFormat> format = options.format ? Result<MeshFormat>(*options.format) : mesh_format(path);
+    if (!format.ok()) return format.error();
+    if (context.is_cancelled()) return cancelled_error();
+    std::string bytes;
+    Result<std::vector<std::string>> warnings = write_mesh(mesh, *format, bytes, options);
+    if (!warnings.ok()) return warnings;
+    if (context.is_cancelled()) return cancelled_error();
+    const std::string_view pieces[] = {bytes};
+    const Status written = write_file(path, pieces);
+    if (!written.ok()) return written.error();
+    return warnings;
+}
+
+} // namespace filigree

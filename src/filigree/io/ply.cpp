@@ -1,0 +1,908 @@
+// PLY, the Stanford polygon file format: text, and binary of both byte orders.
+#include "filigree/io/mesh_formats.h"
+#include "filigree/io/text_scanner.h"
+#include "filigree/io/text_writer.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstring>
+
+namespace filigree {
+
+namespace {
+
+constexpr std::size_t kRowsBetweenReports = 1 << 16;
+static_assert(std::endian::native == std::endian::little, "little-endian files are copied as they are");
+
+// ------------------------------------------------------------------------------------------------ header
+
+enum class Type { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
+
+std::size_t size_of(Type type) {
+    static constexpr std::size_t kBytes[] = {1, 1, 2, 2, 4, 4, 4, 8};
+    return kBytes[static_cast<std::size_t>(type)];
+}
+
+struct Property {
+    std::string name;
+    Type type = Type::float32;
+    std::optional<Type> list_count; ///< a list, with its length as this type
+};
+
+struct Element {
+    std::string name;
+    std::size_t count = 0;
+    std::vector<Property> properties;
+
+    bool has_lists() const {
+        return std::any_of(properties.begin(), properties.end(), [](const Property& p) { return p.list_count; });
+    }
+    /// Bytes of a binary row without lists.
+    std::size_t row_bytes() const {
+        std::size_t bytes = 0;
+        for (const Property& p : properties) bytes += size_of(p.type);
+        return bytes;
+    }
+    std::size_t find(std::string_view property) const {
+        const auto same = [&](const Property& p) { return p.name == property; };
+        return static_cast<std::size_t>(std::find_if(properties.begin(), properties.end(), same) - properties.begin());
+    }
+    bool has(std::string_view property) const { return find(property) < properties.size(); }
+};
+
+enum class Encoding { ascii, little_endian, big_endian };
+
+struct Header {
+    Encoding encoding = Encoding::ascii;
+    std::vector<Element> elements;
+
+    const Element* find(std::string_view name) const {
+        for (const Element& e : elements)
+            if (e.name == name) return &e;
+        return nullptr;
+    }
+};
+
+class HeaderReader {
+public:
+    explicit HeaderReader(const MeshSource& source) : source_(source), text_(source.bytes) {}
+
+    Result<Header> read() {
+        if (text_.word() != "ply") return source_.error_at_line(1, "does not start with 'ply', as PLY files do.");
+        skip_first_line();
+        for (;;) {
+            text_.skip_blanks();
+            if (text_.at_end())
+                return source_.error_at_line(text_.line(), "the header has no 'end_header'; the file is cut off.");
+            const std::string_view keyword = text_.word();
+            if (keyword == "end_header") break;
+            if (!read_line(keyword)) return *error_;
+            text_.next_line();
+        }
+        skip_last_line();
+        if (!has_format_) return source_.error("the header has no 'format' line.");
+        return std::move(header_);
+    }
+
+    /// Of what follows the header; after read().
+    TextScanner body() const { return text_; }
+
+private:
+    bool fail(const std::string& cause) {
+        error_ = source_.error_at_line(text_.line(), cause);
+        return false;
+    }
+
+    std::string_view next_word() {
+        text_.skip_blanks();
+        return text_.word();
+    }
+
+    void skip_first_line() {
+        while (!text_.at_end() && !TextScanner::is_line_end(text_.peek())) text_.advance();
+        TextScanner after = text_;
+        if (after.peek() == '\r') after.advance();
+        lines_end_in_cr_ = text_.peek() == '\r' && after.peek() != '\n';
+        text_.next_line();
+    }
+
+    /// A binary body may begin with the byte of a line feed: only what ends the other lines is taken.
+    void skip_last_line() {
+        while (!text_.at_end() && !TextScanner::is_line_end(text_.peek())) text_.advance();
+        if (!lines_end_in_cr_ || header_.encoding == Encoding::ascii)
+            text_.next_line();
+        else if (!text_.at_end())
+            text_.advance();
+    }
+
+    bool read_line(std::string_view keyword) {
+        if (keyword == "format") return read_format();
+        if (keyword == "element") return read_element();
+        if (keyword == "property") return read_property();
+        if (keyword.empty() || keyword == "comment" || keyword == "obj_info") return true;
+        return fail("found " + in_quotes(keyword) + " where the header wants 'element', 'property' or 'end_header'.");
+    }
+
+    bool read_format() {
+        const std::string_view format = next_word();
+        has_format_ = true;
+        if (format == "ascii")
+            header_.encoding = Encoding::ascii;
+        else if (format == "binary_little_endian")
+            header_.encoding = Encoding::little_endian;
+        else if (format == "binary_big_endian")
+            header_.encoding = Encoding::big_endian;
+        else
+            return fail("the format " + in_quotes(format) +
+                        " is not one of ascii, binary_little_endian and binary_big_endian.");
+        return true;
+    }
+
+    bool read_element() {
+        Element element{std::string(next_word()), 0, {}};
+        if (header_.find(element.name)) return fail("the element " + in_quotes(element.name) + " is declared twice.");
+        text_.skip_blanks();
+        std::int64_t count = 0;
+        if (!text_.integer(count) || !text_.at_word_end() || count < 0)
+            return fail("the element " + in_quotes(element.name) + " needs a count of zero or more.");
+        element.count = static_cast<std::size_t>(count);
+        header_.elements.push_back(std::move(element));
+        return true;
+    }
+
+    bool read_property() {
+        if (header_.elements.empty()) return fail("a property stands before the first element.");
+        Element& element = header_.elements.back();
+        Property property;
+        std::string_view type = next_word();
+        if (type == "list") {
+            property.list_count.emplace();
+            if (!read_type(next_word(), *property.list_count)) return false;
+            type = next_word();
+        }
+        if (!read_type(type, property.type)) return false;
+        property.name = next_word();
+        if (property.name.empty()) return fail("a property has no name.");
+        if (element.has(property.name)) return fail("the property " + in_quotes(property.name) + " is declared twice.");
+        element.properties.push_back(std::move(property));
+        return true;
+    }
+
+    bool read_type(std::string_view word, Type& type) {
+        static constexpr std::array<std::array<std::string_view, 2>, 8> kNames = {{{"char", "int8"},
+                                                                                   {"uchar", "uint8"},
+                                                                                   {"short", "int16"},
+                                                                                   {"ushort", "uint16"},
+                                                                                   {"int", "int32"},
+                                                                                   {"uint", "uint32"},
+                                                                                   {"float", "float32"},
+                                                                                   {"double", "float64"}}};
+        for (std::size_t i = 0; i < kNames.size(); ++i) {
+            if (word != kNames[i][0] && word != kNames[i][1]) continue;
+            type = static_cast<Type>(i);
+            return true;
+        }
+        return fail("the type " + in_quotes(word) + " is not one of PLY's, such as float, int or uchar.");
+    }
+
+    const MeshSource& source_;
+    TextScanner text_;
+    std::optional<Error> error_;
+    Header header_;
+    bool has_format_ = false, lines_end_in_cr_ = false;
+};
+
+// ------------------------------------------------------------------------------------------------ body
+
+template <class T>
+T load(const char* p, bool swap) {
+    std::array<char, sizeof(T)> bytes;
+    std::memcpy(bytes.data(), p, sizeof(T));
+    if (swap) std::reverse(bytes.begin(), bytes.end());
+    return std::bit_cast<T>(bytes);
+}
+
+/// Calls f(T{}) with the C++ type of `type`.
+template <class F>
+auto with_type(Type type, const F& f) {
+    switch (type) {
+    case Type::int8:
+        return f(std::int8_t{});
+    case Type::uint8:
+        return f(std::uint8_t{});
+    case Type::int16:
+        return f(std::int16_t{});
+    case Type::uint16:
+        return f(std::uint16_t{});
+    case Type::int32:
+        return f(std::int32_t{});
+    case Type::uint32:
+        return f(std::uint32_t{});
+    case Type::float32:
+        return f(float{});
+    case Type::float64:
+        break;
+    }
+    return f(double{});
+}
+
+/// The numbers of a text body, one after the other.
+class AsciiNumbers {
+public:
+    AsciiNumbers(const MeshSource& source, const TextScanner& text) : source_(source), text_(text) {}
+
+    /// Why the next number cannot be read, or "".
+    std::string read(Type type, double& x) {
+        text_.skip_space();
+        if (text_.at_end()) return "the file ends here; it is cut off";
+        if (!text_.number(x)) return "expected a number, found " + in_quotes(text_.word());
+        if (type != Type::float32 && type != Type::float64) {
+            const bool fits = with_type(type, [&](auto t) {
+                using Limits = std::numeric_limits<decltype(t)>;
+                return x >= static_cast<double>(Limits::lowest()) && x <= static_cast<double>(Limits::max());
+            });
+            if (!fits) return "a number does not fit the type of its property";
+        }
+        return "";
+    }
+    std::size_t bytes_left() const { return text_.bytes_left(); }
+    std::size_t offset() const { return text_.offset(); }
+    Error error(const std::string& row, const std::string& cause) const {
+        return source_.error_at_line(text_.line(), row + ": " + cause + ".");
+    }
+
+private:
+    const MeshSource& source_;
+    TextScanner text_;
+};
+
+/// The numbers of a binary body.
+class BinaryNumbers {
+public:
+    BinaryNumbers(const MeshSource& source, std::size_t offset, bool swap)
+        : source_(source), offset_(offset), swap_(swap) {}
+
+    std::string read(Type type, double& x) {
+        if (bytes_left() < size_of(type)) return "the file ends here; it is cut off";
+        x = with_type(type, [&](auto t) { return static_cast<double>(load<decltype(t)>(data(), swap_)); });
+        offset_ += size_of(type);
+        return "";
+    }
+    std::size_t bytes_left() const { return source_.bytes.size() - offset_; }
+    std::size_t offset() const { return offset_; }
+    const char* data() const { return source_.bytes.data() + offset_; }
+    bool swap() const { return swap_; }
+    void skip(std::size_t bytes) { offset_ += bytes; }
+    Error error(const std::string& row, const std::string& cause) const {
+        return source_.error(row + " at byte " + std::to_string(offset_) + ": " + cause + ".");
+    }
+
+private:
+    const MeshSource& source_;
+    std::size_t offset_;
+    bool swap_;
+};
+
+/// The rows of an element without its lists: numbers at a fixed distance from each other.
+struct Table {
+    struct Column {
+        std::size_t offset;
+        Type type;
+    };
+    const char* data = nullptr;
+    std::size_t rows = 0, row_bytes = 0;
+    bool swap = false;
+    std::vector<Column> columns; ///< of each property; of a list, nothing that counts
+    std::vector<double> numbers; ///< what `data` points to when the file's bytes are not a table
+
+    /// Calls set(row, value) for a column; one switch on the type a column, not a value.
+    template <class F>
+    void for_each(std::size_t column, const F& set) const {
+        with_type(columns[column].type, [&](auto t) {
+            const char* p = data + columns[column].offset;
+            for (std::size_t row = 0; row < rows; ++row, p += row_bytes) set(row, load<decltype(t)>(p, swap));
+        });
+    }
+};
+
+template <class Numbers>
+class BodyReader {
+public:
+    BodyReader(const MeshSource& source, const Header& header, Numbers numbers)
+        : source_(source), header_(header), numbers_(numbers) {}
+
+    Result<MeshFile> read() {
+        const Element* vertices = header_.find("vertex");
+        if (!vertices || !vertices->has("x") || !vertices->has("y") || !vertices->has("z"))
+            return source_.error("has no element 'vertex' with x, y and z.");
+        if (vertices->count >= kNoIndex) return source_.unsupported("has more vertices than 32-bit indices can count.");
+        if (header_.find("tristrips") && !header_.find("face"))
+            return source_.unsupported("has triangle strips, which are not read; save it with faces.");
+        vertex_count_ = vertices->count;
+        for (const Element& element : header_.elements)
+            if (!read_element(element)) return *error_;
+        return std::move(file_);
+    }
+
+private:
+    bool fail(const Element& element, std::size_t row, const std::string& cause) {
+        error_ = numbers_.error(element.name + " " + std::to_string(row), cause);
+        return false;
+    }
+
+    bool read_element(const Element& element) {
+        if (element.properties.empty()) return true; // its rows are nothing
+        if (element.count > numbers_.bytes_left())   // a row has a byte at least
+            return fail(element, 0,
+                        "the header promises " + std::to_string(element.count) +
+                            " of these, more than the file can hold; it is cut off");
+        if (source_.context.is_cancelled()) return error_ = cancelled_error(), false;
+        source_.context.report("Reading", source_.fraction(numbers_.offset()));
+        if (element.name == "vertex") return read_vertices(element);
+        if (element.name == "face") return read_faces(element);
+        if (element.count > 0) file_.warnings.push_back("The element " + in_quotes(element.name) + " was left out.");
+        return skip_rows(element);
+    }
+
+    bool report_progress(std::size_t row) {
+        if (row % kRowsBetweenReports != 0) return true;
+        source_.context.report("Reading", source_.fraction(numbers_.offset()));
+        if (!source_.context.is_cancelled()) return true;
+        error_ = cancelled_error();
+        return false;
+    }
+
+    // ---- rows of any kind
+
+    bool read_number(const Element& element, std::size_t row, Type type, double& x) {
+        const std::string problem = numbers_.read(type, x);
+        return problem.empty() || fail(element, row, problem);
+    }
+
+    bool read_list(const Element& element, std::size_t row, const Property& property, std::vector<double>& list) {
+        double length = 0;
+        if (!read_number(element, row, *property.list_count, length)) return false;
+        if (!(length >= 0) || length != std::floor(length))
+            return fail(element, row, "the length of the list " + in_quotes(property.name) + " is not a count");
+        if (length > static_cast<double>(numbers_.bytes_left()))
+            return fail(element, row,
+                        "the list " + in_quotes(property.name) + " is longer than the file; it is damaged or cut off");
+        list.resize(static_cast<std::size_t>(length));
+        for (double& x : list)
+            if (!read_number(element, row, property.type, x)) return false;
+        return true;
+    }
+
+    bool skip_rows(const Element& element) {
+        if constexpr (std::is_same_v<Numbers, BinaryNumbers>)
+            if (!element.has_lists()) return skip_table(element);
+        std::vector<double> list;
+        double x = 0;
+        for (std::size_t row = 0; row < element.count; ++row) {
+            if (!report_progress(row)) return false;
+            for (const Property& p : element.properties)
+                if (p.list_count ? !read_list(element, row, p, list) : !read_number(element, row, p.type, x))
+                    return false;
+        }
+        return true;
+    }
+
+    bool skip_table(const Element& element) {
+        const std::size_t room = numbers_.bytes_left() / element.row_bytes();
+        if (element.count > room) return fail(element, room, "the file ends here; it is cut off");
+        numbers_.skip(element.count * element.row_bytes());
+        return true;
+    }
+
+    // ---- vertices
+
+    static bool is_position(const Property& p) { return p.name == "x" || p.name == "y" || p.name == "z"; }
+
+    bool read_vertices(const Element& element) {
+        for (const Property& p : element.properties) {
+            if (!p.list_count) continue;
+            if (is_position(p)) return fail(element, 0, "the property " + in_quotes(p.name) + " is a list");
+            file_.warnings.push_back("The vertex list " + in_quotes(p.name) + " was left out.");
+        }
+        Table table;
+        if (!read_table(element, table)) return false;
+        if (!read_positions(element, table)) return false;
+        read_attributes(element, table);
+        return true;
+    }
+
+    /// Binary rows without lists are a table as they lie in the file; others become one of doubles.
+    bool read_table(const Element& element, Table& table) {
+        table.rows = element.count;
+        if constexpr (std::is_same_v<Numbers, BinaryNumbers>) {
+            if (!element.has_lists()) {
+                table.data = numbers_.data();
+                table.swap = numbers_.swap();
+                for (const Property& p : element.properties) {
+                    table.columns.push_back({table.row_bytes, p.type});
+                    table.row_bytes += size_of(p.type);
+                }
+                return skip_table(element);
+            }
+        }
+        for (std::size_t i = 0; i < element.properties.size(); ++i)
+            table.columns.push_back({i * sizeof(double), Type::float64});
+        table.row_bytes = element.properties.size() * sizeof(double);
+        table.numbers.reserve(std::min(element.count * element.properties.size(), numbers_.bytes_left()));
+        std::vector<double> list;
+        for (std::size_t row = 0; row < element.count; ++row) {
+            if (!report_progress(row)) return false;
+            for (const Property& p : element.properties) {
+                double x = 0;
+                if (p.list_count ? !read_list(element, row, p, list) : !read_number(element, row, p.type, x))
+                    return false;
+                if (is_position(p) && !fits_float(x)) return fail_position(element, row);
+                table.numbers.push_back(x);
+            }
+        }
+        table.data = reinterpret_cast<const char*>(table.numbers.data());
+        return true;
+    }
+
+    bool fail_position(const Element& element, std::size_t row) {
+        return fail(element, row, "a coordinate is not a finite number that fits 32-bit float");
+    }
+
+    bool read_positions(const Element& element, const Table& table) {
+        const std::size_t axes[3] = {element.find("x"), element.find("y"), element.find("z")};
+        Mesh& mesh = file_.mesh;
+        const bool floats =
+            std::all_of(axes, axes + 3, [&](std::size_t a) { return table.columns[a].type == Type::float32; });
+        if (!floats) {
+            std::vector<Vec3d> world(table.rows);
+            for (int axis = 0; axis < 3; ++axis)
+                table.for_each(axes[axis], [&](std::size_t row, auto x) { world[row][axis] = static_cast<double>(x); });
+            for (std::size_t row = 0; row < world.size(); ++row)
+                for (const double x : world[row])
+                    if (!fits_float(x)) return fail_position(element, row);
+            SplitPositions split = split_origin(world);
+            mesh.positions = std::move(split.positions);
+            mesh.origin = split.origin;
+            return true;
+        }
+        mesh.positions.resize(table.rows);
+        const std::size_t x_offset = table.columns[axes[0]].offset;
+        const bool adjacent =
+            table.columns[axes[1]].offset == x_offset + 4 && table.columns[axes[2]].offset == x_offset + 8;
+        if (adjacent && !table.swap) {
+            const char* p = table.data + x_offset;
+            for (std::size_t row = 0; row < table.rows; ++row, p += table.row_bytes)
+                std::memcpy(mesh.positions[row].data(), p, 12);
+        } else {
+            for (int axis = 0; axis < 3; ++axis)
+                table.for_each(axes[axis],
+                               [&](std::size_t row, auto x) { mesh.positions[row][axis] = static_cast<float>(x); });
+        }
+        for (std::size_t row = 0; row < table.rows; ++row)
+            if (!mesh.positions[row].allFinite()) return fail_position(element, row);
+        split_origin(mesh);
+        return true;
+    }
+
+    void read_attributes(const Element& element, const Table& table) {
+        Mesh& mesh = file_.mesh;
+        std::vector<bool> used(element.properties.size());
+        for (std::size_t i = 0; i < used.size(); ++i)
+            used[i] = is_position(element.properties[i]) || element.properties[i].list_count;
+        /// The columns of these names, when all are there and none is used.
+        const auto find_columns = [&](std::initializer_list<const char*> names) {
+            std::vector<std::size_t> columns;
+            for (const char* name : names)
+                if (const std::size_t i = element.find(name); i < used.size() && !used[i]) columns.push_back(i);
+            if (columns.size() != names.size()) columns.clear();
+            for (const std::size_t i : columns) used[i] = true;
+            return columns;
+        };
+        const auto copy_columns = [&](const std::vector<std::size_t>& columns, auto& values) {
+            if (columns.empty() || !values.empty()) return;
+            values.resize(table.rows);
+            for (std::size_t i = 0; i < columns.size(); ++i)
+                table.for_each(columns[i], [&](std::size_t row, auto x) {
+                    values[row][static_cast<int>(i)] = static_cast<float>(x);
+                });
+        };
+        copy_columns(find_columns({"nx", "ny", "nz"}), mesh.normals.values);
+        for (const auto& names : {std::array{"s", "t"}, std::array{"u", "v"}, std::array{"texture_u", "texture_v"}})
+            if (mesh.uvs.empty()) copy_columns(find_columns({names[0], names[1]}), mesh.uvs.values);
+        read_colors(element, table, find_columns({"red", "green", "blue"}), find_columns({"alpha"}));
+        for (std::size_t i = 0; i < used.size(); ++i) {
+            if (used[i]) continue;
+            VertexScalar scalar{element.properties[i].name, std::vector<float>(table.rows)};
+            table.for_each(i, [&](std::size_t row, auto x) { scalar.values[row] = static_cast<float>(x); });
+            mesh.scalars.push_back(std::move(scalar));
+        }
+    }
+
+    void read_colors(const Element& element, const Table& table, std::vector<std::size_t> columns,
+                     const std::vector<std::size_t>& alpha) {
+        if (columns.empty()) return;
+        Mesh& mesh = file_.mesh;
+        mesh.colors.assign(table.rows, Vec4f::Ones());
+        mesh.colors_have_alpha = !alpha.empty();
+        columns.insert(columns.end(), alpha.begin(), alpha.end());
+        for (std::size_t i = 0; i < columns.size(); ++i) {
+            const Type type = element.properties[columns[i]].type;
+            const float full = type == Type::uint8 ? 255.0f : type == Type::uint16 ? 65535.0f : 1.0f;
+            table.for_each(columns[i], [&](std::size_t row, auto x) {
+                mesh.colors[row][static_cast<int>(i)] = static_cast<float>(x) / full;
+            });
+        }
+    }
+
+    // ---- faces
+
+    bool read_faces(const Element& element) {
+        const std::size_t indices =
+            element.has("vertex_indices") ? element.find("vertex_indices") : element.find("vertex_index");
+        if (indices == element.properties.size() || !element.properties[indices].list_count) {
+            if (element.count > 0)
+                file_.warnings.emplace_back("The faces have no list 'vertex_indices' and were left out.");
+            return skip_rows(element);
+        }
+        for (const Property& p : element.properties)
+            if (p.name != element.properties[indices].name && !is_texcoord(p))
+                file_.warnings.push_back("The face property " + in_quotes(p.name) + " was left out.");
+        short_faces_ = 0;
+        if (!read_face_rows(element, indices)) return false;
+        if (short_faces_ > 0)
+            file_.warnings.push_back(std::to_string(short_faces_) +
+                                     " faces with fewer than three corners were left out.");
+        return true;
+    }
+
+    static bool is_texcoord(const Property& p) { return p.name == "texcoord" && p.list_count; }
+
+    bool read_face_rows(const Element& element, std::size_t indices) {
+        if constexpr (std::is_same_v<Numbers, BinaryNumbers>) {
+            const Property& p = element.properties[indices];
+            const bool common = element.properties.size() == 1 && p.list_count == Type::uint8 && size_of(p.type) == 4 &&
+                                p.type != Type::float32;
+            if (common && !numbers_.swap()) return read_common_faces(element);
+        }
+        Mesh& mesh = file_.mesh;
+        mesh.face_offsets.reserve(element.count + 1);
+        std::vector<double> corners, list, texcoords;
+        double x = 0;
+        for (std::size_t row = 0; row < element.count; ++row) {
+            if (!report_progress(row)) return false;
+            for (std::size_t i = 0; i < element.properties.size(); ++i) {
+                const Property& p = element.properties[i];
+                std::vector<double>& target = i == indices ? corners : is_texcoord(p) ? texcoords : list;
+                if (p.list_count ? !read_list(element, row, p, target) : !read_number(element, row, p.type, x))
+                    return false;
+            }
+            if (!add_face(element, row, corners)) return false;
+            if (corners.size() >= 3) add_uvs(corners.size(), texcoords);
+        }
+        if (!mesh.uvs.corners.empty()) mesh.uvs.corners.resize(mesh.corner_count(), kNoIndex);
+        return true;
+    }
+
+    bool fail_index(const Element& element, std::size_t row, double index) {
+        const auto found =
+            std::abs(index) < 1e18 ? std::to_string(static_cast<std::int64_t>(index)) : std::string("a huge number");
+        return fail(element, row,
+                    "a corner refers to vertex " + found + ", but there are " + std::to_string(vertex_count_) +
+                        " vertices, counted from 0");
+    }
+
+    bool add_face(const Element& element, std::size_t row, const std::vector<double>& corners) {
+        Mesh& mesh = file_.mesh;
+        for (const double index : corners) // NaN fails the first comparison
+            if (!(index >= 0 && index < static_cast<double>(vertex_count_)) || index != std::floor(index))
+                return fail_index(element, row, index);
+        if (corners.size() < 3) return ++short_faces_, true;
+        if (mesh.corners.size() + corners.size() >= kNoIndex) return fail_too_many();
+        for (const double index : corners) mesh.corners.push_back(static_cast<Index>(index));
+        mesh.face_offsets.push_back(static_cast<Index>(mesh.corners.size()));
+        return true;
+    }
+
+    bool fail_too_many() {
+        error_ = source_.unsupported("has more corners than 32-bit indices can count.");
+        return false;
+    }
+
+    /// MeshLab's UVs: a list of u, v for each corner of the face just added.
+    void add_uvs(std::size_t corner_count, const std::vector<double>& texcoords) {
+        CornerAttribute<Vec2f>& uvs = file_.mesh.uvs;
+        if (texcoords.size() != 2 * corner_count || (uvs.per_vertex() && !uvs.empty())) return;
+        uvs.corners.resize(file_.mesh.corner_count() - corner_count, kNoIndex);
+        for (std::size_t c = 0; c < corner_count; ++c) {
+            uvs.corners.push_back(static_cast<Index>(uvs.values.size()));
+            uvs.values.emplace_back(static_cast<float>(texcoords[2 * c]), static_cast<float>(texcoords[2 * c + 1]));
+        }
+    }
+
+    /// Nothing but lists of 4-byte indices with a 1-byte length, which is what nearly all binary files have: sizes in
+    /// a first pass, then plain copies. Three times faster than number by number.
+    bool read_common_faces(const Element& element) {
+        const char* const begin = numbers_.data();
+        const std::size_t room = numbers_.bytes_left();
+        std::size_t corner_count = 0, used = 0;
+        for (std::size_t row = 0; row < element.count; ++row) {
+            const std::size_t size = used < room ? static_cast<unsigned char>(begin[used]) : 0;
+            used += 1 + 4 * size;
+            if (used > room) return fail(element, row, "the file ends here; it is cut off");
+            if (size < 3)
+                ++short_faces_;
+            else
+                corner_count += size;
+        }
+        if (corner_count >= kNoIndex) return fail_too_many();
+        Mesh& mesh = file_.mesh;
+        mesh.corners.resize(corner_count);
+        mesh.face_offsets.resize(element.count - short_faces_ + 1);
+        Index* corner = mesh.corners.data();
+        Index* offset = mesh.face_offsets.data();
+        const auto vertex_count = static_cast<Index>(vertex_count_);
+        const char* p = begin;
+        for (std::size_t row = 0; row < element.count; ++row) {
+            const std::size_t size = static_cast<unsigned char>(*p++);
+            bool in_range = true;
+            for (std::size_t c = 0; c < size; ++c) {
+                const Index index = load<Index>(p + 4 * c, false);
+                in_range &= index < vertex_count;
+                if (size >= 3) *corner++ = index;
+            }
+            if (!in_range)
+                return numbers_.skip(static_cast<std::size_t>(p - begin)),
+                       fail(element, row,
+                            "a corner refers to a vertex that is not there; there are " +
+                                std::to_string(vertex_count_) + ", counted from 0");
+            p += 4 * size;
+            if (size >= 3) *++offset = static_cast<Index>(corner - mesh.corners.data());
+        }
+        numbers_.skip(used);
+        return true;
+    }
+
+    const MeshSource& source_;
+    const Header& header_;
+    Numbers numbers_;
+    std::optional<Error> error_;
+    MeshFile file_;
+    std::size_t vertex_count_ = 0, short_faces_ = 0;
+};
+
+// ------------------------------------------------------------------------------------------------ writing
+
+/// A vertex property to write.
+struct OutputColumn {
+    std::string name;
+    Type type = Type::float32;
+    const float* values = nullptr; ///< of the first vertex
+    std::size_t stride = 1;        ///< floats from one vertex to the next
+    double origin = 0;             ///< added to each value
+    float scale = 1;               ///< multiplied to each value, for colours in bytes
+};
+
+/// Whether bytes hold the colours exactly.
+bool are_bytes(const std::vector<Vec4f>& colors) {
+    for (const Vec4f& color : colors)
+        for (const float x : color)
+            if (!(x >= 0 && x <= 1) || std::round(x * 255.0f) / 255.0f != x) return false;
+    return true;
+}
+
+template <class Vector>
+void add_columns(std::vector<OutputColumn>& columns, std::initializer_list<const char*> names,
+                 const std::vector<Vector>& values, Type type = Type::float32, float scale = 1) {
+    if (values.empty()) return;
+    std::size_t i = 0;
+    for (const char* name : names)
+        columns.push_back({name, type, values.front().data() + i++, Vector::SizeAtCompileTime, 0, scale});
+}
+
+/// One word, as a property's name must be.
+std::string property_name(std::string name) {
+    for (char& c : name)
+        if (static_cast<unsigned char>(c) <= ' ' || c == '#' || c == '\x7f') c = '_';
+    return name.empty() ? "scalar" : name;
+}
+
+class PlyWriter {
+public:
+    PlyWriter(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes)
+        : mesh_(mesh), options_(options), bytes_(bytes), uvs_(values_per_vertex(mesh.uvs, mesh)),
+          normals_(values_per_vertex(mesh.normals, mesh)) {
+        collect_columns();
+        const auto largest = [&] {
+            std::size_t size = 0;
+            for (std::size_t f = 0; f < mesh.face_count(); ++f) size = std::max<std::size_t>(size, mesh.face_size(f));
+            return size;
+        };
+        // lists of UVs have two numbers a corner
+        long_faces_ = largest() * (uvs_ ? 1 : 2) > std::numeric_limits<std::uint8_t>::max();
+    }
+
+    std::vector<std::string> write() {
+        write_header();
+        if (options_.ascii)
+            write_ascii();
+        else if (options_.big_endian)
+            write_binary<true>();
+        else
+            write_binary<false>();
+        std::vector<std::string> lost;
+        if (!normals_) lost.emplace_back("normals that differ at a vertex");
+        if (!mesh_.objects.empty()) lost.emplace_back("objects");
+        add_face_label_losses(mesh_, lost);
+        return lost;
+    }
+
+private:
+    void collect_columns() {
+        add_columns(columns_, {"x", "y", "z"}, mesh_.positions);
+        for (std::size_t axis = 0; axis < columns_.size(); ++axis) {
+            columns_[axis].origin = mesh_.origin[static_cast<int>(axis)];
+            if (!mesh_.origin.isZero(0)) columns_[axis].type = Type::float64;
+        }
+        if (columns_.empty()) // no vertices, but the header names the coordinates all the same
+            for (const char* name : {"x", "y", "z"}) columns_.push_back({name});
+        if (normals_) add_columns(columns_, {"nx", "ny", "nz"}, *normals_);
+        if (uvs_) add_columns(columns_, {"s", "t"}, *uvs_);
+        const bool bytes = are_bytes(mesh_.colors);
+        const Type color_type = bytes ? Type::uint8 : Type::float32;
+        const float scale = bytes ? 255.0f : 1.0f;
+        if (mesh_.colors_have_alpha)
+            add_columns(columns_, {"red", "green", "blue", "alpha"}, mesh_.colors, color_type, scale);
+        else
+            add_columns(columns_, {"red", "green", "blue"}, mesh_.colors, color_type, scale);
+        for (const VertexScalar& scalar : mesh_.scalars)
+            columns_.push_back({property_name(scalar.name), Type::float32, scalar.values.data()});
+    }
+
+    void write_header() {
+        TextWriter out(bytes_);
+        out.text("ply\nformat ");
+        out.text(options_.ascii        ? "ascii"
+                 : options_.big_endian ? "binary_big_endian"
+                                       : "binary_little_endian")
+            .text(" 1.0\n");
+        out.text("element vertex ").number(mesh_.vertex_count()).text("\n");
+        for (const OutputColumn& column : columns_) {
+            out.text(column.type == Type::float64 ? "property double "
+                     : column.type == Type::uint8 ? "property uchar "
+                                                  : "property float ");
+            out.text(column.name).text("\n");
+        }
+        const char* const length = long_faces_ ? "uint" : "uchar";
+        out.text("element face ")
+            .number(mesh_.face_count())
+            .text("\nproperty list ")
+            .text(length)
+            .text(" int vertex_indices\n");
+        if (!uvs_) out.text("property list ").text(length).text(" float texcoord\n");
+        out.text("end_header\n");
+    }
+
+    static std::uint8_t to_byte(const OutputColumn& column, float value) {
+        return static_cast<std::uint8_t>(std::round(value * column.scale));
+    }
+
+    /// Whether every corner of the face has a UV.
+    bool has_uvs(std::size_t face) const {
+        for (std::size_t c = mesh_.face_offsets[face]; c < mesh_.face_offsets[face + 1]; ++c)
+            if (mesh_.uvs.corners[c] == kNoIndex) return false;
+        return true;
+    }
+
+    void write_ascii() {
+        TextWriter out(bytes_);
+        for (std::size_t v = 0; v < mesh_.vertex_count(); ++v) {
+            for (const OutputColumn& column : columns_) {
+                if (&column != columns_.data()) out.text(" ");
+                const float value = column.values[v * column.stride];
+                if (column.type == Type::uint8)
+                    out.number(unsigned{to_byte(column, value)});
+                else
+                    out.coordinate(column.origin, value);
+            }
+            out.text("\n");
+        }
+        for (std::size_t f = 0; f < mesh_.face_count(); ++f) {
+            out.number(mesh_.face_size(f));
+            for (const Index vertex : mesh_.face(f)) out.text(" ").number(vertex);
+            if (!uvs_) write_ascii_uvs(out, f);
+            out.text("\n");
+        }
+    }
+
+    void write_ascii_uvs(TextWriter& out, std::size_t face) {
+        out.text(" ").number(has_uvs(face) ? 2 * mesh_.face_size(face) : 0);
+        if (!has_uvs(face)) return;
+        for (std::size_t c = mesh_.face_offsets[face]; c < mesh_.face_offsets[face + 1]; ++c)
+            for (const float x : mesh_.uvs.values[mesh_.uvs.corners[c]]) out.text(" ").number(x);
+    }
+
+    template <bool Swap, class T>
+    static void store(char* p, T value) {
+        auto bytes = std::bit_cast<std::array<char, sizeof(T)>>(value);
+        if constexpr (Swap) std::reverse(bytes.begin(), bytes.end());
+        std::memcpy(p, bytes.data(), sizeof(T));
+    }
+
+    template <bool Swap>
+    void write_binary() {
+        std::size_t row_bytes = 0;
+        for (const OutputColumn& column : columns_) row_bytes += size_of(column.type);
+        const std::size_t header_bytes = bytes_.size(), length_bytes = long_faces_ ? 4 : 1;
+        const std::size_t uv_bytes = uvs_ ? 0 : mesh_.face_count() * length_bytes + 8 * mesh_.corner_count();
+        bytes_.resize(header_bytes + mesh_.vertex_count() * row_bytes + mesh_.face_count() * length_bytes +
+                      4 * mesh_.corner_count() + uv_bytes);
+        char* const vertices = bytes_.data() + header_bytes;
+        std::size_t offset = 0;
+        for (const OutputColumn& column : columns_) {
+            write_column<Swap>(column, vertices + offset, row_bytes);
+            offset += size_of(column.type);
+        }
+        char* const end = write_faces<Swap>(vertices + mesh_.vertex_count() * row_bytes);
+        bytes_.resize(static_cast<std::size_t>(end - bytes_.data())); // faces without UVs need less
+    }
+
+    template <bool Swap>
+    void write_column(const OutputColumn& column, char* p, std::size_t row_bytes) const {
+        for (std::size_t v = 0; v < mesh_.vertex_count(); ++v, p += row_bytes) {
+            const float value = column.values[v * column.stride];
+            if (column.type == Type::float32)
+                store<Swap>(p, value);
+            else if (column.type == Type::float64)
+                store<Swap>(p, column.origin + static_cast<double>(value));
+            else
+                store<Swap>(p, to_byte(column, value));
+        }
+    }
+
+    template <bool Swap>
+    char* write_faces(char* p) const {
+        const auto store_length = [&](std::size_t length) {
+            if (long_faces_)
+                store<Swap>(p, static_cast<std::uint32_t>(length)), p += 4;
+            else
+                store<Swap>(p, static_cast<std::uint8_t>(length)), p += 1;
+        };
+        for (std::size_t f = 0; f < mesh_.face_count(); ++f) {
+            store_length(mesh_.face_size(f));
+            for (const Index vertex : mesh_.face(f)) store<Swap>(p, vertex), p += 4;
+            if (uvs_) continue;
+            store_length(has_uvs(f) ? 2 * mesh_.face_size(f) : 0);
+            if (!has_uvs(f)) continue;
+            for (std::size_t c = mesh_.face_offsets[f]; c < mesh_.face_offsets[f + 1]; ++c)
+                for (const float x : mesh_.uvs.values[mesh_.uvs.corners[c]]) store<Swap>(p, x), p += 4;
+        }
+        return p;
+    }
+
+    const Mesh& mesh_;
+    const WriteMeshOptions& options_;
+    std::string& bytes_;
+    std::optional<std::vector<Vec2f>> uvs_; // a vertex; none: a list for each face
+    std::optional<std::vector<Vec3f>> normals_;
+    std::vector<OutputColumn> columns_;
+    bool long_faces_ = false;
+};
+
+} // namespace
+
+Result<MeshFile> read_ply(const MeshSource& source) {
+    HeaderReader reader(source);
+    const Result<Header> header = reader.read();
+    if (!header.ok()) return header.error();
+    if (header->encoding == Encoding::ascii)
+        return BodyReader(source, *header, AsciiNumbers(source, reader.body())).read();
+    const BinaryNumbers numbers(source, reader.body().offset(), header->encoding == Encoding::big_endian);
+    return BodyReader(source, *header, numbers).read();
+}
+
+std::vector<std::string> write_ply(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes) {
+    return PlyWriter(mesh, options, bytes).write();
+}
+
+} // namespace filigree
