@@ -1,0 +1,213 @@
+// Based on:
+//   [Ericson 2005] 5.1.2 and 5.1.5 (closest point on a segment and a triangle). We try the plane, then the three edges,
+//   in place of the regions: slower by a little, and right for triangles without an area.
+//   Embree's point queries [Wald 2014]. Embree is told boxes only, in float and in units of the whole box; every
+//   distance that decides is computed here in double, and Embree's radius is kept a little too large.
+#include "filigree/mesh/closest_point.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <embree3/rtcore.h>
+#include <new>
+
+namespace filigree {
+namespace {
+
+constexpr double kFlat = 1e-20;       // squared sine of a corner, below which a triangle has no plane in double
+constexpr double kFarthest = 1e4;     // box sizes: from further out, a query is moved here first
+constexpr double kRadiusSlack = 1e-6; // of the coordinates' size: several roundings of Embree's floats
+
+struct TrianglePoint {
+    Vec3d barycentric;
+    Vec3d position;
+    double squared_distance = std::numeric_limits<double>::infinity();
+};
+
+TrianglePoint closest_on_edge(const Vec3d& p, const std::array<Vec3d, 3>& corners, int from, int to) {
+    // one direction for both triangles of an edge, so that they are equally close to the bit
+    if (std::ranges::lexicographical_compare(corners[to], corners[from])) std::swap(from, to);
+    const Vec3d edge = corners[to] - corners[from];
+    const double squared_length = edge.squaredNorm();
+    const double t = squared_length > 0 ? std::clamp(edge.dot(p - corners[from]) / squared_length, 0.0, 1.0) : 0;
+    TrianglePoint result;
+    result.barycentric.setZero();
+    result.barycentric[from] = 1 - t;
+    result.barycentric[to] = t;
+    result.position = t == 1 ? corners[to] : Vec3d(corners[from] + t * edge); // corners exactly
+    result.squared_distance = (p - result.position).squaredNorm();
+    return result;
+}
+
+TrianglePoint closest_on_triangle(const Vec3d& p, const std::array<Vec3d, 3>& corners) {
+    const Vec3d ab = corners[1] - corners[0], ac = corners[2] - corners[0], ap = p - corners[0];
+    const Vec3d normal = ab.cross(ac);
+    const double squared_area = normal.squaredNorm();
+    if (squared_area > kFlat * ab.squaredNorm() * ac.squaredNorm()) {
+        const double v = ap.cross(ac).dot(normal), w = ab.cross(ap).dot(normal), u = squared_area - v - w;
+        if (u >= 0 && v >= 0 && w >= 0) {
+            TrianglePoint result;
+            result.barycentric = Vec3d(u, v, w) / squared_area;
+            result.position = corners[0] + result.barycentric[1] * ab + result.barycentric[2] * ac;
+            result.squared_distance = (p - result.position).squaredNorm();
+            return result;
+        }
+    }
+    TrianglePoint best;
+    for (int from = 0; from < 3; ++from) {
+        const TrianglePoint candidate = closest_on_edge(p, corners, from, (from + 1) % 3);
+        if (candidate.squared_distance < best.squared_distance) best = candidate;
+    }
+    return best;
+}
+
+SurfacePoint surface_point(const TrianglePoint& point, Index triangle) {
+    return {triangle, point.barycentric.cast<float>(), point.position.cast<float>(), std::sqrt(point.squared_distance)};
+}
+
+/// One for the process: a device is slow to make, and its own threads are TBB's.
+RTCDevice embree_device() {
+    struct Device {
+        RTCDevice handle = rtcNewDevice(nullptr);
+        ~Device() { rtcReleaseDevice(handle); }
+    };
+    static const Device device;
+    if (!device.handle) throw std::bad_alloc();
+    return device.handle;
+}
+
+} // namespace
+
+SurfacePoint closest_point_on_triangle(const Vec3f& p, const Vec3f& a, const Vec3f& b, const Vec3f& c) {
+    return surface_point(closest_on_triangle(p.cast<double>(), {a.cast<double>(), b.cast<double>(), c.cast<double>()}),
+                         kNoIndex);
+}
+
+struct ClosestPointTree::Tree {
+    std::span<const Vec3f> positions;
+    std::span<const Triangle> triangles;
+    Vec3d centre = Vec3d::Zero();
+    double scale = 1; ///< Embree's units in a model unit: the box becomes -1 to 1
+    RTCScene scene = nullptr;
+    /// In Embree's units, during the build only: Embree flushes denormal floats to zero while it calls set_bounds.
+    std::vector<Vec3f> local_positions;
+
+    Tree(std::span<const Vec3f> positions_, std::span<const Triangle> triangles_)
+        : positions(positions_), triangles(triangles_) {
+        if (triangles.empty()) return;
+        Box box;
+        for (const Triangle& triangle : triangles)
+            for (const Index vertex : triangle) box.extend(positions[vertex].cast<double>());
+        centre = box.centre();
+        const double size = box.size().maxCoeff();
+        if (size > 0) scale = 2 / size;
+        local_positions.reserve(positions.size());
+        for (const Vec3f& p : positions) local_positions.push_back(to_local(p.cast<double>()).cast<float>());
+        build();
+        local_positions = {};
+    }
+    ~Tree() {
+        if (scene) rtcReleaseScene(scene);
+    }
+    Tree(const Tree&) = delete;
+    Tree& operator=(const Tree&) = delete;
+
+    Vec3d to_local(const Vec3d& p) const { return (p - centre) * scale; }
+    std::array<Vec3d, 3> corners(Index triangle) const {
+        const auto& [a, b, c] = triangles[triangle];
+        return {positions[a].cast<double>(), positions[b].cast<double>(), positions[c].cast<double>()};
+    }
+
+    void build() {
+        const RTCDevice device = embree_device();
+        const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
+        rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(triangles.size()));
+        rtcSetGeometryUserData(geometry, this);
+        rtcSetGeometryBoundsFunction(geometry, set_bounds, nullptr);
+        rtcCommitGeometry(geometry);
+        scene = rtcNewScene(device);
+        rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+        rtcAttachGeometry(scene, geometry);
+        rtcReleaseGeometry(geometry);
+        rtcCommitScene(scene);
+        if (rtcGetDeviceError(device) == RTC_ERROR_NONE) return;
+        rtcReleaseScene(scene);
+        throw std::bad_alloc();
+    }
+
+    static void set_bounds(const RTCBoundsFunctionArguments* args) {
+        const Tree& tree = *static_cast<const Tree*>(args->geometryUserPtr);
+        const auto& [a, b, c] = tree.triangles[args->primID];
+        const Vec3f &p = tree.local_positions[a], &q = tree.local_positions[b], &r = tree.local_positions[c];
+        const Vec3f low = p.cwiseMin(q).cwiseMin(r), high = p.cwiseMax(q).cwiseMax(r);
+        *args->bounds_o = {low.x(), low.y(), low.z(), 0, high.x(), high.y(), high.z(), 0};
+    }
+
+    /// A query on its way through the tree.
+    struct Search {
+        const Tree& tree;
+        Vec3d query, facing;
+        double slack;
+        Index triangle = kNoIndex;
+        double distance = std::numeric_limits<double>::infinity();
+
+        float radius() const {
+            const double local = distance * tree.scale * (1 + kRadiusSlack) + slack;
+            return static_cast<float>(std::min(local, 10 * kFarthest)); // that reaches all
+        }
+    };
+
+    static bool visit(RTCPointQueryFunctionArguments* args) {
+        Search& search = *static_cast<Search*>(args->userPtr);
+        const Index triangle = args->primID;
+        const std::array<Vec3d, 3> corners = search.tree.corners(triangle);
+        if (!search.facing.isZero(0) &&
+            !((corners[1] - corners[0]).cross(corners[2] - corners[0]).dot(search.facing) > 0))
+            return false;
+        const TrianglePoint point = closest_on_triangle(search.query, corners);
+        const double distance = std::sqrt(point.squared_distance); // compared as it is returned
+        const bool closer = distance < search.distance;
+        if (!closer && !(distance == search.distance && triangle < search.triangle)) return false;
+        search.distance = distance;
+        search.triangle = triangle;
+        if (closer) args->query->radius = search.radius();
+        return closer;
+    }
+
+    SurfacePoint closest(const Vec3d& query, double max_distance, const Vec3d& facing) const {
+        Vec3d local = to_local(query);
+        const double reach = local.cwiseAbs().maxCoeff();
+        const bool far = reach > kFarthest;
+        if (far) local *= kFarthest / reach;
+
+        Search search{.tree = *this,
+                      .query = far ? Vec3d(centre + local / scale) : query,
+                      .facing = facing,
+                      .slack = kRadiusSlack * (1 + std::min(reach, kFarthest)),
+                      .distance = far ? std::numeric_limits<double>::infinity() : max_distance};
+        RTCPointQuery point{};
+        point.x = static_cast<float>(local.x());
+        point.y = static_cast<float>(local.y());
+        point.z = static_cast<float>(local.z());
+        point.radius = search.radius();
+        RTCPointQueryContext context;
+        rtcInitPointQueryContext(&context);
+        rtcPointQuery(scene, &point, &context, visit, &search);
+        if (search.triangle == kNoIndex) return {};
+        const SurfacePoint found = surface_point(closest_on_triangle(query, corners(search.triangle)), search.triangle);
+        return found.distance <= max_distance ? found : SurfacePoint{};
+    }
+};
+
+ClosestPointTree::ClosestPointTree(std::span<const Vec3f> positions, std::span<const Triangle> triangles)
+    : tree_(std::make_unique<Tree>(positions, triangles)) {}
+ClosestPointTree::~ClosestPointTree() = default;
+ClosestPointTree::ClosestPointTree(ClosestPointTree&&) noexcept = default;
+ClosestPointTree& ClosestPointTree::operator=(ClosestPointTree&&) noexcept = default;
+
+SurfacePoint ClosestPointTree::closest(const Vec3f& query, double max_distance, const Vec3f& facing) const {
+    if (!tree_->scene || !(max_distance >= 0)) return {};
+    return tree_->closest(query.cast<double>(), max_distance, facing.cast<double>());
+}
+
+} // namespace filigree
