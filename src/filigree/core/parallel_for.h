@@ -6,7 +6,13 @@
 #include <algorithm>
 #include <cstddef>
 
+#ifdef __SANITIZE_THREAD__
+#include <atomic>
+#include <thread>
+#include <vector>
+#else
 #include <oneapi/tbb/parallel_for.h>
+#endif
 
 namespace filigree {
 
@@ -21,7 +27,17 @@ void parallel_for(const RunContext& context, std::size_t count, std::size_t grai
         for (std::size_t piece = 0; piece < pieces; ++piece) run_piece(piece);
         return;
     }
+#ifdef __SANITIZE_THREAD__
+    // The thread sanitizer cannot see inside oneTBB and takes every hand-over there for a race: plain threads, then.
+    std::atomic<std::size_t> next = 0;
+    std::vector<std::jthread> workers;
+    for (unsigned i = 0; i < context.threads(); ++i)
+        workers.emplace_back([&] {
+            for (std::size_t piece = next++; piece < pieces; piece = next++) run_piece(piece);
+        });
+#else
     context.arena().execute([&] { tbb::parallel_for(std::size_t{0}, pieces, run_piece); });
+#endif
 }
 
 } // namespace filigree
