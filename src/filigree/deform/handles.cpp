@@ -1,10 +1,15 @@
 // Based on:
 //   [Sorkine 2007] As-rigid-as-possible surface modeling: the energy, sum over edges of
 //   w_ij |x_i - x_j - R_i (p_i - p_j)|^2, and its minimisation by turns over rotations R and positions x.
-//   [Mueller 2016] A robust method to extract the rotational part of deformations: rotations start from those of the
-//   round before, so flat and inverted neighbourhoods keep a sensible one. Ours takes Newton's step where the energy is
-//   convex, which on flat neighbourhoods needs 2 steps where the paper's step halves the error, and leaves the saddle
-//   points (half turns) by [Horn 1987] Closed-form solution of absolute orientation using unit quaternions.
+//   [Levi 2015] Smooth rotation enhanced as-rigid-as-possible mesh animation: the further term
+//   w_ij k^2 |R_i - R_j|^2 / 2. Without it a surface has no stiffness against bending but what its edges' length gives,
+//   and a finely meshed bar folds like a drinking straw. Ours weights it by cotangents, so that k is a length that does
+//   not depend on the mesh, and holds a vertex to its own last rotation as much as to its neighbours': then all
+//   vertices can turn at the same time and the energy still never rises. [Mueller 2016] A robust method to extract the
+//   rotational part of deformations: rotations start from those of the round before, so flat and inverted
+//   neighbourhoods keep a sensible one. Ours takes Newton's step where the energy is convex, which on flat
+//   neighbourhoods needs 2 steps where the paper's step halves the error, and leaves the saddle points (half turns) by
+//   [Horn 1987] Closed-form solution of absolute orientation using unit quaternions.
 // New rounds start from the last solution moved by the best rigid motion of the handles, so a rigid motion is exact.
 #include "filigree/deform/handles.h"
 
@@ -106,6 +111,12 @@ Eigen::Quaterniond closest_rotation(const Mat3d& A, const Eigen::Quaterniond& st
     return closed_form_rotation(A);
 }
 
+void to_matrices(std::span<const Eigen::Quaterniond> rotations, std::span<Mat3d> matrices, const RunContext& context) {
+    parallel_for(context, rotations.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) matrices[i] = rotations[i].toRotationMatrix();
+    });
+}
+
 } // namespace
 
 struct HandleSolver::Solver {
@@ -135,7 +146,7 @@ struct HandleSolver::Solver {
     State rest_state() const;
 
     void follow_handles(State& s, std::span<const Vec3f> targets) const;
-    void local_step(State& s, std::vector<Mat3d>& rotations, const RunContext& context) const;
+    void local_step(State& s, std::vector<Mat3d>& rotations, double smoothness, const RunContext& context) const;
     double global_step(State& s, std::span<const Mat3d> rotations, Rows3& x, const RunContext& context) const;
     void substitute(Rows3& x) const;
 };
@@ -240,20 +251,25 @@ void HandleSolver::Solver::follow_handles(State& s, std::span<const Vec3f> targe
     for (std::size_t h = 0; h < handles.size(); ++h) s.positions[handles[h]] = s.targets[h] = targets[h].cast<double>();
 }
 
-/// The best rotation of each neighbourhood for the positions as they are.
-void HandleSolver::Solver::local_step(State& s, std::vector<Mat3d>& rotations, const RunContext& context) const {
+/// Better rotations for the positions as they are (the best, when smoothness is 0). rotations: those of s as matrices.
+void HandleSolver::Solver::local_step(State& s, std::vector<Mat3d>& rotations, double smoothness,
+                                      const RunContext& context) const {
+    const double k = smoothness * diagonal, k2 = k * k;
     parallel_for(context, rest.size(), kGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             if (role[i] == Role::loose) continue;
-            Mat3d covariance = Mat3d::Zero();
+            Mat3d covariance = Mat3d::Zero(), around = Mat3d::Zero();
+            double sum = 0;
             for (SparseMatrix::InnerIterator edge(weights, static_cast<Eigen::Index>(i)); edge; ++edge) {
                 const auto j = static_cast<std::size_t>(edge.index());
                 covariance += (edge.value() * (s.positions[i] - s.positions[j])) * (rest[i] - rest[j]).transpose();
+                around += edge.value() * rotations[j];
+                sum += edge.value();
             }
-            s.rotations[i] = closest_rotation(covariance, s.rotations[i]);
-            rotations[i] = s.rotations[i].toRotationMatrix();
+            s.rotations[i] = closest_rotation(covariance + k2 * (around + sum * rotations[i]), s.rotations[i]);
         }
     });
+    to_matrices(s.rotations, rotations, context);
 }
 
 /// The best positions for the rotations as they are. x: room for the right-hand sides. Returns the longest move.
@@ -355,7 +371,7 @@ Result<HandleResult> HandleSolver::solve(std::span<const Vec3f> targets, const H
     Solver::State state = solver.state; // a copy, so that cancelling leaves nothing half-done
     solver.follow_handles(state, targets);
     std::vector<Mat3d> rotations(state.rotations.size());
-    for (std::size_t i = 0; i < rotations.size(); ++i) rotations[i] = state.rotations[i].toRotationMatrix();
+    to_matrices(state.rotations, rotations, context);
     Rows3 x(static_cast<Eigen::Index>(solver.free.size()), 3);
     solver.global_step(state, rotations, x, context);
 
@@ -363,12 +379,12 @@ Result<HandleResult> HandleSolver::solve(std::span<const Vec3f> targets, const H
     while (result.iterations < options.iterations) {
         if (context.is_cancelled()) return cancelled_error();
         context.report("handles", static_cast<double>(result.iterations) / options.iterations);
-        solver.local_step(state, rotations, context);
+        solver.local_step(state, rotations, options.smoothness, context);
         result.last_move = solver.global_step(state, rotations, x, context) / solver.diagonal;
         ++result.iterations;
         if (result.last_move <= options.tolerance) break;
     }
-    solver.local_step(state, rotations, context); // the rotations that belong to the last positions
+    solver.local_step(state, rotations, options.smoothness, context); // the rotations that belong to the last positions
     for (std::size_t i = 0; i < rotations.size(); ++i) {
         result.pose.positions.push_back(state.positions[i].cast<float>());
         result.pose.gradients.push_back(rotations[i].cast<float>());
