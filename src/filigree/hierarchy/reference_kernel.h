@@ -1,0 +1,211 @@
+// The arithmetic of the reference code: frames of reference points, placing a point in one, and the two loops that
+// refine a row and an edge of a patch. Internal to reference_code.cpp.
+//
+// One template serves a single float (the encoder) and sixteen lanes (the restorer). Both do the same operations in
+// the same order and neither contracts nor reorders, so they give the same bytes on every processor.
+#pragma once
+
+#include "filigree/hierarchy/law.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <type_traits>
+
+namespace filigree::reference {
+
+inline constexpr std::size_t kLanes = 16;
+typedef float Lanes __attribute__((vector_size(4 * kLanes)));
+typedef std::int32_t IntLanes __attribute__((vector_size(4 * kLanes)));
+
+// Inlined into every clone of the loops, and so compiled for each processor.
+#define FILIGREE_INLINE inline __attribute__((always_inline))
+
+template <class F>
+struct Point {
+    F x, y, z;
+};
+template <class F>
+FILIGREE_INLINE Point<F> operator+(const Point<F>& a, const Point<F>& b) {
+    return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+template <class F>
+FILIGREE_INLINE Point<F> operator-(const Point<F>& a, const Point<F>& b) {
+    return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+template <class F, class S>
+FILIGREE_INLINE Point<F> operator*(S s, const Point<F>& a) {
+    return {s * a.x, s * a.y, s * a.z};
+}
+template <class F>
+FILIGREE_INLINE Point<F> cross(const Point<F>& a, const Point<F>& b) {
+    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+template <class F>
+FILIGREE_INLINE F dot(const Point<F>& a, const Point<F>& b) {
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+
+/// Squares below this are taken for it: degenerate references then give a zero normal, not a division by zero.
+/// Positions are scaled to about one before they come here.
+inline constexpr float kTinySquare = 1e-36f;
+/// Ratios of areas beyond this only say "far outside the law's bounds"; held there so that nothing overflows.
+inline constexpr float kHugeRatio = 1e30f;
+
+template <class F>
+FILIGREE_INLINE F at_least(F a, float low) {
+    const F bound = F{} + low;
+    return a < bound ? bound : a;
+}
+template <class F>
+FILIGREE_INLINE F at_most(F a, float high) {
+    const F bound = F{} + high;
+    return a > bound ? bound : a;
+}
+
+/// 1 / sqrt(max(a, kTinySquare)) to float's precision: a guess from the bits and three Newton steps. Plain arithmetic
+/// instead of an instruction, since those are not the same everywhere.
+template <class F>
+FILIGREE_INLINE F inverse_sqrt(F a) {
+    using Int = std::conditional_t<sizeof(F) == sizeof(float), std::int32_t, IntLanes>;
+    a = at_least(a, kTinySquare);
+    F y = std::bit_cast<F>(0x5f375a86 - (std::bit_cast<Int>(a) >> 1));
+    const F half = 0.5f * a;
+    y = y * (1.5f - half * y * y);
+    y = y * (1.5f - half * y * y);
+    return y * (1.5f - half * y * y);
+}
+
+/// The reference points of an edge point: the ends of its coarse edge, beyond them the far corners of the quad on its
+/// left, and for six references those of the quad on its right. beyond[i] and behind[i] lie next to ends[i].
+template <class F>
+struct References {
+    Point<F> ends[2], beyond[2], behind[2];
+
+    void set_lane(std::size_t lane, const References<float>& r) {
+        for (int i = 0; i < 2; ++i) {
+            set_lane(ends[i], lane, r.ends[i]);
+            set_lane(beyond[i], lane, r.beyond[i]);
+            set_lane(behind[i], lane, r.behind[i]);
+        }
+    }
+
+private:
+    static void set_lane(Point<F>& point, std::size_t lane, const Point<float>& p) {
+        point.x[lane] = p.x, point.y[lane] = p.y, point.z[lane] = p.z;
+    }
+};
+
+/// A plane with coordinates: origin + v across + w up, and the height over it.
+template <class F>
+struct Frame {
+    Point<F> origin, across, up;
+};
+
+/// The frame of an edge point. Three references (the report): C1, C2 and Cm = (C3 + C4) / 2 span it. Four: the origin
+/// is the edge's middle, `across` the mean of the quad's two edges along it. Six (`both_sides`): `across` is the mean
+/// over the quads on both sides, in which the edge itself counts twice, and `up` half the way between their far edges.
+template <int kReferences, class F>
+FILIGREE_INLINE Frame<F> edge_frame(const References<F>& r, bool both_sides) {
+    const Point<F> far_middle = 0.5f * (r.beyond[0] + r.beyond[1]);
+    const Point<F> along = r.ends[1] - r.ends[0];
+    if constexpr (kReferences == 3) return {r.ends[0], along, far_middle - r.ends[0]};
+    const Point<F> middle = 0.5f * (r.ends[0] + r.ends[1]);
+    const Point<F> far_along = r.beyond[1] - r.beyond[0];
+    if (kReferences == 4 || !both_sides) return {middle, 0.5f * (along + far_along), far_middle - middle};
+    const Point<F> behind_middle = 0.5f * (r.behind[0] + r.behind[1]);
+    const Point<F> mean_along = 0.25f * (far_along + (r.behind[1] - r.behind[0]));
+    return {middle, 0.5f * along + mean_along, 0.5f * (far_middle - behind_middle)};
+}
+
+/// The frame of a quad's centre point, from the references of its lower edge. Three: that edge's frame. Four and six:
+/// the quad's mean, and the means of its opposite edges.
+template <int kReferences, class F>
+FILIGREE_INLINE Frame<F> centre_frame(const References<F>& r) {
+    Frame<F> frame = edge_frame < kReferences == 3 ? 3 : 4 > (r, false);
+    if constexpr (kReferences != 3) frame.origin = frame.origin + 0.5f * frame.up;
+    return frame;
+}
+
+/// What the law needs besides the records. Factors take the records' unit to the pose's.
+struct Scaling {
+    Law law = Law::keep;
+    float height = 1; ///< factor on heights
+    float size = 1;   ///< factor on rest sizes
+};
+
+/// A frame's size, as the law stores it at rest: width, 1 / area, area.
+template <class F>
+FILIGREE_INLINE F rest_size(const Frame<F>& frame, Law law) {
+    const Point<F> normal = cross(frame.across, frame.up);
+    const F width2 = dot(frame.across, frame.across), area2 = dot(normal, normal);
+    if (law == Law::inverse) return width2 * inverse_sqrt(width2);
+    if (law == Law::proportional) return inverse_sqrt(area2);
+    return area2 * inverse_sqrt(area2);
+}
+
+/// Eq. 2.7 and 2.14: origin + v across + w up + s h n, with s from the law.
+template <class F>
+FILIGREE_INLINE Point<F> place(const Frame<F>& frame, const Point<F>& record, F size, const Scaling& scaling) {
+    const Point<F> normal = cross(frame.across, frame.up);
+    const F area2 = dot(normal, normal);
+    const F inverse_area = inverse_sqrt(area2);
+    F height = scaling.height * record.z;
+    if (scaling.law != Law::keep) {
+        F s = scaling.size * size;
+        if (scaling.law == Law::inverse) {
+            s = s * inverse_sqrt(dot(frame.across, frame.across));
+        } else if (scaling.law == Law::proportional) {
+            s = at_most(s * (area2 * inverse_area), kHugeRatio);
+            s = s * inverse_sqrt(s);
+        } else {
+            s = s * inverse_area;
+        }
+        height = height * at_most(at_least(s, 1 / kMaxLawScale), kMaxLawScale);
+    }
+    return frame.origin + (record.x * frame.across + record.y * frame.up + (height * inverse_area) * normal);
+}
+
+/// Cells of a patch's row at one level. Rows hold x, y and z one after the other, `pitch` apart; up to kLanes floats
+/// around them are read and not used.
+struct CellRow {
+    const float* behind; ///< coarse row j - 1 (of use from j = 1)
+    const float* lower;  ///< coarse row j
+    const float* upper;  ///< coarse row j + 1
+    std::size_t pitch;   ///< of the coarse rows
+    std::size_t cells;   ///< a power of two
+    const float* code;   ///< blocks, see block_floats
+    float* even;         ///< fine row 2 j: coarse points and edge points
+    float* odd;          ///< fine row 2 j + 1: edge points and centre points
+    std::size_t fine_pitch;
+};
+
+/// Consecutive points of an edge: each its references, gathered.
+struct EdgeRun {
+    References<Lanes> references;
+    bool both_sides;
+    const float* code;
+    std::size_t count; ///< 1 to kLanes
+};
+
+inline std::size_t block_width(std::size_t cells) { return std::min(cells, kLanes); }
+/// Kinds of frame with a size of their own in a cell: with six references the centre's is none of the edges'.
+inline std::size_t cell_sizes(int references, Law law) { return law == Law::keep ? 0 : references == 6 ? 3 : 2; }
+/// A block of cells in blocks of up to kLanes: v, w, h of the edge points along the row, of those across it and of the
+/// centres, then the sizes.
+inline std::size_t cell_floats(int references, Law law) { return 9 + cell_sizes(references, law); }
+inline std::size_t edge_floats(Law law) { return law == Law::keep ? 3 : 4; }
+
+/// Refines one row of cells. The points on the patch's sides come out as anything; they are set from the edges.
+void refine_row(const CellRow& row, int references, const Scaling& scaling);
+/// Refines points of an edge.
+void refine_edge(const EdgeRun& run, int references, const Scaling& scaling, Point<Lanes>& out);
+/// Interleaves `count` points of a row, each coordinate times `unit`; writes up to 3 kLanes floats past the end.
+void interleave(const float* row, std::size_t pitch, std::size_t count, float unit, float* out);
+/// Copies lines of 64 bytes past the caches; `to` is aligned to them.
+void stream_lines(const float* from, std::size_t lines, float* to);
+/// Makes what this thread streamed visible to those it tells.
+void finish_streaming();
+
+} // namespace filigree::reference
