@@ -1,6 +1,6 @@
 // Based on:
-//   [Ericson 2005] 5.1.2 and 5.1.5 (closest point on a segment and a triangle). We try the plane, then the three edges,
-//   in place of the regions: slower by a little, and right for triangles without an area.
+//   [Ericson 2005] 5.1.2 and 5.1.5 (closest point on a segment and a triangle). We try the plane, then the edges
+//   that the point is beyond, in place of the regions: this is right for triangles without an area as well.
 //   Embree's point queries [Wald 2014]. Embree is told boxes only, in float and in units of the whole box; every
 //   distance that decides is computed here in double, and Embree's radius is kept a little too large.
 #include "filigree/mesh/closest_point.h"
@@ -43,6 +43,7 @@ TrianglePoint closest_on_triangle(const Vec3d& p, const std::array<Vec3d, 3>& co
     const Vec3d ab = corners[1] - corners[0], ac = corners[2] - corners[0], ap = p - corners[0];
     const Vec3d normal = ab.cross(ac);
     const double squared_area = normal.squaredNorm();
+    std::array<bool, 3> beyond = {true, true, true}; // corner k's opposite edge, where nothing better is known
     if (squared_area > kFlat * ab.squaredNorm() * ac.squaredNorm()) {
         const double v = ap.cross(ac).dot(normal), w = ab.cross(ap).dot(normal), u = squared_area - v - w;
         if (u >= 0 && v >= 0 && w >= 0) {
@@ -52,10 +53,12 @@ TrianglePoint closest_on_triangle(const Vec3d& p, const std::array<Vec3d, 3>& co
             result.squared_distance = (p - result.position).squaredNorm();
             return result;
         }
+        beyond = {u < 0, v < 0, w < 0}; // p sees no other edge
     }
     TrianglePoint best;
-    for (int from = 0; from < 3; ++from) {
-        const TrianglePoint candidate = closest_on_edge(p, corners, from, (from + 1) % 3);
+    for (int k = 0; k < 3; ++k) {
+        if (!beyond[k]) continue;
+        const TrianglePoint candidate = closest_on_edge(p, corners, (k + 1) % 3, (k + 2) % 3);
         if (candidate.squared_distance < best.squared_distance) best = candidate;
     }
     return best;

@@ -18,21 +18,22 @@ struct VertexDistance {
     std::vector<float> per_vertex; ///< the distance of each vertex, for heat maps
 };
 
-/// Surface against surface, both ways, through samples: every vertex, and points spread over the faces by area.
+/// Surface against surface, both ways, through samples: every vertex of a face, and points spread over the faces by
+/// area.
 struct SurfaceDistance {
-    double hausdorff = 0; ///< the larger of the two maxima
+    double hausdorff = 0;                       ///< the larger of the two maxima
     double mean_distance = 0, rms_distance = 0; ///< over the samples of both ways
     double max_a_to_b = 0, max_b_to_a = 0;
 };
 
 struct MeshDistance {
-    std::optional<VertexDistance> vertices; ///< when both have the same number of vertices
+    std::optional<VertexDistance> vertices;  ///< when both have the same number of vertices
     std::optional<SurfaceDistance> surfaces; ///< when both have faces
-    double diagonal = 0; ///< of b's box: what fractions are taken of
+    double diagonal = 0;                     ///< of b's box: what fractions are taken of
 };
 
 /// a against b. samples: points spread over each surface besides its vertices (seeded by the context).
-/// Cost O((V + samples) log F). Origins are respected. Cancellable.
+/// Cost O((V + samples) log F). Origins are respected. Errors: cancelled.
 Result<MeshDistance> mesh_distance(const Mesh& a, const Mesh& b, std::size_t samples, const RunContext& context);
 
 } // namespace filigree

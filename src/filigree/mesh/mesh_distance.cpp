@@ -1,0 +1,163 @@
+#include "filigree/mesh/mesh_distance.h"
+
+#include "filigree/core/parallel_for.h"
+#include "filigree/mesh/closest_point.h"
+#include "filigree/mesh/normals.h"
+#include "filigree/mesh/triangulate.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+namespace filigree {
+namespace {
+
+constexpr std::size_t kGrain = 1024;   // queries a piece
+constexpr std::size_t kBatch = 131072; // queries between looks at the cancel flag
+constexpr double kPercentile = 0.95;
+
+/// Smallest value that at least `fraction` of all are not above; values is reordered and not empty.
+double percentile(std::vector<double>& values, double fraction) {
+    const auto rank = static_cast<std::ptrdiff_t>(std::ceil(fraction * double(values.size()))) - 1;
+    const auto place = values.begin() + std::max<std::ptrdiff_t>(rank, 0);
+    std::nth_element(values.begin(), place, values.end());
+    return *place;
+}
+
+double angle_deg(const Vec3d& a, const Vec3d& b) {
+    return std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / std::numbers::pi; // exact near 0, where acos is not
+}
+
+void compare_normals(const Mesh& a, const Mesh& b, const RunContext& context, VertexDistance& result) {
+    const std::vector<Vec3f> normals_a = vertex_normals(a, a.positions, context);
+    const std::vector<Vec3f> normals_b = vertex_normals(b, b.positions, context);
+    std::vector<double> angles;
+    angles.reserve(normals_a.size());
+    for (std::size_t v = 0; v < normals_a.size(); ++v)
+        if (!normals_a[v].isZero(0) && !normals_b[v].isZero(0))
+            angles.push_back(angle_deg(normals_a[v].cast<double>(), normals_b[v].cast<double>()));
+    if (angles.empty()) return;
+    result.normal_mean_deg = std::accumulate(angles.begin(), angles.end(), 0.0) / double(angles.size());
+    result.normal_max_deg = std::ranges::max(angles);
+    result.normal_p95_deg = percentile(angles, kPercentile);
+}
+
+VertexDistance compare_vertices(const Mesh& a, const Mesh& b, const RunContext& context) {
+    VertexDistance result;
+    result.per_vertex.reserve(a.vertex_count());
+    const Vec3d between_origins = a.origin - b.origin; // first: world positions would lose the digits
+    double sum_of_squares = 0;
+    for (std::size_t v = 0; v < a.vertex_count(); ++v) {
+        const Vec3d offset = a.positions[v].cast<double>() - b.positions[v].cast<double>() + between_origins;
+        const double distance = offset.norm();
+        sum_of_squares += offset.squaredNorm();
+        result.per_vertex.push_back(static_cast<float>(distance));
+        if (result.max_vertex == kNoIndex || distance > result.max) {
+            result.max = distance;
+            result.max_vertex = static_cast<Index>(v);
+        }
+    }
+    if (a.vertex_count() > 0) result.rms = std::sqrt(sum_of_squares / double(a.vertex_count()));
+    compare_normals(a, b, context, result);
+    return result;
+}
+
+/// Random numbers by counter, so that each sample has its own whatever thread asks: [Steele 2014], SplitMix64.
+double random_unit(std::uint64_t seed, std::uint64_t counter) {
+    std::uint64_t x = seed * 0xD1342543DE82EF95u + (counter + 1) * 0x9E3779B97F4A7C15u;
+    x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;
+    x = (x ^ (x >> 27)) * 0x94D049BB133111EBu;
+    return double((x ^ (x >> 31)) >> 11) * 0x1p-53;
+}
+
+struct Surface {
+    std::vector<Vec3f> positions;
+    std::vector<Triangle> triangles;
+};
+
+Surface make_surface(const Mesh& mesh, const Vec3d& shift) {
+    Surface surface{mesh.positions, triangulate(mesh).triangles};
+    if (!shift.isZero(0))
+        for (Vec3f& p : surface.positions) p = (p.cast<double>() + shift).cast<float>();
+    return surface;
+}
+
+/// The vertices of faces, then `count` points: one at random in each of as many equal shares of the area.
+std::vector<Vec3f> sample_surface(const Surface& surface, std::size_t count, std::uint64_t seed) {
+    std::vector<std::uint8_t> used(surface.positions.size());
+    for (const Triangle& triangle : surface.triangles)
+        for (const Index vertex : triangle) used[vertex] = 1;
+    std::vector<Vec3f> samples;
+    for (std::size_t v = 0; v < used.size(); ++v)
+        if (used[v]) samples.push_back(surface.positions[v]);
+
+    const auto corner = [&](std::size_t t, std::size_t k) {
+        return Vec3d(surface.positions[surface.triangles[t][k]].cast<double>());
+    };
+    std::vector<double> area_up_to(surface.triangles.size());
+    double total = 0;
+    for (std::size_t t = 0; t < surface.triangles.size(); ++t)
+        area_up_to[t] = total += (corner(t, 1) - corner(t, 0)).cross(corner(t, 2) - corner(t, 0)).norm();
+    if (total == 0) return samples; // no area to spread points over
+    std::size_t t = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        const double area = (double(i) + random_unit(seed, 3 * i)) / double(count) * total;
+        while (t + 1 < area_up_to.size() && area_up_to[t] <= area) ++t;
+        const double r = std::sqrt(random_unit(seed, 3 * i + 1)), s = random_unit(seed, 3 * i + 2);
+        const Vec3d p = (1 - r) * corner(t, 0) + r * (1 - s) * corner(t, 1) + r * s * corner(t, 2);
+        samples.push_back(p.cast<float>());
+    }
+    return samples;
+}
+
+/// The distance of every sample of `from` to `to`; fewer when cancelled.
+std::vector<double> distances(const Surface& from, const Surface& to, std::size_t count, const RunContext& context) {
+    const std::vector<Vec3f> samples = sample_surface(from, count, context.seed);
+    const ClosestPointTree tree(to.positions, to.triangles);
+    std::vector<double> result(samples.size());
+    for (std::size_t done = 0; done < samples.size(); done += kBatch) {
+        if (context.is_cancelled()) return {};
+        context.report("measuring distances", double(done) / double(samples.size()));
+        parallel_for(context, std::min(kBatch, samples.size() - done), kGrain, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = done + begin; i < done + end; ++i) result[i] = tree.closest(samples[i]).distance;
+        });
+    }
+    return result;
+}
+
+SurfaceDistance compare_surfaces(const Mesh& a, const Mesh& b, std::size_t samples, const RunContext& context) {
+    const Surface surface_a = make_surface(a, a.origin - b.origin), surface_b = make_surface(b, Vec3d::Zero());
+    const std::vector<double> there = distances(surface_a, surface_b, samples, context);
+    const std::vector<double> back = distances(surface_b, surface_a, samples, context);
+    SurfaceDistance result;
+    double sum = 0, sum_of_squares = 0;
+    const auto add = [&](const std::vector<double>& way, double& max) {
+        for (const double distance : way) {
+            max = std::max(max, distance);
+            sum += distance;
+            sum_of_squares += distance * distance;
+        }
+    };
+    add(there, result.max_a_to_b);
+    add(back, result.max_b_to_a);
+    const double count = std::max(1.0, double(there.size() + back.size()));
+    result.mean_distance = sum / count;
+    result.rms_distance = std::sqrt(sum_of_squares / count);
+    result.hausdorff = std::max(result.max_a_to_b, result.max_b_to_a);
+    return result;
+}
+
+} // namespace
+
+Result<MeshDistance> mesh_distance(const Mesh& a, const Mesh& b, std::size_t samples, const RunContext& context) {
+    MeshDistance result;
+    result.diagonal = bounds(b.positions).diagonal();
+    if (a.vertex_count() == b.vertex_count()) result.vertices = compare_vertices(a, b, context);
+    if (a.face_count() > 0 && b.face_count() > 0) result.surfaces = compare_surfaces(a, b, samples, context);
+    if (context.is_cancelled()) return cancelled_error();
+    return result;
+}
+
+} // namespace filigree

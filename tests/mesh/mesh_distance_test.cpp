@@ -1,0 +1,132 @@
+#include "filigree/mesh/mesh_distance.h"
+
+#include "filigree/mesh/shapes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <gtest/gtest.h>
+
+namespace filigree {
+namespace {
+
+MeshDistance distance(const Mesh& a, const Mesh& b, std::size_t samples = 1000) {
+    return *mesh_distance(a, b, samples, RunContext(1));
+}
+
+Mesh square(double side, double z) {
+    Mesh mesh = make_wavy_plane({.resolution = 4, .amplitude = 0, .size = side});
+    for (Vec3f& p : mesh.positions) p.z() = float(z);
+    return mesh;
+}
+
+TEST(MeshDistance, ToItselfIsZero) {
+    const Mesh mesh = make_wavy_cube({.resolution = 16});
+    const MeshDistance d = distance(mesh, mesh);
+    EXPECT_EQ(d.vertices->rms, 0);
+    EXPECT_EQ(d.vertices->max, 0);
+    EXPECT_EQ(d.vertices->normal_max_deg, 0);
+    EXPECT_EQ(d.vertices->per_vertex, std::vector<float>(mesh.vertex_count()));
+    EXPECT_LT(d.surfaces->hausdorff, 1e-7); // samples are rounded to float
+    EXPECT_NEAR(d.diagonal, std::sqrt(3), 0.2);
+}
+
+TEST(MeshDistance, OfParallelSquaresInAnyScale) {
+    for (const double scale : {1e-30, 1.0, 1e30}) {
+        const MeshDistance d = distance(square(scale, 0), square(scale, scale / 4));
+        EXPECT_NEAR(d.vertices->rms / scale, 0.25, 1e-7);
+        EXPECT_NEAR(d.vertices->max / scale, 0.25, 1e-7);
+        EXPECT_EQ(d.vertices->normal_max_deg, 0);
+        EXPECT_NEAR(d.surfaces->hausdorff / scale, 0.25, 1e-7);
+        EXPECT_NEAR(d.surfaces->mean_distance / scale, 0.25, 1e-7);
+        EXPECT_NEAR(d.surfaces->rms_distance / scale, 0.25, 1e-7);
+        EXPECT_NEAR(d.diagonal / scale, std::sqrt(2), 1e-6);
+    }
+}
+
+TEST(MeshDistance, IsNotTheSameBothWays) {
+    const MeshDistance d = distance(square(1, 0), square(3, 0)); // the small one lies in the large one
+    EXPECT_LT(d.surfaces->max_a_to_b, 1e-7);
+    EXPECT_NEAR(d.surfaces->max_b_to_a, std::sqrt(2), 1e-6); // corner to corner
+    EXPECT_EQ(d.surfaces->hausdorff, d.surfaces->max_b_to_a);
+}
+
+TEST(MeshDistance, OfSamplesConvergesToTheIntegral) {
+    // a square turned about one side by the angle of 3-4-5: what is t from that side is 3/5 t from the other square,
+    // both ways, since every foot lies within
+    const Mesh flat = square(2, 0);
+    Mesh turned = flat;
+    for (Vec3f& p : turned.positions) p = Vec3f(0.8f * (p.x() + 1) - 1, p.y(), 0.6f * (p.x() + 1));
+    const MeshDistance d = distance(turned, flat, 100000);
+    EXPECT_NEAR(d.surfaces->max_a_to_b, 1.2, 1e-6);
+    EXPECT_NEAR(d.surfaces->max_b_to_a, 1.2, 1e-6);
+    EXPECT_NEAR(d.surfaces->mean_distance, 0.6, 1e-3);
+    EXPECT_NEAR(d.surfaces->rms_distance, 1.2 / std::sqrt(3), 1e-3);
+    EXPECT_NEAR(d.vertices->normal_mean_deg, 36.8698976, 1e-5);
+    EXPECT_NEAR(d.vertices->normal_p95_deg, 36.8698976, 1e-5);
+}
+
+TEST(MeshDistance, PercentileAndWorstVertex) {
+    Mesh a = square(1, 0);
+    Mesh b = a;
+    b.positions[7].z() += 0.5f;
+    b.positions[9].z() -= 0.25f;
+    const VertexDistance d = *distance(a, b).vertices;
+    EXPECT_EQ(d.max, 0.5);
+    EXPECT_EQ(d.max_vertex, 7u);
+    EXPECT_EQ(d.per_vertex[9], 0.25f);
+    EXPECT_NEAR(d.rms, std::sqrt((0.25 + 0.0625) / 25), 1e-12);
+    EXPECT_GE(d.normal_max_deg, d.normal_p95_deg);
+    EXPECT_GT(d.normal_p95_deg, d.normal_mean_deg);
+}
+
+TEST(MeshDistance, RespectsOrigins) {
+    Mesh a = make_wavy_sphere({.resolution = 8}), b = a;
+    a.origin = Vec3d(500000, 4000000, 100);
+    b.origin = a.origin + Vec3d(0.001, 0, 0);
+    EXPECT_NEAR(distance(a, b).vertices->max, 0.001, 1e-9);
+    EXPECT_NEAR(distance(a, b).vertices->rms, 0.001, 1e-9);
+    EXPECT_NEAR(distance(a, b).surfaces->hausdorff, 0.001, 1e-5);
+    // the same place said in two ways
+    b.origin = a.origin + Vec3d(2, 0, 0);
+    for (Vec3f& p : b.positions) p.x() -= 2;
+    EXPECT_LT(distance(a, b).vertices->max, 1e-6);
+    EXPECT_LT(distance(a, b).surfaces->hausdorff, 1e-6);
+}
+
+TEST(MeshDistance, LeavesOutWhatDoesNotApply) {
+    const Mesh sphere = make_wavy_sphere({.resolution = 4}), finer = make_wavy_sphere({.resolution = 8});
+    EXPECT_FALSE(distance(sphere, finer).vertices);
+    EXPECT_TRUE(distance(sphere, finer).surfaces);
+    Mesh points;
+    points.positions = {{0, 0, 0}, {3, 4, 0}};
+    EXPECT_FALSE(distance(points, sphere).surfaces);
+    EXPECT_EQ(distance(points, points).vertices->normal_max_deg, 0);
+    EXPECT_EQ(distance(Mesh{}, Mesh{}).vertices->rms, 0);
+    EXPECT_EQ(distance(Mesh{}, Mesh{}).vertices->max_vertex, kNoIndex);
+    EXPECT_EQ(distance(Mesh{}, sphere).diagonal, distance(sphere, sphere).diagonal);
+    Mesh collapsed = sphere; // faces, but no area
+    for (Vec3f& p : collapsed.positions) p.setZero();
+    EXPECT_NEAR(distance(collapsed, sphere).surfaces->max_b_to_a, 0.52, 0.02);
+}
+
+TEST(MeshDistance, IsSeededAndIndependentOfThreads) {
+    const Mesh a = make_wavy_cube({.resolution = 24}), b = make_wavy_sphere({.resolution = 24});
+    const auto mean = [&](unsigned threads, std::uint64_t seed) {
+        RunContext context(threads);
+        context.seed = seed;
+        return mesh_distance(a, b, 5000, context)->surfaces->mean_distance;
+    };
+    EXPECT_EQ(mean(1, 1), mean(2, 1));
+    EXPECT_NE(mean(1, 1), mean(1, 2));
+    EXPECT_NEAR(mean(1, 1), mean(1, 2), 1e-3);
+}
+
+TEST(MeshDistance, CanBeCancelled) {
+    const Mesh mesh = make_wavy_cube({.resolution = 8});
+    const RunContext context(1);
+    context.cancel();
+    EXPECT_EQ(mesh_distance(mesh, mesh, 100, context).error().code, ErrorCode::cancelled);
+}
+
+} // namespace
+} // namespace filigree
