@@ -11,20 +11,11 @@ namespace {
 
 constexpr float kWeightStep = 1.0f / 32767.0f; // of an int16 weight
 
-/// Weights of the cell's corners; the fourth is zero in triangles.
-std::array<double, 4> corner_weights(const std::array<Index, 4>& cell, double u, double v) {
-    if (cell[3] == kNoIndex) return {1 - u - v, u, v, 0};
-    return {(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v};
-}
-
 /// m: the point of the cell that a record hangs on.
-Vec3d anchor(const std::array<Index, 4>& cell, double u, double v, std::span<const Vec3f> positions,
+Vec3d anchor(const Triangle& cell, double u, double v, std::span<const Vec3f> positions,
              std::span<const Index> driver) {
-    const std::array<double, 4> weights = corner_weights(cell, u, v);
-    Vec3d m = Vec3d::Zero();
-    for (int k = 0; k < 4; ++k)
-        if (cell[k] != kNoIndex) m += weights[k] * positions[driver[cell[k]]].cast<double>();
-    return m;
+    return (1 - u - v) * positions[driver[cell[0]]].cast<double>() + u * positions[driver[cell[1]]].cast<double>() +
+           v * positions[driver[cell[2]]].cast<double>();
 }
 
 float round_weight(float w) { return std::round(w * 32767.0f) * kWeightStep; }
@@ -54,7 +45,7 @@ void quantise_offsets(BlendDetail& detail, std::span<const Vec3f> positions, std
 } // namespace
 
 BlendDetail encode_blend(std::span<const Vec3f> positions, std::span<const Index> driver,
-                         std::vector<std::array<Index, 4>> cells, const Binding& binding, Precision precision) {
+                         std::vector<Triangle> cells, const Binding& binding, Precision precision) {
     BlendDetail detail;
     detail.cells = std::move(cells);
     detail.precision = precision;
@@ -125,7 +116,6 @@ BlendRestorer::BlendRestorer(const BlendDetail& detail, std::span<const Vec3f> p
     const bool int16 = detail.precision == Precision::int16;
     records.count = items.size();
     records.cells = detail.cells;
-    for (const auto& cell : detail.cells) records.has_quads |= cell[3] != kNoIndex;
     const std::size_t padded = items.size() + blend_kernel::kPadding;
     if (int16) {
         records.u16.assign(padded, 0);
@@ -142,7 +132,7 @@ BlendRestorer::BlendRestorer(const BlendDetail& detail, std::span<const Vec3f> p
     records.slot.reserve(items.size());
 
     for (Index c = 0; c < detail.cells.size(); ++c) {
-        const auto& cell = detail.cells[c];
+        const Triangle& cell = detail.cells[c];
         for (Index r = detail.cell_offsets[c]; r < detail.cell_offsets[c + 1]; ++r) {
             const Index vertex = detail.order[r];
             for (Index i = first_item[vertex]; i != kNoIndex; i = next_item[i]) {

@@ -21,9 +21,8 @@ enum class Precision { float32, int16 };
 
 /// Records in the order of their cells, so that restoring gathers nothing. Record r is vertex order[r] of the mesh.
 struct BlendDetail {
-    /// Driver vertices (positions in the driver level's list) of each cell: a triangle, with kNoIndex as the fourth, or
-    /// a quad with bilinear weights (1-u)(1-v), u(1-v), uv, (1-u)v.
-    std::vector<std::array<Index, 4>> cells;
+    /// Three driver vertices each (positions in the driver level's list), with the weights 1 - u - v, u and v.
+    std::vector<Triangle> cells;
     std::vector<Index> cell_offsets = {0}; ///< records of cell c: cell_offsets[c] .. cell_offsets[c + 1] - 1
     std::vector<Index> order;              ///< a permutation of the mesh's vertices
     std::vector<float> u, v;               ///< weights of each record; multiples of 1/32767 for int16
@@ -37,7 +36,7 @@ struct BlendDetail {
 /// Sorts bonds into records; for int16 rounds the weights first, then the offsets from them, so that rounding the
 /// weights costs nothing. positions: the mesh's; driver: the driver's vertex ids. Cost O(V).
 BlendDetail encode_blend(std::span<const Vec3f> positions, std::span<const Index> driver,
-                         std::vector<std::array<Index, 4>> cells, const Binding& binding, Precision precision);
+                         std::vector<Triangle> cells, const Binding& binding, Precision precision);
 
 /// The positions an int16 detail decodes to at rest: those of the driver are given, the rest is written. Cost O(V).
 void decode_rest(const BlendDetail& detail, std::span<const Index> driver, std::span<Vec3f> positions);

@@ -71,46 +71,33 @@ private:
     }
 };
 
-/// The cell's transforms as a polynomial in (u, v): rows of base + u du + v dv + u v duv.
+/// The cell's transforms as a polynomial in (u, v): rows of base + u du + v dv.
 struct alignas(64) CellTransform {
-    float base[16], du[16], dv[16], duv[16];
+    float base[16], du[16], dv[16];
 };
 
 constexpr int kA = 3, kHalfRest = 12; // offsets in a VertexTransform
 
-template <bool Quads>
-FILIGREE_INLINE void set_cell(CellTransform& cell, const std::array<Index, 4>& corners,
-                              const VertexTransform* transforms) {
+FILIGREE_INLINE void set_cell(CellTransform& cell, const Triangle& corners, const VertexTransform* transforms) {
     const float* t0 = transforms[corners[0]].t;
     const float* t1 = transforms[corners[1]].t;
     const float* t2 = transforms[corners[2]].t;
-    if (Quads && corners[3] != kNoIndex) {
-        const float* t3 = transforms[corners[3]].t;
-        for (int k = 0; k < 16; ++k) {
-            cell.base[k] = t0[k];
-            cell.du[k] = t1[k] - t0[k];
-            cell.dv[k] = t3[k] - t0[k];
-            cell.duv[k] = (t2[k] - t1[k]) - (t3[k] - t0[k]);
-        }
-        return;
-    }
     for (int k = 0; k < 16; ++k) {
         cell.base[k] = t0[k];
         cell.du[k] = t1[k] - t0[k];
         cell.dv[k] = t2[k] - t0[k];
-        if (Quads) cell.duv[k] = 0;
     }
 }
 
 /// Restores the records of one run; writes whole groups of N, so up to N - 1 points past the run's end.
-template <int N, bool Quads, bool Int16, bool Positions, bool Normals>
+template <int N, bool Int16, bool Positions, bool Normals>
 FILIGREE_INLINE void restore_run(const Records& records, const Run& run, const CellTransform& cell, float* positions,
                                  float* normals) {
     using L = Lanes<N>;
     using Float = typename L::Float;
     for (Index k = 0; k < run.count; k += N) {
         const std::size_t r = std::size_t{run.first} + k;
-        Float u, v, uv{};
+        Float u, v;
         if constexpr (Int16) {
             u = L::load(&records.u16[r]) * (1.0f / 32767.0f);
             v = L::load(&records.v16[r]) * (1.0f / 32767.0f);
@@ -118,11 +105,8 @@ FILIGREE_INLINE void restore_run(const Records& records, const Run& run, const C
             u = L::load(&records.u[r]);
             v = L::load(&records.v[r]);
         }
-        if constexpr (Quads) uv = u * v;
         const auto blend = [&](int row) __attribute__((always_inline)) {
-            Float x = cell.base[row] + u * cell.du[row] + v * cell.dv[row];
-            if constexpr (Quads) x += uv * cell.duv[row];
-            return x;
+            return cell.base[row] + u * cell.du[row] + v * cell.dv[row];
         };
         Float a[9];
         for (int i = 0; i < 9; ++i) a[i] = blend(kA + i);
@@ -190,7 +174,7 @@ FILIGREE_INLINE void flush(const Job& job, Vec3f* to, float* buffer, std::size_t
         std::memcpy(to[first].data(), buffer, 3 * count * sizeof(float));
 }
 
-template <int N, bool Quads, bool Int16, bool Positions, bool Normals>
+template <int N, bool Int16, bool Positions, bool Normals>
 FILIGREE_INLINE void restore_runs(const Job& job, std::size_t run_begin, std::size_t run_end) {
     alignas(64) float positions[3 * (kBuffer + 16)];
     alignas(64) float normals[3 * (kBuffer + 16)];
@@ -205,32 +189,26 @@ FILIGREE_INLINE void restore_runs(const Job& job, std::size_t run_begin, std::si
             if (r == run_end) return;
         }
         const Run& run = job.records.runs[r];
-        set_cell<Quads>(cell, job.records.cells[run.cell], job.transforms);
-        restore_run<N, Quads, Int16, Positions, Normals>(job.records, run, cell, positions + 3 * filled,
+        set_cell(cell, job.records.cells[run.cell], job.transforms);
+        restore_run<N, Int16, Positions, Normals>(job.records, run, cell, positions + 3 * filled,
                                                          normals + 3 * filled);
         filled += run.count;
     }
 }
 
-template <int N, bool Quads, bool Int16>
+template <int N, bool Int16>
 FILIGREE_INLINE void restore_chosen(const Job& job, std::size_t begin, std::size_t end) {
     if (job.output.positions && job.output.normals)
-        restore_runs<N, Quads, Int16, true, true>(job, begin, end);
+        restore_runs<N, Int16, true, true>(job, begin, end);
     else if (job.output.positions)
-        restore_runs<N, Quads, Int16, true, false>(job, begin, end);
+        restore_runs<N, Int16, true, false>(job, begin, end);
     else
-        restore_runs<N, Quads, Int16, false, true>(job, begin, end);
+        restore_runs<N, Int16, false, true>(job, begin, end);
 }
 
 template <int N>
 FILIGREE_INLINE void restore_width(const Job& job, std::size_t begin, std::size_t end) {
-    const Records& records = job.records;
-    if (records.has_quads)
-        records.is_int16() ? restore_chosen<N, true, true>(job, begin, end)
-                           : restore_chosen<N, true, false>(job, begin, end);
-    else
-        records.is_int16() ? restore_chosen<N, false, true>(job, begin, end)
-                           : restore_chosen<N, false, false>(job, begin, end);
+    job.records.is_int16() ? restore_chosen<N, true>(job, begin, end) : restore_chosen<N, false>(job, begin, end);
 }
 
 using RestoreFunction = void (*)(const Job&, std::size_t, std::size_t);

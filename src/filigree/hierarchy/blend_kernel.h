@@ -2,7 +2,7 @@
 #pragma once
 
 #include "filigree/core/run_context.h"
-#include "filigree/core/types.h"
+#include "filigree/mesh/mesh.h"
 
 namespace filigree::blend_kernel {
 
@@ -27,8 +27,7 @@ inline constexpr std::size_t kPadding = 16;
 /// Everything about the records that does not change from pose to pose. Per record either q or offset is filled.
 struct Records {
     std::vector<Run> runs;
-    std::vector<std::array<Index, 4>> cells; ///< driver vertices; the fourth is kNoIndex in triangles
-    bool has_quads = false;
+    std::vector<Triangle> cells; ///< of driver vertices
     std::vector<float> u, v;                                   ///< float records
     std::vector<float> q[3];                                   ///< float records: p - m / 2
     std::vector<std::int16_t> u16, v16;                        ///< int16 records: 32767 is 1

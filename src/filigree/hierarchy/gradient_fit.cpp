@@ -18,6 +18,7 @@ constexpr double kQuadraticRidge = 1e-4; // times the neighbour count, in units 
 constexpr double kLinearRidge = 1e-9;    // the same; keeps degenerate rings solvable
 constexpr double kSoftNormal = 0.003;    // the same; pull of the z column towards s n'
 constexpr double kHardNormal = 1e4;      // the same; z column as good as given
+constexpr double kGhostLength = 0.1;     // of a ghost point's distance, in mean edge lengths: short, to see the gradient here
 constexpr std::size_t kMaxRing = 48;     // neighbours a fit uses at most: more add cost, no accuracy
 
 using Row6 = Eigen::Matrix<double, 6, 1>;
@@ -204,7 +205,7 @@ void GradientFit::make_shell(std::span<Mat3f> gradients, Law law) const {
 std::vector<Vec3f> GradientFit::rest_ghosts() const {
     std::vector<Vec3f> ghosts = driver_.positions;
     for (std::size_t i = 0; i < ghosts.size(); ++i)
-        ghosts[i] += (edge_lengths_[i] * normals_[i].cast<double>().normalized()).cast<float>();
+        ghosts[i] += (kGhostLength * edge_lengths_[i] * normals_[i].cast<double>().normalized()).cast<float>();
     return ghosts;
 }
 

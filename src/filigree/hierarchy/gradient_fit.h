@@ -32,7 +32,7 @@ public:
     /// Replaces the normal column of given gradients by s n', n' and s from the gradients themselves.
     void make_shell(std::span<Mat3f> gradients, Law law) const;
 
-    /// The points off the surface, one mean edge length along each vertex's normal (at the vertex where it has none).
+    /// The points off the surface, a tenth of the mean edge along each vertex's normal (at the vertex where it has none).
     std::vector<Vec3f> rest_ghosts() const;
 
 private:

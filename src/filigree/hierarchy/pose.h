@@ -10,8 +10,7 @@ namespace filigree {
 struct Pose {
     std::vector<Vec3f> positions;
     std::vector<Mat3f> gradients; ///< empty or one a driver vertex
-    /// Empty or one a driver vertex: where the point one driver-edge length off the surface went, that is
-    /// rest position + ghost_offset (BlendDetail::ghost_offset) times the rest normal.
+    /// Empty or one a driver vertex: where the points off the surface went that Restorer::rest_ghosts gives.
     std::vector<Vec3f> ghosts;
 };
 

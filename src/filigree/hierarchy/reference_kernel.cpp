@@ -5,7 +5,7 @@
 #include <utility>
 
 #if defined(__x86_64__)
-#include <emmintrin.h>
+#include <immintrin.h>
 #endif
 #if defined(__x86_64__) && !defined(__clang__) // Clang 14 refuses vectors as arguments here, inlined or not
 // The loader picks the widest one that the processor has.
@@ -38,12 +38,16 @@ FILIGREE_INLINE void store_zipped(const Point<Lanes>& a, const Point<Lanes>& b, 
     store_zipped(a.z, b.z, to + 2 * pitch);
 }
 
+// Floats ahead that records are asked for: they come from memory once and in order.
+constexpr std::size_t kPrefetch = 1024;
+
 template <int kReferences>
 FILIGREE_INLINE void refine_row_of(const CellRow& row, const Scaling scaling) {
     const std::size_t width = block_width(row.cells);
     const std::size_t floats = cell_floats(kReferences, scaling.law) * width;
     const float* code = row.code;
     for (std::size_t i = 0; i < row.cells; i += width, code += floats) {
+        for (std::size_t line = 0; line < 12; ++line) __builtin_prefetch(code + kPrefetch + line * kLanes);
         const auto record = [&](std::size_t k) { return load(code + 3 * k * width, width); };
         const auto size = [&](std::size_t k) {
             return scaling.law == Law::keep ? Lanes{} : load(code + (9 + k) * width);
@@ -101,8 +105,17 @@ FILIGREE_CLONES void interleave(const float* row, std::size_t pitch, std::size_t
     }
 }
 
+#if defined(__x86_64__)
+__attribute__((target("avx512f"))) static void stream_lines_avx512(const float* from, std::size_t lines, float* to) {
+    for (std::size_t line = 0; line < lines; ++line)
+        _mm512_stream_ps(to + kLanes * line, _mm512_loadu_ps(from + kLanes * line));
+}
+#endif
+
 void stream_lines(const float* from, std::size_t lines, float* to) {
 #if defined(__x86_64__)
+    static const bool has_avx512 = __builtin_cpu_supports("avx512f");
+    if (has_avx512) return stream_lines_avx512(from, lines, to);
     for (std::size_t quarter = 0; quarter < 4 * lines; ++quarter)
         _mm_stream_ps(to + 4 * quarter, _mm_loadu_ps(from + 4 * quarter));
 #else

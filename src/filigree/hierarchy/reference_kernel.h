@@ -56,25 +56,25 @@ inline constexpr float kHugeRatio = 1e30f;
 template <class F>
 FILIGREE_INLINE F at_least(F a, float low) {
     const F bound = F{} + low;
-    return a < bound ? bound : a;
+    return bound > a ? bound : a;
 }
 template <class F>
 FILIGREE_INLINE F at_most(F a, float high) {
     const F bound = F{} + high;
-    return a > bound ? bound : a;
+    return bound < a ? bound : a;
 }
 
-/// 1 / sqrt(max(a, kTinySquare)) to float's precision: a guess from the bits and three Newton steps. Plain arithmetic
-/// instead of an instruction, since those are not the same everywhere.
+/// 1 / sqrt(max(a, kTinySquare)) to float's precision: a guess from the bits, 3.5 % off at most, then a cubic and a
+/// quadratic step. Plain arithmetic instead of an instruction, since those are not the same everywhere.
 template <class F>
 FILIGREE_INLINE F inverse_sqrt(F a) {
     using Int = std::conditional_t<sizeof(F) == sizeof(float), std::int32_t, IntLanes>;
     a = at_least(a, kTinySquare);
     F y = std::bit_cast<F>(0x5f375a86 - (std::bit_cast<Int>(a) >> 1));
-    const F half = 0.5f * a;
-    y = y * (1.5f - half * y * y);
-    y = y * (1.5f - half * y * y);
-    return y * (1.5f - half * y * y);
+    F t = a * y * y;
+    y = y * (1.875f - t * (1.25f - 0.375f * t));
+    t = a * y * y;
+    return y * (1.5f - 0.5f * t);
 }
 
 /// The reference points of an edge point: the ends of its coarse edge, beyond them the far corners of the quad on its

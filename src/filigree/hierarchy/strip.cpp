@@ -121,7 +121,7 @@ std::vector<Level> simplify_levels(const WorkingMesh& work, const StripOptions& 
         Simplified simplified = simplify(work.positions, current, simplify_options);
         const bool stuck = simplified.triangles.size() == current.size();
         report.simplify_error += simplified.error;
-        report.clustered |= simplified.clustered;
+        report.forced_collapses += simplified.forced;
         current = std::move(simplified.triangles);
         if (stuck && !levels.empty()) continue; // a level that removes nothing is none
         levels.insert(levels.begin(), make_level(current, work.positions.size()));
@@ -131,7 +131,7 @@ std::vector<Level> simplify_levels(const WorkingMesh& work, const StripOptions& 
 
 /// The driver's cells over its own vertices, and as triangles over the mesh's.
 struct Cells {
-    std::vector<std::array<Index, 4>> local;
+    std::vector<Triangle> local;
     std::vector<Triangle> global;
 };
 
@@ -139,11 +139,11 @@ Cells make_cells(const Level& driver) {
     Cells cells;
     for (std::size_t f = 0; f < driver.face_count(); ++f) {
         const Index* c = &driver.corners[driver.face_offsets[f]];
-        cells.local.push_back({c[0], c[1], c[2], kNoIndex});
+        cells.local.push_back({c[0], c[1], c[2]});
     }
     if (cells.local.empty()) // points: each is a cell of its own
-        for (Index i = 0; i < driver.vertices.size(); ++i) cells.local.push_back({i, i, i, kNoIndex});
-    for (const auto& cell : cells.local)
+        for (Index i = 0; i < driver.vertices.size(); ++i) cells.local.push_back({i, i, i});
+    for (const Triangle& cell : cells.local)
         cells.global.push_back({driver.vertices[cell[0]], driver.vertices[cell[1]], driver.vertices[cell[2]]});
     return cells;
 }

@@ -22,7 +22,7 @@ struct StripReport {
     std::size_t welded_vertices = 0;      ///< vertices at the place of an earlier one
     std::size_t across_gap = 0;           ///< see Binding
     std::size_t facing_away = 0;
-    bool clustered = false;               ///< see Simplified
+    std::size_t forced_collapses = 0;     ///< see Simplified
     double simplify_error = 0;            ///< fraction of the diagonal; summed over the levels
     double simplify_seconds = 0, bind_seconds = 0, encode_seconds = 0;
 };

@@ -1,0 +1,263 @@
+// Based on: quadric error metrics [Garland 1997], half-edge form. Where we differ: quadrics are weighted by area, and
+// nothing is forbidden, only priced, so that every mesh can be brought to any count.
+#include "filigree/hierarchy/edge_collapse.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <queue>
+#include <unordered_map>
+
+namespace filigree {
+
+namespace {
+
+constexpr double kBorderWeight = 1;    // of the planes that stand on open edges, so that outlines keep their shape
+constexpr double kLengthWeight = 0.02; // of (edge length)^2 x area: spreads vertices evenly; 0.001 and 0.1 restore 1.3 to 2 times worse
+constexpr double kMinCosine = 0.2;     // a triangle that turns further than this in a collapse counts as turned over
+
+/// Sum of area x (distance to a plane)^2, about the mesh's centre.
+struct Quadric {
+    Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
+    Vec3d b = Vec3d::Zero();
+    double c = 0, area = 0;
+
+    void add_plane(const Vec3d& unit_normal, const Vec3d& point, double weight) {
+        const double d = -unit_normal.dot(point);
+        a += weight * unit_normal * unit_normal.transpose();
+        b += weight * d * unit_normal;
+        c += weight * d * d;
+    }
+    Quadric& operator+=(const Quadric& other) {
+        a += other.a;
+        b += other.b;
+        c += other.c;
+        area += other.area;
+        return *this;
+    }
+    double at(const Vec3d& p) const { return std::max(0.0, p.dot(a * p) + 2 * b.dot(p) + c); }
+};
+
+struct Collapse {
+    double cost;
+    Index from, to;
+    Index stamp; ///< of both ends together when it was priced; older entries are void
+    bool forced;
+
+    bool operator>(const Collapse& other) const {
+        if (cost != other.cost) return cost > other.cost;
+        return from != other.from ? from > other.from : to > other.to;
+    }
+};
+
+class Collapser {
+public:
+    Collapser(std::span<const Vec3f> positions, std::span<const Triangle> triangles) {
+        std::vector<Index> local(positions.size(), kNoIndex);
+        for (const Triangle& t : triangles)
+            for (Index v : t) local[v] = 0;
+        Vec3d centre = Vec3d::Zero();
+        for (Index v = 0; v < positions.size(); ++v)
+            if (local[v] == 0) {
+                local[v] = static_cast<Index>(points_.size());
+                points_.push_back(positions[v].cast<double>());
+                source_.push_back(v);
+                centre += points_.back();
+            }
+        for (Vec3d& p : points_) p -= centre / double(std::max<std::size_t>(points_.size(), 1));
+        for (const Triangle& t : triangles) triangles_.push_back({local[t[0]], local[t[1]], local[t[2]]});
+        around_.resize(points_.size());
+        for (Index t = 0; t < triangles_.size(); ++t)
+            for (Index v : triangles_[t]) around_[v].push_back(t);
+        stamp_.assign(points_.size(), 0);
+        vertex_count_ = points_.size();
+        make_quadrics();
+    }
+
+    void run(std::size_t target, std::optional<double> max_error) {
+        for (Index v = 0; v < points_.size(); ++v) {
+            const std::vector<Index> neighbours = neighbours_of(v);
+            for (Index w : neighbours) price(v, w);
+        }
+        while (vertex_count_ > target && !queue_.empty()) {
+            const Collapse next = queue_.top();
+            queue_.pop();
+            if (next.stamp != stamp_[next.from] + stamp_[next.to]) continue;
+            if (!next.forced && !is_clean(next.from, next.to)) {
+                queue_.push({next.cost + loss(next.from, next.to), next.from, next.to, next.stamp, true});
+                continue;
+            }
+            const double area = quadrics_[next.from].area + quadrics_[next.to].area;
+            const double distance = area > 0 ? std::sqrt(next.cost / area) : 0;
+            if (max_error && distance > *max_error) break;
+            error_ = std::max(error_, distance);
+            forced_ += next.forced;
+            apply(next.from, next.to);
+        }
+    }
+
+    EdgeCollapseResult result() const {
+        EdgeCollapseResult result;
+        for (const Triangle& t : triangles_)
+            if (t[0] != kNoIndex) result.triangles.push_back({source_[t[0]], source_[t[1]], source_[t[2]]});
+        result.vertex_count = vertex_count_;
+        result.error = error_;
+        result.forced = forced_;
+        return result;
+    }
+
+private:
+    Vec3d normal(const Triangle& t) const { // twice the area long
+        return (points_[t[1]] - points_[t[0]]).cross(points_[t[2]] - points_[t[0]]);
+    }
+
+    void make_quadrics() {
+        quadrics_.resize(points_.size());
+        std::unordered_map<std::uint64_t, std::pair<int, Index>> edges; // uses, and the last triangle
+        edges.reserve(triangles_.size() * 2);
+        for (Index t = 0; t < triangles_.size(); ++t) {
+            const Vec3d n = normal(triangles_[t]);
+            const double area = 0.5 * n.norm();
+            for (int k = 0; k < 3; ++k) {
+                Quadric& quadric = quadrics_[triangles_[t][k]];
+                if (area > 0) quadric.add_plane(n.normalized(), points_[triangles_[t][k]], area / 3);
+                quadric.area += area / 3;
+                auto& edge = edges[edge_key(triangles_[t][k], triangles_[t][(k + 1) % 3])];
+                ++edge.first;
+                edge.second = t;
+            }
+        }
+        // Around every vertex the triangles are walked in order, so that sums do not depend on the map's.
+        for (Index t = 0; t < triangles_.size(); ++t)
+            for (int k = 0; k < 3; ++k) {
+                const Index a = triangles_[t][k], b = triangles_[t][(k + 1) % 3];
+                const auto& [uses, last] = edges[edge_key(a, b)];
+                if (uses == 2) continue;
+                const Vec3d along = points_[b] - points_[a];
+                const Vec3d side = along.cross(normal(triangles_[t]));
+                if (side.squaredNorm() == 0) continue;
+                for (Index v : {a, b})
+                    quadrics_[v].add_plane(side.normalized(), points_[a], kBorderWeight * along.squaredNorm() / 2);
+            }
+    }
+
+    static std::uint64_t edge_key(Index a, Index b) { return std::uint64_t{std::min(a, b)} << 32 | std::max(a, b); }
+
+    std::vector<Index> neighbours_of(Index v) const {
+        std::vector<Index> neighbours;
+        for (Index t : around_[v])
+            for (Index w : triangles_[t])
+                if (w != v) neighbours.push_back(w);
+        std::sort(neighbours.begin(), neighbours.end());
+        neighbours.erase(std::unique(neighbours.begin(), neighbours.end()), neighbours.end());
+        return neighbours;
+    }
+
+    void price(Index from, Index to) {
+        const double along = (points_[to] - points_[from]).squaredNorm();
+        const double cost = quadrics_[from].at(points_[to]) + quadrics_[to].at(points_[to]) +
+                            kLengthWeight * along * quadrics_[from].area;
+        queue_.push({cost, from, to, stamp_[from] + stamp_[to], false});
+    }
+
+    /// What a collapse that is not clean is taken to lose: everything around `from`, moved by the edge's length.
+    double loss(Index from, Index to) const {
+        return (points_[to] - points_[from]).squaredNorm() * quadrics_[from].area;
+    }
+
+    static bool has(const Triangle& t, Index v) { return t[0] == v || t[1] == v || t[2] == v; }
+
+    /// No triangle turns over, and the two ends have no common neighbour but those of the triangles between them.
+    bool is_clean(Index from, Index to) const {
+        std::size_t shared = 0;
+        for (Index t : around_[from]) {
+            Triangle moved = triangles_[t];
+            if (has(moved, to)) {
+                ++shared;
+                continue;
+            }
+            const Vec3d before = normal(moved);
+            std::replace(moved.begin(), moved.end(), from, to);
+            const Vec3d after = normal(moved);
+            if (after.dot(before) <= kMinCosine * after.norm() * before.norm()) return false;
+        }
+        const std::vector<Index> a = neighbours_of(from), b = neighbours_of(to);
+        std::vector<Index> common;
+        std::set_intersection(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(common));
+        return common.size() <= shared && around_[from].size() > shared;
+    }
+
+    void remove(Index triangle) {
+        for (Index v : triangles_[triangle]) {
+            std::erase(around_[v], triangle);
+            vertex_count_ -= around_[v].empty();
+        }
+        triangles_[triangle] = {kNoIndex, kNoIndex, kNoIndex};
+    }
+
+    void apply(Index from, Index to) {
+        const std::vector<Index> ring = around_[from];
+        for (Index t : ring)
+            if (has(triangles_[t], to)) remove(t);
+        for (Index t : std::vector<Index>(around_[from])) {
+            std::replace(triangles_[t].begin(), triangles_[t].end(), from, to);
+            around_[to].push_back(t);
+        }
+        vertex_count_ -= !around_[from].empty();
+        around_[from].clear();
+        quadrics_[to] += quadrics_[from];
+        remove_folded(to);
+        ++stamp_[from];
+        ++stamp_[to];
+        for (Index w : neighbours_of(to)) {
+            price(to, w);
+            price(w, to);
+        }
+    }
+
+    /// Triangles over the same three vertices: one is kept when they face the same way, none when they are back to back.
+    void remove_folded(Index v) {
+        const auto key = [&](Index t) {
+            std::array<Index, 3> k = triangles_[t];
+            std::sort(k.begin(), k.end());
+            return k;
+        };
+        std::vector<Index> ring = around_[v];
+        std::sort(ring.begin(), ring.end(), [&](Index s, Index t) {
+            const auto a = key(s), b = key(t);
+            return a != b ? a < b : s < t;
+        });
+        for (std::size_t i = 0; i + 1 < ring.size();) {
+            if (key(ring[i]) != key(ring[i + 1])) {
+                ++i;
+                continue;
+            }
+            const bool back_to_back = normal(triangles_[ring[i]]).dot(normal(triangles_[ring[i + 1]])) < 0;
+            remove(ring[i + 1]);
+            if (back_to_back) remove(ring[i]);
+            ring.erase(ring.begin() + std::ptrdiff_t(i + 1));
+            if (back_to_back) ring.erase(ring.begin() + std::ptrdiff_t(i));
+        }
+    }
+
+    std::vector<Vec3d> points_;
+    std::vector<Index> source_;
+    std::vector<Triangle> triangles_; ///< removed: kNoIndex
+    std::vector<std::vector<Index>> around_;
+    std::vector<Quadric> quadrics_;
+    std::vector<Index> stamp_;
+    std::priority_queue<Collapse, std::vector<Collapse>, std::greater<>> queue_;
+    std::size_t vertex_count_ = 0, forced_ = 0;
+    double error_ = 0;
+};
+
+} // namespace
+
+EdgeCollapseResult collapse_edges(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
+                                  std::size_t target_vertices, std::optional<double> max_error) {
+    Collapser collapser(positions, triangles);
+    collapser.run(target_vertices, max_error);
+    return collapser.result();
+}
+
+} // namespace filigree
