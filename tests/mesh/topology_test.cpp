@@ -68,6 +68,12 @@ TEST(Topology, MeasuresInWorldCoordinatesAtEveryScale) {
     }
 }
 
+TEST(Topology, VolumeOfAnOpenMeshIsThatOfTheConeFromTheOrigin) {
+    Mesh mesh = make_wavy_plane({.resolution = 2, .amplitude = 0, .size = 2});
+    mesh.origin = Vec3d(10, 20, 3);
+    EXPECT_NEAR(analyse(mesh).volume, 4.0 * 3 / 3, 1e-12); // a pyramid
+}
+
 TEST(Topology, FindsOpenAndNonmanifoldEdges) {
     // three triangles around the edge 0-1
     const TopologyReport report = analyse(triangles(scattered(5), {{0, 1, 2}, {1, 0, 3}, {0, 1, 4}}));

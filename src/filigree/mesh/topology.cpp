@@ -280,7 +280,8 @@ void measure_faces(const Mesh& mesh, Incidence& incidence, const RunContext& con
     const Box box = bounds(mesh.positions);
     const double smallest = kDegenerateArea * box.diagonal() * box.diagonal();
     struct Sums {
-        double area = 0, volume = 0;
+        double area = 0, volume = 0; // volume: of tetrahedra over the box's centre, which keeps the digits
+        Vec3d twice_area_vector = Vec3d::Zero();
     };
     std::vector<Sums> pieces((mesh.face_count() + kGrain - 1) / kGrain);
     parallel_for(context, mesh.face_count(), kGrain, [&](std::size_t begin, std::size_t end) {
@@ -293,16 +294,20 @@ void measure_faces(const Mesh& mesh, Incidence& incidence, const RunContext& con
             Vec3d twice_area = Vec3d::Zero();
             for (std::size_t i = 2; i < face.size(); ++i) twice_area += edge(i - 1).cross(edge(i));
             const double area = 0.5 * twice_area.norm();
-            // the fan of the face from its first corner, and tetrahedra over it from the box's centre
             sums.volume += twice_area.dot(mesh.positions[face[0]].cast<double>() - box.centre()) / 6;
+            sums.twice_area_vector += twice_area;
             sums.area += area;
             if (!(area > smallest)) incidence.degenerate[f] = 1;
         }
     });
+    Vec3d twice_area_vector = Vec3d::Zero();
     for (const Sums& sums : pieces) {
         report.area += sums.area;
         report.volume += sums.volume;
+        twice_area_vector += sums.twice_area_vector;
     }
+    const bool encloses = report.is_closed() && report.is_oriented() && report.nonmanifold_edges.count == 0;
+    if (!encloses) report.volume += twice_area_vector.dot(mesh.origin + box.centre()) / 6;
     for (Index f = 0; f < mesh.face_count(); ++f)
         if (incidence.degenerate[f]) add(report.degenerate_faces, {f});
 }

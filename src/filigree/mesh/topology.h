@@ -33,7 +33,7 @@ struct TopologyReport {
     Finding duplicate_vertices;   ///< at exactly the position of an earlier vertex
     Box box;                      ///< in world coordinates
     double area = 0;              ///< model units squared
-    double volume = 0;            ///< signed; meaningful when closed and oriented
+    double volume = 0;            ///< signed; when not closed and oriented, that of the cones from the world's origin
 
     bool is_closed() const { return faces > 0 && open_edges.count == 0; }
     bool is_manifold() const { return nonmanifold_edges.count == 0 && nonmanifold_vertices.count == 0; }
