@@ -191,6 +191,8 @@ Status write_file(const fs::path& path, std::span<const std::string_view> pieces
         return Success{};
     }
     const fs::path target = follow_links(path);
+    std::error_code ignored;
+    if (fs::is_symlink(target, ignored)) return cannot_write(path, ELOOP);
     struct stat existing {};
     const bool exists = ::stat(target.c_str(), &existing) == 0;
     if (exists && S_ISDIR(existing.st_mode)) return cannot_write(path, EISDIR);

@@ -35,9 +35,9 @@ Result<MeshFile> read_mesh(const std::filesystem::path& path, const RunContext& 
 Result<MeshFile> read_mesh(std::string_view bytes, const std::string& name, const RunContext& context);
 
 struct WriteMeshOptions {
-    std::optional<MeshFormat> format; ///< unset: from the file name's ending
-    bool ascii = false;               ///< PLY and STL: text instead of binary
-    bool big_endian = false;          ///< PLY: binary, most significant byte first
+    std::optional<MeshFormat> format = std::nullopt; ///< unset: from the file name's ending
+    bool ascii = false;                              ///< PLY and STL: text instead of binary
+    bool big_endian = false;                         ///< PLY: binary, most significant byte first
 };
 
 /// Writes a mesh through a temporary file beside `path` and a rename, so that `path` is either whole or untouched;

@@ -76,6 +76,9 @@ Result<MeshFile> read_binary(const MeshSource& source) {
     }
     weld(std::move(positions), file.mesh);
     split_origin(file.mesh);
+    if (bytes.starts_with("solid"))
+        file.warnings.emplace_back(
+            "The file is binary, but begins with 'solid' as text does; other programs may stumble.");
     if (has_attributes) file.warnings.emplace_back("The facets' attribute bytes (colours, perhaps) were left out.");
     const std::size_t rest = bytes.size() - kHeaderBytes - kCountBytes - count * kFacetBytes;
     if (rest > 0) file.warnings.push_back(std::to_string(rest) + " bytes after the last facet were left out.");
@@ -156,7 +159,8 @@ private:
                 text_ = before;
                 break;
             }
-            name += (name.empty() ? "" : " ") + std::string(word);
+            if (!name.empty()) name += ' ';
+            name += word;
         }
         return name;
     }

@@ -16,22 +16,20 @@ TextWriter& TextWriter::name(std::string_view s) {
 TextWriter& TextWriter::far_coordinate(double origin, float offset) {
     constexpr int kTries = 4; // the first number of decimals is a guess from below
     const double sum = origin + static_cast<double>(offset);
-    const int first_guess = offset == 0 ? 0 : static_cast<int>(-std::log10(std::abs(offset) * 0x1p-23f)) - 1;
-    char decimals[kLongestNumber];
-    for (int precision = std::max(0, first_guess); precision < std::max(0, first_guess) + kTries; ++precision) {
-        auto [last, error] =
-            std::to_chars(decimals, decimals + sizeof decimals, sum, std::chars_format::fixed, precision);
+    char digits[kLongestNumber];
+    const auto shortest = std::to_chars(digits, digits + sizeof digits, sum);
+    const int guess = offset == 0 ? 0 : static_cast<int>(-std::log10(std::abs(offset) * 0x1p-23f)) - 1;
+    const int first = std::max(0, guess);
+    for (int precision = first; precision < first + kTries; ++precision) {
+        char rounded[kLongestNumber];
+        const auto fixed = std::to_chars(rounded, rounded + sizeof rounded, sum, std::chars_format::fixed, precision);
+        if (fixed.ec != std::errc{} || fixed.ptr - rounded >= shortest.ptr - digits) break;
         double read_back = 0;
-        if (error != std::errc{}) break;
-        std::from_chars(decimals, last, read_back);
-        if (static_cast<float>(read_back - origin) != offset) continue;
-        if (precision > 0) {
-            while (last[-1] == '0') --last;
-            if (last[-1] == '.') --last;
-        }
-        return text({decimals, static_cast<std::size_t>(last - decimals)});
+        std::from_chars(rounded, fixed.ptr, read_back);
+        if (static_cast<float>(read_back - origin) == offset)
+            return text({rounded, static_cast<std::size_t>(fixed.ptr - rounded)});
     }
-    return number(sum);
+    return text({digits, static_cast<std::size_t>(shortest.ptr - digits)});
 }
 
 } // namespace filigree

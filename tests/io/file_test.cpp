@@ -1,0 +1,123 @@
+#include "filigree/io/file.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <csignal>
+#include <fstream>
+#include <thread>
+
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+using namespace filigree;
+namespace fs = std::filesystem;
+
+namespace {
+
+/// A folder of its own, gone at the end.
+class File : public testing::Test {
+protected:
+    File() {
+        std::string name = (fs::temp_directory_path() / "filigree-XXXXXX").string();
+        folder_ = ::mkdtemp(name.data());
+    }
+    ~File() override {
+        std::error_code ignored;
+        fs::permissions(folder_, fs::perms::owner_all, ignored);
+        fs::remove_all(folder_, ignored);
+    }
+
+    std::size_t files_in_folder() const {
+        return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
+    }
+
+    fs::path folder_;
+};
+
+Status write(const fs::path& path, std::string_view bytes) {
+    const std::array pieces = {bytes};
+    return write_file(path, pieces);
+}
+
+} // namespace
+
+TEST_F(File, ComesBackAsItWasWritten) {
+    std::string bytes(300000, '\0');
+    for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = static_cast<char>(i * i);
+    const std::array<std::string_view, 3> pieces = {std::string_view(bytes).substr(0, 1000), "",
+                                                    std::string_view(bytes).substr(1000)};
+    ASSERT_TRUE(write_file(folder_ / "näme 日本語", pieces).ok());
+    EXPECT_EQ(*read_file(folder_ / "näme 日本語"), bytes);
+    EXPECT_EQ(files_in_folder(), 1u); // nothing temporary stays
+    ASSERT_TRUE(write(folder_ / "empty", "").ok());
+    EXPECT_EQ(*read_file(folder_ / "empty"), "");
+}
+
+TEST_F(File, MissingFilesAndFoldersAreNotFound) {
+    for (const fs::path& path : {folder_ / "missing", folder_, folder_ / "missing" / "deeper"}) {
+        const Result<std::string> bytes = read_file(path);
+        ASSERT_FALSE(bytes.ok());
+        EXPECT_EQ(bytes.error().code, ErrorCode::not_found);
+        EXPECT_NE(bytes.error().message.find(path.string()), std::string::npos);
+    }
+}
+
+TEST_F(File, ReadsPipes) {
+    const fs::path pipe = folder_ / "pipe";
+    ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+    const std::string bytes(200000, 'x');
+    std::thread writer([&] { std::ofstream(pipe) << bytes; });
+    EXPECT_EQ(*read_file(pipe), bytes);
+    writer.join();
+}
+
+TEST_F(File, WritesToDevicesInPlace) {
+    EXPECT_TRUE(write("/dev/null", "x").ok());
+    const Status full = write("/dev/full", "x");
+    ASSERT_FALSE(full.ok());
+    EXPECT_EQ(full.error().code, ErrorCode::unwritable);
+    EXPECT_NE(full.error().message.find("disk is full"), std::string::npos);
+}
+
+TEST_F(File, UnwritableTargetsAreSaid) {
+    for (const fs::path& path : {folder_ / "missing" / "a.obj", folder_, folder_ / std::string(300, 'x')}) {
+        const Status status = write(path, "x");
+        ASSERT_FALSE(status.ok());
+        EXPECT_EQ(status.error().code, ErrorCode::unwritable);
+    }
+    EXPECT_EQ(files_in_folder(), 0u);
+}
+
+TEST_F(File, AFailedWriteLeavesTheOldFileAndNothingElse) {
+    ASSERT_TRUE(write(folder_ / "a", "old").ok());
+    rlimit before{};
+    ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+    const rlimit small{1000, before.rlim_max}; // stands in for a full disk
+    const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+    ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &small), 0);
+    const Status status = write(folder_ / "a", std::string(5000, 'n'));
+    ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
+    std::signal(SIGXFSZ, handler);
+    ASSERT_FALSE(status.ok());
+    EXPECT_EQ(status.error().code, ErrorCode::unwritable);
+    EXPECT_EQ(*read_file(folder_ / "a"), "old");
+    EXPECT_EQ(files_in_folder(), 1u);
+}
+
+TEST_F(File, FollowsLinksAndKeepsPermissions) {
+    ASSERT_TRUE(write(folder_ / "real", "old").ok());
+    fs::permissions(folder_ / "real", fs::perms::owner_read | fs::perms::owner_write | fs::perms::group_read);
+    fs::create_symlink("real", folder_ / "link");
+    fs::create_symlink("not there yet", folder_ / "dangling");
+    ASSERT_TRUE(write(folder_ / "link", "new").ok());
+    ASSERT_TRUE(write(folder_ / "dangling", "born").ok());
+    EXPECT_TRUE(fs::is_symlink(folder_ / "link"));
+    EXPECT_EQ(*read_file(folder_ / "real"), "new");
+    EXPECT_EQ(*read_file(folder_ / "not there yet"), "born");
+    EXPECT_EQ(fs::status(folder_ / "real").permissions(),
+              fs::perms::owner_read | fs::perms::owner_write | fs::perms::group_read);
+    fs::create_symlink("circle", folder_ / "circle");
+    EXPECT_FALSE(write(folder_ / "circle", "x").ok());
+}
