@@ -175,6 +175,25 @@ TEST(Handles, EnergyNeverRises) {
     }
 }
 
+TEST(Handles, MomentumGetsFurtherThanPlainRounds) {
+    const Body body = make_body(8);
+    const std::vector<Index> handles = both_ends(body);
+    const std::vector<Vec3f> targets = at(body, handles, bent_ends(body, 90));
+    HandleSolver plain = make_solver(body, handles), momentum = make_solver(body, handles);
+    Pose after_plain;
+    for (int round = 0; round < 50; ++round) // a solve of one round has no momentum
+        after_plain = plain.solve(targets, {.iterations = 1, .tolerance = 0}, RunContext(1))->pose;
+    double before = std::numeric_limits<double>::infinity();
+    for (const unsigned rounds : {1u, 2u, 5u, 10u, 20u, 50u}) {
+        momentum.reset();
+        const auto result = momentum.solve(targets, {.iterations = rounds, .tolerance = 0}, RunContext(1));
+        const double now = energy(body, result->pose, HandleOptions{}.smoothness);
+        EXPECT_LT(now, before);
+        before = now;
+    }
+    EXPECT_LT(before, energy(body, after_plain, HandleOptions{}.smoothness));
+}
+
 /// How a section of the bar across x turned about z (degrees), and where its centre went.
 struct Section {
     double angle = 0;

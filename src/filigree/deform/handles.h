@@ -11,7 +11,7 @@
 namespace filigree {
 
 struct HandleOptions {
-    unsigned iterations = 100; ///< at most this many local-global rounds
+    unsigned iterations = 200; ///< at most this many local-global rounds
     double tolerance = 1e-5;   ///< stop when no vertex moves further in a round; fraction of the diagonal
     /// Resistance to bending: the length over which a sharp bend is spread, as a fraction of the diagonal. It makes
     /// results independent of the mesh's fineness; with 0, the plain method, fine surfaces fold sharply.
@@ -26,7 +26,8 @@ struct HandleResult {
 
 /// The local-global solver for one rest shape and one set of handles; the global step's matrix is factored once
 /// [Sorkine 2007] with cotangent weights (clamped to be non-negative), and the local step keeps each vertex's rotation
-/// from the round before as its start [Mueller 2016] and is drawn to its neighbours' [Levi 2015]. Rotations are proper
+/// from the round before as its start [Mueller 2016] and is drawn to its neighbours' [Levi 2015];
+/// rounds have momentum, but the energy never rises. Rotations are proper
 /// (determinant 1) whatever the targets are.
 class HandleSolver {
 public:
