@@ -23,7 +23,8 @@ struct ShapeOptions {
 /// of vertices have no height), so the faces meet without crack or hole. 6 n^2 + 2 vertices, 6 n^2 quads, n = resolution;
 /// centred on the origin.
 Mesh make_wavy_cube(const ShapeOptions& options);
-/// A sphere from the cube's grid with radial waves; 6 n^2 + 2 vertices.
+/// A sphere from the cube's grid, spread to equal angles, with radial waves: a gyroid's field, smooth everywhere for
+/// every frequency; 6 n^2 + 2 vertices.
 Mesh make_wavy_sphere(const ShapeOptions& options);
 /// The open square with waves in z; (n + 1)^2 vertices, with UVs.
 Mesh make_wavy_plane(const ShapeOptions& options);
@@ -31,7 +32,8 @@ Mesh make_wavy_plane(const ShapeOptions& options);
 Mesh make_bar(const ShapeOptions& options);
 /// A closed cylinder along x: 4 n quads around, round(n length) along, caps of a square grid of n x n quads.
 Mesh make_cylinder(const ShapeOptions& options);
-/// A torus about z with waves on its tube; 2 n around the ring, n around the tube.
+/// A torus about z with waves on its tube; 2 n around the ring, n around the tube, n at least 3. The frequency is
+/// rounded to whole waves, so that they meet themselves; amplitude and thickness are fractions of the ring's radius.
 Mesh make_torus(const ShapeOptions& options);
 
 /// The shape called `name`: wavy-cube, wavy-sphere, wavy-plane, bar, cylinder or torus. Errors: usage, for an unknown
