@@ -1,0 +1,100 @@
+#include "filigree/io/mesh_file.h"
+
+#include <gtest/gtest.h>
+
+using namespace filigree;
+
+namespace {
+
+Result<MeshFile> read(const std::string& text) { return read_mesh(text, "cow.ply", RunContext(1)); }
+
+const std::string kVertices = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n";
+const std::string kFaces = "element face 1\nproperty list uchar int vertex_indices\n";
+
+std::string ascii(const std::string& elements, const std::string& body) {
+    return "ply\nformat ascii 1.0\n" + elements + "end_header\n" + body;
+}
+
+} // namespace
+
+TEST(Ply, ElementsComeInAnyOrderAmongOthers) {
+    const auto file = read(ascii("element edge 1\nproperty int a\nproperty list uchar int b\n" + kFaces + kVertices,
+                                 "7 2 8 9\n3 0 1 2\n0 0 0 1 0 0 0 1 0"));
+    EXPECT_EQ(file->mesh.corners, (std::vector<Index>{0, 1, 2}));
+    EXPECT_EQ(file->mesh.positions[2], Vec3f(0, 1, 0));
+    ASSERT_EQ(file->warnings.size(), 1u);
+    EXPECT_NE(file->warnings[0].find("'edge'"), std::string::npos);
+}
+
+TEST(Ply, PropertiesComeInAnyOrder) {
+    const auto file = read(ascii(
+        "element vertex 3\nproperty uchar blue\nproperty double z\nproperty float quality\n"
+        "property list uchar int near\nproperty float y\nproperty uchar red\nproperty uchar green\nproperty short x\n" +
+            kFaces,
+        "51 3 0.5 2 7 7 2 0 255 1\n0 0 1 0 0 0 0 9\n0 0 2 0 8 0 0 0\n3 0 1 2\n"));
+    EXPECT_EQ(file->mesh.positions[0], Vec3f(1, 2, 3));
+    EXPECT_EQ(file->mesh.colors[0], Vec4f(0, 1, 0.2f, 1));
+    ASSERT_EQ(file->mesh.scalars.size(), 1u);
+    EXPECT_EQ(file->mesh.scalars[0].values, (std::vector<float>{0.5f, 1, 2}));
+    EXPECT_EQ(file->warnings.size(), 1u); // the list
+}
+
+TEST(Ply, ABinaryBodyMayBeginWithALineFeed) {
+    std::string body(36, '\0');
+    body[0] = '\n'; // the lowest byte of x
+    const std::string tail("\x03\0\0\0\0\x01\0\0\0\x02\0\0\0", 13);
+    for (const std::string end : {"\n", "\r\n", "\r"}) {
+        std::string text = "ply\nformat binary_little_endian 1.0\n" + kVertices + kFaces + "end_header\n";
+        for (std::size_t i = 0; (i = text.find('\n', i)) != std::string::npos; i += end.size()) text.replace(i, 1, end);
+        const auto file = read(text + body + tail);
+        ASSERT_TRUE(file.ok()) << file.error().message;
+        EXPECT_EQ(file->mesh.positions[0].x(), 1.4e-44f);
+        EXPECT_TRUE(file->warnings.empty());
+    }
+}
+
+TEST(Ply, LongFacesNeedLongLengths) {
+    Mesh mesh;
+    for (Index v = 0; v < 300; ++v)
+        mesh.positions.emplace_back(std::cos(0.02f * static_cast<float>(v)), std::sin(0.02f * static_cast<float>(v)),
+                                    0.0f);
+    std::vector<Index> all(300);
+    for (Index v = 0; v < 300; ++v) all[v] = v;
+    mesh.add_face(all);
+    std::string bytes;
+    ASSERT_TRUE(write_mesh(mesh, MeshFormat::ply, bytes).ok());
+    EXPECT_EQ(read(bytes)->mesh.corners, all);
+}
+
+TEST(Ply, ErrorsNameThePlace) {
+    const std::string binary = "ply\nformat binary_little_endian 1.0\n" + kVertices + kFaces + "end_header\n";
+    std::string bad_index = binary + std::string(36, '\0') + std::string("\x03\0\0\0\0\x01\0\0\0\x03\0\0\0", 13);
+    std::string not_finite = binary + std::string(36, '\0') + std::string(13, '\0');
+    not_finite.replace(binary.size() + 12, 4, std::string("\0\0\xc0\x7f", 4));
+    const std::vector<std::pair<std::string, std::string>> cases = {
+        {"plyx\n", "cow.ply:1:"},
+        {"ply\nformat ascii 1.0\nelement vertex 3\n", "end_header"},
+        {"ply\nformat ebcdic 1.0\nend_header\n", "cow.ply:2:"},
+        {ascii("element vertex -3\n", ""), "cow.ply:3:"},
+        {ascii("element vertex 3\nproperty quaternion x\n", ""), "cow.ply:4:"},
+        {ascii("element vertex 3\nproperty float x\nproperty float x\n", ""), "twice"},
+        {ascii("element vertex 1\nproperty float x\nproperty float y\n", "0 0\n"), "x, y and z"},
+        {ascii(kVertices + kFaces, "0 0 0 1 0 0 0 1\n"), "cut off"},
+        {ascii(kVertices + kFaces, "0 0 0\n1 0 0\n0 1 q\n3 0 1 2"), "cow.ply:12: vertex 2"},
+        {ascii(kVertices + kFaces, "0 0 0\n1 0 0\n0 1 0\n3 0 1 3"), "cow.ply:13: face 0"},
+        {ascii(kVertices + kFaces, "0 0 0\n1 0 0\n0 1 0\n3 0 1 -1"), "vertex -1"},
+        {ascii(kVertices + kFaces, "0 0 0\n1 0 0\n0 1 0\n3 0 1 0.5"), "whole"},
+        {ascii(kVertices + kFaces, "0 0 0\n1 0 0\n0 1 inf\n3 0 1 2"), "finite"},
+        {ascii("element vertex 9223372036854775807\nproperty float x\nproperty float y\nproperty float z\n", "0 0 0"),
+         "vert"},
+        {binary + std::string(30, '\0'), "vertex 2 at byte"},
+        {binary + std::string(36, '\0') + "\x03\0", "face 0 at byte"},
+        {bad_index, "face 0 at byte"},
+        {not_finite, "vertex 1"},
+    };
+    for (const auto& [text, part] : cases) {
+        const auto file = read(text);
+        ASSERT_FALSE(file.ok()) << text;
+        EXPECT_NE(file.error().message.find(part), std::string::npos) << file.error().message << " for " << part;
+    }
+}
