@@ -20,8 +20,8 @@ struct ShapeOptions {
 
 /// The report's cube (eq. 2.1, figure 2.1): each face carries z = amplitude sin(2 pi frequency u) sin(2 pi frequency v)
 /// outwards, u and v in 0 to 1 over the face; the ring of quads along the cube's edges is flat (the two outermost rows
-/// of vertices have no height), so the faces meet without crack or hole. 6 n^2 + 2 vertices, 6 n^2 quads, n = resolution;
-/// centred on the origin.
+/// of vertices have no height), so the faces meet without crack or hole. 6 n^2 + 2 vertices, 6 n^2 quads, n =
+/// resolution; centred on the origin.
 Mesh make_wavy_cube(const ShapeOptions& options);
 /// A sphere from the cube's grid, spread to equal angles, with radial waves: a gyroid's field, smooth everywhere for
 /// every frequency; 6 n^2 + 2 vertices.
