@@ -24,11 +24,10 @@ struct HandleResult {
     double last_move = 0;    ///< largest move of the last round, fraction of the diagonal
 };
 
-/// The local-global solver for one rest shape and one set of handles; the global step's matrix is factored once
-/// [Sorkine 2007] with cotangent weights (clamped to be non-negative), and the local step keeps each vertex's rotation
-/// from the round before as its start [Mueller 2016] and is drawn to its neighbours' [Levi 2015];
-/// rounds have momentum, but the energy never rises. Rotations are proper
-/// (determinant 1) whatever the targets are.
+/// The local-global solver for one rest shape and one set of handles [Sorkine 2007]: the global step's matrix, with
+/// cotangent weights (clamped to be non-negative), is factored once; in the local step each vertex's rotation starts
+/// from that of the round before [Mueller 2016] and is drawn to its neighbours' [Levi 2015]. Rounds have momentum, but
+/// the energy never rises. Rotations are proper (determinant 1) whatever the targets are.
 class HandleSolver {
 public:
     /// positions: V rest points; triangles: over them, any quality (degenerate ones only just hold their vertices
