@@ -1,7 +1,9 @@
 #include "filigree/hierarchy/regular_patches.h"
+#include "filigree/io/mesh_file.h"
 #include "filigree/mesh/shapes.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <gtest/gtest.h>
 #include <map>
@@ -202,6 +204,34 @@ TEST(RegularPatches, HolesMustLieOnEveryLevel) {
 
     const Mesh odd = plane_without(4, [](unsigned i, unsigned j) { return i == 1 && j == 1; });
     EXPECT_NE(refusal(odd).find("do not fit"), std::string::npos);
+}
+
+TEST(RegularPatches, TakesOrRefusesRealMeshesWithAReason) {
+    const char* folder = std::getenv("FILIGREE_CORPUS");
+    const std::filesystem::path corpus = folder ? folder : FILIGREE_ROOT "/../shared/corpus";
+    if (!std::filesystem::exists(corpus / "good")) GTEST_SKIP() << "no corpus at " << corpus;
+    std::size_t read = 0;
+    for (const auto& entry : std::filesystem::directory_iterator(corpus / "good")) {
+        if (entry.path().extension() != ".obj") continue;
+        SCOPED_TRACE(entry.path().filename());
+        const auto file = read_mesh(entry.path(), RunContext(1));
+        ASSERT_TRUE(file.ok()) << file.error().message;
+        const Mesh& mesh = file->mesh;
+        ++read;
+        const auto patches = find_regular_patches(mesh, 16, RunContext(1));
+        bool all_quads = true;
+        for (std::size_t f = 0; f < mesh.face_count(); ++f) all_quads &= mesh.face_size(f) == 4;
+        if (patches.ok()) {
+            EXPECT_TRUE(all_quads);
+            expect_grids_are_the_mesh(mesh, *patches);
+        } else {
+            EXPECT_EQ(patches.error().code, ErrorCode::unsuitable);
+            EXPECT_EQ(patches.error().message.find(" corners; ") == std::string::npos, all_quads)
+                << patches.error().message;
+            RecordProperty(entry.path().stem().string(), patches.error().message);
+        }
+    }
+    EXPECT_GT(read, 0u);
 }
 
 TEST(RegularPatches, StopsWhenAsked) {

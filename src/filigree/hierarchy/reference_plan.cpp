@@ -6,7 +6,12 @@
 #include <cassert>
 #include <cmath>
 #include <cstring>
+#include <new>
 #include <utility>
+
+#if defined(__linux__)
+#include <sys/mman.h>
+#endif
 
 namespace filigree::reference {
 namespace {
@@ -14,6 +19,10 @@ namespace {
 // Grids above this are written past the caches, which they would only flush.
 constexpr std::size_t kStreamBytes = std::size_t{16} << 20;
 constexpr std::size_t kPointsPerTask = 65536;
+constexpr std::align_val_t kLargePage{std::size_t{2} << 20}, kLine{sizeof(Line)};
+std::align_val_t alignment_of(std::size_t bytes) {
+    return bytes >= 2 * static_cast<std::size_t>(kLargePage) ? kLargePage : kLine;
+}
 
 /// Right-angled axes that turn with a base quad: along its rows, and its normal. Any, where the quad has no direction.
 Mat3f base_axes(const Grid& driver, std::size_t patch) {
@@ -105,6 +114,15 @@ struct ArraySink {
 };
 
 } // namespace
+
+void* allocate_large_pages(std::size_t bytes) {
+    void* data = ::operator new(bytes, alignment_of(bytes));
+#if defined(__linux__)
+    if (alignment_of(bytes) == kLargePage) madvise(data, bytes, MADV_HUGEPAGE); // a wish: no harm if it is not heard
+#endif
+    return data;
+}
+void free_large_pages(void* data, std::size_t bytes) { ::operator delete(data, alignment_of(bytes)); }
 
 int exponent_of(float extent) { return extent > 0 && std::isfinite(extent) ? std::ilogb(extent) + 1 : -126; }
 
