@@ -76,7 +76,7 @@ void write(benchmark::State& state, const Mesh& mesh, const Format& format) {
     set_bytes(state, size);
 }
 
-/// What nothing that keeps the bytes can beat: a copy into fresh memory.
+/// What nothing that keeps the bytes can beat.
 void copy(benchmark::State& state, const Mesh& mesh, const Format& format) {
     std::string bytes;
     if (!write_mesh(mesh, format.format, bytes, format.options).ok()) return state.SkipWithError("not written");

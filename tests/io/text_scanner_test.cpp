@@ -83,6 +83,7 @@ TEST(TextWriter, FloatsReadBackToTheSameBits) {
         if (!std::isfinite(x)) continue;
         ASSERT_EQ(std::bit_cast<std::uint32_t>(static_cast<float>(parse(print(x)))), std::bit_cast<std::uint32_t>(x));
     }
+    for (const float x : {0x1.5c87fap-84f, -0x1.5c87fap-84f}) EXPECT_EQ(static_cast<float>(parse(print(x))), x);
     EXPECT_EQ(print(0.1f), "0.1");
     EXPECT_EQ(print(Index{42}), "42");
 }

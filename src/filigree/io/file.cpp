@@ -1,4 +1,5 @@
 #include "filigree/io/file.h"
+#include "filigree/io/large_memory.h"
 
 #include <atomic>
 #include <cerrno>
@@ -84,7 +85,10 @@ Result<std::string> read_descriptor(int descriptor, const fs::path& path) {
     if (S_ISDIR(status.st_mode)) return cannot_read(path, EISDIR);
     // The size is a hint: pipes have none, and files grow and shrink. One byte more finds the end without another
     // round.
-    std::string bytes(S_ISREG(status.st_mode) ? static_cast<std::size_t>(status.st_size) + 1 : kPipePiece, '\0');
+    std::string bytes;
+    const std::size_t first_size = S_ISREG(status.st_mode) ? static_cast<std::size_t>(status.st_size) + 1 : kPipePiece;
+    reserve_large(bytes, first_size);
+    bytes.resize(first_size);
     for (std::size_t used = 0;;) {
         if (used == bytes.size()) bytes.resize(2 * bytes.size());
         const ssize_t got = ::read(descriptor, bytes.data() + used, bytes.size() - used);

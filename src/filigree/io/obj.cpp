@@ -1,4 +1,5 @@
 // Wavefront OBJ, polygons only.
+#include "filigree/io/large_memory.h"
 #include "filigree/io/mesh_formats.h"
 #include "filigree/io/text_scanner.h"
 #include "filigree/io/text_writer.h"
@@ -111,9 +112,9 @@ private:
 
     /// Guesses from the file's size (a scan has 70 bytes a vertex and 35 a face); memory that is not touched is free.
     void reserve() {
-        world_.reserve(source_.bytes.size() / 70);
-        mesh_.face_offsets.reserve(source_.bytes.size() / 35 + 1);
-        mesh_.corners.reserve(source_.bytes.size() / 35 * 3);
+        reserve_large(world_, source_.bytes.size() / 70);
+        reserve_large(mesh_.face_offsets, source_.bytes.size() / 35 + 1);
+        reserve_large(mesh_.corners, source_.bytes.size() / 35 * 3);
     }
 
     bool read_statement() {

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <string>
 #include <string_view>
+#include <type_traits>
 
 namespace filigree {
 
@@ -34,6 +35,10 @@ public:
     /// The shortest decimal that reads back to the same number.
     template <class T>
     TextWriter& number(T x) {
+        // the one float (all were tried) whose shortest decimal becomes a neighbour when read as double, then rounded
+        constexpr float kRoundsTwice = 0x1.5c87fap-84f;
+        if constexpr (std::is_same_v<T, float>)
+            if (x == kRoundsTwice || x == -kRoundsTwice) return number(static_cast<double>(x));
         make_room();
         char* const first = buffer_.data() + used_;
         used_ += static_cast<std::size_t>(std::to_chars(first, first + kLongestNumber, x).ptr - first);
