@@ -5,8 +5,18 @@
 
 namespace filigree {
 
+namespace {
+
+/// More workers than processors only wait for each other (and oneTBB would print that they do).
+unsigned clamp_threads(unsigned wanted) {
+    const unsigned processors = std::max(1u, std::thread::hardware_concurrency());
+    return wanted == 0 ? processors : std::min(wanted, processors);
+}
+
+} // namespace
+
 RunContext::RunContext(unsigned threads)
-    : threads_(threads ? threads : std::max(1u, std::thread::hardware_concurrency())),
+    : threads_(clamp_threads(threads)),
       arena_(std::make_shared<tbb::task_arena>(static_cast<int>(threads_))),
       cancelled_(std::make_shared<std::atomic<bool>>(false)) {}
 

@@ -1,5 +1,7 @@
 #include "filigree/hierarchy/model.h"
 
+#include <cmath>
+
 namespace filigree {
 
 Mesh level_mesh(const Model& model, unsigned level) {
@@ -31,6 +33,68 @@ std::vector<Vec3f> driver_positions(const Model& model) {
     positions.reserve(model.driver().vertices.size());
     for (Index v : model.driver().vertices) positions.push_back(model.mesh.positions[v]);
     return positions;
+}
+
+namespace {
+
+bool ascending_below(std::span<const Index> ids, std::size_t limit) {
+    for (std::size_t i = 0; i < ids.size(); ++i)
+        if (ids[i] >= limit || (i > 0 && ids[i] <= ids[i - 1])) return false;
+    return true;
+}
+
+std::string check_level(const Level& level, std::size_t vertex_count) {
+    if (level.vertices.empty()) return "a level has no vertices";
+    if (!ascending_below(level.vertices, vertex_count)) return "a level's vertices are not ascending ids of the mesh";
+    Mesh mesh; // borrowed for its own checks
+    mesh.positions.resize(level.vertices.size(), Vec3f::Zero());
+    mesh.face_offsets = level.face_offsets;
+    mesh.corners = level.corners;
+    return check_mesh(mesh);
+}
+
+std::string check_blend(const BlendDetail& detail, std::size_t vertex_count, std::size_t driver_count) {
+    if (detail.cells.empty() || detail.cell_offsets.size() != detail.cells.size() + 1) return "cells and offsets differ";
+    for (const Triangle& cell : detail.cells)
+        for (Index v : cell)
+            if (v >= driver_count) return "a cell names a driver vertex that is not there";
+    if (detail.cell_offsets.front() != 0 || detail.cell_offsets.back() != vertex_count) return "records are missing";
+    for (std::size_t c = 0; c < detail.cells.size(); ++c)
+        if (detail.cell_offsets[c] > detail.cell_offsets[c + 1]) return "the cells' offsets do not ascend";
+    if (detail.order.size() != vertex_count || detail.u.size() != vertex_count || detail.v.size() != vertex_count)
+        return "there is not one record a vertex";
+    std::vector<bool> seen(vertex_count, false);
+    for (Index v : detail.order) {
+        if (v >= vertex_count || seen[v]) return "the records' order is no permutation";
+        seen[v] = true;
+    }
+    for (std::size_t r = 0; r < vertex_count; ++r)
+        if (!(std::abs(detail.u[r]) <= 2 && std::abs(detail.v[r]) <= 2)) return "a weight is out of range";
+    if (detail.precision == Precision::int16) {
+        if (detail.offsets.size() != vertex_count || detail.cell_scales.size() != detail.cells.size())
+            return "there is not one offset a record";
+        for (float scale : detail.cell_scales)
+            if (!std::isfinite(scale)) return "a cell's scale is not finite";
+    }
+    if (!ascending_below(detail.across_gap, vertex_count) || !ascending_below(detail.facing_away, vertex_count))
+        return "a list of vertices is not ascending";
+    return "";
+}
+
+} // namespace
+
+std::string check_model(const Model& model) {
+    if (std::string wrong = check_mesh(model.mesh); !wrong.empty()) return wrong;
+    if (model.levels.empty()) return "there is no driver";
+    for (const Level& level : model.levels)
+        if (std::string wrong = check_level(level, model.mesh.vertex_count()); !wrong.empty()) return wrong;
+    if (const auto* blend = std::get_if<BlendDetail>(&model.detail))
+        return check_blend(*blend, model.mesh.vertex_count(), model.driver().vertices.size());
+    const auto& reference = std::get<ReferenceDetail>(model.detail);
+    if (reference.patches.levels != model.levels.size() ||
+        reference.rest_driver.size() != model.driver().vertices.size())
+        return "levels and patches differ";
+    return check_reference(reference, model.mesh.vertex_count());
 }
 
 } // namespace filigree

@@ -40,4 +40,8 @@ Mesh level_mesh(const Model& model, unsigned level);
 /// The driver's rest positions, in the driver's order.
 std::vector<Vec3f> driver_positions(const Model& model);
 
+/// The first thing wrong with a model, as a sentence, or "" when everything refers to what is there: indices in range,
+/// offsets ascending, records one a vertex, numbers finite. A model that passes can be restored. Cost O(size).
+std::string check_model(const Model& model);
+
 } // namespace filigree

@@ -17,6 +17,7 @@
 #include "filigree/hierarchy/regular_patches.h"
 
 #include <memory>
+#include <string>
 
 namespace filigree {
 
@@ -78,5 +79,9 @@ private:
     struct State;
     std::unique_ptr<State> state_;
 };
+
+/// The first thing wrong with a detail that came from outside, as a sentence, or "" when it can be restored: sizes that
+/// fit each other, ids below vertex_count. Cost O(V).
+std::string check_reference(const ReferenceDetail& detail, std::size_t vertex_count);
 
 } // namespace filigree

@@ -64,6 +64,7 @@ std::vector<Index> split_shared_normals(Mesh& mesh) {
     std::unordered_map<std::uint64_t, Index> copies; // (value, vertex) to the copy made for it
     for (std::size_t c = 0; c < mesh.corner_count(); ++c) {
         const Index value = normals.corners[c], vertex = mesh.corners[c];
+        if (value == kNoIndex) continue; // this corner has no normal
         if (vertex_of[value] == kNoIndex) vertex_of[value] = vertex;
         if (vertex_of[value] == vertex) continue;
         const auto [copy, is_new] =

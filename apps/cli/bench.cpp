@@ -1,0 +1,322 @@
+// filigree bench: our figures on this machine, rivals (triad, memcpy, deforming every vertex) in the same run. The
+// Google Benchmark programs in bench/ go through more sizes; scripts/bench-peers sets this beside other programs.
+#include "fidelity.h"
+#include "session.h"
+
+#include "filigree/core/parallel_for.h"
+#include "filigree/deform/handles.h"
+#include "filigree/deform/space_warp.h"
+#include "filigree/hierarchy/blend_code.h"
+#include "filigree/hierarchy/restore.h"
+#include "filigree/hierarchy/strip.h"
+#include "filigree/io/model_file.h"
+#include "filigree/mesh/shapes.h"
+#include "filigree/mesh/triangulate.h"
+
+#include <algorithm>
+#include <cstring>
+#include <random>
+
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
+
+namespace filigree::cli {
+
+namespace {
+
+struct Figure {
+    std::string name;
+    double value;
+    std::string unit;
+};
+
+/// Median seconds of a call: at least five, for about 0.4 seconds.
+template <class Work>
+double median_seconds(const Work& work) {
+    std::vector<double> seconds;
+    const double start = now_seconds();
+    while (seconds.size() < 5 || (now_seconds() - start < 0.4 && seconds.size() < 1000)) {
+        const double begin = now_seconds();
+        work();
+        seconds.push_back(now_seconds() - begin);
+    }
+    std::nth_element(seconds.begin(), seconds.begin() + std::ptrdiff_t(seconds.size() / 2), seconds.end());
+    return seconds[seconds.size() / 2];
+}
+
+class Bench {
+public:
+    Bench(Mesh mesh, const RunContext& context) : mesh_(std::move(mesh)), context_(context) {}
+
+    void restore() {
+        const double triad = measure_triad();
+        for (const Precision precision : {Precision::float32, Precision::int16}) restore_blend(precision, triad);
+        restore_reference(triad);
+    }
+
+    void strip_phases() {
+        double simplify = 0, bind = 0;
+        const double total = median_seconds([&] {
+            const Stripped stripped = require(strip(mesh_, {}, context_));
+            simplify = stripped.report.simplify_seconds;
+            bind = stripped.report.bind_seconds;
+        });
+        add("strip.total", total, "s");
+        add("strip.simplify", simplify, "s");
+        add("strip.bind", bind, "s");
+        const Model& model = blend_model(Precision::float32);
+        std::string bytes;
+        add("strip.write_model", median_seconds([&] { bytes = write_model(model); }), "s");
+        add("strip.read_model", median_seconds([&] { require(read_model(bytes, "model", context_)); }), "s");
+    }
+
+    void files() {
+        for (const auto& [name, format] : {std::pair{"obj", MeshFormat::obj}, {"ply", MeshFormat::ply},
+                                           {"stl", MeshFormat::stl}, {"off", MeshFormat::off}}) {
+            std::string bytes;
+            const double write = median_seconds([&] {
+                bytes.clear();
+                require(write_mesh(mesh_, format, bytes));
+            });
+            const double read =
+                median_seconds([&] { require(read_mesh(bytes, std::string("mesh.") + name, context_)); });
+            std::string copy(bytes.size(), '\0');
+            const double memcpy_seconds =
+                median_seconds([&] { std::memcpy(copy.data(), bytes.data(), bytes.size()); });
+            const double megabytes = double(bytes.size()) * 1e-6;
+            add(fmt::format("files.read_{}", name), megabytes / read, "MB/s");
+            add(fmt::format("files.write_{}", name), megabytes / write, "MB/s");
+            add(fmt::format("files.read_{}_of_memcpy", name), memcpy_seconds / read, "ratio");
+        }
+    }
+
+    /// A deformer that costs something, over every vertex and over the driver alone.
+    void deform() {
+        const Model& model = blend_model(Precision::float32);
+        Box box = bounds(mesh_.positions);
+        box.min += mesh_.origin;
+        box.max += mesh_.origin;
+        std::mt19937_64 random(1);
+        std::vector<Vec3d> centres, displacements;
+        for (int i = 0; i < 200; ++i) {
+            const auto point = [&] {
+                Vec3d p;
+                for (int k = 0; k < 3; ++k) p[k] = double(random() >> 11) * 0x1p-53;
+                return p;
+            };
+            centres.push_back(box.min + point().cwiseProduct(box.size()));
+            displacements.push_back(0.05 * box.diagonal() * (point() - Vec3d::Constant(0.5)));
+        }
+        const auto rbf = make_rbf(centres, displacements);
+        std::vector<std::unique_ptr<SpaceWarp>> chain;
+        chain.push_back(make_twist(box, Axis::x, 90));
+        chain.push_back(make_bend(box, Axis::x, 90));
+        const auto bend = make_chain(std::move(chain));
+        const Restorer restorer = require(Restorer::create(model, {}, context_));
+        for (const auto& [name, warp] : {std::pair<const char*, const SpaceWarp*>{"rbf_200", rbf.get()}, {"bend_twist", bend.get()}}) {
+            const double all =
+                median_seconds([&] { warp_positions(*warp, mesh_.positions, mesh_.origin, context_); });
+            const double ours = median_seconds([&] {
+                require(restorer.positions(warp_pose(*warp, driver_positions(model), mesh_.origin, context_), context_));
+            });
+            add(fmt::format("deform.{}_all", name), all, "s");
+            add(fmt::format("deform.{}_driver_and_restore", name), ours, "s");
+            add(fmt::format("deform.{}_speed_up", name), all / ours, "ratio");
+        }
+    }
+
+    /// As-rigid-as-possible on the driver, restored in every round, as a hand would see it.
+    void handles() {
+        const Model& model = blend_model(Precision::float32);
+        const Mesh driver = level_mesh(model, 0);
+        const std::vector<Triangle> triangles = triangulate(driver).triangles;
+        const Box box = bounds(driver.positions);
+        int axis = 0;
+        box.size().maxCoeff(&axis);
+        std::vector<Index> ends;
+        std::vector<Vec3f> targets;
+        for (Index v = 0; v < driver.vertex_count(); ++v) {
+            const double at = (driver.positions[v][axis] - box.min[axis]) / box.size()[axis];
+            if (at > 0.05 && at < 0.95) continue;
+            ends.push_back(v);
+            targets.push_back(driver.positions[v]);
+            if (at >= 0.95) targets.back()[(axis + 1) % 3] += static_cast<float>(0.2 * box.diagonal());
+        }
+        add("handles.setup", median_seconds([&] { require(HandleSolver::create(driver.positions, triangles, ends)); }), "s");
+        HandleSolver solver = require(HandleSolver::create(driver.positions, triangles, ends));
+        const Restorer restorer = require(Restorer::create(model, {}, context_));
+        add("handles.iteration", median_seconds([&] {
+                const HandleResult result = require(solver.solve(targets, {.iterations = 1, .tolerance = 0}, context_));
+                require(restorer.positions(result.pose, context_));
+            }),
+            "s");
+    }
+
+    void fidelity() {
+        const Model& model = blend_model(Precision::float32);
+        Mesh copy = mesh_;
+        const Result<Stripped> reference =
+            strip(std::move(copy), {.code = DetailCode::reference, .base = model.driver().vertices.size()}, context_);
+        rows_ = measure_fidelity(model, reference ? &reference->model : nullptr, context_);
+        for (const FidelitySummary& summary : summarise(rows_)) {
+            std::string name = summary.method;
+            std::erase(name, ',');
+            std::replace(name.begin(), name.end(), ' ', '_');
+            add("fidelity." + name + ".affine_rms", summary.affine_rms, "diagonals");
+            add("fidelity." + name + ".curved_rms", summary.curved_rms, "diagonals");
+            add("fidelity." + name + ".curved_normal_p95", summary.curved_normal_p95_deg, "degrees");
+        }
+    }
+
+    void set_base(std::optional<std::size_t> base) { base_ = base; }
+    const std::vector<Figure>& figures() const { return figures_; }
+    const std::vector<FidelityRow>& fidelity_rows() const { return rows_; }
+
+private:
+    void add(std::string name, double value, std::string unit) {
+        figures_.push_back({std::move(name), value, std::move(unit)});
+    }
+
+    const Model& blend_model(Precision precision) {
+        std::optional<Model>& model = models_[static_cast<std::size_t>(precision)];
+        if (!model) model = require(strip(mesh_, {.base = base_, .precision = precision}, context_)).model;
+        return *model;
+    }
+
+    /// a = b + s c over arrays far larger than the caches, stored past them: bytes a second, the rival of everything
+    /// that streams. Also with ordinary stores, which read each line before they write it.
+    double measure_triad() {
+        const std::size_t count = std::size_t{16} << 20;
+        std::vector<float> a(count), b(count, 1.5f), c(count, 2.5f);
+        const auto run = [&](bool streaming) {
+            return median_seconds([&] {
+                parallel_for(context_, count, 1 << 16, [&](std::size_t begin, std::size_t end) {
+#if defined(__SSE2__)
+                    if (streaming) {
+                        const __m128 s = _mm_set1_ps(0.5f);
+                        std::size_t i = begin;
+                        for (; i < end && reinterpret_cast<std::uintptr_t>(&a[i]) % 16 != 0; ++i) a[i] = b[i] + 0.5f * c[i];
+                        for (; i + 4 <= end; i += 4)
+                            _mm_stream_ps(&a[i], _mm_add_ps(_mm_loadu_ps(&b[i]), _mm_mul_ps(s, _mm_loadu_ps(&c[i]))));
+                        for (; i < end; ++i) a[i] = b[i] + 0.5f * c[i];
+                        return;
+                    }
+#endif
+                    for (std::size_t i = begin; i < end; ++i) a[i] = b[i] + 0.5f * c[i];
+                });
+            });
+        };
+        const double bytes = 3.0 * double(count) * sizeof(float);
+        const double plain = bytes / run(false), streaming = bytes / run(true);
+        add("restore.triad", plain * 1e-9, "GB/s");
+        add("restore.triad_streaming", streaming * 1e-9, "GB/s");
+        return std::max(plain, streaming);
+    }
+
+    void restore_blend(Precision precision, double triad) {
+        const Model& model = blend_model(precision);
+        const auto& detail = std::get<BlendDetail>(model.detail);
+        std::vector<BlendRestorer::Item> items(mesh_.vertex_count());
+        for (Index v = 0; v < items.size(); ++v) items[v] = {v, v};
+        const std::vector<Vec3f> normals(items.size(), Vec3f::UnitZ());
+        const BlendRestorer restorer(detail, model.mesh.positions, model.driver().vertices, items, normals);
+        const std::vector<Vec3f> driver = driver_positions(model);
+        const std::vector<Mat3f> gradients(driver.size(), Mat3f::Identity());
+        std::vector<Vec3f> positions(items.size()), out_normals(items.size());
+        const std::string name = precision == Precision::int16 ? "restore.int16" : "restore.float";
+        const double count = double(items.size());
+        const double record_bytes = precision == Precision::int16 ? 10 : 20;
+
+        const double seconds = median_seconds(
+            [&] { restorer.restore(driver, gradients, positions, {}, false, context_); });
+        add(name, count / seconds, "vertices/s");
+        add(name + ".of_triad", count * (record_bytes + 12) / seconds / triad, "ratio");
+        add(name + ".with_normals",
+            count / median_seconds([&] { restorer.restore(driver, gradients, positions, out_normals, false, context_); }),
+            "vertices/s");
+        add(name + ".in_mesh_order",
+            count / median_seconds([&] { restorer.restore(driver, gradients, positions, {}, true, context_); }),
+            "vertices/s");
+    }
+
+    void restore_reference(double triad) {
+        const unsigned resolution = 512;
+        const Stripped stripped =
+            require(strip(make_wavy_cube({.resolution = resolution}), {.code = DetailCode::reference}, context_));
+        const auto& detail = std::get<ReferenceDetail>(stripped.model.detail);
+        const std::vector<Vec3f> driver = driver_positions(stripped.model);
+        for (const Law law : {Law::inverse, Law::keep}) {
+            const ReferenceRestorer restorer(detail, law);
+            std::vector<Vec3f> positions(6 * std::size_t(resolution + 1) * (resolution + 1));
+            const double seconds = median_seconds(
+                [&] { restorer.restore_grids(driver, detail.patches.levels, positions, context_); });
+            const std::string name = law == Law::keep ? "restore.reference_keep" : "restore.reference";
+            add(name, double(positions.size()) / seconds, "vertices/s");
+            const double bytes = double(restorer.code_bytes()) + double(positions.size() * sizeof(Vec3f));
+            add(name + ".of_triad", bytes / seconds / triad, "ratio");
+        }
+    }
+
+    Mesh mesh_;
+    const RunContext& context_;
+    std::optional<std::size_t> base_ = {};
+    std::array<std::optional<Model>, 2> models_;
+    std::vector<Figure> figures_;
+    std::vector<FidelityRow> rows_;
+};
+
+} // namespace
+
+void add_bench(CLI::App& app, Session& session) {
+    struct Options {
+        std::string name = "all", mesh;
+        std::optional<std::size_t> base = {};
+    };
+    auto options = std::make_shared<Options>();
+    CLI::App* command = app.add_subcommand("bench", "Measure this machine: speeds with their rivals, and fidelity");
+    const std::vector<std::string> names = {"all", "restore", "strip", "files", "deform", "handles", "fidelity"};
+    command->add_option("name", options->name, "What to measure")->check(CLI::IsMember(names))->capture_default_str();
+    command->add_option("--mesh", options->mesh, "Mesh to measure on (unset: the wavy cube with 393,218 vertices)");
+    command->add_option("--base", options->base, "Vertices of the driver (unset: as strip chooses)");
+    session.add_common_options(*command, "  filigree bench restore --threads 1\n"
+                                         "  filigree bench fidelity --mesh scan.ply --base 1000\n"
+                                         "  filigree bench --json > figures.json");
+    command->callback([options, &session] {
+        session.begin();
+        Mesh mesh = options->mesh.empty() ? make_wavy_cube({.resolution = 256}) : session.read_mesh(options->mesh);
+        const Json mesh_json = {{"name", options->mesh.empty() ? "wavy-cube" : options->mesh},
+                                {"vertices", mesh.vertex_count()},
+                                {"faces", mesh.face_count()}};
+        RunContext silent = session.context(); // a bar would cost time that is measured
+        silent.progress = nullptr;
+        Bench bench(std::move(mesh), silent);
+        bench.set_base(options->base);
+        const auto wants = [&](const char* name) { return options->name == "all" || options->name == name; };
+        if (wants("restore")) bench.restore();
+        if (wants("strip")) bench.strip_phases();
+        if (wants("files")) bench.files();
+        if (wants("deform")) bench.deform();
+        if (wants("handles")) bench.handles();
+        if (wants("fidelity")) bench.fidelity();
+        if (silent.is_cancelled()) throw Failure{cancelled_error()};
+
+        Table table;
+        Json results = Json::array();
+        for (const Figure& figure : bench.figures()) {
+            table.row(figure.name, fmt::format("{:10.4g} {}", figure.value, figure.unit));
+            results.push_back({{"name", figure.name}, {"value", figure.value}, {"unit", figure.unit}});
+        }
+        Json rows = Json::array();
+        std::string text = table.text();
+        if (!bench.fidelity_rows().empty()) text += fmt::format("\n{:<18} {:<12} {:>9} {:>9} {:>9}\n", "method", "warp", "rms", "max", "normals");
+        for (const FidelityRow& row : bench.fidelity_rows()) {
+            rows.push_back({{"method", row.method}, {"warp", row.warp}, {"rms", row.rms}, {"max", row.max},
+                            {"normal_p95_deg", row.normal_p95_deg}});
+            text += fmt::format("{:<18} {:<12} {:>9.2e} {:>9.2e} {:>9.3g}\n", row.method, row.warp, row.rms, row.max, row.normal_p95_deg);
+        }
+        session.print(text, {{"mesh", mesh_json}, {"threads", silent.threads()}, {"results", results}, {"fidelity", rows}});
+    });
+}
+
+} // namespace filigree::cli

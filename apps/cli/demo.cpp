@@ -1,0 +1,150 @@
+#include "restore_options.h"
+
+#include "filigree/deform/space_warp.h"
+#include "filigree/hierarchy/strip.h"
+#include "filigree/io/model_file.h"
+#include "filigree/mesh/mesh_distance.h"
+#include "filigree/mesh/shapes.h"
+
+#include <algorithm>
+#include <filesystem>
+
+namespace filigree::cli {
+
+namespace {
+
+constexpr unsigned kDemoResolution = 264; // of the wavy cube: 418,178 vertices
+constexpr int kRepetitions = 5;           // of what is timed; the median counts
+
+Box world_box(const Mesh& mesh) {
+    Box box = bounds(mesh.positions);
+    box.min += mesh.origin;
+    box.max += mesh.origin;
+    return box;
+}
+
+/// A quarter circle and a half turn, along the longest side.
+std::unique_ptr<SpaceWarp> bend_and_twist(const Box& box) {
+    int longest = 0;
+    box.size().maxCoeff(&longest);
+    std::vector<std::unique_ptr<SpaceWarp>> warps;
+    warps.push_back(make_twist(box, static_cast<Axis>(longest), 90));
+    warps.push_back(make_bend(box, static_cast<Axis>(longest), 90));
+    return make_chain(std::move(warps));
+}
+
+template <class Work>
+double median_seconds(const Work& work) {
+    std::vector<double> seconds;
+    for (int i = 0; i < kRepetitions; ++i) {
+        const double start = now_seconds();
+        work();
+        seconds.push_back(now_seconds() - start);
+    }
+    std::nth_element(seconds.begin(), seconds.begin() + kRepetitions / 2, seconds.end());
+    return seconds[kRepetitions / 2];
+}
+
+void run_demo(const std::string& input, const std::string& folder, Session& session) {
+    const RunContext& context = session.context();
+    std::error_code failed;
+    std::filesystem::create_directories(folder, failed);
+    if (failed)
+        throw Failure{{ErrorCode::unwritable, folder + " cannot be made: " + failed.message() + "."}};
+    const auto in_folder = [&](const char* name) { return (std::filesystem::path(folder) / name).string(); };
+
+    const double start = now_seconds();
+    Mesh mesh = input.empty() ? make_wavy_cube({.resolution = kDemoResolution}) : session.read_mesh(input);
+    const double read = now_seconds();
+    const Stripped stripped = require(strip(mesh, {}, context));
+    const Model& model = stripped.model;
+    const double strip_seconds = now_seconds() - read;
+
+    // The long way: every vertex, and every normal where the mesh has them.
+    const auto warp = bend_and_twist(world_box(mesh));
+    Mesh full = mesh;
+    const double full_seconds = median_seconds([&] {
+        full.positions = warp_positions(*warp, mesh.positions, mesh.origin, context);
+    });
+    full = mesh;
+    warp_mesh(*warp, full, context);
+
+    // Ours: the driver with its gradients, then all detail back.
+    const Restorer restorer = require(Restorer::create(model, {}, context));
+    Pose pose;
+    const double driver_seconds = median_seconds(
+        [&] { pose = warp_pose(*warp, driver_positions(model), model.mesh.origin, context); });
+    std::vector<Vec3f> positions;
+    const double restore_seconds = median_seconds([&] { positions = require(restorer.positions(pose, context)); });
+    const Mesh restored = require(restorer.mesh(pose, context));
+    const MeshDistance with_gradients = require(mesh_distance(restored, full, 0, context));
+    const Mesh from_positions = require(restorer.mesh({pose.positions, {}, {}}, context));
+    const MeshDistance positions_only = require(mesh_distance(from_positions, full, 0, context));
+
+    require(write_model(model, in_folder("model.fil"), context));
+    Mesh driver = level_mesh(model, 0);
+    session.write_mesh(driver, in_folder("driver.ply"));
+    driver.positions = pose.positions;
+    for (VertexScalar& scalar : gradient_scalars(pose.gradients)) driver.scalars.push_back(std::move(scalar));
+    session.write_mesh(driver, in_folder("driver_bent.ply"));
+    session.write_mesh(mesh, in_folder("mesh.ply"));
+    session.write_mesh(full, in_folder("full_deformation.ply"));
+    session.write_mesh(restored, in_folder("restored.ply"));
+
+    const double ours = driver_seconds + restore_seconds;
+    const VertexDistance& d = *with_gradients.vertices;
+    const VertexDistance& p = *positions_only.vertices;
+    Table table;
+    table.row("mesh", fmt::format("{} vertices, {} faces  ({})", with_commas(mesh.vertex_count()),
+                                  with_commas(mesh.face_count()), input.empty() ? "the report's wavy cube" : input));
+    table.row("driver", fmt::format("{} vertices, stripped in {}", with_commas(model.driver().vertices.size()),
+                                    seconds_text(strip_seconds)));
+    table.row("deform every vertex", seconds_text(full_seconds));
+    table.row("deform driver, restore",
+              fmt::format("{}  ({} + {})", seconds_text(ours), seconds_text(driver_seconds),
+                          seconds_text(restore_seconds)));
+    table.row("speed ratio", fmt::format("{:.1f} times", full_seconds / ours));
+    table.row("difference, rms", distance_text(d.rms, with_gradients.diagonal));
+    table.row("normals off by", fmt::format("{:.2g} degrees (95 % of them by less than {:.2g})", d.normal_mean_deg,
+                                            d.normal_p95_deg));
+    table.row("without gradients", fmt::format("rms {:.2e} of the diagonal, 95 % of normals within {:.2g} degrees",
+                                               p.rms / positions_only.diagonal, p.normal_p95_deg));
+    table.row("files", folder + "/: mesh, driver, driver_bent, restored, full_deformation (.ply), model.fil");
+    session.print(table.text(), {{"mesh", input.empty() ? "wavy-cube" : input},
+                                 {"output", folder},
+                                 {"vertices", mesh.vertex_count()},
+                                 {"driver_vertices", model.driver().vertices.size()},
+                                 {"read_seconds", read - start},
+                                 {"strip_seconds", strip_seconds},
+                                 {"full_seconds", full_seconds},
+                                 {"driver_seconds", driver_seconds},
+                                 {"restore_seconds", restore_seconds},
+                                 {"speed_ratio", full_seconds / ours},
+                                 {"rms", d.rms / with_gradients.diagonal},
+                                 {"rms_units", d.rms},
+                                 {"max", d.max / with_gradients.diagonal},
+                                 {"normal_mean_deg", d.normal_mean_deg},
+                                 {"normal_p95_deg", d.normal_p95_deg},
+                                 {"positions_only_rms", p.rms / positions_only.diagonal},
+                                 {"positions_only_normal_p95_deg", p.normal_p95_deg}});
+}
+
+} // namespace
+
+void add_demo(CLI::App& app, Session& session) {
+    struct Options {
+        std::string input, output = "filigree-demo";
+    };
+    auto options = std::make_shared<Options>();
+    CLI::App* command =
+        app.add_subcommand("demo", "The main job, start to end: strip, bend and twist the driver, restore, compare");
+    command->add_option("mesh", options->input, "Mesh (unset: the report's wavy cube with 418,178 vertices)");
+    command->add_option("-o,--output", options->output, "Folder for the meshes")->capture_default_str();
+    session.add_common_options(*command, "  filigree demo\n  filigree demo scan.ply -o out");
+    command->callback([options, &session] {
+        session.begin();
+        run_demo(options->input, options->output, session);
+    });
+}
+
+} // namespace filigree::cli

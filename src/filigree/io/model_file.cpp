@@ -1,0 +1,422 @@
+// A header, a table of sections, and the sections: plain little-endian arrays, each on an eight-byte boundary with its
+// own checksum. Reading goes through the table alone, so sections of later versions are passed over.
+#include "filigree/io/model_file.h"
+
+#include "filigree/io/file.h"
+
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <new>
+
+#define XXH_INLINE_ALL
+#include <xxhash.h>
+
+static_assert(std::endian::native == std::endian::little, "model files are written as the processor keeps them");
+
+namespace filigree {
+
+namespace {
+
+constexpr char kMagic[8] = {'F', 'I', 'L', 'I', 'G', 'R', 'E', 'E'};
+constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kMaxSections = 4096;
+
+struct Header {
+    char magic[8];
+    std::uint32_t version, section_count;
+    std::uint64_t file_size;
+    std::uint64_t table_hash; ///< XXH3-64 of the table
+};
+static_assert(sizeof(Header) == 32);
+
+struct Section {
+    char name[8];            ///< padded with zeros
+    std::uint32_t index;     ///< of a level or a scalar; else 0
+    std::uint32_t item_size; ///< bytes
+    std::uint64_t offset;    ///< from the start of the file, a multiple of 8
+    std::uint64_t count;     ///< items
+    std::uint64_t hash;      ///< XXH3-64 of the section's bytes
+};
+static_assert(sizeof(Section) == 40);
+
+// ---------------------------------------------------------------------------------------------------------- writing
+
+class SectionWriter {
+public:
+    template <class T>
+    void array(std::string_view name, const std::vector<T>& items, std::uint32_t index = 0) {
+        if (!items.empty()) raw(name, index, items.data(), sizeof(T), items.size());
+    }
+    template <class T>
+    void value(std::string_view name, const T& item) {
+        raw(name, 0, &item, sizeof(T), 1);
+    }
+    void strings(std::string_view name, const std::vector<std::string>& items) {
+        std::vector<char> bytes; // each ended by a zero byte
+        for (const std::string& item : items) {
+            bytes.insert(bytes.end(), item.begin(), item.end());
+            bytes.push_back('\0');
+        }
+        array(name, bytes);
+    }
+
+    std::string finish() {
+        const std::size_t table_bytes = sections_.size() * sizeof(Section);
+        for (Section& section : sections_) section.offset += sizeof(Header) + table_bytes;
+        Header header{};
+        std::memcpy(header.magic, kMagic, sizeof kMagic);
+        header.version = kVersion;
+        header.section_count = static_cast<std::uint32_t>(sections_.size());
+        header.file_size = sizeof(Header) + table_bytes + content_.size();
+        header.table_hash = XXH3_64bits(sections_.data(), table_bytes);
+        std::string file;
+        file.reserve(header.file_size);
+        file.append(reinterpret_cast<const char*>(&header), sizeof header);
+        file.append(reinterpret_cast<const char*>(sections_.data()), table_bytes);
+        return file += content_;
+    }
+
+private:
+    void raw(std::string_view name, std::uint32_t index, const void* items, std::size_t item_size, std::size_t count) {
+        Section section{};
+        std::memcpy(section.name, name.data(), std::min<std::size_t>(name.size(), sizeof section.name));
+        section.index = index;
+        section.item_size = static_cast<std::uint32_t>(item_size);
+        section.offset = content_.size();
+        section.count = count;
+        section.hash = XXH3_64bits(items, item_size * count);
+        sections_.push_back(section);
+        content_.append(static_cast<const char*>(items), item_size * count);
+        content_.append((8 - content_.size() % 8) % 8, '\0');
+    }
+
+    std::vector<Section> sections_;
+    std::string content_;
+};
+
+template <class T>
+void write_attribute(SectionWriter& out, const std::string& name, const CornerAttribute<T>& attribute) {
+    out.array(name + ".val", attribute.values);
+    out.array(name + ".cor", attribute.corners);
+}
+
+void write_labels(SectionWriter& out, const std::string& name, const FaceLabels& labels) {
+    out.strings(name + ".nam", labels.names);
+    out.array(name + ".fac", labels.of_face);
+}
+
+/// Faces as one size when all have it, else as their offsets.
+void write_faces(SectionWriter& out, const std::string& name, std::uint32_t index, const std::vector<Index>& offsets,
+                 const std::vector<Index>& corners) {
+    const Index size = offsets.size() > 1 ? offsets[1] : 0;
+    bool uniform = size > 0;
+    for (std::size_t f = 0; uniform && f < offsets.size(); ++f) uniform = offsets[f] == f * size;
+    out.array(name + (uniform ? ".siz" : ".off"), uniform ? std::vector<Index>{size} : offsets, index);
+    out.array(name + ".cor", corners, index);
+}
+
+void write_mesh_sections(SectionWriter& out, const Mesh& mesh, bool with_positions) {
+    if (with_positions) out.array("mesh.pos", mesh.positions);
+    out.value("mesh.org", std::array<double, 3>{mesh.origin[0], mesh.origin[1], mesh.origin[2]});
+    out.value("mesh.num", static_cast<std::uint64_t>(mesh.vertex_count()));
+    write_faces(out, "mesh", 0, mesh.face_offsets, mesh.corners);
+    write_attribute(out, "uv", mesh.uvs);
+    write_attribute(out, "nrm", mesh.normals);
+    out.array("col.val", mesh.colors);
+    if (mesh.colors_have_alpha) out.value("col.alp", std::uint32_t{1});
+    std::vector<std::string> names;
+    for (std::uint32_t i = 0; i < mesh.scalars.size(); ++i) {
+        names.push_back(mesh.scalars[i].name);
+        out.array("scal.val", mesh.scalars[i].values, i);
+    }
+    out.strings("scal.nam", names);
+    write_labels(out, "obj", mesh.objects);
+    write_labels(out, "grp", mesh.groups);
+    write_labels(out, "mat", mesh.materials);
+    out.array("smooth", mesh.smoothing);
+    out.strings("mtllib", mesh.material_files);
+}
+
+void write_blend(SectionWriter& out, const Model& model, const BlendDetail& detail) {
+    out.value("bl.prec", static_cast<std::uint32_t>(detail.precision));
+    out.array("bl.cell", detail.cells);
+    out.array("bl.coff", detail.cell_offsets);
+    out.array("bl.order", detail.order);
+    if (detail.precision == Precision::float32) {
+        out.array("bl.u", detail.u);
+        out.array("bl.v", detail.v);
+    } else {
+        const auto rounded = [](const std::vector<float>& weights) {
+            std::vector<std::int16_t> steps;
+            for (float w : weights) steps.push_back(static_cast<std::int16_t>(std::lround(w * 32767.0f)));
+            return steps;
+        };
+        out.array("bl.u16", rounded(detail.u));
+        out.array("bl.v16", rounded(detail.v));
+        out.array("bl.off16", detail.offsets);
+        out.array("bl.scale", detail.cell_scales);
+        out.array("drv.pos", driver_positions(model));
+    }
+    out.array("bl.gap", detail.across_gap);
+    out.array("bl.away", detail.facing_away);
+}
+
+void write_reference(SectionWriter& out, const ReferenceDetail& detail) {
+    out.value("rf.par", std::array<std::uint32_t, 2>{detail.patches.levels, detail.references});
+    out.value("rf.ext", detail.extent);
+    out.array("rf.base", detail.patches.base);
+    out.array("rf.grid", detail.patches.grid);
+    out.array("rf.drv", detail.rest_driver);
+    out.array("rf.rec", detail.records);
+    out.array("rf.loose", detail.loose);
+}
+
+// ---------------------------------------------------------------------------------------------------------- reading
+
+/// What is wrong with a file, thrown inside this source file only and turned into an Error at its door.
+struct Damage {
+    std::string what;
+};
+
+class SectionReader {
+public:
+    explicit SectionReader(std::string_view bytes) : bytes_(bytes) {
+        Header header;
+        if (bytes.size() < sizeof header) throw Damage{"is cut off in its header"};
+        std::memcpy(&header, bytes.data(), sizeof header);
+        if (header.version > kVersion)
+            throw Damage{"is of version " + std::to_string(header.version) + " and this program reads version " +
+                         std::to_string(kVersion) + "; use a newer program"};
+        if (header.file_size != bytes.size())
+            throw Damage{"should have " + std::to_string(header.file_size) + " bytes and has " +
+                         std::to_string(bytes.size()) + ": it was cut off or added to"};
+        if (header.section_count > kMaxSections ||
+            header.section_count * sizeof(Section) > bytes.size() - sizeof header)
+            throw Damage{"names more sections than fit into it"};
+        const std::size_t table_bytes = header.section_count * sizeof(Section);
+        if (XXH3_64bits(bytes.data() + sizeof header, table_bytes) != header.table_hash)
+            throw Damage{"has a damaged table of sections (checksum)"};
+        sections_.resize(header.section_count);
+        if (table_bytes > 0) std::memcpy(sections_.data(), bytes.data() + sizeof header, table_bytes);
+    }
+
+    /// The items of a section; empty when there is none.
+    template <class T>
+    std::vector<T> array(std::string_view name, std::uint32_t index = 0) const {
+        const Section* section = find(name, index);
+        if (!section) return {};
+        const std::string label(name);
+        if (section->item_size != sizeof(T)) throw Damage{"has items of a wrong size in section " + label};
+        if (section->offset > bytes_.size() || section->count > (bytes_.size() - section->offset) / sizeof(T))
+            throw Damage{"has a section " + label + " that reaches past its end"};
+        const char* begin = bytes_.data() + section->offset;
+        if (XXH3_64bits(begin, section->count * sizeof(T)) != section->hash)
+            throw Damage{"has a damaged section " + label + " (checksum)"};
+        std::vector<T> items(section->count);
+        if (!items.empty()) std::memcpy(static_cast<void*>(items.data()), begin, items.size() * sizeof(T));
+        return items;
+    }
+    template <class T>
+    T value(std::string_view name) const {
+        const std::vector<T> items = array<T>(name);
+        if (items.size() != 1) throw Damage{"lacks its section " + std::string(name)};
+        return items[0];
+    }
+    std::vector<std::string> strings(std::string_view name) const {
+        std::vector<std::string> items;
+        std::string item;
+        for (char c : array<char>(name)) {
+            if (c != '\0') {
+                item += c;
+                continue;
+            }
+            items.push_back(std::move(item));
+            item.clear();
+        }
+        return items;
+    }
+
+private:
+    const Section* find(std::string_view name, std::uint32_t index) const {
+        for (const Section& section : sections_)
+            if (section.index == index && name == std::string_view(section.name, strnlen(section.name, 8)))
+                return &section;
+        return nullptr;
+    }
+
+    std::string_view bytes_;
+    std::vector<Section> sections_;
+};
+
+template <class T>
+CornerAttribute<T> read_attribute(const SectionReader& in, const std::string& name) {
+    return {in.array<T>(name + ".val"), in.array<Index>(name + ".cor")};
+}
+
+FaceLabels read_labels(const SectionReader& in, const std::string& name) {
+    return {in.strings(name + ".nam"), in.array<Index>(name + ".fac")};
+}
+
+void read_faces(const SectionReader& in, const std::string& name, std::uint32_t index, std::vector<Index>& offsets,
+                std::vector<Index>& corners) {
+    corners = in.array<Index>(name + ".cor", index);
+    const std::vector<Index> size = in.array<Index>(name + ".siz", index);
+    if (size.empty()) {
+        offsets = in.array<Index>(name + ".off", index);
+        if (offsets.empty()) offsets = {0};
+        return;
+    }
+    if (size.size() != 1 || size[0] == 0 || corners.size() % size[0] != 0)
+        throw Damage{"has faces that do not divide their corners"};
+    offsets.resize(corners.size() / size[0] + 1);
+    for (std::size_t f = 0; f < offsets.size(); ++f) offsets[f] = static_cast<Index>(f * size[0]);
+}
+
+Mesh read_mesh_sections(const SectionReader& in) {
+    Mesh mesh;
+    mesh.positions = in.array<Vec3f>("mesh.pos");
+    const auto origin = in.value<std::array<double, 3>>("mesh.org");
+    mesh.origin = {origin[0], origin[1], origin[2]};
+    read_faces(in, "mesh", 0, mesh.face_offsets, mesh.corners);
+    mesh.uvs = read_attribute<Vec2f>(in, "uv");
+    mesh.normals = read_attribute<Vec3f>(in, "nrm");
+    mesh.colors = in.array<Vec4f>("col.val");
+    mesh.colors_have_alpha = !in.array<std::uint32_t>("col.alp").empty();
+    const std::vector<std::string> names = in.strings("scal.nam");
+    for (std::uint32_t i = 0; i < names.size(); ++i) mesh.scalars.push_back({names[i], in.array<float>("scal.val", i)});
+    mesh.objects = read_labels(in, "obj");
+    mesh.groups = read_labels(in, "grp");
+    mesh.materials = read_labels(in, "mat");
+    mesh.smoothing = in.array<Index>("smooth");
+    mesh.material_files = in.strings("mtllib");
+    return mesh;
+}
+
+BlendDetail read_blend(const SectionReader& in) {
+    BlendDetail detail;
+    const auto precision = in.value<std::uint32_t>("bl.prec");
+    if (precision > 1) throw Damage{"has records of a precision that is not known"};
+    detail.precision = static_cast<Precision>(precision);
+    detail.cells = in.array<Triangle>("bl.cell");
+    detail.cell_offsets = in.array<Index>("bl.coff");
+    detail.order = in.array<Index>("bl.order");
+    if (detail.precision == Precision::float32) {
+        detail.u = in.array<float>("bl.u");
+        detail.v = in.array<float>("bl.v");
+    } else {
+        for (std::int16_t step : in.array<std::int16_t>("bl.u16")) detail.u.push_back(float(step) * (1.0f / 32767.0f));
+        for (std::int16_t step : in.array<std::int16_t>("bl.v16")) detail.v.push_back(float(step) * (1.0f / 32767.0f));
+        detail.offsets = in.array<std::array<std::int16_t, 3>>("bl.off16");
+        detail.cell_scales = in.array<float>("bl.scale");
+    }
+    detail.across_gap = in.array<Index>("bl.gap");
+    detail.facing_away = in.array<Index>("bl.away");
+    return detail;
+}
+
+ReferenceDetail read_reference(const SectionReader& in) {
+    ReferenceDetail detail;
+    const auto parameters = in.value<std::array<std::uint32_t, 2>>("rf.par");
+    detail.patches.levels = parameters[0];
+    detail.references = parameters[1];
+    detail.extent = in.value<float>("rf.ext");
+    detail.patches.base = in.array<std::array<Index, 4>>("rf.base");
+    detail.patches.grid = in.array<Index>("rf.grid");
+    detail.rest_driver = in.array<Vec3f>("rf.drv");
+    detail.records = in.array<Vec3f>("rf.rec");
+    detail.loose = in.array<Index>("rf.loose");
+    return detail;
+}
+
+Model read_sections(std::string_view bytes) {
+    const SectionReader in(bytes);
+    Model model;
+    model.mesh = read_mesh_sections(in);
+    const auto level_count = in.value<std::uint32_t>("levels");
+    if (level_count > 64) throw Damage{"has more levels than make sense"};
+    for (std::uint32_t k = 0; k < level_count; ++k) {
+        Level& level = model.levels.emplace_back();
+        level.vertices = in.array<Index>("lev.vert", k);
+        read_faces(in, "lev", k, level.face_offsets, level.corners);
+    }
+    const auto code = in.value<std::uint32_t>("code");
+    if (code > 1) throw Damage{"has a detail code that is not known"};
+    if (static_cast<DetailCode>(code) == DetailCode::reference)
+        model.detail = read_reference(in);
+    else
+        model.detail = read_blend(in);
+
+    // int16 models hold the driver's positions alone; the others come from the records, once those are known to be
+    // sound.
+    const std::vector<Vec3f> driver = in.array<Vec3f>("drv.pos");
+    if (!driver.empty()) {
+        const auto vertex_count = in.value<std::uint64_t>("mesh.num");
+        auto* detail = std::get_if<BlendDetail>(&model.detail);
+        if (!detail || vertex_count != detail->order.size() || model.levels.empty() ||
+            driver.size() != model.driver().vertices.size())
+            throw Damage{"has records that do not fit its vertices"};
+        model.mesh.positions.assign(vertex_count, Vec3f::Zero());
+        for (std::size_t i = 0; i < driver.size(); ++i)
+            if (model.driver().vertices[i] < vertex_count) model.mesh.positions[model.driver().vertices[i]] = driver[i];
+        if (const std::string wrong = check_model(model); !wrong.empty()) throw Damage{"is inconsistent: " + wrong};
+        decode_rest(*detail, model.driver().vertices, model.mesh.positions);
+    }
+    if (const std::string wrong = check_model(model); !wrong.empty()) throw Damage{"is inconsistent: " + wrong};
+    return model;
+}
+
+} // namespace
+
+bool is_model_file(std::string_view bytes) { return bytes.starts_with(std::string_view(kMagic, sizeof kMagic)); }
+
+std::string write_model(const Model& model) {
+    SectionWriter out;
+    const auto* blend = std::get_if<BlendDetail>(&model.detail);
+    write_mesh_sections(out, model.mesh, !blend || blend->precision == Precision::float32);
+    out.value("code", static_cast<std::uint32_t>(model.code()));
+    out.value("levels", static_cast<std::uint32_t>(model.levels.size()));
+    for (std::uint32_t k = 0; k < model.levels.size(); ++k) {
+        out.array("lev.vert", model.levels[k].vertices, k);
+        write_faces(out, "lev", k, model.levels[k].face_offsets, model.levels[k].corners);
+    }
+    if (blend)
+        write_blend(out, model, *blend);
+    else
+        write_reference(out, std::get<ReferenceDetail>(model.detail));
+    return out.finish();
+}
+
+Status write_model(const Model& model, const std::filesystem::path& path, const RunContext& context) {
+    if (context.is_cancelled()) return cancelled_error();
+    context.report("write", 0);
+    const std::string bytes = write_model(model);
+    const std::string_view piece = bytes;
+    Status status = write_file(path, std::span(&piece, 1));
+    context.report("write", 1);
+    return status;
+}
+
+Result<Model> read_model(std::string_view bytes, const std::string& name, const RunContext& context) {
+    if (context.is_cancelled()) return cancelled_error();
+    if (!is_model_file(bytes))
+        return Error{ErrorCode::bad_file, name + " is not a Filigree model: make one with 'filigree strip'."};
+    try {
+        return read_sections(bytes);
+    } catch (const Damage& damage) {
+        return Error{ErrorCode::bad_file, name + " " + damage.what + "; strip the mesh again."};
+    } catch (const std::bad_alloc&) {
+        return Error{ErrorCode::out_of_memory, name + " does not fit into memory."};
+    }
+}
+
+Result<Model> read_model(const std::filesystem::path& path, const RunContext& context) {
+    context.report("read", 0);
+    Result<std::string> bytes = read_file(path);
+    if (!bytes) return bytes.error();
+    Result<Model> model = read_model(*bytes, path.string(), context);
+    context.report("read", 1);
+    return model;
+}
+
+} // namespace filigree
