@@ -1,134 +1,200 @@
 #include "filigree/hierarchy/reference_kernel.h"
 
 #include <cstring>
-#include <type_traits>
 #include <utility>
 
 #if defined(__x86_64__)
 #include <immintrin.h>
 #endif
-#if defined(__x86_64__) && !defined(__clang__) // Clang 14 refuses vectors as arguments here, inlined or not
-// The loader picks the widest one that the processor has.
-#define FILIGREE_CLONES __attribute__((target_clones("avx512f", "avx2", "default")))
-#else
-#define FILIGREE_CLONES
-#endif
 
 namespace filigree::reference {
+
+// Vectors as wide as the processor's: wider ones would be taken apart in memory, five times slower.
+#define FILIGREE_LANES(N)                                                                                              \
+    typedef float Lanes##N __attribute__((vector_size(4 * N)));                                                        \
+    typedef std::int32_t IntLanes##N __attribute__((vector_size(4 * N)));                                              \
+    template <>                                                                                                        \
+    struct IntOf<Lanes##N> {                                                                                           \
+        using type = IntLanes##N;                                                                                      \
+    };
+FILIGREE_LANES(4)
+FILIGREE_LANES(8)
+FILIGREE_LANES(16)
+
 namespace {
 
-FILIGREE_INLINE Lanes load(const float* from) {
-    Lanes lanes;
+template <class F>
+inline constexpr std::size_t kWidth = sizeof(F) / sizeof(float);
+
+template <class F>
+FILIGREE_INLINE F load(const float* from) {
+    F lanes;
     std::memcpy(&lanes, from, sizeof lanes);
     return lanes;
 }
-FILIGREE_INLINE void store(const Lanes& lanes, float* to) { std::memcpy(to, &lanes, sizeof lanes); }
-FILIGREE_INLINE Point<Lanes> load(const float* from, std::size_t pitch) {
-    return {load(from), load(from + pitch), load(from + 2 * pitch)};
+template <class F>
+FILIGREE_INLINE void store(const F& lanes, float* to) {
+    std::memcpy(to, &lanes, sizeof lanes);
+}
+template <class F>
+FILIGREE_INLINE Point<F> load(const float* from, std::size_t pitch) {
+    return {load<F>(from), load<F>(from + pitch), load<F>(from + 2 * pitch)};
 }
 
 /// a0 b0 a1 b1 ...
-FILIGREE_INLINE void store_zipped(const Lanes& a, const Lanes& b, float* to) {
-    store(__builtin_shufflevector(a, b, 0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23), to);
-    store(__builtin_shufflevector(a, b, 8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31), to + kLanes);
+template <class F, std::size_t... kLane>
+FILIGREE_INLINE void store_zipped(const F& a, const F& b, float* to, std::index_sequence<kLane...>) {
+    constexpr std::size_t kN = sizeof...(kLane);
+    store(__builtin_shufflevector(a, b, int(kLane / 2 + kLane % 2 * kN)...), to);
+    store(__builtin_shufflevector(a, b, int(kN / 2 + kLane / 2 + kLane % 2 * kN)...), to + kN);
 }
-FILIGREE_INLINE void store_zipped(const Point<Lanes>& a, const Point<Lanes>& b, float* to, std::size_t pitch) {
-    store_zipped(a.x, b.x, to);
-    store_zipped(a.y, b.y, to + pitch);
-    store_zipped(a.z, b.z, to + 2 * pitch);
+template <class F>
+FILIGREE_INLINE void store_zipped(const Point<F>& a, const Point<F>& b, float* to, std::size_t pitch) {
+    constexpr auto lanes = std::make_index_sequence<kWidth<F>>();
+    store_zipped(a.x, b.x, to, lanes);
+    store_zipped(a.y, b.y, to + pitch, lanes);
+    store_zipped(a.z, b.z, to + 2 * pitch, lanes);
 }
 
-// Floats ahead that records are asked for: they come from memory once and in order.
+// Floats ahead that records are asked for: they come from memory once and in order. Without it, half the speed.
 constexpr std::size_t kPrefetch = 1024;
 
-template <int kReferences>
+template <class F, int kReferences>
+FILIGREE_INLINE void refine_lanes(const CellRow& row, const Scaling& scaling, const float* code, std::size_t width,
+                                  std::size_t i) {
+    const auto record = [&](std::size_t k) __attribute__((always_inline)) {
+        return load<F>(code + 3 * k * width, width);
+    };
+    const auto size = [&](std::size_t k) __attribute__((always_inline)) {
+        return scaling.law == Law::keep ? F{} : load<F>(code + (9 + k) * width);
+    };
+    const Point<F> a0 = load<F>(row.lower + i, row.pitch), a1 = load<F>(row.lower + i + 1, row.pitch);
+    const Point<F> b0 = load<F>(row.upper + i, row.pitch), b1 = load<F>(row.upper + i + 1, row.pitch);
+    References<F> along{{a0, a1}, {b0, b1}, {}}, upwards{{b0, a0}, {b1, a1}, {}};
+    if constexpr (kReferences == 6) {
+        along.behind[0] = load<F>(row.behind + i, row.pitch);
+        along.behind[1] = load<F>(row.behind + i + 1, row.pitch);
+        upwards.behind[0] = load<F>(row.upper + i - 1, row.pitch);
+        upwards.behind[1] = load<F>(row.lower + i - 1, row.pitch);
+    }
+    const auto edge = place(edge_frame<kReferences>(along, true), record(0), size(0), scaling);
+    store_zipped(a0, edge, row.even + 2 * i, row.fine_pitch);
+    const auto side = place(edge_frame<kReferences>(upwards, true), record(1), size(1), scaling);
+    const auto centre = place(centre_frame<kReferences>(along), record(2), size(kReferences == 6 ? 2 : 0), scaling);
+    store_zipped(side, centre, row.odd + 2 * i, row.fine_pitch);
+}
+
+template <class F, int kReferences>
 FILIGREE_INLINE void refine_row_of(const CellRow& row, const Scaling scaling) {
-    const std::size_t width = block_width(row.cells);
-    const std::size_t floats = cell_floats(kReferences, scaling.law) * width;
+    const std::size_t width = block_width(row.cells), floats = cell_floats(kReferences, scaling.law);
     const float* code = row.code;
-    for (std::size_t i = 0; i < row.cells; i += width, code += floats) {
-        for (std::size_t line = 0; line < cell_floats(kReferences, scaling.law); ++line)
-            __builtin_prefetch(code + kPrefetch + line * kLanes);
+    for (std::size_t i = 0; i < row.cells; i += width, code += floats * width) {
+        for (std::size_t line = 0; line < floats; ++line) __builtin_prefetch(code + kPrefetch + line * kLanes);
         for (std::size_t c = 0; c < 3; ++c) __builtin_prefetch(row.upper + (3 + c) * row.pitch + i);
-        const auto record = [&](std::size_t k) { return load(code + 3 * k * width, width); };
-        const auto size = [&](std::size_t k) {
-            return scaling.law == Law::keep ? Lanes{} : load(code + (9 + k) * width);
-        };
-        const Point<Lanes> a0 = load(row.lower + i, row.pitch), a1 = load(row.lower + i + 1, row.pitch);
-        const Point<Lanes> b0 = load(row.upper + i, row.pitch), b1 = load(row.upper + i + 1, row.pitch);
-        References<Lanes> along{{a0, a1}, {b0, b1}, {}}, upwards{{b0, a0}, {b1, a1}, {}};
-        if constexpr (kReferences == 6) {
-            along.behind[0] = load(row.behind + i, row.pitch);
-            along.behind[1] = load(row.behind + i + 1, row.pitch);
-            upwards.behind[0] = load(row.upper + i - 1, row.pitch);
-            upwards.behind[1] = load(row.lower + i - 1, row.pitch);
-        }
-        const auto edge = place(edge_frame<kReferences>(along, true), record(0), size(0), scaling);
-        store_zipped(a0, edge, row.even + 2 * i, row.fine_pitch);
-        const auto side = place(edge_frame<kReferences>(upwards, true), record(1), size(1), scaling);
-        const auto centre = place(centre_frame<kReferences>(along), record(2), size(kReferences == 6 ? 2 : 0), scaling);
-        store_zipped(side, centre, row.odd + 2 * i, row.fine_pitch);
+        for (std::size_t lane = 0; lane < width; lane += kWidth<F>)
+            refine_lanes<F, kReferences>(row, scaling, code + lane, width, i + lane);
+    }
+}
+
+template <class F>
+FILIGREE_INLINE void refine_row_of(const CellRow& row, int references, const Scaling& scaling) {
+    if (references == 4) return refine_row_of<F, 4>(row, scaling);
+    if (references == 6) return refine_row_of<F, 6>(row, scaling);
+    // The report's own, with the law known to the compiler: 3 to 8 % faster.
+    switch (scaling.law) {
+    case Law::keep:
+        return refine_row_of<F, 3>(row, {Law::keep, scaling.height, scaling.size});
+    case Law::inverse:
+        return refine_row_of<F, 3>(row, {Law::inverse, scaling.height, scaling.size});
+    case Law::proportional:
+        return refine_row_of<F, 3>(row, {Law::proportional, scaling.height, scaling.size});
+    case Law::volume:
+        return refine_row_of<F, 3>(row, {Law::volume, scaling.height, scaling.size});
     }
 }
 
 /// Element e of three interleaved vectors comes from coordinate e % 3 of point e / 3.
-template <std::size_t kPart, std::size_t... kLane>
-FILIGREE_INLINE void store_interleaved(const Point<Lanes>& p, float* to, std::index_sequence<kLane...>) {
-    const Lanes xy = __builtin_shufflevector(
-        p.x, p.y, int((16 * kPart + kLane) % 3 == 1 ? 16 + (16 * kPart + kLane) / 3 : (16 * kPart + kLane) / 3)...);
-    store(
-        __builtin_shufflevector(xy, p.z, int((16 * kPart + kLane) % 3 == 2 ? 16 + (16 * kPart + kLane) / 3 : kLane)...),
-        to + kPart * kLanes);
+template <std::size_t kPart, class F, std::size_t... kLane>
+FILIGREE_INLINE void store_interleaved(const Point<F>& p, float* to, std::index_sequence<kLane...>) {
+    constexpr std::size_t kN = sizeof...(kLane), kFirst = kPart * kN;
+    const F xy = __builtin_shufflevector(p.x, p.y, int(((kFirst + kLane) % 3 == 1 ? kN : 0) + (kFirst + kLane) / 3)...);
+    store(__builtin_shufflevector(xy, p.z, int((kFirst + kLane) % 3 == 2 ? kN + (kFirst + kLane) / 3 : kLane)...),
+          to + kFirst);
 }
 
-} // namespace
-
-FILIGREE_CLONES void refine_row(const CellRow& row, int references, const Scaling& scaling) {
-    if (references == 4) return refine_row_of<4>(row, scaling);
-    if (references == 6) return refine_row_of<6>(row, scaling);
-    // The report's own, with the law known to the compiler: 3 to 8 % faster.
-    const auto with_law = [&](Law law) { return Scaling{law, scaling.height, scaling.size}; };
-    switch (scaling.law) {
-    case Law::keep:
-        return refine_row_of<3>(row, with_law(Law::keep));
-    case Law::inverse:
-        return refine_row_of<3>(row, with_law(Law::inverse));
-    case Law::proportional:
-        return refine_row_of<3>(row, with_law(Law::proportional));
-    case Law::volume:
-        return refine_row_of<3>(row, with_law(Law::volume));
-    }
-}
-
-FILIGREE_CLONES void refine_edge(const EdgeRun& run, int references, const Scaling& scaling, Point<Lanes>& out) {
-    const Frame<Lanes> frame = references == 3   ? edge_frame<3>(run.references, run.both_sides)
-                               : references == 4 ? edge_frame<4>(run.references, run.both_sides)
-                                                 : edge_frame<6>(run.references, run.both_sides);
-    const Lanes size = scaling.law == Law::keep ? Lanes{} : load(run.code + 3 * run.count);
-    out = place(frame, load(run.code, run.count), size, scaling);
-}
-
-FILIGREE_CLONES void interleave(const float* row, std::size_t pitch, std::size_t count, float unit, float* out) {
-    constexpr auto lanes = std::make_index_sequence<kLanes>();
-    for (std::size_t i = 0; i < count; i += kLanes, out += 3 * kLanes) {
-        const Point<Lanes> p = unit * load(row + i, pitch);
+template <class F>
+FILIGREE_INLINE void interleave_of(const float* row, std::size_t pitch, std::size_t count, float unit, float* out) {
+    constexpr auto lanes = std::make_index_sequence<kWidth<F>>();
+    for (std::size_t i = 0; i < count; i += kWidth<F>, out += 3 * kWidth<F>) {
+        const Point<F> p = unit * load<F>(row + i, pitch);
         store_interleaved<0>(p, out, lanes);
         store_interleaved<1>(p, out, lanes);
         store_interleaved<2>(p, out, lanes);
     }
 }
 
-#if defined(__x86_64__)
-__attribute__((target("avx512f"))) static void stream_lines_avx512(const float* from, std::size_t lines, float* to) {
+#if defined(__x86_64__) && !defined(__clang__) // Clang 14 refuses vectors as arguments here, inlined or not
+#define FILIGREE_FOR_AVX512 __attribute__((target("avx512f")))
+#define FILIGREE_FOR_AVX2 __attribute__((target("avx2")))
+FILIGREE_FOR_AVX512 void refine_row_16(const CellRow& row, int references, const Scaling& scaling) {
+    refine_row_of<Lanes16>(row, references, scaling);
+}
+FILIGREE_FOR_AVX2 void refine_row_8(const CellRow& row, int references, const Scaling& scaling) {
+    refine_row_of<Lanes8>(row, references, scaling);
+}
+FILIGREE_FOR_AVX512 void interleave_16(const float* row, std::size_t pitch, std::size_t count, float unit, float* out) {
+    interleave_of<Lanes16>(row, pitch, count, unit, out);
+}
+FILIGREE_FOR_AVX2 void interleave_8(const float* row, std::size_t pitch, std::size_t count, float unit, float* out) {
+    interleave_of<Lanes8>(row, pitch, count, unit, out);
+}
+FILIGREE_FOR_AVX512 void stream_lines_16(const float* from, std::size_t lines, float* to) {
     for (std::size_t line = 0; line < lines; ++line)
         _mm512_stream_ps(to + kLanes * line, _mm512_loadu_ps(from + kLanes * line));
 }
+const bool kHasAvx512 = __builtin_cpu_supports("avx512f"), kHasAvx2 = __builtin_cpu_supports("avx2");
+#define FILIGREE_WIDEST(with_16, with_8)                                                                               \
+    if (kHasAvx512) return with_16;                                                                                    \
+    if (kHasAvx2) return with_8
+#else
+#define FILIGREE_WIDEST(with_16, with_8)
 #endif
+
+} // namespace
+
+void refine_row(const CellRow& row, int references, const Scaling& scaling) {
+    FILIGREE_WIDEST(refine_row_16(row, references, scaling), refine_row_8(row, references, scaling));
+    refine_row_of<Lanes4>(row, references, scaling);
+}
+
+void refine_edge(const EdgeRun& run, int references, const Scaling& scaling, float (&out)[3][kLanes]) {
+    const float* from = run.references[0];
+    const std::size_t next_coordinate = 6 * kLanes;
+    for (std::size_t lane = 0; lane < run.count; lane += 4) {
+        const auto point = [&](std::size_t k) { return load<Lanes4>(from + k * kLanes + lane, next_coordinate); };
+        const References<Lanes4> r{{point(0), point(1)}, {point(2), point(3)}, {point(4), point(5)}};
+        const Frame<Lanes4> frame = references == 3   ? edge_frame<3>(r, run.both_sides)
+                                    : references == 4 ? edge_frame<4>(r, run.both_sides)
+                                                      : edge_frame<6>(r, run.both_sides);
+        const float* code = run.code + lane;
+        const Lanes4 size = scaling.law == Law::keep ? Lanes4{} : load<Lanes4>(code + 3 * run.count);
+        const Point<Lanes4> p = place(frame, load<Lanes4>(code, run.count), size, scaling);
+        store(p.x, out[0] + lane);
+        store(p.y, out[1] + lane);
+        store(p.z, out[2] + lane);
+    }
+}
+
+void interleave(const float* row, std::size_t pitch, std::size_t count, float unit, float* out) {
+    FILIGREE_WIDEST(interleave_16(row, pitch, count, unit, out), interleave_8(row, pitch, count, unit, out));
+    interleave_of<Lanes4>(row, pitch, count, unit, out);
+}
 
 void stream_lines(const float* from, std::size_t lines, float* to) {
 #if defined(__x86_64__)
-    static const bool has_avx512 = __builtin_cpu_supports("avx512f");
-    if (has_avx512) return stream_lines_avx512(from, lines, to);
+#if !defined(__clang__)
+    if (kHasAvx512) return stream_lines_16(from, lines, to);
+#endif
     for (std::size_t quarter = 0; quarter < 4 * lines; ++quarter)
         _mm_stream_ps(to + 4 * quarter, _mm_loadu_ps(from + 4 * quarter));
 #else

@@ -1,8 +1,8 @@
 // The arithmetic of the reference code: frames of reference points, placing a point in one, and the two loops that
 // refine a row and an edge of a patch. Internal to reference_code.cpp.
 //
-// One template serves a single float (the encoder) and sixteen lanes (the restorer). Both do the same operations in
-// the same order and neither contracts nor reorders, so they give the same bytes on every processor.
+// One template serves a single float (the encoder) and four, eight or sixteen lanes (the restorer). Both do the same
+// operations in the same order and neither contracts nor reorders, so they give the same bytes on every processor.
 #pragma once
 
 #include "filigree/hierarchy/law.h"
@@ -11,13 +11,16 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
-#include <type_traits>
 
 namespace filigree::reference {
 
 inline constexpr std::size_t kLanes = 16;
-typedef float Lanes __attribute__((vector_size(4 * kLanes)));
-typedef std::int32_t IntLanes __attribute__((vector_size(4 * kLanes)));
+
+/// The integer type of the same shape as F, one float or a vector of them.
+template <class F>
+struct IntOf {
+    using type = std::int32_t;
+};
 
 // Inlined into every clone of the loops, and so compiled for each processor.
 #define FILIGREE_INLINE inline __attribute__((always_inline))
@@ -68,7 +71,7 @@ FILIGREE_INLINE F at_most(F a, float high) {
 /// quadratic step. Plain arithmetic instead of an instruction, since those are not the same everywhere.
 template <class F>
 FILIGREE_INLINE F inverse_sqrt(F a) {
-    using Int = std::conditional_t<sizeof(F) == sizeof(float), std::int32_t, IntLanes>;
+    using Int = typename IntOf<F>::type;
     a = at_least(a, kTinySquare);
     F y = std::bit_cast<F>(0x5f375a86 - (std::bit_cast<Int>(a) >> 1));
     F t = a * y * y;
@@ -82,19 +85,6 @@ FILIGREE_INLINE F inverse_sqrt(F a) {
 template <class F>
 struct References {
     Point<F> ends[2], beyond[2], behind[2];
-
-    void set_lane(std::size_t lane, const References<float>& r) {
-        for (int i = 0; i < 2; ++i) {
-            set_lane(ends[i], lane, r.ends[i]);
-            set_lane(beyond[i], lane, r.beyond[i]);
-            set_lane(behind[i], lane, r.behind[i]);
-        }
-    }
-
-private:
-    static void set_lane(Point<F>& point, std::size_t lane, const Point<float>& p) {
-        point.x[lane] = p.x, point.y[lane] = p.y, point.z[lane] = p.z;
-    }
 };
 
 /// A plane with coordinates: origin + v across + w up, and the height over it.
@@ -181,9 +171,10 @@ struct CellRow {
     std::size_t fine_pitch;
 };
 
-/// Consecutive points of an edge: each its references, gathered.
+/// Consecutive points of an edge: each its references, gathered. Row 6 c + k is coordinate c of ends, beyond and
+/// behind.
 struct EdgeRun {
-    References<Lanes> references;
+    alignas(64) float references[18][kLanes];
     bool both_sides;
     const float* code;
     std::size_t count; ///< 1 to kLanes
@@ -200,7 +191,7 @@ inline std::size_t edge_floats(Law law) { return law == Law::keep ? 3 : 4; }
 /// Refines one row of cells. The points on the patch's sides come out as anything; they are set from the edges.
 void refine_row(const CellRow& row, int references, const Scaling& scaling);
 /// Refines points of an edge.
-void refine_edge(const EdgeRun& run, int references, const Scaling& scaling, Point<Lanes>& out);
+void refine_edge(const EdgeRun& run, int references, const Scaling& scaling, float (&out)[3][kLanes]);
 /// Interleaves `count` points of a row, each coordinate times `unit`; writes up to 3 kLanes floats past the end.
 void interleave(const float* row, std::size_t pitch, std::size_t count, float unit, float* out);
 /// Copies lines of 64 bytes past the caches; `to` is aligned to them.

@@ -363,13 +363,18 @@ void Plan::refine_edges(const Level& level, const Pose& pose, const Grid& coarse
             {}, edges_.twins[edge] != kNoIndex, level.edges.front().floats + block * width * edge_floats(law_), width};
         for (std::size_t lane = 0; lane < width; ++lane) {
             const References<float> r = side_references(coarse, edges_, edge, k0 + lane);
-            run.references.set_lane(lane, r);
+            const Point<float> points[6] = {r.ends[0], r.ends[1], r.beyond[0], r.beyond[1], r.behind[0], r.behind[1]};
+            for (std::size_t k = 0; k < 6; ++k) {
+                run.references[k][lane] = points[k].x;
+                run.references[6 + k][lane] = points[k].y;
+                run.references[12 + k][lane] = points[k].z;
+            }
         }
-        Point<Lanes> points;
+        float points[3][kLanes];
         refine_edge(run, references_, pose.scaling, points);
         float* to = edges.data() + 3 * (edge * m + k0);
         for (std::size_t lane = 0; lane < width; ++lane, to += 3)
-            to[0] = points.x[lane], to[1] = points.y[lane], to[2] = points.z[lane];
+            for (std::size_t c = 0; c < 3; ++c) to[c] = points[c][lane];
     };
     parallel_for(context, blocks, kPointsPerTask / width, [&](auto begin, auto end) {
         for (std::size_t block = begin; block < end; ++block) refine_block(block);
