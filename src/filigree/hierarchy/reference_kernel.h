@@ -53,7 +53,7 @@ FILIGREE_INLINE F dot(const Point<F>& a, const Point<F>& b) {
 /// Squares below this are taken for it: degenerate references then give a zero normal, not a division by zero.
 /// Positions are scaled to about one before they come here.
 inline constexpr float kTinySquare = 1e-36f;
-/// Ratios of areas beyond this only say "far outside the law's bounds"; held there so that nothing overflows.
+/// Ratios of areas beyond this are held there, so that nothing overflows.
 inline constexpr float kHugeRatio = 1e30f;
 
 template <class F>
@@ -148,11 +148,12 @@ FILIGREE_INLINE Point<F> place(const Frame<F>& frame, const Point<F>& record, F 
             s = s * inverse_sqrt(dot(frame.across, frame.across));
         } else if (scaling.law == Law::proportional) {
             s = at_most(s * (area2 * inverse_area), kHugeRatio);
-            s = s * inverse_sqrt(s);
+            s = s * inverse_sqrt(s); // grows with its surroundings alone: no bound needed
         } else {
             s = s * inverse_area;
         }
-        height = height * at_most(at_least(s, 1 / kMaxLawScale), kMaxLawScale);
+        if (scaling.law != Law::proportional) s = at_most(at_least(s, 1 / kMaxLawScale), kMaxLawScale);
+        height = height * s;
     }
     return frame.origin + (record.x * frame.across + record.y * frame.up + (height * inverse_area) * normal);
 }
