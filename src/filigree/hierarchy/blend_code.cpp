@@ -3,7 +3,9 @@
 #include "filigree/core/parallel_for.h"
 #include "filigree/hierarchy/blend_kernel.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace filigree {
 
@@ -32,20 +34,21 @@ void quantise_offsets(BlendDetail& detail, std::span<const Vec3f> positions, std
                               anchor(detail.cells[c], detail.u[r], detail.v[r], positions, driver));
             largest = std::max(largest, offsets.back().cwiseAbs().maxCoeff());
         }
-        const float scale = detail.cell_scales[c] = static_cast<float>(largest / 32767.0);
+        // Rounded up: the largest offset has to fit, also where floats are too small to hold all their digits.
+        float scale = static_cast<float>(largest / 32767.0);
+        while (32767.0 * scale < largest) scale = std::nextafter(scale, std::numeric_limits<float>::infinity());
+        detail.cell_scales[c] = scale;
         for (std::size_t k = 0; k < offsets.size(); ++k)
             for (int axis = 0; axis < 3; ++axis)
                 detail.offsets[detail.cell_offsets[c] + k][axis] =
-                    scale > 0 ? static_cast<std::int16_t>(
-                                    std::clamp(std::round(offsets[k][axis] / scale), -32767.0, 32767.0))
-                              : std::int16_t{0};
+                    scale > 0 ? static_cast<std::int16_t>(std::round(offsets[k][axis] / scale)) : std::int16_t{0};
     }
 }
 
 } // namespace
 
-BlendDetail encode_blend(std::span<const Vec3f> positions, std::span<const Index> driver,
-                         std::vector<Triangle> cells, const Binding& binding, Precision precision) {
+BlendDetail encode_blend(std::span<const Vec3f> positions, std::span<const Index> driver, std::vector<Triangle> cells,
+                         const Binding& binding, Precision precision) {
     BlendDetail detail;
     detail.cells = std::move(cells);
     detail.precision = precision;
@@ -101,7 +104,8 @@ BlendRestorer::BlendRestorer(const BlendDetail& detail, std::span<const Vec3f> p
     const Box box = bounds(positions);
     const double diagonal = box.diagonal();
     const Vec3d centre = box.centre();
-    if (diagonal > 0 && (diagonal < 1e-15 || diagonal > 1e15)) content_->scale = std::exp2(-std::round(std::log2(diagonal)));
+    if (diagonal > 0 && (diagonal < 1e-15 || diagonal > 1e15)) // the inverse has to be a float
+        content_->scale = std::exp2(-std::min(std::round(std::log2(diagonal)), 127.0));
     const double scale = content_->scale;
     for (Index v : driver) content_->rest.push_back(scale * (positions[v].cast<double>() - centre));
 

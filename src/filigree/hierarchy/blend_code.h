@@ -1,6 +1,7 @@
 // Our detail code: each vertex hangs on one driver cell and follows its gradients.
 //
-// Driver vertex i rests at c_i and goes to c_i' with gradient A_i; a vertex p hangs at m = sum b_i c_i. The Hermite blend
+// Driver vertex i rests at c_i and goes to c_i' with gradient A_i; a vertex p hangs at m = sum b_i c_i. The Hermite
+// blend
 //     p' = sum b_i [c_i' + 1/2 (A_i + A_p)(p - c_i)],  A_p = sum b_i A_i
 // is linear-blend skinning of a shifted rest point:
 //     q = p - m / 2,  t_i = c_i' - A_i c_i / 2,  p' = sum b_i t_i + (sum b_i A_i) q
@@ -35,8 +36,8 @@ struct BlendDetail {
 
 /// Sorts bonds into records; for int16 rounds the weights first, then the offsets from them, so that rounding the
 /// weights costs nothing. positions: the mesh's; driver: the driver's vertex ids. Cost O(V).
-BlendDetail encode_blend(std::span<const Vec3f> positions, std::span<const Index> driver,
-                         std::vector<Triangle> cells, const Binding& binding, Precision precision);
+BlendDetail encode_blend(std::span<const Vec3f> positions, std::span<const Index> driver, std::vector<Triangle> cells,
+                         const Binding& binding, Precision precision);
 
 /// The positions an int16 detail decodes to at rest: those of the driver are given, the rest is written. Cost O(V).
 void decode_rest(const BlendDetail& detail, std::span<const Index> driver, std::span<Vec3f> positions);

@@ -27,14 +27,14 @@ inline constexpr std::size_t kPadding = 16;
 /// Everything about the records that does not change from pose to pose. Per record either q or offset is filled.
 struct Records {
     std::vector<Run> runs;
-    std::vector<Triangle> cells; ///< of driver vertices
-    std::vector<float> u, v;                                   ///< float records
-    std::vector<float> q[3];                                   ///< float records: p - m / 2
-    std::vector<std::int16_t> u16, v16;                        ///< int16 records: 32767 is 1
-    std::vector<std::int16_t> offset[3];                       ///< int16 records: (p - m) / scale of the cell
-    std::vector<float> scale;                                  ///< int16 records: one a cell
-    std::vector<float> normal[3];                              ///< empty or unit rest normals
-    std::vector<Index> slot;                                   ///< where record r goes when order is asked for
+    std::vector<Triangle> cells;         ///< of driver vertices
+    std::vector<float> u, v;             ///< float records
+    std::vector<float> q[3];             ///< float records: p - m / 2
+    std::vector<std::int16_t> u16, v16;  ///< int16 records: 32767 is 1
+    std::vector<std::int16_t> offset[3]; ///< int16 records: (p - m) / scale of the cell
+    std::vector<float> scale;            ///< int16 records: one a cell
+    std::vector<float> normal[3];        ///< empty or unit rest normals
+    std::vector<Index> slot;             ///< where record r goes when order is asked for
 
     bool is_int16() const { return !u16.empty(); }
     std::size_t count = 0;
@@ -51,6 +51,12 @@ struct Output {
 /// p' = sum b t + (sum b A) q for every record, and n' = unit(cofactor(sum b A) n). Same bytes for any thread count and
 /// any processor. Cost: bounded by memory.
 void restore(const Records& records, std::span<const VertexTransform> transforms, const Output& output,
+             const RunContext& context);
+
+/// Vertices at a time that this processor has an implementation for, ascending; restore takes the last.
+std::span<const int> lane_counts();
+/// restore by one of them, so that tests can hold them against each other.
+void restore(const Records& records, std::span<const VertexTransform> transforms, const Output& output, int lanes,
              const RunContext& context);
 
 } // namespace filigree::blend_kernel

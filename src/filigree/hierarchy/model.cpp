@@ -54,7 +54,8 @@ std::string check_level(const Level& level, std::size_t vertex_count) {
 }
 
 std::string check_blend(const BlendDetail& detail, std::size_t vertex_count, std::size_t driver_count) {
-    if (detail.cells.empty() || detail.cell_offsets.size() != detail.cells.size() + 1) return "cells and offsets differ";
+    if (detail.cells.empty() || detail.cell_offsets.size() != detail.cells.size() + 1)
+        return "cells and offsets differ";
     for (const Triangle& cell : detail.cells)
         for (Index v : cell)
             if (v >= driver_count) return "a cell names a driver vertex that is not there";
@@ -69,7 +70,7 @@ std::string check_blend(const BlendDetail& detail, std::size_t vertex_count, std
         seen[v] = true;
     }
     for (std::size_t r = 0; r < vertex_count; ++r)
-        if (!(std::abs(detail.u[r]) <= 2 && std::abs(detail.v[r]) <= 2)) return "a weight is out of range";
+        if (!(std::abs(detail.u[r]) <= 1 && std::abs(detail.v[r]) <= 1)) return "a weight is out of range";
     if (detail.precision == Precision::int16) {
         if (detail.offsets.size() != vertex_count || detail.cell_scales.size() != detail.cells.size())
             return "there is not one offset a record";

@@ -7,6 +7,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <map>
 #include <new>
 
 #define XXH_INLINE_ALL
@@ -20,7 +21,6 @@ namespace {
 
 constexpr char kMagic[8] = {'F', 'I', 'L', 'I', 'G', 'R', 'E', 'E'};
 constexpr std::uint32_t kVersion = 1;
-constexpr std::uint32_t kMaxSections = 4096;
 
 struct Header {
     char magic[8];
@@ -53,11 +53,9 @@ public:
         raw(name, 0, &item, sizeof(T), 1);
     }
     void strings(std::string_view name, const std::vector<std::string>& items) {
-        std::vector<char> bytes; // each ended by a zero byte
-        for (const std::string& item : items) {
-            bytes.insert(bytes.end(), item.begin(), item.end());
-            bytes.push_back('\0');
-        }
+        std::vector<char> bytes; // each ended by a zero byte, so a name that holds one ends there
+        for (const std::string& item : items)
+            bytes.insert(bytes.end(), item.c_str(), item.c_str() + std::strlen(item.c_str()) + 1);
         array(name, bytes);
     }
 
@@ -176,7 +174,7 @@ void write_reference(SectionWriter& out, const ReferenceDetail& detail) {
 
 /// What is wrong with a file, thrown inside this source file only and turned into an Error at its door.
 struct Damage {
-    std::string what;
+    std::string what, remedy = "strip the mesh again";
 };
 
 class SectionReader {
@@ -185,35 +183,43 @@ public:
         Header header;
         if (bytes.size() < sizeof header) throw Damage{"is cut off in its header"};
         std::memcpy(&header, bytes.data(), sizeof header);
-        if (header.version > kVersion)
+        if (header.version != kVersion)
             throw Damage{"is of version " + std::to_string(header.version) + " and this program reads version " +
-                         std::to_string(kVersion) + "; use a newer program"};
+                             std::to_string(kVersion),
+                         "use a newer program, or strip the mesh again"};
         if (header.file_size != bytes.size())
             throw Damage{"should have " + std::to_string(header.file_size) + " bytes and has " +
                          std::to_string(bytes.size()) + ": it was cut off or added to"};
-        if (header.section_count > kMaxSections ||
-            header.section_count * sizeof(Section) > bytes.size() - sizeof header)
+        if (header.section_count > (bytes.size() - sizeof header) / sizeof(Section))
             throw Damage{"names more sections than fit into it"};
         const std::size_t table_bytes = header.section_count * sizeof(Section);
         if (XXH3_64bits(bytes.data() + sizeof header, table_bytes) != header.table_hash)
             throw Damage{"has a damaged table of sections (checksum)"};
-        sections_.resize(header.section_count);
-        if (table_bytes > 0) std::memcpy(sections_.data(), bytes.data() + sizeof header, table_bytes);
+        // No two sections share bytes, so all of them together need no more memory than the file.
+        std::size_t end = sizeof header + table_bytes;
+        for (std::size_t i = 0; i < header.section_count; ++i) {
+            Section section;
+            std::memcpy(&section, bytes.data() + sizeof header + i * sizeof section, sizeof section);
+            const std::string name(section.name, strnlen(section.name, sizeof section.name));
+            if (section.offset < end || section.offset > bytes.size() || section.item_size == 0 ||
+                section.count > (bytes.size() - section.offset) / section.item_size)
+                throw Damage{"has a section " + name + " that overlaps another or reaches past its end"};
+            end = section.offset + section.count * section.item_size;
+            sections_.emplace(std::pair(name, section.index), section);
+        }
     }
 
     /// The items of a section; empty when there is none.
     template <class T>
     std::vector<T> array(std::string_view name, std::uint32_t index = 0) const {
-        const Section* section = find(name, index);
-        if (!section) return {};
-        const std::string label(name);
-        if (section->item_size != sizeof(T)) throw Damage{"has items of a wrong size in section " + label};
-        if (section->offset > bytes_.size() || section->count > (bytes_.size() - section->offset) / sizeof(T))
-            throw Damage{"has a section " + label + " that reaches past its end"};
-        const char* begin = bytes_.data() + section->offset;
-        if (XXH3_64bits(begin, section->count * sizeof(T)) != section->hash)
-            throw Damage{"has a damaged section " + label + " (checksum)"};
-        std::vector<T> items(section->count);
+        const auto found = sections_.find({std::string(name), index});
+        if (found == sections_.end()) return {};
+        const Section& section = found->second;
+        if (section.item_size != sizeof(T)) throw Damage{"has items of a wrong size in section " + found->first.first};
+        const char* begin = bytes_.data() + section.offset;
+        if (XXH3_64bits(begin, section.count * sizeof(T)) != section.hash)
+            throw Damage{"has a damaged section " + found->first.first + " (checksum)"};
+        std::vector<T> items(section.count);
         if (!items.empty()) std::memcpy(static_cast<void*>(items.data()), begin, items.size() * sizeof(T));
         return items;
     }
@@ -238,15 +244,8 @@ public:
     }
 
 private:
-    const Section* find(std::string_view name, std::uint32_t index) const {
-        for (const Section& section : sections_)
-            if (section.index == index && name == std::string_view(section.name, strnlen(section.name, 8)))
-                return &section;
-        return nullptr;
-    }
-
     std::string_view bytes_;
-    std::vector<Section> sections_;
+    std::map<std::pair<std::string, std::uint32_t>, Section> sections_; ///< by name and index; of equals the first
 };
 
 template <class T>
@@ -354,7 +353,7 @@ Model read_sections(std::string_view bytes) {
         const auto vertex_count = in.value<std::uint64_t>("mesh.num");
         auto* detail = std::get_if<BlendDetail>(&model.detail);
         if (!detail || vertex_count != detail->order.size() || model.levels.empty() ||
-            driver.size() != model.driver().vertices.size())
+            driver.size() != model.driver().vertices.size() || detail->precision != Precision::int16)
             throw Damage{"has records that do not fit its vertices"};
         model.mesh.positions.assign(vertex_count, Vec3f::Zero());
         for (std::size_t i = 0; i < driver.size(); ++i)
@@ -404,7 +403,7 @@ Result<Model> read_model(std::string_view bytes, const std::string& name, const 
     try {
         return read_sections(bytes);
     } catch (const Damage& damage) {
-        return Error{ErrorCode::bad_file, name + " " + damage.what + "; strip the mesh again."};
+        return Error{ErrorCode::bad_file, name + " " + damage.what + "; " + damage.remedy + "."};
     } catch (const std::bad_alloc&) {
         return Error{ErrorCode::out_of_memory, name + " does not fit into memory."};
     }
