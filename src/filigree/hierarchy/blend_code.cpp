@@ -101,8 +101,9 @@ BlendRestorer::~BlendRestorer() = default;
 BlendRestorer::BlendRestorer(const BlendDetail& detail, std::span<const Vec3f> positions, std::span<const Index> driver,
                              std::span<const Item> items, std::span<const Vec3f> normals)
     : content_(std::make_unique<Content>()) {
-    const Box box = bounds(positions);
-    const double diagonal = box.diagonal();
+    const double diagonal = bounds(positions).diagonal();
+    Box box; // the driver's, which files of either precision keep to the bit
+    for (Index v : driver) box.extend(positions[v].cast<double>());
     const Vec3d centre = box.centre();
     if (diagonal > 0 && (diagonal < 1e-15 || diagonal > 1e15)) // the inverse has to be a float
         content_->scale = std::exp2(-std::min(std::round(std::log2(diagonal)), 127.0));

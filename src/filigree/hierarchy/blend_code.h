@@ -17,7 +17,8 @@
 
 namespace filigree {
 
-/// float32: 20 bytes a vertex. int16: 10 bytes, error below 1e-6 of the diagonal, faster where memory is the bound.
+/// float32: 20 bytes a vertex. int16: 10 bytes, faster where memory is the bound; an error of at most half a step an
+/// axis, and 32767 steps are the largest offset in the cell: usually below 1e-6 of the diagonal.
 enum class Precision { float32, int16 };
 
 /// Records in the order of their cells, so that restoring gathers nothing. Record r is vertex order[r] of the mesh.

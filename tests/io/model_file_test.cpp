@@ -1,0 +1,406 @@
+// Model files: they come back as they were, and whatever happens to their bytes ends in a sound model or a sentence.
+#include "filigree/io/model_file.h"
+
+#include "filigree/hierarchy/restore.h"
+#include "filigree/hierarchy/strip.h"
+#include "filigree/io/file.h"
+#include "filigree/mesh/shapes.h"
+#include "io/sample_meshes.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cstring>
+#include <fstream>
+#include <random>
+
+#include <sys/stat.h>
+#include <unistd.h>
+#define XXH_INLINE_ALL
+#include <xxhash.h>
+
+using namespace filigree;
+using namespace filigree_test;
+namespace fs = std::filesystem;
+
+namespace {
+
+const RunContext kContext(1);
+
+Model stripped(Mesh mesh, const StripOptions& options = {}) {
+    Result<Stripped> result = strip(std::move(mesh), options, kContext);
+    EXPECT_TRUE(result.ok()) << (result.ok() ? "" : result.error().message);
+    return result.ok() ? std::move(result->model) : Model{};
+}
+
+/// A dozen kilobytes at most, so that every byte can be damaged.
+std::vector<Model> small_models() {
+    std::vector<Model> models;
+    Mesh decorated = make_wavy_plane({.resolution = 6});
+    decorated.origin = {500000, 0, -3};
+    for (const Vec3f& p : decorated.positions) {
+        decorated.normals.values.emplace_back(0, 0, 1);
+        decorated.colors.emplace_back(p.x(), p.y(), 0, 1);
+    }
+    decorated.scalars = {{"quality", std::vector<float>(decorated.vertex_count(), 0.5f)}};
+    models.push_back(stripped(decorated, {.base = 9}));
+    models.push_back(stripped(decorated, {.base = 9, .precision = Precision::int16}));
+    models.push_back(stripped(make_corner_attribute_mesh(), {.base = 4}));
+    models.push_back(stripped(make_wavy_plane({.resolution = 4}), {.code = DetailCode::reference}));
+    return models;
+}
+
+Pose rest_pose(const Model& model) { return {driver_positions(model), {}, {}}; }
+
+std::vector<Vec3f> bent(const Model& model) {
+    Pose pose = rest_pose(model);
+    for (Vec3f& p : pose.positions) p += Vec3f(0.1f * p.y() * p.y(), 0.2f * p.x(), 0.3f * p.x() * p.y());
+    const Result<Restorer> restorer = Restorer::create(model, {}, kContext);
+    return *restorer->positions(pose, kContext);
+}
+
+bool same_bytes(std::span<const Vec3f> a, std::span<const Vec3f> b) {
+    return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size_bytes()) == 0;
+}
+
+Result<Model> read(const std::string& bytes) { return read_model(bytes, "a.fil", kContext); }
+
+std::string error_of(const std::string& bytes) {
+    const Result<Model> model = read(bytes);
+    EXPECT_FALSE(model.ok());
+    if (model.ok()) return "";
+    EXPECT_EQ(model.error().code, ErrorCode::bad_file);
+    return model.error().message;
+}
+
+/// A damaged file is refused with a sentence, or what it gives is sound and can be restored at every level.
+void expect_sound_or_refused(const std::string& bytes) {
+    const Result<Model> model = read(bytes);
+    if (!model.ok()) {
+        ASSERT_EQ(model.error().code, ErrorCode::bad_file) << model.error().message;
+        ASSERT_TRUE(model.error().message.ends_with(".")) << model.error().message;
+        ASSERT_LT(model.error().message.size(), 300u);
+        return;
+    }
+    ASSERT_EQ(check_model(*model), "");
+    for (unsigned level = 0; level <= model->finest_level(); ++level) {
+        const Result<Restorer> restorer = Restorer::create(*model, {.level = level}, kContext);
+        ASSERT_TRUE(restorer.ok());
+        ASSERT_TRUE(restorer->mesh(rest_pose(*model), kContext).ok());
+    }
+    std::ignore = write_model(*model);
+}
+
+// What docs/fil-format.md says, a second time: the tests do not trust the source file's own structs.
+struct TestHeader {
+    char magic[8];
+    std::uint32_t version, section_count;
+    std::uint64_t file_size, table_hash;
+};
+struct TestSection {
+    char name[8];
+    std::uint32_t index, item_size;
+    std::uint64_t offset, count, hash;
+};
+
+/// Changes a file and makes every checksum right again.
+class Patcher {
+public:
+    explicit Patcher(std::string bytes) : bytes_(std::move(bytes)) {
+        std::memcpy(&header, bytes_.data(), sizeof header);
+        sections.resize(header.section_count);
+        std::memcpy(sections.data(), bytes_.data() + sizeof header, sections.size() * sizeof(TestSection));
+    }
+
+    TestHeader header;
+    std::vector<TestSection> sections;
+
+    bool has(std::string_view name) const {
+        for (const TestSection& s : sections)
+            if (name == std::string_view(s.name, strnlen(s.name, 8))) return true;
+        return false;
+    }
+    TestSection& section(std::string_view name) {
+        for (TestSection& s : sections)
+            if (name == std::string_view(s.name, strnlen(s.name, 8))) return s;
+        ADD_FAILURE() << "no section " << name;
+        return sections[0];
+    }
+    template <class T>
+    void set(std::string_view name, std::size_t item, const T& value) {
+        const TestSection& s = section(name);
+        ASSERT_LE((item + 1) * sizeof(T), s.count * s.item_size);
+        std::memcpy(bytes_.data() + s.offset + item * sizeof(T), &value, sizeof(T));
+    }
+    template <class T>
+    T get(std::string_view name, std::size_t item) {
+        T value;
+        std::memcpy(&value, bytes_.data() + section(name).offset + item * sizeof(T), sizeof(T));
+        return value;
+    }
+    void rename(std::string_view name, std::string_view to) {
+        TestSection& s = section(name);
+        std::memset(s.name, 0, 8);
+        std::memcpy(s.name, to.data(), to.size());
+    }
+    void flip(std::size_t at, unsigned bit) {
+        if (at < bytes_.size()) bytes_[at] = static_cast<char>(bytes_[at] ^ (1 << bit));
+    }
+
+    std::string bytes() {
+        for (TestSection& s : sections)
+            if (s.offset <= bytes_.size() && s.item_size > 0 && s.count <= (bytes_.size() - s.offset) / s.item_size)
+                s.hash = XXH3_64bits(bytes_.data() + s.offset, s.count * s.item_size);
+        header.table_hash = XXH3_64bits(sections.data(), sections.size() * sizeof(TestSection));
+        std::string out = bytes_;
+        std::memcpy(out.data(), &header, sizeof header);
+        std::memcpy(out.data() + sizeof header, sections.data(), sections.size() * sizeof(TestSection));
+        return out;
+    }
+
+private:
+    std::string bytes_;
+};
+
+} // namespace
+
+TEST(ModelFile, ComesBackToTheByte) {
+    for (const Model& model : small_models()) {
+        const std::string bytes = write_model(model);
+        EXPECT_TRUE(is_model_file(bytes));
+        const Result<Model> back = read(bytes);
+        ASSERT_TRUE(back.ok()) << back.error().message;
+        EXPECT_EQ(write_model(*back), bytes);
+        EXPECT_EQ(back->code(), model.code());
+        EXPECT_EQ(back->mesh.corners, model.mesh.corners);
+        EXPECT_EQ(back->mesh.origin, model.mesh.origin);
+        EXPECT_EQ(back->mesh.groups.names, model.mesh.groups.names);
+        EXPECT_EQ(back->mesh.material_files, model.mesh.material_files);
+        ASSERT_EQ(back->levels.size(), model.levels.size());
+        EXPECT_TRUE(same_bytes(driver_positions(*back), driver_positions(model)));
+        EXPECT_TRUE(same_bytes(bent(*back), bent(model)));
+        const auto* blend = std::get_if<BlendDetail>(&model.detail);
+        if (!blend || blend->precision == Precision::float32) {
+            EXPECT_TRUE(same_bytes(back->mesh.positions, model.mesh.positions));
+        }
+    }
+}
+
+TEST(ModelFile, Int16IsHalfTheBytesAndCloseToTheMesh) {
+    const Mesh mesh = make_wavy_cube({.resolution = 48});
+    const Model exact = stripped(mesh, {.base = 300}),
+                rounded = stripped(mesh, {.base = 300, .precision = Precision::int16});
+    EXPECT_LT(write_model(rounded).size(), write_model(exact).size());
+    const Result<Model> back = read(write_model(rounded));
+    ASSERT_TRUE(back.ok());
+    const auto& detail = std::get<BlendDetail>(back->detail);
+    for (std::size_t c = 0; c < detail.cells.size(); ++c)
+        for (Index r = detail.cell_offsets[c]; r < detail.cell_offsets[c + 1]; ++r) {
+            const Vec3f off = back->mesh.positions[detail.order[r]] - mesh.positions[detail.order[r]];
+            ASSERT_LE(off.lpNorm<Eigen::Infinity>(), 0.5f * detail.cell_scales[c] + 1e-7f); // half a step
+        }
+}
+
+TEST(ModelFile, NamesWithAZeroByteEndThere) {
+    Mesh mesh = make_wavy_plane({.resolution = 2});
+    mesh.scalars = {{std::string("a\0b", 3), std::vector<float>(9, 1.0f)}, {"", std::vector<float>(9, 2.0f)}};
+    const Result<Model> back = read(write_model(stripped(mesh)));
+    ASSERT_TRUE(back.ok()) << back.error().message;
+    ASSERT_EQ(back->mesh.scalars.size(), 2u);
+    EXPECT_EQ(back->mesh.scalars[0].name, "a");
+    EXPECT_EQ(back->mesh.scalars[1].values[8], 2.0f);
+}
+
+TEST(ModelFile, EveryCutIsRefused) {
+    for (const Model& model : small_models()) {
+        const std::string bytes = write_model(model);
+        for (std::size_t size = 0; size < bytes.size(); ++size) {
+            const Result<Model> cut = read(bytes.substr(0, size));
+            ASSERT_FALSE(cut.ok()) << size;
+            ASSERT_EQ(cut.error().code, ErrorCode::bad_file);
+        }
+        EXPECT_NE(error_of(bytes + '\0').find("added to"), std::string::npos);
+    }
+}
+
+TEST(ModelFile, EveryFlippedBitIsSeenOrHarmless) {
+    for (const Model& model : small_models()) {
+        const std::string bytes = write_model(model);
+        for (std::size_t at = 0; at < bytes.size(); ++at) {
+            std::string damaged = bytes;
+            damaged[at] = static_cast<char>(damaged[at] ^ (1 << at % 8));
+            const Result<Model> back = read(damaged);
+            if (!back.ok()) continue;
+            ASSERT_EQ(write_model(*back), bytes) << at; // only what lies between sections has no checksum
+        }
+    }
+}
+
+TEST(ModelFile, SectionsOfLaterProgramsArePassedOver) {
+    const Model model = small_models()[0];
+    Patcher patcher(write_model(model));
+    patcher.rename("col.val", "later.on");
+    const Result<Model> back = read(patcher.bytes());
+    ASSERT_TRUE(back.ok()) << back.error().message;
+    EXPECT_TRUE(back->mesh.colors.empty());
+    EXPECT_TRUE(same_bytes(bent(*back), bent(model)));
+}
+
+TEST(ModelFile, OtherVersionsAreRefusedWithASentence) {
+    for (const std::uint32_t version : {0u, 2u, 0xffffffffu}) {
+        Patcher patcher(write_model(small_models()[0]));
+        patcher.header.version = version;
+        const std::string message = error_of(patcher.bytes());
+        EXPECT_NE(message.find("version " + std::to_string(version)), std::string::npos) << message;
+        EXPECT_NE(message.find("use a newer program"), std::string::npos) << message;
+    }
+    EXPECT_NE(error_of("ply\n").find("not a Filigree model"), std::string::npos);
+    EXPECT_NE(error_of("").find("not a Filigree model"), std::string::npos);
+}
+
+TEST(ModelFile, HostileTables) {
+    const std::string bytes = write_model(small_models()[0]);
+    const std::uint64_t huge[] = {~std::uint64_t{0},      ~std::uint64_t{0} / 12 + 1,
+                                  std::uint64_t{1} << 63, std::uint64_t{1} << 32,
+                                  bytes.size(),           (std::uint64_t{1} << 62) + 1};
+    for (const std::uint64_t value : huge)
+        for (std::size_t s = 0; s < Patcher(bytes).sections.size(); ++s) {
+            Patcher count(bytes), offset(bytes);
+            count.sections[s].count = value;
+            offset.sections[s].offset = value;
+            error_of(count.bytes());
+            error_of(offset.bytes());
+        }
+    for (std::size_t s = 0; s < Patcher(bytes).sections.size(); ++s) {
+        Patcher size(bytes), overlap(bytes);
+        size.sections[s].item_size = 0;
+        error_of(size.bytes());
+        overlap.sections[s].offset -= 8; // the section before, or the table
+        if (s == 0 || overlap.sections[s - 1].count * overlap.sections[s - 1].item_size > 0) error_of(overlap.bytes());
+    }
+    Patcher many(bytes);
+    many.header.section_count = 0xffffffff;
+    std::string damaged = many.bytes();
+    EXPECT_NE(error_of(damaged).find("more sections"), std::string::npos);
+}
+
+TEST(ModelFile, NothingMissingIsRestored) {
+    for (const Model& model : small_models()) {
+        const std::string bytes = write_model(model);
+        for (std::size_t s = 0; s < Patcher(bytes).sections.size(); ++s) {
+            Patcher patcher(bytes);
+            patcher.rename(std::string(patcher.sections[s].name, strnlen(patcher.sections[s].name, 8)), "gone");
+            ASSERT_NO_FATAL_FAILURE(expect_sound_or_refused(patcher.bytes()));
+        }
+    }
+}
+
+TEST(ModelFile, HostileNumbers) {
+    const std::string blend = write_model(small_models()[0]), rounded = write_model(small_models()[1]),
+                      reference = write_model(small_models()[3]);
+    const auto refuses = [](const std::string& bytes, std::string_view name, auto value, std::size_t item = 1) {
+        Patcher patcher(bytes);
+        patcher.set(name, item, value);
+        EXPECT_NE(error_of(patcher.bytes()), "") << name;
+    };
+    for (const char* name : {"mesh.cor", "lev.vert", "lev.cor", "bl.cell", "bl.coff", "bl.order"})
+        for (const Index id : {49u, 1000000u, kNoIndex}) refuses(blend, name, id);
+    for (const char* name : {"mesh.pos", "bl.u", "bl.v", "nrm.val", "scal.val"})
+        for (const float x : {NAN, INFINITY}) refuses(blend, name, x);
+    for (const double x : {double{NAN}, double{INFINITY}}) refuses(blend, "mesh.org", x);
+    refuses(blend, "bl.u", 1e30f);
+    refuses(blend, "mesh.siz", 0u, 0);
+    refuses(blend, "mesh.siz", 2u, 0);
+    refuses(blend, "levels", 65u, 0);
+    refuses(blend, "levels", 0u, 0);
+    refuses(blend, "code", 2u, 0);
+    refuses(blend, "code", 1000u, 0);
+    refuses(blend, "bl.prec", 7u, 0);
+    refuses(blend, "bl.order", Patcher(blend).get<Index>("bl.order", 0)); // twice: no permutation
+    refuses(blend, "lev.vert", Patcher(blend).get<Index>("lev.vert", 0)); // not ascending
+
+    refuses(rounded, "bl.scale", NAN);
+    refuses(rounded, "drv.pos", NAN);
+    refuses(rounded, "mesh.num", std::uint64_t{1} << 60, 0);
+    refuses(rounded, "mesh.num", std::uint64_t{48}, 0);
+    refuses(rounded, "bl.prec", 0u, 0);
+    refuses(rounded, "bl.u16", std::int16_t{-32768});
+
+    for (const char* name : {"rf.base", "rf.grid"})
+        for (const Index id : {25u, kNoIndex}) refuses(reference, name, id);
+    for (const std::uint32_t x : {0u, 1u, 17u, 0xffffffffu}) refuses(reference, "rf.par", x, 0);
+    refuses(reference, "rf.par", 5u, 1);
+    for (const char* name : {"rf.ext", "rf.drv", "rf.rec"}) refuses(reference, name, NAN, 0);
+}
+
+TEST(ModelFile, ADriverSectionInAFloatModelIsNoReasonToReadPastItsEnd) {
+    Patcher patcher(write_model(small_models()[0]));
+    patcher.rename("col.val", "drv.pos"); // items of another size
+    EXPECT_NE(error_of(patcher.bytes()), "");
+    Model model = small_models()[0]; // and of the right size, by way of a scalar
+    model.mesh.normals.values.resize(model.driver().vertices.size());
+    Patcher again(write_model(model));
+    again.rename("nrm.val", "drv.pos");
+    EXPECT_NE(error_of(again.bytes()), "");
+}
+
+TEST(ModelFile, FuzzedFilesAreSoundOrRefused) {
+    std::vector<std::string> seeds;
+    for (const Model& model : small_models()) seeds.push_back(write_model(model));
+    static const std::uint64_t kNumbers[] = {0,          1,          2,          3,          0x7fffffff,
+                                             0x80000000, 0xffffffff, 0x7fc00000, 0x7f800000, 65536};
+    std::mt19937 random(1);
+    const auto below = [&](std::size_t n) { return random() % std::max<std::size_t>(n, 1); };
+    const auto start = std::chrono::steady_clock::now();
+    std::size_t rounds = 0;
+    for (; rounds < 200'000 && std::chrono::steady_clock::now() - start < std::chrono::seconds(2); ++rounds) {
+        Patcher patcher(seeds[rounds % seeds.size()]);
+        for (std::size_t damages = 1 + below(3); damages > 0; --damages) {
+            TestSection& section = patcher.sections[below(patcher.sections.size())];
+            const std::size_t bytes = section.count * section.item_size;
+            switch (below(6)) {
+            case 0:
+                section.count = below(2) ? kNumbers[below(std::size(kNumbers))] : below(section.count + 2);
+                break;
+            case 1:
+                section.index = static_cast<std::uint32_t>(below(4));
+                break;
+            case 2:
+                std::swap(section.name, patcher.sections[below(patcher.sections.size())].name);
+                break;
+            default: // bits of the content, most of them in one number
+                for (std::size_t bits = 1 + below(3); bits > 0; --bits)
+                    if (bytes > 0) patcher.flip(section.offset + below(bytes), static_cast<unsigned>(below(8)));
+            }
+        }
+        std::string bytes = patcher.bytes(); // checksums are right; sometimes damaged once more
+        if (below(8) == 0) bytes.resize(below(bytes.size()));
+        ASSERT_NO_FATAL_FAILURE(expect_sound_or_refused(bytes)) << "round " << rounds;
+    }
+    EXPECT_GT(rounds, 100u);
+}
+
+TEST(ModelFile, WritingFailsWithoutHarm) {
+    std::string name = (fs::temp_directory_path() / "filigree-XXXXXX").string();
+    const fs::path folder = ::mkdtemp(name.data());
+    const Model model = small_models()[0];
+    const std::string_view old = "old";
+    ASSERT_TRUE(write_file(folder / "a.fil", std::span(&old, 1)).ok());
+    for (const fs::path& path : {folder / "missing" / "a.fil", folder}) {
+        const Status status = write_model(model, path, kContext);
+        ASSERT_FALSE(status.ok());
+        EXPECT_EQ(status.error().code, ErrorCode::unwritable);
+    }
+    const RunContext cancelled(1);
+    cancelled.cancel();
+    EXPECT_EQ(write_model(model, folder / "a.fil", cancelled).error().code, ErrorCode::cancelled);
+    EXPECT_EQ(*read_file(folder / "a.fil"), "old");
+    EXPECT_EQ(read_model(folder / "a.fil", kContext).error().code, ErrorCode::bad_file);
+    EXPECT_EQ(read_model(folder / "missing.fil", kContext).error().code, ErrorCode::not_found);
+
+    ASSERT_TRUE(write_model(model, folder / "a.fil", kContext).ok());
+    EXPECT_EQ(*read_file(folder / "a.fil"), write_model(model));
+    EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 1); // nothing temporary stays
+    ASSERT_TRUE(read_model(folder / "a.fil", kContext).ok());
+    fs::remove_all(folder);
+}
