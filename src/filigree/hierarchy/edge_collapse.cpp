@@ -12,9 +12,10 @@ namespace filigree {
 
 namespace {
 
-constexpr double kBorderWeight = 1;    // of the planes that stand on open edges, so that outlines keep their shape
-constexpr double kLengthWeight = 0.02; // of (edge length)^2 x area: spreads vertices evenly; 0.001 and 0.1 restore 1.3 to 2 times worse
-constexpr double kMinCosine = 0.2;     // a triangle that turns further than this in a collapse counts as turned over
+constexpr double kBorderWeight = 1; // of the planes that stand on open edges, so that outlines keep their shape
+constexpr double kLengthWeight =
+    0.02; // of (edge length)^2 x area: spreads vertices evenly; 0.001 and 0.1 restore 1.3 to 2 times worse
+constexpr double kMinCosine = 0.2; // a triangle that turns further than this in a collapse counts as turned over
 
 /// Sum of area x (distance to a plane)^2, about the mesh's centre.
 struct Quadric {
@@ -71,6 +72,7 @@ public:
             for (Index v : triangles_[t]) around_[v].push_back(t);
         stamp_.assign(points_.size(), 0);
         vertex_count_ = points_.size();
+        triangle_count_ = triangles_.size();
         make_quadrics();
     }
 
@@ -83,6 +85,7 @@ public:
             const Collapse next = queue_.top();
             queue_.pop();
             if (next.stamp != stamp_[next.from] + stamp_[next.to]) continue;
+            if (shared_triangles(next.from, next.to) == triangle_count_) continue; // something has to be left
             if (!next.forced && !is_clean(next.from, next.to)) {
                 queue_.push({next.cost + loss(next.from, next.to), next.from, next.to, next.stamp, true});
                 continue;
@@ -167,6 +170,11 @@ private:
 
     static bool has(const Triangle& t, Index v) { return t[0] == v || t[1] == v || t[2] == v; }
 
+    std::size_t shared_triangles(Index a, Index b) const {
+        return static_cast<std::size_t>(
+            std::count_if(around_[a].begin(), around_[a].end(), [&](Index t) { return has(triangles_[t], b); }));
+    }
+
     /// No triangle turns over, and the two ends have no common neighbour but those of the triangles between them.
     bool is_clean(Index from, Index to) const {
         std::size_t shared = 0;
@@ -193,6 +201,7 @@ private:
             vertex_count_ -= around_[v].empty();
         }
         triangles_[triangle] = {kNoIndex, kNoIndex, kNoIndex};
+        --triangle_count_;
     }
 
     void apply(Index from, Index to) {
@@ -215,7 +224,8 @@ private:
         }
     }
 
-    /// Triangles over the same three vertices: one is kept when they face the same way, none when they are back to back.
+    /// Triangles over the same three vertices: one is kept when they face the same way or are all there is, none when
+    /// they are back to back.
     void remove_folded(Index v) {
         const auto key = [&](Index t) {
             std::array<Index, 3> k = triangles_[t];
@@ -232,7 +242,8 @@ private:
                 ++i;
                 continue;
             }
-            const bool back_to_back = normal(triangles_[ring[i]]).dot(normal(triangles_[ring[i + 1]])) < 0;
+            const bool back_to_back =
+                triangle_count_ > 2 && normal(triangles_[ring[i]]).dot(normal(triangles_[ring[i + 1]])) < 0;
             remove(ring[i + 1]);
             if (back_to_back) remove(ring[i]);
             ring.erase(ring.begin() + std::ptrdiff_t(i + 1));
@@ -247,7 +258,7 @@ private:
     std::vector<Quadric> quadrics_;
     std::vector<Index> stamp_;
     std::priority_queue<Collapse, std::vector<Collapse>, std::greater<>> queue_;
-    std::size_t vertex_count_ = 0, forced_ = 0;
+    std::size_t vertex_count_ = 0, triangle_count_ = 0, forced_ = 0;
     double error_ = 0;
 };
 
