@@ -90,6 +90,21 @@ FILIGREE_INLINE void set_cell(CellTransform& cell, const Triangle& corners, cons
     }
 }
 
+/// Records ahead that are asked for early: five arrays are more than the processor follows by itself.
+constexpr std::size_t kPrefetch = 512;
+
+template <bool Int16>
+FILIGREE_INLINE void prefetch(const Records& records, std::size_t r) {
+    const auto ask = [&](const auto& array) __attribute__((always_inline)) { __builtin_prefetch(array.data() + r); };
+    if constexpr (Int16) {
+        ask(records.u16), ask(records.v16);
+        for (const auto& offset : records.offset) ask(offset);
+    } else {
+        ask(records.u), ask(records.v);
+        for (const auto& q : records.q) ask(q);
+    }
+}
+
 /// Restores the records of one run; writes whole groups of N, so up to N - 1 points past the run's end.
 template <int N, bool Int16, bool Positions, bool Normals>
 FILIGREE_INLINE void restore_run(const Records& records, const Run& run, const CellTransform& cell, float* positions,
@@ -98,6 +113,7 @@ FILIGREE_INLINE void restore_run(const Records& records, const Run& run, const C
     using Float = typename L::Float;
     for (Index k = 0; k < run.count; k += N) {
         const std::size_t r = std::size_t{run.first} + k;
+        prefetch<Int16>(records, r + kPrefetch);
         Float u, v;
         if constexpr (Int16) {
             u = L::load(&records.u16[r]) * (1.0f / 32767.0f);

@@ -18,7 +18,7 @@ constexpr double kQuadraticRidge = 1e-4; // times the neighbour count, in units 
 constexpr double kLinearRidge = 1e-9;    // the same; keeps degenerate rings solvable
 constexpr double kSoftNormal = 0.003;    // the same; pull of the z column towards s n'
 constexpr double kHardNormal = 1e4;      // the same; z column as good as given
-constexpr double kGhostLength = 0.1;     // of a ghost point's distance, in mean edge lengths: short, to see the gradient here
+constexpr double kGhostLength = 0.1;     // of a ghost point from its vertex, in mean edge lengths
 constexpr std::size_t kMaxRing = 48;     // neighbours a fit uses at most: more add cost, no accuracy
 
 using Row6 = Eigen::Matrix<double, 6, 1>;
@@ -41,10 +41,14 @@ double law_scale(Law law, double rest_area, double area) {
         return std::clamp(s, 1.0 / kMaxLawScale, double{kMaxLawScale}); // also for ratio = 0, where s is infinite
     };
     switch (law) {
-    case Law::keep: return 1;
-    case Law::inverse: return bounded(1 / std::sqrt(ratio));
-    case Law::proportional: return std::sqrt(ratio);
-    case Law::volume: return bounded(1 / ratio);
+    case Law::keep:
+        return 1;
+    case Law::inverse:
+        return bounded(1 / std::sqrt(ratio));
+    case Law::proportional:
+        return std::sqrt(ratio);
+    case Law::volume:
+        return bounded(1 / ratio);
     }
     return 1;
 }
@@ -84,8 +88,8 @@ GradientFit::GradientFit(const Mesh& driver, const RunContext& context) {
         for (std::size_t k = begin; k < one_ring && ring_.size() - begin < kMaxRing; ++k)
             for (Index j : neighbours[ring_[k]]) take(j);
         for (std::size_t k = begin; k < one_ring; ++k)
-            edge_lengths_[i] += (driver_.positions[ring_[k]] - driver_.positions[i]).cast<double>().norm() /
-                                double(one_ring - begin);
+            edge_lengths_[i] +=
+                (driver_.positions[ring_[k]] - driver_.positions[i]).cast<double>().norm() / double(one_ring - begin);
         ring_offsets_.push_back(static_cast<Index>(ring_.size()));
     }
     soft_ = solve(kSoftNormal, context);
@@ -195,7 +199,8 @@ void GradientFit::make_shell(std::span<Mat3f> gradients, Law law) const {
         if (n.squaredNorm() == 0) continue;
         const Mat3d a = gradients[i].cast<double>();
         const Mat3d frame = tangent_frame(n);
-        const Vec3d across = (a * frame.col(0)).cross(a * frame.col(1)); // the deformed normal; its length is the area ratio
+        const Vec3d across =
+            (a * frame.col(0)).cross(a * frame.col(1)); // the deformed normal; its length is the area ratio
         const double area = across.norm();
         const Vec3d column = area > 0 ? Vec3d(law_scale(law, 1, area) * across / area) : Vec3d(Vec3d::Zero());
         gradients[i] = (a + (column - a * n) * n.transpose()).cast<float>();

@@ -14,9 +14,9 @@ enum class NormalColumn {
 };
 
 /// Precomputed least-squares fits over the two-ring of every driver vertex. In rest coordinates (u, v, z) about the
-/// vertex, z along its normal, positions are fitted by [u v z u^2 uv v^2] with a ridge on the quadratic terms; what is left
-/// at run time is A_i = sum_j (c_j' - c_i') alpha_ij^T + s n_i' beta_i^T. Exact at rest, for rigid motions, and with
-/// Law::proportional for uniform scale. A vertex without faces has the identity.
+/// vertex, z along its normal, positions are fitted by [u v z u^2 uv v^2] with a ridge on the quadratic terms; what is
+/// left at run time is A_i = sum_j (c_j' - c_i') alpha_ij^T + s n_i' beta_i^T. Exact at rest, for rigid motions, and
+/// with Law::proportional for uniform scale. A vertex without faces has the identity.
 class GradientFit {
 public:
     /// driver: the driver at rest. Cost O(V) fits of six unknowns.
@@ -32,13 +32,14 @@ public:
     /// Replaces the normal column of given gradients by s n', n' and s from the gradients themselves.
     void make_shell(std::span<Mat3f> gradients, Law law) const;
 
-    /// The points off the surface, a tenth of the mean edge along each vertex's normal (at the vertex where it has none).
+    /// The points off the surface, a tenth of the mean edge along each vertex's normal (at the vertex where it has
+    /// none).
     std::vector<Vec3f> rest_ghosts() const;
 
 private:
     struct Weights {
-        std::vector<Vec3d> alpha; ///< one a neighbour
-        std::vector<Vec3d> beta;  ///< one a vertex
+        std::vector<Vec3d> alpha;      ///< one a neighbour
+        std::vector<Vec3d> beta;       ///< one a vertex
         std::vector<Mat3d> rest_error; ///< identity minus the fit at rest; not zero only where the ring is degenerate
     };
     Weights solve(double normal_weight, const RunContext& context) const;

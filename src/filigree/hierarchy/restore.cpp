@@ -9,9 +9,9 @@ struct Restorer::Content {
     RestoreOptions options;
     unsigned level = 0;
     Law law = Law::proportional;
-    Mesh rest;                            ///< the level at rest, with split normals
-    std::vector<Index> vertices;          ///< ids in the finest mesh; empty at the finest level
-    std::vector<Index> vertex_of_normal;  ///< of rest.normals.values, in the level's own ids
+    Mesh rest;                           ///< the level at rest, with split normals
+    std::vector<Index> vertices;         ///< ids in the finest mesh; empty at the finest level
+    std::vector<Index> vertex_of_normal; ///< of rest.normals.values, in the level's own ids
 
     // blend code
     std::optional<GradientFit> gradient_fit;
@@ -107,9 +107,10 @@ namespace {
 std::optional<Error> check_pose(const Model& model, const Pose& pose) {
     const std::size_t driver = model.driver().vertices.size();
     const auto wrong = [&](std::size_t count, const char* what) -> std::optional<Error> {
-        return Error{ErrorCode::mismatch, "The pose has " + std::to_string(count) + " " + what +
-                                              " and the model's driver " + std::to_string(driver) +
-                                              " vertices: export the driver again (filigree level MODEL 0) and move that."};
+        return Error{ErrorCode::mismatch,
+                     "The pose has " + std::to_string(count) + " " + what + " and the model's driver " +
+                         std::to_string(driver) +
+                         " vertices: export the driver again (filigree level MODEL 0) and move that."};
     };
     if (pose.positions.size() != driver) return wrong(pose.positions.size(), "vertices");
     if (!pose.gradients.empty() && pose.gradients.size() != driver) return wrong(pose.gradients.size(), "gradients");
@@ -155,8 +156,7 @@ Result<Mesh> Restorer::mesh(const Pose& pose, const RunContext& context) const {
     if (!mesh.normals.empty()) {
         const std::vector<Vec3f> normals = vertex_normals(mesh, mesh.positions, context);
         for (std::size_t i = 0; i < mesh.normals.values.size(); ++i)
-            if (content.vertex_of_normal[i] != kNoIndex)
-                mesh.normals.values[i] = normals[content.vertex_of_normal[i]];
+            if (content.vertex_of_normal[i] != kNoIndex) mesh.normals.values[i] = normals[content.vertex_of_normal[i]];
     }
     return mesh;
 }

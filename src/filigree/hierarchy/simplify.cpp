@@ -1,7 +1,7 @@
-// Based on: quadric error metrics [Garland 1997], in two stages. meshoptimizer takes off the bulk at 2 M triangles a second;
-// the last levels, which become the driver, are made by our own collapses, which spread their vertices evenly and are
-// not held back by scraps, seams and non-manifold places. meshoptimizer counts triangles and we vertices, so its target
-// is corrected by the ratio reached.
+// Based on: quadric error metrics [Garland 1997], in two stages. meshoptimizer takes off the bulk at 2 M triangles a
+// second; the last levels, which become the driver, are made by our own collapses, which spread their vertices evenly
+// and are not held back by scraps, seams and non-manifold places. meshoptimizer counts triangles and we vertices, so
+// its target is corrected by the ratio reached.
 #include "filigree/hierarchy/simplify.h"
 
 #include "filigree/hierarchy/edge_collapse.h"
@@ -33,10 +33,10 @@ bool collapse_bulk(std::span<const Vec3f> positions, double longest_side, std::s
                    double max_error, Simplified& current) {
     std::vector<Triangle> out(current.triangles.size());
     float relative_error = 0; // to the longest side
-    const std::size_t indices = meshopt_simplify(
-        out.data()->data(), current.triangles.data()->data(), current.triangles.size() * 3, positions.data()->data(),
-        positions.size(), sizeof(Vec3f), target_triangles * 3,
-        static_cast<float>(std::min(max_error / longest_side, 1e6)), 0, &relative_error);
+    const std::size_t indices =
+        meshopt_simplify(out.data()->data(), current.triangles.data()->data(), current.triangles.size() * 3,
+                         positions.data()->data(), positions.size(), sizeof(Vec3f), target_triangles * 3,
+                         static_cast<float>(std::min(max_error / longest_side, 1e6)), 0, &relative_error);
     if (indices == 0 || indices / 3 == current.triangles.size()) return false;
     out.resize(indices / 3);
     current.triangles = std::move(out);
@@ -61,14 +61,13 @@ Simplified simplify(std::span<const Vec3f> positions, std::span<const Triangle> 
     const std::size_t bulk_target = std::max(target, kFinishFrom);
     for (int round = 0; round < 6 && current.vertex_count * 50 > bulk_target * 51; ++round) {
         const double triangles_per_vertex = double(current.triangles.size()) / double(current.vertex_count);
-        if (!collapse_bulk(positions, longest_side, static_cast<std::size_t>(double(bulk_target) * triangles_per_vertex),
-                           max_error, current))
+        if (!collapse_bulk(positions, longest_side,
+                           static_cast<std::size_t>(double(bulk_target) * triangles_per_vertex), max_error, current))
             break;
     }
     if (current.vertex_count * 50 > target * 51) {
-        EdgeCollapseResult finished =
-            collapse_edges(positions, current.triangles, target,
-                           options.max_error ? std::optional(max_error) : std::nullopt);
+        EdgeCollapseResult finished = collapse_edges(positions, current.triangles, target,
+                                                     options.max_error ? std::optional(max_error) : std::nullopt);
         current.triangles = std::move(finished.triangles);
         current.vertex_count = finished.vertex_count;
         current.error = std::max(current.error, finished.error);

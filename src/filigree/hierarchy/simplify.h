@@ -22,8 +22,8 @@ struct Simplified {
     std::size_t forced = 0;       ///< collapses that changed topology: dropped scraps, closed handles
 };
 
-/// Quadric edge collapses [Garland 1997]: meshoptimizer down to 20,000 vertices, our own (collapse_edges) from there, and
-/// wherever meshoptimizer cannot go on. triangles must be over welded vertices (one id a position), else seams hold
+/// Quadric edge collapses [Garland 1997]: meshoptimizer down to 20,000 vertices, our own (collapse_edges) from there,
+/// and wherever meshoptimizer cannot go on. triangles must be over welded vertices (one id a position), else seams hold
 /// them back. With both options, error ends it before the count does. Cost O(F log F); deterministic.
 Simplified simplify(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
                     const SimplifyOptions& options);

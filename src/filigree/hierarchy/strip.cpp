@@ -95,7 +95,7 @@ std::vector<std::size_t> level_targets(std::size_t vertices, const StripOptions&
         }
         return targets;
     }
-    const double base = double(options.error ? 3 : options.base.value_or(default_base(vertices)));
+    const double base = double(options.error ? 3 : std::min(vertices, options.base.value_or(default_base(vertices))));
     for (double count = base; targets.empty() || count * 2 < double(vertices); count *= kLevelFactor)
         targets.push_back(static_cast<std::size_t>(count));
     return targets;
@@ -168,8 +168,8 @@ Result<Stripped> strip_blend(Mesh mesh, const StripOptions& options, const RunCo
     result.report.bind_seconds = bind_time.seconds();
 
     const Stopwatch encode_time;
-    result.model.detail = encode_blend(mesh.positions, levels.front().vertices, std::move(cells.local), *binding,
-                                       options.precision);
+    result.model.detail =
+        encode_blend(mesh.positions, levels.front().vertices, std::move(cells.local), *binding, options.precision);
     result.model.levels = std::move(levels);
     result.model.mesh = std::move(mesh);
     split_shared_normals(result.model.mesh);
@@ -210,7 +210,8 @@ Result<Stripped> strip_reference(Mesh mesh, const StripOptions& options, const R
 
 std::optional<Error> check_options(const Mesh& mesh, const StripOptions& options) {
     if (int(options.base.has_value()) + int(options.levels.has_value()) + int(options.error.has_value()) > 1)
-        return Error{ErrorCode::usage, "Give at most one of base, levels and error: each says how coarse the driver is."};
+        return Error{ErrorCode::usage,
+                     "Give at most one of base, levels and error: each says how coarse the driver is."};
     if (options.base && *options.base < 3) return Error{ErrorCode::usage, "base must be 3 or more vertices."};
     if (options.levels && (*options.levels < 1 || *options.levels > 16))
         return Error{ErrorCode::usage, "levels must be 1 to 16."};

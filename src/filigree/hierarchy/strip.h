@@ -11,19 +11,19 @@ struct StripOptions {
     DetailCode code = DetailCode::blend;
     // How coarse the driver is; at most one of the three. With none: 1,000 vertices, fewer for meshes below 20,000
     // (a twentieth, at least 50) and all of them below 50; for the reference code as far as it goes.
-    std::optional<std::size_t> base = {};  ///< driver vertices, about; 3 or more
-    std::optional<unsigned> levels = {};   ///< levels below the finest, each with a quarter of the vertices of the next
-    std::optional<double> error = {};      ///< largest distance of the driver from the mesh, fraction of the diagonal
+    std::optional<std::size_t> base = {}; ///< driver vertices, about; 3 or more
+    std::optional<unsigned> levels = {};  ///< levels below the finest, each with a quarter of the vertices of the next
+    std::optional<double> error = {};     ///< largest distance of the driver from the mesh, fraction of the diagonal
     Precision precision = Precision::float32; ///< blend code only
     unsigned references = 3;                  ///< reference code only: 3, 4 or 6
 };
 
 struct StripReport {
-    std::size_t welded_vertices = 0;      ///< vertices at the place of an earlier one
-    std::size_t across_gap = 0;           ///< see Binding
+    std::size_t welded_vertices = 0; ///< vertices at the place of an earlier one
+    std::size_t across_gap = 0;      ///< see Binding
     std::size_t facing_away = 0;
-    std::size_t forced_collapses = 0;     ///< see Simplified
-    double simplify_error = 0;            ///< fraction of the diagonal; summed over the levels
+    std::size_t forced_collapses = 0; ///< see Simplified
+    double simplify_error = 0;        ///< fraction of the diagonal; summed over the levels
     double simplify_seconds = 0, bind_seconds = 0, encode_seconds = 0;
 };
 
