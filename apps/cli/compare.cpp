@@ -14,6 +14,7 @@ void add_compare(CLI::App& app, Session& session) {
     command->add_option("a", options->a, "Mesh")->required();
     command->add_option("b", options->b, "Mesh to measure against; fractions are of its diagonal")->required();
     command->add_option("--samples", options->samples, "Points on each surface, besides its vertices")
+        ->check(whole_number(0))
         ->capture_default_str();
     session.add_common_options(*command, "  filigree compare restored.ply full.ply\n"
                                          "  filigree compare driver.ply scan.ply --json");

@@ -66,12 +66,7 @@ Mesh deform_model(const Model& model, const Options& options, Session& session) 
         const HandlesFile handles = require(read_handles(options.handles));
         pose = require(pose_by_handles(model, handles, session.context()));
     }
-    if (!options.pose_output.empty()) {
-        Mesh driver = level_mesh(model, 0);
-        driver.positions = pose.positions;
-        for (VertexScalar& scalar : gradient_scalars(pose.gradients)) driver.scalars.push_back(std::move(scalar));
-        session.write_mesh(driver, options.pose_output);
-    }
+    if (!options.pose_output.empty()) session.write_mesh(posed_driver(model, pose), options.pose_output);
     const Restorer restorer = require(Restorer::create(model, options.restore, session.context()));
     return require(restorer.mesh(pose, session.context()));
 }
@@ -81,30 +76,33 @@ Mesh deform_model(const Model& model, const Options& options, Session& session) 
 void add_deform(CLI::App& app, Session& session) {
     auto options = std::make_shared<Options>();
     CLI::App* command = app.add_subcommand(
-        "deform", "Deform a mesh (every vertex) or a model (its driver, then restore); options apply in the order given");
+        "deform",
+        "Deform a mesh (every vertex) or a model (its driver, then restore); options apply in the order given");
     command->add_option("file", options->input, "Mesh or model")->required();
     command->add_option("-o,--output", options->output, "Mesh file to write")->required();
     const auto add_step = [&](const std::string& kind, const std::string& text, const CLI::Validator& check) {
         command
             ->add_option_function<double>(
-                "--" + kind, [options, kind](const double& amount) { options->steps.push_back({kind, amount}); }, text)
+                "--" + kind,
+                [options, kind](const double& amount) {
+                    options->steps.push_back({kind, amount});
+                },
+                text)
             ->check(check)
             ->trigger_on_parse()
             ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
     };
-    const CLI::Validator any = CLI::Number;
-    const CLI::Validator positive = CLI::PositiveNumber;
-    add_step("stretch", "Scale along the axis by this factor", positive);
-    add_step("squeeze", "Scale along the axis by this factor and across it so that the volume stays", positive);
-    add_step("bend", "Bend the axis into an arc of this many degrees", any);
-    add_step("twist", "Turn the far end about the axis by this many degrees against the near end", any);
-    add_step("taper", "Scale cross-sections, from 1 at the near end to this factor at the far end", positive);
-    add_step("random", "Smooth random displacement of up to this fraction of the diagonal", any);
-    command->add_option("--seed", options->seed, "Seed of --random")->capture_default_str();
-    command
-        ->add_option_function<Axis>("--axis", [options](const Axis& axis) { options->axis = axis; },
-                                    "x, y or z (unset: the longest side of the box)")
-        ->transform(CLI::CheckedTransformer(std::map<std::string, Axis>{{"x", Axis::x}, {"y", Axis::y}, {"z", Axis::z}}));
+    add_step("stretch", "Scale along the axis by this factor", positive_number());
+    add_step("squeeze", "Scale along the axis by this factor and across it so that the volume stays",
+             positive_number());
+    add_step("bend", "Bend the axis into an arc of this many degrees", finite_number());
+    add_step("twist", "Turn the far end about the axis by this many degrees against the near end", finite_number());
+    add_step("taper", "Scale cross-sections, from 1 at the near end to this factor at the far end", positive_number());
+    add_step("random", "Smooth random displacement of up to this fraction of the diagonal", finite_number());
+    command->add_option("--seed", options->seed, "Seed of --random")->check(whole_number(0))->capture_default_str();
+    add_choice<Axis>(
+        *command, "--axis", {{"x", Axis::x}, {"y", Axis::y}, {"z", Axis::z}},
+        [options](Axis axis) { options->axis = axis; }, "Of all of these (unset: the longest side of the box)");
     command->add_option("--handles", options->handles,
                         "Pull parts and let the rest follow as rigidly as possible: a JSON file, see docs/handles.md");
     command->add_option("--pose", options->pose_output, "Models: also write the moved driver, with its gradients");
@@ -117,13 +115,13 @@ void add_deform(CLI::App& app, Session& session) {
         if (options->steps.empty() == options->handles.empty())
             throw Failure{{ErrorCode::usage, "Say how to deform: one or more of --stretch, --squeeze, --bend, --twist, "
                                              "--taper and --random, or --handles FILE."}};
-        const std::variant<Mesh, Model> content = session.read_any(options->input);
+        const Session::Content content = session.read_any(options->input);
         const double start = now_seconds();
-        const auto* model = std::get_if<Model>(&content);
+        const auto* model = std::get_if<Model>(&content.value);
         if (!model && !options->pose_output.empty())
             throw Failure{{ErrorCode::usage, "--pose writes a model's driver, and " + options->input + " is a mesh."}};
         const Mesh mesh = model ? deform_model(*model, *options, session)
-                                : deform_mesh(std::get<Mesh>(content), *options, session.context());
+                                : deform_mesh(std::get<Mesh>(content.value), *options, session.context());
         const double seconds = now_seconds() - start;
         session.write_mesh(mesh, options->output);
         session.print(fmt::format("{}: {} vertices deformed {} in {}\n", options->output,

@@ -2,7 +2,7 @@
 
 #include "filigree/deform/space_warp.h"
 #include "filigree/hierarchy/strip.h"
-#include "filigree/io/model_file.h"
+
 #include "filigree/mesh/mesh_distance.h"
 #include "filigree/mesh/shapes.h"
 
@@ -49,8 +49,7 @@ void run_demo(const std::string& input, const std::string& folder, Session& sess
     const RunContext& context = session.context();
     std::error_code failed;
     std::filesystem::create_directories(folder, failed);
-    if (failed)
-        throw Failure{{ErrorCode::unwritable, folder + " cannot be made: " + failed.message() + "."}};
+    if (failed) throw Failure{{ErrorCode::unwritable, folder + " cannot be made: " + failed.message() + "."}};
     const auto in_folder = [&](const char* name) { return (std::filesystem::path(folder) / name).string(); };
 
     const double start = now_seconds();
@@ -63,17 +62,16 @@ void run_demo(const std::string& input, const std::string& folder, Session& sess
     // The long way: every vertex, and every normal where the mesh has them.
     const auto warp = bend_and_twist(world_box(mesh));
     Mesh full = mesh;
-    const double full_seconds = median_seconds([&] {
-        full.positions = warp_positions(*warp, mesh.positions, mesh.origin, context);
-    });
+    const double full_seconds =
+        median_seconds([&] { full.positions = warp_positions(*warp, mesh.positions, mesh.origin, context); });
     full = mesh;
     warp_mesh(*warp, full, context);
 
     // Ours: the driver with its gradients, then all detail back.
     const Restorer restorer = require(Restorer::create(model, {}, context));
     Pose pose;
-    const double driver_seconds = median_seconds(
-        [&] { pose = warp_pose(*warp, driver_positions(model), model.mesh.origin, context); });
+    const double driver_seconds =
+        median_seconds([&] { pose = warp_pose(*warp, driver_positions(model), model.mesh.origin, context); });
     std::vector<Vec3f> positions;
     const double restore_seconds = median_seconds([&] { positions = require(restorer.positions(pose, context)); });
     const Mesh restored = require(restorer.mesh(pose, context));
@@ -81,12 +79,9 @@ void run_demo(const std::string& input, const std::string& folder, Session& sess
     const Mesh from_positions = require(restorer.mesh({pose.positions, {}, {}}, context));
     const MeshDistance positions_only = require(mesh_distance(from_positions, full, 0, context));
 
-    require(write_model(model, in_folder("model.fil"), context));
-    Mesh driver = level_mesh(model, 0);
-    session.write_mesh(driver, in_folder("driver.ply"));
-    driver.positions = pose.positions;
-    for (VertexScalar& scalar : gradient_scalars(pose.gradients)) driver.scalars.push_back(std::move(scalar));
-    session.write_mesh(driver, in_folder("driver_bent.ply"));
+    session.write_model(model, in_folder("model.fil"));
+    session.write_mesh(level_mesh(model, 0), in_folder("driver.ply"));
+    session.write_mesh(posed_driver(model, pose), in_folder("driver_bent.ply"));
     session.write_mesh(mesh, in_folder("mesh.ply"));
     session.write_mesh(full, in_folder("full_deformation.ply"));
     session.write_mesh(restored, in_folder("restored.ply"));
@@ -100,13 +95,12 @@ void run_demo(const std::string& input, const std::string& folder, Session& sess
     table.row("driver", fmt::format("{} vertices, stripped in {}", with_commas(model.driver().vertices.size()),
                                     seconds_text(strip_seconds)));
     table.row("deform every vertex", seconds_text(full_seconds));
-    table.row("deform driver, restore",
-              fmt::format("{}  ({} + {})", seconds_text(ours), seconds_text(driver_seconds),
-                          seconds_text(restore_seconds)));
+    table.row("deform driver, restore", fmt::format("{}  ({} + {})", seconds_text(ours), seconds_text(driver_seconds),
+                                                    seconds_text(restore_seconds)));
     table.row("speed ratio", fmt::format("{:.1f} times", full_seconds / ours));
     table.row("difference, rms", distance_text(d.rms, with_gradients.diagonal));
-    table.row("normals off by", fmt::format("{:.2g} degrees (95 % of them by less than {:.2g})", d.normal_mean_deg,
-                                            d.normal_p95_deg));
+    table.row("normals off by",
+              fmt::format("{:.2g} degrees (95 % of them by less than {:.2g})", d.normal_mean_deg, d.normal_p95_deg));
     table.row("without gradients", fmt::format("rms {:.2e} of the diagonal, 95 % of normals within {:.2g} degrees",
                                                p.rms / positions_only.diagonal, p.normal_p95_deg));
     table.row("files", folder + "/: mesh, driver, driver_bent, restored, full_deformation (.ply), model.fil");

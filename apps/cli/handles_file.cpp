@@ -24,7 +24,7 @@ Vec3d read_vec(const Json& json, const std::string& key) {
 }
 
 HandleEntry read_entry(const Json& json) {
-    static const std::array<std::string_view, 9> known = {"name", "vertices", "box",    "sphere",  "move",
+    static const std::array<std::string_view, 9> known = {"name", "vertices", "box",    "sphere", "move",
                                                           "axis", "degrees",  "centre", "comment"};
     for (const auto& [key, value] : json.items())
         if (std::find(known.begin(), known.end(), key) == known.end())
@@ -42,7 +42,8 @@ HandleEntry read_entry(const Json& json) {
     if (json.contains("axis")) {
         const Vec3d axis = read_vec(json, "axis");
         if (!(axis.norm() > 0)) throw BadHandle{"\"axis\" must not be zero"};
-        entry.rotation = Eigen::AngleAxisd(json.at("degrees").get<double>() * std::numbers::pi / 180, axis.normalized());
+        entry.rotation =
+            Eigen::AngleAxisd(json.at("degrees").get<double>() * std::numbers::pi / 180, axis.normalized());
     }
     if (json.contains("centre")) entry.centre = read_vec(json, "centre");
     return entry;
@@ -144,8 +145,8 @@ Result<Mesh> move_mesh_by_handles(Mesh mesh, const HandlesFile& file, const RunC
     return guarded(file.path, [&]() -> Result<Mesh> {
         // Vertices at one place move together: the solve is over the first of each place.
         const std::vector<Index> representative = weld_map(mesh.positions);
-        const auto targets = handle_targets(file, world_positions(mesh.positions, mesh.origin),
-                                            [](Index v) { return v; }, mesh.vertex_count());
+        const auto targets = handle_targets(
+            file, world_positions(mesh.positions, mesh.origin), [](Index v) { return v; }, mesh.vertex_count());
         std::map<Index, Vec3d> welded;
         for (const auto& [vertex, target] : targets) welded.emplace(representative[vertex], target);
         std::vector<Triangle> triangles = triangulate(mesh).triangles;

@@ -12,12 +12,12 @@ namespace filigree::cli {
 /// One handle: which vertices, and where they go: rotated about `centre`, then moved.
 struct HandleEntry {
     std::string name;
-    std::vector<Index> vertices;                ///< ids in the mesh, or
-    std::optional<Box> box = {};                ///< all vertices inside, world coordinates, or
+    std::vector<Index> vertices;                         ///< ids in the mesh, or
+    std::optional<Box> box = {};                         ///< all vertices inside, world coordinates, or
     std::optional<std::pair<Vec3d, double>> sphere = {}; ///< centre and radius, world coordinates
-    Vec3d move = Vec3d::Zero();                 ///< model units
+    Vec3d move = Vec3d::Zero();                          ///< model units
     Eigen::AngleAxisd rotation = Eigen::AngleAxisd::Identity();
-    std::optional<Vec3d> centre = {};           ///< unset: the middle of the handle's vertices
+    std::optional<Vec3d> centre = {}; ///< unset: the middle of the handle's vertices
 };
 
 struct HandlesFile {

@@ -2,8 +2,6 @@
 
 #include "filigree/mesh/topology.h"
 
-#include <filesystem>
-
 namespace filigree::cli {
 
 namespace {
@@ -57,9 +55,9 @@ std::vector<std::string> attribute_names(const Mesh& mesh) {
 void describe_mesh(const Mesh& mesh, Session& session, Table& table, Json& json) {
     const TopologyReport report = analyse_topology(mesh, session.context());
     table.row("vertices", with_commas(report.vertices));
-    table.row("faces", fmt::format("{}  ({} triangles, {} quads, {} larger)", with_commas(report.faces),
-                                   with_commas(report.triangles), with_commas(report.quads),
-                                   with_commas(report.polygons)));
+    table.row("faces",
+              fmt::format("{}  ({} triangles, {} quads, {} larger)", with_commas(report.faces),
+                          with_commas(report.triangles), with_commas(report.quads), with_commas(report.polygons)));
     table.row("edges", with_commas(report.edges));
     table.row("components", with_commas(report.components));
     table.row("Euler number", std::to_string(report.euler));
@@ -68,9 +66,9 @@ void describe_mesh(const Mesh& mesh, Session& session, Table& table, Json& json)
     table.row("oriented", report.is_oriented() ? "yes" : "no");
     const Vec3d size = report.box.size();
     if (!report.box.empty())
-        table.row("box", fmt::format("{:.6g} x {:.6g} x {:.6g}, diagonal {:.6g}, from ({:.9g}, {:.9g}, {:.9g})", size[0],
-                                     size[1], size[2], report.box.diagonal(), report.box.min[0], report.box.min[1],
-                                     report.box.min[2]));
+        table.row("box", fmt::format("{:.6g} x {:.6g} x {:.6g}, diagonal {:.6g}, from ({:.9g}, {:.9g}, {:.9g})",
+                                     size[0], size[1], size[2], report.box.diagonal(), report.box.min[0],
+                                     report.box.min[1], report.box.min[2]));
     table.row("area", fmt::format("{:.6g}", report.area));
     if (report.is_closed() && report.is_oriented()) table.row("volume", fmt::format("{:.6g}", report.volume));
     const std::vector<std::string> attributes = attribute_names(mesh);
@@ -100,7 +98,7 @@ void describe_mesh(const Mesh& mesh, Session& session, Table& table, Json& json)
     }
 }
 
-void describe_model(const Model& model, std::uintmax_t bytes, Table& table, Json& json) {
+void describe_model(const Model& model, std::size_t bytes, Table& table, Json& json) {
     table.row("code", model.code() == DetailCode::blend ? "blend" : "reference");
     Json levels = Json::array();
     for (unsigned k = 0; k <= model.finest_level(); ++k) {
@@ -147,20 +145,18 @@ void add_info(CLI::App& app, Session& session) {
                                          "  filigree info scan.fil");
     command->callback([path, &session] {
         session.begin();
-        const std::variant<Mesh, Model> content = session.read_any(*path);
+        const Session::Content content = session.read_any(*path);
         Table table;
         Json json = {{"file", *path}};
         table.row("file", *path);
-        if (const auto* mesh = std::get_if<Mesh>(&content)) {
+        if (const auto* mesh = std::get_if<Mesh>(&content.value)) {
             json["kind"] = "mesh";
             describe_mesh(*mesh, session, table, json);
         } else {
             json["kind"] = "model";
-            const auto& model = std::get<Model>(content);
+            const auto& model = std::get<Model>(content.value);
             json["code"] = model.code() == DetailCode::blend ? "blend" : "reference";
-            std::error_code unknown;
-            const std::uintmax_t bytes = *path == "-" ? 0 : std::filesystem::file_size(*path, unknown);
-            describe_model(model, unknown ? 0 : bytes, table, json);
+            describe_model(model, content.bytes, table, json);
         }
         session.print(table.text(), json);
     });

@@ -14,8 +14,9 @@ void add_level(CLI::App& app, Session& session) {
     command->add_option("model", options->model, "Model file")->required();
     command->add_option("level", options->level, "Level, 0 the coarsest")->required();
     command->add_option("-o,--output", options->output, "Mesh file to write")->required();
-    command->add_option("--ghosts", options->ghosts,
-                        "Also write the driver's ghost points: moved along with it, they tell restore how space deforms");
+    command->add_option(
+        "--ghosts", options->ghosts,
+        "Also write the driver's ghost points: moved along with it, they tell restore how space deforms");
     session.add_common_options(*command, "  filigree level scan.fil 0 -o driver.obj\n"
                                          "  filigree level scan.fil 0 -o driver.ply --ghosts ghosts.ply");
     command->callback([options, &session] {
@@ -30,7 +31,8 @@ void add_level(CLI::App& app, Session& session) {
             Mesh ghosts = level_mesh(model, 0);
             ghosts.positions = require(Restorer::create(model, {}, session.context())).rest_ghosts();
             if (ghosts.positions.empty())
-                throw Failure{{ErrorCode::unsuitable, "A reference model has no ghost points; strip with --code blend."}};
+                throw Failure{
+                    {ErrorCode::unsuitable, "A reference model has no ghost points; strip with --code blend."}};
             session.write_mesh(ghosts, options->ghosts);
         }
         session.print(fmt::format("{}: {} vertices, {} faces\n", options->output, with_commas(mesh.vertex_count()),

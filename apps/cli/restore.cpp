@@ -25,11 +25,9 @@ std::vector<Vec3f> positions_for(const Mesh& mesh, const Model& model) {
 void add_restore_options(CLI::App& command, RestoreOptions& options) {
     std::map<std::string, Law> laws;
     for (std::string_view name : kLawNames) laws[std::string(name)] = *law_from_name(name);
-    command
-        .add_option_function<Law>(
-            "--law", [&options](const Law& law) { options.law = law; },
-            "Detail height as its surroundings grow: keep, inverse (reference default), proportional (blend default), volume")
-        ->transform(CLI::CheckedTransformer(laws));
+    add_choice<Law>(
+        command, "--law", laws, [&options](Law law) { options.law = law; },
+        "How high detail is when its surroundings grow (unset: proportional, or inverse for a reference model)");
     command.add_option("--level", options.level, "Restore up to this level (unset: the finest)");
     command.add_flag("--thin-shell", options.thin_shell, "Bumps keep their shape, as on cloth and skin");
 }
@@ -46,13 +44,15 @@ Pose pose_from_mesh(const Mesh& mesh, const Model& model) {
     return pose;
 }
 
-std::vector<VertexScalar> gradient_scalars(std::span<const Mat3f> gradients) {
-    std::vector<VertexScalar> scalars;
-    for (int k = 0; k < 9; ++k) {
-        VertexScalar& scalar = scalars.emplace_back(VertexScalar{gradient_name(k / 3, k % 3), {}});
-        for (const Mat3f& gradient : gradients) scalar.values.push_back(gradient(k / 3, k % 3));
+Mesh posed_driver(const Model& model, const Pose& pose) {
+    Mesh driver = level_mesh(model, 0);
+    driver.positions = pose.positions;
+    driver.normals = {};
+    for (int k = 0; k < 9 && !pose.gradients.empty(); ++k) {
+        VertexScalar& scalar = driver.scalars.emplace_back(VertexScalar{gradient_name(k / 3, k % 3), {}});
+        for (const Mat3f& gradient : pose.gradients) scalar.values.push_back(gradient(k / 3, k % 3));
     }
-    return scalars;
+    return driver;
 }
 
 void add_restore(CLI::App& app, Session& session) {
@@ -64,9 +64,10 @@ void add_restore(CLI::App& app, Session& session) {
     CLI::App* command = app.add_subcommand("restore", "Put the detail back onto a moved driver");
     command->add_option("model", options->model, "Model file")->required();
     command
-        ->add_option("--pose", options->pose,
-                     "The moved driver: level 0 with the same vertex order; a PLY with vertex properties f00 .. f22 gives "
-                     "gradients too")
+        ->add_option(
+            "--pose", options->pose,
+            "The moved driver: level 0 with the same vertex order; a PLY with vertex properties f00 .. f22 gives "
+            "gradients too")
         ->required();
     command->add_option("--ghosts", options->ghosts, "The moved ghost points (see level --ghosts)");
     command->add_option("-o,--output", options->output, "Mesh file to write")->required();
@@ -89,12 +90,10 @@ void add_restore(CLI::App& app, Session& session) {
                            : !pose.gradients.empty()             ? "positions and gradients"
                            : !pose.ghosts.empty()                ? "positions and ghost points"
                                                                  : "positions";
-        session.print(fmt::format("{}: {} vertices restored from {} in {}\n", options->output,
-                                  with_commas(mesh.vertex_count()), from, seconds_text(seconds)),
-                      {{"output", options->output},
-                       {"vertices", mesh.vertex_count()},
-                       {"from", from},
-                       {"seconds", seconds}});
+        session.print(
+            fmt::format("{}: {} vertices restored from {} in {}\n", options->output, with_commas(mesh.vertex_count()),
+                        from, seconds_text(seconds)),
+            {{"output", options->output}, {"vertices", mesh.vertex_count()}, {"from", from}, {"seconds", seconds}});
     });
 }
 

@@ -3,7 +3,10 @@
 #include "filigree/io/file.h"
 #include "filigree/io/model_file.h"
 
+#include <algorithm>
+#include <charconv>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <unistd.h>
@@ -12,11 +15,31 @@ namespace filigree::cli {
 
 namespace {
 
-const RunContext* cancel_target = nullptr; // what Ctrl-C stops; set once, before the handler
+const RunContext* cancel_target = nullptr;                    // what Ctrl-C stops; set once, before the handler
+volatile std::sig_atomic_t is_waiting_for_standard_input = 0; // where nothing looks at the cancel flag
 
 void on_interrupt(int) {
+    if (is_waiting_for_standard_input) {
+        constexpr std::string_view kLine = "filigree: Cancelled; nothing was written.\n";
+        [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, kLine.data(), kLine.size());
+        ::_exit(static_cast<int>(ErrorCode::cancelled));
+    }
     cancel_target->cancel();
     std::signal(SIGINT, SIG_DFL); // a second one ends the program at once
+}
+
+/// To stderr, whole and at once. When nobody can read it, nothing is lost that matters.
+void write_text(const std::string& text) {
+    std::fputs(text.c_str(), stderr);
+    std::fflush(stderr);
+}
+
+/// What messages call a file.
+std::string shown_name(const std::string& path) { return path == "-" ? "standard input" : path; }
+
+bool read_number(const std::string& text, double& number) {
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    return error == std::errc() && end == text.data() + text.size() && std::isfinite(number);
 }
 
 /// A bar that is drawn over itself, at most ten times a second.
@@ -29,13 +52,12 @@ public:
         last_ = now;
         constexpr int kWidth = 30;
         const int full = static_cast<int>(fraction * kWidth);
-        fmt::print(stderr, "\r{:<12} [{}{}] {:3.0f} %", phase, std::string(full, '#'), std::string(kWidth - full, '.'),
-                   100 * fraction);
-        std::fflush(stderr);
+        write_text(fmt::format("\r{:<12} [{}{}] {:3.0f} %", phase, std::string(full, '#'),
+                               std::string(kWidth - full, '.'), 100 * fraction));
         drawn_ = true;
     }
     void clear() {
-        if (drawn_) fmt::print(stderr, "\r{:<60}\r", "");
+        if (drawn_) write_text(fmt::format("\r{:<60}\r", ""));
         drawn_ = false;
     }
 
@@ -54,7 +76,7 @@ void Session::add_common_options(CLI::App& command, const std::string& examples)
     command.add_flag("--json", json, "Print the result as JSON");
     command.add_option("--threads", threads, "Threads to use; 0 for all (results never depend on it)")
         ->check(CLI::Range(0, 1024));
-    command.add_flag("--quiet", quiet, "No progress bar, no warnings");
+    command.add_flag("--quiet", quiet, "No progress bar, no warnings, no summary of what was written");
     command.footer("Examples:\n" + examples);
 }
 
@@ -67,49 +89,104 @@ void Session::begin() {
         };
     cancel_target = &*context_;
     std::signal(SIGINT, on_interrupt);
+    std::signal(SIGPIPE, SIG_IGN);
 }
 
 void Session::warn(const std::string& sentence) {
-    if (!quiet) fmt::print(stderr, "filigree: warning: {}\n", sentence);
+    if (std::find(warnings_.begin(), warnings_.end(), sentence) != warnings_.end()) return;
+    if (!quiet) say("filigree: warning: " + sentence);
     warnings_.push_back(sentence);
 }
 
-Mesh Session::read_mesh(const std::string& path) {
-    MeshFile file = require(filigree::read_mesh(path, context()));
+std::string Session::read_bytes(const std::string& path) const {
+    is_waiting_for_standard_input = path == "-";
+    Result<std::string> bytes = read_file(path);
+    is_waiting_for_standard_input = 0;
+    return require(std::move(bytes));
+}
+
+Mesh Session::parse_mesh(const std::string& bytes, const std::string& path) {
+    MeshFile file = require(filigree::read_mesh(bytes, shown_name(path), context()));
     for (const std::string& warning : file.warnings) warn(warning);
     return std::move(file.mesh);
 }
 
-Model Session::read_model(const std::string& path) { return require(filigree::read_model(path, context())); }
+Mesh Session::read_mesh(const std::string& path) {
+    const std::string bytes = read_bytes(path);
+    if (is_model_file(bytes))
+        throw Failure{{ErrorCode::bad_file, shown_name(path) + ": is a model where a mesh belongs; "
+                                                               "'filigree level MODEL 0 -o MESH' writes its driver."}};
+    return parse_mesh(bytes, path);
+}
 
-std::variant<Mesh, Model> Session::read_any(const std::string& path) {
-    const std::string bytes = require(read_file(path));
-    if (is_model_file(bytes)) return require(filigree::read_model(bytes, path, context()));
-    MeshFile file = require(filigree::read_mesh(bytes, path, context()));
-    for (const std::string& warning : file.warnings) warn(warning);
-    return std::move(file.mesh);
+Model Session::read_model(const std::string& path) {
+    return require(filigree::read_model(read_bytes(path), shown_name(path), context()));
+}
+
+Session::Content Session::read_any(const std::string& path) {
+    const std::string bytes = read_bytes(path);
+    if (is_model_file(bytes)) return {require(filigree::read_model(bytes, shown_name(path), context())), bytes.size()};
+    return {parse_mesh(bytes, path), bytes.size()};
+}
+
+void Session::begin_writing(const std::string& path) {
+    if (context().is_cancelled()) throw Failure{cancelled_error()};
+    wrote_file_ = true;
+    standard_output_taken_ |= path == "-";
 }
 
 void Session::write_mesh(const Mesh& mesh, const std::string& path) {
-    standard_output_taken_ |= path == "-";
-    if (path == "-") { // no name to tell the format by: PLY holds the most
-        std::string bytes;
-        for (const std::string& warning : require(filigree::write_mesh(mesh, MeshFormat::ply, bytes))) warn(warning);
-        const std::string_view piece = bytes;
-        require(write_file(path, std::span(&piece, 1)));
-        return;
-    }
-    for (const std::string& warning : require(filigree::write_mesh(mesh, path, context()))) warn(warning);
+    if (const std::string wrong = check_mesh(mesh); !wrong.empty())
+        throw Failure{{ErrorCode::unsuitable, path + ": not written: the result is beyond what numbers can hold (" +
+                                                  wrong + "); deform less."}};
+    begin_writing(path);
+    WriteMeshOptions options;
+    if (path == "-") options.format = MeshFormat::ply; // no name to tell the format by: PLY holds the most
+    for (const std::string& warning : require(filigree::write_mesh(mesh, path, context(), options))) warn(warning);
+}
+
+void Session::write_model(const Model& model, const std::string& path) {
+    begin_writing(path);
+    require(filigree::write_model(model, path, context()));
 }
 
 void Session::print(const std::string& text, Json object) {
-    std::FILE* out = standard_output_taken_ ? stderr : stdout;
-    if (json) {
-        object["warnings"] = warnings_;
-        fmt::print(out, "{}\n", object.dump(2, ' ', false, Json::error_handler_t::replace));
-    } else if (!quiet) {
-        fmt::print(out, "{}", text);
-    }
+    if (!wrote_file_ && context().is_cancelled()) throw Failure{cancelled_error()};
+    if (!json && quiet && wrote_file_) return;
+    object["warnings"] = warnings_;
+    const std::string shown = json ? object.dump(2, ' ', false, Json::error_handler_t::replace) + "\n" : text;
+    if (standard_output_taken_) return write_text(shown);
+    if (std::fputs(shown.c_str(), stdout) == EOF || std::fflush(stdout) == EOF)
+        throw Failure{{ErrorCode::unwritable,
+                       "standard output: cannot be written: the reader has gone away, or the disk is full."}};
+}
+
+void say(const std::string& line) { write_text(line + "\n"); }
+
+CLI::Validator finite_number() {
+    return {[](std::string& text) {
+                double number;
+                return read_number(text, number) ? "" : "'" + text + "' is not a number";
+            },
+            ""};
+}
+
+CLI::Validator positive_number() {
+    return {[](std::string& text) {
+                double number;
+                return read_number(text, number) && number > 0 ? "" : "'" + text + "' is not a number above 0";
+            },
+            ""};
+}
+
+CLI::Validator whole_number(std::int64_t least) {
+    return {[least](std::string& text) {
+                std::int64_t number;
+                const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+                const bool is_whole = error == std::errc() && end == text.data() + text.size() && number >= least;
+                return is_whole ? "" : fmt::format("'{}' is not a whole number from {} up", text, least);
+            },
+            ""};
 }
 
 std::string Table::text() const {

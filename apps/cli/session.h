@@ -6,6 +6,8 @@
 #include "filigree/hierarchy/model.h"
 #include "filigree/io/mesh_file.h"
 
+#include <functional>
+#include <map>
 #include <string>
 #include <variant>
 #include <vector>
@@ -38,27 +40,58 @@ public:
 
     /// Adds --json, --threads and --quiet, and a footer with examples.
     void add_common_options(CLI::App& command, const std::string& examples);
-    /// Makes the context when the options are known; from here on Ctrl-C cancels.
+    /// Makes the context when the options are known; from here on Ctrl-C cancels, and a reader that has gone away is an
+    /// error like any other.
     void begin();
     const RunContext& context() const { return *context_; }
 
     Mesh read_mesh(const std::string& path);
     Model read_model(const std::string& path);
+    struct Content {
+        std::variant<Mesh, Model> value;
+        std::size_t bytes; ///< of the file
+    };
     /// A mesh or a model, told by the content.
-    std::variant<Mesh, Model> read_any(const std::string& path);
+    Content read_any(const std::string& path);
     void write_mesh(const Mesh& mesh, const std::string& path);
+    void write_model(const Model& model, const std::string& path);
 
-    /// Goes to stderr at once, unless quiet, and into the JSON.
+    /// Goes to stderr at once, unless quiet, and into the JSON; a sentence that was said is not said again.
     void warn(const std::string& sentence);
 
-    /// The result: `text` for people, or with --json `object` with the warnings added.
+    /// The result: `text` for people, or with --json `object` with the warnings added. Standard output, unless a mesh
+    /// or a model went there. With --quiet a text that only tells of a file written is left out.
     void print(const std::string& text, Json object);
 
 private:
+    std::string read_bytes(const std::string& path) const;
+    Mesh parse_mesh(const std::string& bytes, const std::string& path);
+    void begin_writing(const std::string& path);
+
     std::optional<RunContext> context_;
     std::vector<std::string> warnings_;
+    bool wrote_file_ = false;
     bool standard_output_taken_ = false; ///< by a mesh or a model
 };
+
+/// An option that is one of a few words, each of which stands for a value.
+template <class T>
+CLI::Option* add_choice(CLI::App& command, const std::string& name, const std::map<std::string, T>& choices,
+                        std::function<void(T)> set, const std::string& text) {
+    return command
+        .add_option_function<std::string>(
+            name, [choices, set](const std::string& word) { set(choices.at(word)); }, text)
+        ->check(CLI::IsMember(choices))
+        ->type_name("");
+}
+
+/// Checks of an option's number, by rules that are the same in every locale.
+CLI::Validator finite_number();
+CLI::Validator positive_number();
+CLI::Validator whole_number(std::int64_t least);
+
+/// A line on stderr.
+void say(const std::string& line);
 
 /// Lines "name   value" with the values in one column.
 class Table {

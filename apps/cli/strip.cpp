@@ -1,9 +1,21 @@
 #include "session.h"
 
 #include "filigree/hierarchy/strip.h"
-#include "filigree/io/model_file.h"
+
+#include <filesystem>
 
 namespace filigree::cli {
+
+namespace {
+
+/// A model under a mesh's name is a slip, and could be the end of the mesh.
+void refuse_mesh_name(const std::string& path) {
+    if (path != "-" && mesh_format(path).ok())
+        throw Failure{{ErrorCode::usage, path + ": is the name of a mesh; give the model another, such as " +
+                                             std::filesystem::path(path).stem().string() + ".fil."}};
+}
+
+} // namespace
 
 void add_strip(CLI::App& app, Session& session) {
     struct Options {
@@ -15,24 +27,30 @@ void add_strip(CLI::App& app, Session& session) {
     command->add_option("mesh", options->input, "Mesh to strip")->required();
     command->add_option("-o,--output", options->output, "Model file to write (.fil)")->required();
     StripOptions& strip_options = options->strip;
-    auto* base = command->add_option("--base", strip_options.base,
-                                     "Vertices of the driver (unset: 1,000, fewer for small meshes)");
-    auto* levels = command->add_option("--levels", strip_options.levels,
-                                       "Levels to remove, each leaves a quarter of the vertices");
-    auto* error = command->add_option("--error", strip_options.error,
-                                      "Largest distance of the driver from the mesh, fraction of the diagonal");
+    auto* base =
+        command
+            ->add_option("--base", strip_options.base, "Vertices of the driver (unset: 1,000, fewer for small meshes)")
+            ->check(whole_number(3));
+    auto* levels =
+        command->add_option("--levels", strip_options.levels, "Levels to remove, each leaves a quarter of the vertices")
+            ->check(whole_number(1));
+    auto* error = command
+                      ->add_option("--error", strip_options.error,
+                                   "Largest distance of the driver from the mesh, fraction of the diagonal")
+                      ->check(positive_number());
     base->excludes(levels)->excludes(error);
     levels->excludes(error);
+    add_choice<DetailCode>(
+        *command, "--code", {{"blend", DetailCode::blend}, {"reference", DetailCode::reference}},
+        [options](DetailCode code) { options->strip.code = code; },
+        "blend: any mesh (default); reference: the report's, for regular quads");
+    add_choice<Precision>(
+        *command, "--precision", {{"float", Precision::float32}, {"int16", Precision::int16}},
+        [options](Precision precision) { options->strip.precision = precision; },
+        "Of the blend code: float, 20 bytes a vertex (default), or int16, 10 bytes");
     command
-        ->add_option("--code", strip_options.code, "blend: any mesh; reference: the report's, for regular quads")
-        ->transform(CLI::CheckedTransformer(
-            std::map<std::string, DetailCode>{{"blend", DetailCode::blend}, {"reference", DetailCode::reference}}))
-        ->default_str("blend");
-    command->add_option("--precision", strip_options.precision, "blend: float (20 bytes a vertex) or int16 (10 bytes)")
-        ->transform(CLI::CheckedTransformer(
-            std::map<std::string, Precision>{{"float", Precision::float32}, {"int16", Precision::int16}}))
-        ->default_str("float");
-    command->add_option("--references", strip_options.references, "reference: references a point, 3, 4 or 6")
+        ->add_option("--references", strip_options.references,
+                     "Of the reference code: coarse points that a point refers to")
         ->check(CLI::IsMember({3, 4, 6}))
         ->capture_default_str();
     session.add_common_options(*command, "  filigree strip scan.ply -o scan.fil\n"
@@ -40,12 +58,13 @@ void add_strip(CLI::App& app, Session& session) {
                                          "  filigree strip cube.obj -o cube.fil --code reference");
     command->callback([options, &session] {
         session.begin();
+        refuse_mesh_name(options->output);
         const double start = now_seconds();
         Mesh mesh = session.read_mesh(options->input);
         const double read = now_seconds();
         const Stripped stripped = require(strip(std::move(mesh), options->strip, session.context()));
         const double stripped_at = now_seconds();
-        require(write_model(stripped.model, options->output, session.context()));
+        session.write_model(stripped.model, options->output);
         const Model& model = stripped.model;
         const StripReport& report = stripped.report;
 
