@@ -7,6 +7,7 @@
 #include "filigree/deform/space_warp.h"
 
 #include "filigree/core/parallel_for.h"
+#include "filigree/mesh/normals.h"
 
 #include <Eigen/Geometry>
 #include <Eigen/QR>
@@ -15,7 +16,6 @@
 #include <cmath>
 #include <numbers>
 #include <random>
-#include <unordered_map>
 
 namespace filigree {
 namespace {
@@ -206,32 +206,8 @@ Mat3d cofactor(const Mat3d& A) {
     return result;
 }
 
-/// The vertex of each normal value (kNoIndex: in no use), after giving every vertex values of its own.
-std::vector<Index> own_normals(Mesh& mesh) {
-    CornerAttribute<Vec3f>& normals = mesh.normals;
-    std::vector<Index> vertex_of(normals.values.size(), kNoIndex);
-    if (normals.per_vertex()) {
-        for (std::size_t v = 0; v < vertex_of.size(); ++v) vertex_of[v] = static_cast<Index>(v);
-        return vertex_of;
-    }
-    std::unordered_map<std::uint64_t, Index> copies; // (value, vertex) to the copy of the value for this vertex
-    for (std::size_t c = 0; c < mesh.corners.size(); ++c) {
-        const Index vertex = mesh.corners[c], value = normals.corners[c];
-        if (vertex_of[value] == kNoIndex) vertex_of[value] = vertex;
-        if (vertex_of[value] == vertex) continue;
-        const std::uint64_t key = std::uint64_t{value} << 32 | vertex;
-        const auto [copy, is_new] = copies.try_emplace(key, static_cast<Index>(normals.values.size()));
-        if (is_new) {
-            normals.values.push_back(Vec3f(normals.values[value]));
-            vertex_of.push_back(vertex);
-        }
-        normals.corners[c] = copy->second;
-    }
-    return vertex_of;
-}
-
 void warp_normals(const SpaceWarp& warp, Mesh& mesh, const RunContext& context) {
-    const std::vector<Index> vertex_of = own_normals(mesh);
+    const std::vector<Index> vertex_of = split_shared_normals(mesh);
     parallel_for(context, vertex_of.size(), kGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             if (vertex_of[i] == kNoIndex) continue;
