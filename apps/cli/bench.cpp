@@ -2,8 +2,8 @@
 // Google Benchmark programs in bench/ go through more sizes; scripts/bench-peers sets this beside other programs.
 #include "fidelity.h"
 #include "session.h"
+#include "triad.h"
 
-#include "filigree/core/parallel_for.h"
 #include "filigree/deform/handles.h"
 #include "filigree/deform/space_warp.h"
 #include "filigree/hierarchy/blend_code.h"
@@ -16,10 +16,6 @@
 #include <algorithm>
 #include <cstring>
 #include <random>
-
-#if defined(__SSE2__)
-#include <emmintrin.h>
-#endif
 
 namespace filigree::cli {
 
@@ -72,8 +68,10 @@ public:
     }
 
     void files() {
-        for (const auto& [name, format] : {std::pair{"obj", MeshFormat::obj}, {"ply", MeshFormat::ply},
-                                           {"stl", MeshFormat::stl}, {"off", MeshFormat::off}}) {
+        for (const auto& [name, format] : {std::pair{"obj", MeshFormat::obj},
+                                           {"ply", MeshFormat::ply},
+                                           {"stl", MeshFormat::stl},
+                                           {"off", MeshFormat::off}}) {
             std::string bytes;
             const double write = median_seconds([&] {
                 bytes.clear();
@@ -82,8 +80,7 @@ public:
             const double read =
                 median_seconds([&] { require(read_mesh(bytes, std::string("mesh.") + name, context_)); });
             std::string copy(bytes.size(), '\0');
-            const double memcpy_seconds =
-                median_seconds([&] { std::memcpy(copy.data(), bytes.data(), bytes.size()); });
+            const double memcpy_seconds = median_seconds([&] { std::memcpy(copy.data(), bytes.data(), bytes.size()); });
             const double megabytes = double(bytes.size()) * 1e-6;
             add(fmt::format("files.read_{}", name), megabytes / read, "MB/s");
             add(fmt::format("files.write_{}", name), megabytes / write, "MB/s");
@@ -114,11 +111,12 @@ public:
         chain.push_back(make_bend(box, Axis::x, 90));
         const auto bend = make_chain(std::move(chain));
         const Restorer restorer = require(Restorer::create(model, {}, context_));
-        for (const auto& [name, warp] : {std::pair<const char*, const SpaceWarp*>{"rbf_200", rbf.get()}, {"bend_twist", bend.get()}}) {
-            const double all =
-                median_seconds([&] { warp_positions(*warp, mesh_.positions, mesh_.origin, context_); });
+        for (const auto& [name, warp] :
+             {std::pair<const char*, const SpaceWarp*>{"rbf_200", rbf.get()}, {"bend_twist", bend.get()}}) {
+            const double all = median_seconds([&] { warp_positions(*warp, mesh_.positions, mesh_.origin, context_); });
             const double ours = median_seconds([&] {
-                require(restorer.positions(warp_pose(*warp, driver_positions(model), mesh_.origin, context_), context_));
+                require(
+                    restorer.positions(warp_pose(*warp, driver_positions(model), mesh_.origin, context_), context_));
             });
             add(fmt::format("deform.{}_all", name), all, "s");
             add(fmt::format("deform.{}_driver_and_restore", name), ours, "s");
@@ -143,7 +141,8 @@ public:
             targets.push_back(driver.positions[v]);
             if (at >= 0.95) targets.back()[(axis + 1) % 3] += static_cast<float>(0.2 * box.diagonal());
         }
-        add("handles.setup", median_seconds([&] { require(HandleSolver::create(driver.positions, triangles, ends)); }), "s");
+        add("handles.setup", median_seconds([&] { require(HandleSolver::create(driver.positions, triangles, ends)); }),
+            "s");
         HandleSolver solver = require(HandleSolver::create(driver.positions, triangles, ends));
         const Restorer restorer = require(Restorer::create(model, {}, context_));
         add("handles.iteration", median_seconds([&] {
@@ -184,34 +183,16 @@ private:
         return *model;
     }
 
-    /// a = b + s c over arrays far larger than the caches, stored past them: bytes a second, the rival of everything
-    /// that streams. Also with ordinary stores, which read each line before they write it.
+    /// Bytes a second of the streaming triad; also reported with ordinary stores.
     double measure_triad() {
-        const std::size_t count = std::size_t{16} << 20;
-        std::vector<float> a(count), b(count, 1.5f), c(count, 2.5f);
-        const auto run = [&](bool streaming) {
-            return median_seconds([&] {
-                parallel_for(context_, count, 1 << 16, [&](std::size_t begin, std::size_t end) {
-#if defined(__SSE2__)
-                    if (streaming) {
-                        const __m128 s = _mm_set1_ps(0.5f);
-                        std::size_t i = begin;
-                        for (; i < end && reinterpret_cast<std::uintptr_t>(&a[i]) % 16 != 0; ++i) a[i] = b[i] + 0.5f * c[i];
-                        for (; i + 4 <= end; i += 4)
-                            _mm_stream_ps(&a[i], _mm_add_ps(_mm_loadu_ps(&b[i]), _mm_mul_ps(s, _mm_loadu_ps(&c[i]))));
-                        for (; i < end; ++i) a[i] = b[i] + 0.5f * c[i];
-                        return;
-                    }
-#endif
-                    for (std::size_t i = begin; i < end; ++i) a[i] = b[i] + 0.5f * c[i];
-                });
-            });
+        Triad triad;
+        const auto rate = [&](bool streams) {
+            return double(Triad::bytes(streams)) / median_seconds([&] { triad.run(context_, streams); });
         };
-        const double bytes = 3.0 * double(count) * sizeof(float);
-        const double plain = bytes / run(false), streaming = bytes / run(true);
-        add("restore.triad", plain * 1e-9, "GB/s");
+        add("restore.triad", rate(false) * 1e-9, "GB/s");
+        const double streaming = rate(true);
         add("restore.triad_streaming", streaming * 1e-9, "GB/s");
-        return std::max(plain, streaming);
+        return streaming;
     }
 
     void restore_blend(Precision precision, double triad) {
@@ -228,12 +209,13 @@ private:
         const double count = double(items.size());
         const double record_bytes = precision == Precision::int16 ? 10 : 20;
 
-        const double seconds = median_seconds(
-            [&] { restorer.restore(driver, gradients, positions, {}, false, context_); });
+        const double seconds =
+            median_seconds([&] { restorer.restore(driver, gradients, positions, {}, false, context_); });
         add(name, count / seconds, "vertices/s");
         add(name + ".of_triad", count * (record_bytes + 12) / seconds / triad, "ratio");
-        add(name + ".with_normals",
-            count / median_seconds([&] { restorer.restore(driver, gradients, positions, out_normals, false, context_); }),
+        add(name + ".with_normals", count / median_seconds([&] {
+                                        restorer.restore(driver, gradients, positions, out_normals, false, context_);
+                                    }),
             "vertices/s");
         add(name + ".in_mesh_order",
             count / median_seconds([&] { restorer.restore(driver, gradients, positions, {}, true, context_); }),
@@ -249,11 +231,13 @@ private:
         for (const Law law : {Law::inverse, Law::keep}) {
             const ReferenceRestorer restorer(detail, law);
             std::vector<Vec3f> positions(6 * std::size_t(resolution + 1) * (resolution + 1));
-            const double seconds = median_seconds(
-                [&] { restorer.restore_grids(driver, detail.patches.levels, positions, context_); });
+            const double seconds =
+                median_seconds([&] { restorer.restore_grids(driver, detail.patches.levels, positions, context_); });
             const std::string name = law == Law::keep ? "restore.reference_keep" : "restore.reference";
             add(name, double(positions.size()) / seconds, "vertices/s");
-            const double bytes = double(restorer.code_bytes()) + double(positions.size() * sizeof(Vec3f));
+            // Records once; of the points a level writes, those of all but the finest are read again.
+            const double bytes =
+                double(restorer.code_bytes()) + double(positions.size() * sizeof(Vec3f)) * (4.0 / 3 + 1.0 / 3);
             add(name + ".of_triad", bytes / seconds / triad, "ratio");
         }
     }
@@ -309,13 +293,19 @@ void add_bench(CLI::App& app, Session& session) {
         }
         Json rows = Json::array();
         std::string text = table.text();
-        if (!bench.fidelity_rows().empty()) text += fmt::format("\n{:<18} {:<12} {:>9} {:>9} {:>9}\n", "method", "warp", "rms", "max", "normals");
+        if (!bench.fidelity_rows().empty())
+            text += fmt::format("\n{:<18} {:<12} {:>9} {:>9} {:>9}\n", "method", "warp", "rms", "max", "normals");
         for (const FidelityRow& row : bench.fidelity_rows()) {
-            rows.push_back({{"method", row.method}, {"warp", row.warp}, {"rms", row.rms}, {"max", row.max},
+            rows.push_back({{"method", row.method},
+                            {"warp", row.warp},
+                            {"rms", row.rms},
+                            {"max", row.max},
                             {"normal_p95_deg", row.normal_p95_deg}});
-            text += fmt::format("{:<18} {:<12} {:>9.2e} {:>9.2e} {:>9.3g}\n", row.method, row.warp, row.rms, row.max, row.normal_p95_deg);
+            text += fmt::format("{:<18} {:<12} {:>9.2e} {:>9.2e} {:>9.3g}\n", row.method, row.warp, row.rms, row.max,
+                                row.normal_p95_deg);
         }
-        session.print(text, {{"mesh", mesh_json}, {"threads", silent.threads()}, {"results", results}, {"fidelity", rows}});
+        session.print(text,
+                      {{"mesh", mesh_json}, {"threads", silent.threads()}, {"results", results}, {"fidelity", rows}});
     });
 }
 

@@ -132,12 +132,15 @@ std::vector<FidelityRow> measure_fidelity(const Model& model, const Model* refer
         if (reference) {
             const Result<Restorer> reference_restorer = Restorer::create(*reference, {}, context);
             if (!reference_restorer) continue;
-            comparison.add("reference",
-                           *reference_restorer->positions(warp_pose(*warp.warp, driver_positions(*reference), reference->mesh.origin, context), context));
+            comparison.add(
+                "reference",
+                *reference_restorer->positions(
+                    warp_pose(*warp.warp, driver_positions(*reference), reference->mesh.origin, context), context));
         }
         Pose positions_only{pose.positions, {}, {}};
         comparison.add("blend, positions", *restorer->positions(positions_only, context));
-        Pose with_ghosts{pose.positions, {}, warp_positions(*warp.warp, restorer->rest_ghosts(), model.mesh.origin, context)};
+        Pose with_ghosts{
+            pose.positions, {}, warp_positions(*warp.warp, restorer->rest_ghosts(), model.mesh.origin, context)};
         comparison.add("blend, ghosts", *restorer->positions(with_ghosts, context));
         comparison.add("blend, gradients", *restorer->positions(pose, context));
     }
