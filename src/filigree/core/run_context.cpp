@@ -1,7 +1,8 @@
 #include "filigree/core/run_context.h"
 
 #include <algorithm>
-#include <thread>
+
+#include <oneapi/tbb/info.h>
 
 namespace filigree {
 
@@ -9,7 +10,7 @@ namespace {
 
 /// More workers than processors only wait for each other (and oneTBB would print that they do).
 unsigned clamp_threads(unsigned wanted) {
-    const unsigned processors = std::max(1u, std::thread::hardware_concurrency());
+    const unsigned processors = static_cast<unsigned>(tbb::info::default_concurrency()); // those we may run on
     return wanted == 0 ? processors : std::min(wanted, processors);
 }
 
