@@ -208,6 +208,7 @@ private:
         const std::vector<Index> ring = around_[from];
         for (Index t : ring)
             if (has(triangles_[t], to)) remove(t);
+        vertex_count_ += around_[to].empty() && !around_[from].empty(); // it had lost its last one, and gets new ones
         for (Index t : std::vector<Index>(around_[from])) {
             std::replace(triangles_[t].begin(), triangles_[t].end(), from, to);
             around_[to].push_back(t);

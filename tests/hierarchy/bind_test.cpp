@@ -1,0 +1,159 @@
+#include "filigree/hierarchy/bind.h"
+
+#include "filigree/hierarchy/simplify.h"
+#include "filigree/mesh/closest_point.h"
+#include "filigree/mesh/normals.h"
+#include "filigree/mesh/shapes.h"
+#include "filigree/mesh/triangulate.h"
+#include "filigree/mesh/weld.h"
+
+#include <gtest/gtest.h>
+
+namespace filigree {
+namespace {
+
+const RunContext kOneThread(1);
+
+struct Bound {
+    std::vector<Triangle> triangles, cells;
+    Binding binding;
+};
+
+Bound bound(const Mesh& mesh, std::vector<Triangle> cells, const RunContext& context = kOneThread) {
+    Bound out;
+    const std::vector<Index> representative = weld_map(mesh.positions);
+    for (Triangle t : triangulate(mesh).triangles) {
+        for (Index& v : t) v = representative[v];
+        out.triangles.push_back(t);
+    }
+    out.cells = std::move(cells);
+    auto binding = bind_to_driver(mesh.positions, representative, out.triangles,
+                                  vertex_normals(out.triangles, mesh.positions, kOneThread), out.cells, context);
+    EXPECT_TRUE(binding.ok());
+    out.binding = std::move(*binding);
+    EXPECT_EQ(out.binding.bonds.size(), mesh.vertex_count());
+    for (const Bond& bond : out.binding.bonds) {
+        EXPECT_LT(bond.cell, out.cells.size());
+        EXPECT_TRUE(bond.u >= 0 && bond.v >= 0 && bond.u + bond.v <= 1 + 1e-6f) << bond.u << ' ' << bond.v;
+    }
+    return out;
+}
+
+Bound bound_to(const Mesh& mesh, std::size_t base, const RunContext& context = kOneThread) {
+    return bound(mesh, simplify(mesh.positions, triangulate(mesh).triangles, {.target_vertices = base}).triangles,
+                 context);
+}
+
+Vec3d anchor(const Mesh& mesh, const Bound& bound, std::size_t vertex) {
+    const Bond& bond = bound.binding.bonds[vertex];
+    const Triangle& cell = bound.cells[bond.cell];
+    return (1.0 - bond.u - bond.v) * mesh.positions[cell[0]].cast<double>() +
+           bond.u * mesh.positions[cell[1]].cast<double>() + bond.v * mesh.positions[cell[2]].cast<double>();
+}
+
+/// Two wavy sheets, one facing up and one down, `gap` apart and joined by nothing (or along one side).
+Mesh thin_plate(float gap, bool joined) {
+    const Mesh sheet = make_wavy_plane({.resolution = 40, .frequency = 3, .amplitude = 0.03});
+    Mesh mesh = sheet;
+    const auto count = static_cast<Index>(sheet.vertex_count());
+    for (const Vec3f& p : sheet.positions) mesh.positions.push_back(p - Vec3f(0, 0, gap));
+    for (std::size_t f = 0; f < sheet.face_count(); ++f) {
+        const auto face = sheet.face(f);
+        mesh.add_face(std::array<Index, 4>{face[3] + count, face[2] + count, face[1] + count, face[0] + count});
+    }
+    mesh.uvs = {};
+    if (joined)
+        for (Index i = 0; i < 40; ++i) mesh.add_face(std::array<Index, 4>{i + 1, i, i + count, i + 1 + count});
+    return mesh;
+}
+
+TEST(Bind, ThinPlatesBindToTheirOwnSide) {
+    for (const float gap : {0.02f, 1e-3f, 1e-5f})
+        for (const bool joined : {false, true}) {
+            const Mesh mesh = thin_plate(gap, joined);
+            const Index half = static_cast<Index>(mesh.vertex_count() / 2);
+            const Bound out = bound_to(mesh, 200);
+            std::size_t wrong = 0;
+            for (Index v = 0; v < mesh.vertex_count(); ++v) {
+                if (joined && mesh.positions[v].y() < -0.4f) continue; // around the fold, either side is the own one
+                const Triangle& cell = out.cells[out.binding.bonds[v].cell];
+                const auto lower = std::count_if(cell.begin(), cell.end(), [&](Index c) { return c >= half; });
+                wrong += v < half ? lower == 3 : lower == 0;
+            }
+            EXPECT_EQ(wrong, 0u) << gap << ' ' << joined;
+            EXPECT_TRUE(out.binding.across_gap.empty());
+        }
+}
+
+TEST(Bind, DriverVerticesHangOnThemselves) {
+    const Mesh mesh = make_wavy_sphere({.resolution = 32});
+    const Bound out = bound_to(mesh, 300);
+    for (const Triangle& cell : out.cells)
+        for (const Index v : cell)
+            EXPECT_LT((anchor(mesh, out, v) - mesh.positions[v].cast<double>()).norm(), 1e-7) << v;
+}
+
+/// On a body without thin parts the closest point along the surface is the closest point.
+TEST(Bind, ThickBodiesBindToTheClosestPoint) {
+    const Mesh mesh = make_wavy_sphere({.resolution = 32, .frequency = 3});
+    const Bound out = bound_to(mesh, 300);
+    const ClosestPointTree tree(mesh.positions, out.cells);
+    std::size_t further = 0;
+    for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
+        const double here = (anchor(mesh, out, v) - mesh.positions[v].cast<double>()).norm();
+        further += here > tree.closest(mesh.positions[v]).distance + 1e-6;
+    }
+    EXPECT_LT(further, mesh.vertex_count() / 100);
+}
+
+TEST(Bind, PartsWithoutADriverVertexAreReported) {
+    Mesh mesh = make_wavy_plane({.resolution = 8});
+    const auto sheet = static_cast<Index>(mesh.vertex_count());
+    std::vector<Triangle> cells = triangulate(mesh).triangles;
+    mesh.uvs = {};
+    for (const Vec3f& p : {Vec3f(0, 0, 0.3f), Vec3f(0.1f, 0, 0.3f), Vec3f(0, 0.1f, 0.3f), Vec3f(0.2f, 0.2f, 5)})
+        mesh.positions.push_back(p); // a scrap above, and a loose vertex
+    mesh.add_face(Triangle{sheet, sheet + 1, sheet + 2});
+    const Bound out = bound(mesh, cells);
+    EXPECT_EQ(out.binding.across_gap, (std::vector<Index>{sheet, sheet + 1, sheet + 2, sheet + 3}));
+    EXPECT_TRUE(out.binding.facing_away.empty());
+    for (Index v = sheet; v < sheet + 3; ++v)
+        EXPECT_LT((anchor(mesh, out, v) - mesh.positions[v].cast<double>()).norm(), 0.4) << v;
+}
+
+TEST(Bind, WhatFacesTheOtherWayIsReported) {
+    Mesh mesh; // a driver that faces up, and a flap at its corner that faces down
+    mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {-0.2f, 0.1f, 0.1f}, {0.1f, -0.2f, 0.1f}};
+    mesh.add_face(Triangle{0, 1, 2});
+    mesh.add_face(Triangle{0, 4, 3});
+    EXPECT_EQ(bound(mesh, {{0, 1, 2}}).binding.facing_away, (std::vector<Index>{3, 4}));
+}
+
+TEST(Bind, DuplicatesShareABond) {
+    Mesh mesh = make_wavy_plane({.resolution = 6});
+    const std::vector<Triangle> cells = {{0, 6, 48}, {0, 48, 42}};
+    const Index twin = static_cast<Index>(mesh.vertex_count());
+    mesh.uvs = {};
+    mesh.positions.push_back(mesh.positions[17]);
+    const Bound out = bound(mesh, cells);
+    const Bond &a = out.binding.bonds[17], &b = out.binding.bonds[twin];
+    EXPECT_TRUE(a.cell == b.cell && a.u == b.u && a.v == b.v);
+}
+
+TEST(Bind, SameBondsForAnyThreads) {
+    const Mesh mesh = make_wavy_cube({.resolution = 80});
+    const Bound one = bound_to(mesh, 400), two = bound_to(mesh, 400, RunContext(2));
+    for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
+        const Bond &a = one.binding.bonds[v], &b = two.binding.bonds[v];
+        ASSERT_TRUE(a.cell == b.cell && a.u == b.u && a.v == b.v) << v;
+    }
+    const RunContext cancelled(1);
+    cancelled.cancel();
+    const std::vector<Index> representative = weld_map(mesh.positions);
+    EXPECT_FALSE(bind_to_driver(mesh.positions, representative, one.triangles,
+                                vertex_normals(one.triangles, mesh.positions, kOneThread), one.cells, cancelled)
+                     .ok());
+}
+
+} // namespace
+} // namespace filigree

@@ -1,0 +1,152 @@
+// Levels for any mesh: counts are reached, what is closed stays closed, and the error is what it says.
+#include "filigree/hierarchy/simplify.h"
+
+#include "filigree/mesh/mesh_distance.h"
+#include "filigree/mesh/shapes.h"
+#include "filigree/mesh/topology.h"
+#include "filigree/mesh/triangulate.h"
+
+#include <gtest/gtest.h>
+#include <set>
+
+namespace filigree {
+namespace {
+
+const RunContext kOneThread(1);
+
+Mesh triangle_mesh(std::span<const Vec3f> positions, std::span<const Triangle> triangles) {
+    Mesh mesh;
+    mesh.positions.assign(positions.begin(), positions.end());
+    for (const Triangle& t : triangles) mesh.add_face(t);
+    return mesh;
+}
+
+/// The simplified mesh over its own triangles, after what always holds was checked.
+Simplified simplified(const Mesh& mesh, const SimplifyOptions& options) {
+    const std::vector<Triangle> triangles = triangulate(mesh).triangles;
+    Simplified result = simplify(mesh.positions, triangles, options);
+    std::set<Index> used;
+    for (const Triangle& t : result.triangles) {
+        EXPECT_TRUE(t[0] != t[1] && t[1] != t[2] && t[2] != t[0]);
+        used.insert(t.begin(), t.end());
+    }
+    EXPECT_EQ(used.size(), result.vertex_count);
+    EXPECT_TRUE(used.empty() || *used.rbegin() < mesh.vertex_count());
+    return result;
+}
+
+void expect_near_target(std::size_t count, std::size_t target) {
+    EXPECT_LE(double(count), 1.02 * double(target) + 1) << target;
+    EXPECT_GE(double(count), 0.98 * double(target) - 3) << target; // a collapse may take a whole scrap with it
+}
+
+TEST(Simplify, CountsAreReachedOnEveryShape) {
+    for (const std::string_view name : shape_names()) {
+        const Mesh mesh = *make_shape(name, {.resolution = 32});
+        for (const std::size_t target : {3u, 30u, 300u}) {
+            SCOPED_TRACE(name);
+            expect_near_target(simplified(mesh, {.target_vertices = target}).vertex_count, target);
+        }
+    }
+}
+
+TEST(Simplify, LargeMeshesGoThroughBothStages) {
+    const Mesh mesh = make_wavy_cube({.resolution = 96}); // 55,298 vertices
+    for (const std::size_t target : {30000u, 5000u})
+        expect_near_target(simplified(mesh, {.target_vertices = target}).vertex_count, target);
+}
+
+TEST(Simplify, SeparateTrianglesAreDroppedToTheCount) {
+    Mesh mesh;
+    for (Index i = 0; i < 2000; ++i) {
+        const auto x = static_cast<float>(i % 50), y = static_cast<float>(i / 50);
+        for (const Vec3f& p : {Vec3f(x, y, 0), Vec3f(x + 0.5f, y, 0), Vec3f(x, y + 0.5f, 0.1f)})
+            mesh.positions.push_back(p);
+        mesh.add_face(Triangle{3 * i, 3 * i + 1, 3 * i + 2});
+    }
+    for (const std::size_t target : {3u, 60u, 600u, 3000u})
+        expect_near_target(simplified(mesh, {.target_vertices = target}).vertex_count, target);
+}
+
+TEST(Simplify, NonManifoldMeshesReachTheCount) {
+    // Forty fins around one edge chain, and two cubes that share a face's worth of vertices twice over.
+    Mesh fins;
+    for (Index k = 0; k < 20; ++k) fins.positions.emplace_back(0.0f, 0.0f, static_cast<float>(k));
+    for (Index f = 0; f < 40; ++f) {
+        const auto first = static_cast<Index>(fins.positions.size());
+        for (Index k = 0; k < 20; ++k)
+            fins.positions.emplace_back(std::cos(0.15f * static_cast<float>(f)),
+                                        std::sin(0.15f * static_cast<float>(f)), static_cast<float>(k));
+        for (Index k = 0; k + 1 < 20; ++k) fins.add_face(std::array<Index, 4>{k, k + 1, first + k + 1, first + k});
+    }
+    Mesh doubled = make_wavy_plane({.resolution = 24});
+    const std::size_t corners = doubled.corner_count();
+    for (std::size_t c = 0; c < corners; c += 4)
+        doubled.add_face(
+            std::array{doubled.corners[c], doubled.corners[c + 1], doubled.corners[c + 2], doubled.corners[c + 3]});
+    for (const Mesh& mesh : {fins, doubled})
+        for (const std::size_t target : {10u, 100u, 400u})
+            expect_near_target(simplified(mesh, {.target_vertices = target}).vertex_count, target);
+}
+
+TEST(Simplify, WhatIsClosedStaysClosedWhileNothingIsForced) {
+    for (const std::string_view name : {"wavy-cube", "wavy-sphere", "bar", "cylinder", "torus"}) {
+        const Mesh mesh = *make_shape(name, {.resolution = 32});
+        const std::int64_t euler = analyse_topology(mesh, kOneThread).euler;
+        for (const std::size_t target : {1000u, 200u, 60u}) {
+            const Simplified result = simplified(mesh, {.target_vertices = target});
+            if (result.forced > 0) continue;
+            Mesh left = triangle_mesh(mesh.positions, result.triangles);
+            const TopologyReport report = analyse_topology(left, kOneThread);
+            EXPECT_TRUE(report.is_closed() && report.is_manifold() && report.is_oriented()) << name << ' ' << target;
+            EXPECT_EQ(report.euler, euler) << name << ' ' << target;
+        }
+        EXPECT_EQ(simplified(mesh, {.target_vertices = 200}).forced, 0u) << name; // a good surface needs no force
+    }
+}
+
+TEST(Simplify, TheErrorIsABound) {
+    for (const std::string_view name : shape_names()) {
+        const Mesh mesh = *make_shape(name, {.resolution = 48});
+        for (const double most : {0.02, 0.005, 0.001}) {
+            const Simplified result = simplified(mesh, {.max_error = most});
+            EXPECT_LE(result.error, most * (1 + 1e-6)) << name;
+            const auto apart = mesh_distance(triangle_mesh(mesh.positions, result.triangles), mesh, 20000, kOneThread);
+            ASSERT_TRUE(apart.ok());
+            // A root mean square over the area around a collapse: single points may lie a few times further.
+            EXPECT_LE(apart->surfaces->rms_distance, most * apart->diagonal) << name << ' ' << most;
+            EXPECT_LE(apart->surfaces->hausdorff, 4 * most * apart->diagonal) << name << ' ' << most;
+        }
+    }
+}
+
+TEST(Simplify, FlatAndTinyMeshes) {
+    const Mesh flat = make_wavy_plane({.resolution = 16, .amplitude = 0});
+    const Simplified corners = simplified(flat, {.target_vertices = 4});
+    EXPECT_EQ(corners.vertex_count, 4u);
+    EXPECT_EQ(corners.triangles.size(), 2u);
+    std::set<Index> kept;
+    for (const Triangle& t : corners.triangles) kept.insert(t.begin(), t.end());
+    EXPECT_EQ(kept, (std::set<Index>{0, 16, 272, 288})); // the outline stays
+
+    const std::vector<Vec3f> points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    const std::vector<Triangle> tetrahedron = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
+    EXPECT_EQ(simplify(points, tetrahedron, {}).triangles, tetrahedron); // nothing was asked for
+    EXPECT_EQ(simplify(points, tetrahedron, {.target_vertices = 4}).triangles, tetrahedron);
+    for (const std::size_t target : {0u, 3u})
+        EXPECT_EQ(simplify(points, tetrahedron, {.target_vertices = target}).vertex_count, 3u);
+    EXPECT_TRUE(simplify({}, {}, {.target_vertices = 3}).triangles.empty());
+}
+
+TEST(Simplify, SameTrianglesEveryTime) {
+    const Mesh mesh = make_wavy_cube({.resolution = 64});
+    const Simplified first = simplified(mesh, {.target_vertices = 500});
+    EXPECT_EQ(simplified(mesh, {.target_vertices = 500}).triangles, first.triangles);
+    // Where the mesh lies and how large it is, in powers of two, changes nothing either.
+    Mesh larger = mesh;
+    for (Vec3f& p : larger.positions) p *= 1024;
+    EXPECT_EQ(simplified(larger, {.target_vertices = 500}).triangles, first.triangles);
+}
+
+} // namespace
+} // namespace filigree
