@@ -114,9 +114,10 @@ public:
         for (const auto& [name, warp] :
              {std::pair<const char*, const SpaceWarp*>{"rbf_200", rbf.get()}, {"bend_twist", bend.get()}}) {
             const double all = median_seconds([&] { warp_positions(*warp, mesh_.positions, mesh_.origin, context_); });
+            std::vector<Vec3f> restored(mesh_.vertex_count());
             const double ours = median_seconds([&] {
-                require(
-                    restorer.positions(warp_pose(*warp, driver_positions(model), mesh_.origin, context_), context_));
+                require(restorer.positions(warp_pose(*warp, driver_positions(model), mesh_.origin, context_), restored,
+                                           context_));
             });
             add(fmt::format("deform.{}_all", name), all, "s");
             add(fmt::format("deform.{}_driver_and_restore", name), ours, "s");
@@ -145,9 +146,10 @@ public:
             "s");
         HandleSolver solver = require(HandleSolver::create(driver.positions, triangles, ends));
         const Restorer restorer = require(Restorer::create(model, {}, context_));
+        std::vector<Vec3f> restored(mesh_.vertex_count());
         add("handles.iteration", median_seconds([&] {
                 const HandleResult result = require(solver.solve(targets, {.iterations = 1, .tolerance = 0}, context_));
-                require(restorer.positions(result.pose, context_));
+                require(restorer.positions(result.pose, restored, context_));
             }),
             "s");
     }

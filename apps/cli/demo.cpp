@@ -45,12 +45,37 @@ double median_seconds(const Work& work) {
     return seconds[kRepetitions / 2];
 }
 
+/// The demo's folder; unless it is kept, what was written there goes again, and the folder where it is new.
+class OutputFolder {
+public:
+    explicit OutputFolder(std::filesystem::path path) : path_(std::move(path)) {
+        std::error_code failed;
+        is_new_ = std::filesystem::create_directories(path_, failed);
+        if (failed)
+            throw Failure{
+                {ErrorCode::unwritable, path_.string() + ": the folder cannot be made; choose another with -o."}};
+    }
+    ~OutputFolder() {
+        std::error_code ignored;
+        if (is_kept_) return;
+        for (const std::filesystem::path& file : files_) std::filesystem::remove(file, ignored);
+        if (is_new_) std::filesystem::remove(path_, ignored);
+    }
+    OutputFolder(const OutputFolder&) = delete;
+    OutputFolder& operator=(const OutputFolder&) = delete;
+
+    std::string file(const char* name) { return files_.emplace_back(path_ / name).string(); }
+    void keep() { is_kept_ = true; }
+
+private:
+    std::filesystem::path path_;
+    std::vector<std::filesystem::path> files_;
+    bool is_new_ = false, is_kept_ = false;
+};
+
 void run_demo(const std::string& input, const std::string& folder, Session& session) {
     const RunContext& context = session.context();
-    std::error_code failed;
-    std::filesystem::create_directories(folder, failed);
-    if (failed) throw Failure{{ErrorCode::unwritable, folder + " cannot be made: " + failed.message() + "."}};
-    const auto in_folder = [&](const char* name) { return (std::filesystem::path(folder) / name).string(); };
+    OutputFolder files(folder);
 
     const double start = now_seconds();
     Mesh mesh = input.empty() ? make_wavy_cube({.resolution = kDemoResolution}) : session.read_mesh(input);
@@ -72,19 +97,20 @@ void run_demo(const std::string& input, const std::string& folder, Session& sess
     Pose pose;
     const double driver_seconds =
         median_seconds([&] { pose = warp_pose(*warp, driver_positions(model), model.mesh.origin, context); });
-    std::vector<Vec3f> positions;
-    const double restore_seconds = median_seconds([&] { positions = require(restorer.positions(pose, context)); });
+    std::vector<Vec3f> positions(mesh.vertex_count());
+    const double restore_seconds = median_seconds([&] { require(restorer.positions(pose, positions, context)); });
     const Mesh restored = require(restorer.mesh(pose, context));
     const MeshDistance with_gradients = require(mesh_distance(restored, full, 0, context));
     const Mesh from_positions = require(restorer.mesh({pose.positions, {}, {}}, context));
     const MeshDistance positions_only = require(mesh_distance(from_positions, full, 0, context));
 
-    session.write_model(model, in_folder("model.fil"));
-    session.write_mesh(level_mesh(model, 0), in_folder("driver.ply"));
-    session.write_mesh(posed_driver(model, pose), in_folder("driver_bent.ply"));
-    session.write_mesh(mesh, in_folder("mesh.ply"));
-    session.write_mesh(full, in_folder("full_deformation.ply"));
-    session.write_mesh(restored, in_folder("restored.ply"));
+    session.write_model(model, files.file("model.fil"));
+    session.write_mesh(level_mesh(model, 0), files.file("driver.ply"));
+    session.write_mesh(posed_driver(model, pose), files.file("driver_bent.ply"));
+    session.write_mesh(mesh, files.file("mesh.ply"));
+    session.write_mesh(full, files.file("full_deformation.ply"));
+    session.write_mesh(restored, files.file("restored.ply"));
+    files.keep();
 
     const double ours = driver_seconds + restore_seconds;
     const VertexDistance& d = *with_gradients.vertices;

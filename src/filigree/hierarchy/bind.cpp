@@ -54,6 +54,7 @@ std::vector<Index> nearest_sources(std::span<const Vec3f> positions, std::span<c
             buckets[0].push_back(v);
         }
     std::vector<Index> current;
+    std::vector<float> spread_at(positions.size(), -1); // the distance a vertex last passed on
     for (std::size_t b = 0; b < buckets.size(); ++b)
         while (!buckets[b].empty()) {
             current.clear();
@@ -61,6 +62,8 @@ std::vector<Index> nearest_sources(std::span<const Vec3f> positions, std::span<c
             for (Index v : current) {
                 const float d = distance[v];
                 if (static_cast<std::size_t>(std::min(d / width, kLastBucket)) != b) continue; // came closer since
+                if (spread_at[v] == d) continue;                                               // twice in the bucket
+                spread_at[v] = d;
                 for (Index t : around[v])
                     for (Index w : triangles[t]) {
                         const float through = d + (positions[w] - positions[v]).norm();

@@ -121,19 +121,30 @@ std::optional<Error> check_pose(const Model& model, const Pose& pose) {
 } // namespace
 
 Result<std::vector<Vec3f>> Restorer::positions(const Pose& pose, const RunContext& context) const {
+    std::vector<Vec3f> restored(vertex_count());
+    if (Status status = positions(pose, restored, context); !status) return status.error();
+    return restored;
+}
+
+Status Restorer::positions(const Pose& pose, std::span<Vec3f> out, const RunContext& context) const {
     const Content& content = *content_;
     if (std::optional<Error> error = check_pose(*content.model, pose)) return *error;
+    if (out.size() != vertex_count())
+        return Error{ErrorCode::mismatch, "There is room for " + std::to_string(out.size()) +
+                                              " positions and the level has " + std::to_string(vertex_count()) + "."};
     if (context.is_cancelled()) return cancelled_error();
-    std::vector<Vec3f> positions(vertex_count());
     if (content.blend) {
-        content.blend->restore(pose.positions, gradients(pose, context), positions, {}, true, context);
-        return positions;
+        content.blend->restore(pose.positions, gradients(pose, context), out, {}, true, context);
+        return Success{};
+    }
+    if (content.vertices.empty()) { // the finest level: ids and slots are the same
+        content.reference->restore(pose.positions, content.level, out, context);
+        return Success{};
     }
     std::vector<Vec3f> all(content.model->mesh.vertex_count());
     content.reference->restore(pose.positions, content.level, all, context);
-    if (content.vertices.empty()) return all;
-    for (std::size_t v = 0; v < positions.size(); ++v) positions[v] = all[content.vertices[v]];
-    return positions;
+    for (std::size_t v = 0; v < out.size(); ++v) out[v] = all[content.vertices[v]];
+    return Success{};
 }
 
 Result<Mesh> Restorer::mesh(const Pose& pose, const RunContext& context) const {

@@ -35,6 +35,8 @@ public:
     /// Positions of the level's vertices. Errors: mismatch (the pose has another number of vertices than the driver),
     /// cancelled. Same bytes for any thread count.
     Result<std::vector<Vec3f>> positions(const Pose& pose, const RunContext& context) const;
+    /// The same into `out` (vertex_count() points), for pose after pose without a new array.
+    Status positions(const Pose& pose, std::span<Vec3f> out, const RunContext& context) const;
 
     /// The level as a mesh: positions, and the normals where the mesh came with normals (by the cofactor of the blended
     /// gradient; computed anew from the faces for the reference code); every other attribute as it came.
