@@ -201,6 +201,25 @@ TEST(ModelFile, Int16IsHalfTheBytesAndCloseToTheMesh) {
         }
 }
 
+TEST(ModelFile, IsWhatTheManualShows) {
+    std::string shown;
+    std::ifstream manual(FILIGREE_ROOT "/docs/fil-format.md");
+    for (std::string line; std::getline(manual, line);) {
+        if (line.size() < 15 || line.find_first_not_of("0123456789abcdef", 4) != 12 || line[12] != ':') continue;
+        const std::string digits = line.substr(13, 37);
+        for (std::size_t i = 0, high = 16; i < digits.size(); ++i) {
+            if (!std::isxdigit(static_cast<unsigned char>(digits[i]))) continue;
+            const std::size_t digit = std::string("0123456789abcdef").find(digits[i]);
+            if (high < 16) shown += static_cast<char>(high * 16 + digit);
+            high = high < 16 ? 16 : digit;
+        }
+    }
+    Mesh mesh;
+    mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.25f, 0.25f, 0.5f}};
+    for (const Triangle& t : {Triangle{0, 1, 3}, Triangle{1, 2, 3}, Triangle{2, 0, 3}}) mesh.add_face(t);
+    EXPECT_EQ(shown, write_model(stripped(mesh, {.base = 3})));
+}
+
 TEST(ModelFile, NamesWithAZeroByteEndThere) {
     Mesh mesh = make_wavy_plane({.resolution = 2});
     mesh.scalars = {{std::string("a\0b", 3), std::vector<float>(9, 1.0f)}, {"", std::vector<float>(9, 2.0f)}};
