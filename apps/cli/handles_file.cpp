@@ -117,7 +117,10 @@ auto guarded(const std::string& path, const Work& work) -> decltype(work()) {
     } catch (const BadHandle& bad) {
         return Error{ErrorCode::usage, bad.what + "."};
     } catch (const Json::exception& error) {
-        return Error{ErrorCode::bad_file, path + ": " + error.what() + "."};
+        const std::string what = error.what(); // "[json.exception.type_error.302] type must be number, ..."
+        const std::size_t bracket = what.find("] ");
+        return Error{ErrorCode::bad_file, path + ": " + what.substr(bracket == std::string::npos ? 0 : bracket + 2) +
+                                              " (see docs/handles.md)."};
     }
 }
 

@@ -12,12 +12,13 @@ namespace {
 int exit_code(ErrorCode code) { return static_cast<int>(code); }
 
 /// What is wrong with the arguments, in one line that says where help is; or the help or version that was asked for.
-int leave(const CLI::App& app, const CLI::ParseError& error) {
+int leave(const CLI::App& app, const CLI::ParseError& error, int argc, char** argv) {
     if (error.get_exit_code() == 0) return app.exit(error);
     std::string sentence = error.what(), command = "filigree";
     std::replace(sentence.begin(), sentence.end(), '\n', ' ');
     for (const CLI::App* chosen : app.get_subcommands()) command += " " + chosen->get_name();
-    if (app.get_subcommands().empty() && error.get_name() == "RequiredError") sentence = "A command is required";
+    if (app.get_subcommands().empty() && error.get_name() == "RequiredError")
+        sentence = argc > 1 ? fmt::format("'{}' is no command", argv[1]) : "A command is required";
     cli::say(fmt::format("filigree: {}; '{} --help' says what there is.", sentence, command));
     return exit_code(ErrorCode::usage);
 }
@@ -48,7 +49,7 @@ int run(int argc, char** argv) {
         app.parse(argc, argv);
         return 0;
     } catch (const CLI::ParseError& error) {
-        return leave(app, error);
+        return leave(app, error, argc, argv);
     }
 }
 

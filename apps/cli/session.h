@@ -82,7 +82,7 @@ CLI::Option* add_choice(CLI::App& command, const std::string& name, const std::m
         .add_option_function<std::string>(
             name, [choices, set](const std::string& word) { set(choices.at(word)); }, text)
         ->check(CLI::IsMember(choices))
-        ->type_name("");
+        ->type_name("WORD");
 }
 
 /// Checks of an option's number, by rules that are the same in every locale.
