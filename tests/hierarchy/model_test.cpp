@@ -60,6 +60,7 @@ TEST(Model, DamageOfTheReferenceCodeIsSeen) {
          [](Model& m) { reference(m).patches.levels = 0; }, [](Model& m) { reference(m).patches.levels = 40; },
          [](Model& m) { reference(m).patches.base.clear(); }, [](Model& m) { reference(m).patches.base[0][0] ^= 1; },
          [](Model& m) { reference(m).patches.grid.pop_back(); }, [](Model& m) { reference(m).patches.grid[4] = 81; },
+         [](Model& m) { reference(m).patches.grid[10] = reference(m).patches.grid[11]; },
          [](Model& m) { reference(m).rest_driver.pop_back(); }, [](Model& m) { reference(m).rest_driver[0].z() = NAN; },
          [](Model& m) { reference(m).records.pop_back(); }, [](Model& m) { reference(m).records[2].x() = INFINITY; },
          [](Model& m) { reference(m).extent = NAN; }, [](Model& m) { reference(m).loose = {1000}; },

@@ -1,5 +1,6 @@
 #include "filigree/hierarchy/reference_plan.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace filigree {
@@ -12,8 +13,12 @@ std::string check_reference(const ReferenceDetail& detail, std::size_t vertex_co
     const std::size_t points = patches.side() + 1;
     if (patches.grid.size() / points / points != patches.patch_count() || patches.grid.size() % (points * points) != 0)
         return "the patches' grids have a wrong size";
-    for (Index v : patches.grid)
+    std::vector<bool> in_patch(vertex_count, false);
+    for (Index v : patches.grid) {
         if (v >= vertex_count) return "a patch names a vertex that is not there";
+        in_patch[v] = true;
+    }
+    if (std::find(in_patch.begin(), in_patch.end(), false) != in_patch.end()) return "a vertex is in no patch";
     std::vector<bool> in_driver(vertex_count, false);
     std::size_t driver_count = 0;
     for (std::size_t p = 0; p < patches.patch_count(); ++p) {

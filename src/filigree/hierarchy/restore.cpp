@@ -141,7 +141,7 @@ Status Restorer::positions(const Pose& pose, std::span<Vec3f> out, const RunCont
         content.reference->restore(pose.positions, content.level, out, context);
         return Success{};
     }
-    std::vector<Vec3f> all(content.model->mesh.vertex_count());
+    std::vector<Vec3f> all = content.model->mesh.positions; // a damaged level may name others than come
     content.reference->restore(pose.positions, content.level, all, context);
     for (std::size_t v = 0; v < out.size(); ++v) out[v] = all[content.vertices[v]];
     return Success{};
