@@ -177,13 +177,11 @@ private:
 
     /// No triangle turns over, and the two ends have no common neighbour but those of the triangles between them.
     bool is_clean(Index from, Index to) const {
-        std::size_t shared = 0;
+        const std::size_t shared = shared_triangles(from, to);
+        if (around_[from].size() == shared) return false; // nothing would be left of it
         for (Index t : around_[from]) {
             Triangle moved = triangles_[t];
-            if (has(moved, to)) {
-                ++shared;
-                continue;
-            }
+            if (has(moved, to)) continue;
             const Vec3d before = normal(moved);
             std::replace(moved.begin(), moved.end(), from, to);
             const Vec3d after = normal(moved);
@@ -192,7 +190,7 @@ private:
         const std::vector<Index> a = neighbours_of(from), b = neighbours_of(to);
         std::vector<Index> common;
         std::set_intersection(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(common));
-        return common.size() <= shared && around_[from].size() > shared;
+        return common.size() <= shared;
     }
 
     void remove(Index triangle) {
