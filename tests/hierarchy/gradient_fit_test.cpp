@@ -64,7 +64,8 @@ TEST(GradientFit, RigidMotionsAndProportionalScaleAreExact) {
     const Mesh mesh = make_wavy_sphere({.resolution = 16});
     const GradientFit fit(mesh, kOneThread);
     for (const double scale : {0.1, 1.0, 50.0}) {
-        const auto moved = mapped(mesh.positions, [&](const Vec3d& p) { return scale * turn * (p + Vec3d(1, 2, 3)); });
+        const auto moved =
+            mapped(mesh.positions, [&](const Vec3d& p) { return Vec3d(scale * turn * (p + Vec3d(1, 2, 3))); });
         for (const NormalColumn column : {NormalColumn::fitted, NormalColumn::shell})
             EXPECT_LT(largest_error(fit.fit(moved, column, Law::proportional, kOneThread), scale * turn), 1e-4 * scale);
     }
