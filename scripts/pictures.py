@@ -136,7 +136,7 @@ def fidelity():
         thing.location = (x + 0.1, 0, 0.14)
         label(text, (x, -3, -1.75), 0.17)
     wall(1.0)
-    render(1200, 540, 8.4, (0, 0, -0.02))
+    render(1120, 504, 8.4, (0, 0, -0.02))
 
 
 def reference_levels():
