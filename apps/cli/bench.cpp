@@ -91,9 +91,7 @@ public:
     /// A deformer that costs something, over every vertex and over the driver alone.
     void deform() {
         const Model& model = blend_model(Precision::float32);
-        Box box = bounds(mesh_.positions);
-        box.min += mesh_.origin;
-        box.max += mesh_.origin;
+        const Box box = world_bounds(mesh_);
         std::mt19937_64 random(1);
         std::vector<Vec3d> centres, displacements;
         for (int i = 0; i < 200; ++i) {

@@ -22,13 +22,6 @@ std::unique_ptr<SpaceWarp> make_warp(const WarpStep& step, const Box& box, Axis 
     return make_smooth_random(box, step.amount, seed);
 }
 
-Box world_box(const Mesh& mesh) {
-    Box box = bounds(mesh.positions);
-    box.min += mesh.origin;
-    box.max += mesh.origin;
-    return box;
-}
-
 /// The warps one after the other, all over the box of the undeformed mesh.
 std::unique_ptr<SpaceWarp> chain_steps(const std::vector<WarpStep>& steps, const Box& box, std::optional<Axis> axis,
                                        std::uint64_t seed) {
@@ -50,7 +43,7 @@ struct Options {
 
 Mesh deform_mesh(Mesh mesh, const Options& options, const RunContext& context) {
     if (options.handles.empty()) {
-        warp_mesh(*chain_steps(options.steps, world_box(mesh), options.axis, options.seed), mesh, context);
+        warp_mesh(*chain_steps(options.steps, world_bounds(mesh), options.axis, options.seed), mesh, context);
         return mesh;
     }
     const HandlesFile handles = require(read_handles(options.handles));
@@ -60,7 +53,7 @@ Mesh deform_mesh(Mesh mesh, const Options& options, const RunContext& context) {
 Mesh deform_model(const Model& model, const Options& options, Session& session) {
     Pose pose;
     if (options.handles.empty()) {
-        const auto warp = chain_steps(options.steps, world_box(model.mesh), options.axis, options.seed);
+        const auto warp = chain_steps(options.steps, world_bounds(model.mesh), options.axis, options.seed);
         pose = warp_pose(*warp, driver_positions(model), model.mesh.origin, session.context());
     } else {
         const HandlesFile handles = require(read_handles(options.handles));

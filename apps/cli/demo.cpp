@@ -16,13 +16,6 @@ namespace {
 constexpr unsigned kDemoResolution = 264; // of the wavy cube: 418,178 vertices
 constexpr int kRepetitions = 5;           // of what is timed; the median counts
 
-Box world_box(const Mesh& mesh) {
-    Box box = bounds(mesh.positions);
-    box.min += mesh.origin;
-    box.max += mesh.origin;
-    return box;
-}
-
 /// A quarter circle and a half turn, along the longest side.
 std::unique_ptr<SpaceWarp> bend_and_twist(const Box& box) {
     int longest = 0;
@@ -85,7 +78,7 @@ void run_demo(const std::string& input, const std::string& folder, Session& sess
     const double strip_seconds = now_seconds() - read;
 
     // The long way: every vertex, and every normal where the mesh has them.
-    const auto warp = bend_and_twist(world_box(mesh));
+    const auto warp = bend_and_twist(world_bounds(mesh));
     Mesh full = mesh;
     const double full_seconds =
         median_seconds([&] { full.positions = warp_positions(*warp, mesh.positions, mesh.origin, context); });

@@ -117,9 +117,7 @@ private:
 
 std::vector<FidelityRow> measure_fidelity(const Model& model, const Model* reference, const RunContext& context) {
     std::vector<FidelityRow> rows;
-    Box box = bounds(model.mesh.positions);
-    box.min += model.mesh.origin;
-    box.max += model.mesh.origin;
+    const Box box = world_bounds(model.mesh);
     const Result<Restorer> restorer = Restorer::create(model, {}, context);
     if (!restorer) return rows;
 

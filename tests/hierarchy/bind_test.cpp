@@ -40,8 +40,9 @@ Bound bound(const Mesh& mesh, std::vector<Triangle> cells, const RunContext& con
 }
 
 Bound bound_to(const Mesh& mesh, std::size_t base, const RunContext& context = kOneThread) {
-    return bound(mesh, simplify(mesh.positions, triangulate(mesh).triangles, {.target_vertices = base}).triangles,
-                 context);
+    return bound(
+        mesh, simplify(mesh.positions, triangulate(mesh).triangles, {.target_vertices = base}, RunContext()).triangles,
+        context);
 }
 
 Vec3d anchor(const Mesh& mesh, const Bound& bound, std::size_t vertex) {

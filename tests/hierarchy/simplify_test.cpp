@@ -24,7 +24,7 @@ Mesh triangle_mesh(std::span<const Vec3f> positions, std::span<const Triangle> t
 /// The simplified mesh over its own triangles, after what always holds was checked.
 Simplified simplified(const Mesh& mesh, const SimplifyOptions& options) {
     const std::vector<Triangle> triangles = triangulate(mesh).triangles;
-    Simplified result = simplify(mesh.positions, triangles, options);
+    Simplified result = simplify(mesh.positions, triangles, options, RunContext());
     std::set<Index> used;
     for (const Triangle& t : result.triangles) {
         EXPECT_TRUE(t[0] != t[1] && t[1] != t[2] && t[2] != t[0]);
@@ -45,7 +45,7 @@ TEST(Simplify, CountsAreReachedOnEveryShape) {
         const Mesh mesh = *make_shape(name, {.resolution = 32});
         for (const std::size_t target : {3u, 30u, 300u}) {
             SCOPED_TRACE(name);
-            expect_near_target(simplified(mesh, {.target_vertices = target}).vertex_count, target);
+            expect_near_target(simplified(mesh, {.target_vertices = target}, RunContext()).vertex_count, target);
         }
     }
 }
@@ -53,7 +53,7 @@ TEST(Simplify, CountsAreReachedOnEveryShape) {
 TEST(Simplify, LargeMeshesGoThroughBothStages) {
     const Mesh mesh = make_wavy_cube({.resolution = 96}); // 55,298 vertices
     for (const std::size_t target : {30000u, 5000u})
-        expect_near_target(simplified(mesh, {.target_vertices = target}).vertex_count, target);
+        expect_near_target(simplified(mesh, {.target_vertices = target}, RunContext()).vertex_count, target);
 }
 
 TEST(Simplify, SeparateTrianglesAreDroppedToTheCount) {
@@ -65,7 +65,7 @@ TEST(Simplify, SeparateTrianglesAreDroppedToTheCount) {
         mesh.add_face(Triangle{3 * i, 3 * i + 1, 3 * i + 2});
     }
     for (const std::size_t target : {3u, 60u, 600u, 3000u})
-        expect_near_target(simplified(mesh, {.target_vertices = target}).vertex_count, target);
+        expect_near_target(simplified(mesh, {.target_vertices = target}, RunContext()).vertex_count, target);
 }
 
 TEST(Simplify, NonManifoldMeshesReachTheCount) {
@@ -86,7 +86,7 @@ TEST(Simplify, NonManifoldMeshesReachTheCount) {
             std::array{doubled.corners[c], doubled.corners[c + 1], doubled.corners[c + 2], doubled.corners[c + 3]});
     for (const Mesh& mesh : {fins, doubled})
         for (const std::size_t target : {10u, 100u, 400u})
-            expect_near_target(simplified(mesh, {.target_vertices = target}).vertex_count, target);
+            expect_near_target(simplified(mesh, {.target_vertices = target}, RunContext()).vertex_count, target);
 }
 
 TEST(Simplify, WhatIsClosedStaysClosedWhileNothingIsForced) {
@@ -132,10 +132,10 @@ TEST(Simplify, FlatAndTinyMeshes) {
     const std::vector<Vec3f> points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
     const std::vector<Triangle> tetrahedron = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
     EXPECT_EQ(simplify(points, tetrahedron, {}).triangles, tetrahedron); // nothing was asked for
-    EXPECT_EQ(simplify(points, tetrahedron, {.target_vertices = 4}).triangles, tetrahedron);
+    EXPECT_EQ(simplify(points, tetrahedron, {.target_vertices = 4}, RunContext()).triangles, tetrahedron);
     for (const std::size_t target : {0u, 3u})
-        EXPECT_EQ(simplify(points, tetrahedron, {.target_vertices = target}).vertex_count, 3u);
-    EXPECT_TRUE(simplify({}, {}, {.target_vertices = 3}).triangles.empty());
+        EXPECT_EQ(simplify(points, tetrahedron, {.target_vertices = target}, RunContext()).vertex_count, 3u);
+    EXPECT_TRUE(simplify({}, {}, {.target_vertices = 3}, RunContext()).triangles.empty());
 }
 
 TEST(Simplify, SameTrianglesEveryTime) {

@@ -1,7 +1,6 @@
 // How things go wrong: a named code and one sentence that says where, why, and what to do.
 #pragma once
 
-#include <cassert>
 #include <string>
 #include <utility>
 #include <variant>
@@ -37,18 +36,19 @@ public:
     bool ok() const { return content_.index() == 0; }
     explicit operator bool() const { return ok(); }
 
-    /// The value; only when ok().
-    T& value() & { return assert(ok()), *std::get_if<0>(&content_); }
-    const T& value() const& { return assert(ok()), *std::get_if<0>(&content_); }
-    T&& value() && { return assert(ok()), std::move(*std::get_if<0>(&content_)); }
+    /// The value; only when ok(), else std::bad_variant_access is thrown. By value from a temporary, so that it cannot
+    /// dangle in a loop over it.
+    T& value() & { return std::get<0>(content_); }
+    const T& value() const& { return std::get<0>(content_); }
+    T value() && { return std::get<0>(std::move(content_)); }
     T& operator*() & { return value(); }
     const T& operator*() const& { return value(); }
-    T&& operator*() && { return std::move(*this).value(); }
+    T operator*() && { return std::move(*this).value(); }
     T* operator->() { return &value(); }
     const T* operator->() const { return &value(); }
 
-    /// The error; only when not ok().
-    const Error& error() const { return assert(!ok()), *std::get_if<1>(&content_); }
+    /// The error; only when not ok(), else the same is thrown.
+    const Error& error() const { return std::get<1>(content_); }
 
 private:
     std::variant<T, Error> content_;

@@ -66,6 +66,7 @@ std::vector<Index> nearest_sources(std::span<const Vec3f> positions, std::span<c
                 spread_at[v] = d;
                 for (Index t : around[v])
                     for (Index w : triangles[t]) {
+                        if (d >= distance[w]) continue; // most neighbours, without a look at where they are
                         const float through = d + (positions[w] - positions[v]).norm();
                         if (!(through < distance[w])) continue;
                         distance[w] = through;

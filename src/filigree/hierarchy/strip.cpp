@@ -118,7 +118,7 @@ std::vector<Level> simplify_levels(const WorkingMesh& work, const StripOptions& 
             simplify_options.max_error = *options.error - report.simplify_error;
             if (*simplify_options.max_error <= 0 && !levels.empty()) break;
         }
-        Simplified simplified = simplify(work.positions, current, simplify_options);
+        Simplified simplified = simplify(work.positions, current, simplify_options, context);
         const bool stuck = simplified.triangles.size() == current.size();
         report.simplify_error += simplified.error;
         report.forced_collapses += simplified.forced;

@@ -69,6 +69,14 @@ struct Mesh {
     }
 };
 
+/// The box of a mesh's vertices in the world. Cost O(V).
+inline Box world_bounds(const Mesh& mesh) {
+    Box box = bounds(mesh.positions);
+    box.min += mesh.origin;
+    box.max += mesh.origin;
+    return box;
+}
+
 using Triangle = std::array<Index, 3>;
 
 /// Positions with their origin split off, so that float keeps their digits far from the world's origin.
