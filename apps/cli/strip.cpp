@@ -36,7 +36,7 @@ void add_strip(CLI::App& app, Session& session) {
             ->check(whole_number(1));
     auto* error = command
                       ->add_option("--error", strip_options.error,
-                                   "Largest distance of the driver from the mesh, fraction of the diagonal")
+                                   "How far the driver may leave the mesh (rms), fraction of the diagonal")
                       ->check(positive_number());
     base->excludes(levels)->excludes(error);
     levels->excludes(error);
@@ -65,6 +65,7 @@ void add_strip(CLI::App& app, Session& session) {
         const Stripped stripped = require(strip(std::move(mesh), options->strip, session.context()));
         const double stripped_at = now_seconds();
         session.write_model(stripped.model, options->output);
+        const double write_seconds = now_seconds() - stripped_at;
         const Model& model = stripped.model;
         const StripReport& report = stripped.report;
 
@@ -81,25 +82,28 @@ void add_strip(CLI::App& app, Session& session) {
         if (report.across_gap)
             table.row("bound across gaps", with_commas(report.across_gap) + " (parts without a driver of their own)");
         if (report.facing_away) table.row("bound facing away", with_commas(report.facing_away));
-        table.row("seconds", fmt::format("{:.3f} read, {:.3f} simplify, {:.3f} bind, {:.3f} encode, {:.3f} write",
-                                         read - start, report.simplify_seconds, report.bind_seconds,
-                                         report.encode_seconds, now_seconds() - stripped_at));
-        session.print(table.text(), {{"output", options->output},
-                                     {"vertices", model.mesh.vertex_count()},
-                                     {"driver_vertices", model.driver().vertices.size()},
-                                     {"driver_faces", model.driver().face_count()},
-                                     {"levels", levels_json},
-                                     {"welded_vertices", report.welded_vertices},
-                                     {"forced_collapses", report.forced_collapses},
-                                     {"across_gap", report.across_gap},
-                                     {"facing_away", report.facing_away},
-                                     {"simplify_error", report.simplify_error},
-                                     {"seconds",
-                                      {{"read", read - start},
-                                       {"simplify", report.simplify_seconds},
-                                       {"bind", report.bind_seconds},
-                                       {"encode", report.encode_seconds},
-                                       {"strip", stripped_at - read}}}});
+        table.row("seconds",
+                  fmt::format("{:.3f} read, {:.3f} simplify, {:.3f} bind, {:.3f} encode, {:.3f} write", read - start,
+                              report.simplify_seconds, report.bind_seconds, report.encode_seconds, write_seconds));
+        session.print(table.text(),
+                      {{"output", options->output},
+                       {"vertices", model.mesh.vertex_count()},
+                       {"driver_vertices", model.driver().vertices.size()},
+                       {"driver_faces", model.driver().face_count()},
+                       {"levels", levels_json},
+                       {"welded_vertices", report.welded_vertices},
+                       {"forced_collapses", report.forced_collapses},
+                       {"across_gap", report.across_gap},
+                       {"facing_away", report.facing_away},
+                       {"simplify_error", report.simplify_error},
+                       {"simplify_error_units", report.simplify_error * world_bounds(model.mesh).diagonal()},
+                       {"seconds",
+                        {{"read", read - start},
+                         {"simplify", report.simplify_seconds},
+                         {"bind", report.bind_seconds},
+                         {"encode", report.encode_seconds},
+                         {"strip", stripped_at - read},
+                         {"write", write_seconds}}}});
     });
 }
 

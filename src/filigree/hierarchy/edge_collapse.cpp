@@ -40,7 +40,8 @@ struct Quadric {
 };
 
 struct Collapse {
-    double cost;
+    double cost;  ///< what it is sorted by
+    double error; ///< the part of the cost that is distance from the surface
     Index from, to;
     Index stamp; ///< of both ends together when it was priced; older entries are void
     bool forced;
@@ -76,22 +77,23 @@ public:
         make_quadrics();
     }
 
-    void run(std::size_t target, std::optional<double> max_error) {
+    void run(std::size_t target, std::optional<double> max_error, const RunContext& context) {
         for (Index v = 0; v < points_.size(); ++v) {
             const std::vector<Index> neighbours = neighbours_of(v);
             for (Index w : neighbours) price(v, w);
         }
-        while (vertex_count_ > target && !queue_.empty()) {
+        while (vertex_count_ > target && !queue_.empty() && !context.is_cancelled()) {
             const Collapse next = queue_.top();
             queue_.pop();
             if (next.stamp != stamp_[next.from] + stamp_[next.to]) continue;
             if (shared_triangles(next.from, next.to) == triangle_count_) continue; // something has to be left
             if (!next.forced && !is_clean(next.from, next.to)) {
-                queue_.push({next.cost + loss(next.from, next.to), next.from, next.to, next.stamp, true});
+                const double lost = loss(next.from, next.to);
+                queue_.push({next.cost + lost, next.error + lost, next.from, next.to, next.stamp, true});
                 continue;
             }
             const double area = quadrics_[next.from].area + quadrics_[next.to].area;
-            const double distance = area > 0 ? std::sqrt(next.cost / area) : 0;
+            const double distance = area > 0 ? std::sqrt(next.error / area) : 0;
             if (max_error && distance > *max_error) break;
             error_ = std::max(error_, distance);
             forced_ += next.forced;
@@ -116,7 +118,7 @@ private:
 
     void make_quadrics() {
         quadrics_.resize(points_.size());
-        std::unordered_map<std::uint64_t, std::pair<int, Index>> edges; // uses, and the last triangle
+        std::unordered_map<std::uint64_t, int> edges; // how many triangles each has
         edges.reserve(triangles_.size() * 2);
         for (Index t = 0; t < triangles_.size(); ++t) {
             const Vec3d n = normal(triangles_[t]);
@@ -125,17 +127,13 @@ private:
                 Quadric& quadric = quadrics_[triangles_[t][k]];
                 if (area > 0) quadric.add_plane(n.normalized(), points_[triangles_[t][k]], area / 3);
                 quadric.area += area / 3;
-                auto& edge = edges[edge_key(triangles_[t][k], triangles_[t][(k + 1) % 3])];
-                ++edge.first;
-                edge.second = t;
+                ++edges[edge_key(triangles_[t][k], triangles_[t][(k + 1) % 3])];
             }
         }
-        // Around every vertex the triangles are walked in order, so that sums do not depend on the map's.
         for (Index t = 0; t < triangles_.size(); ++t)
             for (int k = 0; k < 3; ++k) {
                 const Index a = triangles_[t][k], b = triangles_[t][(k + 1) % 3];
-                const auto& [uses, last] = edges[edge_key(a, b)];
-                if (uses == 2) continue;
+                if (edges[edge_key(a, b)] == 2) continue;
                 const Vec3d along = points_[b] - points_[a];
                 const Vec3d side = along.cross(normal(triangles_[t]));
                 if (side.squaredNorm() == 0) continue;
@@ -158,9 +156,9 @@ private:
 
     void price(Index from, Index to) {
         const double along = (points_[to] - points_[from]).squaredNorm();
-        const double cost = quadrics_[from].at(points_[to]) + quadrics_[to].at(points_[to]) +
-                            kLengthWeight * along * quadrics_[from].area;
-        queue_.push({cost, from, to, stamp_[from] + stamp_[to], false});
+        const double error = quadrics_[from].at(points_[to]) + quadrics_[to].at(points_[to]);
+        const double cost = error + kLengthWeight * along * quadrics_[from].area;
+        queue_.push({cost, error, from, to, stamp_[from] + stamp_[to], false});
     }
 
     /// What a collapse that is not clean is taken to lose: everything around `from`, moved by the edge's length.
@@ -264,9 +262,10 @@ private:
 } // namespace
 
 EdgeCollapseResult collapse_edges(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
-                                  std::size_t target_vertices, std::optional<double> max_error) {
+                                  std::size_t target_vertices, std::optional<double> max_error,
+                                  const RunContext& context) {
     Collapser collapser(positions, triangles);
-    collapser.run(target_vertices, max_error);
+    collapser.run(target_vertices, max_error, context);
     return collapser.result();
 }
 

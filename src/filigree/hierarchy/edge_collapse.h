@@ -1,6 +1,7 @@
 // Edge collapses that can always go on: for the last, coarsest levels, where the driver's quality is decided.
 #pragma once
 
+#include "filigree/core/run_context.h"
 #include "filigree/mesh/mesh.h"
 
 #include <optional>
@@ -10,8 +11,9 @@ namespace filigree {
 struct EdgeCollapseResult {
     std::vector<Triangle> triangles;
     std::size_t vertex_count = 0; ///< distinct vertices in `triangles`
-    double error = 0;             ///< the largest root of a collapse's quadric error per area: a distance, model units
-    std::size_t forced = 0;       ///< collapses that changed topology or turned a triangle over
+    /// The worst collapse, model units: root mean square distance of what it merged from the old surface's planes.
+    double error = 0;
+    std::size_t forced = 0; ///< collapses that changed topology or turned a triangle over
 };
 
 /// Half-edge collapses in the order of their quadric error [Garland 1997], down to at most `target_vertices`, or until
@@ -20,6 +22,7 @@ struct EdgeCollapseResult {
 /// and needle-thin parts go early, a good surface never tears for them. Non-manifold input is fine, and the last
 /// triangle stays. triangles: over welded vertices. Cost O(F log F), about 300,000 collapses a second; deterministic.
 EdgeCollapseResult collapse_edges(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
-                                  std::size_t target_vertices, std::optional<double> max_error);
+                                  std::size_t target_vertices, std::optional<double> max_error,
+                                  const RunContext& context);
 
 } // namespace filigree

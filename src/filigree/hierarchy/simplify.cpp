@@ -134,8 +134,8 @@ Simplified simplify(std::span<const Vec3f> positions, std::span<const Triangle> 
         if (!collapse_bulk(positions, double(bulk_target) / double(current.vertex_count), max_error, current, context))
             break;
     if (current.vertex_count * 50 > target * 51) {
-        EdgeCollapseResult finished = collapse_edges(positions, current.triangles, target,
-                                                     options.max_error ? std::optional(max_error) : std::nullopt);
+        EdgeCollapseResult finished = collapse_edges(
+            positions, current.triangles, target, options.max_error ? std::optional(max_error) : std::nullopt, context);
         current.triangles = std::move(finished.triangles);
         current.vertex_count = finished.vertex_count;
         current.error = std::max(current.error, finished.error);

@@ -11,14 +11,16 @@ namespace filigree {
 /// When to stop; the first that is reached. With neither, nothing is removed.
 struct SimplifyOptions {
     std::optional<std::size_t> target_vertices = {}; ///< at most about this many (within 2 %), whatever the mesh
-    std::optional<double> max_error = {};            ///< fraction of the bounding-box diagonal
+    /// Stop before a collapse whose quadric error is worse: a root mean square distance, fraction of the diagonal.
+    /// Single points may be a few times further away.
+    std::optional<double> max_error = {};
 };
 
 /// What is left: triangles over the input's own vertex ids.
 struct Simplified {
     std::vector<Triangle> triangles;
     std::size_t vertex_count = 0; ///< distinct vertices in `triangles`
-    double error = 0;             ///< the largest quadric error of a collapse, fraction of the diagonal
+    double error = 0;             ///< the worst collapse, as in max_error
     std::size_t forced = 0;       ///< collapses that changed topology: dropped scraps, closed handles
 };
 

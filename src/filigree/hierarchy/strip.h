@@ -13,7 +13,7 @@ struct StripOptions {
     // (a twentieth, at least 50) and all of them below 50; for the reference code as far as it goes.
     std::optional<std::size_t> base = {}; ///< driver vertices, about; 3 or more
     std::optional<unsigned> levels = {};  ///< levels below the finest, each with a quarter of the vertices of the next
-    std::optional<double> error = {};     ///< largest distance of the driver from the mesh, fraction of the diagonal
+    std::optional<double> error = {};     ///< how far the driver may leave the mesh, fraction of the diagonal (rms)
     Precision precision = Precision::float32; ///< blend code only
     unsigned references = 3;                  ///< reference code only: 3, 4 or 6
 };
@@ -23,7 +23,7 @@ struct StripReport {
     std::size_t across_gap = 0;      ///< see Binding
     std::size_t facing_away = 0;
     std::size_t forced_collapses = 0; ///< see Simplified
-    double simplify_error = 0;        ///< fraction of the diagonal; summed over the levels
+    double simplify_error = 0;        ///< see Simplified::error; summed over the levels
     double simplify_seconds = 0, bind_seconds = 0, encode_seconds = 0;
 };
 
