@@ -13,7 +13,6 @@
 #include "filigree/mesh/shapes.h"
 #include "filigree/mesh/triangulate.h"
 
-#include <algorithm>
 #include <cstring>
 #include <random>
 
@@ -21,25 +20,13 @@ namespace filigree::cli {
 
 namespace {
 
+constexpr unsigned kBenchResolution = 256; // of the wavy cube, unless there is a mesh
+
 struct Figure {
     std::string name;
     double value;
     std::string unit;
 };
-
-/// Median seconds of a call: at least five, for about 0.4 seconds.
-template <class Work>
-double median_seconds(const Work& work) {
-    std::vector<double> seconds;
-    const double start = now_seconds();
-    while (seconds.size() < 5 || (now_seconds() - start < 0.4 && seconds.size() < 1000)) {
-        const double begin = now_seconds();
-        work();
-        seconds.push_back(now_seconds() - begin);
-    }
-    std::nth_element(seconds.begin(), seconds.begin() + std::ptrdiff_t(seconds.size() / 2), seconds.end());
-    return seconds[seconds.size() / 2];
-}
 
 class Bench {
 public:
@@ -129,8 +116,7 @@ public:
         const Mesh driver = level_mesh(model, 0);
         const std::vector<Triangle> triangles = triangulate(driver).triangles;
         const Box box = bounds(driver.positions);
-        int axis = 0;
-        box.size().maxCoeff(&axis);
+        const int axis = static_cast<int>(longest_axis(box));
         std::vector<Index> ends;
         std::vector<Vec3f> targets;
         for (Index v = 0; v < driver.vertex_count(); ++v) {
@@ -159,12 +145,10 @@ public:
             strip(std::move(copy), {.code = DetailCode::reference, .base = model.driver().vertices.size()}, context_);
         rows_ = measure_fidelity(model, reference ? &reference->model : nullptr, context_);
         for (const FidelitySummary& summary : summarise(rows_)) {
-            std::string name = summary.method;
-            std::erase(name, ',');
-            std::replace(name.begin(), name.end(), ' ', '_');
-            add("fidelity." + name + ".affine_rms", summary.affine_rms, "diagonals");
-            add("fidelity." + name + ".curved_rms", summary.curved_rms, "diagonals");
-            add("fidelity." + name + ".curved_normal_p95", summary.curved_normal_p95_deg, "degrees");
+            const std::string name = "fidelity." + summary.method;
+            add(name + ".affine_rms", summary.affine_rms, "diagonals");
+            add(name + ".curved_rms", summary.curved_rms, "diagonals");
+            add(name + ".curved_normal_p95", summary.curved_normal_p95_deg, "degrees");
         }
     }
 
@@ -261,14 +245,17 @@ void add_bench(CLI::App& app, Session& session) {
     CLI::App* command = app.add_subcommand("bench", "Measure this machine: speeds with their rivals, and fidelity");
     const std::vector<std::string> names = {"all", "restore", "strip", "files", "deform", "handles", "fidelity"};
     command->add_option("name", options->name, "What to measure")->check(CLI::IsMember(names))->capture_default_str();
-    command->add_option("--mesh", options->mesh, "Mesh to measure on (unset: the wavy cube with 393,218 vertices)");
+    command->add_option("--mesh", options->mesh,
+                        fmt::format("Mesh to measure on (unset: the wavy cube with {} vertices)",
+                                    with_commas(wavy_cube_vertices(kBenchResolution))));
     command->add_option("--base", options->base, "Vertices of the driver (unset: as strip chooses)");
     session.add_common_options(*command, "  filigree bench restore --threads 1\n"
                                          "  filigree bench fidelity --mesh scan.ply --base 1000\n"
                                          "  filigree bench --json > figures.json");
     command->callback([options, &session] {
         session.begin();
-        Mesh mesh = options->mesh.empty() ? make_wavy_cube({.resolution = 256}) : session.read_mesh(options->mesh);
+        Mesh mesh =
+            options->mesh.empty() ? make_wavy_cube({.resolution = kBenchResolution}) : session.read_mesh(options->mesh);
         const Json mesh_json = {{"name", options->mesh.empty() ? "wavy-cube" : options->mesh},
                                 {"vertices", mesh.vertex_count()},
                                 {"faces", mesh.face_count()}};

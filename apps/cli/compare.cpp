@@ -1,7 +1,5 @@
 #include "session.h"
 
-#include "filigree/mesh/mesh_distance.h"
-
 namespace filigree::cli {
 
 void add_compare(CLI::App& app, Session& session) {
@@ -25,8 +23,8 @@ void add_compare(CLI::App& app, Session& session) {
         Table table;
         Json json = {{"a", options->a}, {"b", options->b}, {"diagonal_units", distance.diagonal}};
         const auto add = [&](const char* key, const char* title, double units) {
-            table.row(title, distance_text(units, distance.diagonal));
-            json[key] = distance.diagonal > 0 ? units / distance.diagonal : 0.0;
+            table.row(title, distance_text(distance, units));
+            json[key] = distance.relative(units);
             json[std::string(key) + "_units"] = units;
         };
         if (const auto& v = distance.vertices) {

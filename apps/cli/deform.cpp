@@ -25,11 +25,8 @@ std::unique_ptr<SpaceWarp> make_warp(const WarpStep& step, const Box& box, Axis 
 /// The warps one after the other, all over the box of the undeformed mesh.
 std::unique_ptr<SpaceWarp> chain_steps(const std::vector<WarpStep>& steps, const Box& box, std::optional<Axis> axis,
                                        std::uint64_t seed) {
-    int longest = 0;
-    box.size().maxCoeff(&longest);
     std::vector<std::unique_ptr<SpaceWarp>> warps;
-    for (const WarpStep& step : steps)
-        warps.push_back(make_warp(step, box, axis.value_or(static_cast<Axis>(longest)), seed));
+    for (const WarpStep& step : steps) warps.push_back(make_warp(step, box, axis.value_or(longest_axis(box)), seed));
     return make_chain(std::move(warps));
 }
 
@@ -50,18 +47,18 @@ Mesh deform_mesh(Mesh mesh, const Options& options, const RunContext& context) {
     return require(move_mesh_by_handles(std::move(mesh), handles, context));
 }
 
-Mesh deform_model(const Model& model, const Options& options, Session& session) {
-    Pose pose;
+Pose deform_driver(const Model& model, const Options& options, const RunContext& context) {
     if (options.handles.empty()) {
         const auto warp = chain_steps(options.steps, world_bounds(model.mesh), options.axis, options.seed);
-        pose = warp_pose(*warp, driver_positions(model), model.mesh.origin, session.context());
-    } else {
-        const HandlesFile handles = require(read_handles(options.handles));
-        pose = require(pose_by_handles(model, handles, session.context()));
+        return warp_pose(*warp, driver_positions(model), model.mesh.origin, context);
     }
-    if (!options.pose_output.empty()) session.write_mesh(posed_driver(model, pose), options.pose_output);
-    const Restorer restorer = require(Restorer::create(model, options.restore, session.context()));
-    return require(restorer.mesh(pose, session.context()));
+    const HandlesFile handles = require(read_handles(options.handles));
+    return require(pose_by_handles(model, handles, context));
+}
+
+Mesh restore_pose(const Model& model, const Pose& pose, const Options& options, const RunContext& context) {
+    const Restorer restorer = require(Restorer::create(model, options.restore, context));
+    return require(restorer.mesh(pose, context));
 }
 
 } // namespace
@@ -105,6 +102,7 @@ void add_deform(CLI::App& app, Session& session) {
                                          "  filigree deform scan.fil -o pulled.ply --handles pull.json");
     command->callback([options, &session] {
         session.begin();
+        check_second_output("--pose", options->pose_output, options->output);
         if (options->steps.empty() == options->handles.empty())
             throw Failure{{ErrorCode::usage, "Say how to deform: one or more of --stretch, --squeeze, --bend, --twist, "
                                              "--taper and --random, or --handles FILE."}};
@@ -113,10 +111,12 @@ void add_deform(CLI::App& app, Session& session) {
         const auto* model = std::get_if<Model>(&content.value);
         if (!model && !options->pose_output.empty())
             throw Failure{{ErrorCode::usage, "--pose writes a model's driver, and " + options->input + " is a mesh."}};
-        const Mesh mesh = model ? deform_model(*model, *options, session)
+        const Pose pose = model ? deform_driver(*model, *options, session.context()) : Pose{};
+        const Mesh mesh = model ? restore_pose(*model, pose, *options, session.context())
                                 : deform_mesh(std::get<Mesh>(content.value), *options, session.context());
         const double seconds = now_seconds() - start;
         session.write_mesh(mesh, options->output);
+        if (!options->pose_output.empty()) session.write_mesh(posed_driver(*model, pose), options->pose_output);
         session.print(fmt::format("{}: {} vertices deformed {} in {}\n", options->output,
                                   with_commas(mesh.vertex_count()), model ? "through the driver" : "one by one",
                                   seconds_text(seconds)),

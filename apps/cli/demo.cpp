@@ -2,46 +2,30 @@
 
 #include "filigree/deform/space_warp.h"
 #include "filigree/hierarchy/strip.h"
-
 #include "filigree/mesh/mesh_distance.h"
 #include "filigree/mesh/shapes.h"
 
-#include <algorithm>
 #include <filesystem>
 
 namespace filigree::cli {
 
 namespace {
 
-constexpr unsigned kDemoResolution = 264; // of the wavy cube: 418,178 vertices
-constexpr int kRepetitions = 5;           // of what is timed; the median counts
+constexpr unsigned kDemoResolution = 264; // of the wavy cube, as large as the report's
 
-/// A quarter circle and a half turn, along the longest side.
+/// A quarter turn about the longest side, then a quarter circle along it.
 std::unique_ptr<SpaceWarp> bend_and_twist(const Box& box) {
-    int longest = 0;
-    box.size().maxCoeff(&longest);
     std::vector<std::unique_ptr<SpaceWarp>> warps;
-    warps.push_back(make_twist(box, static_cast<Axis>(longest), 90));
-    warps.push_back(make_bend(box, static_cast<Axis>(longest), 90));
+    warps.push_back(make_twist(box, longest_axis(box), 90));
+    warps.push_back(make_bend(box, longest_axis(box), 90));
     return make_chain(std::move(warps));
 }
 
-template <class Work>
-double median_seconds(const Work& work) {
-    std::vector<double> seconds;
-    for (int i = 0; i < kRepetitions; ++i) {
-        const double start = now_seconds();
-        work();
-        seconds.push_back(now_seconds() - start);
-    }
-    std::nth_element(seconds.begin(), seconds.begin() + kRepetitions / 2, seconds.end());
-    return seconds[kRepetitions / 2];
-}
-
-/// The demo's folder; unless it is kept, what was written there goes again, and the folder where it is new.
+/// The demo's folder; unless it is kept, files that were not there before go again, and the folder where it is new.
 class OutputFolder {
 public:
-    explicit OutputFolder(std::filesystem::path path) : path_(std::move(path)) {
+    OutputFolder(std::filesystem::path path, std::filesystem::path input)
+        : path_(std::move(path)), input_(std::move(input)) {
         std::error_code failed;
         is_new_ = std::filesystem::create_directories(path_, failed);
         if (failed)
@@ -51,24 +35,36 @@ public:
     ~OutputFolder() {
         std::error_code ignored;
         if (is_kept_) return;
-        for (const std::filesystem::path& file : files_) std::filesystem::remove(file, ignored);
+        for (const std::filesystem::path& file : new_files_) std::filesystem::remove(file, ignored);
         if (is_new_) std::filesystem::remove(path_, ignored);
     }
     OutputFolder(const OutputFolder&) = delete;
     OutputFolder& operator=(const OutputFolder&) = delete;
 
-    std::string file(const char* name) { return files_.emplace_back(path_ / name).string(); }
+    /// Where to write; to be asked for all files before the work, for it refuses the input's own place.
+    std::string file(const char* name) {
+        const std::filesystem::path file = path_ / name;
+        std::error_code failed;
+        if (std::filesystem::equivalent(file, input_, failed) && !failed)
+            throw Failure{{ErrorCode::usage, file.string() + ": is the input and would be overwritten; choose another "
+                                                             "folder with -o."}};
+        if (!std::filesystem::exists(file, failed)) new_files_.push_back(file);
+        return file.string();
+    }
     void keep() { is_kept_ = true; }
 
 private:
-    std::filesystem::path path_;
-    std::vector<std::filesystem::path> files_;
+    std::filesystem::path path_, input_;
+    std::vector<std::filesystem::path> new_files_;
     bool is_new_ = false, is_kept_ = false;
 };
 
 void run_demo(const std::string& input, const std::string& folder, Session& session) {
     const RunContext& context = session.context();
-    OutputFolder files(folder);
+    OutputFolder files(folder, input);
+    const std::string model_file = files.file("model.fil"), mesh_file = files.file("mesh.ply"),
+                      driver_file = files.file("driver.ply"), posed_driver_file = files.file("driver_bent.ply"),
+                      full_file = files.file("full_deformation.ply"), restored_file = files.file("restored.ply");
 
     const double start = now_seconds();
     Mesh mesh = input.empty() ? make_wavy_cube({.resolution = kDemoResolution}) : session.read_mesh(input);
@@ -97,12 +93,12 @@ void run_demo(const std::string& input, const std::string& folder, Session& sess
     const Mesh from_positions = require(restorer.mesh({pose.positions, {}, {}}, context));
     const MeshDistance positions_only = require(mesh_distance(from_positions, full, 0, context));
 
-    session.write_model(model, files.file("model.fil"));
-    session.write_mesh(level_mesh(model, 0), files.file("driver.ply"));
-    session.write_mesh(posed_driver(model, pose), files.file("driver_bent.ply"));
-    session.write_mesh(mesh, files.file("mesh.ply"));
-    session.write_mesh(full, files.file("full_deformation.ply"));
-    session.write_mesh(restored, files.file("restored.ply"));
+    session.write_model(model, model_file);
+    session.write_mesh(driver_mesh(model), driver_file);
+    session.write_mesh(posed_driver(model, pose), posed_driver_file);
+    session.write_mesh(mesh, mesh_file);
+    session.write_mesh(full, full_file);
+    session.write_mesh(restored, restored_file);
     files.keep();
 
     const double ours = driver_seconds + restore_seconds;
@@ -117,11 +113,11 @@ void run_demo(const std::string& input, const std::string& folder, Session& sess
     table.row("deform driver, restore", fmt::format("{}  ({} + {})", seconds_text(ours), seconds_text(driver_seconds),
                                                     seconds_text(restore_seconds)));
     table.row("speed ratio", fmt::format("{:.1f} times", full_seconds / ours));
-    table.row("difference, rms", distance_text(d.rms, with_gradients.diagonal));
+    table.row("difference, rms", distance_text(with_gradients, d.rms));
     table.row("normals off by",
               fmt::format("{:.2g} degrees (95 % of them by less than {:.2g})", d.normal_mean_deg, d.normal_p95_deg));
     table.row("without gradients", fmt::format("rms {:.2e} of the diagonal, 95 % of normals within {:.2g} degrees",
-                                               p.rms / positions_only.diagonal, p.normal_p95_deg));
+                                               positions_only.relative(p.rms), p.normal_p95_deg));
     table.row("files", folder + "/: mesh, driver, driver_bent, restored, full_deformation (.ply), model.fil");
     session.print(table.text(), {{"mesh", input.empty() ? "wavy-cube" : input},
                                  {"output", folder},
@@ -133,12 +129,14 @@ void run_demo(const std::string& input, const std::string& folder, Session& sess
                                  {"driver_seconds", driver_seconds},
                                  {"restore_seconds", restore_seconds},
                                  {"speed_ratio", full_seconds / ours},
-                                 {"rms", d.rms / with_gradients.diagonal},
+                                 {"rms", with_gradients.relative(d.rms)},
                                  {"rms_units", d.rms},
-                                 {"max", d.max / with_gradients.diagonal},
+                                 {"max", with_gradients.relative(d.max)},
+                                 {"max_units", d.max},
                                  {"normal_mean_deg", d.normal_mean_deg},
                                  {"normal_p95_deg", d.normal_p95_deg},
-                                 {"positions_only_rms", p.rms / positions_only.diagonal},
+                                 {"positions_only_rms", positions_only.relative(p.rms)},
+                                 {"positions_only_rms_units", p.rms},
                                  {"positions_only_normal_p95_deg", p.normal_p95_deg}});
 }
 
@@ -151,7 +149,9 @@ void add_demo(CLI::App& app, Session& session) {
     auto options = std::make_shared<Options>();
     CLI::App* command =
         app.add_subcommand("demo", "The main job, start to end: strip, bend and twist the driver, restore, compare");
-    command->add_option("mesh", options->input, "Mesh (unset: the report's wavy cube with 418,178 vertices)");
+    command->add_option("mesh", options->input,
+                        fmt::format("Mesh (unset: the report's wavy cube with {} vertices)",
+                                    with_commas(wavy_cube_vertices(kDemoResolution))));
     command->add_option("-o,--output", options->output, "Folder for the meshes")->capture_default_str();
     session.add_common_options(*command, "  filigree demo\n  filigree demo scan.ply -o out");
     command->callback([options, &session] {

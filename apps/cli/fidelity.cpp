@@ -19,9 +19,7 @@ struct NamedWarp {
 };
 
 std::vector<NamedWarp> fidelity_warps(const Box& box) {
-    int longest = 0;
-    box.size().maxCoeff(&longest);
-    const Axis axis = static_cast<Axis>(longest);
+    const Axis axis = longest_axis(box);
     std::vector<NamedWarp> warps;
     warps.push_back({"stretch 2", true, make_stretch(box, axis, 2)});
     warps.push_back({"stretch 0.5", true, make_stretch(box, axis, 0.5)});
@@ -98,12 +96,15 @@ public:
         truth_.positions = warp_positions(*warp.warp, rest.positions, rest.origin, context);
     }
 
-    void add(const std::string& method, std::vector<Vec3f> positions) {
-        restored_.positions = std::move(positions);
+    /// Nothing where the method failed or was cancelled.
+    void add(const char* method, Result<std::vector<Vec3f>> positions) {
+        if (!positions) return;
+        restored_.positions = *std::move(positions);
         const Result<MeshDistance> distance = mesh_distance(restored_, truth_, 0, context_);
         if (!distance || !distance->vertices) return;
-        rows_.push_back({method, warp_.name, warp_.affine, distance->vertices->rms / distance->diagonal,
-                         distance->vertices->max / distance->diagonal, distance->vertices->normal_p95_deg});
+        const VertexDistance& d = *distance->vertices;
+        rows_.push_back(
+            {method, warp_.name, warp_.affine, distance->relative(d.rms), distance->relative(d.max), d.normal_p95_deg});
     }
 
 private:
@@ -120,6 +121,12 @@ std::vector<FidelityRow> measure_fidelity(const Model& model, const Model* refer
     const Box box = world_bounds(model.mesh);
     const Result<Restorer> restorer = Restorer::create(model, {}, context);
     if (!restorer) return rows;
+    std::optional<Restorer> reference_restorer;
+    if (reference) {
+        Result<Restorer> created = Restorer::create(*reference, {}, context);
+        if (!created) return rows;
+        reference_restorer = *std::move(created);
+    }
 
     for (const NamedWarp& warp : fidelity_warps(box)) {
         if (context.is_cancelled()) return rows;
@@ -127,20 +134,17 @@ std::vector<FidelityRow> measure_fidelity(const Model& model, const Model* refer
         const Pose pose = warp_pose(*warp.warp, driver_positions(model), model.mesh.origin, context);
         comparison.add("wrap", move_with_cells(model, pose, move_wrap, context));
         comparison.add("skinning", move_with_cells(model, pose, move_skinning, context));
-        if (reference) {
-            const Result<Restorer> reference_restorer = Restorer::create(*reference, {}, context);
-            if (!reference_restorer) continue;
+        if (reference_restorer)
             comparison.add(
                 "reference",
-                *reference_restorer->positions(
+                reference_restorer->positions(
                     warp_pose(*warp.warp, driver_positions(*reference), reference->mesh.origin, context), context));
-        }
-        Pose positions_only{pose.positions, {}, {}};
-        comparison.add("blend, positions", *restorer->positions(positions_only, context));
-        Pose with_ghosts{
+        const Pose positions_only{pose.positions, {}, {}};
+        comparison.add("blend_positions", restorer->positions(positions_only, context));
+        const Pose with_ghosts{
             pose.positions, {}, warp_positions(*warp.warp, restorer->rest_ghosts(), model.mesh.origin, context)};
-        comparison.add("blend, ghosts", *restorer->positions(with_ghosts, context));
-        comparison.add("blend, gradients", *restorer->positions(pose, context));
+        comparison.add("blend_ghosts", restorer->positions(with_ghosts, context));
+        comparison.add("blend_gradients", restorer->positions(pose, context));
     }
     return rows;
 }

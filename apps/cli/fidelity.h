@@ -10,7 +10,7 @@ namespace filigree::cli {
 
 /// One method under one warp, against warping every vertex.
 struct FidelityRow {
-    std::string method; ///< wrap, skinning, reference, blend_positions, blend_ghosts, blend_gradients, ...
+    std::string method; ///< wrap, skinning, reference, blend_positions, blend_ghosts or blend_gradients
     std::string warp;
     bool affine = false;
     double rms = 0, max = 0;   ///< fractions of the deformed mesh's diagonal
@@ -24,7 +24,7 @@ struct FidelitySummary {
 };
 
 /// model: a blend model; reference: null, or a reference model of the same mesh. The warps are those of
-/// docs/benchmarks.md, along the longest side of the box.
+/// docs/benchmarks.md, along the longest side of the box. When cancelled, the rows so far.
 std::vector<FidelityRow> measure_fidelity(const Model& model, const Model* reference, const RunContext& context);
 std::vector<FidelitySummary> summarise(const std::vector<FidelityRow>& rows);
 

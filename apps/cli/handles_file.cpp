@@ -23,6 +23,17 @@ Vec3d read_vec(const Json& json, const std::string& key) {
     return {value[0].get<double>(), value[1].get<double>(), value[2].get<double>()};
 }
 
+std::vector<Index> read_vertices(const Json& json) {
+    if (!json.is_array()) throw BadHandle{"\"vertices\" must be a list of vertex ids"};
+    std::vector<Index> vertices;
+    for (const Json& id : json) {
+        if (!id.is_number_unsigned() || id.get<std::uint64_t>() >= kNoIndex)
+            throw BadHandle{"\"vertices\" must be whole numbers from 0 up, and " + id.dump() + " is no vertex id"};
+        vertices.push_back(id.get<Index>());
+    }
+    return vertices;
+}
+
 HandleEntry read_entry(const Json& json) {
     static const std::array<std::string_view, 9> known = {"name", "vertices", "box",    "sphere", "move",
                                                           "axis", "degrees",  "centre", "comment"};
@@ -31,7 +42,7 @@ HandleEntry read_entry(const Json& json) {
             throw BadHandle{"\"" + key + "\" is not a word of a handle (docs/handles.md lists them)"};
     HandleEntry entry;
     entry.name = json.value("name", "");
-    if (json.contains("vertices")) entry.vertices = json.at("vertices").get<std::vector<Index>>();
+    if (json.contains("vertices")) entry.vertices = read_vertices(json.at("vertices"));
     if (json.contains("box")) entry.box = Box{read_vec(json.at("box"), "min"), read_vec(json.at("box"), "max")};
     if (json.contains("sphere"))
         entry.sphere = {read_vec(json.at("sphere"), "centre"), json.at("sphere").at("radius").get<double>()};
@@ -151,7 +162,11 @@ Result<Mesh> move_mesh_by_handles(Mesh mesh, const HandlesFile& file, const RunC
         const auto targets = handle_targets(
             file, world_positions(mesh.positions, mesh.origin), [](Index v) { return v; }, mesh.vertex_count());
         std::map<Index, Vec3d> welded;
-        for (const auto& [vertex, target] : targets) welded.emplace(representative[vertex], target);
+        for (const auto& [vertex, target] : targets)
+            if (const auto known = welded.emplace(representative[vertex], target).first; known->second != target)
+                throw BadHandle{fmt::format("{}: two handles move vertices {} and {}, which lie at one place, to "
+                                            "different places: name them in one handle",
+                                            file.path, known->first, vertex)};
         std::vector<Triangle> triangles = triangulate(mesh).triangles;
         for (Triangle& t : triangles)
             for (Index& v : t) v = representative[v];

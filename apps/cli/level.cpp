@@ -1,6 +1,4 @@
-#include "session.h"
-
-#include "filigree/hierarchy/restore.h"
+#include "restore_options.h"
 
 namespace filigree::cli {
 
@@ -21,20 +19,22 @@ void add_level(CLI::App& app, Session& session) {
                                          "  filigree level scan.fil 0 -o driver.ply --ghosts ghosts.ply");
     command->callback([options, &session] {
         session.begin();
+        check_second_output("--ghosts", options->ghosts, options->output);
         const Model model = session.read_model(options->model);
         if (options->level > model.finest_level())
             throw Failure{{ErrorCode::usage, fmt::format("{} has levels 0 to {}; there is no level {}.", options->model,
                                                          model.finest_level(), options->level)}};
-        const Mesh mesh = level_mesh(model, options->level);
-        session.write_mesh(mesh, options->output);
+        const Mesh mesh = options->level == 0 ? driver_mesh(model) : level_mesh(model, options->level);
+        Mesh ghosts;
         if (!options->ghosts.empty()) {
-            Mesh ghosts = level_mesh(model, 0);
+            ghosts = driver_mesh(model);
             ghosts.positions = require(Restorer::create(model, {}, session.context())).rest_ghosts();
             if (ghosts.positions.empty())
                 throw Failure{
                     {ErrorCode::unsuitable, "A reference model has no ghost points; strip with --code blend."}};
-            session.write_mesh(ghosts, options->ghosts);
         }
+        session.write_mesh(mesh, options->output);
+        if (!options->ghosts.empty()) session.write_mesh(ghosts, options->ghosts);
         session.print(fmt::format("{}: {} vertices, {} faces\n", options->output, with_commas(mesh.vertex_count()),
                                   with_commas(mesh.face_count())),
                       {{"output", options->output},

@@ -9,6 +9,8 @@ using namespace filigree;
 
 namespace {
 
+constexpr int kOwnError = 1; // what no ErrorCode foresees: a mistake in this program
+
 int exit_code(ErrorCode code) { return static_cast<int>(code); }
 
 /// What is wrong with the arguments, in one line that says where help is; or the help or version that was asked for.
@@ -34,7 +36,8 @@ int run(int argc, char** argv) {
                "  filigree strip scan.ply -o scan.fil && filigree level scan.fil 0 -o driver.obj\n"
                "  filigree restore scan.fil --pose moved_driver.obj -o restored.ply\n\n"
                "FILE '-' is standard input or output. Each command has examples: 'filigree COMMAND --help'.\n"
-               "Exit codes: 0 done, 2 usage, 3 cannot read, 4 damaged file, 5 unknown format, 6 cannot write,\n"
+               "Exit codes: 0 done, 1 an error of our own, 2 usage, 3 cannot read, 4 damaged file, 5 unknown format, 6 "
+               "cannot write,\n"
                "7 unsuitable input, 8 inputs do not belong together, 9 out of memory, 130 cancelled.");
     cli::add_make(app, session);
     cli::add_info(app, session);
@@ -70,5 +73,8 @@ int main(int argc, char** argv) {
         return out_of_memory();
     } catch (const std::length_error&) { // more than any vector can hold
         return out_of_memory();
+    } catch (const std::exception& error) {
+        cli::say(fmt::format("filigree: An error of our own ({}); please report it with the command.", error.what()));
+        return kOwnError;
     }
 }

@@ -44,8 +44,14 @@ Pose pose_from_mesh(const Mesh& mesh, const Model& model) {
     return pose;
 }
 
-Mesh posed_driver(const Model& model, const Pose& pose) {
+Mesh driver_mesh(const Model& model) {
     Mesh driver = level_mesh(model, 0);
+    std::erase_if(driver.scalars, [](const VertexScalar& scalar) { return is_gradient_name(scalar.name); });
+    return driver;
+}
+
+Mesh posed_driver(const Model& model, const Pose& pose) {
+    Mesh driver = driver_mesh(model);
     driver.positions = pose.positions;
     driver.normals = {};
     for (int k = 0; k < 9 && !pose.gradients.empty(); ++k) {

@@ -13,6 +13,9 @@ void add_restore_options(CLI::App& command, RestoreOptions& options);
 /// A pose from a moved level 0: its positions, and the gradients in its vertex scalars f00 .. f22 where it has them.
 Pose pose_from_mesh(const Mesh& mesh, const Model& model);
 
+/// Level 0 for others to move: without scalars of the mesh's own that pose_from_mesh would take for gradients.
+Mesh driver_mesh(const Model& model);
+
 /// Level 0 as the pose moves it, with the scalars f00 .. f22 that pose_from_mesh reads where the pose has gradients,
 /// and without the normals of the driver at rest.
 Mesh posed_driver(const Model& model, const Pose& pose);

@@ -9,23 +9,24 @@
 #include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <filesystem>
 #include <unistd.h>
 
 namespace filigree::cli {
 
 namespace {
 
-const RunContext* cancel_target = nullptr;                    // what Ctrl-C stops; set once, before the handler
-volatile std::sig_atomic_t is_waiting_for_standard_input = 0; // where nothing looks at the cancel flag
+const RunContext* cancel_target = nullptr;           // what Ctrl-C stops; set once, before the handler
+volatile std::sig_atomic_t is_waiting_for_input = 0; // where nothing looks at the cancel flag
 
-void on_interrupt(int) {
-    if (is_waiting_for_standard_input) {
+void on_interrupt(int signal) {
+    if (is_waiting_for_input) {
         constexpr std::string_view kLine = "filigree: Cancelled; nothing was written.\n";
         [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, kLine.data(), kLine.size());
         ::_exit(static_cast<int>(ErrorCode::cancelled));
     }
     cancel_target->cancel();
-    std::signal(SIGINT, SIG_DFL); // a second one ends the program at once
+    std::signal(signal, SIG_DFL); // a second one ends the program at once
 }
 
 /// To stderr, whole and at once. When nobody can read it, nothing is lost that matters.
@@ -72,6 +73,18 @@ double now_seconds() {
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
+double median_seconds(const std::function<void()>& work) {
+    std::vector<double> seconds;
+    const double start = now_seconds();
+    while (seconds.size() < 5 || (now_seconds() - start < 0.4 && seconds.size() < 1000)) {
+        const double begin = now_seconds();
+        work();
+        seconds.push_back(now_seconds() - begin);
+    }
+    std::nth_element(seconds.begin(), seconds.begin() + std::ptrdiff_t(seconds.size() / 2), seconds.end());
+    return seconds[seconds.size() / 2];
+}
+
 void Session::add_common_options(CLI::App& command, const std::string& examples) {
     command.add_flag("--json", json, "Print the result as JSON");
     command.add_option("--threads", threads, "Threads to use; 0 for all (results never depend on it)")
@@ -89,6 +102,8 @@ void Session::begin() {
         };
     cancel_target = &*context_;
     std::signal(SIGINT, on_interrupt);
+    std::signal(SIGTERM, on_interrupt);
+    if (std::signal(SIGHUP, on_interrupt) == SIG_IGN) std::signal(SIGHUP, SIG_IGN); // under nohup
     std::signal(SIGPIPE, SIG_IGN);
 }
 
@@ -99,9 +114,10 @@ void Session::warn(const std::string& sentence) {
 }
 
 std::string Session::read_bytes(const std::string& path) const {
-    is_waiting_for_standard_input = path == "-";
+    std::error_code ignored;
+    is_waiting_for_input = path == "-" || !std::filesystem::is_regular_file(path, ignored); // a pipe, a terminal
     Result<std::string> bytes = read_file(path);
-    is_waiting_for_standard_input = 0;
+    is_waiting_for_input = 0;
     return require(std::move(bytes));
 }
 
@@ -161,6 +177,14 @@ void Session::print(const std::string& text, Json object) {
                        "standard output: cannot be written: the reader has gone away, or the disk is full."}};
 }
 
+void check_second_output(const std::string& option, const std::string& path, const std::string& first) {
+    if (path.empty()) return;
+    if (path == first)
+        throw Failure{{ErrorCode::usage, option + " and -o both write to " + (path == "-" ? "standard output" : path) +
+                                             "; give each a place of its own."}};
+    if (path != "-") require(mesh_format(path));
+}
+
 void say(const std::string& line) { write_text(line + "\n"); }
 
 CLI::Validator finite_number() {
@@ -203,8 +227,8 @@ std::string with_commas(std::size_t count) {
     return digits;
 }
 
-std::string distance_text(double units, double diagonal) {
-    return fmt::format("{:.2e} of the diagonal ({:.3g} units)", diagonal > 0 ? units / diagonal : 0.0, units);
+std::string distance_text(const MeshDistance& distance, double units) {
+    return fmt::format("{:.2e} of the diagonal ({:.3g} units)", distance.relative(units), units);
 }
 
 std::string seconds_text(double seconds) {

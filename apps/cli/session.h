@@ -5,6 +5,7 @@
 #include "filigree/core/run_context.h"
 #include "filigree/hierarchy/model.h"
 #include "filigree/io/mesh_file.h"
+#include "filigree/mesh/mesh_distance.h"
 
 #include <functional>
 #include <map>
@@ -40,8 +41,8 @@ public:
 
     /// Adds --json, --threads and --quiet, and a footer with examples.
     void add_common_options(CLI::App& command, const std::string& examples);
-    /// Makes the context when the options are known; from here on Ctrl-C cancels, and a reader that has gone away is an
-    /// error like any other.
+    /// Makes the context when the options are known; from here on Ctrl-C and its like (SIGTERM, SIGHUP) cancel, and a
+    /// reader that has gone away is an error like any other.
     void begin();
     const RunContext& context() const { return *context_; }
 
@@ -90,6 +91,10 @@ CLI::Validator finite_number();
 CLI::Validator positive_number();
 CLI::Validator whole_number(std::int64_t least);
 
+/// Refuses, before any work, a second output (`option`; empty: none) that goes where the first goes, or has no format
+/// that we know.
+void check_second_output(const std::string& option, const std::string& path, const std::string& first);
+
 /// A line on stderr.
 void say(const std::string& line);
 
@@ -106,11 +111,16 @@ private:
 /// 1234567 as "1,234,567".
 std::string with_commas(std::size_t count);
 /// "3.2e-05 of the diagonal (0.0012 units)".
-std::string distance_text(double units, double diagonal);
+std::string distance_text(const MeshDistance& distance, double units);
 /// Seconds with three digits that matter.
 std::string seconds_text(double seconds);
 
 double now_seconds(); ///< a monotonic clock
+/// Median seconds of a call: at least five, for about 0.4 seconds.
+double median_seconds(const std::function<void()>& work);
+
+/// Vertices of make_wavy_cube with so many quads along a side.
+constexpr std::size_t wavy_cube_vertices(std::size_t resolution) { return 6 * resolution * resolution + 2; }
 
 // One command each, in the file of its name.
 void add_make(CLI::App& app, Session& session);

@@ -58,16 +58,16 @@ protected:
         return names;
     }
 
-    /// Runs `filigree` in the folder. input: a file for standard input. interrupt_after: seconds until SIGINT.
+    /// Runs `filigree` in the folder. input: a file for standard input. interrupt_after: seconds until `signal`.
     /// A program that takes longer than a minute is killed, and its code is -1.
     Ran run(const std::vector<std::string>& arguments, const std::string& input = "/dev/null",
-            double interrupt_after = -1) const {
-        return run_shell("exec \"$0\" \"$@\"", arguments, input, interrupt_after);
+            double interrupt_after = -1, int signal = SIGINT) const {
+        return run_shell("exec \"$0\" \"$@\"", arguments, input, interrupt_after, signal);
     }
 
     /// Runs a line of shell, with the program as $0 and `arguments` behind it.
     Ran run_shell(const std::string& line, const std::vector<std::string>& arguments = {},
-                  const std::string& input = "/dev/null", double interrupt_after = -1) const {
+                  const std::string& input = "/dev/null", double interrupt_after = -1, int signal = SIGINT) const {
         const std::string out = path("streams/out"), err = path("streams/err");
         std::vector<std::string> words = {"sh", "-c", "cd '" + folder_.string() + "' && " + line, FILIGREE_PROGRAM};
         words.insert(words.end(), arguments.begin(), arguments.end());
@@ -89,7 +89,7 @@ protected:
         int status = 0;
         bool interrupted = interrupt_after < 0;
         while (::waitpid(child, &status, WNOHANG) == 0) {
-            if (!interrupted && seconds() > interrupt_after) interrupted = ::kill(child, SIGINT) == 0;
+            if (!interrupted && seconds() > interrupt_after) interrupted = ::kill(child, signal) == 0;
             if (seconds() > 60) ::kill(child, SIGKILL);
             std::this_thread::sleep_for(std::chrono::milliseconds(2));
         }

@@ -365,6 +365,12 @@ TEST(WarpMesh, CollapseKeepsTheNormalThatHasNoImage) {
     EXPECT_EQ(mesh.normals.values[0], Vec3f::Zero());
 }
 
+TEST(SpaceWarp, LongestAxis) {
+    EXPECT_EQ(longest_axis({{-1, 0, 0}, {1, 3, 2}}), Axis::y);
+    EXPECT_EQ(longest_axis({{0, 0, 0}, {1, 1, 2}}), Axis::z);
+    EXPECT_EQ(longest_axis({{5, 5, 5}, {6, 6, 6}}), Axis::x); // the first of equals
+}
+
 TEST(WarpMesh, FarFromTheOriginNothingIsLost) {
     const Vec3d far(500000, 5400000, 300);
     Mesh near = make_bulge(8), away = near;

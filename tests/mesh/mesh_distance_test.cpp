@@ -101,6 +101,8 @@ TEST(MeshDistance, LeavesOutWhatDoesNotApply) {
     points.positions = {{0, 0, 0}, {3, 4, 0}};
     EXPECT_FALSE(distance(points, sphere).surfaces);
     EXPECT_EQ(distance(points, points).vertices->normal_max_deg, 0);
+    EXPECT_EQ(distance(points, points).relative(2.5), 0.5);
+    EXPECT_EQ(distance(points, Mesh{}).relative(2.5), 0); // no extent to take a fraction of
     EXPECT_EQ(distance(Mesh{}, Mesh{}).vertices->rms, 0);
     EXPECT_EQ(distance(Mesh{}, Mesh{}).vertices->max_vertex, kNoIndex);
     EXPECT_EQ(distance(Mesh{}, sphere).diagonal, distance(sphere, sphere).diagonal);

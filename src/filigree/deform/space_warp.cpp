@@ -328,6 +328,12 @@ std::unique_ptr<SpaceWarp> make_rbf(std::span<const Vec3d> centres, std::span<co
     return std::make_unique<RbfWarp>(centres, displacements);
 }
 
+Axis longest_axis(const Box& box) {
+    int longest = 0;
+    box.size().maxCoeff(&longest);
+    return static_cast<Axis>(longest);
+}
+
 std::unique_ptr<SpaceWarp> make_chain(std::vector<std::unique_ptr<SpaceWarp>> warps) {
     return std::make_unique<ChainWarp>(std::move(warps));
 }

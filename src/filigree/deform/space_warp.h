@@ -28,6 +28,9 @@ public:
 
 enum class Axis { x, y, z };
 
+/// The axis along which the box is longest; the first of those that are equal.
+Axis longest_axis(const Box& box);
+
 // Bend, twist and taper vary between the ends of the box. Positions go on smoothly beyond an end, but gradients jump
 // there; a point exactly on an end has the gradient of the inside. Along an axis in which the box has no length
 // (below 1e-9 of its diagonal) these three are the identity.

@@ -2,9 +2,11 @@
 #pragma once
 
 #include "filigree/io/mesh_file.h"
+#include "filigree/io/text_scanner.h"
 
 #include <cmath>
 #include <optional>
+#include <utility>
 
 namespace filigree {
 
@@ -77,6 +79,17 @@ inline void add_face_label_losses(const Mesh& mesh, std::vector<std::string>& lo
     if (!mesh.groups.empty()) lost.push_back("groups");
     if (!mesh.materials.empty() || !mesh.material_files.empty()) lost.push_back("materials");
     if (!mesh.smoothing.empty()) lost.push_back("smoothing groups");
+}
+
+/// Names what a format without numbers a vertex loses; the nine of a gradient together.
+inline void add_scalar_losses(const Mesh& mesh, std::vector<std::string>& lost) {
+    bool has_gradients = false;
+    for (const VertexScalar& scalar : mesh.scalars) {
+        if (!is_gradient_name(scalar.name))
+            lost.push_back("the scalar " + in_quotes(scalar.name));
+        else if (!std::exchange(has_gradients, true))
+            lost.push_back("deformation gradients (f00 to f22)");
+    }
 }
 
 } // namespace filigree

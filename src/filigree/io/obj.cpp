@@ -406,7 +406,7 @@ std::vector<std::string> write_obj(const Mesh& mesh, std::string& bytes) {
     write_faces(out, mesh);
     std::vector<std::string> lost;
     if (!mesh.colors.empty() && mesh.colors_have_alpha) lost.push_back("the colours' alpha");
-    for (const VertexScalar& scalar : mesh.scalars) lost.push_back("the scalar " + in_quotes(scalar.name));
+    add_scalar_losses(mesh, lost);
     return lost;
 }
 

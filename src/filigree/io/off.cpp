@@ -274,7 +274,7 @@ std::vector<std::string> write_off(const Mesh& mesh, std::string& bytes) {
     if (!normals) lost.emplace_back("normals that differ at a vertex");
     if (!mesh.objects.empty()) lost.emplace_back("objects");
     add_face_label_losses(mesh, lost);
-    for (const VertexScalar& scalar : mesh.scalars) lost.push_back("the scalar " + in_quotes(scalar.name));
+    add_scalar_losses(mesh, lost);
     return lost;
 }
 

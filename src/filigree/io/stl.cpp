@@ -301,7 +301,7 @@ std::vector<std::string> write_stl(const Mesh& mesh, const WriteMeshOptions& opt
     if (!mesh.colors.empty()) lost.emplace_back("colours");
     if (!options.ascii && !mesh.objects.empty()) lost.emplace_back("objects");
     add_face_label_losses(mesh, lost);
-    for (const VertexScalar& scalar : mesh.scalars) lost.push_back("the scalar " + in_quotes(scalar.name));
+    add_scalar_losses(mesh, lost);
     return lost;
 }
 

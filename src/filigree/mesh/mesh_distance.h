@@ -30,6 +30,9 @@ struct MeshDistance {
     std::optional<VertexDistance> vertices;  ///< when both have the same number of vertices
     std::optional<SurfaceDistance> surfaces; ///< when both have faces
     double diagonal = 0;                     ///< of b's box: what fractions are taken of
+
+    /// A distance in model units as a fraction of the diagonal; 0 where b has no extent.
+    double relative(double units) const { return diagonal > 0 ? units / diagonal : 0.0; }
 };
 
 /// a against b. samples: points spread over each surface besides its vertices (seeded by the context).
