@@ -26,7 +26,7 @@ void on_interrupt(int signal) {
         ::_exit(static_cast<int>(ErrorCode::cancelled));
     }
     cancel_target->cancel();
-    std::signal(signal, SIG_DFL); // a second one ends the program at once
+    if (signal == SIGINT) std::signal(SIGINT, SIG_DFL); // a second Ctrl-C ends the program at once
 }
 
 /// To stderr, whole and at once. When nobody can read it, nothing is lost that matters.

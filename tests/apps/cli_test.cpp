@@ -412,11 +412,14 @@ TEST_F(Cli, LawsAndThinShells) {
     }
     make_model();
     ok({"deform", "cube.obj", "-o", "full.obj", "--stretch", "1.5"});
-    ok({"deform", "cube.fil", "-o", "bent.obj", "--stretch", "1.5", "--pose", "pose.obj"}); // OBJ: no gradients
+    const Json bent = json({"deform", "cube.fil", "-o", "bent.obj", "--stretch", "1.5", "--pose", "pose.obj"});
+    EXPECT_EQ(bent.at("warnings"), Json{"OBJ cannot hold deformation gradients (f00 to f22); left out."});
     ok({"restore", "cube.fil", "--pose", "pose.obj", "-o", "thin.obj", "--thin-shell"});
     ok({"restore", "cube.fil", "--pose", "pose.obj", "-o", "thick.obj"});
     EXPECT_GT(rms("thin.obj", "thick.obj"), 1e-6);
-    EXPECT_LT(rms("thin.obj", "full.obj"), 0.05);
+    // Measured 5.6e-3, for waves that keep their shape are not stretched along. Without any waves it would be 9e-3:
+    // half their height of 0.04 sides, over a diagonal of 2.2.
+    EXPECT_LT(rms("thin.obj", "full.obj"), 8e-3);
 }
 
 TEST_F(Cli, IntermediateLevels) {
@@ -488,7 +491,7 @@ TEST_F(Cli, ProgressBarOnlyOnATerminal) {
 TEST_F(Cli, DemoDoesTheMainJob) {
     make_cube();
     const Json demo = json({"demo", "cube.obj", "-o", "out"});
-    EXPECT_LT(demo.at("rms").get<double>(), 1e-3);
+    EXPECT_LT(demo.at("rms").get<double>(), 2e-3); // measured 9.0e-4 with a driver of 76; without gradients 6.8e-3
     for (const char* key : {"rms", "max", "positions_only_rms"})
         EXPECT_GT(demo.at(std::string(key) + "_units").get<double>(), demo.at(key).get<double>()); // diagonal 1.9
     EXPECT_EQ(rms("out/mesh.ply", "cube.obj"), 0);
