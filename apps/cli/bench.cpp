@@ -213,7 +213,7 @@ private:
         const auto& detail = std::get<ReferenceDetail>(stripped.model.detail);
         const std::vector<Vec3f> driver = driver_positions(stripped.model);
         for (const Law law : {Law::inverse, Law::keep}) {
-            const ReferenceRestorer restorer(detail, law);
+            const ReferenceRestorer restorer(detail, law, context_);
             std::vector<Vec3f> positions(6 * std::size_t(resolution + 1) * (resolution + 1));
             const double seconds =
                 median_seconds([&] { restorer.restore_grids(driver, detail.patches.levels, positions, context_); });

@@ -2,6 +2,7 @@
 
 #include "filigree/mesh/shapes.h"
 #include "filigree/mesh/triangulate.h"
+#include "threads.h"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -254,6 +255,7 @@ TEST(Handles, ASecondSolveWithTheSameTargetsIsStable) {
 }
 
 TEST(Handles, SameBytesForAnyThreadCount) {
+    FILIGREE_NEEDS_TWO_THREADS();
     const Body body = make_body(16);
     const std::vector<Index> handles = both_ends(body);
     const std::vector<Vec3f> targets = at(body, handles, bent_ends(body, 90));

@@ -1,6 +1,7 @@
 #include "filigree/deform/space_warp.h"
 
 #include "filigree/mesh/normals.h"
+#include "threads.h"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -385,6 +386,7 @@ TEST(WarpMesh, FarFromTheOriginNothingIsLost) {
 }
 
 TEST(WarpMesh, PoseAgreesWithPositionsAndBytesWithAnyThreadCount) {
+    FILIGREE_NEEDS_TWO_THREADS();
     const Mesh mesh = make_bulge(150); // several pieces of the parallel loop
     const auto warp = make_smooth_random(box_of(mesh), 0.2, 9);
     const Pose one = warp_pose(*warp, mesh.positions, mesh.origin, RunContext(1));

@@ -6,6 +6,7 @@
 #include "filigree/mesh/shapes.h"
 #include "filigree/mesh/triangulate.h"
 #include "filigree/mesh/weld.h"
+#include "threads.h"
 
 #include <gtest/gtest.h>
 
@@ -142,18 +143,25 @@ TEST(Bind, DuplicatesShareABond) {
 }
 
 TEST(Bind, SameBondsForAnyThreads) {
+    FILIGREE_NEEDS_TWO_THREADS();
     const Mesh mesh = make_wavy_cube({.resolution = 80});
     const Bound one = bound_to(mesh, 400), two = bound_to(mesh, 400, RunContext(2));
     for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
         const Bond &a = one.binding.bonds[v], &b = two.binding.bonds[v];
         ASSERT_TRUE(a.cell == b.cell && a.u == b.u && a.v == b.v) << v;
     }
+}
+
+TEST(Bind, CanBeCancelled) {
+    const Mesh mesh = make_wavy_cube({.resolution = 8});
+    const Bound bound = bound_to(mesh, 50);
     const RunContext cancelled(1);
     cancelled.cancel();
     const std::vector<Index> representative = weld_map(mesh.positions);
-    EXPECT_FALSE(bind_to_driver(mesh.positions, representative, one.triangles,
-                                vertex_normals(one.triangles, mesh.positions, kOneThread), one.cells, cancelled)
-                     .ok());
+    const auto binding =
+        bind_to_driver(mesh.positions, representative, bound.triangles,
+                       vertex_normals(bound.triangles, mesh.positions, kOneThread), bound.cells, cancelled);
+    EXPECT_EQ(binding.error().code, ErrorCode::cancelled);
 }
 
 } // namespace

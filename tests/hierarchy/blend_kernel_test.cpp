@@ -1,5 +1,6 @@
 // The kernel against the formula it comes from, in double and written out plainly.
 #include "filigree/hierarchy/blend_kernel.h"
+#include "threads.h"
 
 #include <Eigen/LU>
 #include <cstring>
@@ -211,6 +212,7 @@ TEST(BlendKernel, LargeOutputsOnThreadsAreTheSameBytes) {
 }
 
 TEST(BlendKernel, NoThreadChangesAByte) {
+    FILIGREE_NEEDS_TWO_THREADS();
     for (const bool int16 : {false, true}) {
         std::vector<Index> lengths(200, 300);
         const Scene scene = make_scene(lengths, int16, 6);

@@ -2,6 +2,7 @@
 
 #include "filigree/mesh/normals.h"
 #include "filigree/mesh/shapes.h"
+#include "threads.h"
 
 #include <gtest/gtest.h>
 
@@ -140,6 +141,7 @@ TEST(GradientFit, CollapsedDriversGiveFiniteGradients) {
 }
 
 TEST(GradientFit, NoThreadChangesAByte) {
+    FILIGREE_NEEDS_TWO_THREADS();
     const Mesh mesh = make_wavy_sphere({.resolution = 32});
     const auto moved =
         mapped(mesh.positions, [](const Vec3d& p) { return Vec3d(p.x() * p.y(), p.y(), p.z() + p.x()); });

@@ -33,7 +33,8 @@ TEST(Model, DamageOfMeshAndLevelsIsSeen) {
                      [](Model& m) { m.levels[0].vertices.clear(); }, [](Model& m) { m.levels[0].vertices.back() = 81; },
                      [](Model& m) { m.levels[1].vertices[1] = m.levels[1].vertices[0]; },
                      [](Model& m) { m.levels[1].corners[0] = static_cast<Index>(m.levels[1].vertices.size()); },
-                     [](Model& m) { m.levels[1].face_offsets.back() += 3; }});
+                     [](Model& m) { m.levels[1].face_offsets.back() += 3; },
+                     [](Model& m) { m.levels[0].face_offsets.erase(m.levels[0].face_offsets.begin() + 1); }});
 }
 
 TEST(Model, DamageOfTheBlendCodeIsSeen) {

@@ -1,5 +1,6 @@
 #include "filigree/hierarchy/reference_code.h"
 #include "filigree/mesh/shapes.h"
+#include "threads.h"
 
 #include <Eigen/Geometry>
 #include <cmath>
@@ -303,6 +304,7 @@ TEST(ReferenceCode, GridsAreWhatRestoreGives) {
 }
 
 TEST(ReferenceCode, SameBytesForAnyThreadCount) {
+    FILIGREE_NEEDS_TWO_THREADS();
     const Mesh mesh = make_wavy_cube({.resolution = 256});
     const RunContext three(3);
     const auto one_detail = encoded(mesh, 6);

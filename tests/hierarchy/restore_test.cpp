@@ -5,6 +5,7 @@
 #include "filigree/mesh/normals.h"
 #include "filigree/mesh/shapes.h"
 #include "hierarchy/stripping.h"
+#include "threads.h"
 
 #include <memory>
 #include <numbers>
@@ -245,6 +246,7 @@ TEST(Restore, CellsOfOneToSixHundredRecords) {
 }
 
 TEST(Restore, SameBytesForAnyThreads) {
+    FILIGREE_NEEDS_TWO_THREADS();
     Mesh mesh = make_wavy_cube({.resolution = 64});
     mesh.normals.values = vertex_normals(mesh, mesh.positions, kOneThread);
     const Model model = stripped(mesh).model;

@@ -4,6 +4,7 @@
 #include "filigree/mesh/mesh_distance.h"
 #include "filigree/mesh/shapes.h"
 #include "hierarchy/stripping.h"
+#include "threads.h"
 
 #include <random>
 
@@ -197,6 +198,7 @@ TEST(Strip, DuplicatesStayTogether) {
 }
 
 TEST(Strip, SameBytesForAnyThreads) {
+    FILIGREE_NEEDS_TWO_THREADS();
     for (const Precision precision : kPrecisions) {
         const Mesh mesh = make_wavy_cube({.resolution = 80});
         const StripOptions options{.base = 500, .precision = precision};

@@ -330,6 +330,7 @@ TEST(ModelFile, HostileNumbers) {
     refuses(blend, "bl.u", 1e30f);
     refuses(blend, "mesh.siz", 0u, 0);
     refuses(blend, "mesh.siz", 2u, 0);
+    refuses(blend, "mesh.num", std::uint64_t{48}, 0);
     refuses(blend, "levels", 65u, 0);
     refuses(blend, "levels", 0u, 0);
     refuses(blend, "code", 2u, 0);

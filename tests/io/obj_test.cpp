@@ -84,3 +84,10 @@ TEST(Obj, ErrorsNameTheLine) {
         EXPECT_NE(file.error().message.find(part), std::string::npos) << file.error().message;
     }
 }
+
+TEST(Obj, WeightsOfVerticesAreLeftOutWithAWarning) {
+    const auto file = read("v 0 0 0 1\nv 1 0 0 2\nv 0 1 0 .5\nf 1 2 3\n");
+    EXPECT_EQ(file->mesh.positions[1], Vec3f(1, 0, 0));
+    ASSERT_EQ(file->warnings.size(), 1u);
+    EXPECT_EQ(file->warnings[0].substr(0, 2), "2 ");
+}

@@ -98,3 +98,37 @@ TEST(Ply, ErrorsNameThePlace) {
         EXPECT_NE(file.error().message.find(part), std::string::npos) << file.error().message << " for " << part;
     }
 }
+
+TEST(Ply, AlphaWithoutAColourIsAScalar) {
+    const auto file = read(ascii(kVertices + "property float alpha\n" + kFaces, "0 0 0 .5 1 0 0 1 0 1 0 2 3 0 1 2\n"));
+    EXPECT_TRUE(file->mesh.colors.empty());
+    ASSERT_EQ(file->mesh.scalars.size(), 1u);
+    EXPECT_EQ(file->mesh.scalars[0].values, (std::vector<float>{0.5f, 1, 2}));
+}
+
+TEST(Ply, TexcoordBesideUvsOfVerticesIsLeftOutWithAWarning) {
+    const auto file =
+        read(ascii(kVertices + "property float s\nproperty float t\n" + kFaces + "property list uchar float texcoord\n",
+                   "0 0 0 0 0 1 0 0 1 0 0 1 0 0 1 3 0 1 2 6 9 9 9 9 9 9\n"));
+    EXPECT_TRUE(file->mesh.uvs.per_vertex());
+    EXPECT_EQ(file->mesh.uvs.values[1], Vec2f(1, 0));
+    ASSERT_EQ(file->warnings.size(), 1u);
+    EXPECT_NE(file->warnings[0].find("texcoord"), std::string::npos);
+}
+
+TEST(Ply, ScalarsWhoseNamesAreTakenGetOthers) {
+    Mesh mesh;
+    mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    mesh.add_face(Triangle{0, 1, 2});
+    mesh.scalars = {{"x", {1, 2, 3}}, {"a b", {4, 5, 6}}, {"a_b", {7, 8, 9}}};
+    std::string bytes;
+    const auto warnings = write_mesh(mesh, MeshFormat::ply, bytes);
+    ASSERT_EQ(warnings->size(), 1u);
+    EXPECT_NE((*warnings)[0].find("'x' of a scalar (now 'x_2')"), std::string::npos) << (*warnings)[0];
+    const auto back = read(bytes);
+    ASSERT_TRUE(back.ok()) << back.error().message;
+    EXPECT_EQ(back->mesh.positions, mesh.positions);
+    std::vector<std::string> names;
+    for (const VertexScalar& scalar : back->mesh.scalars) names.push_back(scalar.name);
+    EXPECT_EQ(names, (std::vector<std::string>{"x_2", "a_b", "a_b_2"}));
+}

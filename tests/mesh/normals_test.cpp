@@ -2,6 +2,7 @@
 
 #include "filigree/mesh/shapes.h"
 #include "filigree/mesh/triangulate.h"
+#include "threads.h"
 
 #include <gtest/gtest.h>
 
@@ -56,6 +57,7 @@ TEST(VertexNormals, PolygonsAgreeWithTheirTrianglesWhereFlat) {
 }
 
 TEST(VertexNormals, DoNotDependOnThreads) {
+    FILIGREE_NEEDS_TWO_THREADS();
     const Mesh mesh = make_wavy_cube({.resolution = 96});
     EXPECT_EQ(vertex_normals(mesh, mesh.positions, RunContext(1)), vertex_normals(mesh, mesh.positions, RunContext(3)));
 }

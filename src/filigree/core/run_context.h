@@ -16,7 +16,8 @@ namespace filigree {
 /// Passed by const reference down every long call. Cheap to copy; copies share the cancel flag and the arena.
 class RunContext {
 public:
-    /// threads: workers for parallel loops, 0 for all the processor has. Results never depend on it.
+    /// threads: workers for parallel loops, 0 for all the processor has. No more than the processors we may run on, as
+    /// more would only wait for each other: threads() says how many it became. Results never depend on it.
     explicit RunContext(unsigned threads = 0);
 
     /// Called from the calling thread with the phase's name and the fraction done, 0 to 1. Unset: silent.

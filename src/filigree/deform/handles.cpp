@@ -30,6 +30,7 @@ namespace filigree {
 namespace {
 
 constexpr std::size_t kGrain = 512;
+constexpr std::size_t kMaxVertices = 20'000'000; // the sparse matrices count their entries in int
 
 // Cotangents have no unit, so these hold for any mesh. The floor ties vertices together that only degenerate or obtuse
 // triangles connect; the ceiling (an angle of 0.06 degrees) keeps slivers from drowning everything else.
@@ -382,6 +383,9 @@ HandleSolver::~HandleSolver() = default;
 Result<HandleSolver> HandleSolver::create(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
                                           std::span<const Index> handles) {
     if (handles.empty()) return Error{ErrorCode::usage, "There is no handle; give at least one vertex a target."};
+    if (positions.size() > kMaxVertices)
+        return Error{ErrorCode::unsuitable, "Handles move at most " + std::to_string(kMaxVertices) +
+                                                " vertices; strip the mesh and move its driver."};
     std::vector<bool> is_handle(positions.size());
     for (const Index handle : handles) {
         const std::string name = "Handle vertex " + std::to_string(handle);

@@ -32,7 +32,8 @@ class HandleSolver {
 public:
     /// positions: V rest points; triangles: over them, any quality (degenerate ones only just hold their vertices
     /// together; a vertex that is connected to no handle stays where it is). handles: distinct vertices whose positions
-    /// are given. Errors: usage (a handle out of range, repeated, or none at all), out_of_memory.
+    /// are given. Errors: usage (a handle out of range, repeated, or none at all), unsuitable (more than
+    /// 20 million vertices), out_of_memory.
     static Result<HandleSolver> create(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
                                        std::span<const Index> handles);
     HandleSolver(HandleSolver&&) noexcept;

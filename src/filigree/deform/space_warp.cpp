@@ -49,13 +49,13 @@ std::unique_ptr<SpaceWarp> make_identity() {
 }
 
 /// A box along one of its axes: `along`, and the two axes across it in cyclic order.
-struct AxisFrame {
+struct AxisBasis {
     int along, across, across2;
     Vec3d centre;
     double low, high, length;
     bool thin;
 
-    AxisFrame(const Box& box, Axis axis)
+    AxisBasis(const Box& box, Axis axis)
         : along(static_cast<int>(axis)), across((along + 1) % 3), across2((along + 2) % 3), centre(box.centre()),
           low(box.min[along]), high(box.max[along]), length(box.size()[along]),
           thin(!(length > kThin * box.diagonal())) {}
@@ -64,11 +64,11 @@ struct AxisFrame {
     double clamp(double x) const { return std::clamp(x, low, high); }
 };
 
-/// Scales about the centre of the frame's box.
-std::unique_ptr<SpaceWarp> make_scale(const AxisFrame& frame, double along, double across) {
+/// Scales about the centre of the basis's box.
+std::unique_ptr<SpaceWarp> make_scale(const AxisBasis& basis, double along, double across) {
     Vec3d scale = Vec3d::Constant(across);
-    scale[frame.along] = along;
-    return make_warp([scale, centre = frame.centre](const Vec3d& p) {
+    scale[basis.along] = along;
+    return make_warp([scale, centre = basis.centre](const Vec3d& p) {
         return Warped{centre + scale.cwiseProduct(p - centre), scale.asDiagonal()};
     });
 }
@@ -224,16 +224,16 @@ void warp_normals(const SpaceWarp& warp, Mesh& mesh, const RunContext& context) 
 
 std::unique_ptr<SpaceWarp> make_stretch(const Box& box, Axis axis, double factor) {
     assert(factor != 0);
-    return make_scale(AxisFrame(box, axis), factor, 1);
+    return make_scale(AxisBasis(box, axis), factor, 1);
 }
 
 std::unique_ptr<SpaceWarp> make_squeeze(const Box& box, Axis axis, double factor) {
     assert(factor > 0);
-    return make_scale(AxisFrame(box, axis), factor, 1 / std::sqrt(factor));
+    return make_scale(AxisBasis(box, axis), factor, 1 / std::sqrt(factor));
 }
 
 std::unique_ptr<SpaceWarp> make_bend(const Box& box, Axis axis, double degrees) {
-    const AxisFrame f(box, axis);
+    const AxisBasis f(box, axis);
     if (f.thin) return make_identity();
     return make_warp([f, curvature = radians(degrees) / f.length](const Vec3d& p) {
         const double x = f.clamp(p[f.along]) - f.centre[f.along], beyond = p[f.along] - f.centre[f.along] - x;
@@ -256,7 +256,7 @@ std::unique_ptr<SpaceWarp> make_bend(const Box& box, Axis axis, double degrees) 
 }
 
 std::unique_ptr<SpaceWarp> make_twist(const Box& box, Axis axis, double degrees) {
-    const AxisFrame f(box, axis);
+    const AxisBasis f(box, axis);
     if (f.thin) return make_identity();
     return make_warp([f, rate = radians(degrees) / f.length](const Vec3d& p) {
         const double angle = rate * (f.clamp(p[f.along]) - f.centre[f.along]);
@@ -279,7 +279,7 @@ std::unique_ptr<SpaceWarp> make_twist(const Box& box, Axis axis, double degrees)
 
 std::unique_ptr<SpaceWarp> make_taper(const Box& box, Axis axis, double factor) {
     assert(factor > 0);
-    const AxisFrame f(box, axis);
+    const AxisBasis f(box, axis);
     if (f.thin) return make_identity();
     return make_warp([f, rate = (factor - 1) / f.length](const Vec3d& p) {
         const double scale = 1 + rate * (f.clamp(p[f.along]) - f.low);

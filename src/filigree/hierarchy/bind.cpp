@@ -6,6 +6,7 @@
 #include "filigree/mesh/closest_point.h"
 
 #include <algorithm>
+#include <optional>
 
 namespace filigree {
 
@@ -156,6 +157,9 @@ Result<Binding> bind_to_driver(std::span<const Vec3f> positions, std::span<const
                                std::span<const Triangle> triangles, std::span<const Vec3f> normals,
                                std::span<const Triangle> cells, const RunContext& context) {
     context.report("bind", 0);
+    if (std::max(triangles.size(), cells.size()) > kNoIndex / 3) // lists of triangles around vertices
+        return Error{ErrorCode::unsuitable, "The mesh has more triangles than 32-bit indices can list (" +
+                                                std::to_string(kNoIndex / 3) + "); split it into parts."};
     const std::size_t count = positions.size();
     std::vector<bool> in_driver(count, false);
     for (const Triangle& cell : cells)
@@ -191,7 +195,9 @@ Result<Binding> bind_to_driver(std::span<const Vec3f> positions, std::span<const
     if (context.is_cancelled()) return cancelled_error();
 
     if (std::find(kind.begin(), kind.end(), gap) != kind.end()) {
-        const ClosestPointTree tree(positions, cells);
+        std::optional<ClosestPointTree> built; // in our arena: Embree builds on the threads of the one it is called in
+        context.arena().execute([&] { built.emplace(positions, cells); });
+        const ClosestPointTree& tree = *built;
         parallel_for(context, count, 1 << 12, [&](std::size_t begin, std::size_t end) {
             for (std::size_t v = begin; v < end; ++v) {
                 if (kind[v] != gap || representative[v] != v) continue;

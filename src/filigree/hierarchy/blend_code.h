@@ -1,4 +1,5 @@
-// Our detail code: each vertex hangs on one driver cell and follows its gradients.
+// Our detail code: each vertex hangs on one driver cell (a triangle of the driver; where the driver has no faces, a
+// single vertex named three times) and follows its gradients.
 //
 // Driver vertex i rests at c_i and goes to c_i' with gradient A_i; a vertex p hangs at m = sum b_i c_i. The Hermite
 // blend

@@ -24,34 +24,15 @@ constexpr std::size_t kMaxRing = 48;     // neighbours a fit uses at most: more 
 using Row6 = Eigen::Matrix<double, 6, 1>;
 
 /// Columns: two unit tangents and the normal.
-Mat3d tangent_frame(const Vec3d& normal) {
-    Mat3d frame;
-    frame.col(0) = normal.unitOrthogonal();
-    frame.col(1) = normal.cross(frame.col(0));
-    frame.col(2) = normal;
-    return frame;
+Mat3d tangent_basis(const Vec3d& normal) {
+    Mat3d basis;
+    basis.col(0) = normal.unitOrthogonal();
+    basis.col(1) = normal.cross(basis.col(0));
+    basis.col(2) = normal;
+    return basis;
 }
 
 } // namespace
-
-double law_scale(Law law, double rest_area, double area) {
-    if (!(rest_area > 0)) return 1;
-    const double ratio = area / rest_area;
-    const auto bounded = [](double s) {
-        return std::clamp(s, 1.0 / kMaxLawScale, double{kMaxLawScale}); // also for ratio = 0, where s is infinite
-    };
-    switch (law) {
-    case Law::keep:
-        return 1;
-    case Law::inverse:
-        return bounded(1 / std::sqrt(ratio));
-    case Law::proportional:
-        return std::sqrt(ratio);
-    case Law::volume:
-        return bounded(1 / ratio);
-    }
-    return 1;
-}
 
 GradientFit::GradientFit(const Mesh& driver, const RunContext& context) {
     driver_.positions = driver.positions;
@@ -86,7 +67,10 @@ GradientFit::GradientFit(const Mesh& driver, const RunContext& context) {
         for (std::size_t k = 0; k < neighbours[i].size(); k += step) take(neighbours[i][k]);
         const std::size_t one_ring = ring_.size();
         for (std::size_t k = begin; k < one_ring && ring_.size() - begin < kMaxRing; ++k)
-            for (Index j : neighbours[ring_[k]]) take(j);
+            for (Index j : neighbours[ring_[k]]) {
+                if (ring_.size() - begin >= kMaxRing) break; // a fan may have any number
+                take(j);
+            }
         for (std::size_t k = begin; k < one_ring; ++k)
             edge_lengths_[i] +=
                 (driver_.positions[ring_[k]] - driver_.positions[i]).cast<double>().norm() / double(one_ring - begin);
@@ -107,7 +91,7 @@ GradientFit::Weights GradientFit::solve(double normal_weight, const RunContext& 
             const std::size_t ring_begin = ring_offsets_[i], ring_end = ring_offsets_[i + 1];
             const Vec3d normal = normals_[i].cast<double>();
             if (ring_begin == ring_end || normal.squaredNorm() == 0) continue;
-            const Mat3d frame = tangent_frame(normal.normalized());
+            const Mat3d basis = tangent_basis(normal.normalized());
             const Vec3d centre = driver_.positions[i].cast<double>();
             double size = 0;
             for (std::size_t k = ring_begin; k < ring_end; ++k)
@@ -119,7 +103,7 @@ GradientFit::Weights GradientFit::solve(double normal_weight, const RunContext& 
             rows.clear();
             Eigen::Matrix<double, 6, 6> normal_matrix = Eigen::Matrix<double, 6, 6>::Zero();
             for (std::size_t k = ring_begin; k < ring_end; ++k) {
-                const Vec3d x = frame.transpose() * (driver_.positions[ring_[k]].cast<double>() - centre) / size;
+                const Vec3d x = basis.transpose() * (driver_.positions[ring_[k]].cast<double>() - centre) / size;
                 Row6 row;
                 row << x[0], x[1], x[2], x[0] * x[0], x[0] * x[1], x[1] * x[1];
                 normal_matrix += row * row.transpose();
@@ -132,8 +116,8 @@ GradientFit::Weights GradientFit::solve(double normal_weight, const RunContext& 
             const Eigen::Matrix<double, 6, 3> inverse =
                 normal_matrix.ldlt().solve(Eigen::Matrix<double, 6, 3>::Identity());
             for (std::size_t k = ring_begin; k < ring_end; ++k)
-                weights.alpha[k] = frame * (inverse.transpose() * rows[k - ring_begin]) / size;
-            weights.beta[i] = frame * (m * normal_weight * inverse.row(2).transpose());
+                weights.alpha[k] = basis * (inverse.transpose() * rows[k - ring_begin]) / size;
+            weights.beta[i] = basis * (m * normal_weight * inverse.row(2).transpose());
         }
     });
     std::vector<Vec3d> columns(count);
@@ -198,9 +182,9 @@ void GradientFit::make_shell(std::span<Mat3f> gradients, Law law) const {
         const Vec3d n = normals_[i].cast<double>().normalized();
         if (n.squaredNorm() == 0) continue;
         const Mat3d a = gradients[i].cast<double>();
-        const Mat3d frame = tangent_frame(n);
+        const Mat3d basis = tangent_basis(n);
         const Vec3d across =
-            (a * frame.col(0)).cross(a * frame.col(1)); // the deformed normal; its length is the area ratio
+            (a * basis.col(0)).cross(a * basis.col(1)); // the deformed normal; its length is the area ratio
         const double area = across.norm();
         const Vec3d column = area > 0 ? Vec3d(law_scale(law, 1, area) * across / area) : Vec3d(Vec3d::Zero());
         gradients[i] = (a + (column - a * n) * n.transpose()).cast<float>();

@@ -54,7 +54,4 @@ private:
     Weights soft_, hard_;
 };
 
-/// s of a law from old and new area; `inverse` takes the square root of the area as its width.
-double law_scale(Law law, double rest_area, double area);
-
 } // namespace filigree

@@ -28,4 +28,7 @@ inline std::optional<Law> law_from_name(std::string_view name) {
     return std::nullopt;
 }
 
+/// s of a law from old and new area; `inverse` takes the square root of the area as its width.
+double law_scale(Law law, double rest_area, double area);
+
 } // namespace filigree

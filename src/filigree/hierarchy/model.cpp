@@ -53,6 +53,13 @@ std::string check_level(const Level& level, std::size_t vertex_count) {
     return check_mesh(mesh);
 }
 
+/// What the gradient fit's cost is bounded by: it pairs the corners of each face.
+bool all_triangles(const Level& level) {
+    for (std::size_t f = 0; f < level.face_count(); ++f)
+        if (level.face_offsets[f + 1] - level.face_offsets[f] != 3) return false;
+    return true;
+}
+
 std::string check_blend(const BlendDetail& detail, std::size_t vertex_count, std::size_t driver_count) {
     if (detail.cells.empty() || detail.cell_offsets.size() != detail.cells.size() + 1)
         return "cells and offsets differ";
@@ -89,8 +96,10 @@ std::string check_model(const Model& model) {
     if (model.levels.empty()) return "there is no driver";
     for (const Level& level : model.levels)
         if (std::string wrong = check_level(level, model.mesh.vertex_count()); !wrong.empty()) return wrong;
-    if (const auto* blend = std::get_if<BlendDetail>(&model.detail))
+    if (const auto* blend = std::get_if<BlendDetail>(&model.detail)) {
+        if (!all_triangles(model.driver())) return "the driver of a blend model has faces that are not triangles";
         return check_blend(*blend, model.mesh.vertex_count(), model.driver().vertices.size());
+    }
     const auto& reference = std::get<ReferenceDetail>(model.detail);
     if (reference.patches.levels != model.levels.size() ||
         reference.rest_driver.size() != model.driver().vertices.size())

@@ -12,7 +12,7 @@ namespace {
 
 using namespace reference;
 
-// Coordinates in a frame beyond this are kept as loose points: those of a sliver fling them about when it opens.
+// Coordinates in a basis beyond this are kept as loose points: those of a sliver fling them about when it opens.
 constexpr double kMaxCoordinate = 4;
 // So are points that decode worse than this, as a fraction of the power of two above the extent.
 constexpr float kMaxRoundTripError = 2.5e-7f;
@@ -21,9 +21,9 @@ constexpr std::size_t kRecordsPerTask = 16384;
 Vec3d to_vector(const Point<float>& p) { return {p.x, p.y, p.z}; }
 
 /// (v, w, h) of a point: the report's signed areas, eq. 2.10 to 2.13. They need no projection, since its height over
-/// the plane drops out of the products with r. Not finite where the frame spans no plane.
-Vec3d coordinates(const Frame<float>& frame, const Vec3d& point) {
-    const Vec3d across = to_vector(frame.across), up = to_vector(frame.up), p = point - to_vector(frame.origin);
+/// the plane drops out of the products with r. Not finite where the basis spans no plane.
+Vec3d coordinates(const Basis<float>& basis, const Vec3d& point) {
+    const Vec3d across = to_vector(basis.across), up = to_vector(basis.up), p = point - to_vector(basis.origin);
     const Vec3d r = across.cross(up);
     return {p.cross(up).dot(r) / r.squaredNorm(), across.cross(p).dot(r) / r.squaredNorm(), p.dot(r) / r.norm()};
 }
@@ -37,14 +37,14 @@ public:
 
     Status encode() {
         for (const Index vertex : plan_.driver_vertices()) detail_.rest_driver.push_back(mesh_.positions[vertex]);
-        const Pose pose = plan_.begin(detail_.rest_driver, true, work_.coarse);
+        const PlacedDriver placed = plan_.begin(detail_.rest_driver, true, work_.coarse);
         for (unsigned level = 0; level < detail_.patches.levels; ++level) {
             if (context_.is_cancelled()) return cancelled_error();
             context_.report("remove detail", static_cast<double>(level) / detail_.patches.levels);
-            encode_level(pose.axes);
+            encode_level(placed.axes);
             if (level + 1 == detail_.patches.levels) break;
             plan_.fold_level(work_.coarse, context_);
-            plan_.refine(level, pose, work_.coarse, work_.fine, work_.edges, context_);
+            plan_.refine(level, placed, work_.coarse, work_.fine, work_.edges, context_);
             std::swap(work_.coarse, work_.fine);
         }
         return Success{};
@@ -56,9 +56,9 @@ private:
         const std::size_t m = work_.coarse.cells(), half_step = patches.side() / m / 2, first = detail_.records.size();
         detail_.records.resize(first + plan_.record_count(m));
         std::vector<std::uint8_t> loose(plan_.record_count(m), 0);
-        const auto encode = [&](std::size_t number, Index vertex, const Frame<float>& frame, const Point<float>& from,
+        const auto encode = [&](std::size_t number, Index vertex, const Basis<float>& basis, const Point<float>& from,
                                 const Mat3f& base_axes) {
-            loose[number] = !encode_point(frame, vertex, detail_.records[first + number]);
+            loose[number] = !encode_point(basis, vertex, detail_.records[first + number]);
             if (loose[number]) encode_loose(from, base_axes, vertex, detail_.records[first + number]);
         };
         const BaseEdges& edges = plan_.edges();
@@ -69,7 +69,7 @@ private:
                         const References<float> r = side_references(work_.coarse, edges, edge, k);
                         const Index half = edges.halves[edge];
                         encode(plan_.edge_record(m, edge, k), side_vertex(patches, half, (2 * k + 1) * half_step),
-                               edge_frame(references(), r, edges.twins[edge] != kNoIndex), r.ends[0], axes[half / 4]);
+                               edge_basis(references(), r, edges.twins[edge] != kNoIndex), r.ends[0], axes[half / 4]);
                     }
             });
         parallel_for(
@@ -84,7 +84,7 @@ private:
                             const bool right = kind != CellPoint::upwards, up = kind != CellPoint::along;
                             encode(plan_.cell_record(m, p, i, j, kind),
                                    patches.at(p, (2 * i + right) * half_step, (2 * j + up) * half_step),
-                                   cell_frame(references(), work_.coarse, kind, p, i, j),
+                                   cell_basis(references(), work_.coarse, kind, p, i, j),
                                    work_.coarse.at(p, i, j + !right), axes[p]);
                         }
             });
@@ -93,12 +93,12 @@ private:
     }
 
     /// Whether the point decodes well from the record.
-    bool encode_point(const Frame<float>& frame, Index vertex, Vec3f& record) const {
+    bool encode_point(const Basis<float>& basis, Index vertex, Vec3f& record) const {
         const Vec3d target = scaled_position(vertex);
-        const Vec3d c = coordinates(frame, target);
+        const Vec3d c = coordinates(basis, target);
         if (!(std::abs(c.x()) <= kMaxCoordinate && std::abs(c.y()) <= kMaxCoordinate && c.allFinite())) return false;
         record = c.cast<float>();
-        const Point<float> decoded = place(frame, {record.x(), record.y(), record.z()}, 0.0f, Scaling{});
+        const Point<float> decoded = place(basis, {record.x(), record.y(), record.z()}, 0.0f, Scaling{});
         record.z() = std::ldexp(record.z(), exponent_);
         return (to_vector(decoded) - target).cwiseAbs().maxCoeff() <= kMaxRoundTripError;
     }
@@ -150,7 +150,7 @@ ReferenceRestorer::ReferenceRestorer(const ReferenceDetail& detail, Law law, con
     : state_(std::make_unique<State>(detail, law)) {
     Plan& plan = state_->plan;
     Work work;
-    const Pose rest = plan.begin(detail.rest_driver, !detail.loose.empty(), work.coarse);
+    const PlacedDriver rest = plan.begin(detail.rest_driver, !detail.loose.empty(), work.coarse);
     for (unsigned level = 0; level < detail.patches.levels; ++level) {
         plan.fold_level(work.coarse, context);
         // Without a law nobody asks what sizes were at rest.

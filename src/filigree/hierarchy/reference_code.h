@@ -39,7 +39,7 @@ struct ReferenceDetail {
     /// its centre.
     std::vector<Vec3f> records;
     /// Records, ascending, of points whose references at rest span no plane, or that lie too far from them: their
-    /// numbers are an offset from the first reference in the frame of the base quad, and no law applies.
+    /// numbers are an offset from the first reference in the basis of the base quad, and no law applies.
     std::vector<Index> loose;
 };
 
@@ -52,7 +52,7 @@ Result<ReferenceDetail> encode_reference(const Mesh& mesh, const ReferenceOption
 class ReferenceRestorer {
 public:
     /// Folds the law into the records. Keeps a reference to `detail`. Cost O(V).
-    ReferenceRestorer(const ReferenceDetail& detail, Law law, const RunContext& context = RunContext());
+    ReferenceRestorer(const ReferenceDetail& detail, Law law, const RunContext& context);
     ~ReferenceRestorer();
     ReferenceRestorer(ReferenceRestorer&&) noexcept;
     ReferenceRestorer& operator=(ReferenceRestorer&&) noexcept;

@@ -77,10 +77,10 @@ FILIGREE_INLINE void refine_lanes(const CellRow& row, const Scaling& scaling, co
         upwards.behind[0] = load<F>(row.upper + i - 1, row.pitch);
         upwards.behind[1] = load<F>(row.lower + i - 1, row.pitch);
     }
-    const auto edge = place(edge_frame<kReferences>(along, true), record(0), size(0), scaling);
+    const auto edge = place(edge_basis<kReferences>(along, true), record(0), size(0), scaling);
     store_zipped(a0, edge, row.even + 2 * i, row.fine_pitch);
-    const auto side = place(edge_frame<kReferences>(upwards, true), record(1), size(1), scaling);
-    const auto centre = place(centre_frame<kReferences>(along), record(2), size(kReferences == 6 ? 2 : 0), scaling);
+    const auto side = place(edge_basis<kReferences>(upwards, true), record(1), size(1), scaling);
+    const auto centre = place(centre_basis<kReferences>(along), record(2), size(kReferences == 6 ? 2 : 0), scaling);
     store_zipped(side, centre, row.odd + 2 * i, row.fine_pitch);
 }
 
@@ -173,12 +173,12 @@ void refine_edge(const EdgeRun& run, int references, const Scaling& scaling, flo
     for (std::size_t lane = 0; lane < run.count; lane += 4) {
         const auto point = [&](std::size_t k) { return load<Lanes4>(from + k * kLanes + lane, next_coordinate); };
         const References<Lanes4> r{{point(0), point(1)}, {point(2), point(3)}, {point(4), point(5)}};
-        const Frame<Lanes4> frame = references == 3   ? edge_frame<3>(r, run.both_sides)
-                                    : references == 4 ? edge_frame<4>(r, run.both_sides)
-                                                      : edge_frame<6>(r, run.both_sides);
+        const Basis<Lanes4> basis = references == 3   ? edge_basis<3>(r, run.both_sides)
+                                    : references == 4 ? edge_basis<4>(r, run.both_sides)
+                                                      : edge_basis<6>(r, run.both_sides);
         const float* code = run.code + lane;
         const Lanes4 size = scaling.law == Law::keep ? Lanes4{} : load<Lanes4>(code + 3 * run.count);
-        const Point<Lanes4> p = place(frame, load<Lanes4>(code, run.count), size, scaling);
+        const Point<Lanes4> p = place(basis, load<Lanes4>(code, run.count), size, scaling);
         store(p.x, out[0] + lane);
         store(p.y, out[1] + lane);
         store(p.z, out[2] + lane);

@@ -1,4 +1,4 @@
-// The arithmetic of the reference code: frames of reference points, placing a point in one, and the two loops that
+// The arithmetic of the reference code: bases of reference points, placing a point in one, and the two loops that
 // refine a row and an edge of a patch. Internal to reference_code.cpp.
 //
 // One template serves a single float (the encoder) and four, eight or sixteen lanes (the restorer). Both do the same
@@ -89,15 +89,15 @@ struct References {
 
 /// A plane with coordinates: origin + v across + w up, and the height over it.
 template <class F>
-struct Frame {
+struct Basis {
     Point<F> origin, across, up;
 };
 
-/// The frame of an edge point. Three references (the report): C1, C2 and Cm = (C3 + C4) / 2 span it. Four: the origin
+/// The basis of an edge point. Three references (the report): C1, C2 and Cm = (C3 + C4) / 2 span it. Four: the origin
 /// is the edge's middle, `across` the mean of the quad's two edges along it. Six (`both_sides`): `across` is the mean
 /// over the quads on both sides, in which the edge itself counts twice, and `up` half the way between their far edges.
 template <int kReferences, class F>
-FILIGREE_INLINE Frame<F> edge_frame(const References<F>& r, bool both_sides) {
+FILIGREE_INLINE Basis<F> edge_basis(const References<F>& r, bool both_sides) {
     const Point<F> far_middle = 0.5f * (r.beyond[0] + r.beyond[1]);
     const Point<F> along = r.ends[1] - r.ends[0];
     if constexpr (kReferences == 3) return {r.ends[0], along, far_middle - r.ends[0]};
@@ -109,13 +109,13 @@ FILIGREE_INLINE Frame<F> edge_frame(const References<F>& r, bool both_sides) {
     return {middle, 0.5f * along + mean_along, 0.5f * (far_middle - behind_middle)};
 }
 
-/// The frame of a quad's centre point, from the references of its lower edge. Three: that edge's frame. Four and six:
+/// The basis of a quad's centre point, from the references of its lower edge. Three: that edge's basis. Four and six:
 /// the quad's mean, and the means of its opposite edges.
 template <int kReferences, class F>
-FILIGREE_INLINE Frame<F> centre_frame(const References<F>& r) {
-    Frame<F> frame = edge_frame < kReferences == 3 ? 3 : 4 > (r, false);
-    if constexpr (kReferences != 3) frame.origin = frame.origin + 0.5f * frame.up;
-    return frame;
+FILIGREE_INLINE Basis<F> centre_basis(const References<F>& r) {
+    Basis<F> basis = edge_basis < kReferences == 3 ? 3 : 4 > (r, false);
+    if constexpr (kReferences != 3) basis.origin = basis.origin + 0.5f * basis.up;
+    return basis;
 }
 
 /// What the law needs besides the records. Factors take the records' unit to the pose's.
@@ -125,11 +125,11 @@ struct Scaling {
     float size = 1;   ///< factor on rest sizes
 };
 
-/// A frame's size, as the law stores it at rest: width, 1 / area, area.
+/// A basis's size, as the law stores it at rest: width, 1 / area, area.
 template <class F>
-FILIGREE_INLINE F rest_size(const Frame<F>& frame, Law law) {
-    const Point<F> normal = cross(frame.across, frame.up);
-    const F width2 = dot(frame.across, frame.across), area2 = dot(normal, normal);
+FILIGREE_INLINE F rest_size(const Basis<F>& basis, Law law) {
+    const Point<F> normal = cross(basis.across, basis.up);
+    const F width2 = dot(basis.across, basis.across), area2 = dot(normal, normal);
     if (law == Law::inverse) return width2 * inverse_sqrt(width2);
     if (law == Law::proportional) return inverse_sqrt(area2);
     return area2 * inverse_sqrt(area2);
@@ -137,15 +137,15 @@ FILIGREE_INLINE F rest_size(const Frame<F>& frame, Law law) {
 
 /// Eq. 2.7 and 2.14: origin + v across + w up + s h n, with s from the law.
 template <class F>
-FILIGREE_INLINE Point<F> place(const Frame<F>& frame, const Point<F>& record, F size, const Scaling& scaling) {
-    const Point<F> normal = cross(frame.across, frame.up);
+FILIGREE_INLINE Point<F> place(const Basis<F>& basis, const Point<F>& record, F size, const Scaling& scaling) {
+    const Point<F> normal = cross(basis.across, basis.up);
     const F area2 = dot(normal, normal);
     const F inverse_area = inverse_sqrt(area2);
     F height = scaling.height * record.z;
     if (scaling.law != Law::keep) {
         F s = scaling.size * size;
         if (scaling.law == Law::inverse) {
-            s = s * inverse_sqrt(dot(frame.across, frame.across));
+            s = s * inverse_sqrt(dot(basis.across, basis.across));
         } else if (scaling.law == Law::proportional) {
             s = at_most(s * (area2 * inverse_area), kHugeRatio);
             s = s * inverse_sqrt(s); // grows with its surroundings alone: no bound needed
@@ -155,7 +155,7 @@ FILIGREE_INLINE Point<F> place(const Frame<F>& frame, const Point<F>& record, F 
         if (scaling.law != Law::proportional) s = at_most(at_least(s, 1 / kMaxLawScale), kMaxLawScale);
         height = height * s;
     }
-    return frame.origin + (record.x * frame.across + record.y * frame.up + (height * inverse_area) * normal);
+    return basis.origin + (record.x * basis.across + record.y * basis.up + (height * inverse_area) * normal);
 }
 
 /// Cells of a patch's row at one level. Rows hold x, y and z one after the other, `pitch` apart; up to kLanes floats
@@ -182,7 +182,7 @@ struct EdgeRun {
 };
 
 inline std::size_t block_width(std::size_t cells) { return std::min(cells, kLanes); }
-/// Kinds of frame with a size of their own in a cell: with six references the centre's is none of the edges'.
+/// Kinds of basis with a size of their own in a cell: with six references the centre's is none of the edges'.
 inline std::size_t cell_sizes(int references, Law law) { return law == Law::keep ? 0 : references == 6 ? 3 : 2; }
 /// A block of cells in blocks of up to kLanes: v, w, h of the edge points along the row, of those across it and of the
 /// centres, then the sizes.

@@ -177,13 +177,13 @@ Point<float> loose_point(const Point<float>& from, const Mat3f& axes, const Vec3
     return {from.x + moved.x(), from.y + moved.y(), from.z + moved.z()};
 }
 
-Frame<float> edge_frame(int references, const References<float>& r, bool both_sides) {
-    return references == 3   ? reference::edge_frame<3>(r, both_sides)
-           : references == 4 ? reference::edge_frame<4>(r, both_sides)
-                             : reference::edge_frame<6>(r, both_sides);
+Basis<float> edge_basis(int references, const References<float>& r, bool both_sides) {
+    return references == 3   ? reference::edge_basis<3>(r, both_sides)
+           : references == 4 ? reference::edge_basis<4>(r, both_sides)
+                             : reference::edge_basis<6>(r, both_sides);
 }
-Frame<float> centre_frame(int references, const References<float>& r) {
-    return references == 3 ? reference::centre_frame<3>(r) : reference::centre_frame<4>(r);
+Basis<float> centre_basis(int references, const References<float>& r) {
+    return references == 3 ? reference::centre_basis<3>(r) : reference::centre_basis<4>(r);
 }
 
 /// Cell (i, j)'s references for the point on its lower edge.
@@ -213,10 +213,10 @@ References<float> side_references(const Grid& grid, const BaseEdges& edges, std:
     return r;
 }
 
-Frame<float> cell_frame(int references, const Grid& grid, CellPoint kind, std::size_t patch, std::size_t i,
+Basis<float> cell_basis(int references, const Grid& grid, CellPoint kind, std::size_t patch, std::size_t i,
                         std::size_t j) {
-    if (kind == CellPoint::centre) return centre_frame(references, along_references(grid, patch, i, j));
-    return edge_frame(
+    if (kind == CellPoint::centre) return centre_basis(references, along_references(grid, patch, i, j));
+    return edge_basis(
         references,
         kind == CellPoint::along ? along_references(grid, patch, i, j) : upwards_references(grid, patch, i, j), true);
 }
@@ -269,7 +269,7 @@ void Plan::fold_edges(Level& level, std::span<const Vec3f> records, const Grid& 
                     const Vec3f& record = records[edge_record(m, edge, k)];
                     to[0] = record.x(), to[width] = record.y(), to[2 * width] = std::ldexp(record.z(), -rest_exponent_);
                     if (law_ != Law::keep)
-                        to[3 * width] = rest_size(edge_frame(references_, side_references(rest, edges_, edge, k),
+                        to[3 * width] = rest_size(edge_basis(references_, side_references(rest, edges_, edge, k),
                                                              edges_.twins[edge] != kNoIndex),
                                                   law_);
                 }
@@ -290,7 +290,7 @@ void Plan::fold_cells(Level& level, std::span<const Vec3f> records, const Grid& 
             slot[0] = record.x(), slot[width] = record.y(), slot[2 * width] = std::ldexp(record.z(), -rest_exponent_);
         }
         for (std::size_t k = 0; k < cell_sizes(references_, law_); ++k)
-            to[(9 + k) * width] = rest_size(cell_frame(references_, rest, static_cast<CellPoint>(k), p, i, j), law_);
+            to[(9 + k) * width] = rest_size(cell_basis(references_, rest, static_cast<CellPoint>(k), p, i, j), law_);
     };
     parallel_for(context, rows, std::max<std::size_t>(1, kPointsPerTask / m), [&](auto begin, auto end) {
         for (std::size_t row = begin; row < end; ++row)
@@ -330,30 +330,30 @@ void Plan::fold_loose(Level& level, std::size_t first, std::size_t count, std::s
     }
 }
 
-Pose Plan::begin(std::span<const Vec3f> driver, bool with_axes, Grid& grid) const {
+PlacedDriver Plan::begin(std::span<const Vec3f> driver, bool with_axes, Grid& grid) const {
     assert(driver.size() == driver_vertices_.size());
     const int exponent = std::max(rest_exponent_, exponent_of(extent_of(driver)));
-    Pose pose;
-    pose.to_unit = std::ldexp(1.0f, -exponent);
-    pose.from_unit = std::ldexp(1.0f, exponent);
-    pose.scaling.law = law_;
-    pose.scaling.height = std::ldexp(1.0f, rest_exponent_ - exponent);
+    PlacedDriver placed;
+    placed.to_unit = std::ldexp(1.0f, -exponent);
+    placed.from_unit = std::ldexp(1.0f, exponent);
+    placed.scaling.law = law_;
+    placed.scaling.height = std::ldexp(1.0f, rest_exponent_ - exponent);
     const int area_exponent = 2 * (rest_exponent_ - exponent);
-    pose.scaling.size = law_ == Law::volume         ? std::ldexp(1.0f, area_exponent)
-                        : law_ == Law::proportional ? std::min(std::ldexp(1.0f, -area_exponent), kHugeRatio)
-                                                    : pose.scaling.height;
+    placed.scaling.size = law_ == Law::volume         ? std::ldexp(1.0f, area_exponent)
+                          : law_ == Law::proportional ? std::min(std::ldexp(1.0f, -area_exponent), kHugeRatio)
+                                                      : placed.scaling.height;
     grid.resize(patches().patch_count(), 1);
     for (std::size_t slot = 0; slot < driver_slots_.size(); ++slot) {
-        const Vec3f p = pose.to_unit * driver[driver_slots_[slot]];
+        const Vec3f p = placed.to_unit * driver[driver_slots_[slot]];
         const std::size_t corner = slot % 4;
         grid.set(slot / 4, corner == 1 || corner == 2, corner >= 2, {p.x(), p.y(), p.z()});
     }
     for (std::size_t patch = 0; with_axes && patch < patches().patch_count(); ++patch)
-        pose.axes.push_back(base_axes(grid, patch));
-    return pose;
+        placed.axes.push_back(base_axes(grid, patch));
+    return placed;
 }
 
-void Plan::refine_edges(const Level& level, const Pose& pose, const Grid& coarse, std::vector<float>& edges,
+void Plan::refine_edges(const Level& level, const PlacedDriver& placed, const Grid& coarse, std::vector<float>& edges,
                         const RunContext& context) const {
     const std::size_t m = coarse.cells(), width = block_width(m), blocks = edges_.halves.size() * (m / width);
     edges.resize(3 * edges_.halves.size() * m);
@@ -371,7 +371,7 @@ void Plan::refine_edges(const Level& level, const Pose& pose, const Grid& coarse
             }
         }
         float points[3][kLanes];
-        refine_edge(run, references_, pose.scaling, points);
+        refine_edge(run, references_, placed.scaling, points);
         float* to = edges.data() + 3 * (edge * m + k0);
         for (std::size_t lane = 0; lane < width; ++lane, to += 3)
             for (std::size_t c = 0; c < 3; ++c) to[c] = points[c][lane];
@@ -381,7 +381,7 @@ void Plan::refine_edges(const Level& level, const Pose& pose, const Grid& coarse
     });
     for (const LoosePoint& loose : level.loose_on_edges) {
         const Point<float> p = loose_point(Side(coarse, edges_.halves[loose.edge]).at(loose.i, 0),
-                                           pose.axes[loose.patch], pose.scaling.height * loose.offset);
+                                           placed.axes[loose.patch], placed.scaling.height * loose.offset);
         float* to = edges.data() + 3 * (loose.edge * m + loose.i);
         to[0] = p.x, to[1] = p.y, to[2] = p.z;
     }
@@ -393,8 +393,8 @@ const float* Plan::edge_point(const std::vector<float>& edges, std::size_t m, In
 }
 
 template <class Sink>
-void Plan::refine_cells(const Level& level, const Pose& pose, const Grid& coarse, const std::vector<float>& edges,
-                        const Sink& sink, const RunContext& context) const {
+void Plan::refine_cells(const Level& level, const PlacedDriver& placed, const Grid& coarse,
+                        const std::vector<float>& edges, const Sink& sink, const RunContext& context) const {
     const std::size_t m = coarse.cells(), rows = patches().patch_count() * m;
     const std::size_t row_floats = m * cell_floats(references_, law_), fine_pitch = (2 * m / kLanes + 3) * kLanes;
     parallel_for(context, rows, std::max<std::size_t>(1, kPointsPerTask / (4 * m)), [&](auto begin, auto end) {
@@ -410,7 +410,7 @@ void Plan::refine_cells(const Level& level, const Pose& pose, const Grid& coarse
             const float *lower = coarse.row(p, j), *upper = coarse.row(p, j + 1);
             refine_row({j > 0 ? coarse.row(p, j - 1) : lower, lower, upper, coarse.pitch(), m,
                         level.cells.front().floats + row * row_floats, even, odd, fine_pitch},
-                       references_, pose.scaling);
+                       references_, placed.scaling);
             for (std::size_t c = 0; c < 3; ++c) even[c * fine_pitch + 2 * m] = lower[c * coarse.pitch() + m];
             for (std::size_t k = 0; j == 0 && k < m; ++k) set(even, 2 * k + 1, edge_point(edges, m, half, k));
             writer.write(even, fine_pitch, p, 2 * j);
@@ -429,29 +429,29 @@ void Plan::refine_cells(const Level& level, const Pose& pose, const Grid& coarse
         // The first reference: the cell's lower left corner, or its upper left one where the edge runs down.
         const Point<float> from = coarse.at(loose.patch, loose.i, loose.j + !right);
         sink.set(loose.patch, 2 * loose.i + right, 2 * loose.j + up,
-                 loose_point(from, pose.axes[loose.patch], pose.scaling.height * loose.offset));
+                 loose_point(from, placed.axes[loose.patch], placed.scaling.height * loose.offset));
     }
 }
 
 template <class Sink>
-void Plan::refine_into(unsigned level, const Pose& pose, const Grid& coarse, const Sink& sink,
+void Plan::refine_into(unsigned level, const PlacedDriver& placed, const Grid& coarse, const Sink& sink,
                        std::vector<float>& edges, const RunContext& context) const {
-    refine_edges(levels_[level], pose, coarse, edges, context);
-    refine_cells(levels_[level], pose, coarse, edges, sink, context);
+    refine_edges(levels_[level], placed, coarse, edges, context);
+    refine_cells(levels_[level], placed, coarse, edges, sink, context);
 }
 
-void Plan::refine(unsigned level, const Pose& pose, const Grid& coarse, Grid& fine, std::vector<float>& edges,
+void Plan::refine(unsigned level, const PlacedDriver& placed, const Grid& coarse, Grid& fine, std::vector<float>& edges,
                   const RunContext& context) const {
     fine.resize(patches().patch_count(), 2 * coarse.cells());
-    refine_into(level, pose, coarse, GridSink{fine}, edges, context);
+    refine_into(level, placed, coarse, GridSink{fine}, edges, context);
 }
 
 void Plan::restore(std::span<const Vec3f> driver, unsigned level, std::span<Vec3f> positions, Work& work,
                    const RunContext& context) const {
-    const Pose pose = begin(driver, !detail_.loose.empty(), work.coarse);
+    const PlacedDriver placed = begin(driver, !detail_.loose.empty(), work.coarse);
     const std::size_t side = (std::size_t{1} << level) + 1;
     assert(level <= levels_.size() && positions.size() == patches().patch_count() * side * side);
-    const ArraySink sink{positions, side, pose.from_unit};
+    const ArraySink sink{positions, side, placed.from_unit};
     if (level == 0) {
         for (std::size_t slot = 0; slot < driver_slots_.size(); ++slot) {
             const std::size_t corner = slot % 4;
@@ -460,10 +460,10 @@ void Plan::restore(std::span<const Vec3f> driver, unsigned level, std::span<Vec3
         return;
     }
     for (unsigned l = 0; l + 1 < level; ++l) {
-        refine(l, pose, work.coarse, work.fine, work.edges, context);
+        refine(l, placed, work.coarse, work.fine, work.edges, context);
         std::swap(work.coarse, work.fine);
     }
-    refine_into(level - 1, pose, work.coarse, sink, work.edges, context);
+    refine_into(level - 1, placed, work.coarse, sink, work.edges, context);
 }
 
 std::unique_ptr<Work> Plan::take_work() const {

@@ -100,16 +100,16 @@ References<float> along_references(const Grid& grid, std::size_t patch, std::siz
 References<float> upwards_references(const Grid& grid, std::size_t patch, std::size_t i, std::size_t j);
 References<float> side_references(const Grid& grid, const BaseEdges& edges, std::size_t edge, std::size_t k);
 
-Frame<float> edge_frame(int references, const References<float>& r, bool both_sides);
-Frame<float> centre_frame(int references, const References<float>& r);
+Basis<float> edge_basis(int references, const References<float>& r, bool both_sides);
+Basis<float> centre_basis(int references, const References<float>& r);
 
 /// Kinds of coded points in a cell, in the order of their records.
 enum class CellPoint { along, upwards, centre };
-Frame<float> cell_frame(int references, const Grid& grid, CellPoint kind, std::size_t patch, std::size_t i,
+Basis<float> cell_basis(int references, const Grid& grid, CellPoint kind, std::size_t patch, std::size_t i,
                         std::size_t j);
 
 /// Where a driver is scaled from and to, and the law's factors for it.
-struct Pose {
+struct PlacedDriver {
     float to_unit = 1, from_unit = 1;
     Scaling scaling;
     std::vector<Mat3f> axes; ///< of each base quad, when asked for
@@ -141,9 +141,9 @@ public:
     void fold_level(const Grid& rest, const RunContext& context);
 
     /// Sets the driver's grid.
-    Pose begin(std::span<const Vec3f> driver, bool with_axes, Grid& grid) const;
+    PlacedDriver begin(std::span<const Vec3f> driver, bool with_axes, Grid& grid) const;
     /// One level finer.
-    void refine(unsigned level, const Pose& pose, const Grid& coarse, Grid& fine, std::vector<float>& edges,
+    void refine(unsigned level, const PlacedDriver& placed, const Grid& coarse, Grid& fine, std::vector<float>& edges,
                 const RunContext& context) const;
     /// All levels from the driver to `level`, into grids as ReferenceRestorer::restore_grids has them.
     void restore(std::span<const Vec3f> driver, unsigned level, std::span<Vec3f> positions, Work& work,
@@ -170,14 +170,14 @@ private:
     void fold_edges(Level& level, std::span<const Vec3f> records, const Grid& rest, const RunContext& context) const;
     void fold_cells(Level& level, std::span<const Vec3f> records, const Grid& rest, const RunContext& context) const;
     void fold_loose(Level& level, std::size_t first, std::size_t count, std::size_t m) const;
-    void refine_edges(const Level& level, const Pose& pose, const Grid& coarse, std::vector<float>& edges,
+    void refine_edges(const Level& level, const PlacedDriver& placed, const Grid& coarse, std::vector<float>& edges,
                       const RunContext& context) const;
     template <class Sink>
-    void refine_cells(const Level& level, const Pose& pose, const Grid& coarse, const std::vector<float>& edges,
-                      const Sink& sink, const RunContext& context) const;
+    void refine_cells(const Level& level, const PlacedDriver& placed, const Grid& coarse,
+                      const std::vector<float>& edges, const Sink& sink, const RunContext& context) const;
     template <class Sink>
-    void refine_into(unsigned level, const Pose& pose, const Grid& coarse, const Sink& sink, std::vector<float>& edges,
-                     const RunContext& context) const;
+    void refine_into(unsigned level, const PlacedDriver& placed, const Grid& coarse, const Sink& sink,
+                     std::vector<float>& edges, const RunContext& context) const;
     /// Point k of a side, in the side's own direction.
     const float* edge_point(const std::vector<float>& edges, std::size_t m, Index half, std::size_t k) const;
 

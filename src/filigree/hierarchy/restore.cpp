@@ -78,7 +78,7 @@ Result<Restorer> Restorer::create(const Model& model, const RestoreOptions& opti
         content->prepare_blend(context);
     } else {
         content->law = options.law.value_or(Law::inverse);
-        content->reference.emplace(std::get<ReferenceDetail>(model.detail), content->law);
+        content->reference.emplace(std::get<ReferenceDetail>(model.detail), content->law, context);
     }
     return Restorer(std::move(content));
 }

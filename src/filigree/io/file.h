@@ -14,8 +14,9 @@ namespace filigree {
 Result<std::string> read_file(const std::filesystem::path& path);
 
 /// Replaces `path` by `pieces`, one after the other: written to a temporary file in the same folder, flushed, then
-/// renamed. On any error, or when the process dies, `path` is as it was. "-" is standard output.
-/// Symbolic links are followed, and the permissions of an existing file are kept. Errors: unwritable.
+/// renamed. On any error, or when the process dies, `path` is as it was. "-" is standard output. Only a device or pipe
+/// is written in place: it cannot be replaced, and keeps what it got before an error. Symbolic links are followed, and
+/// the permissions of an existing file are kept. Errors: unwritable.
 Status write_file(const std::filesystem::path& path, std::span<const std::string_view> pieces);
 
 } // namespace filigree

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <map>
 #include <new>
+#include <stdexcept>
 
 #define XXH_INLINE_ALL
 #include <xxhash.h>
@@ -346,11 +347,13 @@ Model read_sections(std::string_view bytes) {
     else
         model.detail = read_blend(in);
 
-    // int16 models hold the driver's positions alone; the others come from the records, once those are known to be
-    // sound.
+    // Float models hold every position. int16 models hold the driver's positions alone; the others come from the
+    // records, once those are known to be sound.
     const std::vector<Vec3f> driver = in.array<Vec3f>("drv.pos");
+    const auto vertex_count = in.value<std::uint64_t>("mesh.num");
+    if (driver.empty() && vertex_count != model.mesh.vertex_count())
+        throw Damage{"does not have as many positions as it says"};
     if (!driver.empty()) {
-        const auto vertex_count = in.value<std::uint64_t>("mesh.num");
         auto* detail = std::get_if<BlendDetail>(&model.detail);
         if (!detail || vertex_count != detail->order.size() || model.levels.empty() ||
             driver.size() != model.driver().vertices.size() || detail->precision != Precision::int16)
@@ -389,11 +392,15 @@ std::string write_model(const Model& model) {
 Status write_model(const Model& model, const std::filesystem::path& path, const RunContext& context) {
     if (context.is_cancelled()) return cancelled_error();
     context.report("write", 0);
-    const std::string bytes = write_model(model);
-    const std::string_view piece = bytes;
-    Status status = write_file(path, std::span(&piece, 1));
-    context.report("write", 1);
-    return status;
+    try {
+        const std::string bytes = write_model(model);
+        const std::string_view piece = bytes;
+        Status status = write_file(path, std::span(&piece, 1));
+        context.report("write", 1);
+        return status;
+    } catch (const std::bad_alloc&) {
+        return Error{ErrorCode::out_of_memory, path.string() + ": not enough memory for the file's bytes."};
+    }
 }
 
 Result<Model> read_model(std::string_view bytes, const std::string& name, const RunContext& context) {
@@ -405,6 +412,8 @@ Result<Model> read_model(std::string_view bytes, const std::string& name, const 
     } catch (const Damage& damage) {
         return Error{ErrorCode::bad_file, name + " " + damage.what + "; " + damage.remedy + "."};
     } catch (const std::bad_alloc&) {
+        return Error{ErrorCode::out_of_memory, name + " does not fit into memory."};
+    } catch (const std::length_error&) {
         return Error{ErrorCode::out_of_memory, name + " does not fit into memory."};
     }
 }

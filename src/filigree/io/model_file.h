@@ -15,12 +15,13 @@ bool is_model_file(std::string_view bytes);
 
 /// Reads a model; "-" is standard input. Nothing in the file is trusted: sizes are held against the file's length
 /// before anything is allocated, every section has a checksum, and what comes back passes check_model.
-/// Errors: not_found, bad_file (truncated, damaged, of a later version, not a model), out_of_memory.
+/// Errors: not_found, bad_file (truncated, damaged, of a later version, not a model), out_of_memory, cancelled.
 Result<Model> read_model(const std::filesystem::path& path, const RunContext& context);
 /// The same from bytes in memory; `name` stands in messages.
 Result<Model> read_model(std::string_view bytes, const std::string& name, const RunContext& context);
 
-/// Writes a model through a temporary file and a rename; "-" is standard output. Errors: unwritable.
+/// Writes a model through a temporary file and a rename; "-" is standard output. Errors: unwritable,
+/// out_of_memory, cancelled.
 Status write_model(const Model& model, const std::filesystem::path& path, const RunContext& context);
 /// The bytes of the file. The same model gives the same bytes.
 std::string write_model(const Model& model);

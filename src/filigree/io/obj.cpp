@@ -163,6 +163,7 @@ private:
             if (!fits_float(n[i])) return fail("a coordinate is not a finite number that fits 32-bit float.");
         if (world_.size() == kNoIndex - 1) return fail("there are more vertices than 32-bit indices can count.");
         world_.emplace_back(n[0], n[1], n[2]);
+        if (count == 4 && n[3] != 1) ++weights_;
         if (count >= 6) add_color(Vec3d(n[3], n[4], n[5]), count == 7 ? &n[6] : nullptr);
         return true;
     }
@@ -181,6 +182,8 @@ private:
         int count = 0;
         if (!read_numbers(n, 3, count, what)) return false;
         if (count < least) return fail("the line has too few numbers for " + std::string(what) + ".");
+        if (attribute.values.size() == kNoIndex - 1)
+            return fail("there are more lines with " + std::string(what) + " than 32-bit indices can count.");
         T value;
         for (int i = 0; i < T::SizeAtCompileTime; ++i) value[i] = static_cast<float>(n[i]);
         attribute.values.push_back(value);
@@ -309,6 +312,7 @@ private:
         warn(short_faces_, "faces with fewer than three corners were left out.");
         warn(lines_and_points_, "line and point elements were left out.");
         warn(unknown_statements_, "statements of other kinds were left out (the first: " + first_unknown_ + ").");
+        warn(weights_, "vertices have a fourth coordinate, a weight, which was left out.");
         warn(third_uvs_, "UVs have a third number, which was left out.");
         if (colored_vertices_ > 0) warn(world_.size() - colored_vertices_, "vertices have no colour and became white.");
         return warnings;
@@ -325,7 +329,7 @@ private:
     LabelRuns smoothing_;
     HighestIndex highest_vertex_, highest_uv_, highest_normal_;
     std::size_t lines_read_ = 0, short_faces_ = 0, lines_and_points_ = 0, third_uvs_ = 0, colored_vertices_ = 0;
-    std::size_t unknown_statements_ = 0;
+    std::size_t unknown_statements_ = 0, weights_ = 0;
     std::string first_unknown_;
 };
 

@@ -330,7 +330,8 @@ private:
         copy_columns(find_columns({"nx", "ny", "nz"}), mesh.normals.values);
         for (const auto& names : {std::array{"s", "t"}, std::array{"u", "v"}, std::array{"texture_u", "texture_v"}})
             if (mesh.uvs.empty()) copy_columns(find_columns({names[0], names[1]}), mesh.uvs.values);
-        read_colors(element, table, find_columns({"red", "green", "blue"}), find_columns({"alpha"}));
+        if (const auto rgb = find_columns({"red", "green", "blue"}); !rgb.empty())
+            read_colors(element, table, rgb, find_columns({"alpha"})); // without a colour, alpha is a scalar
         for (std::size_t i = 0; i < used.size(); ++i) {
             if (used[i]) continue;
             VertexScalar scalar{element.properties[i].name, std::vector<float>(table.rows)};
@@ -341,7 +342,6 @@ private:
 
     void read_colors(const Element& element, const Table& table, std::vector<std::size_t> columns,
                      const std::vector<std::size_t>& alpha) {
-        if (columns.empty()) return;
         Mesh& mesh = file_.mesh;
         mesh.colors.assign(table.rows, Vec4f::Ones());
         mesh.colors_have_alpha = !alpha.empty();
@@ -368,6 +368,8 @@ private:
         for (const Property& p : element.properties)
             if (p.name != element.properties[indices].name && !is_texcoord(p))
                 file_.warnings.push_back("The face property " + in_quotes(p.name) + " was left out.");
+        if (has_vertex_uvs() && std::any_of(element.properties.begin(), element.properties.end(), is_texcoord))
+            file_.warnings.emplace_back("The faces' 'texcoord' was left out: the vertices have UVs too.");
         short_faces_ = 0;
         if (!read_face_rows(element, indices)) return false;
         if (short_faces_ > 0)
@@ -375,6 +377,8 @@ private:
                                      " faces with fewer than three corners were left out.");
         return true;
     }
+
+    bool has_vertex_uvs() const { return file_.mesh.uvs.per_vertex() && !file_.mesh.uvs.empty(); }
 
     static bool is_texcoord(const Property& p) { return p.name == "texcoord" && p.list_count; }
 
@@ -433,7 +437,7 @@ private:
     /// MeshLab's UVs: a list of u, v for each corner of the face just added.
     void add_uvs(std::size_t corner_count, const std::vector<double>& texcoords) {
         CornerAttribute<Vec2f>& uvs = file_.mesh.uvs;
-        if (texcoords.size() != 2 * corner_count || (uvs.per_vertex() && !uvs.empty())) return;
+        if (texcoords.size() != 2 * corner_count || has_vertex_uvs()) return;
         uvs.corners.resize(file_.mesh.corner_count() - corner_count, kNoIndex);
         for (std::size_t c = 0; c < corner_count; ++c) {
             uvs.corners.push_back(static_cast<Index>(uvs.values.size()));

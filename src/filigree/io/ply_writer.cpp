@@ -13,6 +13,8 @@ using namespace ply;
 
 namespace {
 
+constexpr std::size_t kMaxInt = std::numeric_limits<std::int32_t>::max(); // most readers know "int" indices best
+
 /// A vertex property to write.
 struct OutputColumn {
     std::string name;
@@ -72,6 +74,7 @@ public:
             write_binary<false>();
         std::vector<std::string> lost;
         if (!normals_) lost.emplace_back("normals that differ at a vertex");
+        lost.insert(lost.end(), renamed_.begin(), renamed_.end());
         if (!mesh_.objects.empty()) lost.emplace_back("objects");
         add_face_label_losses(mesh_, lost);
         return lost;
@@ -95,8 +98,22 @@ private:
             add_columns(columns_, {"red", "green", "blue", "alpha"}, mesh_.colors, color_type, scale);
         else
             add_columns(columns_, {"red", "green", "blue"}, mesh_.colors, color_type, scale);
-        for (const VertexScalar& scalar : mesh_.scalars)
-            columns_.push_back({property_name(scalar.name), Type::float32, scalar.values.data()});
+        for (const VertexScalar& scalar : mesh_.scalars) {
+            std::string name = unique_name(property_name(scalar.name));
+            if (name != scalar.name)
+                renamed_.push_back("the name " + in_quotes(scalar.name) + " of a scalar (now " + in_quotes(name) + ")");
+            columns_.push_back({std::move(name), Type::float32, scalar.values.data()});
+        }
+    }
+
+    /// The name, or with a number behind it where a column has it already.
+    std::string unique_name(const std::string& name) const {
+        const auto taken = [&](const std::string& candidate) {
+            return std::any_of(columns_.begin(), columns_.end(), [&](const auto& c) { return c.name == candidate; });
+        };
+        std::string unique = name;
+        for (int i = 2; taken(unique); ++i) unique = name + "_" + std::to_string(i);
+        return unique;
     }
 
     void write_header() {
@@ -118,7 +135,8 @@ private:
             .number(mesh_.face_count())
             .text("\nproperty list ")
             .text(length)
-            .text(" int vertex_indices\n");
+            .text(mesh_.vertex_count() > kMaxInt ? " uint" : " int")
+            .text(" vertex_indices\n");
         if (!uvs_) out.text("property list ").text(length).text(" float texcoord\n");
         out.text("end_header\n");
     }
@@ -227,6 +245,7 @@ private:
     std::optional<std::vector<Vec3f>> normals_;
     std::vector<OutputColumn> columns_;
     bool long_faces_ = false;
+    std::vector<std::string> renamed_; // for the warning
 };
 
 } // namespace

@@ -93,7 +93,8 @@ public:
         return {first, static_cast<std::size_t>(p_ - first)};
     }
 
-    /// The rest of the line without blanks around it, and past it. Comments belong to it: names may hold a '#'.
+    /// The rest of the line without blanks around it; stops before the line's end. A '#' belongs to it: names may hold
+    /// one.
     std::string_view rest_of_line() {
         skip_blanks();
         const char* const first = p_;

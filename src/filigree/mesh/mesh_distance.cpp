@@ -10,6 +10,7 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <optional>
 
 namespace filigree {
 namespace {
@@ -115,7 +116,9 @@ std::vector<Vec3f> sample_surface(const Surface& surface, std::size_t count, std
 /// The distance of every sample of `from` to `to`; fewer when cancelled.
 std::vector<double> distances(const Surface& from, const Surface& to, std::size_t count, const RunContext& context) {
     const std::vector<Vec3f> samples = sample_surface(from, count, context.seed);
-    const ClosestPointTree tree(to.positions, to.triangles);
+    std::optional<ClosestPointTree> built; // in our arena: Embree builds on the threads of the one it is called in
+    context.arena().execute([&] { built.emplace(to.positions, to.triangles); });
+    const ClosestPointTree& tree = *built;
     std::vector<double> result(samples.size());
     for (std::size_t done = 0; done < samples.size(); done += kBatch) {
         if (context.is_cancelled()) return {};

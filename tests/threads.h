@@ -1,0 +1,11 @@
+// For tests that compare numbers of threads.
+#pragma once
+
+#include "filigree/core/run_context.h"
+
+#include <gtest/gtest.h>
+
+/// Leaves the test where there is one processor: contexts have no more threads than that, so it would compare one
+/// thread with one thread.
+#define FILIGREE_NEEDS_TWO_THREADS()                                                                                   \
+    if (filigree::RunContext(2).threads() < 2) GTEST_SKIP() << "needs two processors"
