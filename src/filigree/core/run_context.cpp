@@ -17,8 +17,7 @@ unsigned clamp_threads(unsigned wanted) {
 } // namespace
 
 RunContext::RunContext(unsigned threads)
-    : threads_(clamp_threads(threads)),
-      arena_(std::make_shared<tbb::task_arena>(static_cast<int>(threads_))),
+    : threads_(clamp_threads(threads)), arena_(std::make_shared<tbb::task_arena>(static_cast<int>(threads_))),
       cancelled_(std::make_shared<std::atomic<bool>>(false)) {}
 
 } // namespace filigree

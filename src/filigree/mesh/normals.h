@@ -14,9 +14,9 @@ std::vector<Vec3f> vertex_normals(const Mesh& mesh, std::span<const Vec3f> posit
 std::vector<Vec3f> vertex_normals(std::span<const Triangle> triangles, std::span<const Vec3f> positions,
                                   const RunContext& context);
 
-/// Makes every stored normal belong to one vertex: a value that corners of several vertices share (all corners of a flat
-/// side, say) is copied for each further one, behind the others. Returns the vertex of each value, kNoIndex for a value
-/// that no corner uses. Cost O(corners).
+/// Makes every stored normal belong to one vertex: a value that corners of several vertices share (all corners of a
+/// flat side, say) is copied for each further one, behind the others. Returns the vertex of each value, kNoIndex for a
+/// value that no corner uses. Cost O(corners).
 std::vector<Index> split_shared_normals(Mesh& mesh);
 
 } // namespace filigree
