@@ -93,6 +93,10 @@ CellShape cell_shape(const Vec3f& a, const Vec3f& b, const Vec3f& c) {
     return {(b - a).cross(c - a), centre, radius * 1.0001f};
 }
 
+/// How much closer a cell that faces away has to be than one that does not. Without a limit, steep detail whose own
+/// cell leans the other way ends up on a cell far off; without a preference, on the other side of thin parts.
+constexpr double kAwayCost = 4;
+
 /// The walk of one vertex over the driver's triangles.
 class Walk {
 public:
@@ -102,7 +106,8 @@ public:
 
     struct Found {
         SurfacePoint point;
-        bool faces_away = true;
+        bool faces_away = false;
+        double cost = std::numeric_limits<double>::infinity(); ///< distance, kAwayCost times as much when facing away
     };
 
     Found closest(const Vec3f& p, const Vec3f& normal, Index start) {
@@ -126,18 +131,18 @@ private:
             visited_[t] = stamp_;
             const CellShape& shape = shapes_[t];
             const bool faces_away = shape.normal.dot(normal) < 0;
-            if (faces_away && !best.faces_away) continue;
-            const double reach = best.point.distance + double(shape.radius);
-            if (faces_away == best.faces_away && double((p - shape.centre).squaredNorm()) > reach * reach) continue;
+            const double factor = faces_away ? kAwayCost : 1;
+            const double reach = best.cost / factor + double(shape.radius);
+            if (double((p - shape.centre).squaredNorm()) > reach * reach) continue;
             SurfacePoint point = closest_point_on_triangle(p, positions_[cells_[t][0]], positions_[cells_[t][1]],
                                                            positions_[cells_[t][2]]);
-            const bool better = faces_away != best.faces_away
-                                    ? !faces_away
-                                    : point.distance < best.point.distance ||
-                                          (point.distance == best.point.distance && t < best.point.triangle);
+            const double cost = factor * point.distance;
+            const bool better = cost != best.cost               ? cost < best.cost
+                                : faces_away != best.faces_away ? !faces_away
+                                                                : t < best.point.triangle;
             if (!better) continue;
             point.triangle = t;
-            best = {point, faces_away};
+            best = {point, faces_away, cost};
         }
     }
 

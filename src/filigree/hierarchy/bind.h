@@ -18,7 +18,8 @@ struct Binding {
     /// Not connected along the surface to any driver vertex (a dropped part, a loose vertex): bound to the closest
     /// driver triangle across the gap. Ascending vertex ids.
     std::vector<Index> across_gap;
-    /// No triangle nearby along the surface faces the same way; bound to the closest that does not. Ascending.
+    /// No triangle nearby along the surface faces the same way; bound to one that does not and is much closer.
+    /// Ascending.
     std::vector<Index> facing_away;
 };
 
