@@ -96,6 +96,7 @@ CellShape cell_shape(const Vec3f& a, const Vec3f& b, const Vec3f& c) {
 /// How much closer a cell that faces away has to be than one that does not. Without a limit, steep detail whose own
 /// cell leans the other way ends up on a cell far off; without a preference, on the other side of thin parts.
 constexpr double kAwayCost = 4;
+constexpr double kAwayStart = 0.25; // and how far off it counts where it touches, in radii of the cell
 
 /// The walk of one vertex over the driver's triangles.
 class Walk {
@@ -107,7 +108,7 @@ public:
     struct Found {
         SurfacePoint point;
         bool faces_away = false;
-        double cost = std::numeric_limits<double>::infinity(); ///< distance, kAwayCost times as much when facing away
+        double cost = std::numeric_limits<double>::infinity(); ///< distance, more when facing away
     };
 
     Found closest(const Vec3f& p, const Vec3f& normal, Index start) {
@@ -132,11 +133,12 @@ private:
             const CellShape& shape = shapes_[t];
             const bool faces_away = shape.normal.dot(normal) < 0;
             const double factor = faces_away ? kAwayCost : 1;
-            const double reach = best.cost / factor + double(shape.radius);
+            const double start = faces_away ? kAwayStart * double(shape.radius) : 0;
+            const double reach = std::max(0.0, best.cost - start) / factor + double(shape.radius);
             if (double((p - shape.centre).squaredNorm()) > reach * reach) continue;
             SurfacePoint point = closest_point_on_triangle(p, positions_[cells_[t][0]], positions_[cells_[t][1]],
                                                            positions_[cells_[t][2]]);
-            const double cost = factor * point.distance;
+            const double cost = start + factor * point.distance;
             const bool better = cost != best.cost               ? cost < best.cost
                                 : faces_away != best.faces_away ? !faces_away
                                                                 : t < best.point.triangle;

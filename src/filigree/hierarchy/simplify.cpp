@@ -38,7 +38,7 @@ struct Piece {
     std::vector<Index> source; ///< of each local vertex
 };
 
-constexpr std::size_t kPieceTriangles = 400'000;
+constexpr std::size_t kPieceTriangles = 1'000'000;
 
 /// The mesh cut along its longest side into pieces of equal size; one piece where it is small. Depends on the mesh
 /// alone.
