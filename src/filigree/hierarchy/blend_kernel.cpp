@@ -272,7 +272,7 @@ void restore(const Records& records, std::span<const VertexTransform> transforms
 void restore(const Records& records, std::span<const VertexTransform> transforms, const Output& output, int lanes,
              const RunContext& context) {
     const RestoreFunction restore_piece = restore_function(lanes);
-    // Stores go past the caches when the output would not stay in them anyway: 1.3 times faster at 6 M vertices.
+    // Stores go past the caches when the output would not stay in them anyway.
     constexpr std::size_t kCacheBytes = std::size_t{16} << 20;
     const Job job{records, transforms.data(), output, !output.in_order && records.count * sizeof(Vec3f) > kCacheBytes};
     // Pieces of whole runs with about kPiece records: found by bisection, so that they depend on the records alone.
