@@ -285,14 +285,18 @@ TEST(Handles, ScaleAndPlaceDoNotMatter) {
     }
 }
 
+/// Adds a copy of `part`, moved, that shares nothing with the body.
+void append(Body& body, const Body& part, const Vec3f& move) {
+    const auto first = static_cast<Index>(body.positions.size());
+    for (const Vec3f& p : part.positions) body.positions.push_back(p + move);
+    for (const Triangle& t : part.triangles) body.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+}
+
 TEST(Handles, PartsWithoutHandlesStayAtRest) {
     Body body = make_body(4);
     const std::size_t count = body.positions.size();
     const Body other = body;
-    for (const Vec3f& p : other.positions) body.positions.push_back(p + Vec3f(0, 5, 0));
-    for (const Triangle& t : other.triangles)
-        body.triangles.push_back(
-            {t[0] + static_cast<Index>(count), t[1] + static_cast<Index>(count), t[2] + static_cast<Index>(count)});
+    append(body, other, Vec3f(0, 5, 0));
     body.positions.emplace_back(9, 9, 9); // in no triangle at all
     const std::vector<Index> handles = select(body, [](const Vec3f& p) { return std::abs(p.x()) > 1.9f && p.y() < 2; });
     HandleSolver solver = make_solver(body, handles);
@@ -308,10 +312,7 @@ TEST(Handles, EachPartFollowsItsOwnHandles) {
     Body body = make_body(4);
     const std::size_t count = body.positions.size();
     const Body other = body;
-    for (const Vec3f& p : other.positions) body.positions.push_back(p + Vec3f(0, 5, 0));
-    for (const Triangle& t : other.triangles)
-        body.triangles.push_back(
-            {t[0] + static_cast<Index>(count), t[1] + static_cast<Index>(count), t[2] + static_cast<Index>(count)});
+    append(body, other, Vec3f(0, 5, 0));
     const std::vector<Index> handles = both_ends(body);
     const Mat3f R = rotation(130, {1, 2, 3});
     const auto motion = [&](const Vec3f& p) { return p.y() < 2 ? Vec3f(R * p) : Vec3f(R.transpose() * p); };
