@@ -7,6 +7,7 @@
 #include "filigree/mesh/triangulate.h"
 
 #include <gtest/gtest.h>
+#include <map>
 #include <set>
 
 namespace filigree {
@@ -136,6 +137,25 @@ TEST(Simplify, FlatAndTinyMeshes) {
     for (const std::size_t target : {0u, 3u})
         EXPECT_EQ(simplify(points, tetrahedron, {.target_vertices = target}, RunContext()).vertex_count, 3u);
     EXPECT_TRUE(simplify({}, {}, {.target_vertices = 3}, RunContext()).triangles.empty());
+}
+
+/// A large mesh: still closed and oriented, and threads change nothing.
+TEST(Simplify, TwoMillionTrianglesStayClosed) {
+    const Mesh mesh = make_wavy_cube({.resolution = 410}); // 2,017,200 triangles
+    const std::vector<Triangle> triangles = triangulate(mesh).triangles;
+    const Simplified one = simplify(mesh.positions, triangles, {.target_vertices = 60'000}, RunContext(1));
+    EXPECT_EQ(one.triangles, simplify(mesh.positions, triangles, {.target_vertices = 60'000}, RunContext(2)).triangles);
+    // Every edge is run as often one way as the other. (meshoptimizer may bring four triangles together at an edge.)
+    std::map<std::pair<Index, Index>, int> runs;
+    for (const Triangle& t : one.triangles)
+        for (int k = 0; k < 3; ++k) ++runs[{t[k], t[(k + 1) % 3]}];
+    std::size_t open = 0;
+    for (const auto& [edge, count] : runs) {
+        const auto back = runs.find({edge.second, edge.first});
+        open += back == runs.end() || back->second != count;
+    }
+    EXPECT_EQ(open, 0u);
+    EXPECT_LE(one.vertex_count, 60'000 * 1.02);
 }
 
 TEST(Simplify, SameTrianglesEveryTime) {
