@@ -1,0 +1,51 @@
+// Where a picture is taken from.
+#pragma once
+
+#include "filigree/mesh/mesh.h"
+
+#include <Eigen/Geometry>
+
+namespace filigree {
+
+/// A camera in the world. Right-handed; looks from `eye` to `target`.
+struct Camera {
+    Vec3d eye = {0, 0, 1}, target = {0, 0, 0}, up = {0, 1, 0}; ///< up need not be at right angles to the view
+    double field_of_view_deg = 30;                             ///< the vertical angle of view; 0: parallel projection
+    double height = 1; ///< parallel projection: model units from the bottom to the top of the picture
+
+    /// Columns right, up and back of the camera: unit, at right angles. A view along `up` takes another up.
+    Mat3d basis() const;
+    /// World to camera space (x right, y up, z towards the viewer), without the eye's translation: p -> basis^T (p - eye).
+    Vec3d to_camera(const Vec3d& world) const { return basis().transpose() * (world - eye); }
+    /// Camera space to clip space; depth -1 at `near` and 1 at `far` (distances along the view, 0 < near < far).
+    Eigen::Matrix4d projection(double aspect, double near, double far) const;
+    /// Where a world point falls on a picture of that size, in pixels from the top left; z: distance along the view.
+    Vec3d project(const Vec3d& world, double width, double height) const;
+};
+
+/// The usual directions. With y up: front looks along -z, side along -x (from the right), top along -y, iso from the
+/// front right above. With z up the same turned so that front looks along +y.
+enum class View { front, side, top, iso };
+enum class UpAxis { x, y, z };
+
+Vec3d up_vector(UpAxis up);
+/// Unit, from the object to the viewer.
+Vec3d view_direction(View view, UpAxis up);
+
+/// What fit_camera needs to know of an object: its points in the world.
+struct CameraPoints {
+    std::span<const Vec3f> positions;
+    Vec3d origin = Vec3d::Zero();
+};
+
+/// The camera that looks along -direction and shows all points as large as they fit in a picture of that aspect (width
+/// / height) with `margin` (a fraction of the picture's height, on every side). Exact, also in perspective: for each
+/// side of the frustum the point furthest out decides. The target is the middle of the points' box seen from there.
+/// No points: a camera on the unit cube. Cost O(points).
+Camera fit_camera(std::span<const CameraPoints> points, const Vec3d& direction, const Vec3d& up, double aspect,
+                  double field_of_view_deg = 30, double margin = 0.06);
+
+/// The camera turned by an angle about the axis `up` through its target.
+Camera turned(const Camera& camera, double degrees);
+
+} // namespace filigree

@@ -1,0 +1,32 @@
+// Numbers as colours.
+#pragma once
+
+#include "filigree/core/types.h"
+
+namespace filigree {
+
+/// sequential: dark to bright, for amounts (an error, a strain). diverging: two hues from a pale middle, for signed
+/// amounts. Both are made in OKLab [Ottosson 2020] so that equal steps of the number look like equal steps of colour;
+/// lightness rises steadily in the first and is symmetric in the second, so they survive a grey print.
+enum class ColorMap { sequential, diverging };
+
+/// sRGB, 0 to 1, for t in [0, 1] (clamped; NaN gives a neutral grey). Cost: a few multiplications (a table inside).
+Vec3f color_at(ColorMap map, float t);
+
+/// The table behind it: 256 sRGB colours, evenly from t = 0 to t = 1.
+std::span<const Vec3f> color_table(ColorMap map);
+
+/// sRGB (0 to 1) to OKLab: lightness 0 to 1, and a, b. Distances in it are how different two colours look.
+Vec3f srgb_to_oklab(const Vec3f& srgb);
+
+/// A range a legend would show for `values`: finite ones only, the ends as round numbers (1, 2 or 5 times a power of
+/// ten apart), {0, 1} when there are none. With `from_zero` it starts at 0.
+struct ValueRange {
+    float least = 0, most = 1;
+};
+ValueRange legend_range(std::span<const float> values, bool from_zero);
+
+/// Numbers to write beside a legend: round, ascending, inside the range, about `count` of them.
+std::vector<double> legend_ticks(const ValueRange& range, unsigned count);
+
+} // namespace filigree
