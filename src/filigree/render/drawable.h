@@ -1,0 +1,75 @@
+// What can be drawn: surfaces, models and points in GPU memory.
+#pragma once
+
+#include "filigree/hierarchy/model.h"
+#include "filigree/hierarchy/pose.h"
+#include "filigree/hierarchy/restore.h"
+#include "filigree/render/color_map.h"
+#include "filigree/render/picture.h"
+
+#include <memory>
+#include <optional>
+
+namespace filigree {
+
+/// Where normals come from. automatic: the mesh's own; without any, smooth within `crease_deg` and sharp beyond.
+enum class Shading { automatic, smooth, flat };
+
+/// One number a vertex, shown as colour.
+struct ScalarColors {
+    std::span<const float> values; ///< empty: not shown; else one a vertex
+    ColorMap map = ColorMap::sequential;
+    ValueRange range;
+};
+
+/// A colour and a texture for the faces of one material.
+struct SurfaceMaterial {
+    Vec3f color = {1, 1, 1};          ///< sRGB, multiplies the picture
+    const Picture* picture = nullptr; ///< drawn by the mesh's UVs; null: none
+};
+
+struct SurfaceOptions {
+    Shading shading = Shading::automatic;
+    double crease_deg = 45; ///< faces that meet at a larger angle keep a sharp edge (automatic shading)
+    ScalarColors scalars;
+    std::vector<SurfaceMaterial> materials; ///< empty or one a name in mesh.materials
+    std::vector<char> hidden_faces;         ///< empty or one a face: not zero leaves it out
+};
+
+struct PointOptions {
+    float radius = 0; ///< model units; 0: 0.4 of the typical distance to the next point
+    ScalarColors scalars;
+    std::span<const Vec4f> colors; ///< empty or RGBA a point
+};
+
+/// Something in GPU memory. Made and drawn with one OpenGL context current.
+class Drawable {
+public:
+    /// Errors of all three: out_of_memory (graphics memory), unsuitable (nothing to draw), cancelled.
+    static Result<Drawable> surface(const Mesh& mesh, const SurfaceOptions& options, const RunContext& context);
+    static Result<Drawable> points(std::span<const Vec3f> positions, const Vec3d& origin, const PointOptions& options,
+                                   const RunContext& context);
+    /// A model at a level, restored by the vertex shader (reference models: on the CPU, then uploaded). Normals
+    /// belong to the rest shape and turn with the gradients. Starts unposed. The model must outlive the drawable.
+    static Result<Drawable> model(const Model& model, const RestoreOptions& restore, const SurfaceOptions& options,
+                                  const RunContext& context);
+    Drawable(Drawable&&) noexcept;
+    Drawable& operator=(Drawable&&) noexcept;
+    ~Drawable();
+
+    /// Models only. Errors: mismatch (the pose has another number of vertices than the driver).
+    Status set_pose(const Pose& pose, const RunContext& context);
+
+    const Box& box() const; ///< of what is drawn, in the world; for a posed model not smaller than it
+    std::size_t triangle_count() const;
+    std::size_t point_count() const;
+
+    struct Content;
+    const Content& content() const { return *content_; }
+
+private:
+    explicit Drawable(std::unique_ptr<Content> content);
+    std::unique_ptr<Content> content_;
+};
+
+} // namespace filigree
