@@ -1,4 +1,5 @@
-// Restoring on the GPU: the records are uploaded once, a frame uploads the driver's pose, the vertex shader does the rest.
+// Restoring on the GPU: the records are uploaded once, a frame uploads the driver's pose, the vertex shader does the
+// rest.
 #pragma once
 
 #include "filigree/hierarchy/model.h"
@@ -8,14 +9,15 @@
 
 namespace filigree {
 
-/// A blend model at one level in GPU memory. Everything here needs the OpenGL context it was made in to be current.
+/// Vertices of a blend model in GPU memory. Everything here needs the OpenGL context it was made in to be current.
 class GpuRestorer {
 public:
-    /// What to restore: for each item a vertex of the finest mesh and its unit rest normal (`normals` empty: none).
-    /// Several items may share a vertex (with different normals). The model must outlive the restorer.
-    /// Records are float or int16 as the model's are: 20 or 12 bytes an item, and 4 for its normal.
-    /// Errors: usage (no such level), unsuitable (a reference model: restore it on the CPU),
-    /// out_of_memory (more than the GPU takes in one buffer).
+    /// What to restore: for each item a vertex of the finest mesh and its unit rest normal (`normals` empty: none; a
+    /// zero normal stays zero). Several items may share a vertex (with different normals). The model must outlive the
+    /// restorer. Starts at rest. Of the options a level is only checked: the items say what is restored.
+    /// Records are float or int16 as the model's are: 24 or 12 bytes an item, and 4 for its normal.
+    /// Errors: usage (no such level), mismatch (no such vertex, or another number of normals), unsuitable (a reference
+    /// model: restore it on the CPU), unsupported (no storage buffers in vertex shaders), out_of_memory, cancelled.
     static Result<GpuRestorer> create(const Model& model, std::span<const Index> vertices,
                                       std::span<const Vec3f> normals, const RestoreOptions& options,
                                       const RunContext& context);
@@ -23,23 +25,29 @@ public:
     GpuRestorer& operator=(GpuRestorer&&) noexcept;
     ~GpuRestorer();
 
-    /// Uploads a pose: 64 bytes a driver vertex, nothing else. Errors: mismatch (as Restorer::positions).
+    /// Uploads a pose: 64 bytes a driver vertex, nothing else. Errors: mismatch (as Restorer::positions), cancelled.
     Status set_pose(const Pose& pose, const RunContext& context);
 
     std::size_t item_count() const;
     /// The place of each item in the order they are drawn in (records are sorted by driver triangle): what an index
     /// buffer has to go through.
     std::span<const Index> drawn_at() const;
-    /// GLSL functions `vec3 restored_position(int record)` and `vec3 restored_normal(int record)`, and the buffers they
-    /// read (storage bindings 0 to 2), to go into a vertex shader after its #version line.
-    static const char* shader_source(Precision precision);
+
+    /// GLSL to go into a vertex shader after its #version line (430 or later):
+    ///     vec3 restored_position();                            model units, as the mesh's positions
+    ///     vec3 restored_normal();                              unit; only with has_normals()
+    ///     void restore_vertex(out vec3 position, out vec3 normal);   both for little more than the price of one
+    /// It takes the vertex inputs 4 and 5, the storage bindings 0 to 2, and names that begin with restore. gl_VertexID
+    /// has to be the place of the item: do not draw with another base vertex.
+    static std::string shader_source(Precision precision);
     Precision precision() const;
     bool has_normals() const;
-    /// Binds the buffers that shader_source reads.
+    /// Binds what shader_source reads: vertex inputs 4 and 5 into the current vertex array, and the storage buffers.
     void bind() const;
 
     /// What the vertex shader computes, read back through transform feedback, by item; normals empty where there are
-    /// none. For tests and exact checks: drawing never reads back.
+    /// none. For tests and exact checks: drawing never reads back. Leaves no program and no vertex array bound.
+    /// Errors: out_of_memory.
     struct ReadBack {
         std::vector<Vec3f> positions, normals;
     };
