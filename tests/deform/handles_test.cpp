@@ -310,7 +310,6 @@ TEST(Handles, PartsWithoutHandlesStayAtRest) {
 
 TEST(Handles, EachPartFollowsItsOwnHandles) {
     Body body = make_body(4);
-    const std::size_t count = body.positions.size();
     const Body other = body;
     append(body, other, Vec3f(0, 5, 0));
     const std::vector<Index> handles = both_ends(body);
