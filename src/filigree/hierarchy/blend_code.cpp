@@ -167,9 +167,13 @@ BlendRestorer::BlendRestorer(const BlendDetail& detail, std::span<const Vec3f> p
 
 std::span<const Index> BlendRestorer::slots() const { return content_->records.slot; }
 
-void BlendRestorer::restore(std::span<const Vec3f> driver_positions, std::span<const Mat3f> gradients,
-                            std::span<Vec3f> out_positions, std::span<Vec3f> out_normals, bool in_order,
-                            const RunContext& context) const {
+const blend_kernel::Records& BlendRestorer::records() const { return content_->records; }
+
+float BlendRestorer::output_scale() const { return static_cast<float>(1 / content_->scale); }
+
+std::vector<blend_kernel::VertexTransform> BlendRestorer::transforms(std::span<const Vec3f> driver_positions,
+                                                                     std::span<const Mat3f> gradients,
+                                                                     const RunContext& context) const {
     const std::vector<Vec3d>& rest = content_->rest;
     std::vector<blend_kernel::VertexTransform> transforms(rest.size());
     parallel_for(context, rest.size(), 4096, [&](std::size_t begin, std::size_t end) {
@@ -184,12 +188,19 @@ void BlendRestorer::restore(std::span<const Vec3f> driver_positions, std::span<c
             std::copy_n(gradients[i].data(), 9, transform.a);
         }
     });
+    return transforms;
+}
+
+void BlendRestorer::restore(std::span<const Vec3f> driver_positions, std::span<const Mat3f> gradients,
+                            std::span<Vec3f> out_positions, std::span<Vec3f> out_normals, bool in_order,
+                            const RunContext& context) const {
     blend_kernel::Output output;
     if (!out_positions.empty()) output.positions = out_positions.data();
     if (!out_normals.empty()) output.normals = out_normals.data();
     output.in_order = in_order;
-    output.scale = static_cast<float>(1 / content_->scale);
-    if (output.positions || output.normals) blend_kernel::restore(content_->records, transforms, output, context);
+    output.scale = output_scale();
+    if (!output.positions && !output.normals) return;
+    blend_kernel::restore(content_->records, transforms(driver_positions, gradients, context), output, context);
 }
 
 } // namespace filigree

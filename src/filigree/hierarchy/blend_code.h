@@ -18,6 +18,11 @@
 
 namespace filigree {
 
+namespace blend_kernel {
+struct Records;
+struct VertexTransform;
+} // namespace blend_kernel
+
 /// float32: 20 bytes a vertex. int16: 10 bytes, faster where memory is the bound; an error of at most half a step an
 /// axis, and 32767 steps are the largest offset in the cell: usually below 1e-6 of the diagonal.
 enum class Precision { float32, int16 };
@@ -66,6 +71,14 @@ public:
     void restore(std::span<const Vec3f> driver_positions, std::span<const Mat3f> gradients,
                  std::span<Vec3f> out_positions, std::span<Vec3f> out_normals, bool in_order,
                  const RunContext& context) const;
+
+    /// What restore hands to the kernel, for kernels elsewhere (the GPU's): everything that stays, what a pose gives
+    /// (one a driver vertex), and the power of two that restored positions are multiplied with.
+    const blend_kernel::Records& records() const;
+    std::vector<blend_kernel::VertexTransform> transforms(std::span<const Vec3f> driver_positions,
+                                                          std::span<const Mat3f> gradients,
+                                                          const RunContext& context) const;
+    float output_scale() const;
 
 private:
     struct Content;

@@ -57,19 +57,39 @@ void Restorer::Content::prepare_blend(const RunContext& context) {
     blend_normals.emplace(detail, positions, driver, items, unit(std::move(normals)));
 }
 
+Result<unsigned> restored_level(const Model& model, const RestoreOptions& options) {
+    if (options.level && *options.level > model.finest_level())
+        return Error{ErrorCode::usage, "The model has levels 0 to " + std::to_string(model.finest_level()) +
+                                           "; there is no level " + std::to_string(*options.level) + "."};
+    return options.level.value_or(model.finest_level());
+}
+
+Status check_pose(const Model& model, const Pose& pose) {
+    const std::size_t driver = model.driver().vertices.size();
+    const auto wrong = [&](std::size_t count, const char* what) {
+        return Error{ErrorCode::mismatch,
+                     "The pose has " + std::to_string(count) + " " + what + " and the model's driver " +
+                         std::to_string(driver) +
+                         " vertices: export the driver again (filigree level MODEL 0) and move that."};
+    };
+    if (pose.positions.size() != driver) return wrong(pose.positions.size(), "vertices");
+    if (!pose.gradients.empty() && pose.gradients.size() != driver) return wrong(pose.gradients.size(), "gradients");
+    if (!pose.ghosts.empty() && pose.ghosts.size() != driver) return wrong(pose.ghosts.size(), "ghost points");
+    return Success{};
+}
+
 Restorer::Restorer(std::unique_ptr<Content> content) : content_(std::move(content)) {}
 Restorer::Restorer(Restorer&&) noexcept = default;
 Restorer& Restorer::operator=(Restorer&&) noexcept = default;
 Restorer::~Restorer() = default;
 
 Result<Restorer> Restorer::create(const Model& model, const RestoreOptions& options, const RunContext& context) {
-    if (options.level && *options.level > model.finest_level())
-        return Error{ErrorCode::usage, "The model has levels 0 to " + std::to_string(model.finest_level()) +
-                                           "; there is no level " + std::to_string(*options.level) + "."};
+    const Result<unsigned> level = restored_level(model, options);
+    if (!level) return level.error();
     auto content = std::make_unique<Content>();
     content->model = &model;
     content->options = options;
-    content->level = options.level.value_or(model.finest_level());
+    content->level = *level;
     content->rest = level_mesh(model, content->level);
     if (content->level < model.finest_level()) content->vertices = model.levels[content->level].vertices;
     content->vertex_of_normal = split_shared_normals(content->rest);
@@ -102,24 +122,6 @@ std::vector<Mat3f> Restorer::gradients(const Pose& pose, const RunContext& conte
     return gradients;
 }
 
-namespace {
-
-std::optional<Error> check_pose(const Model& model, const Pose& pose) {
-    const std::size_t driver = model.driver().vertices.size();
-    const auto wrong = [&](std::size_t count, const char* what) -> std::optional<Error> {
-        return Error{ErrorCode::mismatch,
-                     "The pose has " + std::to_string(count) + " " + what + " and the model's driver " +
-                         std::to_string(driver) +
-                         " vertices: export the driver again (filigree level MODEL 0) and move that."};
-    };
-    if (pose.positions.size() != driver) return wrong(pose.positions.size(), "vertices");
-    if (!pose.gradients.empty() && pose.gradients.size() != driver) return wrong(pose.gradients.size(), "gradients");
-    if (!pose.ghosts.empty() && pose.ghosts.size() != driver) return wrong(pose.ghosts.size(), "ghost points");
-    return std::nullopt;
-}
-
-} // namespace
-
 Result<std::vector<Vec3f>> Restorer::positions(const Pose& pose, const RunContext& context) const {
     std::vector<Vec3f> restored(vertex_count());
     if (Status status = positions(pose, restored, context); !status) return status.error();
@@ -128,7 +130,7 @@ Result<std::vector<Vec3f>> Restorer::positions(const Pose& pose, const RunContex
 
 Status Restorer::positions(const Pose& pose, std::span<Vec3f> out, const RunContext& context) const {
     const Content& content = *content_;
-    if (std::optional<Error> error = check_pose(*content.model, pose)) return *error;
+    if (Status status = check_pose(*content.model, pose); !status) return status.error();
     if (out.size() != vertex_count())
         return Error{ErrorCode::mismatch, "There is room for " + std::to_string(out.size()) +
                                               " positions and the level has " + std::to_string(vertex_count()) + "."};
@@ -149,7 +151,7 @@ Status Restorer::positions(const Pose& pose, std::span<Vec3f> out, const RunCont
 
 Result<Mesh> Restorer::mesh(const Pose& pose, const RunContext& context) const {
     const Content& content = *content_;
-    if (std::optional<Error> error = check_pose(*content.model, pose)) return *error;
+    if (Status status = check_pose(*content.model, pose); !status) return status.error();
     if (context.is_cancelled()) return cancelled_error();
     Mesh mesh = content.rest;
     if (content.blend) {

@@ -17,6 +17,11 @@ struct RestoreOptions {
     std::optional<unsigned> level = {}; ///< restore up to this level; unset: the finest
 };
 
+/// The level that the options mean. Errors: usage (no such level).
+Result<unsigned> restored_level(const Model& model, const RestoreOptions& options);
+/// Whether a pose belongs to a model. Errors: mismatch (the pose has another number of vertices than the driver).
+Status check_pose(const Model& model, const Pose& pose);
+
 /// Restores one model at one level, pose after pose. Everything that does not depend on the pose is prepared once.
 class Restorer {
 public:
