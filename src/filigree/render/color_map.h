@@ -19,14 +19,16 @@ std::span<const Vec3f> color_table(ColorMap map);
 /// sRGB (0 to 1) to OKLab: lightness 0 to 1, and a, b. Distances in it are how different two colours look.
 Vec3f srgb_to_oklab(const Vec3f& srgb);
 
-/// A range a legend would show for `values`: finite ones only, the ends as round numbers (1, 2 or 5 times a power of
-/// ten apart), {0, 1} when there are none. With `from_zero` it starts at 0.
+/// A range a legend would show for `values`: finite ones only, the ends as round numbers (multiples of 1, 2 or 5 times
+/// a power of ten, no further out than they must), never empty, {0, 1} when there are no values. With `from_zero` it
+/// starts at 0, and values below do not count.
 struct ValueRange {
     float least = 0, most = 1;
 };
 ValueRange legend_range(std::span<const float> values, bool from_zero);
 
-/// Numbers to write beside a legend: round, ascending, inside the range, about `count` of them.
+/// Numbers to write beside a legend: round, ascending, inside the range, at most `count` of them (from two up) and
+/// about so many.
 std::vector<double> legend_ticks(const ValueRange& range, unsigned count);
 
 } // namespace filigree
