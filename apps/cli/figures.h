@@ -1,0 +1,57 @@
+// The report's figures, drawn by the program from what it computes.
+#pragma once
+
+#include "page.h"
+#include "session.h"
+
+#include "filigree/render/camera.h"
+#include "filigree/render/renderer.h"
+
+#include <memory>
+#include <optional>
+
+namespace filigree::cli {
+
+/// A figure, and the numbers in it.
+struct Figure {
+    Page page;
+    Json values;
+};
+
+/// Draws meshes for figures; OpenGL starts with the first of them.
+class FigureRenderer {
+public:
+    explicit FigureRenderer(const RunContext& context);
+    ~FigureRenderer();
+
+    struct Look {
+        SurfaceOptions surface = {};
+        Appearance appearance = {};
+        bool ground = true;
+    };
+    /// A picture on white, `width` x `height` page units large, sharp at twice that. z is up.
+    Picture picture(const Mesh& mesh, const Look& look, const Camera& camera, double width, double height);
+
+    const RunContext& context() const { return context_; }
+
+private:
+    struct Content;
+    const RunContext& context_;
+    std::unique_ptr<Content> content_;
+};
+
+// One function a figure, in the report's order.
+Figure draw_simple_triangle(FigureRenderer& renderer);     // 1.1
+Figure draw_wavy_cube(FigureRenderer& renderer);           // 2.1
+Figure draw_ray_and_triangle(FigureRenderer& renderer);    // 2.2
+Figure draw_border_cases(FigureRenderer& renderer);        // 2.3
+Figure draw_shared_points(FigureRenderer& renderer);       // 2.4
+Figure draw_removed_level(FigureRenderer& renderer);       // 2.6
+Figure draw_barycentric_areas(FigureRenderer& renderer);   // 2.7
+Figure draw_recursive_storing(FigureRenderer& renderer);   // 2.8
+Figure draw_removed_detail(FigureRenderer& renderer);      // 2.9
+Figure draw_deformation_process(FigureRenderer& renderer); // 2.10
+Figure draw_extreme_deformation(FigureRenderer& renderer); // 3.1
+Figure draw_fidelity(FigureRenderer& renderer);            // our own
+
+} // namespace filigree::cli
