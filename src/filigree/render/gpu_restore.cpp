@@ -272,11 +272,15 @@ Result<GpuRestorer::ReadBack> GpuRestorer::read_back() const {
         }
     }
 
+    const bool drawn = glGetError() == GL_NO_ERROR;
     glDisable(GL_RASTERIZER_DISCARD);
     glBindBufferBase(GL_TRANSFORM_FEEDBACK_BUFFER, 0, 0);
     glUseProgram(0);
     glBindVertexArray(0);
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, static_cast<GLuint>(drawn_to));
+    if (!drawn)
+        return Error{ErrorCode::out_of_memory, "The GPU could not restore " + std::to_string(count) +
+                                                   " vertices: restore a lower level, or on the CPU."};
     return result;
 }
 
