@@ -157,6 +157,8 @@ Vec3f color_at(ColorMap map, float t) {
     return table[entry] + (place - static_cast<float>(entry)) * (table[entry + 1] - table[entry]);
 }
 
+Vec3f srgb_to_linear(const Vec3f& srgb) { return srgb.cast<double>().unaryExpr(&decoded).cast<float>(); }
+
 Vec3f srgb_to_oklab(const Vec3f& srgb) {
     const Vec3d linear = srgb.cast<double>().unaryExpr(&decoded);
     return (cones_to_lab() * (linear_to_cones() * linear).unaryExpr([](double x) { return std::cbrt(x); }))

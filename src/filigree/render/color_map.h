@@ -19,6 +19,9 @@ std::span<const Vec3f> color_table(ColorMap map);
 /// sRGB (0 to 1) to OKLab: lightness 0 to 1, and a, b. Distances in it are how different two colours look.
 Vec3f srgb_to_oklab(const Vec3f& srgb);
 
+/// sRGB (0 to 1) to amounts of light, which add up.
+Vec3f srgb_to_linear(const Vec3f& srgb);
+
 /// A range a legend would show for `values`: finite ones only, the ends as round numbers (multiples of 1, 2 or 5 times
 /// a power of ten, no further out than they must), never empty, {0, 1} when there are no values. With `from_zero` it
 /// starts at 0, and values below do not count.

@@ -25,7 +25,7 @@ bool can_load(const char* library) {
 }
 
 constexpr std::array<EGLint, 7> kWanted = {
-    EGL_CONTEXT_MAJOR_VERSION,       4,       EGL_CONTEXT_MINOR_VERSION, 3, EGL_CONTEXT_OPENGL_PROFILE_MASK,
+    EGL_CONTEXT_MAJOR_VERSION,           4,       EGL_CONTEXT_MINOR_VERSION, 3, EGL_CONTEXT_OPENGL_PROFILE_MASK,
     EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
 
 /// Displays to try, best first: the devices EGL knows (GPUs), then Mesa without any surface.

@@ -48,7 +48,8 @@ Program Program::link(std::span<const Stage> stages, std::span<const char* const
 }
 
 Result<Buffer> make_buffer(const void* data, std::size_t bytes) {
-    while (glGetError() != GL_NO_ERROR) {}
+    while (glGetError() != GL_NO_ERROR) {
+    }
     Buffer buffer = Buffer::make();
     glBindBuffer(GL_COPY_WRITE_BUFFER, buffer.name());
     glBufferData(GL_COPY_WRITE_BUFFER, static_cast<GLsizeiptr>(bytes), data, GL_STATIC_DRAW);

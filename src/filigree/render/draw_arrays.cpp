@@ -1,0 +1,195 @@
+#include "filigree/render/draw_arrays.h"
+
+#include "filigree/core/parallel_for.h"
+#include "filigree/mesh/triangulate.h"
+#include "filigree/mesh/weld.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+namespace filigree {
+
+namespace {
+
+constexpr std::size_t kMostCreased = 256; // faces at a vertex whose pairs are all looked at
+
+/// Twice the face's area, along its normal [Newell].
+Vec3f newell(const Mesh& mesh, std::span<const Vec3f> positions, std::size_t face) {
+    const std::span<const Index> corners = mesh.face(face);
+    const Vec3d base = positions[corners[0]].cast<double>(); // differences keep digits, and cannot overflow early
+    Vec3d sum = Vec3d::Zero();
+    for (std::size_t k = 1; k + 1 < corners.size(); ++k)
+        sum += (positions[corners[k]].cast<double>() - base).cross(positions[corners[k + 1]].cast<double>() - base);
+    return sum.cast<float>();
+}
+
+Vec3f unit(const Vec3f& v) { return v.cast<double>().stableNormalized().cast<float>(); }
+
+/// Corners by the place of their vertex.
+struct CornersAt {
+    std::vector<Index> offsets; ///< per place
+    std::vector<Index> corners;
+};
+
+CornersAt corners_at_places(const Mesh& mesh, std::span<const Index> place) {
+    CornersAt at;
+    at.offsets.assign(place.size() + 1, 0);
+    for (Index v : mesh.corners) ++at.offsets[place[v] + 1];
+    std::partial_sum(at.offsets.begin(), at.offsets.end(), at.offsets.begin());
+    std::vector<Index> next(at.offsets.begin(), at.offsets.end() - 1);
+    at.corners.resize(mesh.corner_count());
+    for (Index c = 0; c < mesh.corner_count(); ++c) at.corners[next[place[mesh.corners[c]]]++] = c;
+    return at;
+}
+
+/// Normals of the corners at one place.
+class CornerNormals {
+public:
+    CornerNormals(const Mesh& mesh, std::span<const Vec3f> positions, const SurfaceOptions& options,
+                  const RunContext& context)
+        : mesh_(mesh), shading_(options.shading),
+          least_cosine_(static_cast<float>(std::cos(options.crease_deg * std::numbers::pi / 180))) {
+        if (shading_ == Shading::automatic && !mesh.normals.empty()) return;
+        areas_.resize(mesh.face_count());
+        parallel_for(context, mesh.face_count(), 4096, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t f = begin; f < end; ++f) areas_[f] = newell(mesh, positions, f);
+        });
+    }
+
+    /// faces: the face of each corner.
+    void at(std::span<const Index> corners, std::span<const Index> faces, std::vector<Vec3f>& normals) {
+        normals.resize(corners.size());
+        if (shading_ == Shading::automatic && !mesh_.normals.empty()) {
+            for (std::size_t i = 0; i < corners.size(); ++i) {
+                const Index at =
+                    mesh_.normals.per_vertex() ? mesh_.corners[corners[i]] : mesh_.normals.corners[corners[i]];
+                normals[i] = at == kNoIndex ? Vec3f(Vec3f::Zero()) : unit(mesh_.normals.values[at]);
+            }
+            return;
+        }
+        if (shading_ == Shading::flat) {
+            for (std::size_t i = 0; i < corners.size(); ++i) normals[i] = unit(areas_[faces[i]]);
+            return;
+        }
+        Vec3f sum = Vec3f::Zero();
+        for (Index f : faces) sum += areas_[f];
+        const Vec3f smooth = unit(sum);
+        std::fill(normals.begin(), normals.end(), smooth);
+        if (shading_ == Shading::smooth || corners.size() > kMostCreased) return;
+
+        units_.clear();
+        bool is_smooth = true;
+        for (Index f : faces) {
+            units_.push_back(unit(areas_[f]));
+            // Twice half the angle is the whole: then every pair is within it.
+            const float half = std::sqrt(std::max(0.0f, 0.5f + 0.5f * least_cosine_));
+            is_smooth = is_smooth && (units_.back().isZero() || units_.back().dot(smooth) >= half);
+        }
+        if (is_smooth) return;
+        for (std::size_t i = 0; i < corners.size(); ++i) {
+            sum = Vec3f::Zero();
+            for (std::size_t j = 0; j < corners.size(); ++j)
+                if (units_[i].dot(units_[j]) >= least_cosine_) sum += areas_[faces[j]];
+            normals[i] = units_[i].isZero() ? smooth : unit(sum);
+        }
+    }
+
+private:
+    const Mesh& mesh_;
+    Shading shading_;
+    float least_cosine_;
+    std::vector<Vec3f> areas_, units_;
+};
+
+} // namespace
+
+Result<DrawArrays> make_draw_arrays(const Mesh& mesh, std::span<const Vec3f> positions, const SurfaceOptions& options,
+                                    const RunContext& context) {
+    DrawArrays arrays;
+    const std::vector<Index> place = weld_map(positions);
+    const CornersAt at = corners_at_places(mesh, place);
+    std::vector<Index> face_of_corner(mesh.corner_count());
+    for (Index f = 0; f < mesh.face_count(); ++f)
+        std::fill(face_of_corner.begin() + mesh.face_offsets[f], face_of_corner.begin() + mesh.face_offsets[f + 1], f);
+    if (context.is_cancelled()) return cancelled_error();
+
+    // Draw vertices: the corners at one place fall together where vertex, normal and UV agree.
+    const auto uv_index = [&](Index corner) {
+        return mesh.uvs.per_vertex() ? mesh.corners[corner] : mesh.uvs.corners[corner];
+    };
+    std::vector<Index> draw_vertex(mesh.corner_count());
+    std::vector<Vec3f> normals;
+    std::vector<Index> faces, uv_of_draw;
+    CornerNormals corner_normals(mesh, positions, options, context);
+    for (std::size_t p = 0; p < place.size(); ++p) {
+        if (p % (1 << 18) == 0) {
+            if (context.is_cancelled()) return cancelled_error();
+            context.report("preparing to draw", double(p) / double(place.size()));
+        }
+        const std::span corners(at.corners.data() + at.offsets[p], at.offsets[p + 1] - at.offsets[p]);
+        if (corners.empty()) continue;
+        faces.clear();
+        for (Index c : corners) faces.push_back(face_of_corner[c]);
+        corner_normals.at(corners, faces, normals);
+        const std::size_t first = arrays.vertex.size();
+        for (std::size_t i = 0; i < corners.size(); ++i) {
+            const Index vertex = mesh.corners[corners[i]];
+            const Index uv = mesh.uvs.empty() ? kNoIndex : uv_index(corners[i]);
+            std::size_t d = std::max(first, arrays.vertex.size() - std::min(arrays.vertex.size(), kMostCreased));
+            while (d < arrays.vertex.size() && !(arrays.vertex[d] == vertex && arrays.normals[d] == normals[i] &&
+                                                 (mesh.uvs.empty() || uv_of_draw[d] == uv)))
+                ++d;
+            draw_vertex[corners[i]] = static_cast<Index>(d);
+            if (d < arrays.vertex.size()) continue;
+            arrays.vertex.push_back(vertex);
+            arrays.normals.push_back(normals[i]);
+            if (mesh.uvs.empty()) continue;
+            uv_of_draw.push_back(uv);
+            arrays.uvs.push_back(uv == kNoIndex ? Vec2f(Vec2f::Zero()) : mesh.uvs.values[uv]);
+        }
+    }
+
+    // Triangles, by material.
+    const Triangulation cut = triangulate(mesh);
+    const bool by_material = !options.materials.empty() && !mesh.materials.empty();
+    const auto material_of = [&](Index face) { return by_material ? mesh.materials.of_face[face] : kNoIndex; };
+    const auto slot_of = [&](Index face) { // kNoIndex comes last
+        const Index m = material_of(face);
+        return m == kNoIndex ? mesh.materials.names.size() : m;
+    };
+    const auto is_hidden = [&](Index face) { return !options.hidden_faces.empty() && options.hidden_faces[face]; };
+    std::vector<Index> next(mesh.materials.names.size() + 2, 0);
+    for (Index f : cut.source_face)
+        if (!is_hidden(f)) ++next[slot_of(f) + 1];
+    std::partial_sum(next.begin(), next.end(), next.begin());
+    for (std::size_t m = 0; m + 1 < next.size(); ++m)
+        if (next[m] < next[m + 1])
+            arrays.parts.push_back(
+                {m == mesh.materials.names.size() ? kNoIndex : static_cast<Index>(m), next[m], next[m + 1] - next[m]});
+    arrays.triangles.resize(next.back());
+    arrays.edges.resize(next.back());
+    std::vector<Index> corner_of_vertex(mesh.vertex_count());
+    Index known = kNoIndex;
+    for (std::size_t t = 0; t < cut.triangles.size(); ++t) {
+        const Index f = cut.source_face[t];
+        if (is_hidden(f)) continue;
+        const Index begin = mesh.face_offsets[f], size = mesh.face_size(f);
+        if (f != known)
+            for (Index c = begin; c < begin + size; ++c) corner_of_vertex[mesh.corners[c]] = c;
+        known = f;
+        const Index slot = next[slot_of(f)]++;
+        std::uint8_t edges = 0;
+        for (int k = 0; k < 3; ++k) {
+            const Index from = corner_of_vertex[cut.triangles[t][k]] - begin,
+                        to = corner_of_vertex[cut.triangles[t][(k + 1) % 3]] - begin;
+            arrays.triangles[slot][k] = draw_vertex[begin + from];
+            if (to == (from + 1) % size) edges |= static_cast<std::uint8_t>(1 << k);
+        }
+        arrays.edges[slot] = edges;
+    }
+    return arrays;
+}
+
+} // namespace filigree

@@ -1,0 +1,660 @@
+#include "filigree/render/renderer.h"
+
+#include "filigree/render/color_map.h"
+#include "filigree/render/drawable_content.h"
+#include "filigree/render/shaders.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <numbers>
+
+namespace filigree {
+
+namespace {
+
+using Mat4f = Eigen::Matrix4f;
+using Mat4d = Eigen::Matrix4d;
+using gl::Framebuffer;
+using gl::Program;
+using gl::Texture;
+
+constexpr int kKeyShadowSize = 2048, kSkyShadowSize = 1536;
+constexpr double kKeyReach = 0.16;      // of the key light: tangent of half the angle it is seen under
+constexpr double kGroundSide = 2.5;     // half, in diagonals of the scene
+constexpr double kGroundDarkness = 0.6; // of a shadow that no light reaches
+constexpr unsigned kFewPasses = 4;      // below, the hardware's multisampling does the antialiasing
+// Light that a white surface gets where it faces the source, over all passes. The sky is seen by half on average.
+constexpr double kKeyLight = 0.92, kSkyLight = 2 * 0.46, kFillLight = 0.11, kBounceLight = 0.09;
+
+/// A sequence that fills the unit square evenly whatever its length [Roberts 2018].
+std::array<double, 2> evenly(unsigned i, double shift) {
+    const double g = 1.32471795724474602596;
+    const auto part = [](double x) { return x - std::floor(x); };
+    return {part(shift + (i + 1) / g), part(shift + (i + 1) / (g * g))};
+}
+
+/// Two directions that make a right-handed basis with the unit vector n.
+std::array<Vec3d, 2> tangents(const Vec3d& n) {
+    const Vec3d other = std::abs(n.x()) < 0.7 ? Vec3d::UnitX() : Vec3d::UnitY();
+    const Vec3d t = other.cross(n).normalized();
+    return {t, n.cross(t)};
+}
+
+/// Where light comes from, from the viewer's side: key from the upper left, sky from above and behind the viewer.
+struct Lights {
+    Vec3d key, sky, fill;
+
+    Lights(const Vec3d& back, const Vec3d& camera_right, const Vec3d& up) {
+        Vec3d right = up.cross(back);
+        right = right.norm() > 1e-3 ? right.normalized() : camera_right;
+        const Vec3d front = right.cross(up);
+        key = (-0.72 * right + 0.72 * up + 0.42 * front).normalized();
+        sky = (up + 0.55 * front).normalized();
+        fill = (0.80 * right + 0.05 * up + 0.45 * front).normalized();
+        // Looking down (or up) along the axis, front is no longer towards the viewer: turn all that way.
+        const double along = back.dot(up);
+        if (std::abs(along) > 0.85)
+            for (Vec3d* d : {&key, &sky, &fill}) *d = (*d + 0.6 * along * up).normalized();
+    }
+    Vec3d key_sample(unsigned i) const {
+        const auto [u, v] = evenly(i, 0.5);
+        const auto [a, b] = tangents(key);
+        const double r = kKeyReach * std::sqrt(u), angle = 2 * std::numbers::pi * v;
+        return (key + r * std::cos(angle) * a + r * std::sin(angle) * b).normalized();
+    }
+    /// Evenly over the hemisphere around the sky's middle.
+    Vec3d sky_sample(unsigned i) const {
+        const auto [u, v] = evenly(i, 0.25);
+        const auto [a, b] = tangents(sky);
+        const double z = 1 - u, r = std::sqrt(std::max(0.0, 1 - z * z)), angle = 2 * std::numbers::pi * v;
+        return z * sky + r * std::cos(angle) * a + r * std::sin(angle) * b;
+    }
+};
+
+/// The block that shaders/frame.glsl declares.
+struct FrameBlock {
+    float view_projection[16], key_matrix[16], sky_matrix[16];
+    float eye[4], key_direction[4], sky_direction[4], fill_direction[4], up[4], viewport[4], strength[4], ground[4];
+};
+
+void put(float (&to)[16], const Mat4d& m) { Eigen::Map<Mat4f>{to} = m.cast<float>(); }
+void put(float (&to)[4], const Vec3d& v, double w) {
+    for (int k = 0; k < 3; ++k) to[k] = static_cast<float>(v[k]);
+    to[3] = static_cast<float>(w);
+}
+
+std::array<Vec3d, 8> corners_of(const Box& box) {
+    std::array<Vec3d, 8> corners;
+    for (int k = 0; k < 8; ++k)
+        corners[k] = Vec3d((k & 1) ? box.max.x() : box.min.x(), (k & 2) ? box.max.y() : box.min.y(),
+                           (k & 4) ? box.max.z() : box.min.z());
+    return corners;
+}
+
+/// Parallel light from a direction over a box: to clip space, and the size of a texel.
+struct LightView {
+    Mat4d matrix;
+    double texel;
+
+    LightView(const Vec3d& direction, const Box& box, int size) {
+        const auto [a, b] = tangents(direction);
+        Vec3d lo = Vec3d::Constant(std::numeric_limits<double>::infinity()), hi = -lo;
+        for (const Vec3d& c : corners_of(box)) {
+            const Vec3d p(a.dot(c), b.dot(c), direction.dot(c));
+            lo = lo.cwiseMin(p);
+            hi = hi.cwiseMax(p);
+        }
+        const double margin = 4.0 / size; // so that the outermost texels stay empty
+        const Vec3d extent = (hi - lo).cwiseMax(1e-6) * (1 + 2 * margin);
+        const Vec3d centre = 0.5 * (lo + hi);
+        const double near = hi.z() + 0.02, far = lo.z() - 4 * kGroundSide; // the ground far behind is lit too
+        matrix = Mat4d::Zero();
+        matrix.row(0) << 2 / extent.x() * a.transpose(), -2 / extent.x() * centre.x();
+        matrix.row(1) << 2 / extent.y() * b.transpose(), -2 / extent.y() * centre.y();
+        matrix.row(2) << -2 / (near - far) * direction.transpose(), (near + far) / (near - far);
+        matrix(3, 3) = 1;
+        texel = std::max(extent.x(), extent.y()) / size;
+    }
+    Mat4d to_texture() const {
+        Mat4d half = Mat4d::Identity();
+        half.diagonal() << 0.5, 0.5, 0.5, 1;
+        half.col(3) << 0.5, 0.5, 0.5, 1;
+        return half * matrix;
+    }
+};
+
+void set_color(const Program& program, const char* name, const Vec3f& srgb) {
+    glUniform3fv(program.uniform(name), 1, srgb_to_linear(srgb).eval().data());
+}
+
+Texture make_texture(GLenum format, GLsizei width, GLsizei height) {
+    Texture texture = Texture::make();
+    glBindTexture(GL_TEXTURE_2D, texture.name());
+    glTexStorage2D(GL_TEXTURE_2D, 1, format, width, height);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+    return texture;
+}
+
+Framebuffer make_framebuffer(const Texture* color, const Texture* depth) {
+    Framebuffer framebuffer = Framebuffer::make();
+    glBindFramebuffer(GL_FRAMEBUFFER, framebuffer.name());
+    if (color) glFramebufferTexture(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, color->name(), 0);
+    if (depth) glFramebufferTexture(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, depth->name(), 0);
+    if (!color) glDrawBuffer(GL_NONE);
+    return framebuffer;
+}
+
+/// A depth map that light is compared with.
+struct ShadowMap {
+    Texture depth;
+    Framebuffer framebuffer;
+    int size = 0;
+
+    explicit ShadowMap(int side) : depth(make_texture(GL_DEPTH_COMPONENT32F, side, side)), size(side) {
+        glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+        glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+        glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+        glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+        glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_COMPARE_MODE, GL_COMPARE_REF_TO_TEXTURE);
+        framebuffer = make_framebuffer(nullptr, &depth);
+    }
+};
+
+const std::string kVersion = "#version 430 core\n";
+
+unsigned passes_for(const Scene& scene) {
+    double triangles = 0;
+    for (const SceneObject& object : scene.objects)
+        triangles += double(object.drawable->triangle_count()) + 2.0 * double(object.drawable->point_count());
+    return static_cast<unsigned>(std::clamp(std::lround(40 * std::sqrt(2.5e5 / std::max(triangles, 1.0))), 12L, 40L));
+}
+
+} // namespace
+
+Box Scene::box() const {
+    Box all;
+    for (const SceneObject& object : objects) {
+        const Box& box = object.drawable->box();
+        if (box.empty()) continue;
+        all.extend(box.min);
+        all.extend(box.max);
+    }
+    return all;
+}
+
+struct Renderer::Content {
+    enum class Source { given, float_records, int16_records };
+
+    // Made once.
+    std::map<std::pair<Source, bool>, Program> surface_programs; ///< by source and whether edges are drawn
+    std::map<Source, Program> depth_programs;
+    Program points, ground, add, show;
+    gl::Buffer frame_buffer;
+    gl::VertexArray nothing; ///< for shaders that need no input
+    ShadowMap key_map{kKeyShadowSize}, sky_map{kSkyShadowSize};
+    GLint largest = 0, most_samples = 0;
+
+    // One picture.
+    Scene scene;
+    Camera camera;
+    unsigned width = 0, height = 0, passes = 0, done = 0;
+    int samples = 0;
+    Texture pass_color, pass_depth, sum;
+    GLuint multisampled_color = 0, multisampled_depth = 0;
+    Framebuffer pass, multisampled, total;
+    Vec3d centre = Vec3d::Zero();
+    double scale = 1;
+    Box box; ///< of the scene, in scene space
+    bool shows_ground = false;
+    double ground_level = 0, ground_light = 1;
+    std::optional<Lights> lights;
+
+    ~Content() { free_multisampled(); }
+    void free_multisampled() {
+        glDeleteRenderbuffers(1, &multisampled_color);
+        glDeleteRenderbuffers(1, &multisampled_depth);
+        multisampled_color = multisampled_depth = 0;
+    }
+
+    static std::string vertex_source(Source source) {
+        if (source == Source::given) return kVersion + shaders::frame + shaders::surface_vertex;
+        return kVersion + "#define RESTORED\n" +
+               GpuRestorer::shader_source(source == Source::float_records ? Precision::float32 : Precision::int16) +
+               shaders::frame + shaders::surface_vertex;
+    }
+    const Program& surface_program(Source source, bool with_edges) {
+        Program& program = surface_programs[{source, with_edges}];
+        if (program) return program;
+        std::vector<Program::Stage> stages = {{GL_VERTEX_SHADER, vertex_source(source)}};
+        if (with_edges) stages.push_back({GL_GEOMETRY_SHADER, kVersion + shaders::frame + shaders::edges_geometry});
+        stages.push_back({GL_FRAGMENT_SHADER, kVersion + (with_edges ? "#define EDGES\n" : "") + shaders::frame +
+                                                  shaders::lighting + shaders::surface_fragment});
+        return program = Program::link(stages);
+    }
+    const Program& depth_program(Source source) {
+        Program& program = depth_programs[source];
+        if (program) return program;
+        const std::array<Program::Stage, 2> stages = {
+            {{GL_VERTEX_SHADER, vertex_source(source)}, {GL_FRAGMENT_SHADER, kVersion + "void main() {}\n"}}};
+        return program = Program::link(stages);
+    }
+    static Source source_of(const Drawable::Content& drawable) {
+        if (!drawable.on_gpu) return Source::given;
+        return drawable.on_gpu->precision() == Precision::int16 ? Source::int16_records : Source::float_records;
+    }
+
+    Status make_targets();
+    FrameBlock frame(unsigned number) const;
+    void use(const FrameBlock& block) const;
+    void draw_depth(FrameBlock block, const LightView& view, const ShadowMap& map);
+    void draw_objects(bool only_depth);
+    void draw_surface(const SceneObject& object, bool only_depth);
+    void draw_points(const SceneObject& object);
+    void set_place(const Program& program, const SceneObject& object) const;
+    void draw_ground();
+};
+
+Renderer::Renderer(std::unique_ptr<Content> content) : content_(std::move(content)) {}
+Renderer::Renderer(Renderer&&) noexcept = default;
+Renderer& Renderer::operator=(Renderer&&) noexcept = default;
+Renderer::~Renderer() = default;
+
+Result<Renderer> Renderer::create() {
+    if (epoxy_gl_version() < 43)
+        return Error{ErrorCode::unsupported, "The renderer needs OpenGL 4.3 and this context has " +
+                                                 std::to_string(epoxy_gl_version() / 10) + "." +
+                                                 std::to_string(epoxy_gl_version() % 10) +
+                                                 "; install a newer driver, or set LIBGL_ALWAYS_SOFTWARE=1."};
+    auto content = std::make_unique<Content>();
+    const auto link = [](const std::string& vertex, const std::string& fragment) {
+        const std::array<Program::Stage, 2> stages = {
+            {{GL_VERTEX_SHADER, kVersion + vertex}, {GL_FRAGMENT_SHADER, kVersion + fragment}}};
+        return Program::link(stages);
+    };
+    const std::string frame = shaders::frame, lighting = shaders::lighting;
+    content->points = link(frame + shaders::points_vertex, frame + lighting + shaders::points_fragment);
+    content->ground = link(frame + shaders::ground_vertex, frame + lighting + shaders::ground_fragment);
+    content->add = link(shaders::cover_vertex, shaders::add_fragment);
+    content->show = link(shaders::cover_vertex, shaders::show_fragment);
+    content->nothing = gl::VertexArray::make();
+    Result<gl::Buffer> buffer = gl::make_buffer(nullptr, sizeof(FrameBlock));
+    if (!buffer) return buffer.error();
+    content->frame_buffer = std::move(buffer).value();
+    std::array<GLint, 2> viewport = {};
+    glGetIntegerv(GL_MAX_VIEWPORT_DIMS, viewport.data());
+    glGetIntegerv(GL_MAX_TEXTURE_SIZE, &content->largest);
+    content->largest = std::min({content->largest, viewport[0], viewport[1]});
+    glGetIntegerv(GL_MAX_SAMPLES, &content->most_samples);
+    return Renderer(std::move(content));
+}
+
+Status Renderer::Content::make_targets() {
+    const auto w = static_cast<GLsizei>(width), h = static_cast<GLsizei>(height);
+    while (glGetError() != GL_NO_ERROR) {
+    }
+    pass_color = make_texture(GL_RGBA16F, w, h);
+    pass_depth = make_texture(GL_DEPTH_COMPONENT32F, w, h);
+    sum = make_texture(GL_RGBA32F, w, h);
+    pass = make_framebuffer(&pass_color, &pass_depth);
+    total = make_framebuffer(&sum, nullptr);
+    bool complete = glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
+    free_multisampled();
+    multisampled = Framebuffer();
+    if (samples > 1) {
+        glGenRenderbuffers(1, &multisampled_color);
+        glBindRenderbuffer(GL_RENDERBUFFER, multisampled_color);
+        glRenderbufferStorageMultisample(GL_RENDERBUFFER, samples, GL_RGBA16F, w, h);
+        glGenRenderbuffers(1, &multisampled_depth);
+        glBindRenderbuffer(GL_RENDERBUFFER, multisampled_depth);
+        glRenderbufferStorageMultisample(GL_RENDERBUFFER, samples, GL_DEPTH_COMPONENT32F, w, h);
+        multisampled = Framebuffer::make();
+        glBindFramebuffer(GL_FRAMEBUFFER, multisampled.name());
+        glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER, multisampled_color);
+        glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, multisampled_depth);
+        complete = complete && glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
+    }
+    if (!complete || glGetError() != GL_NO_ERROR)
+        return Error{ErrorCode::out_of_memory, "The graphics memory has no room for a picture of " +
+                                                   std::to_string(width) + " by " + std::to_string(height) +
+                                                   " pixels; make it smaller."};
+    return Success{};
+}
+
+Status Renderer::begin(const Scene& scene, const Camera& camera, unsigned width, unsigned height, unsigned passes) {
+    Content& c = *content_;
+    if (width == 0 || height == 0 || width > static_cast<unsigned>(c.largest) ||
+        height > static_cast<unsigned>(c.largest))
+        return Error{ErrorCode::unsuitable, "A picture of " + std::to_string(width) + " by " + std::to_string(height) +
+                                                " pixels cannot be drawn here; sides go from 1 to " +
+                                                std::to_string(c.largest) + "."};
+    c.passes = passes ? passes : passes_for(scene);
+    const int samples = c.passes < kFewPasses ? std::min(c.most_samples, 8) : 0;
+    const bool same_targets = c.width == width && c.height == height && c.samples == samples && c.sum;
+    c.scene = scene;
+    c.camera = camera;
+    c.width = width;
+    c.height = height;
+    c.samples = samples;
+    c.done = 0;
+    if (!same_targets)
+        if (Status status = c.make_targets(); !status) {
+            c.width = 0; // half made: not to be taken for the same
+            return status;
+        }
+    glBindFramebuffer(GL_FRAMEBUFFER, c.total.name());
+    const std::array<float, 4> zero = {};
+    glClearBufferfv(GL_COLOR, 0, zero.data());
+
+    Box world = scene.box();
+    if (world.empty()) world.extend(Vec3d::Zero());
+    const Vec3d up = up_vector(scene.up);
+    c.centre = world.centre();
+    const double diagonal = world.diagonal();
+    c.scale = diagonal > 0 ? 1 / diagonal : 1;
+    c.box = {};
+    c.box.extend(c.scale * (world.min - c.centre));
+    c.box.extend(c.scale * (world.max - c.centre));
+    const Mat3d basis = camera.basis();
+    c.lights.emplace(basis.col(2), basis.col(0), up);
+
+    // In a scene without height the ground lies a little below, not in it.
+    double lowest = std::numeric_limits<double>::infinity();
+    for (const Vec3d& corner : corners_of(c.box)) lowest = std::min(lowest, up.dot(corner));
+    c.ground_level = scene.fixed_ground ? c.scale * (scene.ground_level - up.dot(c.centre)) : lowest - 1e-4;
+    const double eye_height =
+        camera.field_of_view_deg > 0 ? c.scale * up.dot(camera.eye - c.centre) - c.ground_level : up.dot(basis.col(2));
+    c.shows_ground = scene.ground && eye_height > 0;
+    c.ground_light = 0;
+    for (unsigned i = 0; i < c.passes; ++i)
+        c.ground_light += kKeyLight * std::max(0.0, up.dot(c.lights->key_sample(i))) +
+                          kSkyLight * std::max(0.0, up.dot(c.lights->sky_sample(i)));
+    c.ground_light = std::max(c.ground_light / c.passes, 1e-3);
+    return Success{};
+}
+
+FrameBlock Renderer::Content::frame(unsigned number) const {
+    FrameBlock block = {};
+    const Mat3d basis = camera.basis();
+    const Vec3d eye = scale * (camera.eye - centre), back = basis.col(2), up = up_vector(scene.up);
+
+    // Near and far enclose the scene, and the ground where it shows.
+    double nearest = std::numeric_limits<double>::infinity(), furthest = -nearest;
+    Box all = box;
+    if (shows_ground) {
+        const Vec3d base = up * ground_level;
+        for (int axis = 0; axis < 3; ++axis)
+            if (std::abs(up[axis]) < 0.5) {
+                all.extend(base + kGroundSide * Vec3d::Unit(axis));
+                all.extend(base - kGroundSide * Vec3d::Unit(axis));
+            }
+    }
+    for (const Vec3d& corner : corners_of(all)) {
+        const double along = -back.dot(corner - eye);
+        nearest = std::min(nearest, along);
+        furthest = std::max(furthest, along);
+    }
+    Camera scaled = camera;
+    scaled.height *= scale;
+    Vec3d from = eye;
+    if (camera.field_of_view_deg > 0) {
+        furthest = std::max(furthest * 1.001, 1e-3);
+        nearest = std::clamp(nearest * 0.999, furthest * 1e-4, furthest * 0.999);
+    } else { // the eye's place along the view does not matter
+        from += back * (1 - nearest);
+        furthest += 1.1 - nearest;
+        nearest = 0.9;
+    }
+    Mat4d view = Mat4d::Identity();
+    view.topLeftCorner<3, 3>() = basis.transpose();
+    view.topRightCorner<3, 1>() = -basis.transpose() * from;
+    Mat4d projection = scaled.projection(double(width) / height, nearest, furthest);
+    if (samples <= 1 || passes > 1) { // a tent over the pixel
+        const auto [u, v] = evenly(number, 0.0);
+        const auto tent = [](double x) { return x < 0.5 ? std::sqrt(2 * x) - 1 : 1 - std::sqrt(2 - 2 * x); };
+        const double reach = samples > 1 ? 0.5 : 0.8;
+        Mat4d shift = Mat4d::Identity();
+        shift(0, 3) = 2 * reach * tent(u) / width;
+        shift(1, 3) = 2 * reach * tent(v) / height;
+        projection = shift * projection;
+    }
+    put(block.view_projection, projection * view);
+    if (camera.field_of_view_deg > 0)
+        put(block.eye, eye, 1);
+    else
+        put(block.eye, back, 0);
+
+    const Vec3d key = lights->key_sample(number), sky = lights->sky_sample(number);
+    const LightView key_view(key, box, kKeyShadowSize), sky_view(sky, box, kSkyShadowSize);
+    put(block.key_matrix, key_view.to_texture());
+    put(block.sky_matrix, sky_view.to_texture());
+    put(block.key_direction, key, key_view.texel);
+    put(block.sky_direction, sky, sky_view.texel);
+    put(block.fill_direction, lights->fill, 0);
+    put(block.up, up, ground_level);
+    put(block.viewport, {double(width), double(height), double(number)}, 0);
+    put(block.strength, {kKeyLight, kSkyLight, kFillLight}, kBounceLight);
+    put(block.ground,
+        {kKeyLight * std::max(0.0, up.dot(key)) / ground_light, kSkyLight * std::max(0.0, up.dot(sky)) / ground_light,
+         kGroundDarkness},
+        0);
+    return block;
+}
+
+void Renderer::Content::use(const FrameBlock& block) const {
+    glBindBuffer(GL_UNIFORM_BUFFER, frame_buffer.name());
+    glBufferData(GL_UNIFORM_BUFFER, sizeof block, &block, GL_STREAM_DRAW);
+    glBindBufferBase(GL_UNIFORM_BUFFER, 0, frame_buffer.name());
+}
+
+void Renderer::Content::draw_depth(FrameBlock block, const LightView& view, const ShadowMap& map) {
+    glBindFramebuffer(GL_FRAMEBUFFER, map.framebuffer.name());
+    glViewport(0, 0, map.size, map.size);
+    glClear(GL_DEPTH_BUFFER_BIT);
+    put(block.view_projection, view.matrix);
+    // The light comes from one direction: the third row of its view, turned round.
+    put(block.eye, -view.matrix.block<1, 3>(2, 0).transpose().normalized(), 0);
+    block.viewport[3] = 1;
+    use(block);
+    draw_objects(true);
+}
+
+void Renderer::Content::set_place(const Program& program, const SceneObject& object) const {
+    const Drawable::Content& drawable = object.drawable->content();
+    const Vec3f offset = (drawable.origin - centre).cast<float>();
+    glUniform3f(program.uniform("offset"), offset.x(), offset.y(), offset.z());
+    glUniform1f(program.uniform("scale"), static_cast<float>(scale));
+    const std::optional<ClipPlane>& clip = object.appearance.clip;
+    glUniform1i(program.uniform("is_clipped"), clip.has_value());
+    if (clip) {
+        const Vec3d n = clip->normal.normalized();
+        const double d = scale * (clip->offset / clip->normal.norm() - n.dot(centre));
+        glUniform4f(program.uniform("clip"), float(n.x()), float(n.y()), float(n.z()), static_cast<float>(d));
+    }
+}
+
+void Renderer::Content::draw_objects(bool only_depth) {
+    for (const SceneObject& object : scene.objects) {
+        if (object.drawable->content().point_count)
+            draw_points(object);
+        else if (!only_depth || object.appearance.surface)
+            draw_surface(object, only_depth);
+    }
+}
+
+void Renderer::Content::draw_surface(const SceneObject& object, bool only_depth) {
+    const Drawable::Content& drawable = object.drawable->content();
+    const Appearance& look = object.appearance;
+    const bool with_edges = !only_depth && (look.edges || !look.surface);
+    const Program& program =
+        only_depth ? depth_program(source_of(drawable)) : surface_program(source_of(drawable), with_edges);
+    glUseProgram(program.name());
+    set_place(program, object);
+    if (look.clip) glEnable(GL_CLIP_DISTANCE0);
+    glBindVertexArray(drawable.arrays.name());
+    if (drawable.on_gpu) drawable.on_gpu->bind();
+    if (only_depth) {
+        glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(3 * drawable.triangle_count), GL_UNSIGNED_INT, nullptr);
+    } else {
+        const bool own = look.own_colors;
+        glUniform1f(program.uniform("gloss"), look.gloss);
+        glUniform1i(program.uniform("has_colors"), own && drawable.has_colors);
+        glUniform1i(program.uniform("has_scalars"), own && drawable.has_scalars);
+        if (drawable.has_scalars) {
+            glActiveTexture(GL_TEXTURE3);
+            glBindTexture(GL_TEXTURE_1D, drawable.scalar_colors.name());
+        }
+        if (with_edges) {
+            set_color(program, "edge_color", look.edge_color);
+            glUniform1f(program.uniform("edge_width"), look.edge_width);
+            glUniform1i(program.uniform("has_surface"), look.surface);
+            glUniform1i(program.uniform("edge_flags"), 4);
+            glActiveTexture(GL_TEXTURE4);
+            glBindTexture(GL_TEXTURE_BUFFER, drawable.edge_texture.name());
+        }
+        for (const Drawable::Content::Part& part : drawable.parts) {
+            const Vec3f& color = own && part.has_color ? part.color : look.color;
+            set_color(program, "base_color", color);
+            glUniform1i(program.uniform("has_picture"), own && part.picture);
+            if (part.picture) {
+                glActiveTexture(GL_TEXTURE2);
+                glBindTexture(GL_TEXTURE_2D, part.picture.name());
+            }
+            glUniform1i(program.uniform("first_triangle"), static_cast<GLint>(part.first));
+            glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(3 * part.count), GL_UNSIGNED_INT,
+                           reinterpret_cast<const void*>(std::size_t{12} * part.first));
+        }
+    }
+    glDisable(GL_CLIP_DISTANCE0);
+}
+
+void Renderer::Content::draw_points(const SceneObject& object) {
+    const Drawable::Content& drawable = object.drawable->content();
+    const Appearance& look = object.appearance;
+    glUseProgram(points.name());
+    set_place(points, object);
+    glUniform1f(points.uniform("radius"), static_cast<float>(drawable.radius * scale));
+    glUniform1f(points.uniform("gloss"), look.gloss);
+    set_color(points, "base_color", look.color);
+    glUniform1i(points.uniform("has_colors"), look.own_colors && drawable.has_colors);
+    glUniform1i(points.uniform("has_scalars"), look.own_colors && drawable.has_scalars);
+    if (drawable.has_scalars) {
+        glActiveTexture(GL_TEXTURE3);
+        glBindTexture(GL_TEXTURE_1D, drawable.scalar_colors.name());
+    }
+    glBindVertexArray(drawable.arrays.name());
+    glDrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, static_cast<GLsizei>(drawable.point_count));
+}
+
+void Renderer::Content::draw_ground() {
+    const auto [right, forward] = tangents(up_vector(scene.up));
+    const Vec3f a = (kGroundSide * right).cast<float>(), b = (kGroundSide * forward).cast<float>();
+    glUseProgram(ground.name());
+    glUniform3fv(ground.uniform("ground_right"), 1, a.data());
+    glUniform3fv(ground.uniform("ground_forward"), 1, b.data());
+    glBindVertexArray(nothing.name());
+    glDisable(GL_DEPTH_TEST);
+    glDrawArrays(GL_TRIANGLE_STRIP, 0, 4);
+    glEnable(GL_DEPTH_TEST);
+}
+
+bool Renderer::add_pass() {
+    Content& c = *content_;
+    if (c.done >= c.passes) return false;
+    glDisable(GL_BLEND);
+    glDisable(GL_CULL_FACE);
+    glDisable(GL_SCISSOR_TEST);
+    glDisable(GL_STENCIL_TEST);
+    glEnable(GL_DEPTH_TEST);
+    glDepthFunc(GL_LESS);
+    glDepthMask(GL_TRUE);
+    glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+
+    const FrameBlock block = c.frame(c.done);
+    c.draw_depth(block, LightView(c.lights->key_sample(c.done), c.box, kKeyShadowSize), c.key_map);
+    c.draw_depth(block, LightView(c.lights->sky_sample(c.done), c.box, kSkyShadowSize), c.sky_map);
+
+    const Framebuffer& target = c.samples > 1 ? c.multisampled : c.pass;
+    const auto w = static_cast<GLsizei>(c.width), h = static_cast<GLsizei>(c.height);
+    glBindFramebuffer(GL_FRAMEBUFFER, target.name());
+    glViewport(0, 0, w, h);
+    const std::array<float, 4> zero = {};
+    glClearBufferfv(GL_COLOR, 0, zero.data());
+    glClear(GL_DEPTH_BUFFER_BIT);
+    c.use(block);
+    glActiveTexture(GL_TEXTURE0);
+    glBindTexture(GL_TEXTURE_2D, c.key_map.depth.name());
+    glActiveTexture(GL_TEXTURE1);
+    glBindTexture(GL_TEXTURE_2D, c.sky_map.depth.name());
+    if (c.shows_ground) c.draw_ground();
+    c.draw_objects(false);
+
+    if (c.samples > 1) {
+        glBindFramebuffer(GL_READ_FRAMEBUFFER, c.multisampled.name());
+        glBindFramebuffer(GL_DRAW_FRAMEBUFFER, c.pass.name());
+        glBlitFramebuffer(0, 0, w, h, 0, 0, w, h, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+    }
+    glBindFramebuffer(GL_FRAMEBUFFER, c.total.name());
+    glDisable(GL_DEPTH_TEST);
+    glEnable(GL_BLEND);
+    glBlendFunc(GL_ONE, GL_ONE);
+    glUseProgram(c.add.name());
+    glActiveTexture(GL_TEXTURE0);
+    glBindTexture(GL_TEXTURE_2D, c.pass_color.name());
+    glBindVertexArray(c.nothing.name());
+    glDrawArrays(GL_TRIANGLES, 0, 3);
+    glDisable(GL_BLEND);
+    glBindVertexArray(0);
+    glUseProgram(0);
+    ++c.done;
+    return true;
+}
+
+void Renderer::show(unsigned framebuffer) const {
+    const Content& c = *content_;
+    glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
+    glViewport(0, 0, static_cast<GLsizei>(c.width), static_cast<GLsizei>(c.height));
+    glDisable(GL_DEPTH_TEST);
+    glDisable(GL_BLEND);
+    glUseProgram(c.show.name());
+    glUniform1f(c.show.uniform("passes"), static_cast<float>(std::max(1u, c.done)));
+    glUniform2f(c.show.uniform("size"), static_cast<float>(c.width), static_cast<float>(c.height));
+    glUniform3fv(c.show.uniform("top"), 1, c.scene.background.top.data());
+    glUniform3fv(c.show.uniform("bottom"), 1, c.scene.background.bottom.data());
+    glUniform1i(c.show.uniform("is_transparent"), c.scene.background.transparent);
+    glActiveTexture(GL_TEXTURE0);
+    glBindTexture(GL_TEXTURE_2D, c.sum.name());
+    glBindVertexArray(c.nothing.name());
+    glDrawArrays(GL_TRIANGLES, 0, 3);
+    glBindVertexArray(0);
+    glUseProgram(0);
+}
+
+Result<Picture> Renderer::picture(const Scene& scene, const Camera& camera, const PictureOptions& options,
+                                  const RunContext& context) {
+    if (Status status = begin(scene, camera, options.width, options.height, options.passes); !status)
+        return status.error();
+    Content& c = *content_;
+    while (add_pass()) {
+        glFinish();
+        if (context.is_cancelled()) return cancelled_error();
+        context.report("drawing", double(c.done) / c.passes);
+    }
+    const auto w = static_cast<GLsizei>(c.width), h = static_cast<GLsizei>(c.height);
+    const Texture color = make_texture(GL_RGBA8, w, h);
+    const Framebuffer framebuffer = make_framebuffer(&color, nullptr);
+    show(framebuffer.name());
+    Picture picture(c.width, c.height), flipped(c.width, c.height);
+    glPixelStorei(GL_PACK_ALIGNMENT, 1);
+    glReadPixels(0, 0, w, h, GL_RGBA, GL_UNSIGNED_BYTE, flipped.rgba.data());
+    const std::size_t row = std::size_t{4} * c.width;
+    for (unsigned y = 0; y < c.height; ++y)
+        std::copy_n(flipped.rgba.data() + row * (c.height - 1 - y), row, picture.rgba.data() + row * y);
+    if (glGetError() == GL_OUT_OF_MEMORY)
+        return Error{ErrorCode::out_of_memory, "The graphics memory ran out; draw a smaller mesh or picture."};
+    return picture;
+}
+
+} // namespace filigree

@@ -1,0 +1,18 @@
+// What every stage of a pass knows. Positions are in scene space: the world, moved and scaled so that the scene's box
+// has its centre at the origin and the diagonal 1.
+layout(std140, binding = 0) uniform Frame {
+    mat4 view_projection;
+    mat4 key_matrix, sky_matrix; // scene space to the shadow maps' [0, 1]^3
+    vec4 eye;                    // w 1: a position; w 0: the direction to the viewer
+    vec4 key_direction;          // to the light; w: world size of a texel of its shadow map
+    vec4 sky_direction;
+    vec4 fill_direction;
+    vec4 up;                     // w: level of the ground
+    vec4 viewport;               // width, height in pixels; z: number of the pass; w: 1 in a shadow pass
+    vec4 strength;               // of the light: key, sky, fill, bounce from the ground
+    vec4 ground;                 // shares of this pass's light on the ground: key, sky; z: how dark shadow may be
+} frame;
+
+vec3 to_viewer(vec3 position) {
+    return frame.eye.w > 0.5 ? normalize(frame.eye.xyz - position) : frame.eye.xyz;
+}

@@ -1,0 +1,65 @@
+in Surface {
+    vec3 position;
+    vec3 normal;
+    vec2 uv;
+    vec4 color;
+    float scalar;
+} surface;
+#ifdef EDGES
+noperspective in vec3 edge_distance;
+flat in float smallest_height;
+uniform vec3 edge_color;
+uniform float edge_width;
+uniform bool has_surface;
+#endif
+
+uniform vec3 base_color; // all colours are linear
+uniform bool has_colors, has_scalars, has_picture, is_clipped;
+uniform float gloss;
+layout(binding = 2) uniform sampler2D picture;
+layout(binding = 3) uniform sampler1D scalar_colors;
+
+layout(location = 0) out vec4 result;
+
+const vec3 kNoValue = vec3(0.2);
+
+void main() {
+    vec3 view = to_viewer(surface.position);
+    vec3 facing = cross(dFdx(surface.position), dFdy(surface.position));
+    float size = length(facing);
+    facing = size > 0.0 ? facing / size : view;
+    if (dot(facing, view) < 0.0) facing = -facing;
+    vec3 normal = surface.normal;
+    float normal_size = length(normal);
+    normal = normal_size > 1e-3 ? normal / normal_size : facing;
+    if (dot(normal, facing) < 0.0) normal = -normal;
+
+    vec3 albedo = base_color;
+    if (has_colors) albedo = surface.color.rgb;
+    if (has_picture) {
+        vec4 texel = texture(picture, surface.uv);
+        if (texel.a < 0.5) discard;
+        albedo *= texel.rgb;
+    }
+    if (has_scalars)
+        albedo = surface.scalar < -0.25
+                     ? kNoValue
+                     : texture(scalar_colors, (clamp(surface.scalar, 0.0, 1.0) * 255.0 + 0.5) / 256.0).rgb;
+    if (is_clipped && !gl_FrontFacing) albedo *= vec3(0.80, 0.70, 0.64); // the inside of what was cut open
+#ifdef EDGES
+    float d = min(edge_distance.x, min(edge_distance.y, edge_distance.z));
+    float line = 1.0 - smoothstep(0.5 * edge_width - 0.5, 0.5 * edge_width + 0.5, d);
+    if (!has_surface) {
+        if (line < 0.5) discard;
+        albedo = edge_color;
+        line = 0.0;
+    } else { // where triangles are hardly wider than lines, lines are drawn thinner, or all would be line
+        line *= clamp(smallest_height / (5.0 * edge_width), 0.12, 0.85);
+    }
+#endif
+    vec3 light = shade(surface.position, facing, normal, albedo, gloss);
+#ifdef EDGES
+    light = mix(light, edge_color, line);
+#endif
+    result = vec4(light, 1.0);
+}
