@@ -13,12 +13,14 @@ namespace filigree::cli {
 bool is_film_path(const std::filesystem::path& path);
 
 /// Writes a film frame by frame. Nothing stands at `path` until finish(); a writer that goes away before takes its
-/// unfinished files (temporary ones beside the target) with it, also when it was cancelled.
+/// unfinished files (temporary ones beside the target) and the ffmpeg that it started with it, also when it was
+/// cancelled. Numbers of pictures count from 1. Transparent parts of .mp4 and .gif become white.
 class FilmWriter {
 public:
     /// .mp4 (H.264, yuv420p; odd sizes are padded by a row or column of the last pixel) and .gif (a palette of its own)
-    /// need the program ffmpeg; numbered PNGs do not.
-    /// Errors: usage (no film's name), unsupported (ffmpeg is missing: says what to install), unwritable.
+    /// need the program ffmpeg; numbered PNGs do not. A .gif is kept in memory (by ffmpeg) until its palette is known.
+    /// Errors: usage (no film's name, no pixels, no such rate), unsupported (ffmpeg is missing: says what to install),
+    /// unwritable.
     static Result<FilmWriter> create(const std::filesystem::path& path, unsigned width, unsigned height,
                                      double frames_per_second);
     FilmWriter(FilmWriter&&) noexcept;
@@ -27,7 +29,7 @@ public:
 
     /// Errors: mismatch (another size), unwritable (disk full, ffmpeg failed: with its last words).
     Status add(const Picture& frame);
-    /// Puts the film in place.
+    /// Puts the film in place. Errors: unsuitable (no frames), unwritable.
     Status finish();
 
     unsigned frame_count() const;

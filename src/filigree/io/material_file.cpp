@@ -70,7 +70,7 @@ public:
     MaterialReader(const Mesh& mesh, const fs::path& mesh_path) : mesh_(mesh), folder_(mesh_path.parent_path()) {
         for (const std::string& name : mesh.materials.names) {
             wanted_.try_emplace(name, materials_.size());
-            materials_.push_back({name});
+            materials_.emplace_back().name = name;
         }
         states_.resize(materials_.size());
     }

@@ -1,0 +1,445 @@
+#include "film.h"
+
+#include "filigree/io/file.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <csignal>
+#include <optional>
+#include <sstream>
+#include <system_error>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <spawn.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+extern char** environ;
+
+namespace filigree::cli {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The letters around a number pattern, "%d" or "%04d", and how many digits it asks for.
+struct NumberPattern {
+    std::string before, after;
+    unsigned digits = 1;
+
+    std::string name(unsigned number) const { return fmt::format("{}{:0{}}{}", before, number, digits, after); }
+};
+
+/// The one pattern in a file's name; none when there is none, or more than one '%'.
+std::optional<NumberPattern> number_pattern(const std::string& name) {
+    const std::size_t start = name.find('%');
+    if (start == std::string::npos || name.find('%', start + 1) != std::string::npos) return std::nullopt;
+    std::size_t at = start + 1;
+    NumberPattern pattern{name.substr(0, start), "", 1};
+    if (at + 1 < name.size() && name[at] == '0' && name[at + 1] >= '1' && name[at + 1] <= '9') {
+        pattern.digits = static_cast<unsigned>(name[at + 1] - '0');
+        at += 2;
+    }
+    if (at >= name.size() || name[at] != 'd') return std::nullopt;
+    pattern.after = name.substr(at + 1);
+    return pattern;
+}
+
+enum class FilmKind { none, mp4, gif, numbered };
+
+FilmKind film_kind(const fs::path& path) {
+    std::string ending = path.extension().string();
+    for (char& c : ending)
+        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+    if (ending == ".mp4") return FilmKind::mp4;
+    if (ending == ".gif") return FilmKind::gif;
+    return ending == ".png" && number_pattern(path.filename().string()) ? FilmKind::numbered : FilmKind::none;
+}
+
+Error cannot_write(const fs::path& path, const std::string& cause) {
+    return {ErrorCode::unwritable, path.string() + ": cannot be written: " + cause + "."};
+}
+
+/// Files beside a target that are gone at the end, unless they are put in place.
+class TemporaryFile {
+public:
+    /// Written with `bytes`. Messages name `target`.
+    static Result<TemporaryFile> create(const fs::path& target, std::string_view bytes) {
+        static std::atomic<unsigned> next{0};
+        fs::path path;
+        std::error_code ignored;
+        do { // leftovers of a killed process with our number stay
+            path = target.parent_path() / fmt::format(".filigree-{}-film{}.tmp", ::getpid(), next++);
+        } while (fs::exists(fs::symlink_status(path, ignored)));
+        const Status status = write_file(path, {&bytes, 1});
+        if (status) return TemporaryFile(std::move(path));
+        Error error = status.error();
+        error.message.replace(0, path.string().size(), target.string());
+        return error;
+    }
+    TemporaryFile(TemporaryFile&& other) noexcept : path_(std::exchange(other.path_, {})) {}
+    TemporaryFile& operator=(TemporaryFile&& other) noexcept {
+        std::swap(path_, other.path_);
+        return *this;
+    }
+    ~TemporaryFile() {
+        if (!path_.empty()) ::unlink(path_.c_str());
+    }
+
+    const fs::path& path() const { return path_; }
+
+    Status put_in_place(const fs::path& target) {
+        std::error_code failed;
+        const fs::file_status existing = fs::status(target, failed);
+        if (fs::is_directory(existing)) return cannot_write(target, "it is a folder");
+        if (fs::is_regular_file(existing)) fs::permissions(path_, existing.permissions(), failed); // best effort
+        const fs::path real = fs::is_symlink(target, failed) ? fs::weakly_canonical(target, failed) : target;
+        if (::rename(path_.c_str(), real.c_str()) != 0)
+            return cannot_write(target, fmt::format("its folder does not let us (error {})", errno));
+        path_.clear();
+        return Success{};
+    }
+
+private:
+    explicit TemporaryFile(fs::path path) : path_(std::move(path)) {}
+    fs::path path_;
+};
+
+/// Closes what it holds.
+class Descriptor {
+public:
+    explicit Descriptor(int descriptor = -1) : descriptor_(descriptor) {}
+    Descriptor(Descriptor&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
+    Descriptor& operator=(Descriptor&& other) noexcept {
+        std::swap(descriptor_, other.descriptor_);
+        return *this;
+    }
+    ~Descriptor() { close(); }
+
+    int get() const { return descriptor_; }
+    bool is_open() const { return descriptor_ >= 0; }
+    void close() {
+        if (is_open()) ::close(std::exchange(descriptor_, -1));
+    }
+
+private:
+    int descriptor_;
+};
+
+/// A child process that reads what we send and whose complaints we hear. Killed when it goes away unfinished.
+class Process {
+public:
+    /// 0 or the error number; ENOENT when there is no such program.
+    int start(std::vector<std::string> words) {
+        int input[2], errors[2];
+        // A socket, not a pipe: sending to a process that has ended is an error then, and never a signal.
+        if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, input) != 0) return errno;
+        input_ = Descriptor(input[0]);
+        const Descriptor child_input(input[1]);
+        if (::pipe2(errors, O_CLOEXEC) != 0) return errno;
+        errors_ = Descriptor(errors[0]);
+        const Descriptor child_errors(errors[1]);
+
+        std::vector<char*> arguments;
+        for (std::string& word : words) arguments.push_back(word.data());
+        arguments.push_back(nullptr);
+        posix_spawn_file_actions_t streams;
+        posix_spawn_file_actions_init(&streams);
+        posix_spawn_file_actions_adddup2(&streams, child_input.get(), STDIN_FILENO);
+        posix_spawn_file_actions_addopen(&streams, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+        posix_spawn_file_actions_adddup2(&streams, child_errors.get(), STDERR_FILENO);
+        posix_spawnattr_t attributes;
+        posix_spawnattr_init(&attributes);
+        sigset_t defaults;
+        sigemptyset(&defaults);
+        sigaddset(&defaults, SIGPIPE); // we ignore it, and children inherit that
+        posix_spawnattr_setsigdefault(&attributes, &defaults);
+        posix_spawnattr_setpgroup(&attributes, 0); // Ctrl-C is for us: we say when the child ends
+        posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
+        pid_t child = -1;
+        const int failed = ::posix_spawnp(&child, words[0].c_str(), &streams, &attributes, arguments.data(), environ);
+        posix_spawnattr_destroy(&attributes);
+        posix_spawn_file_actions_destroy(&streams);
+        if (!failed) child_ = child;
+        return failed;
+    }
+    Process() = default;
+    Process(const Process&) = delete;
+    Process& operator=(const Process&) = delete;
+    ~Process() {
+        if (child_ < 0) return;
+        ::kill(child_, SIGKILL);
+        wait();
+    }
+
+    /// False when the child has stopped listening. It is heard all the while: else it could wait for us to listen
+    /// while we wait for it.
+    bool send(std::string_view bytes) {
+        while (!bytes.empty()) {
+            pollfd waiting[2] = {{input_.get(), POLLOUT, 0}, {errors_.get(), POLLIN, 0}};
+            if (::poll(waiting, 2, -1) < 0 && errno != EINTR) return false;
+            if (waiting[1].revents) listen();
+            if (!waiting[0].revents) continue;
+            const ssize_t sent = ::send(input_.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+            if (sent < 0 && errno != EINTR && errno != EAGAIN) return false;
+            if (sent > 0) bytes.remove_prefix(static_cast<std::size_t>(sent));
+        }
+        return true;
+    }
+
+    /// Says that this was all and waits for the end; whether the child is content.
+    bool finish() {
+        input_.close();
+        while (errors_.is_open()) listen();
+        const int status = wait();
+        return WIFEXITED(status) && WEXITSTATUS(status) == 0;
+    }
+
+    /// The start of what it said on stderr.
+    const std::string& complaint() const { return complaint_; }
+
+private:
+    /// Waits for something on stderr, keeps the start of it, and closes it at its end.
+    void listen() {
+        constexpr std::size_t kMostKept = 4096;
+        char bytes[4096];
+        const ssize_t got = ::read(errors_.get(), bytes, sizeof bytes);
+        if (got < 0 && errno == EINTR) return;
+        if (got <= 0) return errors_.close();
+        complaint_.append(bytes, std::min(static_cast<std::size_t>(got), kMostKept - complaint_.size()));
+    }
+
+    int wait() {
+        int status = -1;
+        while (::waitpid(child_, &status, 0) < 0 && errno == EINTR) {
+        }
+        child_ = -1;
+        return status;
+    }
+
+    pid_t child_ = -1;
+    Descriptor input_, errors_;
+    std::string complaint_;
+};
+
+/// The first line of ffmpeg's complaint, which names the cause; those after it name what followed from it.
+std::string first_line(const std::string& complaint) {
+    constexpr std::size_t kLongest = 200;
+    const std::size_t start = std::min(complaint.find_first_not_of("\r\n"), complaint.size());
+    std::string line = complaint.substr(start, complaint.find_first_of("\r\n", start) - start);
+    if (line.starts_with('[') && line.find("] ") != std::string::npos)
+        line.erase(0, line.find("] ") + 2); // [mp4 @ 0x5..]
+    if (line.size() > kLongest) line = line.substr(0, kLongest) + "...";
+    for (char& c : line)
+        if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') c = '?';
+    while (!line.empty() && (line.back() == '.' || line.back() == ' ')) line.pop_back();
+    return line;
+}
+
+std::vector<std::string> ffmpeg_command(FilmKind kind, unsigned width, unsigned height, double frames_per_second,
+                                        const fs::path& output) {
+    // The same number of threads everywhere, as x264's output depends on it. The colours are sRGB and say so.
+    constexpr std::string_view kMp4 =
+        "-threads 8 -vf scale=out_color_matrix=bt709:out_range=tv:flags=bicubic+accurate_rnd+full_chroma_int "
+        "-c:v libx264 -crf 17 -pix_fmt yuv420p -colorspace bt709 -color_primaries bt709 -color_trc iec61966-2-1 "
+        "-color_range tv -movflags +faststart -f mp4";
+    constexpr std::string_view kGif =
+        "-filter_complex split[all][shown];[all]palettegen=reserve_transparent=0[palette];"
+        "[shown][palette]paletteuse=diff_mode=rectangle -loop 0 -f gif";
+    std::istringstream line(fmt::format("ffmpeg -hide_banner -nostdin -nostats -loglevel error -y "
+                                        "-f rawvideo -pix_fmt rgb24 -video_size {}x{} -framerate {} -i pipe:0 "
+                                        "-map_metadata -1 -fflags +bitexact -flags:v +bitexact {}",
+                                        width, height, frames_per_second, kind == FilmKind::mp4 ? kMp4 : kGif));
+    std::vector<std::string> words;
+    for (std::string word; line >> word;) words.push_back(word);
+    words.push_back("file:" + output.string()); // whatever the name holds, it is no option and no protocol
+    return words;
+}
+
+/// Red, green and blue over white; the last row and column repeated up to the size asked for.
+void pack_over_white(const Picture& picture, unsigned width, unsigned height, std::string& rgb) {
+    rgb.resize(std::size_t{3} * width * height);
+    char* to = rgb.data();
+    for (unsigned y = 0; y < height; ++y) {
+        const std::uint8_t* const row = picture.pixel(0, std::min(y, picture.height - 1));
+        for (unsigned x = 0; x < width; ++x) {
+            const std::uint8_t* const from = row + std::size_t{4} * std::min(x, picture.width - 1);
+            const unsigned alpha = from[3];
+            for (int i = 0; i < 3; ++i) *to++ = static_cast<char>((from[i] * alpha + 255 * (255 - alpha) + 127) / 255);
+        }
+    }
+}
+
+/// Where frames go, one after the other.
+class FrameSink {
+public:
+    virtual ~FrameSink() = default;
+    virtual Status add(const Picture& frame) = 0;
+    virtual Status finish() = 0;
+};
+
+class NumberedPictures : public FrameSink {
+public:
+    explicit NumberedPictures(const fs::path& target)
+        : folder_(target.parent_path()), pattern_(*number_pattern(target.filename().string())) {}
+
+    Status add(const Picture& frame) override {
+        Result<TemporaryFile> file = TemporaryFile::create(picture_path(files_.size()), encode_png(frame));
+        if (!file) return file.error();
+        files_.push_back(std::move(file).value());
+        return Success{};
+    }
+
+    Status finish() override {
+        std::error_code ignored;
+        for (std::size_t i = 0; i < files_.size(); ++i)
+            if (fs::is_directory(picture_path(i), ignored)) return cannot_write(picture_path(i), "it is a folder");
+        for (std::size_t i = 0; i < files_.size(); ++i) {
+            const Status status = files_[i].put_in_place(picture_path(i));
+            if (status) continue;
+            for (std::size_t placed = 0; placed < i; ++placed) fs::remove(picture_path(placed), ignored);
+            return status;
+        }
+        return Success{};
+    }
+
+private:
+    fs::path picture_path(std::size_t index) const { return folder_ / pattern_.name(static_cast<unsigned>(index + 1)); }
+
+    fs::path folder_;
+    NumberPattern pattern_;
+    std::vector<TemporaryFile> files_;
+};
+
+class EncodedFilm : public FrameSink {
+public:
+    EncodedFilm(fs::path target, TemporaryFile file) : target_(std::move(target)), file_(std::move(file)) {}
+
+    Status start(FilmKind kind, unsigned width, unsigned height, double frames_per_second) {
+        const unsigned multiple = kind == FilmKind::mp4 ? 2 : 1; // yuv420p keeps colour for blocks of two by two
+        padded_width_ = (width + multiple - 1) / multiple * multiple;
+        padded_height_ = (height + multiple - 1) / multiple * multiple;
+        const int failed =
+            ffmpeg_.start(ffmpeg_command(kind, padded_width_, padded_height_, frames_per_second, file_.path()));
+        if (failed == ENOENT || failed == EACCES || failed == ENOTDIR)
+            return Error{ErrorCode::unsupported,
+                         target_.string() + ": ffmpeg is not installed; apt-get install ffmpeg, or write numbered "
+                                            "pictures (frame_%04d.png)."};
+        if (failed) return cannot_write(target_, fmt::format("ffmpeg cannot be started (error {})", failed));
+        return Success{};
+    }
+
+    Status add(const Picture& frame) override {
+        pack_over_white(frame, padded_width_, padded_height_, rgb_);
+        if (ffmpeg_.send(rgb_)) return Success{};
+        ffmpeg_.finish();
+        return failure();
+    }
+
+    Status finish() override {
+        if (!ffmpeg_.finish()) return failure();
+        const Descriptor film(::open(file_.path().c_str(), O_RDONLY | O_CLOEXEC));
+        if (!film.is_open() || ::fsync(film.get()) != 0) return cannot_write(target_, "the disk failed");
+        return file_.put_in_place(target_);
+    }
+
+private:
+    Error failure() const {
+        const std::string line = first_line(ffmpeg_.complaint());
+        if (line.empty()) return cannot_write(target_, "ffmpeg ended before the film did");
+        return cannot_write(target_, "ffmpeg says '" + line + "'");
+    }
+
+    fs::path target_;
+    TemporaryFile file_;
+    Process ffmpeg_; // below the file, so that it ends before the file is removed
+    unsigned padded_width_ = 0, padded_height_ = 0;
+    std::string rgb_;
+};
+
+} // namespace
+
+bool is_film_path(const fs::path& path) { return film_kind(path) != FilmKind::none; }
+
+struct FilmWriter::Content {
+    std::string name; ///< in messages
+    unsigned width, height;
+    std::unique_ptr<FrameSink> sink;
+    unsigned frame_count = 0;
+    std::optional<Error> end = {}; ///< what every call gets once the film is finished or has failed
+
+    void end_with(Error error) {
+        end = std::move(error);
+        sink.reset(); // with its temporary files
+    }
+};
+
+FilmWriter::FilmWriter(std::unique_ptr<Content> content) : content_(std::move(content)) {}
+FilmWriter::FilmWriter(FilmWriter&&) noexcept = default;
+FilmWriter& FilmWriter::operator=(FilmWriter&&) noexcept = default;
+FilmWriter::~FilmWriter() = default;
+
+Result<FilmWriter> FilmWriter::create(const fs::path& path, unsigned width, unsigned height, double frames_per_second) {
+    const FilmKind kind = film_kind(path);
+    if (kind == FilmKind::none)
+        return Error{ErrorCode::usage, path.string() +
+                                           ": is no film's name; end it in .mp4 or .gif, or number pictures "
+                                           "with one %d (frame_%04d.png)."};
+    if (width == 0 || height == 0) return Error{ErrorCode::usage, path.string() + ": a film without pixels."};
+    constexpr double kMostFramesPerSecond = 1000;
+    if (!(frames_per_second > 0 && frames_per_second <= kMostFramesPerSecond))
+        return Error{ErrorCode::usage,
+                     fmt::format("{}: {} frames a second make no film; choose from just above 0 to {}.", path.string(),
+                                 frames_per_second, kMostFramesPerSecond)};
+    std::error_code ignored;
+    if (fs::is_directory(path, ignored)) return cannot_write(path, "it is a folder");
+    if (fs::exists(path, ignored) && !fs::is_regular_file(path, ignored))
+        return cannot_write(path, "it is a device or pipe, and films need a file");
+    if (fs::exists(path, ignored) && ::access(path.c_str(), W_OK) != 0)
+        return cannot_write(path, "permission is denied");
+
+    Result<TemporaryFile> file = TemporaryFile::create(path, {}); // tells at once whether the folder takes files
+    if (!file) return file.error();
+    auto content = std::make_unique<Content>(Content{path.string(), width, height, nullptr});
+    if (kind == FilmKind::numbered) {
+        content->sink = std::make_unique<NumberedPictures>(path);
+    } else {
+        auto film = std::make_unique<EncodedFilm>(path, std::move(file).value());
+        if (const Status started = film->start(kind, width, height, frames_per_second); !started)
+            return started.error();
+        content->sink = std::move(film);
+    }
+    return FilmWriter(std::move(content));
+}
+
+Status FilmWriter::add(const Picture& frame) {
+    if (content_->end) return *content_->end;
+    if (frame.width != content_->width || frame.height != content_->height)
+        return Error{ErrorCode::mismatch,
+                     fmt::format("{}: a picture of {} x {} pixels does not fit a film of {} x {}.", content_->name,
+                                 frame.width, frame.height, content_->width, content_->height)};
+    const Status status = content_->sink->add(frame);
+    if (status)
+        ++content_->frame_count;
+    else
+        content_->end_with(status.error());
+    return status;
+}
+
+Status FilmWriter::finish() {
+    if (content_->end) return *content_->end;
+    const std::string& name = content_->name;
+    const Status status = content_->frame_count > 0
+                              ? content_->sink->finish()
+                              : Status(Error{ErrorCode::unsuitable, name + ": a film needs at least one picture."});
+    content_->end_with(status ? Error{ErrorCode::usage, name + ": the film is finished already."} : status.error());
+    return status;
+}
+
+unsigned FilmWriter::frame_count() const { return content_->frame_count; }
+
+} // namespace filigree::cli
