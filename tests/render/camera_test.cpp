@@ -178,7 +178,7 @@ TEST(FitCamera, SeveralPartsAndAFarOriginLoseNoDigits) {
     const std::vector<Vec3f> house = cloud(200, {5, 4, 3}, 5), tree = cloud(200, {1, 1, 4}, 6);
     const Vec3d far(500000, -5200000, 300);
     const std::vector<CameraPoints> near_parts = {{house, Vec3d::Zero()}, {tree, {9, 0, 0}}};
-    const std::vector<CameraPoints> far_parts = {{house, far}, {{}, {}}, {tree, far + Vec3d(9, 0, 0)}};
+    const std::vector<CameraPoints> far_parts = {{house, far}, CameraPoints{}, {tree, far + Vec3d(9, 0, 0)}};
     for (const double field_of_view : {0.0, 30.0}) {
         const Vec3d direction = view_direction(View::iso, UpAxis::z);
         const Camera near = fit_camera(near_parts, direction, up_vector(UpAxis::z), 1.3, field_of_view);
