@@ -113,9 +113,8 @@ std::vector<Vec3f> sample_surface(const Surface& surface, std::size_t count, std
     return samples;
 }
 
-/// The distance of every sample of `from` to `to`; fewer when cancelled.
-std::vector<double> distances(const Surface& from, const Surface& to, std::size_t count, const RunContext& context) {
-    const std::vector<Vec3f> samples = sample_surface(from, count, context.seed);
+/// The distance of every sample to a surface; fewer when cancelled.
+std::vector<double> distances(std::span<const Vec3f> samples, const Surface& to, const RunContext& context) {
     std::optional<ClosestPointTree> built; // in our arena: Embree builds on the threads of the one it is called in
     context.arena().execute([&] { built.emplace(to.positions, to.triangles); });
     const ClosestPointTree& tree = *built;
@@ -132,8 +131,8 @@ std::vector<double> distances(const Surface& from, const Surface& to, std::size_
 
 SurfaceDistance compare_surfaces(const Mesh& a, const Mesh& b, std::size_t samples, const RunContext& context) {
     const Surface surface_a = make_surface(a, a.origin - b.origin), surface_b = make_surface(b, Vec3d::Zero());
-    const std::vector<double> there = distances(surface_a, surface_b, samples, context);
-    const std::vector<double> back = distances(surface_b, surface_a, samples, context);
+    const std::vector<double> there = distances(sample_surface(surface_a, samples, context.seed), surface_b, context);
+    const std::vector<double> back = distances(sample_surface(surface_b, samples, context.seed), surface_a, context);
     SurfaceDistance result;
     double sum = 0, sum_of_squares = 0;
     const auto add = [&](const std::vector<double>& way, double& max) {
@@ -161,6 +160,41 @@ Result<MeshDistance> mesh_distance(const Mesh& a, const Mesh& b, std::size_t sam
     if (a.face_count() > 0 && b.face_count() > 0) result.surfaces = compare_surfaces(a, b, samples, context);
     if (context.is_cancelled()) return cancelled_error();
     return result;
+}
+
+Result<std::vector<float>> distances_to_surface(const Mesh& a, const Mesh& b, const RunContext& context) {
+    if (b.face_count() == 0)
+        return Error{ErrorCode::unsuitable, "The mesh to measure against has no faces, and the meshes do not have the "
+                                            "same number of vertices; give one with a surface."};
+    const Surface vertices = make_surface(a, a.origin - b.origin), surface = make_surface(b, Vec3d::Zero());
+    const std::vector<double> found = distances(vertices.positions, surface, context);
+    if (context.is_cancelled()) return cancelled_error();
+    return std::vector<float>(found.begin(), found.end());
+}
+
+Result<std::vector<float>> edge_strains(const Mesh& a, const Mesh& rest) {
+    if (a.vertex_count() != rest.vertex_count() || a.face_offsets != rest.face_offsets || a.corners != rest.corners)
+        return Error{ErrorCode::mismatch, "Strain is measured between two poses of one mesh, and these two do not have "
+                                          "the same vertices and faces."};
+    std::vector<double> sums(a.vertex_count());
+    std::vector<Index> counts(a.vertex_count());
+    for (std::size_t f = 0; f < a.face_count(); ++f) {
+        const std::span<const Index> corners = a.face(f);
+        for (std::size_t k = 0; k < corners.size(); ++k) {
+            const Index i = corners[k], j = corners[(k + 1) % corners.size()];
+            const double before = (rest.positions[i] - rest.positions[j]).cast<double>().norm();
+            if (!(before > 0)) continue;
+            const double change = std::abs((a.positions[i] - a.positions[j]).cast<double>().norm() / before - 1);
+            for (const Index v : {i, j}) {
+                sums[v] += change;
+                ++counts[v];
+            }
+        }
+    }
+    std::vector<float> strains(sums.size());
+    for (std::size_t v = 0; v < sums.size(); ++v)
+        strains[v] = counts[v] ? static_cast<float>(sums[v] / counts[v]) : 0.0f;
+    return strains;
 }
 
 } // namespace filigree

@@ -39,4 +39,13 @@ struct MeshDistance {
 /// Cost O((V + samples) log F). Origins are respected. Errors: cancelled.
 Result<MeshDistance> mesh_distance(const Mesh& a, const Mesh& b, std::size_t samples, const RunContext& context);
 
+/// The distance of each of a's vertices from b's surface, model units, for heat maps. Cost O(V log F). Origins are
+/// respected. Errors: unsuitable (b has no faces), cancelled.
+Result<std::vector<float>> distances_to_surface(const Mesh& a, const Mesh& b, const RunContext& context);
+
+/// How much the edges at each vertex have changed their length: the mean over the edges of the faces at it of
+/// |length in a / length in rest - 1|, over edges that have a length at rest. Cost O(corners).
+/// Errors: mismatch (the meshes do not have the same faces).
+Result<std::vector<float>> edge_strains(const Mesh& a, const Mesh& rest);
+
 } // namespace filigree

@@ -20,7 +20,7 @@ using gl::Framebuffer;
 using gl::Program;
 using gl::Texture;
 
-constexpr int kKeyShadowSize = 2048, kSkyShadowSize = 1536;
+constexpr int kLeastShadowSize = 512, kMostShadowSize = 2048;
 constexpr double kKeyReach = 0.16;      // of the key light: tangent of half the angle it is seen under
 constexpr double kGroundSide = 2.5;     // half, in diagonals of the scene
 constexpr double kGroundDarkness = 0.6; // of a shadow that no light reaches
@@ -42,35 +42,43 @@ std::array<Vec3d, 2> tangents(const Vec3d& n) {
     return {t, n.cross(t)};
 }
 
-/// Where light comes from, from the viewer's side: key from the upper left, sky from above and behind the viewer.
-struct Lights {
-    Vec3d key, sky, fill;
-
+/// Where light comes from, as the viewer sees it: key from the upper left, sky from above and behind the viewer. All of
+/// it turns with the camera, so that the frames of a turntable are lit alike.
+class Lights {
+public:
     Lights(const Vec3d& back, const Vec3d& camera_right, const Vec3d& up) {
-        Vec3d right = up.cross(back);
-        right = right.norm() > 1e-3 ? right.normalized() : camera_right;
-        const Vec3d front = right.cross(up);
-        key = (-0.72 * right + 0.72 * up + 0.42 * front).normalized();
-        sky = (up + 0.55 * front).normalized();
-        fill = (0.80 * right + 0.05 * up + 0.45 * front).normalized();
+        const Vec3d level = up.cross(back);
+        right_ = level.norm() > 1e-3 ? level.normalized() : camera_right;
+        const Vec3d front = right_.cross(up);
+        key_ = (-0.72 * right_ + 0.72 * up + 0.42 * front).normalized();
+        sky_ = (up + 0.55 * front).normalized();
+        fill_ = (0.80 * right_ + 0.05 * up + 0.45 * front).normalized();
         // Looking down (or up) along the axis, front is no longer towards the viewer: turn all that way.
         const double along = back.dot(up);
         if (std::abs(along) > 0.85)
-            for (Vec3d* d : {&key, &sky, &fill}) *d = (*d + 0.6 * along * up).normalized();
+            for (Vec3d* d : {&key_, &sky_, &fill_}) *d = (*d + 0.6 * along * up).normalized();
     }
-    Vec3d key_sample(unsigned i) const {
+    const Vec3d& fill() const { return fill_; }
+    /// The i-th point of the key light.
+    Vec3d key(unsigned i) const {
         const auto [u, v] = evenly(i, 0.5);
-        const auto [a, b] = tangents(key);
-        const double r = kKeyReach * std::sqrt(u), angle = 2 * std::numbers::pi * v;
-        return (key + r * std::cos(angle) * a + r * std::sin(angle) * b).normalized();
+        const double r = kKeyReach * std::sqrt(u);
+        return around(key_, 1, r, 2 * std::numbers::pi * v).normalized();
     }
-    /// Evenly over the hemisphere around the sky's middle.
-    Vec3d sky_sample(unsigned i) const {
+    /// The i-th direction, evenly over the hemisphere around the sky's middle.
+    Vec3d sky(unsigned i) const {
         const auto [u, v] = evenly(i, 0.25);
-        const auto [a, b] = tangents(sky);
-        const double z = 1 - u, r = std::sqrt(std::max(0.0, 1 - z * z)), angle = 2 * std::numbers::pi * v;
-        return z * sky + r * std::cos(angle) * a + r * std::sin(angle) * b;
+        const double z = 1 - u, r = std::sqrt(std::max(0.0, 1 - z * z));
+        return around(sky_, z, r, 2 * std::numbers::pi * v);
     }
+
+private:
+    Vec3d around(const Vec3d& axis, double along, double across, double angle) const {
+        const Vec3d a = (right_ - axis * axis.dot(right_)).normalized(), b = axis.cross(a);
+        return along * axis + across * (std::cos(angle) * a + std::sin(angle) * b);
+    }
+
+    Vec3d right_, key_, sky_, fill_;
 };
 
 /// The block that shaders/frame.glsl declares.
@@ -194,7 +202,7 @@ struct Renderer::Content {
     Program points, ground, add, show;
     gl::Buffer frame_buffer;
     gl::VertexArray nothing; ///< for shaders that need no input
-    ShadowMap key_map{kKeyShadowSize}, sky_map{kSkyShadowSize};
+    std::optional<ShadowMap> key_map, sky_map;
     GLint largest = 0, most_samples = 0;
 
     // One picture.
@@ -295,6 +303,12 @@ Status Renderer::Content::make_targets() {
     const auto w = static_cast<GLsizei>(width), h = static_cast<GLsizei>(height);
     while (glGetError() != GL_NO_ERROR) {
     }
+    // Shadows as fine as the picture: a coarse picture needs no fine map.
+    const int side = std::clamp(static_cast<int>(std::max(width, height)) * 8 / 5, kLeastShadowSize, kMostShadowSize);
+    if (!key_map || key_map->size != side) {
+        key_map.emplace(side);
+        sky_map.emplace(side * 3 / 4);
+    }
     pass_color = make_texture(GL_RGBA16F, w, h);
     pass_depth = make_texture(GL_DEPTH_COMPONENT32F, w, h);
     sum = make_texture(GL_RGBA32F, w, h);
@@ -369,8 +383,8 @@ Status Renderer::begin(const Scene& scene, const Camera& camera, unsigned width,
     c.shows_ground = scene.ground && eye_height > 0;
     c.ground_light = 0;
     for (unsigned i = 0; i < c.passes; ++i)
-        c.ground_light += kKeyLight * std::max(0.0, up.dot(c.lights->key_sample(i))) +
-                          kSkyLight * std::max(0.0, up.dot(c.lights->sky_sample(i)));
+        c.ground_light +=
+            kKeyLight * std::max(0.0, up.dot(c.lights->key(i))) + kSkyLight * std::max(0.0, up.dot(c.lights->sky(i)));
     c.ground_light = std::max(c.ground_light / c.passes, 1e-3);
     return Success{};
 }
@@ -426,13 +440,13 @@ FrameBlock Renderer::Content::frame(unsigned number) const {
     else
         put(block.eye, back, 0);
 
-    const Vec3d key = lights->key_sample(number), sky = lights->sky_sample(number);
-    const LightView key_view(key, box, kKeyShadowSize), sky_view(sky, box, kSkyShadowSize);
+    const Vec3d key = lights->key(number), sky = lights->sky(number);
+    const LightView key_view(key, box, key_map->size), sky_view(sky, box, sky_map->size);
     put(block.key_matrix, key_view.to_texture());
     put(block.sky_matrix, sky_view.to_texture());
     put(block.key_direction, key, key_view.texel);
     put(block.sky_direction, sky, sky_view.texel);
-    put(block.fill_direction, lights->fill, 0);
+    put(block.fill_direction, lights->fill(), 0);
     put(block.up, up, ground_level);
     put(block.viewport, {double(width), double(height), double(number)}, 0);
     put(block.strength, {kKeyLight, kSkyLight, kFillLight}, kBounceLight);
@@ -573,8 +587,8 @@ bool Renderer::add_pass() {
     glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
 
     const FrameBlock block = c.frame(c.done);
-    c.draw_depth(block, LightView(c.lights->key_sample(c.done), c.box, kKeyShadowSize), c.key_map);
-    c.draw_depth(block, LightView(c.lights->sky_sample(c.done), c.box, kSkyShadowSize), c.sky_map);
+    c.draw_depth(block, LightView(c.lights->key(c.done), c.box, c.key_map->size), *c.key_map);
+    c.draw_depth(block, LightView(c.lights->sky(c.done), c.box, c.sky_map->size), *c.sky_map);
 
     const Framebuffer& target = c.samples > 1 ? c.multisampled : c.pass;
     const auto w = static_cast<GLsizei>(c.width), h = static_cast<GLsizei>(c.height);
@@ -585,9 +599,9 @@ bool Renderer::add_pass() {
     glClear(GL_DEPTH_BUFFER_BIT);
     c.use(block);
     glActiveTexture(GL_TEXTURE0);
-    glBindTexture(GL_TEXTURE_2D, c.key_map.depth.name());
+    glBindTexture(GL_TEXTURE_2D, c.key_map->depth.name());
     glActiveTexture(GL_TEXTURE1);
-    glBindTexture(GL_TEXTURE_2D, c.sky_map.depth.name());
+    glBindTexture(GL_TEXTURE_2D, c.sky_map->depth.name());
     if (c.shows_ground) c.draw_ground();
     c.draw_objects(false);
 

@@ -1,0 +1,602 @@
+#include "film.h"
+#include "page.h"
+#include "restore_options.h"
+#include "stage.h"
+
+#include <charconv>
+#include <filesystem>
+#include <numbers>
+
+namespace filigree::cli {
+
+namespace {
+
+struct Size {
+    unsigned width = 0, height = 0;
+};
+
+struct ClipOption {
+    int axis = 2;
+    bool keeps_far_side = false; ///< cuts away what is below, not above
+    double fraction = 0.5;       ///< of the object's box
+};
+
+struct Options {
+    std::vector<std::string> files, poses, captions;
+    std::string output;
+    Size size;
+    View view = View::iso;
+    UpAxis up = UpAxis::y;
+    std::vector<double> camera;
+    double field_of_view = 30;
+    bool shared_camera = false;
+    std::string background, color, edge_color;
+    Shading shading = Shading::automatic;
+    bool edges = false, wireframe = false, points = false, no_ground = false, no_captions = false;
+    double point_radius = 0;
+    std::optional<ClipOption> clip;
+    std::string scalar, against, unit;
+    std::vector<double> range;
+    ColorMap map = ColorMap::sequential;
+    bool has_map = false;
+    unsigned passes = 0;
+    bool turntable = false;
+    unsigned frames = 90;
+    double frames_per_second = 30;
+    RestoreOptions restore;
+};
+
+constexpr double kCaptionHeight = 34, kLegendWidth = 120, kGap = 10; // pixels
+
+[[noreturn]] void refuse(const std::string& sentence) { throw Failure{{ErrorCode::usage, sentence}}; }
+
+Size parse_size(const std::string& text) {
+    Size size;
+    const char* end = text.data() + text.size();
+    const auto [x, first] = std::from_chars(text.data(), end, size.width);
+    if (first == std::errc() && x < end && *x == 'x') {
+        const auto [rest, second] = std::from_chars(x + 1, end, size.height);
+        if (second == std::errc() && rest == end && size.width > 0 && size.height > 0) return size;
+    }
+    refuse("--size: '" + text + "' is no size; write width and height in pixels, such as 1920x1080.");
+}
+
+/// "z=0.5": what is above the middle along z is cut away; "-z=0.5": what is below.
+ClipOption parse_clip(const std::string& text) {
+    ClipOption clip;
+    std::string_view rest = text;
+    clip.keeps_far_side = rest.starts_with('-');
+    if (clip.keeps_far_side) rest.remove_prefix(1);
+    const std::size_t axis = rest.empty() ? std::string::npos : std::string_view("xyz").find(rest[0]);
+    if (axis != std::string::npos && rest.size() > 2 && rest[1] == '=') {
+        clip.axis = static_cast<int>(axis);
+        const auto [end, error] = std::from_chars(rest.data() + 2, rest.data() + rest.size(), clip.fraction);
+        if (error == std::errc() && end == rest.data() + rest.size() && std::isfinite(clip.fraction)) return clip;
+    }
+    refuse("--clip: '" + text +
+           "' is no clip plane; write z=0.5 to cut away what is above the middle along z, -z=0.5 "
+           "for what is below.");
+}
+
+Background parse_background(const std::string& text) {
+    Background background;
+    if (text.empty()) return background;
+    if (text == "transparent") {
+        background.transparent = true;
+        return background;
+    }
+    const std::size_t comma = text.find(',');
+    background.top = parse_color(text.substr(0, comma), "--background");
+    background.bottom =
+        comma == std::string::npos ? background.top : parse_color(text.substr(comma + 1), "--background");
+    return background;
+}
+
+/// Something to draw, and where the camera has to look.
+struct Subject {
+    std::optional<Model> model; ///< the drawable refers to it
+    Mesh mesh;                  ///< as it is drawn; for a model the rest shape of its level
+    LoadedMaterials materials;
+    std::vector<float> scalars; ///< one a vertex, or empty
+    std::string scalar_title;
+    std::optional<Restorer> restorer; ///< of the level, where there are poses
+    std::optional<Drawable> drawable;
+};
+
+std::string stem(const std::string& path) {
+    return path == "-" ? "standard input" : std::filesystem::path(path).filename().string();
+}
+
+class Rendering {
+public:
+    Rendering(const Options& options, Session& session) : options_(options), session_(session), stage_(session) {
+        if (!options.against.empty()) against_ = session.read_mesh(options.against);
+    }
+
+    void still();
+    void film();
+
+private:
+    const RunContext& context() const { return session_.context(); }
+    std::unique_ptr<Subject> read(const std::string& path);
+    void choose_scalars(Subject& subject, const std::string& path);
+    void upload(Subject& subject);
+    /// Poses a model; its vertices' places are left in subject.mesh.
+    void set_pose(Subject& subject, const std::string& path, bool on_screen);
+    Scene scene_of(const Subject& subject) const;
+    Camera camera_for(std::span<const CameraPoints> points, double aspect) const;
+    PictureOptions picture_options(unsigned width, unsigned height) const {
+        return {.width = width, .height = height, .passes = options_.passes};
+    }
+    bool has_scalars() const { return !options_.scalar.empty(); }
+    ValueRange range_of(std::span<const float> values) const;
+    Json summary(const Size& size, std::size_t frames) const;
+
+    const Options& options_;
+    Session& session_;
+    Stage stage_;
+    std::optional<Mesh> against_;
+    ValueRange range_; ///< of the scalars shown; fixed by --range or by what is drawn first
+    bool range_known_ = false;
+    std::size_t triangles_ = 0, points_ = 0;
+};
+
+std::unique_ptr<Subject> Rendering::read(const std::string& path) {
+    auto subject = std::make_unique<Subject>();
+    Session::Content content = session_.read_any(path);
+    if (auto* model = std::get_if<Model>(&content.value)) {
+        subject->model = std::move(*model);
+        const unsigned level = options_.restore.level.value_or(subject->model->finest_level());
+        if (level > subject->model->finest_level())
+            refuse(fmt::format("{}: has levels 0 to {}; there is no level {}.", path, subject->model->finest_level(),
+                               level));
+        subject->mesh = level_mesh(*subject->model, level);
+    } else {
+        subject->mesh = std::move(std::get<Mesh>(content.value));
+        subject->materials = load_materials(subject->mesh, path, session_);
+    }
+    if (subject->mesh.vertex_count() == 0)
+        throw Failure{{ErrorCode::unsuitable, path + ": has no vertices, so there is nothing to draw."}};
+    choose_scalars(*subject, path);
+    return subject;
+}
+
+std::vector<float> levels_of_removal(const Model& model, unsigned level) {
+    std::vector<float> levels(model.mesh.vertex_count(), static_cast<float>(model.finest_level()));
+    for (unsigned k = model.finest_level(); k-- > 0;)
+        for (Index v : model.levels[k].vertices) levels[v] = static_cast<float>(k);
+    if (level == model.finest_level()) return levels;
+    std::vector<float> chosen;
+    for (Index v : model.levels[level].vertices) chosen.push_back(levels[v]);
+    return chosen;
+}
+
+void Rendering::choose_scalars(Subject& subject, const std::string& path) {
+    const std::string& name = options_.scalar;
+    if (name.empty()) return;
+    subject.scalar_title = options_.unit.empty() ? name : name + " (" + options_.unit + ")";
+    if (name == "level") {
+        if (!subject.model)
+            refuse("--scalar level shows at which level of a model each vertex comes in, and " + path + " is a mesh.");
+        subject.scalars =
+            levels_of_removal(*subject.model, options_.restore.level.value_or(subject.model->finest_level()));
+    } else if (name == "error" || name == "strain") {
+        if (!against_) refuse("--scalar " + name + " is against another mesh; name it with --against MESH.");
+        if (name == "strain") {
+            subject.scalars = require(edge_strains(subject.mesh, *against_));
+        } else {
+            std::vector<float> values;
+            const MeshDistance distance = require(mesh_distance(subject.mesh, *against_, 0, context()));
+            values = distance.vertices ? distance.vertices->per_vertex
+                                       : require(distances_to_surface(subject.mesh, *against_, context()));
+            subject.scalars = heat_map(std::move(values), distance.diagonal).values;
+            if (options_.unit.empty()) subject.scalar_title = "error / diagonal";
+        }
+    } else {
+        for (const VertexScalar& scalar : subject.mesh.scalars)
+            if (scalar.name == name) subject.scalars = scalar.values;
+        if (subject.scalars.empty()) {
+            std::string names = "error, strain, level";
+            for (const VertexScalar& scalar : subject.mesh.scalars) names += ", " + scalar.name;
+            throw Failure{{ErrorCode::unsuitable,
+                           fmt::format("{}: has no vertex scalar '{}'; there are: {}.", path, name, names)}};
+        }
+    }
+}
+
+ValueRange Rendering::range_of(std::span<const float> values) const {
+    if (!options_.range.empty()) return {static_cast<float>(options_.range[0]), static_cast<float>(options_.range[1])};
+    if (options_.scalar == "error" || options_.scalar == "strain")
+        return heat_map(std::vector<float>(values.begin(), values.end()), 1).range;
+    return legend_range(values, false);
+}
+
+void Rendering::upload(Subject& subject) {
+    ScalarColors scalars{subject.scalars, options_.map, range_};
+    if (options_.points || subject.mesh.face_count() == 0) {
+        PointOptions points{static_cast<float>(options_.point_radius), scalars, subject.mesh.colors};
+        subject.drawable = require(Drawable::points(subject.mesh.positions, subject.mesh.origin, points, context()));
+    } else {
+        SurfaceOptions surface;
+        surface.shading = options_.shading;
+        surface.scalars = scalars;
+        surface.materials = subject.materials.materials;
+        subject.drawable = subject.model
+                               ? require(Drawable::model(*subject.model, options_.restore, surface, context()))
+                               : require(Drawable::surface(subject.mesh, surface, context()));
+    }
+    triangles_ += subject.drawable->triangle_count();
+    points_ += subject.drawable->point_count();
+}
+
+void Rendering::set_pose(Subject& subject, const std::string& path, bool on_screen) {
+    const Pose pose = pose_from_mesh(session_.read_mesh(path), *subject.model);
+    if (!subject.restorer) subject.restorer = require(Restorer::create(*subject.model, options_.restore, context()));
+    require(subject.restorer->positions(pose, subject.mesh.positions, context()));
+    if (on_screen) require(subject.drawable->set_pose(pose, context()));
+}
+
+Scene Rendering::scene_of(const Subject& subject) const {
+    Scene scene;
+    Appearance look;
+    if (!options_.color.empty()) {
+        look.color = parse_color(options_.color, "--color");
+        look.own_colors = has_scalars();
+    } else if (subject.mesh.face_count() == 0 || options_.points) {
+        look.color = {0.30f, 0.50f, 0.78f};
+    }
+    if (!options_.edge_color.empty()) look.edge_color = parse_color(options_.edge_color, "--edge-color");
+    look.edges = options_.edges;
+    look.surface = !options_.wireframe;
+    if (has_scalars()) look.gloss = 0.15f; // colours are to be read
+    if (options_.clip) {
+        const ClipOption& clip = *options_.clip;
+        const Box& box = subject.drawable->box();
+        const double sign = clip.keeps_far_side ? -1 : 1;
+        look.clip = ClipPlane{sign * Vec3d::Unit(clip.axis),
+                              sign * (box.min[clip.axis] + clip.fraction * box.size()[clip.axis])};
+    }
+    scene.objects.push_back({&*subject.drawable, look});
+    scene.background = parse_background(options_.background);
+    scene.up = options_.up;
+    scene.ground = !options_.no_ground;
+    return scene;
+}
+
+Camera Rendering::camera_for(std::span<const CameraPoints> points, double aspect) const {
+    if (options_.camera.empty())
+        return fit_camera(points, view_direction(options_.view, options_.up), up_vector(options_.up), aspect,
+                          options_.field_of_view);
+    const std::vector<double>& n = options_.camera;
+    Camera camera;
+    camera.eye = {n[0], n[1], n[2]};
+    camera.target = {n[3], n[4], n[5]};
+    camera.up = n.size() == 9 ? Vec3d(n[6], n[7], n[8]) : up_vector(options_.up);
+    camera.field_of_view_deg = options_.field_of_view;
+    const double distance = (camera.eye - camera.target).norm();
+    if (!(distance > 0)) refuse("--camera: eye and target are the same point; the camera looks nowhere.");
+    camera.height = distance;
+    return camera;
+}
+
+Json Rendering::summary(const Size& size, std::size_t frames) const {
+    return {{"output", options_.output},
+            {"width", size.width},
+            {"height", size.height},
+            {"frames", frames},
+            {"triangles", triangles_},
+            {"points", points_},
+            {"renderer", stage_.renderer_name()}};
+}
+
+/// Where the panels of a page stand: rows of equal boxes, a caption below each, the legend at the right.
+struct Layout {
+    unsigned columns = 1, rows = 1, width = 0, height = 0; ///< of a panel
+    double caption = 0, legend = 0;
+    Size page;
+
+    Layout(std::size_t count, const Size& wanted, bool captions, bool has_legend)
+        : caption(captions ? kCaptionHeight : 0), legend(has_legend ? kLegendWidth : 0) {
+        columns = static_cast<unsigned>(count <= 4 ? count : std::size_t(std::ceil(std::sqrt(double(count)))));
+        rows = static_cast<unsigned>((count + columns - 1) / columns);
+        page = wanted;
+        if (page.width == 0)
+            page = count == 1 ? Size{1280 + unsigned(legend), 960 + unsigned(caption)}
+                              : Size{columns * 720 + unsigned(legend), rows * unsigned(620 + caption)};
+        const double w = (page.width - legend - kGap * (columns - 1)) / columns;
+        const double h = double(page.height) / rows - caption;
+        if (w < 16 || h < 16)
+            refuse(fmt::format("--size: {} pictures with their captions do not fit into {}x{} pixels; make it larger.",
+                               count, page.width, page.height));
+        width = static_cast<unsigned>(w);
+        height = static_cast<unsigned>(h);
+    }
+    Point corner(std::size_t panel) const {
+        return {double(panel % columns) * (width + kGap), double(panel / columns) * (height + caption)};
+    }
+};
+
+void Rendering::still() {
+    const double start = now_seconds();
+    const std::size_t count = options_.files.size();
+    const bool captions = !options_.no_captions && (count > 1 || !options_.captions.empty());
+    const Layout layout(count, options_.size, captions, has_scalars());
+    const bool is_vector = std::filesystem::path(options_.output).extension() != ".png";
+    const double aspect = double(layout.width) / layout.height;
+
+    // With one camera or one range for all, all are read first.
+    std::vector<std::unique_ptr<Subject>> subjects(count);
+    std::optional<Camera> shared;
+    if (options_.shared_camera || (has_scalars() && options_.range.empty() && count > 1)) {
+        std::vector<CameraPoints> points;
+        std::vector<float> values;
+        for (std::size_t i = 0; i < count; ++i) {
+            subjects[i] = read(options_.files[i]);
+            points.push_back({subjects[i]->mesh.positions, subjects[i]->mesh.origin});
+            values.insert(values.end(), subjects[i]->scalars.begin(), subjects[i]->scalars.end());
+        }
+        if (options_.shared_camera) shared = camera_for(points, aspect);
+        range_ = range_of(values);
+        range_known_ = true;
+    }
+    Page page(layout.page.width, layout.page.height);
+    std::string title;
+    Picture alone;
+    for (std::size_t i = 0; i < count; ++i) {
+        if (!subjects[i]) subjects[i] = read(options_.files[i]);
+        Subject& subject = *subjects[i];
+        if (!range_known_) range_ = range_of(subject.scalars);
+        upload(subject);
+        if (!options_.poses.empty()) set_pose(subject, options_.poses[0], true);
+        const CameraPoints points{subject.mesh.positions, subject.mesh.origin};
+        const Camera camera = shared ? *shared : camera_for(std::span(&points, 1), aspect);
+        Picture picture = stage_.take(scene_of(subject), camera, picture_options(layout.width, layout.height));
+        title = subject.scalar_title;
+        subjects[i].reset();
+        if (count == 1 && !captions && !has_scalars() && !is_vector) {
+            alone = std::move(picture);
+            break;
+        }
+        const Point corner = layout.corner(i);
+        page.picture(picture, corner, layout.width, layout.height);
+        if (captions)
+            page.text(i < options_.captions.size() ? options_.captions[i] : Page::plain(stem(options_.files[i])),
+                      {corner.x() + 0.5 * layout.width, corner.y() + layout.height + 22},
+                      {.size = 15, .align = Align::centre});
+    }
+    if (has_scalars())
+        page.legend(options_.map, range_, Page::plain(title), {layout.page.width - kLegendWidth + 14, 24},
+                    std::min(420.0, layout.page.height - 60.0));
+    if (alone.width)
+        write_picture(alone, options_.output, session_);
+    else if (context().is_cancelled())
+        throw Failure{cancelled_error()};
+    else
+        require(page.write(options_.output, 1));
+    const double seconds = now_seconds() - start;
+    Json json = summary(alone.width ? Size{alone.width, alone.height} : layout.page, 1);
+    json["seconds"] = seconds;
+    session_.print(fmt::format("{}: {} by {} pixels in {} ({})\n", options_.output, layout.page.width,
+                               layout.page.height, seconds_text(seconds), stage_.renderer_name()),
+                   json);
+}
+
+/// A film of one subject or of a row of files: what changes from frame to frame is the pose, the file or the camera.
+void Rendering::film() {
+    const double start = now_seconds();
+    const bool by_pose = !options_.poses.empty(), by_file = !by_pose && options_.files.size() > 1;
+    const std::size_t moments = by_pose ? options_.poses.size() : by_file ? options_.files.size() : 1;
+    const std::size_t frames = options_.turntable ? std::max<std::size_t>(options_.frames, moments) : moments;
+    const Size size = options_.size.width ? options_.size : Size{960, 720};
+    const unsigned legend = has_scalars() ? unsigned(kLegendWidth) : 0;
+    if (size.width <= legend + 16 || size.height < 16) refuse("--size: too small for a film.");
+    const double aspect = double(size.width - legend) / size.height;
+    FilmWriter writer =
+        require(FilmWriter::create(options_.output, size.width, size.height, options_.frames_per_second));
+
+    // A first look at every moment, for a camera, a ground and a range of colours that hold for the whole film.
+    std::unique_ptr<Subject> subject;
+    std::vector<Vec3f> seen_points; // some of every moment's, relative to the first one's centre
+    std::optional<Vec3d> centre;
+    Box all;
+    std::vector<float> values;
+    for (std::size_t m = 0; m < moments; ++m) {
+        if (context().is_cancelled()) throw Failure{cancelled_error()};
+        context().report("looking ahead", double(m) / double(moments));
+        if (by_file || m == 0) subject = read(options_.files[by_file ? m : 0]);
+        if (by_pose) set_pose(*subject, options_.poses[m], false);
+        const Box box = world_bounds(subject->mesh);
+        if (!centre) centre = box.centre();
+        for (std::size_t v = 0; v < subject->mesh.vertex_count(); v += 1 + subject->mesh.vertex_count() / 20'000)
+            seen_points.push_back((subject->mesh.world_position(v) - *centre).cast<float>());
+        all.extend(box.min);
+        all.extend(box.max);
+        values.insert(values.end(), subject->scalars.begin(), subject->scalars.end());
+    }
+    range_ = range_of(values);
+    CameraPoints points{seen_points, *centre};
+    std::vector<Vec3f> ring; // a turning object needs room all around
+    if (options_.turntable) {
+        const Vec3d up = up_vector(options_.up);
+        // A lathe's profile says enough: for each height the largest radius.
+        std::map<long, std::pair<double, double>> profile;
+        for (const Vec3f& point : seen_points) {
+            const Vec3d p = point.cast<double>() + *centre - all.centre();
+            const double height = p.dot(up), radius = (p - height * up).norm();
+            auto& [most, at] = profile[std::lround(height / std::max(all.diagonal(), 1e-300) * 200)];
+            if (radius >= most) most = radius, at = height;
+        }
+        for (const auto& [key, edge] : profile)
+            for (int k = 0; k < 48; ++k)
+                ring.push_back((Eigen::AngleAxisd(k * std::numbers::pi / 24, up) * (edge.first * up.unitOrthogonal()) +
+                                edge.second * up)
+                                   .cast<float>());
+        points = {ring, all.centre()};
+    }
+    Camera camera = camera_for(std::span(&points, 1), aspect);
+    if (options_.turntable && options_.camera.empty()) {
+        // Turn about the object's middle, whatever point the fitted camera looks at.
+        const Vec3d shift = up_vector(options_.up);
+        const Vec3d off = camera.target - all.centre();
+        camera.target -= off - off.dot(shift) * shift;
+        camera.eye -= off - off.dot(shift) * shift;
+    }
+
+    std::size_t shown = moments; // the moment that is uploaded: none
+    for (std::size_t f = 0; f < frames; ++f) {
+        if (context().is_cancelled()) throw Failure{cancelled_error()};
+        context().report("filming", double(f) / double(frames));
+        const std::size_t moment = f * moments / frames;
+        if (moment != shown) {
+            if (by_file || !subject->drawable) {
+                if (by_file) subject = read(options_.files[moment]);
+                triangles_ = points_ = 0;
+                upload(*subject);
+            }
+            if (by_pose) set_pose(*subject, options_.poses[moment], true);
+            shown = moment;
+        }
+        Scene scene = scene_of(*subject);
+        scene.fixed_ground = true;
+        const int axis = static_cast<int>(options_.up);
+        scene.ground_level = all.min[axis] - 1e-4 * all.diagonal();
+        const Camera seen = options_.turntable ? turned(camera, 360.0 * double(f) / double(frames)) : camera;
+        PictureOptions picture = picture_options(size.width - legend, size.height);
+        if (!picture.passes) picture.passes = 12;
+        // The bar tells of frames, not of the passes within each.
+        RunContext quiet = context();
+        quiet.progress = nullptr;
+        Picture frame = require(stage_.renderer().picture(scene, seen, picture, quiet));
+        if (has_scalars()) {
+            Page page(size.width, size.height);
+            page.picture(frame, {0, 0}, picture.width, picture.height);
+            page.legend(options_.map, range_, Page::plain(subject->scalar_title), {size.width - kLegendWidth + 14, 24},
+                        std::min(420.0, size.height - 60.0));
+            frame = page.pixels(1);
+        }
+        require(writer.add(frame));
+    }
+    require(writer.finish());
+    const double seconds = now_seconds() - start;
+    Json json = summary(size, frames);
+    json["seconds"] = seconds;
+    session_.print(fmt::format("{}: {} frames of {} by {} pixels in {} ({})\n", options_.output, frames, size.width,
+                               size.height, seconds_text(seconds), stage_.renderer_name()),
+                   json);
+}
+
+void check(const Options& options, bool is_film) {
+    const std::string ending = std::filesystem::path(options.output).extension().string();
+    if (!is_film && ending != ".png" && ending != ".svg" && ending != ".pdf")
+        throw Failure{{ErrorCode::unsupported, options.output + ": has no ending that we can draw; use .png, .svg or "
+                                                                ".pdf, or .mp4, .gif or frame_%04d.png for a film."}};
+    if (!options.camera.empty() && options.camera.size() != 6 && options.camera.size() != 9)
+        refuse("--camera takes 6 numbers (eye and target) or 9 (and the direction that is up).");
+    if (!options.range.empty() && !(options.range[0] < options.range[1]))
+        refuse("--range: the first number has to be below the second.");
+    if (options.turntable && !is_film)
+        refuse("--turntable makes a film; give -o a name that ends in .mp4 or .gif, or frame_%04d.png.");
+    if (is_film && !options.turntable && options.poses.size() < 2 && options.files.size() < 2)
+        refuse("A film needs several files or several --poses to show one after the other, or --turntable.");
+    if (!options.poses.empty() && options.files.size() != 1) refuse("--poses move one model; give one model file.");
+    if (!is_film && options.poses.size() > 1)
+        refuse("Several poses make a film; give -o a name that ends in .mp4 or .gif, or frame_%04d.png.");
+    if (!options.poses.empty() && !options.scalar.empty() && options.scalar != "level")
+        refuse("With --poses only --scalar level can be shown: the poses are restored where nothing is measured.");
+}
+
+} // namespace
+
+void add_render(CLI::App& app, Session& session) {
+    auto options = std::make_shared<Options>();
+    CLI::App* command = app.add_subcommand("render", "Draw meshes, point sets and models: a picture or a film");
+    command
+        ->add_option("files", options->files,
+                     "Meshes, point sets or models; several stand side by side, or one "
+                     "after the other in a film")
+        ->required();
+    command
+        ->add_option("-o,--output", options->output, "Picture (.png, .svg, .pdf) or film (.mp4, .gif, frame_%04d.png)")
+        ->required();
+    command->add_option_function<std::string>(
+        "--size", [options](const std::string& text) { options->size = parse_size(text); },
+        "Width and height in pixels, such as 1920x1080 (unset: by what is drawn)");
+    add_choice<View>(
+        *command, "--view", {{"front", View::front}, {"side", View::side}, {"top", View::top}, {"iso", View::iso}},
+        [options](View view) { options->view = view; }, "Where to look from (unset: iso)");
+    add_choice<UpAxis>(
+        *command, "--up", {{"x", UpAxis::x}, {"y", UpAxis::y}, {"z", UpAxis::z}},
+        [options](UpAxis up) { options->up = up; }, "Which axis is up (unset: y)");
+    command->add_option("--camera", options->camera, "Eye and target, and up if need be: 6 or 9 numbers in model units")
+        ->check(finite_number())
+        ->expected(6, 9)
+        ->delimiter(',');
+    command->add_option("--field-of-view", options->field_of_view, "Vertical, in degrees; 0 is parallel projection")
+        ->check(CLI::Range(0.0, 150.0))
+        ->capture_default_str();
+    command->add_flag("--shared-camera", options->shared_camera, "Several files: one camera that shows all in place");
+    command->add_option("--background", options->background,
+                        "#rrggbb, two of them from top to bottom (#rrggbb,#rrggbb), or transparent");
+    command->add_option("--color", options->color, "Of the objects, #rrggbb (unset: their own, or clay)");
+    add_choice<Shading>(
+        *command, "--shading", {{"auto", Shading::automatic}, {"smooth", Shading::smooth}, {"flat", Shading::flat}},
+        [options](Shading shading) { options->shading = shading; },
+        "auto: the file's normals, else smooth up to 45 degrees (unset: auto)");
+    command->add_flag("--edges", options->edges, "Draw the polygons' edges over the surface");
+    command->add_option("--edge-color", options->edge_color, "#rrggbb");
+    command->add_flag("--wireframe", options->wireframe, "Draw the edges alone");
+    command->add_flag("--points", options->points, "Draw the vertices as balls");
+    command->add_option("--point-radius", options->point_radius, "Of the balls, model units (unset: by their spacing)")
+        ->check(positive_number());
+    command->add_option_function<std::string>(
+        "--clip", [options](const std::string& text) { options->clip = parse_clip(text); },
+        "Cut open: z=0.5 takes away what is above the middle along z, -z=0.5 what is below");
+    command->add_option("--scalar", options->scalar,
+                        "Colour by a vertex scalar of the file, or by error, strain (both with --against) or level");
+    command->add_option("--against", options->against, "Mesh that error and strain are measured against");
+    command->add_option("--range", options->range, "Least and most value of the colours (unset: by the values)")
+        ->check(finite_number())
+        ->expected(2);
+    command->add_option("--unit", options->unit, "Unit to write over the legend");
+    add_choice<ColorMap>(
+        *command, "--map", {{"sequential", ColorMap::sequential}, {"diverging", ColorMap::diverging}},
+        [options](ColorMap map) { options->map = map; },
+        "Colours: for amounts, or for signed amounts (unset: sequential)");
+    command->add_option("--caption", options->captions, "One a file (unset: the names, where there are several)");
+    command->add_flag("--no-captions", options->no_captions, "Draw no captions");
+    command->add_flag("--no-ground", options->no_ground, "Draw no shadow on the ground");
+    command->add_option("--poses", options->poses,
+                        "Moved drivers of a model, one a frame (PLY with gradients where there are any)");
+    command->add_flag("--turntable", options->turntable, "A film once around the object");
+    command->add_option("--frames", options->frames, "Frames of a turntable")
+        ->check(whole_number(1))
+        ->capture_default_str();
+    command->add_option("--fps", options->frames_per_second, "Frames a second")
+        ->check(positive_number())
+        ->capture_default_str();
+    command
+        ->add_option("--passes", options->passes,
+                     "Light directions and positions within a pixel that are averaged "
+                     "(unset: 12 to 40 by the size of the mesh; films 12)")
+        ->check(whole_number(1));
+    add_restore_options(*command, options->restore);
+    session.add_common_options(
+        *command, "  filigree render scan.ply -o scan.png\n"
+                  "  filigree render scan.fil --level 0 --edges -o driver.png --view front --size 1920x1080\n"
+                  "  filigree render a.ply b.ply -o both.png --caption before --caption after\n"
+                  "  filigree render restored.ply --scalar error --against full.ply -o error.png\n"
+                  "  filigree render scan.fil --poses pose_*.ply -o film.mp4\n"
+                  "  filigree render scan.ply -o around.gif --turntable --size 480x480");
+    command->callback([options, &session] {
+        session.begin();
+        const bool is_film = is_film_path(options->output);
+        check(*options, is_film);
+        Rendering rendering(*options, session);
+        if (is_film)
+            rendering.film();
+        else
+            rendering.still();
+    });
+}
+
+} // namespace filigree::cli

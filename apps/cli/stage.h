@@ -1,0 +1,47 @@
+// Where the program's pictures are taken: OpenGL, the renderer, and what goes into a scene.
+#pragma once
+
+#include "session.h"
+
+#include "filigree/render/gl_context.h"
+#include "filigree/render/renderer.h"
+
+namespace filigree::cli {
+
+/// OpenGL without a window, and a renderer in it. One at a time.
+class Stage {
+public:
+    explicit Stage(Session& session);
+
+    Picture take(const Scene& scene, const Camera& camera, const PictureOptions& options);
+    Renderer& renderer() { return renderer_; }
+    const std::string& renderer_name() const { return gl_.renderer_name(); }
+
+private:
+    Session& session_;
+    HeadlessContext gl_;
+    Renderer renderer_;
+};
+
+/// A mesh's colours and textures from the libraries it names, which have to outlive its upload.
+struct LoadedMaterials {
+    std::vector<SurfaceMaterial> materials;
+    std::vector<std::unique_ptr<Picture>> pictures;
+};
+LoadedMaterials load_materials(const Mesh& mesh, const std::string& path, Session& session);
+
+/// "#d04030", sRGB; otherwise a Failure that names the option.
+Vec3f parse_color(const std::string& text, const std::string& option);
+
+/// Writes a picture as PNG. Progress, cancelling and messages are the session's.
+void write_picture(const Picture& picture, const std::string& path, Session& session);
+
+/// Errors as colours: dark is none. `values` in model units become fractions of `diagonal`; the range covers 99.5 % of
+/// them, and what is above has the brightest colour.
+struct HeatMap {
+    std::vector<float> values;
+    ValueRange range;
+};
+HeatMap heat_map(std::vector<float> values, double diagonal);
+
+} // namespace filigree::cli
