@@ -1,10 +1,50 @@
-#include "session.h"
+#include "page.h"
+#include "stage.h"
+
+#include <filesystem>
 
 namespace filigree::cli {
 
+namespace {
+
+/// a coloured by how far each of its vertices is from b, with a legend and the figures below.
+void draw_errors(const Mesh& a, const Mesh& b, const std::string& caption, const MeshDistance& distance, UpAxis up,
+                 const std::string& path, Session& session) {
+    const RunContext& context = session.context();
+    const HeatMap errors =
+        heat_map(distance.vertices ? distance.vertices->per_vertex : require(distances_to_surface(a, b, context)),
+                 distance.diagonal);
+    Stage stage(session);
+    const ScalarColors scalars{errors.values, ColorMap::sequential, errors.range};
+    const Drawable drawable = a.face_count()
+                                  ? require(Drawable::surface(a, {.scalars = scalars}, context))
+                                  : require(Drawable::points(a.positions, a.origin, {.scalars = scalars}, context));
+    constexpr unsigned kWidth = 1120, kHeight = 840;
+    const CameraPoints points{a.positions, a.origin};
+    const Camera camera =
+        fit_camera(std::span(&points, 1), view_direction(View::iso, up), up_vector(up), double(kWidth) / kHeight);
+    Scene scene;
+    scene.objects.push_back({&drawable, {.gloss = 0.15f}});
+    scene.up = up;
+    const Picture picture = stage.take(scene, camera, {.width = kWidth, .height = kHeight});
+    Page page(kWidth + 130, kHeight + 40);
+    page.picture(picture, {0, 0}, kWidth, kHeight);
+    page.legend(ColorMap::sequential, errors.range, "distance / diagonal", {kWidth + 14, 24}, 420);
+    page.text(caption, {kWidth / 2.0, kHeight + 26}, {.size = 15, .align = Align::centre});
+    if (context.is_cancelled()) throw Failure{cancelled_error()};
+    require(page.write(path, 1));
+}
+
+std::string file_name(const std::string& path) {
+    return path == "-" ? "standard input" : std::filesystem::path(path).filename().string();
+}
+
+} // namespace
+
 void add_compare(CLI::App& app, Session& session) {
     struct Options {
-        std::string a, b;
+        std::string a, b, picture;
+        UpAxis up = UpAxis::y;
         std::size_t samples = 100'000;
     };
     auto options = std::make_shared<Options>();
@@ -14,10 +54,17 @@ void add_compare(CLI::App& app, Session& session) {
     command->add_option("--samples", options->samples, "Points on each surface, besides its vertices")
         ->check(whole_number(0))
         ->capture_default_str();
+    command->add_option("--picture", options->picture,
+                        "Also draw the first mesh coloured by its distance from the second (.png, .svg, .pdf)");
+    add_choice<UpAxis>(
+        *command, "--up", {{"x", UpAxis::x}, {"y", UpAxis::y}, {"z", UpAxis::z}},
+        [options](UpAxis up) { options->up = up; }, "Which axis is up in the picture (unset: y)");
     session.add_common_options(*command, "  filigree compare restored.ply full.ply\n"
+                                         "  filigree compare restored.ply full.ply --picture heat.png\n"
                                          "  filigree compare driver.ply scan.ply --json");
     command->callback([options, &session] {
         session.begin();
+        if (!options->picture.empty()) check_picture_path(options->picture);
         const Mesh a = session.read_mesh(options->a), b = session.read_mesh(options->b);
         const MeshDistance distance = require(mesh_distance(a, b, options->samples, session.context()));
         Table table;
@@ -42,6 +89,21 @@ void add_compare(CLI::App& app, Session& session) {
         if (const auto& s = distance.surfaces) {
             add("hausdorff", "Hausdorff distance", s->hausdorff);
             add("mean_distance", "mean surface distance", s->mean_distance);
+        }
+        if (!options->picture.empty()) {
+            const double rms = distance.vertices   ? distance.vertices->rms
+                               : distance.surfaces ? distance.surfaces->rms_distance
+                                                   : 0;
+            const double most = distance.vertices   ? distance.vertices->max
+                                : distance.surfaces ? distance.surfaces->max_a_to_b
+                                                    : 0;
+            draw_errors(a, b,
+                        fmt::format("{} against {}: rms {:.2e}, max {:.2e} of the diagonal",
+                                    Page::plain(file_name(options->a)), Page::plain(file_name(options->b)),
+                                    distance.relative(rms), distance.relative(most)),
+                        distance, options->up, options->picture, session);
+            table.row("picture", options->picture);
+            json["picture"] = options->picture;
         }
         session.print(table.text(), json);
     });

@@ -486,10 +486,7 @@ void Rendering::film() {
 }
 
 void check(const Options& options, bool is_film) {
-    const std::string ending = std::filesystem::path(options.output).extension().string();
-    if (!is_film && ending != ".png" && ending != ".svg" && ending != ".pdf")
-        throw Failure{{ErrorCode::unsupported, options.output + ": has no ending that we can draw; use .png, .svg or "
-                                                                ".pdf, or .mp4, .gif or frame_%04d.png for a film."}};
+    if (!is_film) check_picture_path(options.output);
     if (!options.camera.empty() && options.camera.size() != 6 && options.camera.size() != 9)
         refuse("--camera takes 6 numbers (eye and target) or 9 (and the direction that is up).");
     if (!options.range.empty() && !(options.range[0] < options.range[1]))

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <filesystem>
 
 namespace filigree::cli {
 
@@ -43,6 +44,12 @@ Vec3f parse_color(const std::string& text, const std::string& option) {
         if (const auto [end, error] = std::from_chars(first, last, value, 16); error == std::errc() && end == last)
             return Vec3f(float(value >> 16), float(value >> 8 & 255), float(value & 255)) / 255.0f;
     throw Failure{{ErrorCode::usage, option + ": '" + text + "' is no colour; write it as #rrggbb, such as #d04030."}};
+}
+
+void check_picture_path(const std::string& path) {
+    const std::string ending = std::filesystem::path(path).extension().string();
+    if (ending != ".png" && ending != ".svg" && ending != ".pdf")
+        throw Failure{{ErrorCode::unsupported, path + ": is no picture's name; let it end in .png, .svg or .pdf."}};
 }
 
 void write_picture(const Picture& picture, const std::string& path, Session& session) {

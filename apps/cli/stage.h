@@ -33,6 +33,9 @@ LoadedMaterials load_materials(const Mesh& mesh, const std::string& path, Sessio
 /// "#d04030", sRGB; otherwise a Failure that names the option.
 Vec3f parse_color(const std::string& text, const std::string& option);
 
+/// Refuses, before any work, a name that ends in none of .png, .svg and .pdf.
+void check_picture_path(const std::string& path);
+
 /// Writes a picture as PNG. Progress, cancelling and messages are the session's.
 void write_picture(const Picture& picture, const std::string& path, Session& session);
 

@@ -17,9 +17,9 @@ enum class Shading { automatic, smooth, flat };
 
 /// One number a vertex, shown as colour.
 struct ScalarColors {
-    std::span<const float> values; ///< empty: not shown; else one a vertex
+    std::span<const float> values = {}; ///< empty: not shown; else one a vertex
     ColorMap map = ColorMap::sequential;
-    ValueRange range;
+    ValueRange range = {};
 };
 
 /// A colour and a texture for the faces of one material.
@@ -31,15 +31,15 @@ struct SurfaceMaterial {
 struct SurfaceOptions {
     Shading shading = Shading::automatic;
     double crease_deg = 45; ///< faces that meet at a larger angle keep a sharp edge (automatic shading)
-    ScalarColors scalars;
-    std::vector<SurfaceMaterial> materials; ///< empty or one a name in mesh.materials
-    std::vector<char> hidden_faces;         ///< empty or one a face: not zero leaves it out
+    ScalarColors scalars = {};
+    std::vector<SurfaceMaterial> materials = {}; ///< empty or one a name in mesh.materials
+    std::vector<char> hidden_faces = {};         ///< empty or one a face: not zero leaves it out
 };
 
 struct PointOptions {
     float radius = 0; ///< model units; 0: 0.4 of the typical distance to the next point
-    ScalarColors scalars;
-    std::span<const Vec4f> colors; ///< empty or RGBA a point
+    ScalarColors scalars = {};
+    std::span<const Vec4f> colors = {}; ///< empty or RGBA a point
 };
 
 /// Something in GPU memory. Made and drawn with one OpenGL context current.
@@ -50,7 +50,8 @@ public:
     static Result<Drawable> points(std::span<const Vec3f> positions, const Vec3d& origin, const PointOptions& options,
                                    const RunContext& context);
     /// A model at a level, restored by the vertex shader (reference models: on the CPU, then uploaded). Normals
-    /// belong to the rest shape and turn with the gradients. Starts unposed. The model must outlive the drawable.
+    /// belong to the rest shape and turn with the gradients. Starts unposed. The model must outlive the drawable, and
+    /// so must what the options point to.
     static Result<Drawable> model(const Model& model, const RestoreOptions& restore, const SurfaceOptions& options,
                                   const RunContext& context);
     Drawable(Drawable&&) noexcept;
