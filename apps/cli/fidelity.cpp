@@ -58,7 +58,8 @@ std::vector<Vec3f> move_with_cells(const Model& model, const Pose& pose, const M
             for (int k = 0; k < 3; ++k) {
                 r[k] = rest[detail.cells[c][k]].cast<double>();
                 n[k] = pose.positions[detail.cells[c][k]].cast<double>();
-                a[k] = pose.gradients[detail.cells[c][k]].cast<double>();
+                a[k] = pose.gradients.empty() ? Mat3d::Identity()
+                                              : Mat3d(pose.gradients[detail.cells[c][k]].cast<double>());
             }
             for (Index i = detail.cell_offsets[c]; i < detail.cell_offsets[c + 1]; ++i) {
                 const Vec3d weights(1 - detail.u[i] - detail.v[i], detail.u[i], detail.v[i]);
@@ -116,6 +117,10 @@ private:
 
 } // namespace
 
+std::vector<Vec3f> wrap_positions(const Model& model, const Pose& pose, const RunContext& context) {
+    return move_with_cells(model, pose, move_wrap, context);
+}
+
 std::vector<FidelityRow> measure_fidelity(const Model& model, const Model* reference, const RunContext& context) {
     std::vector<FidelityRow> rows;
     const Box box = world_bounds(model.mesh);
@@ -132,7 +137,7 @@ std::vector<FidelityRow> measure_fidelity(const Model& model, const Model* refer
         if (context.is_cancelled()) return rows;
         Comparison comparison(model.mesh, warp, rows, context);
         const Pose pose = warp_pose(*warp.warp, driver_positions(model), model.mesh.origin, context);
-        comparison.add("wrap", move_with_cells(model, pose, move_wrap, context));
+        comparison.add("wrap", wrap_positions(model, pose, context));
         comparison.add("skinning", move_with_cells(model, pose, move_skinning, context));
         if (reference_restorer)
             comparison.add(

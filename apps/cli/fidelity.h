@@ -2,6 +2,7 @@
 #pragma once
 
 #include "filigree/hierarchy/model.h"
+#include "filigree/hierarchy/pose.h"
 
 #include <string>
 #include <vector>
@@ -26,6 +27,8 @@ struct FidelitySummary {
 /// model: a blend model; reference: null, or a reference model of the same mesh. The warps are those of
 /// docs/benchmarks.md, along the longest side of the box. When cancelled, the rows so far.
 std::vector<FidelityRow> measure_fidelity(const Model& model, const Model* reference, const RunContext& context);
+/// What a wrap deformer makes of a blend model's driver: each vertex carried along in the frame of its cell.
+std::vector<Vec3f> wrap_positions(const Model& model, const Pose& pose, const RunContext& context);
 std::vector<FidelitySummary> summarise(const std::vector<FidelityRow>& rows);
 
 } // namespace filigree::cli

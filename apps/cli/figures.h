@@ -21,7 +21,8 @@ struct Figure {
 /// Draws meshes for figures; OpenGL starts with the first of them.
 class FigureRenderer {
 public:
-    explicit FigureRenderer(const RunContext& context);
+    /// scale: pixels for each page unit.
+    FigureRenderer(const RunContext& context, double scale);
     ~FigureRenderer();
 
     struct Look {
@@ -29,7 +30,7 @@ public:
         Appearance appearance = {};
         bool ground = true;
     };
-    /// A picture on white, `width` x `height` page units large, sharp at twice that. z is up.
+    /// A picture on white, `width` x `height` page units large. z is up.
     Picture picture(const Mesh& mesh, const Look& look, const Camera& camera, double width, double height);
 
     const RunContext& context() const { return context_; }
@@ -37,6 +38,7 @@ public:
 private:
     struct Content;
     const RunContext& context_;
+    double scale_;
     std::unique_ptr<Content> content_;
 };
 

@@ -48,6 +48,8 @@ int run(int argc, char** argv) {
     cli::add_compare(app, session);
     cli::add_bench(app, session);
     cli::add_demo(app, session);
+    cli::add_render(app, session);
+    cli::add_figures(app, session);
     try {
         app.parse(argc, argv);
         return 0;

@@ -57,6 +57,9 @@ public:
     void write_mesh(const Mesh& mesh, const std::string& path);
     void write_model(const Model& model, const std::string& path);
 
+    /// To be called before a file is written in another way: the last chance to cancel.
+    void begin_writing(const std::string& path);
+
     /// Goes to stderr at once, unless quiet, and into the JSON; a sentence that was said is not said again.
     void warn(const std::string& sentence);
 
@@ -67,7 +70,6 @@ public:
 private:
     std::string read_bytes(const std::string& path) const;
     Mesh parse_mesh(const std::string& bytes, const std::string& path);
-    void begin_writing(const std::string& path);
 
     std::optional<RunContext> context_;
     std::vector<std::string> warnings_;
@@ -132,5 +134,7 @@ void add_restore(CLI::App& app, Session& session);
 void add_compare(CLI::App& app, Session& session);
 void add_bench(CLI::App& app, Session& session);
 void add_demo(CLI::App& app, Session& session);
+void add_render(CLI::App& app, Session& session);
+void add_figures(CLI::App& app, Session& session);
 
 } // namespace filigree::cli

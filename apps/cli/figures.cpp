@@ -1,0 +1,111 @@
+#include "figures.h"
+
+#include "figures_layout.h"
+#include "output_folder.h"
+
+#include <algorithm>
+
+namespace filigree::cli {
+
+namespace {
+
+struct FigureEntry {
+    const char* name; ///< the report's number, or a word where it is ours
+    Figure (*draw)(FigureRenderer&);
+    const char* title;
+};
+
+// In the report's order. 2.5, the points inside the model, belongs between 2.4 and 2.6, 2.11, the window, behind 2.10.
+constexpr FigureEntry kFigures[] = {
+    {"1.1", draw_simple_triangle, "a simple deformation"},
+    {"2.1", draw_wavy_cube, "the object"},
+    {"2.2", draw_ray_and_triangle, "ray, plane and triangle"},
+    {"2.3", draw_border_cases, "rays on an edge"},
+    {"2.4", draw_shared_points, "rays at shared points"},
+    {"2.6", draw_removed_level, "one level removed"},
+    {"2.7", draw_barycentric_areas, "barycentric areas"},
+    {"2.8", draw_recursive_storing, "recursive storing"},
+    {"2.9", draw_removed_detail, "one and three levels removed"},
+    {"2.10", draw_deformation_process, "stretched, detail returned"},
+    {"3.1", draw_extreme_deformation, "an extreme deformation"},
+    {"codes", draw_fidelity, "the codes and a wrap deformer compared"},
+};
+
+/// figure_2_10 for "2.10".
+std::string file_stem(const std::string& name) {
+    std::string stem = "figure_" + name;
+    std::replace(stem.begin(), stem.end(), '.', '_');
+    return stem;
+}
+
+std::vector<FigureEntry> chosen_figures(const std::vector<std::string>& only) {
+    if (only.empty()) return {std::begin(kFigures), std::end(kFigures)};
+    std::string known;
+    for (const FigureEntry& figure : kFigures) known += std::string(known.empty() ? "" : ", ") + figure.name;
+    for (const std::string& name : only)
+        if (std::none_of(std::begin(kFigures), std::end(kFigures), [&](const auto& f) { return f.name == name; }))
+            throw Failure{{ErrorCode::usage, fmt::format("There is no figure '{}'; --only takes {}.", name, known)}};
+    std::vector<FigureEntry> chosen;
+    for (const FigureEntry& figure : kFigures)
+        if (std::find(only.begin(), only.end(), figure.name) != only.end()) chosen.push_back(figure);
+    return chosen;
+}
+
+struct Options {
+    std::string output = "filigree-figures", format = "png";
+    std::vector<std::string> only;
+    int width = 1440;
+};
+
+void run_figures(const Options& options, Session& session) {
+    const RunContext& context = session.context();
+    const std::vector<FigureEntry> chosen = chosen_figures(options.only);
+    OutputFolder folder(options.output);
+    std::vector<std::string> paths;
+    for (const FigureEntry& figure : chosen)
+        paths.push_back(folder.file(file_stem(figure.name) + "." + options.format));
+
+    const double scale = options.width / kFigureWidth;
+    FigureRenderer renderer(context, scale);
+    std::vector<Figure> drawn; // all of them before the first is written, so that a cancel changes nothing
+    for (const FigureEntry& figure : chosen) {
+        context.report("figures", double(drawn.size()) / double(chosen.size()));
+        drawn.push_back(figure.draw(renderer));
+        if (context.is_cancelled()) throw Failure{cancelled_error()};
+    }
+    Table table;
+    Json figures = Json::array();
+    for (std::size_t i = 0; i < chosen.size(); ++i) {
+        session.begin_writing(paths[i]);
+        require(drawn[i].page.write(paths[i], scale));
+        table.row(chosen[i].name, fmt::format("{}  ({})", paths[i], chosen[i].title));
+        figures.push_back({{"name", chosen[i].name}, {"file", paths[i]}, {"values", drawn[i].values}});
+    }
+    context.report("figures", 1);
+    folder.keep();
+    session.print(table.text(), {{"output", options.output}, {"figures", figures}});
+}
+
+} // namespace
+
+void add_figures(CLI::App& app, Session& session) {
+    auto options = std::make_shared<Options>();
+    CLI::App* command = app.add_subcommand("figures", "The report's figures, drawn from what the program computes");
+    command->add_option("-o,--output", options->output, "Folder for the figures")->capture_default_str();
+    command->add_option("--only", options->only, "Figures to draw: 1.1, 2.1, ... 3.1, codes (unset: all)")
+        ->type_name("NAME...");
+    add_choice<std::string>(
+        *command, "--format", {{"png", "png"}, {"svg", "svg"}, {"pdf", "pdf"}},
+        [options](std::string format) { options->format = std::move(format); }, "png (unset), svg or pdf");
+    command->add_option("--width", options->width, "Width of a figure in pixels; SVG and PDF: of the pictures in it")
+        ->check(CLI::Range(180, 7200))
+        ->capture_default_str();
+    session.add_common_options(*command, "  filigree figures -o figures\n"
+                                         "  filigree figures --only 1.1 2.10 --format pdf");
+    command->callback([options, &session] {
+        session.begin();
+        run_figures(*options, session);
+    });
+}
+
+} // namespace filigree::cli

@@ -1,0 +1,319 @@
+// Figures 2.1, 2.9, 2.10, 3.1 and our own: meshes as the renderer draws them.
+#include "fidelity.h"
+#include "figures.h"
+#include "figures_layout.h"
+
+#include "filigree/deform/space_warp.h"
+#include "filigree/hierarchy/restore.h"
+#include "filigree/hierarchy/strip.h"
+#include "filigree/mesh/mesh_distance.h"
+#include "filigree/mesh/shapes.h"
+#include "filigree/render/gl_context.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace filigree::cli {
+
+struct FigureRenderer::Content {
+    HeadlessContext gl;
+    Renderer renderer;
+};
+
+FigureRenderer::FigureRenderer(const RunContext& context, double scale) : context_(context), scale_(scale) {}
+FigureRenderer::~FigureRenderer() = default;
+
+namespace {
+
+/// Lets what is not solid, the ground's shadow, run out towards the picture's borders, so that no box is seen.
+void fade_borders(Picture& picture) {
+    const double w = picture.width, h = picture.height, reach = 0.16 * std::min(w, h);
+    for (unsigned y = 0; y < picture.height; ++y)
+        for (unsigned x = 0; x < picture.width; ++x) {
+            std::uint8_t& alpha = picture.pixel(x, y)[3];
+            if (alpha == 255) continue;
+            const double inside = std::min({x + 0.5, w - x - 0.5, y + 0.5, h - y - 0.5}) / reach;
+            const double t = std::min(1.0, inside);
+            alpha = static_cast<std::uint8_t>(std::lround(alpha * t * t * (3 - 2 * t)));
+        }
+}
+
+} // namespace
+
+Picture FigureRenderer::picture(const Mesh& mesh, const Look& look, const Camera& camera, double width, double height) {
+    if (!content_) {
+        HeadlessContext gl = require(HeadlessContext::create());
+        Renderer renderer = require(Renderer::create());
+        content_.reset(new Content{std::move(gl), std::move(renderer)});
+    }
+    const Drawable drawable = require(Drawable::surface(mesh, look.surface, context_));
+    Scene scene;
+    scene.objects.push_back({&drawable, look.appearance});
+    scene.objects.back().appearance.edge_width *= static_cast<float>(scale_);
+    scene.background.transparent = true; // the page is white
+    scene.up = UpAxis::z;
+    scene.ground = look.ground;
+    PictureOptions options;
+    options.width = static_cast<unsigned>(std::lround(scale_ * width));
+    options.height = static_cast<unsigned>(std::lround(scale_ * height));
+    RunContext silent = context_; // the command reports figures, not passes
+    silent.progress = nullptr;
+    Picture picture = require(content_->renderer.picture(scene, camera, options, silent));
+    fade_borders(picture);
+    return picture;
+}
+
+namespace {
+
+using Look = FigureRenderer::Look;
+
+/// Flat quads with their edges drawn, in page units.
+Look with_edges(float width) {
+    Look look;
+    look.surface.shading = Shading::flat;
+    look.appearance.edges = true;
+    look.appearance.edge_width = width;
+    return look;
+}
+
+/// The camera from which all of the meshes fill a panel.
+Camera common_camera(std::span<const Mesh* const> meshes, const Vec3d& direction, const Panel& panel) {
+    std::vector<CameraPoints> points;
+    for (const Mesh* mesh : meshes) points.push_back({mesh->positions, mesh->origin});
+    return fit_camera(points, direction, Vec3d::UnitZ(), panel.width / panel.height, 26, 0.04);
+}
+
+void draw_mesh(Page& page, const Panel& panel, FigureRenderer& renderer, const Mesh& mesh, const Look& look,
+               const Camera& camera) {
+    page.picture(renderer.picture(mesh, look, camera, panel.width, panel.height), panel.top_left, panel.width,
+                 panel.height);
+}
+
+const Vec3d kFromCorner(0.62, -0.86, 0.52); // over the cube's front right edge
+
+Model stripped_model(const Mesh& mesh, const StripOptions& options, const RunContext& context) {
+    return std::move(require(strip(mesh, options, context)).model);
+}
+
+/// "2.3 · 10^{-4}".
+std::string power_text(double value) {
+    if (!(value > 0)) return "0";
+    int exponent = static_cast<int>(std::floor(std::log10(value)));
+    double digits = value / std::pow(10.0, exponent);
+    if (digits >= 9.95) {
+        digits /= 10;
+        ++exponent;
+    }
+    return fmt::format("{:.1f}\u00a0·\u00a010^{{{}{}}}", digits, exponent < 0 ? "−" : "", std::abs(exponent));
+}
+
+/// Mean distance of the vertices of a cube's upper side along an axis from the plane that their rim is in. The outermost
+/// rows are left out: the waves of the neighbouring sides reach as far.
+double mean_height(const Mesh& rest, const Mesh& now, Eigen::Index axis, double plane) {
+    double sum = 0, count = 0;
+    for (std::size_t v = 0; v < rest.vertex_count(); ++v) {
+        const Vec3f& p = rest.positions[v];
+        if (p[axis] < 0.45f || std::abs(p[(axis + 1) % 3]) > 0.45f || std::abs(p[(axis + 2) % 3]) > 0.45f) continue;
+        sum += std::abs(double(now.positions[v][axis]) - plane);
+        ++count;
+    }
+    return sum / count;
+}
+
+} // namespace
+
+Figure draw_wavy_cube(FigureRenderer& renderer) {
+    constexpr double kPanelHeight = 400;
+    const ShapeOptions shape{.resolution = 264};
+    const Mesh cube = make_wavy_cube(shape);
+    Page page = captioned_page(
+        content_height(1, kPanelHeight) - kSubcaptionRoom, "Figure 2.1",
+        fmt::format("The object of the figures that follow: a cube of {} quads whose sides carry the waves of eq. 2.1, "
+                    "{:.0f} along each side. The quads along its edges are flat, so that the sides meet without a gap.",
+                    with_commas(cube.face_count()), shape.frequency));
+    const Panel panel{{100, kFigureMargin}, kFigureWidth - 200, kPanelHeight};
+    const Mesh* meshes[] = {&cube};
+    draw_mesh(page, panel, renderer, cube, {}, common_camera(meshes, kFromCorner, panel));
+    return {std::move(page),
+            {{"vertices", cube.vertex_count()}, {"faces", cube.face_count()}, {"frequency", shape.frequency}}};
+}
+
+Figure draw_removed_detail(FigureRenderer& renderer) {
+    constexpr double kPanelHeight = 310;
+    const Mesh cube = make_wavy_cube({.resolution = 64});
+    const Model model = stripped_model(cube, {.code = DetailCode::reference, .levels = 3}, renderer.context());
+    const Mesh meshes[] = {level_mesh(model, 2), level_mesh(model, 0)};
+    Page page = captioned_page(
+        content_height(1, kPanelHeight), "Figure 2.9",
+        fmt::format("The cube of {} quads after one and after three rounds of removing every second row and column. "
+                    "One round keeps the waves; after three, eight quads along a side are too few for them.",
+                    with_commas(cube.face_count())));
+    const std::vector<Panel> panels = panels_in_rows(1, 2, kPanelHeight);
+    const Mesh* all[] = {&cube};
+    const Camera camera = common_camera(all, kFromCorner, panels[0]);
+    for (std::size_t k = 0; k < 2; ++k) {
+        draw_mesh(page, panels[k], renderer, meshes[k], with_edges(k == 0 ? 0.4f : 0.6f), camera);
+        subcaption(page, panels[k], k == 0 ? "left" : "right",
+                   fmt::format("{}: {} vertices", k == 0 ? "1 iteration" : "3 iterations",
+                               with_commas(meshes[k].vertex_count())));
+    }
+    return {std::move(page), {{"vertices", {meshes[0].vertex_count(), meshes[1].vertex_count()}}}};
+}
+
+Figure draw_deformation_process(FigureRenderer& renderer) {
+    constexpr double kPanelHeight = 220, kStretch = 2.5;
+    const RunContext& context = renderer.context();
+    const Mesh cube = make_wavy_cube({.resolution = 64});
+    const Model model = stripped_model(cube, {.code = DetailCode::reference, .levels = 5}, context);
+    const auto warp = make_stretch(world_bounds(cube), Axis::x, kStretch);
+    const Pose pose{warp_positions(*warp, driver_positions(model), model.mesh.origin, context), {}, {}};
+    const Restorer restorer = require(Restorer::create(model, {.law = Law::inverse}, context));
+    const Mesh low = level_mesh(model, 0);
+    Mesh stretched = low;
+    stretched.positions = pose.positions;
+    const Mesh returned = require(restorer.mesh(pose, context));
+
+    const double before = mean_height(cube, cube, 2, 0.5), after = mean_height(cube, returned, 2, 0.5),
+                 ends = mean_height(cube, returned, 0, 0.5 * kStretch);
+    Page page = captioned_page(
+        content_height(2, kPanelHeight), "Figure 2.10",
+        fmt::format(
+            "The cube through the whole process: five levels of detail are removed, the {} vertices that are "
+            "left are stretched to {:.1f} times the length, and the detail is returned by the inverse law (eq. "
+            "2.14). The waves of the four stretched sides come back with {:.0f}\u00a0% of their mean height, those "
+            "of the two ends with {:.0f}\u00a0%.",
+            with_commas(low.vertex_count()), kStretch, 100 * after / before, 100 * ends / before));
+    const std::vector<Panel> panels = panels_in_rows(2, 2, kPanelHeight);
+    const Mesh* all[] = {&cube, &returned};
+    const Camera camera = common_camera(all, kFromCorner, panels[0]);
+    const std::tuple<const char*, const char*, const Mesh*, Look> parts[] = {
+        {"i", "original", &cube, {}},
+        {"ii", "low detail", &low, with_edges(0.6f)},
+        {"iii", "stretched with low detail", &stretched, with_edges(0.6f)},
+        {"iv", "detail returned", &returned, {}}};
+    for (std::size_t k = 0; k < 4; ++k) {
+        const auto& [number, text, mesh, look] = parts[k];
+        draw_mesh(page, panels[k], renderer, *mesh, look, camera);
+        subcaption(page, panels[k], number, fmt::format("{}, {} vertices", text, with_commas(mesh->vertex_count())));
+    }
+    return {std::move(page),
+            {{"stretch", kStretch},
+             {"driver_vertices", low.vertex_count()},
+             {"mean_height", before},
+             {"mean_height_returned", after},
+             {"mean_height_of_ends", ends}}};
+}
+
+Figure draw_extreme_deformation(FigureRenderer& renderer) {
+    constexpr double kPanelHeight = 220;
+    const RunContext& context = renderer.context();
+    const Mesh face = make_wavy_plane({.resolution = 64});
+    const Model model = stripped_model(face, {.code = DetailCode::reference}, context);
+    const Mesh corners = level_mesh(model, 0);
+    Pose pose{corners.positions, {}, {}};
+    for (Vec3f& p : pose.positions) { // by hand: one corner up and out, its opposite down, the others pulled apart
+        const bool right = p.x() > 0, back = p.y() > 0;
+        p = right ? (back ? Vec3f(0.80f, 0.55f, 0.45f) : Vec3f(0.45f, -0.75f, -0.20f))
+                  : (back ? Vec3f(-0.40f, 0.70f, -0.05f) : Vec3f(-0.85f, -0.40f, 0.15f));
+    }
+    Mesh moved = corners;
+    moved.positions = pose.positions;
+    const Restorer restorer = require(Restorer::create(model, {}, context));
+    const Mesh returned = require(restorer.mesh(pose, context));
+
+    Page page = captioned_page(
+        content_height(2, kPanelHeight), "Figure 3.1",
+        fmt::format("An extreme deformation of one face. Of the {} vertices only the {} corners are moved, each "
+                    "somewhere else; all others are put back from their records, level by level.",
+                    with_commas(face.vertex_count()), corners.vertex_count()));
+    const std::vector<Panel> panels = panels_in_rows(2, 2, kPanelHeight);
+    const Mesh* all[] = {&face, &returned, &moved};
+    const Camera camera = common_camera(all, Vec3d(0.15, -0.70, 0.95), panels[0]);
+    const std::tuple<const char*, const char*, const Mesh*, Look> parts[] = {
+        {"i", "original face", &face, {}},
+        {"ii", "all detail removed", &corners, with_edges(1.0f)},
+        {"iii", "the corners moved", &moved, with_edges(1.0f)},
+        {"iv", "detail returned", &returned, {}}};
+    for (std::size_t k = 0; k < 4; ++k) {
+        auto [number, text, mesh, look] = parts[k];
+        look.ground = false;
+        draw_mesh(page, panels[k], renderer, *mesh, look, camera);
+        subcaption(page, panels[k], number, fmt::format("{}, {} vertices", text, with_commas(mesh->vertex_count())));
+    }
+    return {std::move(page), {{"vertices", face.vertex_count()}, {"moved_vertices", corners.vertex_count()}}};
+}
+
+Figure draw_fidelity(FigureRenderer& renderer) {
+    constexpr double kPanelHeight = 196, kPanelWidth = 162, kGap = 10, kRmsRoom = 22, kTurn = 60;
+    const RunContext& context = renderer.context();
+    const Mesh cube = make_wavy_cube({.resolution = 64});
+    const Box box = world_bounds(cube);
+    std::vector<std::unique_ptr<SpaceWarp>> warps;
+    warps.push_back(make_twist(box, Axis::z, kTurn));
+    warps.push_back(make_bend(box, Axis::z, kTurn));
+    const auto warp = make_chain(std::move(warps));
+    Mesh full = cube;
+    full.positions = warp_positions(*warp, cube.positions, cube.origin, context);
+
+    const Model reference = stripped_model(cube, {.code = DetailCode::reference, .levels = 2}, context);
+    const std::size_t driver_count = reference.driver().vertices.size();
+    const Model blend = stripped_model(cube, {.base = driver_count}, context);
+    const Pose reference_pose = warp_pose(*warp, driver_positions(reference), cube.origin, context);
+    const Pose blend_pose = warp_pose(*warp, driver_positions(blend), cube.origin, context);
+    const Restorer reference_restorer = require(Restorer::create(reference, {}, context));
+    const Restorer blend_restorer = require(Restorer::create(blend, {}, context));
+    const std::pair<const char*, std::vector<Vec3f>> methods[] = {
+        {"reference code", require(reference_restorer.positions(reference_pose, context))},
+        {"wrap deformer", wrap_positions(blend, blend_pose, context)},
+        {"blend code", require(blend_restorer.positions(blend_pose, context))}};
+
+    Page page = captioned_page(
+        kFigureMargin + 2 * kPanelHeight + kSubcaptionRoom + kRmsRoom + 10, "Codes compared",
+        fmt::format(
+            "The wavy cube, {} vertices, twisted and bent by {:.0f} degrees. (i) Every vertex is deformed. (ii) to "
+            "(iv) Only a driver of about {} vertices is, and the rest follows: by the report’s records, "
+            "carried along in the frames of the driver’s triangles, and by the blend code with the gradients "
+            "of the deformation. Below, how far each vertex is from where (i) has it.",
+            with_commas(cube.vertex_count()), kTurn, with_commas(driver_count)));
+    const auto panel_at = [&](std::size_t row, std::size_t column) {
+        return Panel{{kFigureMargin + double(column) * (kPanelWidth + kGap),
+                      kFigureMargin + double(row) * (kPanelHeight + kSubcaptionRoom + 6)},
+                     kPanelWidth,
+                     kPanelHeight};
+    };
+    const Mesh* all[] = {&full};
+    const Camera camera = common_camera(all, Vec3d(0.45, -0.95, 0.42), panel_at(0, 0));
+    draw_mesh(page, panel_at(0, 0), renderer, full, {}, camera);
+    subcaption(page, panel_at(0, 0), "i", "every vertex");
+
+    const ValueRange decades{-6, -2};
+    const char* numbers[] = {"ii", "iii", "iv"};
+    Json values = Json::object();
+    for (std::size_t k = 0; k < 3; ++k) {
+        Mesh mesh = full;
+        mesh.positions = methods[k].second;
+        draw_mesh(page, panel_at(0, k + 1), renderer, mesh, {}, camera);
+        subcaption(page, panel_at(0, k + 1), numbers[k], methods[k].first);
+
+        const MeshDistance distance = require(mesh_distance(mesh, full, 0, context));
+        const VertexDistance& d = *distance.vertices;
+        std::vector<float> exponents;
+        for (const float units : d.per_vertex)
+            exponents.push_back(static_cast<float>(std::log10(std::max(1e-12, distance.relative(double(units))))));
+        Look heat;
+        heat.surface.scalars = {exponents, ColorMap::sequential, decades};
+        heat.appearance.gloss = 0;
+        const Panel panel = panel_at(1, k + 1);
+        draw_mesh(page, panel, renderer, mesh, heat, camera);
+        page.text("rms " + power_text(distance.relative(d.rms)),
+                  {panel.centre().x(), panel.top_left.y() + panel.height + 16}, {.size = 12, .align = Align::centre});
+        values[methods[k].first] = {{"rms", distance.relative(d.rms)}, {"max", distance.relative(d.max)}};
+    }
+    const Panel key = panel_at(1, 0);
+    page.legend(ColorMap::sequential, decades, "distance / diagonal", key.top_left + Point(30, 12), kPanelHeight - 20,
+                LegendScale::powers_of_ten);
+    return {std::move(page),
+            {{"vertices", cube.vertex_count()}, {"driver_vertices", driver_count}, {"methods", values}}};
+}
+
+} // namespace filigree::cli
