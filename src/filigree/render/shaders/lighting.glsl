@@ -6,11 +6,15 @@ const float kFloor = 0.02;
 const vec3 kKeyColor = vec3(1.0, 0.955, 0.89), kSkyColor = vec3(0.90, 0.955, 1.0);
 
 /// Share of the light that comes through at a point of a surface with that geometric normal. The point is moved off
-/// the surface by about a texel, further where the light grazes.
-float visibility(sampler2DShadow map, mat4 matrix, vec3 position, vec3 normal, vec4 light) {
-    float cosine = clamp(dot(normal, light.xyz), 0.0, 1.0);
-    vec3 off = normal * light.w * (1.0 + 2.0 * sqrt(1.0 - cosine * cosine)) + light.xyz * light.w;
+/// the surface by about as far as it looks around in the map, further where the light grazes. Where it looks differs
+/// from pixel to pixel and pass to pass, so that the shadows' rims melt into each other.
+float visibility(sampler2DShadow map, mat4 matrix, vec3 position, vec3 normal, vec4 light, float around) {
+    float cosine = clamp(dot(normal, light.xyz), 0.0, 1.0), reach = light.w * around;
+    vec3 off = normal * reach * (1.0 + 2.0 * sqrt(1.0 - cosine * cosine)) + light.xyz * reach;
     vec3 p = (matrix * vec4(position + off, 1.0)).xyz;
+    float turn = fract(52.9829189 * fract(dot(gl_FragCoord.xy + 5.588238 * frame.viewport.z, vec2(0.06711056, 0.00583715))));
+    float angle = 6.2831853 * turn, radius = around * sqrt(fract(turn * 7.31 + 0.618034 * frame.viewport.z));
+    p.xy += radius * vec2(cos(angle), sin(angle)) / vec2(textureSize(map, 0));
     if (any(lessThan(p, vec3(0.0))) || any(greaterThan(p, vec3(1.0)))) return 1.0;
     return texture(map, p);
 }
@@ -20,8 +24,8 @@ vec3 shade(vec3 position, vec3 facing, vec3 normal, vec3 albedo, float gloss) {
     vec3 view = to_viewer(position), up = frame.up.xyz;
     float key_cosine = max(dot(normal, frame.key_direction.xyz), 0.0);
     float sky_cosine = max(dot(normal, frame.sky_direction.xyz), 0.0);
-    float key = key_cosine > 0.0 ? visibility(key_shadow, frame.key_matrix, position, facing, frame.key_direction) : 0.0;
-    float sky = sky_cosine > 0.0 ? visibility(sky_shadow, frame.sky_matrix, position, facing, frame.sky_direction) : 0.0;
+    float key = key_cosine > 0.0 ? visibility(key_shadow, frame.key_matrix, position, facing, frame.key_direction, 1.5) : 0.0;
+    float sky = sky_cosine > 0.0 ? visibility(sky_shadow, frame.sky_matrix, position, facing, frame.sky_direction, 3.0) : 0.0;
 
     vec3 key_light = frame.strength.x * key_cosine * key * kKeyColor;
     vec3 light = key_light;
