@@ -54,7 +54,7 @@ std::vector<FigureEntry> chosen_figures(const std::vector<std::string>& only) {
 struct Options {
     std::string output = "filigree-figures", format = "png";
     std::vector<std::string> only;
-    int width = 1440;
+    unsigned width = 1440, passes = 0;
 };
 
 void run_figures(const Options& options, Session& session) {
@@ -66,7 +66,7 @@ void run_figures(const Options& options, Session& session) {
         paths.push_back(folder.file(file_stem(figure.name) + "." + options.format));
 
     const double scale = options.width / kFigureWidth;
-    FigureRenderer renderer(context, scale);
+    FigureRenderer renderer(session, scale, options.passes);
     std::vector<Figure> drawn; // all of them before the first is written, so that a cancel changes nothing
     for (const FigureEntry& figure : chosen) {
         context.report("figures", double(drawn.size()) / double(chosen.size()));
@@ -100,6 +100,8 @@ void add_figures(CLI::App& app, Session& session) {
     command->add_option("--width", options->width, "Width of a figure in pixels; SVG and PDF: of the pictures in it")
         ->check(CLI::Range(180, 7200))
         ->capture_default_str();
+    command->add_option("--passes", options->passes, "Passes of light in rendered figures (unset: as the mesh needs)")
+        ->check(CLI::Range(1, 4096));
     session.add_common_options(*command, "  filigree figures -o figures\n"
                                          "  filigree figures --only 1.1 2.10 --format pdf");
     command->callback([options, &session] {

@@ -8,9 +8,10 @@
 #include "filigree/render/renderer.h"
 
 #include <memory>
-#include <optional>
 
 namespace filigree::cli {
+
+class Stage;
 
 /// A figure, and the numbers in it.
 struct Figure {
@@ -21,8 +22,8 @@ struct Figure {
 /// Draws meshes for figures; OpenGL starts with the first of them.
 class FigureRenderer {
 public:
-    /// scale: pixels for each page unit.
-    FigureRenderer(const RunContext& context, double scale);
+    /// scale: pixels for each page unit. passes: as in PictureOptions.
+    FigureRenderer(Session& session, double scale, unsigned passes);
     ~FigureRenderer();
 
     struct Look {
@@ -33,13 +34,13 @@ public:
     /// A picture on white, `width` x `height` page units large. z is up.
     Picture picture(const Mesh& mesh, const Look& look, const Camera& camera, double width, double height);
 
-    const RunContext& context() const { return context_; }
+    const RunContext& context() const { return session_.context(); }
 
 private:
-    struct Content;
-    const RunContext& context_;
+    Session& session_;
     double scale_;
-    std::unique_ptr<Content> content_;
+    unsigned passes_;
+    std::unique_ptr<Stage> stage_;
 };
 
 // One function a figure, in the report's order.

@@ -2,25 +2,21 @@
 #include "fidelity.h"
 #include "figures.h"
 #include "figures_layout.h"
+#include "stage.h"
 
 #include "filigree/deform/space_warp.h"
 #include "filigree/hierarchy/restore.h"
 #include "filigree/hierarchy/strip.h"
 #include "filigree/mesh/mesh_distance.h"
 #include "filigree/mesh/shapes.h"
-#include "filigree/render/gl_context.h"
 
 #include <algorithm>
 #include <cmath>
 
 namespace filigree::cli {
 
-struct FigureRenderer::Content {
-    HeadlessContext gl;
-    Renderer renderer;
-};
-
-FigureRenderer::FigureRenderer(const RunContext& context, double scale) : context_(context), scale_(scale) {}
+FigureRenderer::FigureRenderer(Session& session, double scale, unsigned passes)
+    : session_(session), scale_(scale), passes_(passes) {}
 FigureRenderer::~FigureRenderer() = default;
 
 namespace {
@@ -41,12 +37,8 @@ void fade_borders(Picture& picture) {
 } // namespace
 
 Picture FigureRenderer::picture(const Mesh& mesh, const Look& look, const Camera& camera, double width, double height) {
-    if (!content_) {
-        HeadlessContext gl = require(HeadlessContext::create());
-        Renderer renderer = require(Renderer::create());
-        content_.reset(new Content{std::move(gl), std::move(renderer)});
-    }
-    const Drawable drawable = require(Drawable::surface(mesh, look.surface, context_));
+    if (!stage_) stage_ = std::make_unique<Stage>(session_);
+    const Drawable drawable = require(Drawable::surface(mesh, look.surface, context()));
     Scene scene;
     scene.objects.push_back({&drawable, look.appearance});
     scene.objects.back().appearance.edge_width *= static_cast<float>(scale_);
@@ -56,9 +48,8 @@ Picture FigureRenderer::picture(const Mesh& mesh, const Look& look, const Camera
     PictureOptions options;
     options.width = static_cast<unsigned>(std::lround(scale_ * width));
     options.height = static_cast<unsigned>(std::lround(scale_ * height));
-    RunContext silent = context_; // the command reports figures, not passes
-    silent.progress = nullptr;
-    Picture picture = require(content_->renderer.picture(scene, camera, options, silent));
+    options.passes = passes_;
+    Picture picture = stage_->take(scene, camera, options);
     fade_borders(picture);
     return picture;
 }
@@ -107,8 +98,8 @@ std::string power_text(double value) {
     return fmt::format("{:.1f}\u00a0·\u00a010^{{{}{}}}", digits, exponent < 0 ? "−" : "", std::abs(exponent));
 }
 
-/// Mean distance of the vertices of a cube's upper side along an axis from the plane that their rim is in. The outermost
-/// rows are left out: the waves of the neighbouring sides reach as far.
+/// Mean distance of the vertices of a cube's upper side along an axis from the plane that their rim is in. The
+/// outermost rows are left out: the waves of the neighbouring sides reach as far.
 double mean_height(const Mesh& rest, const Mesh& now, Eigen::Index axis, double plane) {
     double sum = 0, count = 0;
     for (std::size_t v = 0; v < rest.vertex_count(); ++v) {
