@@ -8,6 +8,7 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <set>
 
 namespace filigree {
 
@@ -15,13 +16,14 @@ namespace {
 
 constexpr std::size_t kMostCreased = 256; // faces at a vertex whose pairs are all looked at
 
-/// Twice the face's area, along its normal [Newell].
-Vec3f newell(const Mesh& mesh, std::span<const Vec3f> positions, std::size_t face) {
+/// Twice the face's area, along its normal [Newell], of the mesh scaled: float holds no areas of the very small and the
+/// very large.
+Vec3f newell(const Mesh& mesh, std::span<const Vec3f> positions, std::size_t face, double scale) {
     const std::span<const Index> corners = mesh.face(face);
     const Vec3d base = positions[corners[0]].cast<double>(); // differences keep digits, and cannot overflow early
+    const auto from_base = [&](Index corner) { return Vec3d(scale * (positions[corner].cast<double>() - base)); };
     Vec3d sum = Vec3d::Zero();
-    for (std::size_t k = 1; k + 1 < corners.size(); ++k)
-        sum += (positions[corners[k]].cast<double>() - base).cross(positions[corners[k + 1]].cast<double>() - base);
+    for (std::size_t k = 1; k + 1 < corners.size(); ++k) sum += from_base(corners[k]).cross(from_base(corners[k + 1]));
     return sum.cast<float>();
 }
 
@@ -53,8 +55,9 @@ public:
           least_cosine_(static_cast<float>(std::cos(options.crease_deg * std::numbers::pi / 180))) {
         if (shading_ == Shading::automatic && !mesh.normals.empty()) return;
         areas_.resize(mesh.face_count());
+        const double diagonal = bounds(positions).diagonal(), scale = diagonal > 0 ? 1 / diagonal : 1;
         parallel_for(context, mesh.face_count(), 4096, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t f = begin; f < end; ++f) areas_[f] = newell(mesh, positions, f);
+            for (std::size_t f = begin; f < end; ++f) areas_[f] = newell(mesh, positions, f, scale);
         });
     }
 
@@ -91,7 +94,7 @@ public:
         for (std::size_t i = 0; i < corners.size(); ++i) {
             sum = Vec3f::Zero();
             for (std::size_t j = 0; j < corners.size(); ++j)
-                if (units_[i].dot(units_[j]) >= least_cosine_) sum += areas_[faces[j]];
+                if (i == j || units_[i].dot(units_[j]) >= least_cosine_) sum += areas_[faces[j]];
             normals[i] = units_[i].isZero() ? smooth : unit(sum);
         }
     }
@@ -170,22 +173,33 @@ Result<DrawArrays> make_draw_arrays(const Mesh& mesh, std::span<const Vec3f> pos
                 {m == mesh.materials.names.size() ? kNoIndex : static_cast<Index>(m), next[m], next[m + 1] - next[m]});
     arrays.triangles.resize(next.back());
     arrays.edges.resize(next.back());
-    std::vector<Index> corner_of_vertex(mesh.vertex_count());
+    std::vector<Index> corner_of_vertex(mesh.vertex_count(), kNoIndex);
+    std::set<std::pair<Index, Index>> outline; // vertices of the sides of a face that passes some vertex twice
     Index known = kNoIndex;
     for (std::size_t t = 0; t < cut.triangles.size(); ++t) {
         const Index f = cut.source_face[t];
         if (is_hidden(f)) continue;
         const Index begin = mesh.face_offsets[f], size = mesh.face_size(f);
-        if (f != known)
-            for (Index c = begin; c < begin + size; ++c) corner_of_vertex[mesh.corners[c]] = c;
+        if (f != known) {
+            bool passes_twice = false;
+            for (Index c = begin; c < begin + size; ++c) {
+                Index& corner = corner_of_vertex[mesh.corners[c]];
+                passes_twice = passes_twice || (corner != kNoIndex && corner >= begin);
+                corner = c;
+            }
+            outline.clear();
+            for (Index k = 0; passes_twice && k < size; ++k)
+                outline.emplace(mesh.corners[begin + k], mesh.corners[begin + (k + 1) % size]);
+        }
         known = f;
         const Index slot = next[slot_of(f)]++;
         std::uint8_t edges = 0;
         for (int k = 0; k < 3; ++k) {
-            const Index from = corner_of_vertex[cut.triangles[t][k]] - begin,
-                        to = corner_of_vertex[cut.triangles[t][(k + 1) % 3]] - begin;
+            const Index a = cut.triangles[t][k], b = cut.triangles[t][(k + 1) % 3];
+            const Index from = corner_of_vertex[a] - begin, to = corner_of_vertex[b] - begin;
             arrays.triangles[slot][k] = draw_vertex[begin + from];
-            if (to == (from + 1) % size) edges |= static_cast<std::uint8_t>(1 << k);
+            if (outline.empty() ? to == (from + 1) % size : outline.contains({a, b}))
+                edges |= static_cast<std::uint8_t>(1 << k);
         }
         arrays.edges[slot] = edges;
     }
