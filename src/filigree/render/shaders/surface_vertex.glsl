@@ -1,6 +1,6 @@
 // A surface's vertices: given, or restored from the driver's pose (with RESTORED, after restore.glsl).
 layout(location = 0) in vec3 in_position;
-layout(location = 1) in vec2 in_normal; // octahedral
+layout(location = 1) in vec2 in_normal; // octahedral, times 32767; -32768 for none
 layout(location = 2) in vec2 in_uv;
 layout(location = 3) in vec4 in_color;
 layout(location = 6) in float in_scalar;
@@ -18,7 +18,9 @@ out Surface {
     float scalar;
 } surface;
 
-vec3 from_octahedron(vec2 e) {
+vec3 from_octahedron(vec2 steps) {
+    if (steps.x < -32767.5) return vec3(0.0);
+    vec2 e = steps * (1.0 / 32767.0);
     vec3 n = vec3(e, 1.0 - abs(e.x) - abs(e.y));
     float t = max(-n.z, 0.0);
     n.xy += mix(vec2(t), vec2(-t), greaterThanEqual(n.xy, vec2(0.0)));
