@@ -93,7 +93,7 @@ void add_figures(CLI::App& app, Session& session) {
     CLI::App* command = app.add_subcommand("figures", "The report's figures, drawn from what the program computes");
     command->add_option("-o,--output", options->output, "Folder for the figures")->capture_default_str();
     command->add_option("--only", options->only, "Figures to draw: 1.1, 2.1, ... 3.1, codes (unset: all)")
-        ->type_name("NAME...");
+        ->type_name("NAME");
     add_choice<std::string>(
         *command, "--format", {{"png", "png"}, {"svg", "svg"}, {"pdf", "pdf"}},
         [options](std::string format) { options->format = std::move(format); }, "png (unset), svg or pdf");

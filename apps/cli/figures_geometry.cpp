@@ -148,10 +148,10 @@ void draw_ridge_case(Page& page, const Panel& panel, const Ridge& ridge, const R
     int number = 0;
     for (const auto* quad : {&ridge.left, &ridge.right}) {
         const Vec3d outer = 0.5 * ((*quad)[number == 0 ? 0 : 1] + (*quad)[number == 0 ? 3 : 2]);
-        const Vec3d foot = 0.72 * outer - Vec3d(0, 0.5, 0);
+        const Vec3d foot = 0.82 * outer - Vec3d(0, 0.5, 0);
         const Vec3d tip = foot + 0.46 * Ridge::normal(*quad);
         page.arrow(view(foot), view(tip), {kGreen, 1.3});
-        label(page, names[number], view(tip), {number == 0 ? -13.0 : 14.0, -5}, kGreen);
+        label(page, names[number], view(tip), {number == 0 ? -13.0 : 15.0, number == 0 ? -5.0 : 3.0}, kGreen);
         ++number;
     }
 
@@ -233,7 +233,7 @@ std::vector<SharedPoint> shared_points() {
         cases[flat].mesh.add_face({-1, -1, 0}, x, y, 4, false);
         for (Vec3d& p : cases[flat].mesh.positions) // as wavy as the model
             p.z() = 0.13 * std::sin(2.1 * p.x() + 0.4) * std::sin(2.3 * p.y() + 1.1);
-        cases[flat].ray = Vec3d(-0.5, -0.2, 1.0);
+        cases[flat].ray = Vec3d(-0.3, 0.15, 1.4);
         cases[flat].yaw = 20;
         cases[flat].pitch = 40;
     }

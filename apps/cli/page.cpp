@@ -493,7 +493,8 @@ void Page::picture(const Picture& picture, Point top_left, double width, double 
         cairo_clip(drawing);
         cairo_set_source_surface(drawing, surface.get(), 0, 0);
         cairo_pattern_set_filter(cairo_get_source(drawing), CAIRO_FILTER_BEST);
-        cairo_pattern_set_extend(cairo_get_source(drawing), CAIRO_EXTEND_PAD);
+        if (cairo_surface_get_type(cairo_get_target(drawing)) == CAIRO_SURFACE_TYPE_IMAGE) // others keep it as it is
+            cairo_pattern_set_extend(cairo_get_source(drawing), CAIRO_EXTEND_PAD);
         cairo_paint(drawing);
         cairo_restore(drawing);
     });
