@@ -1,3 +1,4 @@
+#include "demo_pictures.h"
 #include "output_folder.h"
 #include "restore_options.h"
 
@@ -12,20 +13,38 @@ namespace {
 
 constexpr unsigned kDemoResolution = 264; // of the wavy cube, as large as the report's
 
-/// A quarter turn about the longest side, then a quarter circle along it.
-std::unique_ptr<SpaceWarp> bend_and_twist(const Box& box) {
+/// A quarter turn about the longest side, then a quarter circle along it; or a part of both.
+std::unique_ptr<SpaceWarp> bend_and_twist(const Box& box, double part = 1) {
     std::vector<std::unique_ptr<SpaceWarp>> warps;
-    warps.push_back(make_twist(box, longest_axis(box), 90));
-    warps.push_back(make_bend(box, longest_axis(box), 90));
+    warps.push_back(make_twist(box, longest_axis(box), 90 * part));
+    warps.push_back(make_bend(box, longest_axis(box), 90 * part));
     return make_chain(std::move(warps));
 }
 
-void run_demo(const std::string& input, const std::string& folder, Session& session) {
+/// Neither is what the demo is about: where OpenGL or ffmpeg is missing it goes on with a warning. Returns the files.
+std::vector<std::string> draw_and_film(const DemoScene& scene, const std::function<Pose(double)>& pose_at,
+                                       const std::string& picture, const std::string& film, Session& session) {
+    std::vector<std::string> made;
+    try {
+        Stage stage(session);
+        draw_demo(scene, stage, picture, session);
+        made.push_back(picture);
+        film_demo(scene, pose_at, stage, film, session);
+        made.push_back(film);
+    } catch (const Failure& failure) {
+        if (failure.error.code != ErrorCode::unsupported) throw;
+        session.warn(failure.error.message);
+    }
+    return made;
+}
+
+void run_demo(const std::string& input, const std::string& folder, bool pictures, Session& session) {
     const RunContext& context = session.context();
     OutputFolder files(folder, input);
     const std::string model_file = files.file("model.fil"), mesh_file = files.file("mesh.ply"),
                       driver_file = files.file("driver.ply"), posed_driver_file = files.file("driver_bent.ply"),
-                      full_file = files.file("full_deformation.ply"), restored_file = files.file("restored.ply");
+                      full_file = files.file("full_deformation.ply"), restored_file = files.file("restored.ply"),
+                      picture_file = files.file("demo.png"), film_file = files.file("demo.mp4");
 
     const double start = now_seconds();
     Mesh mesh = input.empty() ? make_wavy_cube({.resolution = kDemoResolution}) : session.read_mesh(input);
@@ -60,6 +79,15 @@ void run_demo(const std::string& input, const std::string& folder, Session& sess
     session.write_mesh(mesh, mesh_file);
     session.write_mesh(full, full_file);
     session.write_mesh(restored, restored_file);
+    std::vector<std::string> pictures_made;
+    if (pictures && mesh.face_count() > 0) {
+        const DemoScene scene{mesh, model, pose, restored, with_gradients};
+        const Box box = world_bounds(mesh);
+        const auto pose_at = [&](double part) {
+            return warp_pose(*bend_and_twist(box, part), driver_positions(model), model.mesh.origin, context);
+        };
+        pictures_made = draw_and_film(scene, pose_at, picture_file, film_file, session);
+    }
     files.keep();
 
     const double ours = driver_seconds + restore_seconds;
@@ -80,8 +108,10 @@ void run_demo(const std::string& input, const std::string& folder, Session& sess
     table.row("without gradients", fmt::format("rms {:.2e} of the diagonal, 95 % of normals within {:.2g} degrees",
                                                positions_only.relative(p.rms), p.normal_p95_deg));
     table.row("files", folder + "/: mesh, driver, driver_bent, restored, full_deformation (.ply), model.fil");
+    if (!pictures_made.empty()) table.row("to look at", fmt::format("{}", fmt::join(pictures_made, ", ")));
     session.print(table.text(), {{"mesh", input.empty() ? "wavy-cube" : input},
                                  {"output", folder},
+                                 {"pictures", pictures_made},
                                  {"vertices", mesh.vertex_count()},
                                  {"driver_vertices", model.driver().vertices.size()},
                                  {"read_seconds", read - start},
@@ -106,6 +136,7 @@ void run_demo(const std::string& input, const std::string& folder, Session& sess
 void add_demo(CLI::App& app, Session& session) {
     struct Options {
         std::string input, output = "filigree-demo";
+        bool no_pictures = false;
     };
     auto options = std::make_shared<Options>();
     CLI::App* command =
@@ -113,11 +144,13 @@ void add_demo(CLI::App& app, Session& session) {
     command->add_option("mesh", options->input,
                         fmt::format("Mesh (unset: the report's wavy cube with {} vertices)",
                                     with_commas(wavy_cube_vertices(kDemoResolution))));
-    command->add_option("-o,--output", options->output, "Folder for the meshes")->capture_default_str();
+    command->add_option("-o,--output", options->output, "Folder for the meshes, the picture and the film")
+        ->capture_default_str();
+    command->add_flag("--no-pictures", options->no_pictures, "Draw no picture and no film");
     session.add_common_options(*command, "  filigree demo\n  filigree demo scan.ply -o out");
     command->callback([options, &session] {
         session.begin();
-        run_demo(options->input, options->output, session);
+        run_demo(options->input, options->output, !options->no_pictures, session);
     });
 }
 

@@ -11,8 +11,8 @@ using namespace filigree_test;
 
 namespace {
 
-const std::vector<std::string> kCommands = {"make",    "info",    "strip", "level", "deform",
-                                            "restore", "compare", "bench", "demo"};
+const std::vector<std::string> kCommands = {"make",    "info",  "strip", "level",  "deform", "restore",
+                                            "compare", "bench", "demo",  "render", "figures"};
 
 std::vector<std::string> lines_of(const std::string& text) {
     std::vector<std::string> lines;
@@ -495,6 +495,10 @@ TEST_F(Cli, DemoDoesTheMainJob) {
     for (const char* key : {"rms", "max", "positions_only_rms"})
         EXPECT_GT(demo.at(std::string(key) + "_units").get<double>(), demo.at(key).get<double>()); // diagonal 1.9
     EXPECT_EQ(rms("out/mesh.ply", "cube.obj"), 0);
+    if (demo.at("warnings").empty()) { // OpenGL and ffmpeg are there
+        EXPECT_EQ(demo.at("pictures"), Json({"out/demo.png", "out/demo.mp4"}));
+        for (const Json& name : demo.at("pictures")) EXPECT_TRUE(std::filesystem::exists(path(name))) << name;
+    }
     for (const char* name : {"driver.ply", "driver_bent.ply", "restored.ply", "full_deformation.ply", "model.fil"})
         EXPECT_TRUE(std::filesystem::exists(path(std::string("out/") + name))) << name;
 }
@@ -507,11 +511,11 @@ TEST_F(Cli, DemoKeepsWhatWasThere) {
     const std::string mesh = bytes_of(path("out/mesh.ply"));
     fails(2, {"demo", "out/mesh.ply", "-o", "out"}, {"out/mesh.ply", "-o"});
     EXPECT_EQ(bytes_of(path("out/model.fil")), "mine");
-    fails(6, {"demo", "cube.obj", "-o", "out"}, {"out/driver.ply"});
+    fails(6, {"demo", "cube.obj", "-o", "out", "--no-pictures"}, {"out/driver.ply"});
     EXPECT_TRUE(std::filesystem::exists(path("out/model.fil")));
     EXPECT_EQ(bytes_of(path("out/mesh.ply")), mesh);
     std::filesystem::remove(path("out/model.fil"));
-    fails(6, {"demo", "cube.obj", "-o", "out"}, {"out/driver.ply"});
+    fails(6, {"demo", "cube.obj", "-o", "out", "--no-pictures"}, {"out/driver.ply"});
     EXPECT_FALSE(std::filesystem::exists(path("out/model.fil"))); // this one was the demo's own
 }
 

@@ -91,7 +91,7 @@ ColorTable table_of(const std::function<Vec3d(double)>& oklab_at) {
 /// Night blue, violet, red, orange, cream. Control points may lie outside of what a screen can show; the curve does
 /// not.
 ColorTable make_sequential() {
-    const EvenCurve curve(std::array{lch(0.25, 0.11, 282), lch(0.36, 0.22, 290), lch(0.47, 0.26, 330),
+    const EvenCurve curve(std::array{lch(0.34, 0.11, 276), lch(0.41, 0.22, 287), lch(0.47, 0.26, 330),
                                      lch(0.60, 0.29, 15), lch(0.74, 0.18, 58), lch(0.85, 0.155, 82),
                                      lch(0.94, 0.06, 95)});
     return table_of([&](double t) { return curve.at(t); });

@@ -1,0 +1,120 @@
+#include "demo_pictures.h"
+
+#include "page.h"
+
+#include <cmath>
+#include <numbers>
+
+namespace filigree::cli {
+
+namespace {
+
+constexpr unsigned kPanelWidth = 460, kPanelHeight = 440;
+constexpr unsigned kFilmWidth = 640, kFilmHeight = 480, kFilmFrames = 30, kFilmPasses = 8;
+constexpr std::size_t kMostFilmTriangles = 150'000;
+
+Camera camera_for(std::span<const CameraPoints> points, double aspect) {
+    return fit_camera(points, view_direction(View::iso, UpAxis::y), up_vector(UpAxis::y), aspect, 30, 0.08);
+}
+
+unsigned film_level(const Model& model) {
+    unsigned level = model.finest_level();
+    const auto triangles = [&](unsigned k) {
+        return k == model.finest_level() ? model.mesh.corner_count() - 2 * model.mesh.face_count()
+                                         : model.levels[k].corners.size() - 2 * model.levels[k].face_count();
+    };
+    while (level > 0 && triangles(level) > kMostFilmTriangles) --level;
+    return level;
+}
+
+} // namespace
+
+void draw_demo(const DemoScene& scene, Stage& stage, const std::string& path, Session& session) {
+    const RunContext& context = session.context();
+    const double aspect = double(kPanelWidth) / kPanelHeight;
+    const CameraPoints before{scene.mesh.positions, scene.mesh.origin},
+        after{scene.restored.positions, scene.restored.origin};
+    const Camera at_rest = camera_for(std::span(&before, 1), aspect), moved = camera_for(std::span(&after, 1), aspect);
+    const HeatMap errors = heat_map(scene.error.vertices->per_vertex, scene.error.diagonal);
+
+    constexpr double kGap = 8, kCaption = 40, kLegend = 130;
+    Page page(5 * kPanelWidth + 4 * kGap + kLegend, kPanelHeight + kCaption);
+    unsigned panel = 0;
+    const auto add = [&](const Drawable& drawable, const Camera& camera, bool edges, const std::string& caption) {
+        Scene shown;
+        Appearance look;
+        look.edges = edges;
+        shown.objects.push_back({&drawable, look});
+        const Picture picture = stage.take(shown, camera, {.width = kPanelWidth, .height = kPanelHeight, .passes = 16});
+        const Point corner(panel++ * (kPanelWidth + kGap), 0);
+        page.picture(picture, corner, kPanelWidth, kPanelHeight);
+        page.text(caption, corner + Point(kPanelWidth / 2.0, kPanelHeight + 26), {.size = 16, .align = Align::centre});
+    };
+    {
+        const Drawable mesh = require(Drawable::surface(scene.mesh, {}, context));
+        add(mesh, at_rest, false, fmt::format("mesh: {} vertices", with_commas(scene.mesh.vertex_count())));
+    }
+    {
+        RestoreOptions driver;
+        driver.level = 0;
+        Drawable drawable = require(Drawable::model(scene.model, driver, {}, context));
+        add(drawable, at_rest, true, fmt::format("driver: {}", with_commas(scene.model.driver().vertices.size())));
+        require(drawable.set_pose(scene.pose, context));
+        add(drawable, moved, true, "driver, deformed");
+    }
+    Drawable restored = require(Drawable::model(scene.model, {}, {}, context));
+    require(restored.set_pose(scene.pose, context));
+    add(restored, moved, false, "detail restored");
+    const ScalarColors scalars{errors.values, ColorMap::sequential, errors.range};
+    restored = require(Drawable::model(scene.model, {}, {.scalars = scalars}, context));
+    require(restored.set_pose(scene.pose, context));
+    add(restored, moved, false, "distance from the full deformation");
+    page.legend(ColorMap::sequential, errors.range, "distance / diagonal", {page.width() - kLegend + 14, 20},
+                kPanelHeight - 40.0);
+    if (context.is_cancelled()) throw Failure{cancelled_error()};
+    require(page.write(path, 1));
+}
+
+void film_demo(const DemoScene& scene, const std::function<Pose(double)>& pose_at, Stage& stage,
+               const std::string& path, Session& session) {
+    const RunContext& context = session.context();
+    RunContext without_bar = context; // the bar tells of frames
+    without_bar.progress = nullptr;
+    FilmWriter writer = require(FilmWriter::create(path, kFilmWidth, kFilmHeight, 30));
+    RestoreOptions restore;
+    restore.level = film_level(scene.model);
+    Drawable drawable = require(Drawable::model(scene.model, restore, {}, context));
+
+    // One camera and one ground for the whole way: a few moments say where it leads.
+    std::vector<std::vector<Vec3f>> moments;
+    const Restorer restorer = require(Restorer::create(scene.model, restore, context));
+    std::vector<CameraPoints> points;
+    Box box;
+    for (int k = 0; k <= 4; ++k) {
+        moments.push_back(require(restorer.positions(pose_at(k / 4.0), context)));
+        const Box here = bounds(moments.back());
+        box.extend(here.min + scene.mesh.origin);
+        box.extend(here.max + scene.mesh.origin);
+    }
+    for (const std::vector<Vec3f>& moment : moments) points.push_back({moment, scene.mesh.origin});
+    const Camera camera = camera_for(points, double(kFilmWidth) / kFilmHeight);
+
+    std::vector<Picture> frames;
+    for (unsigned f = 0; f < kFilmFrames; ++f) {
+        if (context.is_cancelled()) throw Failure{cancelled_error()};
+        context.report("filming", double(f) / kFilmFrames);
+        const double t = 0.5 - 0.5 * std::cos(std::numbers::pi * f / (kFilmFrames - 1)); // starts and ends slowly
+        require(drawable.set_pose(pose_at(t), context));
+        Scene shown;
+        shown.objects.push_back({&drawable, {}});
+        shown.fixed_ground = true;
+        shown.ground_level = box.min.y() - 1e-4 * box.diagonal();
+        frames.push_back(require(stage.renderer().picture(
+            shown, camera, {.width = kFilmWidth, .height = kFilmHeight, .passes = kFilmPasses}, without_bar)));
+    }
+    for (const Picture& frame : frames) require(writer.add(frame));
+    for (unsigned f = kFilmFrames - 1; f-- > 1;) require(writer.add(frames[f]));
+    require(writer.finish());
+}
+
+} // namespace filigree::cli

@@ -1,0 +1,30 @@
+// What the demo shows: one picture of the whole job, and a film of it.
+#pragma once
+
+#include "film.h"
+#include "stage.h"
+
+#include "filigree/hierarchy/restore.h"
+#include "filigree/mesh/mesh_distance.h"
+
+#include <string>
+
+namespace filigree::cli {
+
+struct DemoScene {
+    const Mesh& mesh;          ///< as it came
+    const Model& model;        ///< stripped
+    const Pose& pose;          ///< of the driver, deformed
+    const Mesh& restored;      ///< for the camera and its size; what is drawn is restored by the vertex shader
+    const MeshDistance& error; ///< of the restored mesh against the full deformation
+};
+
+/// Five panels: mesh, driver, moved driver, restored mesh, its error as colours with a legend.
+void draw_demo(const DemoScene& scene, Stage& stage, const std::string& path, Session& session);
+
+/// The mesh from rest to the pose and back; pose_at(t), t from 0 to 1, gives the driver on the way. Of large meshes a
+/// lower level is shown, the finest with at most 150,000 triangles.
+void film_demo(const DemoScene& scene, const std::function<Pose(double)>& pose_at, Stage& stage,
+               const std::string& path, Session& session);
+
+} // namespace filigree::cli
