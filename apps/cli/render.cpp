@@ -152,6 +152,8 @@ std::unique_ptr<Subject> Rendering::read(const std::string& path) {
                                level));
         subject->mesh = level_mesh(*subject->model, level);
     } else {
+        if (!options_.poses.empty())
+            refuse(path + ": is a mesh, and --poses move a model; 'filigree strip' makes one of it.");
         subject->mesh = std::move(std::get<Mesh>(content.value));
         subject->materials = load_materials(subject->mesh, path, session_);
     }
@@ -233,7 +235,13 @@ void Rendering::set_pose(Subject& subject, const std::string& path, bool on_scre
     const Pose pose = pose_from_mesh(session_.read_mesh(path), *subject.model);
     if (!subject.restorer) subject.restorer = require(Restorer::create(*subject.model, options_.restore, context()));
     require(subject.restorer->positions(pose, subject.mesh.positions, context()));
-    if (on_screen) require(subject.drawable->set_pose(pose, context()));
+    if (!on_screen) return;
+    if (const std::size_t points = subject.drawable->point_count()) { // which are not restored on the GPU
+        points_ -= points;
+        upload(subject);
+    } else {
+        require(subject.drawable->set_pose(pose, context()));
+    }
 }
 
 Scene Rendering::scene_of(const Subject& subject) const {
@@ -367,10 +375,9 @@ void Rendering::still() {
     if (has_scalars())
         page.legend(options_.map, range_, Page::plain(title), {layout.page.width - kLegendWidth + 14, 24},
                     std::min(420.0, layout.page.height - 60.0));
+    session_.begin_writing(options_.output);
     if (alone.width)
         write_picture(alone, options_.output, session_);
-    else if (context().is_cancelled())
-        throw Failure{cancelled_error()};
     else
         require(page.write(options_.output, 1));
     const double seconds = now_seconds() - start;
@@ -476,6 +483,7 @@ void Rendering::film() {
         }
         require(writer.add(frame));
     }
+    session_.begin_writing(options_.output);
     require(writer.finish());
     const double seconds = now_seconds() - start;
     Json json = summary(size, frames);
@@ -559,7 +567,8 @@ void add_render(CLI::App& app, Session& session) {
         *command, "--map", {{"sequential", ColorMap::sequential}, {"diverging", ColorMap::diverging}},
         [options](ColorMap map) { options->map = map; },
         "Colours: for amounts, or for signed amounts (unset: sequential)");
-    command->add_option("--caption", options->captions, "One a file (unset: the names, where there are several)");
+    command->add_option("--caption", options->captions, "One a file (unset: the names, where there are several)")
+        ->allow_extra_args(false); // else it would take the files behind it
     command->add_flag("--no-captions", options->no_captions, "Draw no captions");
     command->add_flag("--no-ground", options->no_ground, "Draw no shadow on the ground");
     command->add_option("--poses", options->poses,
