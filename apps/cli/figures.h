@@ -8,6 +8,7 @@
 #include "filigree/render/renderer.h"
 
 #include <memory>
+#include <optional>
 
 namespace filigree::cli {
 
@@ -29,7 +30,7 @@ public:
     struct Look {
         SurfaceOptions surface = {};
         Appearance appearance = {};
-        bool ground = true;
+        std::optional<double> ground_level = {}; ///< unset: the mesh stands on it
     };
     /// A picture on white, `width` x `height` page units large. z is up.
     Picture picture(const Mesh& mesh, const Look& look, const Camera& camera, double width, double height);

@@ -44,7 +44,8 @@ Picture FigureRenderer::picture(const Mesh& mesh, const Look& look, const Camera
     scene.objects.back().appearance.edge_width *= static_cast<float>(scale_);
     scene.background.transparent = true; // the page is white
     scene.up = UpAxis::z;
-    scene.ground = look.ground;
+    scene.fixed_ground = look.ground_level.has_value();
+    scene.ground_level = look.ground_level.value_or(0);
     PictureOptions options;
     options.width = static_cast<unsigned>(std::lround(scale_ * width));
     options.height = static_cast<unsigned>(std::lround(scale_ * height));
@@ -119,9 +120,10 @@ Figure draw_wavy_cube(FigureRenderer& renderer) {
     const Mesh cube = make_wavy_cube(shape);
     Page page = captioned_page(
         content_height(1, kPanelHeight) - kSubcaptionRoom, "Figure 2.1",
-        fmt::format("The object of the figures that follow: a cube of {} quads whose sides carry the waves of eq. 2.1, "
-                    "{:.0f} along each side. The quads along its edges are flat, so that the sides meet without a gap.",
-                    with_commas(cube.face_count()), shape.frequency));
+        fmt::format(
+            "The object of the figures that follow: a cube of {} quads whose sides carry the waves of eq.\u00a02.1, "
+            "{:.0f} along each side. The quads along its edges are flat, so that the sides meet without a gap.",
+            with_commas(cube.face_count()), shape.frequency));
     const Panel panel{{100, kFigureMargin}, kFigureWidth - 200, kPanelHeight};
     const Mesh* meshes[] = {&cube};
     draw_mesh(page, panel, renderer, cube, {}, common_camera(meshes, kFromCorner, panel));
@@ -170,7 +172,7 @@ Figure draw_deformation_process(FigureRenderer& renderer) {
         content_height(2, kPanelHeight), "Figure 2.10",
         fmt::format(
             "The cube through the whole process: five levels of detail are removed, the {} vertices that are "
-            "left are stretched to {:.1f} times the length, and the detail is returned by the inverse law (eq. "
+            "left are stretched to {:.1f} times the length, and the detail is returned by the inverse law (eq.\u00a0"
             "2.14). The waves of the four stretched sides come back with {:.0f}\u00a0% of their mean height, those "
             "of the two ends with {:.0f}\u00a0%.",
             with_commas(low.vertex_count()), kStretch, 100 * after / before, 100 * ends / before));
@@ -205,7 +207,7 @@ Figure draw_extreme_deformation(FigureRenderer& renderer) {
     for (Vec3f& p : pose.positions) { // by hand: one corner up and out, its opposite down, the others pulled apart
         const bool right = p.x() > 0, back = p.y() > 0;
         p = right ? (back ? Vec3f(0.80f, 0.55f, 0.45f) : Vec3f(0.45f, -0.75f, -0.20f))
-                  : (back ? Vec3f(-0.40f, 0.70f, -0.05f) : Vec3f(-0.85f, -0.40f, 0.15f));
+                  : (back ? Vec3f(-0.50f, 0.90f, -0.05f) : Vec3f(-0.70f, -0.35f, 0.25f));
     }
     Mesh moved = corners;
     moved.positions = pose.positions;
@@ -219,7 +221,8 @@ Figure draw_extreme_deformation(FigureRenderer& renderer) {
                     with_commas(face.vertex_count()), corners.vertex_count()));
     const std::vector<Panel> panels = panels_in_rows(2, 2, kPanelHeight);
     const Mesh* all[] = {&face, &returned, &moved};
-    const Camera camera = common_camera(all, Vec3d(0.15, -0.70, 0.95), panels[0]);
+    const double floor = std::min(world_bounds(returned).min.z(), world_bounds(moved).min.z()) - 0.05;
+    const Camera camera = common_camera(all, Vec3d(0.25, -0.85, 0.62), panels[0]);
     const std::tuple<const char*, const char*, const Mesh*, Look> parts[] = {
         {"i", "original face", &face, {}},
         {"ii", "all detail removed", &corners, with_edges(1.0f)},
@@ -227,7 +230,7 @@ Figure draw_extreme_deformation(FigureRenderer& renderer) {
         {"iv", "detail returned", &returned, {}}};
     for (std::size_t k = 0; k < 4; ++k) {
         auto [number, text, mesh, look] = parts[k];
-        look.ground = false;
+        look.ground_level = floor;
         draw_mesh(page, panels[k], renderer, *mesh, look, camera);
         subcaption(page, panels[k], number, fmt::format("{}, {} vertices", text, with_commas(mesh->vertex_count())));
     }

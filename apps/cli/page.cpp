@@ -356,8 +356,7 @@ struct Page::Content {
 
     void replay(cairo_t* drawing) const {
         cairo_set_source_rgb(drawing, 1, 1, 1);
-        cairo_rectangle(drawing, 0, 0, width, height);
-        cairo_fill(drawing);
+        cairo_paint(drawing); // all of it: the last row of pixels may reach beyond the page
         for (const auto& command : commands) command(drawing);
     }
 
