@@ -1,0 +1,56 @@
+// Which points of a lattice are inside a closed mesh: row by row, exactly.
+//
+// p is inside when p + (e, e^2, e^3), e -> 0+, has odd crossing parity. The point is perturbed and not the mesh, along a
+// direction that lies in no plane and on no line of the mesh. So there are no special cases, and the answer does not
+// depend on the order of triangles, on threads or on the processor. A box of n^3 cells on the lattice gets n^3 points;
+// bodies that share a face share no point and miss none.
+#pragma once
+
+#include "filigree/core/run_context.h"
+#include "filigree/sample/exact_sign.h"
+#include "filigree/sample/lattice.h"
+
+#include <functional>
+
+namespace filigree {
+
+/// Where closed parts overlap: parity makes the overlap outside, merged makes it inside (winding number 1 or more).
+enum class Overlap { parity, merged };
+
+struct ScanReport {
+    std::uint64_t crossings = 0; ///< of lattice rows with triangles
+    exact::Tally tally;          ///< decisions that the double filter left open
+    double seconds = 0;
+};
+
+/// Triangles as the scan takes them: welded, so that only position counts.
+struct ScanMesh {
+    std::span<const Vec3f> positions;
+    std::span<const Triangle> triangles;
+};
+
+/// Bits of all lattice points. Does not look whether the mesh is closed: with an open one, rows may be filled to their
+/// end. Memory: a bit a point (and 2 bytes a point for `merged`, in slabs). Uses AVX-512 or AVX2 where the processor has
+/// them; the same bits without. Errors: unsuitable (does not fit into `most_bytes`: says how much it would take),
+/// cancelled.
+Result<Occupancy> scan_inside(const ScanMesh& mesh, const Lattice& lattice, Overlap overlap, const RunContext& context,
+                              ScanReport* report = nullptr, std::size_t most_bytes = std::size_t{4} << 30);
+
+/// The same slab by slab, for lattices larger than memory: `slab(first_k, occupancy)` gets layers first_k ..
+/// first_k + occupancy.counts[2] - 1, ascending.
+Status scan_inside_slabs(const ScanMesh& mesh, const Lattice& lattice, Overlap overlap, std::size_t layers,
+                         const std::function<void(std::size_t first_k, const Occupancy&)>& slab,
+                         const RunContext& context, ScanReport* report = nullptr);
+
+/// Net signed crossings before each point (winding numbers for closed, oriented meshes), for the layers first_k ..
+/// first_k + layers - 1: one int16 a point, rows along x without padding.
+Result<std::vector<std::int16_t>> scan_winding(const ScanMesh& mesh, const Lattice& lattice, std::size_t first_k,
+                                               std::size_t layers, const RunContext& context,
+                                               ScanReport* report = nullptr);
+
+/// Vector widths this processor has an implementation for (1, 4 or 8 doubles), ascending, so that tests can hold them
+/// against each other; scan_inside takes the last.
+std::span<const int> scan_lane_counts();
+Result<Occupancy> scan_inside(const ScanMesh& mesh, const Lattice& lattice, const RunContext& context, int lanes);
+
+} // namespace filigree
