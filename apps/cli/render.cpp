@@ -414,11 +414,12 @@ void Rendering::film() {
         if (by_pose) set_pose(*subject, options_.poses[m], false);
         const Box box = world_bounds(subject->mesh);
         if (!centre) centre = box.centre();
-        for (std::size_t v = 0; v < subject->mesh.vertex_count(); v += 1 + subject->mesh.vertex_count() / 20'000)
+        const std::size_t stride = 1 + subject->mesh.vertex_count() / 20'000; // a film may be long
+        for (std::size_t v = 0; v < subject->mesh.vertex_count(); v += stride)
             seen_points.push_back((subject->mesh.world_position(v) - *centre).cast<float>());
         all.extend(box.min);
         all.extend(box.max);
-        values.insert(values.end(), subject->scalars.begin(), subject->scalars.end());
+        for (std::size_t v = 0; v < subject->scalars.size(); v += stride) values.push_back(subject->scalars[v]);
     }
     range_ = range_of(values);
     CameraPoints points{seen_points, *centre};
