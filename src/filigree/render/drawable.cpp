@@ -36,9 +36,10 @@ std::array<std::uint8_t, 4> to_bytes(const Vec4f& color) {
     return bytes;
 }
 
-/// A scalar as the place in its range, -1 for none.
+/// A scalar as the place in its range, far below for none: so far that a triangle with such a corner has no value
+/// anywhere, as there is none to interpolate.
 float to_unit(float value, const ValueRange& range) {
-    if (!std::isfinite(value)) return -1;
+    if (!std::isfinite(value)) return -1e6f;
     const float width = range.most - range.least;
     return width > 0 ? std::clamp((value - range.least) / width, 0.0f, 1.0f) : 0.5f;
 }
@@ -104,12 +105,12 @@ float typical_distance(std::span<const Vec3f> positions, const RunContext& conte
     parallel_for(context, probes, 8, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             const std::size_t self = i * positions.size() / probes;
-            float best = std::numeric_limits<float>::infinity();
+            double best = std::numeric_limits<double>::infinity(); // float holds no squares of the very small and large
             for (std::size_t j = 0; j < positions.size(); ++j) {
-                const float d = (positions[j] - positions[self]).squaredNorm();
+                const double d = (positions[j] - positions[self]).cast<double>().squaredNorm();
                 if (j != self && d > 0) best = std::min(best, d);
             }
-            nearest[i] = std::sqrt(best);
+            nearest[i] = static_cast<float>(std::sqrt(best));
         }
     });
     std::nth_element(nearest.begin(), nearest.begin() + probes / 2, nearest.end());
