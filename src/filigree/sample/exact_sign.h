@@ -14,9 +14,9 @@ struct Tally {
     std::uint64_t expansions = 0; ///< decided by floating-point expansions [Shewchuk 1997]
 };
 
-/// Sign (-1, 0, 1) of (b - a) x (c - a): 1 when a, b, c turn counter-clockwise. Exact for all finite doubles whose
-/// nonzero coordinates are not below 2^-300 in size. Filter first, then 128-bit integers where all coordinates are small
-/// multiples of one power of two, then expansions.
+/// Sign (-1, 0, 1) of (b - a) x (c - a): 1 when a, b, c turn counter-clockwise. Exact when all coordinates are zero or
+/// from 2^-300 to 2^300 in size, as all floats are; beyond, products may leave the range of doubles. Filter first, then
+/// 128-bit integers where all coordinates are small multiples of one power of two, then expansions.
 int orient2d(const std::array<double, 2>& a, const std::array<double, 2>& b, const std::array<double, 2>& c,
              Tally* tally = nullptr);
 
