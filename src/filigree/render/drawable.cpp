@@ -96,25 +96,30 @@ std::vector<T> in_draw_order(const DrawArrays& draw, std::span<const Index> draw
 
 Error nothing_to_draw() { return {ErrorCode::unsuitable, "There is no face to draw; draw the vertices as points."}; }
 
-/// The median distance from a point to its nearest neighbour, over some of the points.
+/// The median distance from a point to its sixth neighbour, over some of the points: the spacing of a lattice, and on
+/// a scanned surface about the way to the furthest of those around.
 float typical_distance(std::span<const Vec3f> positions, const RunContext& context) {
-    constexpr std::size_t kProbes = 200;
+    constexpr std::size_t kProbes = 200, kNeighbours = 6;
     const std::size_t probes = std::min(positions.size(), kProbes);
     if (positions.size() < 2) return 0;
     std::vector<float> nearest(probes);
     parallel_for(context, probes, 8, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             const std::size_t self = i * positions.size() / probes;
-            double best = std::numeric_limits<double>::infinity(); // float holds no squares of the very small and large
+            std::array<double, kNeighbours> best; // ascending; float holds no squares of the very small and large
+            best.fill(std::numeric_limits<double>::infinity());
             for (std::size_t j = 0; j < positions.size(); ++j) {
-                const double d = (positions[j] - positions[self]).cast<double>().squaredNorm();
-                if (j != self && d > 0) best = std::min(best, d);
+                double d = (positions[j] - positions[self]).cast<double>().squaredNorm();
+                if (j == self || !(d > 0) || d >= best.back()) continue;
+                for (double& known : best)
+                    if (d < known) std::swap(d, known);
             }
-            nearest[i] = static_cast<float>(std::sqrt(best));
+            const auto none = std::find(best.begin(), best.end(), std::numeric_limits<double>::infinity());
+            nearest[i] = none == best.begin() ? 0 : static_cast<float>(std::sqrt(*(none - 1)));
         }
     });
     std::nth_element(nearest.begin(), nearest.begin() + probes / 2, nearest.end());
-    return std::isfinite(nearest[probes / 2]) ? nearest[probes / 2] : 0;
+    return nearest[probes / 2];
 }
 
 Box world_box(std::span<const Vec3f> positions, const Vec3d& origin) {
@@ -226,7 +231,7 @@ Result<Drawable> Drawable::points(std::span<const Vec3f> positions, const Vec3d&
     content->origin = origin;
     content->point_count = positions.size();
     content->box = world_box(positions, origin);
-    content->radius = options.radius > 0 ? options.radius : 0.4f * typical_distance(positions, context);
+    content->radius = options.radius > 0 ? options.radius : 0.48f * typical_distance(positions, context);
     if (!(content->radius > 0))
         content->radius = static_cast<float>(content->box.diagonal() > 0 ? 0.01 * content->box.diagonal() : 1.0);
     content->box.min.array() -= content->radius;

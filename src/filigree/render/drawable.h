@@ -37,7 +37,7 @@ struct SurfaceOptions {
 };
 
 struct PointOptions {
-    float radius = 0; ///< model units; 0: 0.4 of the typical distance to the next point
+    float radius = 0; ///< model units; 0: 0.48 of the typical distance to the sixth neighbour
     ScalarColors scalars = {};
     std::span<const Vec4f> colors = {}; ///< empty or RGBA a point
 };
