@@ -50,6 +50,10 @@ void check_picture_path(const std::string& path) {
     const std::string ending = std::filesystem::path(path).extension().string();
     if (ending != ".png" && ending != ".svg" && ending != ".pdf")
         throw Failure{{ErrorCode::unsupported, path + ": is no picture's name; let it end in .png, .svg or .pdf."}};
+    std::error_code ignored;
+    const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+    if (!folder.empty() && !std::filesystem::is_directory(folder, ignored))
+        throw Failure{{ErrorCode::unwritable, path + ": cannot be written: there is no such folder."}};
 }
 
 void write_picture(const Picture& picture, const std::string& path, Session& session) {

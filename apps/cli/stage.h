@@ -33,7 +33,7 @@ LoadedMaterials load_materials(const Mesh& mesh, const std::string& path, Sessio
 /// "#d04030", sRGB; otherwise a Failure that names the option.
 Vec3f parse_color(const std::string& text, const std::string& option);
 
-/// Refuses, before any work, a name that ends in none of .png, .svg and .pdf.
+/// Refuses, before any work, a name that ends in none of .png, .svg and .pdf, or lies in no folder.
 void check_picture_path(const std::string& path);
 
 /// Writes a picture as PNG. Progress, cancelling and messages are the session's.
