@@ -147,10 +147,30 @@ TEST_F(Rendered, GoldenEdges) {
 
 TEST_F(Rendered, GoldenPoints) {
     const Mesh mesh = sphere(6);
-    const Drawable balls = points(mesh);
+    const Drawable balls = points(mesh, {.radius = 0.06f});
     EXPECT_EQ(balls.point_count(), mesh.vertex_count());
     EXPECT_EQ(balls.triangle_count(), 0u);
     expect_golden(draw(scene_of(balls, {.color = {0.3f, 0.5f, 0.8f}}), camera_on(mesh)), "points");
+}
+
+TEST_F(Rendered, PointsAreAsLargeAsTheirSpacingAsks) {
+    std::vector<Vec3f> lattice;
+    for (int x = 0; x < 12; ++x)
+        for (int y = 0; y < 12; ++y)
+            for (int z = 0; z < 12; ++z) lattice.emplace_back(float(2 * x), float(2 * y), float(2 * z));
+    const auto radius = [](std::span<const Vec3f> positions) {
+        return -drawable_of(Drawable::points(positions, Vec3d::Zero(), {}, kOneThread)).box().min.x();
+    };
+    EXPECT_GT(radius(lattice), 0.3 * 2);
+    EXPECT_LT(radius(lattice), 0.51 * 2); // balls hardly touch
+    std::vector<Vec3f> twice(lattice);
+    twice.insert(twice.end(), lattice.begin(), lattice.end());
+    EXPECT_NEAR(radius(twice), radius(lattice), 1e-6);
+    const std::vector<Vec3f> one = {{0, 0, 0}}, same(5, one[0]), two = {{0, 0, 0}, {1, 0, 0}};
+    for (const std::vector<Vec3f>& few : {one, same, two}) {
+        EXPECT_GT(radius(few), 0);
+        EXPECT_LE(radius(few), 1);
+    }
 }
 
 TEST_F(Rendered, GoldenClip) {
