@@ -2,6 +2,7 @@
 #pragma once
 
 #include "filigree/core/run_context.h"
+#include "filigree/mesh/mesh.h"
 #include "filigree/sample/exact_sign.h"
 
 #include <memory>
@@ -9,9 +10,9 @@
 namespace filigree {
 
 /// Counts how often the segment from an eye to a point crosses the mesh. For each triangle the plane and side tests of
-/// the report's eq. 2.2 to 2.6 are made as exact signs; the point counts as moved by (e, e^2, e^3), so a hit on an edge or
-/// a vertex counts once where the ray pierces and an even number of times where it grazes, without a list of cases. The
-/// same answer as scan_inside for every eye. A wide tree over the triangles; queries from many threads are safe.
+/// the report's eq. 2.2 to 2.6 are made as exact signs; the point counts as moved by (e, e^2, e^3), so a hit on an edge
+/// or a vertex counts once where the ray pierces and an even number of times where it grazes, without a list of cases.
+/// The same answer as scan_inside for every eye. A wide tree over the triangles; queries from many threads are safe.
 class RayParity {
 public:
     /// eye: not on the surface; unset: far outside the box, in no special place. An eye inside is noticed, and all

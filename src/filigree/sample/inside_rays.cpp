@@ -1,0 +1,545 @@
+// Based on: the report, 2.2 (plane and side tests, parity), with exact signs instead of its list of cases; binned
+// surface area heuristic and eight-wide nodes after [Wald 2014].
+//
+// A node tests eight boxes at once in floats. Boxes are kept in units of half the mesh's size, around its centre, and
+// are widened by more than the test can err, so it never loses a triangle. A leaf tests four triangles at once in
+// doubles with a bound on the error; what the bound leaves open is decided exactly.
+#include "filigree/sample/inside_rays.h"
+
+#include "filigree/core/parallel_for.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <mutex>
+
+namespace filigree {
+
+namespace {
+
+#define FILIGREE_INLINE inline __attribute__((always_inline))
+
+typedef float Float8 __attribute__((vector_size(32)));
+typedef std::int32_t Int8 __attribute__((vector_size(32)));
+typedef float Float4 __attribute__((vector_size(16)));
+typedef double Double4 __attribute__((vector_size(32)));
+typedef std::int64_t Long4 __attribute__((vector_size(32)));
+
+// In units of 2^-24: rounding of the point (1), of the box (2), of their difference (2), and of the inverse direction
+// and the product (4 relative to at most 2 half sizes) move a plane by less than 13.
+constexpr float kWiden = 0x1p-20f;
+constexpr double kLongest = 4;         // of a ray, in half sizes: leaves the box from anywhere inside
+constexpr double kLeastStep = 0x1p-40; // of a direction's component: moves a ray's end by less than rounding does
+
+// Each side test is the sum of six products of three differences with a relative error below 8 * 2^-53.
+constexpr double kSideError = 6e-15;
+constexpr double kUnderflow = 0x1p-1060; // see exact_sign.cpp
+
+constexpr std::uint32_t kLeaf = std::uint32_t{1} << 31;
+constexpr std::size_t kLeafSize = 4, kWidth = 8, kBins = 16;
+constexpr int kDeepest = 30;            // of nodes split by cost; below, by count
+constexpr std::size_t kWaiting = 32;    // leaves found before they are tested
+constexpr std::size_t kStackSize = 512; // 7 a level, kDeepest + 32 levels
+
+struct alignas(64) Node {
+    float lo[3][kWidth], hi[3][kWidth];
+    std::uint32_t child[kWidth]; ///< of nodes; with kLeaf, of leaves
+};
+
+struct alignas(64) Leaf {
+    float corner[3][3][kLeafSize]; ///< [corner][axis][triangle]
+    float eye_side[kLeafSize];     ///< orient3d(a, b, c, eye); 0 also where there is no triangle
+    std::uint32_t count;
+
+    Vec3d vertex(int k, int triangle) const {
+        return {corner[k][0][triangle], corner[k][1][triangle], corner[k][2][triangle]};
+    }
+};
+
+struct FlatBox {
+    std::array<float, 3> lo = {INFINITY, INFINITY, INFINITY}, hi = {-INFINITY, -INFINITY, -INFINITY};
+
+    void extend(const FlatBox& other) {
+        for (std::size_t i = 0; i < 3; ++i) {
+            lo[i] = std::min(lo[i], other.lo[i]);
+            hi[i] = std::max(hi[i], other.hi[i]);
+        }
+    }
+    float half_area() const {
+        const float x = hi[0] - lo[0], y = hi[1] - lo[1], z = hi[2] - lo[2];
+        return x * y + y * z + z * x;
+    }
+};
+
+struct Reference {
+    FlatBox box;
+    Index triangle;
+    float middle(std::size_t axis) const { return box.lo[axis] + box.hi[axis]; }
+};
+
+struct Tree {
+    std::vector<Node> nodes; ///< the first is the root
+    std::vector<Leaf> leaves;
+    Vec3d eye;
+    bool eye_inside = false;
+    Vec3d lowest, highest, centre;
+    double inverse_half_size = 1;
+    void (*count_crossings)(const Tree&, const Vec3d&, RayParity::Count&) = nullptr;
+};
+
+/// What the tree over the boxes is made with.
+class Builder {
+public:
+    Builder(std::vector<Reference> references, std::span<const Vec3f> positions, std::span<const Triangle> triangles,
+            std::span<const std::int8_t> eye_side, const RunContext& context)
+        : references_(std::move(references)), positions_(positions), triangles_(triangles), eye_side_(eye_side),
+          context_(context) {}
+
+    /// False when cancelled.
+    bool build(std::vector<Node>& nodes, std::vector<Leaf>& leaves) {
+        nodes_ = &nodes;
+        leaves_ = &leaves;
+        add_node({0, references_.size(), box_of(0, references_.size())}, 0);
+        return !context_.is_cancelled();
+    }
+
+private:
+    struct Range {
+        std::size_t begin, end;
+        FlatBox box;
+        std::size_t size() const { return end - begin; }
+    };
+
+    std::vector<Reference> references_;
+    std::span<const Vec3f> positions_;
+    std::span<const Triangle> triangles_;
+    std::span<const std::int8_t> eye_side_;
+    const RunContext& context_;
+    std::vector<Node>* nodes_ = nullptr;
+    std::vector<Leaf>* leaves_ = nullptr;
+
+    FlatBox box_of(std::size_t begin, std::size_t end) const {
+        FlatBox box;
+        for (std::size_t r = begin; r < end; ++r) box.extend(references_[r].box);
+        return box;
+    }
+
+    std::uint32_t add_node(const Range& whole, int depth) {
+        std::array<Range, kWidth> children;
+        children[0] = whole;
+        std::size_t count = 1;
+        while (count < kWidth) { // the largest that is not a leaf is divided
+            std::size_t largest = kWidth;
+            for (std::size_t c = 0; c < count; ++c)
+                if (children[c].size() > kLeafSize &&
+                    (largest == kWidth || children[c].box.half_area() > children[largest].box.half_area()))
+                    largest = c;
+            if (largest == kWidth) break;
+            const Range range = children[largest];
+            const std::size_t middle = divide(range, depth);
+            children[largest] = {range.begin, middle, box_of(range.begin, middle)};
+            children[count++] = {middle, range.end, box_of(middle, range.end)};
+        }
+
+        const auto id = static_cast<std::uint32_t>(nodes_->size());
+        nodes_->emplace_back();
+        for (std::size_t c = 0; c < kWidth; ++c) {
+            const FlatBox box = c < count ? children[c].box : FlatBox(); // an empty box is never entered
+            for (std::size_t axis = 0; axis < 3; ++axis) {
+                (*nodes_)[id].lo[axis][c] = box.lo[axis];
+                (*nodes_)[id].hi[axis][c] = box.hi[axis];
+            }
+            (*nodes_)[id].child[c] = kLeaf;
+        }
+        if (context_.is_cancelled()) return id;
+        for (std::size_t c = 0; c < count; ++c) {
+            const std::uint32_t child =
+                children[c].size() <= kLeafSize ? kLeaf | add_leaf(children[c]) : add_node(children[c], depth + 1);
+            (*nodes_)[id].child[c] = child;
+        }
+        return id;
+    }
+
+    std::uint32_t add_leaf(const Range& range) {
+        Leaf leaf = {};
+        leaf.count = static_cast<std::uint32_t>(range.size());
+        for (std::size_t lane = 0; lane < range.size(); ++lane) {
+            const Index t = references_[range.begin + lane].triangle;
+            for (std::size_t k = 0; k < 3; ++k)
+                for (std::size_t axis = 0; axis < 3; ++axis)
+                    leaf.corner[k][axis][lane] = positions_[triangles_[t][k]][static_cast<Eigen::Index>(axis)];
+            leaf.eye_side[lane] = static_cast<float>(eye_side_[t]);
+        }
+        leaves_->push_back(leaf);
+        return static_cast<std::uint32_t>(leaves_->size() - 1);
+    }
+
+    /// Puts the range into two parts where box areas times leaves add up to least; returns where the second begins.
+    std::size_t divide(const Range& range, int depth) {
+        const auto first = references_.begin() + static_cast<std::ptrdiff_t>(range.begin);
+        const auto last = references_.begin() + static_cast<std::ptrdiff_t>(range.end);
+        FlatBox middles;
+        for (auto r = first; r != last; ++r)
+            for (std::size_t axis = 0; axis < 3; ++axis) {
+                middles.lo[axis] = std::min(middles.lo[axis], r->middle(axis));
+                middles.hi[axis] = std::max(middles.hi[axis], r->middle(axis));
+            }
+        struct Bin {
+            FlatBox box;
+            std::size_t count = 0;
+        };
+        std::array<std::array<Bin, kBins>, 3> bins;
+        std::array<float, 3> scale;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            const float extent = middles.hi[axis] - middles.lo[axis];
+            scale[axis] = extent > 0 ? float(kBins) * 0.9999f / extent : 0;
+            if (!(scale[axis] < 1e30f)) scale[axis] = 0;
+        }
+        const auto bin_of = [&](const Reference& r, std::size_t axis) {
+            return static_cast<std::size_t>((r.middle(axis) - middles.lo[axis]) * scale[axis]);
+        };
+        for (auto r = first; r != last; ++r)
+            for (std::size_t axis = 0; axis < 3; ++axis) {
+                Bin& bin = bins[axis][bin_of(*r, axis)];
+                bin.box.extend(r->box);
+                ++bin.count;
+            }
+
+        float least = INFINITY;
+        std::size_t best_axis = 0, best_bin = 0;
+        const auto cost = [](const Bin& part) {
+            return part.box.half_area() * static_cast<float>((part.count + kLeafSize - 1) / kLeafSize);
+        };
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            std::array<float, kBins> upper_cost = {};
+            Bin part;
+            for (std::size_t b = kBins - 1; b > 0; --b) {
+                part.box.extend(bins[axis][b].box);
+                part.count += bins[axis][b].count;
+                upper_cost[b] = part.count ? cost(part) : INFINITY;
+            }
+            part = {};
+            for (std::size_t b = 1; b < kBins; ++b) {
+                part.box.extend(bins[axis][b - 1].box);
+                part.count += bins[axis][b - 1].count;
+                if (part.count && cost(part) + upper_cost[b] < least) {
+                    least = cost(part) + upper_cost[b];
+                    best_axis = axis;
+                    best_bin = b;
+                }
+            }
+        }
+        if (depth >= kDeepest || !(least < INFINITY)) return range.begin + range.size() / 2;
+        const auto middle =
+            std::partition(first, last, [&](const Reference& r) { return bin_of(r, best_axis) < best_bin; });
+        return static_cast<std::size_t>(middle - references_.begin());
+    }
+};
+
+/// The segment from the point towards the eye as the boxes are tested with it: near and far are rows of Node::lo, hi.
+struct Ray {
+    float origin[3], inverse[3];
+    int near[3], far[3];
+};
+
+Ray make_ray(const Tree& tree, const Vec3d& point) {
+    const Vec3d from = (point - tree.centre) * tree.inverse_half_size;
+    Vec3d step = (tree.eye - point) * tree.inverse_half_size;
+    const double length = step.cwiseAbs().maxCoeff();
+    if (length > kLongest) step *= kLongest / length;
+    Ray ray;
+    for (int i = 0; i < 3; ++i) {
+        const double component = std::abs(step[i]) < kLeastStep ? std::copysign(kLeastStep, step[i]) : step[i];
+        ray.origin[i] = static_cast<float>(from[i]);
+        ray.inverse[i] = static_cast<float>(1 / component);
+        ray.near[i] = component > 0 ? i : 3 + i;
+        ray.far[i] = component > 0 ? 3 + i : i;
+    }
+    return ray;
+}
+
+FILIGREE_INLINE Float8 load8(const float* p) { return *reinterpret_cast<const Float8*>(p); }
+FILIGREE_INLINE Double4 load4(const float* p) {
+    return __builtin_convertvector(*reinterpret_cast<const Float4*>(p), Double4);
+}
+FILIGREE_INLINE Double4 absolute(Double4 x) { return x < 0 ? -x : x; }
+FILIGREE_INLINE Double4 larger(Double4 x, Double4 y) { return x > y ? x : y; }
+
+template <class T>
+FILIGREE_INLINE void prefetch(const T& object) {
+    for (std::size_t byte = 0; byte < sizeof(T); byte += 64)
+        __builtin_prefetch(reinterpret_cast<const char*>(&object) + byte);
+}
+
+/// A bit for each lane of a comparison. As an instruction, since the compiler makes twenty out of the same in C++, and
+/// its own function for it cannot be inlined into code for several processors.
+template <bool Avx2>
+FILIGREE_INLINE unsigned lane_bits(Int8 mask) {
+    unsigned bits = 0;
+    if constexpr (Avx2)
+        asm("vmovmskps %1, %0" : "=r"(bits) : "x"(mask));
+    else
+        for (int lane = 0; lane < 8; ++lane) bits |= (mask[lane] & 1u) << lane;
+    return bits;
+}
+template <bool Avx2>
+FILIGREE_INLINE unsigned lane_bits(Long4 mask) {
+    unsigned bits = 0;
+    if constexpr (Avx2)
+        asm("vmovmskpd %1, %0" : "=r"(bits) : "x"(mask));
+    else
+        for (int lane = 0; lane < 4; ++lane) bits |= static_cast<unsigned>(mask[lane] & 1) << lane;
+    return bits;
+}
+
+/// A bit for each child whose box the ray meets.
+template <bool Avx2>
+FILIGREE_INLINE unsigned children_met(const Node& node, const Ray& ray) {
+    const float(*rows)[kWidth] = node.lo; // hi follows
+    Float8 enter = {}, leave = Float8{} + 1;
+    for (int i = 0; i < 3; ++i) {
+        const Float8 to_near = (load8(rows[ray.near[i]]) - ray.origin[i]) * ray.inverse[i];
+        const Float8 to_far = (load8(rows[ray.far[i]]) - ray.origin[i]) * ray.inverse[i];
+        enter = to_near > enter ? to_near : enter;
+        leave = to_far < leave ? to_far : leave;
+    }
+    return lane_bits<Avx2>(enter <= leave);
+}
+
+bool crosses_exactly(const Leaf& leaf, int triangle, const Vec3d& eye, const Vec3d& point, exact::Tally& tally) {
+    const Vec3d a = leaf.vertex(0, triangle), b = leaf.vertex(1, triangle), c = leaf.vertex(2, triangle);
+    const int side = exact::orient3d_perturbed(eye, a, b, point, &tally);
+    return exact::orient3d_perturbed(eye, b, c, point, &tally) == side &&
+           exact::orient3d_perturbed(eye, c, a, point, &tally) == side &&
+           exact::orient3d_perturbed(a, b, c, point, &tally) != static_cast<int>(leaf.eye_side[triangle]);
+}
+
+template <bool Avx2>
+FILIGREE_INLINE void count_leaf(const Leaf& leaf, const Vec3d& eye, const Vec3d& point, const Vec3d& to_eye,
+                                double longest_step, RayParity::Count& count) {
+    Double4 a[3], b[3], c[3], size = {};
+    for (int i = 0; i < 3; ++i) {
+        a[i] = load4(leaf.corner[0][i]) - point[i];
+        b[i] = load4(leaf.corner[1][i]) - point[i];
+        c[i] = load4(leaf.corner[2][i]) - point[i];
+        size = larger(size, larger(absolute(a[i]), larger(absolute(b[i]), absolute(c[i]))));
+    }
+    const Double4 bound = kSideError * longest_step * size * size + kUnderflow;
+    // Sides of the planes through the ray's ends and each edge: to_eye . (a x b), (b x c), (c x a).
+    const Double4 eye_a[3] = {to_eye[1] * a[2] - to_eye[2] * a[1], to_eye[2] * a[0] - to_eye[0] * a[2],
+                              to_eye[0] * a[1] - to_eye[1] * a[0]};
+    const Double4 eye_b[3] = {to_eye[1] * b[2] - to_eye[2] * b[1], to_eye[2] * b[0] - to_eye[0] * b[2],
+                              to_eye[0] * b[1] - to_eye[1] * b[0]};
+    const Double4 ab = eye_a[0] * b[0] + eye_a[1] * b[1] + eye_a[2] * b[2];
+    const Double4 bc = eye_b[0] * c[0] + eye_b[1] * c[1] + eye_b[2] * c[2];
+    const Double4 ca = -(eye_a[0] * c[0] + eye_a[1] * c[1] + eye_a[2] * c[2]);
+
+    const Double4 eye_side = load4(leaf.eye_side);
+    const Long4 some_left = (ab > bound) | (bc > bound) | (ca > bound);
+    const Long4 some_right = (ab < -bound) | (bc < -bound) | (ca < -bound);
+    const Long4 possible = ~(some_left & some_right) & (eye_side != 0);
+    if (lane_bits<Avx2>(possible) == 0) return;
+
+    const Long4 all_left = (ab > bound) & (bc > bound) & (ca > bound);
+    const Long4 all_right = (ab < -bound) & (bc < -bound) & (ca < -bound);
+    const Double4 across = eye_side * (a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
+                                       a[2] * (b[0] * c[1] - b[1] * c[0]));
+    const Double4 across_bound = kSideError * size * size * size + kUnderflow;
+    const Long4 beyond = across > across_bound, before = across < -across_bound;
+    const Long4 crossed = possible & (all_left | all_right) & beyond;
+    const Long4 open = possible & ~((all_left | all_right) & beyond) & ~before;
+    count.crossings += static_cast<std::uint64_t>(std::popcount(lane_bits<Avx2>(crossed)));
+    for (unsigned lanes = lane_bits<Avx2>(open); lanes != 0; lanes &= lanes - 1)
+        if (crosses_exactly(leaf, std::countr_zero(lanes), eye, point, count.tally)) ++count.crossings;
+}
+
+template <bool Avx2>
+FILIGREE_INLINE void count_crossings(const Tree& tree, const Vec3d& point, RayParity::Count& count) {
+    const Ray ray = make_ray(tree, point);
+    const Vec3d to_eye = tree.eye - point;
+    const double longest_step = to_eye.cwiseAbs().maxCoeff();
+    // Leaves wait until the memory they were asked from has answered: that, not arithmetic, is what a query waits for.
+    std::uint32_t stack[kStackSize], leaves[kWaiting + kWidth];
+    std::size_t top = 0, waiting = 0;
+    stack[top++] = 0;
+    while (top > 0) {
+        const Node& node = tree.nodes[stack[--top]];
+        for (unsigned met = children_met<Avx2>(node, ray); met != 0; met &= met - 1) {
+            const std::uint32_t child = node.child[std::countr_zero(met)];
+            if (child & kLeaf) {
+                prefetch(tree.leaves[child & ~kLeaf]);
+                leaves[waiting++] = child & ~kLeaf;
+            } else {
+                prefetch(tree.nodes[child]);
+                stack[top++] = child;
+            }
+        }
+        if (waiting < kWaiting && top > 0) continue;
+        for (std::size_t i = 0; i < waiting; ++i) {
+            const Leaf& leaf = tree.leaves[leaves[i]];
+            count.triangles_tested += leaf.count;
+            count_leaf<Avx2>(leaf, tree.eye, point, to_eye, longest_step, count);
+        }
+        waiting = 0;
+    }
+}
+
+#if defined(__x86_64__)
+__attribute__((target("avx2"))) void count_crossings_avx2(const Tree& tree, const Vec3d& point,
+                                                          RayParity::Count& count) {
+    count_crossings<true>(tree, point, count);
+}
+#endif
+void count_crossings_plain(const Tree& tree, const Vec3d& point, RayParity::Count& count) {
+    count_crossings<false>(tree, point, count);
+}
+
+auto counting_function() {
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx2")) return count_crossings_avx2;
+#endif
+    return count_crossings_plain;
+}
+
+/// Whether the eye, which is in the triangle's plane, lies in the triangle or on its border.
+bool is_in_triangle(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& eye) {
+    const std::array<int, 3> normal = exact::normal_signs(a, b, c);
+    for (int axis = 0; axis < 3; ++axis) {
+        const int facing = normal[static_cast<std::size_t>(axis)];
+        if (facing == 0) continue;
+        const auto flat = [&](const Vec3d& p) { return std::array{p[(axis + 1) % 3], p[(axis + 2) % 3]}; };
+        const auto is_outside = [&](const Vec3d& from, const Vec3d& to) {
+            return exact::orient2d(flat(from), flat(to), flat(eye)) == -facing;
+        };
+        return !is_outside(a, b) && !is_outside(b, c) && !is_outside(c, a);
+    }
+    return false; // without area; where it belongs to a closed surface, others lie there as well
+}
+
+/// Whether the ray from p + (e, e^2, e^3) along x crosses the triangle.
+bool crosses_along_x(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& p) {
+    const auto side_of_edge = [&](const Vec3d& from, const Vec3d& to) {
+        if (const int side = exact::orient2d({from[1], from[2]}, {to[1], to[2]}, {p[1], p[2]})) return side;
+        if (from[2] != to[2]) return from[2] > to[2] ? 1 : -1;
+        return (to[1] > from[1]) - (to[1] < from[1]);
+    };
+    const int side = side_of_edge(a, b);
+    return side != 0 && side_of_edge(b, c) == side && side_of_edge(c, a) == side &&
+           exact::orient3d_perturbed(a, b, c, p) != side;
+}
+
+} // namespace
+
+struct RayParity::Content : Tree {};
+
+RayParity::RayParity(std::unique_ptr<Content> content) : content_(std::move(content)) {}
+RayParity::RayParity(RayParity&&) noexcept = default;
+RayParity& RayParity::operator=(RayParity&&) noexcept = default;
+RayParity::~RayParity() = default;
+
+Result<RayParity> RayParity::create(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
+                                    const Vec3d* eye, const RunContext& context) {
+    if (triangles.empty()) return Error{ErrorCode::unsuitable, "The mesh has no triangles, so nothing is inside it."};
+    auto content = std::make_unique<Content>();
+    Box box;
+    for (const Triangle& t : triangles)
+        for (const Index v : t) box.extend(positions[v].cast<double>());
+    content->lowest = box.min;
+    content->highest = box.max;
+    content->centre = box.centre();
+    const double half_size = 0.5 * box.size().maxCoeff();
+    content->inverse_half_size = half_size > 0 ? 1 / half_size : 1;
+    content->count_crossings = counting_function();
+
+    // Towards no direction that meshes favour, in coordinates of few digits so that ties can be decided in integers.
+    if (eye)
+        content->eye = *eye;
+    else {
+        const double unit = std::exp2(std::ceil(std::log2(half_size > 0 ? half_size : 1)) - 8);
+        const Vec3d wanted = content->centre + half_size * Vec3d(2.417, 3.731, 1.183);
+        content->eye = (wanted / unit).array().round() * unit;
+    }
+    const Vec3d& e = content->eye;
+    for (const double x : e)
+        if (!(std::abs(x) <= 0x1p300) || (x != 0 && std::abs(x) < 0x1p-300))
+            return Error{ErrorCode::unsuitable,
+                         "The eye's coordinates must be numbers that are 0 or from 2^-300 to 2^300 in size."};
+
+    // On which side of each triangle the eye is, once; whether it is on the surface or inside.
+    const bool is_within_box = (e.array() >= box.min.array()).all() && (e.array() <= box.max.array()).all();
+    std::vector<std::int8_t> eye_side(triangles.size());
+    std::vector<Reference> references(triangles.size());
+    std::atomic<bool> is_on_surface = false;
+    std::atomic<std::uint64_t> crossings = 0;
+    parallel_for(context, triangles.size(), 1 << 14, [&](std::size_t begin, std::size_t end) {
+        std::uint64_t crossed = 0;
+        for (std::size_t t = begin; t < end; ++t) {
+            std::array<Vec3d, 3> p;
+            Reference& reference = references[t];
+            reference.triangle = static_cast<Index>(t);
+            for (std::size_t k = 0; k < 3; ++k) {
+                p[k] = positions[triangles[t][k]].cast<double>();
+                const Vec3f place = ((p[k] - content->centre) * content->inverse_half_size).cast<float>();
+                reference.box.extend({{place[0] - kWiden, place[1] - kWiden, place[2] - kWiden},
+                                      {place[0] + kWiden, place[1] + kWiden, place[2] + kWiden}});
+            }
+            eye_side[t] = static_cast<std::int8_t>(exact::orient3d(p[0], p[1], p[2], e));
+            if (!is_within_box) continue;
+            if (eye_side[t] == 0 && is_in_triangle(p[0], p[1], p[2], e)) is_on_surface = true;
+            crossed += crosses_along_x(p[0], p[1], p[2], e);
+        }
+        crossings += crossed;
+    });
+    if (is_on_surface)
+        return Error{ErrorCode::unsuitable,
+                     "The eye lies on the surface, so it is neither inside nor outside; move it a little."};
+    content->eye_inside = crossings % 2 == 1;
+
+    Builder builder(std::move(references), positions, triangles, eye_side, context);
+    if (!builder.build(content->nodes, content->leaves)) return cancelled_error();
+    return RayParity(std::move(content));
+}
+
+bool RayParity::contains(const Vec3d& point, Count* count) const {
+    // Beyond the box there is nothing; as the point counts as moved up, nothing begins at the highest coordinate
+    // either.
+    const auto p = point.array();
+    if (!((p >= content_->lowest.array()).all() && (p < content_->highest.array()).all())) return false;
+    Count own;
+    content_->count_crossings(*content_, point, own);
+    if (count) {
+        count->crossings += own.crossings;
+        count->triangles_tested += own.triangles_tested;
+        count->tally.integers += own.tally.integers;
+        count->tally.expansions += own.tally.expansions;
+    }
+    return (own.crossings % 2 == 1) != content_->eye_inside;
+}
+
+Result<std::vector<std::uint8_t>> RayParity::contains(std::span<const Vec3d> points, const RunContext& context,
+                                                      Count* count) const {
+    constexpr std::size_t kPiece = 1024, kBetweenReports = std::size_t{1} << 18;
+    std::vector<std::uint8_t> inside(points.size());
+    std::mutex adding;
+    for (std::size_t first = 0; first < points.size(); first += kBetweenReports) {
+        context.report("inside", static_cast<double>(first) / static_cast<double>(points.size()));
+        const std::size_t pieces = std::min(kBetweenReports, points.size() - first);
+        parallel_for(context, pieces, kPiece, [&](std::size_t begin, std::size_t end) {
+            if (context.is_cancelled()) return;
+            Count own;
+            for (std::size_t i = first + begin; i < first + end; ++i) inside[i] = contains(points[i], &own);
+            if (!count) return;
+            const std::lock_guard lock(adding);
+            count->crossings += own.crossings;
+            count->triangles_tested += own.triangles_tested;
+            count->tally.integers += own.tally.integers;
+            count->tally.expansions += own.tally.expansions;
+        });
+        if (context.is_cancelled()) return cancelled_error();
+    }
+    return inside;
+}
+
+const Vec3d& RayParity::eye() const { return content_->eye; }
+
+} // namespace filigree
