@@ -1,7 +1,7 @@
 // Which points of a lattice are inside a closed mesh: row by row, exactly.
 //
-// p is inside when p + (e, e^2, e^3), e -> 0+, has odd crossing parity. The point is perturbed and not the mesh, along a
-// direction that lies in no plane and on no line of the mesh. So there are no special cases, and the answer does not
+// p is inside when p + (e, e^2, e^3), e -> 0+, has odd crossing parity. The point is perturbed and not the mesh, along
+// a direction that lies in no plane and on no line of the mesh. So there are no special cases, and the answer does not
 // depend on the order of triangles, on threads or on the processor. A box of n^3 cells on the lattice gets n^3 points;
 // bodies that share a face share no point and miss none.
 #pragma once
@@ -30,8 +30,8 @@ struct ScanMesh {
 };
 
 /// Bits of all lattice points. Does not look whether the mesh is closed: with an open one, rows may be filled to their
-/// end. Memory: a bit a point (and 2 bytes a point for `merged`, in slabs). Uses AVX-512 or AVX2 where the processor has
-/// them; the same bits without. Errors: unsuitable (does not fit into `most_bytes`: says how much it would take),
+/// end. Memory: a bit a point (and 2 bytes a point for `merged`, in slabs). Uses AVX-512 or AVX2 where the processor
+/// has them; the same bits without. Errors: unsuitable (does not fit into `most_bytes`: says how much it would take),
 /// cancelled.
 Result<Occupancy> scan_inside(const ScanMesh& mesh, const Lattice& lattice, Overlap overlap, const RunContext& context,
                               ScanReport* report = nullptr, std::size_t most_bytes = std::size_t{4} << 30);
@@ -48,7 +48,7 @@ Result<std::vector<std::int16_t>> scan_winding(const ScanMesh& mesh, const Latti
                                                std::size_t layers, const RunContext& context,
                                                ScanReport* report = nullptr);
 
-/// Vector widths this processor has an implementation for (1, 4 or 8 doubles), ascending, so that tests can hold them
+/// Vector widths this processor has an implementation for (2, 4 or 8 doubles), ascending, so that tests can hold them
 /// against each other; scan_inside takes the last.
 std::span<const int> scan_lane_counts();
 Result<Occupancy> scan_inside(const ScanMesh& mesh, const Lattice& lattice, const RunContext& context, int lanes);

@@ -1,0 +1,329 @@
+// Three nested lower bounds and a prefix XOR. Per triangle: the layers k it spans (lower bounds of its vertices in z);
+// in a layer, the rows j between two of its edges (lower bounds along y); in a row, the first point i at or beyond its
+// plane (lower bound along x), where one bit is toggled. Then every row is prefix-XORed, 64 points at a time. Nothing
+// is sorted, and `at or beyond` everywhere is all there is of tie-breaking.
+#include "filigree/sample/inside_scan.h"
+
+#include "filigree/core/parallel_for.h"
+#include "filigree/sample/inside_scan_kernel.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <mutex>
+#include <string>
+
+namespace filigree {
+
+namespace {
+
+using scan_kernel::Axis;
+using scan_kernel::Job;
+using scan_kernel::LargeTriangle;
+using scan_kernel::Piece;
+
+constexpr std::size_t kMaxCount = 65534; // a lower bound, 0 to count, has 16 bits
+constexpr double kLowest = 0x1p-300;     // what exact signs need of coordinates that are not 0
+constexpr double kHighest = 0x1p300;
+constexpr std::size_t kBatch = std::size_t{1} << 20; // triangles from one look at `cancel` and `progress` to the next
+constexpr std::size_t kLargeBatch = std::size_t{1} << 14;
+constexpr std::size_t kMergedBytes = std::size_t{64} << 20; // of signed crossings at a time, where a layer has fewer
+
+std::size_t words_for(std::size_t points) { return (points + 63) / 64; }
+
+std::string gigabytes(double bytes) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.3g GiB", bytes / double(1 << 30));
+    return text;
+}
+
+std::string sizes(const std::array<std::size_t, 3>& counts) {
+    return std::to_string(counts[0]) + " x " + std::to_string(counts[1]) + " x " + std::to_string(counts[2]);
+}
+
+/// An axis of the lattice for the kernel, or what is wrong with it.
+Result<Axis> make_axis(const std::vector<double>& coordinates, double spacing, char name) {
+    const std::string where = std::string("The lattice's coordinates along ") + name;
+    if (coordinates.size() > kMaxCount)
+        return Error{ErrorCode::unsuitable, where + " are " + std::to_string(coordinates.size()) + "; the most are " +
+                                                std::to_string(kMaxCount) + ": take a larger spacing."};
+    for (const double x : coordinates)
+        if (!(std::abs(x) <= kHighest) || (x != 0 && std::abs(x) < kLowest))
+            return Error{ErrorCode::usage, where + " hold a value that is not a number, or too large or small to be "
+                                                   "decided exactly; make the lattice with make_lattice."};
+    Axis axis;
+    axis.count = coordinates.size();
+    axis.values = coordinates;
+    axis.values.resize(axis.count + Axis::kPadding, axis.count > 0 ? coordinates.back() : 0);
+    if (axis.count == 0) return axis;
+    axis.first = coordinates.front();
+    if (axis.count == 1) {
+        axis.computable = true;
+        return axis;
+    }
+    const auto is_computable = [&](double step) {
+        for (std::size_t i = 0; i < axis.count; ++i)
+            if (axis.first + double(i) * step != coordinates[i]) return false;
+        return true;
+    };
+    axis.step = spacing;
+    axis.computable = is_computable(spacing);
+    if (!axis.computable) axis.step = (coordinates.back() - axis.first) / double(axis.count - 1);
+    axis.inverse_step = 1 / axis.step;
+    bool even = axis.step >= kLowest;
+    for (std::size_t i = 0; i < axis.count; ++i)
+        even = even && std::abs(coordinates[i] - (axis.first + double(i) * axis.step)) < 0.125 * axis.step;
+    for (std::size_t i = 1; i < axis.count; ++i) even = even && coordinates[i - 1] < coordinates[i];
+    if (!even)
+        return Error{ErrorCode::usage, where +
+                                           " are not evenly spaced and ascending; make the lattice with make_lattice, "
+                                           "or take a larger spacing where rounding did this."};
+    return axis;
+}
+
+class Scan {
+public:
+    static Result<Scan> create(const ScanMesh& mesh, const Lattice& lattice, const RunContext& context, int lanes) {
+        Scan scan(context, lanes);
+        scan.counts_ = lattice.counts();
+        for (int axis = 0; axis < 3; ++axis) {
+            auto made = make_axis(lattice.coordinates[axis], lattice.spacing, "xyz"[axis]);
+            if (!made) return made.error();
+            scan.job_.axes[axis] = std::move(made).value();
+        }
+        scan.triangle_count_ = mesh.triangles.size();
+        scan.is_empty_ = std::ranges::find(scan.counts_, 0u) != scan.counts_.end();
+        if (scan.is_empty_) return scan;
+        scan.codes_.resize(mesh.positions.size());
+        scan.job_.positions = mesh.positions.data();
+        scan.job_.triangles = mesh.triangles.data();
+        scan.job_.codes = scan.codes_.data(); // moving a vector does not move what it holds
+        scan.job_.shared = context.threads() > 1;
+        parallel_for(context, mesh.positions.size(), std::size_t{1} << 15, [&](std::size_t begin, std::size_t end) {
+            scan.loops_.encode(scan.job_, scan.codes_.data(), begin, end);
+        });
+        return scan;
+    }
+
+    const std::array<std::size_t, 3>& counts() const { return counts_; }
+
+    /// Inside or not for layers first_k .. first_k + layers - 1. `signed_crossings` is room that `merged` may use
+    /// again. Returns false when cancelled.
+    bool fill(Overlap overlap, std::size_t first_k, std::size_t layers, std::uint64_t* bits,
+              std::vector<std::int16_t>& signed_crossings) {
+        if (is_empty_) return true;
+        if (overlap == Overlap::parity) {
+            Job job = job_for(first_k, layers);
+            job.bits = bits;
+            job.row_entries = 64 * words_for(counts_[0]);
+            if (!collect(job)) return false;
+            fill_rows(bits, layers);
+            return true;
+        }
+        const std::size_t at_once = merged_layers(counts_);
+        for (std::size_t k = 0; k < layers; k += at_once) {
+            const std::size_t count = std::min(at_once, layers - k);
+            signed_crossings.assign(counts_[0] * counts_[1] * count, 0);
+            if (!wind(first_k + k, count, signed_crossings.data())) return false;
+            threshold(signed_crossings.data(), count, bits + k * counts_[1] * words_for(counts_[0]));
+        }
+        return true;
+    }
+
+    /// Winding numbers of a slab into `numbers`, which are 0. Returns false when cancelled.
+    bool wind(std::size_t first_k, std::size_t layers, std::int16_t* numbers) {
+        if (is_empty_) return true;
+        Job job = job_for(first_k, layers);
+        job.crossings = numbers;
+        job.row_entries = counts_[0];
+        if (!collect(job)) return false;
+        const std::size_t n = counts_[0];
+        parallel_for(context_, counts_[1] * layers, rows_at_once(), [&](std::size_t begin, std::size_t end) {
+            for (std::size_t row = begin; row < end; ++row) {
+                std::int16_t sum = 0;
+                for (std::int16_t& x : std::span(numbers + row * n, n)) x = sum = std::int16_t(sum + x);
+            }
+        });
+        return true;
+    }
+
+    void report_to(ScanReport* report) const {
+        if (!report) return;
+        report->crossings = total_.crossings;
+        report->tally = total_.tally;
+        report->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+    }
+
+    static std::size_t merged_layers(const std::array<std::size_t, 3>& counts) {
+        return std::max<std::size_t>(1, kMergedBytes / (sizeof(std::int16_t) * counts[0] * counts[1]));
+    }
+
+private:
+    Scan(const RunContext& context, int lanes) : context_(context), loops_(scan_kernel::loops(lanes)) {}
+
+    Job job_for(std::size_t first_k, std::size_t layers) const {
+        Job job = job_;
+        job.first_k = first_k;
+        job.end_k = first_k + layers;
+        return job;
+    }
+
+    std::size_t rows_at_once() const { return std::max<std::size_t>(1, (std::size_t{1} << 18) / counts_[0]); }
+
+    /// All crossings of the job's layers. Pieces may run in any order: toggling and adding commute.
+    bool collect(const Job& job) {
+        // with one thread, large pieces fill vectors better; the result is the same
+        const std::size_t grain = std::size_t{1} << (job.shared ? 13 : 16);
+        std::vector<LargeTriangle> large;
+        std::mutex mutex;
+        const auto add_up = [&](const Piece& piece) {
+            const std::lock_guard lock(mutex);
+            total_.crossings += piece.crossings;
+            total_.tally.integers += piece.tally.integers;
+            total_.tally.expansions += piece.tally.expansions;
+            large.insert(large.end(), piece.large.begin(), piece.large.end());
+        };
+        const auto in_batches = [&](std::size_t count, std::size_t batch, std::size_t piece_size, const auto& body) {
+            for (std::size_t first = 0; first < count; first += batch) {
+                if (context_.is_cancelled()) return false;
+                parallel_for(context_, std::min(batch, count - first), piece_size,
+                             [&](std::size_t begin, std::size_t end) {
+                                 if (context_.is_cancelled()) return;
+                                 Piece piece;
+                                 body(first + begin, first + end, piece);
+                                 add_up(piece);
+                             });
+                const double done = double(std::min(first + batch, count)) / double(count);
+                const double layers = double(job.end_k - job.first_k);
+                context_.report("scan", (double(job.first_k) + done * layers) / double(counts_[2]));
+            }
+            return !context_.is_cancelled();
+        };
+        if (!in_batches(triangle_count_, kBatch, grain, [&](std::size_t begin, std::size_t end, Piece& piece) {
+                loops_.scan_triangles(job, begin, end, piece);
+            }))
+            return false;
+        const std::vector<LargeTriangle> tasks = std::move(large);
+        large.clear();
+        return in_batches(tasks.size(), kLargeBatch, 1, [&](std::size_t begin, std::size_t end, Piece& piece) {
+            loops_.scan_large(job, std::span(tasks).subspan(begin, end - begin), piece);
+        });
+    }
+
+    /// Toggles to inside and outside: each bit becomes the parity of those up to it.
+    void fill_rows(std::uint64_t* bits, std::size_t layers) const {
+        const std::size_t words = words_for(counts_[0]);
+        const std::uint64_t last = ~std::uint64_t{0} >> (64 * words - counts_[0]);
+        parallel_for(context_, counts_[1] * layers, rows_at_once(), [&](std::size_t begin, std::size_t end) {
+            for (std::size_t row = begin; row < end; ++row) {
+                std::uint64_t carry = 0;
+                for (std::uint64_t& word : std::span(bits + row * words, words)) {
+                    std::uint64_t x = word;
+                    for (int shift = 1; shift < 64; shift *= 2) x ^= x << shift;
+                    word = x ^= carry;
+                    carry = -(x >> 63);
+                }
+                bits[row * words + words - 1] &= last;
+            }
+        });
+    }
+
+    void threshold(const std::int16_t* numbers, std::size_t layers, std::uint64_t* bits) const {
+        const std::size_t n = counts_[0], words = words_for(n);
+        parallel_for(context_, counts_[1] * layers, rows_at_once(), [&](std::size_t begin, std::size_t end) {
+            for (std::size_t row = begin; row < end; ++row)
+                for (std::size_t w = 0; w < words; ++w) {
+                    std::uint64_t word = 0;
+                    for (std::size_t i = 64 * w; i < std::min(n, 64 * w + 64); ++i)
+                        word |= std::uint64_t{numbers[row * n + i] >= 1} << (i & 63);
+                    bits[row * words + w] = word;
+                }
+        });
+    }
+
+    const RunContext& context_;
+    scan_kernel::Loops loops_;
+    Job job_; ///< but for the slab and where results go
+    std::array<std::size_t, 3> counts_ = {};
+    std::vector<std::uint32_t> codes_;
+    std::size_t triangle_count_ = 0;
+    bool is_empty_ = false;
+    Piece total_;
+    std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+};
+
+Result<Occupancy> scan_whole(const ScanMesh& mesh, const Lattice& lattice, Overlap overlap, const RunContext& context,
+                             ScanReport* report, std::size_t most_bytes, int lanes) {
+    const std::array<std::size_t, 3> counts = lattice.counts();
+    const double rows = double(counts[1]) * double(counts[2]);
+    double bytes = rows * double(words_for(counts[0])) * sizeof(std::uint64_t) +
+                   double(mesh.positions.size()) * sizeof(std::uint32_t);
+    if (overlap == Overlap::merged && rows > 0)
+        bytes += double(counts[0]) * double(counts[1]) * sizeof(std::int16_t) *
+                 double(std::min(counts[2], Scan::merged_layers({std::max<std::size_t>(counts[0], 1), counts[1], 1})));
+    if (bytes > double(most_bytes))
+        return Error{ErrorCode::unsuitable,
+                     "A lattice of " + sizes(counts) + " points takes " + gigabytes(bytes) + " of memory, and " +
+                         gigabytes(double(most_bytes)) +
+                         " are allowed; take a larger spacing, allow more, or scan it in slabs."};
+    auto scan = Scan::create(mesh, lattice, context, lanes);
+    if (!scan) return scan.error();
+    Occupancy occupancy;
+    occupancy.counts = counts;
+    occupancy.words_per_row = words_for(counts[0]);
+    occupancy.bits.resize(occupancy.words_per_row * counts[1] * counts[2]);
+    std::vector<std::int16_t> signed_crossings;
+    if (!scan->fill(overlap, 0, counts[2], occupancy.bits.data(), signed_crossings)) return cancelled_error();
+    scan->report_to(report);
+    return occupancy;
+}
+
+} // namespace
+
+std::span<const int> scan_lane_counts() { return scan_kernel::lane_counts(); }
+
+Result<Occupancy> scan_inside(const ScanMesh& mesh, const Lattice& lattice, Overlap overlap, const RunContext& context,
+                              ScanReport* report, std::size_t most_bytes) {
+    return scan_whole(mesh, lattice, overlap, context, report, most_bytes, scan_lane_counts().back());
+}
+
+Result<Occupancy> scan_inside(const ScanMesh& mesh, const Lattice& lattice, const RunContext& context, int lanes) {
+    return scan_whole(mesh, lattice, Overlap::parity, context, nullptr, std::size_t{4} << 30, lanes);
+}
+
+Status scan_inside_slabs(const ScanMesh& mesh, const Lattice& lattice, Overlap overlap, std::size_t layers,
+                         const std::function<void(std::size_t first_k, const Occupancy&)>& slab,
+                         const RunContext& context, ScanReport* report) {
+    auto scan = Scan::create(mesh, lattice, context, scan_lane_counts().back());
+    if (!scan) return scan.error();
+    const std::array<std::size_t, 3>& counts = scan->counts();
+    Occupancy occupancy;
+    occupancy.words_per_row = words_for(counts[0]);
+    std::vector<std::int16_t> signed_crossings;
+    layers = std::max<std::size_t>(layers, 1);
+    for (std::size_t k = 0; k < counts[2]; k += layers) {
+        occupancy.counts = {counts[0], counts[1], std::min(layers, counts[2] - k)};
+        occupancy.bits.assign(occupancy.words_per_row * counts[1] * occupancy.counts[2], 0);
+        if (!scan->fill(overlap, k, occupancy.counts[2], occupancy.bits.data(), signed_crossings))
+            return cancelled_error();
+        slab(k, occupancy);
+    }
+    scan->report_to(report);
+    return Success{};
+}
+
+Result<std::vector<std::int16_t>> scan_winding(const ScanMesh& mesh, const Lattice& lattice, std::size_t first_k,
+                                               std::size_t layers, const RunContext& context, ScanReport* report) {
+    auto scan = Scan::create(mesh, lattice, context, scan_lane_counts().back());
+    if (!scan) return scan.error();
+    const std::array<std::size_t, 3>& counts = scan->counts();
+    first_k = std::min(first_k, counts[2]);
+    layers = std::min(layers, counts[2] - first_k);
+    std::vector<std::int16_t> numbers(counts[0] * counts[1] * layers);
+    if (!scan->wind(first_k, layers, numbers.data())) return cancelled_error();
+    scan->report_to(report);
+    return numbers;
+}
+
+} // namespace filigree
