@@ -7,6 +7,7 @@
 #include "filigree/sample/inside_rays.h"
 
 #include "filigree/core/parallel_for.h"
+#include "filigree/sample/wide_tree.h"
 
 #include <algorithm>
 #include <bit>
@@ -35,11 +36,10 @@ constexpr double kLeastStep = 0x1p-40; // of a direction's component: moves a ra
 constexpr double kSideError = 6e-15;
 constexpr double kUnderflow = 0x1p-1060; // see exact_sign.cpp
 
-constexpr std::uint32_t kLeaf = std::uint32_t{1} << 31;
-constexpr std::size_t kLeafSize = 4, kWidth = 8, kBins = 16;
-constexpr int kDeepest = 30;            // of nodes split by cost; below, by count
-constexpr std::size_t kWaiting = 32;    // leaves found before they are tested
-constexpr std::size_t kStackSize = 512; // 7 a level, kDeepest + 32 levels
+constexpr std::uint32_t kLeaf = WideTree::kLeaf;
+constexpr std::size_t kLeafSize = WideTree::kLeafSize, kWidth = WideTree::kWidth;
+constexpr std::size_t kWaiting = 32; // leaves found before they are tested
+constexpr std::size_t kStackSize = (kWidth - 1) * WideTree::kDeepest + kWidth;
 
 struct alignas(64) Node {
     float lo[3][kWidth], hi[3][kWidth];
@@ -56,27 +56,6 @@ struct alignas(64) Leaf {
     }
 };
 
-struct FlatBox {
-    std::array<float, 3> lo = {INFINITY, INFINITY, INFINITY}, hi = {-INFINITY, -INFINITY, -INFINITY};
-
-    void extend(const FlatBox& other) {
-        for (std::size_t i = 0; i < 3; ++i) {
-            lo[i] = std::min(lo[i], other.lo[i]);
-            hi[i] = std::max(hi[i], other.hi[i]);
-        }
-    }
-    float half_area() const {
-        const float x = hi[0] - lo[0], y = hi[1] - lo[1], z = hi[2] - lo[2];
-        return x * y + y * z + z * x;
-    }
-};
-
-struct Reference {
-    FlatBox box;
-    Index triangle;
-    float middle(std::size_t axis) const { return box.lo[axis] + box.hi[axis]; }
-};
-
 struct Tree {
     std::vector<Node> nodes; ///< the first is the root
     std::vector<Leaf> leaves;
@@ -87,154 +66,37 @@ struct Tree {
     void (*count_crossings)(const Tree&, const Vec3d&, RayParity::Count&) = nullptr;
 };
 
-/// What the tree over the boxes is made with.
-class Builder {
-public:
-    Builder(std::vector<Reference> references, std::span<const Vec3f> positions, std::span<const Triangle> triangles,
-            std::span<const std::int8_t> eye_side, const RunContext& context)
-        : references_(std::move(references)), positions_(positions), triangles_(triangles), eye_side_(eye_side),
-          context_(context) {}
-
-    /// False when cancelled.
-    bool build(std::vector<Node>& nodes, std::vector<Leaf>& leaves) {
-        nodes_ = &nodes;
-        leaves_ = &leaves;
-        add_node({0, references_.size(), box_of(0, references_.size())}, 0);
-        return !context_.is_cancelled();
-    }
-
-private:
-    struct Range {
-        std::size_t begin, end;
-        FlatBox box;
-        std::size_t size() const { return end - begin; }
-    };
-
-    std::vector<Reference> references_;
-    std::span<const Vec3f> positions_;
-    std::span<const Triangle> triangles_;
-    std::span<const std::int8_t> eye_side_;
-    const RunContext& context_;
-    std::vector<Node>* nodes_ = nullptr;
-    std::vector<Leaf>* leaves_ = nullptr;
-
-    FlatBox box_of(std::size_t begin, std::size_t end) const {
-        FlatBox box;
-        for (std::size_t r = begin; r < end; ++r) box.extend(references_[r].box);
-        return box;
-    }
-
-    std::uint32_t add_node(const Range& whole, int depth) {
-        std::array<Range, kWidth> children;
-        children[0] = whole;
-        std::size_t count = 1;
-        while (count < kWidth) { // the largest that is not a leaf is divided
-            std::size_t largest = kWidth;
-            for (std::size_t c = 0; c < count; ++c)
-                if (children[c].size() > kLeafSize &&
-                    (largest == kWidth || children[c].box.half_area() > children[largest].box.half_area()))
-                    largest = c;
-            if (largest == kWidth) break;
-            const Range range = children[largest];
-            const std::size_t middle = divide(range, depth);
-            children[largest] = {range.begin, middle, box_of(range.begin, middle)};
-            children[count++] = {middle, range.end, box_of(middle, range.end)};
-        }
-
-        const auto id = static_cast<std::uint32_t>(nodes_->size());
-        nodes_->emplace_back();
-        for (std::size_t c = 0; c < kWidth; ++c) {
-            const FlatBox box = c < count ? children[c].box : FlatBox(); // an empty box is never entered
-            for (std::size_t axis = 0; axis < 3; ++axis) {
-                (*nodes_)[id].lo[axis][c] = box.lo[axis];
-                (*nodes_)[id].hi[axis][c] = box.hi[axis];
-            }
-            (*nodes_)[id].child[c] = kLeaf;
-        }
-        if (context_.is_cancelled()) return id;
-        for (std::size_t c = 0; c < count; ++c) {
-            const std::uint32_t child =
-                children[c].size() <= kLeafSize ? kLeaf | add_leaf(children[c]) : add_node(children[c], depth + 1);
-            (*nodes_)[id].child[c] = child;
-        }
-        return id;
-    }
-
-    std::uint32_t add_leaf(const Range& range) {
-        Leaf leaf = {};
-        leaf.count = static_cast<std::uint32_t>(range.size());
-        for (std::size_t lane = 0; lane < range.size(); ++lane) {
-            const Index t = references_[range.begin + lane].triangle;
+/// Nodes and leaves as queries read them.
+void fill(Tree& tree, const WideTree& shape, std::span<const Vec3f> positions, std::span<const Triangle> triangles,
+          std::span<const std::int8_t> eye_side, const RunContext& context) {
+    tree.nodes.resize(shape.nodes.size());
+    tree.leaves.resize(shape.leaf_count);
+    const auto fill_leaf = [&](Leaf& leaf, std::span<const Index> of_leaf) {
+        leaf = {};
+        leaf.count = static_cast<std::uint32_t>(of_leaf.size());
+        for (std::size_t lane = 0; lane < of_leaf.size(); ++lane) {
+            const Triangle& triangle = triangles[of_leaf[lane]];
             for (std::size_t k = 0; k < 3; ++k)
                 for (std::size_t axis = 0; axis < 3; ++axis)
-                    leaf.corner[k][axis][lane] = positions_[triangles_[t][k]][static_cast<Eigen::Index>(axis)];
-            leaf.eye_side[lane] = static_cast<float>(eye_side_[t]);
+                    leaf.corner[k][axis][lane] = positions[triangle[k]][static_cast<Eigen::Index>(axis)];
+            leaf.eye_side[lane] = static_cast<float>(eye_side[of_leaf[lane]]);
         }
-        leaves_->push_back(leaf);
-        return static_cast<std::uint32_t>(leaves_->size() - 1);
-    }
-
-    /// Puts the range into two parts where box areas times leaves add up to least; returns where the second begins.
-    std::size_t divide(const Range& range, int depth) {
-        const auto first = references_.begin() + static_cast<std::ptrdiff_t>(range.begin);
-        const auto last = references_.begin() + static_cast<std::ptrdiff_t>(range.end);
-        FlatBox middles;
-        for (auto r = first; r != last; ++r)
-            for (std::size_t axis = 0; axis < 3; ++axis) {
-                middles.lo[axis] = std::min(middles.lo[axis], r->middle(axis));
-                middles.hi[axis] = std::max(middles.hi[axis], r->middle(axis));
-            }
-        struct Bin {
-            FlatBox box;
-            std::size_t count = 0;
-        };
-        std::array<std::array<Bin, kBins>, 3> bins;
-        std::array<float, 3> scale;
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-            const float extent = middles.hi[axis] - middles.lo[axis];
-            scale[axis] = extent > 0 ? float(kBins) * 0.9999f / extent : 0;
-            if (!(scale[axis] < 1e30f)) scale[axis] = 0;
-        }
-        const auto bin_of = [&](const Reference& r, std::size_t axis) {
-            return static_cast<std::size_t>((r.middle(axis) - middles.lo[axis]) * scale[axis]);
-        };
-        for (auto r = first; r != last; ++r)
-            for (std::size_t axis = 0; axis < 3; ++axis) {
-                Bin& bin = bins[axis][bin_of(*r, axis)];
-                bin.box.extend(r->box);
-                ++bin.count;
-            }
-
-        float least = INFINITY;
-        std::size_t best_axis = 0, best_bin = 0;
-        const auto cost = [](const Bin& part) {
-            return part.box.half_area() * static_cast<float>((part.count + kLeafSize - 1) / kLeafSize);
-        };
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-            std::array<float, kBins> upper_cost = {};
-            Bin part;
-            for (std::size_t b = kBins - 1; b > 0; --b) {
-                part.box.extend(bins[axis][b].box);
-                part.count += bins[axis][b].count;
-                upper_cost[b] = part.count ? cost(part) : INFINITY;
-            }
-            part = {};
-            for (std::size_t b = 1; b < kBins; ++b) {
-                part.box.extend(bins[axis][b - 1].box);
-                part.count += bins[axis][b - 1].count;
-                if (part.count && cost(part) + upper_cost[b] < least) {
-                    least = cost(part) + upper_cost[b];
-                    best_axis = axis;
-                    best_bin = b;
+    };
+    parallel_for(context, shape.nodes.size(), 256, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t n = begin; n < end; ++n)
+            for (std::size_t c = 0; c < kWidth; ++c) {
+                const WideTree::Child& child = shape.nodes[n].children[c]; // an empty box is never entered
+                for (std::size_t axis = 0; axis < 3; ++axis) {
+                    tree.nodes[n].lo[axis][c] = child.box.lo[axis];
+                    tree.nodes[n].hi[axis][c] = child.box.hi[axis];
                 }
+                tree.nodes[n].child[c] = child.id;
+                if (child.id & kLeaf)
+                    fill_leaf(tree.leaves[child.id & ~kLeaf],
+                              std::span(shape.order).subspan(child.begin, child.end - child.begin));
             }
-        }
-        if (depth >= kDeepest || !(least < INFINITY)) return range.begin + range.size() / 2;
-        const auto middle =
-            std::partition(first, last, [&](const Reference& r) { return bin_of(r, best_axis) < best_bin; });
-        return static_cast<std::size_t>(middle - references_.begin());
-    }
-};
+    });
+}
 
 /// The segment from the point towards the eye as the boxes are tested with it: near and far are rows of Node::lo, hi.
 struct Ray {
@@ -468,20 +330,18 @@ Result<RayParity> RayParity::create(std::span<const Vec3f> positions, std::span<
     // On which side of each triangle the eye is, once; whether it is on the surface or inside.
     const bool is_within_box = (e.array() >= box.min.array()).all() && (e.array() <= box.max.array()).all();
     std::vector<std::int8_t> eye_side(triangles.size());
-    std::vector<Reference> references(triangles.size());
+    std::vector<FlatBox> boxes(triangles.size());
     std::atomic<bool> is_on_surface = false;
     std::atomic<std::uint64_t> crossings = 0;
     parallel_for(context, triangles.size(), 1 << 14, [&](std::size_t begin, std::size_t end) {
         std::uint64_t crossed = 0;
         for (std::size_t t = begin; t < end; ++t) {
             std::array<Vec3d, 3> p;
-            Reference& reference = references[t];
-            reference.triangle = static_cast<Index>(t);
             for (std::size_t k = 0; k < 3; ++k) {
                 p[k] = positions[triangles[t][k]].cast<double>();
                 const Vec3f place = ((p[k] - content->centre) * content->inverse_half_size).cast<float>();
-                reference.box.extend({{place[0] - kWiden, place[1] - kWiden, place[2] - kWiden},
-                                      {place[0] + kWiden, place[1] + kWiden, place[2] + kWiden}});
+                boxes[t].extend({{place[0] - kWiden, place[1] - kWiden, place[2] - kWiden},
+                                 {place[0] + kWiden, place[1] + kWiden, place[2] + kWiden}});
             }
             eye_side[t] = static_cast<std::int8_t>(exact::orient3d(p[0], p[1], p[2], e));
             if (!is_within_box) continue;
@@ -495,8 +355,9 @@ Result<RayParity> RayParity::create(std::span<const Vec3f> positions, std::span<
                      "The eye lies on the surface, so it is neither inside nor outside; move it a little."};
     content->eye_inside = crossings % 2 == 1;
 
-    Builder builder(std::move(references), positions, triangles, eye_side, context);
-    if (!builder.build(content->nodes, content->leaves)) return cancelled_error();
+    const auto shape = make_wide_tree(boxes, context);
+    if (!shape) return shape.error();
+    fill(*content, *shape, positions, triangles, eye_side, context);
     return RayParity(std::move(content));
 }
 
