@@ -155,8 +155,8 @@ std::unique_ptr<Subject> Rendering::read(const std::string& path) {
         if (!options_.poses.empty())
             refuse(path + ": is a mesh, and --poses move a model; 'filigree strip' makes one of it.");
         subject->mesh = std::move(std::get<Mesh>(content.value));
-        subject->materials = load_materials(subject->mesh, path, session_);
     }
+    subject->materials = load_materials(subject->mesh, path, session_);
     if (subject->mesh.vertex_count() == 0)
         throw Failure{{ErrorCode::unsuitable, path + ": has no vertices, so there is nothing to draw."}};
     choose_scalars(*subject, path);

@@ -195,7 +195,14 @@ Status Drawable::Content::upload_surface(const Mesh& mesh, std::span<const Vec3f
             const SurfaceMaterial& material = surface.materials[drawn.material];
             part.color = material.color;
             part.has_color = true;
-            if (material.picture && has_uvs) part.picture = picture_texture(*material.picture);
+            if (material.picture && has_uvs) {
+                GLint most = 0;
+                glGetIntegerv(GL_MAX_TEXTURE_SIZE, &most);
+                if (std::max(material.picture->width, material.picture->height) > static_cast<unsigned>(most))
+                    return Error{ErrorCode::unsuitable, "A texture is larger than the " + std::to_string(most) +
+                                                            " pixels a side that can be drawn here; scale it down."};
+                part.picture = picture_texture(*material.picture);
+            }
         }
         parts.push_back(std::move(part));
     }
