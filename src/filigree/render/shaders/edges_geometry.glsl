@@ -6,21 +6,9 @@ layout(triangle_strip, max_vertices = 3) out;
 uniform usamplerBuffer edge_flags; // one a triangle
 uniform int first_triangle;
 
-in Surface {
-    vec3 position;
-    vec3 normal;
-    vec2 uv;
-    vec4 color;
-    float scalar;
-} corner[];
+in Surface { SURFACE_FIELDS } corner[];
 
-out Surface {
-    vec3 position;
-    vec3 normal;
-    vec2 uv;
-    vec4 color;
-    float scalar;
-} surface;
+out Surface { SURFACE_FIELDS } surface;
 noperspective out vec3 edge_distance;
 flat out float smallest_height;
 

@@ -16,3 +16,6 @@ layout(std140, binding = 0) uniform Frame {
 vec3 to_viewer(vec3 position) {
     return frame.eye.w > 0.5 ? normalize(frame.eye.xyz - position) : frame.eye.xyz;
 }
+
+// What a surface's vertices hand on, from stage to stage.
+#define SURFACE_FIELDS vec3 position; vec3 normal; vec2 uv; vec4 color; float scalar;

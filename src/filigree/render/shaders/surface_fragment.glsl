@@ -1,10 +1,4 @@
-in Surface {
-    vec3 position;
-    vec3 normal;
-    vec2 uv;
-    vec4 color;
-    float scalar;
-} surface;
+in Surface { SURFACE_FIELDS } surface;
 #ifdef EDGES
 noperspective in vec3 edge_distance;
 flat in float smallest_height;

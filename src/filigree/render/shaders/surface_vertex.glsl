@@ -10,13 +10,7 @@ uniform float scale;    // 1 / the scene's diagonal
 uniform vec4 clip;      // in scene space; what lies where dot(clip.xyz, p) > clip.w is cut away
 uniform bool is_clipped;
 
-out Surface {
-    vec3 position;
-    vec3 normal;
-    vec2 uv;
-    vec4 color;
-    float scalar;
-} surface;
+out Surface { SURFACE_FIELDS } surface;
 
 vec3 from_octahedron(vec2 steps) {
     if (steps.x < -32767.5) return vec3(0.0);
