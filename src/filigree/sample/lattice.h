@@ -29,9 +29,9 @@ struct Lattice {
 };
 
 struct LatticeOptions {
-    double spacing = 0;                ///< model units, above 0
-    std::optional<Vec3d> origin = {};  ///< a lattice point, relative to the mesh's origin; unset: half a spacing inside
-                                       ///< the box's lowest corner, so that the lattice is centred in its cells
+    double spacing = 0;               ///< model units, above 0
+    std::optional<Vec3d> origin = {}; ///< a lattice point, relative to the mesh's origin; unset: half a spacing inside
+                                      ///< the box's lowest corner, so that the lattice is centred in its cells
 };
 
 /// The lattice over a box (relative to the mesh's origin). Spacing and origin are rounded to a dyadic grid fine enough
