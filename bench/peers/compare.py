@@ -1,8 +1,10 @@
 """Prints the peers' figures, and ours beside them as ratios: above 1 is in our favour.
 
-    compare.py PEERS [OURS]
+    compare.py PEERS [OURS...]
 
-PEERS: lines "name value unit". OURS: what `filigree bench --json` prints, {"results": [{"name", "value", "unit"}, ...]}.
+PEERS: lines "name value unit". OURS: what `filigree bench --json` prints, {"results": [{"name", "value", "unit"}, ...]},
+and what `filigree sample --method scan --json` prints, each for another lattice: "inside.scan_N" has N points along the
+longest side.
 Rates (…/s) are better high, all else (s, bytes) better low; a pair is shown when both sides were measured.
 """
 import json
@@ -25,6 +27,14 @@ PAIRS = [
     ("handles, set-up", "handles.setup", "cgal.arap_setup"),
     ("handles, an iteration", "handles.iteration", "cgal.arap_iteration"),
 ]
+for n in (64, 128, 256, 512):
+    PAIRS += [
+        (f"inside, {n}: scan / CGAL, exact", f"inside.scan_{n}", f"inside.cgal_{n}"),
+        (f"inside, {n}: scan / Embree, a ray a row", f"inside.scan_{n}", f"inside.embree_rows_{n}"),
+        (f"inside, {n}: scan / Embree, shot again at each hit", f"inside.scan_{n}", f"inside.embree_again_{n}"),
+        (f"inside, {n}: scan / Embree, a ray a point", f"inside.scan_{n}", f"inside.embree_points_{n}"),
+        (f"inside, {n}: scan / all triangles in a loop", f"inside.scan_{n}", f"inside.plain_{n}"),
+    ]
 
 
 def read_peers(path):
@@ -37,14 +47,21 @@ def read_peers(path):
     return figures
 
 
-def read_ours(path):
-    with open(path, encoding="utf-8") as file:
-        return {figure["name"]: (figure["value"], figure["unit"]) for figure in json.load(file)["results"]}
+def read_ours(paths):
+    figures = {}
+    for path in paths:
+        with open(path, encoding="utf-8") as file:
+            said = json.load(file)
+        if "results" in said:
+            figures |= {figure["name"]: (figure["value"], figure["unit"]) for figure in said["results"]}
+        else:
+            figures[f"inside.scan_{max(said['lattice'])}"] = (said["tested"] / said["seconds"], "points/s")
+    return figures
 
 
 def main():
     peers = read_peers(sys.argv[1])
-    ours = read_ours(sys.argv[2]) if len(sys.argv) > 2 else {}
+    ours = read_ours(sys.argv[2:])
 
     print(f"{'peer':<34} {'figure':>12}")
     for name, (value, unit) in peers.items():
