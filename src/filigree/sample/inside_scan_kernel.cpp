@@ -478,21 +478,35 @@ FILIGREE_INLINE void scan_layers(const Job& job, Index triangle, std::uint32_t k
     }
 }
 
+/// Triangles that a row may cross, without a branch: those between two rows or two layers, and most are, are crossed by
+/// none. In a slab, also not those wholly below or above it. Returns how many.
+template <bool Slab>
+std::size_t find_candidates(const Job& job, std::size_t begin, std::size_t end, Index* candidates) {
+    std::size_t count = 0;
+    for (std::size_t t = begin; t < end; ++t) {
+        const Triangle& triangle = job.triangles[t];
+        const std::uint32_t a = job.codes[triangle[0]], b = job.codes[triangle[1]], c = job.codes[triangle[2]];
+        const std::uint32_t differ = (a ^ b) | (a ^ c);
+        std::size_t wanted = std::size_t((differ & 0xffff) != 0) & std::size_t(differ >> 16 != 0);
+        if constexpr (Slab) // K is in the upper half, so whole codes compare like it
+            wanted &= std::size_t(std::min({a, b, c}) >> 16 < job.end_k) &
+                      std::size_t(std::max({a, b, c}) >> 16 > job.first_k);
+        candidates[count] = Index(t);
+        count += wanted;
+    }
+    return count;
+}
+
 template <int N, bool Signed>
 FILIGREE_INLINE void scan_triangles_lanes(const Job& job, std::size_t begin, std::size_t end, Piece& piece) {
-    // Candidates first, without a branch: a triangle between two rows or two layers, and most are, is crossed by none.
     constexpr std::size_t kBlock = 1024;
     Index candidates[kBlock];
     SmallTriangles small[kSmallWidth][kSmallWidth]; // by layers - 1 and rows - 1
+    const bool is_slab = job.first_k > 0 || job.end_k < job.axes[2].count;
     for (std::size_t block = begin; block < end; block += kBlock) {
-        std::size_t count = 0;
-        for (std::size_t t = block; t < std::min(end, block + kBlock); ++t) {
-            const Triangle& triangle = job.triangles[t];
-            const std::uint32_t a = job.codes[triangle[0]], b = job.codes[triangle[1]], c = job.codes[triangle[2]];
-            const std::uint32_t differ = (a ^ b) | (a ^ c);
-            candidates[count] = Index(t);
-            count += std::size_t((differ & 0xffff) != 0) & std::size_t(differ >> 16 != 0);
-        }
+        const std::size_t block_end = std::min(end, block + kBlock);
+        const std::size_t count = is_slab ? find_candidates<true>(job, block, block_end, candidates)
+                                          : find_candidates<false>(job, block, block_end, candidates);
         for (std::size_t n = 0; n < count; ++n) {
             const Triangle& triangle = job.triangles[candidates[n]];
             const std::uint32_t a = job.codes[triangle[0]], b = job.codes[triangle[1]], c = job.codes[triangle[2]];
@@ -500,7 +514,6 @@ FILIGREE_INLINE void scan_triangles_lanes(const Job& job, std::size_t begin, std
             auto [k, k_end] = std::minmax({a >> 16, b >> 16, c >> 16});
             k = std::max(k, std::uint32_t(job.first_k));
             k_end = std::min(k_end, std::uint32_t(job.end_k));
-            if (k >= k_end) continue;
             const std::uint32_t width_j = j_end - j, width_k = k_end - k;
             if (width_j <= kSmallWidth && width_k <= kSmallWidth) {
                 SmallTriangles& shape = small[width_k - 1][width_j - 1];
