@@ -224,6 +224,77 @@ TEST(InsideScan, IsRightOnRandomTetrahedraOfTheLattice) {
     }
 }
 
+/// Lattices with a point within rounding of a face, so that only exact signs can tell its side.
+TEST(InsideScan, IsRightWithinRoundingOfTheSurface) {
+    std::mt19937 random(13);
+    std::uniform_real_distribution<double> uniform;
+    int crossed = 0;
+    for (int trial = 0; trial < 3000; ++trial) {
+        Solid mesh{{}, {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}}};
+        const double flat = trial % 3 == 0 ? 1 : std::exp2(-30 * uniform(random)); // faces that hold +x, almost
+        const double away = trial % 2 == 0 ? 0 : 4000;
+        const Vec3d stretch(1, flat, 1);
+        const auto shear = [&](const Vec3d& p) { return Vec3d(p[0], p[1] + p[2], p[2]); };
+        for (int v = 0; v < 4; ++v) {
+            const Vec3d p(uniform(random), uniform(random), uniform(random));
+            mesh.positions.push_back((shear(stretch.cwiseProduct(p)) + Vec3d(away, 0, 0)).cast<float>());
+        }
+        // a row through the first face
+        const Vec3d a = mesh.positions[0].cast<double>(), b = mesh.positions[2].cast<double>(),
+                    c = mesh.positions[1].cast<double>();
+        const double u = uniform(random), v = (1 - u) * uniform(random);
+        const double y = a[1] + u * (b[1] - a[1]) + v * (c[1] - a[1]), z = a[2] + u * (b[2] - a[2]) + v * (c[2] - a[2]);
+        const Eigen::Matrix<long double, 3, 1> e = (b - a).cast<long double>(), f = (c - a).cast<long double>(),
+                                               n = e.cross(f);
+        if (n[0] == 0) continue;
+        const double x =
+            double((long double)a[0] - (n[1] * ((long double)y - a[1]) + n[2] * ((long double)z - a[2])) / n[0]);
+        const int rows = trial % 5 == 0 ? 8 : 1; // on either side: with 8, the triangle spans more than small ones do
+        const double spacing = 0.25 / rows;
+        Lattice lattice = make_points({x - 8 * spacing, y - rows * spacing * flat, z - rows * spacing}, spacing,
+                                      {17, 2 * std::size_t(rows) + 1, 2 * std::size_t(rows) + 1});
+        for (int j = 0; j <= 2 * rows; ++j) lattice.coordinates[1][std::size_t(j)] = y + (j - rows) * spacing * flat;
+        lattice.coordinates[0][8] = x;
+        lattice.coordinates[1][std::size_t(rows)] = y;
+        lattice.coordinates[2][std::size_t(rows)] = z;
+        crossed += expect_right(mesh, lattice, std::to_string(trial)) > 0;
+    }
+    EXPECT_GT(crossed, 1000);
+}
+
+/// Slivers seen edge-on along the rows, with a normal that doubles get wrong.
+TEST(InsideScan, IsRightOnSlivers) {
+    std::mt19937 random(14);
+    std::uniform_real_distribution<double> uniform(-1, 1);
+    for (int trial = 0; trial < 1000; ++trial) {
+        const double tiny = std::exp2(-20 - trial % 50);
+        Solid mesh{{}, {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}}};
+        for (int v = 0; v < 3; ++v) { // on the line y = z, nearly
+            const double y = v == 0 ? tiny * uniform(random) : v, z = v == 0 ? tiny * uniform(random) : v;
+            mesh.positions.push_back(Vec3d(4 * uniform(random), y, z).cast<float>());
+        }
+        mesh.positions.push_back(Vec3d(uniform(random), 2 + uniform(random), uniform(random)).cast<float>());
+        std::ranges::shuffle(mesh.positions, random);
+        const int rows = trial % 2 == 0 ? 2 : 8; // a unit
+        const std::size_t count = std::size_t(3 * rows);
+        expect_right(mesh, make_points({-4, 0, 0}, 1.0 / rows, {8 * std::size_t(rows) + 1, count, count}), "sliver");
+    }
+}
+
+TEST(InsideScan, IsRightWhereTrianglesAreFarLargerThanTheLattice) {
+    std::mt19937 random(15);
+    for (const float size : {1e3f, 1e6f, 1e9f})
+        for (int turn = 0; turn < 10; ++turn) {
+            const Solid mesh = turned(make_octahedron(size), random);
+            const Vec3d a = mesh.positions[0].cast<double>(), b = mesh.positions[2].cast<double>(),
+                        c = mesh.positions[4].cast<double>();
+            for (const Vec3d& place : {a, Vec3d(0.5 * (a + b)), Vec3d((a + b + c) / 3)})
+                for (const double spacing : {0.01, 1.0, 100.0})
+                    expect_right(mesh, make_points(place - Vec3d::Constant(6 * spacing), spacing, {12, 13, 14}),
+                                 "large");
+        }
+}
+
 TEST(InsideScan, IsRightOnALatticeFarAway) {
     std::mt19937 random(10);
     for (const float away : {100.0f, 1e4f, 1e6f}) {
