@@ -17,7 +17,8 @@ class RayParity {
 public:
     /// eye: not on the surface; unset: far outside the box, in no special place. An eye inside is noticed, and all
     /// answers turned round. Copies what it needs. Cost O(F log F).
-    /// Errors: unsuitable (the eye lies on the surface; no triangles).
+    /// Errors: unsuitable (the eye lies on the surface, or is not within the range of exact_sign.h; no triangles),
+    /// cancelled.
     static Result<RayParity> create(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
                                     const Vec3d* eye, const RunContext& context);
     RayParity(RayParity&&) noexcept;
@@ -28,6 +29,7 @@ public:
         std::uint64_t crossings = 0, triangles_tested = 0;
         exact::Tally tally;
     };
+    /// Points outside the mesh's box, and those that are no numbers, are outside without a count. Adds to `count`.
     bool contains(const Vec3d& point, Count* count = nullptr) const;
     /// One 0 or 1 a point. Errors: cancelled.
     Result<std::vector<std::uint8_t>> contains(std::span<const Vec3d> points, const RunContext& context,
