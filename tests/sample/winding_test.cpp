@@ -236,6 +236,20 @@ TEST(WindingInside, AgreesWithTheSumOverAllTrianglesOnDirtyMeshes) {
     }
 }
 
+TEST(WindingInside, OfASheetIsWhatItsHollowsHold) {
+    const RunContext context(1);
+    const Surface sheet = shape("wavy-plane", 8); // all round 1/2 on the one side, above it where the sheet bends round
+    const Lattice lattice = lattice_over(sheet, 0.05);
+    WindingReport report;
+    const auto occupancy = winding_inside(sheet.positions, sheet.triangles, lattice, 0.001, context, &report);
+    ASSERT_TRUE(occupancy);
+    const Comparison comparison = compare(sheet, lattice, *occupancy, 0.001);
+    EXPECT_EQ(comparison.different, 0u);
+    EXPECT_GT(comparison.inside, 0u);
+    EXPECT_LT(comparison.inside, comparison.points / 2);
+    EXPECT_GT(report.near_half, 0.1); // and says that it is not sure
+}
+
 TEST(WindingInside, HoldsForPointsOnTheConesThemselves) {
     const RunContext context(1);
     // Three faces about a corner are gone: the cone's tip is the middle of the box, and its triangles, spokes and tip
