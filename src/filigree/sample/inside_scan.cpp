@@ -223,6 +223,10 @@ private:
             for (std::size_t row = begin; row < end; ++row) {
                 std::uint64_t carry = 0;
                 for (std::uint64_t& word : std::span(bits + row * words, words)) {
+                    if (word == 0) { // nearly always
+                        word = carry;
+                        continue;
+                    }
                     std::uint64_t x = word;
                     for (int shift = 1; shift < 64; shift *= 2) x ^= x << shift;
                     word = x ^= carry;

@@ -478,54 +478,68 @@ FILIGREE_INLINE void scan_layers(const Job& job, Index triangle, std::uint32_t k
     }
 }
 
-/// Triangles that a row may cross, without a branch: those between two rows or two layers, and most are, are crossed by
-/// none. In a slab, also not those wholly below or above it. Returns how many.
-template <bool Slab>
-std::size_t find_candidates(const Job& job, std::size_t begin, std::size_t end, Index* candidates) {
+/// Triangles that a row may cross, and the rows and layers they span.
+struct Candidates {
+    static constexpr std::size_t kRoom = 1024;
+    Index triangle[kRoom];
+    std::uint32_t j[kRoom], j_end[kRoom], k[kRoom], k_end[kRoom];
     std::size_t count = 0;
+};
+
+/// Finds them without a branch: triangles between two rows or two layers, and most are, are crossed by none. In a slab,
+/// also those wholly below or above it.
+template <bool Slab>
+[[gnu::noinline]] void find_candidates(const Job& job, std::size_t begin, std::size_t end, Candidates& found) {
+    const std::uint32_t first_k = std::uint32_t(job.first_k), end_k = std::uint32_t(job.end_k);
+    // K is in the upper half of a code, so whole codes are in its order
+    const auto lowest = [](auto a, auto b, auto c) { return std::min(std::min(a, b), c); };
+    const auto highest = [](auto a, auto b, auto c) { return std::max(std::max(a, b), c); };
+    found.count = 0;
     for (std::size_t t = begin; t < end; ++t) {
         const Triangle& triangle = job.triangles[t];
         const std::uint32_t a = job.codes[triangle[0]], b = job.codes[triangle[1]], c = job.codes[triangle[2]];
         const std::uint32_t differ = (a ^ b) | (a ^ c);
         std::size_t wanted = std::size_t((differ & 0xffff) != 0) & std::size_t(differ >> 16 != 0);
-        if constexpr (Slab) // K is in the upper half, so whole codes compare like it
-            wanted &= std::size_t(std::min({a, b, c}) >> 16 < job.end_k) &
-                      std::size_t(std::max({a, b, c}) >> 16 > job.first_k);
-        candidates[count] = Index(t);
-        count += wanted;
+        if constexpr (Slab)
+            wanted &= std::size_t(lowest(a, b, c) >> 16 < end_k) & std::size_t(highest(a, b, c) >> 16 > first_k);
+        found.triangle[found.count] = Index(t);
+        found.j[found.count] = a;
+        found.k[found.count] = b;
+        found.k_end[found.count] = c;
+        found.count += wanted;
     }
-    return count;
+    for (std::size_t n = 0; n < found.count; ++n) {
+        const std::uint32_t a = found.j[n], b = found.k[n], c = found.k_end[n];
+        found.j[n] = lowest(a & 0xffff, b & 0xffff, c & 0xffff);
+        found.j_end[n] = highest(a & 0xffff, b & 0xffff, c & 0xffff);
+        found.k[n] = std::max(lowest(a, b, c) >> 16, first_k);
+        found.k_end[n] = std::min(highest(a, b, c) >> 16, end_k);
+    }
 }
 
 template <int N, bool Signed>
 FILIGREE_INLINE void scan_triangles_lanes(const Job& job, std::size_t begin, std::size_t end, Piece& piece) {
-    constexpr std::size_t kBlock = 1024;
-    Index candidates[kBlock];
+    Candidates found;
     SmallTriangles small[kSmallWidth][kSmallWidth]; // by layers - 1 and rows - 1
     const bool is_slab = job.first_k > 0 || job.end_k < job.axes[2].count;
-    for (std::size_t block = begin; block < end; block += kBlock) {
-        const std::size_t block_end = std::min(end, block + kBlock);
-        const std::size_t count = is_slab ? find_candidates<true>(job, block, block_end, candidates)
-                                          : find_candidates<false>(job, block, block_end, candidates);
-        for (std::size_t n = 0; n < count; ++n) {
-            const Triangle& triangle = job.triangles[candidates[n]];
-            const std::uint32_t a = job.codes[triangle[0]], b = job.codes[triangle[1]], c = job.codes[triangle[2]];
-            const auto [j, j_end] = std::minmax({a & 0xffff, b & 0xffff, c & 0xffff});
-            auto [k, k_end] = std::minmax({a >> 16, b >> 16, c >> 16});
-            k = std::max(k, std::uint32_t(job.first_k));
-            k_end = std::min(k_end, std::uint32_t(job.end_k));
-            const std::uint32_t width_j = j_end - j, width_k = k_end - k;
+    for (std::size_t block = begin; block < end; block += Candidates::kRoom) {
+        (is_slab ? find_candidates<true> : find_candidates<false>)(job, block, std::min(end, block + Candidates::kRoom),
+                                                                   found);
+        for (std::size_t n = 0; n < found.count; ++n) {
+            const Index triangle = found.triangle[n];
+            const std::uint32_t width_j = found.j_end[n] - found.j[n], width_k = found.k_end[n] - found.k[n];
             if (width_j <= kSmallWidth && width_k <= kSmallWidth) {
                 SmallTriangles& shape = small[width_k - 1][width_j - 1];
-                shape.triangle[shape.count] = candidates[n];
-                shape.j[shape.count] = std::uint16_t(j);
-                shape.k[shape.count] = std::uint16_t(k);
+                shape.triangle[shape.count] = triangle;
+                shape.j[shape.count] = std::uint16_t(found.j[n]);
+                shape.k[shape.count] = std::uint16_t(found.k[n]);
                 if (++shape.count == SmallTriangles::kRoom) scan_small<N, Signed>(job, shape, width_j, width_k, piece);
             } else if (std::uint64_t{width_j} * width_k <= kLargeRows) {
-                scan_layers<N, Signed>(job, candidates[n], k, k_end, piece);
+                scan_layers<N, Signed>(job, triangle, found.k[n], found.k_end[n], piece);
             } else {
                 const std::uint32_t layers = std::uint32_t(std::max<std::uint64_t>(1, 8 * kLargeRows / width_j));
-                for (; k < k_end; k += layers) piece.large.push_back({candidates[n], k, std::min(k + layers, k_end)});
+                for (std::uint32_t k = found.k[n]; k < found.k_end[n]; k += layers)
+                    piece.large.push_back({triangle, k, std::min(k + layers, found.k_end[n])});
             }
         }
     }
