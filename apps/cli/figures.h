@@ -32,6 +32,10 @@ public:
         Appearance appearance = {};
         std::optional<double> ground_level = {}; ///< unset: the mesh stands on it
     };
+    /// A picture of a scene on white, `width` x `height` page units large. z is up.
+    Picture picture(Scene scene, const Camera& camera, double width, double height);
+    /// OpenGL has to be there before something is made to be drawn.
+    void start();
     /// A picture on white, `width` x `height` page units large. z is up.
     Picture picture(const Mesh& mesh, const Look& look, const Camera& camera, double width, double height);
 
@@ -50,6 +54,7 @@ Figure draw_wavy_cube(FigureRenderer& renderer);           // 2.1
 Figure draw_ray_and_triangle(FigureRenderer& renderer);    // 2.2
 Figure draw_border_cases(FigureRenderer& renderer);        // 2.3
 Figure draw_shared_points(FigureRenderer& renderer);       // 2.4
+Figure draw_inside_points(FigureRenderer& renderer);       // 2.5
 Figure draw_removed_level(FigureRenderer& renderer);       // 2.6
 Figure draw_barycentric_areas(FigureRenderer& renderer);   // 2.7
 Figure draw_recursive_storing(FigureRenderer& renderer);   // 2.8

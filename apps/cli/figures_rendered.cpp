@@ -1,4 +1,4 @@
-// Figures 2.1, 2.9, 2.10, 3.1 and our own: meshes as the renderer draws them.
+// Figures 2.1, 2.5, 2.9, 2.10, 3.1 and our own: meshes as the renderer draws them.
 #include "fidelity.h"
 #include "figures.h"
 #include "figures_layout.h"
@@ -9,6 +9,7 @@
 #include "filigree/hierarchy/strip.h"
 #include "filigree/mesh/mesh_distance.h"
 #include "filigree/mesh/shapes.h"
+#include "filigree/sample/sample_inside.h"
 
 #include <algorithm>
 #include <cmath>
@@ -36,16 +37,25 @@ void fade_borders(Picture& picture) {
 
 } // namespace
 
-Picture FigureRenderer::picture(const Mesh& mesh, const Look& look, const Camera& camera, double width, double height) {
+void FigureRenderer::start() {
     if (!stage_) stage_ = std::make_unique<Stage>(session_);
+}
+
+Picture FigureRenderer::picture(const Mesh& mesh, const Look& look, const Camera& camera, double width, double height) {
+    start();
     const Drawable drawable = require(Drawable::surface(mesh, look.surface, context()));
     Scene scene;
     scene.objects.push_back({&drawable, look.appearance});
     scene.objects.back().appearance.edge_width *= static_cast<float>(scale_);
-    scene.background.transparent = true; // the page is white
-    scene.up = UpAxis::z;
     scene.fixed_ground = look.ground_level.has_value();
     scene.ground_level = look.ground_level.value_or(0);
+    return picture(std::move(scene), camera, width, height);
+}
+
+Picture FigureRenderer::picture(Scene scene, const Camera& camera, double width, double height) {
+    start();
+    scene.background.transparent = true; // the page is white
+    scene.up = UpAxis::z;
     PictureOptions options;
     options.width = static_cast<unsigned>(std::lround(scale_ * width));
     options.height = static_cast<unsigned>(std::lround(scale_ * height));
@@ -129,6 +139,44 @@ Figure draw_wavy_cube(FigureRenderer& renderer) {
     draw_mesh(page, panel, renderer, cube, {}, common_camera(meshes, kFromCorner, panel));
     return {std::move(page),
             {{"vertices", cube.vertex_count()}, {"faces", cube.face_count()}, {"frequency", shape.frequency}}};
+}
+
+Figure draw_inside_points(FigureRenderer& renderer) {
+    constexpr double kPanelHeight = 400;
+    const RunContext& context = renderer.context();
+    const Mesh cube = make_wavy_cube({.resolution = 96});
+    const Box box = bounds(cube.positions);
+    const double spacing = require(spacing_for_count(cube, 6000, {}, context));
+    const Lattice lattice = require(make_lattice(box, {.spacing = spacing}));
+    InsideReport report;
+    const Occupancy inside = require(sample_inside(cube, lattice, {}, context, &report));
+    const LatticePoints points = points_inside(lattice, inside);
+
+    Page page = captioned_page(
+        content_height(1, kPanelHeight) - kSubcaptionRoom, "Figure 2.5",
+        fmt::format(
+            "The points of a regular lattice that lie inside the cube, {} of {}. The front of the surface is left "
+            "out. Each row of the lattice crosses the surface {:.1f} times on average.",
+            with_commas(points.positions.size()), with_commas(static_cast<std::size_t>(lattice.point_count())),
+            double(report.scan.crossings) / (double(lattice.counts()[1]) * double(lattice.counts()[2]))));
+    const Panel panel{{100, kFigureMargin}, kFigureWidth - 200, kPanelHeight};
+    renderer.start();
+    const Drawable surface = require(Drawable::surface(cube, {}, context));
+    const Drawable balls = require(Drawable::points(points.positions, cube.origin,
+                                                    {.radius = static_cast<float>(0.3 * lattice.spacing)}, context));
+    Appearance red, blue;
+    red.color = {0.80f, 0.22f, 0.18f};
+    blue.color = {0.20f, 0.42f, 0.80f};
+    const double front = box.min.y() + 0.12 * box.size().y(); // behind the waves of the front side
+    red.clip = ClipPlane{-Vec3d::UnitY(), -front};
+    Scene scene;
+    scene.objects = {{&surface, red}, {&balls, blue}};
+    const Mesh* meshes[] = {&cube};
+    const Camera camera = common_camera(meshes, Vec3d(0.32, -0.94, 0.34), panel);
+    page.picture(renderer.picture(std::move(scene), camera, panel.width, panel.height), panel.top_left, panel.width,
+                 panel.height);
+    return {std::move(page),
+            {{"inside", points.positions.size()}, {"lattice", lattice.counts()}, {"crossings", report.scan.crossings}}};
 }
 
 Figure draw_removed_detail(FigureRenderer& renderer) {

@@ -135,6 +135,7 @@ void add_compare(CLI::App& app, Session& session);
 void add_bench(CLI::App& app, Session& session);
 void add_demo(CLI::App& app, Session& session);
 void add_render(CLI::App& app, Session& session);
+void add_sample(CLI::App& app, Session& session);
 void add_figures(CLI::App& app, Session& session);
 
 } // namespace filigree::cli
