@@ -23,27 +23,29 @@ struct ScanReport {
     double seconds = 0;
 };
 
-/// Triangles as the scan takes them: welded, so that only position counts.
+/// Triangles as the scan takes them. Only coordinates count: vertices need not be shared, nor triangles turn the same
+/// way (but for `merged` and scan_winding).
 struct ScanMesh {
     std::span<const Vec3f> positions;
     std::span<const Triangle> triangles;
 };
 
 /// Bits of all lattice points. Does not look whether the mesh is closed: with an open one, rows may be filled to their
-/// end. Memory: a bit a point (and 2 bytes a point for `merged`, in slabs). Uses AVX-512 or AVX2 where the processor
-/// has them; the same bits without. Errors: unsuitable (does not fit into `most_bytes`: says how much it would take),
-/// cancelled.
+/// end. Memory: a bit a point, 4 bytes a vertex, and for `merged` 32 MiB (or a layer of 2 bytes a point, if that is
+/// more). Uses AVX-512 or AVX2 where the processor has them; the same bits without. Cost O(V + F + crossings + points /
+/// 64). Errors: unsuitable (does not fit into `most_bytes`: says how much it would take; more than 65,534 points on an
+/// axis), usage (coordinates that are not evenly spaced), cancelled.
 Result<Occupancy> scan_inside(const ScanMesh& mesh, const Lattice& lattice, Overlap overlap, const RunContext& context,
                               ScanReport* report = nullptr, std::size_t most_bytes = std::size_t{4} << 30);
 
 /// The same slab by slab, for lattices larger than memory: `slab(first_k, occupancy)` gets layers first_k ..
-/// first_k + occupancy.counts[2] - 1, ascending.
+/// first_k + occupancy.counts[2] - 1, ascending. Every slab looks at all triangles, about 1 ns each.
 Status scan_inside_slabs(const ScanMesh& mesh, const Lattice& lattice, Overlap overlap, std::size_t layers,
                          const std::function<void(std::size_t first_k, const Occupancy&)>& slab,
                          const RunContext& context, ScanReport* report = nullptr);
 
 /// Net signed crossings before each point (winding numbers for closed, oriented meshes), for the layers first_k ..
-/// first_k + layers - 1: one int16 a point, rows along x without padding.
+/// first_k + layers - 1 (as far as there are any): one int16 a point, rows along x without padding.
 Result<std::vector<std::int16_t>> scan_winding(const ScanMesh& mesh, const Lattice& lattice, std::size_t first_k,
                                                std::size_t layers, const RunContext& context,
                                                ScanReport* report = nullptr);

@@ -36,8 +36,9 @@ struct LatticeOptions {
 
 /// The lattice over a box (relative to the mesh's origin). Spacing and origin are rounded to a dyadic grid fine enough
 /// that nothing changes by more than 2^-24 of the spacing, so that most ties can be decided in integers.
-/// Errors: usage (spacing not finite or not above 0; a box without extent), unsuitable (more than 65,534 points on an
-/// axis, or a spacing below the resolution of the coordinates: says what would do).
+/// Without an origin, an axis shorter than the spacing gets one layer, in its middle.
+/// Errors: usage (spacing not finite, not above 0 or larger than the box; a box without extent), unsuitable (more than
+/// 65,534 points on an axis, or none, or a spacing below the resolution of the coordinates: says what would do).
 Result<Lattice> make_lattice(const Box& box, const LatticeOptions& options);
 
 /// One bit a lattice point, rows along x: bit i & 63 of word i >> 6 of row (j, k).
