@@ -1,14 +1,15 @@
 #include "page.h"
 #include "stage.h"
 
+#include <cmath>
 #include <filesystem>
 
 namespace filigree::cli {
 
 namespace {
 
-/// a coloured by how far each of its vertices is from b, with a legend and the figures below.
-void draw_errors(const Mesh& a, const Mesh& b, const std::string& caption, const MeshDistance& distance, UpAxis up,
+/// a coloured by how far each of its vertices is from b, with a legend; the vertices' rms and maximum stand below.
+void draw_errors(const Mesh& a, const Mesh& b, const std::string& names, const MeshDistance& distance, UpAxis up,
                  const std::string& path, Session& session) {
     const RunContext& context = session.context();
     const HeatMap errors =
@@ -20,7 +21,7 @@ void draw_errors(const Mesh& a, const Mesh& b, const std::string& caption, const
                                   ? require(Drawable::surface(a, {.scalars = scalars}, context))
                                   : require(Drawable::points(a.positions, a.origin, {.scalars = scalars}, context));
     constexpr unsigned kWidth = 1120, kHeight = 840;
-    const CameraPoints points{a.positions, a.origin};
+    const CameraPoints points{a.positions, a.origin, drawable.point_radius()};
     const Camera camera =
         fit_camera(std::span(&points, 1), view_direction(View::iso, up), up_vector(up), double(kWidth) / kHeight);
     Scene scene;
@@ -30,6 +31,13 @@ void draw_errors(const Mesh& a, const Mesh& b, const std::string& caption, const
     Page page(kWidth + 130, kHeight + 40);
     page.picture(picture, {0, 0}, kWidth, kHeight);
     page.legend(ColorMap::sequential, errors.range, "distance / diagonal", {kWidth + 14, 24}, 420);
+    double sum = 0, most = 0;
+    for (float value : errors.values) {
+        sum += double(value) * value;
+        most = std::max(most, double(value));
+    }
+    const std::string caption = fmt::format("{}: rms {:.2e}, max {:.2e} of the diagonal", names,
+                                            std::sqrt(sum / std::max<double>(1, double(errors.values.size()))), most);
     page.text(caption, {kWidth / 2.0, kHeight + 26}, {.size = 15, .align = Align::centre});
     if (context.is_cancelled()) throw Failure{cancelled_error()};
     require(page.write(path, 1));
@@ -91,16 +99,7 @@ void add_compare(CLI::App& app, Session& session) {
             add("mean_distance", "mean surface distance", s->mean_distance);
         }
         if (!options->picture.empty()) {
-            const double rms = distance.vertices   ? distance.vertices->rms
-                               : distance.surfaces ? distance.surfaces->rms_distance
-                                                   : 0;
-            const double most = distance.vertices   ? distance.vertices->max
-                                : distance.surfaces ? distance.surfaces->max_a_to_b
-                                                    : 0;
-            draw_errors(a, b,
-                        fmt::format("{} against {}: rms {:.2e}, max {:.2e} of the diagonal",
-                                    Page::plain(file_name(options->a)), Page::plain(file_name(options->b)),
-                                    distance.relative(rms), distance.relative(most)),
+            draw_errors(a, b, Page::plain(file_name(options->a)) + " against " + Page::plain(file_name(options->b)),
                         distance, options->up, options->picture, session);
             table.row("picture", options->picture);
             json["picture"] = options->picture;

@@ -21,7 +21,8 @@ std::unique_ptr<SpaceWarp> bend_and_twist(const Box& box, double part = 1) {
     return make_chain(std::move(warps));
 }
 
-/// Neither is what the demo is about: where OpenGL or ffmpeg is missing it goes on with a warning. Returns the files.
+/// Neither is what the demo is about: where one cannot be made (no OpenGL, no ffmpeg, no room) it goes on with a
+/// warning. Returns the files.
 std::vector<std::string> draw_and_film(const DemoScene& scene, const std::function<Pose(double)>& pose_at,
                                        const std::string& picture, const std::string& film, Session& session) {
     std::vector<std::string> made;
@@ -32,7 +33,7 @@ std::vector<std::string> draw_and_film(const DemoScene& scene, const std::functi
         film_demo(scene, pose_at, stage, film, session);
         made.push_back(film);
     } catch (const Failure& failure) {
-        if (failure.error.code != ErrorCode::unsupported) throw;
+        if (failure.error.code == ErrorCode::cancelled) throw;
         session.warn(failure.error.message);
     }
     return made;

@@ -101,8 +101,9 @@ Runs parse(const std::string& text, const TextStyle& style) {
         const char c = text[at];
         const char next = at + 1 < text.size() ? text[at + 1] : '\0';
         if (c == '\\' && next != '\0') {
-            add(std::string(1, next));
-            at += 2;
+            const std::size_t behind = std::max<std::size_t>(1, character_length(text, at + 1));
+            add(text.substr(at + 1, behind));
+            at += 1 + behind;
         } else if (c == '*') {
             bool& flag = next == '*' ? bold : italic;
             flag = !flag;

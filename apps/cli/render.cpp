@@ -3,6 +3,7 @@
 #include "restore_options.h"
 #include "stage.h"
 
+#include <algorithm>
 #include <charconv>
 #include <filesystem>
 #include <numbers>
@@ -38,7 +39,6 @@ struct Options {
     std::string scalar, against, unit;
     std::vector<double> range;
     ColorMap map = ColorMap::sequential;
-    bool has_map = false;
     unsigned passes = 0;
     bool turntable = false;
     unsigned frames = 90;
@@ -103,7 +103,7 @@ struct Subject {
     std::optional<Drawable> drawable;
 };
 
-std::string stem(const std::string& path) {
+std::string file_name(const std::string& path) {
     return path == "-" ? "standard input" : std::filesystem::path(path).filename().string();
 }
 
@@ -136,7 +136,9 @@ private:
     Session& session_;
     Stage stage_;
     std::optional<Mesh> against_;
-    ValueRange range_; ///< of the scalars shown; fixed by --range or by what is drawn first
+    Box clip_box_;          ///< films: of all moments, so that the plane stands still
+    float film_radius_ = 0; ///< films: of the balls, as in the first frame
+    ValueRange range_;      ///< of the scalars shown; fixed by --range or by what is drawn first
     bool range_known_ = false;
     std::size_t triangles_ = 0, points_ = 0;
 };
@@ -191,8 +193,9 @@ void Rendering::choose_scalars(Subject& subject, const std::string& path) {
             const MeshDistance distance = require(mesh_distance(subject.mesh, *against_, 0, context()));
             values = distance.vertices ? distance.vertices->per_vertex
                                        : require(distances_to_surface(subject.mesh, *against_, context()));
-            subject.scalars = heat_map(std::move(values), distance.diagonal).values;
-            if (options_.unit.empty()) subject.scalar_title = "error / diagonal";
+            const bool in_units = !options_.unit.empty(); // else as fractions of the diagonal
+            subject.scalars = heat_map(std::move(values), in_units ? 1 : distance.diagonal).values;
+            if (!in_units) subject.scalar_title = "error / diagonal";
         }
     } else {
         for (const VertexScalar& scalar : subject.mesh.scalars)
@@ -216,7 +219,8 @@ ValueRange Rendering::range_of(std::span<const float> values) const {
 void Rendering::upload(Subject& subject) {
     ScalarColors scalars{subject.scalars, options_.map, range_};
     if (options_.points || subject.mesh.face_count() == 0) {
-        PointOptions points{static_cast<float>(options_.point_radius), scalars, subject.mesh.colors};
+        const float radius = film_radius_ > 0 ? film_radius_ : static_cast<float>(options_.point_radius);
+        PointOptions points{radius, scalars, subject.mesh.colors};
         subject.drawable = require(Drawable::points(subject.mesh.positions, subject.mesh.origin, points, context()));
     } else {
         SurfaceOptions surface;
@@ -259,7 +263,7 @@ Scene Rendering::scene_of(const Subject& subject) const {
     if (has_scalars()) look.gloss = 0.15f; // colours are to be read
     if (options_.clip) {
         const ClipOption& clip = *options_.clip;
-        const Box& box = subject.drawable->box();
+        const Box box = clip_box_.empty() ? world_bounds(subject.mesh) : clip_box_; // where the vertices are
         const double sign = clip.keeps_far_side ? -1 : 1;
         look.clip = ClipPlane{sign * Vec3d::Unit(clip.axis),
                               sign * (box.min[clip.axis] + clip.fraction * box.size()[clip.axis])};
@@ -283,6 +287,7 @@ Camera Rendering::camera_for(std::span<const CameraPoints> points, double aspect
     camera.field_of_view_deg = options_.field_of_view;
     const double distance = (camera.eye - camera.target).norm();
     if (!(distance > 0)) refuse("--camera: eye and target are the same point; the camera looks nowhere.");
+    if (!(camera.up.norm() > 0)) refuse("--camera: the direction that is up has no length.");
     camera.height = distance;
     return camera;
 }
@@ -329,7 +334,7 @@ void Rendering::still() {
     const std::size_t count = options_.files.size();
     const bool captions = !options_.no_captions && (count > 1 || !options_.captions.empty());
     const Layout layout(count, options_.size, captions, has_scalars());
-    const bool is_vector = std::filesystem::path(options_.output).extension() != ".png";
+    const bool is_vector = lower_ending(options_.output) != ".png";
     const double aspect = double(layout.width) / layout.height;
 
     // With one camera or one range for all, all are read first.
@@ -356,7 +361,7 @@ void Rendering::still() {
         if (!range_known_) range_ = range_of(subject.scalars);
         upload(subject);
         if (!options_.poses.empty()) set_pose(subject, options_.poses[0], true);
-        const CameraPoints points{subject.mesh.positions, subject.mesh.origin};
+        const CameraPoints points{subject.mesh.positions, subject.mesh.origin, subject.drawable->point_radius()};
         const Camera camera = shared ? *shared : camera_for(std::span(&points, 1), aspect);
         Picture picture = stage_.take(scene_of(subject), camera, picture_options(layout.width, layout.height));
         title = subject.scalar_title;
@@ -368,7 +373,7 @@ void Rendering::still() {
         const Point corner = layout.corner(i);
         page.picture(picture, corner, layout.width, layout.height);
         if (captions)
-            page.text(i < options_.captions.size() ? options_.captions[i] : Page::plain(stem(options_.files[i])),
+            page.text(i < options_.captions.size() ? options_.captions[i] : Page::plain(file_name(options_.files[i])),
                       {corner.x() + 0.5 * layout.width, corner.y() + layout.height + 22},
                       {.size = 15, .align = Align::centre});
     }
@@ -422,7 +427,15 @@ void Rendering::film() {
         for (std::size_t v = 0; v < subject->scalars.size(); v += stride) values.push_back(subject->scalars[v]);
     }
     range_ = range_of(values);
+    clip_box_ = all;
     CameraPoints points{seen_points, *centre};
+    if (by_file && moments > 1) subject = read(options_.files[0]);
+    if (by_pose) set_pose(*subject, options_.poses[0], false);
+    upload(*subject);
+    film_radius_ = subject->drawable->point_radius();
+    points.radius = film_radius_;
+    all.min.array() -= film_radius_;
+    all.max.array() += film_radius_;
     std::vector<Vec3f> ring; // a turning object needs room all around
     if (options_.turntable) {
         const Vec3d up = up_vector(options_.up);
@@ -439,7 +452,7 @@ void Rendering::film() {
                 ring.push_back((Eigen::AngleAxisd(k * std::numbers::pi / 24, up) * (edge.first * up.unitOrthogonal()) +
                                 edge.second * up)
                                    .cast<float>());
-        points = {ring, all.centre()};
+        points = {ring, all.centre(), points.radius};
     }
     Camera camera = camera_for(std::span(&points, 1), aspect);
     if (options_.turntable && options_.camera.empty()) {
@@ -500,6 +513,23 @@ void check(const Options& options, bool is_film) {
         refuse("--camera takes 6 numbers (eye and target) or 9 (and the direction that is up).");
     if (!options.range.empty() && !(options.range[0] < options.range[1]))
         refuse("--range: the first number has to be below the second.");
+    if (options.captions.size() > options.files.size())
+        refuse(fmt::format("There are {} captions for {} files.", options.captions.size(), options.files.size()));
+    if (is_film && !options.captions.empty()) refuse("A film has no captions; leave --caption out.");
+    if (!options.against.empty() && options.scalar != "error" && options.scalar != "strain")
+        refuse("--against is what --scalar error and --scalar strain are measured against; say which.");
+    if (options.scalar.empty() && (!options.range.empty() || !options.unit.empty()))
+        refuse("--range and --unit belong to --scalar; say which numbers to show.");
+    if (options.shared_camera && !options.poses.empty()) refuse("--shared-camera is for several files; leave it out.");
+    if (is_film && (std::count(options.files.begin(), options.files.end(), "-") ||
+                    std::count(options.poses.begin(), options.poses.end(), "-")))
+        refuse("A film reads its files twice, and standard input can be read once; give file names.");
+    const bool has_page = is_film ? !options.scalar.empty()
+                                  : !options.scalar.empty() || !options.captions.empty() || options.files.size() > 1 ||
+                                        lower_ending(options.output) != ".png";
+    if (options.background == "transparent" && (has_page || is_film))
+        refuse("--background transparent is for one picture in a .png without captions and legend; films and pages are "
+               "white below.");
     if (options.turntable && !is_film)
         refuse("--turntable makes a film; give -o a name that ends in .mp4 or .gif, or frame_%04d.png.");
     if (is_film && !options.turntable && options.poses.size() < 2 && options.files.size() < 2)
@@ -518,7 +548,7 @@ void add_render(CLI::App& app, Session& session) {
     CLI::App* command = app.add_subcommand("render", "Draw meshes, point sets and models: a picture or a film");
     command
         ->add_option("files", options->files,
-                     "Meshes, point sets or models; several stand side by side, or one "
+                     "Meshes, point sets or models, before the options; several stand side by side, or one "
                      "after the other in a film")
         ->required();
     command
@@ -568,7 +598,10 @@ void add_render(CLI::App& app, Session& session) {
         *command, "--map", {{"sequential", ColorMap::sequential}, {"diverging", ColorMap::diverging}},
         [options](ColorMap map) { options->map = map; },
         "Colours: for amounts, or for signed amounts (unset: sequential)");
-    command->add_option("--caption", options->captions, "One a file (unset: the names, where there are several)")
+    command
+        ->add_option(
+            "--caption", options->captions,
+            "One a file (unset: the names, where there are several); C_m, 10^{-3}, *italic* and **bold** are set so")
         ->allow_extra_args(false); // else it would take the files behind it
     command->add_flag("--no-captions", options->no_captions, "Draw no captions");
     command->add_flag("--no-ground", options->no_ground, "Draw no shadow on the ground");

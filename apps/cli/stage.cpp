@@ -4,6 +4,7 @@
 #include "filigree/io/material_file.h"
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <filesystem>
 
@@ -46,8 +47,15 @@ Vec3f parse_color(const std::string& text, const std::string& option) {
     throw Failure{{ErrorCode::usage, option + ": '" + text + "' is no colour; write it as #rrggbb, such as #d04030."}};
 }
 
+std::string lower_ending(const std::string& path) {
+    std::string ending = std::filesystem::path(path).extension().string();
+    std::transform(ending.begin(), ending.end(), ending.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    return ending;
+}
+
 void check_picture_path(const std::string& path) {
-    const std::string ending = std::filesystem::path(path).extension().string();
+    const std::string ending = lower_ending(path);
     if (ending != ".png" && ending != ".svg" && ending != ".pdf")
         throw Failure{{ErrorCode::unsupported, path + ": is no picture's name; let it end in .png, .svg or .pdf."}};
     std::error_code ignored;

@@ -33,6 +33,9 @@ LoadedMaterials load_materials(const Mesh& mesh, const std::string& path, Sessio
 /// "#d04030", sRGB; otherwise a Failure that names the option.
 Vec3f parse_color(const std::string& text, const std::string& option);
 
+/// How a file's name ends, in small letters: ".png".
+std::string lower_ending(const std::string& path);
+
 /// Refuses, before any work, a name that ends in none of .png, .svg and .pdf, or lies in no folder.
 void check_picture_path(const std::string& path);
 

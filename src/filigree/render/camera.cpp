@@ -51,12 +51,16 @@ struct Reach {
 
     static constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-    void extend(const Vec3d& p) {
-        box.extend(p);
-        right = std::max(right, p.x() + slope_x * p.z());
-        left = std::max(left, -p.x() + slope_x * p.z());
-        top = std::max(top, p.y() + slope_y * p.z());
-        bottom = std::max(bottom, -p.y() + slope_y * p.z());
+    /// A ball, or a point.
+    void extend(const Vec3d& p, double radius = 0) {
+        box.extend(p + Vec3d::Constant(radius));
+        box.extend(p - Vec3d::Constant(radius));
+        const double across = radius * std::sqrt(1 + slope_x * slope_x),
+                     along = radius * std::sqrt(1 + slope_y * slope_y);
+        right = std::max(right, p.x() + slope_x * p.z() + across);
+        left = std::max(left, -p.x() + slope_x * p.z() + across);
+        top = std::max(top, p.y() + slope_y * p.z() + along);
+        bottom = std::max(bottom, -p.y() + slope_y * p.z() + along);
     }
 };
 
@@ -135,7 +139,8 @@ Camera fit_camera(std::span<const CameraPoints> points, const Vec3d& direction, 
     const std::optional<Vec3d> reference = reference_point(points);
     for (const CameraPoints& part : points) {
         const Vec3d offset = axes.transpose() * (part.origin - *reference);
-        for (const Vec3f& position : part.positions) reach.extend(axes.transpose() * position.cast<double>() + offset);
+        for (const Vec3f& position : part.positions)
+            reach.extend(axes.transpose() * position.cast<double>() + offset, part.radius);
     }
     if (!reference) {
         const Box cube = unit_cube();

@@ -38,6 +38,7 @@ Vec3d view_direction(View view, UpAxis up);
 struct CameraPoints {
     std::span<const Vec3f> positions;
     Vec3d origin = Vec3d::Zero();
+    double radius = 0; ///< of balls around them, model units
 };
 
 /// The camera that looks along -direction and shows all points as large as they fit in a picture of that aspect (width

@@ -217,6 +217,7 @@ Drawable::~Drawable() = default;
 const Box& Drawable::box() const { return content_->box; }
 std::size_t Drawable::triangle_count() const { return content_->triangle_count; }
 std::size_t Drawable::point_count() const { return content_->point_count; }
+float Drawable::point_radius() const { return content_->radius; }
 
 Result<Drawable> Drawable::surface(const Mesh& mesh, const SurfaceOptions& options, const RunContext& context) {
     if (mesh.face_count() == 0) return nothing_to_draw();

@@ -64,6 +64,7 @@ public:
     const Box& box() const; ///< of what is drawn, in the world; for a posed model not smaller than it
     std::size_t triangle_count() const;
     std::size_t point_count() const;
+    float point_radius() const; ///< of the balls, model units; 0 for surfaces
 
     struct Content;
     const Content& content() const { return *content_; }

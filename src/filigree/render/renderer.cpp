@@ -656,6 +656,7 @@ Result<Picture> Renderer::picture(const Scene& scene, const Camera& camera, cons
         if (context.is_cancelled()) return cancelled_error();
         context.report("drawing", double(c.done) / c.passes);
     }
+    c.scene.objects.clear(); // they need not outlive this call
     const auto w = static_cast<GLsizei>(c.width), h = static_cast<GLsizei>(c.height);
     const Texture color = make_texture(GL_RGBA8, w, h);
     const Framebuffer framebuffer = make_framebuffer(&color, nullptr);

@@ -72,7 +72,8 @@ public:
                             const RunContext& context);
 
     /// For windows: starts over, with passes to come of `passes` in all; add_pass draws the next (false: all done);
-    /// show puts the sum so far into `framebuffer` (an OpenGL name; 0 is the window) of that size.
+    /// show puts the sum so far into `framebuffer` (an OpenGL name; 0 is the window) of that size. The scene's
+    /// drawables must outlive the last add_pass. Errors of begin as of picture.
     Status begin(const Scene& scene, const Camera& camera, unsigned width, unsigned height, unsigned passes);
     bool add_pass();
     void show(unsigned framebuffer) const;

@@ -31,7 +31,8 @@ void main() {
     }
     vec3 albedo = base_color;
     if (has_colors) albedo = ball.color.rgb;
-    if (has_scalars) albedo = texture(scalar_colors, (clamp(ball.scalar, 0.0, 1.0) * 255.0 + 0.5) / 256.0).rgb;
+    if (has_scalars && ball.scalar < -0.25) albedo = vec3(0.2); // no value
+    else if (has_scalars) albedo = texture(scalar_colors, (clamp(ball.scalar, 0.0, 1.0) * 255.0 + 0.5) / 256.0).rgb;
     vec3 normal = normalize(position - ball.centre);
     result = vec4(shade(position, normal, normal, albedo, gloss), 1.0);
 }
