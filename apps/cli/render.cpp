@@ -527,9 +527,8 @@ void check(const Options& options, bool is_film) {
     const bool has_page = is_film ? !options.scalar.empty()
                                   : !options.scalar.empty() || !options.captions.empty() || options.files.size() > 1 ||
                                         lower_ending(options.output) != ".png";
-    if (options.background == "transparent" && (has_page || is_film))
-        refuse("--background transparent is for one picture in a .png without captions and legend; films and pages are "
-               "white below.");
+    if (options.background == "transparent" && has_page)
+        refuse("--background transparent is for one picture in a .png without captions and legend; a page is white.");
     if (options.turntable && !is_film)
         refuse("--turntable makes a film; give -o a name that ends in .mp4 or .gif, or frame_%04d.png.");
     if (is_film && !options.turntable && options.poses.size() < 2 && options.files.size() < 2)

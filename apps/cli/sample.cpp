@@ -55,8 +55,10 @@ std::vector<Vec3d> points_in_view(const Mesh& mesh, const Options& options, cons
     std::copy_n(options.frustum.begin(), 3, frustum.counts.begin());
     const std::vector<Vec3d> points = require(frustum_points(frustum));
     tested = points.size();
-    const double start = now_seconds();
+    const double begin = now_seconds();
     const InsideTest test = require(InsideTest::create(mesh, inside, context));
+    const double start = now_seconds();
+    report.setup_seconds = start - begin;
     const std::vector<std::uint8_t> answers = require(test.contains(points, context));
     report.used = test.used();
     report.seconds = now_seconds() - start;
@@ -118,7 +120,7 @@ void run_sample(Options options, Session& session) {
         points = require(spread_inside(mesh, lattice, options.pattern, options.inside, context, &report));
         spacing = lattice.spacing;
         counts = lattice.counts();
-        for (int axis = 0; axis < 3; ++axis) origin[axis] = lattice.coordinates[axis][0];
+        for (int axis = 0; axis < 3; ++axis) origin[axis] = mesh.origin[axis] + lattice.coordinates[axis][0];
         tested = static_cast<std::size_t>(lattice.point_count());
     }
     Mesh cloud;
@@ -139,7 +141,8 @@ void run_sample(Options options, Session& session) {
     Table table;
     table.row("points inside", fmt::format("{} of {}", with_commas(points.size()), with_commas(tested)));
     table.row("spacing", fmt::format("{:.6g} units", spacing));
-    table.row("method", fmt::format("{} in {}", method_name(report.used), seconds_text(report.seconds)));
+    table.row("method", fmt::format("{} in {}, set up in {}", method_name(report.used), seconds_text(report.seconds),
+                                    seconds_text(report.setup_seconds)));
     if (report.used == InsideMethod::scan)
         table.row("crossings",
                   fmt::format("{} ({} decided in integers, {} in expansions)", with_commas_64(report.scan.crossings),
@@ -157,6 +160,7 @@ void run_sample(Options options, Session& session) {
                                  {"integers", report.scan.tally.integers},
                                  {"expansions", report.scan.tally.expansions},
                                  {"near_half", report.winding.near_half},
+                                 {"setup_seconds", report.setup_seconds},
                                  {"seconds", report.seconds}});
 }
 

@@ -105,6 +105,7 @@ Result<Occupancy> sample_inside(const Mesh& mesh, const Lattice& lattice, const 
     if (!welded) return welded.error();
     found.closure = welded->closure;
     const std::span<const Triangle> triangles = welded->triangles;
+    found.setup_seconds = now_seconds() - start;
 
     Result<Occupancy> occupancy = Occupancy{};
     if (found.used == InsideMethod::scan) {
@@ -116,6 +117,7 @@ Result<Occupancy> sample_inside(const Mesh& mesh, const Lattice& lattice, const 
         const Result<RayParity> rays =
             RayParity::create(mesh.positions, triangles, options.eye ? &*options.eye : nullptr, context);
         if (!rays) return rays.error();
+        found.setup_seconds = now_seconds() - start;
         occupancy->counts = lattice.counts();
         occupancy->words_per_row = (lattice.counts()[0] + 63) / 64;
         const double bytes =
@@ -140,7 +142,7 @@ Result<Occupancy> sample_inside(const Mesh& mesh, const Lattice& lattice, const 
                             std::uint64_t{1} << (i & 63);
         }
     }
-    found.seconds = now_seconds() - start;
+    found.seconds = now_seconds() - start - found.setup_seconds;
     return occupancy;
 }
 

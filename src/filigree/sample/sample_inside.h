@@ -43,7 +43,8 @@ struct InsideReport {
     ScanReport scan;
     RayParity::Count rays;
     WindingReport winding;
-    double seconds = 0;
+    double setup_seconds = 0; ///< welding, finding out how the mesh closes, building trees
+    double seconds = 0;       ///< deciding about the points
 };
 
 /// Which of a lattice's points are inside. The same answer by scan and by rays on every closed mesh.

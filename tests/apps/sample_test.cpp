@@ -1,0 +1,80 @@
+// filigree sample, as a user runs it.
+#include "apps/program.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+using namespace filigree_test;
+
+namespace {
+
+class Sample : public Program {
+protected:
+    void make_cube() { ok({"make", "wavy-cube", "-o", "cube.obj", "--resolution", "16", "--quiet"}); }
+    void make_open() {
+        make_cube();
+        ASSERT_EQ(run_shell("head -n -3 cube.obj > open.obj").code, 0);
+    }
+};
+
+TEST_F(Sample, CountsAndMethodsAgree) {
+    make_cube();
+    const Json scan = json({"sample", "cube.obj", "-o", "scan.ply", "--count", "3000"});
+    EXPECT_EQ(scan.at("method"), "scan");
+    EXPECT_NEAR(scan.at("points").get<double>(), 3000, 150);
+    const std::string spacing = scan.at("spacing_units").dump();
+    const Json rays = json({"sample", "cube.obj", "-o", "rays.ply", "--spacing", spacing, "--method", "rays"});
+    const Json winding = json({"sample", "cube.obj", "-o", "winding.ply", "--spacing", spacing, "--method", "winding"});
+    EXPECT_EQ(bytes_of(path("scan.ply")), bytes_of(path("rays.ply")));
+    EXPECT_EQ(bytes_of(path("scan.ply")), bytes_of(path("winding.ply")));
+    EXPECT_EQ(rays.at("points"), scan.at("points"));
+    EXPECT_EQ(winding.at("open_edges"), 0);
+}
+
+TEST_F(Sample, AnOpenMeshIsTakenByWindingNumbers) {
+    make_open();
+    const Json open = json({"sample", "open.obj", "-o", "points.ply", "--spacing", "0.1"});
+    EXPECT_EQ(open.at("method"), "winding");
+    EXPECT_GT(open.at("points").get<int>(), 500);
+    EXPECT_EQ(open.at("warnings").size(), 1u);
+    fails(7, {"sample", "open.obj", "-o", "x.ply", "--spacing", "0.1", "--method", "scan"}, {"open edges", "winding"});
+}
+
+TEST_F(Sample, PatternsAreSeeded) {
+    make_cube();
+    for (const char* pattern : {"jitter", "poisson"}) {
+        const std::vector<std::string> base = {"sample", "cube.obj", "--spacing", "0.1", "--pattern", pattern, "-o"};
+        const auto with = [&](const char* file, const char* seed) {
+            std::vector<std::string> arguments = base;
+            arguments.insert(arguments.end(), {file, "--seed", seed, "--quiet"});
+            ok(arguments);
+            return bytes_of(path(file));
+        };
+        EXPECT_EQ(with("a.ply", "1"), with("b.ply", "1"));
+        EXPECT_NE(with("a.ply", "1"), with("c.ply", "2"));
+    }
+}
+
+TEST_F(Sample, WrongArgumentsAreRefusedInASentence) {
+    make_cube();
+    fails(2, {"sample", "cube.obj", "-o", "x.ply"}, {"--spacing", "--count"});
+    fails(2, {"sample", "cube.obj", "-o", "x.ply", "--spacing", "0"}, {"--spacing"});
+    fails(2, {"sample", "cube.obj", "-o", "x.ply", "--spacing", "nan"}, {"--spacing"});
+    fails(7, {"sample", "cube.obj", "-o", "x.ply", "--spacing", "1e-9"}, {"spacing"});
+    fails(5, {"sample", "cube.obj", "-o", "x.ply", "--spacing", "0.1", "--picture", "x.jpg"}, {"x.jpg"});
+    ok({"sample", "cube.obj", "-o", "points.ply", "--spacing", "0.2", "--quiet"});
+    fails(7, {"sample", "points.ply", "-o", "x.ply", "--spacing", "0.2", "--quiet"}, {"no faces"});
+    for (const std::string& name : files()) EXPECT_FALSE(name.starts_with("x.")) << name;
+}
+
+TEST_F(Sample, FrustumOfTheReport) {
+    make_cube();
+    const Json view = json({"sample", "cube.obj", "-o", "points.ply", "--frustum", "12", "12", "12"});
+    EXPECT_EQ(view.at("method"), "rays");
+    EXPECT_EQ(view.at("tested"), 1728);
+    EXPECT_GT(view.at("points").get<int>(), 100);
+    EXPECT_LT(view.at("points").get<int>(), 1000);
+}
+
+} // namespace
