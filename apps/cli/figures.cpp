@@ -29,6 +29,7 @@ constexpr FigureEntry kFigures[] = {
     {"2.9", draw_removed_detail, "one and three levels removed"},
     {"2.10", draw_deformation_process, "stretched, detail returned"},
     {"3.1", draw_extreme_deformation, "an extreme deformation"},
+    {"border", draw_border_rays, "rays through vertices and edges, answered"},
     {"codes", draw_fidelity, "the codes and a wrap deformer compared"},
 };
 
@@ -93,7 +94,7 @@ void add_figures(CLI::App& app, Session& session) {
     auto options = std::make_shared<Options>();
     CLI::App* command = app.add_subcommand("figures", "The report's figures, drawn from what the program computes");
     command->add_option("-o,--output", options->output, "Folder for the figures")->capture_default_str();
-    command->add_option("--only", options->only, "Figures to draw: 1.1, 2.1, ... 3.1, codes (unset: all)")
+    command->add_option("--only", options->only, "Figures to draw: 1.1, 2.1, ... 3.1, border, codes (unset: all)")
         ->type_name("NAME");
     add_choice<std::string>(
         *command, "--format", {{"png", "png"}, {"svg", "svg"}, {"pdf", "pdf"}},

@@ -61,6 +61,7 @@ Figure draw_recursive_storing(FigureRenderer& renderer);   // 2.8
 Figure draw_removed_detail(FigureRenderer& renderer);      // 2.9
 Figure draw_deformation_process(FigureRenderer& renderer); // 2.10
 Figure draw_extreme_deformation(FigureRenderer& renderer); // 3.1
+Figure draw_border_rays(FigureRenderer& renderer);         // our own
 Figure draw_fidelity(FigureRenderer& renderer);            // our own
 
 } // namespace filigree::cli

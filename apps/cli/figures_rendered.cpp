@@ -179,6 +179,78 @@ Figure draw_inside_points(FigureRenderer& renderer) {
             {{"inside", points.positions.size()}, {"lattice", lattice.counts()}, {"crossings", report.scan.crossings}}};
 }
 
+/// The cases of figures 2.3 and 2.4, each asked from an eye that makes the ray meet the cube exactly there.
+Figure draw_border_rays(FigureRenderer& renderer) {
+    struct Case {
+        const char* name;
+        Vec3d through, direction;
+    };
+    const Case cases[] = {
+        {"a vertex of four quads", {0, -0.5, 0.25}, {0.25, 1, -0.25}},
+        {"a corner of three quads", {-0.5, -0.5, 0.5}, {1, 1, -1}},
+        {"an edge of two quads", {0.125, -0.5, 0.25}, {0.25, 1, -0.5}},
+        {"a corner, touched", {-0.5, -0.5, 0.5}, {1, -1, 0.25}},
+        {"an edge, touched", {0.125, -0.5, 0.5}, {0.25, 1, 1}},
+        {"along an edge", {0, -0.5, 0.5}, {1, 0, 0}},
+    };
+    constexpr double kPanelHeight = 200;
+    constexpr float kRadius = 0.035f;
+    const RunContext& context = renderer.context();
+    const Mesh cube = make_wavy_cube({.resolution = 4, .amplitude = 0});
+    const std::vector<Triangle> triangles = weld_triangles(cube).triangles;
+    Page page = captioned_page(content_height(2, kPanelHeight), "Rays at the border",
+                               "Points on rays that meet a cube of quads exactly at a vertex or an edge, told by the "
+                               "parity of crossings from an eye on "
+                               "the same line. Blue points are inside, grey ones outside. Piercing counts once and "
+                               "touching not at all, without a list "
+                               "of cases: the point counts as moved by an infinitely small step.");
+    const std::vector<Panel> panels = panels_in_rows(2, 3, kPanelHeight);
+    renderer.start();
+    const Drawable wires = require(Drawable::surface(cube, {}, context));
+    Json values = Json::array();
+    for (std::size_t c = 0; c < std::size(cases); ++c) {
+        const Case& shown = cases[c];
+        const Vec3d eye = shown.through - 4 * shown.direction;
+        const RayParity rays = require(RayParity::create(cube.positions, triangles, &eye, context));
+        std::vector<Vec3f> inside, outside;
+        std::size_t wrong = 0;
+        for (int step = -5; step <= 9; ++step) {
+            const Vec3d p = shown.through + step / 8.0 * shown.direction;
+            const bool is_inside = rays.contains(p);
+            (is_inside ? inside : outside).push_back(p.cast<float>());
+            const double depth = 0.5 - p.cwiseAbs().maxCoeff(); // below the cube's surface; 0 is on it
+            wrong += depth != 0 && is_inside != (depth > 0);
+        }
+        Scene scene;
+        Appearance wire, blue, grey;
+        wire.surface = false;
+        wire.edge_width = 1.2f;
+        blue.color = {0.20f, 0.42f, 0.80f};
+        grey.color = {0.62f, 0.63f, 0.65f};
+        scene.objects.push_back({&wires, wire});
+        std::vector<Drawable> balls;
+        balls.reserve(2);
+        for (const auto& [points, look] : {std::pair(&inside, blue), std::pair(&outside, grey)}) {
+            if (points->empty()) continue;
+            balls.push_back(require(Drawable::points(*points, Vec3d::Zero(), {.radius = kRadius}, context)));
+            scene.objects.push_back({&balls.back(), look});
+        }
+        scene.ground = false;
+        const CameraPoints all[] = {
+            {cube.positions, cube.origin}, {inside, Vec3d::Zero(), kRadius}, {outside, Vec3d::Zero(), kRadius}};
+        const Panel& panel = panels[c];
+        const Camera camera =
+            fit_camera(all, Vec3d(0.42, -0.9, 0.36), Vec3d::UnitZ(), panel.width / panel.height, 26, 0.04);
+        page.picture(renderer.picture(std::move(scene), camera, panel.width, panel.height), panel.top_left, panel.width,
+                     panel.height);
+        constexpr const char* kNumbers[] = {"i", "ii", "iii", "iv", "v", "vi"};
+        subcaption(page, panel, kNumbers[c], shown.name);
+        values.push_back(
+            {{"case", shown.name}, {"inside", inside.size()}, {"outside", outside.size()}, {"wrong", wrong}});
+    }
+    return {std::move(page), {{"cases", values}}};
+}
+
 Figure draw_removed_detail(FigureRenderer& renderer) {
     constexpr double kPanelHeight = 310;
     const Mesh cube = make_wavy_cube({.resolution = 64});
