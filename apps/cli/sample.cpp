@@ -130,7 +130,7 @@ void run_sample(Options options, Session& session) {
     if (points.empty())
         session.warn(
             fmt::format("{}: no point is inside; take a smaller spacing than {:.4g}.", options.input, spacing));
-    if (report.used == InsideMethod::winding)
+    if (report.used == InsideMethod::winding && report.winding.open_edges > 0)
         session.warn(
             fmt::format("{}: is not closed ({} edges do not close), so winding numbers decided; {:.2g} % of the "
                         "points were near the border between inside and outside.",
