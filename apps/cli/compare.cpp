@@ -2,7 +2,6 @@
 #include "stage.h"
 
 #include <cmath>
-#include <filesystem>
 
 namespace filigree::cli {
 
@@ -41,10 +40,6 @@ void draw_errors(const Mesh& a, const Mesh& b, const std::string& names, const M
     page.text(caption, {kWidth / 2.0, kHeight + 26}, {.size = 15, .align = Align::centre});
     if (context.is_cancelled()) throw Failure{cancelled_error()};
     require(page.write(path, 1));
-}
-
-std::string file_name(const std::string& path) {
-    return path == "-" ? "standard input" : std::filesystem::path(path).filename().string();
 }
 
 } // namespace

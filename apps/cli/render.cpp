@@ -103,10 +103,6 @@ struct Subject {
     std::optional<Drawable> drawable;
 };
 
-std::string file_name(const std::string& path) {
-    return path == "-" ? "standard input" : std::filesystem::path(path).filename().string();
-}
-
 class Rendering {
 public:
     Rendering(const Options& options, Session& session) : options_(options), session_(session), stage_(session) {
@@ -463,14 +459,14 @@ void Rendering::film() {
         camera.eye -= off - off.dot(shift) * shift;
     }
 
-    std::size_t shown = moments; // the moment that is uploaded: none
+    std::size_t shown = by_pose ? moments : 0; // the moment that is uploaded; moments: none
     for (std::size_t f = 0; f < frames; ++f) {
         if (context().is_cancelled()) throw Failure{cancelled_error()};
         context().report("filming", double(f) / double(frames));
         const std::size_t moment = f * moments / frames;
         if (moment != shown) {
-            if (by_file || !subject->drawable) {
-                if (by_file) subject = read(options_.files[moment]);
+            if (by_file) {
+                subject = read(options_.files[moment]);
                 triangles_ = points_ = 0;
                 upload(*subject);
             }

@@ -47,6 +47,10 @@ Vec3f parse_color(const std::string& text, const std::string& option) {
     throw Failure{{ErrorCode::usage, option + ": '" + text + "' is no colour; write it as #rrggbb, such as #d04030."}};
 }
 
+std::string file_name(const std::string& path) {
+    return path == "-" ? "standard input" : std::filesystem::path(path).filename().string();
+}
+
 std::string lower_ending(const std::string& path) {
     std::string ending = std::filesystem::path(path).extension().string();
     std::transform(ending.begin(), ending.end(), ending.begin(),

@@ -33,6 +33,8 @@ LoadedMaterials load_materials(const Mesh& mesh, const std::string& path, Sessio
 /// "#d04030", sRGB; otherwise a Failure that names the option.
 Vec3f parse_color(const std::string& text, const std::string& option);
 
+/// What a picture calls a file.
+std::string file_name(const std::string& path);
 /// How a file's name ends, in small letters: ".png".
 std::string lower_ending(const std::string& path);
 

@@ -1,6 +1,7 @@
 #include "filigree/mesh/mesh_distance.h"
 
 #include "filigree/core/parallel_for.h"
+#include "filigree/core/random.h"
 #include "filigree/mesh/closest_point.h"
 #include "filigree/mesh/normals.h"
 #include "filigree/mesh/triangulate.h"
@@ -63,14 +64,6 @@ VertexDistance compare_vertices(const Mesh& a, const Mesh& b, const RunContext& 
     if (a.vertex_count() > 0) result.rms = std::sqrt(sum_of_squares / double(a.vertex_count()));
     compare_normals(a, b, context, result);
     return result;
-}
-
-/// Random numbers by counter, so that each sample has its own whatever thread asks: [Steele 2014], SplitMix64.
-double random_unit(std::uint64_t seed, std::uint64_t counter) {
-    std::uint64_t x = seed * 0xD1342543DE82EF95u + (counter + 1) * 0x9E3779B97F4A7C15u;
-    x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;
-    x = (x ^ (x >> 27)) * 0x94D049BB133111EBu;
-    return double((x ^ (x >> 31)) >> 11) * 0x1p-53;
 }
 
 struct Surface {

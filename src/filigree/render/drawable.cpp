@@ -3,6 +3,7 @@
 #include "filigree/core/parallel_for.h"
 #include "filigree/render/color_map.h"
 #include "filigree/render/drawable_content.h"
+#include "filigree/render/octahedron.h"
 
 #include <algorithm>
 #include <array>
@@ -13,21 +14,6 @@ namespace filigree {
 namespace {
 
 using gl::Buffer;
-
-std::int16_t to_snorm(float x) { return static_cast<std::int16_t>(std::lround(std::clamp(x, -1.0f, 1.0f) * 32767.0f)); }
-
-/// A unit vector on an octahedron unfolded to a square [Meyer et al. 2010]; -32768, which nothing else has, for zero.
-std::array<std::int16_t, 2> to_octahedron(const Vec3f& n) {
-    const float size = std::abs(n.x()) + std::abs(n.y()) + std::abs(n.z());
-    if (!(size > 0)) return {-32768, -32768};
-    float x = n.x() / size, y = n.y() / size;
-    if (n.z() < 0) {
-        const float folded = (1 - std::abs(y)) * (x >= 0 ? 1.0f : -1.0f);
-        y = (1 - std::abs(x)) * (y >= 0 ? 1.0f : -1.0f);
-        x = folded;
-    }
-    return {to_snorm(x), to_snorm(y)};
-}
 
 std::array<std::uint8_t, 4> to_bytes(const Vec4f& color) {
     std::array<std::uint8_t, 4> bytes;
@@ -144,8 +130,8 @@ Status Drawable::Content::upload_surface(const Mesh& mesh, std::span<const Vec3f
         const auto points =
             in_draw_order<Vec3f>(draw, drawn_at, [&](std::size_t d) { return mesh_positions[vertex(d)]; });
         if (Status s = set_input(positions, std::span(points), kPosition, 3, GL_FLOAT, GL_FALSE); !s) return s;
-        const auto packed = in_draw_order<std::array<std::int16_t, 2>>(
-            draw, drawn_at, [&](std::size_t d) { return to_octahedron(draw.normals[d]); });
+        const auto packed =
+            in_draw_order<std::uint32_t>(draw, drawn_at, [&](std::size_t d) { return octahedral(draw.normals[d]); });
         if (Status s = set_input(normals, std::span(packed), kNormal, 2, GL_SHORT, GL_FALSE); !s) return s;
     }
     has_uvs = !draw.uvs.empty();

@@ -2,6 +2,7 @@
 
 #include "filigree/hierarchy/blend_kernel.h"
 #include "filigree/render/gl_objects.h"
+#include "filigree/render/octahedron.h"
 #include "filigree/render/shaders.h"
 
 #include <algorithm>
@@ -15,23 +16,6 @@ namespace {
 constexpr GLuint kRecordInput = 4, kMoreInput = 5;                           // shaders/restore.glsl: vertex inputs
 constexpr GLuint kTransformBinding = 0, kCellBinding = 1, kBlockBinding = 2; // and storage bindings
 constexpr unsigned kBlockBits = 16;                                          // records that count from one cell
-
-/// A direction in 2 x 16 bits, to 0.003 degrees. The one pair that no direction has stands for the zero normal.
-std::uint32_t octahedral(const Vec3f& n) {
-    constexpr std::uint32_t kZero = 0x80008000u;
-    const float sum = n.cwiseAbs().sum();
-    if (!(sum > 0 && sum <= std::numeric_limits<float>::max())) return kZero;
-    float x = n.x() / sum, y = n.y() / sum;
-    if (n.z() < 0) {
-        const float folded_x = std::copysign(1 - std::abs(y), x);
-        y = std::copysign(1 - std::abs(x), y);
-        x = folded_x;
-    }
-    const auto bits = [](float value) {
-        return static_cast<std::uint16_t>(static_cast<std::int16_t>(std::round(32767 * value)));
-    };
-    return std::uint32_t{bits(x)} | std::uint32_t{bits(y)} << 16;
-}
 
 std::uint32_t pair(std::int16_t low, std::int16_t high) {
     return std::uint32_t{static_cast<std::uint16_t>(low)} | std::uint32_t{static_cast<std::uint16_t>(high)} << 16;

@@ -1,6 +1,7 @@
 #include "filigree/sample/sample_inside.h"
 
 #include "filigree/core/parallel_for.h"
+#include "filigree/core/random.h"
 #include "filigree/mesh/triangulate.h"
 #include "filigree/mesh/weld.h"
 
@@ -16,14 +17,6 @@ namespace {
 
 double now_seconds() {
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
-/// A number of [0, 1) for each (seed, counter) [Steele et al. 2014].
-double random_unit(std::uint64_t seed, std::uint64_t counter) {
-    std::uint64_t x = seed * 0xD1342543DE82EF95u + (counter + 1) * 0x9E3779B97F4A7C15u;
-    x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;
-    x = (x ^ (x >> 27)) * 0x94D049BB133111EBu;
-    return double((x ^ (x >> 31)) >> 11) * 0x1p-53;
 }
 
 Closure closure_of(std::span<const Triangle> triangles, std::span<const Vec3f> positions) {
