@@ -1,0 +1,56 @@
+// A body: the particles inside a mesh, what they weigh, how they hang together, and the skin that touches others.
+#pragma once
+
+#include "filigree/physics/cells.h"
+#include "filigree/physics/embedding.h"
+#include "filigree/physics/material.h"
+#include "filigree/physics/vectors.h"
+
+namespace filigree {
+
+/// Points of the surface that touch obstacles and other bodies and catch wind, about half a spacing apart.
+struct Skin {
+    Embedding points;           ///< on the mesh's surface
+    std::vector<Vec3f> normals; ///< unit, outward, at rest
+    std::vector<float> areas;   ///< m^2, share of the surface
+};
+
+/// Everything about a body that does not change while it moves. Rest positions are in metres along the mesh's own axes,
+/// relative to the mesh's origin times the scale.
+struct Body {
+    Material material;
+    double scale = 1; ///< metres a model unit
+    Cells cells;
+    /// fem, springs: the corners of the cells. meshfree: one in each cell, at the centroid of its occupied part (and
+    /// eight in a cell whose neighbours lie in a plane or line, so that gradients exist everywhere).
+    Vectors rest;
+    std::vector<float> mass;   ///< kg
+    std::vector<float> volume; ///< m^3: occupied, shared out as the mass is
+    Skin skin;
+
+    double spacing() const { return cells.spacing; }
+    std::size_t particle_count() const { return rest.size(); }
+};
+
+struct BodyOptions {
+    double scale = 1;  ///< metres a model unit, above 0
+    CellOptions cells; ///< count: of particles, about
+};
+
+struct BodyReport {
+    CellReport cells;
+    std::size_t split_cells = 0; ///< meshfree: with eight particles
+    std::size_t skin_points = 0;
+    double mass = 0;     ///< kg
+    std::string warning; ///< a sentence where parts are fewer than two cells across, or left out; or ""
+};
+
+/// A body from a mesh. Errors: as make_cells; usage (check_material, scale).
+Result<Body> make_body(const Mesh& mesh, const Material& material, const BodyOptions& options,
+                       const RunContext& context, BodyReport* report = nullptr);
+
+/// A body of whole cells without a mesh: skin points at the centres of its outer faces, split in four. For tests and
+/// benchmarks.
+Body make_body(Cells cells, const Material& material);
+
+} // namespace filigree

@@ -1,0 +1,35 @@
+// Signed distance from a mesh, on a grid: what bodies collide with.
+#pragma once
+
+#include "filigree/core/result.h"
+#include "filigree/core/run_context.h"
+#include "filigree/mesh/mesh.h"
+
+namespace filigree {
+
+/// Distances at the points of a regular grid around a mesh, negative inside, trilinear in between.
+class DistanceField {
+public:
+    struct Sample {
+        float distance; ///< m, negative inside
+        Vec3f normal;   ///< unit, outward: the direction in which the distance grows
+    };
+
+    /// Of a mesh with coordinates times `scale`, relative to the mesh's origin; `spacing` in m (0: a 64th of the
+    /// longest side). Inside is told as by InsideMethod::automatic. Errors: as InsideTest; unsuitable (more than 2^27
+    /// points), cancelled.
+    static Result<DistanceField> create(const Mesh& mesh, double scale, double spacing, const RunContext& context);
+
+    /// Outside the grid the distance to the grid is added, so it is a lower bound's estimate: far points are far.
+    Sample at(const Vec3f& point) const;
+    const Box& box() const { return box_; } ///< of the grid
+
+private:
+    Box box_;
+    Vec3f corner_;
+    float spacing_ = 0;
+    std::array<std::size_t, 3> counts_ = {};
+    std::vector<float> distances_;
+};
+
+} // namespace filigree

@@ -1,0 +1,45 @@
+// Points that go along with particles: which particles carry each, by which weights.
+#pragma once
+
+#include "filigree/core/run_context.h"
+#include "filigree/physics/vectors.h"
+
+#include <span>
+
+namespace filigree {
+
+struct Cells;
+
+/// Point i is carried by particles[offsets[i] .. offsets[i + 1]) with weights that sum to 1 and reproduce linear
+/// functions: sum w X = rest[i].
+struct Embedding {
+    std::vector<Vec3f> rest; ///< m
+    std::vector<Index> offsets = {0};
+    std::vector<Index> particles;
+    std::vector<float> weights;
+
+    std::size_t size() const { return rest.size(); }
+};
+
+struct EmbeddingReport {
+    std::size_t far_points = 0; ///< with too few particles near; carried by the nearest ones
+    float least_weight = 0;     ///< most negative
+};
+
+/// Linearly precise moving-least-squares weights over the particles within 1.75 spacings of each point; more of them
+/// where those do not span space. Cost O(points log particles).
+Embedding embed(std::span<const Vec3f> points, const Vectors& rest, double spacing, const RunContext& context,
+                EmbeddingReport* report = nullptr);
+
+/// Trilinear weights in the cell that holds each point (or the nearest cell): positive inside, eight a point. For the
+/// corners of cells.
+Embedding embed_in_cells(std::span<const Vec3f> points, const Cells& cells, const RunContext& context);
+
+/// Where the points went, and the deformation gradients there, by the Hermite form of docs/bodies.md:
+///     A = sum w F_j,   c' = sum w (x_j + 1/2 (F_j + A) (c - X_j)).
+/// An affine motion of the particles is followed exactly. `gradients` may be empty: not wanted. Cost O(weights).
+void move_embedded(const Embedding& embedding, const Vectors& rest, const Vectors& positions,
+                   std::span<const Mat3f> particle_gradients, std::span<Vec3f> points, std::span<Mat3f> gradients,
+                   const RunContext& context);
+
+} // namespace filigree

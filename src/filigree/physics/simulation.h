@@ -1,0 +1,98 @@
+// Bodies in a world, moved frame by frame.
+#pragma once
+
+#include "filigree/physics/body.h"
+#include "filigree/physics/elasticity.h"
+#include "filigree/physics/world.h"
+
+namespace filigree {
+
+/// A body and how it starts.
+struct Actor {
+    std::shared_ptr<const Body> body;
+    Eigen::Isometry3d placement = Eigen::Isometry3d::Identity(); ///< from the body's rest positions to the world
+    Vec3d velocity = Vec3d::Zero();                              ///< m/s
+    Vec3d spin = Vec3d::Zero();                                  ///< rad/s about the centre of mass
+};
+
+/// explicit_steps: symplectic Euler, as many substeps as stability asks for. descent: vertex block descent, a fixed
+/// number of implicit substeps. automatic: the first where it takes no more than most_substeps, else the second.
+enum class StepMode { automatic, explicit_steps, descent };
+
+struct StepOptions {
+    double frames_per_second = 60;
+    StepMode mode = StepMode::automatic;
+    unsigned most_substeps = 64;
+    unsigned descent_substeps = 4, descent_iterations = 8;
+    bool contacts_between_bodies = true;
+};
+
+/// What a frame took and met.
+struct FrameReport {
+    StepMode used = StepMode::explicit_steps;
+    unsigned substeps = 0;
+    std::size_t contacts = 0;     ///< skin points that touch something, at the frame's end
+    double deepest_contact = 0;   ///< m below a surface
+    float least_volume_ratio = 1; ///< smallest J; 0 or less: inverted
+    float most_stretch = 1;
+    double elastic_seconds = 0, contact_seconds = 0, other_seconds = 0;
+    std::size_t clamped_particles = 0; ///< whose motion was not finite, or whose start was scaled down
+};
+
+struct Energy {
+    double kinetic = 0, elastic = 0, potential = 0; ///< J; potential: of gravity, relative to the world's origin
+    double total() const { return kinetic + elastic + potential; }
+};
+struct Momentum {
+    Vec3d linear = Vec3d::Zero();  ///< kg m/s
+    Vec3d angular = Vec3d::Zero(); ///< kg m^2/s, about the world's origin
+};
+
+/// Same bytes for any number of threads, and for a run that was saved and restored in between.
+class Simulation {
+public:
+    /// Errors: usage (no bodies, a pin or hand of a body that is not there, an option out of its range).
+    static Result<Simulation> create(World world, std::vector<Actor> actors, const StepOptions& options,
+                                     const RunContext& context);
+    Simulation(Simulation&&) noexcept;
+    Simulation& operator=(Simulation&&) noexcept;
+    ~Simulation();
+
+    /// One frame. Errors: cancelled (the state is that of the frame's start).
+    Result<FrameReport> advance(const RunContext& context);
+
+    std::size_t frame() const; ///< frames done
+    double time() const;       ///< s
+    const World& world() const;
+    std::size_t body_count() const;
+    const Body& body(std::size_t body) const;
+    const Vectors& positions(std::size_t body) const;  ///< world, m
+    const Vectors& velocities(std::size_t body) const; ///< m/s
+    /// For tests, and for whoever starts a body in another shape.
+    void set_positions(std::size_t body, const Vectors& positions);
+    void set_velocities(std::size_t body, const Vectors& velocities);
+    /// Hands may come and go while it runs.
+    void set_hands(std::vector<Hand> hands);
+
+    Energy energy(const RunContext& context) const;
+    Momentum momentum() const;
+
+    /// Points that go along with a body: its driver, or all of a mesh. Rest positions in the body's rest space, m.
+    /// Returns a number for attached_*.
+    std::size_t attach(std::size_t body, std::span<const Vec3f> points, const RunContext& context);
+    /// Where they are now (world, m) and the gradients from rest to there. `gradients` may be empty: not wanted.
+    void attached(std::size_t attachment, std::span<Vec3f> points, std::span<Mat3f> gradients,
+                  const RunContext& context) const;
+
+    /// Everything that moves, as bytes (docs/scenes.md), and back. Errors: bad_file (damaged), mismatch (of other
+    /// bodies).
+    std::string save() const;
+    Status restore(std::string_view bytes);
+
+private:
+    struct Content;
+    explicit Simulation(std::unique_ptr<Content> content);
+    std::unique_ptr<Content> content_;
+};
+
+} // namespace filigree

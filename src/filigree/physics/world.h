@@ -1,0 +1,97 @@
+// What is around bodies: gravity, obstacles, forces, hands, wind, and how they move in time.
+#pragma once
+
+#include "filigree/physics/distance_field.h"
+
+#include <memory>
+#include <variant>
+#include <vector>
+
+namespace filigree {
+
+/// A value that changes in time: linear between keys, constant before the first and after the last.
+template <class T>
+struct Keyed {
+    std::vector<double> times; ///< s, ascending; empty: `constant`
+    std::vector<T> values;     ///< one a time
+    T constant{};
+
+    T at(double time) const {
+        if (times.empty()) return constant;
+        if (time <= times.front()) return values.front();
+        for (std::size_t k = 1; k < times.size(); ++k)
+            if (time < times[k]) {
+                const double t = (time - times[k - 1]) / (times[k] - times[k - 1]);
+                return T(values[k - 1] + (values[k] - values[k - 1]) * t);
+            }
+        return values.back();
+    }
+};
+
+/// A rigid motion: turn about `centre` by `angle` (the angle times a unit axis), then move.
+struct RigidMotion {
+    Vec3d centre = Vec3d::Zero();
+    Keyed<Vec3d> move{{}, {}, Vec3d::Zero()};  ///< m
+    Keyed<Vec3d> angle{{}, {}, Vec3d::Zero()}; ///< axis times radians
+
+    Eigen::Isometry3d at(double time) const;
+};
+
+struct HalfSpace {
+    Vec3d point = Vec3d::Zero(), normal = {0, 1, 0}; ///< solid below
+};
+struct Ball {
+    Vec3d centre = Vec3d::Zero();
+    double radius = 1;
+};
+struct Cuboid {
+    Vec3d centre = Vec3d::Zero(), size = Vec3d::Ones(); ///< along the axes before the obstacle's motion
+};
+struct MeshObstacle {
+    std::shared_ptr<const DistanceField> field;
+    Vec3d offset = Vec3d::Zero(); ///< added to the field's coordinates
+};
+
+/// Something solid that bodies touch and that does not feel them.
+struct Obstacle {
+    std::variant<HalfSpace, Ball, Cuboid, MeshObstacle> shape;
+    RigidMotion motion;
+    double friction = 0.5;    ///< Coulomb's coefficient
+    double restitution = 0.5; ///< 0 .. 1: speed of a hard point after the bounce over that before
+};
+
+/// Particles held fast: they follow `motion`, from where they were at the start.
+struct Pin {
+    std::size_t body = 0;
+    std::vector<Index> particles;
+    RigidMotion motion;
+};
+
+/// A force on the particles of a region, or of the whole body, shared out by mass.
+struct RegionForce {
+    std::size_t body = 0;
+    std::vector<Index> particles;
+    Keyed<Vec3d> force{{}, {}, Vec3d::Zero()}; ///< N, of the whole region
+};
+
+/// A hand that pulls a point of a body's surface towards a moving target by a damped spring.
+struct Hand {
+    std::size_t body = 0;
+    Vec3f point = Vec3f::Zero();                                      ///< of the body at rest
+    double stiffness = 0;                                             ///< N/m; 0: chosen from the body's
+    Keyed<Vec3d> target{{}, {}, Vec3d::Zero()};                       ///< world, m
+    double from = 0, until = std::numeric_limits<double>::infinity(); ///< s
+};
+
+struct World {
+    Vec3d gravity = {0, -9.81, 0};            ///< m/s^2
+    Keyed<Vec3d> wind{{}, {}, Vec3d::Zero()}; ///< m/s
+    double air_density = 0;                   ///< kg/m^3: wind presses by 1/2 density |v| v on the area that faces it
+    std::vector<Obstacle> obstacles;
+    std::vector<Pin> pins;
+    std::vector<RegionForce> forces;
+    std::vector<Hand> hands;
+    double body_friction = 0.3; ///< between bodies
+};
+
+} // namespace filigree
