@@ -82,11 +82,14 @@ public:
     /// Deformation gradients at the particles, relative to reference().
     virtual void gradients(const Vectors& positions, std::span<Mat3f> gradients, const RunContext& context) = 0;
 
-    /// After each substep: plastic flow, heat, neighbours. Does nothing for elastic materials.
+    /// After each substep: plastic flow, heat. Does nothing for elastic materials.
     virtual void finish_substep(const Vectors& positions, float dt, const RunContext& context);
-    /// How often the particles' neighbourhoods were renewed. Each time reference() becomes the positions of that
-    /// moment, and points that go along with the particles are to be embedded anew there.
-    virtual std::size_t renewals() const;
+    /// Whether finish_substep found neighbourhoods so distorted that they should be renewed. Two calls, so that the
+    /// stepper can move what is embedded in the body by the old gradients first.
+    virtual bool wants_renewal() const;
+    /// Neighbours and weights anew: reference() becomes `positions`, gradients the identity; what is stored (elastic
+    /// strain, volume ratio) goes along, so forces stay what they were as nearly as may be.
+    virtual void renew(const Vectors& positions, const RunContext& context);
 
     /// Stored state as bytes, and back; empty for elastic materials. restore_state is false for bytes of another body.
     virtual std::string state() const;
