@@ -59,6 +59,9 @@ struct CellReport {
 Result<Cells> make_cells(const Mesh& mesh, double scale, const CellOptions& options, const RunContext& context,
                          CellReport* report = nullptr);
 
+/// Whole cells at these indices, in any order. Cost O(n log n).
+Cells lattice_cells(std::vector<Cells::LatticeIndex> indices, double spacing, const Vec3d& origin);
+
 /// Cells of a solid box of nx * ny * nz cells, for tests and benchmarks; corner (0, 0, 0) at `origin`.
 Cells box_cells(std::size_t nx, std::size_t ny, std::size_t nz, double spacing, const Vec3d& origin = Vec3d::Zero());
 

@@ -1,0 +1,127 @@
+#include "filigree/physics/body.h"
+
+#include "filigree/core/parallel_for.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+
+namespace filigree {
+
+namespace {
+
+/// Below this mean square of its neighbours' offsets along some direction, in spacings, a cell's particle has no
+/// gradient in that direction.
+constexpr float kLeastSpread = 0.01f;
+
+/// Particles at the corners: each cell gives an eighth of its mass to each of its corners.
+void use_corners(Body& body) {
+    const Cells& cells = body.cells;
+    body.rest = Vectors(cells.corners.size());
+    for (std::size_t c = 0; c < cells.corners.size(); ++c) {
+        const auto& index = cells.corners[c];
+        body.rest.set(c, (cells.origin + cells.spacing * Vec3d(index[0], index[1], index[2])).cast<float>());
+    }
+    const double eighth = cells.spacing * cells.spacing * cells.spacing / 8;
+    std::vector<double> volume(cells.corners.size());
+    for (std::size_t c = 0; c < cells.cells.size(); ++c)
+        for (const Index corner : cells.cell_corners[c]) volume[corner] += cells.fraction[c] * eighth;
+    body.volume.assign(volume.begin(), volume.end());
+}
+
+/// Whether the centroids around a cell's spread in all directions.
+bool has_spread(const Cells& cells, std::size_t cell) {
+    const auto& index = cells.cells[cell];
+    Mat3f moment = Mat3f::Zero();
+    int count = 0;
+    for (int k = -1; k <= 1; ++k)
+        for (int j = -1; j <= 1; ++j)
+            for (int i = -1; i <= 1; ++i) {
+                if (i == 0 && j == 0 && k == 0) continue;
+                const Index neighbour = cells.find_cell(index[0] + i, index[1] + j, index[2] + k);
+                if (neighbour == kNoIndex) continue;
+                const Vec3f offset = (cells.centroid[neighbour] - cells.centroid[cell]) / float(cells.spacing);
+                moment += offset * offset.transpose();
+                ++count;
+            }
+    if (count < 3) return false;
+    const Eigen::SelfAdjointEigenSolver<Mat3f> eigen(moment / float(count), Eigen::EigenvaluesOnly);
+    return eigen.eigenvalues()[0] >= kLeastSpread;
+}
+
+/// One particle a cell, or eight where one would have no gradient. Returns how many cells have eight.
+std::size_t use_centroids(Body& body, const RunContext& context) {
+    const Cells& cells = body.cells;
+    std::vector<std::uint8_t> spread(cells.cells.size());
+    parallel_for(context, spread.size(), 1024, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t c = begin; c < end; ++c) spread[c] = has_spread(cells, c);
+    });
+    const auto split = std::size_t(std::count(spread.begin(), spread.end(), 0));
+    body.rest = Vectors(cells.cells.size() + 7 * split);
+    body.volume.resize(body.rest.size());
+    const double cube = cells.spacing * cells.spacing * cells.spacing;
+    const auto quarter = float(cells.spacing / 4);
+    std::size_t particle = 0;
+    for (std::size_t c = 0; c < cells.cells.size(); ++c) {
+        const unsigned parts = spread[c] ? 1 : 8;
+        for (unsigned part = 0; part < parts; ++part, ++particle) {
+            Vec3f position = cells.centroid[c];
+            if (parts == 8)
+                for (int axis = 0; axis < 3; ++axis) position[axis] += part >> axis & 1 ? quarter : -quarter;
+            body.rest.set(particle, position);
+            body.volume[particle] = float(cells.fraction[c] * cube / parts);
+        }
+    }
+    return split;
+}
+
+/// Fills rest, volume and mass. Returns how many cells were split.
+std::size_t make_particles(Body& body, const RunContext& context) {
+    std::size_t split = 0;
+    if (body.material.model == MaterialModel::meshfree)
+        split = use_centroids(body, context);
+    else
+        use_corners(body);
+    body.mass.resize(body.volume.size());
+    for (std::size_t p = 0; p < body.mass.size(); ++p) body.mass[p] = float(body.material.density * body.volume[p]);
+    return split;
+}
+
+Embedding embed_skin(std::span<const Vec3f> points, const Body& body, const RunContext& context) {
+    return body.material.model == MaterialModel::meshfree ? embed(points, body.rest, body.spacing(), context)
+                                                          : embed_in_cells(points, body.cells, context);
+}
+
+} // namespace
+
+Body make_body(Cells cells, const Material& material) {
+    const RunContext context;
+    Body body;
+    body.material = material;
+    body.cells = std::move(cells);
+    make_particles(body, context);
+
+    std::vector<Vec3f> points;
+    const double h = body.spacing();
+    for (const auto& cell : body.cells.cells)
+        for (int axis = 0; axis < 3; ++axis)
+            for (int side = -1; side <= 1; side += 2) {
+                std::array<int, 3> next = {cell[0], cell[1], cell[2]};
+                next[axis] += side;
+                if (body.cells.find_cell(next[0], next[1], next[2]) != kNoIndex) continue;
+                Vec3d normal = Vec3d::Zero();
+                normal[axis] = side;
+                const Vec3d centre = Vec3d(cell[0], cell[1], cell[2]) + Vec3d::Constant(0.5) + 0.5 * normal;
+                for (int quarter = 0; quarter < 4; ++quarter) {
+                    Vec3d at = centre;
+                    at[(axis + 1) % 3] += quarter & 1 ? 0.25 : -0.25;
+                    at[(axis + 2) % 3] += quarter & 2 ? 0.25 : -0.25;
+                    points.push_back((body.cells.origin + h * at).cast<float>());
+                    body.skin.normals.push_back(normal.cast<float>());
+                    body.skin.areas.push_back(float(h * h / 4));
+                }
+            }
+    body.skin.points = embed_skin(points, body, context);
+    return body;
+}
+
+} // namespace filigree

@@ -1,0 +1,342 @@
+#include "filigree/physics/embedding.h"
+
+#include "filigree/core/parallel_for.h"
+#include "filigree/physics/cells.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
+namespace filigree {
+
+namespace {
+
+constexpr std::size_t kGrain = 2048;   // points in a piece of parallel work
+constexpr double kRadius = 1.75;       // spacings; smaller is sharper, and 1.75 always holds a cell's eight corners
+constexpr double kRadiusGrowth = 1.25; // where the particles in it do not do
+constexpr int kAttempts = 6;
+constexpr double kLeastWeight = -0.5; // beyond, a weight makes more of the noise of its particle than of its motion
+/// 27 det / trace^3 of the particles' covariance, 1 for a round cloud: below, they count as lying in a plane.
+constexpr double kSpanning = 2e-3;
+
+/// Particles sorted into the boxes of a regular grid, those of a row of boxes one after the other.
+class ParticleGrid {
+public:
+    ParticleGrid(const Vectors& rest, double spacing) {
+        Box box;
+        for (std::size_t i = 0; i < rest.size(); ++i) box.extend(rest[i].cast<double>());
+        low_ = box.min;
+        step_ = spacing;
+        const double most = 8.0 * double(rest.size()) + 4096;
+        const auto counts = [&] { return ((box.size() / step_).array().floor() + 1).eval(); };
+        while (counts().prod() > most) step_ *= 1.25;
+        for (int axis = 0; axis < 3; ++axis) counts_[axis] = int(counts()[axis]);
+
+        std::vector<std::size_t> box_of(rest.size());
+        offsets_.assign(std::size_t(counts_[0]) * counts_[1] * counts_[2] + 1, 0);
+        for (std::size_t i = 0; i < rest.size(); ++i) {
+            const Vec3d q = (rest[i].cast<double>() - low_) / step_;
+            box_of[i] = row(int(q[1]), int(q[2])) + std::size_t(int(q[0]));
+            ++offsets_[box_of[i] + 1];
+        }
+        for (std::size_t b = 1; b < offsets_.size(); ++b) offsets_[b] += offsets_[b - 1];
+        std::vector<Index> next(offsets_.begin(), offsets_.end() - 1);
+        positions_.resize(rest.size());
+        particles_.resize(rest.size());
+        for (std::size_t i = 0; i < rest.size(); ++i) {
+            const Index slot = next[box_of[i]]++;
+            positions_[slot] = rest[i].cast<double>();
+            particles_[slot] = Index(i);
+        }
+    }
+
+    struct Near {
+        Index particle;
+        Vec3d position;
+        double squared_distance;
+    };
+    /// Particles closer than `radius`.
+    void find(const Vec3d& point, double radius, std::vector<Near>& found) const {
+        found.clear();
+        std::array<int, 3> begin, end;
+        for (int axis = 0; axis < 3; ++axis) {
+            const double at = (point[axis] - low_[axis]) / step_, reach = radius / step_;
+            begin[axis] = int(std::clamp(std::floor(at - reach), 0.0, double(counts_[axis])));
+            end[axis] = int(std::clamp(std::floor(at + reach) + 1, 0.0, double(counts_[axis])));
+        }
+        if (begin[0] >= end[0]) return;
+        for (int k = begin[2]; k < end[2]; ++k)
+            for (int j = begin[1]; j < end[1]; ++j) {
+                const Index last = offsets_[row(j, k) + std::size_t(end[0])];
+                for (Index s = offsets_[row(j, k) + std::size_t(begin[0])]; s < last; ++s) {
+                    const double d = (positions_[s] - point).squaredNorm();
+                    if (d < radius * radius) found.push_back({particles_[s], positions_[s], d});
+                }
+            }
+    }
+
+private:
+    std::size_t row(int j, int k) const { return (std::size_t(k) * counts_[1] + j) * counts_[0]; }
+
+    Vec3d low_;
+    double step_;
+    std::array<int, 3> counts_;
+    std::vector<Index> offsets_, particles_;
+    std::vector<Vec3d> positions_;
+};
+
+/// What the weights of one point are made of.
+struct Fit {
+    std::vector<ParticleGrid::Near> near;
+    std::vector<double> weights;
+    double least = 0; ///< weight
+
+    /// Linearly precise weights at `point`. False where the particles do not span space; then, if `anyway`, weights
+    /// that are linearly precise in the plane or line that they do span.
+    bool solve(const Vec3d& point, double radius, bool anyway) {
+        weights.resize(near.size());
+        double sum = 0;
+        Vec3d mean = Vec3d::Zero();
+        for (std::size_t n = 0; n < near.size(); ++n) {
+            const double s = 1 - near[n].squared_distance / (radius * radius);
+            weights[n] = s * s * s;
+            sum += weights[n];
+            mean += weights[n] * (near[n].position - point);
+        }
+        if (!(sum > 0)) return false;
+        mean /= sum;
+        Mat3d covariance = Mat3d::Zero();
+        for (std::size_t n = 0; n < near.size(); ++n) {
+            const Vec3d d = near[n].position - point - mean;
+            const Vec3d wd = weights[n] * d;
+            covariance.col(0) += wd[0] * d;
+            covariance.col(1) += wd[1] * d;
+            covariance.col(2) += wd[2] * d;
+        }
+        const double trace = covariance.trace();
+        Vec3d slope;
+        if (near.size() >= 4 && 27 * covariance.determinant() > kSpanning * trace * trace * trace)
+            slope = covariance.inverse() * -mean;
+        else if (anyway)
+            slope = within_span(covariance, -mean);
+        else
+            return false;
+        least = 0;
+        for (std::size_t n = 0; n < near.size(); ++n) {
+            weights[n] *= 1 / sum + slope.dot(near[n].position - point - mean);
+            least = std::min(least, weights[n]);
+        }
+        return true;
+    }
+
+private:
+    static Vec3d within_span(const Mat3d& covariance, const Vec3d& b) {
+        const Eigen::SelfAdjointEigenSolver<Mat3d> eigen(covariance);
+        Vec3d slope = Vec3d::Zero();
+        for (int i = 0; i < 3; ++i)
+            if (eigen.eigenvalues()[i] > 1e-2 * eigen.eigenvalues()[2])
+                slope += eigen.eigenvectors().col(i).dot(b) / eigen.eigenvalues()[i] * eigen.eigenvectors().col(i);
+        return slope;
+    }
+};
+
+/// What one piece of parallel work finds.
+struct Piece {
+    std::vector<Index> counts, particles;
+    std::vector<float> weights;
+    EmbeddingReport report;
+};
+
+void embed_point(const Vec3d& point, const ParticleGrid& grid, double spacing, Fit& fit, Piece& piece) {
+    const auto accept = [&] {
+        piece.counts.push_back(Index(fit.near.size()));
+        for (std::size_t n = 0; n < fit.near.size(); ++n) {
+            piece.particles.push_back(fit.near[n].particle);
+            piece.weights.push_back(float(fit.weights[n]));
+        }
+        piece.report.least_weight = std::min(piece.report.least_weight, float(fit.least));
+    };
+    // Far points reach one spacing further than their nearest particle.
+    double growth = 1, nearest = 0;
+    grid.find(point, kRadius * spacing, fit.near);
+    for (double radius = kRadius * spacing; fit.near.empty(); grid.find(point, radius, fit.near))
+        radius *= kRadiusGrowth;
+    nearest = INFINITY;
+    for (const auto& near : fit.near) nearest = std::min(nearest, std::sqrt(near.squared_distance));
+    const auto reach = [&] { return std::max(kRadius * spacing * growth, nearest + spacing * growth); };
+    for (int attempt = 0; attempt < kAttempts; ++attempt, growth *= kRadiusGrowth) {
+        const double radius = reach();
+        if (attempt > 0 || radius > kRadius * spacing) grid.find(point, radius, fit.near);
+        if (fit.solve(point, radius, false) && fit.least >= kLeastWeight) return accept();
+    }
+    // Not to be had: what can be had from those around the nearest particle, and no slope where that shoots too far.
+    ++piece.report.far_points;
+    growth = 1;
+    const double radius = reach();
+    grid.find(point, radius, fit.near);
+    fit.solve(point, radius, true);
+    if (fit.least < kLeastWeight) {
+        double sum = 0;
+        for (std::size_t n = 0; n < fit.near.size(); ++n) {
+            const double s = 1 - fit.near[n].squared_distance / (radius * radius);
+            sum += fit.weights[n] = s * s * s;
+        }
+        for (double& weight : fit.weights) weight /= sum;
+        fit.least = 0;
+    }
+    accept();
+}
+
+} // namespace
+
+Embedding embed(std::span<const Vec3f> points, const Vectors& rest, double spacing, const RunContext& context,
+                EmbeddingReport* report) {
+    Embedding embedding;
+    embedding.rest.assign(points.begin(), points.end());
+    embedding.offsets.assign(points.size() + 1, 0);
+    if (report) *report = {};
+    if (points.empty() || rest.size() == 0) return embedding;
+
+    const ParticleGrid grid(rest, spacing);
+    std::vector<Piece> pieces((points.size() + kGrain - 1) / kGrain);
+    parallel_for(context, points.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        Piece& piece = pieces[begin / kGrain];
+        Fit fit;
+        for (std::size_t p = begin; p < end; ++p) embed_point(points[p].cast<double>(), grid, spacing, fit, piece);
+    });
+
+    std::size_t total = 0;
+    for (const Piece& piece : pieces) total += piece.particles.size();
+    embedding.particles.reserve(total);
+    embedding.weights.reserve(total);
+    std::size_t point = 0;
+    for (Piece& piece : pieces) {
+        for (const Index count : piece.counts) {
+            embedding.offsets[point + 1] = embedding.offsets[point] + count;
+            ++point;
+        }
+        embedding.particles.insert(embedding.particles.end(), piece.particles.begin(), piece.particles.end());
+        embedding.weights.insert(embedding.weights.end(), piece.weights.begin(), piece.weights.end());
+        if (report) {
+            report->far_points += piece.report.far_points;
+            report->least_weight = std::min(report->least_weight, piece.report.least_weight);
+        }
+        piece = {};
+    }
+    return embedding;
+}
+
+namespace {
+
+/// The cell that holds a point given in spacings from the lattice's origin, else the nearest.
+Index nearest_cell(const Cells& cells, const Vec3d& at) {
+    const Vec3d low = at.array().floor();
+    if ((low.array() >= -1).all() && (low.array() <= 65535).all()) {
+        const std::array<int, 3> index = {int(low[0]), int(low[1]), int(low[2])};
+        if (const Index cell = cells.find_cell(index[0], index[1], index[2]); cell != kNoIndex) return cell;
+    }
+    const auto outside = [](double x, double begin, double end) { return std::max({begin - x, x - end, 0.0}); };
+    double least = std::numeric_limits<double>::infinity();
+    Index nearest = 0;
+    for (const Cells::Run& run : cells.runs) {
+        const auto& first = cells.cells[run.first_cell];
+        const double z = outside(at[2], first[2], first[2] + 1.0);
+        const double y = outside(at[1], first[1], first[1] + 1.0);
+        if (z * z + y * y >= least) continue;
+        const double x = outside(at[0], first[0], double(first[0]) + run.count);
+        const double distance = z * z + y * y + x * x;
+        if (distance >= least) continue;
+        least = distance;
+        nearest = run.first_cell + Index(std::clamp(low[0] - first[0], 0.0, run.count - 1.0));
+    }
+    return nearest;
+}
+
+} // namespace
+
+Embedding embed_in_cells(std::span<const Vec3f> points, const Cells& cells, const RunContext& context) {
+    Embedding embedding;
+    embedding.rest.assign(points.begin(), points.end());
+    embedding.offsets.assign(points.size() + 1, 0);
+    if (points.empty() || cells.cells.empty()) return embedding;
+    for (std::size_t p = 0; p <= points.size(); ++p) embedding.offsets[p] = Index(8 * p);
+    embedding.particles.resize(8 * points.size());
+    embedding.weights.resize(8 * points.size());
+    parallel_for(context, points.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t p = begin; p < end; ++p) {
+            const Vec3d at = (points[p].cast<double>() - cells.origin) / cells.spacing;
+            const Index cell = nearest_cell(cells, at);
+            const auto& index = cells.cells[cell];
+            const Vec3d t = at - Vec3d(index[0], index[1], index[2]);
+            // Trilinear in the cell, and linear beyond it: the products would shoot up there.
+            const Vec3d inside = t.cwiseMax(0.0).cwiseMin(1.0), beyond = t - inside;
+            for (unsigned corner = 0; corner < 8; ++corner) {
+                double weight = 1, slope = 0;
+                for (int axis = 0; axis < 3; ++axis) {
+                    const bool up = corner >> axis & 1;
+                    weight *= up ? inside[axis] : 1 - inside[axis];
+                    slope += up ? beyond[axis] : -beyond[axis];
+                }
+                embedding.particles[8 * p + corner] = cells.cell_corners[cell][corner];
+                embedding.weights[8 * p + corner] = float(weight + slope / 4);
+            }
+        }
+    });
+    return embedding;
+}
+
+namespace {
+
+typedef float Float4 __attribute__((vector_size(16)));
+
+Float4 load(const float* from) {
+    Float4 values;
+    __builtin_memcpy(&values, from, sizeof values);
+    return values;
+}
+
+} // namespace
+
+void move_embedded(const Embedding& embedding, const Vectors& rest, const Vectors& positions,
+                   std::span<const Mat3f> particle_gradients, std::span<Vec3f> points, std::span<Mat3f> gradients,
+                   const RunContext& context) {
+    assert(points.size() == embedding.size() && (gradients.empty() || gradients.size() == points.size()));
+    parallel_for(context, points.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t p = begin; p < end; ++p) {
+            const Index first = embedding.offsets[p], last = embedding.offsets[p + 1];
+            const Vec3f c = embedding.rest[p];
+            if (first == last) { // no particles at all
+                points[p] = c;
+                if (!gradients.empty()) gradients[p] = Mat3f::Identity();
+                continue;
+            }
+            // Relative to one of the particles: weights that sum to 1 up to rounding then do no harm far from the
+            // origin. The fourth lane carries something and means nothing.
+            const Vec3f base = positions[embedding.particles[first]];
+            Float4 a0 = {}, a1 = {}, a2 = {}; // columns of A
+            Float4 moved = {}, half = {}, arm = {};
+            for (Index n = first; n < last; ++n) {
+                const Index j = embedding.particles[n];
+                const float w = embedding.weights[n];
+                const float* f = particle_gradients[j].data();
+                const Float4 tail =
+                    load(f + 5); // f22 of the second column, and the third: nothing past the end is read
+                const Float4 f0 = w * load(f), f1 = w * load(f + 3);
+                const Float4 f2 = w * __builtin_shuffle(tail, (Float4){}, (decltype(tail < tail)){1, 2, 3, 0});
+                const float dx = c.x() - rest.x[j], dy = c.y() - rest.y[j], dz = c.z() - rest.z[j];
+                a0 += f0;
+                a1 += f1;
+                a2 += f2;
+                half += f0 * dx + f1 * dy + f2 * dz;
+                arm += w * Float4{dx, dy, dz, 0};
+                moved += w * Float4{positions.x[j] - base.x(), positions.y[j] - base.y(), positions.z[j] - base.z(), 0};
+            }
+            const Float4 offset = moved + 0.5f * (half + a0 * arm[0] + a1 * arm[1] + a2 * arm[2]);
+            points[p] = base + Vec3f(offset[0], offset[1], offset[2]);
+            if (!gradients.empty()) gradients[p] << a0[0], a1[0], a2[0], a0[1], a1[1], a2[1], a0[2], a1[2], a2[2];
+        }
+    });
+}
+
+} // namespace filigree
