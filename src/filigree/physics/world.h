@@ -60,6 +60,9 @@ struct Obstacle {
     double restitution = 0.5; ///< 0 .. 1: speed of a hard point after the bounce over that before
 };
 
+/// Distance and outward normal of an obstacle that stands at `motion` (its RigidMotion at some time). World, m.
+DistanceField::Sample distance_to(const Obstacle& obstacle, const Eigen::Isometry3d& motion, const Vec3f& point);
+
 /// Particles held fast: they follow `motion`, from where they were at the start.
 struct Pin {
     std::size_t body = 0;
@@ -91,7 +94,8 @@ struct World {
     std::vector<Pin> pins;
     std::vector<RegionForce> forces;
     std::vector<Hand> hands;
-    double body_friction = 0.3; ///< between bodies
+    double body_friction = 0.3;    ///< between bodies, Coulomb's
+    double body_restitution = 0.7; ///< between bodies
 };
 
 } // namespace filigree

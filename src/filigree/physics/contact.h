@@ -1,0 +1,106 @@
+// Bodies touching obstacles and each other: penalty forces at skin points, with friction and restitution.
+#pragma once
+
+#include "filigree/physics/body_state.h"
+#include "filigree/physics/world.h"
+
+#include <functional>
+
+namespace filigree {
+
+/// Share of the elastic rate that contact stiffness may add: contacts never shorten explicit steps by more.
+inline constexpr float kContactRate = 0.5f;
+
+/// Stiffness of each skin point, N/m: that of a spacing's depth of material under the point's area, bounded so that all
+/// points together add no more than kContactRate times the body's own rate to any particle.
+std::vector<float> skin_stiffness(const Body& body, const Embedding& skin, float rest_rate);
+
+struct ContactReport {
+    std::size_t contacts = 0; ///< points that touch
+    float deepest = 0;        ///< m
+};
+
+/// All contacts of a scene. Finding what is near is separate from forces, and rare.
+class Contacts {
+public:
+    /// bodies: fixed in number from here on.
+    Contacts(const World& world, std::size_t bodies, bool between_bodies);
+
+    /// What might touch while nothing moves further than `reach`. Skin points within `reach` of an obstacle, and pairs
+    /// of balls of different bodies within 2 `reach` of touching.
+    void find_near(std::span<const BodyState> bodies, double time, float reach, const RunContext& context);
+
+    /// Adds the forces of what touches now to the bodies' forces, and lets friction's anchors slide. dt: of the
+    /// substep.
+    ContactReport add_forces(std::span<BodyState> bodies, double time, float dt, const RunContext& context);
+
+    /// Moves what is deeper than a part of the spacing out, and takes its speed inwards away: for impacts faster than
+    /// the penalty can stop.
+    void push_out(std::span<BodyState> bodies, double time);
+
+    /// Contacts of one body as blocks for vertex block descent. Valid until find_near.
+    class Blocks final : public BlockTerms {
+    public:
+        void add(Index particle, const Vectors& positions, Vec3f& force, Symmetric3& block) const override;
+        /// A further spring that pulls points of an embedding: a hand.
+        void add_pull(const Embedding& points, std::size_t point, const Vec3f& target, float stiffness);
+        std::span<const std::uint8_t> touched() const { return touched_; }
+
+    private:
+        friend class Contacts;
+        struct Entry {
+            const Embedding* embedding = nullptr; ///< the point that touches
+            Index point = 0;
+            float stiffness = 0;
+            const Obstacle* obstacle = nullptr;
+            Eigen::Isometry3d motion; ///< of the obstacle
+            bool anchored = false;
+            Vec3f anchor = Vec3f::Zero(); ///< world
+            float friction = 0, unloading = 1;
+            const BodyState* other = nullptr; ///< or a ball of another body
+            Index other_point = 0;
+            float reach = 0;              ///< sum of the balls' radii
+            Vec3f target = Vec3f::Zero(); ///< neither: a pull to here
+        };
+        void link(std::size_t particles);
+        std::vector<Entry> entries_;
+        std::vector<std::uint8_t> touched_;
+        std::vector<Index> offsets_, entry_of_; ///< entries of each particle
+        std::vector<float> weight_of_;
+    };
+    /// `pulls` adds hands before the particles are linked. time, dt: of the substep's end, and its length.
+    Blocks blocks(std::span<const BodyState> bodies, std::size_t body, double time, float dt,
+                  const std::function<void(Blocks&)>& pulls) const;
+    /// After a descent substep: anchors begin, slide and end as positions say.
+    ContactReport update_anchors(std::span<const BodyState> bodies, double time);
+
+    bool is_touched(std::size_t body) const { return touched_[body]; } ///< by the last add_forces or update_anchors
+
+    /// Where friction holds a skin point on an obstacle, in the obstacle's own axes. All that contacts remember.
+    struct Anchor {
+        Index body, obstacle, point;
+        Vec3f place;
+    };
+    std::vector<Anchor> anchors() const;
+    /// Instead of those there are; ascending by body, obstacle and point. find_near comes next.
+    void set_anchors(std::span<const Anchor> anchors);
+
+private:
+    struct Near {
+        Index obstacle, point;
+        bool anchored = false;
+        Vec3f anchor = Vec3f::Zero();
+    };
+    struct NearPair {
+        Index first_body, first, second_body, second;
+    };
+    void find_pairs(std::span<const BodyState> bodies, float reach);
+
+    const World& world_;
+    bool between_bodies_;
+    std::vector<std::vector<Near>> near_; ///< by body, ascending by obstacle and point
+    std::vector<NearPair> pairs_;
+    std::vector<std::uint8_t> touched_;
+};
+
+} // namespace filigree

@@ -1,0 +1,55 @@
+#include "filigree/physics/world.h"
+
+namespace filigree {
+
+namespace {
+
+DistanceField::Sample distance_in_own_axes(const HalfSpace& ground, const Vec3d& point) {
+    const Vec3d normal = ground.normal.normalized();
+    return {float(normal.dot(point - ground.point)), normal.cast<float>()};
+}
+
+DistanceField::Sample distance_in_own_axes(const Ball& ball, const Vec3d& point) {
+    const Vec3d out = point - ball.centre;
+    const double length = out.norm();
+    return {float(length - ball.radius), length > 0 ? Vec3f((out / length).cast<float>()) : Vec3f::UnitY()};
+}
+
+DistanceField::Sample distance_in_own_axes(const Cuboid& box, const Vec3d& point) {
+    const Vec3d from_centre = point - box.centre;
+    const Vec3d beyond = from_centre.cwiseAbs() - 0.5 * box.size; // positive: outside of that pair of sides
+    const Vec3d side = from_centre.unaryExpr([](double x) { return x < 0 ? -1.0 : 1.0; });
+    Eigen::Index axis;
+    if (const double inside = beyond.maxCoeff(&axis); inside <= 0)
+        return {float(inside), Vec3f(Vec3f::Unit(axis) * float(side[axis]))};
+    const Vec3d outside = beyond.cwiseMax(0);
+    const double distance = outside.norm();
+    return {float(distance), (outside.cwiseProduct(side) / distance).cast<float>()};
+}
+
+DistanceField::Sample distance_in_own_axes(const MeshObstacle& mesh, const Vec3d& point) {
+    return mesh.field->at((point - mesh.offset).cast<float>());
+}
+
+} // namespace
+
+Eigen::Isometry3d RigidMotion::at(double time) const {
+    const Vec3d turned = angle.at(time);
+    const double radians = turned.norm();
+    const Mat3d turn =
+        radians > 0 ? Eigen::AngleAxisd(radians, turned / radians).toRotationMatrix() : Mat3d(Mat3d::Identity());
+    Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
+    motion.linear() = turn;
+    motion.translation() = centre - turn * centre + move.at(time);
+    return motion;
+}
+
+DistanceField::Sample distance_to(const Obstacle& obstacle, const Eigen::Isometry3d& motion, const Vec3f& point) {
+    const Vec3d own = motion.linear().transpose() * (point.cast<double>() - motion.translation());
+    DistanceField::Sample sample =
+        std::visit([&](const auto& shape) { return distance_in_own_axes(shape, own); }, obstacle.shape);
+    sample.normal = (motion.linear() * sample.normal.cast<double>()).cast<float>();
+    return sample;
+}
+
+} // namespace filigree
