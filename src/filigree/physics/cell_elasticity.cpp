@@ -1,0 +1,82 @@
+// The fem material: what cell_kernel computes, behind the interface of all materials; the energy in double.
+#include "filigree/core/parallel_for.h"
+#include "filigree/physics/body.h"
+#include "filigree/physics/cell_kernel.h"
+
+#include <cmath>
+
+namespace filigree {
+
+namespace {
+
+/// The energy of one cell, J, from its corners in doubles.
+double cell_energy(const cell_kernel::CellMaterial& m, const std::array<Vec3d, 8>& corners, double fraction) {
+    std::array<Vec3d, 8> X = corners; // the Walsh-Hadamard transform, in place
+    for (unsigned bit = 1; bit < 8; bit *= 2)
+        for (unsigned i = 0; i < 8; ++i)
+            if (!(i & bit)) {
+                const Vec3d low = X[i], high = X[i | bit];
+                X[i] = low + high;
+                X[i | bit] = high - low;
+            }
+    const double h = m.spacing, size = 4 * h;
+    const double I =
+        (X[1].squaredNorm() + X[2].squaredNorm() + X[4].squaredNorm() +
+         (X[3].squaredNorm() + X[5].squaredNorm() + X[6].squaredNorm()) * (2.0 / 3.0) + X[7].squaredNorm() / 3.0) /
+        (size * size);
+    const double J = X[1].dot(X[2].cross(X[4])) / (size * size * size);
+    const double shear = m.shear, bulk = m.bulk, g = m.rest_ratio;
+    // (J - g)^2 - (1 - g)^2 and log(I + 1) - log(4) as products: a body near rest has an energy, not rounding.
+    return fraction * h * h * h *
+           (0.5 * shear * ((I - 3) - std::log1p((I - 3) / 4)) + 0.5 * bulk * (J - 1) * (J + 1 - 2 * g));
+}
+
+class CellElasticity final : public Elasticity {
+public:
+    explicit CellElasticity(const Body& body) : body_(body), plan_(cell_kernel::make_plan(body)) {}
+
+    ElasticReport forces(const Vectors& positions, Vectors& forces, const RunContext& context) override {
+        return cell_kernel::forces(plan_, positions, forces, sums_, context);
+    }
+
+    void sweep(Vectors& positions, const Descent& descent, const RunContext& context) override {
+        cell_kernel::sweep(plan_, positions, descent, context);
+    }
+
+    double energy(const Vectors& positions, const RunContext& context) override {
+        const Cells& cells = body_.cells;
+        constexpr std::size_t kPiece = 1024;
+        std::vector<double> sums((cells.cells.size() + kPiece - 1) / kPiece); // a piece each, added in order
+        parallel_for(context, cells.cells.size(), kPiece, [&](std::size_t begin, std::size_t end) {
+            double sum = 0;
+            std::array<Vec3d, 8> corners;
+            for (std::size_t cell = begin; cell < end; ++cell) {
+                for (int c = 0; c < 8; ++c) corners[c] = positions[cells.cell_corners[cell][c]].cast<double>();
+                sum += cell_energy(plan_.material, corners, cells.fraction[cell]);
+            }
+            sums[begin / kPiece] = sum;
+        });
+        double sum = 0;
+        for (const double piece : sums) sum += piece;
+        return sum;
+    }
+
+    const Vectors& reference() const override { return body_.rest; }
+
+    void gradients(const Vectors& positions, std::span<Mat3f> gradients, const RunContext& context) override {
+        corner_gradients(body_.cells, positions, gradients, context);
+    }
+
+private:
+    const Body& body_;
+    cell_kernel::Plan plan_;
+    cell_kernel::Sums sums_;
+};
+
+} // namespace
+
+std::unique_ptr<Elasticity> make_cell_elasticity(const Body& body, const RunContext&) {
+    return std::make_unique<CellElasticity>(body);
+}
+
+} // namespace filigree
