@@ -98,7 +98,7 @@ void describe_mesh(const Mesh& mesh, Session& session, Table& table, Json& json)
     }
 }
 
-void describe_model(const Model& model, std::size_t bytes, Table& table, Json& json) {
+void describe_model(const Model& model, const PoseSequence& poses, std::size_t bytes, Table& table, Json& json) {
     table.row("code", model.code() == DetailCode::blend ? "blend" : "reference");
     Json levels = Json::array();
     for (unsigned k = 0; k <= model.finest_level(); ++k) {
@@ -130,6 +130,14 @@ void describe_model(const Model& model, std::size_t bytes, Table& table, Json& j
         json["references"] = reference.references;
         json["patches"] = reference.patches.patch_count();
     }
+    if (!poses.empty()) {
+        table.row("poses",
+                  fmt::format("{} at {} frames a second{}", with_commas(poses.frames.size()), poses.frames_per_second,
+                              poses.frames[0].gradients.empty() ? "" : ", with gradients"));
+        json["poses"] = {{"frames", poses.frames.size()},
+                         {"frames_per_second", poses.frames_per_second},
+                         {"gradients", !poses.frames[0].gradients.empty()}};
+    }
     table.row("bytes", with_commas(bytes));
     json["bytes"] = bytes;
 }
@@ -156,7 +164,7 @@ void add_info(CLI::App& app, Session& session) {
             json["kind"] = "model";
             const auto& model = std::get<Model>(content.value);
             json["code"] = model.code() == DetailCode::blend ? "blend" : "reference";
-            describe_model(model, content.bytes, table, json);
+            describe_model(model, content.poses, content.bytes, table, json);
         }
         session.print(table.text(), json);
     });

@@ -42,11 +42,16 @@ struct Options {
     unsigned passes = 0;
     bool turntable = false;
     unsigned frames = 90;
-    double frames_per_second = 30;
+    std::size_t frame = 0;                   ///< of the model's own poses, from 1; 0: all in a film, else none
+    std::optional<double> frames_per_second; ///< unset: the poses' own, or 30
     RestoreOptions restore;
 };
 
 constexpr double kCaptionHeight = 34, kLegendWidth = 120, kGap = 10; // pixels
+
+constexpr const char* kPosesWithoutScalars = "With poses (--poses, --frame or the model's own) only --scalar level can "
+                                             "be shown: they are restored where nothing "
+                                             "is measured.";
 
 [[noreturn]] void refuse(const std::string& sentence) { throw Failure{{ErrorCode::usage, sentence}}; }
 
@@ -95,6 +100,7 @@ Background parse_background(const std::string& text) {
 /// Something to draw, and where the camera has to look.
 struct Subject {
     std::optional<Model> model; ///< the drawable refers to it
+    PoseSequence poses;         ///< of the model's file
     Mesh mesh;                  ///< as it is drawn; for a model the rest shape of its level
     LoadedMaterials materials;
     std::vector<float> scalars; ///< one a vertex, or empty
@@ -117,8 +123,11 @@ private:
     std::unique_ptr<Subject> read(const std::string& path);
     void choose_scalars(Subject& subject, const std::string& path);
     void upload(Subject& subject);
+    Pose read_pose(const Subject& subject, const std::string& path) const {
+        return pose_from_mesh(session_.read_mesh(path), *subject.model);
+    }
     /// Poses a model; its vertices' places are left in subject.mesh.
-    void set_pose(Subject& subject, const std::string& path, bool on_screen);
+    void set_pose(Subject& subject, const Pose& pose, bool on_screen);
     Scene scene_of(const Subject& subject) const;
     Camera camera_for(std::span<const CameraPoints> points, double aspect) const;
     PictureOptions picture_options(unsigned width, unsigned height) const {
@@ -144,14 +153,16 @@ std::unique_ptr<Subject> Rendering::read(const std::string& path) {
     Session::Content content = session_.read_any(path);
     if (auto* model = std::get_if<Model>(&content.value)) {
         subject->model = std::move(*model);
+        subject->poses = std::move(content.poses);
+        if (options_.frame > 0) own_pose(subject->poses, options_.frame, path);
         const unsigned level = options_.restore.level.value_or(subject->model->finest_level());
         if (level > subject->model->finest_level())
             refuse(fmt::format("{}: has levels 0 to {}; there is no level {}.", path, subject->model->finest_level(),
                                level));
         subject->mesh = level_mesh(*subject->model, level);
     } else {
-        if (!options_.poses.empty())
-            refuse(path + ": is a mesh, and --poses move a model; 'filigree strip' makes one of it.");
+        if (!options_.poses.empty() || options_.frame > 0)
+            refuse(path + ": is a mesh, and --poses and --frame move a model; 'filigree strip' makes one of it.");
         subject->mesh = std::move(std::get<Mesh>(content.value));
     }
     subject->materials = load_materials(subject->mesh, path, session_);
@@ -231,8 +242,7 @@ void Rendering::upload(Subject& subject) {
     points_ += subject.drawable->point_count();
 }
 
-void Rendering::set_pose(Subject& subject, const std::string& path, bool on_screen) {
-    const Pose pose = pose_from_mesh(session_.read_mesh(path), *subject.model);
+void Rendering::set_pose(Subject& subject, const Pose& pose, bool on_screen) {
     if (!subject.restorer) subject.restorer = require(Restorer::create(*subject.model, options_.restore, context()));
     require(subject.restorer->positions(pose, subject.mesh.positions, context()));
     if (!on_screen) return;
@@ -341,6 +351,7 @@ void Rendering::still() {
         std::vector<float> values;
         for (std::size_t i = 0; i < count; ++i) {
             subjects[i] = read(options_.files[i]);
+            if (options_.frame > 0) set_pose(*subjects[i], subjects[i]->poses.frames[options_.frame - 1], false);
             points.push_back({subjects[i]->mesh.positions, subjects[i]->mesh.origin});
             values.insert(values.end(), subjects[i]->scalars.begin(), subjects[i]->scalars.end());
         }
@@ -356,7 +367,8 @@ void Rendering::still() {
         Subject& subject = *subjects[i];
         if (!range_known_) range_ = range_of(subject.scalars);
         upload(subject);
-        if (!options_.poses.empty()) set_pose(subject, options_.poses[0], true);
+        if (!options_.poses.empty()) set_pose(subject, read_pose(subject, options_.poses[0]), true);
+        if (options_.frame > 0) set_pose(subject, subject.poses.frames[options_.frame - 1], true);
         const CameraPoints points{subject.mesh.positions, subject.mesh.origin, subject.drawable->point_radius()};
         const Camera camera = shared ? *shared : camera_for(std::span(&points, 1), aspect);
         Picture picture = stage_.take(scene_of(subject), camera, picture_options(layout.width, layout.height));
@@ -392,18 +404,34 @@ void Rendering::still() {
 /// A film of one subject or of a row of files: what changes from frame to frame is the pose, the file or the camera.
 void Rendering::film() {
     const double start = now_seconds();
-    const bool by_pose = !options_.poses.empty(), by_file = !by_pose && options_.files.size() > 1;
-    const std::size_t moments = by_pose ? options_.poses.size() : by_file ? options_.files.size() : 1;
+    const bool by_file = options_.poses.empty() && options_.files.size() > 1;
+    std::unique_ptr<Subject> subject = read(options_.files[0]);
+    // Poses that the model holds play by themselves, unless one of them or others are asked for.
+    const bool is_own = !by_file && options_.poses.empty() && !subject->poses.empty();
+    const bool by_pose = !options_.poses.empty() || is_own;
+    const std::size_t moments = by_file              ? options_.files.size()
+                                : !by_pose           ? 1
+                                : !is_own            ? options_.poses.size()
+                                : options_.frame > 0 ? 1
+                                                     : subject->poses.frames.size();
+    if (moments == 1 && !options_.turntable && !is_own)
+        refuse("A film needs a model with poses, several files or several --poses to show one after the other, or "
+               "--turntable.");
+    if (is_own && has_scalars() && options_.scalar != "level") refuse(kPosesWithoutScalars);
+    const auto pose_at = [&](std::size_t moment) {
+        if (!is_own) return read_pose(*subject, options_.poses[moment]);
+        return subject->poses.frames[options_.frame > 0 ? options_.frame - 1 : moment];
+    };
+    const double rate = options_.frames_per_second.value_or(
+        is_own && options_.frame == 0 && !options_.turntable ? subject->poses.frames_per_second : 30);
     const std::size_t frames = options_.turntable ? std::max<std::size_t>(options_.frames, moments) : moments;
     const Size size = options_.size.width ? options_.size : Size{960, 720};
     const unsigned legend = has_scalars() ? unsigned(kLegendWidth) : 0;
     if (size.width <= legend + 16 || size.height < 16) refuse("--size: too small for a film.");
     const double aspect = double(size.width - legend) / size.height;
-    FilmWriter writer =
-        require(FilmWriter::create(options_.output, size.width, size.height, options_.frames_per_second));
+    FilmWriter writer = require(FilmWriter::create(options_.output, size.width, size.height, rate));
 
     // A first look at every moment, for a camera, a ground and a range of colours that hold for the whole film.
-    std::unique_ptr<Subject> subject;
     std::vector<Vec3f> seen_points; // some of every moment's, relative to the first one's centre
     std::optional<Vec3d> centre;
     Box all;
@@ -411,8 +439,8 @@ void Rendering::film() {
     for (std::size_t m = 0; m < moments; ++m) {
         if (context().is_cancelled()) throw Failure{cancelled_error()};
         context().report("looking ahead", double(m) / double(moments));
-        if (by_file || m == 0) subject = read(options_.files[by_file ? m : 0]);
-        if (by_pose) set_pose(*subject, options_.poses[m], false);
+        if (by_file && m > 0) subject = read(options_.files[m]);
+        if (by_pose) set_pose(*subject, pose_at(m), false);
         const Box box = world_bounds(subject->mesh);
         if (!centre) centre = box.centre();
         const std::size_t stride = 1 + subject->mesh.vertex_count() / 20'000; // a film may be long
@@ -426,7 +454,7 @@ void Rendering::film() {
     clip_box_ = all;
     CameraPoints points{seen_points, *centre};
     if (by_file && moments > 1) subject = read(options_.files[0]);
-    if (by_pose) set_pose(*subject, options_.poses[0], false);
+    if (by_pose) set_pose(*subject, pose_at(0), false);
     upload(*subject);
     film_radius_ = subject->drawable->point_radius();
     points.radius = film_radius_;
@@ -470,7 +498,7 @@ void Rendering::film() {
                 triangles_ = points_ = 0;
                 upload(*subject);
             }
-            if (by_pose) set_pose(*subject, options_.poses[moment], true);
+            if (by_pose) set_pose(*subject, pose_at(moment), true);
             shown = moment;
         }
         Scene scene = scene_of(*subject);
@@ -527,13 +555,14 @@ void check(const Options& options, bool is_film) {
         refuse("--background transparent is for one picture in a .png without captions and legend; a page is white.");
     if (options.turntable && !is_film)
         refuse("--turntable makes a film; give -o a name that ends in .mp4 or .gif, or frame_%04d.png.");
-    if (is_film && !options.turntable && options.poses.size() < 2 && options.files.size() < 2)
-        refuse("A film needs several files or several --poses to show one after the other, or --turntable.");
+    if (!options.poses.empty() && options.frame > 0) refuse("--poses and --frame both pose the model; give one.");
+    if (options.frame > 0 && is_film && !options.turntable)
+        refuse("--frame is one moment; let -o end in .png, or add --turntable.");
     if (!options.poses.empty() && options.files.size() != 1) refuse("--poses move one model; give one model file.");
     if (!is_film && options.poses.size() > 1)
         refuse("Several poses make a film; give -o a name that ends in .mp4 or .gif, or frame_%04d.png.");
-    if (!options.poses.empty() && !options.scalar.empty() && options.scalar != "level")
-        refuse("With --poses only --scalar level can be shown: the poses are restored where nothing is measured.");
+    if ((!options.poses.empty() || options.frame > 0) && !options.scalar.empty() && options.scalar != "level")
+        refuse(kPosesWithoutScalars);
 }
 
 } // namespace
@@ -606,9 +635,14 @@ void add_render(CLI::App& app, Session& session) {
     command->add_option("--frames", options->frames, "Frames of a turntable")
         ->check(whole_number(1))
         ->capture_default_str();
-    command->add_option("--fps", options->frames_per_second, "Frames a second")
-        ->check(positive_number())
-        ->capture_default_str();
+    command
+        ->add_option("--frame", options->frame,
+                     "One of the poses that the model holds, from 1 (unset: a film plays them all, a picture shows "
+                     "the model at rest)")
+        ->check(whole_number(1));
+    command
+        ->add_option("--fps", options->frames_per_second, "Frames a second (unset: those of the model's poses, or 30)")
+        ->check(positive_number());
     command
         ->add_option("--passes", options->passes,
                      "Light directions and positions within a pixel that are averaged "
@@ -621,6 +655,8 @@ void add_render(CLI::App& app, Session& session) {
                   "  filigree render a.ply b.ply -o both.png --caption before --caption after\n"
                   "  filigree render restored.ply --scalar error --against full.ply -o error.png\n"
                   "  filigree render scan.fil --poses pose_*.ply -o film.mp4\n"
+                  "  filigree render bounce.fil -o bounce.mp4\n"
+                  "  filigree render bounce.fil --frame 30 -o half_a_second.png\n"
                   "  filigree render scan.ply -o around.gif --turntable --size 480x480");
     command->callback([options, &session] {
         session.begin();

@@ -13,6 +13,9 @@ void add_restore_options(CLI::App& command, RestoreOptions& options);
 /// A pose from a moved level 0: its positions, and the gradients in its vertex scalars f00 .. f22 where it has them.
 Pose pose_from_mesh(const Mesh& mesh, const Model& model);
 
+/// One of a model's own poses, counted from 1. Fails when there is no such frame.
+const Pose& own_pose(const PoseSequence& poses, std::size_t frame, const std::string& path);
+
 /// Level 0 for others to move: without scalars of the mesh's own that pose_from_mesh would take for gradients.
 Mesh driver_mesh(const Model& model);
 

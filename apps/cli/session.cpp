@@ -135,14 +135,17 @@ Mesh Session::read_mesh(const std::string& path) {
     return parse_mesh(bytes, path);
 }
 
-Model Session::read_model(const std::string& path) {
-    return require(filigree::read_model(read_bytes(path), shown_name(path), context()));
+Model Session::read_model(const std::string& path, PoseSequence* poses) {
+    const std::string bytes = read_bytes(path);
+    if (poses) *poses = require(read_poses(bytes, shown_name(path), context()));
+    return require(filigree::read_model(bytes, shown_name(path), context()));
 }
 
 Session::Content Session::read_any(const std::string& path) {
     const std::string bytes = read_bytes(path);
-    if (is_model_file(bytes)) return {require(filigree::read_model(bytes, shown_name(path), context())), bytes.size()};
-    return {parse_mesh(bytes, path), bytes.size()};
+    if (!is_model_file(bytes)) return {parse_mesh(bytes, path), bytes.size(), {}};
+    return {require(filigree::read_model(bytes, shown_name(path), context())), bytes.size(),
+            require(read_poses(bytes, shown_name(path), context()))};
 }
 
 void Session::begin_writing(const std::string& path) {
@@ -161,9 +164,9 @@ void Session::write_mesh(const Mesh& mesh, const std::string& path) {
     for (const std::string& warning : require(filigree::write_mesh(mesh, path, context(), options))) warn(warning);
 }
 
-void Session::write_model(const Model& model, const std::string& path) {
+void Session::write_model(const Model& model, const std::string& path, const PoseSequence& poses) {
     begin_writing(path);
-    require(filigree::write_model(model, path, context()));
+    require(filigree::write_model(model, poses, path, context()));
 }
 
 void Session::print(const std::string& text, Json object) {

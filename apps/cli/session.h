@@ -4,6 +4,7 @@
 #include "filigree/core/result.h"
 #include "filigree/core/run_context.h"
 #include "filigree/hierarchy/model.h"
+#include "filigree/hierarchy/pose.h"
 #include "filigree/io/mesh_file.h"
 #include "filigree/mesh/mesh_distance.h"
 
@@ -47,15 +48,17 @@ public:
     const RunContext& context() const { return *context_; }
 
     Mesh read_mesh(const std::string& path);
-    Model read_model(const std::string& path);
+    /// poses: where to put the model's own; null: not wanted.
+    Model read_model(const std::string& path, PoseSequence* poses = nullptr);
     struct Content {
         std::variant<Mesh, Model> value;
-        std::size_t bytes; ///< of the file
+        std::size_t bytes;  ///< of the file
+        PoseSequence poses; ///< of a model that has been moved
     };
     /// A mesh or a model, told by the content.
     Content read_any(const std::string& path);
     void write_mesh(const Mesh& mesh, const std::string& path);
-    void write_model(const Model& model, const std::string& path);
+    void write_model(const Model& model, const std::string& path, const PoseSequence& poses = {});
 
     /// To be called before a file is written in another way: the last chance to cancel.
     void begin_writing(const std::string& path);

@@ -14,4 +14,12 @@ struct Pose {
     std::vector<Vec3f> ghosts;
 };
 
+/// Poses of one driver, moment after moment: positions, and gradients in all of them or in none. No ghosts.
+struct PoseSequence {
+    double frames_per_second = 60;
+    std::vector<Pose> frames;
+
+    bool empty() const { return frames.empty(); }
+};
+
 } // namespace filigree

@@ -4,6 +4,7 @@
 
 #include "filigree/io/file.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -33,7 +34,7 @@ static_assert(sizeof(Header) == 32);
 
 struct Section {
     char name[8];            ///< padded with zeros
-    std::uint32_t index;     ///< of a level or a scalar; else 0
+    std::uint32_t index;     ///< of a level, a scalar or a pose; else 0
     std::uint32_t item_size; ///< bytes
     std::uint64_t offset;    ///< from the start of the file, a multiple of 8
     std::uint64_t count;     ///< items
@@ -171,6 +172,44 @@ void write_reference(SectionWriter& out, const ReferenceDetail& detail) {
     out.array("rf.loose", detail.loose);
 }
 
+using FileGradient = std::array<float, 9>; // row-major
+
+void write_poses(SectionWriter& out, const PoseSequence& poses) {
+    if (poses.empty()) return;
+    out.value("pose.fps", poses.frames_per_second);
+    std::vector<FileGradient> gradients;
+    for (std::uint32_t frame = 0; frame < poses.frames.size(); ++frame) {
+        const Pose& pose = poses.frames[frame];
+        out.array("pose.pos", pose.positions, frame);
+        gradients.resize(pose.gradients.size());
+        for (std::size_t v = 0; v < gradients.size(); ++v)
+            for (int k = 0; k < 9; ++k) gradients[v][std::size_t(k)] = pose.gradients[v](k / 3, k % 3);
+        out.array("pose.grd", gradients, frame);
+    }
+}
+
+/// The first thing wrong with poses for a driver of so many vertices, or "".
+std::string check_poses(const PoseSequence& poses, std::size_t driver_vertices) {
+    if (!poses.empty() && !(std::isfinite(poses.frames_per_second) && poses.frames_per_second > 0))
+        return "its rate is not a number above 0";
+    for (std::size_t frame = 0; frame < poses.frames.size(); ++frame) {
+        const Pose& pose = poses.frames[frame];
+        const std::string name = "pose " + std::to_string(frame + 1);
+        if (pose.positions.size() != driver_vertices)
+            return name + " has " + std::to_string(pose.positions.size()) + " vertices and the driver " +
+                   std::to_string(driver_vertices);
+        if (pose.gradients.empty() != poses.frames[0].gradients.empty() ||
+            (!pose.gradients.empty() && pose.gradients.size() != driver_vertices))
+            return name + " does not have the gradients that the others have";
+        if (!pose.ghosts.empty()) return name + " has ghost points, which files do not hold";
+        const auto is_finite = [](const auto& value) { return value.allFinite(); };
+        if (!std::all_of(pose.positions.begin(), pose.positions.end(), is_finite) ||
+            !std::all_of(pose.gradients.begin(), pose.gradients.end(), is_finite))
+            return name + " has a number that is not finite";
+    }
+    return "";
+}
+
 // ---------------------------------------------------------------------------------------------------------- reading
 
 /// What is wrong with a file, thrown inside this source file only and turned into an Error at its door.
@@ -229,6 +268,11 @@ public:
         const std::vector<T> items = array<T>(name);
         if (items.size() != 1) throw Damage{"lacks its section " + std::string(name)};
         return items[0];
+    }
+    /// Entries of that name, whatever their index; and the largest index.
+    std::pair<std::size_t, std::uint32_t> count(const std::string& name) const {
+        const auto first = sections_.lower_bound({name, 0}), end = sections_.upper_bound({name, ~std::uint32_t{0}});
+        return {static_cast<std::size_t>(std::distance(first, end)), first == end ? 0 : std::prev(end)->first.second};
     }
     std::vector<std::string> strings(std::string_view name) const {
         std::vector<std::string> items;
@@ -329,6 +373,35 @@ ReferenceDetail read_reference(const SectionReader& in) {
     return detail;
 }
 
+/// Frames 0 .. n - 1 without a gap: so no index is larger than the table is long.
+std::size_t frame_count(const SectionReader& in, const std::string& name) {
+    const auto [count, last] = in.count(name);
+    if (count > 0 && last != count - 1) throw Damage{"lacks one of its poses (" + name + ")", "simulate it again"};
+    return count;
+}
+
+PoseSequence read_pose_sections(std::string_view bytes) {
+    const SectionReader in(bytes);
+    PoseSequence poses;
+    const std::size_t frames = frame_count(in, "pose.pos"), with_gradients = frame_count(in, "pose.grd");
+    if (frames == 0 && with_gradients == 0) return poses;
+    if (with_gradients != 0 && with_gradients != frames)
+        throw Damage{"has gradients for some of its poses alone", "simulate it again"};
+    poses.frames_per_second = in.value<double>("pose.fps");
+    poses.frames.resize(frames);
+    for (std::uint32_t frame = 0; frame < frames; ++frame) {
+        Pose& pose = poses.frames[frame];
+        pose.positions = in.array<Vec3f>("pose.pos", frame);
+        for (const FileGradient& entries : in.array<FileGradient>("pose.grd", frame)) {
+            Mat3f& gradient = pose.gradients.emplace_back();
+            for (int k = 0; k < 9; ++k) gradient(k / 3, k % 3) = entries[std::size_t(k)];
+        }
+    }
+    if (const std::string wrong = check_poses(poses, in.array<Index>("lev.vert").size()); !wrong.empty())
+        throw Damage{"is inconsistent: " + wrong, "simulate it again"};
+    return poses;
+}
+
 Model read_sections(std::string_view bytes) {
     const SectionReader in(bytes);
     Model model;
@@ -368,11 +441,29 @@ Model read_sections(std::string_view bytes) {
     return model;
 }
 
+/// What `read` makes of a file's bytes; what it throws as an Error.
+template <class Read>
+auto guarded(std::string_view bytes, const std::string& name, const RunContext& context, const Read& read)
+    -> Result<decltype(read(bytes))> {
+    if (context.is_cancelled()) return cancelled_error();
+    if (!is_model_file(bytes))
+        return Error{ErrorCode::bad_file, name + " is not a Filigree model: make one with 'filigree strip'."};
+    try {
+        return read(bytes);
+    } catch (const Damage& damage) {
+        return Error{ErrorCode::bad_file, name + " " + damage.what + "; " + damage.remedy + "."};
+    } catch (const std::bad_alloc&) {
+        return Error{ErrorCode::out_of_memory, name + " does not fit into memory."};
+    } catch (const std::length_error&) {
+        return Error{ErrorCode::out_of_memory, name + " does not fit into memory."};
+    }
+}
+
 } // namespace
 
 bool is_model_file(std::string_view bytes) { return bytes.starts_with(std::string_view(kMagic, sizeof kMagic)); }
 
-std::string write_model(const Model& model) {
+std::string write_model(const Model& model, const PoseSequence& poses) {
     SectionWriter out;
     const auto* blend = std::get_if<BlendDetail>(&model.detail);
     write_mesh_sections(out, model.mesh, !blend || blend->precision == Precision::float32);
@@ -386,14 +477,21 @@ std::string write_model(const Model& model) {
         write_blend(out, model, *blend);
     else
         write_reference(out, std::get<ReferenceDetail>(model.detail));
+    write_poses(out, poses);
     return out.finish();
 }
 
-Status write_model(const Model& model, const std::filesystem::path& path, const RunContext& context) {
+std::string write_model(const Model& model) { return write_model(model, PoseSequence()); }
+
+Status write_model(const Model& model, const PoseSequence& poses, const std::filesystem::path& path,
+                   const RunContext& context) {
     if (context.is_cancelled()) return cancelled_error();
+    if (const std::string wrong = poses.empty() ? "" : check_poses(poses, model.driver().vertices.size());
+        !wrong.empty())
+        return Error{ErrorCode::mismatch, path.string() + ": not written: " + wrong + "."};
     context.report("write", 0);
     try {
-        const std::string bytes = write_model(model);
+        const std::string bytes = write_model(model, poses);
         const std::string_view piece = bytes;
         Status status = write_file(path, std::span(&piece, 1));
         context.report("write", 1);
@@ -403,19 +501,16 @@ Status write_model(const Model& model, const std::filesystem::path& path, const 
     }
 }
 
+Status write_model(const Model& model, const std::filesystem::path& path, const RunContext& context) {
+    return write_model(model, PoseSequence(), path, context);
+}
+
 Result<Model> read_model(std::string_view bytes, const std::string& name, const RunContext& context) {
-    if (context.is_cancelled()) return cancelled_error();
-    if (!is_model_file(bytes))
-        return Error{ErrorCode::bad_file, name + " is not a Filigree model: make one with 'filigree strip'."};
-    try {
-        return read_sections(bytes);
-    } catch (const Damage& damage) {
-        return Error{ErrorCode::bad_file, name + " " + damage.what + "; " + damage.remedy + "."};
-    } catch (const std::bad_alloc&) {
-        return Error{ErrorCode::out_of_memory, name + " does not fit into memory."};
-    } catch (const std::length_error&) {
-        return Error{ErrorCode::out_of_memory, name + " does not fit into memory."};
-    }
+    return guarded(bytes, name, context, read_sections);
+}
+
+Result<PoseSequence> read_poses(std::string_view bytes, const std::string& name, const RunContext& context) {
+    return guarded(bytes, name, context, read_pose_sections);
 }
 
 Result<Model> read_model(const std::filesystem::path& path, const RunContext& context) {
@@ -425,6 +520,12 @@ Result<Model> read_model(const std::filesystem::path& path, const RunContext& co
     Result<Model> model = read_model(*bytes, path.string(), context);
     context.report("read", 1);
     return model;
+}
+
+Result<PoseSequence> read_poses(const std::filesystem::path& path, const RunContext& context) {
+    Result<std::string> bytes = read_file(path);
+    if (!bytes) return bytes.error();
+    return read_poses(*bytes, path.string(), context);
 }
 
 } // namespace filigree

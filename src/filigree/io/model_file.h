@@ -4,6 +4,7 @@
 #include "filigree/core/result.h"
 #include "filigree/core/run_context.h"
 #include "filigree/hierarchy/model.h"
+#include "filigree/hierarchy/pose.h"
 
 #include <filesystem>
 #include <string>
@@ -20,10 +21,22 @@ Result<Model> read_model(const std::filesystem::path& path, const RunContext& co
 /// The same from bytes in memory; `name` stands in messages.
 Result<Model> read_model(std::string_view bytes, const std::string& name, const RunContext& context);
 
+/// The poses that a model file holds beside its model; no frames where there are none. Errors: as read_model (a frame
+/// missing or of another number of vertices than the driver, numbers that are not finite).
+Result<PoseSequence> read_poses(const std::filesystem::path& path, const RunContext& context);
+Result<PoseSequence> read_poses(std::string_view bytes, const std::string& name, const RunContext& context);
+
 /// Writes a model through a temporary file and a rename; "-" is standard output. Errors: unwritable,
 /// out_of_memory, cancelled.
 Status write_model(const Model& model, const std::filesystem::path& path, const RunContext& context);
 /// The bytes of the file. The same model gives the same bytes.
 std::string write_model(const Model& model);
+
+/// The same with poses of its driver. Errors: mismatch as well (a pose of another number of vertices, gradients in some
+/// frames alone, ghosts, numbers or a rate that are not finite and the rate above 0), which is found before anything is
+/// written. No frames: the file of the model alone.
+Status write_model(const Model& model, const PoseSequence& poses, const std::filesystem::path& path,
+                   const RunContext& context);
+std::string write_model(const Model& model, const PoseSequence& poses);
 
 } // namespace filigree
