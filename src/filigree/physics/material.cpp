@@ -1,0 +1,39 @@
+#include "filigree/physics/material.h"
+
+#include <cmath>
+
+namespace filigree {
+
+double pressure_wave_speed(const Material& material) {
+    const double nu = material.model == MaterialModel::springs ? 0.25 : material.poisson_ratio;
+    const LameParameters lame = lame_parameters(material.young_modulus, nu);
+    return std::sqrt((lame.lambda + 2 * lame.mu) / material.density);
+}
+
+std::string check_material(const Material& material) {
+    const auto is_positive = [](double value) { return std::isfinite(value) && value > 0; };
+    const auto is_not_negative = [](double value) { return std::isfinite(value) && value >= 0; };
+    const auto within = [](double value, double least, double most) { return value >= least && value <= most; };
+
+    if (!is_positive(material.density)) return "The density must be above 0 kg/m^3.";
+    if (!is_positive(material.young_modulus)) return "Young's modulus must be above 0 Pa.";
+    if (!within(material.poisson_ratio, 0, 0.49)) return "Poisson's ratio must be from 0 to 0.49.";
+    if (!is_not_negative(material.damping)) return "The damping must be 0 or more (1/s).";
+    if (!is_not_negative(material.internal_damping)) return "The internal damping must be 0 s or more.";
+    if (!within(material.bending, 0, 0.2)) return "The bending share must be from 0 to 0.2.";
+
+    if (!(material.yield_stress > 0)) return "The yield stress must be above 0 Pa.";
+    if (!is_not_negative(material.creep_time)) return "The creep time must be 0 s or more.";
+    if (!is_positive(material.temperature)) return "The temperature must be above 0 K.";
+    if (!(material.melting_from > 0)) return "Melting must begin above 0 K.";
+    if (!(material.melting_to >= material.melting_from))
+        return "The temperature at which melting ends must not be below that at which it begins.";
+    if (!is_positive(material.viscosity)) return "The viscosity must be above 0 Pa s.";
+    if (!std::isfinite(material.heating)) return "The heating must be a number (K/s).";
+    if (!is_not_negative(material.conductivity)) return "The conductivity must be 0 m^2/s or more.";
+    if (material.model != MaterialModel::meshfree && (material.is_plastic() || material.melts()))
+        return "Only the meshfree model yields and melts; take it, or leave yield stress and melting out.";
+    return "";
+}
+
+} // namespace filigree
