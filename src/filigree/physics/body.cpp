@@ -1,6 +1,8 @@
 #include "filigree/physics/body.h"
 
 #include "filigree/core/parallel_for.h"
+#include "filigree/physics/mesh_cells.h"
+#include "filigree/physics/surface_points.h"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -48,13 +50,19 @@ bool has_spread(const Cells& cells, std::size_t cell) {
     return eigen.eigenvalues()[0] >= kLeastSpread;
 }
 
-/// One particle a cell, or eight where one would have no gradient. Returns how many cells have eight.
-std::size_t use_centroids(Body& body, const RunContext& context) {
-    const Cells& cells = body.cells;
+/// For each cell 1 where its particle will have a gradient.
+std::vector<std::uint8_t> find_spread(const Cells& cells, const RunContext& context) {
     std::vector<std::uint8_t> spread(cells.cells.size());
     parallel_for(context, spread.size(), 1024, [&](std::size_t begin, std::size_t end) {
         for (std::size_t c = begin; c < end; ++c) spread[c] = has_spread(cells, c);
     });
+    return spread;
+}
+
+/// One particle a cell, or eight where one would have no gradient. Returns how many cells have eight.
+std::size_t use_centroids(Body& body, const RunContext& context) {
+    const Cells& cells = body.cells;
+    const std::vector<std::uint8_t> spread = find_spread(cells, context);
     const auto split = std::size_t(std::count(spread.begin(), spread.end(), 0));
     body.rest = Vectors(cells.cells.size() + 7 * split);
     body.volume.resize(body.rest.size());
@@ -91,7 +99,55 @@ Embedding embed_skin(std::span<const Vec3f> points, const Body& body, const RunC
                                                           : embed_in_cells(points, body.cells, context);
 }
 
+/// What make_particles would make.
+std::size_t count_particles(const Cells& cells, MaterialModel model, const RunContext& context) {
+    if (model != MaterialModel::meshfree) return cells.corners.size();
+    const std::vector<std::uint8_t> spread = find_spread(cells, context);
+    return cells.cells.size() + 7 * std::size_t(std::count(spread.begin(), spread.end(), 0));
+}
+
+std::string warning_of(const CellReport& cells) {
+    std::string warning;
+    if (cells.thin_cells > 0)
+        warning = std::to_string(cells.thin_cells) + " of " + std::to_string(cells.cells) +
+                  " cells lie in parts fewer than two cells across, which will be too soft or too stiff there; more "
+                  "particles make them right.";
+    if (cells.loose_parts > 0)
+        warning += (warning.empty() ? "" : " ") + std::to_string(cells.loose_parts) +
+                   " small unconnected part(s) have no particles of their own and go along with the nearest ones.";
+    return warning;
+}
+
 } // namespace
+
+Result<Body> make_body(const Mesh& mesh, const Material& material, const BodyOptions& options,
+                       const RunContext& context, BodyReport* report) {
+    if (std::string wrong = check_material(material); !wrong.empty()) return Error{ErrorCode::usage, std::move(wrong)};
+    BodyReport ignored;
+    BodyReport& found = report ? *report : ignored;
+    found = {};
+    const WeldedTriangles welded = weld_triangles(mesh);
+    const auto count = [&](const Cells& cells) { return count_particles(cells, material.model, context); };
+    Result<Cells> cells = make_cells(mesh, welded, options.scale, options.cells, count, context, &found.cells);
+    if (!cells) return cells.error();
+
+    Body body;
+    body.material = material;
+    body.scale = options.scale;
+    body.cells = std::move(cells).value();
+    found.split_cells = make_particles(body, context);
+    SurfacePoints surface =
+        spread_on_surface(mesh.positions, welded.triangles, options.scale, 0.5 * body.cells.spacing);
+    body.skin.normals = std::move(surface.normals);
+    body.skin.areas = std::move(surface.areas);
+    body.skin.points = embed_skin(surface.positions, body, context);
+    if (context.is_cancelled()) return cancelled_error();
+
+    found.skin_points = body.skin.points.size();
+    for (const float mass : body.mass) found.mass += mass;
+    found.warning = warning_of(found.cells);
+    return body;
+}
 
 Body make_body(Cells cells, const Material& material) {
     const RunContext context;
