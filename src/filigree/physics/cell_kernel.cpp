@@ -71,14 +71,35 @@ struct Lanes : LaneTypes<N> {
     static FILIGREE_INLINE Float most(Float a, Float b) { return b > a ? b : a; }
     static FILIGREE_INLINE Float magnitude(Float x) { return (Float)((Int)x & 0x7fffffff); }
 
-    /// sqrt(x) for x >= 0, some 1e-6 of it off: a first guess from the exponent and three Newton steps.
     static FILIGREE_INLINE Float square_root(Float x) {
-        Float y = (Float)(0x5f3759df - ((Int)x >> 1));
-        for (int step = 0; step < 3; ++step) y = y * (1.5f - 0.5f * x * y * y);
-        return x * y;
+#if defined(__x86_64__) // the vector types have no such operation; rounding is the same everywhere
+        Float y;
+        if constexpr (N == 4)
+            asm("sqrtps %1, %0" : "=x"(y) : "x"(x));
+        else
+            asm("vsqrtps %1, %0" : "=v"(y) : "v"(x));
+        return y;
+#else
+        for (int lane = 0; lane < N; ++lane) x[lane] = std::sqrt(x[lane]);
+        return x;
+#endif
     }
 
+    using Half = typename LaneTypes<N == 4 ? 4 : N / 2>::Float;
+    /// The last N / 2 lanes.
+    static FILIGREE_INLINE Half last_half(Float x) { return last_half(x, std::make_integer_sequence<int, N / 2>{}); }
+    /// Twice the same, end to end.
+    static FILIGREE_INLINE Float twice(Half x) { return twice(x, std::make_integer_sequence<int, N>{}); }
+
 private:
+    template <int... I>
+    static FILIGREE_INLINE Half last_half(Float x, std::integer_sequence<int, I...>) {
+        return __builtin_shufflevector(x, x, (N / 2 + I)...);
+    }
+    template <int... I>
+    static FILIGREE_INLINE Float twice(Half x, std::integer_sequence<int, I...>) {
+        return __builtin_shufflevector(x, x, (I % (N / 2))...);
+    }
     template <int... I>
     static FILIGREE_INLINE Int iota(std::integer_sequence<int, I...>) {
         return Int{I...};
@@ -328,6 +349,30 @@ FILIGREE_INLINE void add_last_corner(const Cells::Run& run, float* const* sums, 
             sums[(row < 2 ? 0 : 3) + axis][std::size_t{run.rows[row]} + run.count] += force[row][axis];
 }
 
+/// Forces of a run's cells from i on, in blocks of N and then of as few as the rest needs.
+template <int N>
+FILIGREE_INLINE void add_run(const Factors& f, const Vectors& positions, const Cells::Run& run, Index i,
+                             const float* fraction, float* const* sums, Carry<N>& carry, Extremes<N>& extremes) {
+    for (; i + N <= run.count; i += N) add_forces<N, false>(f, positions, run, i, N, fraction, sums, carry, extremes);
+    const Index rest = run.count - i;
+    if (rest == 0) return add_last_corner<N>(run, sums, carry);
+    if constexpr (N > 4)
+        if (rest <= N / 2) {
+            using L = Lanes<N>;
+            Carry<N / 2> half_carry;
+            for (int u = 0; u < 4; ++u)
+                half_carry.right[u] = {L::last_half(carry.right[u].x), L::last_half(carry.right[u].y),
+                                       L::last_half(carry.right[u].z)};
+            Extremes<N / 2> half;
+            add_run<N / 2>(f, positions, run, i, fraction, sums, half_carry, half);
+            extremes.rate = L::most(extremes.rate, L::twice(half.rate));
+            extremes.I = L::most(extremes.I, L::twice(half.I));
+            extremes.J = L::least(extremes.J, L::twice(half.J));
+            return;
+        }
+    add_forces<N, true>(f, positions, run, i, rest, fraction, sums, carry, extremes);
+}
+
 struct ForceJob {
     const Plan& plan;
     const Vectors& positions;
@@ -357,14 +402,7 @@ FILIGREE_INLINE void add_slabs(const ForceJob& job, std::size_t begin, std::size
                                     to.y.data() + shift + kPadding,
                                     to.z.data() + shift + kPadding};
             Carry<N> carry = {};
-            Index i = 0;
-            for (; i + N <= run.count; i += N)
-                add_forces<N, false>(factors, job.positions, run, i, N, plan.fraction.data(), sums, carry, extremes);
-            if (i < run.count)
-                add_forces<N, true>(factors, job.positions, run, i, run.count - i, plan.fraction.data(), sums, carry,
-                                    extremes);
-            else
-                add_last_corner<N>(run, sums, carry);
+            add_run<N>(factors, job.positions, run, 0, plan.fraction.data(), sums, carry, extremes);
         }
         ElasticReport& report = job.reports[index];
         float rate = 0, J = extremes.J[0], I = 0;
@@ -446,6 +484,20 @@ FILIGREE_INLINE void add_systems(const Factors& f, const Vectors& positions, con
         L::add(systems + k * stride + i, Tail ? L::keep(L::first(count), values[k]) : values[k]);
 }
 
+template <int N>
+FILIGREE_INLINE void add_run_systems(const Factors& f, const Vectors& positions, const Cells::Run& run, Index i,
+                                     const float* fraction, int side, bool left_first, float* systems,
+                                     std::size_t stride) {
+    for (; i + N <= run.count; i += N)
+        add_systems<N, false>(f, positions, run, i, N, fraction, side, left_first, systems, stride);
+    const Index rest = run.count - i;
+    if (rest == 0) return;
+    if constexpr (N > 4)
+        if (rest <= N / 2)
+            return add_run_systems<N / 2>(f, positions, run, i, fraction, side, left_first, systems, stride);
+    add_systems<N, true>(f, positions, run, i, rest, fraction, side, left_first, systems, stride);
+}
+
 /// Moves vertices `v`, v + 2 ... v + 2 (N - 1) of a row, as many as there are.
 template <int N>
 FILIGREE_INLINE void solve_vertices(const SweepJob& job, const Row& row, Index v, const float* systems,
@@ -507,15 +559,8 @@ FILIGREE_INLINE void sweep_rows(const SweepJob& job, std::size_t begin, std::siz
         for (std::size_t n = row.first_neighbour; n < row.last_neighbour; ++n) {
             const Neighbour& neighbour = plan.neighbours[n];
             const Cells::Run& run = plan.cells->runs[neighbour.run];
-            float* to = systems.data() + neighbour.offset + 1;
-            Index i = 0;
-            const bool left_first = neighbour.offset % 2 == parity;
-            for (; i + N <= run.count; i += N)
-                add_systems<N, false>(factors, job.positions, run, i, N, plan.fraction.data(), neighbour.side,
-                                      left_first, to, stride);
-            if (i < run.count)
-                add_systems<N, true>(factors, job.positions, run, i, run.count - i, plan.fraction.data(),
-                                     neighbour.side, left_first, to, stride);
+            add_run_systems<N>(factors, job.positions, run, 0, plan.fraction.data(), neighbour.side,
+                               neighbour.offset % 2 == parity, systems.data() + neighbour.offset + 1, stride);
         }
         for (Index v = parity; v < row.count; v += 2 * N) solve_vertices<N>(job, row, v, systems.data(), stride);
     }
