@@ -1,5 +1,7 @@
-// What materials without memory leave as it is.
+// Which material is whose; and what those without memory leave as it is.
 #include "filigree/physics/elasticity.h"
+
+#include "filigree/physics/body.h"
 
 namespace filigree {
 
@@ -8,5 +10,12 @@ bool Elasticity::wants_renewal() const { return false; }
 void Elasticity::renew(const Vectors&, const RunContext&) {}
 std::string Elasticity::state() const { return {}; }
 bool Elasticity::restore_state(std::string_view bytes) { return bytes.empty(); }
+
+std::unique_ptr<Elasticity> make_elasticity(const Body& body, const RunContext& context) {
+    const MaterialModel model = body.material.model;
+    if (model == MaterialModel::springs) return make_spring_elasticity(body, context);
+    if (model == MaterialModel::meshfree) return make_meshfree_elasticity(body, context);
+    return make_cell_elasticity(body, context);
+}
 
 } // namespace filigree
