@@ -10,6 +10,7 @@ namespace filigree {
 namespace {
 
 constexpr std::size_t kGrain = 256;
+constexpr double kStiffness = 4;             ///< times the stiffness of a spacing of material under the point
 constexpr float kTangentialStiffness = 0.5f; ///< of friction's spring, as a part of the normal stiffness
 constexpr float kDeepest = 0.75f;            ///< spacings under a surface that a penalty is trusted with
 
@@ -80,7 +81,7 @@ std::vector<float> skin_stiffness(const Body& body, const Embedding& skin, float
             visit(skin.particles[k], std::abs(skin.weights[k]));
     };
     for (std::size_t s = 0; s < skin.size(); ++s) {
-        stiffness[s] = float(modulus * double(body.skin.areas[s]) / body.spacing());
+        stiffness[s] = float(kStiffness * modulus * double(body.skin.areas[s]) / body.spacing());
         each_weight(s, [&](Index particle, float weight) { sums[particle] += double(weight * stiffness[s]); });
     }
     for (std::size_t s = 0; s < skin.size(); ++s) {
@@ -196,7 +197,7 @@ ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, flo
                 }
                 const Vec3f velocity =
                     embedded_point(body.skin, at.point, body.velocities) - motions.velocity(at.obstacle, place);
-                const float stiffness = body.skin_stiffness[at.point];
+                const float stiffness = body.skin_stiffness[at.point] * float(obstacle.stiffness);
                 const float away = velocity.dot(surface.normal);
                 const float push = stiffness * -surface.distance * unloading(obstacle.restitution, away, slow);
                 if (!at.anchored) at.anchor = motions.to_own_axes(at.obstacle, place);
@@ -357,7 +358,7 @@ Contacts::Blocks Contacts::blocks(std::span<const BodyState> bodies, std::size_t
         Blocks::Entry& entry = blocks.entries_.emplace_back();
         entry.embedding = &body.skin;
         entry.point = at.point;
-        entry.stiffness = body.skin_stiffness[at.point];
+        entry.stiffness = body.skin_stiffness[at.point] * float(obstacle.stiffness);
         entry.obstacle = &obstacle;
         entry.motion = motions.at(at.obstacle);
         entry.anchored = at.anchored;
@@ -407,7 +408,8 @@ ContactReport Contacts::update_anchors(std::span<const BodyState> bodies, double
             report.deepest = std::max(report.deepest, -surface.distance);
             if (!at.anchored) at.anchor = motions.to_own_axes(at.obstacle, place);
             at.anchored = true;
-            const float stiffness = body.skin_stiffness[at.point], grip = kTangentialStiffness * stiffness;
+            const float stiffness = body.skin_stiffness[at.point] * float(obstacle.stiffness);
+            const float grip = kTangentialStiffness * stiffness;
             const float limit = float(obstacle.friction) * stiffness * -surface.distance;
             const Vec3f offset = along_surface(place - motions.to_world(at.obstacle, at.anchor), surface.normal);
             if (const float stretch = offset.norm(); grip * stretch > limit)

@@ -9,7 +9,7 @@
 namespace filigree {
 
 /// Share of the elastic rate that contact stiffness may add: contacts never shorten explicit steps by more.
-inline constexpr float kContactRate = 0.5f;
+inline constexpr float kContactRate = 1;
 
 /// Stiffness of each skin point, N/m: that of a spacing's depth of material under the point's area, bounded so that all
 /// points together add no more than kContactRate times the body's own rate to any particle.
@@ -74,6 +74,7 @@ public:
     /// After a descent substep: anchors begin, slide and end as positions say.
     ContactReport update_anchors(std::span<const BodyState> bodies, double time);
 
+    void forget_touches() { touched_.assign(touched_.size(), 0); }
     bool is_touched(std::size_t body) const { return touched_[body]; } ///< by the last add_forces or update_anchors
 
     /// Where friction holds a skin point on an obstacle, in the obstacle's own axes. All that contacts remember.

@@ -38,6 +38,7 @@ private:
 struct Grip {
     Hand hand;
     Embedding region;
+    Vec3f offset = Vec3f::Zero();               ///< from the region's middle to the point, when it was seized
     float stiffness = 0, damping = 0, rate = 0; ///< N/m, N s/m, 1/s^2
 };
 
@@ -191,7 +192,7 @@ struct Simulation::Content {
     void blow(double now, const RunContext& context);
     float reach(const RunContext& context) const;
     float most_speed(double now) const;
-    Grip grip(const Hand& hand) const;
+    Grip grip(const Hand& hand, const RunContext& context) const;
     bool is_pulled(std::size_t body, double now) const;
 
     void kick(float dt, bool damp, const RunContext& context);
@@ -224,6 +225,9 @@ Result<Simulation> Simulation::create(World world, std::vector<Actor> actors, co
         return usage("The number of frames a second must be above 0.");
     if (options.most_substeps == 0 || options.descent_substeps == 0 || options.descent_iterations == 0)
         return usage("Substeps and iterations are counted from 1.");
+    for (const Obstacle& obstacle : world.obstacles)
+        if (!(obstacle.stiffness > 0 && obstacle.stiffness <= 1))
+            return usage("An obstacle's stiffness is above 0, to 1.");
     const auto check_body = [&](std::size_t body, std::span<const Index> particles, const char* what) -> std::string {
         if (body >= actors.size()) return std::string(what) + " belongs to a body that is not there.";
         for (const Index particle : particles)
@@ -282,16 +286,16 @@ Result<Simulation> Simulation::create(World world, std::vector<Actor> actors, co
             content->wind_forces.emplace_back(content->bodies[b].positions.size());
             content->is_held[b] = 1;
         }
-    for (const Hand& hand : content->world.hands) content->grips.push_back(content->grip(hand));
+    for (const Hand& hand : content->world.hands) content->grips.push_back(content->grip(hand, context));
     content->move_pins(0, 0);
     return Simulation(std::move(content));
 }
 
-Grip Simulation::Content::grip(const Hand& hand) const {
+Grip Simulation::Content::grip(const Hand& hand, const RunContext& context) const {
     const BodyState& body = bodies[hand.body];
     const Vectors& reference = body.elasticity->reference();
     const float radius = 2.5f * float(body.body->spacing());
-    Grip grip{hand, {}, 0, 0, 0};
+    Grip grip{hand, {}, Vec3f::Zero(), 0, 0, 0};
     grip.region.rest = {hand.point};
     double mass = 0, region_mass = 0;
     std::size_t nearest = 0;
@@ -311,6 +315,12 @@ Grip Simulation::Content::grip(const Hand& hand) const {
     }
     for (float& weight : grip.region.weights) weight /= float(mass);
     grip.region.offsets = {0, Index(grip.region.particles.size())};
+    std::vector<Mat3f> gradients(reference.size());
+    body.elasticity->gradients(body.positions, gradients, context);
+    Mat3f gradient = Mat3f::Zero();
+    for (std::size_t k = 0; k < grip.region.particles.size(); ++k)
+        gradient += grip.region.weights[k] * gradients[grip.region.particles[k]];
+    grip.offset = gradient * (hand.point - embedded_point(grip.region, 0, reference));
     // A pull of k gives particle i the rate k w_i / m_i, at most k / (sum of weighted masses).
     const double stiffest = double(kHandRate) * double(body.rest_rate) * mass;
     grip.stiffness = float(hand.stiffness > 0 ? std::min(hand.stiffness, stiffest) : stiffest / 8);
@@ -374,7 +384,7 @@ Simulation::Content::Acting Simulation::Content::evaluate(double now, float dt, 
         for (Grip& grip : grips) {
             if (grip.hand.body != b || !(grip.hand.from <= now && now < grip.hand.until)) continue;
             const Vec3f to_target =
-                grip.hand.target.at(now).cast<float>() - embedded_point(grip.region, 0, body.positions);
+                grip.hand.target.at(now).cast<float>() - grip.offset - embedded_point(grip.region, 0, body.positions);
             const Vec3f force =
                 grip.stiffness * to_target - grip.damping * embedded_point(grip.region, 0, body.velocities);
             add_to_particles(grip.region, 0, force, bodies[b].forces);
@@ -443,16 +453,17 @@ float Simulation::Content::most_speed(double now) const {
     return std::sqrt(squared) + float(obstacles);
 }
 
+/// Pinned particles too: move_pins sets them right.
 void Simulation::Content::kick(float dt, bool damp, const RunContext& context) {
     const Vec3f gravity = world.gravity.cast<float>();
     for (BodyState& body : bodies) {
         const float kept = damp ? std::exp(-2 * dt * float(body.body->material.damping)) : 1.0f;
         parallel_for(context, body.positions.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-            const auto kick_axis = [&](std::vector<float>& v, const std::vector<float>& f, float g) {
-                for (std::size_t i = begin; i < end; ++i) {
-                    const float kicked = (v[i] + dt * (f[i] * body.inverse_mass[i] + g)) * kept;
-                    v[i] = body.fixed[i] ? v[i] : kicked;
-                }
+            const float* light = body.inverse_mass.data();
+            const auto kick_axis = [&](std::vector<float>& velocities, const std::vector<float>& forces, float g) {
+                float* v = velocities.data();
+                const float* f = forces.data();
+                for (std::size_t i = begin; i < end; ++i) v[i] = (v[i] + dt * (f[i] * light[i] + g)) * kept;
             };
             kick_axis(body.velocities.x, body.forces.x, gravity.x());
             kick_axis(body.velocities.y, body.forces.y, gravity.y());
@@ -604,6 +615,7 @@ double Simulation::Content::explicit_part(double from, double until, FrameReport
         }
         const Stopwatch watch(report.other_seconds);
         kick(0.5f * dt, true, context);
+        move_pins(now, dt);
         finish_substep(dt, context);
         ++report.substeps;
     }
@@ -620,6 +632,9 @@ void Simulation::Content::restore_momentum(BodyState& body, const RigidState& be
     const Vec3d turn = (after.inertia + 1e-12 * after.inertia.trace() * Mat3d::Identity())
                            .ldlt()
                            .solve(before.angular * kept - after.angular);
+    const double size = std::sqrt(after.inertia.trace() / after.mass);
+    const double rounding = 1e-7 * std::max(centre.norm(), size);
+    if ((centre - after.centre).norm() + t * (shift.norm() + size * turn.norm()) < rounding) return;
     for (std::size_t i = 0; i < body.positions.size(); ++i) {
         const Vec3d arm = body.positions[i].cast<double>() - after.centre;
         body.velocities.add(i, (shift + turn.cross(arm)).cast<float>());
@@ -649,7 +664,8 @@ void Simulation::Content::descent_part(double from, double until, FrameReport& r
                 blocks[b] = contacts.blocks(bodies, b, now, dt, [&](Contacts::Blocks& all) {
                     for (const Grip& grip : grips)
                         if (grip.hand.body == b && grip.hand.from <= now && now < grip.hand.until)
-                            all.add_pull(grip.region, 0, grip.hand.target.at(now).cast<float>(), grip.stiffness);
+                            all.add_pull(grip.region, 0, grip.hand.target.at(now).cast<float>() - grip.offset,
+                                         grip.stiffness);
                 });
         }
         {
@@ -723,6 +739,7 @@ Result<FrameReport> Simulation::advance(const RunContext& context) {
     const std::string undo = content.save();
     const double from = content.time(), until = double(content.frame + 1) * content.frame_seconds();
     FrameReport report;
+    content.contacts.forget_touches();
     if (!content.wind_forces.empty()) content.blow(from, context);
 
     double reached = from;
@@ -770,9 +787,9 @@ void Simulation::set_positions(std::size_t body, const Vectors& positions) {
 void Simulation::set_velocities(std::size_t body, const Vectors& velocities) {
     content_->bodies[body].velocities = velocities;
 }
-void Simulation::set_hands(std::vector<Hand> hands) {
+void Simulation::set_hands(std::vector<Hand> hands, const RunContext& context) {
     content_->grips.clear();
-    for (const Hand& hand : hands) content_->grips.push_back(content_->grip(hand));
+    for (const Hand& hand : hands) content_->grips.push_back(content_->grip(hand, context));
     content_->world.hands = std::move(hands);
 }
 

@@ -72,7 +72,7 @@ public:
     void set_positions(std::size_t body, const Vectors& positions);
     void set_velocities(std::size_t body, const Vectors& velocities);
     /// Hands may come and go while it runs.
-    void set_hands(std::vector<Hand> hands);
+    void set_hands(std::vector<Hand> hands, const RunContext& context);
 
     Energy energy(const RunContext& context) const;
     Momentum momentum() const;

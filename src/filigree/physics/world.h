@@ -56,8 +56,10 @@ struct MeshObstacle {
 struct Obstacle {
     std::variant<HalfSpace, Ball, Cuboid, MeshObstacle> shape;
     RigidMotion motion;
-    double friction = 0.5;    ///< Coulomb's coefficient
-    double restitution = 0.5; ///< 0 .. 1: speed of a hard point after the bounce over that before
+    double friction = 0.5; ///< Coulomb's coefficient
+    /// 0 .. 1: speed of a hard point after the bounce over that before. A soft body bounces by its own elasticity too.
+    double restitution = 0.5;
+    double stiffness = 1; ///< above 0, to 1: of the contact; less for ground that is softer than the bodies
 };
 
 /// Distance and outward normal of an obstacle that stands at `motion` (its RigidMotion at some time). World, m.
