@@ -18,6 +18,7 @@
 #include "filigree/physics/elasticity.h"
 
 #include "filigree/core/parallel_for.h"
+#include "filigree/core/random.h"
 #include "filigree/physics/body.h"
 #include "filigree/physics/mls_neighbours.h"
 #include "filigree/physics/plasticity.h"
@@ -36,9 +37,18 @@ namespace {
 
 constexpr std::size_t kGrain = 256, kBlock = 8; // particles; stresses are computed for kBlock at a time
 constexpr double kHourglass = 0.05;             // of mu V / h^2
-constexpr int kRateIterations = 12;
-constexpr float kLeastInvariant = 1e-8f; // |F|^2 of a collapsed neighbourhood: it is taken for a small cube
-constexpr float kLeastCube = 1e-3f;
+constexpr int kRateIterations = 30;
+constexpr double kRateMargin = 1.4;
+// A neighbourhood in a point or on a line has no cofactor and so no force that opens it: sweeps take it for a thin box.
+constexpr float kLeastCofactor = 1e-3f; // |cof F|^2
+constexpr float kThinBox = 0.1f;        // added to F's diagonal
+// Growing out of a collapse by leaps leaves particles on the wrong side of each other.
+constexpr float kCollapsed = 0.5f;      // |F|^2
+constexpr float kCollapsedStep = 0.05f; // spacings a sweep
+// Corners folded inwards are held by nothing but their hourglass term, in states of equilibrium: sweeps harden it where
+// a neighbour has slipped far from where F says. No ordinary motion does that.
+constexpr float kFolded = 0.3f; // spacings
+constexpr float kMostHardening = 20;
 
 constexpr float kFlowToRenew = 0.5f;       // |G|^2 - 3 of the flow G since the last renewal: a stretch by 1.45
 constexpr float kMostFlow = 2.5f;          // ... of any single particle
@@ -58,6 +68,9 @@ FILIGREE_INLINE Float4 cross(Float4 a, Float4 b) {
     return __builtin_shufflevector(c, c, 1, 2, 0, 3);
 }
 FILIGREE_INLINE float dot3(Float4 a, Float4 b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+FILIGREE_INLINE float squared_norm(const Columns& m) {
+    return dot3(m.c[0], m.c[0]) + dot3(m.c[1], m.c[1]) + dot3(m.c[2], m.c[2]);
+}
 FILIGREE_INLINE Vec3f to_vector(Float4 a) { return {a[0], a[1], a[2]}; }
 FILIGREE_INLINE Float4 to_lanes(const Vec3f& a) { return Float4{a.x(), a.y(), a.z(), 0}; }
 FILIGREE_INLINE Mat3f to_matrix(const Columns& m) {
@@ -214,6 +227,12 @@ StressLoop widest_stress() {
     return stress_plain;
 }
 
+/// slip: weighted, as `allowed` is.
+FILIGREE_INLINE float hardening(Float4 slip, float allowed) {
+    const float squared = dot3(slip, slip);
+    return squared > allowed ? std::min(squared / allowed, kMostHardening) : 1.f;
+}
+
 float smoothstep(double from, double to, double x) {
     if (x >= to) return 1;
     if (x <= from) return 0;
@@ -237,6 +256,7 @@ public:
             renewed_ = stored_;
             temperature_.assign(n, float(material.temperature));
         }
+        slip_allowed_ = float(double(kFolded * kFolded) * body.spacing() * body.spacing());
         moduli_.resize(n);
         find_neighbours(context);
     }
@@ -268,20 +288,7 @@ public:
             found[begin / kGrain] = all;
         });
         parallel_for(context, n, kGrain, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t i = begin; i < end; ++i) {
-                const Columns here = columns_[i];
-                const Float4 x = position_[i];
-                Float4 force = {};
-                for (std::size_t k = neighbours_.offsets[i]; k < neighbours_.offsets[i + 1]; ++k) {
-                    const Index j = neighbours_.neighbours[k];
-                    const Float4 pair = neighbours_.pairs[k];
-                    const Columns& there = columns_[j];
-                    const Float4 first = here.c[0] + there.c[0]; // and z_i + z_j in the last lane
-                    force += first * pair[0] + (here.c[1] + there.c[1]) * pair[1] + (here.c[2] + there.c[2]) * pair[2] +
-                             (position_[j] - x) * (first[3] * pair[3]);
-                }
-                forces.set(i, to_vector(force));
-            }
+            for (std::size_t i = begin; i < end; ++i) forces.set(i, to_vector(gather_force(i)));
         });
 
         ElasticReport report;
@@ -292,7 +299,7 @@ public:
                 squared = piece.squared[l] <= squared ? squared : piece.squared[l];
                 least = piece.volume_ratio[l] >= least ? least : piece.volume_ratio[l];
             }
-        report.rate = stiffness * unit_rate_ + hourglass_rate_;
+        report.rate = stiffness * unit_rate_;
         report.least_volume_ratio = least;
         report.most_stretch = std::sqrt(squared / 3);
         return report;
@@ -449,6 +456,22 @@ private:
         return F;
     }
 
+    /// The force on a particle, from B in columns_ and position_.
+    FILIGREE_INLINE Float4 gather_force(std::size_t i) const {
+        const Columns here = columns_[i];
+        const Float4 x = position_[i];
+        Float4 force = {};
+        for (std::size_t k = neighbours_.offsets[i]; k < neighbours_.offsets[i + 1]; ++k) {
+            const Index j = neighbours_.neighbours[k];
+            const Float4 pair = neighbours_.pairs[k];
+            const Columns& there = columns_[j];
+            const Float4 first = here.c[0] + there.c[0]; // and z_i + z_j in the last lane
+            force += first * pair[0] + (here.c[1] + there.c[1]) * pair[1] + (here.c[2] + there.c[2]) * pair[2] +
+                     (position_[j] - x) * (first[3] * pair[3]);
+        }
+        return force;
+    }
+
     /// Everything that follows from reference_: neighbours, hourglass stiffness, the bound of the rate.
     void find_neighbours(const RunContext& context) {
         const std::size_t n = body_.particle_count();
@@ -463,51 +486,52 @@ private:
             hourglass_[i] = sum > 0 ? float(2 * kHourglass * double(body_.volume[i]) / (h * h)) / sum : 0.f;
         }
         for (std::size_t i = 0; i < n; ++i) moduli_[i] = particle_moduli(i);
-        bound_rate(context);
+        find_rate(context);
     }
 
-    /// With c the most of dP/dF: |K_ij| <= c N_ij, N_ij = sum_p V_p |g_pi| |g_pj|. For any y > 0 no eigenvalue of M^-1
-    /// K is above the largest c (N y)_i / (y_i m_i); a few power iterations make y a good one.
-    void bound_rate(const RunContext& context) {
+    /// Largest eigenvalue of M^-1 K at rest (hourglass term included) by power iteration, over the stiffness that
+    /// stress_block finds at rest. Rayleigh quotients approach it from below: hence kRateMargin, which also has to
+    /// cover what a state changes beyond its largest stiffness. Tests compare with dense eigenvalues.
+    void find_rate(const RunContext& context) {
+        unit_rate_ = unit_rate(shear_, context);
+        if (body_.material.melts()) unit_rate_ = std::max(unit_rate_, unit_rate(melt_shear_, context));
+    }
+    float unit_rate(float shear, const RunContext& context) {
         const std::size_t n = body_.particle_count();
-        std::vector<float> y(n, 1.f), through(n), next(n);
-        unit_rate_ = std::numeric_limits<float>::infinity();
+        const float lambda = bulk_ - shear * (2 / 3.f);
+        const auto component = [](std::size_t i, std::uint64_t c) { return float(random_unit(1, 3 * i + c) - 0.5); };
+        for (std::size_t i = 0; i < n; ++i) position_[i] = Float4{component(i, 0), component(i, 1), component(i, 2), 0};
+        double rate = 0;
+        std::vector<Float4> next(n);
         for (int iteration = 0; iteration < kRateIterations; ++iteration) {
             parallel_for(context, n, kGrain, [&](std::size_t begin, std::size_t end) {
-                for (std::size_t p = begin; p < end; ++p) {
-                    float sum = neighbours_.self_gradient[p].norm() * y[p];
-                    for (std::size_t k = neighbours_.offsets[p]; k < neighbours_.offsets[p + 1]; ++k)
-                        sum += neighbours_.gradient(p, to_vector(neighbours_.pairs[k])).norm() *
-                               y[neighbours_.neighbours[k]];
-                    through[p] = sum * body_.volume[p];
+                for (std::size_t i = begin; i < end; ++i) {
+                    Mat3f G = to_matrix(gradient(i));
+                    if (!neighbours_.missing.empty()) G -= neighbours_.missing[i];
+                    const Mat3f stress = shear * (G + G.transpose()) + lambda * G.trace() * Mat3f::Identity();
+                    const float z = hourglass_[i] * shear;
+                    const auto& m = neighbours_.inverse_moment[i];
+                    Mat3f M;
+                    M << m[0], m[3], m[4], m[3], m[1], m[5], m[4], m[5], m[2];
+                    columns_[i] = to_columns(body_.volume[i] * stress * M - z * G);
+                    columns_[i].c[0][3] = z;
                 }
             });
             parallel_for(context, n, kGrain, [&](std::size_t begin, std::size_t end) {
-                for (std::size_t i = begin; i < end; ++i) {
-                    float sum = neighbours_.self_gradient[i].norm() * through[i];
-                    for (std::size_t k = neighbours_.offsets[i]; k < neighbours_.offsets[i + 1]; ++k) {
-                        const Index p = neighbours_.neighbours[k];
-                        sum += neighbours_.gradient(p, to_vector(neighbours_.pairs[k])).norm() * through[p];
-                    }
-                    next[i] = sum / body_.mass[i];
-                }
+                for (std::size_t i = begin; i < end; ++i) next[i] = gather_force(i);
             });
-            float most = 0;
-            for (std::size_t i = 0; i < n; ++i) most = std::max(most, next[i] / y[i]);
-            unit_rate_ = std::min(unit_rate_, most);
-            float largest = 0;
-            for (const float value : next) largest = std::max(largest, value);
-            // Half of the old one damps what alternates; and y stays above 0 (far, light or lonely particles).
-            for (std::size_t i = 0; i < n; ++i)
-                y[i] = std::max(0.5f * (y[i] + (largest > 0 ? next[i] / largest : 0.f)), 1e-3f);
+            double power = 0, mass = 0, largest = 0;
+            for (std::size_t i = 0; i < n; ++i) {
+                power -= double(dot3(next[i], position_[i]));
+                mass += double(body_.mass[i] * dot3(position_[i], position_[i]));
+                next[i] /= -body_.mass[i];
+                for (int a = 0; a < 3; ++a) largest = std::max(largest, double(std::abs(next[i][a])));
+            }
+            if (mass > 0) rate = std::max(rate, power / mass);
+            if (!(largest > 0)) break;
+            for (std::size_t i = 0; i < n; ++i) position_[i] = next[i] * float(1 / largest);
         }
-        hourglass_rate_ = 0;
-        for (std::size_t i = 0; i < n; ++i) {
-            float sum = 0;
-            for (std::size_t k = neighbours_.offsets[i]; k < neighbours_.offsets[i + 1]; ++k)
-                sum += neighbours_.pairs[k][3] * (hourglass_[i] + hourglass_[neighbours_.neighbours[k]]);
-            hourglass_rate_ = std::max(hourglass_rate_, 2 * sum * shear_ / body_.mass[i]);
-        }
+        return float(kRateMargin * rate / double(lambda + 2 * shear));
     }
 
     /// Greedily, so that no two particles of a color have a neighbour in common, nor are neighbours.
@@ -545,14 +569,14 @@ private:
             F = {{times(F, D.c[0]), times(F, D.c[1]), times(F, D.c[2])}};
             g = Float4{dot3(D.c[0], g), dot3(D.c[1], g), dot3(D.c[2], g), 0};
         }
-        float I = dot3(F.c[0], F.c[0]) + dot3(F.c[1], F.c[1]) + dot3(F.c[2], F.c[2]);
-        if (I < kLeastInvariant) { // nothing to tell directions by
-            for (int a = 0; a < 3; ++a) F.c[a][a] += kLeastCube;
-            I = 3 * kLeastCube * kLeastCube;
+        Columns cofactor = {{cross(F.c[1], F.c[2]), cross(F.c[2], F.c[0]), cross(F.c[0], F.c[1])}};
+        if (squared_norm(cofactor) < kLeastCofactor) {
+            for (int a = 0; a < 3; ++a) F.c[a][a] += kThinBox;
+            cofactor = {{cross(F.c[1], F.c[2]), cross(F.c[2], F.c[0]), cross(F.c[0], F.c[1])}};
         }
-        const Float4 cof0 = cross(F.c[1], F.c[2]);
-        const Float4 cof = cof0 * g[0] + cross(F.c[2], F.c[0]) * g[1] + cross(F.c[0], F.c[1]) * g[2];
-        const float J = dot3(F.c[0], cof0), V = body_.volume[p];
+        const float I = squared_norm(F);
+        const Float4 cof = times(cofactor, g);
+        const float J = dot3(F.c[0], cofactor.c[0]), V = body_.volume[p];
         const Moduli& m = moduli_[p];
         const float inverse = 1 / (I + 1), shear = m.mu * (1 - inverse);
         const Float4 Fg = times(F, g);
@@ -577,14 +601,21 @@ private:
             const Index p = neighbours_.neighbours[k];
             const Float4 pair = neighbours_.pairs[k];
             add_energy_of(p, to_lanes(neighbours_.gradient(p, -to_vector(pair))), force, block);
-            const float zi = moduli_[i].z, zp = moduli_[p].z;
-            force += (zi + zp) * pair[3] * (position_[p] - x) - zi * times(here, pair) - zp * times(columns_[p], pair);
+            const Float4 offset = pair[3] * (position_[p] - x);
+            const Float4 slip_here = offset - times(here, pair), slip_there = offset - times(columns_[p], pair);
+            const float allowed = pair[3] * pair[3] * slip_allowed_;
+            const float zi = moduli_[i].z * hardening(slip_here, allowed);
+            const float zp = moduli_[p].z * hardening(slip_there, allowed);
+            force += zi * slip_here + zp * slip_there;
             stiffness += (zi + zp) * pair[3];
         }
         block.add_scaled_identity(stiffness);
         Vec3f total = to_vector(force);
         if (descent.touched[i] && descent.external) descent.external->add(i, positions, total, block);
-        const Float4 step = to_lanes(block.solve(total));
+        Vec3f solved = block.solve(total);
+        const float most = kCollapsedStep * float(body_.spacing()), length = solved.norm();
+        if (length > most && squared_norm(here) < kCollapsed) solved *= most / length;
+        const Float4 step = to_lanes(solved);
         positions.add(i, to_vector(step));
         position_[i] += step;
         for (int a = 0; a < 3; ++a) columns_[i].c[a] += step * self[a];
@@ -713,13 +744,14 @@ private:
     const Body& body_;
     bool flows_; // whether stored_ and so on are there
     float shear_, bulk_, melt_shear_;
+    float slip_allowed_; // m^2
     StressLoop stress_ = widest_stress();
 
     // From the reference alone.
     MlsNeighbours neighbours_;
     std::vector<float> hourglass_; // z over the shear modulus
     std::vector<std::vector<Index>> colors_;
-    float unit_rate_ = 0, hourglass_rate_ = 0;
+    float unit_rate_ = 0; // rate over the largest stiffness
 
     // State.
     Vectors reference_;
