@@ -421,8 +421,7 @@ struct SweepJob {
     const Plan& plan;
     Vectors& positions;
     const Descent& descent;
-    std::span<const Index> rows; ///< of one color of j and k
-    bool odd_x;
+    std::span<const Index> rows; ///< of equal parities in j and k
 };
 
 /// A force and a block (xx yy zz xy xz yz) for each of a row's cells.
@@ -545,6 +544,7 @@ FILIGREE_INLINE void solve_vertices(const SweepJob& job, const Row& row, Index v
         }
 }
 
+/// Both colors of each row, one after the other: rows of equal parities in j and k share no cell.
 template <int N>
 FILIGREE_INLINE void sweep_rows(const SweepJob& job, std::size_t begin, std::size_t end) {
     const Plan& plan = job.plan;
@@ -554,15 +554,17 @@ FILIGREE_INLINE void sweep_rows(const SweepJob& job, std::size_t begin, std::siz
     std::vector<float> systems(kSystem * stride);
     for (std::size_t r = begin; r < end; ++r) {
         const Row& row = plan.rows[job.rows[r]];
-        for (int k = 0; k < kSystem; ++k) std::fill_n(systems.begin() + k * stride, row.count + 1, 0.0f);
-        const Index parity = row.odd_start != job.odd_x ? 1 : 0; // of the color's vertices, counted along the row
-        for (std::size_t n = row.first_neighbour; n < row.last_neighbour; ++n) {
-            const Neighbour& neighbour = plan.neighbours[n];
-            const Cells::Run& run = plan.cells->runs[neighbour.run];
-            add_run_systems<N>(factors, job.positions, run, 0, plan.fraction.data(), neighbour.side,
-                               neighbour.offset % 2 == parity, systems.data() + neighbour.offset + 1, stride);
+        for (const bool odd_x : {false, true}) {
+            const Index parity = row.odd_start != odd_x ? 1 : 0; // of the color's vertices, counted along the row
+            for (int k = 0; k < kSystem; ++k) std::fill_n(systems.begin() + k * stride, row.count + 1, 0.0f);
+            for (std::size_t n = row.first_neighbour; n < row.last_neighbour; ++n) {
+                const Neighbour& neighbour = plan.neighbours[n];
+                const Cells::Run& run = plan.cells->runs[neighbour.run];
+                add_run_systems<N>(factors, job.positions, run, 0, plan.fraction.data(), neighbour.side,
+                                   neighbour.offset % 2 == parity, systems.data() + neighbour.offset + 1, stride);
+            }
+            for (Index v = parity; v < row.count; v += 2 * N) solve_vertices<N>(job, row, v, systems.data(), stride);
         }
-        for (Index v = parity; v < row.count; v += 2 * N) solve_vertices<N>(job, row, v, systems.data(), stride);
     }
 }
 
@@ -764,12 +766,11 @@ void sweep(const Plan& plan, Vectors& positions, const Descent& descent, int lan
     assert(positions.size() == plan.cells->corners.size());
     const SweepFunction sweep_rows_of = sweep_function(lanes);
     const std::size_t grain = std::max<std::size_t>(1, kCornersPerSweep * plan.rows.size() / (positions.size() + 1));
-    for (const std::vector<Index>& rows : plan.row_colors)
-        for (const bool odd_x : {false, true}) {
-            const SweepJob job{plan, positions, descent, rows, odd_x};
-            parallel_for(context, rows.size(), grain,
-                         [&](std::size_t begin, std::size_t end) { sweep_rows_of(job, begin, end); });
-        }
+    for (const std::vector<Index>& rows : plan.row_colors) {
+        const SweepJob job{plan, positions, descent, rows};
+        parallel_for(context, rows.size(), grain,
+                     [&](std::size_t begin, std::size_t end) { sweep_rows_of(job, begin, end); });
+    }
 }
 
 } // namespace filigree::cell_kernel
