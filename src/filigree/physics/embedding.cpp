@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <limits>
 
 namespace filigree {
 
@@ -20,36 +21,44 @@ constexpr double kLeastWeight = -0.5; // beyond, a weight makes more of the nois
 /// 27 det / trace^3 of the particles' covariance, 1 for a round cloud: below, they count as lying in a plane.
 constexpr double kSpanning = 2e-3;
 
-/// Particles sorted into the boxes of a regular grid, those of a row of boxes one after the other.
+/// Particles sorted into the boxes of a regular grid, those of a row of boxes one after the other. Those whose
+/// positions are not finite are left out.
 class ParticleGrid {
 public:
     ParticleGrid(const Vectors& rest, double spacing) {
         Box box;
-        for (std::size_t i = 0; i < rest.size(); ++i) box.extend(rest[i].cast<double>());
+        for (std::size_t i = 0; i < rest.size(); ++i) {
+            if (!rest[i].allFinite()) continue;
+            particles_.push_back(Index(i));
+            box.extend(rest[i].cast<double>());
+        }
+        if (particles_.empty()) return;
         low_ = box.min;
         step_ = spacing;
-        const double most = 8.0 * double(rest.size()) + 4096;
+        const double most = 8.0 * double(particles_.size()) + 4096;
         const auto counts = [&] { return ((box.size() / step_).array().floor() + 1).eval(); };
         while (counts().prod() > most) step_ *= 1.25;
         for (int axis = 0; axis < 3; ++axis) counts_[axis] = int(counts()[axis]);
 
-        std::vector<std::size_t> box_of(rest.size());
+        std::vector<std::size_t> box_of(particles_.size());
         offsets_.assign(std::size_t(counts_[0]) * counts_[1] * counts_[2] + 1, 0);
-        for (std::size_t i = 0; i < rest.size(); ++i) {
-            const Vec3d q = (rest[i].cast<double>() - low_) / step_;
-            box_of[i] = row(int(q[1]), int(q[2])) + std::size_t(int(q[0]));
-            ++offsets_[box_of[i] + 1];
+        for (std::size_t p = 0; p < particles_.size(); ++p) {
+            const Vec3d q = (rest[particles_[p]].cast<double>() - low_) / step_;
+            box_of[p] = row(int(q[1]), int(q[2])) + std::size_t(int(q[0]));
+            ++offsets_[box_of[p] + 1];
         }
         for (std::size_t b = 1; b < offsets_.size(); ++b) offsets_[b] += offsets_[b - 1];
         std::vector<Index> next(offsets_.begin(), offsets_.end() - 1);
-        positions_.resize(rest.size());
-        particles_.resize(rest.size());
-        for (std::size_t i = 0; i < rest.size(); ++i) {
-            const Index slot = next[box_of[i]]++;
-            positions_[slot] = rest[i].cast<double>();
-            particles_[slot] = Index(i);
+        const std::vector<Index> unsorted = particles_;
+        positions_.resize(unsorted.size());
+        for (std::size_t p = 0; p < unsorted.size(); ++p) {
+            const Index slot = next[box_of[p]]++;
+            positions_[slot] = rest[unsorted[p]].cast<double>();
+            particles_[slot] = unsorted[p];
         }
     }
+
+    bool empty() const { return particles_.empty(); }
 
     struct Near {
         Index particle;
@@ -79,9 +88,9 @@ public:
 private:
     std::size_t row(int j, int k) const { return (std::size_t(k) * counts_[1] + j) * counts_[0]; }
 
-    Vec3d low_;
-    double step_;
-    std::array<int, 3> counts_;
+    Vec3d low_ = Vec3d::Zero();
+    double step_ = 1;
+    std::array<int, 3> counts_ = {};
     std::vector<Index> offsets_, particles_;
     std::vector<Vec3d> positions_;
 };
@@ -157,13 +166,22 @@ void embed_point(const Vec3d& point, const ParticleGrid& grid, double spacing, F
         }
         piece.report.least_weight = std::min(piece.report.least_weight, float(fit.least));
     };
+    if (grid.empty() || !point.allFinite()) { // nothing to be had: any particle will do
+        fit.near = {{0, point, 0}};
+        fit.weights = {1};
+        fit.least = 0;
+        ++piece.report.far_points;
+        return accept();
+    }
     // Far points reach one spacing further than their nearest particle.
-    double growth = 1, nearest = 0;
+    double growth = 1;
     grid.find(point, kRadius * spacing, fit.near);
     for (double radius = kRadius * spacing; fit.near.empty(); grid.find(point, radius, fit.near))
         radius *= kRadiusGrowth;
-    nearest = INFINITY;
+    double nearest = std::numeric_limits<double>::infinity();
     for (const auto& near : fit.near) nearest = std::min(nearest, std::sqrt(near.squared_distance));
+    const bool far = nearest > kRadius * spacing;
+    piece.report.far_points += far;
     const auto reach = [&] { return std::max(kRadius * spacing * growth, nearest + spacing * growth); };
     for (int attempt = 0; attempt < kAttempts; ++attempt, growth *= kRadiusGrowth) {
         const double radius = reach();
@@ -171,7 +189,7 @@ void embed_point(const Vec3d& point, const ParticleGrid& grid, double spacing, F
         if (fit.solve(point, radius, false) && fit.least >= kLeastWeight) return accept();
     }
     // Not to be had: what can be had from those around the nearest particle, and no slope where that shoots too far.
-    ++piece.report.far_points;
+    piece.report.far_points += !far;
     growth = 1;
     const double radius = reach();
     grid.find(point, radius, fit.near);
@@ -265,7 +283,9 @@ Embedding embed_in_cells(std::span<const Vec3f> points, const Cells& cells, cons
     embedding.weights.resize(8 * points.size());
     parallel_for(context, points.size(), kGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t p = begin; p < end; ++p) {
-            const Vec3d at = (points[p].cast<double>() - cells.origin) / cells.spacing;
+            Vec3d at = (points[p].cast<double>() - cells.origin) / cells.spacing;
+            if (!at.allFinite())
+                at = Vec3d(cells.cells[0][0], cells.cells[0][1], cells.cells[0][2]); // anything will do
             const Index cell = nearest_cell(cells, at);
             const auto& index = cells.cells[cell];
             const Vec3d t = at - Vec3d(index[0], index[1], index[2]);

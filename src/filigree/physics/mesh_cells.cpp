@@ -449,7 +449,7 @@ Result<Trial> find_spacing(const CellMaker& maker, std::size_t count,
         if (cells < 1 || std::abs(std::log(shortest / cells / best.spacing)) > 0.2) continue;
         Result<Trial> trial = try_spacing(shortest / cells);
         if (!trial) return trial.error();
-        if (std::abs(miss(*trial)) < std::log(1 + kFitTolerance) &&
+        if (std::abs(trial->particles - double(count)) <= kFitTolerance * double(count) &&
             (!fitted || std::abs(miss(*trial)) < std::abs(miss(*fitted))))
             fitted = std::move(trial).value();
     }

@@ -1,0 +1,174 @@
+#include "filigree/physics/body.h"
+
+#include "filigree/io/mesh_file.h"
+#include "filigree/mesh/closest_point.h"
+#include "filigree/mesh/shapes.h"
+#include "io/corpus.h"
+#include "threads.h"
+
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+namespace filigree {
+namespace {
+
+const RunContext kContext;
+
+Material of(MaterialModel model, double density = 1000) {
+    Material material;
+    material.model = model;
+    material.density = density;
+    return material;
+}
+
+double sum(const std::vector<float>& values) { return std::accumulate(values.begin(), values.end(), 0.0); }
+
+TEST(Body, ABoxWeighsWhatItShould) {
+    for (const MaterialModel model : {MaterialModel::fem, MaterialModel::springs, MaterialModel::meshfree}) {
+        const Body body = make_body(box_cells(5, 4, 3, 0.1), of(model, 800));
+        const bool corners = model != MaterialModel::meshfree;
+        ASSERT_EQ(body.particle_count(), corners ? 6u * 5 * 4 : 60u);
+        EXPECT_NEAR(sum(body.mass), 800 * 0.06, 1e-5);
+        EXPECT_NEAR(sum(body.volume), 0.06, 1e-8);
+        EXPECT_FLOAT_EQ(body.mass[0], corners ? 0.1f : 0.8f); // of one cell: an eighth, or all
+        EXPECT_EQ(body.skin.points.size(), 4u * 2 * (5 * 4 + 4 * 3 + 3 * 5));
+        EXPECT_NEAR(sum(body.skin.areas), 0.94, 1e-6);
+        for (std::size_t p = 0; p < body.skin.points.size(); ++p) {
+            const Vec3f out = body.skin.points.rest[p] + 0.01f * body.skin.normals[p];
+            EXPECT_TRUE((out.array() < 0).any() || (out.array() > Eigen::Array3f(0.5f, 0.4f, 0.3f)).any());
+        }
+    }
+}
+
+TEST(Body, MeshfreeCellsWithoutNeighboursAroundAreSplit) {
+    EXPECT_EQ(make_body(box_cells(6, 1, 1, 0.1), of(MaterialModel::meshfree)).particle_count(), 48u);
+    EXPECT_EQ(make_body(box_cells(6, 5, 1, 0.1), of(MaterialModel::meshfree)).particle_count(), 240u);
+    EXPECT_EQ(make_body(box_cells(1, 1, 1, 0.1), of(MaterialModel::meshfree)).particle_count(), 8u);
+    EXPECT_EQ(make_body(box_cells(6, 2, 2, 0.1), of(MaterialModel::meshfree)).particle_count(), 24u);
+    const Body line = make_body(box_cells(6, 1, 1, 0.1), of(MaterialModel::meshfree));
+    EXPECT_NEAR(sum(line.mass), 6, 1e-5);
+    EXPECT_LT((line.rest[0] - Vec3f(0.025f, 0.025f, 0.025f)).norm(), 1e-6f);
+}
+
+TEST(Body, ASphereHasItsMassAndSkin) {
+    const double pi = 3.14159265358979;
+    const Mesh sphere = make_wavy_sphere({.resolution = 40, .amplitude = 0});
+    for (const MaterialModel model : {MaterialModel::fem, MaterialModel::meshfree}) {
+        BodyReport report;
+        const auto body = make_body(sphere, of(model), {.scale = 2, .cells = {.count = 8000}}, kContext, &report);
+        ASSERT_TRUE(body) << body.error().message;
+        EXPECT_NEAR(double(body->particle_count()) / 8000, 1, 0.16);
+        EXPECT_NEAR(sum(body->mass) / (1000 * pi / 6 * 8), 1, 0.015);
+        EXPECT_NEAR(report.mass, sum(body->mass), 1e-3);
+        EXPECT_NEAR(sum(body->skin.areas) / (4 * pi), 1, 0.01);
+        EXPECT_EQ(report.skin_points, body->skin.points.size());
+        const double wanted = 4 * pi / (0.25 * body->spacing() * body->spacing());
+        EXPECT_GT(double(report.skin_points), 0.8 * wanted);
+        EXPECT_LT(double(report.skin_points), 1.8 * wanted);
+        for (std::size_t p = 0; p < report.skin_points; ++p) {
+            const Vec3f& point = body->skin.points.rest[p];
+            EXPECT_NEAR(point.norm(), 1, 2e-3);
+            EXPECT_GT(body->skin.normals[p].dot(point.normalized()), 0.95f);
+        }
+        EXPECT_EQ(report.warning, "");
+    }
+}
+
+TEST(Body, TheSkinOfABoxHasItsEdgesAndCorners) {
+    const Mesh bar = make_bar({.resolution = 4, .size = 0.2, .length = 2});
+    const auto body = make_body(bar, of(MaterialModel::fem), {.cells = {.spacing = 0.05}}, kContext);
+    ASSERT_TRUE(body) << body.error().message;
+    int corners = 0;
+    for (const Vec3f& point : body->skin.points.rest)
+        corners += (point.cwiseAbs() - Vec3f(0.2f, 0.1f, 0.1f)).norm() < 1e-6f;
+    EXPECT_EQ(corners, 8);
+    EXPECT_NEAR(sum(body->skin.areas), 2 * 0.04 + 4 * 0.08, 1e-6);
+}
+
+TEST(Body, SkinFollowsTheParticles) {
+    const Mesh cube = make_wavy_cube({.resolution = 24});
+    for (const MaterialModel model : {MaterialModel::fem, MaterialModel::meshfree}) {
+        const auto body = make_body(cube, of(model), {.cells = {.count = 2000}}, kContext);
+        ASSERT_TRUE(body) << body.error().message;
+        const Embedding& skin = body->skin.points;
+        for (std::size_t p = 0; p < skin.size(); ++p) {
+            Vec3d at = Vec3d::Zero();
+            double weights = 0;
+            for (Index n = skin.offsets[p]; n < skin.offsets[p + 1]; ++n) {
+                at += skin.weights[n] * body->rest[skin.particles[n]].cast<double>();
+                weights += skin.weights[n];
+            }
+            ASSERT_NEAR(weights, 1, 1e-6);
+            ASSERT_LT((at - skin.rest[p].cast<double>()).norm(), 1e-6);
+        }
+    }
+}
+
+TEST(Body, KoalaHasItsMassAndSkin) {
+    const auto path = filigree_test::corpus_folder() / "good/koala_100k.obj";
+    if (!std::filesystem::exists(path)) GTEST_SKIP() << "no corpus";
+    const Mesh koala = read_mesh(path, kContext)->mesh;
+    const WeldedTriangles welded = weld_triangles(koala);
+    double volume = 0, area = 0;
+    for (const Triangle& t : welded.triangles) {
+        const Vec3d a = koala.positions[t[0]].cast<double>(), b = koala.positions[t[1]].cast<double>(),
+                    c = koala.positions[t[2]].cast<double>();
+        volume += a.dot(b.cross(c)) / 6;
+        area += (b - a).cross(c - a).norm() / 2;
+    }
+    const auto fine = make_body(koala, of(MaterialModel::fem), {.cells = {.count = 20000}}, kContext);
+    ASSERT_TRUE(fine) << fine.error().message;
+    EXPECT_NEAR(sum(fine->mass) / (1000 * volume), 1, 0.01);
+    const auto body = make_body(koala, of(MaterialModel::meshfree), {}, kContext);
+    ASSERT_TRUE(body) << body.error().message;
+    EXPECT_NEAR(sum(body->mass) / (1000 * volume), 1, 0.01);
+    EXPECT_NEAR(sum(body->skin.areas) / area, 1, 0.001);
+
+    const ClosestPointTree tree(koala.positions, welded.triangles);
+    const double size = bounds(koala.positions).diagonal();
+    std::size_t outward = 0;
+    for (std::size_t p = 0; p < body->skin.points.size(); ++p) {
+        const SurfacePoint found = tree.closest(body->skin.points.rest[p]);
+        ASSERT_LT(found.distance, 1e-6 * size);
+        const Triangle& t = welded.triangles[found.triangle];
+        const Vec3f normal =
+            (koala.positions[t[1]] - koala.positions[t[0]]).cross(koala.positions[t[2]] - koala.positions[t[0]]);
+        outward += normal.dot(body->skin.normals[p]) > 0;
+    }
+    EXPECT_GT(double(outward), 0.99 * double(body->skin.points.size()));
+}
+
+TEST(Body, ThreadsDoNotMatter) {
+    FILIGREE_NEEDS_TWO_THREADS();
+    const Mesh cube = make_wavy_cube({.resolution = 16});
+    const BodyOptions options{.cells = {.count = 1500}};
+    const Body one = *make_body(cube, of(MaterialModel::meshfree), options, RunContext(1));
+    const Body two = *make_body(cube, of(MaterialModel::meshfree), options, RunContext(2));
+    EXPECT_EQ(one.rest.x, two.rest.x);
+    EXPECT_EQ(one.mass, two.mass);
+    EXPECT_EQ(one.skin.points.rest, two.skin.points.rest);
+    EXPECT_EQ(one.skin.points.weights, two.skin.points.weights);
+    EXPECT_EQ(one.skin.normals, two.skin.normals);
+}
+
+TEST(Body, ThinPartsAreSaid) {
+    const Mesh plate = make_wavy_plane({.resolution = 8, .amplitude = 0});
+    BodyReport report;
+    const auto body = make_body(plate, of(MaterialModel::meshfree), {.cells = {.spacing = 0.1}}, kContext, &report);
+    ASSERT_TRUE(body) << body.error().message;
+    EXPECT_EQ(report.split_cells, 100u);
+    EXPECT_EQ(body->particle_count(), 800u);
+    EXPECT_NE(report.warning.find("fewer than two cells across"), std::string::npos) << report.warning;
+}
+
+TEST(Body, BadMaterialsAndScalesAreRefused) {
+    const Mesh cube = make_wavy_cube({.resolution = 4});
+    EXPECT_EQ(make_body(cube, of(MaterialModel::fem, -1), {}, kContext).error().code, ErrorCode::usage);
+    EXPECT_EQ(make_body(cube, {}, {.scale = 0, .cells = {}}, kContext).error().code, ErrorCode::usage);
+    EXPECT_EQ(make_body(cube, {}, {.cells = {.spacing = -1}}, kContext).error().code, ErrorCode::usage);
+    EXPECT_EQ(make_body(Mesh{}, {}, {}, kContext).error().code, ErrorCode::unsuitable);
+}
+
+} // namespace
+} // namespace filigree
