@@ -178,7 +178,10 @@ Result<DistanceField> DistanceField::create(const Mesh& mesh, double scale, doub
                 const std::size_t p = row * grid.counts[0] + i;
                 if (!band[p]) continue;
                 const Vec3d point = grid.point(i, row % grid.counts[1], row / grid.counts[1]);
-                const SurfacePoint found = tree.closest(point.cast<float>());
+                // No further than its neighbour's and one step; which makes the search short.
+                double reach = std::numeric_limits<double>::infinity();
+                if (i > 0 && band[p - 1]) reach = 1.001 * (distances[p - 1] + grid.spacing);
+                const SurfacePoint found = tree.closest(point.cast<float>(), reach);
                 distances[p] = float(found.distance);
                 closest[p] = found.position;
             }

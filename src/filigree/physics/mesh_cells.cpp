@@ -304,6 +304,12 @@ public:
         for (const Index vertex : mesh.corners) used_[vertex] = 1;
         for (std::size_t v = 0; v < used_.size(); ++v)
             if (used_[v]) box_.extend(mesh.positions[v].cast<double>());
+        for (const Triangle& triangle : welded.triangles) {
+            const auto [a, b, c] = corners_of(triangle);
+            longest_edge_ =
+                std::max({longest_edge_, (b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()});
+        }
+        longest_edge_ = std::sqrt(longest_edge_);
     }
 
     const Box& box() const { return box_; }
@@ -370,11 +376,10 @@ private:
         SurfaceCells surface(grid, cells);
         for (std::size_t v = 0; v < used_.size(); ++v)
             if (used_[v]) surface.cover(mesh_.positions[v].cast<double>(), kOnFace);
-        for (const Triangle& triangle : welded_.triangles) {
-            std::array<Vec3d, 3> corners;
-            for (int n = 0; n < 3; ++n) corners[n] = mesh_.positions[triangle[n]].cast<double>();
-            walk_triangle(corners, 0.5 * grid.spacing, [&](const Vec3d& p) { surface.cover(p, kSheetReach); });
-        }
+        if (longest_edge_ > 0.5 * grid.spacing)
+            for (const Triangle& triangle : welded_.triangles)
+                walk_triangle(corners_of(triangle), 0.5 * grid.spacing,
+                              [&](const Vec3d& p) { surface.cover(p, kSheetReach); });
         const std::vector<Draft> added = surface.take();
         cells.insert(cells.end(), added.begin(), added.end());
         std::sort(cells.begin(), cells.end(), [](const Draft& a, const Draft& b) {
@@ -393,12 +398,18 @@ private:
         return cells;
     }
 
+    std::array<Vec3d, 3> corners_of(const Triangle& triangle) const {
+        return {mesh_.positions[triangle[0]].cast<double>(), mesh_.positions[triangle[1]].cast<double>(),
+                mesh_.positions[triangle[2]].cast<double>()};
+    }
+
     const Mesh& mesh_;
     const WeldedTriangles& welded_;
     double scale_;
     RunContext context_;             ///< without progress: the spacings are counted, not what each takes
     std::vector<std::uint8_t> used_; ///< vertices of faces
     Box box_;
+    double longest_edge_ = 0;
 };
 
 /// What came of a spacing.
