@@ -15,7 +15,8 @@ namespace filigree {
 namespace {
 
 constexpr std::size_t kGrain = 2048;
-constexpr double kSafety = 0.9;            ///< part of the stable step that is used
+constexpr double kSafety = 0.8;            ///< part of the stable step that is used: it changes while a step is made
+constexpr double kLeastSubsteps = 2;       ///< a frame; with one, large motions gain energy
 constexpr float kMostStretch = 10;         ///< a body stretched further starts scaled down ...
 constexpr float kStretchAfter = 3;         ///< ... to this
 constexpr float kHandRate = 0.25f;         ///< share of the elastic rate that a hand may add
@@ -595,10 +596,12 @@ double Simulation::Content::explicit_part(double from, double until, FrameReport
     const unsigned limit = options.mode == StepMode::automatic ? options.most_substeps : kExplicitLimit;
     while (until - now > 1e-9 * frame_seconds()) {
         const double remaining = until - now;
-        const double steps = acting.step > 0 ? std::ceil(remaining / acting.step) : kExplicitLimit + 1.0;
+        const double fewest = std::ceil(kLeastSubsteps * remaining / frame_seconds() - 1e-6);
+        const double steps =
+            acting.step > 0 ? std::max(fewest, std::ceil(remaining / acting.step)) : kExplicitLimit + 1.0;
         const double allowed = report.substeps == 0 ? limit : 2.0 * limit - report.substeps;
         if (!(steps <= allowed) || context.is_cancelled()) return now;
-        const float dt = float(remaining / std::max(1.0, steps));
+        const float dt = float(remaining / steps);
         {
             const Stopwatch watch(report.other_seconds);
             kick(0.5f * dt, false, context);

@@ -1,0 +1,572 @@
+#include "filigree/physics/simulation.h"
+
+#include "filigree/core/random.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+namespace filigree {
+namespace {
+
+Material material(MaterialModel model, double young_modulus = 1e5) {
+    Material material;
+    material.model = model;
+    material.young_modulus = young_modulus;
+    material.damping = 0;
+    return material;
+}
+
+std::shared_ptr<const Body> box(std::size_t nx, std::size_t ny, std::size_t nz, double spacing, const Material& of) {
+    return std::make_shared<Body>(make_body(box_cells(nx, ny, nz, spacing), of));
+}
+
+World free_space() {
+    World world;
+    world.gravity.setZero();
+    return world;
+}
+
+World with_ground(double restitution = 0.5) {
+    World world;
+    Obstacle ground;
+    ground.shape = HalfSpace{};
+    ground.restitution = restitution;
+    world.obstacles.push_back(ground);
+    return world;
+}
+
+Simulation simulation(World world, std::vector<Actor> actors, StepOptions options = {}, unsigned threads = 1) {
+    Result<Simulation> made = Simulation::create(std::move(world), std::move(actors), options, RunContext(threads));
+    EXPECT_TRUE(made.ok()) << (made ? "" : made.error().message);
+    return *std::move(made);
+}
+
+Actor actor(std::shared_ptr<const Body> body, const Vec3d& at = Vec3d::Zero()) {
+    Actor actor;
+    actor.body = std::move(body);
+    actor.placement.translation() = at;
+    return actor;
+}
+
+FrameReport run(Simulation& simulation, std::size_t frames, unsigned threads = 1) {
+    const RunContext context(threads);
+    FrameReport last;
+    for (std::size_t f = 0; f < frames; ++f) {
+        Result<FrameReport> report = simulation.advance(context);
+        EXPECT_TRUE(report.ok());
+        last = *report;
+    }
+    return last;
+}
+
+bool all_finite(const Vectors& values) {
+    for (std::size_t i = 0; i < values.size(); ++i)
+        if (!values[i].allFinite()) return false;
+    return true;
+}
+
+Vec3d centre_of_mass(const Simulation& simulation, std::size_t body = 0) {
+    Vec3d sum = Vec3d::Zero();
+    double mass = 0;
+    for (std::size_t i = 0; i < simulation.body(body).particle_count(); ++i) {
+        const double m = double(simulation.body(body).mass[i]);
+        sum += m * simulation.positions(body)[i].cast<double>();
+        mass += m;
+    }
+    return sum / mass;
+}
+
+/// Largest distance of a particle from the rigid motion that fits the body's start best.
+double shape_error(const Simulation& simulation, std::size_t body = 0) {
+    const Vectors &rest = simulation.body(body).rest, &now = simulation.positions(body);
+    Eigen::Matrix3Xd from(3, rest.size()), to(3, rest.size());
+    for (std::size_t i = 0; i < rest.size(); ++i) {
+        from.col(i) = rest[i].cast<double>();
+        to.col(i) = now[i].cast<double>();
+    }
+    const Eigen::Matrix4d motion = Eigen::umeyama(from, to, false);
+    return ((motion.topLeftCorner<3, 3>() * from).colwise() + motion.topRightCorner<3, 1>() - to)
+        .colwise()
+        .norm()
+        .maxCoeff();
+}
+
+const auto kModels = testing::Values(MaterialModel::fem, MaterialModel::springs, MaterialModel::meshfree);
+std::string model_name(const testing::TestParamInfo<MaterialModel>& info) {
+    return std::array{"fem", "springs", "meshfree"}[std::size_t(info.param)];
+}
+
+class EachMaterial : public testing::TestWithParam<MaterialModel> {};
+INSTANTIATE_TEST_SUITE_P(Simulation, EachMaterial, kModels, model_name);
+
+class EachMode : public testing::TestWithParam<StepMode> {};
+INSTANTIATE_TEST_SUITE_P(Simulation, EachMode, testing::Values(StepMode::explicit_steps, StepMode::descent),
+                         [](const testing::TestParamInfo<StepMode>& info) {
+                             return info.param == StepMode::descent ? "descent" : "explicit_steps";
+                         });
+
+// Half a second of fall is g t^2 / 2, to the rounding of positions, whatever the step.
+TEST_P(EachMode, FreeFallIsExact) {
+    for (const double rate : {10.0, 60.0, 1000.0}) {
+        StepOptions options;
+        options.mode = GetParam();
+        options.frames_per_second = rate;
+        Simulation falling = simulation(World{}, {actor(box(4, 4, 4, 0.25, material(MaterialModel::fem)))}, options);
+        const Vec3d start = centre_of_mass(falling);
+        run(falling, std::size_t(0.5 * rate));
+        EXPECT_NEAR(centre_of_mass(falling).y() - start.y(), -9.81 / 8, 2e-5) << rate << " frames a second";
+        // Descent takes speeds from differences of positions: short steps show their rounding.
+        EXPECT_LT(shape_error(falling), rate == 1000 && GetParam() == StepMode::descent ? 4e-3 : 2e-5);
+        EXPECT_NEAR(falling.momentum().linear.y() / 1000, -9.81 / 2, 1e-4);
+    }
+}
+
+TEST_P(EachMaterial, KeepsMomentumWithExplicitSteps) {
+    StepOptions options;
+    options.mode = StepMode::explicit_steps;
+    Actor spinning = actor(box(5, 5, 5, 0.2, material(GetParam())));
+    spinning.velocity = {1, 2, 3};
+    spinning.spin = {0, 5, 1};
+    Simulation free = simulation(free_space(), {spinning}, options);
+    const Momentum before = free.momentum();
+    run(free, 600); // 10 s
+    const Momentum after = free.momentum();
+    EXPECT_LT((after.linear - before.linear).norm() / before.linear.norm(), 1e-6);
+    // About the centre of mass; that of the world's origin grows with the distance, and so does its rounding.
+    const Vec3d arm = centre_of_mass(free);
+    const Vec3d spin_after = after.angular - arm.cross(after.linear);
+    const Simulation start = simulation(free_space(), {spinning}, options);
+    const Vec3d spin_before = before.angular - centre_of_mass(start).cross(before.linear);
+    EXPECT_LT((spin_after - spin_before).norm() / spin_before.norm(),
+              GetParam() == MaterialModel::springs ? 1e-5 : 2e-5);
+}
+
+// Implicit Euler loses angular momentum; the correction gives it back.
+TEST(Simulation, KeepsMomentumWithDescent) {
+    StepOptions options;
+    options.mode = StepMode::descent;
+    Actor spinning = actor(box(5, 5, 5, 0.2, material(MaterialModel::fem)));
+    spinning.velocity = {1, 2, 3};
+    spinning.spin = {0, 5, 1};
+    Simulation free = simulation(free_space(), {spinning}, options);
+    const Momentum before = free.momentum();
+    const Vec3d spin_before = before.angular - centre_of_mass(free).cross(before.linear);
+    run(free, 600);
+    const Momentum after = free.momentum();
+    EXPECT_LT((after.linear - before.linear).norm() / before.linear.norm(), 1e-5);
+    const Vec3d spin_after = after.angular - centre_of_mass(free).cross(after.linear);
+    EXPECT_LT((spin_after - spin_before).norm() / spin_before.norm(), 1e-3);
+}
+
+TEST(Simulation, KeepsEnergyWithExplicitSteps) {
+    StepOptions options;
+    options.mode = StepMode::explicit_steps;
+    Actor spinning = actor(box(5, 5, 5, 0.2, material(MaterialModel::fem)));
+    spinning.spin = {0, 5, 1};
+    Simulation free = simulation(free_space(), {spinning}, options);
+    const double before = free.energy(RunContext(1)).total();
+    run(free, 600);
+    EXPECT_NEAR(free.energy(RunContext(1)).total() / before, 1, 0.01);
+}
+
+// On a mat much softer than itself a body behaves like a hard point: it leaves with e times its speed.
+TEST(Simulation, BounceHeightFollowsRestitution) {
+    for (const double restitution : {1.0, 0.7, 0.0}) {
+        World world = with_ground(restitution);
+        world.obstacles[0].stiffness = 0.03;
+        const double drop = 0.5, size = 0.3;
+        Simulation bouncing =
+            simulation(world, {actor(box(3, 3, 3, 0.1, material(MaterialModel::fem, 1e6)), {0, drop, 0})},
+                       {.mode = StepMode::explicit_steps});
+        double highest = 0;
+        bool bounced = false;
+        for (int frame = 0; frame < 60; ++frame) {
+            bounced = run(bouncing, 1).contacts > 0 || bounced;
+            if (bounced) highest = std::max(highest, centre_of_mass(bouncing).y() - size / 2);
+        }
+        EXPECT_NEAR(highest, drop * restitution * restitution, 0.03 * drop) << restitution;
+    }
+}
+
+// A soft body that bounces on a ground of restitution 1 turns its fall into swinging, and back; nothing is lost.
+TEST(Simulation, BounceKeepsEnergy) {
+    World world = with_ground(1);
+    world.obstacles[0].friction = 0; // the foot widens as it lands, and would rub
+    Simulation bouncing = simulation(world, {actor(box(5, 5, 5, 0.1, material(MaterialModel::fem, 1e5)), {0, 0.5, 0})},
+                                     {.mode = StepMode::explicit_steps});
+    const double before = bouncing.energy(RunContext(1)).total();
+    const double below = 9.81 * 125 * 0.25; // what is left when it lies on the ground
+    std::size_t contacts = 0;
+    for (int frame = 0; frame < 120; ++frame) contacts += run(bouncing, 1).contacts;
+    EXPECT_GT(contacts, 100u);
+    for (int frame = 0; frame < 60 && run(bouncing, 1).contacts > 0;) ++frame;
+    EXPECT_NEAR((bouncing.energy(RunContext(1)).total() - below) / (before - below), 1, 0.05);
+}
+
+TEST_P(EachMaterial, RestStaysAtRest) {
+    for (const StepMode mode : {StepMode::explicit_steps, StepMode::descent}) {
+        StepOptions options;
+        options.mode = mode;
+        Simulation resting = simulation(free_space(), {actor(box(3, 3, 3, 0.1, material(GetParam())))}, options);
+        run(resting, 1000);
+        EXPECT_LT(shape_error(resting), 3e-6);
+        EXPECT_LT((centre_of_mass(resting) - Vec3d(0.15, 0.15, 0.15)).norm(), 1e-6);
+    }
+}
+
+// 100,000 frames, 28 minutes of it.
+TEST_P(EachMode, RestStaysAtRestForLong) {
+    StepOptions options;
+    options.mode = GetParam();
+    options.descent_substeps = 1;
+    World world;
+    Material soft = material(MaterialModel::fem, 1e4);
+    soft.damping = 1;
+    const auto body = box(1, 2, 1, 0.2, soft);
+    Pin pin;
+    for (Index i = 0; i < body->particle_count(); ++i)
+        if (body->rest.y[i] > 0.39f) pin.particles.push_back(i);
+    world.pins.push_back(pin);
+    Simulation hanging = simulation(world, {actor(body)}, options);
+    run(hanging, 2000);
+    const Vectors settled = hanging.positions(0);
+    run(hanging, 98000);
+    double moved = 0;
+    for (std::size_t i = 0; i < settled.size(); ++i)
+        moved = std::max(moved, double((settled[i] - hanging.positions(0)[i]).norm()));
+    EXPECT_LT(moved, GetParam() == StepMode::descent ? 1e-5 : 2e-6);
+}
+
+TEST(Simulation, RestsOnTheGround) {
+    Material soft = material(MaterialModel::fem);
+    soft.damping = 1;
+    Simulation resting = simulation(with_ground(), {actor(box(5, 5, 5, 0.2, soft), {0, 0.01, 0})});
+    run(resting, 600);
+    const Vectors settled = resting.positions(0);
+    const FrameReport report = run(resting, 600);
+    EXPECT_LT(report.deepest_contact, 0.02);
+    EXPECT_GT(report.contacts, 50u);
+    double moved = 0;
+    for (std::size_t i = 0; i < settled.size(); ++i)
+        moved = std::max(moved, double((settled[i] - resting.positions(0)[i]).norm()));
+    EXPECT_LT(moved, 1e-4);
+}
+
+// A block on a slope of 30 degrees stays for a friction above tan 30 = 0.577 and slides at g (sin - mu cos) below.
+TEST(Simulation, FrictionHoldsAndSlides) {
+    for (const double friction : {0.7, 0.3}) {
+        World world;
+        Obstacle slope;
+        const double angle = std::numbers::pi / 6;
+        slope.shape = HalfSpace{Vec3d::Zero(), {std::sin(angle), std::cos(angle), 0}};
+        slope.friction = friction;
+        slope.restitution = 0;
+        world.obstacles.push_back(slope);
+        Material rubber = material(MaterialModel::fem, 1e6);
+        rubber.internal_damping = 2e-3;
+        Actor block = actor(box(6, 2, 6, 0.1, rubber));
+        block.placement.linear() = Eigen::AngleAxisd(-angle, Vec3d::UnitZ()).toRotationMatrix();
+        Simulation sliding = simulation(world, {block}, {.mode = StepMode::explicit_steps});
+        run(sliding, 30); // half a second to settle
+        const Vec3d before = centre_of_mass(sliding);
+        run(sliding, 60);
+        const double way = (centre_of_mass(sliding) - before).norm();
+        const double acceleration = 9.81 * (std::sin(angle) - friction * std::cos(angle));
+        if (friction == 0.7) {
+            EXPECT_LT(way, 2e-3);
+            continue;
+        }
+        EXPECT_NEAR(way, acceleration * (0.5 + 0.5), 0.1 * acceleration); // (1.5^2 - 0.5^2) / 2
+    }
+}
+
+// First bending frequency of a clamped bar, 4 cells across: Euler and Bernoulli's less what shear and the bar's
+// thickness take (Timoshenko), 0.56 (h / L^2) sqrt(E / (12 rho)) ...
+TEST(Simulation, BarSwingsAtItsFrequency) {
+    const double length = 1, height = 0.1, young = 1e7, density = 1000;
+    Material rubber = material(MaterialModel::fem, young);
+    const auto body = box(40, 4, 4, 0.025, rubber);
+    World world = free_space();
+    Pin pin;
+    for (Index i = 0; i < body->particle_count(); ++i)
+        if (body->rest.x[i] == 0) pin.particles.push_back(i);
+    world.pins.push_back(pin);
+    Simulation bar = simulation(world, {actor(body)}, {.frames_per_second = 240, .mode = StepMode::explicit_steps});
+    Vectors bent = bar.positions(0), swing(bent.size());
+    for (std::size_t i = 0; i < bent.size(); ++i) swing.y[i] = 0.05f * bent.x[i] * bent.x[i] * (3 - bent.x[i]) / 2;
+    bar.set_velocities(0, swing);
+    std::size_t tip = 0;
+    for (std::size_t i = 0; i < bent.size(); ++i)
+        if (bent.x[i] > 0.999f) tip = i;
+    // Times when the tip passes its rest place upwards.
+    std::vector<double> passes;
+    double before = 0;
+    for (int frame = 1; frame <= 960; ++frame) {
+        run(bar, 1);
+        const double now = double(bar.positions(0).y[tip] - bent.y[tip]);
+        if (before < 0 && now >= 0) passes.push_back((frame - 1 + before / (before - now)) / 240);
+        before = now;
+    }
+    ASSERT_GT(passes.size(), 4u);
+    const double measured = double(passes.size() - 1) / (passes.back() - passes.front());
+    const double slender = 1.8751 * 1.8751 / (2 * std::numbers::pi) *
+                           std::sqrt(young * height * height / 12 / density) / (length * length);
+    EXPECT_NEAR(measured / slender, 1, 0.03);
+}
+
+// A bar pulled at its ends: stress over strain is E, and it thins by nu.
+TEST(Simulation, StretchGivesModulusAndPoissonRatio) {
+    Material rubber = material(MaterialModel::fem, 1e5);
+    rubber.damping = 5;
+    const auto body = box(16, 4, 4, 0.05, rubber);
+    World world = free_space();
+    const double area = 0.04, strain = 0.01, force = 1e5 * area * strain;
+    for (const double end : {0.0, 0.8}) {
+        RegionForce pull;
+        for (Index i = 0; i < body->particle_count(); ++i)
+            if (std::abs(double(body->rest.x[i]) - end) < 1e-6) pull.particles.push_back(i);
+        pull.force.constant = Vec3d(end == 0 ? -force : force, 0, 0);
+        world.forces.push_back(pull);
+    }
+    Simulation bar = simulation(world, {actor(body)});
+    run(bar, 300);
+    const Vectors &rest = body->rest, &now = bar.positions(0);
+    double length = 0, width = 0, rest_length = 0, rest_width = 0;
+    const auto between = [&](const Vec3f& from, const Vec3f& to, double& rest_distance, double& distance) {
+        std::size_t a = 0, b = 0;
+        for (std::size_t i = 0; i < rest.size(); ++i) {
+            if ((rest[i] - from).norm() < 1e-4f) a = i;
+            if ((rest[i] - to).norm() < 1e-4f) b = i;
+        }
+        rest_distance = double((rest[a] - rest[b]).norm());
+        distance = double((now[a] - now[b]).norm());
+    };
+    between({0.2f, 0.1f, 0.1f}, {0.6f, 0.1f, 0.1f}, rest_length, length);
+    between({0.4f, 0.0f, 0.1f}, {0.4f, 0.2f, 0.1f}, rest_width, width);
+    const double measured = length / rest_length - 1;
+    EXPECT_NEAR(measured / strain, 1, 0.03);
+    EXPECT_NEAR((1 - width / rest_width) / measured, 0.3, 0.015);
+}
+
+TEST_P(EachMode, TwoBodiesKeepTheirMomentumInACollision) {
+    StepOptions options;
+    options.mode = GetParam();
+    const auto body = box(4, 4, 4, 0.1, material(MaterialModel::fem, 1e5));
+    Actor left = actor(body), right = actor(body, {0.8, 0.1, 0.05});
+    left.velocity = {2, 0, 0};
+    Simulation colliding = simulation(free_space(), {left, right}, options);
+    const Momentum before = colliding.momentum();
+    std::size_t most_contacts = 0;
+    for (int frame = 0; frame < 60; ++frame) most_contacts = std::max(most_contacts, run(colliding, 1).contacts);
+    EXPECT_GT(most_contacts, 10u);
+    const Momentum after = colliding.momentum();
+    const double allowed = GetParam() == StepMode::descent ? 0.05 : 1e-5;
+    EXPECT_LT((after.linear - before.linear).norm() / before.linear.norm(), allowed);
+    // They pushed each other and did not pass through.
+    EXPECT_GT(centre_of_mass(colliding, 1).x(), centre_of_mass(colliding, 0).x() + 0.35);
+    EXPECT_GT(centre_of_mass(colliding, 1).x(), 1.2);
+}
+
+TEST(Simulation, PinsFollowTheirKeys) {
+    const auto body = box(4, 4, 4, 0.1, material(MaterialModel::fem));
+    World world;
+    Pin pin;
+    for (Index i = 0; i < body->particle_count(); ++i)
+        if (body->rest.x[i] == 0) pin.particles.push_back(i);
+    pin.motion.move.times = {0, 1};
+    pin.motion.move.values = {Vec3d::Zero(), Vec3d(0, 0.5, 0)};
+    world.pins.push_back(pin);
+    Simulation moved = simulation(world, {actor(body)});
+    run(moved, 120);
+    for (const Index particle : pin.particles)
+        EXPECT_NEAR(moved.positions(0).y[particle], body->rest.y[particle] + 0.5f, 1e-6);
+    EXPECT_GT(centre_of_mass(moved).y(), 0.3);
+}
+
+TEST(Simulation, AHandPulls) {
+    Material soft = material(MaterialModel::fem);
+    soft.damping = 2;
+    const auto body = box(4, 4, 4, 0.1, soft);
+    Simulation pulled = simulation(free_space(), {actor(body)});
+    Hand hand;
+    hand.point = {0.4f, 0.2f, 0.2f};
+    hand.target.constant = Vec3d(1.4, 0.2, 0.2);
+    pulled.set_hands({hand}, RunContext(1));
+    run(pulled, 300);
+    EXPECT_NEAR(centre_of_mass(pulled).x(), 1.2, 0.05);
+    pulled.set_hands({}, RunContext(1));
+    run(pulled, 10);
+}
+
+TEST(Simulation, WindPushes) {
+    World world = free_space();
+    world.air_density = 1.2;
+    world.wind.constant = Vec3d(10, 0, 0);
+    Simulation blown = simulation(world, {actor(box(4, 4, 4, 0.1, material(MaterialModel::fem, 1e6)))});
+    run(blown, 6); // a tenth of a second
+    // rho v^2 / 2 on 0.16 m^2, and suction is not modelled; 64 kg.
+    const double expected = 0.5 * 1.2 * 100 * 0.16 / 64 * 0.1;
+    EXPECT_NEAR(blown.momentum().linear.x() / 64, expected, 0.05 * expected);
+}
+
+// Attached points follow an affine motion of the particles exactly, with its gradient.
+TEST_P(EachMaterial, AttachedPointsFollowAffineMotions) {
+    const auto body = box(5, 5, 5, 0.2, material(GetParam()));
+    Simulation moved = simulation(free_space(), {actor(body)});
+    std::vector<Vec3f> points;
+    for (int k = 0; k < 50; ++k)
+        points.emplace_back(float(random_unit(1, 3 * k)), float(random_unit(1, 3 * k + 1)),
+                            float(random_unit(1, 3 * k + 2)));
+    const std::size_t attachment = moved.attach(0, points, RunContext(1));
+    Mat3f turn = Eigen::AngleAxisf(1.0f, Vec3f(1, 2, 3).normalized()).toRotationMatrix();
+    turn.col(0) *= 1.5f;
+    Vectors positions = moved.positions(0);
+    for (std::size_t i = 0; i < positions.size(); ++i) positions.set(i, turn * positions[i] + Vec3f(1, 2, 3));
+    moved.set_positions(0, positions);
+    std::vector<Vec3f> now(points.size());
+    std::vector<Mat3f> gradients(points.size());
+    moved.attached(attachment, now, gradients, RunContext(1));
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        EXPECT_LT((now[i] - (turn * points[i] + Vec3f(1, 2, 3))).norm(), 5e-6f);
+        EXPECT_LT((gradients[i] - turn).norm(), 2e-5f);
+    }
+}
+
+TEST_P(EachMaterial, SameBytesForAnyThreadsAndAfterARestore) {
+    for (const StepMode mode : {StepMode::explicit_steps, StepMode::descent}) {
+        Material plain = material(GetParam());
+        if (GetParam() == MaterialModel::meshfree) plain.yield_stress = 2e3;
+        const auto body = box(4, 4, 3, 0.15, plain);
+        Actor falling = actor(body, {0, 0.05, 0});
+        falling.spin = {1, 2, 3};
+        const auto at_end = [&](unsigned threads) {
+            Simulation one = simulation(with_ground(), {falling, actor(body, {0.2, 0.6, 0})}, {.mode = mode}, threads);
+            run(one, 20, threads);
+            return one.save();
+        };
+        const std::string bytes = at_end(1);
+        EXPECT_TRUE(bytes == at_end(2)) << int(mode);
+        Simulation first = simulation(with_ground(), {falling, actor(body, {0.2, 0.6, 0})}, {.mode = mode});
+        run(first, 11);
+        const std::string middle = first.save();
+        Simulation second = simulation(with_ground(), {falling, actor(body, {0.2, 0.6, 0})}, {.mode = mode});
+        ASSERT_TRUE(second.restore(middle).ok());
+        run(second, 9);
+        EXPECT_TRUE(bytes == second.save()) << int(mode);
+    }
+}
+
+TEST(Simulation, RefusesStatesThatAreDamagedOrOfOthers) {
+    Simulation one = simulation(with_ground(), {actor(box(3, 3, 3, 0.1, material(MaterialModel::fem)))});
+    run(one, 3);
+    const std::string bytes = one.save();
+    for (std::size_t length = 0; length < bytes.size(); length += 7)
+        EXPECT_FALSE(one.restore(std::string_view(bytes).substr(0, length)).ok());
+    EXPECT_TRUE(one.restore(bytes).ok());
+    Simulation other = simulation(with_ground(), {actor(box(3, 3, 2, 0.1, material(MaterialModel::fem)))});
+    const Status refused = other.restore(bytes);
+    ASSERT_FALSE(refused.ok());
+    EXPECT_EQ(refused.error().code, ErrorCode::mismatch);
+}
+
+// Starts that would break most solvers come back to the shape they had.
+class BadStart : public testing::TestWithParam<std::tuple<MaterialModel, const char*>> {};
+INSTANTIATE_TEST_SUITE_P(Simulation, BadStart,
+                         testing::Combine(kModels,
+                                          testing::Values("inverted", "plane", "line", "point", "shrunk", "random")),
+                         [](const auto& info) {
+                             return std::string(std::array{"fem", "springs",
+                                                           "meshfree"}[std::size_t(std::get<0>(info.param))]) +
+                                    "_" + std::get<1>(info.param);
+                         });
+
+TEST_P(BadStart, ComesBackToRest) {
+    const auto [model, start] = GetParam();
+    Material rubber = material(model, 1e5);
+    rubber.damping = 2;
+    const auto body = box(4, 4, 4, 0.25, rubber);
+    Simulation wild = simulation(free_space(), {actor(body)});
+    Vectors positions = wild.positions(0);
+    const std::string kind = start;
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+        Vec3f p = positions[i];
+        if (kind == "inverted") p.y() = -p.y();
+        if (kind == "plane") p.y() = 0;
+        if (kind == "line") p.y() = p.z() = 0;
+        if (kind == "point") p.setZero();
+        if (kind == "shrunk") p *= 1e-3f;
+        if (kind == "random")
+            p = Vec3f(float(random_unit(7, 3 * i)), float(random_unit(7, 3 * i + 1)), float(random_unit(7, 3 * i + 2)));
+        positions.set(i, p);
+    }
+    wild.set_positions(0, positions);
+    FrameReport report;
+    for (int second = 0; second < 40 && (second < 2 || shape_error(wild) > 5e-3); ++second) report = run(wild, 60);
+    ASSERT_TRUE(all_finite(wild.positions(0)));
+    EXPECT_LT(shape_error(wild), 5e-3);
+    EXPECT_GT(report.least_volume_ratio, 0.98f);
+}
+
+// Huge starts, steps, stiffnesses and mass ratios: finite, whatever else.
+TEST_P(EachMaterial, NeverNotFinite) {
+    for (const double scale : {10.0, 1000.0})
+        for (const double rate : {10.0, 60.0, 1000.0})
+            for (const double young : {1e2, 1e5, 1e9}) {
+                const auto body = box(3, 3, 3, 0.25, material(GetParam(), young));
+                Simulation wild = simulation(with_ground(), {actor(body, {0, 0.2, 0})}, {.frames_per_second = rate});
+                Vectors positions = wild.positions(0);
+                for (std::size_t i = 0; i < positions.size(); ++i) positions.set(i, float(scale) * positions[i]);
+                wild.set_positions(0, positions);
+                const FrameReport first = run(wild, 1);
+                if (scale == 1000) {
+                    EXPECT_GT(first.clamped_particles, 0u);
+                }
+                run(wild, 30);
+                EXPECT_TRUE(all_finite(wild.positions(0))) << scale << " " << rate << " " << young;
+                double furthest = 0;
+                for (std::size_t i = 0; i < positions.size(); ++i)
+                    furthest = std::max(furthest, double(wild.positions(0)[i].norm()));
+                EXPECT_LT(furthest, 2e3 * scale) << scale << " " << rate << " " << young;
+            }
+}
+
+TEST(Simulation, AHeavyBodyOnALightOne) {
+    Material light = material(MaterialModel::fem, 1e5), heavy = light;
+    light.density = 100;
+    heavy.density = 1e5;
+    light.damping = heavy.damping = 1;
+    Simulation stacked = simulation(
+        with_ground(), {actor(box(4, 4, 4, 0.25, light)), actor(box(2, 2, 2, 0.25, heavy), {0.25, 1.05, 0.25})});
+    run(stacked, 120);
+    EXPECT_TRUE(all_finite(stacked.positions(0)));
+    EXPECT_TRUE(all_finite(stacked.positions(1)));
+}
+
+TEST(Simulation, CancelLeavesTheFrameUndone) {
+    const RunContext context(1);
+    Simulation one = simulation(with_ground(), {actor(box(3, 3, 3, 0.1, material(MaterialModel::fem)), {0, 0.5, 0})});
+    run(one, 5);
+    const std::string before = one.save();
+    context.cancel();
+    const Result<FrameReport> report = one.advance(context);
+    ASSERT_FALSE(report.ok());
+    EXPECT_EQ(report.error().code, ErrorCode::cancelled);
+    EXPECT_TRUE(before == one.save());
+}
+
+TEST(Simulation, RefusesWhatIsNotThere) {
+    const auto body = box(2, 2, 2, 0.1, material(MaterialModel::fem));
+    const RunContext context(1);
+    EXPECT_FALSE(Simulation::create({}, {}, {}, context).ok());
+    World world;
+    world.pins.push_back({1, {0}, {}});
+    EXPECT_FALSE(Simulation::create(world, {actor(body)}, {}, context).ok());
+    world.pins = {{0, {27}, {}}};
+    EXPECT_FALSE(Simulation::create(world, {actor(body)}, {}, context).ok());
+    EXPECT_FALSE(Simulation::create({}, {actor(body)}, {.frames_per_second = 0}, context).ok());
+}
+
+} // namespace
+} // namespace filigree
