@@ -43,27 +43,42 @@ bool read_number(const std::string& text, double& number) {
     return error == std::errc() && end == text.data() + text.size() && std::isfinite(number);
 }
 
-/// A bar that is drawn over itself, at most ten times a second.
+/// A bar that is drawn over itself, at most ten times a second; in long phases with the time left.
 class ProgressBar {
 public:
     ~ProgressBar() { clear(); }
     void draw(std::string_view phase, double fraction) {
         const double now = now_seconds();
+        if (phase != phase_) {
+            phase_ = phase;
+            phase_start_ = now;
+        }
         if (now - start_ < 0.5 || (now - last_ < 0.1 && fraction < 1)) return; // short work needs no bar
         last_ = now;
         constexpr int kWidth = 30;
         const int full = static_cast<int>(fraction * kWidth);
-        write_text(fmt::format("\r{:<12} [{}{}] {:3.0f} %", phase, std::string(full, '#'),
-                               std::string(kWidth - full, '.'), 100 * fraction));
+        write_text(fmt::format("\r{:<14} [{}{}] {:3.0f} %{:<18}", phase, std::string(full, '#'),
+                               std::string(kWidth - full, '.'), 100 * fraction, time_left(now, fraction)));
         drawn_ = true;
     }
     void clear() {
-        if (drawn_) write_text(fmt::format("\r{:<60}\r", ""));
+        if (drawn_) write_text(fmt::format("\r{:<70}\r", ""));
         drawn_ = false;
+        phase_.clear();
     }
 
 private:
-    double start_ = now_seconds(), last_ = 0;
+    /// As if the rest went as the phase has gone so far; "" before that can be said.
+    std::string time_left(double now, double fraction) const {
+        const double gone = now - phase_start_;
+        if (gone < 2 || fraction < 0.01) return "";
+        const auto seconds = static_cast<long>(gone / fraction * (1 - fraction) + 0.5);
+        if (seconds < 60) return fmt::format(", {} s left", seconds);
+        return fmt::format(", {}:{:02} min left", seconds / 60, seconds % 60);
+    }
+
+    std::string phase_;
+    double start_ = now_seconds(), phase_start_ = start_, last_ = 0;
     bool drawn_ = false;
 };
 

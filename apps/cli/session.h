@@ -139,6 +139,7 @@ void add_bench(CLI::App& app, Session& session);
 void add_demo(CLI::App& app, Session& session);
 void add_render(CLI::App& app, Session& session);
 void add_sample(CLI::App& app, Session& session);
+void add_simulate(CLI::App& app, Session& session);
 void add_figures(CLI::App& app, Session& session);
 
 } // namespace filigree::cli

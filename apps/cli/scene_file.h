@@ -1,0 +1,117 @@
+// Scenes described in a TOML file: docs/scenes.md lists every key, from the same table that this reader goes by.
+#pragma once
+
+#include "session.h"
+
+#include "filigree/mesh/shapes.h"
+#include "filigree/physics/simulation.h"
+#include "filigree/render/camera.h"
+
+#include <optional>
+
+namespace filigree::cli {
+
+/// A part of a body: what lies in a box or a ball at the start (world, m), or what is near vertices of its mesh. With
+/// none of the three: all of it.
+struct SceneRegion {
+    std::optional<Box> box = {};
+    std::optional<Ball> ball = {};
+    std::vector<Index> vertices;
+};
+
+struct SceneMotion {
+    Keyed<Vec3d> move{{}, {}, Vec3d::Zero()}, angle{{}, {}, Vec3d::Zero()}; ///< m; axis times radians
+    std::optional<Vec3d> pivot = {};                                        ///< unset: the middle of what moves
+    bool moves() const { return !move.times.empty() || !angle.times.empty(); }
+};
+
+struct SceneBody {
+    unsigned line = 0; ///< where it begins in the file, for messages
+    std::string name;
+    std::string mesh; ///< file, as found from here; or
+    std::string shape;
+    ShapeOptions shape_options;
+    std::size_t driver = 1000; ///< vertices
+    BodyOptions body;          ///< with the scale, metres a model unit
+    Material material;
+    std::optional<Vec3d> centre = {}; ///< m; unset: where the mesh's own coordinates say
+    Eigen::AngleAxisd rotation = Eigen::AngleAxisd::Identity();
+    Vec3d velocity = Vec3d::Zero(), spin = Vec3d::Zero(); ///< m/s, rad/s
+    std::optional<Vec3f> color = {};
+};
+
+struct SceneObstacle {
+    unsigned line = 0;
+    std::string shape; ///< ground, ball, box or mesh
+    HalfSpace ground;
+    Ball ball;
+    Cuboid box;
+    std::string mesh; ///< file
+    double scale = 1, spacing = 0;
+    std::optional<Vec3d> centre = {}; ///< of a mesh
+    SceneMotion motion;
+    double friction = 0.5, restitution = 0.5;
+    std::optional<Vec3f> color = {};
+    bool visible = true;
+};
+
+struct ScenePin {
+    unsigned line = 0;
+    std::size_t body = 0;
+    SceneRegion region;
+    SceneMotion motion;
+};
+
+struct SceneForce {
+    unsigned line = 0;
+    std::size_t body = 0;
+    SceneRegion region;
+    Keyed<Vec3d> newtons{{}, {}, Vec3d::Zero()};
+};
+
+struct SceneHand {
+    unsigned line = 0;
+    std::size_t body = 0;
+    std::optional<Vec3d> point = {}; ///< world, at the start; or
+    std::optional<Index> vertex = {};
+    Hand hand; ///< without the point
+};
+
+struct ScenePicture {
+    View view = View::iso;
+    UpAxis up = UpAxis::y;
+    std::optional<Vec3d> eye = {}, target = {};
+    double field_of_view = 30;
+    unsigned width = 960, height = 720, passes = 8;
+    std::optional<Vec3f> background_top = {}, background_bottom = {};
+    bool ground = true, obstacles = true, particles = false;
+    std::size_t most_triangles = 300'000; ///< of a body as it is drawn
+};
+
+struct SceneFile {
+    std::string path;
+    std::string content; ///< all that the motion depends on but the meshes, spelled in one way
+    std::size_t frames = 120;
+    StepOptions step;
+    Vec3d gravity = {0, -9.81, 0};
+    Keyed<Vec3d> wind{{}, {}, Vec3d::Zero()};
+    double air_density = 0, body_friction = 0.3;
+    std::vector<SceneBody> bodies;
+    std::vector<SceneObstacle> obstacles;
+    std::vector<ScenePin> pins;
+    std::vector<SceneForce> forces;
+    std::vector<SceneHand> hands;
+    ScenePicture picture;
+};
+
+/// Reads and checks a scene; meshes are not opened. Fails with file and line: bad_file (not TOML, unknown keys with a
+/// suggestion, wrong types and ranges), not_found.
+SceneFile read_scene(const std::string& path);
+
+/// The tables of docs/scenes.md: every key with its type, unit, default and range, and the materials by name.
+std::string scene_manual();
+
+/// "scene.toml:12: what"
+[[noreturn]] void fail_in_scene(const SceneFile& scene, unsigned line, ErrorCode code, const std::string& what);
+
+} // namespace filigree::cli

@@ -1,0 +1,327 @@
+#include "scene_keys.h"
+
+#include "scene_file.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <fmt/format.h>
+
+namespace filigree::cli {
+
+namespace {
+
+constexpr double kAny = std::numeric_limits<double>::infinity();
+
+using enum KeyType;
+
+constexpr KeyRule plain(std::string_view table, std::string_view key, KeyType type, std::string_view unit,
+                        std::string_view unset, std::string_view text, std::string_view only = "") {
+    return {table, key, type, unit, unset, -kAny, kAny, false, "", only, text};
+}
+constexpr KeyRule from(double least, double most, std::string_view table, std::string_view key, KeyType type,
+                       std::string_view unit, std::string_view unset, std::string_view text,
+                       std::string_view only = "") {
+    return {table, key, type, unit, unset, least, most, false, "", only, text};
+}
+constexpr KeyRule above(double least, double most, std::string_view table, std::string_view key, KeyType type,
+                        std::string_view unit, std::string_view unset, std::string_view text,
+                        std::string_view only = "") {
+    return {table, key, type, unit, unset, least, most, true, "", only, text};
+}
+constexpr KeyRule one_of(std::string_view words, std::string_view table, std::string_view key, std::string_view unset,
+                         std::string_view text) {
+    return {table, key, word, "", unset, -kAny, kAny, false, words, "", text};
+}
+
+constexpr KeyRule kKeys[] = {
+    from(1, 1e6, "simulation", "frames", whole, "", "120", "frames to compute; the start is one more in the output"),
+    above(0, 1e6, "simulation", "duration", number, "s", "", "or how long to compute"),
+    from(0.1, 1e5, "simulation", "frames_per_second", number, "1/s", "60", "of the output"),
+    one_of("automatic explicit descent", "simulation", "mode", "automatic",
+           "how time is stepped: explicit where most_substeps are enough, else descent; or always one of them"),
+    from(1, 1e5, "simulation", "most_substeps", whole, "", "64", "a frame, explicit"),
+    from(1, 1000, "simulation", "descent_substeps", whole, "", "4", "a frame, descent"),
+    from(1, 1000, "simulation", "descent_iterations", whole, "", "8", "a substep, descent"),
+    plain("simulation", "contacts_between_bodies", flag, "", "true", "whether bodies touch each other"),
+
+    plain("world", "gravity", vector, "m/s^2", "[0, -9.81, 0]", "acceleration of everything"),
+    plain("world", "wind", keyed, "m/s", "[0, 0, 0]", "velocity of the air"),
+    from(0, 1e4, "world", "air_density", number, "kg/m^3", "1.2 with wind, else 0", "how hard the air presses"),
+    from(0, 100, "world", "body_friction", number, "", "0.3", "Coulomb's coefficient between bodies"),
+
+    plain("body", "name", text, "", "that of the mesh or shape",
+          "of files, and for pins, forces and hands; letters, digits, - and _"),
+    plain("body", "mesh", text, "", "", "file of a mesh or model (.fil), seen from the scene's folder; or"),
+    one_of("wavy-cube wavy-sphere wavy-plane bar cylinder torus", "body", "shape", "",
+           "a built-in shape, as `filigree make` has them; one of `mesh` and `shape` must be there"),
+    from(1, 8192, "body", "resolution", whole, "", "64", "quads along a side", "shape"),
+    from(0, kAny, "body", "frequency", number, "", "5", "waves along a side", "shape"),
+    from(0, kAny, "body", "amplitude", number, "sides", "0.04", "height of the waves", "shape"),
+    above(0, kAny, "body", "size", number, "model units", "1", "side or diameter", "shape"),
+    above(0, kAny, "body", "length", number, "sides", "4", "of bars and cylinders", "shape"),
+    above(0, kAny, "body", "thickness", number, "ring radii", "0.3", "of a torus: radius of its tube", "shape"),
+    from(3, 1e8, "body", "driver", whole, "vertices", "1000",
+         "of the driver that the particles move; a model has its own"),
+    above(0, 1e9, "body", "scale", number, "m a model unit", "1", "how large the body is"),
+    from(8, 1e8, "body", "particles", whole, "", "8000", "about so many"),
+    above(0, 1e6, "body", "spacing", number, "m", "", "instead of `particles`: from one to the next"),
+    plain("body", "material", text, "", "rubber", "one of the materials below; the keys from `model` on change it"),
+    one_of("fem springs meshfree", "body", "model", "by the material",
+           "finite elements, springs, or mesh-free; only the last flows"),
+    above(0, 1e6, "body", "density", number, "kg/m^3", "by the material", ""),
+    above(0, 1e12, "body", "young_modulus", number, "Pa", "by the material", "stiffness"),
+    from(0, 0.49, "body", "poisson_ratio", number, "", "by the material",
+         "how much it thins when pulled; springs have 1/4"),
+    from(0, 1e6, "body", "damping", number, "1/s", "by the material", "part of the speed lost a second"),
+    from(0, 1e3, "body", "internal_damping", number, "s", "by the material",
+         "stress by the rate of strain, as a multiple of stiffness"),
+    from(0, 0.2, "body", "bending", number, "", "by the material", "springs: share of bending springs"),
+    above(0, 1e12, "body", "yield_stress", number, "Pa", "by the material",
+          "mesh-free: above it the shape changes for good"),
+    from(0, 1e6, "body", "creep_time", number, "s", "by the material", "how slowly; 0 is at once"),
+    from(0, 1e5, "body", "temperature", number, "K", "by the material", "at the start"),
+    from(0, 1e5, "body", "melting_from", number, "K", "by the material", "mesh-free: stiff below"),
+    from(0, 1e5, "body", "melting_to", number, "K", "by the material", "fluid above"),
+    from(0, 1e9, "body", "viscosity", number, "Pa s", "by the material", "of the melt"),
+    from(-1e6, 1e6, "body", "heating", number, "K/s", "by the material", "of the surface, from around"),
+    from(0, 1e3, "body", "conductivity", number, "m^2/s", "by the material", "thermal diffusivity inside"),
+    plain("body", "centre", vector, "m", "where its coordinates say", "of the body's box at the start"),
+    plain("body", "rotate", rotation, "degrees", "", "about that centre: `{ axis = [0, 1, 0], degrees = 30 }`"),
+    plain("body", "velocity", vector, "m/s", "[0, 0, 0]", "at the start"),
+    plain("body", "spin", vector, "degrees/s", "[0, 0, 0]", "at the start, about its centre of mass: axis times speed"),
+    plain("body", "color", color, "", "by its number", "in pictures, `\"#rrggbb\"`"),
+
+    one_of("ground ball box mesh", "obstacle", "shape", "", "must be there"),
+    plain("obstacle", "point", vector, "m", "[0, 0, 0]", "one on the surface", "ground"),
+    plain("obstacle", "normal", vector, "", "[0, 1, 0]", "away from what is solid, of any length", "ground"),
+    plain("obstacle", "centre", vector, "m", "[0, 0, 0]; a mesh: where its coordinates say",
+          "of the ball, the box, or the mesh's box", "ball box mesh"),
+    above(0, 1e6, "obstacle", "radius", number, "m", "1", "", "ball"),
+    plain("obstacle", "size", vector, "m", "[1, 1, 1]", "along x, y and z, before it turns; above 0", "box"),
+    plain("obstacle", "mesh", text, "", "", "file, seen from the scene's folder", "mesh"),
+    above(0, 1e9, "obstacle", "scale", number, "m a model unit", "1", "", "mesh"),
+    above(0, 1e6, "obstacle", "spacing", number, "m", "1/64 of the longest side",
+          "of the grid that holds its distances", "mesh"),
+    from(0, 100, "obstacle", "friction", number, "", "0.5", "Coulomb's coefficient"),
+    from(0, 1, "obstacle", "restitution", number, "", "0.5", "speed of a hard point after the bounce over that before"),
+    plain("obstacle", "move", keyed, "m", "[0, 0, 0]", "from where it is"),
+    plain("obstacle", "turn", keyed, "degrees", "[0, 0, 0]", "axis times angle, before it moves"),
+    plain("obstacle", "pivot", vector, "m", "its centre", "what it turns about"),
+    plain("obstacle", "color", color, "", "grey", "in pictures"),
+    plain("obstacle", "visible", flag, "", "true", "in pictures"),
+
+    plain("pin", "body", text, "", "the only one", "name of the body whose particles are held"),
+    plain("pin", "box", box, "m", "", "those in a box at the start: `{ min = [x, y, z], max = [x, y, z] }`; or"),
+    plain("pin", "ball", ball, "m", "", "in a ball: `{ centre = [x, y, z], radius = r }`; or"),
+    plain("pin", "vertices", ids, "", "", "near vertices of its mesh, counted from 0"),
+    plain("pin", "move", keyed, "m", "[0, 0, 0]", "from where they were"),
+    plain("pin", "turn", keyed, "degrees", "[0, 0, 0]", "axis times angle, before they move"),
+    plain("pin", "pivot", vector, "m", "their middle", "what they turn about"),
+
+    plain("force", "body", text, "", "the only one", "name of the body that is pushed"),
+    plain("force", "box", box, "m", "the whole body", "on what is in a box at the start; or"),
+    plain("force", "ball", ball, "m", "the whole body", "in a ball; or"),
+    plain("force", "vertices", ids, "", "the whole body", "near vertices of its mesh"),
+    plain("force", "newtons", keyed, "N", "[0, 0, 0]", "of all of it together"),
+
+    plain("hand", "body", text, "", "the only one", "name of the body that is pulled"),
+    plain("hand", "point", vector, "m", "", "the surface's nearest point to this one at the start; or"),
+    from(0, 4294967294.0, "hand", "vertex", whole, "", "", "a vertex of its mesh"),
+    plain("hand", "target", keyed, "m", "the point", "where the hand is"),
+    from(0, 1e12, "hand", "stiffness", number, "N/m", "0: by the body's", "of the spring between them"),
+    from(0, 1e9, "hand", "from", number, "s", "0", "when it takes hold"),
+    from(0, 1e9, "hand", "until", number, "s", "to the end", "when it lets go"),
+
+    one_of("front side top iso", "picture", "view", "iso", "where from"),
+    one_of("x y z", "picture", "up", "y", "which axis is up"),
+    plain("picture", "eye", vector, "m", "as near as all the motion fits", "where the camera is; with `target`"),
+    plain("picture", "target", vector, "m", "", "what it looks at"),
+    from(0, 150, "picture", "field_of_view", number, "degrees", "30", "vertical; 0 is parallel projection"),
+    from(16, 8192, "picture", "size", pixels, "pixels", "[960, 720]", "width and height"),
+    plain("picture", "background", text, "", "light grey",
+          "`\"#rrggbb\"`, or two from top to bottom: `\"#rrggbb,#rrggbb\"`"),
+    plain("picture", "ground", flag, "", "true", "whether a level ground, or the lowest point, catches the shadow"),
+    plain("picture", "obstacles", flag, "", "true", "whether they are drawn"),
+    plain("picture", "particles", flag, "", "false", "whether particles are drawn in place of the surface"),
+    from(1, 1000, "picture", "passes", whole, "", "8", "light directions that are averaged"),
+    from(1, 1e9, "picture", "most_triangles", whole, "", "300000",
+         "of a body; a larger one is drawn at a coarser level"),
+};
+
+/// A material, with what differs from a new one's.
+template <class Set>
+NamedMaterial made(std::string_view name, std::string_view text, double density, double young, double poisson,
+                   const Set& set) {
+    NamedMaterial named{name, text, {}};
+    named.material.density = density;
+    named.material.young_modulus = young;
+    named.material.poisson_ratio = poisson;
+    set(named.material);
+    return named;
+}
+
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+    std::vector<std::size_t> row(b.size() + 1);
+    for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
+    for (std::size_t i = 1; i <= a.size(); ++i) {
+        std::size_t diagonal = row[0];
+        row[0] = i;
+        for (std::size_t j = 1; j <= b.size(); ++j) {
+            const std::size_t changed = diagonal + (a[i - 1] != b[j - 1]);
+            diagonal = row[j];
+            row[j] = std::min({row[j] + 1, row[j - 1] + 1, changed});
+        }
+    }
+    return row.back();
+}
+
+std::string table_head(std::string_view table) {
+    return fmt::format("\n### `{}`\n\n| key | type | unit | unset | range | |\n|---|---|---|---|---|---|\n",
+                       shown_table(table));
+}
+
+std::string manual_row(const KeyRule& rule) {
+    std::string text(rule.text);
+    if (!rule.only.empty() && rule.table == "obstacle") {
+        std::string shapes(rule.only);
+        for (std::size_t at; (at = shapes.find(' ')) != std::string::npos;) shapes.replace(at, 1, ", ");
+        text = shapes + (text.empty() ? "" : ": " + text);
+    }
+    std::string range = range_text(rule);
+    for (std::size_t at = 0; at < rule.words.size();) { // `a`, `b`
+        const std::size_t end = std::min(rule.words.find(' ', at), rule.words.size());
+        range += fmt::format("{}`{}`", range.empty() ? "" : ", ", rule.words.substr(at, end - at));
+        at = end + 1;
+    }
+    return fmt::format("| `{}` | {} | {} | {} | {} | {} |\n", rule.key, type_text(rule.type), rule.unit, rule.unset,
+                       range, text);
+}
+
+std::string or_never(double value) { return std::isinf(value) ? "" : fmt::format("{}", value); }
+
+} // namespace
+
+std::span<const KeyRule> scene_keys() { return kKeys; }
+
+const KeyRule* find_key(std::string_view table, std::string_view key) {
+    for (const KeyRule& rule : kKeys)
+        if (rule.table == table && rule.key == key) return &rule;
+    return nullptr;
+}
+
+bool is_list(std::string_view table) { return table != "simulation" && table != "world" && table != "picture"; }
+
+std::string shown_table(std::string_view table) {
+    return is_list(table) ? fmt::format("[[{}]]", table) : fmt::format("[{}]", table);
+}
+
+std::span<const NamedMaterial> named_materials() {
+    static const std::array materials = {
+        made("rubber", "bounces", 1100, 1e6, 0.45, [](Material& m) { m.damping = 0.2; }),
+        made("jelly", "wobbles", 1000, 2e4, 0.45, [](Material& m) { m.internal_damping = 0.002; }),
+        made("foam", "light and soft", 60, 2e4, 0.1, [](Material& m) { m.damping = 1; }),
+        made("wood", "stiff; a tenth of real wood's", 600, 1e9, 0.3, [](Material&) {}),
+        made("metal", "heavy and stiff; a hundredth of steel's", 7800, 2e9, 0.3, [](Material&) {}),
+        made("lattice", "springs", 1000, 1e5, 0.25, [](Material& m) { m.model = MaterialModel::springs; }),
+        made("clay", "keeps the shape it is pressed into", 1700, 2e5, 0.35,
+             [](Material& m) {
+                 m.model = MaterialModel::meshfree;
+                 m.yield_stress = 8e3;
+                 m.creep_time = 0.02;
+                 m.damping = 2;
+             }),
+        made("wax", "melts from 45 to 65 degrees Celsius", 900, 2e5, 0.35,
+             [](Material& m) {
+                 m.model = MaterialModel::meshfree;
+                 m.yield_stress = 2e4;
+                 m.melting_from = 318;
+                 m.melting_to = 338;
+                 m.viscosity = 20;
+                 m.conductivity = 1e-4;
+                 m.damping = 1;
+             }),
+    };
+    return materials;
+}
+
+std::string range_text(const KeyRule& rule) {
+    const bool has_least = !std::isinf(rule.least), has_most = !std::isinf(rule.most);
+    if (rule.above) {
+        return has_most ? fmt::format("above {}, to {}", rule.least, rule.most) : fmt::format("above {}", rule.least);
+    }
+    if (has_least)
+        return has_most ? fmt::format("{} to {}", rule.least, rule.most) : fmt::format("{} and up", rule.least);
+    return "";
+}
+
+std::string type_text(KeyType type) {
+    switch (type) {
+    case text:
+        return "text";
+    case word:
+        return "word";
+    case number:
+        return "number";
+    case whole:
+        return "whole number";
+    case flag:
+        return "true or false";
+    case vector:
+        return "three numbers";
+    case keyed:
+        return "three numbers, or keys";
+    case color:
+        return "colour";
+    case box:
+        return "box";
+    case ball:
+        return "ball";
+    case ids:
+        return "list of vertex ids";
+    case rotation:
+        return "axis and degrees";
+    case pixels:
+        return "two whole numbers";
+    }
+    return "";
+}
+
+std::string most_alike(std::string_view word, std::span<const std::string_view> words) {
+    std::string_view best;
+    std::size_t least = std::max<std::size_t>(2, word.size() / 3) + 1;
+    for (const std::string_view known : words)
+        if (const std::size_t distance = edit_distance(word, known); distance < least) {
+            least = distance;
+            best = known;
+        }
+    return std::string(best);
+}
+
+std::string scene_manual() {
+    std::string manual;
+    std::string_view table;
+    for (const KeyRule& rule : kKeys) {
+        if (rule.table != table) manual += table_head(rule.table);
+        table = rule.table;
+        manual += manual_row(rule);
+    }
+    manual +=
+        "\n### Materials\n\n| name | model | density | young_modulus | poisson_ratio | damping | internal_damping | "
+        "yield_stress | creep_time | melting_from, melting_to | viscosity | |\n"
+        "|---|---|---|---|---|---|---|---|---|---|---|---|\n";
+    constexpr std::array<std::string_view, 3> kModels = {"fem", "springs", "meshfree"};
+    for (const NamedMaterial& named : named_materials()) {
+        const Material& m = named.material;
+        manual +=
+            fmt::format("| `{}` | {} | {} | {:.0e} | {} | {} | {} | {} | {} | {} | {} | {} |\n", named.name,
+                        kModels[std::size_t(m.model)], m.density, m.young_modulus, m.poisson_ratio, m.damping,
+                        m.internal_damping, or_never(m.yield_stress), m.is_plastic() ? or_never(m.creep_time) : "",
+                        m.melts() ? fmt::format("{}, {}", m.melting_from, m.melting_to) : "",
+                        m.melts() ? fmt::format("{}", m.viscosity) : "", named.text);
+    }
+    return manual.substr(1);
+}
+
+} // namespace filigree::cli

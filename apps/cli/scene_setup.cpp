@@ -1,0 +1,272 @@
+#include "scene_setup.h"
+
+#include "filigree/hierarchy/strip.h"
+#include "filigree/mesh/closest_point.h"
+#include "filigree/mesh/triangulate.h"
+
+#include <algorithm>
+
+#define XXH_INLINE_ALL
+#include <xxhash.h>
+
+namespace filigree::cli {
+
+namespace {
+
+const Vec3f kBodyColors[] = {
+    {0.86f, 0.52f, 0.36f}, {0.42f, 0.60f, 0.80f}, {0.55f, 0.70f, 0.45f}, {0.80f, 0.68f, 0.38f}, {0.62f, 0.50f, 0.72f}};
+const Vec3f kObstacleColor{0.62f, 0.63f, 0.65f};
+
+/// The value, or a failure that names the scene's line.
+template <class T>
+T require_at(const SceneFile& scene, unsigned line, Result<T> result) {
+    if (!result && result.error().code == ErrorCode::cancelled) throw Failure{result.error()};
+    if (!result) fail_in_scene(scene, line, result.error().code, result.error().message);
+    return std::move(result).value();
+}
+
+/// A failure inside `work` gets the scene's line.
+template <class Work>
+auto at_line(const SceneFile& scene, unsigned line, const Work& work) -> decltype(work()) {
+    try {
+        return work();
+    } catch (const Failure& failure) {
+        if (failure.error.code == ErrorCode::cancelled) throw;
+        fail_in_scene(scene, line, failure.error.code, failure.error.message);
+    }
+}
+
+class Hash {
+public:
+    Hash() { XXH3_64bits_reset(&state_); }
+    template <class T>
+    void add(const std::vector<T>& items) {
+        XXH3_64bits_update(&state_, items.data(), items.size() * sizeof(T));
+    }
+    void add(const std::string& text) { XXH3_64bits_update(&state_, text.data(), text.size()); }
+    std::uint64_t value() const { return XXH3_64bits_digest(&state_); }
+
+private:
+    XXH3_state_t state_;
+};
+
+Box body_box(const SetUpBody& body) { return bounds(body.model.mesh.positions); }
+
+Mesh box_mesh(const Cuboid& box) {
+    Mesh mesh;
+    for (int k = 0; k < 8; ++k)
+        mesh.positions.push_back(
+            (box.centre + 0.5 * box.size.cwiseProduct(Vec3d(k & 1 ? 1 : -1, k & 2 ? 1 : -1, k & 4 ? 1 : -1)))
+                .cast<float>());
+    for (const std::array<Index, 4>& face :
+         {std::array<Index, 4>{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}})
+        mesh.add_face(face);
+    return mesh;
+}
+
+Mesh ball_mesh(const Ball& ball) {
+    Mesh mesh = make_wavy_sphere({.resolution = 48, .amplitude = 0, .size = 2 * ball.radius});
+    for (Vec3f& p : mesh.positions) p += ball.centre.cast<float>();
+    return mesh;
+}
+
+class Builder {
+public:
+    Builder(const SceneFile& scene, Session& session) : scene_(scene), session_(session) {}
+
+    SetUpScene build() {
+        hash_.add(scene_.content);
+        result_.bodies.reserve(scene_.bodies.size());
+        for (const SceneBody& body : scene_.bodies) add_body(body);
+        for (const SceneObstacle& obstacle : scene_.obstacles) add_obstacle(obstacle);
+        for (const ScenePin& pin : scene_.pins) add_pin(pin);
+        for (const SceneForce& force : scene_.forces)
+            result_.world.forces.push_back(
+                {force.body, particles_of(force.body, force.region, force.line), force.newtons});
+        for (const SceneHand& hand : scene_.hands) add_hand(hand);
+        result_.world.gravity = scene_.gravity;
+        result_.world.wind = scene_.wind;
+        result_.world.air_density = scene_.air_density;
+        result_.world.body_friction = scene_.body_friction;
+        result_.hash = hash_.value();
+        return std::move(result_);
+    }
+
+private:
+    const RunContext& context() const { return session_.context(); }
+
+    Model model_of(const SceneBody& body) {
+        Session::Content content{Mesh(), 0, {}};
+        if (body.mesh.empty())
+            content.value = require(make_shape(body.shape, body.shape_options));
+        else
+            content = session_.read_any(body.mesh);
+        if (auto* model = std::get_if<Model>(&content.value)) return std::move(*model);
+        auto& mesh = std::get<Mesh>(content.value);
+        StripOptions options;
+        options.base = std::min(body.driver, std::max<std::size_t>(mesh.vertex_count(), 3));
+        return require(strip(std::move(mesh), options, context())).model;
+    }
+
+    void add_body(const SceneBody& from) {
+        SetUpBody body;
+        body.name = from.name;
+        body.mesh_path = from.mesh;
+        body.scale = from.body.scale;
+        body.model = at_line(scene_, from.line, [&] { return model_of(from); });
+        Mesh& mesh = body.model.mesh;
+        const Vec3d origin = std::exchange(mesh.origin, Vec3d::Zero());
+        hash_.add(mesh.positions);
+        hash_.add(mesh.corners);
+        body.body = std::make_shared<const Body>(
+            require_at(scene_, from.line, make_body(mesh, from.material, from.body, context(), &body.report)));
+        if (!body.report.warning.empty()) session_.warn("body '" + body.name + "': " + body.report.warning);
+        body.color = from.color.value_or(kBodyColors[result_.bodies.size() % std::size(kBodyColors)]);
+        body.has_own_color = !from.color;
+
+        const Vec3d middle = body.scale * body_box(body).centre();
+        Actor actor{body.body, Eigen::Isometry3d::Identity(), from.velocity, from.spin};
+        actor.placement = Eigen::Translation3d(from.centre.value_or(middle + body.scale * origin)) * from.rotation *
+                          Eigen::Translation3d(-middle);
+        result_.actors.push_back(std::move(actor));
+        result_.bodies.push_back(std::move(body));
+    }
+
+    static RigidMotion motion_of(const SceneMotion& from, const Vec3d& middle) {
+        RigidMotion motion;
+        motion.centre = from.pivot.value_or(middle);
+        motion.move = from.move;
+        motion.angle = from.angle;
+        return motion;
+    }
+
+    void add_obstacle(const SceneObstacle& from) {
+        Obstacle obstacle;
+        SetUpObstacle drawn;
+        Vec3d middle = Vec3d::Zero();
+        if (from.shape == "ground") {
+            obstacle.shape = from.ground;
+            middle = from.ground.point;
+            drawn.is_ground = true;
+            drawn.plane = from.ground;
+        } else if (from.shape == "ball") {
+            obstacle.shape = from.ball;
+            middle = from.ball.centre;
+            drawn.mesh = ball_mesh(from.ball);
+        } else if (from.shape == "box") {
+            obstacle.shape = from.box;
+            middle = from.box.centre;
+            drawn.mesh = box_mesh(from.box);
+        } else {
+            drawn.mesh = at_line(scene_, from.line, [&] { return session_.read_mesh(from.mesh); });
+            Mesh& mesh = drawn.mesh;
+            hash_.add(mesh.positions);
+            hash_.add(mesh.corners);
+            MeshObstacle shape;
+            shape.field = std::make_shared<const DistanceField>(
+                require_at(scene_, from.line, DistanceField::create(mesh, from.scale, from.spacing, context())));
+            const Vec3d own = from.scale * bounds(mesh.positions).centre();
+            middle = from.centre.value_or(own + from.scale * mesh.origin);
+            shape.offset = middle - own;
+            obstacle.shape = shape;
+            for (Vec3f& p : mesh.positions) p = (from.scale * p.cast<double>() + shape.offset).cast<float>();
+            mesh.origin = Vec3d::Zero();
+        }
+        obstacle.motion = drawn.motion = motion_of(from.motion, middle);
+        obstacle.friction = from.friction;
+        obstacle.restitution = from.restitution;
+        result_.world.obstacles.push_back(std::move(obstacle));
+        drawn.moves = from.motion.moves();
+        drawn.color = from.color.value_or(kObstacleColor);
+        if (from.visible) result_.drawn.push_back(std::move(drawn));
+    }
+
+    /// Particles of a region at the start; all where it names nothing.
+    std::vector<Index> particles_of(std::size_t number, const SceneRegion& region, unsigned line) const {
+        const Actor& actor = result_.actors[number];
+        const Body& body = *actor.body;
+        std::vector<Index> chosen;
+        if (!region.vertices.empty()) {
+            chosen = particles_near(number, region.vertices, line);
+        } else {
+            for (Index i = 0; i < body.particle_count(); ++i) {
+                const Vec3d p = actor.placement * body.rest[i].cast<double>();
+                const bool is_outside = (region.box && ((p.array() < region.box->min.array()).any() ||
+                                                        (p.array() > region.box->max.array()).any())) ||
+                                        (region.ball && (p - region.ball->centre).norm() > region.ball->radius);
+                if (!is_outside) chosen.push_back(i);
+            }
+        }
+        if (chosen.empty())
+            fail_in_scene(
+                scene_, line, ErrorCode::bad_file,
+                fmt::format("the region holds no particle of '{}' at the start; make it larger (particles are "
+                            "{:.3g} m apart)",
+                            result_.bodies[number].name, body.spacing()));
+        return chosen;
+    }
+
+    std::vector<Index> particles_near(std::size_t number, std::span<const Index> vertices, unsigned line) const {
+        const SetUpBody& body = result_.bodies[number];
+        const Vectors& rest = body.body->rest;
+        const float reach = float(0.87 * body.body->spacing()); // half a cell's diagonal
+        std::vector<Index> chosen;
+        for (const Index vertex : vertices) {
+            if (vertex >= body.model.mesh.vertex_count())
+                fail_in_scene(scene_, line, ErrorCode::bad_file,
+                              fmt::format("there is no vertex {} in '{}', which has {}", vertex, body.name,
+                                          body.model.mesh.vertex_count()));
+            const Vec3f at = float(body.scale) * body.model.mesh.positions[vertex];
+            Index nearest = 0;
+            for (Index i = 0; i < rest.size(); ++i) {
+                const float distance = (rest[i] - at).norm();
+                if (distance <= reach) chosen.push_back(i);
+                if (distance < (rest[nearest] - at).norm()) nearest = i;
+            }
+            chosen.push_back(nearest);
+        }
+        std::sort(chosen.begin(), chosen.end());
+        chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+        return chosen;
+    }
+
+    void add_pin(const ScenePin& from) {
+        Pin pin{from.body, particles_of(from.body, from.region, from.line), {}};
+        const Actor& actor = result_.actors[from.body];
+        Vec3d middle = Vec3d::Zero();
+        for (const Index i : pin.particles)
+            middle += actor.placement * actor.body->rest[i].cast<double>() / double(pin.particles.size());
+        pin.motion = motion_of(from.motion, middle);
+        result_.world.pins.push_back(std::move(pin));
+    }
+
+    void add_hand(const SceneHand& from) {
+        const SetUpBody& body = result_.bodies[from.body];
+        const Mesh& mesh = body.model.mesh;
+        Hand hand = from.hand;
+        if (from.vertex) {
+            if (*from.vertex >= mesh.vertex_count())
+                fail_in_scene(scene_, from.line, ErrorCode::bad_file,
+                              fmt::format("there is no vertex {} in '{}', which has {}", *from.vertex, body.name,
+                                          mesh.vertex_count()));
+            hand.point = float(body.scale) * mesh.positions[*from.vertex];
+        } else {
+            const std::vector<Triangle> triangles = triangulate(mesh).triangles;
+            const ClosestPointTree tree(mesh.positions, triangles);
+            const Vec3d at = result_.actors[from.body].placement.inverse() * *from.point / body.scale;
+            hand.point = float(body.scale) * tree.closest(at.cast<float>()).position;
+        }
+        result_.world.hands.push_back(std::move(hand));
+    }
+
+    const SceneFile& scene_;
+    Session& session_;
+    SetUpScene result_;
+    Hash hash_;
+};
+
+} // namespace
+
+SetUpScene set_up(const SceneFile& scene, Session& session) { return Builder(scene, session).build(); }
+
+} // namespace filigree::cli

@@ -1,0 +1,412 @@
+#include "output_folder.h"
+#include "simulate_film.h"
+#include "simulate_recording.h"
+
+#include "filigree/hierarchy/restore.h"
+#include "filigree/io/file.h"
+#include "filigree/mesh/normals.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <numbers>
+
+namespace filigree::cli {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Options {
+    std::string scene, save, resume;
+    std::vector<std::string> outputs;
+    std::size_t frames = 0, stop_at = 0; ///< 0: as the scene says; not before the end
+    bool check = false, keys = false;
+};
+
+[[noreturn]] void refuse(const std::string& sentence) { throw Failure{{ErrorCode::usage, sentence}}; }
+
+/// Where a run's results go, sorted by kind, and everything that can be refused before the work.
+struct Outputs {
+    std::vector<std::string> models, films, folders;
+
+    explicit Outputs(const std::vector<std::string>& paths) {
+        for (std::size_t i = 0; i < paths.size(); ++i) {
+            const std::string& path = paths[i];
+            if (std::find(paths.begin(), paths.begin() + std::ptrdiff_t(i), path) != paths.begin() + std::ptrdiff_t(i))
+                refuse(path + ": two outputs cannot go to one place.");
+            std::error_code ignored;
+            const fs::path folder = fs::path(path).parent_path();
+            const bool is_folder = path.ends_with('/') || fs::is_directory(path, ignored);
+            if (!is_folder && !folder.empty() && !fs::is_directory(folder, ignored))
+                throw Failure{{ErrorCode::unwritable, path + ": cannot be written: there is no such folder."}};
+            if (is_folder)
+                folders.push_back(path);
+            else if (lower_ending(path) == ".fil")
+                models.push_back(path);
+            else if (is_film_path(path))
+                films.push_back(path);
+            else
+                throw Failure{{ErrorCode::unsupported,
+                               path +
+                                   ": is no name for a simulation's output; end it in .fil (a model with its poses), "
+                                   ".mp4, .gif or _%04d.png (a film), or / (a folder of meshes)."}};
+        }
+    }
+};
+
+/// "out.fil", or "out_NAME.fil" where there are several bodies.
+std::string model_path(const std::string& path, const SetUpScene& ready, const SetUpBody& body) {
+    if (ready.bodies.size() == 1) return path;
+    const fs::path whole(path);
+    return (whole.parent_path() / fmt::format("{}_{}{}", whole.stem().string(), body.name, whole.extension().string()))
+        .string();
+}
+
+double percentile_95(std::vector<float>& values) {
+    if (values.empty()) return 0;
+    const auto place = values.begin() + std::ptrdiff_t(0.95 * double(values.size() - 1));
+    std::nth_element(values.begin(), place, values.end());
+    return *place;
+}
+
+class Run {
+public:
+    Run(const Options& options, Session& session)
+        : options_(options), session_(session), scene_(read_scene(options.scene)), outputs_(options.outputs),
+          always_(session.threads) {
+        if (options.frames) scene_.frames = options.frames;
+        open_outputs();
+        ready_ = set_up(scene_, session);
+        simulation_ = require(Simulation::create(ready_.world, ready_.actors, scene_.step, session.context()));
+        prepare();
+        if (options.resume.empty())
+            start();
+        else
+            require(unpack_state(require(read_file(options.resume)), options.resume, ready_.hash, recording_,
+                                 *simulation_));
+    }
+
+    void simulate() {
+        const std::size_t last = options_.stop_at ? std::min(options_.stop_at, scene_.frames) : scene_.frames;
+        if (recording_.totals.frames > last)
+            refuse(fmt::format("{}: is at frame {} already, and {} is the last.", options_.resume,
+                               recording_.totals.frames, last));
+        const std::size_t first = recording_.totals.frames;
+        RunContext silent = session_.context(); // the bar tells of frames
+        silent.progress = nullptr;
+        for (std::size_t frame = first; frame < last; ++frame) {
+            session_.context().report("simulating", double(frame - first) / double(last - first));
+            const Result<FrameReport> report = simulation_->advance(silent);
+            if (!report && report.error().code == ErrorCode::cancelled) cancelled(frame);
+            record(require(report));
+        }
+        session_.context().report("simulating", 1);
+    }
+
+    void write() {
+        if (!options_.save.empty()) save();
+        const double start = now_seconds();
+        if (!films_.empty()) {
+            film_seconds_ = film_scene(scene_, ready_, recording_, *stage_, films_, session_);
+            for (const std::string& path : outputs_.films) session_.begin_writing(path);
+            for (FilmWriter& film : films_) require(film.finish());
+        }
+        write_meshes();
+        for (const std::string& path : outputs_.models)
+            for (std::size_t b = 0; b < ready_.bodies.size(); ++b)
+                session_.write_model(ready_.bodies[b].model, model_path(path, ready_, ready_.bodies[b]),
+                                     recording_.poses[b]);
+        write_seconds_ = now_seconds() - start;
+    }
+
+    void report() const;
+
+private:
+    void open_outputs() {
+        if (!outputs_.films.empty()) stage_.emplace(session_);
+        for (const std::string& path : outputs_.films)
+            films_.push_back(require(
+                FilmWriter::create(path, scene_.picture.width, scene_.picture.height, scene_.step.frames_per_second)));
+    }
+
+    void prepare() {
+        for (std::size_t b = 0; b < ready_.bodies.size(); ++b) {
+            const SetUpBody& body = ready_.bodies[b];
+            const auto attach = [&](std::vector<Vec3f> points) {
+                for (Vec3f& p : points) p *= float(body.scale);
+                return simulation_->attach(b, points, always_);
+            };
+            drivers_.push_back(attach(driver_positions(body.model)));
+            restorers_.push_back(require(Restorer::create(body.model, {}, always_)));
+            restored_.emplace_back(body.model.mesh.vertex_count());
+            if (options_.check) direct_.push_back(attach(body.model.mesh.positions));
+        }
+        recording_.poses.assign(ready_.bodies.size(), {scene_.step.frames_per_second, {}});
+        if (scene_.picture.particles) recording_.particles.resize(ready_.bodies.size());
+        if (options_.check) recording_.checks.resize(ready_.bodies.size());
+    }
+
+    void start() {
+        recording_.totals.start = simulation_->energy(always_);
+        for (std::size_t b = 0; b < ready_.bodies.size(); ++b) record_body(b);
+        recording_.totals.coupling_seconds = recording_.totals.restore_seconds = 0; // the start is no frame
+        for (CheckTotals& check : recording_.checks) check = {};
+    }
+
+    void record(const FrameReport& report) {
+        recording_.totals.add(report);
+        for (std::size_t b = 0; b < ready_.bodies.size(); ++b) record_body(b);
+    }
+
+    /// The driver's pose in metres, the mesh that follows from it, and how far that is from the truth.
+    void record_body(std::size_t b) {
+        const double start = now_seconds();
+        const SetUpBody& body = ready_.bodies[b];
+        Pose& pose = recording_.poses[b].frames.emplace_back();
+        pose.positions.resize(body.model.driver().vertices.size());
+        pose.gradients.resize(pose.positions.size());
+        simulation_->attached(drivers_[b], pose.positions, pose.gradients, always_);
+        for (Mat3f& gradient : pose.gradients) gradient *= float(body.scale);
+        const double moved = now_seconds();
+        require(restorers_[b].positions(pose, restored_[b], always_));
+        recording_.totals.coupling_seconds += moved - start;
+        recording_.totals.restore_seconds += now_seconds() - moved;
+        if (options_.check) check_body(b);
+        if (recording_.particles.empty()) return;
+        const Vectors& particles = simulation_->positions(b);
+        std::vector<Vec3f>& drawn = recording_.particles[b].emplace_back();
+        for (std::size_t i = 0; i < particles.size(); ++i) drawn.push_back(particles[i]);
+    }
+
+    void check_body(std::size_t b) {
+        const SetUpBody& body = ready_.bodies[b];
+        const std::vector<Vec3f>& restored = restored_[b];
+        std::vector<Vec3f> direct(restored.size());
+        const double start = now_seconds();
+        simulation_->attached(direct_[b], direct, {}, always_);
+        const double seconds = now_seconds() - start;
+        double squares = 0, most = 0;
+        for (std::size_t v = 0; v < direct.size(); ++v) {
+            const double distance = (direct[v] - restored[v]).cast<double>().norm();
+            squares += distance * distance;
+            most = std::max(most, distance);
+        }
+        const std::vector<Vec3f> ours = vertex_normals(body.model.mesh, restored, always_),
+                                 theirs = vertex_normals(body.model.mesh, direct, always_);
+        std::vector<float> angles;
+        for (std::size_t v = 0; v < ours.size(); ++v)
+            if (!ours[v].isZero() && !theirs[v].isZero())
+                angles.push_back(std::atan2(ours[v].cross(theirs[v]).norm(), ours[v].dot(theirs[v])) * 180 /
+                                 std::numbers::pi_v<float>);
+        const double diagonal = body.scale * bounds(body.model.mesh.positions).diagonal(), p95 = percentile_95(angles);
+        const double rms = std::sqrt(squares / double(direct.size())) / diagonal;
+        CheckTotals& check = recording_.checks[b];
+        check.rms_sum += rms;
+        check.worst_rms = std::max(check.worst_rms, rms);
+        check.worst_max = std::max(check.worst_max, most / diagonal);
+        check.p95_sum += p95;
+        check.worst_p95 = std::max(check.worst_p95, p95);
+        check.direct_seconds += seconds;
+    }
+
+    void save() {
+        const std::string bytes = pack_state(recording_, *simulation_, ready_.hash);
+        const std::string_view piece = bytes;
+        require(write_file(options_.save, std::span(&piece, 1)));
+    }
+
+    [[noreturn]] void cancelled(std::size_t frame) {
+        if (options_.save.empty()) throw Failure{cancelled_error()};
+        save();
+        throw Failure{{ErrorCode::cancelled, fmt::format("Cancelled after frame {} of {}; go on with --resume {}.",
+                                                         frame, scene_.frames, options_.save)}};
+    }
+
+    /// A mesh a frame and body.
+    void write_meshes() {
+        for (const std::string& path : outputs_.folders) {
+            OutputFolder folder(path, options_.scene);
+            std::vector<std::vector<std::string>> files(ready_.bodies.size());
+            for (std::size_t b = 0; b < files.size(); ++b)
+                for (std::size_t frame = 0; frame < recording_.poses[b].frames.size(); ++frame)
+                    files[b].push_back(folder.file(fmt::format("{}_{:04}.ply", ready_.bodies[b].name, frame + 1)));
+            RunContext silent = session_.context();
+            silent.progress = nullptr;
+            for (std::size_t frame = 0; frame < files[0].size(); ++frame) {
+                session_.context().report("writing meshes", double(frame) / double(files[0].size()));
+                for (std::size_t b = 0; b < files.size(); ++b)
+                    session_.write_mesh(require(restorers_[b].mesh(recording_.poses[b].frames[frame], silent)),
+                                        files[b][frame]);
+            }
+            session_.context().report("writing meshes", 1);
+            folder.keep();
+        }
+    }
+
+    const Options& options_;
+    Session& session_;
+    SceneFile scene_;
+    Outputs outputs_;
+    RunContext always_; ///< not cancelled: what is recorded of a frame is whole
+    std::optional<Stage> stage_;
+    std::vector<FilmWriter> films_;
+    SetUpScene ready_;
+    std::optional<Simulation> simulation_;
+    std::vector<std::size_t> drivers_, direct_; ///< attachments
+    std::vector<Restorer> restorers_;
+    std::vector<std::vector<Vec3f>> restored_;
+    Recording recording_;
+    double film_seconds_ = 0, write_seconds_ = 0;
+};
+
+Json energy_json(const Energy& energy) {
+    return {{"kinetic", energy.kinetic}, {"elastic", energy.elastic}, {"potential", energy.potential}};
+}
+
+std::string energy_text(const Energy& e) {
+    return fmt::format("{:.4g} J  (kinetic {:.4g}, elastic {:.4g}, potential {:.4g})", e.total(), e.kinetic, e.elastic,
+                       e.potential);
+}
+
+void Run::report() const {
+    const Totals& t = recording_.totals;
+    const double frames = double(std::max<std::uint64_t>(t.frames, 1));
+    const Energy end = simulation_->energy(always_);
+    Table table;
+    Json json = {{"scene", options_.scene}, {"outputs", options_.outputs}, {"bodies", Json::array()}};
+    table.row("scene", options_.scene);
+    for (std::size_t b = 0; b < ready_.bodies.size(); ++b) {
+        const SetUpBody& body = ready_.bodies[b];
+        const std::size_t elements = body.body->cells.cells.size(), vertices = body.model.mesh.vertex_count(),
+                          driver = body.model.driver().vertices.size();
+        table.row(body.name,
+                  fmt::format("{} particles, {} cells of {:.3g} m; {:.4g} kg, {:.4g} m^3; {} vertices by a "
+                              "driver of {}",
+                              with_commas(body.body->particle_count()), with_commas(elements), body.body->spacing(),
+                              body.report.mass, body.report.cells.volume, with_commas(vertices), with_commas(driver)));
+        json["bodies"].push_back({{"name", body.name},
+                                  {"particles", body.body->particle_count()},
+                                  {"elements", elements},
+                                  {"spacing_m", body.body->spacing()},
+                                  {"mass_kg", body.report.mass},
+                                  {"volume_m3", body.report.cells.volume},
+                                  {"thin_cells", body.report.cells.thin_cells},
+                                  {"loose_parts", body.report.cells.loose_parts},
+                                  {"vertices", vertices},
+                                  {"driver_vertices", driver}});
+    }
+    table.row("frames",
+              fmt::format("{} of {}, at {} a second", t.frames, scene_.frames, scene_.step.frames_per_second));
+    const std::uint64_t least = t.frames ? t.least_substeps : 0;
+    table.row("substeps",
+              fmt::format("{} to {} a frame, {:.3g} on average; {} frames explicit, {} by descent", least,
+                          t.most_substeps, double(t.substeps) / frames, t.explicit_frames, t.descent_frames));
+    const auto ms = [&](double seconds) { return 1e3 * seconds / frames; };
+    const double seconds = t.elastic_seconds + t.contact_seconds + t.other_seconds;
+    table.row("time a frame",
+              fmt::format("{:.3g} ms elastic, {:.3g} contacts, {:.3g} other, {:.3g} driver, {:.3g} "
+                          "restore: {:.3g} in all",
+                          ms(t.elastic_seconds), ms(t.contact_seconds), ms(t.other_seconds), ms(t.coupling_seconds),
+                          ms(t.restore_seconds), ms(seconds + t.coupling_seconds + t.restore_seconds)));
+    table.row("cells",
+              fmt::format("{:.3g} of their volume at least, stretched {:.3g} times at most{}", t.least_volume_ratio,
+                          t.most_stretch, t.least_volume_ratio <= 0 ? "; some were inside out" : ""));
+    table.row("contacts",
+              fmt::format("{} points at most, {:.3g} m deep at most", with_commas(t.most_contacts), t.deepest_contact));
+    table.row("energy at the start", energy_text(t.start));
+    table.row("and at the end", energy_text(end));
+    if (t.clamped_particles) table.row("clamped", with_commas(t.clamped_particles) + " motions of particles");
+    json["frames"] = t.frames;
+    json["frames_per_second"] = scene_.step.frames_per_second;
+    json["explicit_frames"] = t.explicit_frames;
+    json["descent_frames"] = t.descent_frames;
+    json["substeps"] = {{"min", least}, {"mean", double(t.substeps) / frames}, {"max", t.most_substeps}};
+    json["ms_a_frame"] = {{"elastic", ms(t.elastic_seconds)},
+                          {"contacts", ms(t.contact_seconds)},
+                          {"other", ms(t.other_seconds)},
+                          {"driver", ms(t.coupling_seconds)},
+                          {"restore", ms(t.restore_seconds)}};
+    json["least_volume_ratio"] = t.least_volume_ratio;
+    json["most_stretch"] = t.most_stretch;
+    json["most_contacts"] = t.most_contacts;
+    json["deepest_contact_m"] = t.deepest_contact;
+    json["clamped_particles"] = t.clamped_particles;
+    json["energy_start"] = energy_json(t.start);
+    json["energy_end"] = energy_json(end);
+    double direct = 0;
+    for (std::size_t b = 0; b < recording_.checks.size(); ++b) {
+        const CheckTotals& check = recording_.checks[b];
+        direct += check.direct_seconds;
+        table.row(ready_.bodies[b].name + ", restored",
+                  fmt::format("rms {:.2e} of the diagonal from all attached (worst frame {:.2e}, worst vertex {:.2e}); "
+                              "95 % of normals within {:.3g} degrees (worst frame {:.3g})",
+                              check.rms_sum / frames, check.worst_rms, check.worst_max, check.p95_sum / frames,
+                              check.worst_p95));
+        json["bodies"][b]["check"] = {{"rms_mean", check.rms_sum / frames},
+                                      {"rms_worst", check.worst_rms},
+                                      {"max_worst", check.worst_max},
+                                      {"normal_p95_deg_mean", check.p95_sum / frames},
+                                      {"normal_p95_deg_worst", check.worst_p95}};
+    }
+    if (!recording_.checks.empty() && t.frames) {
+        const double ratio = direct / (t.coupling_seconds + t.restore_seconds);
+        table.row("attached directly",
+                  fmt::format("{:.3g} ms a frame: {:.3g} times the driver and the restore", ms(direct), ratio));
+        json["direct_ms_a_frame"] = ms(direct);
+        json["direct_ratio"] = ratio;
+    }
+    if (!options_.outputs.empty())
+        table.row("written", fmt::format("{} in {}", fmt::join(options_.outputs, ", "), seconds_text(write_seconds_)));
+    if (!options_.save.empty()) table.row("state", options_.save);
+    json["write_seconds"] = write_seconds_;
+    json["film_seconds"] = film_seconds_;
+    session_.print(table.text(), json);
+}
+
+void check(const Options& options) {
+    if (options.scene.empty()) refuse("Give a scene: filigree simulate SCENE.toml -o OUT.");
+    if (options.outputs.empty() && options.save.empty() && !options.check)
+        refuse("Say where the motion goes: -o OUT.fil, -o FILM.mp4 or -o FOLDER/; or give --save or --check.");
+    if (options.stop_at && options.save.empty())
+        refuse("--stop-at stops a run that goes on later; say where with --save.");
+}
+
+} // namespace
+
+void add_simulate(CLI::App& app, Session& session) {
+    auto options = std::make_shared<Options>();
+    CLI::App* command =
+        app.add_subcommand("simulate", "Let the bodies of a scene move: a film, a model with poses, or meshes");
+    command->add_option("scene", options->scene, "Scene (.toml), see docs/scenes.md");
+    command
+        ->add_option(
+            "-o,--output", options->outputs,
+            "A model with its poses (.fil), a film (.mp4, .gif, NAME_%04d.png), or a folder of meshes (NAME/); "
+            "may come several times")
+        ->allow_extra_args(false);
+    command->add_option("--frames", options->frames, "Frames to compute (unset: as the scene says)")
+        ->check(whole_number(1));
+    command->add_flag("--check", options->check,
+                      "Also carry every vertex by the particles, and say how far the restored mesh is from that");
+    command->add_option("--stop-at", options->stop_at, "Stop after this frame, to go on later; with --save")
+        ->check(whole_number(1));
+    command->add_option("--save", options->save, "Write the state at the end, or when cancelled, to go on from");
+    command->add_option("--resume", options->resume, "Go on from a state that --save wrote");
+    command->add_flag("--keys", options->keys, "Print every key that a scene can have, and the materials");
+    session.add_common_options(*command, "  filigree simulate bounce.toml -o bounce.mp4 -o bounce.fil\n"
+                                         "  filigree simulate bounce.toml -o meshes/ --frames 60 --check\n"
+                                         "  filigree simulate long.toml --save state --stop-at 100\n"
+                                         "  filigree simulate long.toml --resume state -o long.mp4\n"
+                                         "  filigree simulate --keys");
+    command->callback([options, &session] {
+        session.begin();
+        if (options->keys) return session.print(scene_manual(), {{"manual", scene_manual()}});
+        check(*options);
+        Run run(*options, session);
+        run.simulate();
+        run.write();
+        run.report();
+    });
+}
+
+} // namespace filigree::cli

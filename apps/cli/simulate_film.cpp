@@ -1,0 +1,246 @@
+#include "simulate_film.h"
+
+#include "filigree/hierarchy/restore.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace filigree::cli {
+
+namespace {
+
+constexpr double kRoom = 0.4; // obstacles so near to the motion, in its diagonals, are in the picture
+
+/// The finest level with no more triangles.
+unsigned level_for(const Model& model, std::size_t most_triangles) {
+    unsigned level = model.finest_level();
+    const auto triangles = [&](unsigned k) {
+        return k == model.finest_level() ? model.mesh.corner_count() - 2 * model.mesh.face_count()
+                                         : model.levels[k].corners.size() - 2 * model.levels[k].face_count();
+    };
+    while (level > 0 && triangles(level) > most_triangles) --level;
+    return level;
+}
+
+std::vector<Vec3f> moved(std::span<const Vec3f> points, const Eigen::Isometry3d& motion) {
+    std::vector<Vec3f> result;
+    result.reserve(points.size());
+    for (const Vec3f& p : points) result.push_back((motion * p.cast<double>()).cast<float>());
+    return result;
+}
+
+void extend(Box& box, std::span<const Vec3f> points) {
+    const Box other = bounds(points);
+    if (other.empty()) return;
+    box.extend(other.min);
+    box.extend(other.max);
+}
+
+class SceneFilm {
+public:
+    SceneFilm(const SceneFile& scene, const SetUpScene& ready, const Recording& recording, Session& session)
+        : scene_(scene), ready_(ready), recording_(recording), session_(session),
+          frames_(recording.poses[0].frames.size()), quiet_(session.context()) {
+        quiet_.progress = nullptr; // the bar tells of frames
+        actors_.reserve(ready.bodies.size());
+        for (const SetUpBody& body : ready.bodies) prepare(body);
+        look_ahead();
+        choose_ground();
+        obstacles_.resize(ready.drawn.size());
+    }
+
+    Picture frame(std::size_t number, Stage& stage) {
+        Scene shown;
+        for (std::size_t b = 0; b < actors_.size(); ++b) shown.objects.push_back(body_at(b, number));
+        for (std::size_t k = 0; k < ready_.drawn.size() && scene_.picture.obstacles; ++k)
+            if (const Drawable* drawable = obstacle_at(k, number))
+                shown.objects.push_back({drawable, {.color = ready_.drawn[k].color, .gloss = 0.1f}});
+        const ScenePicture& picture = scene_.picture;
+        if (picture.background_top) shown.background.top = *picture.background_top;
+        if (picture.background_bottom) shown.background.bottom = *picture.background_bottom;
+        shown.up = picture.up;
+        shown.ground = picture.ground;
+        shown.fixed_ground = true;
+        shown.ground_level = ground_level_;
+        return require(stage.renderer().picture(
+            shown, camera_, {.width = picture.width, .height = picture.height, .passes = picture.passes}, quiet_));
+    }
+    std::size_t frames() const { return frames_; }
+
+private:
+    struct ShownBody {
+        const SetUpBody* body;
+        LoadedMaterials materials;
+        RestoreOptions restore;
+        std::optional<Drawable> drawable;
+        float ball_radius = 0;
+    };
+
+    void prepare(const SetUpBody& body) {
+        ShownBody& shown = actors_.emplace_back();
+        shown.body = &body;
+        shown.restore.level = level_for(body.model, scene_.picture.most_triangles);
+        if (scene_.picture.particles) {
+            shown.ball_radius = float(0.4 * body.body->spacing());
+            return;
+        }
+        if (!body.mesh_path.empty()) shown.materials = load_materials(body.model.mesh, body.mesh_path, session_);
+        SurfaceOptions surface;
+        surface.materials = shown.materials.materials;
+        shown.drawable = require(Drawable::model(body.model, shown.restore, surface, quiet_));
+    }
+
+    SceneObject body_at(std::size_t b, std::size_t frame) {
+        ShownBody& shown = actors_[b];
+        const Pose& pose = recording_.poses[b].frames[frame];
+        if (scene_.picture.particles) {
+            PointOptions points;
+            points.radius = shown.ball_radius;
+            shown.drawable = require(Drawable::points(recording_.particles[b][frame], Vec3d::Zero(), points, quiet_));
+        } else {
+            require(shown.drawable->set_pose(pose, quiet_));
+        }
+        return {&*shown.drawable, {.color = shown.body->color, .own_colors = shown.body->has_own_color}};
+    }
+
+    double time_of(std::size_t frame) const { return double(frame) / scene_.step.frames_per_second; }
+
+    /// Null where the level ground of the picture stands for it.
+    const Drawable* obstacle_at(std::size_t k, std::size_t frame) {
+        const SetUpObstacle& obstacle = ready_.drawn[k];
+        if (is_level_ground(obstacle)) return nullptr;
+        std::optional<Drawable>& drawable = obstacles_[k];
+        if (drawable && !obstacle.moves) return &*drawable;
+        Mesh mesh = obstacle.is_ground ? slab(obstacle.plane) : obstacle.mesh;
+        mesh.positions = moved(mesh.positions, obstacle.motion.at(time_of(frame)));
+        mesh.normals = {}; // of the mesh before it turned
+        drawable = require(Drawable::surface(mesh, {}, quiet_));
+        return &*drawable;
+    }
+
+    bool is_level_ground(const SetUpObstacle& obstacle) const {
+        return obstacle.is_ground && !obstacle.moves && obstacle.motion.angle.constant.isZero() &&
+               obstacle.plane.normal.isApprox(up_vector(scene_.picture.up), 1e-9);
+    }
+
+    /// A plane as a plate below it, as large as the motion.
+    Mesh slab(const HalfSpace& plane) const {
+        const Vec3d middle = box_.centre() - plane.normal.dot(box_.centre() - plane.point) * plane.normal;
+        const double half = 0.62 * box_.diagonal(), thickness = 0.02 * box_.diagonal();
+        Vec3d side = plane.normal.cross(up_vector(scene_.picture.up));
+        if (side.norm() < 1e-6) side = plane.normal.unitOrthogonal();
+        side.normalize();
+        const Vec3d along = plane.normal.cross(side);
+        Mesh mesh;
+        for (int k = 0; k < 8; ++k)
+            mesh.positions.push_back((middle + half * ((k & 1 ? 1 : -1) * side + (k & 2 ? 1 : -1) * along) -
+                                      (k & 4 ? 0 : thickness) * plane.normal)
+                                         .cast<float>());
+        const bool turns_right = side.cross(along).dot(plane.normal) > 0;
+        for (std::array<Index, 4> face :
+             {std::array<Index, 4>{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}}) {
+            if (!turns_right) std::reverse(face.begin(), face.end());
+            mesh.add_face(face);
+        }
+        return mesh;
+    }
+
+    /// Where everything goes: one camera for the whole film.
+    void look_ahead() {
+        std::vector<Vec3f> seen;
+        for (ShownBody& shown : actors_) {
+            const std::size_t b = std::size_t(&shown - actors_.data());
+            const Restorer restorer = require(Restorer::create(shown.body->model, shown.restore, quiet_));
+            const std::size_t stride = 1 + restorer.vertex_count() * frames_ / 400'000;
+            std::vector<Vec3f> positions(restorer.vertex_count());
+            for (std::size_t frame = 0; frame < frames_; ++frame) {
+                if (session_.context().is_cancelled()) throw Failure{cancelled_error()};
+                session_.context().report("looking ahead", double(frame) / double(frames_));
+                require(restorer.positions(recording_.poses[b].frames[frame], positions, quiet_));
+                extend(box_, positions);
+                for (std::size_t v = frame % stride; v < positions.size(); v += stride) seen.push_back(positions[v]);
+            }
+        }
+        session_.context().report("looking ahead", 1);
+        if (scene_.picture.obstacles) see_obstacles(seen);
+        const ScenePicture& picture = scene_.picture;
+        const double aspect = double(picture.width) / picture.height;
+        if (picture.eye) {
+            camera_.eye = *picture.eye;
+            camera_.target = *picture.target;
+            camera_.up = up_vector(picture.up);
+            camera_.field_of_view_deg = picture.field_of_view;
+            camera_.height = (camera_.eye - camera_.target).norm();
+            return;
+        }
+        const CameraPoints points{seen};
+        camera_ = fit_camera(std::span(&points, 1), view_direction(picture.view, picture.up), up_vector(picture.up),
+                             aspect, picture.field_of_view);
+    }
+
+    void see_obstacles(std::vector<Vec3f>& seen) {
+        Box near = box_;
+        near.min.array() -= kRoom * box_.diagonal();
+        near.max.array() += kRoom * box_.diagonal();
+        for (const SetUpObstacle& obstacle : ready_.drawn) {
+            const std::size_t moments = obstacle.moves ? frames_ : 1;
+            for (std::size_t frame = 0; frame < moments; frame += 1 + moments / 32) {
+                const std::vector<Vec3f> points = moved(obstacle.mesh.positions, obstacle.motion.at(time_of(frame)));
+                const std::size_t stride = 1 + points.size() / 2000;
+                for (std::size_t v = 0; v < points.size(); v += stride) {
+                    const Vec3d p = points[v].cast<double>();
+                    if ((p.array() < near.min.array()).any() || (p.array() > near.max.array()).any()) continue;
+                    seen.push_back(points[v]);
+                    lowest_obstacle_ = std::min(lowest_obstacle_, p[axis()]);
+                }
+            }
+        }
+    }
+
+    /// The level ground where there is one, else the lowest point of all.
+    void choose_ground() {
+        ground_level_ = std::min(box_.min[axis()], lowest_obstacle_) - 1e-4 * box_.diagonal();
+        for (const SetUpObstacle& obstacle : ready_.drawn) {
+            if (is_level_ground(obstacle)) {
+                // Deep enough not to cut off what rests on it by rounding.
+                ground_level_ =
+                    obstacle.motion.at(0).translation()[axis()] + obstacle.plane.point[axis()] - 1e-4 * box_.diagonal();
+                return;
+            }
+            if (obstacle.is_ground && scene_.picture.obstacles)
+                for (const Vec3f& p : slab(obstacle.plane).positions)
+                    ground_level_ = std::min(ground_level_, double(p[axis()]));
+        }
+    }
+    int axis() const { return static_cast<int>(scene_.picture.up); }
+
+    const SceneFile& scene_;
+    const SetUpScene& ready_;
+    const Recording& recording_;
+    Session& session_;
+    std::size_t frames_;
+    RunContext quiet_;
+    std::vector<ShownBody> actors_;
+    std::vector<std::optional<Drawable>> obstacles_;
+    Box box_; ///< of the bodies, in all frames
+    double lowest_obstacle_ = std::numeric_limits<double>::infinity(), ground_level_ = 0;
+    Camera camera_;
+};
+
+} // namespace
+
+double film_scene(const SceneFile& scene, const SetUpScene& ready, const Recording& recording, Stage& stage,
+                  std::span<FilmWriter> writers, Session& session) {
+    const double start = now_seconds();
+    SceneFilm film(scene, ready, recording, session);
+    for (std::size_t frame = 0; frame < film.frames(); ++frame) {
+        if (session.context().is_cancelled()) throw Failure{cancelled_error()};
+        session.context().report("filming", double(frame) / double(film.frames()));
+        const Picture picture = film.frame(frame, stage);
+        for (FilmWriter& writer : writers) require(writer.add(picture));
+    }
+    session.context().report("filming", 1);
+    return now_seconds() - start;
+}
+
+} // namespace filigree::cli
