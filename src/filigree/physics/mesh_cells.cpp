@@ -20,8 +20,9 @@ namespace {
 using LatticeIndex = Cells::LatticeIndex;
 
 constexpr double kMostCells = 0x1p26;
-constexpr double kMostGridCells = 0x1p30; // of the box, one byte each
-constexpr std::size_t kMostAlong = 16383; // times four samples: what scan_inside takes on an axis
+constexpr std::size_t kEnoughTouches = std::size_t{1} << 25; // points that say where in their cells a sheet runs
+constexpr double kMostGridCells = 0x1p30;                    // of the box, one byte each
+constexpr std::size_t kMostAlong = 16383;                    // times four samples: what scan_inside takes on an axis
 // Samples a cell along each axis: a closed mesh is scanned at a nanosecond each, a winding number takes microseconds.
 constexpr unsigned kSamples = 4, kWindingSamples = 2;
 constexpr double kMostWindings = 0x1p20; // beyond, one sample a cell
@@ -197,16 +198,21 @@ public:
             high[axis] = clamped(at[axis] + reach, axis);
         }
         const std::size_t index = grid_.index(cell[0], cell[1], cell[2]);
-        if (state_[index] == kOccupied) return;
+        if (state_[index] == kOccupied || is_full()) return;
+        if (state_[index] == kAdded && touches_.size() >= kEnoughTouches) return;
         if (state_[index] == kEmpty) {
             for (std::size_t k = low[2]; k <= high[2]; ++k)
                 for (std::size_t j = low[1]; j <= high[1]; ++j)
                     for (std::size_t i = low[0]; i <= high[0]; ++i)
                         if (state_[grid_.index(i, j, k)] != kEmpty) return;
             state_[index] = kAdded;
+            ++added_;
         }
         touches_.push_back({index, point.cast<float>()});
     }
+
+    /// More cells than there may be: no more are added.
+    bool is_full() const { return double(added_) > kMostCells; }
 
     /// The added cells, in no order; each at the mean of the points in it.
     std::vector<Draft> take() {
@@ -241,6 +247,7 @@ private:
     const Grid& grid_;
     std::vector<std::uint8_t> state_;
     std::vector<Touch> touches_;
+    std::size_t added_ = 0;
 };
 
 /// For each cell the first cell of its group; cells that share a corner hang together.
