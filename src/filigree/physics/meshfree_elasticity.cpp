@@ -37,8 +37,8 @@ namespace {
 
 constexpr std::size_t kGrain = 256, kBlock = 8; // particles; stresses are computed for kBlock at a time
 constexpr double kHourglass = 0.05;             // of mu V / h^2
-constexpr int kRateIterations = 30;
-constexpr double kRateMargin = 1.4;
+constexpr int kRateIterations = 30, kRenewedRateIterations = 12;
+constexpr double kRateMargin = 1.4, kRenewedRateMargin = 1.55;
 // A neighbourhood in a point or on a line has no cofactor and so no force that opens it: sweeps take it for a thin box.
 constexpr float kLeastCofactor = 1e-3f; // |cof F|^2
 constexpr float kThinBox = 0.1f;        // added to F's diagonal
@@ -55,6 +55,13 @@ constexpr float kMostFlow = 2.5f;          // ... of any single particle
 constexpr float kSlipToRenew = 0.5f;       // spacings: of a neighbour from where F says
 constexpr std::size_t kShareToRenew = 100; // renew when one particle of this many is distorted
 constexpr double kMostHeatSteps = 16;
+// A melt's particles are free to line up until their neighbours tell nothing of one direction. Those closer than
+// kPacked repel each other a little, which keeps them as far apart every way.
+constexpr double kPacked = 1;            // spacings
+constexpr double kPacking = 4;           // of the melt's shear modulus times spacing
+constexpr double kMostPacked = 14;       // neighbours at a time, for the bound of the rate
+constexpr float kLeastMelt = 0.8f;       // volume ratio: below it a renewed melt forgets its shape
+constexpr float kMostCorrection = 0.02f; // of a volume ratio, a renewal
 
 struct Columns {
     Float4 c[3]; // of a matrix; the fourth lane is unused or holds something else
@@ -258,7 +265,7 @@ public:
         }
         slip_allowed_ = float(double(kFolded * kFolded) * body.spacing() * body.spacing());
         moduli_.resize(n);
-        find_neighbours(context);
+        find_neighbours(false, context);
     }
 
     ElasticReport forces(const Vectors& positions, Vectors& forces, const RunContext& context) override {
@@ -299,7 +306,7 @@ public:
                 squared = piece.squared[l] <= squared ? squared : piece.squared[l];
                 least = piece.volume_ratio[l] >= least ? least : piece.volume_ratio[l];
             }
-        report.rate = stiffness * unit_rate_;
+        report.rate = stiffness * unit_rate_ + (packing_.empty() ? 0.f : packing_rate_);
         report.least_volume_ratio = least;
         report.most_stretch = std::sqrt(squared / 3);
         return report;
@@ -380,7 +387,7 @@ public:
             flows_ = true;
         }
         reference_ = positions;
-        find_neighbours(context);
+        find_neighbours(true, context);
         if (body_.material.melts()) correct_volume(context);
         renewed_ = stored_;
     }
@@ -427,8 +434,10 @@ public:
         take(temperature_.data(), n * sizeof(float));
         flows_ = true;
         wants_renewal_ = wants != 0;
+        const bool is_renewed =
+            reference.x != body_.rest.x || reference.y != body_.rest.y || reference.z != body_.rest.z;
         reference_ = std::move(reference);
-        find_neighbours(RunContext());
+        find_neighbours(is_renewed, RunContext());
         return true;
     }
 
@@ -469,11 +478,28 @@ private:
             force += first * pair[0] + (here.c[1] + there.c[1]) * pair[1] + (here.c[2] + there.c[2]) * pair[2] +
                      (position_[j] - x) * (first[3] * pair[3]);
         }
+        if (!packing_.empty() && packing_[i] > 0)
+            for_overlaps(i, [&](Float4 away, float overlap, float stiffness) { force += stiffness * overlap * away; });
         return force;
     }
 
+    /// Calls visit(unit vector away from the neighbour, m of overlap, N/m) for the neighbours that a melted particle
+    /// is closer to than kPacked.
+    template <class Visit>
+    FILIGREE_INLINE void for_overlaps(std::size_t i, const Visit& visit) const {
+        for (std::size_t k = neighbours_.offsets[i]; k < neighbours_.offsets[i + 1]; ++k) {
+            const Index j = neighbours_.neighbours[k];
+            const Float4 d = position_[i] - position_[j];
+            const float squared = dot3(d, d);
+            const float stiffness = packing_[i] * packing_[j];
+            if (!(squared < packed_ * packed_ && squared > 1e-12f * packed_ * packed_ && stiffness > 0)) continue;
+            const float length = std::sqrt(squared);
+            visit(d * (1 / length), packed_ - length, stiffness);
+        }
+    }
+
     /// Everything that follows from reference_: neighbours, hourglass stiffness, the bound of the rate.
-    void find_neighbours(const RunContext& context) {
+    void find_neighbours(bool is_renewed, const RunContext& context) {
         const std::size_t n = body_.particle_count();
         neighbours_ = find_mls_neighbours(reference_, body_.volume, body_.spacing(), context);
         position_.resize(n);
@@ -485,25 +511,28 @@ private:
             const float sum = neighbours_.weight_sum[i];
             hourglass_[i] = sum > 0 ? float(2 * kHourglass * double(body_.volume[i]) / (h * h)) / sum : 0.f;
         }
-        for (std::size_t i = 0; i < n; ++i) moduli_[i] = particle_moduli(i);
-        find_rate(context);
+        find_packing();
+        for (std::size_t i = 0; i < n; ++i) update_particle(i);
+        find_rate(is_renewed, context);
     }
 
     /// Largest eigenvalue of M^-1 K at rest (hourglass term included) by power iteration, over the stiffness that
-    /// stress_block finds at rest. Rayleigh quotients approach it from below: hence kRateMargin, which also has to
+    /// stress_block finds at rest. Rayleigh quotients approach it from below: hence the margin, which also has to
     /// cover what a state changes beyond its largest stiffness. Tests compare with dense eigenvalues.
-    void find_rate(const RunContext& context) {
-        unit_rate_ = unit_rate(shear_, context);
-        if (body_.material.melts()) unit_rate_ = std::max(unit_rate_, unit_rate(melt_shear_, context));
+    void find_rate(bool is_renewed, const RunContext& context) {
+        const int iterations = is_renewed ? kRenewedRateIterations : kRateIterations;
+        unit_rate_ = unit_rate(shear_, iterations, context);
+        if (body_.material.melts()) unit_rate_ = std::max(unit_rate_, unit_rate(melt_shear_, iterations, context));
+        unit_rate_ *= float(is_renewed ? kRenewedRateMargin : kRateMargin);
     }
-    float unit_rate(float shear, const RunContext& context) {
+    float unit_rate(float shear, int iterations, const RunContext& context) {
         const std::size_t n = body_.particle_count();
         const float lambda = bulk_ - shear * (2 / 3.f);
         const auto component = [](std::size_t i, std::uint64_t c) { return float(random_unit(1, 3 * i + c) - 0.5); };
         for (std::size_t i = 0; i < n; ++i) position_[i] = Float4{component(i, 0), component(i, 1), component(i, 2), 0};
         double rate = 0;
         std::vector<Float4> next(n);
-        for (int iteration = 0; iteration < kRateIterations; ++iteration) {
+        for (int iteration = 0; iteration < iterations; ++iteration) {
             parallel_for(context, n, kGrain, [&](std::size_t begin, std::size_t end) {
                 for (std::size_t i = begin; i < end; ++i) {
                     Mat3f G = to_matrix(gradient(i));
@@ -531,7 +560,7 @@ private:
             if (!(largest > 0)) break;
             for (std::size_t i = 0; i < n; ++i) position_[i] = next[i] * float(1 / largest);
         }
-        return float(kRateMargin * rate / double(lambda + 2 * shear));
+        return float(rate / double(lambda + 2 * shear));
     }
 
     /// Greedily, so that no two particles of a color have a neighbour in common, nor are neighbours.
@@ -610,6 +639,11 @@ private:
             stiffness += (zi + zp) * pair[3];
         }
         block.add_scaled_identity(stiffness);
+        if (!packing_.empty() && packing_[i] > 0)
+            for_overlaps(i, [&](Float4 away, float overlap, float k) {
+                force += k * overlap * away;
+                block.add_outer(to_vector(away), k);
+            });
         Vec3f total = to_vector(force);
         if (descent.touched[i] && descent.external) descent.external->add(i, positions, total, block);
         Vec3f solved = block.solve(total);
@@ -639,6 +673,8 @@ private:
             const Float4 slip = pair[3] * (position_[neighbours_.neighbours[k]] - position_[i]) - times(F, pair);
             if (pair[3] > 0) sum += 0.5 * double(m.z * dot3(slip, slip) / pair[3]);
         }
+        if (!packing_.empty() && packing_[i] > 0)
+            for_overlaps(i, [&](Float4, float overlap, float k) { sum += 0.25 * double(k * overlap * overlap); });
         return sum;
     }
 
@@ -650,6 +686,19 @@ private:
     Moduli particle_moduli(std::size_t i) const {
         const float shear = flows_ ? shear_modulus(melted(i)) : shear_;
         return moduli(bulk_, shear, hourglass_[i] * shear);
+    }
+
+    void update_particle(std::size_t i) {
+        moduli_[i] = particle_moduli(i);
+        if (!packing_.empty()) packing_[i] = packing_scale_ * melted(i) * body_.volume[i];
+    }
+    void find_packing() {
+        if (!flows_ || !body_.material.melts()) return;
+        const double h = body_.spacing(), stiffness = kPacking * double(melt_shear_) * h; // of two whole cells
+        packing_.resize(body_.particle_count());
+        packed_ = float(kPacked * h);
+        packing_scale_ = float(std::sqrt(stiffness) / (h * h * h));
+        packing_rate_ = float(2 * kMostPacked * stiffness / (body_.material.density * h * h * h));
     }
 
     /// Flow of one particle; how far it has flowed since the last renewal, |G|^2 - 3.
@@ -713,7 +762,7 @@ private:
         }
         for (std::size_t i = 0; i < n; ++i) {
             temperature_[i] += float(material.heating * double(dt)) * neighbours_.exposure[i];
-            moduli_[i] = particle_moduli(i);
+            update_particle(i);
         }
     }
 
@@ -727,16 +776,23 @@ private:
     }
 
     /// The product of gradients over many renewals drifts from the volume there is. Inside, and wherever particles are
-    /// denser than at the start, the kernel's sum tells how far.
+    /// denser than at the start, the kernel's sum tells how far. At its surface a melt bears no tension (drops come
+    /// apart), and a neighbourhood that was turned inside out is a round one from now on.
     void correct_volume(const RunContext& context) {
         parallel_for(context, body_.particle_count(), kGrain, [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i) {
                 const float part = melted(i);
                 if (!(part > 0)) continue;
-                const float volume_ratio = 1 / neighbours_.density[i], J = stored_[i].determinant();
-                if (!(J > 0) || (volume_ratio > J && neighbours_.exposure[i] > 0)) continue;
-                const float wanted = J + 0.5f * part * (volume_ratio - J);
-                stored_[i] *= std::cbrt(std::clamp(wanted / J, 0.5f, 2.f));
+                const float exposure = neighbours_.exposure[i], J = stored_[i].determinant();
+                float there = std::clamp(1 / neighbours_.density[i], kLeastMelt, 1 / kLeastMelt);
+                if (exposure > 0) there = std::min(there, 1.f);
+                if (!(J > kLeastMelt)) {
+                    stored_[i] = Mat3f::Identity() * std::cbrt(there);
+                    continue;
+                }
+                if (there > J && exposure > 0) there = std::min(J, 1.f);
+                const float change = std::clamp(there - J, -kMostCorrection, kMostCorrection);
+                stored_[i] *= std::cbrt((J + part * change) / J);
             }
         });
     }
@@ -758,6 +814,10 @@ private:
     std::vector<Mat3f> stored_, renewed_; // D, and D at the last renewal
     std::vector<float> temperature_;      // K
     bool wants_renewal_ = false;
+
+    // Of melts; empty for others.
+    std::vector<float> packing_; // the product of two is a pair's stiffness, N/m
+    float packed_ = 0, packing_scale_ = 0, packing_rate_ = 0;
 
     // Scratch and what follows from the state.
     std::vector<Moduli> moduli_;
