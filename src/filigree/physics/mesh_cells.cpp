@@ -329,11 +329,7 @@ public:
         if (!drafts) return drafts.error();
         add_surface(*grid, *drafts);
         if (context_.is_cancelled()) return cancelled_error();
-        if (double(drafts->size()) > kMostCells)
-            return Error{ErrorCode::unsuitable,
-                         "A spacing of " + number(spacing * scale_) + " m gives " + number(double(drafts->size())) +
-                             " cells, more than 2^26; give at least " +
-                             number(1.05 * spacing * std::cbrt(double(drafts->size()) / kMostCells) * scale_) + " m."};
+        if (double(drafts->size()) > kMostCells) return too_many(*grid, double(drafts->size()));
         Cells cells = finish(*grid, *drafts);
         std::size_t loose = 0;
         const std::vector<std::uint8_t> kept = without_loose_parts(cells, loose);
@@ -358,6 +354,13 @@ public:
     }
 
 private:
+    Error too_many(const Grid& grid, double count) const {
+        return {ErrorCode::unsuitable, "A spacing of " + number(grid.spacing * scale_) + " m gives about " +
+                                           number(count) + " cells, more than 2^26; give at least " +
+                                           number(1.05 * grid.spacing * std::cbrt(count / kMostCells) * scale_) +
+                                           " m."};
+    }
+
     Result<std::vector<Draft>> sample(const Grid& grid) const {
         const bool scans = welded_.closure.is_closed() && welded_.closure.is_oriented();
         const double most = 8 * double(grid.counts[0]) * double(grid.counts[1]) * double(grid.counts[2]);
@@ -374,6 +377,8 @@ private:
             if (!occupancy) return occupancy.error();
             const std::vector<Draft> found = find_occupied(grid, *occupancy, n, k, end, context_);
             cells.insert(cells.end(), found.begin(), found.end());
+            if (double(cells.size()) > kMostCells)
+                return too_many(grid, double(cells.size()) * double(grid.counts[2]) / double(end));
         }
         return cells;
     }
