@@ -38,8 +38,11 @@ constexpr float kVolumeFrom = 0.3f, kVolumeStiffness = 1.5f;
 constexpr float kVolumeNear =
     0.6f; // a sweep looks at cells below this at its start: one sweep will not take others there
 constexpr float kLeastLength = 1e-6f; // of the rest length: a shorter spring has its direction at rest
-constexpr float kLargest = 1e15f;     // m: positions beyond are not fit for explicit steps
-constexpr std::size_t kGrain = 256;   // particles
+// Growing out of a collapse by leaps leaves particles on the wrong side of each other.
+constexpr float kCollapsed = 0.5f;     // squared lengths over those at rest
+constexpr float kCollapsedStep = 0.1f; // spacings a sweep
+constexpr float kLargest = 1e15f;      // m: positions beyond are not fit for explicit steps
+constexpr std::size_t kGrain = 256;    // particles
 constexpr std::size_t kRunGrain = 16;
 constexpr std::size_t kMostLanes = 16;
 
@@ -537,6 +540,7 @@ private:
         Symmetric3 block;
         block.add_scaled_identity(inertia);
         const Star& star = stars_[i];
+        float lengths = 0, rests = 0; // squared
         for (std::size_t s = 0; s < kStencil; ++s) {
             if (star.other[s] == kNoIndex) continue;
             Vec3f d = positions[star.other[s]] - x;
@@ -545,6 +549,8 @@ private:
                 d = steps_[s].least;
                 squared = steps_[s].least_squared;
             }
+            lengths += squared;
+            rests += steps_[s].rest * steps_[s].rest;
             const float k = star.stiffness[s], across = 1 - steps_[s].rest / std::sqrt(squared);
             force += k * across * d;
             const float a = std::max(0.f, across);
@@ -558,7 +564,10 @@ private:
                                 block.add_outer(g, stiffness);
                             });
         if (descent.touched[i] && descent.external) descent.external->add(i, positions, force, block);
-        positions.add(i, block.solve(force));
+        Vec3f step = block.solve(force);
+        const float most = kCollapsedStep * float(body_.spacing()), length = step.norm();
+        if (length > most && lengths < kCollapsed * rests) step *= most / length;
+        positions.add(i, step);
     }
 
     /// Half of its springs' energy, and that of the cells' corners that it is.
