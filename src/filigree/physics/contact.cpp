@@ -109,18 +109,23 @@ void Contacts::find_near(std::span<const BodyState> bodies, double time, float r
             for (std::size_t s = begin; s < end; ++s) places[s] = embedded_point(body.skin, s, body.positions);
         });
         std::vector<Near> found;
-        std::vector<std::uint8_t> is_near(points);
+        std::vector<float> distances(points);
         auto old = near_[b].begin();
+        const Box box = bounds(places);
         for (std::size_t o = 0; o < world_.obstacles.size(); ++o) {
+            const float nearest = distance_to(world_.obstacles[o], motions.at(o), box.centre().cast<float>()).distance -
+                                  float(box.diagonal() / 2);
+            if (nearest > reach) continue;
             parallel_for(context, points, kGrain, [&](std::size_t begin, std::size_t end) {
                 for (std::size_t s = begin; s < end; ++s)
-                    is_near[s] = distance_to(world_.obstacles[o], motions.at(o), places[s]).distance < reach;
+                    distances[s] = distance_to(world_.obstacles[o], motions.at(o), places[s]).distance;
             });
             for (Index s = 0; s < points; ++s) {
-                if (!is_near[s]) continue;
+                if (!(distances[s] < reach)) continue;
                 Near& near = found.emplace_back(Near{Index(o), s});
                 while (old != near_[b].end() && std::pair(old->obstacle, old->point) < std::pair(Index(o), s)) ++old;
                 if (old != near_[b].end() && old->obstacle == o && old->point == s) near = *old;
+                near.clear_until = distances[s];
             }
         }
         near_[b] = std::move(found);
@@ -165,32 +170,38 @@ void Contacts::find_pairs(std::span<const BodyState> bodies, float reach) {
                     for (int j = key[1] - 1; j <= key[1] + 1; ++j) {
                         auto at = std::ranges::lower_bound(grid, std::pair(Key{i, j, key[2] - 1}, Index{0}));
                         for (; at != grid.end() && at->first <= Key{i, j, key[2] + 1}; ++at)
-                            if ((balls[b][at->second] - balls[a][s]).squaredNorm() < far * far)
-                                pairs_.push_back({Index(a), s, Index(b), at->second});
+                            if (const float gap = (balls[b][at->second] - balls[a][s]).norm() - far + 2 * reach;
+                                gap < 2 * reach)
+                                pairs_.push_back({Index(a), s, Index(b), at->second, gap / 2});
                     }
             }
         }
 }
 
-ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, float dt, const RunContext& context) {
+ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, float travelled, float dt,
+                                   const RunContext& context) {
     ContactReport report;
     const ObstacleMotions motions(world_, time);
     const float slow = smooth_speed(world_, dt);
     std::vector<Vec3f> forces;
-    std::vector<float> depths;
     std::ranges::fill(touched_, std::uint8_t{0});
 
     for (std::size_t b = 0; b < bodies.size(); ++b) {
         BodyState& body = bodies[b];
         std::vector<Near>& near = near_[b];
         forces.assign(near.size(), Vec3f::Zero());
-        depths.assign(near.size(), 0);
         parallel_for(context, near.size(), kGrain, [&](std::size_t begin, std::size_t end) {
             for (std::size_t k = begin; k < end; ++k) {
                 Near& at = near[k];
+                at.depth = 0;
+                if (at.clear_until > travelled) {
+                    at.anchored = false;
+                    continue;
+                }
                 const Obstacle& obstacle = world_.obstacles[at.obstacle];
                 const Vec3f place = embedded_point(body.skin, at.point, body.positions);
                 const DistanceField::Sample surface = distance_to(obstacle, motions.at(at.obstacle), place);
+                at.clear_until = travelled + surface.distance;
                 if (!(surface.distance < 0)) {
                     at.anchored = false;
                     continue;
@@ -210,26 +221,28 @@ ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, flo
                 if (const float stretch = offset.norm(); grip * stretch > limit) // slides: the anchor follows
                     at.anchor = motions.to_own_axes(at.obstacle, place - offset * (limit / (grip * stretch)));
                 forces[k] = push * surface.normal + held;
-                depths[k] = -surface.distance;
+                at.depth = -surface.distance;
             }
         });
         for (std::size_t k = 0; k < near.size(); ++k) {
-            if (!(depths[k] > 0)) continue;
+            if (!(near[k].depth > 0)) continue;
             add_to_particles(body.skin, near[k].point, forces[k], body.forces);
             touched_[b] = 1;
             ++report.contacts;
-            report.deepest = std::max(report.deepest, depths[k]);
+            report.deepest = std::max(report.deepest, near[k].depth);
         }
     }
 
     forces.assign(pairs_.size(), Vec3f::Zero());
     parallel_for(context, pairs_.size(), kGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k) {
-            const NearPair& pair = pairs_[k];
+            NearPair& pair = pairs_[k];
+            if (pair.clear_until > travelled) continue;
             const BodyState &a = bodies[pair.first_body], &b = bodies[pair.second_body];
             const Vec3f between =
                 embedded_point(a.balls, pair.first, a.positions) - embedded_point(b.balls, pair.second, b.positions);
             const float distance = between.norm(), depth = a.ball_radius + b.ball_radius - distance;
+            pair.clear_until = travelled - depth / 2;
             if (!(depth > 0 && distance > 0)) continue;
             const Vec3f normal = between / distance;
             const Vec3f velocity =
@@ -258,6 +271,7 @@ void Contacts::push_out(std::span<BodyState> bodies, double time) {
         BodyState& body = bodies[b];
         const float most = kDeepest * float(body.body->spacing());
         for (const Near& at : near_[b]) {
+            if (!(at.depth > most)) continue;
             const Vec3f place = embedded_point(body.skin, at.point, body.positions);
             const DistanceField::Sample surface =
                 distance_to(world_.obstacles[at.obstacle], motions.at(at.obstacle), place);
@@ -399,6 +413,7 @@ ContactReport Contacts::update_anchors(std::span<const BodyState> bodies, double
             const Obstacle& obstacle = world_.obstacles[at.obstacle];
             const Vec3f place = embedded_point(body.skin, at.point, body.positions);
             const DistanceField::Sample surface = distance_to(obstacle, motions.at(at.obstacle), place);
+            at.depth = std::max(0.0f, -surface.distance);
             if (!(surface.distance < 0)) {
                 at.anchored = false;
                 continue;
@@ -438,7 +453,7 @@ std::vector<Contacts::Anchor> Contacts::anchors() const {
 void Contacts::set_anchors(std::span<const Anchor> anchors) {
     for (std::vector<Near>& near : near_) near.clear();
     for (const Anchor& anchor : anchors)
-        near_[anchor.body].push_back({anchor.obstacle, anchor.point, true, anchor.place});
+        near_[anchor.body].push_back({anchor.obstacle, anchor.point, 0, 0, true, anchor.place});
 }
 
 } // namespace filigree

@@ -30,12 +30,13 @@ public:
     /// of balls of different bodies within 2 `reach` of touching.
     void find_near(std::span<const BodyState> bodies, double time, float reach, const RunContext& context);
 
-    /// Adds the forces of what touches now to the bodies' forces, and lets friction's anchors slide. dt: of the
-    /// substep.
-    ContactReport add_forces(std::span<BodyState> bodies, double time, float dt, const RunContext& context);
+    /// Adds the forces of what touches now to the bodies' forces, and lets friction's anchors slide. travelled: how
+    /// far anything may have moved since find_near, m. dt: of the substep.
+    ContactReport add_forces(std::span<BodyState> bodies, double time, float travelled, float dt,
+                             const RunContext& context);
 
     /// Moves what is deeper than a part of the spacing out, and takes its speed inwards away: for impacts faster than
-    /// the penalty can stop.
+    /// the penalty can stop. Looks at what the last add_forces or update_anchors found.
     void push_out(std::span<BodyState> bodies, double time);
 
     /// Contacts of one body as blocks for vertex block descent. Valid until find_near.
@@ -89,11 +90,14 @@ public:
 private:
     struct Near {
         Index obstacle, point;
+        float clear_until = 0; ///< way that anything may travel before this can touch
+        float depth = 0;       ///< now
         bool anchored = false;
         Vec3f anchor = Vec3f::Zero();
     };
     struct NearPair {
         Index first_body, first, second_body, second;
+        float clear_until; ///< as above; both bodies travel
     };
     void find_pairs(std::span<const BodyState> bodies, float reach);
 

@@ -15,7 +15,7 @@ namespace filigree {
 namespace {
 
 constexpr std::size_t kGrain = 2048;
-constexpr double kSafety = 0.8;            ///< part of the stable step that is used: it changes while a step is made
+constexpr double kSafety = 0.9;            ///< part of the stable step that is used: it changes while a step is made
 constexpr double kLeastSubsteps = 2;       ///< a frame; with one, large motions gain energy
 constexpr float kMostStretch = 10;         ///< a body stretched further starts scaled down ...
 constexpr float kStretchAfter = 3;         ///< ... to this
@@ -189,7 +189,7 @@ struct Simulation::Content {
         double step = std::numeric_limits<double>::infinity(); ///< s, longest stable; 0 where no step is
         std::vector<ElasticReport> elastic;                    ///< of each body
     };
-    Acting evaluate(double now, float dt, FrameReport& report, const RunContext& context);
+    Acting evaluate(double now, float travelled, float dt, FrameReport& report, const RunContext& context);
     void blow(double now, const RunContext& context);
     float reach(const RunContext& context) const;
     float most_speed(double now) const;
@@ -336,7 +336,7 @@ bool Simulation::Content::is_pulled(std::size_t body, double now) const {
     });
 }
 
-Simulation::Content::Acting Simulation::Content::evaluate(double now, float dt, FrameReport& report,
+Simulation::Content::Acting Simulation::Content::evaluate(double now, float travelled, float dt, FrameReport& report,
                                                           const RunContext& context) {
     Acting acting;
     acting.elastic.resize(bodies.size());
@@ -361,7 +361,7 @@ Simulation::Content::Acting Simulation::Content::evaluate(double now, float dt, 
     }
     {
         const Stopwatch watch(report.contact_seconds);
-        const ContactReport touching = contacts.add_forces(bodies, now, dt, context);
+        const ContactReport touching = contacts.add_forces(bodies, now, travelled, dt, context);
         report.contacts = touching.contacts;
         report.deepest_contact = std::max(report.deepest_contact, double(touching.deepest));
     }
@@ -591,8 +591,8 @@ double Simulation::Content::explicit_part(double from, double until, FrameReport
     };
     look_around();
     const float first_dt = float(frame_seconds() / options.most_substeps);
-    Acting acting = evaluate(now, first_dt, report, context);
-    if (tame(acting.elastic, report, context)) acting = evaluate(now, first_dt, report, context);
+    Acting acting = evaluate(now, 0, first_dt, report, context);
+    if (tame(acting.elastic, report, context)) acting = evaluate(now, 0, first_dt, report, context);
     const unsigned limit = options.mode == StepMode::automatic ? options.most_substeps : kExplicitLimit;
     while (until - now > 1e-9 * frame_seconds()) {
         const double remaining = until - now;
@@ -611,7 +611,7 @@ double Simulation::Content::explicit_part(double from, double until, FrameReport
             if (meets_anything) travelled += dt * most_speed(now);
         }
         if (travelled > near_until) look_around();
-        acting = evaluate(now, dt, report, context);
+        acting = evaluate(now, travelled, dt, report, context);
         {
             const Stopwatch watch(report.contact_seconds);
             contacts.push_out(bodies, now);
