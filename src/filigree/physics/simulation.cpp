@@ -585,7 +585,7 @@ double Simulation::Content::explicit_part(double from, double until, FrameReport
         const float speed = most_speed(now) + float(world.gravity.norm() * frame_seconds());
         float spacing = std::numeric_limits<float>::max();
         for (const BodyState& body : bodies) spacing = std::min(spacing, float(body.body->spacing()));
-        near_until = std::clamp(1.2f * speed * float(until - now), 0.25f * spacing, 4 * spacing);
+        near_until = std::clamp(2 * speed * float(until - now), 0.25f * spacing, 4 * spacing);
         contacts.find_near(bodies, now, near_until, context);
         travelled = 0;
     };
