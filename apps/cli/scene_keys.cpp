@@ -70,7 +70,7 @@ constexpr KeyRule kKeys[] = {
     plain("body", "material", text, "", "rubber", "one of the materials below; the keys from `model` on change it"),
     one_of("fem springs meshfree", "body", "model", "by the material",
            "finite elements, springs, or mesh-free; only the last flows"),
-    above(0, 1e6, "body", "density", number, "kg/m^3", "by the material", ""),
+    above(0, 1e6, "body", "density", number, "kg/m^3", "by the material", "mass by volume"),
     above(0, 1e12, "body", "young_modulus", number, "Pa", "by the material", "stiffness"),
     from(0, 0.49, "body", "poisson_ratio", number, "", "by the material",
          "how much it thins when pulled; springs have 1/4"),
@@ -185,8 +185,8 @@ std::string table_head(std::string_view table) {
 std::string manual_row(const KeyRule& rule) {
     std::string text(rule.text);
     if (!rule.only.empty() && rule.table == "obstacle") {
-        std::string shapes(rule.only);
-        for (std::size_t at; (at = shapes.find(' ')) != std::string::npos;) shapes.replace(at, 1, ", ");
+        std::string shapes;
+        for (const char c : rule.only) shapes += c == ' ' ? std::string(", ") : std::string(1, c);
         text = shapes + (text.empty() ? "" : ": " + text);
     }
     std::string range = range_text(rule);
@@ -249,10 +249,11 @@ std::span<const NamedMaterial> named_materials() {
 std::string range_text(const KeyRule& rule) {
     const bool has_least = !std::isinf(rule.least), has_most = !std::isinf(rule.most);
     if (rule.above) {
-        return has_most ? fmt::format("above {}, to {}", rule.least, rule.most) : fmt::format("above {}", rule.least);
+        return has_most ? fmt::format("above {:g}, to {:g}", rule.least, rule.most)
+                        : fmt::format("above {:g}", rule.least);
     }
     if (has_least)
-        return has_most ? fmt::format("{} to {}", rule.least, rule.most) : fmt::format("{} and up", rule.least);
+        return has_most ? fmt::format("{:g} to {:g}", rule.least, rule.most) : fmt::format("{:g} and up", rule.least);
     return "";
 }
 
@@ -290,12 +291,14 @@ std::string type_text(KeyType type) {
 
 std::string most_alike(std::string_view word, std::span<const std::string_view> words) {
     std::string_view best;
-    std::size_t least = std::max<std::size_t>(2, word.size() / 3) + 1;
-    for (const std::string_view known : words)
-        if (const std::size_t distance = edit_distance(word, known); distance < least) {
-            least = distance;
-            best = known;
-        }
+    std::size_t least = std::string_view::npos;
+    for (const std::string_view known : words) {
+        const std::size_t distance = edit_distance(word, known);
+        const bool begins_alike = !word.empty() && !known.empty() && word[0] == known[0];
+        if (distance > std::max<std::size_t>(2, word.size() / (begins_alike ? 2 : 3)) || distance >= least) continue;
+        least = distance;
+        best = known;
+    }
     return std::string(best);
 }
 

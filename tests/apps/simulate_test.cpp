@@ -1,0 +1,263 @@
+// filigree simulate, as a user runs it: scenes, their mistakes, outputs, stopping and going on.
+#include "apps/program.h"
+
+#include "filigree/io/mesh_file.h"
+#include "filigree/io/model_file.h"
+#include "filigree/render/picture.h"
+
+using namespace filigree_test;
+using namespace filigree;
+
+namespace {
+
+const RunContext kContext(1);
+
+/// A small cube above the ground.
+const std::string kDrop = "[simulation]\nframes = 6\n[[body]]\nname = \"cube\"\nshape = \"wavy-cube\"\nresolution = 8\n"
+                          "particles = 200\ndriver = 60\nyoung_modulus = 5e4\ncentre = [0, 0.62, 0]\n"
+                          "velocity = [0.5, -4, 0]\n[[obstacle]]\nshape = \"ground\"\n"
+                          "[picture]\nsize = [64, 48]\npasses = 1\n";
+
+class Simulate : public Program {
+protected:
+    void SetUp() override { write("drop.toml", kDrop); }
+
+    static std::vector<std::string> words(const std::string& scene, const std::vector<std::string>& more) {
+        std::vector<std::string> all = {"simulate", scene};
+        all.insert(all.end(), more.begin(), more.end());
+        return all;
+    }
+    /// What is said about a scene that must be refused.
+    void refused(const std::string& scene, const std::vector<std::string>& needles, int code = 4) const {
+        write("bad.toml", scene);
+        const Ran ran = run({"simulate", "bad.toml", "-o", "x.fil"});
+        SCOPED_TRACE(scene + "\n" + ran.err);
+        EXPECT_EQ(ran.code, code);
+        EXPECT_TRUE(ran.err.starts_with("filigree: bad.toml:"));
+        EXPECT_EQ(std::count(ran.err.begin(), ran.err.end(), '\n'), 1);
+        for (const std::string& needle : needles) EXPECT_NE(ran.err.find(needle), std::string::npos) << needle;
+        EXPECT_FALSE(std::filesystem::exists(path("x.fil")));
+    }
+    PoseSequence poses(const std::string& name) const { return read_poses(path(name), kContext).value(); }
+    bool has_opengl() const {
+        ok({"make", "bar", "-o", "bar.ply", "--resolution", "2"});
+        return run({"render", "bar.ply", "-o", "bar.png", "--size", "32x32", "--passes", "1"}).code != 5;
+    }
+};
+
+const std::string kBody = "[[body]]\nshape = \"bar\"\n"; // two lines
+
+} // namespace
+
+TEST_F(Simulate, ACubeFallsAndItsPosesPlay) {
+    const Json json = this->json(words("drop.toml", {"-o", "drop.fil"}));
+    EXPECT_EQ(json["frames"], 6);
+    EXPECT_EQ(json["bodies"][0]["name"], "cube");
+    EXPECT_NEAR(json["bodies"][0]["mass_kg"].get<double>(), 1060, 60); // rubber, a cube of 1 m with coarse waves
+    EXPECT_EQ(json["explicit_frames"].get<int>() + json["descent_frames"].get<int>(), 6);
+    EXPECT_GT(json["most_contacts"], 0);
+    EXPECT_LT(json["energy_end"]["potential"], json["energy_start"]["potential"]);
+
+    const PoseSequence all = poses("drop.fil");
+    ASSERT_EQ(all.frames.size(), 7u); // with the start
+    EXPECT_EQ(all.frames_per_second, 60);
+    EXPECT_NEAR(bounds(all.frames[0].positions).centre().y(), 0.62, 1e-3);
+    EXPECT_LT(bounds(all.frames[6].positions).centre().y(), 0.55);
+    EXPECT_GT(bounds(all.frames[6].positions).min.y(), -0.1); // the ground holds it
+    EXPECT_GT(bounds(all.frames[6].positions).centre().x(), 0.02);
+
+    ok({"restore", "drop.fil", "--frame", "7", "-o", "last.ply"});
+    EXPECT_EQ(read_mesh(path("last.ply"), kContext)->mesh.vertex_count(), 386u);
+    if (has_opengl()) {
+        EXPECT_EQ(this->json({"render", "drop.fil", "-o", "f_%d.png", "--size", "64x48", "--passes", "1"})["frames"],
+                  7);
+    }
+}
+
+TEST_F(Simulate, TheSameBytesForAnyNumberOfThreads) {
+    ok(words("drop.toml", {"-o", "one.fil", "--threads", "1"}));
+    ok(words("drop.toml", {"-o", "two.fil", "--threads", "2"}));
+    EXPECT_EQ(bytes_of(path("one.fil")), bytes_of(path("two.fil")));
+}
+
+TEST_F(Simulate, StoppedAndResumedIsAsRunThrough) {
+    ok(words("drop.toml", {"-o", "through.fil", "--save", "through.state"}));
+    ok(words("drop.toml", {"--stop-at", "3", "--save", "half.state"}));
+    EXPECT_FALSE(std::filesystem::exists(path("half.fil")));
+    ok(words("drop.toml", {"--resume", "half.state", "-o", "resumed.fil"}));
+    EXPECT_EQ(bytes_of(path("through.fil")), bytes_of(path("resumed.fil")));
+    // A longer scene goes on from the end of a shorter one.
+    write("longer.toml", "# a comment\n" + kDrop);
+    ok(words("longer.toml", {"--frames", "8", "--resume", "through.state", "-o", "longer.fil"}));
+    EXPECT_EQ(poses("longer.fil").frames.size(), 9u);
+
+    fails(2, words("drop.toml", {"--resume", "through.state", "--stop-at", "2", "--save", "x"}), {"frame 6"});
+    write("other.toml", kDrop + "[world]\ngravity = [0, -1, 0]\n");
+    fails(8, words("other.toml", {"--resume", "half.state", "-o", "x.fil"}), {"half.state", "another scene"});
+    std::string damaged = bytes_of(path("half.state"));
+    damaged[damaged.size() / 2] = static_cast<char>(damaged[damaged.size() / 2] ^ 1);
+    write("damaged.state", damaged);
+    fails(4, words("drop.toml", {"--resume", "damaged.state", "-o", "x.fil"}), {"damaged.state", "damaged"});
+    write("short.state", damaged.substr(0, 12));
+    fails(4, words("drop.toml", {"--resume", "short.state", "-o", "x.fil"}), {"short.state"});
+    fails(4, words("drop.toml", {"--resume", "drop.toml", "-o", "x.fil"}), {"drop.toml", "no saved state"});
+    fails(3, words("drop.toml", {"--resume", "none.state", "-o", "x.fil"}), {"none.state"});
+}
+
+TEST_F(Simulate, WhenCancelledTheStateIsSavedAndNothingElse) {
+    write("long.toml", "[simulation]\nframes = 100000\n" + kDrop.substr(kDrop.find("[[body]]")));
+    Ran ran = run(words("long.toml", {"-o", "long.fil", "--save", "long.state"}), "/dev/null", 1.0);
+    EXPECT_EQ(ran.code, 130) << ran.err;
+    EXPECT_NE(ran.err.find("--resume long.state"), std::string::npos) << ran.err;
+    EXPECT_FALSE(std::filesystem::exists(path("long.fil")));
+    ASSERT_TRUE(std::filesystem::exists(path("long.state")));
+    ran = run(words("long.toml", {"-o", "long.fil"}), "/dev/null", 0.5);
+    EXPECT_EQ(ran.code, 130);
+    EXPECT_FALSE(std::filesystem::exists(path("long.fil")));
+    // The state is whole: it goes on.
+    const Ran more = run(words("long.toml", {"--resume", "long.state", "--frames", "1", "--save", "more.state"}));
+    EXPECT_EQ(more.code, 2);
+    EXPECT_NE(more.err.find("already"), std::string::npos) << more.err;
+}
+
+TEST_F(Simulate, CheckComparesWithEveryVertexAttached) {
+    const Json json = this->json(words("drop.toml", {"--check"}));
+    const Json& check = json["bodies"][0]["check"];
+    EXPECT_GT(check["rms_mean"], 0);
+    EXPECT_LE(check["rms_mean"], check["rms_worst"]);
+    EXPECT_LE(check["rms_worst"], check["max_worst"]);
+    EXPECT_LT(check["rms_worst"], 0.02);
+    EXPECT_GT(json["direct_ratio"], 0);
+}
+
+TEST_F(Simulate, OneRunWritesSeveralOutputs) {
+    const bool films = has_opengl();
+    std::vector<std::string> outputs = {"-o", "a.fil", "-o", "meshes/"};
+    if (films) outputs.insert(outputs.end(), {"-o", "f_%02d.png"});
+    ok(words("drop.toml", outputs));
+    EXPECT_TRUE(std::filesystem::exists(path("meshes/cube_0001.ply")));
+    EXPECT_TRUE(std::filesystem::exists(path("meshes/cube_0007.ply")));
+    EXPECT_FALSE(std::filesystem::exists(path("meshes/cube_0008.ply")));
+    ok({"restore", "a.fil", "--frame", "5", "-o", "fifth.ply"});
+    EXPECT_EQ(bytes_of(path("fifth.ply")), bytes_of(path("meshes/cube_0005.ply")));
+    if (films) {
+        const Picture first = read_picture(path("f_01.png")).value(), last = read_picture(path("f_07.png")).value();
+        EXPECT_EQ(first.width, 64u);
+        EXPECT_GT(picture_distance(first, last), 1);
+    }
+    fails(2, words("drop.toml", {"-o", "a.fil", "-o", "a.fil"}), {"a.fil"});
+    fails(5, words("drop.toml", {"-o", "a.ply"}), {"a.ply", ".fil", ".mp4"});
+    fails(6, words("drop.toml", {"-o", "nowhere/a.fil"}), {"nowhere"});
+    fails(2, words("drop.toml", {}), {"-o"});
+    fails(2, words("drop.toml", {"--stop-at", "3", "-o", "x.fil"}), {"--save"});
+}
+
+TEST_F(Simulate, SeveralBodiesAreFilesOfTheirOwn) {
+    write("two.toml", kDrop +
+                          "[[body]]\nshape = \"bar\"\nresolution = 4\nlength = 2\nsize = 0.3\nparticles = 100\n"
+                          "centre = [0, 1.6, 0]\nmaterial = \"lattice\"\n[[pin]]\nbody = \"bar\"\nvertices = [0]\n"
+                          "[[force]]\nbody = \"cube\"\nnewtons = [{ time = 0, value = [0, 0, 0] }, { time = 0.1, "
+                          "value = [1e3, 0, 0] }]\n[[hand]]\nbody = \"cube\"\npoint = [0, 2, 0]\ntarget = [0, 2, 0]\n");
+    ok(words("two.toml", {"-o", "two.fil", "--frames", "3"}));
+    EXPECT_EQ(poses("two_cube.fil").frames.size(), 4u);
+    EXPECT_EQ(poses("two_bar.fil").frames.size(), 4u);
+    EXPECT_FALSE(std::filesystem::exists(path("two.fil")));
+}
+
+TEST_F(Simulate, AModelIsABodyAndScaleMakesMetres) {
+    ok({"make", "wavy-cube", "-o", "cube.ply", "--resolution", "8", "--size", "100"});
+    ok({"strip", "cube.ply", "-o", "cube.fil", "--base", "80"});
+    write("model.toml", "[[body]]\nmesh = \"cube.fil\"\nscale = 0.01\nparticles = 200\ncentre = [0, 3, 0]\n"
+                        "rotate = { axis = [0, 0, 1], degrees = 90 }\n[simulation]\nframes = 2\n");
+    ok(words("model.toml", {"-o", "moved.fil"}));
+    const PoseSequence moved = poses("moved.fil");
+    EXPECT_EQ(moved.frames[0].positions.size(), 80u);
+    EXPECT_NEAR(moved.frames[0].gradients[0].determinant(), 1e-6, 1e-8);
+    ok({"restore", "moved.fil", "--frame", "1", "-o", "start.ply"});
+    const Box box = world_bounds(read_mesh(path("start.ply"), kContext)->mesh);
+    EXPECT_NEAR(box.centre().y(), 3, 1e-3);
+    EXPECT_NEAR(box.size().x(), 1.06, 0.03);
+}
+
+TEST_F(Simulate, UnknownKeysGetLineAndSuggestion) {
+    refused(kBody + "youngs_modulus = 1e5\n",
+            {"bad.toml:3: unknown key 'youngs_modulus' in [[body]]; did you mean 'young_modulus'?"});
+    refused(kBody + "[simulation]\nframe = 3\n", {"bad.toml:4: unknown key 'frame' in [simulation]", "'frames'"});
+    refused(kBody + "colour = \"#ffffff\"\n", {"bad.toml:3:", "'color'"});
+    refused(kBody + "quaternion = 1\n", {"bad.toml:3: unknown key 'quaternion'", "docs/scenes.md"});
+    refused(kBody + "[[bodies]]\n", {"bad.toml:3: unknown table 'bodies'; did you mean [[body]]?"});
+    refused("[body]\nshape = \"bar\"\n", {"bad.toml:1:", "[[body]]"});
+    refused(kBody + "[[world]]\n", {"bad.toml:3:", "[world]"});
+}
+
+TEST_F(Simulate, WrongTypesAndRangesAreNamed) {
+    refused(kBody + "density = \"heavy\"\n", {"bad.toml:3:", "'density'", "number", "\"heavy\""});
+    refused(kBody + "density = -1\n", {"bad.toml:3:", "above 0", "-1"});
+    refused(kBody + "poisson_ratio = 0.5\n", {"bad.toml:3:", "0 to 0.49"});
+    refused(kBody + "particles = 1.5\n", {"bad.toml:3:", "whole number"});
+    refused(kBody + "centre = [1, 2]\n", {"bad.toml:3:", "three numbers", "a list"});
+    refused(kBody + "centre = [1, 2, nan]\n", {"bad.toml:3:", "three numbers"});
+    refused(kBody + "color = \"red\"\n", {"bad.toml:3:", "#rrggbb"});
+    refused(kBody + "material = \"ruber\"\n", {"bad.toml:3:", "'rubber'?"});
+    refused(kBody + "yield_stress = 1e3\n", {"bad.toml:", "meshfree"});
+    refused(kBody + "rotate = { axis = [0, 0, 0], degrees = 3 }\n", {"bad.toml:3:", "rotate.axis"});
+    refused(kBody + "rotate = { axis = [0, 0, 1] }\n", {"bad.toml:3:", "axis and degrees"});
+    refused(kBody + "name = \"a/b\"\n", {"bad.toml:3:", "letters"});
+    refused(kBody + "mesh = \"a.ply\"\n", {"bad.toml:1:", "one of mesh and shape"});
+    refused("[[body]]\n", {"bad.toml:1:", "one of mesh and shape"});
+    refused("[[body]]\nshape = \"blob\"\n", {"bad.toml:2:", "wavy-cube"});
+    refused("[[body]]\nmesh = \"none.ply\"\n", {"bad.toml:2:", "none.ply"}, 3);
+    refused("[[body]]\nmesh = \"bad.toml\"\n", {"bad.toml:1:"}, 5);
+    refused(kBody + "[[obstacle]]\nshape = \"ball\"\nsize = [1, 1, 1]\n", {"bad.toml:5:", "'size'", "box", "ball"});
+    refused(kBody + "[[obstacle]]\nshape = \"mesh\"\n", {"bad.toml:3:", "mesh"});
+    refused(kBody + "[[obstacle]]\nshape = \"box\"\nmove = [{ time = 1, value = [0, 0, 0] }, { time = 1, value = [1, "
+                    "0, 0] }]\n",
+            {"bad.toml:5:", "ascend"});
+    refused(kBody + "[[obstacle]]\nshape = \"box\"\nmove = [{ time = 1 }]\n", {"bad.toml:5:", "time", "value"});
+    refused(kBody + "[[pin]]\nbody = \"baa\"\n", {"bad.toml:4:", "'baa'", "bar"});
+    refused(kBody + "[[pin]]\nbox = { min = [9, 9, 9], max = [10, 10, 10] }\n", {"bad.toml:3:", "no particle"});
+    refused(kBody + "[[pin]]\nvertices = [1000000]\n", {"bad.toml:3:", "1000000"});
+    refused(kBody + "[[hand]]\ntarget = [0, 0, 0]\n", {"bad.toml:3:", "point and vertex"});
+    refused(kBody + "[simulation]\nframes = 1\nduration = 2\n", {"bad.toml:5:", "frames and duration"});
+    refused(kBody + "[simulation]\nmode = \"fast\"\n", {"bad.toml:4:", "automatic, explicit, descent"});
+}
+
+TEST_F(Simulate, WhatIsNoSceneIsRefused) {
+    refused("", {"no [[body]]"});
+    refused("[simulation]\nframes = 3\n", {"no [[body]]"});
+    refused("[[body]\n", {"bad.toml:1:"});
+    refused(kBody + "shape = \"bar\"\n", {"bad.toml:3:"}); // twice
+    refused(std::string("\0\xff\xfe", 3), {"bad.toml:1:"});
+    fails(3, {"simulate", "none.toml", "-o", "x.fil"}, {"none.toml"});
+    fails(2, {"simulate"}, {"SCENE.toml"});
+    EXPECT_FALSE(std::filesystem::exists(path("x.fil")));
+}
+
+TEST_F(Simulate, TheManualShowsEveryKey) {
+    std::istringstream keys(ok({"simulate", "--keys"}).out);
+    const std::string manual = bytes_of(FILIGREE_ROOT "/docs/scenes.md");
+    std::size_t lines = 0;
+    for (std::string line; std::getline(keys, line); ++lines)
+        EXPECT_NE(manual.find(line + "\n"), std::string::npos) << "docs/scenes.md lacks: " << line;
+    EXPECT_GT(lines, 90u);
+}
+
+TEST_F(Simulate, TheExamplesRun) {
+    for (const char* const name : {"bounce", "bar_sag", "press", "melt", "collide"}) {
+        SCOPED_TRACE(name);
+        const std::string scene = FILIGREE_ROOT "/examples/scenes/" + std::string(name) + ".toml";
+        const Json json = this->json({"simulate", scene, "--frames", "2", "-o", "out.fil"});
+        EXPECT_EQ(json["frames"], 2);
+        EXPECT_EQ(json["clamped_particles"], 0);
+        EXPECT_GT(json["least_volume_ratio"], 0.5);
+        EXPECT_EQ(json["warnings"], Json::array());
+    }
+    for (const char* const name : {"koala_drop", "dragon_pull"}) { // meshes that a user has to bring
+        const std::string scene = FILIGREE_ROOT "/examples/scenes/" + std::string(name) + ".toml";
+        const Ran ran = run({"simulate", scene, "--frames", "1", "-o", "out.fil"});
+        EXPECT_TRUE(ran.code == 0 || ran.code == 3) << ran.err;
+        if (ran.code == 3) {
+            EXPECT_NE(ran.err.find("there is no file"), std::string::npos) << ran.err;
+        }
+    }
+}
