@@ -19,7 +19,7 @@ constexpr float kMostRadius = 3.6f;   // spacings: neighbours are not looked for
 constexpr float kGrowth = 1.2f;       // of the radius, a try
 constexpr std::size_t kEnough = 8;    // neighbours
 constexpr float kLeastSpread = 0.03f; // spacings^2: weighted mean square of offsets in the direction of the least
-constexpr float kNoSpread = 0.03f;   // below it there is no gradient in that direction
+constexpr float kNoSpread = 0.03f;    // below it there is no gradient in that direction
 constexpr std::size_t kGrain = 256;
 
 /// Particles sorted by the cells of a grid.
