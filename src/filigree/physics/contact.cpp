@@ -99,7 +99,20 @@ std::vector<float> skin_stiffness(const Body& body, const Embedding& skin, float
 Contacts::Contacts(const World& world, std::size_t bodies, bool between_bodies)
     : world_(world), between_bodies_(between_bodies), near_(bodies), touched_(bodies, 0) {}
 
-void Contacts::find_near(std::span<const BodyState> bodies, double time, float reach, const RunContext& context) {
+void Contacts::look_around(std::span<const BodyState> bodies, double time, float travelled, float obstacle_reach,
+                           float pair_reach, const RunContext& context) {
+    if (travelled > near_until_ && !world_.obstacles.empty()) {
+        find_near(bodies, time, travelled, obstacle_reach, context);
+        near_until_ = travelled + obstacle_reach;
+    }
+    if (travelled > pairs_until_ && between_bodies_ && bodies.size() > 1) {
+        find_pairs(bodies, travelled, pair_reach, context);
+        pairs_until_ = travelled + pair_reach;
+    }
+}
+
+void Contacts::find_near(std::span<const BodyState> bodies, double time, float travelled, float reach,
+                         const RunContext& context) {
     const ObstacleMotions motions(world_, time);
     for (std::size_t b = 0; b < bodies.size(); ++b) {
         const BodyState& body = bodies[b];
@@ -125,31 +138,36 @@ void Contacts::find_near(std::span<const BodyState> bodies, double time, float r
                 Near& near = found.emplace_back(Near{Index(o), s});
                 while (old != near_[b].end() && std::pair(old->obstacle, old->point) < std::pair(Index(o), s)) ++old;
                 if (old != near_[b].end() && old->obstacle == o && old->point == s) near = *old;
-                near.clear_until = distances[s];
+                near.clear_until = travelled + distances[s];
             }
         }
         near_[b] = std::move(found);
     }
-    if (between_bodies_ && bodies.size() > 1) find_pairs(bodies, reach);
 }
 
-void Contacts::find_pairs(std::span<const BodyState> bodies, float reach) {
+void Contacts::find_pairs(std::span<const BodyState> bodies, float travelled, float reach, const RunContext& context) {
     pairs_.clear();
-    std::vector<std::vector<Vec3f>> balls(bodies.size());
     std::vector<Box> boxes(bodies.size());
-    for (std::size_t b = 0; b < bodies.size(); ++b) {
+    for (std::size_t b = 0; b < bodies.size(); ++b)
+        for (std::size_t i = 0; i < bodies[b].positions.size(); ++i)
+            boxes[b].extend(bodies[b].positions[i].cast<double>());
+    std::vector<std::vector<Vec3f>> balls(bodies.size());
+    const auto find_balls = [&](std::size_t b) {
+        if (!balls[b].empty()) return;
         balls[b].resize(bodies[b].balls.size());
-        for (std::size_t s = 0; s < balls[b].size(); ++s) {
-            balls[b][s] = embedded_point(bodies[b].balls, s, bodies[b].positions);
-            boxes[b].extend(balls[b][s].cast<double>());
-        }
-    }
+        parallel_for(context, balls[b].size(), kGrain, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t s = begin; s < end; ++s)
+                balls[b][s] = embedded_point(bodies[b].balls, s, bodies[b].positions);
+        });
+    };
     for (std::size_t a = 0; a < bodies.size(); ++a)
         for (std::size_t b = a + 1; b < bodies.size(); ++b) {
             const float far = bodies[a].ball_radius + bodies[b].ball_radius + 2 * reach;
             const Vec3d low = boxes[a].min.cwiseMax(boxes[b].min) - Vec3d::Constant(double(far));
             const Vec3d high = boxes[a].max.cwiseMin(boxes[b].max) + Vec3d::Constant(double(far));
             if (!(low.array() <= high.array()).all()) continue;
+            find_balls(a);
+            find_balls(b);
             const auto is_common = [&](const Vec3f& p) {
                 return (p.cast<double>().array() >= low.array()).all() &&
                        (p.cast<double>().array() <= high.array()).all();
@@ -172,7 +190,7 @@ void Contacts::find_pairs(std::span<const BodyState> bodies, float reach) {
                         for (; at != grid.end() && at->first <= Key{i, j, key[2] + 1}; ++at)
                             if (const float gap = (balls[b][at->second] - balls[a][s]).norm() - far + 2 * reach;
                                 gap < 2 * reach)
-                                pairs_.push_back({Index(a), s, Index(b), at->second, gap / 2});
+                                pairs_.push_back({Index(a), s, Index(b), at->second, travelled + gap / 2});
                     }
             }
         }

@@ -26,12 +26,17 @@ public:
     /// bodies: fixed in number from here on.
     Contacts(const World& world, std::size_t bodies, bool between_bodies);
 
-    /// What might touch while nothing moves further than `reach`. Skin points within `reach` of an obstacle, and pairs
-    /// of balls of different bodies within 2 `reach` of touching.
-    void find_near(std::span<const BodyState> bodies, double time, float reach, const RunContext& context);
+    /// Finds what might touch before anything has moved by the reaches, unless what was found last still holds: skin
+    /// points near obstacles, and pairs of balls of different bodies. travelled: how far anything may have moved since
+    /// `forget`, m.
+    void look_around(std::span<const BodyState> bodies, double time, float travelled, float obstacle_reach,
+                     float pair_reach, const RunContext& context);
+    /// What was found; anchors and touches stay.
+    void forget() { near_until_ = pairs_until_ = -1; }
+    void forget_touches() { touched_.assign(touched_.size(), 0); }
 
-    /// Adds the forces of what touches now to the bodies' forces, and lets friction's anchors slide. travelled: how
-    /// far anything may have moved since find_near, m. dt: of the substep.
+    /// Adds the forces of what touches now to the bodies' forces, and lets friction's anchors slide. travelled: as
+    /// above. dt: of the substep.
     ContactReport add_forces(std::span<BodyState> bodies, double time, float travelled, float dt,
                              const RunContext& context);
 
@@ -39,7 +44,7 @@ public:
     /// the penalty can stop. Looks at what the last add_forces or update_anchors found.
     void push_out(std::span<BodyState> bodies, double time);
 
-    /// Contacts of one body as blocks for vertex block descent. Valid until find_near.
+    /// Contacts of one body as blocks for vertex block descent. Valid until look_around.
     class Blocks final : public BlockTerms {
     public:
         void add(Index particle, const Vectors& positions, Vec3f& force, Symmetric3& block) const override;
@@ -75,7 +80,6 @@ public:
     /// After a descent substep: anchors begin, slide and end as positions say.
     ContactReport update_anchors(std::span<const BodyState> bodies, double time);
 
-    void forget_touches() { touched_.assign(touched_.size(), 0); }
     bool is_touched(std::size_t body) const { return touched_[body]; } ///< by the last add_forces or update_anchors
 
     /// Where friction holds a skin point on an obstacle, in the obstacle's own axes. All that contacts remember.
@@ -84,7 +88,7 @@ public:
         Vec3f place;
     };
     std::vector<Anchor> anchors() const;
-    /// Instead of those there are; ascending by body, obstacle and point. find_near comes next.
+    /// Instead of those there are; ascending by body, obstacle and point. forget comes next.
     void set_anchors(std::span<const Anchor> anchors);
 
 private:
@@ -99,12 +103,15 @@ private:
         Index first_body, first, second_body, second;
         float clear_until; ///< as above; both bodies travel
     };
-    void find_pairs(std::span<const BodyState> bodies, float reach);
+    void find_near(std::span<const BodyState> bodies, double time, float travelled, float reach,
+                   const RunContext& context);
+    void find_pairs(std::span<const BodyState> bodies, float travelled, float reach, const RunContext& context);
 
     const World& world_;
     bool between_bodies_;
     std::vector<std::vector<Near>> near_; ///< by body, ascending by obstacle and point
     std::vector<NearPair> pairs_;
+    float near_until_ = -1, pairs_until_ = -1; ///< way travelled up to which they hold
     std::vector<std::uint8_t> touched_;
 };
 

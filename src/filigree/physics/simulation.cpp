@@ -191,7 +191,7 @@ struct Simulation::Content {
     };
     Acting evaluate(double now, float travelled, float dt, FrameReport& report, const RunContext& context);
     void blow(double now, const RunContext& context);
-    float reach(const RunContext& context) const;
+    float least_spacing() const;
     float most_speed(double now) const;
     Grip grip(const Hand& hand, const RunContext& context) const;
     bool is_pulled(std::size_t body, double now) const;
@@ -424,6 +424,12 @@ void Simulation::Content::blow(double now, const RunContext& context) {
     }
 }
 
+float Simulation::Content::least_spacing() const {
+    float spacing = std::numeric_limits<float>::max();
+    for (const BodyState& body : bodies) spacing = std::min(spacing, float(body.body->spacing()));
+    return spacing;
+}
+
 /// Of particles and moving obstacles, m/s.
 float Simulation::Content::most_speed(double now) const {
     float squared = 0;
@@ -578,16 +584,15 @@ bool Simulation::Content::tame(std::span<const ElasticReport> elastic, FrameRepo
 /// (for the caller to go on in another way) or the work was cancelled.
 double Simulation::Content::explicit_part(double from, double until, FrameReport& report, const RunContext& context) {
     double now = from;
-    float travelled = 0, near_until = 0;
+    float travelled = 0;
     const bool meets_anything = !world.obstacles.empty() || bodies.size() > 1;
     const auto look_around = [&] {
+        if (!meets_anything) return;
         const Stopwatch watch(report.contact_seconds);
         const float speed = most_speed(now) + float(world.gravity.norm() * frame_seconds());
-        float spacing = std::numeric_limits<float>::max();
-        for (const BodyState& body : bodies) spacing = std::min(spacing, float(body.body->spacing()));
-        near_until = std::clamp(2 * speed * float(until - now), 0.25f * spacing, 4 * spacing);
-        contacts.find_near(bodies, now, near_until, context);
-        travelled = 0;
+        contacts.look_around(bodies, now, travelled,
+                             std::clamp(2 * speed * float(until - now), 0.25f * least_spacing(), 4 * least_spacing()),
+                             0.5f * least_spacing(), context);
     };
     look_around();
     const float first_dt = float(frame_seconds() / options.most_substeps);
@@ -610,7 +615,7 @@ double Simulation::Content::explicit_part(double from, double until, FrameReport
             move_pins(now, dt);
             if (meets_anything) travelled += dt * most_speed(now);
         }
-        if (travelled > near_until) look_around();
+        look_around();
         acting = evaluate(now, travelled, dt, report, context);
         {
             const Stopwatch watch(report.contact_seconds);
@@ -659,10 +664,10 @@ void Simulation::Content::descent_part(double from, double until, FrameReport& r
         std::vector<Contacts::Blocks> blocks(bodies.size());
         {
             const Stopwatch watch(report.contact_seconds);
-            float spacing = std::numeric_limits<float>::max();
-            for (const BodyState& body : bodies) spacing = std::min(spacing, float(body.body->spacing()));
             const float speed = most_speed(now) + float(world.gravity.norm()) * dt;
-            contacts.find_near(bodies, now, std::clamp(1.5f * speed * dt, 0.25f * spacing, 8 * spacing), context);
+            const float way = std::clamp(1.5f * speed * dt, 0.25f * least_spacing(), 8 * least_spacing());
+            contacts.forget();
+            contacts.look_around(bodies, now, 0, way, way, context);
             for (std::size_t b = 0; b < bodies.size(); ++b)
                 blocks[b] = contacts.blocks(bodies, b, now, dt, [&](Contacts::Blocks& all) {
                     for (const Grip& grip : grips)
@@ -742,6 +747,7 @@ Result<FrameReport> Simulation::advance(const RunContext& context) {
     const std::string undo = content.save();
     const double from = content.time(), until = double(content.frame + 1) * content.frame_seconds();
     FrameReport report;
+    content.contacts.forget();
     content.contacts.forget_touches();
     if (!content.wind_forces.empty()) content.blow(from, context);
 
