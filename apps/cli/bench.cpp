@@ -2,6 +2,7 @@
 // Google Benchmark programs in bench/ go through more sizes; scripts/bench-peers sets this beside other programs.
 #include "fidelity.h"
 #include "session.h"
+#include "simulate_bench.h"
 #include "triad.h"
 
 #include "filigree/deform/handles.h"
@@ -21,12 +22,6 @@ namespace filigree::cli {
 namespace {
 
 constexpr unsigned kBenchResolution = 256; // of the wavy cube, unless there is a mesh
-
-struct Figure {
-    std::string name;
-    double value;
-    std::string unit;
-};
 
 class Bench {
 public:
@@ -152,6 +147,11 @@ public:
         }
     }
 
+    void simulate(std::size_t particles) {
+        for (Figure& figure : measure_simulation(mesh_, {.particles = particles, .base = base_}, context_))
+            figures_.push_back(std::move(figure));
+    }
+
     void set_base(std::optional<std::size_t> base) { base_ = base; }
     const std::vector<Figure>& figures() const { return figures_; }
     const std::vector<FidelityRow>& fidelity_rows() const { return rows_; }
@@ -240,15 +240,19 @@ void add_bench(CLI::App& app, Session& session) {
     struct Options {
         std::string name = "all", mesh;
         std::optional<std::size_t> base = {};
+        std::size_t particles = 0;
     };
     auto options = std::make_shared<Options>();
     CLI::App* command = app.add_subcommand("bench", "Measure this machine: speeds with their rivals, and fidelity");
-    const std::vector<std::string> names = {"all", "restore", "strip", "files", "deform", "handles", "fidelity"};
+    const std::vector<std::string> names = {"all",    "restore", "strip",    "files",
+                                            "deform", "handles", "fidelity", "simulate"};
     command->add_option("name", options->name, "What to measure")->check(CLI::IsMember(names))->capture_default_str();
     command->add_option("--mesh", options->mesh,
                         fmt::format("Mesh to measure on (unset: the wavy cube with {} vertices)",
                                     with_commas(wavy_cube_vertices(kBenchResolution))));
     command->add_option("--base", options->base, "Vertices of the driver (unset: as strip chooses)");
+    command->add_option("--particles", options->particles, "Particles of the bodies (unset: 1,000 to 200,000)")
+        ->check(CLI::Range(8, 1000000));
     session.add_common_options(*command, "  filigree bench restore --threads 1\n"
                                          "  filigree bench fidelity --mesh scan.ply --base 1000\n"
                                          "  filigree bench --json > figures.json");
@@ -270,6 +274,7 @@ void add_bench(CLI::App& app, Session& session) {
         if (wants("deform")) bench.deform();
         if (wants("handles")) bench.handles();
         if (wants("fidelity")) bench.fidelity();
+        if (wants("simulate")) bench.simulate(options->particles);
         if (silent.is_cancelled()) throw Failure{cancelled_error()};
 
         Table table;

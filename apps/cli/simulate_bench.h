@@ -1,0 +1,30 @@
+// What bodies cost, and how near they come: the part of `filigree bench` about physics.
+#pragma once
+
+#include "filigree/mesh/mesh.h"
+
+#include "filigree/core/run_context.h"
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace filigree::cli {
+
+struct Figure {
+    std::string name;
+    double value;
+    std::string unit;
+};
+
+struct SimulateBenchOptions {
+    std::size_t particles = 0;            ///< of every body; 0: the sizes of docs/benchmarks.md
+    std::optional<std::size_t> base = {}; ///< driver vertices of the falling mesh; unset: 1,000
+};
+
+/// Times are the least of a few runs of the same bytes, frame by frame. With several threads, their gain over one and
+/// the number of bytes in which the final states differ are measured as well. When cancelled, the figures so far.
+std::vector<Figure> measure_simulation(const Mesh& mesh, const SimulateBenchOptions& options,
+                                       const RunContext& context);
+
+} // namespace filigree::cli
