@@ -168,6 +168,7 @@ private:
         simulation_->attached(drivers_[b], pose.positions, pose.gradients, always_);
         for (Mat3f& gradient : pose.gradients) gradient *= float(body.scale);
         const double moved = now_seconds();
+        hold_lost(b);
         require(restorers_[b].positions(pose, restored_[b], always_));
         recording_.totals.coupling_seconds += moved - start;
         recording_.totals.restore_seconds += now_seconds() - moved;
@@ -177,6 +178,31 @@ private:
         std::vector<Vec3f>& drawn = recording_.particles[b].emplace_back();
         for (std::size_t i = 0; i < particles.size(); ++i) drawn.push_back(particles[i]);
     }
+
+    /// Driver vertices that went nowhere sensible in a frame stay where they were, so that one does not spoil all.
+    void hold_lost(std::size_t b) {
+        constexpr double kFar = 1e4; // diagonals a frame
+        std::vector<Pose>& frames = recording_.poses[b].frames;
+        if (frames.size() < 2) return;
+        const SetUpBody& body = ready_.bodies[b];
+        const Pose& before = frames[frames.size() - 2];
+        Pose& now = frames.back();
+        const auto far = static_cast<float>(kFar * body.scale * bounds(body.model.mesh.positions).diagonal());
+        const float most_gradient = float(kFar * body.scale);
+        std::size_t lost = 0;
+        for (std::size_t v = 0; v < now.positions.size(); ++v) {
+            const bool is_near = (now.positions[v] - before.positions[v]).norm() <= far;
+            if (is_near && now.gradients[v].norm() <= most_gradient) continue; // false for what is not a number
+            now.positions[v] = before.positions[v];
+            now.gradients[v] = before.gradients[v];
+            ++lost;
+        }
+        if (lost > 0)
+            session_.warn(fmt::format("body '{}': the motion broke down at some of its surface, first in frame {}; "
+                                      "parts of the driver were held where they were",
+                                      body.name, first_lost(b)));
+    }
+    std::size_t first_lost(std::size_t b) { return lost_.try_emplace(b, recording_.totals.frames).first->second; }
 
     void check_body(std::size_t b) {
         const SetUpBody& body = ready_.bodies[b];
@@ -256,6 +282,7 @@ private:
     std::vector<Restorer> restorers_;
     std::vector<std::vector<Vec3f>> restored_;
     Recording recording_;
+    std::map<std::size_t, std::size_t> lost_; ///< by body: the first frame that hold_lost met
     double film_seconds_ = 0, write_seconds_ = 0;
 };
 
