@@ -162,6 +162,7 @@ private:
             }
         }
         session_.context().report("looking ahead", 1);
+        leave_out_strays(seen);
         if (scene_.picture.obstacles) see_obstacles(seen);
         const ScenePicture& picture = scene_.picture;
         const double aspect = double(picture.width) / picture.height;
@@ -176,6 +177,34 @@ private:
         const CameraPoints points{seen};
         camera_ = fit_camera(std::span(&points, 1), view_direction(picture.view, picture.up), up_vector(picture.up),
                              aspect, picture.field_of_view);
+    }
+
+    /// A few points that leave the rest far behind (drops of a melt) are not what the picture is made for.
+    void leave_out_strays(std::vector<Vec3f>& seen) {
+        constexpr double kStrays = 0.001, kMargin = 0.25; // a part of all points; in diagonals of the others' box
+        if (seen.size() < 1000) return;
+        Box others;
+        others.min = others.max = Vec3d::Zero();
+        std::vector<float> values(seen.size());
+        for (int axis = 0; axis < 3; ++axis) {
+            std::transform(seen.begin(), seen.end(), values.begin(), [&](const Vec3f& p) { return p[axis]; });
+            const auto at = [&](double part) {
+                const auto place = values.begin() + std::ptrdiff_t(part * double(values.size() - 1));
+                std::nth_element(values.begin(), place, values.end());
+                return double(*place);
+            };
+            others.min[axis] = at(kStrays);
+            others.max[axis] = at(1 - kStrays);
+        }
+        const double margin = kMargin * others.diagonal();
+        others.min.array() -= margin;
+        others.max.array() += margin;
+        std::erase_if(seen, [&](const Vec3f& p) {
+            return (p.cast<double>().array() < others.min.array()).any() ||
+                   (p.cast<double>().array() > others.max.array()).any();
+        });
+        box_.min = box_.min.cwiseMax(others.min);
+        box_.max = box_.max.cwiseMin(others.max);
     }
 
     void see_obstacles(std::vector<Vec3f>& seen) {
