@@ -27,7 +27,7 @@ using Corners = std::array<std::size_t, 3>;
 double least_seconds(const std::function<void()>& work) {
     double least = std::numeric_limits<double>::infinity();
     const double start = now_seconds();
-    for (int call = 0; call < 5 || now_seconds() - start < 0.4; ++call) {
+    for (int call = 0; call < 5 || now_seconds() - start < 0.2; ++call) {
         const double begin = now_seconds();
         work();
         least = std::min(least, now_seconds() - begin);

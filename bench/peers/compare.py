@@ -26,6 +26,9 @@ PAIRS = [
     ("strip / decimate + bind", "strip.total", "blender.decimate_and_bind"),
     ("handles, set-up", "handles.setup", "cgal.arap_setup"),
     ("handles, an iteration", "handles.iteration", "cgal.arap_iteration"),
+    ("8,000 particles, a frame / neo-Hookean, implicit", "simulate.cube.frame", "bullet.neo_hookean_implicit"),
+    ("8,000 particles, a frame / neo-Hookean, explicit", "simulate.cube.frame", "bullet.neo_hookean_explicit"),
+    ("8,000 particles, springs / links, 10 iterations", "simulate.springs_stiff.frame", "bullet.springs"),
 ]
 for n in (64, 128, 256, 512):
     PAIRS += [
