@@ -179,6 +179,40 @@ TEST_F(Simulate, AModelIsABodyAndScaleMakesMetres) {
     EXPECT_NEAR(box.size().x(), 1.06, 0.03);
 }
 
+TEST_F(Simulate, ObstaclesPinsAndWindAct) {
+    const std::string bar = "shape = \"bar\"\nresolution = 4\nlength = 2\nsize = 0.4\nparticles = 150\ndriver = 60\n"
+                            "young_modulus = 2e4\n";
+    ok({"make", "bar", "-o", "shelf.ply", "--resolution", "8", "--length", "2"});
+    const std::string shelf = "[[obstacle]]\nshape = \"mesh\"\nmesh = \"shelf.ply\"\ncentre = [0, -0.7, 0]\n";
+    const auto last_box = [&](const std::string& name, const std::string& scene) {
+        write(name + ".toml", "[simulation]\nduration = 0.5\n" + scene);
+        ok(words(name + ".toml", {"-o", name + ".fil"}));
+        return bounds(poses(name + ".fil").frames.back().positions);
+    };
+    const Box alone = last_box("alone", "[[body]]\n" + bar);
+    EXPECT_LT(alone.centre().y(), -1); // half a second of falling
+    EXPECT_NEAR(last_box("shelf", "[[body]]\n" + bar + shelf).min.y(), -0.2, 0.08);
+    const Box blown = last_box("blown", "[world]\nwind = [20, 0, 0]\n[[body]]\n" + bar + "density = 20\n");
+    EXPECT_GT(blown.centre().x(), 0.2);
+    // All of it held, moved and turned; the pivot is its middle.
+    const Box held =
+        last_box("held", "[[body]]\n" + bar +
+                             "[[pin]]\nbox = { min = [-1, -1, -1], max = [1, 1, 1] }\nmove = [{ time = 0, "
+                             "value = [0, 0, 0] }, { time = 0.2, value = [0, 1, 0] }]\nturn = [{ time = 0, "
+                             "value = [0, 0, 0] }, { time = 0.4, value = [0, 0, 90] }]\n");
+    EXPECT_NEAR(held.centre().y(), 1, 1e-3);
+    EXPECT_NEAR(held.size().y(), 0.8, 1e-3);
+    EXPECT_NEAR(held.size().x(), 0.4, 1e-3);
+    const Box pulled = last_box("pulled", "[world]\ngravity = [0, 0, 0]\n[[body]]\n" + bar +
+                                              "[[hand]]\npoint = [1, 0, 0]\ntarget = [2, 0, 0]\n");
+    EXPECT_GT(pulled.max.x(), 0.5);
+    const Box pushed = last_box("pushed", "[world]\ngravity = [0, 0, 0]\n[[body]]\n" + bar +
+                                              "damping = 0\n[[force]]\nnewtons = [0, 0, 140.8]\n");
+    const double mass = json(words("pushed.toml", {"--check"}))["bodies"][0]["mass_kg"];
+    EXPECT_NEAR(mass, 140.8, 18); // a coarse lattice is a little heavier than the bar
+    EXPECT_NEAR(pushed.centre().z(), 0.125 * 140.8 / mass, 0.003);
+}
+
 TEST_F(Simulate, UnknownKeysGetLineAndSuggestion) {
     refused(kBody + "youngs_modulus = 1e5\n",
             {"bad.toml:3: unknown key 'youngs_modulus' in [[body]]; did you mean 'young_modulus'?"});
