@@ -34,6 +34,13 @@ std::string suggestion(std::string_view word, std::span<const std::string_view> 
     return alike.empty() ? " (docs/scenes.md lists what there is)" : fmt::format("; did you mean '{}'?", alike);
 }
 
+/// The table that has such a key, as it is written; "" when there is none.
+std::string table_with(std::string_view key) {
+    for (const KeyRule& rule : scene_keys())
+        if (rule.key == key) return shown_table(rule.table);
+    return "";
+}
+
 /// A value as messages show it: what was written, or what kind of thing it is.
 std::string shown(const toml::node& node) {
     if (const auto text = node.value_exact<std::string>()) return "\"" + *text + "\"";
@@ -54,7 +61,9 @@ public:
             if (rule.table == name) known.push_back(rule.key);
         for (const auto& [key, value] : table)
             if (!find_key(name, key.str())) {
-                const std::string hint = suggestion(key.str(), known);
+                const std::string other = table_with(key.str());
+                const std::string hint =
+                    other.empty() ? suggestion(key.str(), known) : fmt::format("; it belongs to {}", other);
                 fail_question(key.source().begin.line,
                               fmt::format("unknown key '{}' in {}{}", key.str(), shown_table(name), hint));
             }

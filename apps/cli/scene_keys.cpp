@@ -293,6 +293,7 @@ std::string most_alike(std::string_view word, std::span<const std::string_view> 
     std::string_view best;
     std::size_t least = std::string_view::npos;
     for (const std::string_view known : words) {
+        if (word.size() >= 3 && known.starts_with(word)) return std::string(known);
         const std::size_t distance = edit_distance(word, known);
         const bool begins_alike = !word.empty() && !known.empty() && word[0] == known[0];
         if (distance > std::max<std::size_t>(2, word.size() / (begins_alike ? 2 : 3)) || distance >= least) continue;

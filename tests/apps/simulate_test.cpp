@@ -218,6 +218,8 @@ TEST_F(Simulate, UnknownKeysGetLineAndSuggestion) {
             {"bad.toml:3: unknown key 'youngs_modulus' in [[body]]; did you mean 'young_modulus'?"});
     refused(kBody + "[simulation]\nframe = 3\n", {"bad.toml:4: unknown key 'frame' in [simulation]", "'frames'"});
     refused(kBody + "colour = \"#ffffff\"\n", {"bad.toml:3:", "'color'"});
+    refused(kBody + "restitution = 1\n", {"bad.toml:3:", "'restitution' in [[body]]; it belongs to [[obstacle]]."});
+    refused(kBody + "dens = 1\n", {"bad.toml:3:", "'density'?"});
     refused(kBody + "quaternion = 1\n", {"bad.toml:3: unknown key 'quaternion'", "docs/scenes.md"});
     refused(kBody + "[[bodies]]\n", {"bad.toml:3: unknown table 'bodies'; did you mean [[body]]?"});
     refused("[body]\nshape = \"bar\"\n", {"bad.toml:1:", "[[body]]"});
