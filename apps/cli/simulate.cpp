@@ -104,7 +104,10 @@ public:
     }
 
     void write() {
-        if (!options_.save.empty()) save();
+        if (!options_.save.empty()) {
+            session_.begin_writing(options_.save);
+            save();
+        }
         const double start = now_seconds();
         if (!films_.empty()) {
             film_seconds_ = film_scene(scene_, ready_, recording_, *stage_, films_, session_);
@@ -391,6 +394,10 @@ void Run::report() const {
 }
 
 void check(const Options& options) {
+    std::error_code ignored;
+    const fs::path folder = fs::path(options.save).parent_path();
+    if (fs::is_directory(options.save, ignored) || (!folder.empty() && !fs::is_directory(folder, ignored)))
+        throw Failure{{ErrorCode::unwritable, options.save + ": cannot be written: it is a folder, or in none."}};
     if (options.scene.empty()) refuse("Give a scene: filigree simulate SCENE.toml -o OUT.");
     if (options.outputs.empty() && options.save.empty() && !options.check)
         refuse("Say where the motion goes: -o OUT.fil, -o FILM.mp4 or -o FOLDER/; or give --save or --check.");

@@ -101,6 +101,8 @@ TEST_F(Simulate, StoppedAndResumedIsAsRunThrough) {
     write("short.state", damaged.substr(0, 12));
     fails(4, words("drop.toml", {"--resume", "short.state", "-o", "x.fil"}), {"short.state"});
     fails(4, words("drop.toml", {"--resume", "drop.toml", "-o", "x.fil"}), {"drop.toml", "no saved state"});
+    fails(6, words("drop.toml", {"--save", "nowhere/state"}), {"nowhere/state"});
+    EXPECT_EQ(ok(words("drop.toml", {"--save", "quiet.state", "--quiet"})).out, "");
     fails(3, words("drop.toml", {"--resume", "none.state", "-o", "x.fil"}), {"none.state"});
 }
 
