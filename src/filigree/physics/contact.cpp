@@ -234,7 +234,8 @@ ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, flo
                 const float grip = kTangentialStiffness * stiffness;
                 const Vec3f offset = along_surface(place - motions.to_world(at.obstacle, at.anchor), surface.normal);
                 const Vec3f wanted = -grip * (offset + 2 * dt * along_surface(velocity, surface.normal));
-                const float limit = float(obstacle.friction) * push;
+                // Of the push without its weakening: a foot that trembles would lose its hold at every rise.
+                const float limit = float(obstacle.friction) * stiffness * -surface.distance;
                 const Vec3f held = limited(wanted, limit);
                 if (const float stretch = offset.norm(); grip * stretch > limit) // slides: the anchor follows
                     at.anchor = motions.to_own_axes(at.obstacle, place - offset * (limit / (grip * stretch)));

@@ -4,6 +4,7 @@
 #include "filigree/core/random.h"
 #include "filigree/physics/contact.h"
 
+#include <Eigen/SVD>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -89,6 +90,15 @@ Embedding embed_balls(const BodyState& state, const RunContext& context) {
     for (std::size_t s = 0; s < points.size(); ++s) points[s] -= state.ball_radius * body.skin.normals[s];
     return body.material.model == MaterialModel::meshfree ? embed(points, body.rest, body.spacing(), context)
                                                           : embed_in_cells(points, body.cells, context);
+}
+
+/// A gradient with its stretches within [1 / 4, 4]: what flows is sheared without end, its detail is not.
+Mat3f bounded_stretch(const Mat3f& gradient) {
+    if (!gradient.allFinite()) return Mat3f::Identity();
+    const Eigen::JacobiSVD<Mat3f> svd(gradient, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    const Vec3f& stretch = svd.singularValues();
+    if (stretch.maxCoeff() <= 4 && stretch.minCoeff() >= 0.25f) return gradient;
+    return svd.matrixU() * stretch.cwiseMax(0.25f).cwiseMin(4).asDiagonal() * svd.matrixV().transpose();
 }
 
 Error usage(std::string sentence) { return {ErrorCode::usage, std::move(sentence)}; }
@@ -295,7 +305,7 @@ Result<Simulation> Simulation::create(World world, std::vector<Actor> actors, co
 Grip Simulation::Content::grip(const Hand& hand, const RunContext& context) const {
     const BodyState& body = bodies[hand.body];
     const Vectors& reference = body.elasticity->reference();
-    const float radius = 2.5f * float(body.body->spacing());
+    const float radius = 4 * float(body.body->spacing());
     Grip grip{hand, {}, Vec3f::Zero(), 0, 0, 0};
     grip.region.rest = {hand.point};
     double mass = 0, region_mass = 0;
@@ -527,6 +537,9 @@ void Simulation::Content::renew(BodyState& body, std::size_t index, const RunCon
         carried[a].resize(attachment.embedding.size());
         std::vector<Mat3f> gradients(attachment.embedding.size());
         attached(attachment, carried[a], gradients, context);
+        parallel_for(context, gradients.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end; ++i) gradients[i] = bounded_stretch(gradients[i]);
+        });
         attachment.gradients = std::move(gradients);
     }
     body.elasticity->renew(body.positions, context);

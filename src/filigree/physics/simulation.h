@@ -16,7 +16,8 @@ struct Actor {
 };
 
 /// explicit_steps: symplectic Euler, as many substeps as stability asks for. descent: vertex block descent, a fixed
-/// number of implicit substeps. automatic: the first where it takes no more than most_substeps, else the second.
+/// number of implicit substeps. automatic: the first where it takes no more than most_substeps, else the second; a
+/// frame that was begun in the first way may take up to twice as many.
 enum class StepMode { automatic, explicit_steps, descent };
 
 struct StepOptions {
