@@ -84,30 +84,27 @@ struct Timing {
     }
 };
 
-Timing time_scene(const Scene& scene, const RunContext& context, Follower* follower = nullptr) {
-    Timing timing;
-    for (unsigned run = 0; run < kRuns; ++run) {
-        Simulation simulation = require(Simulation::create(scene.world, {scene.actor}, scene.step, context));
-        if (follower) follower->start(simulation, context);
-        for (std::size_t frame = 0; frame < scene.frames; ++frame) {
-            Phases phases;
-            const double begin = now_seconds();
-            const FrameReport report = require(simulation.advance(context));
-            phases.elastic = report.elastic_seconds;
-            phases.contacts = report.contact_seconds;
-            phases.other = now_seconds() - begin - phases.elastic - phases.contacts;
-            if (follower) follower->follow(simulation, phases, context);
-            if (run != 0) {
-                timing.frames[frame].keep_least(phases);
-                continue;
-            }
-            timing.frames.push_back(phases);
-            timing.substeps.push_back(report.substeps);
-            timing.descent_frames += report.used == StepMode::descent;
+void time_run(const Scene& scene, const RunContext& context, Follower* follower, Timing& timing) {
+    const bool is_first = timing.frames.empty();
+    Simulation simulation = require(Simulation::create(scene.world, {scene.actor}, scene.step, context));
+    if (follower) follower->start(simulation, context);
+    for (std::size_t frame = 0; frame < scene.frames; ++frame) {
+        Phases phases;
+        const double begin = now_seconds();
+        const FrameReport report = require(simulation.advance(context));
+        phases.elastic = report.elastic_seconds;
+        phases.contacts = report.contact_seconds;
+        phases.other = now_seconds() - begin - phases.elastic - phases.contacts;
+        if (follower) follower->follow(simulation, phases, context);
+        if (!is_first) {
+            timing.frames[frame].keep_least(phases);
+            continue;
         }
-        if (run == 0) timing.state = simulation.save();
+        timing.frames.push_back(phases);
+        timing.substeps.push_back(report.substeps);
+        timing.descent_frames += report.used == StepMode::descent;
     }
-    return timing;
+    timing.state = simulation.save();
 }
 
 std::size_t differing_bytes(const std::string& a, const std::string& b) {
@@ -385,10 +382,13 @@ private:
 
     /// The frame's time; with more threads than one, what they gain and whether they compute the same.
     Timing time_both(const std::string& name, const Scene& scene, Follower* follower = nullptr) {
-        const Timing timing = time_scene(scene, context_, follower);
+        Timing timing, one;
+        for (unsigned run = 0; run < kRuns; ++run) { // in turn, as the machine's speed drifts
+            time_run(scene, context_, follower, timing);
+            if (has_more_threads()) time_run(scene, one_thread_, follower, one);
+        }
         add(name + ".frame", timing.milliseconds(), "ms");
         if (has_more_threads()) {
-            const Timing one = time_scene(scene, one_thread_, follower);
             add(name + ".gain", one.milliseconds() / timing.milliseconds(), "ratio");
             add(name + ".differing_bytes", double(differing_bytes(one.state, timing.state)), "bytes");
         }
