@@ -316,6 +316,52 @@ TEST(Simulation, BarSwingsAtItsFrequency) {
     EXPECT_NEAR(measured / slender, 1, 0.03);
 }
 
+// A block that is sent along the ground stops after v^2 / (2 mu g), trembling or not.
+TEST(Simulation, SlidingFollowsCoulomb) {
+    for (const double restitution : {0.0, 0.5, 1.0})
+        for (const double friction : {0.2, 0.5}) {
+            World world = with_ground(restitution);
+            world.obstacles[0].friction = friction;
+            Actor block = actor(box(6, 2, 6, 0.1, material(MaterialModel::fem, 1e6)));
+            block.velocity = {2, 0, 0};
+            Simulation sliding = simulation(world, {block}, {.mode = StepMode::explicit_steps});
+            const double from = centre_of_mass(sliding).x();
+            run(sliding, 120);
+            const double expected = 4 / (2 * friction * 9.81);
+            EXPECT_NEAR(centre_of_mass(sliding).x() - from, expected, 0.06 * expected)
+                << restitution << " " << friction;
+        }
+}
+
+// Damping inside a body acts on what deforms it, not on how it turns.
+TEST(Simulation, InternalDampingLetsBodiesSpin) {
+    Material jelly = material(MaterialModel::fem, 1e6);
+    jelly.internal_damping = 2e-3;
+    Actor spinning = actor(box(4, 4, 4, 0.1, jelly));
+    spinning.spin = {0, 20, 0};
+    Simulation free = simulation(free_space(), {spinning}, {.mode = StepMode::explicit_steps});
+    const double before = free.momentum().angular.y();
+    run(free, 120);
+    EXPECT_NEAR(free.momentum().angular.y() / before, 1, 1e-3);
+}
+
+// Hands and ground share particles of one color among many points: each sees its own moves alone.
+TEST_P(EachMaterial, DescentIsTheSameForAnyThreads) {
+    const auto body = box(12, 12, 12, 0.08, material(GetParam(), 1e7));
+    const auto at_end = [&](unsigned threads) {
+        World world = with_ground();
+        Hand hand;
+        hand.point = {0.96f, 0.48f, 0.48f};
+        hand.target.constant = Vec3d(1.2, 0.6, 0.5);
+        world.hands.push_back(hand);
+        Simulation held = simulation(world, {actor(body)}, {.mode = StepMode::descent}, threads);
+        run(held, 4, threads);
+        return held.save();
+    };
+    const std::string bytes = at_end(1);
+    for (int attempt = 0; attempt < 3; ++attempt) EXPECT_TRUE(bytes == at_end(2));
+}
+
 /// How far the tip of a bar along x sinks when its other end is held.
 double sag(std::shared_ptr<const Body> body, const Vec3d& tip) {
     World world;

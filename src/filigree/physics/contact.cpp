@@ -234,11 +234,15 @@ ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, flo
                 const float grip = kTangentialStiffness * stiffness;
                 const Vec3f offset = along_surface(place - motions.to_world(at.obstacle, at.anchor), surface.normal);
                 const Vec3f wanted = -grip * (offset + 2 * dt * along_surface(velocity, surface.normal));
-                // Of the push without its weakening: a foot that trembles would lose its hold at every rise.
-                const float limit = float(obstacle.friction) * stiffness * -surface.distance;
-                const Vec3f held = limited(wanted, limit);
-                if (const float stretch = offset.norm(); grip * stretch > limit) // slides: the anchor follows
-                    at.anchor = motions.to_own_axes(at.obstacle, place - offset * (limit / (grip * stretch)));
+                // What holds is judged by the penalty without its weakening, or a foot that trembles would slip at
+                // every rise; what slides rubs by the push there is.
+                const float hold = float(obstacle.friction) * stiffness * -surface.distance;
+                const float stretch = grip * offset.norm();
+                Vec3f held = limited(wanted, hold);
+                if (stretch > hold) {
+                    held = limited(wanted, float(obstacle.friction) * push);
+                    at.anchor = motions.to_own_axes(at.obstacle, place - offset * (hold / stretch));
+                }
                 forces[k] = push * surface.normal + held;
                 at.depth = -surface.distance;
             }
@@ -313,20 +317,30 @@ void Contacts::push_out(std::span<BodyState> bodies, double time) {
     }
 }
 
+void Contacts::Blocks::look(const Vectors& positions) {
+    start_ = positions;
+    for (Entry& entry : entries_) {
+        entry.place = embedded_point(*entry.embedding, entry.point, positions);
+        if (entry.other)
+            entry.other_place = embedded_point(entry.other->balls, entry.other_point, entry.other->positions);
+    }
+}
+
 void Contacts::Blocks::add(Index particle, const Vectors& positions, Vec3f& force, Symmetric3& block) const {
+    const Vec3f moved = positions[particle] - start_[particle];
     for (Index k = offsets_[particle]; k < offsets_[particle + 1]; ++k) {
         const Entry& entry = entries_[entry_of_[k]];
         const float weight = weight_of_[k], stiffness = entry.stiffness;
-        const Vec3f place = embedded_point(*entry.embedding, entry.point, positions);
+        const Vec3f place = entry.place + weight * moved;
         if (entry.other) {
-            const Vec3f between = place - embedded_point(entry.other->balls, entry.other_point, entry.other->positions);
+            const Vec3f between = place - entry.other_place;
             const float distance = between.norm();
             if (!(distance < entry.reach && distance > 0)) continue;
             const Vec3f normal = between / distance;
             force += weight * stiffness * entry.unloading * (entry.reach - distance) * normal;
             block.add_outer(normal, weight * weight * stiffness);
         } else if (entry.obstacle) {
-            const DistanceField::Sample surface = distance_to(*entry.obstacle, entry.motion, place);
+            const DistanceField::Sample surface = distance_to(*entry.obstacle, *entry.motion, place);
             if (!(surface.distance < 0)) continue;
             const float push = stiffness * entry.unloading * -surface.distance;
             force += weight * push * surface.normal;
@@ -382,6 +396,8 @@ Contacts::Blocks Contacts::blocks(std::span<const BodyState> bodies, std::size_t
     const ObstacleMotions motions(world_, time);
     const float slow = smooth_speed(world_, dt);
     Blocks blocks;
+    for (std::size_t o = 0; o < world_.obstacles.size(); ++o)
+        blocks.motions_.push_back(std::make_unique<Eigen::Isometry3d>(motions.at(o)));
     for (const Near& at : near_[b]) {
         const Obstacle& obstacle = world_.obstacles[at.obstacle];
         const Vec3f place = embedded_point(body.skin, at.point, body.positions);
@@ -393,7 +409,7 @@ Contacts::Blocks Contacts::blocks(std::span<const BodyState> bodies, std::size_t
         entry.point = at.point;
         entry.stiffness = body.skin_stiffness[at.point] * float(obstacle.stiffness);
         entry.obstacle = &obstacle;
-        entry.motion = motions.at(at.obstacle);
+        entry.motion = blocks.motions_[at.obstacle].get();
         entry.anchored = at.anchored;
         entry.anchor = motions.to_world(at.obstacle, at.anchor);
         entry.friction = float(obstacle.friction);

@@ -5,6 +5,7 @@
 #include "filigree/physics/world.h"
 
 #include <functional>
+#include <memory>
 
 namespace filigree {
 
@@ -47,6 +48,9 @@ public:
     /// Contacts of one body as blocks for vertex block descent. Valid until look_around.
     class Blocks final : public BlockTerms {
     public:
+        /// Before every sweep: where all points are. During the sweep add sees each move by the asking particle alone,
+        /// so that nothing depends on which thread moves the others when.
+        void look(const Vectors& positions);
         void add(Index particle, const Vectors& positions, Vec3f& force, Symmetric3& block) const override;
         /// A further spring that pulls points of an embedding: a hand.
         void add_pull(const Embedding& points, std::size_t point, const Vec3f& target, float stiffness);
@@ -59,17 +63,20 @@ public:
             Index point = 0;
             float stiffness = 0;
             const Obstacle* obstacle = nullptr;
-            Eigen::Isometry3d motion; ///< of the obstacle
+            const Eigen::Isometry3d* motion = nullptr; ///< of the obstacle
             bool anchored = false;
             Vec3f anchor = Vec3f::Zero(); ///< world
             float friction = 0, unloading = 1;
             const BodyState* other = nullptr; ///< or a ball of another body
             Index other_point = 0;
-            float reach = 0;              ///< sum of the balls' radii
-            Vec3f target = Vec3f::Zero(); ///< neither: a pull to here
+            float reach = 0;                                          ///< sum of the balls' radii
+            Vec3f target = Vec3f::Zero();                             ///< neither: a pull to here
+            Vec3f place = Vec3f::Zero(), other_place = Vec3f::Zero(); ///< of the points, by look
         };
         void link(std::size_t particles);
         std::vector<Entry> entries_;
+        std::vector<std::unique_ptr<Eigen::Isometry3d>> motions_; ///< of the obstacles
+        Vectors start_;                                           ///< positions at the last look
         std::vector<std::uint8_t> touched_;
         std::vector<Index> offsets_, entry_of_; ///< entries of each particle
         std::vector<float> weight_of_;

@@ -247,7 +247,8 @@ DistanceField::Sample DistanceField::at(const Vec3f& point) const {
     if (const Vec3f beyond = point - within; !beyond.isZero(0)) {
         // As from the surface point that the grid's border is nearest to.
         const Vec3f away = std::max(sample.distance, 0.0f) * sample.normal + beyond;
-        sample.distance += beyond.stableNorm();
+        const float way = beyond.stableNorm();
+        sample.distance = std::max(way, sample.distance - way);
         if (const float far = away.stableNorm(); far > 0) sample.normal = away / far;
     }
     return sample;

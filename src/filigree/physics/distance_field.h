@@ -20,7 +20,7 @@ public:
     /// points), cancelled.
     static Result<DistanceField> create(const Mesh& mesh, double scale, double spacing, const RunContext& context);
 
-    /// Outside the grid the distance to the grid is added, so it is a lower bound's estimate: far points are far.
+    /// Outside the grid a lower bound: the distance to the grid, or what the border's distance leaves of it.
     Sample at(const Vec3f& point) const;
     const Box& box() const { return box_; } ///< of the grid
 

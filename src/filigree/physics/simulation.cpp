@@ -56,6 +56,9 @@ struct RigidState {
     double mass = 0;
     Vec3d centre = Vec3d::Zero(), linear = Vec3d::Zero(), angular = Vec3d::Zero(); ///< angular: about the centre
     Mat3d inertia = Mat3d::Zero();
+
+    /// Angular velocity, 1/s.
+    Vec3d turning() const { return (inertia + 1e-12 * inertia.trace() * Mat3d::Identity()).ldlt().solve(angular); }
 };
 
 RigidState rigid_state(const BodyState& body) {
@@ -356,10 +359,15 @@ Simulation::Content::Acting Simulation::Content::evaluate(double now, float trav
         for (std::size_t b = 0; b < bodies.size(); ++b) {
             BodyState& body = bodies[b];
             const float delay = float(body.body->material.internal_damping);
-            if (delay > 0) { // f(x + tau v) = f(x) - tau K v: Kelvin-Voigt, to first order
+            if (delay > 0) { // f(x + tau v) = f(x) - tau K v: Kelvin-Voigt, to first order; of v less its rigid part
+                const RigidState rigid = rigid_state(body);
+                const Vec3f drifting = (rigid.linear / rigid.mass).cast<float>();
+                const Vec3f turning = rigid.turning().cast<float>(), centre = rigid.centre.cast<float>();
                 Vectors ahead = body.positions;
                 parallel_for(context, ahead.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-                    for (std::size_t i = begin; i < end; ++i) ahead.add(i, delay * body.velocities[i]);
+                    for (std::size_t i = begin; i < end; ++i)
+                        ahead.add(i,
+                                  delay * (body.velocities[i] - drifting - turning.cross(body.positions[i] - centre)));
                 });
                 elastic[b] = body.elasticity->forces(ahead, body.forces, context);
             } else {
@@ -427,8 +435,14 @@ void Simulation::Content::blow(double now, const RunContext& context) {
             const float size = area.norm();
             if (!(size > 0)) continue;
             const float inwards = -(wind - embedded_point(body.skin, s, body.velocities)).dot(area) / size;
-            if (inwards > 0)
-                add_to_particles(body.skin, s, -0.5f * float(world.air_density) * inwards * inwards * area, forces);
+            if (!(inwards > 0)) continue;
+            // No further than the wind's own speed within the frame, whatever the point weighs.
+            float mass = 0;
+            for (Index k = body.skin.offsets[s]; k < body.skin.offsets[s + 1]; ++k)
+                mass += std::abs(body.skin.weights[k]) * body.body->mass[body.skin.particles[k]];
+            const float most = mass * inwards * float(options.frames_per_second) / 8; // a particle has several points
+            const float push = std::min(0.5f * float(world.air_density) * inwards * inwards * size, most);
+            add_to_particles(body.skin, s, -push / size * area, forces);
         }
         wind_forces[b] = std::move(forces);
     }
@@ -678,9 +692,10 @@ void Simulation::Content::descent_part(double from, double until, FrameReport& r
         {
             const Stopwatch watch(report.contact_seconds);
             const float speed = most_speed(now) + float(world.gravity.norm()) * dt;
-            const float way = std::clamp(1.5f * speed * dt, 0.25f * least_spacing(), 8 * least_spacing());
+            const float way = 1.5f * speed * dt, spacing = least_spacing();
             contacts.forget();
-            contacts.look_around(bodies, now, 0, way, way, context);
+            contacts.look_around(bodies, now, 0, std::clamp(way, 0.25f * spacing, 8 * spacing),
+                                 std::clamp(way, 0.25f * spacing, 0.75f * spacing), context);
             for (std::size_t b = 0; b < bodies.size(); ++b)
                 blocks[b] = contacts.blocks(bodies, b, now, dt, [&](Contacts::Blocks& all) {
                     for (const Grip& grip : grips)
@@ -726,11 +741,14 @@ void Simulation::Content::descent_part(double from, double until, FrameReport& r
             move_pins(now, dt);
         }
         for (unsigned iteration = 0; iteration < options.descent_iterations; ++iteration) {
+            if (context.is_cancelled()) return;
             const Stopwatch watch(report.elastic_seconds);
-            for (std::size_t b = 0; b < bodies.size(); ++b)
+            for (std::size_t b = 0; b < bodies.size(); ++b) {
+                blocks[b].look(bodies[b].positions);
                 bodies[b].elasticity->sweep(bodies[b].positions,
                                             {target[b], inertia[b], bodies[b].fixed, blocks[b].touched(), &blocks[b]},
                                             context);
+            }
         }
         {
             const Stopwatch watch(report.contact_seconds);
@@ -773,6 +791,9 @@ Result<FrameReport> Simulation::advance(const RunContext& context) {
     };
     if (!context.is_cancelled() && !is_sound()) { // an explicit frame that failed is done again
         if (Status undone = content.restore(undo); !undone) return undone.error();
+        report = {.elastic_seconds = report.elastic_seconds,
+                  .contact_seconds = report.contact_seconds,
+                  .other_seconds = report.other_seconds};
         reached = from;
     }
     if (!context.is_cancelled() && reached < until) {
@@ -945,6 +966,11 @@ void Simulation::Content::embed_at_rest(std::size_t b, const RunContext& context
 }
 
 std::string Simulation::save() const { return content_->save(); }
-Status Simulation::restore(std::string_view bytes) { return content_->restore(bytes); }
+Status Simulation::restore(std::string_view bytes) {
+    const std::string before = content_->save();
+    Status restored = content_->restore(bytes);
+    if (!restored) (void)content_->restore(before);
+    return restored;
+}
 
 } // namespace filigree

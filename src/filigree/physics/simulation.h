@@ -15,7 +15,7 @@ struct Actor {
     Vec3d spin = Vec3d::Zero();                                  ///< rad/s about the centre of mass
 };
 
-/// explicit_steps: symplectic Euler, as many substeps as stability asks for. descent: vertex block descent, a fixed
+/// explicit_steps: velocity Verlet, as many substeps as stability asks for. descent: vertex block descent, a fixed
 /// number of implicit substeps. automatic: the first where it takes no more than most_substeps, else the second; a
 /// frame that was begun in the first way may take up to twice as many.
 enum class StepMode { automatic, explicit_steps, descent };

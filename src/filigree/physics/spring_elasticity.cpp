@@ -43,7 +43,8 @@ constexpr float kCollapsed = 0.5f;     // squared lengths over those at rest
 constexpr float kCollapsedStep = 0.1f; // spacings a sweep
 constexpr float kLargest = 1e15f;      // m: positions beyond are not fit for explicit steps
 constexpr std::size_t kGrain = 256;    // particles
-constexpr std::size_t kRunGrain = 16;
+constexpr std::size_t kRunGrain = 2;
+constexpr std::size_t kLongestRun = 256; // particles, so that threads have something to share
 constexpr std::size_t kMostLanes = 16;
 
 /// Where a particle's neighbours are, in lattice steps; the opposite of one is its number ^ 1.
@@ -128,7 +129,7 @@ Runs make_runs(const std::vector<Star>& stars) {
         std::array<std::int64_t, kStencil> offset;
         offset.fill(kOpen);
         std::size_t end = first;
-        for (; end < n; ++end) {
+        for (; end < n && end - first < kLongestRun; ++end) {
             std::array<std::int64_t, kStencil> next = offset;
             bool fits = true;
             for (std::size_t s = 0; s < kStencil; ++s) {
@@ -511,18 +512,21 @@ private:
             float most = 0;
             for (std::size_t i = begin; i < end; ++i) {
                 float bound = 0;
-                for_pressed_corners(
-                    positions, Index(i), true, [&](const CornerVolume& volume, std::size_t axis, float stiffness) {
-                        const Vec3f g = volume_gradient(volume, axis, inverse_cube_);
-                        const float below = volume.ratio - kVolumeFrom;
-                        forces.add(i, g * (-stiffness * below));
-                        // g g^T is at most the blocks |g_i| sum |g_j|. J's own second derivative is at most 2 |e| / h^3
-                        // in each edge; an edge's square is at most twice the sum of its ends'.
-                        float sum = 0, longest = 0;
-                        for (std::size_t a = 0; a < 4; ++a) sum += volume_gradient(volume, a, inverse_cube_).norm();
-                        for (const Vec3f& edge : volume.edges) longest = std::max(longest, edge.norm());
-                        bound += stiffness * (g.norm() * sum - below * longest * inverse_cube_ * (axis == 3 ? 12 : 4));
-                    });
+                for_pressed_corners(positions, Index(i), kVolumeFrom,
+                                    [&](const CornerVolume& volume, std::size_t axis, float stiffness) {
+                                        const Vec3f g = volume_gradient(volume, axis, inverse_cube_);
+                                        const float below = volume.ratio - kVolumeFrom;
+                                        forces.add(i, g * (-stiffness * below));
+                                        // g g^T is at most the blocks |g_i| sum |g_j|. J's own second derivative is at
+                                        // most 2 |e| / h^3 in each edge; an edge's square is at most twice the sum of
+                                        // its ends'.
+                                        float sum = 0, longest = 0;
+                                        for (std::size_t a = 0; a < 4; ++a)
+                                            sum += volume_gradient(volume, a, inverse_cube_).norm();
+                                        for (const Vec3f& edge : volume.edges) longest = std::max(longest, edge.norm());
+                                        bound += stiffness * (g.norm() * sum -
+                                                              below * longest * inverse_cube_ * (axis == 3 ? 12 : 4));
+                                    });
                 most = std::max(most, bound * inverse_mass_[i]);
             }
             rates[begin / kGrain] = most;
