@@ -355,9 +355,15 @@ private:
         StepOptions& step = scene_.step;
         in.set("frames_per_second", step.frames_per_second);
         in.set_whole("frames", scene_.frames);
-        if (in.has("duration"))
-            scene_.frames = static_cast<std::size_t>(
-                std::clamp(std::round(in.number("duration", 0) * step.frames_per_second), 1.0, 1e6));
+        if (in.has("duration")) {
+            const double frames = std::round(in.number("duration", 0) * step.frames_per_second);
+            const double most = find_key("simulation", "frames")->most;
+            if (frames > most)
+                in.fail("duration", fmt::format("the duration takes {:.0f} frames at {} a second, and {:.0f} are the "
+                                                "most; shorten it or lower frames_per_second",
+                                                frames, step.frames_per_second, most));
+            scene_.frames = static_cast<std::size_t>(std::max(frames, 1.0));
+        }
         step.mode = static_cast<StepMode>(in.word("mode", 0));
         in.set_whole("most_substeps", step.most_substeps);
         in.set_whole("descent_substeps", step.descent_substeps);
@@ -371,6 +377,7 @@ private:
         constexpr double kAir = 1.2; // kg/m^3, at 20 degrees Celsius
         scene_.air_density = in.number("air_density", in.has("wind") ? kAir : 0);
         in.set("body_friction", scene_.body_friction);
+        in.set("body_restitution", scene_.body_restitution);
     }
 
     void read_body(const Section& in) {
@@ -478,6 +485,8 @@ private:
         obstacle.motion = in.motion();
         in.set("friction", obstacle.friction);
         in.set("restitution", obstacle.restitution);
+        obstacle.sets_restitution = in.has("restitution");
+        in.set("stiffness", obstacle.stiffness);
         in.set("color", obstacle.color);
         obstacle.visible = in.flag("visible", true);
         scene_.obstacles.push_back(std::move(obstacle));

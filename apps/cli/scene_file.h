@@ -50,7 +50,8 @@ struct SceneObstacle {
     double scale = 1, spacing = 0;
     std::optional<Vec3d> centre = {}; ///< of a mesh
     SceneMotion motion;
-    double friction = 0.5, restitution = 0.5;
+    double friction = 0.5, restitution = 0.5, stiffness = 1;
+    bool sets_restitution = false; ///< in the file
     std::optional<Vec3f> color = {};
     bool visible = true;
 };
@@ -95,7 +96,7 @@ struct SceneFile {
     StepOptions step;
     Vec3d gravity = {0, -9.81, 0};
     Keyed<Vec3d> wind{{}, {}, Vec3d::Zero()};
-    double air_density = 0, body_friction = 0.3;
+    double air_density = 0, body_friction = 0.3, body_restitution = 0.7;
     std::vector<SceneBody> bodies;
     std::vector<SceneObstacle> obstacles;
     std::vector<ScenePin> pins;

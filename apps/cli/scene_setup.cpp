@@ -88,6 +88,7 @@ public:
         result_.world.wind = scene_.wind;
         result_.world.air_density = scene_.air_density;
         result_.world.body_friction = scene_.body_friction;
+        result_.world.body_restitution = scene_.body_restitution;
         result_.hash = hash_.value();
         return std::move(result_);
     }
@@ -175,6 +176,7 @@ private:
         obstacle.motion = drawn.motion = motion_of(from.motion, middle);
         obstacle.friction = from.friction;
         obstacle.restitution = from.restitution;
+        obstacle.stiffness = from.stiffness;
         result_.world.obstacles.push_back(std::move(obstacle));
         drawn.moves = from.motion.moves();
         drawn.color = from.color.value_or(kObstacleColor);

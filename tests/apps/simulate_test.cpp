@@ -3,6 +3,7 @@
 
 #include "filigree/io/mesh_file.h"
 #include "filigree/io/model_file.h"
+#include "filigree/physics/simulation.h"
 #include "filigree/render/picture.h"
 
 using namespace filigree_test;
@@ -230,6 +231,8 @@ TEST_F(Simulate, UnknownKeysGetLineAndSuggestion) {
 
 TEST_F(Simulate, WrongTypesAndRangesAreNamed) {
     refused(kBody + "density = \"heavy\"\n", {"bad.toml:3:", "'density'", "number", "\"heavy\""});
+    refused(kBody + "[simulation]\nduration = 20000\n", {"bad.toml:4:", "1200000 frames", "1000000", "duration"});
+    refused(kBody + "[simulation]\nframes_per_second = 9\n", {"bad.toml:4:", "10 to 10000", "9"});
     refused(kBody + "density = -1\n", {"bad.toml:3:", "above 0", "-1"});
     refused(kBody + "poisson_ratio = 0.5\n", {"bad.toml:3:", "0 to 0.49"});
     refused(kBody + "particles = 1.5\n", {"bad.toml:3:", "whole number"});
@@ -278,6 +281,29 @@ TEST_F(Simulate, TheManualShowsEveryKey) {
     for (std::string line; std::getline(keys, line); ++lines)
         EXPECT_NE(manual.find(line + "\n"), std::string::npos) << "docs/scenes.md lacks: " << line;
     EXPECT_GT(lines, 90u);
+}
+
+TEST_F(Simulate, TheManualsDefaultsAreTheLibrarys) {
+    const std::string manual = ok({"simulate", "--keys"}).out;
+    // The fourth cell of a key's row in a table.
+    const auto unset = [&](const std::string& table, const std::string& key) {
+        const std::size_t row = manual.find("| `" + key + "` |", manual.find("`" + table + "`\n"));
+        std::istringstream line(manual.substr(row, manual.find('\n', row) - row));
+        std::string cell;
+        for (int i = 0; i < 5; ++i) std::getline(line, cell, '|');
+        return std::strtod(cell.c_str(), nullptr);
+    };
+    const StepOptions step;
+    EXPECT_EQ(unset("[simulation]", "frames_per_second"), step.frames_per_second);
+    EXPECT_EQ(unset("[simulation]", "most_substeps"), step.most_substeps);
+    EXPECT_EQ(unset("[simulation]", "descent_substeps"), step.descent_substeps);
+    EXPECT_EQ(unset("[simulation]", "descent_iterations"), step.descent_iterations);
+    EXPECT_EQ(unset("[world]", "body_friction"), World{}.body_friction);
+    EXPECT_EQ(unset("[world]", "body_restitution"), World{}.body_restitution);
+    EXPECT_EQ(unset("[[body]]", "particles"), BodyOptions{}.cells.count);
+    EXPECT_EQ(unset("[[obstacle]]", "friction"), Obstacle{}.friction);
+    EXPECT_EQ(unset("[[obstacle]]", "restitution"), Obstacle{}.restitution);
+    EXPECT_EQ(unset("[[obstacle]]", "stiffness"), Obstacle{}.stiffness);
 }
 
 TEST_F(Simulate, TheExamplesRun) {
