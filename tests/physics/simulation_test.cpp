@@ -103,8 +103,8 @@ INSTANTIATE_TEST_SUITE_P(Simulation, EachMaterial, kModels, model_name);
 
 class EachMode : public testing::TestWithParam<StepMode> {};
 INSTANTIATE_TEST_SUITE_P(Simulation, EachMode, testing::Values(StepMode::explicit_steps, StepMode::descent),
-                         [](const testing::TestParamInfo<StepMode>& info) {
-                             return info.param == StepMode::descent ? "descent" : "explicit_steps";
+                         [](const testing::TestParamInfo<StepMode>& mode) {
+                             return mode.param == StepMode::descent ? "descent" : "explicit_steps";
                          });
 
 // Half a second of fall is g t^2 / 2, to the rounding of positions, whatever the step.
@@ -557,10 +557,10 @@ class BadStart : public testing::TestWithParam<std::tuple<MaterialModel, const c
 INSTANTIATE_TEST_SUITE_P(Simulation, BadStart,
                          testing::Combine(kModels,
                                           testing::Values("inverted", "plane", "line", "point", "shrunk", "random")),
-                         [](const auto& info) {
+                         [](const auto& start) {
                              return std::string(std::array{"fem", "springs",
-                                                           "meshfree"}[std::size_t(std::get<0>(info.param))]) +
-                                    "_" + std::get<1>(info.param);
+                                                           "meshfree"}[std::size_t(std::get<0>(start.param))]) +
+                                    "_" + std::get<1>(start.param);
                          });
 
 TEST_P(BadStart, ComesBackToRest) {
