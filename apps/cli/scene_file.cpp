@@ -427,6 +427,22 @@ private:
         return name;
     }
 
+    /// Refuses keys that do nothing for the body's model.
+    static void refuse_other_models(const Section& in, MaterialModel model) {
+        constexpr std::array kNames = {"fem", "springs", "meshfree"};
+        const auto refuse = [&](std::string_view key, const char* models) {
+            if (in.has(key))
+                in.fail(key, fmt::format("'{}' in [[body]] is for model = {}, and this body's is \"{}\"", key, models,
+                                         kNames[std::size_t(model)]));
+        };
+        if (model != MaterialModel::meshfree)
+            for (const char* key : {"yield_stress", "creep_time", "temperature", "melting_from", "melting_to",
+                                    "viscosity", "heating", "conductivity"})
+                refuse(key, "\"meshfree\"");
+        if (model != MaterialModel::springs) refuse("bending", "\"springs\"");
+        if (model == MaterialModel::springs) refuse("poisson_ratio", "\"fem\" or \"meshfree\"");
+    }
+
     static void read_material(const Section& in, Material& material) {
         std::vector<std::string_view> names;
         for (const NamedMaterial& named : named_materials()) names.push_back(named.name);
@@ -439,6 +455,9 @@ private:
         }
         material = named_materials()[std::size_t(found - names.begin())].material;
         material.model = static_cast<MaterialModel>(in.word("model", static_cast<int>(material.model)));
+        refuse_other_models(in, material.model);
+        if (material.model != MaterialModel::meshfree) // a flowing material as another model does not flow
+            material.yield_stress = material.melting_from = material.melting_to = Material::kNever;
         in.set("density", material.density);
         in.set("young_modulus", material.young_modulus);
         in.set("poisson_ratio", material.poisson_ratio);
@@ -453,9 +472,6 @@ private:
         in.set("viscosity", material.viscosity);
         in.set("heating", material.heating);
         in.set("conductivity", material.conductivity);
-        if (material.model != MaterialModel::meshfree && (material.is_plastic() || material.melts()))
-            in.fail(in.has("model") ? "model" : "material",
-                    "only model = \"meshfree\" yields and melts; leave yield_stress and melting_to out, or choose it");
         if (std::string wrong = check_material(material); !wrong.empty()) {
             while (wrong.back() == '.') wrong.pop_back();
             in.fail(in.line(), wrong);

@@ -55,11 +55,65 @@ struct Outputs {
 };
 
 /// "out.fil", or "out_NAME.fil" where there are several bodies.
-std::string model_path(const std::string& path, const SetUpScene& ready, const SetUpBody& body) {
-    if (ready.bodies.size() == 1) return path;
+std::string model_path(const std::string& path, std::size_t bodies, const std::string& body) {
+    if (bodies == 1) return path;
     const fs::path whole(path);
-    return (whole.parent_path() / fmt::format("{}_{}{}", whole.stem().string(), body.name, whole.extension().string()))
+    return (whole.parent_path() / fmt::format("{}_{}{}", whole.stem().string(), body, whole.extension().string()))
         .string();
+}
+
+/// Two names of one file, whether it is there or not; both name something.
+bool is_one_file(const fs::path& a, const fs::path& b) {
+    std::error_code failed;
+    if (fs::equivalent(a, b, failed) && !failed) return true; // links of all kinds
+    return fs::weakly_canonical(fs::absolute(a), failed) == fs::weakly_canonical(fs::absolute(b), failed) && !failed;
+}
+
+/// Whether `file` lies in `folder` and its name is digits between `before` and `after`.
+bool is_numbered(const fs::path& file, const fs::path& folder, const std::string& before, const std::string& after) {
+    const std::string name = file.filename().string();
+    if (name.size() <= before.size() + after.size() || !name.starts_with(before) || !name.ends_with(after))
+        return false;
+    const std::string_view number =
+        std::string_view(name).substr(before.size(), name.size() - before.size() - after.size());
+    return number.find_first_not_of("0123456789") == std::string_view::npos &&
+           is_one_file(file.parent_path() / ".", folder / ".");
+}
+
+/// Refuses outputs that would go over what the run reads, or over each other.
+void check_places(const Options& options, const SceneFile& scene, const Outputs& outputs) {
+    std::vector<std::pair<fs::path, std::string>> taken = {{options.scene, "the scene"}};
+    const auto add_mesh = [&](const std::string& mesh) {
+        if (!mesh.empty()) taken.emplace_back(mesh, "a mesh of the scene");
+    };
+    for (const SceneBody& body : scene.bodies) add_mesh(body.mesh);
+    for (const SceneObstacle& obstacle : scene.obstacles) add_mesh(obstacle.mesh);
+    const auto take = [&](const std::string& path, const std::string& what) {
+        for (const auto& [file, is] : taken)
+            if (is_one_file(path, file)) refuse(fmt::format("{}: is {} and would be overwritten.", path, is));
+        taken.emplace_back(path, what);
+    };
+    if (!options.save.empty()) take(options.save, "where the state goes");
+    if (!options.resume.empty()) taken.emplace_back(options.resume, "the state to go on from"); // may be saved over
+    for (const std::string& path : outputs.models)
+        for (const SceneBody& body : scene.bodies) take(model_path(path, scene.bodies.size(), body.name), "an output");
+    const auto take_numbered = [&](const std::string& path, const fs::path& folder, const std::string& before,
+                                   const std::string& after) {
+        for (const auto& [file, is] : taken)
+            if (is_numbered(file, folder, before, after))
+                refuse(fmt::format("{}: {} is {} and would be overwritten.", path, file.string(), is));
+    };
+    for (const std::string& path : outputs.films) {
+        const std::string name = fs::path(path).filename().string();
+        const std::size_t from = name.find('%'), until = name.find('d', std::min(from, name.size()));
+        if (lower_ending(path) == ".png" && until != std::string::npos)
+            take_numbered(path, fs::path(path).parent_path(), name.substr(0, from), name.substr(until + 1));
+        take(path, "an output");
+    }
+    for (const std::string& path : outputs.folders) {
+        for (const SceneBody& body : scene.bodies) take_numbered(path, path, body.name + "_", ".ply");
+        take(path, "an output");
+    }
 }
 
 double percentile_95(std::vector<float>& values) {
@@ -74,6 +128,7 @@ public:
     Run(const Options& options, Session& session)
         : options_(options), session_(session), scene_(read_scene(options.scene)), outputs_(options.outputs),
           always_(session.threads) {
+        check_places(options, scene_, outputs_);
         if (options.frames) scene_.frames = options.frames;
         open_outputs();
         ready_ = set_up(scene_, session);
@@ -101,6 +156,7 @@ public:
             record(require(report));
         }
         session_.context().report("simulating", 1);
+        warn_of_trouble();
     }
 
     void write() {
@@ -117,7 +173,8 @@ public:
         write_meshes();
         for (const std::string& path : outputs_.models)
             for (std::size_t b = 0; b < ready_.bodies.size(); ++b)
-                session_.write_model(ready_.bodies[b].model, model_path(path, ready_, ready_.bodies[b]),
+                session_.write_model(ready_.bodies[b].model,
+                                     model_path(path, ready_.bodies.size(), ready_.bodies[b].name),
                                      recording_.poses[b]);
         write_seconds_ = now_seconds() - start;
     }
@@ -158,6 +215,7 @@ private:
 
     void record(const FrameReport& report) {
         recording_.totals.add(report);
+        last_volume_ratio_ = report.least_volume_ratio;
         for (std::size_t b = 0; b < ready_.bodies.size(); ++b) record_body(b);
     }
 
@@ -206,6 +264,53 @@ private:
                                       body.name, first_lost(b)));
     }
     std::size_t first_lost(std::size_t b) { return lost_.try_emplace(b, recording_.totals.frames).first->second; }
+
+    /// What makes the motion doubtful, or other than the scene says.
+    void warn_of_trouble() {
+        const Totals& t = recording_.totals;
+        if (t.clamped_particles > 0)
+            session_.warn(fmt::format("{} motions of particles were not finite or had to be limited: the motion is not "
+                                      "to be trusted",
+                                      with_commas(t.clamped_particles)));
+        if (last_volume_ratio_ <= 0)
+            session_.warn("some cells are inside out at the end: the bodies were pressed or pulled too hard");
+        if (t.frames > 0 && is_left_alone()) warn_of_energy();
+        const bool is_deadened = std::any_of(scene_.bodies.begin(), scene_.bodies.end(),
+                                             [](const SceneBody& body) { return body.material.internal_damping > 0; });
+        const bool is_springy = std::any_of(scene_.obstacles.begin(), scene_.obstacles.end(),
+                                            [](const SceneObstacle& obstacle) { return obstacle.sets_restitution; });
+        if (t.descent_frames > 0 && (is_deadened || is_springy))
+            session_.warn(fmt::format("{} frames were computed by descent, whose own damping takes the place of {}; "
+                                      "mode = \"explicit\" heeds {}",
+                                      with_commas(t.descent_frames),
+                                      !is_springy    ? "internal_damping"
+                                      : !is_deadened ? "restitution"
+                                                     : "internal_damping and restitution",
+                                      is_deadened && is_springy ? "them" : "it"));
+    }
+
+    /// Whether nothing in the scene does work on the bodies but gravity.
+    bool is_left_alone() const {
+        return scene_.pins.empty() && scene_.hands.empty() && scene_.forces.empty() && scene_.wind.times.empty() &&
+               scene_.wind.constant.isZero() &&
+               std::none_of(scene_.obstacles.begin(), scene_.obstacles.end(),
+                            [](const SceneObstacle& obstacle) { return obstacle.motion.moves(); });
+    }
+
+    void warn_of_energy() {
+        constexpr double kGrowth = 0.05, kNoise = 1e-8; // the latter: elastic energy of a strain of 1e-4
+        const Energy &start = recording_.totals.start, end = simulation_->energy(always_);
+        double least = 0; // J, below which energies are rounding
+        for (const SetUpBody& body : ready_.bodies)
+            least += kNoise * body.body->material.young_modulus * body.report.cells.volume;
+        // The potential has no zero of its own: what counts is how much of it came or went.
+        const double had = start.kinetic + start.elastic + std::abs(end.potential - start.potential);
+        const double grown = end.total() - start.total();
+        if (grown <= kGrowth * had + least) return;
+        session_.warn(fmt::format("the energy grew by {:.3g} J although nothing did work: bodies start inside "
+                                  "something, or the motion is not to be trusted",
+                                  grown));
+    }
 
     void check_body(std::size_t b) {
         const SetUpBody& body = ready_.bodies[b];
@@ -286,6 +391,7 @@ private:
     std::vector<std::vector<Vec3f>> restored_;
     Recording recording_;
     std::map<std::size_t, std::size_t> lost_; ///< by body: the first frame that hold_lost met
+    float last_volume_ratio_ = 1;
     double film_seconds_ = 0, write_seconds_ = 0;
 };
 

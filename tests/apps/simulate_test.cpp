@@ -155,6 +155,63 @@ TEST_F(Simulate, OneRunWritesSeveralOutputs) {
     fails(2, words("drop.toml", {"--stop-at", "3", "-o", "x.fil"}), {"--save"});
 }
 
+TEST_F(Simulate, NothingGoesOverWhatIsReadOrOverAnotherOutput) {
+    ok({"make", "bar", "-o", "bar.ply", "--resolution", "4"});
+    ok({"strip", "bar.ply", "-o", "bar.fil", "--base", "40"});
+    const auto refuses = [&](const std::string& scene, const std::vector<std::string>& more) {
+        const std::string model = bytes_of(path("bar.fil")), toml = bytes_of(path(scene));
+        fails(2, words(scene, more), {"would be overwritten"});
+        EXPECT_EQ(bytes_of(path("bar.fil")), model);
+        EXPECT_EQ(bytes_of(path(scene)), toml);
+    };
+    write("model.toml", "[[body]]\nname = \"b\"\nmesh = \"bar.fil\"\nparticles = 100\n[simulation]\nframes = 1\n");
+    refuses("model.toml", {"-o", "bar.fil"});
+    refuses("model.toml", {"-o", "./bar.fil"});
+    refuses("model.toml", {"--save", "bar.fil"});
+    refuses("model.toml", {"--save", "model.toml"});
+    refuses("model.toml", {"-o", "x.fil", "--save", "x.fil"});
+    refuses("model.toml", {"-o", "x.fil", "-o", "./x.fil"});
+    refuses("model.toml", {"-o", "meshes/", "-o", "./meshes/"});
+    refuses("model.toml", {"-o", "./", "--save", "b_0001.ply"});
+    refuses("model.toml", {"-o", "f_%02d.png", "--save", "f_01.png"});
+    std::filesystem::create_symlink("bar.fil", path("link.fil"));
+    refuses("model.toml", {"-o", "link.fil"});
+    write("obstacle.toml", kDrop + "[[obstacle]]\nshape = \"mesh\"\nmesh = \"cube_0001.ply\"\n[[body]]\nshape = "
+                                   "\"bar\"\nname = \"two\"\n[[body]]\nmesh = \"bar.fil\"\nname = \"three\"\n");
+    ok({"make", "bar", "-o", "cube_0001.ply"});
+    refuses("obstacle.toml", {"-o", "."});
+    refuses("obstacle.toml", {"-o", "cube_0001.fil", "--save", "cube_0001.ply"});
+    refuses("obstacle.toml", {"-o", "x.fil", "--save", "x_two.fil"});
+    EXPECT_FALSE(std::filesystem::exists(path("x.fil")));
+    // A state that is gone on from may be renewed.
+    ok(words("model.toml", {"--save", "a.state"}));
+    ok(words("model.toml", {"--resume", "a.state", "--save", "a.state", "--frames", "2"}));
+}
+
+TEST_F(Simulate, WarnsOfMotionThatIsNotToBeTrusted) {
+    const auto warnings = [&](const std::string& scene, const std::vector<std::string>& more) {
+        write("warned.toml", scene);
+        return json(words("warned.toml", more))["warnings"].dump();
+    };
+    EXPECT_EQ(warnings(kDrop, {"--check"}), "[]");
+    const std::string bounce = kDrop + "[[obstacle]]\nshape = \"ball\"\ncentre = [9, 9, 9]\n";
+    EXPECT_EQ(warnings(bounce, {"--check", "--frames", "90"}), "[]");
+    // It starts deep inside the ground, which throws it out.
+    const std::string inside = "[[obstacle]]\nshape = \"ground\"\npoint = [0, 0.5, 0]\n";
+    EXPECT_NE(warnings(kDrop + inside, {"--check", "--frames", "30"}).find("energy grew"), std::string::npos);
+    const std::string pinned = "[[pin]]\nball = { centre = [0, 1, 0], radius = 0.2 }\n";
+    EXPECT_EQ(warnings(kDrop + inside + pinned, {"--check"}).find("energy grew"), std::string::npos);
+
+    std::string descent = kDrop;
+    descent.insert(descent.find("frames"), "mode = \"descent\"\n");
+    EXPECT_EQ(warnings(descent, {"--check"}), "[]");
+    const std::string hard = "[[obstacle]]\nshape = \"ball\"\ncentre = [9, 9, 9]\nrestitution = 1\n";
+    EXPECT_NE(warnings(descent + hard, {"--check"}).find("6 frames were computed by descent"), std::string::npos);
+    EXPECT_EQ(warnings(kDrop + hard, {"--check"}), "[]");
+    descent.insert(descent.find("young"), "internal_damping = 0.001\n");
+    EXPECT_NE(warnings(descent, {"--check"}).find("internal_damping"), std::string::npos);
+}
+
 TEST_F(Simulate, SeveralBodiesAreFilesOfTheirOwn) {
     write("two.toml", kDrop +
                           "[[body]]\nshape = \"bar\"\nresolution = 4\nlength = 2\nsize = 0.3\nparticles = 100\n"
@@ -281,6 +338,23 @@ TEST_F(Simulate, TheManualShowsEveryKey) {
     for (std::string line; std::getline(keys, line); ++lines)
         EXPECT_NE(manual.find(line + "\n"), std::string::npos) << "docs/scenes.md lacks: " << line;
     EXPECT_GT(lines, 90u);
+}
+
+TEST_F(Simulate, KeysThatDoNothingForAModelAreRefused) {
+    for (const std::string key : {"yield_stress", "creep_time", "temperature", "melting_from", "melting_to",
+                                  "viscosity", "heating", "conductivity"}) {
+        const std::string needle = "'" + key + "' in [[body]] is for model = \"meshfree\", and this body's is \"";
+        refused(kBody + key + " = 1\n", {"bad.toml:3: " + needle + "fem\"."});
+        refused(kBody + "material = \"lattice\"\n" + key + " = 1\n", {"bad.toml:4: " + needle + "springs\"."});
+        refused(kBody + "material = \"wax\"\nmodel = \"fem\"\n" + key + " = 1\n", {"bad.toml:5: " + needle});
+    }
+    refused(kBody + "bending = 0.1\n", {"bad.toml:3:", "'bending'", "\"springs\"", "\"fem\""});
+    refused(kBody + "material = \"clay\"\nbending = 0.1\n", {"bad.toml:4:", "'bending'", "\"meshfree\""});
+    refused(kBody + "material = \"lattice\"\npoisson_ratio = 0.25\n",
+            {"bad.toml:4:", "'poisson_ratio'", "\"fem\" or \"meshfree\"", "is \"springs\""});
+    // What a material brings along is left out without a word.
+    write("fem.toml", kBody + "resolution = 4\nparticles = 100\nmaterial = \"wax\"\nmodel = \"fem\"\n");
+    ok(words("fem.toml", {"--frames", "1", "--check"}));
 }
 
 TEST_F(Simulate, TheManualsDefaultsAreTheLibrarys) {
