@@ -3,6 +3,7 @@
 // Measured against a scalar loop of the same formula: `filigree bench restore`.
 #include "filigree/hierarchy/blend_kernel.h"
 
+#include "filigree/core/lanes.h"
 #include "filigree/core/parallel_for.h"
 
 #include <algorithm>
@@ -18,30 +19,12 @@ namespace filigree::blend_kernel {
 
 namespace {
 
-#define FILIGREE_INLINE inline __attribute__((always_inline))
-
-/// Types for N floats in a register; Loose and Short are for reading and writing anywhere.
-template <int N>
-struct LaneTypes;
-#define FILIGREE_LANE_TYPES(N)                                                                                         \
-    template <>                                                                                                        \
-    struct LaneTypes<N> {                                                                                              \
-        typedef float Float __attribute__((vector_size(N * 4)));                                                       \
-        typedef float Loose __attribute__((vector_size(N * 4), aligned(4), may_alias));                                \
-        typedef std::int32_t Int __attribute__((vector_size(N * 4)));                                                  \
-        typedef std::int16_t Short __attribute__((vector_size(N * 2), aligned(2), may_alias));                         \
-    };
-FILIGREE_LANE_TYPES(4)
-FILIGREE_LANE_TYPES(8)
-FILIGREE_LANE_TYPES(16)
-#undef FILIGREE_LANE_TYPES
-
 template <int N>
 struct Lanes : LaneTypes<N> {
     using typename LaneTypes<N>::Float;
     using typename LaneTypes<N>::Loose;
     using typename LaneTypes<N>::Int;
-    using typename LaneTypes<N>::Short;
+    typedef std::int16_t Short __attribute__((vector_size(N * 2), aligned(2), may_alias));
 
     static FILIGREE_INLINE Float load(const float* p) { return *reinterpret_cast<const Loose*>(p); }
     static FILIGREE_INLINE Float load(const std::int16_t* p) {
@@ -253,14 +236,7 @@ RestoreFunction restore_function(int lanes) {
 
 std::span<const int> lane_counts() {
     static constexpr int kCounts[] = {4, 8, 16};
-    std::size_t usable = 1;
-#if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx2")) usable = 2;
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq") &&
-        __builtin_cpu_supports("avx512bw"))
-        usable = 3;
-#endif
-    return std::span(kCounts).first(usable);
+    return std::span(kCounts).first(vector_width_count());
 }
 
 void restore(const Records& records, std::span<const VertexTransform> transforms, const Output& output,

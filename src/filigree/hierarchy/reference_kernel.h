@@ -5,6 +5,7 @@
 // operations in the same order and neither contracts nor reorders, so they give the same bytes on every processor.
 #pragma once
 
+#include "filigree/core/lanes.h"
 #include "filigree/hierarchy/law.h"
 
 #include <algorithm>
@@ -23,8 +24,6 @@ struct IntOf {
 };
 
 // Inlined into every clone of the loops, and so compiled for each processor.
-#define FILIGREE_INLINE inline __attribute__((always_inline))
-
 template <class F>
 struct Point {
     F x, y, z;

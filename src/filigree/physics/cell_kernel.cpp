@@ -8,6 +8,7 @@
 // There is no fused multiply-add (the build turns contraction off), so every width gives the same bytes.
 #include "filigree/physics/cell_kernel.h"
 
+#include "filigree/core/lanes.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/physics/vertex_block.h"
 
@@ -18,23 +19,6 @@
 namespace filigree::cell_kernel {
 
 namespace {
-
-#define FILIGREE_INLINE inline __attribute__((always_inline))
-
-/// Types for N floats in a register; Loose is for reading and writing anywhere.
-template <int N>
-struct LaneTypes;
-#define FILIGREE_LANE_TYPES(N)                                                                                         \
-    template <>                                                                                                        \
-    struct LaneTypes<N> {                                                                                              \
-        typedef float Float __attribute__((vector_size(N * 4)));                                                       \
-        typedef float Loose __attribute__((vector_size(N * 4), aligned(4), may_alias));                                \
-        typedef std::int32_t Int __attribute__((vector_size(N * 4)));                                                  \
-    };
-FILIGREE_LANE_TYPES(4)
-FILIGREE_LANE_TYPES(8)
-FILIGREE_LANE_TYPES(16)
-#undef FILIGREE_LANE_TYPES
 
 template <int N>
 struct Lanes : LaneTypes<N> {
@@ -696,14 +680,7 @@ Plan make_plan(const Body& body) {
 
 std::span<const int> lane_counts() {
     static constexpr int kCounts[] = {4, 8, 16};
-    std::size_t usable = 1;
-#if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx2")) usable = 2;
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq") &&
-        __builtin_cpu_supports("avx512bw"))
-        usable = 3;
-#endif
-    return std::span(kCounts).first(usable);
+    return std::span(kCounts).first(vector_width_count());
 }
 
 ElasticReport forces(const Plan& plan, const Vectors& positions, Vectors& forces, Sums& sums,

@@ -17,6 +17,7 @@
 // shear modulus (Maxwell): for slow motion a fluid of that viscosity.
 #include "filigree/physics/elasticity.h"
 
+#include "filigree/core/lanes.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/core/random.h"
 #include "filigree/physics/body.h"
@@ -32,8 +33,6 @@
 
 namespace filigree {
 namespace {
-
-#define FILIGREE_INLINE inline __attribute__((always_inline))
 
 constexpr std::size_t kGrain = 256, kBlock = 8; // particles; stresses are computed for kBlock at a time
 constexpr double kHourglass = 0.05;             // of mu V / h^2

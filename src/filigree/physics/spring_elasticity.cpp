@@ -15,6 +15,7 @@
 // Particles side by side along x share a stencil, and lanes are particles: the same sums in any vector width.
 #include "filigree/physics/elasticity.h"
 
+#include "filigree/core/lanes.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/physics/body.h"
 #include "filigree/physics/vertex_block.h"
@@ -27,8 +28,6 @@
 
 namespace filigree {
 namespace {
-
-#define FILIGREE_INLINE inline __attribute__((always_inline))
 
 constexpr double kSpringStiffness = 0.4; // of E h: gives Young's modulus E with axis and face springs alike
 // A cell pressed flat along an axis and through itself is held on the wrong side by its springs with up to 0.4 E per
@@ -178,20 +177,6 @@ std::array<Step, kStencil> make_steps(double spacing) {
 }
 
 // --- Lanes ---------------------------------------------------------------------------------------------------------
-
-template <int N>
-struct LaneTypes;
-#define FILIGREE_LANE_TYPES(N)                                                                                         \
-    template <>                                                                                                        \
-    struct LaneTypes<N> {                                                                                              \
-        typedef float Float __attribute__((vector_size(N * 4)));                                                       \
-        typedef float Loose __attribute__((vector_size(N * 4), aligned(4), may_alias));                                \
-        typedef std::int32_t Int __attribute__((vector_size(N * 4)));                                                  \
-    };
-FILIGREE_LANE_TYPES(4)
-FILIGREE_LANE_TYPES(8)
-FILIGREE_LANE_TYPES(16)
-#undef FILIGREE_LANE_TYPES
 
 /// 1 / sqrt(x) for x > 0 to float precision: a first guess from the exponent and three Newton steps.
 template <int N>
@@ -365,10 +350,8 @@ FILIGREE_KERNELS(avx512, 16, __attribute__((target("avx512f,avx512vl,avx512dq,av
 
 Kernels widest_kernels() {
 #if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq") &&
-        __builtin_cpu_supports("avx512bw"))
-        return {spring_forces_avx512, cell_volumes_avx512};
-    if (__builtin_cpu_supports("avx2")) return {spring_forces_avx2, cell_volumes_avx2};
+    if (vector_width_count() == 3) return {spring_forces_avx512, cell_volumes_avx512};
+    if (vector_width_count() == 2) return {spring_forces_avx2, cell_volumes_avx2};
 #endif
     return {spring_forces_plain, cell_volumes_plain};
 }

@@ -6,6 +6,7 @@
 // doubles with a bound on the error; what the bound leaves open is decided exactly.
 #include "filigree/sample/inside_rays.h"
 
+#include "filigree/core/lanes.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/sample/wide_tree.h"
 
@@ -17,8 +18,6 @@
 namespace filigree {
 
 namespace {
-
-#define FILIGREE_INLINE inline __attribute__((always_inline))
 
 typedef float Float8 __attribute__((vector_size(32)));
 typedef std::int32_t Int8 __attribute__((vector_size(32)));

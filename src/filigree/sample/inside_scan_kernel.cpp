@@ -6,6 +6,8 @@
 // by about two, so terms of second order need no care.
 #include "filigree/sample/inside_scan_kernel.h"
 
+#include "filigree/core/lanes.h"
+
 #include <algorithm>
 #include <atomic>
 #include <cassert>
@@ -16,8 +18,6 @@
 namespace filigree::scan_kernel {
 
 namespace {
-
-#define FILIGREE_INLINE inline __attribute__((always_inline))
 
 constexpr double kUnit = 0x1p-53;
 constexpr double kOrientError = 3.4e-16;      // of the permanent, for a determinant of differences [Shewchuk 1997]
@@ -583,14 +583,7 @@ FILIGREE_LOOPS(plain, 2, )
 
 std::span<const int> lane_counts() {
     static constexpr int kCounts[] = {2, 4, 8};
-    std::size_t usable = 1;
-#if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx2")) usable = 2;
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq") &&
-        __builtin_cpu_supports("avx512bw"))
-        usable = 3;
-#endif
-    return std::span(kCounts).first(usable);
+    return std::span(kCounts).first(vector_width_count());
 }
 
 Loops loops(int lanes) {

@@ -6,6 +6,7 @@
 // varies slowly away from them, so most blocks of points are decided at their centres.
 #include "filigree/sample/winding.h"
 
+#include "filigree/core/lanes.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/sample/inside_scan.h"
 #include "filigree/sample/wide_tree.h"
@@ -22,8 +23,6 @@
 namespace filigree {
 
 namespace {
-
-#define FILIGREE_INLINE inline __attribute__((always_inline))
 
 typedef float Float8 __attribute__((vector_size(32)));
 typedef std::int32_t Int8 __attribute__((vector_size(32)));
