@@ -5,6 +5,7 @@
 #include "filigree/mesh/triangulate.h"
 
 #include <algorithm>
+#include <cmath>
 
 #define XXH_INLINE_ALL
 #include <xxhash.h>
@@ -78,7 +79,8 @@ public:
         hash_.add(scene_.content);
         result_.bodies.reserve(scene_.bodies.size());
         for (const SceneBody& body : scene_.bodies) add_body(body);
-        for (const SceneObstacle& obstacle : scene_.obstacles) add_obstacle(obstacle);
+        choose_origin();
+        for (const SceneObstacle& obstacle : scene_.obstacles) add_obstacle(from_origin(obstacle));
         for (const ScenePin& pin : scene_.pins) add_pin(pin);
         for (const SceneForce& force : scene_.forces)
             result_.world.forces.push_back(
@@ -133,6 +135,42 @@ private:
         result_.bodies.push_back(std::move(body));
     }
 
+    /// The middle of the bodies where it is far from the world's origin, rounded so that taking it off is exact.
+    void choose_origin() {
+        constexpr double kFar = 100; // sizes of the scene
+        Box box;
+        for (std::size_t b = 0; b < result_.bodies.size(); ++b) {
+            const SetUpBody& body = result_.bodies[b];
+            const Box own = body_box(body);
+            const Vec3d middle = result_.actors[b].placement * (body.scale * own.centre());
+            const double reach = 0.5 * body.scale * own.diagonal();
+            box.extend(middle.array() - reach);
+            box.extend(middle.array() + reach);
+        }
+        if (!(box.centre().norm() > kFar * box.diagonal())) return;
+        const double step = std::exp2(std::ceil(std::log2(box.diagonal())));
+        result_.origin = step * (box.centre() / step).array().round();
+        for (Actor& actor : result_.actors) actor.placement.pretranslate(-result_.origin);
+    }
+
+    // What the file says in the world, as seen from the scene's origin.
+    void move_to_origin(std::optional<Vec3d>& point) const {
+        if (point) *point -= result_.origin;
+    }
+    SceneObstacle from_origin(SceneObstacle obstacle) const {
+        obstacle.ground.point -= result_.origin;
+        obstacle.ball.centre -= result_.origin;
+        obstacle.box.centre -= result_.origin;
+        move_to_origin(obstacle.centre);
+        move_to_origin(obstacle.motion.pivot);
+        return obstacle;
+    }
+    SceneRegion from_origin(SceneRegion region) const {
+        if (region.box) region.box = Box{region.box->min - result_.origin, region.box->max - result_.origin};
+        if (region.ball) region.ball->centre -= result_.origin;
+        return region;
+    }
+
     static RigidMotion motion_of(const SceneMotion& from, const Vec3d& middle) {
         RigidMotion motion;
         motion.centre = from.pivot.value_or(middle);
@@ -146,10 +184,12 @@ private:
         SetUpObstacle drawn;
         Vec3d middle = Vec3d::Zero();
         if (from.shape == "ground") {
-            obstacle.shape = from.ground;
             middle = from.ground.point;
+            HalfSpace plane = from.ground;
+            if (!result_.origin.isZero()) plane.point = plane.normal.dot(plane.point) * plane.normal; // what is nearest
+            obstacle.shape = plane;
             drawn.is_ground = true;
-            drawn.plane = from.ground;
+            drawn.plane = plane;
         } else if (from.shape == "ball") {
             obstacle.shape = from.ball;
             middle = from.ball.centre;
@@ -167,7 +207,7 @@ private:
             shape.field = std::make_shared<const DistanceField>(
                 require_at(scene_, from.line, DistanceField::create(mesh, from.scale, from.spacing, context())));
             const Vec3d own = from.scale * bounds(mesh.positions).centre();
-            middle = from.centre.value_or(own + from.scale * mesh.origin);
+            middle = from.centre.value_or(own + from.scale * mesh.origin - result_.origin);
             shape.offset = middle - own;
             obstacle.shape = shape;
             for (Vec3f& p : mesh.positions) p = (from.scale * p.cast<double>() + shape.offset).cast<float>();
@@ -184,7 +224,8 @@ private:
     }
 
     /// Particles of a region at the start; all where it names nothing.
-    std::vector<Index> particles_of(std::size_t number, const SceneRegion& region, unsigned line) const {
+    std::vector<Index> particles_of(std::size_t number, const SceneRegion& in_world, unsigned line) const {
+        const SceneRegion region = from_origin(in_world);
         const Actor& actor = result_.actors[number];
         const Body& body = *actor.body;
         std::vector<Index> chosen;
@@ -238,7 +279,9 @@ private:
         Vec3d middle = Vec3d::Zero();
         for (const Index i : pin.particles)
             middle += actor.placement * actor.body->rest[i].cast<double>() / double(pin.particles.size());
-        pin.motion = motion_of(from.motion, middle);
+        SceneMotion motion = from.motion;
+        move_to_origin(motion.pivot);
+        pin.motion = motion_of(motion, middle);
         result_.world.pins.push_back(std::move(pin));
     }
 
@@ -246,6 +289,8 @@ private:
         const SetUpBody& body = result_.bodies[from.body];
         const Mesh& mesh = body.model.mesh;
         Hand hand = from.hand;
+        hand.target.constant -= result_.origin;
+        for (Vec3d& target : hand.target.values) target -= result_.origin;
         if (from.vertex) {
             if (*from.vertex >= mesh.vertex_count())
                 fail_in_scene(scene_, from.line, ErrorCode::bad_file,
@@ -255,7 +300,8 @@ private:
         } else {
             const std::vector<Triangle> triangles = triangulate(mesh).triangles;
             const ClosestPointTree tree(mesh.positions, triangles);
-            const Vec3d at = result_.actors[from.body].placement.inverse() * *from.point / body.scale;
+            const Vec3d at =
+                result_.actors[from.body].placement.inverse() * (*from.point - result_.origin) / body.scale;
             hand.point = float(body.scale) * tree.closest(at.cast<float>()).position;
         }
         result_.world.hands.push_back(std::move(hand));

@@ -8,7 +8,7 @@ namespace filigree::cli {
 struct SetUpBody {
     std::string name;
     std::string mesh_path; ///< "" for a built-in shape
-    Model model;           ///< its origin is zero: poses say where it is
+    Model model;           ///< its origin is zero: poses say where it is, from the scene's
     double scale = 1;      ///< metres a model unit
     std::shared_ptr<const Body> body;
     BodyReport report;
@@ -27,6 +27,9 @@ struct SetUpObstacle {
 };
 
 struct SetUpScene {
+    /// Of everything below and of all that moves; not zero only where the bodies are far from the world's, so that
+    /// float keeps their digits.
+    Vec3d origin = Vec3d::Zero();
     std::vector<SetUpBody> bodies;
     std::vector<Actor> actors;
     World world;

@@ -170,6 +170,7 @@ public:
             for (const std::string& path : outputs_.films) session_.begin_writing(path);
             for (FilmWriter& film : films_) require(film.finish());
         }
+        for (SetUpBody& body : ready_.bodies) body.model.mesh.origin = ready_.origin;
         write_meshes();
         for (const std::string& path : outputs_.models)
             for (std::size_t b = 0; b < ready_.bodies.size(); ++b)
@@ -368,9 +369,11 @@ private:
             silent.progress = nullptr;
             for (std::size_t frame = 0; frame < files[0].size(); ++frame) {
                 session_.context().report("writing meshes", double(frame) / double(files[0].size()));
-                for (std::size_t b = 0; b < files.size(); ++b)
-                    session_.write_mesh(require(restorers_[b].mesh(recording_.poses[b].frames[frame], silent)),
-                                        files[b][frame]);
+                for (std::size_t b = 0; b < files.size(); ++b) {
+                    Mesh mesh = require(restorers_[b].mesh(recording_.poses[b].frames[frame], silent));
+                    mesh.origin = ready_.origin;
+                    session_.write_mesh(std::move(mesh), files[b][frame]);
+                }
             }
             session_.context().report("writing meshes", 1);
             folder.keep();

@@ -167,8 +167,8 @@ private:
         const ScenePicture& picture = scene_.picture;
         const double aspect = double(picture.width) / picture.height;
         if (picture.eye) {
-            camera_.eye = *picture.eye;
-            camera_.target = *picture.target;
+            camera_.eye = *picture.eye - ready_.origin;
+            camera_.target = *picture.target - ready_.origin;
             camera_.up = up_vector(picture.up);
             camera_.field_of_view_deg = picture.field_of_view;
             camera_.height = (camera_.eye - camera_.target).norm();

@@ -273,6 +273,47 @@ TEST_F(Simulate, ObstaclesPinsAndWindAct) {
     EXPECT_NEAR(pushed.centre().z(), 0.125 * 140.8 / mass, 0.003);
 }
 
+TEST_F(Simulate, FarFromTheOriginItMovesAsNearIt) {
+    // The same scene at the origin and at `at`, with everything that has a place.
+    const auto scene = [](const std::string& x) {
+        const auto point = [&](const std::string& y) { return "[" + x + ", " + y + ", 0]"; };
+        return "[simulation]\nframes = 20\n[[body]]\nname = \"cube\"\nshape = \"wavy-cube\"\nresolution = 8\n"
+               "particles = 200\ndriver = 60\nyoung_modulus = 5e4\nvelocity = [0, -3, 0]\ncentre = " +
+               point("0.62") +
+               "\n[[obstacle]]\nshape = \"ground\"\n[[obstacle]]\nshape = \"ball\"\nradius = 0.3\ncentre = " +
+               point("0") +
+               "\n[[obstacle]]\nshape = \"mesh\"\nmesh = \"shelf.ply\"\nscale = 0.2\ncentre = " + point("-0.1") +
+               "\n[[pin]]\nball = { centre = " + point("1.1") + ", radius = 0.3 }\npivot = " + point("1") +
+               "\nturn = [{ time = 0, value = [0, 0, 0] }, { time = 0.3, value = [0, 20, 0] }]\n" +
+               "[[hand]]\npoint = " + point("0") + "\ntarget = " + point("-0.2") + "\n[picture]\nsize = [64, 48]\n" +
+               "passes = 1\neye = [" + x + ", 2, 5]\ntarget = " + point("0.5") + "\n";
+    };
+    ok({"make", "bar", "-o", "shelf.ply", "--resolution", "4"});
+    write("near.toml", scene("0"));
+    write("far.toml", scene("131072"));
+    const bool films = has_opengl();
+    const auto outputs = [&](const std::string& name) {
+        std::vector<std::string> all = {"-o", name + ".fil", "-o", name + "/"};
+        if (films) all.insert(all.end(), {"-o", name + "_%02d.png"});
+        return all;
+    };
+    ok(words("near.toml", outputs("near")));
+    ok(words("far.toml", outputs("far")));
+    for (const std::string name : {"near", "far"}) ok({"restore", name + ".fil", "--frame", "21", "-o", name + ".ply"});
+    const Vec3d offset(131072, 0, 0);
+    for (const std::string file : {".ply", "/cube_0021.ply"}) {
+        const Mesh near = read_mesh(path("near" + file), kContext)->mesh,
+                   far = read_mesh(path("far" + file), kContext)->mesh;
+        ASSERT_EQ(near.vertex_count(), far.vertex_count());
+        for (std::size_t v = 0; v < near.vertex_count(); ++v)
+            ASSERT_LT((near.world_position(v) + offset - far.world_position(v)).norm(), 1e-3) << file << " " << v;
+    }
+    if (films) {
+        const Picture a = read_picture(path("near_21.png")).value(), b = read_picture(path("far_21.png")).value();
+        EXPECT_LT(picture_distance(a, b), 0.5);
+    }
+}
+
 TEST_F(Simulate, UnknownKeysGetLineAndSuggestion) {
     refused(kBody + "youngs_modulus = 1e5\n",
             {"bad.toml:3: unknown key 'youngs_modulus' in [[body]]; did you mean 'young_modulus'?"});
