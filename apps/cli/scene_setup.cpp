@@ -147,10 +147,22 @@ private:
             box.extend(middle.array() - reach);
             box.extend(middle.array() + reach);
         }
-        if (!(box.centre().norm() > kFar * box.diagonal())) return;
-        const double step = std::exp2(std::ceil(std::log2(box.diagonal())));
-        result_.origin = step * (box.centre() / step).array().round();
-        for (Actor& actor : result_.actors) actor.placement.pretranslate(-result_.origin);
+        if (box.centre().norm() > kFar * box.diagonal()) {
+            const double step = std::exp2(std::ceil(std::log2(box.diagonal())));
+            result_.origin = step * (box.centre() / step).array().round();
+            for (Actor& actor : result_.actors) actor.placement.pretranslate(-result_.origin);
+        }
+        for (std::size_t b = 0; b < result_.bodies.size(); ++b) warn_of_distance(b);
+    }
+
+    void warn_of_distance(std::size_t b) const {
+        constexpr double kMost = 1e4; // spacings: beyond, a float's last digits are seen in the strain
+        const SetUpBody& body = result_.bodies[b];
+        const Vec3d middle = result_.actors[b].placement * (body.scale * body_box(body).centre());
+        if (middle.norm() <= kMost * body.body->spacing()) return;
+        session_.warn(fmt::format("body '{}' is {:.3g} m from the scene's origin, too far for float positions of "
+                                  "particles {:.3g} m apart; bring the bodies nearer to each other by centre",
+                                  body.name, middle.norm(), body.body->spacing()));
     }
 
     // What the file says in the world, as seen from the scene's origin.

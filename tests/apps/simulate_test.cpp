@@ -202,6 +202,10 @@ TEST_F(Simulate, WarnsOfMotionThatIsNotToBeTrusted) {
     const std::string pinned = "[[pin]]\nball = { centre = [0, 1, 0], radius = 0.2 }\n";
     EXPECT_EQ(warnings(kDrop + inside + pinned, {"--check"}).find("energy grew"), std::string::npos);
 
+    const std::string apart = kDrop + "[[body]]\nshape = \"bar\"\nparticles = 100\nresolution = 4\ncentre = [";
+    EXPECT_EQ(warnings(apart + "500, 3, 0]\n", {"--check", "--frames", "1"}), "[]");
+    EXPECT_NE(warnings(apart + "1e5, 3, 0]\n", {"--check", "--frames", "1"}).find("body 'bar'"), std::string::npos);
+
     std::string descent = kDrop;
     descent.insert(descent.find("frames"), "mode = \"descent\"\n");
     EXPECT_EQ(warnings(descent, {"--check"}), "[]");
