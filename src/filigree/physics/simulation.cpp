@@ -152,7 +152,7 @@ public:
             return {};
         }
         std::vector<T> values(count);
-        std::memcpy(static_cast<void*>(values.data()), bytes_.data(), count * sizeof(T));
+        if (count > 0) std::memcpy(static_cast<void*>(values.data()), bytes_.data(), count * sizeof(T));
         bytes_.remove_prefix(count * sizeof(T));
         return values;
     }
