@@ -202,6 +202,12 @@ TEST_F(Simulate, WarnsOfMotionThatIsNotToBeTrusted) {
     const std::string pinned = "[[pin]]\nball = { centre = [0, 1, 0], radius = 0.2 }\n";
     EXPECT_EQ(warnings(kDrop + inside + pinned, {"--check"}).find("energy grew"), std::string::npos);
 
+    const std::string shot =
+        warnings("[[body]]\nshape = \"bar\"\nresolution = 4\nparticles = 200\nyoung_modulus = 1e3\n"
+                 "velocity = [0, -300, 0]\ncentre = [0, 1, 0]\n[[obstacle]]\nshape = \"ground\"\n",
+                 {"--check", "--frames", "3"});
+    EXPECT_NE(shot.find("motions of particles were not finite or had to be limited"), std::string::npos) << shot;
+    EXPECT_NE(shot.find("inside out at the end"), std::string::npos) << shot;
     const std::string apart = kDrop + "[[body]]\nshape = \"bar\"\nparticles = 100\nresolution = 4\ncentre = [";
     EXPECT_EQ(warnings(apart + "500, 3, 0]\n", {"--check", "--frames", "1"}), "[]");
     EXPECT_NE(warnings(apart + "1e5, 3, 0]\n", {"--check", "--frames", "1"}).find("body 'bar'"), std::string::npos);
