@@ -23,7 +23,7 @@ enum class StepMode { automatic, explicit_steps, descent };
 struct StepOptions {
     double frames_per_second = 60;
     StepMode mode = StepMode::automatic;
-    unsigned most_substeps = 256; ///< a descent frame costs as much as some 500 explicit substeps
+    unsigned most_substeps = 256; ///< a descent frame costs as much as some 120 explicit substeps
     unsigned descent_substeps = 4, descent_iterations = 8;
     bool contacts_between_bodies = true;
 };
