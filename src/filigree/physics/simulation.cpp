@@ -2,13 +2,13 @@
 
 #include "filigree/core/parallel_for.h"
 #include "filigree/core/random.h"
+#include "filigree/physics/byte_stream.h"
 #include "filigree/physics/contact.h"
 
 #include <Eigen/SVD>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstring>
 #include <optional>
 
 namespace filigree {
@@ -105,74 +105,6 @@ Mat3f bounded_stretch(const Mat3f& gradient) {
 }
 
 Error usage(std::string sentence) { return {ErrorCode::usage, std::move(sentence)}; }
-
-class ByteWriter {
-public:
-    template <class T>
-    void value(const T& value) {
-        bytes_.append(reinterpret_cast<const char*>(&value), sizeof value);
-    }
-    template <class T>
-    void array(std::span<const T> values) {
-        value(std::uint64_t(values.size()));
-        bytes_.append(reinterpret_cast<const char*>(values.data()), values.size_bytes());
-    }
-    void vectors(const Vectors& values) {
-        for (const std::vector<float>* array_of : {&values.x, &values.y, &values.z})
-            array(std::span(*array_of).first(values.size()));
-    }
-    std::string take() { return std::move(bytes_); }
-
-private:
-    std::string bytes_;
-};
-
-/// Reads what ByteWriter wrote; after anything that does not fit, ok() is false and values are empty.
-class ByteReader {
-public:
-    explicit ByteReader(std::string_view bytes) : bytes_(bytes) {}
-    bool ok() const { return ok_; }
-    bool at_end() const { return bytes_.empty(); }
-    template <class T>
-    T value() {
-        T value{};
-        if (bytes_.size() < sizeof value) {
-            ok_ = false;
-            return value;
-        }
-        std::memcpy(&value, bytes_.data(), sizeof value);
-        bytes_.remove_prefix(sizeof value);
-        return value;
-    }
-    template <class T>
-    std::vector<T> array() {
-        const std::uint64_t count = value<std::uint64_t>();
-        if (!ok_ || count > bytes_.size() / sizeof(T)) {
-            ok_ = false;
-            return {};
-        }
-        std::vector<T> values(count);
-        if (count > 0) std::memcpy(static_cast<void*>(values.data()), bytes_.data(), count * sizeof(T));
-        bytes_.remove_prefix(count * sizeof(T));
-        return values;
-    }
-    Vectors vectors(std::size_t count) {
-        Vectors values(count);
-        for (std::vector<float>* array_of : {&values.x, &values.y, &values.z}) {
-            const std::vector<float> read = array<float>();
-            if (read.size() != count) {
-                ok_ = false;
-                return values;
-            }
-            std::ranges::copy(read, array_of->begin());
-        }
-        return values;
-    }
-
-private:
-    std::string_view bytes_;
-    bool ok_ = true;
-};
 
 constexpr std::uint64_t kStateMagic = 0x31455441'54534c46; // "FLSTATE1"
 
