@@ -136,6 +136,7 @@ struct Simulation::Content {
     };
     Acting evaluate(double now, float travelled, float dt, FrameReport& report, const RunContext& context);
     void blow(double now, const RunContext& context);
+    Vec3f region_acceleration(const RegionForce& force, double now) const;
     float least_spacing() const;
     float most_speed(double now) const;
     Grip grip(const Hand& hand, const RunContext& context) const;
@@ -318,9 +319,7 @@ Simulation::Content::Acting Simulation::Content::evaluate(double now, float trav
     const Stopwatch watch(report.other_seconds);
     for (const RegionForce& force : world.forces) {
         BodyState& body = bodies[force.body];
-        double mass = 0;
-        for (const Index particle : force.particles) mass += double(body.body->mass[particle]);
-        const Vec3f acceleration = (force.force.at(now) / std::max(mass, 1e-30)).cast<float>();
+        const Vec3f acceleration = region_acceleration(force, now);
         for (const Index particle : force.particles)
             body.forces.add(particle, body.body->mass[particle] * acceleration);
     }
@@ -378,6 +377,12 @@ void Simulation::Content::blow(double now, const RunContext& context) {
         }
         wind_forces[b] = std::move(forces);
     }
+}
+
+Vec3f Simulation::Content::region_acceleration(const RegionForce& force, double now) const {
+    double mass = 0;
+    for (const Index particle : force.particles) mass += double(bodies[force.body].body->mass[particle]);
+    return (force.force.at(now) / std::max(mass, 1e-30)).cast<float>();
 }
 
 float Simulation::Content::least_spacing() const {
@@ -647,10 +652,8 @@ void Simulation::Content::descent_part(double from, double until, FrameReport& r
             std::vector<Vectors> outside(bodies.size());
             for (std::size_t b = 0; b < bodies.size(); ++b) outside[b] = Vectors(bodies[b].positions.size());
             for (const RegionForce& force : world.forces) {
-                double mass = 0;
-                for (const Index particle : force.particles) mass += double(bodies[force.body].body->mass[particle]);
-                for (const Index particle : force.particles)
-                    outside[force.body].add(particle, (force.force.at(now) / std::max(mass, 1e-30)).cast<float>());
+                const Vec3f acceleration = region_acceleration(force, now);
+                for (const Index particle : force.particles) outside[force.body].add(particle, acceleration);
             }
             for (std::size_t b = 0; b < bodies.size(); ++b) {
                 BodyState& body = bodies[b];

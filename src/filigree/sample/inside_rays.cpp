@@ -6,9 +6,9 @@
 // doubles with a bound on the error; what the bound leaves open is decided exactly.
 #include "filigree/sample/inside_rays.h"
 
-#include "filigree/core/lanes.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/sample/wide_tree.h"
+#include "filigree/sample/wide_tree_lanes.h"
 
 #include <algorithm>
 #include <bit>
@@ -18,12 +18,6 @@
 namespace filigree {
 
 namespace {
-
-typedef float Float8 __attribute__((vector_size(32)));
-typedef std::int32_t Int8 __attribute__((vector_size(32)));
-typedef float Float4 __attribute__((vector_size(16)));
-typedef double Double4 __attribute__((vector_size(32)));
-typedef std::int64_t Long4 __attribute__((vector_size(32)));
 
 // In units of 2^-24: rounding of the point (1), of the box (2), of their difference (2), and of the inverse direction
 // and the product (4 relative to at most 2 half sizes) move a plane by less than 13.
@@ -117,40 +111,6 @@ Ray make_ray(const Tree& tree, const Vec3d& point) {
         ray.far[i] = component > 0 ? 3 + i : i;
     }
     return ray;
-}
-
-FILIGREE_INLINE Float8 load8(const float* p) { return *reinterpret_cast<const Float8*>(p); }
-FILIGREE_INLINE Double4 load4(const float* p) {
-    return __builtin_convertvector(*reinterpret_cast<const Float4*>(p), Double4);
-}
-FILIGREE_INLINE Double4 absolute(Double4 x) { return x < 0 ? -x : x; }
-FILIGREE_INLINE Double4 larger(Double4 x, Double4 y) { return x > y ? x : y; }
-
-template <class T>
-FILIGREE_INLINE void prefetch(const T& object) {
-    for (std::size_t byte = 0; byte < sizeof(T); byte += 64)
-        __builtin_prefetch(reinterpret_cast<const char*>(&object) + byte);
-}
-
-/// A bit for each lane of a comparison. As an instruction, since the compiler makes twenty out of the same in C++, and
-/// its own function for it cannot be inlined into code for several processors.
-template <bool Avx2>
-FILIGREE_INLINE unsigned lane_bits(Int8 mask) {
-    unsigned bits = 0;
-    if constexpr (Avx2)
-        asm("vmovmskps %1, %0" : "=r"(bits) : "x"(mask));
-    else
-        for (int lane = 0; lane < 8; ++lane) bits |= (mask[lane] & 1u) << lane;
-    return bits;
-}
-template <bool Avx2>
-FILIGREE_INLINE unsigned lane_bits(Long4 mask) {
-    unsigned bits = 0;
-    if constexpr (Avx2)
-        asm("vmovmskpd %1, %0" : "=r"(bits) : "x"(mask));
-    else
-        for (int lane = 0; lane < 4; ++lane) bits |= static_cast<unsigned>(mask[lane] & 1) << lane;
-    return bits;
 }
 
 /// A bit for each child whose box the ray meets.

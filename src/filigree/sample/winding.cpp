@@ -6,10 +6,10 @@
 // varies slowly away from them, so most blocks of points are decided at their centres.
 #include "filigree/sample/winding.h"
 
-#include "filigree/core/lanes.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/sample/inside_scan.h"
 #include "filigree/sample/wide_tree.h"
+#include "filigree/sample/wide_tree_lanes.h"
 
 #include <algorithm>
 #include <atomic>
@@ -23,12 +23,6 @@
 namespace filigree {
 
 namespace {
-
-typedef float Float8 __attribute__((vector_size(32)));
-typedef std::int32_t Int8 __attribute__((vector_size(32)));
-typedef float Float4 __attribute__((vector_size(16)));
-typedef double Double4 __attribute__((vector_size(32)));
-typedef std::int64_t Long4 __attribute__((vector_size(32)));
 
 constexpr std::size_t kWidth = WideTree::kWidth, kLeafSize = WideTree::kLeafSize;
 constexpr std::uint32_t kLeaf = WideTree::kLeaf;
@@ -215,40 +209,6 @@ Tree make_tree(std::span<const Vec3f> positions, std::span<const Triangle> trian
 }
 
 // Asking it.
-
-template <class T>
-FILIGREE_INLINE void prefetch(const T& object) {
-    for (std::size_t byte = 0; byte < sizeof(T); byte += 64)
-        __builtin_prefetch(reinterpret_cast<const char*>(&object) + byte);
-}
-
-FILIGREE_INLINE Float8 load8(const float* p) { return *reinterpret_cast<const Float8*>(p); }
-FILIGREE_INLINE Double4 load4(const float* p) {
-    return __builtin_convertvector(*reinterpret_cast<const Float4*>(p), Double4);
-}
-FILIGREE_INLINE Double4 absolute(Double4 x) { return x < 0 ? -x : x; }
-FILIGREE_INLINE Double4 larger(Double4 x, Double4 y) { return x > y ? x : y; }
-FILIGREE_INLINE Double4 smaller(Double4 x, Double4 y) { return x < y ? x : y; }
-
-/// See inside_rays.cpp.
-template <bool Avx2>
-FILIGREE_INLINE unsigned lane_bits(Int8 mask) {
-    unsigned bits = 0;
-    if constexpr (Avx2)
-        asm("vmovmskps %1, %0" : "=r"(bits) : "x"(mask));
-    else
-        for (int lane = 0; lane < 8; ++lane) bits |= (mask[lane] & 1u) << lane;
-    return bits;
-}
-template <bool Avx2>
-FILIGREE_INLINE unsigned lane_bits(Long4 mask) {
-    unsigned bits = 0;
-    if constexpr (Avx2)
-        asm("vmovmskpd %1, %0" : "=r"(bits) : "x"(mask));
-    else
-        for (int lane = 0; lane < 4; ++lane) bits |= static_cast<unsigned>(mask[lane] & 1) << lane;
-    return bits;
-}
 
 // 1 / sqrt(x): a first guess from the exponent and Newton steps, each of which doubles the digits.
 FILIGREE_INLINE Float8 inverse_sqrt(Float8 x) {
