@@ -21,6 +21,7 @@
 #include "filigree/core/parallel_for.h"
 #include "filigree/core/random.h"
 #include "filigree/physics/body.h"
+#include "filigree/physics/byte_stream.h"
 #include "filigree/physics/mls_neighbours.h"
 #include "filigree/physics/plasticity.h"
 #include "filigree/physics/vertex_block.h"
@@ -29,7 +30,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 
 namespace filigree {
 namespace {
@@ -393,44 +393,31 @@ public:
 
     std::string state() const override {
         if (!flows_) return {};
-        std::string bytes;
-        const auto add = [&](const void* data, std::size_t size) {
-            bytes.append(static_cast<const char*>(data), size);
-        };
-        const std::size_t n = body_.particle_count();
-        const std::uint64_t count = n, wants = wants_renewal_;
-        add(&count, sizeof count);
-        add(&wants, sizeof wants);
-        for (const auto* axis : {&reference_.x, &reference_.y, &reference_.z}) add(axis->data(), n * sizeof(float));
-        add(stored_.data(), n * sizeof(Mat3f));
-        add(renewed_.data(), n * sizeof(Mat3f));
-        add(temperature_.data(), n * sizeof(float));
-        return bytes;
+        ByteWriter writer;
+        writer.value(std::uint64_t(wants_renewal_));
+        writer.vectors(reference_);
+        writer.array(std::span(stored_));
+        writer.array(std::span(renewed_));
+        writer.array(std::span(temperature_));
+        return writer.take();
     }
 
     bool restore_state(std::string_view bytes) override {
         const std::size_t n = body_.particle_count();
-        std::uint64_t count = 0, wants = 0;
-        constexpr std::size_t kEach = 4 * sizeof(float) + 2 * sizeof(Mat3f);
         if (bytes.empty()) return !flows_;
-        if (bytes.size() != sizeof count + sizeof wants + n * kEach) return false;
-        const auto take = [&](void* data, std::size_t size) {
-            std::memcpy(data, bytes.data(), size);
-            bytes.remove_prefix(size);
-        };
-        take(&count, sizeof count);
-        take(&wants, sizeof wants);
-        if (count != n || wants > 1) return false;
-        Vectors reference(n);
-        for (auto* axis : {&reference.x, &reference.y, &reference.z}) take(axis->data(), n * sizeof(float));
+        ByteReader reader(bytes);
+        const auto wants = reader.value<std::uint64_t>();
+        Vectors reference = reader.vectors(n);
+        std::vector<Mat3f> stored = reader.array<Mat3f>(), renewed = reader.array<Mat3f>();
+        std::vector<float> temperature = reader.array<float>();
+        if (!reader.ok() || !reader.at_end() || wants > 1 || stored.size() != n || renewed.size() != n ||
+            temperature.size() != n)
+            return false;
         for (std::size_t i = 0; i < n; ++i)
             if (!reference[i].allFinite()) return false;
-        stored_.resize(n);
-        renewed_.resize(n);
-        temperature_.resize(n);
-        take(static_cast<void*>(stored_.data()), n * sizeof(Mat3f));
-        take(static_cast<void*>(renewed_.data()), n * sizeof(Mat3f));
-        take(temperature_.data(), n * sizeof(float));
+        stored_ = std::move(stored);
+        renewed_ = std::move(renewed);
+        temperature_ = std::move(temperature);
         flows_ = true;
         wants_renewal_ = wants != 0;
         const bool is_renewed =
