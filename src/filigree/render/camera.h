@@ -23,6 +23,12 @@ struct Camera {
     /// Where a world point falls on a picture of that size, in pixels from the top left; z: distance along the view (a
     /// perspective has no place for points where it is not above 0).
     Vec3d project(const Vec3d& world, double width, double height) const;
+    /// The ray through a pixel (from the top left, fractions allowed): where it starts, and its unit direction. The
+    /// inverse of project.
+    struct Ray {
+        Vec3d origin, direction;
+    };
+    Ray ray(double x, double y, double width, double height) const;
 };
 
 /// The usual directions. With y up: front looks along -z, side along -x (from the right), top along -y, iso from the

@@ -42,9 +42,36 @@ struct PointOptions {
     std::span<const Vec4f> colors = {}; ///< empty or RGBA a point
 };
 
+/// Where a model's vertices are restored. gpu: in the vertex shader, nothing but the driver's pose is uploaded. cpu:
+/// positions and normals are uploaded with each pose; for software renderers, which would restore again in each pass.
+enum class RestoreOn { gpu, cpu };
+
+/// The processor's half of a drawable: all that needs no OpenGL, and so can be made in any thread while a window goes on
+/// drawing. Errors of both: unsuitable (nothing to draw), usage (no such level), cancelled.
+class DrawData {
+public:
+    static Result<DrawData> surface(const Mesh& mesh, const SurfaceOptions& options, const RunContext& context);
+    /// As Drawable::model. The model must outlive the data and the drawable; so must what the options point to.
+    static Result<DrawData> model(const Model& model, const RestoreOptions& restore, const SurfaceOptions& options,
+                                  RestoreOn where, const RunContext& context);
+    DrawData(DrawData&&) noexcept;
+    DrawData& operator=(DrawData&&) noexcept;
+    ~DrawData();
+
+    struct Content;
+
+private:
+    friend class Drawable;
+    explicit DrawData(std::unique_ptr<Content> content);
+    std::unique_ptr<Content> content_;
+};
+
 /// Something in GPU memory. Made and drawn with one OpenGL context current.
 class Drawable {
 public:
+    /// The graphics card's half: copies what was prepared. Errors: out_of_memory (graphics memory), unsupported.
+    static Result<Drawable> upload(DrawData data);
+
     /// Errors of all three: out_of_memory (graphics memory), unsuitable (nothing to draw), cancelled.
     static Result<Drawable> surface(const Mesh& mesh, const SurfaceOptions& options, const RunContext& context);
     static Result<Drawable> points(std::span<const Vec3f> positions, const Vec3d& origin, const PointOptions& options,
@@ -60,6 +87,11 @@ public:
 
     /// Models only. Errors: mismatch (the pose has another number of vertices than the driver).
     Status set_pose(const Pose& pose, const RunContext& context);
+    /// Models and surfaces: other colours by numbers, one a vertex of the level (of the mesh); none: no such colours.
+    /// Errors: mismatch (another number of values), out_of_memory.
+    Status set_scalars(const ScalarColors& scalars);
+    /// Points: moved, as many as before. Errors: mismatch.
+    Status set_positions(std::span<const Vec3f> positions);
 
     const Box& box() const; ///< of what is drawn, in the world; for a posed model not smaller than it
     std::size_t triangle_count() const;

@@ -29,6 +29,9 @@ struct Appearance {
     float edge_width = 1.2f; ///< pixels
     float gloss = 0.35f;     ///< 0 chalk .. 1 porcelain
     std::optional<ClipPlane> clip = {};
+    /// 0 .. 1: the part of its pixels that is drawn, chosen by a pattern that changes from pass to pass. An object with
+    /// f and another with -f (the complement) in the same place melt into each other: a change of level without a pop.
+    float coverage = 1;
 };
 
 struct SceneObject {
@@ -76,7 +79,11 @@ public:
     /// drawables must outlive the last add_pass. Errors of begin as of picture.
     Status begin(const Scene& scene, const Camera& camera, unsigned width, unsigned height, unsigned passes);
     bool add_pass();
-    void show(unsigned framebuffer) const;
+    /// x, y: where the picture's lower left corner goes, pixels; what lies around it stays.
+    void show(unsigned framebuffer, int x = 0, int y = 0) const;
+    /// One pass that stands for all, for what moves: no shadow maps, the sky's light by the normal alone, a soft contact
+    /// shadow on the ground left out. As bright as the whole picture. Errors as of begin. show() then shows it.
+    Status preview(const Scene& scene, const Camera& camera, unsigned width, unsigned height);
 
 private:
     struct Content;

@@ -1,0 +1,126 @@
+// What the studio works on: one state after the other, each a value, and the undo stack between them.
+#pragma once
+
+#include "filigree/deform/space_warp.h"
+#include "filigree/hierarchy/restore.h"
+#include "filigree/hierarchy/strip.h"
+#include "filigree/mesh/shapes.h"
+#include "filigree/mesh/topology.h"
+#include "filigree/physics/material.h"
+#include "filigree/render/surface_materials.h"
+
+#include <QObject>
+#include <QUndoStack>
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace filigree::studio {
+
+/// A mesh as it came and what is known of it. Never changes once made.
+struct Source {
+    Mesh mesh;
+    std::string path; ///< "" for a built-in shape
+    std::string name; ///< what the window calls it
+    std::vector<std::string> warnings;
+    TopologyReport topology;
+    SurfaceMaterials materials;
+};
+
+/// A built-in shape and its settings.
+struct Shape {
+    std::string name = "wavy-cube"; ///< one of shape_names()
+    ShapeOptions options;
+    bool operator==(const Shape&) const = default;
+};
+
+/// The five deformations, one after the other in this order, about the mesh's box at rest.
+struct Warps {
+    Axis axis = Axis::y;
+    double stretch = 1, squeeze = 1; ///< factors
+    double bend = 0, twist = 0;      ///< degrees
+    double taper = 1;                ///< factor
+    bool operator==(const Warps&) const = default;
+    bool none() const { return stretch == 1 && squeeze == 1 && bend == 0 && twist == 0 && taper == 1; }
+};
+
+/// Driver vertices that are put somewhere: moved together from where they are at rest. Not moved at all: a pin.
+struct Handle {
+    std::vector<Index> vertices;   ///< of the driver, ascending; in no other handle
+    std::vector<Vec3f> targets;    ///< one each: model units, relative to the mesh's origin, before the warps
+    bool pinned = false;           ///< by the user, and so shown as a pin
+    bool operator==(const Handle&) const = default;
+};
+
+enum class ObstacleChoice { none, ball, step, slope };
+
+/// How a body is made of the mesh, and the world it is put in. SI units.
+struct BodySettings {
+    std::string preset = "rubber"; ///< of named_materials(); "custom" once the material was changed by hand
+    Material material;             ///< starts as the preset's
+    std::size_t particles = 2000;  ///< about; the spacing follows
+    double size = 1;               ///< m, the longest side of the mesh's box
+    double drop = 0.5;             ///< m above the ground at the start
+    bool gravity = true, ground = true;
+    ObstacleChoice obstacle = ObstacleChoice::none;
+    double friction = 0.5, restitution = 0.5;
+    bool operator==(const BodySettings&) const;
+};
+
+/// Everything that is saved, undone and redone. Cheap to copy: what is large is shared and never changes.
+struct State {
+    std::shared_ptr<const Source> source;
+    std::optional<Shape> shape;                 ///< when the source is a built-in shape
+    StripOptions strip;                         ///< what the model was made with
+    StripReport strip_report;
+    std::shared_ptr<const Model> model;         ///< its mesh is the source's
+    RestoreOptions restore;                     ///< law and thin shell; level: the one shown, always set
+    Warps warps;
+    std::vector<Handle> handles;
+    std::shared_ptr<const Pose> handle_pose;    ///< the driver as the handles put it; null without handles
+    BodySettings body;
+    std::shared_ptr<const PoseSequence> recording; ///< of the driver, the first frame is the start; null: none
+
+    unsigned level() const { return *restore.level; }
+};
+
+/// The state and its history. Lives in the main thread.
+class Document : public QObject {
+    Q_OBJECT
+public:
+    explicit Document(QObject* parent = nullptr);
+
+    const State& state() const { return state_; }
+    QUndoStack& undo_stack() { return undo_stack_; }
+    const QUndoStack& undo_stack() const { return undo_stack_; }
+
+    /// The next state, as a step with that name in the history ("Bend"). Steps in a row with one `merge` key that is
+    /// not empty become one (a slider that is dragged), until end_merge().
+    void change(const QString& name, State next, const std::string& merge = {});
+    void end_merge() { ++merge_run_; }
+    /// A fresh start: no history, nothing unsaved.
+    void replace(State next);
+
+    bool is_modified() const { return !undo_stack_.isClean(); }
+    void set_saved() { undo_stack_.setClean(); }
+
+    /// Everything of the state as bytes: the model file with the recording, and all settings. For tests, and for
+    /// whoever wants to know whether two states are the same.
+    std::string bytes() const;
+
+Q_SIGNALS:
+    /// The state is another one now; what differs can be seen by comparing.
+    void changed(const State& before);
+
+private:
+    friend class StateChange; ///< the undo command
+    void go_to(const State& next);
+
+    State state_;
+    QUndoStack undo_stack_;
+    unsigned merge_run_ = 0;
+};
+
+} // namespace filigree::studio

@@ -1,0 +1,94 @@
+// A body in motion: the simulation in a thread of its own, and the recording it leaves.
+#pragma once
+
+#include "document.h"
+
+#include "filigree/physics/simulation.h"
+
+#include <QElapsedTimer>
+#include <QTimer>
+
+namespace filigree::studio {
+
+/// What stands around a body, to be drawn: meshes in model units, relative to the model's origin.
+struct Surroundings {
+    std::vector<Mesh> obstacles;
+    bool has_ground = false;
+    double ground_level = 0; ///< model units along `up`, relative to the model's origin
+};
+
+/// A body that is ready to move. Shared, and never changes.
+struct MadeBody {
+    std::shared_ptr<const Model> model;
+    std::shared_ptr<const Body> body;
+    BodyReport report;
+    double scale = 1; ///< metres a model unit
+    World world;      ///< metres, relative to the model's origin times the scale
+    Surroundings surroundings;
+};
+/// Errors: as make_body, in words.
+Result<std::shared_ptr<const MadeBody>> make_body_of(const State& state, const Vec3d& up, const RunContext& context);
+
+/// One moment of a body, in model units relative to the model's origin.
+struct Moment {
+    std::size_t frame = 0; ///< frames since the start; 0 is the start
+    Pose pose;             ///< of the driver, with gradients
+    std::vector<Vec3f> particles;
+    std::vector<Vec3f> full; ///< every vertex as the particles carry it; only when asked for
+    FrameReport report;
+    double milliseconds = 0; ///< of the simulation and the driver together
+};
+
+/// Lives in the main thread.
+class Playback : public QObject {
+    Q_OBJECT
+public:
+    explicit Playback(QObject* parent = nullptr);
+    ~Playback() override; ///< stops, wherever it is
+
+    /// A body at its start. Replaces whatever was there.
+    void put(std::shared_ptr<const MadeBody> made);
+    void remove();
+    bool has_body() const { return made_ != nullptr; }
+    std::shared_ptr<const MadeBody> made() const { return made_; }
+
+    void play();  ///< from the last frame simulated, as fast as 60 frames a second
+    void pause();
+    void step();  ///< one frame
+    void reset(); ///< to the start; the recording is emptied
+    bool is_playing() const { return is_playing_; }
+    /// Returns when the frames asked for by play() or step() so far have been delivered, or after `frames` more.
+    void wait_for_frames(std::size_t frames);
+
+    /// Takes hold of a point of the surface (at rest, model units relative to the origin) and pulls it to `target` (as
+    /// now). Plays, if it did not.
+    void grab(const Vec3f& rest_point, const Vec3d& target);
+    void pull(const Vec3d& target);
+    void let_go();
+    bool is_grabbed() const { return is_grabbed_; }
+
+    /// Every vertex with each moment (split view, errors): dearer.
+    void want_full(bool wanted);
+
+    /// The latest moment delivered; null without a body.
+    const Moment* moment() const { return moment_.get(); }
+    /// Poses since the start, the first is the start itself; grows by a frame a moment.
+    const PoseSequence& recording() const { return recording_; }
+
+Q_SIGNALS:
+    void moved();         ///< another moment
+    void state_changed(); ///< body there or not, playing or not
+    void failed(const Error& error);
+
+private:
+    struct Worker;
+    void deliver();
+
+    std::shared_ptr<const MadeBody> made_;
+    std::unique_ptr<Moment> moment_;
+    PoseSequence recording_;
+    bool is_playing_ = false, is_grabbed_ = false;
+    std::unique_ptr<Worker> worker_;
+};
+
+} // namespace filigree::studio

@@ -1,0 +1,20 @@
+// Scripts drive the window as a user does: actions, controls and the mouse, a line each (docs/studio.md).
+#pragma once
+
+#include "window.h"
+
+#include <filesystem>
+
+namespace filigree::studio {
+
+/// Runs a script line by line; paths in it are relative to its folder. Errors: not_found, bad_file ("tour.txt:7: ..."),
+/// and whatever a command of it ends with.
+Status run_script(const std::filesystem::path& path, MainWindow& window);
+
+/// The window as a picture, at its own scale, when all passes are drawn. Errors: unwritable.
+Status save_screenshot(const std::filesystem::path& path, MainWindow& window);
+
+/// Waits until no job runs and the picture is whole, handling events. False after `seconds`.
+bool wait_until_still(MainWindow& window, double seconds);
+
+} // namespace filigree::studio

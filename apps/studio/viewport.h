@@ -1,0 +1,59 @@
+// The picture in the middle: draws the document, turns with the mouse, and lets the mouse pull it.
+#pragma once
+
+#include "workbench.h"
+
+#include <QOpenGLWidget>
+
+namespace filigree::studio {
+
+/// What the last pictures took and showed, for the status bar.
+struct Timings {
+    double driver = 0, restore = 0, draw = 0; ///< milliseconds; restore: 0 where the vertex shader does it
+    double frames_per_second = 0;             ///< drawn, while things move
+    std::size_t vertices = 0, triangles = 0;  ///< of the mesh as drawn
+    unsigned level = 0;                       ///< drawn; may be coarser than the document's
+    std::string renderer;                     ///< what OpenGL calls itself
+};
+
+class Viewport : public QOpenGLWidget {
+    Q_OBJECT
+public:
+    explicit Viewport(Workbench& workbench, QWidget* parent = nullptr);
+    ~Viewport() override;
+
+    const Timings& timings() const;
+    /// Looks from a direction and shows all; with the animation off at once.
+    void look_from(View view);
+    void show_all();
+    /// Draws all passes at once: for screenshots. Blocks.
+    void finish_drawing();
+    /// The sentence shown instead of a picture; "" when all is well.
+    const std::string& trouble() const;
+    /// World position under a point of the widget (device-independent pixels) and the vertex nearest to it; none beside.
+    struct Picked {
+        Vec3d at;
+        Index vertex; ///< of the finest mesh
+    };
+    std::optional<Picked> pick(const QPointF& point);
+
+Q_SIGNALS:
+    void timings_changed();
+
+protected:
+    void initializeGL() override;
+    void paintGL() override;
+    void resizeGL(int width, int height) override;
+    void mousePressEvent(QMouseEvent* event) override;
+    void mouseMoveEvent(QMouseEvent* event) override;
+    void mouseReleaseEvent(QMouseEvent* event) override;
+    void mouseDoubleClickEvent(QMouseEvent* event) override;
+    void wheelEvent(QWheelEvent* event) override;
+    void leaveEvent(QEvent* event) override;
+
+private:
+    struct Content;
+    std::unique_ptr<Content> content_;
+};
+
+} // namespace filigree::studio

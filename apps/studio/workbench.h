@@ -1,0 +1,123 @@
+// The studio without its window: everything a user can do, as functions. Panels, actions, mouse and scripts call these.
+#pragma once
+
+#include "deformation.h"
+#include "document.h"
+#include "jobs.h"
+#include "playback.h"
+#include "view.h"
+
+#include "filigree/mesh/mesh_distance.h"
+
+namespace filigree::studio {
+
+/// Which pose of the driver is shown: the deformation, or the body's motion.
+enum class Mode { deform, body };
+
+struct FilmSettings {
+    unsigned width = 960, height = 720, passes = 8;
+};
+
+class Workbench : public QObject {
+    Q_OBJECT
+public:
+    explicit Workbench(QObject* parent = nullptr);
+    ~Workbench() override;
+
+    Document& document() { return document_; }
+    const State& state() const { return document_.state(); }
+    Jobs& jobs() { return jobs_; }
+    Playback& playback() { return playback_; }
+    ViewState& view() { return view_; }
+    Mode mode() const { return mode_; }
+    void set_mode(Mode mode);
+
+    // Files. All in the background; errors come through told().
+    void open(const std::string& path);             ///< mesh or model, told by the content; history starts anew
+    void save_model(const std::string& path);       ///< .fil with the recording; the document counts as saved
+    void save_mesh(const std::string& path);        ///< the level shown, as it is posed now
+    void save_driver(const std::string& path);      ///< as posed, with gradients
+    void export_meshes(const std::string& pattern); ///< a mesh a frame of the recording, "frame_%04d.obj"
+    void export_film(const std::string& path, const FilmSettings& settings); ///< of the recording, by the view's camera
+
+    // Model
+    void make_shape(const Shape& shape, const std::string& merge = {});
+    // Detail
+    void set_strip(const StripOptions& options, const std::string& merge = {}); ///< strips again
+    void set_level(unsigned level, const std::string& merge = {});
+    void remove_detail(); ///< one level coarser
+    void add_detail();    ///< one level finer
+    void set_law(std::optional<Law> law);
+    void set_thin_shell(bool thin);
+    // Deform
+    void set_warps(const Warps& warps, const std::string& merge = {});
+    void reset_deformation(); ///< warps and handles
+    void pin(std::span<const Index> driver_vertices);
+    void unpin(std::span<const Index> driver_vertices);
+    void unpin_all();
+    /// Pulls a point of the surface (vertex of the finest mesh). Points are in the world, as shown. In body mode the body
+    /// is grabbed instead.
+    void begin_pull(Index vertex, const Vec3d& at);
+    void pull_to(const Vec3d& target);
+    void end_pull();
+    bool is_pulling() const { return is_pulling_; }
+    // Body
+    void set_body(const BodySettings& settings, const std::string& merge = {}); ///< a body that was made is made again
+    void make_body();
+    void play(); ///< replays from the frame shown, then goes on simulating; makes the body where there is none
+    void pause();
+    void step();
+    void reset();
+    void animate(); ///< the report's button: drops the mesh as rubber on the ground and plays
+    bool is_playing() const;
+    // Timeline
+    std::size_t frame_count() const;    ///< recorded frames, the start included; 0: none
+    std::size_t frame() const;          ///< shown, 0 .. frame_count() - 1
+    void go_to_frame(std::size_t frame);
+
+    /// Measures what is shown against the full deformation, in the background; error_measured() tells.
+    void measure_error();
+    const std::optional<VertexDistance>& error() const { return error_; } ///< of the pose shown, if it was measured
+
+    /// The driver's pose as shown; null: at rest. It stays until the next pose_changed().
+    const Pose* pose() const { return pose_.positions.empty() ? nullptr : &pose_; }
+    /// All vertices of the finest mesh as fully deformed, if known for the pose shown; empty else. The split view and
+    /// the error's colours ask for it by want_full.
+    std::span<const Vec3f> full() const { return full_; }
+    void want_full(bool wanted);
+    double driver_milliseconds() const { return driver_milliseconds_; }
+
+    /// Makes points inside the mesh at rest (model units, relative to its origin); inside_points_ready() tells.
+    void sample_inside_points(std::size_t count);
+    std::span<const Vec3f> inside_points() const { return inside_points_; }
+
+    void wait_until_idle(); ///< no job, no drag: for tests and scripts
+
+Q_SIGNALS:
+    void pose_changed();
+    void full_changed();
+    void mode_changed();
+    void timeline_changed(); ///< playing, frame, frame count
+    void error_measured();
+    void inside_points_ready();
+    void opened();           ///< another mesh or model than before
+    void told(const QString& sentence, bool is_error); ///< for the window's message bar
+
+private:
+    void show_pose();
+
+    Document document_;
+    Jobs jobs_;
+    Playback playback_;
+    ViewState view_;
+    HandleDrag drag_;
+    Mode mode_ = Mode::deform;
+    Pose pose_;
+    std::vector<Vec3f> full_, inside_points_;
+    std::optional<VertexDistance> error_;
+    double driver_milliseconds_ = 0;
+    bool is_pulling_ = false, wants_full_ = false;
+    std::size_t frame_ = 0;
+};
+
+} // namespace filigree::studio
