@@ -1,7 +1,6 @@
 // What the demo shows: one picture of the whole job, and a film of it.
 #pragma once
 
-#include "film.h"
 #include "stage.h"
 
 #include "filigree/hierarchy/restore.h"

@@ -1,4 +1,3 @@
-#include "film.h"
 #include "page.h"
 #include "restore_options.h"
 #include "stage.h"
@@ -102,7 +101,7 @@ struct Subject {
     std::optional<Model> model; ///< the drawable refers to it
     PoseSequence poses;         ///< of the model's file
     Mesh mesh;                  ///< as it is drawn; for a model the rest shape of its level
-    LoadedMaterials materials;
+    SurfaceMaterials materials;
     std::vector<float> scalars; ///< one a vertex, or empty
     std::string scalar_title;
     std::optional<Restorer> restorer; ///< of the level, where there are poses
@@ -172,16 +171,6 @@ std::unique_ptr<Subject> Rendering::read(const std::string& path) {
     return subject;
 }
 
-std::vector<float> levels_of_removal(const Model& model, unsigned level) {
-    std::vector<float> levels(model.mesh.vertex_count(), static_cast<float>(model.finest_level()));
-    for (unsigned k = model.finest_level(); k-- > 0;)
-        for (Index v : model.levels[k].vertices) levels[v] = static_cast<float>(k);
-    if (level == model.finest_level()) return levels;
-    std::vector<float> chosen;
-    for (Index v : model.levels[level].vertices) chosen.push_back(levels[v]);
-    return chosen;
-}
-
 void Rendering::choose_scalars(Subject& subject, const std::string& path) {
     const std::string& name = options_.scalar;
     if (name.empty()) return;
@@ -189,8 +178,7 @@ void Rendering::choose_scalars(Subject& subject, const std::string& path) {
     if (name == "level") {
         if (!subject.model)
             refuse("--scalar level shows at which level of a model each vertex comes in, and " + path + " is a mesh.");
-        subject.scalars =
-            levels_of_removal(*subject.model, options_.restore.level.value_or(subject.model->finest_level()));
+        subject.scalars = vertex_levels(*subject.model, options_.restore.level.value_or(subject.model->finest_level()));
     } else if (name == "error" || name == "strain") {
         if (!against_) refuse("--scalar " + name + " is against another mesh; name it with --against MESH.");
         if (name == "strain") {

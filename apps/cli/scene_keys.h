@@ -1,7 +1,7 @@
 // Every key of a scene file in one table: what the reader checks by and what docs/scenes.md shows.
 #pragma once
 
-#include "filigree/physics/material.h"
+#include "filigree/physics/named_materials.h"
 
 #include <limits>
 #include <span>
@@ -31,12 +31,6 @@ const KeyRule* find_key(std::string_view table, std::string_view key);
 /// "[[body]]" or "[world]".
 std::string shown_table(std::string_view table);
 bool is_list(std::string_view table); ///< one of those that may come several times
-
-struct NamedMaterial {
-    std::string_view name, text;
-    Material material;
-};
-std::span<const NamedMaterial> named_materials();
 
 /// What of a number is allowed, as words: "above 0", "0 to 1"; "" for anything.
 std::string range_text(const KeyRule& rule);

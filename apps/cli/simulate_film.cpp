@@ -70,7 +70,7 @@ public:
 private:
     struct ShownBody {
         const SetUpBody* body;
-        LoadedMaterials materials;
+        SurfaceMaterials materials;
         RestoreOptions restore;
         std::optional<Drawable> drawable;
         float ball_radius = 0;

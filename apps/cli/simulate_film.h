@@ -1,7 +1,6 @@
 // Films of scenes: all bodies restored on the GPU, obstacles and the ground, from one camera.
 #pragma once
 
-#include "film.h"
 #include "simulate_recording.h"
 #include "stage.h"
 

@@ -1,7 +1,6 @@
 #include "stage.h"
 
 #include "filigree/io/file.h"
-#include "filigree/io/material_file.h"
 
 #include <algorithm>
 #include <cctype>
@@ -17,23 +16,9 @@ Picture Stage::take(const Scene& scene, const Camera& camera, const PictureOptio
     return require(renderer_.picture(scene, camera, options, session_.context()));
 }
 
-LoadedMaterials load_materials(const Mesh& mesh, const std::string& path, Session& session) {
-    LoadedMaterials loaded;
-    if (mesh.materials.empty()) return loaded;
-    const Materials found = read_materials(mesh, path);
-    for (const std::string& warning : found.warnings) session.warn(warning);
-    std::map<std::filesystem::path, const Picture*> known;
-    for (const Material& material : found.materials) {
-        SurfaceMaterial& surface = loaded.materials.emplace_back(SurfaceMaterial{material.color, nullptr});
-        if (material.picture.empty() || mesh.uvs.empty()) continue;
-        if (!known.contains(material.picture)) {
-            Result<Picture> picture = read_picture(material.picture);
-            if (!picture) session.warn(picture.error().message);
-            if (picture) loaded.pictures.push_back(std::make_unique<Picture>(std::move(*picture)));
-            known[material.picture] = picture ? loaded.pictures.back().get() : nullptr;
-        }
-        surface.picture = known[material.picture];
-    }
+SurfaceMaterials load_materials(const Mesh& mesh, const std::string& path, Session& session) {
+    SurfaceMaterials loaded = load_surface_materials(mesh, path);
+    for (const std::string& warning : loaded.warnings) session.warn(warning);
     return loaded;
 }
 
@@ -73,18 +58,6 @@ void write_picture(const Picture& picture, const std::string& path, Session& ses
     const std::string bytes = encode_png(picture);
     const std::string_view piece = bytes;
     require(write_file(path, std::span(&piece, 1)));
-}
-
-HeatMap heat_map(std::vector<float> values, double diagonal) {
-    HeatMap map{std::move(values), {}};
-    if (diagonal > 0)
-        for (float& value : map.values) value = static_cast<float>(value / diagonal);
-    std::vector<float> lower(map.values); // a few outliers would leave everything else dark
-    const auto place = lower.begin() + std::ptrdiff_t(0.995 * double(lower.size()));
-    if (place < lower.end()) std::nth_element(lower.begin(), place, lower.end());
-    if (place < lower.end() && *place > 0) lower.erase(place + 1, lower.end());
-    map.range = legend_range(lower, true);
-    return map;
 }
 
 } // namespace filigree::cli

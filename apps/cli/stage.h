@@ -3,8 +3,10 @@
 
 #include "session.h"
 
+#include "filigree/render/film.h"
 #include "filigree/render/gl_context.h"
 #include "filigree/render/renderer.h"
+#include "filigree/render/surface_materials.h"
 
 namespace filigree::cli {
 
@@ -23,12 +25,8 @@ private:
     Renderer renderer_;
 };
 
-/// A mesh's colours and textures from the libraries it names, which have to outlive its upload.
-struct LoadedMaterials {
-    std::vector<SurfaceMaterial> materials;
-    std::vector<std::unique_ptr<Picture>> pictures;
-};
-LoadedMaterials load_materials(const Mesh& mesh, const std::string& path, Session& session);
+/// As load_surface_materials; its warnings are said.
+SurfaceMaterials load_materials(const Mesh& mesh, const std::string& path, Session& session);
 
 /// "#d04030", sRGB; otherwise a Failure that names the option.
 Vec3f parse_color(const std::string& text, const std::string& option);
@@ -43,13 +41,5 @@ void check_picture_path(const std::string& path);
 
 /// Writes a picture as PNG. Progress, cancelling and messages are the session's.
 void write_picture(const Picture& picture, const std::string& path, Session& session);
-
-/// Errors as colours: dark is none. `values` in model units become fractions of `diagonal`; the range covers 99.5 % of
-/// them, and what is above has the brightest colour.
-struct HeatMap {
-    std::vector<float> values;
-    ValueRange range;
-};
-HeatMap heat_map(std::vector<float> values, double diagonal);
 
 } // namespace filigree::cli

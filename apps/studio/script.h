@@ -7,12 +7,18 @@
 
 namespace filigree::studio {
 
+/// What has to be set before the QApplication is made: its name, and the kind of OpenGL.
+void prepare_application();
+
 /// Runs a script line by line; paths in it are relative to its folder. Errors: not_found, bad_file ("tour.txt:7: ..."),
 /// and whatever a command of it ends with.
 Status run_script(const std::filesystem::path& path, MainWindow& window);
 
 /// The window as a picture, at its own scale, when all passes are drawn. Errors: unwritable.
 Status save_screenshot(const std::filesystem::path& path, MainWindow& window);
+
+/// Makes the body and simulates so many frames. Errors: whatever the body ends with.
+Status simulate_frames(unsigned frames, MainWindow& window);
 
 /// Waits until no job runs and the picture is whole, handling events. False after `seconds`.
 bool wait_until_still(MainWindow& window, double seconds);

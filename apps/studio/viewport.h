@@ -26,6 +26,8 @@ public:
     /// Looks from a direction and shows all; with the animation off at once.
     void look_from(View view);
     void show_all();
+    /// What is to be shown is there, and drawn at least once (or there is trouble).
+    bool is_ready() const;
     /// Draws all passes at once: for screenshots. Blocks.
     void finish_drawing();
     /// The sentence shown instead of a picture; "" when all is well.

@@ -28,6 +28,8 @@ public:
 
     void show_message(const QString& sentence, bool is_error); ///< in the window's message bar
     QString message() const;                                   ///< what stands there; "" when it is hidden
+    QString last_error() const;                                ///< the last error told; "" for none
+    void clear_last_error();
 
 protected:
     void closeEvent(QCloseEvent* event) override;

@@ -32,19 +32,19 @@ protected:
     void write(const std::string& name, const std::string& bytes) const {
         std::ofstream(folder_ / name, std::ios::binary) << bytes;
     }
-    Materials read(const std::vector<std::string>& names, const std::vector<std::string>& libraries) const {
+    MeshMaterials read(const std::vector<std::string>& names, const std::vector<std::string>& libraries) const {
         Mesh mesh;
         mesh.materials.names = names;
         mesh.material_files = libraries;
-        const Materials materials = read_materials(mesh, folder_ / "mesh.obj");
+        const MeshMaterials materials = read_materials(mesh, folder_ / "mesh.obj");
         EXPECT_EQ(materials.materials.size(), names.size());
         for (std::size_t i = 0; i < names.size(); ++i) EXPECT_EQ(materials.materials[i].name, names[i]);
         return materials;
     }
     /// The material "m" of a library with these lines in it.
-    Material material(const std::string& lines) {
+    MeshMaterial material(const std::string& lines) {
         write("m.mtl", "newmtl m\n" + lines);
-        const Materials result = read({"m"}, {"m.mtl"});
+        const MeshMaterials result = read({"m"}, {"m.mtl"});
         warnings_ = result.warnings;
         return result.materials.at(0);
     }
@@ -63,7 +63,7 @@ protected:
     std::vector<std::string> warnings_;
 };
 
-void expect_color(const Material& material, const Vec3f& color) {
+void expect_color(const MeshMaterial& material, const Vec3f& color) {
     EXPECT_LT((material.color - color).norm(), 1e-6f) << material.color.transpose();
 }
 
@@ -73,7 +73,7 @@ TEST_F(MaterialFile, ColorsAndPicturesComeInTheMeshsOrder) {
     write("paint.mtl", "# made by hand\nKd 1 1 1\n\nnewmtl red paint\nNs 10\nKa 0 1 0\n\tKd\t1 0.25 0 # warm\nillum 2\n"
                        "newmtl unused\nKd 0 1 0\nmap_Kd missing.png\nnewmtl wood\nKd .5 .5 .5\nmap_Kd wood.png\n"
                        "map_Bump missing.png\nnewmtl red paint\nKd 0 0 1\n");
-    const Materials result = read({"wood", "red paint"}, {"paint.mtl"});
+    const MeshMaterials result = read({"wood", "red paint"}, {"paint.mtl"});
     EXPECT_TRUE(result.warnings.empty()) << testing::PrintToString(result.warnings);
     expect_color(result.materials[0], {0.5f, 0.5f, 0.5f});
     EXPECT_EQ(result.materials[0].picture, folder_ / "wood.png");
@@ -84,7 +84,7 @@ TEST_F(MaterialFile, ColorsAndPicturesComeInTheMeshsOrder) {
 TEST_F(MaterialFile, LineEndsOfEverySystemAreRead) {
     for (const std::string end : {"\n", "\r\n", "\r"}) {
         write("m.mtl", "newmtl m" + end + "Kd 1 0 0" + end + "map_Kd wood.png" + end);
-        const Materials result = read({"m"}, {"m.mtl"});
+        const MeshMaterials result = read({"m"}, {"m.mtl"});
         expect_color(result.materials[0], {1, 0, 0});
         EXPECT_EQ(result.materials[0].picture, folder_ / "wood.png");
         EXPECT_TRUE(result.warnings.empty());
@@ -96,7 +96,7 @@ TEST_F(MaterialFile, LibrariesMayHaveBlanksOrShareALineOrAFolder) {
     write("a.mtl", "newmtl a\nKd 0 1 0\n");
     write("b.mtl", "newmtl b\nKd 0 0 1\n");
     write("textures/t.mtl", "newmtl t\nmap_Kd oak 1.png\nnewmtl up\nmap_Kd ..\\wood.png\n");
-    const Materials result =
+    const MeshMaterials result =
         read({"blank", "b", "a", "t", "up"}, {"a b.mtl", "a.mtl \t b.mtl", "a.mtl", "\"textures\\t.mtl\""});
     EXPECT_TRUE(result.warnings.empty()) << testing::PrintToString(result.warnings);
     expect_color(result.materials[0], {1, 0, 0});
@@ -148,7 +148,7 @@ TEST_F(MaterialFile, NothingOutsideOfTheFolderIsRead) {
     }
     std::ofstream(outside_ / "m.mtl") << "newmtl m\nKd 1 0 0\n";
     for (const std::string& library : {std::string("../m.mtl"), (outside_ / "m.mtl").string()}) {
-        const Materials result = read({"m"}, {library});
+        const MeshMaterials result = read({"m"}, {library});
         expect_color(result.materials[0], {0.8f, 0.8f, 0.8f});
         EXPECT_EQ(result.warnings.size(), 2u);
     }
@@ -156,12 +156,12 @@ TEST_F(MaterialFile, NothingOutsideOfTheFolderIsRead) {
 
 TEST_F(MaterialFile, WhatIsMissingIsSaidOnceAKind) {
     write("m.mtl", "newmtl m\nmap_Kd no 1.png\nnewmtl n\nmap_Kd no 2.png\nnewmtl folder\nmap_Kd textures\n");
-    const Materials result = read({"m", "n", "folder", "x", "y"}, {"m.mtl", "gone.mtl", "gone too.mtl"});
+    const MeshMaterials result = read({"m", "n", "folder", "x", "y"}, {"m.mtl", "gone.mtl", "gone too.mtl"});
     ASSERT_EQ(result.warnings.size(), 3u) << testing::PrintToString(result.warnings);
     EXPECT_EQ(result.warnings[0], "The material library 'gone.mtl' (and 1 more) was not found beside the mesh.");
     EXPECT_EQ(result.warnings[1], "The material 'x' (and 1 more) is in no material library; it became grey.");
     EXPECT_EQ(result.warnings[2], "The texture 'no 1.png' (and 2 more) was not found beside the mesh.");
-    for (const Material& material : result.materials) EXPECT_TRUE(material.picture.empty());
+    for (const MeshMaterial& material : result.materials) EXPECT_TRUE(material.picture.empty());
     EXPECT_EQ(picture(""), "");
     expect_warning({"texture", "not found"});
 }
@@ -220,7 +220,7 @@ TEST_F(MaterialFile, WorksWithTheObjReader) {
     write("paint.mtl", "newmtl wood\nmap_Kd wood.png\nnewmtl red\nKd 1 0 0\n");
     const Result<MeshFile> file = read_mesh(folder_ / "mesh.obj", RunContext(1));
     ASSERT_TRUE(file.ok());
-    const Materials result = read_materials(file->mesh, folder_ / "mesh.obj");
+    const MeshMaterials result = read_materials(file->mesh, folder_ / "mesh.obj");
     ASSERT_EQ(result.materials.size(), 2u);
     expect_color(result.materials[0], {1, 0, 0});
     EXPECT_EQ(result.materials[1].picture, folder_ / "wood.png");

@@ -28,6 +28,16 @@ Mesh level_mesh(const Model& model, unsigned level) {
     return mesh;
 }
 
+std::vector<float> vertex_levels(const Model& model, unsigned level) {
+    std::vector<float> levels(model.mesh.vertex_count(), static_cast<float>(model.finest_level()));
+    for (unsigned k = model.finest_level(); k-- > 0;)
+        for (Index v : model.levels[k].vertices) levels[v] = static_cast<float>(k);
+    if (level == model.finest_level()) return levels;
+    std::vector<float> chosen;
+    for (Index v : model.levels[level].vertices) chosen.push_back(levels[v]);
+    return chosen;
+}
+
 std::vector<Vec3f> driver_positions(const Model& model) {
     std::vector<Vec3f> positions;
     positions.reserve(model.driver().vertices.size());

@@ -37,6 +37,9 @@ struct Model {
 /// faces only at the finest level (the caller can see which are empty). Cost O(size of the mesh).
 Mesh level_mesh(const Model& model, unsigned level);
 
+/// The coarsest level that each vertex of level k is in, as numbers for colours. Cost O(size of the levels).
+std::vector<float> vertex_levels(const Model& model, unsigned level);
+
 /// The driver's rest positions, in the driver's order.
 std::vector<Vec3f> driver_positions(const Model& model);
 

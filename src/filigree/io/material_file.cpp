@@ -75,7 +75,7 @@ public:
         states_.resize(materials_.size());
     }
 
-    Materials read() {
+    MeshMaterials read() {
         if (materials_.empty()) return {};
         for (const std::string& line : mesh_.material_files) read_libraries(line);
         for (std::size_t m = 0; m < materials_.size(); ++m)
@@ -181,7 +181,7 @@ private:
         if (name.empty()) return missing_pictures_.add(rest);
         const std::optional<fs::path> path = find(name, beside, missing_pictures_);
         if (!path) return;
-        Material& result = materials_[material];
+        MeshMaterial& result = materials_[material];
         result.picture = folder_ / *path;
     }
 
@@ -212,7 +212,7 @@ private:
     /// What programs leave out or write beside a picture, which our colour would darken.
     void brighten_pictures() {
         for (std::size_t m = 0; m < materials_.size(); ++m) {
-            Material& material = materials_[m];
+            MeshMaterial& material = materials_[m];
             const bool black = material.color.maxCoeff() <= 0;
             if (!material.picture.empty() && (black || !states_[m].has_color)) material.color = Vec3f::Ones();
         }
@@ -233,7 +233,7 @@ private:
 
     const Mesh& mesh_;
     fs::path folder_;
-    std::vector<Material> materials_;
+    std::vector<MeshMaterial> materials_;
     std::vector<State> states_;
     std::unordered_map<std::string, std::size_t> wanted_;
     std::unordered_set<std::string> libraries_read_;
@@ -244,6 +244,8 @@ private:
 
 } // namespace
 
-Materials read_materials(const Mesh& mesh, const fs::path& mesh_path) { return MaterialReader(mesh, mesh_path).read(); }
+MeshMaterials read_materials(const Mesh& mesh, const fs::path& mesh_path) {
+    return MaterialReader(mesh, mesh_path).read();
+}
 
 } // namespace filigree

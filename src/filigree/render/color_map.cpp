@@ -183,6 +183,18 @@ ValueRange legend_range(std::span<const float> values, bool from_zero) {
     return {to_float(step.multiple(first)), to_float(step.multiple(last))};
 }
 
+HeatMap heat_map(std::vector<float> values, double diagonal) {
+    HeatMap map{std::move(values), {}};
+    if (diagonal > 0)
+        for (float& value : map.values) value = static_cast<float>(value / diagonal);
+    std::vector<float> lower(map.values); // a few outliers would leave everything else dark
+    const auto place = lower.begin() + std::ptrdiff_t(0.995 * double(lower.size()));
+    if (place < lower.end()) std::nth_element(lower.begin(), place, lower.end());
+    if (place < lower.end() && *place > 0) lower.erase(place + 1, lower.end());
+    map.range = legend_range(lower, true);
+    return map;
+}
+
 std::vector<double> legend_ticks(const ValueRange& range, unsigned count) {
     constexpr unsigned kMostTicks = 1000;
     const double least = range.least, most = range.most;

@@ -30,6 +30,14 @@ struct ValueRange {
 };
 ValueRange legend_range(std::span<const float> values, bool from_zero);
 
+/// Errors as colours: dark is none. `values` in model units become fractions of `diagonal`; the range covers 99.5 % of
+/// them, and what is above has the brightest colour.
+struct HeatMap {
+    std::vector<float> values;
+    ValueRange range;
+};
+HeatMap heat_map(std::vector<float> values, double diagonal);
+
 /// Numbers to write beside a legend: round, ascending, inside the range, at most `count` of them (from two up) and
 /// about so many.
 std::vector<double> legend_ticks(const ValueRange& range, unsigned count);

@@ -10,9 +10,9 @@ namespace filigree {
 
 /// What SurfaceOptions::materials takes. Has to outlive the drawable's upload.
 struct SurfaceMaterials {
-    std::vector<SurfaceMaterial> materials;        ///< empty, or one a name in mesh.materials
+    std::vector<SurfaceMaterial> materials;         ///< empty, or one a name in mesh.materials
     std::vector<std::shared_ptr<Picture>> pictures; ///< that the materials point to
-    std::vector<std::string> warnings;             ///< a sentence for whatever was missing
+    std::vector<std::string> warnings;              ///< a sentence for whatever was missing
 };
 
 /// As read_materials, with the pictures. Never fails: a mesh can be drawn without them.

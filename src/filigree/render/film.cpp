@@ -1,17 +1,17 @@
-#include "film.h"
+#include "filigree/render/film.h"
 
 #include "filigree/io/file.h"
 
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <charconv>
 #include <csignal>
 #include <optional>
 #include <sstream>
 #include <system_error>
 
 #include <fcntl.h>
-#include <fmt/format.h>
 #include <poll.h>
 #include <spawn.h>
 #include <sys/socket.h>
@@ -20,7 +20,7 @@
 
 extern char** environ;
 
-namespace filigree::cli {
+namespace filigree {
 
 namespace {
 
@@ -31,7 +31,10 @@ struct NumberPattern {
     std::string before, after;
     unsigned digits = 1;
 
-    std::string name(unsigned number) const { return fmt::format("{}{:0{}}{}", before, number, digits, after); }
+    std::string name(unsigned number) const {
+        const std::string text = std::to_string(number);
+        return before + std::string(digits - std::min<std::size_t>(digits, text.size()), '0') + text + after;
+    }
 };
 
 /// The one pattern in a file's name; none when there is none, or more than one '%'.
@@ -60,6 +63,12 @@ FilmKind film_kind(const fs::path& path) {
     return ending == ".png" && number_pattern(path.filename().string()) ? FilmKind::numbered : FilmKind::none;
 }
 
+/// The shortest text that stands for the number, in every locale.
+std::string number_text(double number) {
+    char text[32];
+    return std::string(text, std::to_chars(text, text + sizeof text, number).ptr);
+}
+
 Error cannot_write(const fs::path& path, const std::string& cause) {
     return {ErrorCode::unwritable, path.string() + ": cannot be written: " + cause + "."};
 }
@@ -73,7 +82,8 @@ public:
         fs::path path;
         std::error_code ignored;
         do { // leftovers of a killed process with our number stay
-            path = target.parent_path() / fmt::format(".filigree-{}-film{}.tmp", ::getpid(), next++);
+            path = target.parent_path() /
+                   (".filigree-" + std::to_string(::getpid()) + "-film" + std::to_string(next++) + ".tmp");
         } while (fs::exists(fs::symlink_status(path, ignored)));
         const Status status = write_file(path, {&bytes, 1});
         if (status) return TemporaryFile(std::move(path));
@@ -99,7 +109,7 @@ public:
         if (fs::is_regular_file(existing)) fs::permissions(path_, existing.permissions(), failed); // best effort
         const fs::path real = fs::is_symlink(target, failed) ? fs::weakly_canonical(target, failed) : target;
         if (::rename(path_.c_str(), real.c_str()) != 0)
-            return cannot_write(target, fmt::format("its folder does not let us (error {})", errno));
+            return cannot_write(target, "its folder does not let us (error " + std::to_string(errno) + ")");
         path_.clear();
         return Success{};
     }
@@ -250,10 +260,12 @@ std::vector<std::string> ffmpeg_command(FilmKind kind, unsigned width, unsigned 
     constexpr std::string_view kGif =
         "-filter_complex split[all][shown];[all]palettegen=reserve_transparent=0[palette];"
         "[shown][palette]paletteuse=diff_mode=rectangle -loop 0 -f gif";
-    std::istringstream line(fmt::format("ffmpeg -hide_banner -nostdin -nostats -loglevel error -y "
-                                        "-f rawvideo -pix_fmt rgb24 -video_size {}x{} -framerate {} -i pipe:0 "
-                                        "-map_metadata -1 -fflags +bitexact -flags:v +bitexact {}",
-                                        width, height, frames_per_second, kind == FilmKind::mp4 ? kMp4 : kGif));
+    std::istringstream line("ffmpeg -hide_banner -nostdin -nostats -loglevel error -y "
+                            "-f rawvideo -pix_fmt rgb24 -video_size " +
+                            std::to_string(width) + "x" + std::to_string(height) + " -framerate " +
+                            number_text(frames_per_second) +
+                            " -i pipe:0 -map_metadata -1 -fflags +bitexact -flags:v +bitexact " +
+                            std::string(kind == FilmKind::mp4 ? kMp4 : kGif));
     std::vector<std::string> words;
     for (std::string word; line >> word;) words.push_back(word);
     words.push_back("file:" + output.string()); // whatever the name holds, it is no option and no protocol
@@ -329,7 +341,7 @@ public:
             return Error{ErrorCode::unsupported,
                          target_.string() + ": ffmpeg is not installed; apt-get install ffmpeg, or write numbered "
                                             "pictures (frame_%04d.png)."};
-        if (failed) return cannot_write(target_, fmt::format("ffmpeg cannot be started (error {})", failed));
+        if (failed) return cannot_write(target_, "ffmpeg cannot be started (error " + std::to_string(failed) + ")");
         return Success{};
     }
 
@@ -392,9 +404,9 @@ Result<FilmWriter> FilmWriter::create(const fs::path& path, unsigned width, unsi
     if (width == 0 || height == 0) return Error{ErrorCode::usage, path.string() + ": a film without pixels."};
     constexpr double kMostFramesPerSecond = 1000;
     if (!(frames_per_second > 0 && frames_per_second <= kMostFramesPerSecond))
-        return Error{ErrorCode::usage,
-                     fmt::format("{}: {} frames a second make no film; choose from just above 0 to {}.", path.string(),
-                                 frames_per_second, kMostFramesPerSecond)};
+        return Error{ErrorCode::usage, path.string() + ": " + number_text(frames_per_second) +
+                                           " frames a second make no film; choose from just above 0 to " +
+                                           number_text(kMostFramesPerSecond) + "."};
     std::error_code ignored;
     if (fs::is_directory(path, ignored)) return cannot_write(path, "it is a folder");
     if (fs::exists(path, ignored) && !fs::is_regular_file(path, ignored))
@@ -419,9 +431,10 @@ Result<FilmWriter> FilmWriter::create(const fs::path& path, unsigned width, unsi
 Status FilmWriter::add(const Picture& frame) {
     if (content_->end) return *content_->end;
     if (frame.width != content_->width || frame.height != content_->height)
-        return Error{ErrorCode::mismatch,
-                     fmt::format("{}: a picture of {} x {} pixels does not fit a film of {} x {}.", content_->name,
-                                 frame.width, frame.height, content_->width, content_->height)};
+        return Error{ErrorCode::mismatch, content_->name + ": a picture of " + std::to_string(frame.width) + " x " +
+                                              std::to_string(frame.height) + " pixels does not fit a film of " +
+                                              std::to_string(content_->width) + " x " +
+                                              std::to_string(content_->height) + "."};
     const Status status = content_->sink->add(frame);
     if (status)
         ++content_->frame_count;
@@ -442,4 +455,4 @@ Status FilmWriter::finish() {
 
 unsigned FilmWriter::frame_count() const { return content_->frame_count; }
 
-} // namespace filigree::cli
+} // namespace filigree

@@ -1,4 +1,4 @@
-#include "cli/film.h"
+#include "filigree/render/film.h"
 
 #include "filigree/io/file.h"
 
@@ -16,7 +16,6 @@
 #include <unistd.h>
 
 using namespace filigree;
-using namespace filigree::cli;
 namespace fs = std::filesystem;
 
 namespace {

@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <memory>
 
-namespace filigree::cli {
+namespace filigree {
 
 /// Whether a name stands for a film: .mp4, .gif, or a .png whose name holds a number pattern ("frame_%04d.png").
 bool is_film_path(const std::filesystem::path& path);
@@ -40,4 +40,4 @@ private:
     std::unique_ptr<Content> content_;
 };
 
-} // namespace filigree::cli
+} // namespace filigree

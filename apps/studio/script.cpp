@@ -1,0 +1,382 @@
+#include "script.h"
+
+#include "filigree/io/file.h"
+
+#include <QAbstractButton>
+#include <QAbstractSlider>
+#include <QApplication>
+#include <QBuffer>
+#include <QComboBox>
+#include <QDoubleSpinBox>
+#include <QElapsedTimer>
+#include <QKeySequence>
+#include <QMouseEvent>
+#include <QSpinBox>
+#include <QStringList>
+#include <QSurfaceFormat>
+#include <QWheelEvent>
+
+#include <cmath>
+#include <functional>
+#include <map>
+
+namespace filigree::studio {
+
+namespace {
+
+Error usage(const QString& sentence) { return {ErrorCode::usage, sentence.toStdString()}; }
+
+/// Handles what waits, for as long as nothing else would wake us.
+void handle_events(int milliseconds = 5) { QCoreApplication::processEvents(QEventLoop::AllEvents, milliseconds); }
+
+constexpr double kPatience = 600; // seconds that a command may take
+
+/// The words of a line: separated by spaces, "in quotes" where they hold some. A # begins a comment.
+QStringList words_of(const QString& line) {
+    QStringList words;
+    QString word;
+    bool quoted = false, has_word = false;
+    for (const QChar c : line) {
+        if (c == '"') {
+            quoted = !quoted;
+            has_word = true;
+        } else if (!quoted && c == '#') {
+            break;
+        } else if (!quoted && c.isSpace()) {
+            if (has_word) words << word;
+            word.clear();
+            has_word = false;
+        } else {
+            word += c;
+            has_word = true;
+        }
+    }
+    if (has_word) words << word;
+    return words;
+}
+
+Result<bool> parse_switch(const QString& text) {
+    if (text == "on") return true;
+    if (text == "off") return false;
+    return usage("'" + text + "' is neither on nor off.");
+}
+
+class Script {
+public:
+    Script(std::filesystem::path folder, MainWindow& window) : folder_(std::move(folder)), window_(window) {}
+
+    Status run(const QStringList& words) {
+        const QString& name = words[0];
+        const auto known = commands().find(name);
+        if (known == commands().end()) return usage("there is no command '" + name + "'.");
+        const auto& [least, most, run] = known->second;
+        const int count = static_cast<int>(words.size()) - 1;
+        if (count < least || count > most)
+            return usage("'" + name + "' takes " +
+                         (least == most ? QString::number(least) : QString("%1 to %2").arg(least).arg(most)) +
+                         " words, and " + QString::number(count) + " are there.");
+        return run(*this, words.mid(1));
+    }
+
+private:
+    struct Command {
+        int least, most; ///< words after the name
+        std::function<Status(Script&, const QStringList&)> run;
+    };
+    static const std::map<QString, Command>& commands();
+
+    std::string path(const QString& text) const { return (folder_ / text.toStdString()).string(); }
+    Workbench& workbench() { return window_.workbench(); }
+
+    /// Until all that was begun is done. Errors that the window told are the script's.
+    Status settle() {
+        if (!wait_until_still(window_, kPatience)) return usage("the window is still at work after ten minutes.");
+        return Success{};
+    }
+    Status settle_well(const std::function<void()>& work) {
+        const QString before = window_.last_error();
+        window_.clear_last_error();
+        work();
+        if (Status still = settle(); !still) return still;
+        const QString error = window_.last_error();
+        if (!error.isEmpty()) return Error{ErrorCode::bad_file, error.toStdString()};
+        return Success{};
+    }
+
+    Status do_action(const QString& name) {
+        QAction* const action = window_.actions().find(name);
+        if (!action) return usage("there is no action '" + name + "'.");
+        if (!action->isEnabled()) return usage("the action '" + name + "' can do nothing now.");
+        action->trigger();
+        handle_events();
+        return Success{};
+    }
+
+    Result<QWidget*> control(const QString& name) {
+        // A slider has a number beside it, which takes values in their unit.
+        if (auto* const number = window_.findChild<QWidget*>(name + ".number")) return number;
+        if (auto* const widget = window_.findChild<QWidget*>(name)) return widget;
+        return usage("there is no control '" + name + "'.");
+    }
+
+    Status set(const QString& name, const QString& value) {
+        Result<QWidget*> found = control(name);
+        if (!found) return found.error();
+        QWidget* const widget = *found;
+        if (!widget->isEnabled()) return usage("the control '" + name + "' cannot be changed now.");
+        bool ok = true;
+        if (auto* const number = qobject_cast<QDoubleSpinBox*>(widget)) {
+            const double to = value.toDouble(&ok);
+            if (ok) number->setValue(to);
+        } else if (auto* const whole = qobject_cast<QSpinBox*>(widget)) {
+            const int to = value.toInt(&ok);
+            if (ok) whole->setValue(to);
+        } else if (auto* const slider = qobject_cast<QAbstractSlider*>(widget)) {
+            const int to = value.toInt(&ok);
+            if (ok) slider->setValue(to);
+        } else if (auto* const button = qobject_cast<QAbstractButton*>(widget); button && button->isCheckable()) {
+            const Result<bool> on = parse_switch(value);
+            if (!on) return on.error();
+            if (button->isChecked() != *on) button->click();
+        } else if (auto* const choice = qobject_cast<QComboBox*>(widget)) {
+            const int index = choice->findText(value, Qt::MatchFixedString);
+            if (index < 0) return usage("'" + name + "' has no choice '" + value + "'.");
+            choice->setCurrentIndex(index);
+            Q_EMIT choice->activated(index);
+        } else {
+            return usage("'" + name + "' is no control that takes a value.");
+        }
+        if (!ok) return usage("'" + value + "' is no number.");
+        handle_events();
+        return Success{};
+    }
+
+    Status expect(const QString& name, const QString& value) {
+        if (name == "message")
+            return window_.message().contains(value)
+                       ? Status(Success{})
+                       : usage("the message is '" + window_.message() + "', not '" + value + "'.");
+        Result<QWidget*> found = control(name);
+        if (!found) return found.error();
+        QString is;
+        if (const auto* number = qobject_cast<QDoubleSpinBox*>(*found))
+            return std::abs(number->value() - value.toDouble()) < 1e-6
+                       ? Status(Success{})
+                       : usage("'" + name + "' is " + QString::number(number->value()) + ", not " + value + ".");
+        if (const auto* whole = qobject_cast<QSpinBox*>(*found)) is = QString::number(whole->value());
+        if (const auto* slider = qobject_cast<QAbstractSlider*>(*found)) is = QString::number(slider->value());
+        if (const auto* button = qobject_cast<QAbstractButton*>(*found)) is = button->isChecked() ? "on" : "off";
+        if (const auto* choice = qobject_cast<QComboBox*>(*found)) is = choice->currentText();
+        return is == value ? Status(Success{}) : usage("'" + name + "' is '" + is + "', not '" + value + "'.");
+    }
+
+    Result<QPointF> place(const QString& x, const QString& y) {
+        bool x_ok = false, y_ok = false;
+        const double u = x.toDouble(&x_ok), v = y.toDouble(&y_ok);
+        if (!x_ok || !y_ok || !(u >= 0 && u <= 1 && v >= 0 && v <= 1))
+            return usage("'" + x + " " + y +
+                         "' is no place; write two fractions of the picture's width and height, from 0 to 1.");
+        const Viewport& viewport = window_.viewport();
+        return QPointF(u * (viewport.width() - 1), v * (viewport.height() - 1));
+    }
+
+    void send_mouse(QEvent::Type type, const QPointF& at, Qt::MouseButton button, Qt::MouseButtons held) {
+        Viewport& viewport = window_.viewport();
+        QMouseEvent event(type, at, viewport.mapToGlobal(at), button, held, Qt::NoModifier);
+        QCoreApplication::sendEvent(&viewport, &event);
+        handle_events();
+    }
+
+    Result<Qt::MouseButton> parse_button(const QStringList& words, int at) {
+        const QString name = words.value(at, "left");
+        if (name == "left") return Qt::LeftButton;
+        if (name == "right") return Qt::RightButton;
+        if (name == "middle") return Qt::MiddleButton;
+        return usage("'" + name + "' is no mouse button; there are left, right and middle.");
+    }
+
+    Status press(const QStringList& words) {
+        const Result<QPointF> at = place(words[0], words[1]);
+        if (!at) return at.error();
+        const Result<Qt::MouseButton> button = parse_button(words, 2);
+        if (!button) return button.error();
+        held_ = *button;
+        last_ = *at;
+        send_mouse(QEvent::MouseMove, *at, Qt::NoButton, Qt::NoButton);
+        send_mouse(QEvent::MouseButtonPress, *at, held_, held_);
+        return Success{};
+    }
+
+    Status move(const QStringList& words) {
+        const Result<QPointF> to = place(words[0], words[1]);
+        if (!to) return to.error();
+        constexpr int kSteps = 12; // as a hand would
+        for (int i = 1; i <= kSteps; ++i)
+            send_mouse(QEvent::MouseMove, last_ + (*to - last_) * (double(i) / kSteps), Qt::NoButton, held_);
+        last_ = *to;
+        return Success{};
+    }
+
+    Status release() {
+        send_mouse(QEvent::MouseButtonRelease, last_, held_, Qt::NoButton);
+        held_ = Qt::NoButton;
+        return Success{};
+    }
+
+    Status drag(const QStringList& words) {
+        QStringList from = words.mid(0, 2);
+        if (words.size() > 4) from << words[4];
+        if (Status status = press(from); !status) return status;
+        if (Status status = move(words.mid(2, 2)); !status) return status;
+        return release();
+    }
+
+    Status wheel(const QStringList& words) {
+        const Result<QPointF> at = place(words[0], words[1]);
+        if (!at) return at.error();
+        bool ok = false;
+        const int notches = words[2].toInt(&ok);
+        if (!ok) return usage("'" + words[2] + "' is no number of notches.");
+        Viewport& viewport = window_.viewport();
+        constexpr int kNotch = 120; // eighths of a degree
+        for (int i = 0; i < std::abs(notches); ++i) {
+            QWheelEvent event(*at, viewport.mapToGlobal(*at), {}, {0, notches > 0 ? kNotch : -kNotch}, Qt::NoButton,
+                              Qt::NoModifier, Qt::NoScrollPhase, false);
+            QCoreApplication::sendEvent(&viewport, &event);
+            handle_events();
+        }
+        return Success{};
+    }
+
+    Status key(const QString& text) {
+        const QKeySequence keys(text);
+        if (keys.isEmpty()) return usage("'" + text + "' is no key.");
+        for (QAction* const action : window_.actions().all())
+            if (action->isEnabled() && action->shortcuts().contains(keys)) {
+                action->trigger();
+                handle_events();
+                return Success{};
+            }
+        return usage("no action listens to '" + text + "' now.");
+    }
+
+    Status frames(const QString& text) {
+        bool ok = false;
+        const unsigned count = text.toUInt(&ok);
+        if (!ok || count == 0) return usage("'" + text + "' is no number of frames.");
+        return simulate_frames(count, window_);
+    }
+
+    std::filesystem::path folder_;
+    MainWindow& window_;
+    Qt::MouseButton held_ = Qt::NoButton;
+    QPointF last_;
+};
+
+const std::map<QString, Script::Command>& Script::commands() {
+    using Words = const QStringList&;
+    static const std::map<QString, Command> table = {
+        {"open", {1, 1, [](Script& s, Words w) { return s.settle_well([&] { s.workbench().open(s.path(w[0])); }); }}},
+        {"save",
+         {1, 1, [](Script& s, Words w) { return s.settle_well([&] { s.workbench().save_model(s.path(w[0])); }); }}},
+        {"save_mesh",
+         {1, 1, [](Script& s, Words w) { return s.settle_well([&] { s.workbench().save_mesh(s.path(w[0])); }); }}},
+        {"save_driver",
+         {1, 1, [](Script& s, Words w) { return s.settle_well([&] { s.workbench().save_driver(s.path(w[0])); }); }}},
+        {"export_meshes",
+         {1, 1, [](Script& s, Words w) { return s.settle_well([&] { s.workbench().export_meshes(s.path(w[0])); }); }}},
+        {"export_film",
+         {1, 1,
+          [](Script& s, Words w) { return s.settle_well([&] { s.workbench().export_film(s.path(w[0]), {}); }); }}},
+        {"panel",
+         {1, 1,
+          [](Script& s, Words w) {
+              return s.window_.show_panel(w[0]) ? Status(Success{}) : usage("there is no panel '" + w[0] + "'.");
+          }}},
+        {"do", {1, 1, [](Script& s, Words w) { return s.do_action(w[0]); }}},
+        {"set", {2, 2, [](Script& s, Words w) { return s.set(w[0], w[1]); }}},
+        {"expect", {2, 2, [](Script& s, Words w) { return s.expect(w[0], w[1]); }}},
+        {"key", {1, 1, [](Script& s, Words w) { return s.key(w[0]); }}},
+        {"press", {2, 3, [](Script& s, Words w) { return s.press(w); }}},
+        {"move", {2, 2, [](Script& s, Words w) { return s.move(w); }}},
+        {"release", {0, 0, [](Script& s, Words) { return s.release(); }}},
+        {"drag", {4, 5, [](Script& s, Words w) { return s.drag(w); }}},
+        {"wheel", {3, 3, [](Script& s, Words w) { return s.wheel(w); }}},
+        {"frames", {1, 1, [](Script& s, Words w) { return s.frames(w[0]); }}},
+        {"wait", {0, 0, [](Script& s, Words) { return s.settle(); }}},
+        {"screenshot", {1, 1, [](Script& s, Words w) { return save_screenshot(s.path(w[0]), s.window_); }}},
+    };
+    return table;
+}
+
+} // namespace
+
+void prepare_application() {
+    QCoreApplication::setApplicationName("filigree-studio");
+    QCoreApplication::setOrganizationName("filigree");
+    QCoreApplication::setApplicationVersion(FILIGREE_VERSION);
+    QSurfaceFormat format;
+    format.setVersion(4, 3);
+    format.setProfile(QSurfaceFormat::CoreProfile);
+    format.setDepthBufferSize(0); // the renderer brings its own
+    format.setStencilBufferSize(8);
+    QSurfaceFormat::setDefaultFormat(format);
+    QCoreApplication::setAttribute(Qt::AA_ShareOpenGLContexts);
+}
+
+bool wait_until_still(MainWindow& window, double seconds) {
+    QElapsedTimer clock;
+    clock.start();
+    for (int quiet = 0; quiet < 3;) { // what ends may begin something else
+        if (double(clock.elapsed()) > 1000 * seconds) return false;
+        window.workbench().wait_until_idle();
+        handle_events();
+        quiet = window.workbench().jobs().is_busy() || !window.viewport().is_ready() ? 0 : quiet + 1;
+    }
+    return true;
+}
+
+Status simulate_frames(unsigned frames, MainWindow& window) {
+    Workbench& workbench = window.workbench();
+    workbench.set_mode(Mode::body);
+    workbench.play();
+    workbench.wait_until_idle(); // the body has to be made first
+    workbench.playback().wait_for_frames(frames);
+    workbench.pause();
+    workbench.wait_until_idle();
+    if (workbench.frame_count() <= 1) return Error{ErrorCode::unsuitable, window.last_error().toStdString()};
+    return Success{};
+}
+
+Status save_screenshot(const std::filesystem::path& path, MainWindow& window) {
+    if (!wait_until_still(window, kPatience))
+        return Error{ErrorCode::unsuitable, path.string() + ": the window was not still after ten minutes."};
+    window.viewport().finish_drawing();
+    handle_events();
+    const QImage picture = window.grab().toImage();
+    QByteArray bytes;
+    QBuffer buffer(&bytes);
+    if (!buffer.open(QIODevice::WriteOnly) || !picture.save(&buffer, "PNG"))
+        return Error{ErrorCode::out_of_memory, path.string() + ": there is no memory for the picture."};
+    const std::string_view piece(bytes.constData(), static_cast<std::size_t>(bytes.size()));
+    return write_file(path, std::span(&piece, 1));
+}
+
+Status run_script(const std::filesystem::path& path, MainWindow& window) {
+    Result<std::string> text = read_file(path);
+    if (!text) return text.error();
+    Script script(path.parent_path(), window);
+    const QStringList lines = QString::fromStdString(*text).split('\n');
+    for (qsizetype i = 0; i < lines.size(); ++i) {
+        const QStringList words = words_of(lines[i]);
+        if (words.isEmpty()) continue;
+        const Status status = script.run(words);
+        if (status) continue;
+        Error error = status.error();
+        error.message = path.string() + ":" + std::to_string(i + 1) + ": " + error.message;
+        return error;
+    }
+    return Success{};
+}
+
+} // namespace filigree::studio
