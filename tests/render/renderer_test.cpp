@@ -359,7 +359,8 @@ TEST_F(Rendered, AReferenceModelIsPosedToo) {
     Mesh there = mesh;
     there.positions = restored(model, {pose.positions, {}, {}});
     const Drawable here = surface(there);
-    EXPECT_EQ(draw(scene_of(posed), camera_on(there)).rgba, draw(scene_of(here), camera_on(there)).rgba);
+    // Creases and diagonals stay those of the rest shape.
+    EXPECT_LT(picture_distance(draw(scene_of(posed), camera_on(there)), draw(scene_of(here), camera_on(there))), 1.0);
     Pose wrong = pose;
     wrong.positions.pop_back();
     EXPECT_EQ(posed.set_pose(wrong, kOneThread).error().code, ErrorCode::mismatch);

@@ -113,6 +113,15 @@ Vec3d Camera::project(const Vec3d& world, double width, double picture_height) c
     return {width / 2 + pixels_a_unit * p.x(), picture_height / 2 - pixels_a_unit * p.y(), distance};
 }
 
+Camera::Ray Camera::ray(double x, double y, double width, double picture_height) const {
+    const Mat3d axes = basis();
+    const double visible_height = field_of_view_deg > 0 ? 2 * std::tan(radians(field_of_view_deg) / 2) : height;
+    const double units_a_pixel = visible_height / picture_height;
+    const Vec3d across = units_a_pixel * ((x - width / 2) * axes.col(0) + (picture_height / 2 - y) * axes.col(1));
+    if (field_of_view_deg > 0) return {eye, (across - axes.col(2)).normalized()};
+    return {eye + across, -axes.col(2)};
+}
+
 Vec3d up_vector(UpAxis up) { return turn_from_y(up) * Vec3d::UnitY(); }
 
 Vec3d view_direction(View view, UpAxis up) {

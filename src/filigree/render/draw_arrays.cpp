@@ -27,6 +27,16 @@ Vec3f newell(const Mesh& mesh, std::span<const Vec3f> positions, std::size_t fac
     return sum.cast<float>();
 }
 
+/// newell of all faces.
+std::vector<Vec3f> face_areas(const Mesh& mesh, std::span<const Vec3f> positions, const RunContext& context) {
+    std::vector<Vec3f> areas(mesh.face_count());
+    const double diagonal = bounds(positions).diagonal(), scale = diagonal > 0 ? 1 / diagonal : 1;
+    parallel_for(context, mesh.face_count(), 4096, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t f = begin; f < end; ++f) areas[f] = newell(mesh, positions, f, scale);
+    });
+    return areas;
+}
+
 Vec3f unit(const Vec3f& v) { return v.cast<double>().stableNormalized().cast<float>(); }
 
 /// Corners by the place of their vertex.
@@ -54,16 +64,13 @@ public:
         : mesh_(mesh), shading_(options.shading),
           least_cosine_(static_cast<float>(std::cos(options.crease_deg * std::numbers::pi / 180))) {
         if (shading_ == Shading::automatic && !mesh.normals.empty()) return;
-        areas_.resize(mesh.face_count());
-        const double diagonal = bounds(positions).diagonal(), scale = diagonal > 0 ? 1 / diagonal : 1;
-        parallel_for(context, mesh.face_count(), 4096, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t f = begin; f < end; ++f) areas_[f] = newell(mesh, positions, f, scale);
-        });
+        areas_ = face_areas(mesh, positions, context);
     }
 
     /// faces: the face of each corner.
     void at(std::span<const Index> corners, std::span<const Index> faces, std::vector<Vec3f>& normals) {
         normals.resize(corners.size());
+        is_smooth_ = true;
         if (shading_ == Shading::automatic && !mesh_.normals.empty()) {
             for (std::size_t i = 0; i < corners.size(); ++i) {
                 const Index at =
@@ -83,23 +90,36 @@ public:
         if (shading_ == Shading::smooth || corners.size() > kMostCreased) return;
 
         units_.clear();
-        bool is_smooth = true;
         for (Index f : faces) {
             units_.push_back(unit(areas_[f]));
             // Twice half the angle is the whole: then every pair is within it.
             const float half = std::sqrt(std::max(0.0f, 0.5f + 0.5f * least_cosine_));
-            is_smooth = is_smooth && (units_.back().isZero() || units_.back().dot(smooth) >= half);
+            is_smooth_ = is_smooth_ && (units_.back().isZero() || units_.back().dot(smooth) >= half);
         }
-        if (is_smooth) return;
+        if (is_smooth_) return;
         for (std::size_t i = 0; i < corners.size(); ++i) {
             sum = Vec3f::Zero();
             for (std::size_t j = 0; j < corners.size(); ++j)
-                if (i == j || units_[i].dot(units_[j]) >= least_cosine_) sum += areas_[faces[j]];
+                if (are_smooth(i, j)) sum += areas_[faces[j]];
             normals[i] = units_[i].isZero() ? smooth : unit(sum);
         }
     }
 
+    /// Of the corners that `at` was asked about last: appends the faces that corner i's normal was made of.
+    void add_faces_of(std::size_t i, std::span<const Index> faces, std::vector<Index>& to) const {
+        if (areas_.empty()) return;
+        if (shading_ == Shading::flat) {
+            to.push_back(faces[i]);
+            return;
+        }
+        for (std::size_t j = 0; j < faces.size(); ++j)
+            if (is_smooth_ || units_[i].isZero() || are_smooth(i, j)) to.push_back(faces[j]);
+    }
+
 private:
+    bool are_smooth(std::size_t i, std::size_t j) const { return i == j || units_[i].dot(units_[j]) >= least_cosine_; }
+
+    bool is_smooth_ = true;
     const Mesh& mesh_;
     Shading shading_;
     float least_cosine_;
@@ -109,7 +129,7 @@ private:
 } // namespace
 
 Result<DrawArrays> make_draw_arrays(const Mesh& mesh, std::span<const Vec3f> positions, const SurfaceOptions& options,
-                                    const RunContext& context) {
+                                    const RunContext& context, NormalFaces normal_faces) {
     DrawArrays arrays;
     const std::vector<Index> place = weld_map(positions);
     const CornersAt at = corners_at_places(mesh, place);
@@ -148,11 +168,18 @@ Result<DrawArrays> make_draw_arrays(const Mesh& mesh, std::span<const Vec3f> pos
             if (d < arrays.vertex.size()) continue;
             arrays.vertex.push_back(vertex);
             arrays.normals.push_back(normals[i]);
+            if (normal_faces == NormalFaces::keep) {
+                arrays.normal_offsets.push_back(static_cast<Index>(arrays.normal_faces.size()));
+                corner_normals.add_faces_of(i, faces, arrays.normal_faces);
+            }
             if (mesh.uvs.empty()) continue;
             uv_of_draw.push_back(uv);
             arrays.uvs.push_back(uv == kNoIndex ? Vec2f(Vec2f::Zero()) : mesh.uvs.values[uv]);
         }
     }
+
+    if (normal_faces == NormalFaces::keep)
+        arrays.normal_offsets.push_back(static_cast<Index>(arrays.normal_faces.size()));
 
     // Triangles, by material.
     const Triangulation cut = triangulate(mesh);
@@ -204,6 +231,19 @@ Result<DrawArrays> make_draw_arrays(const Mesh& mesh, std::span<const Vec3f> pos
         arrays.edges[slot] = edges;
     }
     return arrays;
+}
+
+void normals_of_moved(const Mesh& mesh, std::span<const Vec3f> positions, const DrawArrays& arrays,
+                      std::span<Vec3f> normals, const RunContext& context) {
+    const std::vector<Vec3f> areas = face_areas(mesh, positions, context);
+    parallel_for(context, normals.size(), 4096, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t d = begin; d < end; ++d) {
+            Vec3f sum = Vec3f::Zero();
+            for (Index i = arrays.normal_offsets[d]; i < arrays.normal_offsets[d + 1]; ++i)
+                sum += areas[arrays.normal_faces[i]];
+            normals[d] = unit(sum);
+        }
+    });
 }
 
 } // namespace filigree

@@ -3,32 +3,17 @@
 #include "filigree/core/parallel_for.h"
 #include "filigree/render/color_map.h"
 #include "filigree/render/drawable_content.h"
-#include "filigree/render/octahedron.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 namespace filigree {
 
 namespace {
 
 using gl::Buffer;
-
-std::array<std::uint8_t, 4> to_bytes(const Vec4f& color) {
-    std::array<std::uint8_t, 4> bytes;
-    for (int k = 0; k < 4; ++k)
-        bytes[k] = static_cast<std::uint8_t>(std::lround(std::clamp(color[k], 0.0f, 1.0f) * 255.0f));
-    return bytes;
-}
-
-/// A scalar as the place in its range, far below for none: so far that a triangle with such a corner has no value
-/// anywhere, as there is none to interpolate.
-float to_unit(float value, const ValueRange& range) {
-    if (!std::isfinite(value)) return -1e6f;
-    const float width = range.most - range.least;
-    return width > 0 ? std::clamp((value - range.least) / width, 0.0f, 1.0f) : 0.5f;
-}
 
 gl::Texture color_texture(ColorMap map) {
     std::vector<Vec3f> table; // linear light
@@ -42,27 +27,24 @@ gl::Texture color_texture(ColorMap map) {
     return texture;
 }
 
-/// UVs count from the bottom, pictures from the top.
+/// picture: rows from the bottom.
 gl::Texture picture_texture(const Picture& picture) {
-    Picture flipped(picture.width, picture.height);
-    const std::size_t row = std::size_t{4} * picture.width;
-    for (unsigned y = 0; y < picture.height; ++y)
-        std::copy_n(picture.rgba.data() + row * y, row, flipped.rgba.data() + row * (picture.height - 1 - y));
     gl::Texture texture = gl::Texture::make();
     glBindTexture(GL_TEXTURE_2D, texture.name());
     glTexImage2D(GL_TEXTURE_2D, 0, GL_SRGB8_ALPHA8, static_cast<GLsizei>(picture.width),
-                 static_cast<GLsizei>(picture.height), 0, GL_RGBA, GL_UNSIGNED_BYTE, flipped.rgba.data());
+                 static_cast<GLsizei>(picture.height), 0, GL_RGBA, GL_UNSIGNED_BYTE, picture.rgba.data());
     glGenerateMipmap(GL_TEXTURE_2D);
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_LINEAR);
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+    glBindTexture(GL_TEXTURE_2D, 0);
     return texture;
 }
 
 /// Uploads values for a vertex input of the bound vertex array.
 template <class T>
-Status set_input(Buffer& buffer, std::span<const T> values, GLuint input, GLint components, GLenum type,
-                 GLboolean normalized, GLuint divisor = 0) {
-    Result<Buffer> made = gl::make_buffer(values);
+Status set_input(Buffer& buffer, std::span<T> values, GLuint input, GLint components, GLenum type, GLboolean normalized,
+                 GLuint divisor = 0) {
+    Result<Buffer> made = gl::make_buffer(std::span<const T>(values));
     if (!made) return made.error();
     buffer = std::move(made).value();
     glBindBuffer(GL_ARRAY_BUFFER, buffer.name());
@@ -71,16 +53,6 @@ Status set_input(Buffer& buffer, std::span<const T> values, GLuint input, GLint 
     glVertexAttribDivisor(input, divisor);
     return Success{};
 }
-
-/// values[v] of each draw vertex, in the order of drawing.
-template <class T, class Value>
-std::vector<T> in_draw_order(const DrawArrays& draw, std::span<const Index> drawn_at, const Value& value) {
-    std::vector<T> values(draw.vertex.size());
-    for (std::size_t d = 0; d < values.size(); ++d) values[drawn_at.empty() ? d : drawn_at[d]] = value(d);
-    return values;
-}
-
-Error nothing_to_draw() { return {ErrorCode::unsuitable, "There is no face to draw; draw the vertices as points."}; }
 
 /// The median distance from a point to its sixth neighbour, over some of the points: the spacing of a lattice, and on
 /// a scanned surface about the way to the furthest of those around.
@@ -115,80 +87,109 @@ Box world_box(std::span<const Vec3f> positions, const Vec3d& origin) {
     return box;
 }
 
+Box box_of_balls(std::span<const Vec3f> positions, const Vec3d& origin, double radius) {
+    Box box = world_box(positions, origin);
+    box.min.array() -= radius;
+    box.max.array() += radius;
+    return box;
+}
+
+/// Whoever else draws in this context (Qt's painter) finds nothing of ours bound.
+struct Tidy {
+    ~Tidy() {
+        glBindVertexArray(0);
+        for (const GLenum target : {GL_ARRAY_BUFFER, GL_COPY_WRITE_BUFFER, GL_SHADER_STORAGE_BUFFER})
+            glBindBuffer(target, 0);
+    }
+};
+
+/// All of a buffer, to be written anew; empty where the driver has no memory.
+template <class T>
+struct Mapped {
+    std::span<T> values;
+
+    Mapped(const Buffer& buffer, std::size_t count) : buffer_(buffer) {
+        glBindBuffer(GL_COPY_WRITE_BUFFER, buffer_.name());
+        void* at = glMapBufferRange(GL_COPY_WRITE_BUFFER, 0, static_cast<GLsizeiptr>(count * sizeof(T)),
+                                    GL_MAP_WRITE_BIT | GL_MAP_INVALIDATE_BUFFER_BIT);
+        glBindBuffer(GL_COPY_WRITE_BUFFER, 0);
+        if (at) values = {static_cast<T*>(at), count};
+    }
+    Mapped(const Mapped&) = delete;
+    ~Mapped() {
+        if (values.empty()) return;
+        glBindBuffer(GL_COPY_WRITE_BUFFER, buffer_.name());
+        glUnmapBuffer(GL_COPY_WRITE_BUFFER);
+        glBindBuffer(GL_COPY_WRITE_BUFFER, 0);
+    }
+
+private:
+    const Buffer& buffer_;
+};
+
+Error no_memory() {
+    return {ErrorCode::out_of_memory, "The graphics memory has no room for the pose: draw a lower level."};
+}
+
 } // namespace
 
-Status Drawable::Content::upload_surface(const Mesh& mesh, std::span<const Vec3f> mesh_positions,
-                                         const SurfaceOptions& surface, const DrawArrays& draw,
-                                         std::span<const Index> drawn_at) {
+Status Drawable::Content::upload_arrays(const DrawData::Content& data) {
     using namespace vertex_input;
-    if (draw.triangles.empty()) return nothing_to_draw();
-    if (!arrays) arrays = gl::VertexArray::make();
+    arrays = gl::VertexArray::make();
     glBindVertexArray(arrays.name());
-    const auto vertex = [&](std::size_t d) { return draw.vertex[d]; };
-
-    if (!on_gpu) {
-        const auto points =
-            in_draw_order<Vec3f>(draw, drawn_at, [&](std::size_t d) { return mesh_positions[vertex(d)]; });
-        if (Status s = set_input(positions, std::span(points), kPosition, 3, GL_FLOAT, GL_FALSE); !s) return s;
-        const auto packed =
-            in_draw_order<std::uint32_t>(draw, drawn_at, [&](std::size_t d) { return octahedral(draw.normals[d]); });
-        if (Status s = set_input(normals, std::span(packed), kNormal, 2, GL_SHORT, GL_FALSE); !s) return s;
+    if (!data.positions.empty()) {
+        if (Status s = set_input(positions, std::span(data.positions), kPosition, 3, GL_FLOAT, GL_FALSE); !s) return s;
+        if (Status s = set_input(normals, std::span(data.normals), kNormal, 2, GL_SHORT, GL_FALSE); !s) return s;
     }
-    has_uvs = !draw.uvs.empty();
-    if (has_uvs) {
-        const auto values = in_draw_order<Vec2f>(draw, drawn_at, [&](std::size_t d) { return draw.uvs[d]; });
-        if (Status s = set_input(uvs, std::span(values), kUv, 2, GL_FLOAT, GL_FALSE); !s) return s;
-    }
-    has_colors = !mesh.colors.empty();
-    if (has_colors) {
-        const auto values = in_draw_order<std::array<std::uint8_t, 4>>(
-            draw, drawn_at, [&](std::size_t d) { return to_bytes(mesh.colors[vertex(d)]); });
-        if (Status s = set_input(colors, std::span(values), kColor, 4, GL_UNSIGNED_BYTE, GL_TRUE); !s) return s;
-    }
-    has_scalars = !surface.scalars.values.empty();
-    if (has_scalars) {
-        const auto values = in_draw_order<float>(draw, drawn_at, [&](std::size_t d) {
-            return to_unit(surface.scalars.values[vertex(d)], surface.scalars.range);
-        });
-        if (Status s = set_input(scalars, std::span(values), kScalar, 1, GL_FLOAT, GL_FALSE); !s) return s;
-        scalar_colors = color_texture(surface.scalars.map);
-    }
-
-    std::vector<Triangle> order(draw.triangles);
-    if (!drawn_at.empty())
-        for (Triangle& t : order)
-            for (Index& v : t) v = drawn_at[v];
-    Result<Buffer> indices = gl::make_buffer(std::span<const Triangle>(order));
+    has_uvs = !data.uvs.empty();
+    if (has_uvs)
+        if (Status s = set_input(uvs, std::span(data.uvs), kUv, 2, GL_FLOAT, GL_FALSE); !s) return s;
+    has_colors = !data.colors.empty();
+    if (has_colors)
+        if (Status s = set_input(colors, std::span(data.colors), kColor, 4, GL_UNSIGNED_BYTE, GL_TRUE); !s) return s;
+    Result<Buffer> indices = gl::make_buffer(std::span(data.triangles));
     if (!indices) return indices.error();
     triangles = std::move(indices).value();
+    triangle_count = data.triangles.size();
     glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, triangles.name());
-    glBindVertexArray(0);
-    triangle_count = order.size();
 
-    Result<Buffer> flags = gl::make_buffer(std::span<const std::uint8_t>(draw.edges));
+    Result<Buffer> flags = gl::make_buffer(std::span(data.edges));
     if (!flags) return flags.error();
     edge_flags = std::move(flags).value();
     edge_texture = gl::Texture::make();
     glBindTexture(GL_TEXTURE_BUFFER, edge_texture.name());
     glTexBuffer(GL_TEXTURE_BUFFER, GL_R8UI, edge_flags.name());
+    glBindTexture(GL_TEXTURE_BUFFER, 0);
+    return Success{};
+}
 
-    parts.clear();
-    for (const DrawArrays::Part& drawn : draw.parts) {
+Status Drawable::Content::upload_scalars(std::span<const float> places, ColorMap map, GLuint divisor) {
+    has_scalars = !places.empty();
+    if (!has_scalars) return Success{};
+    glBindVertexArray(arrays.name());
+    if (Status s = set_input(scalars, places, vertex_input::kScalar, 1, GL_FLOAT, GL_FALSE, divisor); !s) {
+        has_scalars = false;
+        return s;
+    }
+    scalar_colors = color_texture(map);
+    return Success{};
+}
+
+Status Drawable::Content::upload_parts(std::vector<DrawData::Content::Part> data_parts) {
+    for (DrawData::Content::Part& from : data_parts) {
         Part part;
-        part.first = drawn.first;
-        part.count = drawn.count;
-        if (drawn.material < surface.materials.size()) {
-            const SurfaceMaterial& material = surface.materials[drawn.material];
-            part.color = material.color;
-            part.has_color = true;
-            if (material.picture && has_uvs) {
-                GLint most = 0;
-                glGetIntegerv(GL_MAX_TEXTURE_SIZE, &most);
-                if (std::max(material.picture->width, material.picture->height) > static_cast<unsigned>(most))
-                    return Error{ErrorCode::unsuitable, "A texture is larger than the " + std::to_string(most) +
-                                                            " pixels a side that can be drawn here; scale it down."};
-                part.picture = picture_texture(*material.picture);
-            }
+        part.first = from.first;
+        part.count = from.count;
+        part.color = from.color;
+        part.has_color = from.has_color;
+        if (from.picture) {
+            GLint most = 0;
+            glGetIntegerv(GL_MAX_TEXTURE_SIZE, &most);
+            if (std::max(from.picture->width, from.picture->height) > static_cast<unsigned>(most))
+                return Error{ErrorCode::unsuitable, "A texture is larger than the " + std::to_string(most) +
+                                                        " pixels a side that can be drawn here; scale it down."};
+            part.picture = picture_texture(*from.picture);
+            from.picture.reset();
         }
         parts.push_back(std::move(part));
     }
@@ -205,16 +206,37 @@ std::size_t Drawable::triangle_count() const { return content_->triangle_count; 
 std::size_t Drawable::point_count() const { return content_->point_count; }
 float Drawable::point_radius() const { return content_->radius; }
 
-Result<Drawable> Drawable::surface(const Mesh& mesh, const SurfaceOptions& options, const RunContext& context) {
-    if (mesh.face_count() == 0) return nothing_to_draw();
-    Result<DrawArrays> draw = make_draw_arrays(mesh, mesh.positions, options, context);
-    if (!draw) return draw.error();
+Result<Drawable> Drawable::upload(DrawData draw_data) {
+    DrawData::Content& data = *draw_data.content_;
     auto content = std::make_unique<Content>();
-    content->origin = mesh.origin;
-    content->box = world_box(mesh.positions, mesh.origin);
-    if (Status status = content->upload_surface(mesh, mesh.positions, options, *draw, {}); !status)
-        return status.error();
+    const Tidy tidy;
+    if (Status s = content->upload_arrays(data); !s) return s.error();
+    if (Status s = content->upload_scalars(data.scalars, data.map, 0); !s) return s.error();
+    if (Status s = content->upload_parts(std::move(data.parts)); !s) return s.error();
+    content->origin = data.origin;
+    content->box = data.box;
+    content->vertex = std::move(data.vertex);
+    content->mesh_vertex_count = data.mesh_vertex_count;
+    content->motion = std::move(data.motion);
+    if (std::optional<GpuRestorer>& on_gpu = content->motion.on_gpu) {
+        if (Status s = on_gpu->upload(); !s) return s.error();
+        glBindVertexArray(content->arrays.name());
+        on_gpu->bind();
+    }
     return Drawable(std::move(content));
+}
+
+Result<Drawable> Drawable::surface(const Mesh& mesh, const SurfaceOptions& options, const RunContext& context) {
+    Result<DrawData> data = DrawData::surface(mesh, options, context);
+    if (!data) return data.error();
+    return upload(std::move(*data));
+}
+
+Result<Drawable> Drawable::model(const Model& model, const RestoreOptions& restore, const SurfaceOptions& options,
+                                 const RunContext& context) {
+    Result<DrawData> data = DrawData::model(model, restore, options, RestoreOn::gpu, context);
+    if (!data) return data.error();
+    return upload(std::move(*data));
 }
 
 Result<Drawable> Drawable::points(std::span<const Vec3f> positions, const Vec3d& origin, const PointOptions& options,
@@ -228,94 +250,73 @@ Result<Drawable> Drawable::points(std::span<const Vec3f> positions, const Vec3d&
     content->radius = options.radius > 0 ? options.radius : 0.48f * typical_distance(positions, context);
     if (!(content->radius > 0))
         content->radius = static_cast<float>(content->box.diagonal() > 0 ? 0.01 * content->box.diagonal() : 1.0);
-    content->box.min.array() -= content->radius;
-    content->box.max.array() += content->radius;
+    content->box = box_of_balls(positions, origin, content->radius);
+    content->vertex.resize(positions.size());
+    std::iota(content->vertex.begin(), content->vertex.end(), Index{0});
 
+    const Tidy tidy;
     content->arrays = gl::VertexArray::make();
     glBindVertexArray(content->arrays.name());
     if (Status s = set_input(content->positions, positions, kPosition, 3, GL_FLOAT, GL_FALSE, 1); !s) return s.error();
     content->has_colors = !options.colors.empty();
     if (content->has_colors) {
-        std::vector<std::array<std::uint8_t, 4>> bytes;
-        for (const Vec4f& color : options.colors) bytes.push_back(to_bytes(color));
-        if (Status s = set_input(content->colors, std::span<const std::array<std::uint8_t, 4>>(bytes), kColor, 4,
-                                 GL_UNSIGNED_BYTE, GL_TRUE, 1);
-            !s)
+        const std::vector<ColorBytes> bytes = color_bytes(options.colors, content->vertex, context);
+        if (Status s = set_input(content->colors, std::span(bytes), kColor, 4, GL_UNSIGNED_BYTE, GL_TRUE, 1); !s)
             return s.error();
     }
-    content->has_scalars = !options.scalars.values.empty();
-    if (content->has_scalars) {
-        std::vector<float> places;
-        for (float value : options.scalars.values) places.push_back(to_unit(value, options.scalars.range));
-        if (Status s = set_input(content->scalars, std::span<const float>(places), kScalar, 1, GL_FLOAT, GL_FALSE, 1);
-            !s)
-            return s.error();
-        content->scalar_colors = color_texture(options.scalars.map);
-    }
-    glBindVertexArray(0);
-    return Drawable(std::move(content));
-}
-
-Result<Drawable> Drawable::model(const Model& model, const RestoreOptions& restore, const SurfaceOptions& options,
-                                 const RunContext& context) {
-    if (restore.level && *restore.level > model.finest_level())
-        return Error{ErrorCode::usage, "The model has levels 0 to " + std::to_string(model.finest_level()) +
-                                           "; there is no level " + std::to_string(*restore.level) + "."};
-    const unsigned level = restore.level.value_or(model.finest_level());
-    const Mesh rest = level_mesh(model, level);
-    if (rest.face_count() == 0) return nothing_to_draw();
-    Result<DrawArrays> draw = make_draw_arrays(rest, rest.positions, options, context);
-    if (!draw) return draw.error();
-
-    auto content = std::make_unique<Content>();
-    content->model = &model;
-    content->restore = restore;
-    content->origin = model.mesh.origin;
-    content->box = world_box(rest.positions, model.mesh.origin);
-    if (model.code() == DetailCode::reference) {
-        content->options = options;
-        Result<Restorer> restorer = Restorer::create(model, restore, context);
-        if (!restorer) return restorer.error();
-        content->restorer = std::move(restorer).value();
-        if (Status s = content->upload_surface(rest, rest.positions, options, *draw, {}); !s) return s.error();
-        return Drawable(std::move(content));
-    }
-    std::vector<Index> vertices(draw->vertex);
-    if (level < model.finest_level())
-        for (Index& v : vertices) v = model.levels[level].vertices[v];
-    Result<GpuRestorer> on_gpu = GpuRestorer::create(model, vertices, draw->normals, restore, context);
-    if (!on_gpu) return on_gpu.error();
-    content->on_gpu = std::move(on_gpu).value();
-    content->pose_box.emplace(model, vertices);
-    RestoreOptions driver_alone = restore;
-    driver_alone.level = 0;
-    Result<Restorer> driver = Restorer::create(model, driver_alone, context);
-    if (!driver) return driver.error();
-    content->restorer = std::move(driver).value();
-    if (Status s = content->upload_surface(rest, rest.positions, options, *draw, content->on_gpu->drawn_at()); !s)
-        return s.error();
-    glBindVertexArray(content->arrays.name());
-    content->on_gpu->bind();
-    glBindVertexArray(0);
+    const std::vector<float> places = options.scalars.values.empty()
+                                          ? std::vector<float>()
+                                          : scalar_places(options.scalars, content->vertex, context);
+    if (Status s = content->upload_scalars(places, options.scalars.map, 1); !s) return s.error();
     return Drawable(std::move(content));
 }
 
 Status Drawable::set_pose(const Pose& pose, const RunContext& context) {
     Content& content = *content_;
-    if (!content.model) return Error{ErrorCode::usage, "Only a model can be posed."};
-    if (content.on_gpu) {
-        if (Status s = content.on_gpu->set_pose(pose, context); !s) return s;
-        content.box = content.pose_box->at(pose.positions, content.restorer->gradients(pose, context));
-        content.box.min += content.origin;
-        content.box.max += content.origin;
-        return Success{};
+    ModelMotion& motion = content.motion;
+    if (!motion.model) return Error{ErrorCode::usage, "Only a model can be posed."};
+    Box box;
+    if (motion.on_gpu) {
+        if (Status s = motion.on_gpu->set_pose(pose, context); !s) return s;
+        box = motion.pose_box->at(pose.positions, motion.restorer->gradients(pose, context));
+    } else {
+        const std::size_t count = content.vertex.size();
+        if (Status s = move_vertices(motion, pose, count, context); !s) return s;
+        const Mapped<Vec3f> positions(content.positions, count);
+        const Mapped<std::uint32_t> normals(content.normals, count);
+        if (positions.values.empty() || normals.values.empty()) return no_memory();
+        box = write_moved(motion, positions.values, normals.values, context);
     }
-    Result<Mesh> mesh = content.restorer->mesh(pose, context);
-    if (!mesh) return mesh.error();
-    Result<DrawArrays> draw = make_draw_arrays(*mesh, mesh->positions, content.options, context);
-    if (!draw) return draw.error();
-    content.box = world_box(mesh->positions, content.origin);
-    return content.upload_surface(*mesh, mesh->positions, content.options, *draw, {});
+    content.box = box;
+    content.box.min += content.origin;
+    content.box.max += content.origin;
+    return Success{};
+}
+
+Status Drawable::set_scalars(const ScalarColors& scalars) {
+    Content& content = *content_;
+    const std::size_t count = content.point_count ? content.point_count : content.mesh_vertex_count;
+    if (!scalars.values.empty() && scalars.values.size() != count)
+        return Error{ErrorCode::mismatch, "There are " + std::to_string(scalars.values.size()) + " values for " +
+                                              std::to_string(count) + " vertices: give one each, or none."};
+    const Tidy tidy;
+    if (scalars.values.empty()) return content.upload_scalars({}, scalars.map, 0);
+    return content.upload_scalars(scalar_places(scalars, content.vertex, RunContext()), scalars.map,
+                                  content.point_count ? 1 : 0);
+}
+
+Status Drawable::set_positions(std::span<const Vec3f> positions) {
+    Content& content = *content_;
+    if (!content.point_count) return Error{ErrorCode::usage, "Only points can be put elsewhere; models are posed."};
+    if (positions.size() != content.point_count)
+        return Error{ErrorCode::mismatch, "There are " + std::to_string(positions.size()) + " positions for " +
+                                              std::to_string(content.point_count) + " points: give one each."};
+    glBindBuffer(GL_COPY_WRITE_BUFFER, content.positions.name());
+    glBufferData(GL_COPY_WRITE_BUFFER, static_cast<GLsizeiptr>(positions.size_bytes()), positions.data(),
+                 GL_DYNAMIC_DRAW); // draws in flight keep the old one
+    glBindBuffer(GL_COPY_WRITE_BUFFER, 0);
+    content.box = box_of_balls(positions, content.origin, content.radius);
+    return Success{};
 }
 
 } // namespace filigree

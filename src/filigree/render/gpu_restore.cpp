@@ -70,7 +70,7 @@ GLint integer(GLenum name) {
 
 /// A buffer for shaders to read; never empty, which not every driver binds.
 template <class T>
-Result<gl::Buffer> make_storage(std::vector<T> values) {
+Result<gl::Buffer> make_storage(std::vector<T>& values) {
     if (values.empty()) values.emplace_back();
     const std::span<const T> span = values;
     if (span.size_bytes() > static_cast<std::size_t>(integer(GL_MAX_SHADER_STORAGE_BLOCK_SIZE)))
@@ -91,11 +91,13 @@ struct GpuRestorer::Content {
     bool has_normals = false;
     std::size_t stride = 0, bytes = 0;
     gl::Buffer inputs, transforms, cells, blocks;
+    PackedRecords packed; ///< until they are uploaded
+    std::vector<blend_kernel::VertexTransform> at_rest;
 
     std::vector<blend_kernel::VertexTransform> transforms_of(const Pose& pose, const RunContext& context) const {
         return poses->transforms(pose.positions, driver->gradients(pose, context), context);
     }
-    Status upload(const PackedRecords& packed, const Pose& rest, const RunContext& context);
+    Status upload();
 };
 
 GpuRestorer::GpuRestorer(std::unique_ptr<Content> content) : content_(std::move(content)) {}
@@ -103,11 +105,9 @@ GpuRestorer::GpuRestorer(GpuRestorer&&) noexcept = default;
 GpuRestorer& GpuRestorer::operator=(GpuRestorer&&) noexcept = default;
 GpuRestorer::~GpuRestorer() = default;
 
-Status GpuRestorer::Content::upload(const PackedRecords& packed, const Pose& rest, const RunContext& context) {
-    const std::vector<blend_kernel::VertexTransform> at_rest = transforms_of(rest, context);
-    stride = packed.words * sizeof(std::uint32_t);
-    bytes = packed.inputs.size() * sizeof(packed.inputs[0]) + packed.cells.size() * sizeof(packed.cells[0]) +
-            packed.blocks.size() * sizeof(packed.blocks[0]) + at_rest.size() * sizeof(at_rest[0]);
+Status GpuRestorer::Content::upload() {
+    if (integer(GL_MAX_VERTEX_SHADER_STORAGE_BLOCKS) < 3)
+        return Error{ErrorCode::unsupported, "This GPU's vertex shaders read no storage buffers: restore on the CPU."};
     const auto keep = [](gl::Buffer& kept, Result<gl::Buffer> made) -> Status {
         if (!made) return made.error();
         kept = std::move(*made);
@@ -117,12 +117,26 @@ Status GpuRestorer::Content::upload(const PackedRecords& packed, const Pose& res
         return status;
     if (Status status = keep(cells, make_storage(packed.cells)); !status) return status;
     if (Status status = keep(blocks, make_storage(packed.blocks)); !status) return status;
-    return keep(transforms, make_storage(at_rest));
+    if (Status status = keep(transforms, make_storage(at_rest)); !status) return status;
+    packed = {};
+    at_rest = {};
+    return Success{};
 }
 
 Result<GpuRestorer> GpuRestorer::create(const Model& model, std::span<const Index> vertices,
                                         std::span<const Vec3f> normals, const RestoreOptions& options,
                                         const RunContext& context) {
+    Result<GpuRestorer> restorer = prepare(model, vertices, normals, options, context);
+    if (!restorer) return restorer;
+    if (Status status = restorer->upload(); !status) return status.error();
+    return restorer;
+}
+
+Status GpuRestorer::upload() { return content_->upload(); }
+
+Result<GpuRestorer> GpuRestorer::prepare(const Model& model, std::span<const Index> vertices,
+                                         std::span<const Vec3f> normals, const RestoreOptions& options,
+                                         const RunContext& context) {
     if (model.code() != DetailCode::blend)
         return Error{ErrorCode::unsuitable,
                      "A model of the reference code cannot be restored on the GPU: restore it on "
@@ -136,8 +150,6 @@ Result<GpuRestorer> GpuRestorer::create(const Model& model, std::span<const Inde
     if (!normals.empty() && normals.size() != vertices.size())
         return Error{ErrorCode::mismatch, "There are " + std::to_string(normals.size()) + " normals for " +
                                               std::to_string(vertices.size()) + " vertices: give one each, or none."};
-    if (integer(GL_MAX_VERTEX_SHADER_STORAGE_BLOCKS) < 3)
-        return Error{ErrorCode::unsupported, "This GPU's vertex shaders read no storage buffers: restore on the CPU."};
     if (context.is_cancelled()) return cancelled_error();
 
     const BlendDetail& detail = std::get<BlendDetail>(model.detail);
@@ -163,8 +175,13 @@ Result<GpuRestorer> GpuRestorer::create(const Model& model, std::span<const Inde
 
     Pose rest{driver_positions(model), {}, {}};
     rest.gradients.assign(rest.positions.size(), Mat3f::Identity());
-    if (Status status = content->upload(pack(restorer.records(), restorer.output_scale()), rest, context); !status)
-        return status.error();
+    PackedRecords& packed = content->packed;
+    packed = pack(restorer.records(), restorer.output_scale());
+    std::vector<blend_kernel::VertexTransform>& at_rest = content->at_rest;
+    at_rest = content->transforms_of(rest, context);
+    content->stride = packed.words * sizeof(std::uint32_t);
+    content->bytes = packed.inputs.size() * sizeof(packed.inputs[0]) + packed.cells.size() * sizeof(packed.cells[0]) +
+                     packed.blocks.size() * sizeof(packed.blocks[0]) + at_rest.size() * sizeof(at_rest[0]);
     return GpuRestorer(std::move(content));
 }
 

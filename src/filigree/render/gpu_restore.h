@@ -21,6 +21,12 @@ public:
     static Result<GpuRestorer> create(const Model& model, std::span<const Index> vertices,
                                       std::span<const Vec3f> normals, const RestoreOptions& options,
                                       const RunContext& context);
+    /// create in two halves. prepare needs no OpenGL, so any thread will do, and does not say unsupported or
+    /// out_of_memory; of what it gives only drawn_at, item_count, precision, has_normals and upload may be asked.
+    static Result<GpuRestorer> prepare(const Model& model, std::span<const Index> vertices,
+                                       std::span<const Vec3f> normals, const RestoreOptions& options,
+                                       const RunContext& context);
+    Status upload();
     GpuRestorer(GpuRestorer&&) noexcept;
     GpuRestorer& operator=(GpuRestorer&&) noexcept;
     ~GpuRestorer();

@@ -250,8 +250,8 @@ struct Renderer::Content {
         return program = Program::link(stages);
     }
     static Source source_of(const Drawable::Content& drawable) {
-        if (!drawable.on_gpu) return Source::given;
-        return drawable.on_gpu->precision() == Precision::int16 ? Source::int16_records : Source::float_records;
+        if (!drawable.restorer()) return Source::given;
+        return drawable.restorer()->precision() == Precision::int16 ? Source::int16_records : Source::float_records;
     }
 
     Status make_targets();
@@ -508,7 +508,7 @@ void Renderer::Content::draw_surface(const SceneObject& object, bool only_depth)
     set_place(program, object);
     if (look.clip) glEnable(GL_CLIP_DISTANCE0);
     glBindVertexArray(drawable.arrays.name());
-    if (drawable.on_gpu) drawable.on_gpu->bind();
+    if (drawable.restorer()) drawable.restorer()->bind();
     if (only_depth) {
         glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(3 * drawable.triangle_count), GL_UNSIGNED_INT, nullptr);
     } else {
@@ -626,14 +626,15 @@ bool Renderer::add_pass() {
     return true;
 }
 
-void Renderer::show(unsigned framebuffer) const {
+void Renderer::show(unsigned framebuffer, int x, int y) const {
     const Content& c = *content_;
     glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
-    glViewport(0, 0, static_cast<GLsizei>(c.width), static_cast<GLsizei>(c.height));
+    glViewport(x, y, static_cast<GLsizei>(c.width), static_cast<GLsizei>(c.height));
     glDisable(GL_DEPTH_TEST);
     glDisable(GL_BLEND);
     glUseProgram(c.show.name());
     glUniform1f(c.show.uniform("passes"), static_cast<float>(std::max(1u, c.done)));
+    glUniform2f(c.show.uniform("corner"), static_cast<float>(x), static_cast<float>(y));
     glUniform2f(c.show.uniform("size"), static_cast<float>(c.width), static_cast<float>(c.height));
     glUniform3fv(c.show.uniform("top"), 1, c.scene.background.top.data());
     glUniform3fv(c.show.uniform("bottom"), 1, c.scene.background.bottom.data());
@@ -644,6 +645,12 @@ void Renderer::show(unsigned framebuffer) const {
     glDrawArrays(GL_TRIANGLES, 0, 3);
     glBindVertexArray(0);
     glUseProgram(0);
+}
+
+Status Renderer::preview(const Scene& scene, const Camera& camera, unsigned width, unsigned height) {
+    if (Status status = begin(scene, camera, width, height, 1); !status) return status;
+    add_pass();
+    return Success{};
 }
 
 Result<Picture> Renderer::picture(const Scene& scene, const Camera& camera, const PictureOptions& options,

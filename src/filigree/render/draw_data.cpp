@@ -1,0 +1,229 @@
+// The processor's half of drawables: nothing here calls OpenGL.
+#include "filigree/core/parallel_for.h"
+#include "filigree/mesh/normals.h"
+#include "filigree/render/drawable_content.h"
+#include "filigree/render/octahedron.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace filigree {
+
+namespace {
+
+constexpr std::size_t kGrain = 1 << 14; // draw vertices
+
+Error nothing_to_draw() { return {ErrorCode::unsuitable, "There is no face to draw; draw the vertices as points."}; }
+
+ColorBytes to_bytes(const Vec4f& color) {
+    ColorBytes bytes;
+    for (int k = 0; k < 4; ++k)
+        bytes[k] = static_cast<std::uint8_t>(std::lround(std::clamp(color[k], 0.0f, 1.0f) * 255.0f));
+    return bytes;
+}
+
+/// A scalar as the place in its range, far below for none: so far that a triangle with such a corner has no value
+/// anywhere, as there is none to interpolate.
+float to_unit(float value, const ValueRange& range) {
+    if (!std::isfinite(value)) return -1e6f;
+    const float width = range.most - range.least;
+    return width > 0 ? std::clamp((value - range.least) / width, 0.0f, 1.0f) : 0.5f;
+}
+
+/// value(i) for each i below count.
+template <class T, class Value>
+std::vector<T> values_of(std::size_t count, const RunContext& context, const Value& value) {
+    std::vector<T> values(count);
+    parallel_for(context, count, kGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) values[i] = value(i);
+    });
+    return values;
+}
+
+Box moved_to(Box box, const Vec3d& origin) {
+    box.min += origin;
+    box.max += origin;
+    return box;
+}
+
+/// UVs count from the bottom, pictures from the top.
+Picture flipped(const Picture& picture) {
+    Picture result(picture.width, picture.height);
+    const std::size_t row = std::size_t{4} * picture.width;
+    for (unsigned y = 0; y < picture.height; ++y)
+        std::copy_n(picture.rgba.data() + row * y, row, result.rgba.data() + row * (picture.height - 1 - y));
+    return result;
+}
+
+/// Fills all but the motion. `drawn_at`: the place of each draw vertex in the vertex buffer; empty: its own. It takes
+/// the draw arrays' contents where it can.
+void fill(DrawData::Content& content, const Mesh& mesh, const SurfaceOptions& options, DrawArrays& draw,
+          std::span<const Index> drawn_at, const RunContext& context) {
+    std::vector<Index> source; // the draw vertex at each place of the buffer
+    if (!drawn_at.empty()) {
+        source.resize(drawn_at.size());
+        for (Index d = 0; d < source.size(); ++d) source[drawn_at[d]] = d;
+        parallel_for(context, draw.triangles.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t t = begin; t < end; ++t)
+                for (Index& v : draw.triangles[t]) v = drawn_at[v];
+        });
+    }
+    const auto at = [&](std::size_t i) { return source.empty() ? i : source[i]; };
+    const std::size_t count = draw.vertex.size();
+    content.vertex = values_of<Index>(count, context, [&](std::size_t i) { return draw.vertex[at(i)]; });
+    const std::vector<Index>& vertex = content.vertex;
+    if (!content.motion.on_gpu) {
+        content.positions = values_of<Vec3f>(count, context, [&](std::size_t i) { return mesh.positions[vertex[i]]; });
+        content.normals =
+            values_of<std::uint32_t>(count, context, [&](std::size_t i) { return octahedral(draw.normals[at(i)]); });
+    }
+    if (!draw.uvs.empty())
+        content.uvs = values_of<Vec2f>(count, context, [&](std::size_t i) { return draw.uvs[at(i)]; });
+    if (!mesh.colors.empty()) content.colors = color_bytes(mesh.colors, vertex, context);
+    if (!options.scalars.values.empty()) content.scalars = scalar_places(options.scalars, vertex, context);
+    content.map = options.scalars.map;
+    content.triangles = std::move(draw.triangles);
+    content.edges = std::move(draw.edges);
+    content.mesh_vertex_count = mesh.vertex_count();
+    content.origin = mesh.origin;
+    content.box = moved_to(bounds(mesh.positions), mesh.origin);
+    for (const DrawArrays::Part& drawn : draw.parts) {
+        DrawData::Content::Part part;
+        part.first = drawn.first;
+        part.count = drawn.count;
+        if (drawn.material < options.materials.size()) {
+            const SurfaceMaterial& material = options.materials[drawn.material];
+            part.color = material.color;
+            part.has_color = true;
+            if (material.picture && !draw.uvs.empty()) part.picture = flipped(*material.picture);
+        }
+        content.parts.push_back(std::move(part));
+    }
+}
+
+Result<DrawArrays> arrays_of(const Mesh& mesh, const SurfaceOptions& options, const RunContext& context,
+                             NormalFaces normal_faces) {
+    if (mesh.face_count() == 0) return nothing_to_draw();
+    Result<DrawArrays> draw = make_draw_arrays(mesh, mesh.positions, options, context, normal_faces);
+    if (draw && draw->triangles.empty()) return nothing_to_draw();
+    return draw;
+}
+
+Status move_reference(ModelMotion& motion, const Pose& pose, const RunContext& context) {
+    Result<std::vector<Vec3f>> at = motion.restorer->positions(pose, context);
+    if (!at) return at.error();
+    const DrawArrays& arrays = motion.arrays;
+    for (std::size_t d = 0; d < motion.positions.size(); ++d) motion.positions[d] = (*at)[arrays.vertex[d]];
+    if (!arrays.normal_faces.empty()) {
+        normals_of_moved(*motion.rest, *at, arrays, motion.normals, context);
+        return Success{};
+    }
+    // The mesh came with normals of its own: where there was one, the moved faces give another.
+    const std::vector<Vec3f> normals = vertex_normals(*motion.rest, *at, context);
+    for (std::size_t d = 0; d < motion.normals.size(); ++d)
+        motion.normals[d] = arrays.normals[d].isZero() ? Vec3f(Vec3f::Zero()) : normals[arrays.vertex[d]];
+    return Success{};
+}
+
+} // namespace
+
+std::vector<float> scalar_places(const ScalarColors& scalars, std::span<const Index> vertex,
+                                 const RunContext& context) {
+    return values_of<float>(vertex.size(), context,
+                            [&](std::size_t d) { return to_unit(scalars.values[vertex[d]], scalars.range); });
+}
+
+std::vector<ColorBytes> color_bytes(std::span<const Vec4f> colors, std::span<const Index> vertex,
+                                    const RunContext& context) {
+    return values_of<ColorBytes>(vertex.size(), context, [&](std::size_t d) { return to_bytes(colors[vertex[d]]); });
+}
+
+Status move_vertices(ModelMotion& motion, const Pose& pose, std::size_t count, const RunContext& context) {
+    if (Status status = check_pose(*motion.model, pose); !status) return status.error();
+    if (context.is_cancelled()) return cancelled_error();
+    motion.positions.resize(count);
+    motion.normals.resize(count);
+    if (!motion.on_cpu) return move_reference(motion, pose, context);
+    motion.on_cpu->restore(pose.positions, motion.restorer->gradients(pose, context), motion.positions, motion.normals,
+                           false, context);
+    return Success{};
+}
+
+Box write_moved(const ModelMotion& motion, std::span<Vec3f> positions, std::span<std::uint32_t> normals,
+                const RunContext& context) {
+    std::vector<Box> boxes((positions.size() + kGrain - 1) / kGrain);
+    parallel_for(context, positions.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        const std::span piece = std::span(motion.positions).subspan(begin, end - begin);
+        boxes[begin / kGrain] = bounds(piece);
+        std::copy(piece.begin(), piece.end(), positions.begin() + begin);
+        for (std::size_t d = begin; d < end; ++d) normals[d] = octahedral(motion.normals[d]);
+    });
+    Box box;
+    for (const Box& piece : boxes) {
+        box.extend(piece.min);
+        box.extend(piece.max);
+    }
+    return box;
+}
+
+DrawData::DrawData(std::unique_ptr<Content> content) : content_(std::move(content)) {}
+DrawData::DrawData(DrawData&&) noexcept = default;
+DrawData& DrawData::operator=(DrawData&&) noexcept = default;
+DrawData::~DrawData() = default;
+
+Result<DrawData> DrawData::surface(const Mesh& mesh, const SurfaceOptions& options, const RunContext& context) {
+    Result<DrawArrays> draw = arrays_of(mesh, options, context, NormalFaces::forget);
+    if (!draw) return draw.error();
+    auto content = std::make_unique<Content>();
+    fill(*content, mesh, options, *draw, {}, context);
+    return DrawData(std::move(content));
+}
+
+Result<DrawData> DrawData::model(const Model& model, const RestoreOptions& restore, const SurfaceOptions& options,
+                                 RestoreOn where, const RunContext& context) {
+    const Result<unsigned> level = restored_level(model, restore);
+    if (!level) return level.error();
+    const bool is_reference = model.code() == DetailCode::reference;
+    Mesh rest = level_mesh(model, *level);
+    Result<DrawArrays> draw = arrays_of(rest, options, context, is_reference ? NormalFaces::keep : NormalFaces::forget);
+    if (!draw) return draw.error();
+
+    auto content = std::make_unique<Content>();
+    ModelMotion& motion = content->motion;
+    motion.model = &model;
+    RestoreOptions restored = restore;
+    if (!is_reference) restored.level = 0;
+    Result<Restorer> restorer = Restorer::create(model, restored, context);
+    if (!restorer) return restorer.error();
+    motion.restorer = std::move(restorer).value();
+    if (is_reference) {
+        fill(*content, rest, options, *draw, {}, context);
+        motion.rest = std::move(rest);
+        motion.arrays = std::move(draw).value();
+        return DrawData(std::move(content));
+    }
+
+    std::vector<Index> vertices(draw->vertex); // of the finest mesh
+    if (*level < model.finest_level())
+        for (Index& v : vertices) v = model.levels[*level].vertices[v];
+    std::vector<Index> drawn_at;
+    if (where == RestoreOn::gpu) {
+        Result<GpuRestorer> on_gpu = GpuRestorer::prepare(model, vertices, draw->normals, restore, context);
+        if (!on_gpu) return on_gpu.error();
+        motion.on_gpu = std::move(on_gpu).value();
+        motion.pose_box.emplace(model, vertices);
+        drawn_at.assign(motion.on_gpu->drawn_at().begin(), motion.on_gpu->drawn_at().end());
+    } else {
+        std::vector<BlendRestorer::Item> items(vertices.size());
+        for (Index i = 0; i < items.size(); ++i) items[i] = {vertices[i], i};
+        motion.on_cpu.emplace(std::get<BlendDetail>(model.detail), model.mesh.positions, model.driver().vertices, items,
+                              draw->normals);
+        drawn_at.resize(items.size());
+        for (Index r = 0; r < items.size(); ++r) drawn_at[motion.on_cpu->slots()[r]] = r;
+    }
+    if (context.is_cancelled()) return cancelled_error();
+    fill(*content, rest, options, *draw, drawn_at, context);
+    return DrawData(std::move(content));
+}
+
+} // namespace filigree
