@@ -5,8 +5,9 @@
 
 #include "filigree/deform/handles.h"
 
-#include <condition_variable>
-#include <thread>
+#include <QObject>
+
+#include <memory>
 
 namespace filigree::studio {
 
@@ -20,26 +21,31 @@ Pose deformed_pose(const State& state, const RunContext& context);
 /// solved over all vertices, which takes seconds for several hundred thousand. Positions relative to the mesh's origin.
 Result<std::vector<Vec3f>> full_deformation(const State& state, const RunContext& context);
 
-/// Which driver vertices a pull at a point takes and which stay: those within `grip` of it, and those beyond `reach`
-/// (unless they are in a handle already, which stays as it is). Distances along straight lines, model units.
+/// Which driver vertices a pull at a point takes and which stay: those within `grip` of it, and those beyond `reach`.
+/// Pins are among those that stay. Distances along straight lines at rest, model units.
 struct PullRegion {
-    std::vector<Index> grip, anchors; ///< of the driver, ascending, disjoint; grip holds at least the nearest vertex
+    std::vector<Index> grip, held; ///< of the driver, ascending, disjoint; grip is empty only where all is pinned
 };
 PullRegion pull_region(const State& state, const Vec3f& rest_point, double grip, double reach);
 
-/// As-rigid-as-possible solving in a thread of its own: always for the latest targets, so that a drag never waits.
+/// Where a point goes that the warp takes to `place`: Newton's method from `guess` (both in the world); where it does
+/// not arrive, the best place found.
+Vec3d unwarped(const SpaceWarp& warp, const Vec3d& place, const Vec3d& guess);
+
+/// As-rigid-as-possible solving in a thread of its own: always for the latest move, so that a drag never waits.
 class HandleDrag : public QObject {
     Q_OBJECT
 public:
     explicit HandleDrag(QObject* parent = nullptr);
     ~HandleDrag() override;
 
-    /// Starts with these handles of the state; the last of them is the one that is pulled. Prepares in the background.
-    void begin(std::shared_ptr<const Model> model, std::vector<Handle> handles);
-    /// Where the last handle's vertices are to be.
-    void move(std::vector<Vec3f> targets);
-    /// Waits for the solution of the last targets and returns it; null when it failed. The drag is over.
-    std::shared_ptr<const Pose> finish(std::vector<Handle>* handles);
+    /// From the pose `start` (null: at rest), with the pull's vertices and those it holds. Prepares in the background.
+    void begin(std::shared_ptr<const Model> model, std::shared_ptr<const Pose> start, Handle pull);
+    /// How far the pull's vertices are to be from where they started.
+    void move(const Vec3f& way);
+    /// Waits for the solution of the last move and returns it; null when it failed. The drag is over.
+    std::shared_ptr<const Pose> finish();
+    void stop(); ///< the drag is over, and leaves nothing
     bool is_active() const;
 
 Q_SIGNALS:
@@ -48,6 +54,7 @@ Q_SIGNALS:
 
 private:
     struct Content;
+    void listen();
     std::unique_ptr<Content> content_;
 };
 

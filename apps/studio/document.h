@@ -12,6 +12,7 @@
 #include <QObject>
 #include <QUndoStack>
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
@@ -46,11 +47,17 @@ struct Warps {
     bool none() const { return stretch == 1 && squeeze == 1 && bend == 0 && twist == 0 && taper == 1; }
 };
 
-/// Driver vertices that are put somewhere: moved together from where they are at rest. Not moved at all: a pin.
+/// A pin, or a pull that was made. Each pull starts from the shape that the ones before it left, so nothing jumps when
+/// the next one begins. Places are in model units, relative to the mesh's origin, before the warps.
 struct Handle {
-    std::vector<Index> vertices;   ///< of the driver, ascending; in no other handle
-    std::vector<Vec3f> targets;    ///< one each: model units, relative to the mesh's origin, before the warps
-    bool pinned = false;           ///< by the user, and so shown as a pin
+    std::vector<Index> vertices; ///< of the driver, ascending; in no other pin
+    std::vector<Vec3f> targets;  ///< one each: where they are held, or where the pull left them
+    bool pinned = false;         ///< by the user, and so shown as a pin: pulls leave it where it is
+    // Of a pull, all that is needed to do it again on another resolution:
+    std::vector<Index> held;      ///< of the driver, ascending: stayed where they were
+    Vec3f centre = Vec3f::Zero(); ///< what was taken hold of, at rest
+    double grip = 0, reach = 0;   ///< model units about it, at rest
+    Vec3f move = Vec3f::Zero();   ///< of what is within the grip
     bool operator==(const Handle&) const = default;
 };
 
@@ -72,14 +79,14 @@ struct BodySettings {
 /// Everything that is saved, undone and redone. Cheap to copy: what is large is shared and never changes.
 struct State {
     std::shared_ptr<const Source> source;
-    std::optional<Shape> shape;                 ///< when the source is a built-in shape
-    StripOptions strip;                         ///< what the model was made with
+    std::optional<Shape> shape; ///< when the source is a built-in shape
+    StripOptions strip;         ///< what the model was made with
     StripReport strip_report;
-    std::shared_ptr<const Model> model;         ///< its mesh is the source's
-    RestoreOptions restore;                     ///< law and thin shell; level: the one shown, always set
+    std::shared_ptr<const Model> model; ///< its mesh is the source's
+    RestoreOptions restore;             ///< law and thin shell; level: the one shown, always set
     Warps warps;
     std::vector<Handle> handles;
-    std::shared_ptr<const Pose> handle_pose;    ///< the driver as the handles put it; null without handles
+    std::shared_ptr<const Pose> handle_pose; ///< the driver as the pulls left it; null: at rest
     BodySettings body;
     std::shared_ptr<const PoseSequence> recording; ///< of the driver, the first frame is the start; null: none
 
@@ -100,11 +107,15 @@ public:
     /// not empty become one (a slider that is dragged), until end_merge().
     void change(const QString& name, State next, const std::string& merge = {});
     void end_merge() { ++merge_run_; }
+    /// The key as it is now, for a change that comes later (from the background): end_merge() does not cut it off.
+    std::string merge_key(const std::string& merge) const;
     /// A fresh start: no history, nothing unsaved.
     void replace(State next);
 
     bool is_modified() const { return !undo_stack_.isClean(); }
     void set_saved() { undo_stack_.setClean(); }
+    /// The same number means the same state, also after undo and redo.
+    std::uint64_t state_id() const { return state_id_; }
 
     /// Everything of the state as bytes: the model file with the recording, and all settings. For tests, and for
     /// whoever wants to know whether two states are the same.
@@ -116,11 +127,13 @@ Q_SIGNALS:
 
 private:
     friend class StateChange; ///< the undo command
-    void go_to(const State& next);
+    void go_to(const State& next, std::uint64_t id);
+    void set(State next, std::uint64_t id);
 
     State state_;
     QUndoStack undo_stack_;
     unsigned merge_run_ = 0;
+    std::uint64_t state_id_ = 0, last_id_ = 0;
 };
 
 } // namespace filigree::studio

@@ -21,7 +21,8 @@ public:
 
     /// `work` runs in the other thread; `done` gets its value in the main thread. Work that is started under the same
     /// `topic` as one that runs or waits takes its place: the older one is cancelled and never delivered (a slider
-    /// that strips again and again). An empty topic replaces nothing. An error other than cancelled is told by failed().
+    /// that strips again and again). An empty topic replaces nothing. An error other than cancelled is told by
+    /// failed().
     template <class T>
     void start(const QString& title, const std::string& topic, std::function<Result<T>(const RunContext&)> work,
                std::function<void(T)> done) {
@@ -36,18 +37,18 @@ public:
              [done = std::move(done), value] { done(std::move(**value)); }});
     }
 
-    bool is_busy() const;     ///< something runs or waits
-    QString title() const;    ///< of what runs; "" when nothing does
-    QString phase() const;    ///< what it is at, in the library's words
-    double fraction() const;  ///< done of that phase, 0 to 1
-    void cancel();            ///< what runs, and all that waits
+    bool is_busy() const;    ///< something runs or waits
+    QString title() const;   ///< of what runs; "" when nothing does
+    QString phase() const;   ///< what it is at, in the library's words
+    double fraction() const; ///< done of that phase, 0 to 1
+    void cancel();           ///< what runs, and all that waits
     /// Returns when nothing runs or waits any more; deliveries happen inside. For tests, scripts and closing.
     void wait_until_idle();
 
 Q_SIGNALS:
     void started();
-    void progressed();  ///< at most some thirty times a second
-    void finished();    ///< after delivery, cancelled or failed
+    void progressed(); ///< at most some thirty times a second
+    void finished();   ///< after delivery, cancelled or failed
     void failed(const Error& error);
     void cancelled(const QString& title);
 
@@ -59,6 +60,8 @@ private:
         std::function<void()> deliver;
     };
     void add(Job job);
+    void listen();
+    void finish(const Status& result, bool is_cancelled, bool is_replaced, const Job& job);
 
     struct Content;
     std::unique_ptr<Content> content_;

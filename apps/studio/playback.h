@@ -52,7 +52,7 @@ public:
     bool has_body() const { return made_ != nullptr; }
     std::shared_ptr<const MadeBody> made() const { return made_; }
 
-    void play();  ///< from the last frame simulated, as fast as 60 frames a second
+    void play(); ///< from the last frame simulated, as fast as 60 frames a second
     void pause();
     void step();  ///< one frame
     void reset(); ///< to the start; the recording is emptied

@@ -17,11 +17,11 @@ struct ViewSettings {
     SurfaceStyle style = SurfaceStyle::shaded;
     Coloring coloring = Coloring::own;
     Tool tool = Tool::pull;
-    bool split = false;             ///< driver | restored | full deformation
-    bool driver = false;            ///< the driver's edges over the mesh
-    bool defects = false;           ///< open and non-manifold edges marked
-    bool particles = false;         ///< the body's, instead of its surface
-    bool inside_points = false;     ///< points inside the mesh at rest
+    bool split = false;         ///< driver | restored | full deformation
+    bool driver = false;        ///< the driver's edges over the mesh
+    bool defects = false;       ///< open and non-manifold edges marked
+    bool particles = false;     ///< the body's, instead of its surface
+    bool inside_points = false; ///< points inside the mesh at rest
     std::size_t inside_count = 3000;
     bool clip = false;
     int clip_axis = 2;              ///< 0 x, 1 y, 2 z
@@ -52,14 +52,15 @@ public:
     /// The camera looks at this box from a direction (unit, from the object to the viewer) and shows all of it; zoom
     /// is 1 then.
     void fit(const Box& box, const Vec3d& direction, double aspect);
-    /// Orbits by angles (degrees; azimuth about `up`, elevation held within 89), pans by fractions of the picture's height.
+    /// Orbits by angles (degrees; azimuth about `up`, elevation held within 89), pans by fractions of the picture's
+    /// height.
     void orbit(double azimuth, double elevation);
     void pan(double right, double up);
 
     static constexpr double kLeastZoom = 0.02, kMostZoom = 200;
 
 Q_SIGNALS:
-    void changed();        ///< settings
+    void changed(); ///< settings
     void camera_changed();
 
 private:

@@ -55,8 +55,8 @@ public:
     void pin(std::span<const Index> driver_vertices);
     void unpin(std::span<const Index> driver_vertices);
     void unpin_all();
-    /// Pulls a point of the surface (vertex of the finest mesh). Points are in the world, as shown. In body mode the body
-    /// is grabbed instead.
+    /// Pulls a point of the surface (vertex of the finest mesh). Points are in the world, as shown. In body mode the
+    /// body is grabbed instead.
     void begin_pull(Index vertex, const Vec3d& at);
     void pull_to(const Vec3d& target);
     void end_pull();
@@ -71,8 +71,8 @@ public:
     void animate(); ///< the report's button: drops the mesh as rubber on the ground and plays
     bool is_playing() const;
     // Timeline
-    std::size_t frame_count() const;    ///< recorded frames, the start included; 0: none
-    std::size_t frame() const;          ///< shown, 0 .. frame_count() - 1
+    std::size_t frame_count() const; ///< recorded frames, the start included; 0: none
+    std::size_t frame() const;       ///< shown, 0 .. frame_count() - 1
     void go_to_frame(std::size_t frame);
 
     /// Measures what is shown against the full deformation, in the background; error_measured() tells.
@@ -100,10 +100,11 @@ Q_SIGNALS:
     void timeline_changed(); ///< playing, frame, frame count
     void error_measured();
     void inside_points_ready();
-    void opened();           ///< another mesh or model than before
+    void opened();                                     ///< another mesh or model than before
     void told(const QString& sentence, bool is_error); ///< for the window's message bar
 
 private:
+    struct Content;
     void show_pose();
 
     Document document_;
@@ -118,6 +119,7 @@ private:
     double driver_milliseconds_ = 0;
     bool is_pulling_ = false, wants_full_ = false;
     std::size_t frame_ = 0;
+    std::unique_ptr<Content> content_;
 };
 
 } // namespace filigree::studio
