@@ -1,0 +1,198 @@
+#include "shown_model.h"
+
+#include "filigree/mesh/mesh_distance.h"
+#include "filigree/mesh/triangulate.h"
+
+#include <algorithm>
+
+namespace filigree::studio {
+
+namespace {
+
+LevelFacts facts_of(const Model& model, unsigned level) {
+    const bool finest = level == model.finest_level();
+    const std::size_t faces = finest ? model.mesh.face_count() : model.levels[level].face_count();
+    const std::size_t corners = finest ? model.mesh.corner_count() : model.levels[level].corners.size();
+    LevelFacts facts;
+    facts.triangles = corners - 2 * faces;
+    facts.vertices = finest ? model.mesh.vertex_count() : model.levels[level].vertices.size();
+    if (finest) facts.deviation = 0;
+    return facts;
+}
+
+/// Some of the finest mesh's vertices, evenly by index, as a mesh without faces.
+Mesh some_vertices(const Mesh& mesh, std::size_t most) {
+    Mesh some;
+    some.origin = mesh.origin;
+    const std::size_t count = std::min(mesh.vertex_count(), most);
+    for (std::size_t i = 0; i < count; ++i) some.positions.push_back(mesh.positions[i * mesh.vertex_count() / count]);
+    return some;
+}
+
+/// How far nearly all of `points` are from a level.
+std::optional<double> deviation_of(const Mesh& points, const Mesh& level, const RunContext& context) {
+    constexpr double kNearlyAll = 0.97;
+    Result<std::vector<float>> distances = distances_to_surface(points, level, context);
+    if (!distances || distances->empty()) return std::nullopt;
+    const auto at = distances->begin() + static_cast<std::ptrdiff_t>(kNearlyAll * double(distances->size() - 1));
+    std::nth_element(distances->begin(), at, distances->end());
+    return *at;
+}
+
+} // namespace
+
+std::shared_ptr<const LevelShape> LevelShape::make(std::shared_ptr<const Model> model, RestoreOptions restore,
+                                                   unsigned level, const RunContext& context) {
+    auto shape = std::make_shared<LevelShape>();
+    restore.level = level;
+    Result<Restorer> restorer = Restorer::create(*model, restore, context);
+    if (!restorer) return nullptr;
+    shape->restorer_ = std::move(restorer).value();
+    shape->vertex_count_ = shape->restorer_->vertex_count();
+    if (level == model->finest_level()) {
+        shape->triangles_ = triangulate(model->mesh).triangles;
+    } else {
+        shape->vertices_ = model->levels[level].vertices;
+        shape->triangles_ = triangulate(level_mesh(*model, level)).triangles;
+    }
+    shape->model_ = std::move(model);
+    return shape;
+}
+
+std::vector<Vec3f> LevelShape::positions(const Pose& pose, const RunContext& context) const {
+    Result<std::vector<Vec3f>> restored = restorer_->positions(pose, context);
+    return restored ? std::move(restored).value() : std::vector<Vec3f>();
+}
+
+ShownModel::ShownModel(const State& state, RestoreOn where)
+    : model_(state.model), source_(state.source), restore_(state.restore), where_(where) {
+    rest_pose_.positions = driver_positions(*model_);
+    levels_.resize(model_->finest_level() + 1);
+    asked_.resize(levels_.size());
+    for (unsigned level = 0; level < levels_.size(); ++level) facts_.push_back(facts_of(*model_, level));
+}
+
+bool ShownModel::is_of(const State& state) const {
+    return state.model == model_ && state.restore.law == restore_.law &&
+           state.restore.thin_shell == restore_.thin_shell;
+}
+
+const std::vector<float>& ShownModel::arrival() {
+    if (arrival_.empty()) {
+        arrival_.assign(model_->mesh.vertex_count(), static_cast<float>(finest_level()));
+        for (unsigned level = finest_level(); level-- > 0;)
+            for (const Index vertex : model_->levels[level].vertices) arrival_[vertex] = static_cast<float>(level);
+    }
+    return arrival_;
+}
+
+void ShownModel::ask(unsigned level, bool urgent, Background& background,
+                     std::function<void(std::function<void()>)> upload,
+                     std::function<void(unsigned, const std::optional<Error>&)> ready) {
+    const std::string topic = "level " + std::to_string(level);
+    if (asked_[level]) return;
+    asked_[level] = 1;
+    const std::weak_ptr<int> life = life_;
+    RestoreOptions restore = restore_;
+    restore.level = level;
+    background.start(
+        topic,
+        [this, life, upload = std::move(upload), ready = std::move(ready), level, restore, model = model_,
+         source = source_, where = where_](const RunContext& context) -> Background::Delivery {
+            const std::shared_ptr<const LevelShape> shape = LevelShape::make(model, restore, level, context);
+            if (!shape) return nullptr;
+            SurfaceOptions options;
+            options.materials = source->materials.materials;
+            std::optional<Error> error;
+            std::shared_ptr<DrawData> data;
+            if (!shape->triangles().empty()) {
+                Result<DrawData> made = DrawData::model(*model, restore, options, where, context);
+                if (context.is_cancelled()) return nullptr;
+                if (made)
+                    data = std::make_shared<DrawData>(std::move(made).value());
+                else
+                    error = made.error();
+            }
+            return [this, life, upload, ready, level, model, source, shape, data, error]() mutable {
+                if (life.expired()) return;
+                if (!error)
+                    upload([&] {
+                        Result<Drawable> drawable = data ? Drawable::upload(std::move(*data))
+                                                         : Drawable::points(shape->positions(rest_pose_, RunContext()),
+                                                                            model->mesh.origin, {}, RunContext());
+                        if (drawable)
+                            levels_[level].reset(new ShownLevel{shape, std::move(drawable).value(), data == nullptr});
+                        else
+                            error = drawable.error();
+                    });
+                ready(level, error);
+            };
+        },
+        urgent);
+}
+
+void ShownModel::measure(Background& background, std::function<void()> ready) {
+    if (is_measured_) return;
+    is_measured_ = true;
+    const std::weak_ptr<int> life = life_;
+    background.start(
+        "deviations",
+        [this, life, ready = std::move(ready), model = model_](const RunContext& context) -> Background::Delivery {
+            constexpr std::size_t kProbes = 20'000; // vertices: enough for a percentile
+            const Mesh points = some_vertices(model->mesh, kProbes);
+            std::vector<std::optional<double>> deviations;
+            for (unsigned level = 0; level < model->finest_level(); ++level)
+                deviations.push_back(deviation_of(points, level_mesh(*model, level), context));
+            if (context.is_cancelled()) return nullptr;
+            return [this, life, ready, deviations] {
+                if (life.expired()) return;
+                for (std::size_t level = 0; level < deviations.size(); ++level)
+                    facts_[level].deviation = deviations[level];
+                ready();
+            };
+        });
+}
+
+std::optional<unsigned> ShownModel::nearest_ready(unsigned wanted) const {
+    for (unsigned level = wanted + 1; level-- > 0;)
+        if (levels_[level]) return level;
+    for (unsigned level = wanted + 1; level < levels_.size(); ++level)
+        if (levels_[level]) return level;
+    return std::nullopt;
+}
+
+bool ShownModel::set_pose(ShownLevel& level, const Pose& pose, std::uint64_t stamp, const RunContext& context) {
+    if (level.pose == stamp) return true;
+    if (level.is_points) {
+        const std::vector<Vec3f> positions = level.shape->positions(pose, context);
+        if (!level.drawable.set_positions(positions)) return false;
+    } else if (!level.drawable.set_pose(pose, context)) {
+        return false;
+    }
+    level.pose = stamp;
+    return true;
+}
+
+void ShownModel::set_colors(ShownLevel& level, const VertexColors& colors, std::uint64_t stamp) {
+    if (level.colors == stamp || level.is_points) return;
+    level.colors = stamp;
+    if (colors.values.size() != model_->mesh.vertex_count()) {
+        (void)level.drawable.set_scalars({});
+        return;
+    }
+    std::vector<float> values(level.shape->vertex_count());
+    for (Index v = 0; v < values.size(); ++v) values[v] = colors.values[level.shape->finest_vertex(v)];
+    (void)level.drawable.set_scalars({values, colors.map, colors.range});
+}
+
+void ShownModel::forget_unready() {
+    for (std::size_t level = 0; level < levels_.size(); ++level) asked_[level] = levels_[level] != nullptr;
+    is_measured_ =
+        std::all_of(facts_.begin(), facts_.end(), [](const LevelFacts& f) { return f.deviation.has_value(); });
+}
+
+void ShownModel::clear() {
+    for (auto& level : levels_) level.reset();
+}
+
+} // namespace filigree::studio

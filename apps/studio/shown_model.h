@@ -1,0 +1,99 @@
+// A model as the viewport has it: some of its levels in graphics memory, prepared one after the other in the
+// background.
+#pragma once
+
+#include "background.h"
+#include "document.h"
+#include "level_choice.h"
+
+#include "filigree/render/drawable.h"
+
+namespace filigree::studio {
+
+/// A level in the processor's memory, for picking. Never changes once made.
+class LevelShape {
+public:
+    /// Null: cancelled, or there is no such level.
+    static std::shared_ptr<const LevelShape> make(std::shared_ptr<const Model> model, RestoreOptions restore,
+                                                  unsigned level, const RunContext& context);
+
+    const std::vector<Triangle>& triangles() const { return triangles_; }
+    std::size_t vertex_count() const { return vertex_count_; }
+    Index finest_vertex(Index vertex) const { return vertices_.empty() ? vertex : vertices_[vertex]; }
+    /// As posed, relative to the mesh's origin. Empty: the pose does not belong to the model.
+    std::vector<Vec3f> positions(const Pose& pose, const RunContext& context) const;
+
+private:
+    std::shared_ptr<const Model> model_;
+    std::optional<Restorer> restorer_;
+    std::vector<Index> vertices_; ///< in the finest mesh; empty: it is the finest
+    std::vector<Triangle> triangles_;
+    std::size_t vertex_count_ = 0;
+};
+
+/// Numbers of the finest mesh's vertices to be shown as colours, with the legend's title.
+struct VertexColors {
+    std::vector<float> values; ///< empty: none
+    ColorMap map = ColorMap::sequential;
+    ValueRange range;
+};
+
+/// One level in graphics memory. Lives and dies with the OpenGL context current.
+struct ShownLevel {
+    std::shared_ptr<const LevelShape> shape;
+    Drawable drawable;
+    bool is_points = false;   ///< the mesh has no faces: its vertices as balls
+    std::uint64_t pose = 0;   ///< which pose it has; 0: at rest
+    std::uint64_t colors = 0; ///< which colours it has; 0: its own
+};
+
+/// The levels of one model with one law. Main thread only.
+class ShownModel {
+public:
+    ShownModel(const State& state, RestoreOn where);
+
+    bool is_of(const State& state) const;
+    const Model& model() const { return *model_; }
+    std::shared_ptr<const Model> shared_model() const { return model_; }
+    RestoreOn where() const { return where_; }
+    unsigned finest_level() const { return model_->finest_level(); }
+    const std::vector<LevelFacts>& facts() const { return facts_; }
+    const Pose& rest_pose() const { return rest_pose_; }
+    /// The level at which each vertex of the finest mesh comes in. Made when first asked for.
+    const std::vector<float>& arrival();
+
+    /// Prepares a level unless it was asked for before. `upload` runs its argument with OpenGL at hand; `ready` is
+    /// called with the level, or with the error that says why there will be none.
+    void ask(unsigned level, bool urgent, Background& background, std::function<void(std::function<void()>)> upload,
+             std::function<void(unsigned, const std::optional<Error>&)> ready);
+    /// Measures the deviations of all levels in the background, once.
+    void measure(Background& background, std::function<void()> ready);
+
+    ShownLevel* level(unsigned number) { return levels_[number].get(); } ///< null: not ready
+    /// The finest ready level up to `wanted`, else the coarsest beyond; none: nothing is ready.
+    std::optional<unsigned> nearest_ready(unsigned wanted) const;
+
+    /// Poses and colours a level that is ready; with OpenGL. `stamp` tells poses (colours) apart.
+    bool set_pose(ShownLevel& level, const Pose& pose, std::uint64_t stamp, const RunContext& context);
+    void set_colors(ShownLevel& level, const VertexColors& colors, std::uint64_t stamp);
+
+    /// After Background::cancel_all(): levels that were asked for and did not come can be asked for again.
+    void forget_unready();
+    /// Gives back what is in graphics memory; with OpenGL.
+    void clear();
+
+private:
+    std::shared_ptr<const Model> model_;
+    std::shared_ptr<const Source> source_;
+    RestoreOptions restore_;
+    RestoreOn where_;
+    Pose rest_pose_;
+    std::vector<std::unique_ptr<ShownLevel>> levels_;
+    std::vector<char> asked_;
+    std::vector<LevelFacts> facts_;
+    std::vector<float> arrival_;
+    bool is_measured_ = false;
+    std::shared_ptr<int> life_ = std::make_shared<int>(); ///< deliveries come only while it lives
+};
+
+} // namespace filigree::studio
