@@ -8,8 +8,6 @@ namespace filigree::studio {
 
 namespace {
 
-constexpr double kMostElevation = 89; // degrees: at 90 right and left are gone
-
 double radians(double degrees) { return degrees * std::numbers::pi / 180; }
 
 /// Model units from the bottom to the top of the picture, at a distance along the view.
@@ -18,36 +16,7 @@ double visible_height(const Camera& camera, double distance) {
     return 2 * distance * std::tan(radians(camera.field_of_view_deg) / 2);
 }
 
-double target_distance(const Camera& camera) { return (camera.target - camera.eye).norm(); }
-
 } // namespace
-
-Camera orbited(const Camera& camera, const Vec3d& up, double azimuth, double elevation) {
-    const Vec3d back = camera.eye - camera.target;
-    const double distance = back.norm();
-    if (!(distance > 0)) return camera;
-    const Vec3d direction = back / distance;
-    const Vec3d right = camera.basis().col(0);
-    const double now = std::asin(std::clamp(direction.dot(up), -1.0, 1.0)) * 180 / std::numbers::pi;
-    const double next = std::clamp(now + elevation, -kMostElevation, kMostElevation);
-    // `right` is level and at right angles to the view, so turning about it changes the elevation alone.
-    const Eigen::AngleAxisd tilt(radians(now - next), right);
-    const Eigen::AngleAxisd turn(radians(azimuth), up);
-    Camera result = camera;
-    result.up = up;
-    result.eye = camera.target + distance * (turn * (tilt * direction)).normalized();
-    return result;
-}
-
-Camera panned(const Camera& camera, double right, double down, const PictureSize& size) {
-    const double unit = visible_height(camera, target_distance(camera)) / size.height;
-    const Mat3d basis = camera.basis();
-    const Vec3d shift = unit * (down * basis.col(1) - right * basis.col(0));
-    Camera result = camera;
-    result.eye += shift;
-    result.target += shift;
-    return result;
-}
 
 Camera zoomed_about(const Camera& camera, double factor, double x, double y, const PictureSize& size) {
     const Vec3d fixed = point_in_plane(camera, camera.target, x, y, size);

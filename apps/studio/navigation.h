@@ -1,4 +1,4 @@
-// How the mouse moves the camera: functions from one camera to the next.
+// Between the mouse and the camera: what ViewState does not have.
 #pragma once
 
 #include "filigree/render/camera.h"
@@ -12,13 +12,6 @@ struct PictureSize {
     double width = 1, height = 1;
     double aspect() const { return width / height; }
 };
-
-/// Turned about the target like a turntable: by `azimuth` about `up`, and up by `elevation`, which is held within 89
-/// degrees. Degrees; the object seems to turn the other way.
-Camera orbited(const Camera& camera, const Vec3d& up, double azimuth, double elevation);
-
-/// Moved across the view, so that what lies at the target's distance moves by so many pixels right and down.
-Camera panned(const Camera& camera, double right, double down, const PictureSize& size);
 
 /// `factor` times as large; what is seen at the point (from the top left) at the target's distance stays there.
 Camera zoomed_about(const Camera& camera, double factor, double x, double y, const PictureSize& size);

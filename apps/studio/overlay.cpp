@@ -1,0 +1,266 @@
+#include "overlay.h"
+
+#include "theme.h"
+
+#include <QPainter>
+#include <QPainterPath>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace filigree::studio {
+
+namespace {
+
+constexpr double kMargin = 14; // from the widget's borders
+
+const QColor kPin(226, 74, 51), kOpen(235, 94, 40), kNonManifold(190, 50, 200);
+const std::array<QColor, 3> kAxes = {QColor(214, 69, 65), QColor(76, 160, 72), QColor(62, 116, 214)};
+
+QColor gizmo_color(GizmoPart part) {
+    switch (part) {
+    case GizmoPart::stretch:
+        return {217, 95, 48};
+    case GizmoPart::squeeze:
+        return {44, 127, 184};
+    case GizmoPart::bend:
+        return {49, 150, 84};
+    case GizmoPart::twist:
+        return {136, 86, 167};
+    default:
+        return {196, 138, 20};
+    }
+}
+
+/// The painter of one picture, with what the theme says.
+class Sheet {
+public:
+    Sheet(QPainter& painter, const QPalette& palette, const QRectF& area)
+        : painter_(painter), area_(area), is_dark_(is_dark(palette)), text_(palette.color(QPalette::WindowText)),
+          plate_(palette.color(QPalette::Window)) {
+        plate_.setAlphaF(is_dark_ ? 0.72f : 0.78f);
+        painter.setRenderHint(QPainter::Antialiasing);
+    }
+
+    void trouble(const QString& sentence) {
+        painter_.setPen(text_);
+        const double margin = std::max(24.0, area_.width() * 0.15);
+        painter_.drawText(area_.adjusted(margin, 0, -margin, 0), Qt::AlignCenter | Qt::TextWordWrap, sentence);
+    }
+
+    /// Text on a plate; returns the plate.
+    QRectF label(const QPointF& at, const QString& text, Qt::Alignment alignment, double strength = 1) {
+        const QFontMetricsF metrics(painter_.font());
+        const QRectF bounds = metrics.boundingRect(QRectF(0, 0, 4000, 4000), Qt::AlignLeft, text);
+        QRectF plate(0, 0, bounds.width() + 16, bounds.height() + 8);
+        plate.moveTopLeft(at);
+        if (alignment & Qt::AlignHCenter) plate.moveLeft(at.x() - plate.width() / 2);
+        if (alignment & Qt::AlignRight) plate.moveLeft(at.x() - plate.width());
+        if (alignment & Qt::AlignBottom) plate.moveTop(at.y() - plate.height());
+        plate.moveTopLeft(QPointF(std::round(plate.left()), std::round(plate.top())));
+        painter_.setOpacity(strength);
+        painter_.setPen(Qt::NoPen);
+        painter_.setBrush(plate_);
+        painter_.drawRoundedRect(plate, 5, 5);
+        painter_.setPen(text_);
+        painter_.drawText(plate.adjusted(8, 4, -8, -4), Qt::AlignCenter, text);
+        painter_.setOpacity(1);
+        return plate;
+    }
+
+    void captions(const std::vector<OverlayContent::Caption>& captions) {
+        for (std::size_t i = 0; i < captions.size(); ++i) {
+            const auto& [title, detail, tile] = captions[i];
+            if (i > 0) {
+                QColor line = text_;
+                line.setAlphaF(0.25f);
+                painter_.setPen(QPen(line, 1));
+                const double x = std::round(tile.left()) + 0.5;
+                painter_.drawLine(QPointF(x, tile.top()), QPointF(x, tile.bottom()));
+            }
+            label(QPointF(tile.center().x(), tile.top() + kMargin), detail.isEmpty() ? title : title + "\n" + detail,
+                  Qt::AlignHCenter);
+        }
+    }
+
+    void legend(const OverlayContent::Legend& legend) {
+        constexpr double kWidth = 200, kHeight = 10;
+        const QFontMetricsF metrics(painter_.font());
+        const QString title = legend.unit.isEmpty() ? legend.title : legend.title + ", " + legend.unit;
+        const double width = std::max(kWidth, metrics.horizontalAdvance(title)) + 32;
+        const double height = 2 * metrics.height() + kHeight + 22;
+        const QRectF plate(std::round(area_.right() - kMargin - width), std::round(area_.bottom() - kMargin - height),
+                           width, height);
+        painter_.setPen(Qt::NoPen);
+        painter_.setBrush(plate_);
+        painter_.drawRoundedRect(plate, 5, 5);
+        painter_.setPen(text_);
+        painter_.drawText(plate.adjusted(16, 6, -16, 0), Qt::AlignLeft | Qt::AlignTop, title);
+
+        const QRectF bar(plate.left() + 16, plate.top() + 10 + metrics.height(), plate.width() - 32, kHeight);
+        QLinearGradient gradient(bar.topLeft(), bar.topRight());
+        for (int i = 0; i <= 16; ++i) {
+            const Vec3f c = color_at(legend.map, static_cast<float>(i) / 16);
+            gradient.setColorAt(i / 16.0, QColor::fromRgbF(c.x(), c.y(), c.z()));
+        }
+        painter_.setPen(Qt::NoPen);
+        painter_.setBrush(gradient);
+        painter_.drawRect(bar);
+        painter_.setPen(text_);
+        const double least = legend.range.least, most = legend.range.most;
+        for (const auto& [value, text] : ticks(legend)) {
+            const double x = bar.left() + bar.width() * (value - least) / std::max(most - least, 1e-30);
+            painter_.drawLine(QPointF(x, bar.bottom()), QPointF(x, bar.bottom() + 3));
+            const double half = metrics.horizontalAdvance(text) / 2;
+            const double middle = std::clamp(x, plate.left() + 5 + half, plate.right() - 5 - half);
+            painter_.drawText(QRectF(middle - half - 2, bar.bottom() + 4, 2 * half + 4, metrics.height()),
+                              Qt::AlignCenter, text);
+        }
+    }
+
+    void triad(const OverlayContent& content) {
+        constexpr double kLength = 26;
+        const QPointF middle(area_.left() + kMargin + 32, area_.bottom() - kMargin - 32);
+        std::array<int, 3> order = {0, 1, 2};
+        std::sort(order.begin(), order.end(), [&](int a, int b) {
+            return content.triad_depth[std::size_t(a)] < content.triad_depth[std::size_t(b)];
+        });
+        for (const int i : order) {
+            const auto k = static_cast<std::size_t>(i);
+            const QPointF end = middle + kLength * content.triad[k];
+            painter_.setPen(QPen(kAxes[k], 2.2, Qt::SolidLine, Qt::RoundCap));
+            painter_.drawLine(middle, end);
+            painter_.setPen(text_);
+            const QPointF at = middle + (kLength + 9) * content.triad[k];
+            painter_.drawText(QRectF(at.x() - 10, at.y() - 10, 20, 20), Qt::AlignCenter, QString("xyz").mid(i, 1));
+        }
+    }
+
+    void pins(const std::vector<OverlayContent::Dot>& pins) {
+        for (const OverlayContent::Dot& pin : pins) {
+            QColor color = kPin;
+            if (pin.faces_away) color.setAlphaF(0.3f);
+            painter_.setPen(pin.faces_away ? QPen(Qt::NoPen) : QPen(QColor(255, 255, 255, 200), 1));
+            painter_.setBrush(color);
+            painter_.drawEllipse(pin.at, 3.5, 3.5);
+        }
+    }
+
+    void hover(const QPointF& at, double radius) {
+        for (const auto& [color, width] :
+             {std::pair(QColor(0, 0, 0, 70), 3.0), std::pair(QColor(255, 255, 255), 1.4)}) {
+            painter_.setPen(QPen(color, width));
+            painter_.setBrush(Qt::NoBrush);
+            painter_.drawEllipse(at, radius, radius);
+        }
+        painter_.setPen(Qt::NoPen);
+        painter_.setBrush(Qt::white);
+        painter_.drawEllipse(at, 2, 2);
+    }
+
+    void pull(const QLineF& line) {
+        for (const auto& [color, width] :
+             {std::pair(QColor(0, 0, 0, 90), 4.0), std::pair(QColor(255, 255, 255), 1.8)}) {
+            painter_.setPen(QPen(color, width, Qt::SolidLine, Qt::RoundCap));
+            painter_.drawLine(line);
+        }
+        painter_.setPen(QPen(QColor(0, 0, 0, 110), 1));
+        painter_.setBrush(Qt::white);
+        painter_.drawEllipse(line.p1(), 4, 4);
+        painter_.drawEllipse(line.p2(), 3, 3);
+    }
+
+    void knob(const OverlayContent::Knob& knob) {
+        const QColor color = gizmo_color(knob.part);
+        const double width = knob.is_hot ? 3 : 2;
+        const QColor halo = is_dark_ ? QColor(0, 0, 0, 120) : QColor(255, 255, 255, 170);
+        painter_.setBrush(Qt::NoBrush);
+        painter_.setPen(QPen(halo, width + 2.5, Qt::SolidLine, Qt::RoundCap, Qt::RoundJoin));
+        painter_.drawPolyline(knob.line);
+        painter_.setPen(QPen(color, width, Qt::SolidLine, Qt::RoundCap, Qt::RoundJoin));
+        painter_.drawPolyline(knob.line);
+        painter_.setPen(QPen(halo, 1.2));
+        painter_.setBrush(color);
+        const double radius = knob.is_hot ? 6.5 : 5;
+        const QPointF along = knob.line.back() - knob.line.front();
+        const double length = std::hypot(along.x(), along.y());
+        if (knob.has_tip && length > 3) {
+            const QPointF to = along / length, side(-to.y(), to.x());
+            painter_.drawPolygon(QPolygonF{knob.at + 1.5 * radius * to, knob.at - 0.5 * radius * to + radius * side,
+                                           knob.at - 0.5 * radius * to - radius * side});
+        } else {
+            painter_.drawEllipse(knob.at, radius, radius);
+        }
+        if (!knob.label.isEmpty()) label(knob.at + QPointF(14, -12), knob.label, Qt::AlignLeft);
+    }
+
+    void defects(const std::vector<OverlayContent::Edge>& edges) {
+        for (const OverlayContent::Edge& edge : edges) {
+            painter_.setPen(QPen(QColor(255, 255, 255, 150), 4, Qt::SolidLine, Qt::RoundCap));
+            painter_.drawLine(edge.line);
+        }
+        for (const OverlayContent::Edge& edge : edges) {
+            painter_.setPen(QPen(edge.is_open ? kOpen : kNonManifold, 2.4, Qt::SolidLine, Qt::RoundCap));
+            painter_.drawLine(edge.line);
+        }
+    }
+
+private:
+    static std::vector<std::pair<double, QString>> ticks(const OverlayContent::Legend& legend) {
+        std::vector<std::pair<double, QString>> result;
+        ValueRange written = legend.range;
+        written.least *= static_cast<float>(legend.per_value);
+        written.most *= static_cast<float>(legend.per_value);
+        for (const double tick : legend_ticks(written, legend.whole ? 9 : 4)) {
+            if (legend.whole && tick != std::round(tick)) continue;
+            result.emplace_back(tick / legend.per_value, QString::number(tick, 'g', 3));
+        }
+        return result;
+    }
+
+    QPainter& painter_;
+    QRectF area_;
+    bool is_dark_;
+    QColor text_, plate_;
+};
+
+} // namespace
+
+Overlay::Overlay(QWidget* parent) : QWidget(parent) {
+    setAttribute(Qt::WA_TransparentForMouseEvents);
+    setAttribute(Qt::WA_NoSystemBackground);
+    setObjectName("viewport.overlay");
+}
+
+void Overlay::set(OverlayContent content) {
+    content_ = std::move(content);
+    update();
+}
+
+void Overlay::paintEvent(QPaintEvent*) {
+    QPainter painter(this);
+    Sheet sheet(painter, palette(), rect());
+    const OverlayContent& c = content_;
+    if (!c.trouble.empty()) {
+        painter.fillRect(rect(), palette().window());
+        sheet.trouble(QString::fromStdString(c.trouble));
+        return;
+    }
+    sheet.defects(c.defects);
+    sheet.pins(c.pins);
+    for (const OverlayContent::Knob& knob : c.knobs) sheet.knob(knob);
+    if (c.pull) sheet.pull(*c.pull);
+    if (c.hover) sheet.hover(*c.hover, c.hover_radius);
+    sheet.captions(c.captions);
+    double top = c.captions.empty() ? kMargin : kMargin + 52; // below the captions
+    for (const QString& text : {c.note, c.defect_summary})
+        if (!text.isEmpty()) top = sheet.label(QPointF(kMargin, top), text, Qt::AlignLeft).bottom() + 6;
+    if (c.shows_triad) sheet.triad(c);
+    if (c.legend) sheet.legend(*c.legend);
+    if (c.hint_strength > 0 && !c.hint.isEmpty())
+        sheet.label(QPointF(width() / 2.0, height() - kMargin), c.hint, Qt::AlignHCenter | Qt::AlignBottom,
+                    c.hint_strength);
+}
+
+} // namespace filigree::studio
