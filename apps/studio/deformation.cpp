@@ -1,18 +1,331 @@
 #include "deformation.h"
 
+#include "bell.h"
+
+#include "filigree/mesh/triangulate.h"
+#include "filigree/mesh/weld.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+
 namespace filigree::studio {
-std::unique_ptr<SpaceWarp> make_warp(const Warps&, const Box&) { return nullptr; }
-Pose deformed_pose(const State&, const RunContext&) { return {}; }
-Result<std::vector<Vec3f>> full_deformation(const State&, const RunContext&) { return std::vector<Vec3f>{}; }
-PullRegion pull_region(const State&, const Vec3f&, double, double) { return {}; }
-Vec3d unwarped(const SpaceWarp&, const Vec3d& place, const Vec3d&) { return place; }
-struct HandleDrag::Content {};
-HandleDrag::HandleDrag(QObject* parent) : QObject(parent) {}
-HandleDrag::~HandleDrag() = default;
-void HandleDrag::begin(std::shared_ptr<const Model>, std::shared_ptr<const Pose>, Handle) {}
-void HandleDrag::move(const Vec3f&) {}
-std::shared_ptr<const Pose> HandleDrag::finish() { return nullptr; }
-void HandleDrag::stop() {}
-bool HandleDrag::is_active() const { return false; }
-void HandleDrag::listen() {}
+
+namespace {
+
+std::vector<Vec3f> start_positions(const Model& model, const Pose* start) {
+    return start ? start->positions : driver_positions(model);
+}
+
+std::vector<Triangle> driver_triangles(const Model& model) {
+    Mesh mesh; // the faces alone: triangulating looks at the positions at rest
+    mesh.positions = driver_positions(model);
+    mesh.face_offsets = model.driver().face_offsets;
+    mesh.corners = model.driver().corners;
+    return triangulate(mesh).triangles;
+}
+
+/// Those of a pull and those it holds, in the order that the solver is told their places.
+struct PullSolver {
+    HandleSolver solver;
+    std::vector<Vec3f> targets; ///< of the pulled ones, then of those held: where they start
+    std::size_t pulled;
+
+    static Result<PullSolver> create(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
+                                     std::span<const Index> grip, std::span<const Index> held) {
+        std::vector<Index> handles(grip.begin(), grip.end());
+        handles.insert(handles.end(), held.begin(), held.end());
+        Result<HandleSolver> solver = HandleSolver::create(positions, triangles, handles);
+        if (!solver) return solver.error();
+        std::vector<Vec3f> targets;
+        for (const Index v : handles) targets.push_back(positions[v]);
+        return PullSolver{std::move(*solver), std::move(targets), grip.size()};
+    }
+    Result<HandleResult> solve(const Vec3f& way, const HandleOptions& options, const RunContext& context) {
+        std::vector<Vec3f> places = targets;
+        for (std::size_t i = 0; i < pulled; ++i) places[i] += way;
+        return solver.solve(places, options, context);
+    }
+};
+
+/// The rotations of a pull that began at `start` (null: at rest) follow the gradients there.
+void follow_start(Pose& pose, const Pose* start) {
+    if (!start || start->gradients.empty()) return;
+    for (std::size_t v = 0; v < pose.gradients.size(); ++v) pose.gradients[v] *= start->gradients[v];
+}
+
+/// One pull of the driver done again, over every vertex of the mesh. Vertices at one place move as one.
+Status pull_all(const State& state, const Handle& pull, std::span<const Index> representative,
+                std::span<const Triangle> triangles, std::vector<Vec3f>& positions, const RunContext& context) {
+    const std::vector<Vec3f>& rest = state.model->mesh.positions;
+    std::vector<char> is_held(rest.size());
+    for (const Index v : pull.held) is_held[representative[state.model->driver().vertices[v]]] = 1;
+    std::vector<Index> grip, held;
+    for (const Index v : pull.vertices) is_held[representative[state.model->driver().vertices[v]]] = 2;
+    for (Index v = 0; v < rest.size(); ++v) {
+        if (representative[v] != v) continue;
+        const double distance = (rest[v] - pull.centre).norm();
+        if (is_held[v] == 2 || (!is_held[v] && distance <= pull.grip))
+            grip.push_back(v);
+        else if (is_held[v] || distance > pull.reach)
+            held.push_back(v);
+    }
+    Result<PullSolver> solver = PullSolver::create(positions, triangles, grip, held);
+    if (!solver) return solver.error();
+    Result<HandleResult> result = solver->solve(pull.move, {}, context);
+    if (!result) return result.error();
+    positions = std::move(result->pose.positions);
+    return Success{};
+}
+
+} // namespace
+
+std::unique_ptr<SpaceWarp> make_warp(const Warps& warps, const Box& rest_box) {
+    if (warps.none() || rest_box.empty()) return nullptr;
+    std::vector<std::unique_ptr<SpaceWarp>> steps;
+    if (warps.stretch != 1) steps.push_back(make_stretch(rest_box, warps.axis, warps.stretch));
+    if (warps.squeeze != 1) steps.push_back(make_squeeze(rest_box, warps.axis, warps.squeeze));
+    if (warps.bend != 0) steps.push_back(make_bend(rest_box, warps.axis, warps.bend));
+    if (warps.twist != 0) steps.push_back(make_twist(rest_box, warps.axis, warps.twist));
+    if (warps.taper != 1) steps.push_back(make_taper(rest_box, warps.axis, warps.taper));
+    return make_chain(std::move(steps));
+}
+
+Pose deformed_pose(const State& state, const RunContext& context) {
+    if (!state.model) return {};
+    const Mesh& mesh = state.model->mesh;
+    const auto warp = make_warp(state.warps, world_bounds(mesh));
+    if (!warp) return state.handle_pose ? *state.handle_pose : Pose{};
+    Pose pose = warp_pose(*warp, start_positions(*state.model, state.handle_pose.get()), mesh.origin, context);
+    follow_start(pose, state.handle_pose.get());
+    return pose;
+}
+
+Result<std::vector<Vec3f>> full_deformation(const State& state, const RunContext& context) {
+    const Mesh& mesh = state.model->mesh;
+    std::vector<Vec3f> positions = mesh.positions;
+    const auto is_pull = [](const Handle& handle) { return !handle.pinned; };
+    const auto pulls = std::count_if(state.handles.begin(), state.handles.end(), is_pull);
+    if (pulls > 0) {
+        const std::vector<Index> representative = weld_map(mesh.positions);
+        std::vector<Triangle> triangles = triangulate(mesh).triangles;
+        for (Triangle& triangle : triangles)
+            for (Index& vertex : triangle) vertex = representative[vertex];
+        std::ptrdiff_t done = 0;
+        for (const Handle& handle : state.handles) {
+            if (!is_pull(handle)) continue;
+            context.report("pulling every vertex", double(done++) / double(pulls));
+            if (context.is_cancelled()) return cancelled_error();
+            const Status status = pull_all(state, handle, representative, triangles, positions, context);
+            if (!status) return status.error();
+        }
+        for (Index v = 0; v < positions.size(); ++v) positions[v] = positions[representative[v]];
+    }
+    if (context.is_cancelled()) return cancelled_error();
+    const auto warp = make_warp(state.warps, world_bounds(mesh));
+    return warp ? warp_positions(*warp, positions, mesh.origin, context) : positions;
+}
+
+PullRegion pull_region(const State& state, const Vec3f& rest_point, double grip, double reach) {
+    const std::vector<Vec3f> rest = driver_positions(*state.model);
+    std::vector<char> is_pinned(rest.size());
+    for (const Handle& handle : state.handles)
+        if (handle.pinned)
+            for (const Index v : handle.vertices) is_pinned[v] = 1;
+    PullRegion region;
+    Index nearest = kNoIndex;
+    for (Index v = 0; v < rest.size(); ++v) {
+        if (is_pinned[v]) continue;
+        const float distance = (rest[v] - rest_point).norm();
+        if (nearest == kNoIndex || distance < (rest[nearest] - rest_point).norm()) nearest = v;
+        if (distance <= grip) region.grip.push_back(v);
+    }
+    if (region.grip.empty() && nearest != kNoIndex) region.grip.push_back(nearest);
+    for (Index v = 0; v < rest.size(); ++v)
+        if (is_pinned[v] ||
+            ((rest[v] - rest_point).norm() > reach && !std::binary_search(region.grip.begin(), region.grip.end(), v)))
+            region.held.push_back(v);
+    return region;
+}
+
+Vec3d unwarped(const SpaceWarp& warp, const Vec3d& place, const Vec3d& guess) {
+    constexpr int kSteps = 20;
+    Vec3d point = guess;
+    Warped now = warp.warp(point);
+    double distance = (place - now.position).norm();
+    for (int step = 0; step < kSteps; ++step) {
+        const Eigen::FullPivLU<Mat3d> gradient(now.gradient);
+        if (!gradient.isInvertible()) break;
+        Vec3d way = gradient.solve(place - now.position);
+        bool is_nearer = false;
+        for (int halving = 0; halving < 8 && !is_nearer; ++halving, way *= 0.5) {
+            const Warped next = warp.warp(point + way);
+            const double next_distance = (place - next.position).norm();
+            if (!(next_distance < distance)) continue;
+            point += way;
+            now = next;
+            distance = next_distance;
+            is_nearer = true;
+            break;
+        }
+        if (!is_nearer) break;
+    }
+    return point;
+}
+
+struct HandleDrag::Content {
+    Content(std::shared_ptr<const Model> of, std::shared_ptr<const Pose> from, Handle by, const Bell& rings)
+        : model(std::move(of)), start(std::move(from)), pull(std::move(by)), bell(rings) {}
+
+    std::shared_ptr<const Model> model;
+    std::shared_ptr<const Pose> start;
+    Handle pull;
+    RunContext context;
+    const Bell& bell;
+    std::thread thread;
+
+    std::mutex mutex;
+    std::condition_variable wake;
+    // Under the lock:
+    Vec3f way = Vec3f::Zero();
+    std::uint64_t way_number = 1; ///< of the last move
+    bool is_ending = false, stops = false;
+    std::shared_ptr<const Pose> pose;
+    double milliseconds = 0;
+    std::optional<Error> error;
+    bool is_new = false;
+
+    // A few rounds a picture while the mouse moves; the rest while it rests.
+    static constexpr unsigned kRounds = 8;
+    static constexpr double kTolerance = 1e-4, kFinalTolerance = 1e-5;
+    static constexpr unsigned kMostRounds = 400;                    ///< without a move
+    static constexpr std::chrono::milliseconds kLongestEnding{250}; ///< a large driver is let go a little early
+
+    void work() {
+        const Status status = solve();
+        if (status || status.error().code == ErrorCode::cancelled) return;
+        {
+            const std::scoped_lock lock(mutex);
+            error = status.error();
+            pose = nullptr;
+        }
+        bell.ring();
+    }
+
+    Status solve() {
+        const std::vector<Vec3f> positions = start_positions(*model, start.get());
+        Result<PullSolver> solver = PullSolver::create(positions, driver_triangles(*model), pull.vertices, pull.held);
+        if (!solver) return solver.error();
+        std::uint64_t solved = 0;
+        double last_move = 1;
+        unsigned rounds = 0;
+        std::optional<std::chrono::steady_clock::time_point> ending_since;
+        for (;;) {
+            Vec3f to;
+            double tolerance = kTolerance;
+            {
+                std::unique_lock lock(mutex);
+                const auto settled = [&] {
+                    return last_move <= (is_ending ? kFinalTolerance : kTolerance) || rounds >= kMostRounds;
+                };
+                wake.wait(lock, [&] { return stops || is_ending || way_number != solved || !settled(); });
+                if (stops) return cancelled_error();
+                if (is_ending && !ending_since) ending_since = std::chrono::steady_clock::now();
+                const bool is_late = ending_since && std::chrono::steady_clock::now() - *ending_since > kLongestEnding;
+                if (is_ending && way_number == solved && (settled() || is_late)) return Success{};
+                if (way_number != solved) rounds = 0;
+                solved = way_number;
+                to = way;
+                if (is_ending) tolerance = kFinalTolerance;
+            }
+            const auto begin = std::chrono::steady_clock::now();
+            Result<HandleResult> result = solver->solve(to, {.iterations = kRounds, .tolerance = tolerance}, context);
+            if (!result) return result.error();
+            rounds += std::max(1u, result->iterations);
+            last_move = result->last_move;
+            follow_start(result->pose, start.get());
+            const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - begin;
+            auto next = std::make_shared<const Pose>(std::move(result->pose));
+            {
+                const std::scoped_lock lock(mutex);
+                pose = std::move(next);
+                milliseconds = took.count();
+                is_new = true;
+            }
+            bell.ring();
+        }
+    }
+};
+
+HandleDrag::HandleDrag(QObject* parent) : QObject(parent), bell_(std::make_unique<Bell>()) {
+    connect(bell_.get(), &Bell::rung, this, &HandleDrag::listen);
+}
+HandleDrag::~HandleDrag() { stop(); }
+
+void HandleDrag::begin(std::shared_ptr<const Model> model, std::shared_ptr<const Pose> start, Handle pull) {
+    stop();
+    content_ = std::make_unique<Content>(std::move(model), std::move(start), std::move(pull), *bell_);
+    content_->thread = std::thread([content = content_.get()] { content->work(); });
+}
+
+void HandleDrag::move(const Vec3f& way) {
+    if (!content_) return;
+    {
+        const std::scoped_lock lock(content_->mutex);
+        if (way == content_->way) return;
+        content_->way = way;
+        ++content_->way_number;
+    }
+    content_->wake.notify_one();
+}
+
+std::shared_ptr<const Pose> HandleDrag::finish() {
+    if (!content_) return nullptr;
+    {
+        const std::scoped_lock lock(content_->mutex);
+        content_->is_ending = true;
+    }
+    content_->wake.notify_one();
+    content_->thread.join();
+    const std::unique_ptr<Content> content = std::move(content_);
+    if (content->error) Q_EMIT failed(*content->error);
+    return content->pose;
+}
+
+void HandleDrag::stop() {
+    if (!content_) return;
+    {
+        const std::scoped_lock lock(content_->mutex);
+        content_->stops = true;
+    }
+    content_->context.cancel();
+    content_->wake.notify_one();
+    content_->thread.join();
+    content_.reset();
+}
+
+bool HandleDrag::is_active() const { return content_ != nullptr; }
+
+void HandleDrag::listen() {
+    if (!content_) return;
+    std::shared_ptr<const Pose> pose;
+    std::optional<Error> error;
+    double milliseconds = 0;
+    {
+        const std::scoped_lock lock(content_->mutex);
+        if (std::exchange(content_->is_new, false)) pose = content_->pose;
+        milliseconds = content_->milliseconds;
+        error = content_->error;
+    }
+    if (error) {
+        stop();
+        Q_EMIT failed(*error);
+    } else if (pose) {
+        Q_EMIT solved(std::move(pose), milliseconds);
+    }
+}
+
 } // namespace filigree::studio

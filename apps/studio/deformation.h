@@ -11,6 +11,8 @@
 
 namespace filigree::studio {
 
+class Bell;
+
 /// Null where there is nothing to do.
 std::unique_ptr<SpaceWarp> make_warp(const Warps& warps, const Box& rest_box);
 
@@ -55,7 +57,8 @@ Q_SIGNALS:
 private:
     struct Content;
     void listen();
-    std::unique_ptr<Content> content_;
+    std::unique_ptr<Bell> bell_;
+    std::unique_ptr<Content> content_; ///< null: no drag
 };
 
 } // namespace filigree::studio

@@ -5,10 +5,11 @@
 
 #include "filigree/physics/simulation.h"
 
-#include <QElapsedTimer>
-#include <QTimer>
+#include <QObject>
 
 namespace filigree::studio {
+
+class Bell;
 
 /// What stands around a body, to be drawn: meshes in model units, relative to the model's origin.
 struct Surroundings {
@@ -52,8 +53,8 @@ public:
     bool has_body() const { return made_ != nullptr; }
     std::shared_ptr<const MadeBody> made() const { return made_; }
 
-    void play(); ///< from the last frame simulated, as fast as 60 frames a second
-    void pause();
+    void play();  ///< from the last frame simulated, as fast as 60 frames a second
+    void pause(); ///< at once, in the middle of a frame too: the frames delivered by then are all there are
     void step();  ///< one frame
     void reset(); ///< to the start; the recording is emptied
     bool is_playing() const { return is_playing_; }
@@ -87,8 +88,11 @@ private:
     std::shared_ptr<const MadeBody> made_;
     std::unique_ptr<Moment> moment_;
     PoseSequence recording_;
-    bool is_playing_ = false, is_grabbed_ = false;
-    std::unique_ptr<Worker> worker_;
+    bool is_playing_ = false, is_grabbed_ = false, wants_full_ = false;
+    Vec3f grabbed_ = Vec3f::Zero();
+    std::size_t delivered_ = 0; ///< frames, in all
+    std::unique_ptr<Bell> bell_;
+    std::unique_ptr<Worker> worker_; ///< of the body; null: none
 };
 
 } // namespace filigree::studio
