@@ -1,0 +1,188 @@
+// A body of a mesh and the world around it. The body starts where the mesh is; the ground is put below it, so that
+// nothing jumps when it is made.
+#include "playback.h"
+
+#include "filigree/mesh/shapes.h"
+#include "filigree/render/camera.h"
+
+#include <algorithm>
+#include <numbers>
+
+namespace filigree::studio {
+
+namespace {
+
+constexpr double kGravity = 9.81; // m/s^2
+// Obstacles, in sizes of the body.
+constexpr double kBallRadius = 0.35, kBallAside = 0.12;
+constexpr double kStepHeight = 0.3, kStepWidth = 1.6;
+constexpr double kSlopeDegrees = 25, kSlopeLength = 2.2, kSlopeThickness = 0.12;
+
+/// The directions of a world whose `up` is one of the axes.
+struct Directions {
+    Vec3d up, side, front;
+
+    explicit Directions(const Vec3d& upwards) : up(upwards) {
+        int axis = 0;
+        up.cwiseAbs().maxCoeff(&axis);
+        side = Vec3d::Unit(axis == 0 ? 1 : 0);
+        front = side.cross(up);
+    }
+};
+
+Mesh box_mesh(const Cuboid& box) {
+    Mesh mesh;
+    for (int k = 0; k < 8; ++k)
+        mesh.positions.push_back(
+            (box.centre + 0.5 * box.size.cwiseProduct(Vec3d(k & 1 ? 1 : -1, k & 2 ? 1 : -1, k & 4 ? 1 : -1)))
+                .cast<float>());
+    for (const std::array<Index, 4>& face :
+         {std::array<Index, 4>{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}})
+        mesh.add_face(face);
+    return mesh;
+}
+
+Mesh ball_mesh(const Ball& ball) {
+    ShapeOptions options;
+    options.resolution = 32;
+    options.amplitude = 0;
+    options.size = 2 * ball.radius;
+    Mesh mesh = make_wavy_sphere(options);
+    for (Vec3f& p : mesh.positions) p += ball.centre.cast<float>();
+    return mesh;
+}
+
+/// Adds an obstacle whose highest point is at `top` (m along up), and says how far down it reaches.
+class WorldBuilder {
+public:
+    WorldBuilder(const BodySettings& settings, const Vec3d& up, const Box& box, double scale)
+        : settings_(settings), at_(up), middle_(scale * box.centre()), size_(settings.size), scale_(scale) {
+        const Vec3d low = scale * box.min, high = scale * box.max;
+        lowest_ = std::min(low.dot(up), high.dot(up)) - settings.drop;
+    }
+
+    void build(MadeBody& made) {
+        made_ = &made;
+        made.world.gravity = settings_.gravity ? Vec3d(-kGravity * at_.up) : Vec3d(Vec3d::Zero());
+        double ground = lowest_;
+        if (settings_.obstacle == ObstacleChoice::ball) ground = add_ball();
+        if (settings_.obstacle == ObstacleChoice::step) ground = add_step();
+        if (settings_.obstacle == ObstacleChoice::slope) ground = add_slope();
+        if (!settings_.ground) return;
+        add(HalfSpace{ground * at_.up, at_.up}, {});
+        made.surroundings.has_ground = true;
+        made.surroundings.ground_level = ground / scale_;
+    }
+
+private:
+    Vec3d place(double side, double height) const {
+        return middle_ - middle_.dot(at_.up) * at_.up + side * at_.side + height * at_.up;
+    }
+    /// Sizes along side, up and front as sizes along x, y and z.
+    Vec3d along_axes(double side, double up, double front) const {
+        return (side * at_.side + up * at_.up + front * at_.front).cwiseAbs();
+    }
+
+    void add(decltype(Obstacle::shape) shape, const RigidMotion& motion) {
+        Obstacle obstacle;
+        obstacle.shape = std::move(shape);
+        obstacle.motion = motion;
+        obstacle.friction = settings_.friction;
+        obstacle.restitution = settings_.restitution;
+        made_->world.obstacles.push_back(std::move(obstacle));
+    }
+    void draw(Mesh mesh, const Eigen::Isometry3d& motion) {
+        for (Vec3f& p : mesh.positions) p = ((motion * p.cast<double>()) / scale_).cast<float>();
+        made_->surroundings.obstacles.push_back(std::move(mesh));
+    }
+
+    double add_ball() {
+        const double radius = kBallRadius * size_;
+        const Ball ball{place(kBallAside * size_, lowest_ - radius), radius};
+        add(ball, {});
+        draw(ball_mesh(ball), Eigen::Isometry3d::Identity());
+        return lowest_ - 2 * radius;
+    }
+    double add_step() {
+        const double height = kStepHeight * size_, width = kStepWidth * size_;
+        // Its edge is under the middle, so that the body tips over it.
+        const Cuboid step{place(-0.5 * width, lowest_ - 0.5 * height), along_axes(width, height, width)};
+        add(step, {});
+        draw(box_mesh(step), Eigen::Isometry3d::Identity());
+        return lowest_ - height;
+    }
+    double add_slope() {
+        const double length = kSlopeLength * size_, thickness = kSlopeThickness * size_;
+        const double angle = kSlopeDegrees * std::numbers::pi / 180;
+        // Turned about the middle of its upper side, so far down that a body as wide as its size clears its upper half.
+        const double below = 0.5 * size_ * std::tan(angle);
+        const Vec3d pivot = place(0, lowest_ - below);
+        const Cuboid slope{pivot - 0.5 * thickness * at_.up, along_axes(length, thickness, kStepWidth * size_)};
+        RigidMotion motion;
+        motion.centre = pivot;
+        motion.angle.constant = angle * at_.front;
+        add(slope, motion);
+        const Eigen::Isometry3d turned = motion.at(0);
+        Mesh mesh = box_mesh(slope);
+        double ground = std::numeric_limits<double>::infinity();
+        for (const Vec3f& p : mesh.positions) ground = std::min(ground, (turned * p.cast<double>()).dot(at_.up));
+        draw(std::move(mesh), turned);
+        return ground;
+    }
+
+    const BodySettings& settings_;
+    Directions at_;
+    Vec3d middle_;
+    double size_, scale_, lowest_;
+    MadeBody* made_ = nullptr;
+};
+
+/// Particles near the pinned vertices are held fast, where they are.
+void hold_pins(const State& state, MadeBody& made) {
+    const Vectors& rest = made.body->rest;
+    const float reach = float(0.87 * made.body->spacing()); // half a cell's diagonal
+    const std::vector<Vec3f> driver = driver_positions(*state.model);
+    Pin pin;
+    for (const Handle& handle : state.handles) {
+        if (!handle.pinned) continue;
+        for (const Index v : handle.vertices) {
+            const Vec3f at = float(made.scale) * driver[v];
+            Index nearest = 0;
+            for (Index i = 0; i < rest.size(); ++i) {
+                const float distance = (rest[i] - at).norm();
+                if (distance <= reach) pin.particles.push_back(i);
+                if (distance < (rest[nearest] - at).norm()) nearest = i;
+            }
+            pin.particles.push_back(nearest);
+        }
+    }
+    std::sort(pin.particles.begin(), pin.particles.end());
+    pin.particles.erase(std::unique(pin.particles.begin(), pin.particles.end()), pin.particles.end());
+    if (!pin.particles.empty()) made.world.pins.push_back(std::move(pin));
+}
+
+} // namespace
+
+Result<std::shared_ptr<const MadeBody>> make_body_of(const State& state, const Vec3d& up, const RunContext& context) {
+    const BodySettings& settings = state.body;
+    const Mesh& mesh = state.model->mesh;
+    const Box box = bounds(mesh.positions);
+    const double longest = box.size().maxCoeff();
+    if (!(longest > 0))
+        return Error{ErrorCode::unsuitable,
+                     "A body needs a mesh with a volume, and all points of this one lie at one place."};
+    auto made = std::make_shared<MadeBody>();
+    made->model = state.model;
+    made->scale = settings.size / longest;
+    BodyOptions options;
+    options.scale = made->scale;
+    options.cells.count = settings.particles;
+    Result<Body> body = filigree::make_body(mesh, settings.material, options, context, &made->report);
+    if (!body) return body.error();
+    made->body = std::make_shared<const Body>(std::move(*body));
+    WorldBuilder(settings, up, box, made->scale).build(*made);
+    hold_pins(state, *made);
+    return std::shared_ptr<const MadeBody>(std::move(made));
+}
+
+} // namespace filigree::studio
