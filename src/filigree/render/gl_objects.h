@@ -61,6 +61,14 @@ struct FramebufferTraits {
     }
     static void free(GLuint name) { glDeleteFramebuffers(1, &name); }
 };
+struct RenderbufferTraits {
+    static GLuint make() {
+        GLuint name = 0;
+        glGenRenderbuffers(1, &name);
+        return name;
+    }
+    static void free(GLuint name) { glDeleteRenderbuffers(1, &name); }
+};
 struct VertexArrayTraits {
     static GLuint make() {
         GLuint name = 0;
@@ -81,6 +89,7 @@ struct ShaderTraits {
 using Buffer = Object<BufferTraits>;
 using Texture = Object<TextureTraits>;
 using Framebuffer = Object<FramebufferTraits>;
+using Renderbuffer = Object<RenderbufferTraits>;
 using VertexArray = Object<VertexArrayTraits>;
 using Shader = Object<ShaderTraits>;
 

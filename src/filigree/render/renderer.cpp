@@ -24,6 +24,7 @@ constexpr int kLeastShadowSize = 512, kMostShadowSize = 2048;
 constexpr double kKeyReach = 0.16;      // of the key light: tangent of half the angle it is seen under
 constexpr double kGroundSide = 2.5;     // half, in diagonals of the scene
 constexpr double kGroundDarkness = 0.6; // of a shadow that no light reaches
+constexpr GLuint kUnits = 5;            // of textures, that the shaders read
 constexpr unsigned kFewPasses = 4;      // below, the hardware's multisampling does the antialiasing
 // Light that a white surface gets where it faces the source, over all passes. The sky is seen by half on average.
 constexpr double kKeyLight = 0.92, kSkyLight = 2 * 0.46, kFillLight = 0.11, kBounceLight = 0.09;
@@ -59,6 +60,8 @@ public:
             for (Vec3d* d : {&key_, &sky_, &fill_}) *d = (*d + 0.6 * along * up).normalized();
     }
     const Vec3d& fill() const { return fill_; }
+    const Vec3d& key() const { return key_; } ///< the middle
+    const Vec3d& sky() const { return sky_; }
     /// The i-th point of the key light.
     Vec3d key(unsigned i) const {
         const auto [u, v] = evenly(i, 0.5);
@@ -173,6 +176,136 @@ struct ShadowMap {
 
 const std::string kVersion = "#version 430 core\n";
 
+/// Everything that drawing depends on and that others who draw in this context (Qt's painter) may have left otherwise.
+void set_state() {
+    for (const GLenum ability : {GL_BLEND, GL_CULL_FACE, GL_SCISSOR_TEST, GL_STENCIL_TEST, GL_COLOR_LOGIC_OP,
+                                 GL_POLYGON_OFFSET_FILL, GL_SAMPLE_ALPHA_TO_COVERAGE, GL_SAMPLE_COVERAGE,
+                                 GL_PRIMITIVE_RESTART, GL_RASTERIZER_DISCARD, GL_FRAMEBUFFER_SRGB, GL_DEPTH_CLAMP})
+        glDisable(ability);
+    glEnable(GL_DEPTH_TEST);
+    glEnable(GL_MULTISAMPLE);
+    glDepthFunc(GL_LESS);
+    glDepthMask(GL_TRUE);
+    glDepthRange(0, 1);
+    glClearDepth(1);
+    glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+    glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
+    glBlendEquation(GL_FUNC_ADD);
+    for (GLuint unit = 0; unit < kUnits; ++unit) glBindSampler(unit, 0);
+}
+
+/// Leaves nothing of ours behind that others trip over: no program, arrays, textures or tests; and the framebuffer that
+/// was bound before.
+class Visit {
+public:
+    Visit() {
+        GLint name = 0;
+        glGetIntegerv(GL_DRAW_FRAMEBUFFER_BINDING, &name);
+        framebuffer_ = static_cast<GLuint>(name);
+        set_state();
+    }
+    Visit(const Visit&) = delete;
+    ~Visit() {
+        glDisable(GL_DEPTH_TEST);
+        glDisable(GL_BLEND);
+        glUseProgram(0);
+        glBindVertexArray(0);
+        for (const GLenum target : {GL_ARRAY_BUFFER, GL_UNIFORM_BUFFER, GL_SHADER_STORAGE_BUFFER})
+            glBindBuffer(target, 0);
+        for (GLuint unit = kUnits; unit-- > 0;) {
+            glActiveTexture(GL_TEXTURE0 + unit);
+            for (const GLenum target : {GL_TEXTURE_1D, GL_TEXTURE_2D, GL_TEXTURE_BUFFER}) glBindTexture(target, 0);
+        }
+        glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_);
+    }
+
+private:
+    GLuint framebuffer_ = 0;
+};
+
+/// A colour and a depth of several samples a pixel.
+struct Multisampled {
+    gl::Renderbuffer color, depth;
+    Framebuffer framebuffer;
+
+    Multisampled() = default;
+    Multisampled(int samples, GLenum color_format, GLenum depth_format, GLsizei width, GLsizei height)
+        : color(gl::Renderbuffer::make()), depth(gl::Renderbuffer::make()), framebuffer(Framebuffer::make()) {
+        glBindFramebuffer(GL_FRAMEBUFFER, framebuffer.name());
+        const auto attach = [&](const gl::Renderbuffer& buffer, GLenum format, GLenum attachment) {
+            glBindRenderbuffer(GL_RENDERBUFFER, buffer.name());
+            glRenderbufferStorageMultisample(GL_RENDERBUFFER, samples, format, width, height);
+            glFramebufferRenderbuffer(GL_FRAMEBUFFER, attachment, GL_RENDERBUFFER, buffer.name());
+        };
+        attach(color, color_format, GL_COLOR_ATTACHMENT0);
+        attach(depth, depth_format, GL_DEPTH_ATTACHMENT);
+        glBindRenderbuffer(GL_RENDERBUFFER, 0);
+    }
+    void resolve_to(const Framebuffer& to, GLsizei width, GLsizei height) const {
+        glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer.name());
+        glBindFramebuffer(GL_DRAW_FRAMEBUFFER, to.name());
+        glBlitFramebuffer(0, 0, width, height, 0, 0, width, height, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+    }
+};
+
+bool is_complete() { return glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE; }
+
+/// Where passes are drawn and added up.
+struct Targets {
+    Texture color, depth, sum;
+    Framebuffer pass, total;
+    Multisampled multisampled;
+    unsigned width = 0, height = 0;
+    int samples = 0;
+
+    /// Whether there was room.
+    bool make(unsigned w, unsigned h, int samples_a_pixel) {
+        const auto x = static_cast<GLsizei>(w), y = static_cast<GLsizei>(h);
+        color = make_texture(GL_RGBA16F, x, y);
+        depth = make_texture(GL_DEPTH_COMPONENT32F, x, y);
+        sum = make_texture(GL_RGBA32F, x, y);
+        pass = make_framebuffer(&color, &depth);
+        total = make_framebuffer(&sum, nullptr);
+        bool complete = is_complete();
+        multisampled = samples_a_pixel > 1 ? Multisampled(samples_a_pixel, GL_RGBA16F, GL_DEPTH_COMPONENT32F, x, y)
+                                           : Multisampled();
+        complete = complete && (samples_a_pixel <= 1 || is_complete());
+        width = w;
+        height = h;
+        samples = samples_a_pixel;
+        return complete;
+    }
+};
+
+/// Where a preview is drawn: sRGB, as it is shown.
+struct PreviewTargets {
+    Texture color, depth;
+    Framebuffer framebuffer;
+    Multisampled multisampled;
+    unsigned width = 0, height = 0;
+
+    bool make(unsigned w, unsigned h, int samples) {
+        const auto x = static_cast<GLsizei>(w), y = static_cast<GLsizei>(h);
+        color = make_texture(GL_RGBA8, x, y);
+        depth = samples > 1 ? Texture() : make_texture(GL_DEPTH_COMPONENT24, x, y);
+        framebuffer = make_framebuffer(&color, samples > 1 ? nullptr : &depth);
+        bool complete = is_complete();
+        multisampled = samples > 1 ? Multisampled(samples, GL_RGBA8, GL_DEPTH_COMPONENT24, x, y) : Multisampled();
+        complete = complete && (samples <= 1 || is_complete());
+        width = w;
+        height = h;
+        return complete;
+    }
+};
+
+/// Whether the processor draws, for which several samples a pixel are several times the work.
+bool is_software_renderer() {
+    const auto* text = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
+    const std::string name = text ? text : "";
+    return name.find("llvmpipe") != std::string::npos || name.find("softpipe") != std::string::npos ||
+           name.find("SWR") != std::string::npos || name.find("Software") != std::string::npos;
+}
+
 unsigned passes_for(const Scene& scene) {
     double triangles = 0;
     for (const SceneObject& object : scene.objects)
@@ -195,24 +328,32 @@ Box Scene::box() const {
 
 struct Renderer::Content {
     enum class Source { given, float_records, int16_records };
+    enum class Target { light, preview, depth };
+    /// What a surface's program is made for: nothing is computed that is not needed.
+    struct Kind {
+        Target target = Target::light;
+        Source source = Source::given;
+        bool plain = true; ///< no colours, numbers and pictures of its own
+        bool edges = false, clipped = false, covered = false;
+        auto operator<=>(const Kind&) const = default;
+    };
 
     // Made once.
-    std::map<std::pair<Source, bool>, Program> surface_programs; ///< by source and whether edges are drawn
-    std::map<Source, Program> depth_programs;
-    Program points, ground, add, show;
+    std::map<Kind, Program> surface_programs;
+    Program points, points_in_preview, ground, add, show, copy, preview_background;
     gl::Buffer frame_buffer;
     gl::VertexArray nothing; ///< for shaders that need no input
     std::optional<ShadowMap> key_map, sky_map;
     GLint largest = 0, most_samples = 0;
+    bool is_software = false;
 
     // One picture.
     Scene scene;
     Camera camera;
     unsigned width = 0, height = 0, passes = 0, done = 0;
-    int samples = 0;
-    Texture pass_color, pass_depth, sum;
-    GLuint multisampled_color = 0, multisampled_depth = 0;
-    Framebuffer pass, multisampled, total;
+    bool is_preview = false; ///< what was drawn last
+    Targets targets;
+    PreviewTargets preview_targets;
     Vec3d centre = Vec3d::Zero();
     double scale = 1;
     Box box; ///< of the scene, in scene space
@@ -220,49 +361,53 @@ struct Renderer::Content {
     double ground_level = 0, ground_light = 1;
     std::optional<Lights> lights;
 
-    ~Content() { free_multisampled(); }
-    void free_multisampled() {
-        glDeleteRenderbuffers(1, &multisampled_color);
-        glDeleteRenderbuffers(1, &multisampled_depth);
-        multisampled_color = multisampled_depth = 0;
-    }
-
     static std::string vertex_source(Source source) {
-        if (source == Source::given) return kVersion + shaders::frame + shaders::surface_vertex;
-        return kVersion + "#define RESTORED\n" +
+        if (source == Source::given) return std::string(shaders::frame) + shaders::surface_vertex;
+        return "#define RESTORED\n" +
                GpuRestorer::shader_source(source == Source::float_records ? Precision::float32 : Precision::int16) +
                shaders::frame + shaders::surface_vertex;
     }
-    const Program& surface_program(Source source, bool with_edges) {
-        Program& program = surface_programs[{source, with_edges}];
+    const Program& surface_program(const Kind& kind) {
+        Program& program = surface_programs[kind];
         if (program) return program;
-        std::vector<Program::Stage> stages = {{GL_VERTEX_SHADER, vertex_source(source)}};
-        if (with_edges) stages.push_back({GL_GEOMETRY_SHADER, kVersion + shaders::frame + shaders::edges_geometry});
-        stages.push_back({GL_FRAGMENT_SHADER, kVersion + (with_edges ? "#define EDGES\n" : "") + shaders::frame +
-                                                  shaders::lighting + shaders::surface_fragment});
+        std::string head = kVersion;
+        for (const auto& [is_so, name] : {std::pair(kind.plain, "PLAIN"), std::pair(kind.edges, "EDGES"),
+                                          std::pair(kind.clipped, "CLIPPED"), std::pair(kind.covered, "COVERED")})
+            if (is_so) head += std::string("#define ") + name + "\n";
+        const std::string before = head + shaders::frame + (kind.covered ? shaders::coverage : "");
+        std::vector<Program::Stage> stages = {{GL_VERTEX_SHADER, head + vertex_source(kind.source)}};
+        if (kind.target == Target::depth) {
+            stages.push_back(
+                {GL_FRAGMENT_SHADER,
+                 before + (kind.covered ? "void main() { if (!is_covered()) discard; }\n" : "void main() {}\n")});
+            return program = Program::link(stages);
+        }
+        if (kind.edges) stages.push_back({GL_GEOMETRY_SHADER, head + shaders::frame + shaders::edges_geometry});
+        stages.push_back(
+            {GL_FRAGMENT_SHADER, before + lighting_source(kind.target == Target::preview) + shaders::surface_fragment});
         return program = Program::link(stages);
     }
-    const Program& depth_program(Source source) {
-        Program& program = depth_programs[source];
-        if (program) return program;
-        const std::array<Program::Stage, 2> stages = {
-            {{GL_VERTEX_SHADER, vertex_source(source)}, {GL_FRAGMENT_SHADER, kVersion + "void main() {}\n"}}};
-        return program = Program::link(stages);
-    }
+    static const char* lighting_source(bool preview) { return preview ? shaders::preview_lighting : shaders::lighting; }
     static Source source_of(const Drawable::Content& drawable) {
         if (!drawable.restorer()) return Source::given;
         return drawable.restorer()->precision() == Precision::int16 ? Source::int16_records : Source::float_records;
     }
 
-    Status make_targets();
+    Status start(const Scene& new_scene, const Camera& new_camera, unsigned w, unsigned h);
+    Status make_targets(int samples);
+    Status make_preview_targets();
+    Error no_room() const;
+    FrameBlock view_of(const Eigen::Vector2d& shift) const;
     FrameBlock frame(unsigned number) const;
+    FrameBlock preview_frame() const;
     void use(const FrameBlock& block) const;
     void draw_depth(FrameBlock block, const LightView& view, const ShadowMap& map);
-    void draw_objects(bool only_depth);
-    void draw_surface(const SceneObject& object, bool only_depth);
-    void draw_points(const SceneObject& object);
+    void draw_objects(Target target);
+    void draw_surface(const SceneObject& object, Target target);
+    void draw_points(const SceneObject& object, Target target);
     void set_place(const Program& program, const SceneObject& object) const;
     void draw_ground();
+    void draw_preview_background();
 };
 
 Renderer::Renderer(std::unique_ptr<Content> content) : content_(std::move(content)) {}
@@ -283,7 +428,12 @@ Result<Renderer> Renderer::create() {
         return Program::link(stages);
     };
     const std::string frame = shaders::frame, lighting = shaders::lighting;
-    content->points = link(frame + shaders::points_vertex, frame + lighting + shaders::points_fragment);
+    const std::string points = frame + shaders::coverage;
+    content->points = link(frame + shaders::points_vertex, points + lighting + shaders::points_fragment);
+    content->points_in_preview =
+        link(frame + shaders::points_vertex, points + shaders::preview_lighting + shaders::points_fragment);
+    content->copy = link(shaders::cover_vertex, shaders::copy_fragment);
+    content->preview_background = link(shaders::cover_vertex, shaders::preview_background);
     content->ground = link(frame + shaders::ground_vertex, frame + lighting + shaders::ground_fragment);
     content->add = link(shaders::cover_vertex, shaders::add_fragment);
     content->show = link(shaders::cover_vertex, shaders::show_fragment);
@@ -296,11 +446,11 @@ Result<Renderer> Renderer::create() {
     glGetIntegerv(GL_MAX_TEXTURE_SIZE, &content->largest);
     content->largest = std::min({content->largest, viewport[0], viewport[1]});
     glGetIntegerv(GL_MAX_SAMPLES, &content->most_samples);
+    content->is_software = is_software_renderer();
     return Renderer(std::move(content));
 }
 
-Status Renderer::Content::make_targets() {
-    const auto w = static_cast<GLsizei>(width), h = static_cast<GLsizei>(height);
+Status Renderer::Content::make_targets(int samples) {
     while (glGetError() != GL_NO_ERROR) {
     }
     // Shadows as fine as the picture: a coarse picture needs no fine map.
@@ -309,78 +459,72 @@ Status Renderer::Content::make_targets() {
         key_map.emplace(side);
         sky_map.emplace(side * 3 / 4);
     }
-    pass_color = make_texture(GL_RGBA16F, w, h);
-    pass_depth = make_texture(GL_DEPTH_COMPONENT32F, w, h);
-    sum = make_texture(GL_RGBA32F, w, h);
-    pass = make_framebuffer(&pass_color, &pass_depth);
-    total = make_framebuffer(&sum, nullptr);
-    bool complete = glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
-    free_multisampled();
-    multisampled = Framebuffer();
-    if (samples > 1) {
-        glGenRenderbuffers(1, &multisampled_color);
-        glBindRenderbuffer(GL_RENDERBUFFER, multisampled_color);
-        glRenderbufferStorageMultisample(GL_RENDERBUFFER, samples, GL_RGBA16F, w, h);
-        glGenRenderbuffers(1, &multisampled_depth);
-        glBindRenderbuffer(GL_RENDERBUFFER, multisampled_depth);
-        glRenderbufferStorageMultisample(GL_RENDERBUFFER, samples, GL_DEPTH_COMPONENT32F, w, h);
-        multisampled = Framebuffer::make();
-        glBindFramebuffer(GL_FRAMEBUFFER, multisampled.name());
-        glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER, multisampled_color);
-        glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, multisampled_depth);
-        complete = complete && glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
+    const bool complete = targets.make(width, height, samples);
+    if (complete && glGetError() == GL_NO_ERROR) return Success{};
+    targets.width = 0; // half made: not to be taken for the same
+    return no_room();
+}
+
+Status Renderer::Content::make_preview_targets() {
+    while (glGetError() != GL_NO_ERROR) {
     }
-    if (!complete || glGetError() != GL_NO_ERROR)
-        return Error{ErrorCode::out_of_memory, "The graphics memory has no room for a picture of " +
-                                                   std::to_string(width) + " by " + std::to_string(height) +
-                                                   " pixels; make it smaller."};
+    const bool complete = preview_targets.make(width, height, is_software ? 0 : std::min(most_samples, 4));
+    if (complete && glGetError() == GL_NO_ERROR) return Success{};
+    preview_targets.width = 0;
+    return no_room();
+}
+
+Error Renderer::Content::no_room() const {
+    return {ErrorCode::out_of_memory, "The graphics memory has no room for a picture of " + std::to_string(width) +
+                                          " by " + std::to_string(height) + " pixels; make it smaller."};
+}
+
+Status Renderer::Content::start(const Scene& new_scene, const Camera& new_camera, unsigned w, unsigned h) {
+    if (w == 0 || h == 0 || w > static_cast<unsigned>(largest) || h > static_cast<unsigned>(largest))
+        return Error{ErrorCode::unsuitable, "A picture of " + std::to_string(w) + " by " + std::to_string(h) +
+                                                " pixels cannot be drawn here; sides go from 1 to " +
+                                                std::to_string(largest) + "."};
+    scene = new_scene;
+    camera = new_camera;
+    width = w;
+    height = h;
+    Box world = scene.box();
+    if (world.empty()) world.extend(Vec3d::Zero());
+    const Vec3d up = up_vector(scene.up);
+    centre = world.centre();
+    const double diagonal = world.diagonal();
+    scale = diagonal > 0 ? 1 / diagonal : 1;
+    box = {};
+    box.extend(scale * (world.min - centre));
+    box.extend(scale * (world.max - centre));
+    const Mat3d basis = camera.basis();
+    lights.emplace(basis.col(2), basis.col(0), up);
+
+    // In a scene without height the ground lies a little below, not in it.
+    double lowest = std::numeric_limits<double>::infinity();
+    for (const Vec3d& corner : corners_of(box)) lowest = std::min(lowest, up.dot(corner));
+    ground_level = scene.fixed_ground ? scale * (scene.ground_level - up.dot(centre)) : lowest - 1e-4;
+    const double eye_height =
+        camera.field_of_view_deg > 0 ? scale * up.dot(camera.eye - centre) - ground_level : up.dot(basis.col(2));
+    shows_ground = scene.ground && eye_height > 0;
     return Success{};
 }
 
 Status Renderer::begin(const Scene& scene, const Camera& camera, unsigned width, unsigned height, unsigned passes) {
     Content& c = *content_;
-    if (width == 0 || height == 0 || width > static_cast<unsigned>(c.largest) ||
-        height > static_cast<unsigned>(c.largest))
-        return Error{ErrorCode::unsuitable, "A picture of " + std::to_string(width) + " by " + std::to_string(height) +
-                                                " pixels cannot be drawn here; sides go from 1 to " +
-                                                std::to_string(c.largest) + "."};
+    if (Status status = c.start(scene, camera, width, height); !status) return status;
+    c.is_preview = false;
     c.passes = passes ? passes : passes_for(scene);
-    const int samples = c.passes < kFewPasses ? std::min(c.most_samples, 8) : 0;
-    const bool same_targets = c.width == width && c.height == height && c.samples == samples && c.sum;
-    c.scene = scene;
-    c.camera = camera;
-    c.width = width;
-    c.height = height;
-    c.samples = samples;
     c.done = 0;
-    if (!same_targets)
-        if (Status status = c.make_targets(); !status) {
-            c.width = 0; // half made: not to be taken for the same
-            return status;
-        }
-    glBindFramebuffer(GL_FRAMEBUFFER, c.total.name());
+    const Visit visit;
+    const int samples = c.passes < kFewPasses ? std::min(c.most_samples, 8) : 0;
+    if (c.targets.width != width || c.targets.height != height || c.targets.samples != samples)
+        if (Status status = c.make_targets(samples); !status) return status;
+    glBindFramebuffer(GL_FRAMEBUFFER, c.targets.total.name());
     const std::array<float, 4> zero = {};
     glClearBufferfv(GL_COLOR, 0, zero.data());
 
-    Box world = scene.box();
-    if (world.empty()) world.extend(Vec3d::Zero());
     const Vec3d up = up_vector(scene.up);
-    c.centre = world.centre();
-    const double diagonal = world.diagonal();
-    c.scale = diagonal > 0 ? 1 / diagonal : 1;
-    c.box = {};
-    c.box.extend(c.scale * (world.min - c.centre));
-    c.box.extend(c.scale * (world.max - c.centre));
-    const Mat3d basis = camera.basis();
-    c.lights.emplace(basis.col(2), basis.col(0), up);
-
-    // In a scene without height the ground lies a little below, not in it.
-    double lowest = std::numeric_limits<double>::infinity();
-    for (const Vec3d& corner : corners_of(c.box)) lowest = std::min(lowest, up.dot(corner));
-    c.ground_level = scene.fixed_ground ? c.scale * (scene.ground_level - up.dot(c.centre)) : lowest - 1e-4;
-    const double eye_height =
-        camera.field_of_view_deg > 0 ? c.scale * up.dot(camera.eye - c.centre) - c.ground_level : up.dot(basis.col(2));
-    c.shows_ground = scene.ground && eye_height > 0;
     c.ground_light = 0;
     for (unsigned i = 0; i < c.passes; ++i)
         c.ground_light +=
@@ -389,7 +533,8 @@ Status Renderer::begin(const Scene& scene, const Camera& camera, unsigned width,
     return Success{};
 }
 
-FrameBlock Renderer::Content::frame(unsigned number) const {
+/// shift: of the picture, in pixels.
+FrameBlock Renderer::Content::view_of(const Eigen::Vector2d& shift) const {
     FrameBlock block = {};
     const Mat3d basis = camera.basis();
     const Vec3d eye = scale * (camera.eye - centre), back = basis.col(2), up = up_vector(scene.up);
@@ -425,31 +570,45 @@ FrameBlock Renderer::Content::frame(unsigned number) const {
     view.topLeftCorner<3, 3>() = basis.transpose();
     view.topRightCorner<3, 1>() = -basis.transpose() * from;
     Mat4d projection = scaled.projection(double(width) / height, nearest, furthest);
-    if (samples <= 1 || passes > 1) { // a tent over the pixel
-        const auto [u, v] = evenly(number, 0.0);
-        const auto tent = [](double x) { return x < 0.5 ? std::sqrt(2 * x) - 1 : 1 - std::sqrt(2 - 2 * x); };
-        const double reach = samples > 1 ? 0.5 : 0.8;
-        Mat4d shift = Mat4d::Identity();
-        shift(0, 3) = 2 * reach * tent(u) / width;
-        shift(1, 3) = 2 * reach * tent(v) / height;
-        projection = shift * projection;
-    }
+    Mat4d shifted = Mat4d::Identity();
+    shifted(0, 3) = 2 * shift.x() / width;
+    shifted(1, 3) = 2 * shift.y() / height;
+    projection = shifted * projection;
     put(block.view_projection, projection * view);
     if (camera.field_of_view_deg > 0)
         put(block.eye, eye, 1);
     else
         put(block.eye, back, 0);
+    put(block.fill_direction, lights->fill(), 0);
+    put(block.up, up, ground_level);
+    put(block.viewport, {double(width), double(height), 0}, 0);
+    put(block.strength, {kKeyLight, kSkyLight, kFillLight}, kBounceLight);
+    return block;
+}
 
+FrameBlock Renderer::Content::preview_frame() const {
+    FrameBlock block = view_of(Eigen::Vector2d::Zero());
+    put(block.key_direction, lights->key(), 0);
+    put(block.sky_direction, lights->sky(), 0);
+    return block;
+}
+
+FrameBlock Renderer::Content::frame(unsigned number) const {
+    Eigen::Vector2d shift = Eigen::Vector2d::Zero();
+    if (targets.samples <= 1 || passes > 1) { // a tent over the pixel
+        const auto [u, v] = evenly(number, 0.0);
+        const auto tent = [](double x) { return x < 0.5 ? std::sqrt(2 * x) - 1 : 1 - std::sqrt(2 - 2 * x); };
+        shift = (targets.samples > 1 ? 0.5 : 0.8) * Eigen::Vector2d(tent(u), tent(v));
+    }
+    FrameBlock block = view_of(shift);
     const Vec3d key = lights->key(number), sky = lights->sky(number);
     const LightView key_view(key, box, key_map->size), sky_view(sky, box, sky_map->size);
     put(block.key_matrix, key_view.to_texture());
     put(block.sky_matrix, sky_view.to_texture());
     put(block.key_direction, key, key_view.texel);
     put(block.sky_direction, sky, sky_view.texel);
-    put(block.fill_direction, lights->fill(), 0);
-    put(block.up, up, ground_level);
-    put(block.viewport, {double(width), double(height), double(number)}, 0);
-    put(block.strength, {kKeyLight, kSkyLight, kFillLight}, kBounceLight);
+    block.viewport[2] = static_cast<float>(number);
+    const Vec3d up = up_vector(scene.up);
     put(block.ground,
         {kKeyLight * std::max(0.0, up.dot(key)) / ground_light, kSkyLight * std::max(0.0, up.dot(sky)) / ground_light,
          kGroundDarkness},
@@ -472,7 +631,7 @@ void Renderer::Content::draw_depth(FrameBlock block, const LightView& view, cons
     put(block.eye, -view.matrix.block<1, 3>(2, 0).transpose().normalized(), 0);
     block.viewport[3] = 1;
     use(block);
-    draw_objects(true);
+    draw_objects(Target::depth);
 }
 
 void Renderer::Content::set_place(const Program& program, const SceneObject& object) const {
@@ -482,6 +641,7 @@ void Renderer::Content::set_place(const Program& program, const SceneObject& obj
     glUniform1f(program.uniform("scale"), static_cast<float>(scale));
     const std::optional<ClipPlane>& clip = object.appearance.clip;
     glUniform1i(program.uniform("is_clipped"), clip.has_value());
+    glUniform1f(program.uniform("coverage"), object.appearance.coverage);
     if (clip) {
         const Vec3d n = clip->normal.normalized();
         const double d = scale * (clip->offset / clip->normal.norm() - n.dot(centre));
@@ -489,21 +649,31 @@ void Renderer::Content::set_place(const Program& program, const SceneObject& obj
     }
 }
 
-void Renderer::Content::draw_objects(bool only_depth) {
+void Renderer::Content::draw_objects(Target target) {
     for (const SceneObject& object : scene.objects) {
+        if (object.appearance.coverage == 0) continue;
         if (object.drawable->content().point_count)
-            draw_points(object);
-        else if (!only_depth || object.appearance.surface)
-            draw_surface(object, only_depth);
+            draw_points(object, target);
+        else if (target != Target::depth || object.appearance.surface)
+            draw_surface(object, target);
     }
 }
 
-void Renderer::Content::draw_surface(const SceneObject& object, bool only_depth) {
+void Renderer::Content::draw_surface(const SceneObject& object, Target target) {
     const Drawable::Content& drawable = object.drawable->content();
     const Appearance& look = object.appearance;
+    const bool only_depth = target == Target::depth;
     const bool with_edges = !only_depth && (look.edges || !look.surface);
-    const Program& program =
-        only_depth ? depth_program(source_of(drawable)) : surface_program(source_of(drawable), with_edges);
+    const bool has_pictures = std::any_of(drawable.parts.begin(), drawable.parts.end(),
+                                          [](const Drawable::Content::Part& part) { return bool(part.picture); });
+    Kind kind;
+    kind.target = target;
+    kind.source = source_of(drawable);
+    kind.plain = only_depth || !look.own_colors || !(drawable.has_colors || drawable.has_scalars || has_pictures);
+    kind.edges = with_edges;
+    kind.clipped = look.clip.has_value();
+    kind.covered = look.coverage != 1;
+    const Program& program = surface_program(kind);
     glUseProgram(program.name());
     set_place(program, object);
     if (look.clip) glEnable(GL_CLIP_DISTANCE0);
@@ -544,16 +714,17 @@ void Renderer::Content::draw_surface(const SceneObject& object, bool only_depth)
     glDisable(GL_CLIP_DISTANCE0);
 }
 
-void Renderer::Content::draw_points(const SceneObject& object) {
+void Renderer::Content::draw_points(const SceneObject& object, Target target) {
     const Drawable::Content& drawable = object.drawable->content();
     const Appearance& look = object.appearance;
-    glUseProgram(points.name());
-    set_place(points, object);
-    glUniform1f(points.uniform("radius"), static_cast<float>(drawable.radius * scale));
-    glUniform1f(points.uniform("gloss"), look.gloss);
-    set_color(points, "base_color", look.color);
-    glUniform1i(points.uniform("has_colors"), look.own_colors && drawable.has_colors);
-    glUniform1i(points.uniform("has_scalars"), look.own_colors && drawable.has_scalars);
+    const Program& program = target == Target::preview ? points_in_preview : points;
+    glUseProgram(program.name());
+    set_place(program, object);
+    glUniform1f(program.uniform("radius"), static_cast<float>(drawable.radius * scale));
+    glUniform1f(program.uniform("gloss"), look.gloss);
+    set_color(program, "base_color", look.color);
+    glUniform1i(program.uniform("has_colors"), look.own_colors && drawable.has_colors);
+    glUniform1i(program.uniform("has_scalars"), look.own_colors && drawable.has_scalars);
     if (drawable.has_scalars) {
         glActiveTexture(GL_TEXTURE3);
         glBindTexture(GL_TEXTURE_1D, drawable.scalar_colors.name());
@@ -574,23 +745,27 @@ void Renderer::Content::draw_ground() {
     glEnable(GL_DEPTH_TEST);
 }
 
+void Renderer::Content::draw_preview_background() {
+    glUseProgram(preview_background.name());
+    glUniform1f(preview_background.uniform("height"), static_cast<float>(height));
+    glUniform3fv(preview_background.uniform("top"), 1, scene.background.top.data());
+    glUniform3fv(preview_background.uniform("bottom"), 1, scene.background.bottom.data());
+    glBindVertexArray(nothing.name());
+    glDisable(GL_DEPTH_TEST);
+    glDrawArrays(GL_TRIANGLES, 0, 3);
+    glEnable(GL_DEPTH_TEST);
+}
+
 bool Renderer::add_pass() {
     Content& c = *content_;
-    if (c.done >= c.passes) return false;
-    glDisable(GL_BLEND);
-    glDisable(GL_CULL_FACE);
-    glDisable(GL_SCISSOR_TEST);
-    glDisable(GL_STENCIL_TEST);
-    glEnable(GL_DEPTH_TEST);
-    glDepthFunc(GL_LESS);
-    glDepthMask(GL_TRUE);
-    glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
-
+    if (c.is_preview || c.done >= c.passes) return false;
+    const Visit visit;
     const FrameBlock block = c.frame(c.done);
     c.draw_depth(block, LightView(c.lights->key(c.done), c.box, c.key_map->size), *c.key_map);
     c.draw_depth(block, LightView(c.lights->sky(c.done), c.box, c.sky_map->size), *c.sky_map);
 
-    const Framebuffer& target = c.samples > 1 ? c.multisampled : c.pass;
+    const Targets& targets = c.targets;
+    const Framebuffer& target = targets.samples > 1 ? targets.multisampled.framebuffer : targets.pass;
     const auto w = static_cast<GLsizei>(c.width), h = static_cast<GLsizei>(c.height);
     glBindFramebuffer(GL_FRAMEBUFFER, target.name());
     glViewport(0, 0, w, h);
@@ -603,53 +778,66 @@ bool Renderer::add_pass() {
     glActiveTexture(GL_TEXTURE1);
     glBindTexture(GL_TEXTURE_2D, c.sky_map->depth.name());
     if (c.shows_ground) c.draw_ground();
-    c.draw_objects(false);
+    c.draw_objects(Content::Target::light);
 
-    if (c.samples > 1) {
-        glBindFramebuffer(GL_READ_FRAMEBUFFER, c.multisampled.name());
-        glBindFramebuffer(GL_DRAW_FRAMEBUFFER, c.pass.name());
-        glBlitFramebuffer(0, 0, w, h, 0, 0, w, h, GL_COLOR_BUFFER_BIT, GL_NEAREST);
-    }
-    glBindFramebuffer(GL_FRAMEBUFFER, c.total.name());
+    if (targets.samples > 1) targets.multisampled.resolve_to(targets.pass, w, h);
+    glBindFramebuffer(GL_FRAMEBUFFER, targets.total.name());
     glDisable(GL_DEPTH_TEST);
     glEnable(GL_BLEND);
     glBlendFunc(GL_ONE, GL_ONE);
     glUseProgram(c.add.name());
     glActiveTexture(GL_TEXTURE0);
-    glBindTexture(GL_TEXTURE_2D, c.pass_color.name());
+    glBindTexture(GL_TEXTURE_2D, targets.color.name());
     glBindVertexArray(c.nothing.name());
     glDrawArrays(GL_TRIANGLES, 0, 3);
-    glDisable(GL_BLEND);
-    glBindVertexArray(0);
-    glUseProgram(0);
     ++c.done;
     return true;
 }
 
 void Renderer::show(unsigned framebuffer, int x, int y) const {
     const Content& c = *content_;
+    {
+        const Visit visit;
+        const Program& program = c.is_preview ? c.copy : c.show;
+        glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
+        glViewport(x, y, static_cast<GLsizei>(c.width), static_cast<GLsizei>(c.height));
+        glDisable(GL_DEPTH_TEST);
+        glUseProgram(program.name());
+        glUniform2f(program.uniform("corner"), static_cast<float>(x), static_cast<float>(y));
+        glUniform1f(program.uniform("passes"), static_cast<float>(std::max(1u, c.done)));
+        glUniform2f(program.uniform("size"), static_cast<float>(c.width), static_cast<float>(c.height));
+        glUniform3fv(program.uniform("top"), 1, c.scene.background.top.data());
+        glUniform3fv(program.uniform("bottom"), 1, c.scene.background.bottom.data());
+        glUniform1i(program.uniform("is_transparent"), c.scene.background.transparent);
+        glActiveTexture(GL_TEXTURE0);
+        glBindTexture(GL_TEXTURE_2D, c.is_preview ? c.preview_targets.color.name() : c.targets.sum.name());
+        glBindVertexArray(c.nothing.name());
+        glDrawArrays(GL_TRIANGLES, 0, 3);
+    }
     glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
-    glViewport(x, y, static_cast<GLsizei>(c.width), static_cast<GLsizei>(c.height));
-    glDisable(GL_DEPTH_TEST);
-    glDisable(GL_BLEND);
-    glUseProgram(c.show.name());
-    glUniform1f(c.show.uniform("passes"), static_cast<float>(std::max(1u, c.done)));
-    glUniform2f(c.show.uniform("corner"), static_cast<float>(x), static_cast<float>(y));
-    glUniform2f(c.show.uniform("size"), static_cast<float>(c.width), static_cast<float>(c.height));
-    glUniform3fv(c.show.uniform("top"), 1, c.scene.background.top.data());
-    glUniform3fv(c.show.uniform("bottom"), 1, c.scene.background.bottom.data());
-    glUniform1i(c.show.uniform("is_transparent"), c.scene.background.transparent);
-    glActiveTexture(GL_TEXTURE0);
-    glBindTexture(GL_TEXTURE_2D, c.sum.name());
-    glBindVertexArray(c.nothing.name());
-    glDrawArrays(GL_TRIANGLES, 0, 3);
-    glBindVertexArray(0);
-    glUseProgram(0);
 }
 
 Status Renderer::preview(const Scene& scene, const Camera& camera, unsigned width, unsigned height) {
-    if (Status status = begin(scene, camera, width, height, 1); !status) return status;
-    add_pass();
+    Content& c = *content_;
+    if (Status status = c.start(scene, camera, width, height); !status) return status;
+    c.is_preview = true;
+    c.passes = c.done = 0;
+    const Visit visit;
+    if (c.preview_targets.width != width || c.preview_targets.height != height)
+        if (Status status = c.make_preview_targets(); !status) return status;
+    const bool multisampled = bool(c.preview_targets.multisampled.framebuffer);
+    const Framebuffer& framebuffer =
+        multisampled ? c.preview_targets.multisampled.framebuffer : c.preview_targets.framebuffer;
+    glBindFramebuffer(GL_FRAMEBUFFER, framebuffer.name());
+    const auto w = static_cast<GLsizei>(width), h = static_cast<GLsizei>(height);
+    glViewport(0, 0, w, h);
+    const std::array<float, 4> zero = {};
+    glClearBufferfv(GL_COLOR, 0, zero.data());
+    glClear(GL_DEPTH_BUFFER_BIT);
+    c.use(c.preview_frame());
+    if (!scene.background.transparent) c.draw_preview_background();
+    c.draw_objects(Content::Target::preview);
+    if (multisampled) c.preview_targets.multisampled.resolve_to(c.preview_targets.framebuffer, w, h);
     return Success{};
 }
 

@@ -31,11 +31,15 @@ void main() {
     for (int k = 0; k < 3; ++k) {
         surface.position = corner[k].position;
         surface.normal = corner[k].normal;
+#ifndef PLAIN
         surface.uv = corner[k].uv;
         surface.color = corner[k].color;
         surface.scalar = corner[k].scalar;
+#endif
         gl_Position = gl_in[k].gl_Position;
+#ifdef CLIPPED
         gl_ClipDistance[0] = gl_in[k].gl_ClipDistance[0];
+#endif
         vec3 d = vec3(0.0);
         d[(k + 1) % 3] = height[(k + 1) % 3];
         for (int side = 0; side < 3; ++side)

@@ -18,4 +18,8 @@ vec3 to_viewer(vec3 position) {
 }
 
 // What a surface's vertices hand on, from stage to stage.
+#ifdef PLAIN
+#define SURFACE_FIELDS vec3 position; vec3 normal;
+#else
 #define SURFACE_FIELDS vec3 position; vec3 normal; vec2 uv; vec4 color; float scalar;
+#endif

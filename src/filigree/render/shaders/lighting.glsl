@@ -41,3 +41,5 @@ vec3 shade(vec3 position, vec3 facing, vec3 normal, vec3 albedo, float gloss) {
     float strength = gloss * (0.07 + 0.30 * square * square * grazing);
     return albedo * light + strength * glint * key_light;
 }
+
+vec4 outgoing(vec3 light) { return vec4(light, 1.0); }

@@ -14,6 +14,7 @@ layout(binding = 3) uniform sampler1D scalar_colors;
 layout(location = 0) out vec4 result;
 
 void main() {
+    if (!is_covered()) discard;
     bool is_perspective = frame.eye.w > 0.5;
     vec3 from = is_perspective ? frame.eye.xyz : ball.corner + frame.eye.xyz;
     vec3 direction = normalize(ball.corner - from);
@@ -34,5 +35,5 @@ void main() {
     if (has_scalars && ball.scalar < -0.25) albedo = vec3(0.2); // no value
     else if (has_scalars) albedo = texture(scalar_colors, (clamp(ball.scalar, 0.0, 1.0) * 255.0 + 0.5) / 256.0).rgb;
     vec3 normal = normalize(position - ball.centre);
-    result = vec4(shade(position, normal, normal, albedo, gloss), 1.0);
+    result = outgoing(shade(position, normal, normal, albedo, gloss));
 }

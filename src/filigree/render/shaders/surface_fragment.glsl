@@ -8,7 +8,7 @@ uniform bool has_surface;
 #endif
 
 uniform vec3 base_color; // all colours are linear
-uniform bool has_colors, has_scalars, has_picture, is_clipped;
+uniform bool has_colors, has_scalars, has_picture;
 uniform float gloss;
 layout(binding = 2) uniform sampler2D picture;
 layout(binding = 3) uniform sampler1D scalar_colors;
@@ -18,6 +18,9 @@ layout(location = 0) out vec4 result;
 const vec3 kNoValue = vec3(0.2);
 
 void main() {
+#ifdef COVERED
+    if (!is_covered()) discard;
+#endif
     vec3 view = to_viewer(surface.position);
     vec3 facing = cross(dFdx(surface.position), dFdy(surface.position));
     float size = length(facing);
@@ -29,6 +32,7 @@ void main() {
     if (dot(normal, facing) < 0.0) normal = -normal;
 
     vec3 albedo = base_color;
+#ifndef PLAIN
     if (has_colors) albedo = surface.color.rgb;
     if (has_picture) {
         vec4 texel = texture(picture, surface.uv);
@@ -39,7 +43,10 @@ void main() {
         albedo = surface.scalar < -0.25
                      ? kNoValue
                      : texture(scalar_colors, (clamp(surface.scalar, 0.0, 1.0) * 255.0 + 0.5) / 256.0).rgb;
-    if (is_clipped && !gl_FrontFacing) albedo *= vec3(0.80, 0.70, 0.64); // the inside of what was cut open
+#endif
+#ifdef CLIPPED
+    if (!gl_FrontFacing) albedo *= vec3(0.80, 0.70, 0.64); // the inside of what was cut open
+#endif
 #ifdef EDGES
     float d = min(edge_distance.x, min(edge_distance.y, edge_distance.z));
     float line = 1.0 - smoothstep(0.5 * edge_width - 0.5, 0.5 * edge_width + 0.5, d);
@@ -55,5 +62,5 @@ void main() {
 #ifdef EDGES
     light = mix(light, edge_color, line);
 #endif
-    result = vec4(light, 1.0);
+    result = outgoing(light);
 }

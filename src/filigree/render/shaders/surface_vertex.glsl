@@ -8,7 +8,6 @@ layout(location = 6) in float in_scalar;
 uniform vec3 offset;    // of the object: its origin minus the scene's centre
 uniform float scale;    // 1 / the scene's diagonal
 uniform vec4 clip;      // in scene space; what lies where dot(clip.xyz, p) > clip.w is cut away
-uniform bool is_clipped;
 
 out Surface { SURFACE_FIELDS } surface;
 
@@ -32,9 +31,13 @@ void main() {
 #endif
     surface.position = (position + offset) * scale;
     surface.normal = normal;
+#ifndef PLAIN
     surface.uv = in_uv;
     surface.color = vec4(to_linear(in_color.rgb), in_color.a);
     surface.scalar = in_scalar;
+#endif
     gl_Position = frame.view_projection * vec4(surface.position, 1.0);
-    gl_ClipDistance[0] = is_clipped ? clip.w - dot(clip.xyz, surface.position) : 1.0;
+#ifdef CLIPPED
+    gl_ClipDistance[0] = clip.w - dot(clip.xyz, surface.position);
+#endif
 }
