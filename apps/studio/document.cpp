@@ -8,6 +8,12 @@
 
 namespace filigree::studio {
 
+bool Shape::operator==(const Shape& other) const {
+    const ShapeOptions &a = options, &b = other.options;
+    return name == other.name && a.resolution == b.resolution && a.frequency == b.frequency &&
+           a.amplitude == b.amplitude && a.size == b.size && a.length == b.length && a.thickness == b.thickness;
+}
+
 bool BodySettings::operator==(const BodySettings& other) const {
     const auto same_material = [](const Material& a, const Material& b) {
         return a.model == b.model && a.density == b.density && a.young_modulus == b.young_modulus &&

@@ -34,7 +34,7 @@ struct Source {
 struct Shape {
     std::string name = "wavy-cube"; ///< one of shape_names()
     ShapeOptions options;
-    bool operator==(const Shape&) const = default;
+    bool operator==(const Shape& other) const;
 };
 
 /// The five deformations, one after the other in this order, about the mesh's box at rest.
@@ -73,7 +73,7 @@ struct BodySettings {
     bool gravity = true, ground = true;
     ObstacleChoice obstacle = ObstacleChoice::none;
     double friction = 0.5, restitution = 0.5;
-    bool operator==(const BodySettings&) const;
+    bool operator==(const BodySettings& other) const;
 };
 
 /// Everything that is saved, undone and redone. Cheap to copy: what is large is shared and never changes.

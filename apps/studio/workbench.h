@@ -105,7 +105,26 @@ Q_SIGNALS:
 
 private:
     struct Content;
+    enum class After { nothing, play, step };
+
+    void follow_document(const State& before);
+    void follow_playback();
     void show_pose();
+    void pose_is_new();
+    void find_full();
+    void full_is_new();
+    void show_drag(const std::shared_ptr<const Pose>& pose, double milliseconds);
+    void take_model(State& now, const State& made) const;
+    void change_level(unsigned level, const QString& name, const std::string& merge);
+    void make_body_then(After then);
+    void put_body(std::shared_ptr<const MadeBody> made);
+    const PoseSequence* recording() const; ///< the body's, else the document's; null: none
+    bool is_live_frame() const;            ///< what is shown is where the body is now
+    void show_last_frame();
+    void replay_frame();
+    void commit_recording(const QString& name = {}, const std::string& merge = {});
+    void save(const QString& title, const std::string& path, std::function<Result<QString>(const RunContext&)> work,
+              std::function<void()> then = {});
 
     Document document_;
     Jobs jobs_;

@@ -1,0 +1,30 @@
+#include "words.h"
+
+#include <QLocale>
+
+#include <filesystem>
+
+namespace filigree::studio {
+
+QString with_commas(std::size_t number) { return QLocale(QLocale::English).toString(qulonglong(number)); }
+
+QString counted(std::size_t number, const QString& one, const QString& many) {
+    return with_commas(number) + ' ' + (number == 1 ? one : many);
+}
+
+QString file_name(const std::string& path) {
+    return QString::fromStdString(std::filesystem::path(path).filename().string());
+}
+
+std::string about_file(const std::string& path, const std::string& sentence) {
+    const std::string name = std::filesystem::path(path).filename().string();
+    return name.empty() || sentence.find(name) != std::string::npos ? sentence : name + ": " + sentence;
+}
+
+QString shape_title(const std::string& name) {
+    QString title = QString::fromStdString(name).replace('-', ' ');
+    if (!title.isEmpty()) title[0] = title[0].toUpper();
+    return title;
+}
+
+} // namespace filigree::studio

@@ -1,0 +1,33 @@
+// What the workbench keeps to itself, for the files it is written in.
+#pragma once
+
+#include "workbench.h"
+
+#include <QTimer>
+
+namespace filigree::studio {
+
+/// The state with its source stripped by its options; the level shown stays the finest, or as fine as there is.
+Result<State> stripped_state(State state, const RunContext& context);
+Result<State> state_of_shape(State state, const Shape& shape, const RunContext& context);
+
+struct Workbench::Content {
+    RunContext context;            ///< of what is done at once
+    std::uint64_t pose_number = 0; ///< of the pose shown: what was measured of an older one is dropped
+
+    // A pull: how to come back from the warped shape, and where it began, before the warp.
+    std::unique_ptr<SpaceWarp> warp;
+    Vec3d grabbed = Vec3d::Zero();
+    Handle pull;
+    bool pulls_body = false;
+
+    QTimer replay;
+    After then = After::nothing; ///< once the body is made
+    std::size_t committed = 0;   ///< frames of the live recording that the document has
+    bool keeps_body = false;     ///< a step of our own, after which the body still fits
+    bool commits_steps = false;  ///< once they are delivered
+    bool measures_next = false;  ///< the error, once every vertex is delivered
+    bool is_opening = false, is_another_shape = false;
+};
+
+} // namespace filigree::studio

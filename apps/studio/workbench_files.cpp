@@ -1,0 +1,274 @@
+// Files in and out.
+#include "workbench_content.h"
+
+#include "film_export.h"
+#include "words.h"
+
+#include "filigree/io/file.h"
+#include "filigree/io/mesh_file.h"
+#include "filigree/io/model_file.h"
+
+#include <filesystem>
+
+namespace filigree::studio {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+Error about(const std::string& path, const Error& error) {
+    return error.code == ErrorCode::cancelled ? error : Error{error.code, about_file(path, error.message)};
+}
+
+/// A whole new state from a file, with settings as at the start.
+Result<State> read_state(const std::string& path, const RunContext& context) {
+    context.report("reading", 0);
+    const Result<std::string> bytes = read_file(path);
+    if (!bytes) return bytes.error();
+    State state;
+    auto source = std::make_shared<Source>();
+    source->path = path;
+    source->name = file_name(path).toStdString();
+    if (is_model_file(*bytes)) {
+        Result<Model> model = read_model(*bytes, path, context);
+        if (!model) return model.error();
+        Result<PoseSequence> poses = read_poses(*bytes, path, context);
+        if (!poses) return poses.error();
+        state.strip.code = model->code();
+        if (model->code() == DetailCode::blend) state.strip.base = model->driver().vertices.size();
+        state.model = std::make_shared<const Model>(std::move(*model));
+        if (!poses->empty()) state.recording = std::make_shared<const PoseSequence>(std::move(*poses));
+        source->mesh = state.model->mesh;
+    } else {
+        Result<MeshFile> file = read_mesh(*bytes, path, context);
+        if (!file) return file.error();
+        source->mesh = std::move(file->mesh);
+        source->warnings = std::move(file->warnings);
+    }
+    if (context.is_cancelled()) return cancelled_error();
+    source->topology = analyse_topology(source->mesh, context);
+    source->materials = load_surface_materials(source->mesh, path);
+    source->warnings.insert(source->warnings.end(), source->materials.warnings.begin(),
+                            source->materials.warnings.end());
+    state.source = std::move(source);
+    if (!state.model) return stripped_state(std::move(state), context);
+    state.restore.level = state.model->finest_level();
+    return state;
+}
+
+/// What was opened, in a sentence.
+QString summary(const State& state) {
+    const Mesh& mesh = state.source->mesh;
+    QString text =
+        QString("%1: %2, %3; driver of %4")
+            .arg(QString::fromStdString(state.source->name), counted(mesh.vertex_count(), "vertex", "vertices"),
+                 counted(mesh.face_count(), "face", "faces"), with_commas(state.model->driver().vertices.size()));
+    if (state.recording) text += ", " + counted(state.recording->frames.size(), "recorded frame", "recorded frames");
+    text += '.';
+    if (!state.source->warnings.empty()) {
+        text += ' ' + QString::fromStdString(state.source->warnings[0]);
+        if (const std::size_t more = state.source->warnings.size() - 1; more > 0)
+            text += QString(" (and %1)").arg(counted(more, "more warning", "more warnings"));
+    }
+    return text;
+}
+
+/// The level as the pose puts it.
+Result<Mesh> posed_mesh(const State& state, const Pose& pose, const RunContext& context) {
+    if (pose.positions.empty()) return level_mesh(*state.model, state.level());
+    const Result<Restorer> restorer = Restorer::create(*state.model, state.restore, context);
+    if (!restorer) return restorer.error();
+    return restorer->mesh(pose, context);
+}
+
+/// The driver as `filigree restore` reads it: with the gradients in the scalars f00 .. f22, row by row.
+Mesh posed_driver(const Model& model, const Pose& pose) {
+    Mesh driver = level_mesh(model, 0);
+    std::erase_if(driver.scalars, [](const VertexScalar& scalar) { return is_gradient_name(scalar.name); });
+    if (pose.positions.empty()) return driver;
+    driver.positions = pose.positions;
+    driver.normals = {}; // of the driver at rest
+    for (int k = 0; k < 9 && !pose.gradients.empty(); ++k) {
+        VertexScalar& scalar = driver.scalars.emplace_back();
+        scalar.name = {'f', char('0' + k / 3), char('0' + k % 3)};
+        for (const Mat3f& gradient : pose.gradients) scalar.values.push_back(gradient(k / 3, k % 3));
+    }
+    return driver;
+}
+
+/// Returns what to tell.
+Result<QString> write_checked(const Mesh& mesh, const std::string& path, const RunContext& context) {
+    if (const std::string wrong = check_mesh(mesh); !wrong.empty())
+        return Error{ErrorCode::unsuitable,
+                     path + ": not written: the result is beyond what numbers can hold (" + wrong + "); deform less."};
+    const Result<std::vector<std::string>> warnings = write_mesh(mesh, path, context);
+    if (!warnings) return warnings.error();
+    QString text = QString("Saved %1: %2, %3.")
+                       .arg(file_name(path), counted(mesh.vertex_count(), "vertex", "vertices"),
+                            counted(mesh.face_count(), "face", "faces"));
+    for (const std::string& warning : *warnings) text += ' ' + QString::fromStdString(warning);
+    return text;
+}
+
+/// "frame_%04d.obj" cut at its number.
+struct NumberedPath {
+    std::string before, after;
+    std::size_t digits = 1;
+
+    static Result<NumberedPath> parse(const std::string& pattern) {
+        const Error no_number{ErrorCode::usage, pattern + ": needs one place for the frame's number, such as %04d in "
+                                                          "frame_%04d.obj."};
+        const std::size_t from = pattern.find('%');
+        if (from == std::string::npos || pattern.find('%', from + 1) != std::string::npos) return no_number;
+        const std::size_t until = pattern.find_first_not_of("0123456789", from + 1);
+        if (until == std::string::npos || pattern[until] != 'd' || until - from > 3) return no_number;
+        NumberedPath path{pattern.substr(0, from), pattern.substr(until + 1), 1};
+        if (until > from + 1) path.digits = std::stoul(pattern.substr(from + 1, until - from - 1));
+        return path;
+    }
+    std::string at(std::size_t number) const {
+        std::string text = std::to_string(number);
+        if (text.size() < digits) text.insert(0, digits - text.size(), '0');
+        return before + text + after;
+    }
+};
+
+/// All or none: what was written is taken back when a later one fails, unless it took the place of a file.
+Result<QString> write_frames(const State& state, const PoseSequence& poses, const NumberedPath& path,
+                             const RunContext& context) {
+    const Result<Restorer> restorer = Restorer::create(*state.model, state.restore, context);
+    if (!restorer) return restorer.error();
+    RunContext quiet = context; // the progress is that of the frames
+    quiet.progress = nullptr;
+    std::vector<std::string> written;
+    const auto write_all = [&]() -> Status {
+        for (std::size_t frame = 0; frame < poses.frames.size(); ++frame) {
+            context.report("writing meshes", double(frame) / double(poses.frames.size()));
+            if (context.is_cancelled()) return cancelled_error();
+            const Result<Mesh> mesh = restorer->mesh(poses.frames[frame], quiet);
+            if (!mesh) return mesh.error();
+            const std::string name = path.at(frame + 1);
+            std::error_code ignored;
+            const bool is_new = !fs::exists(name, ignored);
+            const Result<QString> saved = write_checked(*mesh, name, quiet);
+            if (!saved) return saved.error();
+            if (is_new) written.push_back(name);
+        }
+        return Success{};
+    };
+    if (const Status status = write_all(); !status) {
+        std::error_code ignored;
+        for (const std::string& name : written) fs::remove(name, ignored);
+        return status.error();
+    }
+    return QString("Saved %1 to %2.").arg(counted(poses.frames.size(), "mesh", "meshes"), file_name(path.at(1)));
+}
+
+} // namespace
+
+void Workbench::open(const std::string& path) {
+    jobs_.start<State>(
+        "Opening " + file_name(path), "model",
+        [path, body = state().body](const RunContext& context) -> Result<State> {
+            Result<State> state = read_state(path, context);
+            if (!state) return about(path, state.error());
+            state->body = body;
+            return state;
+        },
+        [this](State state) {
+            if (is_pulling_) end_pull();
+            content_->replay.stop();
+            const QString text = summary(state);
+            const bool has_motion = state.recording != nullptr;
+            frame_ = 0;
+            content_->is_opening = true;
+            document_.replace(std::move(state));
+            content_->is_opening = false;
+            set_mode(has_motion ? Mode::body : Mode::deform);
+            Q_EMIT told(text, false);
+        });
+}
+
+void Workbench::save(const QString& title, const std::string& path,
+                     std::function<Result<QString>(const RunContext&)> work, std::function<void()> then) {
+    jobs_.start<QString>(
+        title, {},
+        [path, work = std::move(work)](const RunContext& context) -> Result<QString> {
+            Result<QString> text = work(context);
+            if (!text) return about(path, text.error());
+            return text;
+        },
+        [this, then = std::move(then)](const QString& text) {
+            if (then) then();
+            Q_EMIT told(text, false);
+        });
+}
+
+void Workbench::save_model(const std::string& path) {
+    commit_recording();
+    const std::uint64_t id = document_.state_id();
+    save(
+        "Saving " + file_name(path), path,
+        [path, model = state().model, poses = state().recording](const RunContext& context) -> Result<QString> {
+            const Status status =
+                poses ? write_model(*model, *poses, path, context) : write_model(*model, path, context);
+            if (!status) return status.error();
+            return QString("Saved %1.").arg(file_name(path));
+        },
+        [this, id] {
+            if (document_.state_id() == id) document_.set_saved();
+        });
+}
+
+void Workbench::save_mesh(const std::string& path) {
+    save("Saving " + file_name(path), path,
+         [path, state = state(), pose = pose_](const RunContext& context) -> Result<QString> {
+             const Result<Mesh> mesh = posed_mesh(state, pose, context);
+             if (!mesh) return mesh.error();
+             return write_checked(*mesh, path, context);
+         });
+}
+
+void Workbench::save_driver(const std::string& path) {
+    save("Saving " + file_name(path), path, [path, model = state().model, pose = pose_](const RunContext& context) {
+        return write_checked(posed_driver(*model, pose), path, context);
+    });
+}
+
+void Workbench::export_meshes(const std::string& pattern) {
+    const Result<NumberedPath> path = NumberedPath::parse(pattern);
+    if (!path) {
+        Q_EMIT told(QString::fromStdString(path.error().message), true);
+        return;
+    }
+    commit_recording();
+    if (!state().recording) {
+        Q_EMIT told("There is nothing recorded yet: press Play first.", true);
+        return;
+    }
+    save("Exporting meshes", pattern, [state = state(), path = *path](const RunContext& context) {
+        return write_frames(state, *state.recording, path, context);
+    });
+}
+
+void Workbench::export_film(const std::string& path, const FilmSettings& settings) {
+    commit_recording();
+    auto job = std::make_shared<FilmJob>();
+    job->state = state();
+    job->pose = pose_;
+    if (state().recording) job->poses = *state().recording;
+    if (playback_.has_body()) {
+        job->surroundings = playback_.made()->surroundings;
+        job->has_surroundings = true;
+    }
+    job->camera = view_.camera();
+    job->view = view_.settings();
+    job->film = settings;
+    save("Exporting " + file_name(path), path, [path, job](const RunContext& context) -> Result<QString> {
+        const Result<std::size_t> frames = studio::export_film(*job, path, context);
+        if (!frames) return frames.error();
+        return QString("Saved %1: %2.").arg(file_name(path), counted(*frames, "picture", "pictures"));
+    });
+}
+
+} // namespace filigree::studio
