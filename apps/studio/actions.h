@@ -9,8 +9,8 @@ namespace filigree::studio {
 
 class MainWindow;
 
-/// The actions' object names are "menu.command" ("file.open", "detail.remove", "body.play"). Each has a text, a tooltip,
-/// a shortcut where one is usual, and is enabled only when it can do something.
+/// The actions' object names are "menu.command" ("file.open", "detail.remove", "body.play"). Each has a text, a
+/// tooltip, a shortcut where one is usual, and is enabled only when it can do something.
 class Actions : public QObject {
     Q_OBJECT
 public:

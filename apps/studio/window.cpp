@@ -1,50 +1,479 @@
 #include "window.h"
 
+#include "controls.h"
+#include "help_sheet.h"
+#include "icons.h"
+#include "message_bar.h"
+#include "panels/body_panel.h"
+#include "panels/deform_panel.h"
+#include "panels/detail_panel.h"
+#include "panels/model_panel.h"
+#include "panels/overview.h"
+#include "panels/view_panel.h"
+#include "status_bar.h"
+#include "timeline.h"
+
 #include <QApplication>
 #include <QCloseEvent>
-#include <QDockWidget>
 #include <QDragEnterEvent>
 #include <QDropEvent>
+#include <QFileDialog>
+#include <QFileInfo>
+#include <QKeyEvent>
+#include <QMenuBar>
+#include <QMessageBox>
 #include <QMimeData>
+#include <QPointer>
+#include <QSettings>
+#include <QSplitter>
+#include <QStackedWidget>
+#include <QTabBar>
+#include <QTimer>
+#include <QToolBar>
+
+#include <array>
 
 namespace filigree::studio {
+namespace {
+
+constexpr qsizetype kRecentFiles = 10;
+constexpr int kColumnWidth = 328; // device-independent pixels, at the start
+constexpr std::array<const char*, 5> kPanels = {"model", "detail", "deform", "body", "view"};
+
+/// Whether a widget needs a key for itself that is a shortcut of the window as well.
+bool keeps_key(const QWidget* widget, int key) {
+    const bool arrows = key == Qt::Key_Left || key == Qt::Key_Right || key == Qt::Key_Up || key == Qt::Key_Down;
+    const bool jumps = key == Qt::Key_Home || key == Qt::Key_End || key == Qt::Key_PageUp || key == Qt::Key_PageDown;
+    if (qobject_cast<const QAbstractSlider*>(widget) || qobject_cast<const QAbstractSpinBox*>(widget))
+        return arrows || jumps;
+    if (qobject_cast<const QComboBox*>(widget)) return arrows || jumps || key == Qt::Key_Space;
+    if (qobject_cast<const QTabBar*>(widget)) return arrows || key == Qt::Key_Home || key == Qt::Key_End;
+    if (qobject_cast<const QAbstractButton*>(widget)) return key == Qt::Key_Space;
+    return false;
+}
+
+} // namespace
 
 struct MainWindow::Content {
     bool keep_settings = false;
     std::unique_ptr<Workbench> workbench;
     Viewport* viewport = nullptr;
     std::unique_ptr<Actions> actions;
-    QString message;
+    MessageBar* messages = nullptr;
+    QSplitter* splitter = nullptr;
+    QTabBar* tabs = nullptr;
+    QStackedWidget* panels = nullptr;
+    BodyPanel* body = nullptr;
+    QMenu* recent_menu = nullptr;
+    QPointer<HelpSheet> help;
+    Theme theme = Theme::system;
+    QStringList recent;
+    QString file_path, saving_to, last_error;
+
+    void add_menus(MainWindow& window);
+    void add_toolbar(MainWindow& window);
+    QWidget* make_stage(MainWindow& window);
+    QWidget* make_column(MainWindow& window);
+    void follow_files(MainWindow& window);
+    void show_title(MainWindow& window);
+    void show_recent(MainWindow& window);
+    void add_recent(MainWindow& window, const QString& path);
+    void read_settings(MainWindow& window);
+    void write_settings(const MainWindow& window);
 };
 
 MainWindow::MainWindow(bool keep_settings, QWidget* parent) : QMainWindow(parent), content_(new Content) {
-    content_->keep_settings = keep_settings;
-    content_->workbench = std::make_unique<Workbench>();
-    content_->viewport = new Viewport(*content_->workbench, this);
-    content_->actions = std::make_unique<Actions>(*content_->workbench, *content_->viewport, *this);
-    setCentralWidget(content_->viewport);
-    auto* column = new QDockWidget(this);
-    column->setObjectName("column");
-    addDockWidget(Qt::RightDockWidgetArea, column);
+    Content& content = *content_;
+    content.keep_settings = keep_settings;
+    if (keep_settings)
+        content.theme = static_cast<Theme>(std::clamp(QSettings().value("window/theme", 0).toInt(), 0, 2));
+    apply_theme(content.theme);
+    setObjectName("window");
+    setWindowIcon(icon(Icon::logo));
+    setAcceptDrops(true);
+    setContextMenuPolicy(Qt::NoContextMenu); // no menu that takes the toolbar away
+
+    content.workbench = std::make_unique<Workbench>();
+    content.viewport = new Viewport(*content.workbench);
+    content.viewport->setObjectName("viewport");
+    content.actions = std::make_unique<Actions>(*content.workbench, *content.viewport, *this);
+    content.add_menus(*this);
+    content.add_toolbar(*this);
+    content.splitter = new QSplitter(Qt::Horizontal, this);
+    content.splitter->setObjectName("splitter");
+    content.splitter->setChildrenCollapsible(false);
+    content.splitter->setHandleWidth(3);
+    content.splitter->addWidget(content.make_stage(*this));
+    content.splitter->addWidget(content.make_column(*this));
+    content.splitter->setStretchFactor(0, 1);
+    content.splitter->setStretchFactor(1, 0);
+    setCentralWidget(content.splitter);
+    setStatusBar(new StatusBar(*content.workbench, *content.viewport, *content.actions, this));
+    content.follow_files(*this);
+
+    connect(content.workbench.get(), &Workbench::told, this, &MainWindow::show_message);
     resize(1280, 800);
+    content.splitter->setSizes({1280 - kColumnWidth, kColumnWidth});
+    if (keep_settings) content.read_settings(*this);
+    content.show_recent(*this);
+    content.show_title(*this);
+    qApp->installEventFilter(this);
+    Q_EMIT panel_changed();
+    content.viewport->setFocus();
 }
 
 MainWindow::~MainWindow() {
-    delete takeCentralWidget(); // before the workbench that it draws
+    qApp->removeEventFilter(this);
+    content_->workbench->disconnect(this);
+    delete content_->help.data();
+    delete takeCentralWidget(); // all that looks at the workbench goes before it
+    setStatusBar(nullptr);
 }
 
 Workbench& MainWindow::workbench() { return *content_->workbench; }
 Viewport& MainWindow::viewport() { return *content_->viewport; }
 Actions& MainWindow::actions() { return *content_->actions; }
 
-bool MainWindow::show_panel(const QString&) { return false; }
-void MainWindow::open_file(const QString& path) { content_->workbench->open(path.toStdString()); }
-bool MainWindow::may_discard() { return true; }
-void MainWindow::show_message(const QString& sentence, bool) { content_->message = sentence; }
-QString MainWindow::message() const { return content_->message; }
+void MainWindow::Content::add_menus(MainWindow& window) {
+    const auto menu = [&](const char* name, const QString& title, std::initializer_list<const char*> names) {
+        QMenu* result = window.menuBar()->addMenu(title);
+        result->setObjectName(QLatin1String("menu.") + name);
+        for (const char* action : names) {
+            if (!*action) {
+                result->addSeparator();
+            } else if (QLatin1String(action) == "file.open_recent") {
+                recent_menu = result->addMenu("Open &recent");
+                recent_menu->setObjectName(action);
+            } else {
+                result->addAction(actions->find(action));
+            }
+        }
+    };
+    menu("file", "&File",
+         {"file.open", "file.open_recent", "", "file.save", "file.save_as", "", "file.save_mesh", "file.save_driver",
+          "", "file.export_film", "file.export_meshes", "", "file.quit"});
+    menu("edit", "&Edit",
+         {"edit.undo", "edit.redo", "", "detail.remove", "detail.add", "", "deform.open", "edit.reset_deformation",
+          "edit.unpin_all", "", "tool.pull", "tool.pin", "tool.turn", "", "edit.cancel"});
+    menu("view", "&View",
+         {"view.front",
+          "view.side",
+          "view.top",
+          "view.iso",
+          "view.show_all",
+          "",
+          "view.shaded",
+          "view.edges",
+          "view.wireframe",
+          "",
+          "view.color_own",
+          "view.color_error",
+          "view.color_levels",
+          "view.measure_error",
+          "",
+          "view.split",
+          "view.driver",
+          "view.defects",
+          "view.inside_points",
+          "view.clip",
+          "view.ground",
+          "",
+          "view.level_by_distance",
+          "view.keep_up",
+          "",
+          "panel.model",
+          "panel.detail",
+          "panel.deform",
+          "panel.body",
+          "panel.view",
+          "",
+          "view.system_theme",
+          "view.light_theme",
+          "view.dark_theme"});
+    menu("body", "&Body",
+         {"body.make", "body.animate", "", "body.play", "body.pause", "body.step", "body.back", "body.reset", "",
+          "view.particles"});
+    menu("help", "&Help", {"help.shortcuts", "help.about"});
+}
 
-void MainWindow::closeEvent(QCloseEvent* event) { QMainWindow::closeEvent(event); }
-void MainWindow::dragEnterEvent(QDragEnterEvent* event) { QMainWindow::dragEnterEvent(event); }
-void MainWindow::dropEvent(QDropEvent* event) { QMainWindow::dropEvent(event); }
+void MainWindow::Content::add_toolbar(MainWindow& window) {
+    auto* bar = new QToolBar("Tools", &window);
+    bar->setObjectName("toolbar");
+    bar->setMovable(false);
+    bar->setFloatable(false);
+    bar->setIconSize(QSize(20, 20));
+    for (const char* name : {"tool.pull", "tool.pin", "tool.turn", "", "view.show_all", "", "edit.undo", "edit.redo"}) {
+        if (*name)
+            bar->addAction(actions->find(name));
+        else
+            bar->addSeparator();
+        if (auto* button = *name ? qobject_cast<QToolButton*>(bar->widgetForAction(actions->find(name))) : nullptr) {
+            button->setObjectName(QStringLiteral("toolbar.") + name);
+            button->setFocusPolicy(Qt::TabFocus);
+            button->setAccessibleName(actions->find(name)->text().remove('&'));
+        }
+    }
+    window.addToolBar(Qt::LeftToolBarArea, bar);
+}
+
+QWidget* MainWindow::Content::make_stage(MainWindow& window) {
+    auto* stage = new QWidget(&window);
+    stage->setObjectName("stage");
+    auto* picture = new QWidget(stage);
+    picture->setObjectName("picture");
+    auto* over = new QVBoxLayout(picture);
+    over->setContentsMargins(0, 0, 0, 0);
+    over->addWidget(viewport);
+    messages = new MessageBar(picture);
+    auto* column = new QVBoxLayout(stage);
+    column->setContentsMargins(0, 0, 0, 0);
+    column->setSpacing(0);
+    column->addWidget(picture, 1);
+    column->addWidget(new Timeline(*workbench, *actions, stage));
+    stage->setMinimumWidth(320);
+    return stage;
+}
+
+QWidget* MainWindow::Content::make_column(MainWindow& window) {
+    auto* column = new QWidget(&window);
+    column->setObjectName("column");
+    tabs = new QTabBar(column);
+    tabs->setObjectName("panels");
+    tabs->setAccessibleName("Panels");
+    tabs->setExpanding(true);
+    tabs->setDrawBase(true);
+    tabs->setUsesScrollButtons(false);
+    tabs->setFocusPolicy(Qt::TabFocus);
+    panels = new QStackedWidget(column);
+    panels->setObjectName("panels.pages");
+    body = new BodyPanel(*workbench, *actions);
+    const std::array<std::pair<Panel*, const char*>, 5> pages = {{
+        {new ModelPanel(*workbench, *actions, recent_menu), "The mesh: open, shapes, defects, save"},
+        {new DetailPanel(*workbench), "Levels, the driver and how detail is stored"},
+        {new DeformPanel(*workbench, *actions), "Pull by hand or deform by numbers"},
+        {body, "A body that falls, bounces and can be pulled"},
+        {new ViewPanel(*workbench, *viewport, window), "How the mesh is shown"},
+    }};
+    for (std::size_t k = 0; k < pages.size(); ++k) {
+        panels->addWidget(pages[k].first);
+        QString title = QLatin1String(kPanels[k]);
+        title[0] = title[0].toUpper();
+        tabs->addTab(title);
+        tabs->setTabToolTip(int(k), QLatin1String(pages[k].second) + QStringLiteral(" (Ctrl+%1)").arg(k + 1));
+    }
+    connect(tabs, &QTabBar::currentChanged, &window, [this, &window](int index) {
+        panels->setCurrentIndex(index);
+        Q_EMIT window.panel_changed();
+    });
+    auto* layout = new QVBoxLayout(column);
+    layout->setContentsMargins(0, 0, 0, 0);
+    layout->setSpacing(0);
+    layout->addWidget(new Overview(*workbench, *actions, column));
+    layout->addWidget(tabs);
+    layout->addWidget(panels, 1);
+    column->setMinimumWidth(290);
+    return column;
+}
+
+bool MainWindow::show_panel(const QString& name) {
+    for (std::size_t k = 0; k < kPanels.size(); ++k)
+        if (name == QLatin1String(kPanels[k])) {
+            content_->tabs->setCurrentIndex(int(k));
+            return true;
+        }
+    return false;
+}
+
+QString MainWindow::panel() const {
+    return content_->tabs ? QLatin1String(kPanels[std::size_t(content_->tabs->currentIndex())]) : QString();
+}
+
+// Files
+
+void MainWindow::Content::follow_files(MainWindow& window) {
+    connect(workbench.get(), &Workbench::opened, &window, [this, &window] {
+        const auto& source = workbench->state().source;
+        const QString path = source ? QString::fromStdString(source->path) : QString();
+        file_path = path.endsWith(".fil", Qt::CaseInsensitive) ? path : QString();
+        if (!path.isEmpty()) add_recent(window, path);
+        show_title(window);
+        Q_EMIT window.files_changed();
+    });
+    connect(&workbench->document(), &Document::changed, &window, [this, &window] { show_title(window); });
+    connect(&workbench->document().undo_stack(), &QUndoStack::cleanChanged, &window,
+            [this, &window](bool clean) { window.setWindowModified(!clean); });
+    // A path counts once its file is there.
+    connect(&workbench->jobs(), &Jobs::finished, &window, [this, &window] {
+        if (saving_to.isEmpty() || workbench->jobs().is_busy()) return;
+        const QString path = std::exchange(saving_to, {});
+        if (workbench->document().is_modified()) return;
+        file_path = path;
+        add_recent(window, path);
+        show_title(window);
+        Q_EMIT window.files_changed();
+    });
+    const auto forget = [this] { saving_to.clear(); };
+    connect(&workbench->jobs(), &Jobs::failed, &window, forget);
+    connect(&workbench->jobs(), &Jobs::cancelled, &window, forget);
+}
+
+void MainWindow::Content::show_title(MainWindow& window) {
+    const auto& source = workbench->state().source;
+    const QString name = !file_path.isEmpty() ? QFileInfo(file_path).fileName()
+                         : source             ? QString::fromStdString(source->name)
+                                              : QString();
+    window.setWindowTitle(name.isEmpty() ? QStringLiteral("Filigree") : name + QStringLiteral("[*] – Filigree"));
+    window.setWindowModified(workbench->document().is_modified());
+}
+
+void MainWindow::Content::add_recent(MainWindow& window, const QString& path) {
+    const QString whole = QFileInfo(path).absoluteFilePath();
+    recent.removeAll(whole);
+    recent.prepend(whole);
+    if (recent.size() > kRecentFiles) recent.resize(kRecentFiles);
+    if (keep_settings) QSettings().setValue("files/recent", recent);
+    show_recent(window);
+}
+
+void MainWindow::Content::show_recent(MainWindow& window) {
+    recent_menu->clear();
+    recent_menu->setEnabled(!recent.isEmpty());
+    for (const QString& path : recent) {
+        QAction* action = recent_menu->addAction(QFileInfo(path).fileName().replace('&', "&&"));
+        action->setToolTip(path);
+        action->setStatusTip(path);
+        connect(action, &QAction::triggered, &window, [&window, path] { window.open_file(path); });
+    }
+    recent_menu->setToolTipsVisible(true);
+}
+
+QString MainWindow::file_path() const { return content_->file_path; }
+QStringList MainWindow::recent_files() const { return content_->recent; }
+
+void MainWindow::open_file(const QString& path) {
+    if (may_discard()) content_->workbench->open(path.toStdString());
+}
+
+void MainWindow::save_file(const QString& path) {
+    content_->saving_to = path;
+    content_->workbench->save_model(path.toStdString());
+}
+
+bool MainWindow::may_discard() {
+    if (!content_->workbench->document().is_modified()) return true;
+    QMessageBox box(this);
+    box.setObjectName("unsaved");
+    box.setWindowTitle("Unsaved changes");
+    box.setIcon(QMessageBox::Question);
+    const auto& source = content_->workbench->state().source;
+    box.setText(QStringLiteral("Save the changes of %1 first?")
+                    .arg(source ? QString::fromStdString(source->name) : QStringLiteral("the model")));
+    box.setInformativeText("Without saving they are lost.");
+    box.setStandardButtons(QMessageBox::Save | QMessageBox::Discard | QMessageBox::Cancel);
+    box.setDefaultButton(QMessageBox::Save);
+    const int answer = box.exec();
+    if (answer == QMessageBox::Discard) return true;
+    if (answer != QMessageBox::Save) return false;
+    QString path = content_->file_path;
+    if (path.isEmpty()) {
+        QFileDialog dialog(this, "Save the model");
+        dialog.setObjectName("unsaved.save");
+        dialog.setAcceptMode(QFileDialog::AcceptSave);
+        dialog.setNameFilters({"Filigree models (*.fil)"});
+        dialog.setDefaultSuffix("fil");
+        if (dialog.exec() != QDialog::Accepted) return false;
+        path = dialog.selectedFiles().value(0);
+    }
+    save_file(path);
+    content_->workbench->jobs().wait_until_idle();
+    return !content_->workbench->document().is_modified();
+}
+
+void MainWindow::closeEvent(QCloseEvent* event) {
+    if (!may_discard()) {
+        event->ignore();
+        return;
+    }
+    content_->workbench->jobs().cancel();
+    content_->workbench->pause();
+    if (content_->keep_settings) content_->write_settings(*this);
+    event->accept();
+}
+
+void MainWindow::dragEnterEvent(QDragEnterEvent* event) {
+    const QList<QUrl> urls = event->mimeData()->urls();
+    if (urls.size() == 1 && urls[0].isLocalFile()) event->acceptProposedAction();
+}
+
+void MainWindow::dropEvent(QDropEvent* event) {
+    const QString path = event->mimeData()->urls().value(0).toLocalFile();
+    if (path.isEmpty()) return;
+    event->acceptProposedAction();
+    // the program that the file came from waits for us to return, and we may have to ask first
+    QTimer::singleShot(0, this, [this, path] { open_file(path); });
+}
+
+// Messages, theme, layout
+
+void MainWindow::show_message(const QString& sentence, bool is_error) {
+    if (is_error) content_->last_error = sentence;
+    content_->messages->show_message(sentence, is_error);
+}
+
+QString MainWindow::message() const { return content_->messages->message(); }
+QString MainWindow::last_error() const { return content_->last_error; }
+void MainWindow::clear_last_error() { content_->last_error.clear(); }
+
+Theme MainWindow::theme() const { return content_->theme; }
+
+void MainWindow::set_theme(Theme theme) {
+    content_->theme = theme;
+    apply_theme(theme);
+    if (content_->keep_settings) QSettings().setValue("window/theme", int(theme));
+    Q_EMIT theme_changed();
+}
+
+void MainWindow::show_help() {
+    if (!content_->help) content_->help = new HelpSheet(*content_->actions, this);
+    content_->help->setAttribute(Qt::WA_DeleteOnClose);
+    content_->help->show();
+    content_->help->raise();
+}
+
+void MainWindow::changeEvent(QEvent* event) {
+    QMainWindow::changeEvent(event);
+    if (event->type() == QEvent::ThemeChange && content_->theme == Theme::system) apply_theme(Theme::system);
+}
+
+bool MainWindow::eventFilter(QObject* object, QEvent* event) {
+    if (event->type() == QEvent::ShortcutOverride) {
+        const auto* widget = qobject_cast<QWidget*>(object);
+        const auto* key = static_cast<QKeyEvent*>(event);
+        const bool plain = !(key->modifiers() & (Qt::ControlModifier | Qt::AltModifier | Qt::MetaModifier));
+        if (widget && widget->window() == this && plain && keeps_key(widget, key->key())) {
+            event->accept();
+            return true;
+        }
+    }
+    return QMainWindow::eventFilter(object, event);
+}
+
+void MainWindow::Content::read_settings(MainWindow& window) {
+    const QSettings settings;
+    recent = settings.value("files/recent").toStringList();
+    window.restoreGeometry(settings.value("window/geometry").toByteArray());
+    splitter->restoreState(settings.value("window/splitter").toByteArray());
+    window.show_panel(settings.value("window/panel", "model").toString());
+    body->set_unfolded(settings.value("window/advanced", false).toBool());
+}
+
+void MainWindow::Content::write_settings(const MainWindow& window) {
+    QSettings settings;
+    settings.setValue("window/geometry", window.saveGeometry());
+    settings.setValue("window/splitter", splitter->saveState());
+    settings.setValue("window/panel", window.panel());
+    settings.setValue("window/advanced", body->is_unfolded());
+    settings.setValue("window/theme", int(theme));
+}
 
 } // namespace filigree::studio

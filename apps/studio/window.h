@@ -2,6 +2,7 @@
 #pragma once
 
 #include "actions.h"
+#include "theme.h"
 
 #include <QMainWindow>
 
@@ -25,16 +26,32 @@ public:
     void open_file(const QString& path);
     /// Asks about unsaved changes; false: the user wants to stay.
     bool may_discard();
+    /// The model is saved there, from now on by Save as well.
+    void save_file(const QString& path);
+    QString file_path() const;        ///< where Save writes; "" when it has to ask
+    QStringList recent_files() const; ///< the latest first
+    QString panel() const;            ///< the name of the one shown
+
+    Theme theme() const;
+    void set_theme(Theme theme);
+    void show_help(); ///< the sheet of shortcuts
 
     void show_message(const QString& sentence, bool is_error); ///< in the window's message bar
     QString message() const;                                   ///< what stands there; "" when it is hidden
     QString last_error() const;                                ///< the last error told; "" for none
     void clear_last_error();
 
+Q_SIGNALS:
+    void files_changed(); ///< recent files, or the one that Save writes
+    void theme_changed();
+    void panel_changed();
+
 protected:
     void closeEvent(QCloseEvent* event) override;
     void dragEnterEvent(QDragEnterEvent* event) override;
     void dropEvent(QDropEvent* event) override;
+    bool eventFilter(QObject* object, QEvent* event) override;
+    void changeEvent(QEvent* event) override;
 
 private:
     struct Content;

@@ -1,0 +1,96 @@
+#include "message_bar.h"
+
+#include "icons.h"
+#include "theme.h"
+
+#include <QEvent>
+#include <QPainter>
+
+namespace filigree::studio {
+namespace {
+
+constexpr int kInformationTime = 8000; // ms: long enough to read a path
+
+} // namespace
+
+MessageBar::MessageBar(QWidget* parent)
+    : QFrame(parent), icon_(new QLabel(this)), text_(new Text("message.text", Tone::plain, this)),
+      close_(new QToolButton(this)) {
+    setObjectName("message");
+    icon_->setObjectName("message.icon");
+    text_->setWordWrap(true);
+    text_->setTextInteractionFlags(Qt::TextSelectableByMouse);
+    close_->setObjectName("message.close");
+    close_->setIcon(icon(Icon::close));
+    close_->setAutoRaise(true);
+    close_->setToolTip("Closes the message");
+    close_->setAccessibleName("Close the message");
+    close_->setFocusPolicy(Qt::TabFocus);
+    auto* row = new QHBoxLayout(this);
+    row->setContentsMargins(10, 6, 6, 6);
+    row->setSpacing(8);
+    row->addWidget(icon_, 0, Qt::AlignTop);
+    row->addWidget(text_, 1);
+    row->addWidget(close_, 0, Qt::AlignTop);
+    hide();
+    parent->installEventFilter(this);
+    timer_.setSingleShot(true);
+    timer_.setInterval(kInformationTime);
+    connect(&timer_, &QTimer::timeout, this, &QWidget::hide);
+    connect(close_, &QToolButton::clicked, this, &QWidget::hide);
+}
+
+void MessageBar::show_message(const QString& sentence, bool is_error) {
+    is_error_ = is_error;
+    text_->setText(sentence);
+    text_->setTextFormat(Qt::PlainText);
+    setAccessibleName(sentence);
+    const int side = fontMetrics().height();
+    icon_->setVisible(is_error);
+    icon_->setPixmap(icon(Icon::warning).pixmap(QSize(side, side), devicePixelRatioF()));
+    is_error ? timer_.stop() : timer_.start();
+    setVisible(!sentence.isEmpty());
+    raise();
+    place();
+    update();
+}
+
+QString MessageBar::message() const { return isHidden() ? QString() : text_->text(); }
+
+void MessageBar::place() {
+    const int margin = 12,
+              width = std::min(parentWidget()->width() - 2 * margin, 50 * fontMetrics().averageCharWidth() + 300);
+    const int height = std::max(layout()->totalHeightForWidth(width), layout()->totalMinimumSize().height());
+    setGeometry((parentWidget()->width() - width) / 2, margin, width, height);
+}
+
+bool MessageBar::eventFilter(QObject* object, QEvent* event) {
+    if (event->type() == QEvent::Resize && isVisible()) place();
+    return QFrame::eventFilter(object, event);
+}
+
+void MessageBar::changeEvent(QEvent* event) {
+    QFrame::changeEvent(event);
+    if (event->type() == QEvent::PaletteChange && is_error_)
+        icon_->setPixmap(
+            icon(Icon::warning).pixmap(QSize(fontMetrics().height(), fontMetrics().height()), devicePixelRatioF()));
+}
+
+void MessageBar::paintEvent(QPaintEvent*) {
+    QPainter painter(this);
+    painter.setRenderHint(QPainter::Antialiasing);
+    QColor ground = palette().color(QPalette::Base), line = palette().color(QPalette::Mid);
+    if (is_error_) {
+        const QColor bad = bad_color(palette());
+        const double share = is_dark(palette()) ? 0.22 : 0.1;
+        const auto mixed = [&](int a, int b) { return int(a * (1 - share) + b * share); };
+        ground = QColor(mixed(ground.red(), bad.red()), mixed(ground.green(), bad.green()),
+                        mixed(ground.blue(), bad.blue()));
+        line = bad;
+    }
+    painter.setPen(line);
+    painter.setBrush(ground);
+    painter.drawRoundedRect(QRectF(rect()).adjusted(0.5, 0.5, -0.5, -0.5), 5, 5);
+}
+
+} // namespace filigree::studio

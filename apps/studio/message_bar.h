@@ -1,0 +1,35 @@
+// A sentence over the top of the viewport: what went wrong, or what was done.
+#pragma once
+
+#include "controls.h"
+
+#include <QFrame>
+#include <QTimer>
+
+namespace filigree::studio {
+
+/// Lies over its parent, at the top. Errors stay until they are closed, information goes by itself.
+class MessageBar : public QFrame {
+    Q_OBJECT
+public:
+    explicit MessageBar(QWidget* parent);
+
+    void show_message(const QString& sentence, bool is_error);
+    QString message() const; ///< "" when it is hidden
+
+protected:
+    bool eventFilter(QObject* object, QEvent* event) override;
+    void paintEvent(QPaintEvent* event) override;
+    void changeEvent(QEvent* event) override;
+
+private:
+    void place();
+
+    QLabel* icon_;
+    Text* text_;
+    QToolButton* close_;
+    QTimer timer_;
+    bool is_error_ = false;
+};
+
+} // namespace filigree::studio

@@ -1,0 +1,66 @@
+#include "theme.h"
+
+#include <QApplication>
+#include <QStyle>
+#include <QStyleFactory>
+
+namespace filigree::studio {
+namespace {
+
+struct Shades {
+    QColor window, base, alternate, button, text, disabled, line, highlight, link;
+};
+
+QPalette palette_of(const Shades& s) {
+    QPalette palette(s.text, s.button, s.button.lighter(120), s.line.darker(140), s.line, s.text, Qt::white, s.base,
+                     s.window);
+    palette.setColor(QPalette::AlternateBase, s.alternate);
+    palette.setColor(QPalette::ToolTipBase, s.alternate);
+    palette.setColor(QPalette::ToolTipText, s.text);
+    palette.setColor(QPalette::PlaceholderText, s.disabled);
+    palette.setColor(QPalette::Highlight, s.highlight);
+    palette.setColor(QPalette::HighlightedText, Qt::white);
+    palette.setColor(QPalette::Link, s.link);
+    for (const auto role : {QPalette::WindowText, QPalette::Text, QPalette::ButtonText})
+        palette.setColor(QPalette::Disabled, role, s.disabled);
+    palette.setColor(QPalette::Disabled, QPalette::Highlight, s.line);
+    palette.setColor(QPalette::Disabled, QPalette::HighlightedText, s.disabled);
+    palette.setColor(QPalette::Disabled, QPalette::Base, s.window);
+    return palette;
+}
+
+QPalette light_palette() {
+    return palette_of(
+        {"#f1f2f4", "#ffffff", "#f7f8f9", "#f8f9fa", "#1c2026", "#8b919a", "#c3c8cf", "#2667c9", "#1d56ad"});
+}
+
+QPalette dark_palette() {
+    return palette_of(
+        {"#272a2f", "#1d2024", "#2c3036", "#363a41", "#e4e7eb", "#7f868f", "#191b1f", "#3574d6", "#8ab4f8"});
+}
+
+} // namespace
+
+bool is_dark(const QPalette& palette) {
+    return palette.color(QPalette::Window).lightness() < palette.color(QPalette::WindowText).lightness();
+}
+
+QColor good_color(const QPalette& palette) { return is_dark(palette) ? "#7bd497" : "#16693a"; }
+QColor bad_color(const QPalette& palette) { return is_dark(palette) ? "#ff9d92" : "#a3261a"; }
+QColor quiet_color(const QPalette& palette) { return is_dark(palette) ? "#a6adb6" : "#565d67"; }
+
+void apply_theme(Theme theme) {
+    if (!QApplication::style() || QApplication::style()->name() != QStringLiteral("fusion"))
+        QApplication::setStyle(QStyleFactory::create(QStringLiteral("Fusion")));
+    QApplication::setPalette(QPalette()); // the desktop's, to see what it is
+    const QPalette desktop = QApplication::palette();
+    const bool dark = theme == Theme::dark || (theme == Theme::system && is_dark(desktop));
+    QPalette palette = dark ? dark_palette() : light_palette();
+    if (theme == Theme::system && desktop.color(QPalette::Highlight).saturation() > 100) {
+        const QColor highlight = desktop.color(QPalette::Highlight);
+        if (highlight.lightness() < 150) palette.setColor(QPalette::Active, QPalette::Highlight, highlight);
+    }
+    QApplication::setPalette(palette);
+}
+
+} // namespace filigree::studio
