@@ -24,6 +24,7 @@ constexpr int kLeastShadowSize = 512, kMostShadowSize = 2048;
 constexpr double kKeyReach = 0.16;      // of the key light: tangent of half the angle it is seen under
 constexpr double kGroundSide = 2.5;     // half, in diagonals of the scene
 constexpr double kGroundDarkness = 0.6; // of a shadow that no light reaches
+constexpr double kFinePixels = 64;      // of the picture for each triangle: no more, and vertices are lit, not pixels
 constexpr GLuint kUnits = 5;            // of textures, that the shaders read
 constexpr unsigned kFewPasses = 4;      // below, the hardware's multisampling does the antialiasing
 // Light that a white surface gets where it faces the source, over all passes. The sky is seen by half on average.
@@ -198,12 +199,8 @@ void set_state() {
 /// was bound before.
 class Visit {
 public:
-    Visit() {
-        GLint name = 0;
-        glGetIntegerv(GL_DRAW_FRAMEBUFFER_BINDING, &name);
-        framebuffer_ = static_cast<GLuint>(name);
-        set_state();
-    }
+    Visit() : Visit(bound_framebuffer()) {}
+    explicit Visit(GLuint leave_bound) : framebuffer_(leave_bound) { set_state(); }
     Visit(const Visit&) = delete;
     ~Visit() {
         glDisable(GL_DEPTH_TEST);
@@ -220,6 +217,11 @@ public:
     }
 
 private:
+    static GLuint bound_framebuffer() {
+        GLint name = 0;
+        glGetIntegerv(GL_DRAW_FRAMEBUFFER_BINDING, &name);
+        return static_cast<GLuint>(name);
+    }
     GLuint framebuffer_ = 0;
 };
 
@@ -335,6 +337,7 @@ struct Renderer::Content {
         Source source = Source::given;
         bool plain = true; ///< no colours, numbers and pictures of its own
         bool edges = false, clipped = false, covered = false;
+        bool by_vertex = false; ///< light; previews only
         auto operator<=>(const Kind&) const = default;
     };
 
@@ -361,25 +364,34 @@ struct Renderer::Content {
     double ground_level = 0, ground_light = 1;
     std::optional<Lights> lights;
 
-    static std::string vertex_source(Source source) {
-        if (source == Source::given) return std::string(shaders::frame) + shaders::surface_vertex;
-        return "#define RESTORED\n" +
-               GpuRestorer::shader_source(source == Source::float_records ? Precision::float32 : Precision::int16) +
-               shaders::frame + shaders::surface_vertex;
+    static std::string vertex_source(const Kind& kind) {
+        std::string source;
+        if (kind.source != Source::given)
+            source = "#define RESTORED\n" + GpuRestorer::shader_source(kind.source == Source::float_records
+                                                                           ? Precision::float32
+                                                                           : Precision::int16);
+        source += shaders::frame;
+        if (kind.by_vertex) source += std::string(shaders::preview_lighting) + shaders::light_vertex;
+        return source + shaders::surface_vertex;
     }
     const Program& surface_program(const Kind& kind) {
         Program& program = surface_programs[kind];
         if (program) return program;
         std::string head = kVersion;
-        for (const auto& [is_so, name] : {std::pair(kind.plain, "PLAIN"), std::pair(kind.edges, "EDGES"),
-                                          std::pair(kind.clipped, "CLIPPED"), std::pair(kind.covered, "COVERED")})
+        for (const auto& [is_so, name] :
+             {std::pair(kind.plain, "PLAIN"), std::pair(kind.edges, "EDGES"), std::pair(kind.clipped, "CLIPPED"),
+              std::pair(kind.covered, "COVERED"), std::pair(kind.by_vertex, "BY_VERTEX")})
             if (is_so) head += std::string("#define ") + name + "\n";
         const std::string before = head + shaders::frame + (kind.covered ? shaders::coverage : "");
-        std::vector<Program::Stage> stages = {{GL_VERTEX_SHADER, head + vertex_source(kind.source)}};
+        std::vector<Program::Stage> stages = {{GL_VERTEX_SHADER, head + vertex_source(kind)}};
         if (kind.target == Target::depth) {
             stages.push_back(
                 {GL_FRAGMENT_SHADER,
                  before + (kind.covered ? "void main() { if (!is_covered()) discard; }\n" : "void main() {}\n")});
+            return program = Program::link(stages);
+        }
+        if (kind.by_vertex) {
+            stages.push_back({GL_FRAGMENT_SHADER, before + shaders::light_fragment});
             return program = Program::link(stages);
         }
         if (kind.edges) stages.push_back({GL_GEOMETRY_SHADER, head + shaders::frame + shaders::edges_geometry});
@@ -673,6 +685,8 @@ void Renderer::Content::draw_surface(const SceneObject& object, Target target) {
     kind.edges = with_edges;
     kind.clipped = look.clip.has_value();
     kind.covered = look.coverage != 1;
+    kind.by_vertex = target == Target::preview && !with_edges && !look.clip && !(look.own_colors && has_pictures) &&
+                     double(drawable.triangle_count) * kFinePixels > double(width) * height;
     const Program& program = surface_program(kind);
     glUseProgram(program.name());
     set_place(program, object);
@@ -796,25 +810,30 @@ bool Renderer::add_pass() {
 
 void Renderer::show(unsigned framebuffer, int x, int y) const {
     const Content& c = *content_;
-    {
-        const Visit visit;
-        const Program& program = c.is_preview ? c.copy : c.show;
-        glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
-        glViewport(x, y, static_cast<GLsizei>(c.width), static_cast<GLsizei>(c.height));
-        glDisable(GL_DEPTH_TEST);
-        glUseProgram(program.name());
-        glUniform2f(program.uniform("corner"), static_cast<float>(x), static_cast<float>(y));
-        glUniform1f(program.uniform("passes"), static_cast<float>(std::max(1u, c.done)));
-        glUniform2f(program.uniform("size"), static_cast<float>(c.width), static_cast<float>(c.height));
-        glUniform3fv(program.uniform("top"), 1, c.scene.background.top.data());
-        glUniform3fv(program.uniform("bottom"), 1, c.scene.background.bottom.data());
-        glUniform1i(program.uniform("is_transparent"), c.scene.background.transparent);
-        glActiveTexture(GL_TEXTURE0);
-        glBindTexture(GL_TEXTURE_2D, c.is_preview ? c.preview_targets.color.name() : c.targets.sum.name());
-        glBindVertexArray(c.nothing.name());
-        glDrawArrays(GL_TRIANGLES, 0, 3);
-    }
+    const Visit visit(framebuffer);
     glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
+    const auto w = static_cast<GLsizei>(c.width), h = static_cast<GLsizei>(c.height);
+    glViewport(x, y, w, h);
+    GLint samples = 0;
+    glGetIntegerv(GL_SAMPLES, &samples);
+    if (c.is_preview && samples == 0) { // where the formats agree, no more than copying
+        glBindFramebuffer(GL_READ_FRAMEBUFFER, c.preview_targets.framebuffer.name());
+        glBlitFramebuffer(0, 0, w, h, x, y, x + w, y + h, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+        return;
+    }
+    const Program& program = c.is_preview ? c.copy : c.show;
+    glDisable(GL_DEPTH_TEST);
+    glUseProgram(program.name());
+    glUniform2f(program.uniform("corner"), static_cast<float>(x), static_cast<float>(y));
+    glUniform1f(program.uniform("passes"), static_cast<float>(std::max(1u, c.done)));
+    glUniform2f(program.uniform("size"), static_cast<float>(c.width), static_cast<float>(c.height));
+    glUniform3fv(program.uniform("top"), 1, c.scene.background.top.data());
+    glUniform3fv(program.uniform("bottom"), 1, c.scene.background.bottom.data());
+    glUniform1i(program.uniform("is_transparent"), c.scene.background.transparent);
+    glActiveTexture(GL_TEXTURE0);
+    glBindTexture(GL_TEXTURE_2D, c.is_preview ? c.preview_targets.color.name() : c.targets.sum.name());
+    glBindVertexArray(c.nothing.name());
+    glDrawArrays(GL_TRIANGLES, 0, 3);
 }
 
 Status Renderer::preview(const Scene& scene, const Camera& camera, unsigned width, unsigned height) {
@@ -831,11 +850,13 @@ Status Renderer::preview(const Scene& scene, const Camera& camera, unsigned widt
     glBindFramebuffer(GL_FRAMEBUFFER, framebuffer.name());
     const auto w = static_cast<GLsizei>(width), h = static_cast<GLsizei>(height);
     glViewport(0, 0, w, h);
-    const std::array<float, 4> zero = {};
-    glClearBufferfv(GL_COLOR, 0, zero.data());
     glClear(GL_DEPTH_BUFFER_BIT);
     c.use(c.preview_frame());
-    if (!scene.background.transparent) c.draw_preview_background();
+    const std::array<float, 4> zero = {};
+    if (scene.background.transparent)
+        glClearBufferfv(GL_COLOR, 0, zero.data());
+    else
+        c.draw_preview_background();
     c.draw_objects(Content::Target::preview);
     if (multisampled) c.preview_targets.multisampled.resolve_to(c.preview_targets.framebuffer, w, h);
     return Success{};

@@ -18,7 +18,9 @@ vec3 to_viewer(vec3 position) {
 }
 
 // What a surface's vertices hand on, from stage to stage.
-#ifdef PLAIN
+#if defined(BY_VERTEX)
+#define SURFACE_FIELDS vec3 light;
+#elif defined(PLAIN)
 #define SURFACE_FIELDS vec3 position; vec3 normal;
 #else
 #define SURFACE_FIELDS vec3 position; vec3 normal; vec2 uv; vec4 color; float scalar;

@@ -1,14 +1,16 @@
 // All light at once, without shadows: the key light from its middle, the sky by how much of it a surface faces.
 
 const float kFloor = 0.02;
-const float kOpenKey = 0.90, kOpenSky = 0.84; // the share that is not in shadow, as it is on ordinary shapes
+const float kOpenKey = 0.98, kOpenSky = 0.90; // the share that is not in shadow, as it is on ordinary shapes
 const vec3 kKeyColor = vec3(1.0, 0.955, 0.89), kSkyColor = vec3(0.90, 0.955, 1.0);
 
 /// Light that leaves the surface, as `shade` of lighting.glsl has it on average.
 vec3 shade(vec3 position, vec3 facing, vec3 normal, vec3 albedo, float gloss) {
     vec3 view = to_viewer(position);
     vec3 key_light = frame.strength.x * kOpenKey * max(dot(normal, frame.key_direction.xyz), 0.0) * kKeyColor;
-    float sky = kOpenSky * frame.strength.y * (0.25 + 0.25 * dot(normal, frame.sky_direction.xyz)) +
+    float half_open = 0.5 + 0.5 * dot(normal, frame.sky_direction.xyz);
+    float open_share = kOpenSky * mix(half_open, 1.0, half_open); // what faces away is in the way of itself, too
+    float sky = open_share * frame.strength.y * 0.5 * half_open +
                 frame.strength.z * max(dot(normal, frame.fill_direction.xyz), 0.0);
     vec3 light = key_light + sky * kSkyColor + (kFloor + frame.strength.w * (0.5 - 0.5 * dot(normal, frame.up.xyz)));
     float exponent = exp2(2.0 + 6.0 * gloss);

@@ -29,15 +29,24 @@ void main() {
 #else
     vec3 position = in_position, normal = from_octahedron(in_normal);
 #endif
-    surface.position = (position + offset) * scale;
+    position = (position + offset) * scale;
+#ifdef BY_VERTEX
+#ifdef PLAIN
+    surface.light = light_at(position, normal, vec3(0.0), 0.0);
+#else
+    surface.light = light_at(position, normal, to_linear(in_color.rgb), in_scalar);
+#endif
+#else
+    surface.position = position;
     surface.normal = normal;
 #ifndef PLAIN
     surface.uv = in_uv;
     surface.color = vec4(to_linear(in_color.rgb), in_color.a);
     surface.scalar = in_scalar;
 #endif
-    gl_Position = frame.view_projection * vec4(surface.position, 1.0);
+#endif
+    gl_Position = frame.view_projection * vec4(position, 1.0);
 #ifdef CLIPPED
-    gl_ClipDistance[0] = clip.w - dot(clip.xyz, surface.position);
+    gl_ClipDistance[0] = clip.w - dot(clip.xyz, position);
 #endif
 }
