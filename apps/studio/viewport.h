@@ -32,12 +32,19 @@ public:
     void finish_drawing();
     /// The sentence shown instead of a picture; "" when all is well.
     const std::string& trouble() const;
-    /// World position under a point of the widget (device-independent pixels) and the vertex nearest to it; none beside.
+    /// World position under a point of the widget (device-independent pixels) and the vertex nearest to it; none
+    /// beside.
     struct Picked {
         Vec3d at;
         Index vertex; ///< of the finest mesh
     };
     std::optional<Picked> pick(const QPointF& point);
+    /// Where a point of the world is on the widget (device-independent pixels), in the tile of the restored mesh.
+    QPointF place_of(const Vec3d& world) const;
+    /// Whether the camera goes where it is told on a short way, or at once. By default as the style animates.
+    void set_animated(bool animated);
+    /// Whether nothing is prepared, moves or waits to be drawn: the picture is what finish_drawing() would give.
+    bool is_still() const;
 
 Q_SIGNALS:
     void timings_changed();
@@ -52,6 +59,10 @@ protected:
     void mouseDoubleClickEvent(QMouseEvent* event) override;
     void wheelEvent(QWheelEvent* event) override;
     void leaveEvent(QEvent* event) override;
+    void keyPressEvent(QKeyEvent* event) override; ///< Esc puts back what is being pulled
+    void showEvent(QShowEvent* event) override;
+    void changeEvent(QEvent* event) override;
+    void resizeEvent(QResizeEvent* event) override;
 
 private:
     struct Content;
