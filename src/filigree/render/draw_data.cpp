@@ -1,6 +1,7 @@
 // The processor's half of drawables: nothing here calls OpenGL.
 #include "filigree/core/parallel_for.h"
 #include "filigree/mesh/normals.h"
+#include "filigree/mesh/vertex_cache.h"
 #include "filigree/render/drawable_content.h"
 #include "filigree/render/octahedron.h"
 
@@ -84,6 +85,12 @@ void fill(DrawData::Content& content, const Mesh& mesh, const SurfaceOptions& op
     content.map = options.scalars.map;
     content.triangles = std::move(draw.triangles);
     content.edges = std::move(draw.edges);
+    // Flags of diagonals belong to their triangles: those stay where they are.
+    const bool all_edges =
+        std::all_of(content.edges.begin(), content.edges.end(), [](auto flags) { return flags == 7; });
+    if (all_edges)
+        for (const DrawArrays::Part& part : draw.parts)
+            order_for_vertex_cache(std::span(content.triangles).subspan(part.first, part.count), count);
     content.mesh_vertex_count = mesh.vertex_count();
     content.origin = mesh.origin;
     content.box = moved_to(bounds(mesh.positions), mesh.origin);
