@@ -50,11 +50,11 @@ struct Warps {
 /// A pin, or a pull that was made. Each pull starts from the shape that the ones before it left, so nothing jumps when
 /// the next one begins. Places are in model units, relative to the mesh's origin, before the warps.
 struct Handle {
-    std::vector<Index> vertices; ///< of the driver, ascending; in no other pin
-    std::vector<Vec3f> targets;  ///< one each: where they are held, or where the pull left them
-    bool pinned = false;         ///< by the user, and so shown as a pin: pulls leave it where it is
+    std::vector<Index> vertices = {}; ///< of the driver, ascending; in no other pin
+    std::vector<Vec3f> targets = {};  ///< one each: where they are held, or where the pull left them
+    bool pinned = false;              ///< by the user, and so shown as a pin: pulls leave it where it is
     // Of a pull, all that is needed to do it again on another resolution:
-    std::vector<Index> held;      ///< of the driver, ascending: stayed where they were
+    std::vector<Index> held = {}; ///< of the driver, ascending: stayed where they were
     Vec3f centre = Vec3f::Zero(); ///< what was taken hold of, at rest
     double grip = 0, reach = 0;   ///< model units about it, at rest
     Vec3f move = Vec3f::Zero();   ///< of what is within the grip
