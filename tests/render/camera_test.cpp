@@ -124,6 +124,30 @@ TEST(Camera, ProjectionAndProjectAgree) {
     }
 }
 
+TEST(Camera, RaysAreTheInverseOfProject) {
+    std::mt19937 random(7);
+    std::uniform_real_distribution<double> at(-0.2, 1.2), along(0.1, 30);
+    for (const double field_of_view : {30.0, 100.0, 0.0}) {
+        Camera camera;
+        camera.eye = {1, 2, 9};
+        camera.target = {0.5, -1, 0};
+        camera.field_of_view_deg = field_of_view;
+        camera.height = 3;
+        for (int i = 0; i < 100; ++i) {
+            const double width = 1500, x = width * at(random), y = kHeight * at(random), distance = along(random);
+            const Camera::Ray ray = camera.ray(x, y, width, kHeight);
+            EXPECT_NEAR(ray.direction.norm(), 1, 1e-12);
+            const Vec3d pixel = camera.project(ray.origin + distance * ray.direction, width, kHeight);
+            EXPECT_NEAR(pixel.x(), x, 1e-8);
+            EXPECT_NEAR(pixel.y(), y, 1e-8);
+            EXPECT_GT(pixel.z(), 0);
+        }
+        const Camera::Ray middle = camera.ray(750, 500, 1500, kHeight);
+        expect_same(middle.origin, camera.eye);
+        expect_same(middle.direction, (camera.target - camera.eye).normalized());
+    }
+}
+
 TEST(View, DirectionsSuitTheUpAxis) {
     expect_same(view_direction(View::front, UpAxis::y), {0, 0, 1});
     expect_same(view_direction(View::side, UpAxis::y), {1, 0, 0});

@@ -15,7 +15,16 @@ namespace {
 
 using gl::Buffer;
 
+/// Pictures lie row after row, whatever others in this context have asked for.
+void set_unpacking() {
+    glBindBuffer(GL_PIXEL_UNPACK_BUFFER, 0);
+    glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
+    for (const GLenum name : {GL_UNPACK_ROW_LENGTH, GL_UNPACK_SKIP_ROWS, GL_UNPACK_SKIP_PIXELS, GL_UNPACK_SWAP_BYTES})
+        glPixelStorei(name, 0);
+}
+
 gl::Texture color_texture(ColorMap map) {
+    set_unpacking();
     std::vector<Vec3f> table; // linear light
     for (const Vec3f& srgb : color_table(map)) table.push_back(srgb_to_linear(srgb));
     gl::Texture texture = gl::Texture::make();
@@ -24,11 +33,13 @@ gl::Texture color_texture(ColorMap map) {
     glTexParameteri(GL_TEXTURE_1D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
     glTexParameteri(GL_TEXTURE_1D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
     glTexParameteri(GL_TEXTURE_1D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+    glBindTexture(GL_TEXTURE_1D, 0);
     return texture;
 }
 
 /// picture: rows from the bottom.
 gl::Texture picture_texture(const Picture& picture) {
+    set_unpacking();
     gl::Texture texture = gl::Texture::make();
     glBindTexture(GL_TEXTURE_2D, texture.name());
     glTexImage2D(GL_TEXTURE_2D, 0, GL_SRGB8_ALPHA8, static_cast<GLsizei>(picture.width),
