@@ -1,0 +1,228 @@
+#include "playback.h"
+
+#include "filigree/physics/named_materials.h"
+
+#include <QSignalSpy>
+#include <QTest>
+
+#include <algorithm>
+
+#include <gtest/gtest.h>
+
+namespace filigree::studio {
+namespace {
+
+State ball_state(const BodySettings& body = {}) {
+    State state;
+    ShapeOptions options;
+    options.resolution = 12;
+    options.amplitude = 0;
+    options.size = 2; // model units
+    auto source = std::make_shared<Source>();
+    source->mesh = make_wavy_sphere(options);
+    state.model = std::make_shared<const Model>(strip(source->mesh, {.base = 100}, RunContext()).value().model);
+    state.source = source;
+    state.restore.level = state.model->finest_level();
+    state.body = body;
+    state.body.particles = 300;
+    state.body.material = named_materials()[1].material; // jelly
+    return state;
+}
+
+std::shared_ptr<const MadeBody> made_of(const State& state) {
+    return make_body_of(state, Vec3d::UnitY(), RunContext()).value();
+}
+
+float lowest(const Pose& pose) {
+    float y = 1e9f;
+    for (const Vec3f& p : pose.positions) y = std::min(y, p.y());
+    return y;
+}
+
+TEST(MakeBodyOf, StandsWhereTheMeshIsAboveTheGround) {
+    BodySettings settings;
+    settings.size = 0.5; // m
+    settings.drop = 0.25;
+    const auto made = made_of(ball_state(settings));
+    EXPECT_NEAR(made->scale, 0.25, 1e-3);
+    EXPECT_TRUE(made->surroundings.has_ground);
+    EXPECT_NEAR(made->surroundings.ground_level, -2, 0.02); // its lowest point is at -1, and 1 unit above the ground
+    EXPECT_EQ(made->world.obstacles.size(), 1u);
+    EXPECT_LT(made->world.gravity.y(), -9);
+}
+
+TEST(MakeBodyOf, EveryObstacleIsBelowAndDrawn) {
+    for (const ObstacleChoice choice : {ObstacleChoice::ball, ObstacleChoice::step, ObstacleChoice::slope})
+        for (const Vec3d& up : {Vec3d(Vec3d::UnitX()), Vec3d(Vec3d::UnitY()), Vec3d(Vec3d::UnitZ())}) {
+            BodySettings settings;
+            settings.obstacle = choice;
+            settings.drop = 0.1;
+            const auto made = make_body_of(ball_state(settings), up, RunContext()).value();
+            ASSERT_EQ(made->surroundings.obstacles.size(), 1u);
+            EXPECT_EQ(check_mesh(made->surroundings.obstacles[0]), "");
+            double highest = -1e9, below = 1e9;
+            for (const Vec3f& p : made->surroundings.obstacles[0].positions) {
+                highest = std::max(highest, p.cast<double>().dot(up));
+                below = std::min(below, p.cast<double>().dot(up));
+            }
+            if (choice != ObstacleChoice::slope) {
+                EXPECT_NEAR(highest, -1.2, 0.02);
+            } // 0.1 m is 0.2 units
+            EXPECT_NEAR(below, made->surroundings.ground_level, 0.02);
+            const Vectors& rest = made->body->rest;
+            for (std::size_t i = 0; i < rest.size(); ++i)
+                for (const Obstacle& obstacle : made->world.obstacles)
+                    EXPECT_GT(distance_to(obstacle, obstacle.motion.at(0), rest[i]).distance, -0.01);
+        }
+}
+
+TEST(MakeBodyOf, RefusesWhatHasNoVolumeInWords) {
+    State state = ball_state();
+    Model flat = *state.model;
+    for (Vec3f& p : flat.mesh.positions) p.setZero();
+    state.model = std::make_shared<const Model>(flat);
+    const auto made = make_body_of(state, Vec3d::UnitY(), RunContext());
+    ASSERT_FALSE(made.ok());
+    EXPECT_FALSE(made.error().message.empty());
+}
+
+TEST(Playback, StartsAtRestWithARecordingOfTheStart) {
+    Playback playback;
+    QSignalSpy changed(&playback, &Playback::state_changed);
+    EXPECT_EQ(playback.moment(), nullptr);
+    const State state = ball_state();
+    playback.put(made_of(state));
+    EXPECT_TRUE(playback.has_body());
+    EXPECT_FALSE(playback.is_playing());
+    ASSERT_NE(playback.moment(), nullptr);
+    EXPECT_TRUE(playback.moment()->pose.positions == driver_positions(*state.model));
+    EXPECT_EQ(playback.recording().frames.size(), 1u);
+    EXPECT_EQ(changed.count(), 1);
+    playback.remove();
+    EXPECT_FALSE(playback.has_body());
+    EXPECT_EQ(playback.moment(), nullptr);
+}
+
+TEST(Playback, FallsAndRecordsEveryFrame) {
+    Playback playback;
+    playback.put(made_of(ball_state()));
+    const float start = lowest(playback.moment()->pose);
+    playback.play();
+    EXPECT_TRUE(playback.is_playing());
+    playback.wait_for_frames(12);
+    playback.pause();
+    EXPECT_FALSE(playback.is_playing());
+    const std::size_t frames = playback.recording().frames.size();
+    EXPECT_GE(frames, 13u);
+    EXPECT_EQ(playback.moment()->frame + 1, frames);
+    // Free fall in model units: the ball of 1 m is 2 units.
+    const double time = double(playback.moment()->frame) / 60;
+    if (time < 0.3) {
+        EXPECT_NEAR(start - lowest(playback.moment()->pose), 2 * 0.5 * 9.81 * time * time, 0.05);
+    }
+    for (std::size_t f = 1; f < 12; ++f)
+        EXPECT_LT(lowest(playback.recording().frames[f]), lowest(playback.recording().frames[f - 1]));
+    QCoreApplication::processEvents();
+    EXPECT_EQ(playback.recording().frames.size(), frames); // a pause is a pause
+}
+
+TEST(Playback, StepsOneFrameAtATime) {
+    Playback playback;
+    playback.put(made_of(ball_state()));
+    playback.step();
+    playback.wait_for_frames(0);
+    EXPECT_EQ(playback.moment()->frame, 1u);
+    playback.step();
+    playback.step();
+    playback.wait_for_frames(0);
+    EXPECT_EQ(playback.moment()->frame, 3u);
+    EXPECT_EQ(playback.recording().frames.size(), 4u);
+}
+
+TEST(Playback, ResetGoesBackToTheSameStart) {
+    Playback playback;
+    playback.put(made_of(ball_state()));
+    for (int k = 0; k < 5; ++k) playback.step();
+    playback.wait_for_frames(0);
+    const std::vector<Pose> first = playback.recording().frames;
+    playback.reset();
+    EXPECT_EQ(playback.recording().frames.size(), 1u);
+    EXPECT_EQ(playback.moment()->frame, 0u);
+    for (int k = 0; k < 5; ++k) playback.step();
+    playback.wait_for_frames(0);
+    ASSERT_EQ(playback.recording().frames.size(), first.size());
+    for (std::size_t f = 0; f < first.size(); ++f)
+        EXPECT_TRUE(playback.recording().frames[f].positions == first[f].positions) << "frame " << f;
+}
+
+TEST(Playback, AHandPullsThePointItTook) {
+    BodySettings settings;
+    settings.gravity = settings.ground = false;
+    const State state = ball_state(settings);
+    Playback playback;
+    playback.put(made_of(state));
+    const std::vector<Vec3f> rest = driver_positions(*state.model);
+    const auto top = std::max_element(rest.begin(), rest.end(), [](auto& a, auto& b) { return a.y() < b.y(); });
+    playback.grab(*top, top->cast<double>());
+    EXPECT_TRUE(playback.is_grabbed());
+    EXPECT_TRUE(playback.is_playing());
+    playback.pull(top->cast<double>() + Vec3d(0, 1, 0));
+    playback.wait_for_frames(30);
+    const Index grabbed = Index(top - rest.begin());
+    EXPECT_GT(playback.moment()->pose.positions[grabbed].y(), top->y() + 0.2f);
+    playback.let_go();
+    EXPECT_FALSE(playback.is_grabbed());
+    playback.pull(Vec3d(std::nan(""), 0, 0)); // ignored
+    playback.wait_for_frames(2);
+    EXPECT_TRUE(playback.moment()->pose.positions[grabbed].allFinite());
+}
+
+TEST(Playback, EveryVertexWhenAskedFor) {
+    const State state = ball_state();
+    Playback playback;
+    playback.put(made_of(state));
+    EXPECT_TRUE(playback.moment()->full.empty());
+    playback.want_full(true); // shows the same moment again
+    EXPECT_TRUE(QTest::qWaitFor([&] { return !playback.moment()->full.empty(); }));
+    ASSERT_EQ(playback.moment()->full.size(), state.model->mesh.vertex_count());
+    EXPECT_EQ(playback.recording().frames.size(), 1u);
+    for (std::size_t v = 0; v < playback.moment()->full.size(); ++v)
+        EXPECT_LT((playback.moment()->full[v] - state.model->mesh.positions[v]).norm(), 1e-4f);
+}
+
+TEST(Playback, PinnedVerticesHoldTheBody) {
+    State state = ball_state();
+    const std::vector<Vec3f> rest = driver_positions(*state.model);
+    Handle pins;
+    pins.pinned = true;
+    for (Index v = 0; v < rest.size(); ++v)
+        if (rest[v].y() > 0.7f) pins.vertices.push_back(v);
+    ASSERT_FALSE(pins.vertices.empty());
+    state.handles.push_back(pins);
+    Playback playback;
+    playback.put(made_of(state));
+    for (int k = 0; k < 20; ++k) playback.step();
+    playback.wait_for_frames(0);
+    const Pose& pose = playback.moment()->pose;
+    for (const Index v : pins.vertices) EXPECT_NEAR(pose.positions[v].y(), rest[v].y(), 0.1f);
+    EXPECT_LT(lowest(pose), -1.01f); // the rest hangs
+}
+
+TEST(Playback, GoesAwayInTheMiddleOfAFrame) {
+    BodySettings settings;
+    State state = ball_state(settings);
+    state.body.particles = 30000;
+    state.body.material.young_modulus = 1e9; // hundreds of substeps
+    const auto made = made_of(state);
+    for (int k = 0; k < 2; ++k) {
+        Playback playback;
+        playback.put(made);
+        playback.play();
+        QCoreApplication::processEvents();
+        if (k == 0) playback.pause();
+        playback.play();
+    }
+}
+
+} // namespace
+} // namespace filigree::studio
