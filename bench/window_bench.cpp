@@ -1,7 +1,7 @@
 // What a window waits for while something moves: a pose, a preview, a pass; level by level of a model on 1,000 driver
 // vertices, 1280 x 800. The first argument that is no flag is the mesh's file; none: a wavy cube of as many triangles
 // as the Stanford dragon. `upload` is the graphics half of a drawable, `prepare` the other, which a window does in a
-// thread of its own.
+// thread of its own. The column CPU is all threads together: what stays the same when others use the processor too.
 #include "filigree/hierarchy/strip.h"
 #include "filigree/io/mesh_file.h"
 #include "filigree/mesh/ray_hit.h"
@@ -110,8 +110,7 @@ void show(benchmark::State& state, bool of_preview) {
 }
 
 void prepare(benchmark::State& state, unsigned level, RestoreOn where) {
-    for (auto _ : state)
-        benchmark::DoNotOptimize(DrawData::model(model, {.level = level}, {}, where, context).value());
+    for (auto _ : state) benchmark::DoNotOptimize(DrawData::model(model, {.level = level}, {}, where, context).value());
 }
 
 void upload(benchmark::State& state, unsigned level, RestoreOn where) {
@@ -133,7 +132,10 @@ void pick(benchmark::State& state) {
 }
 
 void add(const std::string& name, auto function, auto... arguments) {
-    benchmark::RegisterBenchmark(name.c_str(), function, arguments...)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()->UseRealTime();
+    benchmark::RegisterBenchmark(name.c_str(), function, arguments...)
+        ->Unit(benchmark::kMillisecond)
+        ->MeasureProcessCPUTime()
+        ->UseRealTime();
 }
 
 void add_level(unsigned level) {

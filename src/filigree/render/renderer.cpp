@@ -24,7 +24,7 @@ constexpr int kLeastShadowSize = 512, kMostShadowSize = 2048;
 constexpr double kKeyReach = 0.16;      // of the key light: tangent of half the angle it is seen under
 constexpr double kGroundSide = 2.5;     // half, in diagonals of the scene
 constexpr double kGroundDarkness = 0.6; // of a shadow that no light reaches
-constexpr double kFinePixels = 64;      // of the picture for each triangle: no more, and vertices are lit, not pixels
+constexpr double kFinePixels = 150;     // of the picture for each triangle: no more, and vertices are lit, not pixels
 constexpr GLuint kUnits = 5;            // of textures, that the shaders read
 constexpr unsigned kFewPasses = 4;      // below, the hardware's multisampling does the antialiasing
 // Light that a white surface gets where it faces the source, over all passes. The sky is seen by half on average.
