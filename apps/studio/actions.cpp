@@ -7,6 +7,7 @@
 #include <QApplication>
 #include <QFileDialog>
 #include <QFileInfo>
+#include <QKeyEvent>
 #include <QMessageBox>
 
 namespace filigree::studio {
@@ -107,6 +108,8 @@ struct Actions::Content {
             if (entry.is_on) entry.action->setChecked(entry.is_on());
         }
         QUndoStack& history = workbench.document().undo_stack();
+        actions.find("file.save")
+            ->setText(window.file_path().isEmpty() ? QStringLiteral("&Save…") : QStringLiteral("&Save"));
         name_step("edit.undo", QStringLiteral("&Undo"), history.undoText());
         name_step("edit.redo", QStringLiteral("&Redo"), history.redoText());
     }
@@ -214,7 +217,10 @@ void Actions::Content::add_file_actions() {
 
 void Actions::Content::cancel() {
     if (workbench.is_pulling()) {
-        QUndoStack& history = workbench.document().undo_stack();
+        QKeyEvent escape(QEvent::KeyPress, Qt::Key_Escape, Qt::NoModifier);
+        QCoreApplication::sendEvent(&viewport, &escape); // it holds what is dragged
+        if (!workbench.is_pulling()) return;
+        QUndoStack& history = workbench.document().undo_stack(); // a pull without a mouse
         const int before = history.index();
         workbench.end_pull();
         if (history.index() > before) history.undo();
@@ -272,7 +278,7 @@ void Actions::Content::add_edit_actions() {
         tools->addAction(action);
     };
     tool("tool.pull", "&Pull", "Drag the surface to pull it", "P", Tool::pull, Icon::pull);
-    tool("tool.pin", "Pi&n", "Click or paint the surface to pin it; on a pin, to take it out", "N", Tool::pin,
+    tool("tool.pin", "Pi&n", "Click or paint the surface to pin it; with Ctrl to take pins out", "N", Tool::pin,
          Icon::pin);
     tool("tool.turn", "&Turn", "Drag anywhere to turn the view", "T", Tool::turn, Icon::turn);
 }
@@ -425,6 +431,7 @@ Actions::Actions(Workbench& workbench, Viewport& viewport, MainWindow& window)
     connect(&workbench, &Workbench::pose_changed, this, [this, &workbench] {
         find(QStringLiteral("edit.cancel"))->setEnabled(workbench.jobs().is_busy() || workbench.is_pulling());
     });
+    connect(&window, &MainWindow::files_changed, this, refresh);
     connect(&window, &MainWindow::theme_changed, this, refresh);
     connect(&window, &MainWindow::panel_changed, this, refresh);
 }

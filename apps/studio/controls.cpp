@@ -1,13 +1,17 @@
 #include "controls.h"
 
+#include "icons.h"
 #include "theme.h"
 
 #include <QEvent>
+#include <QFontMetrics>
 #include <QGuiApplication>
 #include <QKeyEvent>
 #include <QLineEdit>
 #include <QLocale>
 #include <QSignalBlocker>
+#include <QStyleOptionToolButton>
+#include <QStylePainter>
 
 #include <algorithm>
 #include <cmath>
@@ -292,11 +296,18 @@ Panel::Panel(const QString& name, QWidget* parent)
     page_->setAutoFillBackground(false);
 }
 
+void line_up(QGridLayout* rows) {
+    const QFontMetrics metrics(QGuiApplication::font());
+    rows->setHorizontalSpacing(8);
+    rows->setColumnStretch(1, 1);
+    rows->setColumnMinimumWidth(0, metrics.horizontalAdvance("Temperature"));
+    rows->setColumnMinimumWidth(2, metrics.horizontalAdvance("10000 kg/m³") + 32);
+}
+
 QGridLayout* Panel::section(const QString& title) {
     auto* rows = new QGridLayout;
-    rows->setHorizontalSpacing(8);
     rows->setVerticalSpacing(5);
-    rows->setColumnStretch(1, 1);
+    line_up(rows);
     if (!title.isEmpty()) {
         auto* heading = new QLabel(title, page_);
         heading->setObjectName(objectName() + QStringLiteral(".heading.") + title.toLower().replace(' ', '_'));
@@ -404,6 +415,38 @@ void ActionButton::follow() {
     setEnabled(action_->isEnabled());
     setCheckable(action_->isCheckable());
     set_silently(this, action_->isChecked());
+}
+
+FoldButton::FoldButton(const QString& name, const QString& text, const QString& tooltip, QWidget* parent)
+    : QToolButton(parent) {
+    setObjectName(name);
+    setText(text);
+    setToolTip(tooltip);
+    setAccessibleName(text);
+    setCheckable(true);
+    setAutoRaise(true);
+    setToolButtonStyle(Qt::ToolButtonTextBesideIcon);
+    setIcon(studio::icon(Icon::folded));
+    setFocusPolicy(Qt::TabFocus);
+    QFont bold = font();
+    bold.setBold(true);
+    setFont(bold);
+    connect(this, &QToolButton::toggled, this,
+            [this](bool unfolded) { setIcon(studio::icon(unfolded ? Icon::unfolded : Icon::folded)); });
+}
+
+void FoldButton::paintEvent(QPaintEvent*) {
+    QStylePainter painter(this);
+    QStyleOptionToolButton option;
+    initStyleOption(&option);
+    option.state &= ~(QStyle::State_On | QStyle::State_Sunken | QStyle::State_MouseOver); // the arrow says it all
+    option.rect.setLeft(-4);
+    option.rect.setWidth(sizeHint().width());
+    painter.drawControl(QStyle::CE_ToolButtonLabel, option);
+    if (!hasFocus()) return;
+    QStyleOptionFocusRect focus;
+    focus.initFrom(this);
+    painter.drawPrimitive(QStyle::PE_FrameFocusRect, focus);
 }
 
 QToolButton* icon_button(const QString& name, QAction* action, QWidget* parent) {

@@ -92,6 +92,9 @@ private:
     QDoubleSpinBox* number_;
 };
 
+/// Gives the columns of all sections the same places.
+void line_up(QGridLayout* rows);
+
 /// A column of sections in a scroll area. Rows have three columns: label, slider, number.
 class Panel : public QScrollArea {
     Q_OBJECT
@@ -136,7 +139,17 @@ private:
     QAction* action_;
     QString text_;
 };
-/// The same as a small button with an icon alone.
+/// Shows or hides what belongs under it; says so by toggled().
+class FoldButton : public QToolButton {
+    Q_OBJECT
+public:
+    FoldButton(const QString& name, const QString& text, const QString& tooltip, QWidget* parent = nullptr);
+
+protected:
+    void paintEvent(QPaintEvent* event) override;
+};
+
+/// An action as a small button with an icon alone.
 QToolButton* icon_button(const QString& name, QAction* action, QWidget* parent = nullptr);
 
 /// Sets without telling anybody: what a panel does when the document has changed.

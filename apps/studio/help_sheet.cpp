@@ -3,6 +3,7 @@
 #include "controls.h"
 
 #include <QDialogButtonBox>
+#include <QPushButton>
 
 #include <array>
 
@@ -10,23 +11,29 @@ namespace filigree::studio {
 namespace {
 
 struct Group {
-    const char *title, *menus; ///< the first parts of the actions' names, each with a space after it
+    const char *title, *menus; ///< the first parts of the actions' names, a space in between
+    std::size_t column;
 };
 constexpr std::array kGroups = {
-    Group{"File", "file "},          Group{"Edit", "edit "}, Group{"Detail and deformation", "detail deform tool "},
-    Group{"Body and time", "body "}, Group{"View", "view "}, Group{"Panels and help", "panel help "},
+    Group{"File", "file", 0},
+    Group{"Edit", "edit", 0},
+    Group{"Detail and deformation", "detail deform tool", 1},
+    Group{"Body and time", "body", 1},
+    Group{"Panels and help", "panel help", 1},
+    Group{"View", "view", 2},
 };
 
 struct Gesture {
     const char *mouse, *does;
 };
 constexpr std::array kGestures = {
-    Gesture{"Drag the surface", "pulls it (tool Pull), pins it (tool Pin)"},
-    Gesture{"Drag beside it", "turns the view"},
-    Gesture{"Right drag", "turns the view"},
-    Gesture{"Middle drag", "moves the view"},
-    Gesture{"Wheel", "zooms"},
-    Gesture{"Double click", "shows all"},
+    Gesture{"Drag the surface", "pulls it; with the tool Pin: pins it"},
+    Gesture{"Ctrl+drag", "with the tool Pin: takes pins out"},
+    Gesture{"Drag a knob", "deforms as the sliders do"},
+    Gesture{"Drag beside it", "turns the view; so does a right drag"},
+    Gesture{"Middle drag", "moves the view; so does Shift+drag"},
+    Gesture{"Wheel", "zooms where the mouse is"},
+    Gesture{"Double click", "looks at that point; beside: shows all"},
     Gesture{"Double click a slider", "its value at rest"},
 };
 
@@ -41,16 +48,20 @@ HelpSheet::HelpSheet(const Actions& actions, QWidget* parent) : QDialog(parent) 
     setObjectName("help.sheet");
     setWindowTitle("Shortcuts and mouse");
     auto* columns = new QHBoxLayout;
-    columns->setSpacing(36);
-    std::array<QVBoxLayout*, 2> column = {new QVBoxLayout, new QVBoxLayout};
-    for (QVBoxLayout* half : column) columns->addLayout(half);
-    const auto add = [&](std::size_t half, const QString& title, const QString& rows) {
+    columns->setSpacing(32);
+    std::array<QVBoxLayout*, 3> column = {new QVBoxLayout, new QVBoxLayout, new QVBoxLayout};
+    for (QVBoxLayout* one : column) {
+        one->setSpacing(16);
+        columns->addLayout(one);
+    }
+    const auto add = [&](std::size_t place, const QString& title, const QString& rows) {
         auto* label =
             new QLabel("<h4 style='margin: 0'>" + title + "</h4><table cellspacing='0'>" + rows + "</table>", this);
         label->setObjectName("help.sheet." + title.section(' ', 0, 0).toLower());
         label->setTextFormat(Qt::RichText);
         label->setTextInteractionFlags(Qt::TextSelectableByMouse);
-        column[half]->addWidget(label);
+        label->setSizePolicy(QSizePolicy::Preferred, QSizePolicy::Fixed);
+        column[place]->addWidget(label);
     };
 
     QString mouse;
@@ -66,10 +77,9 @@ HelpSheet::HelpSheet(const Actions& actions, QWidget* parent) : QDialog(parent) 
             if (menu == "edit " && text.startsWith("Redo")) text = "Redo";
             rows += row(action->shortcut().toString(QKeySequence::NativeText), text);
         }
-        add(QLatin1String(group.title) == "View" || QLatin1String(group.title) == "Panels and help" ? 1 : 0,
-            group.title, rows);
+        add(group.column, group.title, rows);
     }
-    for (QVBoxLayout* half : column) half->addStretch(1);
+    for (QVBoxLayout* one : column) one->addStretch(1);
 
     auto* page = new QWidget;
     page->setLayout(columns);
@@ -78,6 +88,7 @@ HelpSheet::HelpSheet(const Actions& actions, QWidget* parent) : QDialog(parent) 
     scroll->setWidget(page);
     scroll->setWidgetResizable(true);
     auto* buttons = new QDialogButtonBox(QDialogButtonBox::Close, this);
+    buttons->button(QDialogButtonBox::Close)->setIcon(QIcon());
     connect(buttons, &QDialogButtonBox::rejected, this, &QDialog::reject);
     auto* layout = new QVBoxLayout(this);
     layout->addWidget(scroll);

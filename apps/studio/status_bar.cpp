@@ -49,9 +49,8 @@ StatusBar::StatusBar(Workbench& workbench, Viewport& viewport, const Actions& ac
     vertices_ = part("status.vertices", "Vertices drawn, and in the driver that moves them");
     milliseconds_ = part("status.milliseconds",
                          "Milliseconds of the last picture: moving the driver, restoring the mesh, drawing it");
-    rate_ = part("status.rate", "Pictures a second while things move");
+    rate_ = part("status.rate", "Pictures a second, while things move");
     auto* measure = new ActionButton("status.measure", actions.find("view.measure_error"), "Error", this);
-    measure->setFlat(true);
     addPermanentWidget(measure);
     error_ = part("status.error", "");
 
@@ -89,7 +88,8 @@ void StatusBar::show_timings() {
     const auto ms = [](double value) { return QString::number(value, 'f', value < 10 ? 1 : 0); };
     milliseconds_->setText(QStringLiteral("driver %1 · restore %2 · draw %3 ms")
                                .arg(ms(timings.driver), ms(timings.restore), ms(timings.draw)));
-    rate_->setText(QStringLiteral("%1 fps").arg(timings.frames_per_second, 0, 'f', 0));
+    rate_->setText(timings.frames_per_second > 0 ? QStringLiteral("%1 fps").arg(timings.frames_per_second, 0, 'f', 0)
+                                                 : QStringLiteral("still"));
 }
 
 void StatusBar::show_error() {

@@ -36,7 +36,7 @@ QPalette light_palette() {
 
 QPalette dark_palette() {
     return palette_of(
-        {"#272a2f", "#1d2024", "#2c3036", "#363a41", "#e4e7eb", "#7f868f", "#191b1f", "#3574d6", "#8ab4f8"});
+        {"#2b2e34", "#1a1c1f", "#2c3036", "#363a41", "#e4e7eb", "#7f868f", "#191b1f", "#3574d6", "#8ab4f8"});
 }
 
 } // namespace

@@ -1,7 +1,6 @@
 #include "panels/body_panel.h"
 
 #include "actions.h"
-#include "icons.h"
 
 #include "filigree/physics/named_materials.h"
 
@@ -134,33 +133,17 @@ void BodyPanel::add_world() {
 }
 
 void BodyPanel::add_advanced() {
-    fold_ = new QToolButton(page());
-    fold_->setObjectName("body.advanced");
-    fold_->setText("Advanced");
-    fold_->setToolTip("Further settings of the material");
-    fold_->setAccessibleName("Advanced");
-    fold_->setCheckable(true);
-    fold_->setAutoRaise(true);
-    fold_->setToolButtonStyle(Qt::ToolButtonTextBesideIcon);
-    fold_->setIcon(icon(Icon::folded));
-    fold_->setFocusPolicy(Qt::TabFocus);
-    QFont font = fold_->font();
-    font.setBold(true);
-    fold_->setFont(font);
+    fold_ = new FoldButton("body.advanced", "Advanced", "Further settings of the material", page());
     advanced_ = new QWidget(page());
     advanced_->setObjectName("body.advanced.page");
     auto* rows = new QGridLayout(advanced_);
     rows->setContentsMargins(0, 0, 0, 0);
-    rows->setHorizontalSpacing(8);
     rows->setVerticalSpacing(5);
-    rows->setColumnStretch(1, 1);
+    line_up(rows);
     layout_of_page()->insertWidget(layout_of_page()->count() - 1, fold_, 0, Qt::AlignLeft);
     layout_of_page()->insertWidget(layout_of_page()->count() - 1, advanced_);
     advanced_->hide();
-    connect(fold_, &QToolButton::toggled, this, [this](bool unfolded) {
-        advanced_->setVisible(unfolded);
-        fold_->setIcon(icon(unfolded ? Icon::unfolded : Icon::folded));
-    });
+    connect(fold_, &QToolButton::toggled, advanced_, &QWidget::setVisible);
 
     model_ = choice(rows, "body.model", "Method", {"Finite elements", "Springs", "Meshfree"},
                     "How elasticity is computed. Meshfree is the one that flows and melts.");
@@ -220,8 +203,9 @@ void BodyPanel::add_advanced() {
             s.material.temperature = v + kCelsius;
             s.preset = "custom";
         });
-    material(rows, "body.heating", "Heating", {.least = 0, .most = 200, .step = 1, .decimals = 0, .unit = "K/s"},
-             "How fast the surface warms, kelvins a second", &Material::heating);
+    heating_ =
+        material(rows, "body.heating", "Heating", {.least = 0, .most = 200, .step = 1, .decimals = 0, .unit = "K/s"},
+                 "How fast the surface warms, kelvins a second", &Material::heating);
 }
 
 NumberControl* BodyPanel::setting(QGridLayout* rows, const QString& name, const QString& label, const NumberSpec& spec,
@@ -291,13 +275,13 @@ void BodyPanel::refresh() {
 void BodyPanel::show_rows() {
     const Material& material = workbench_.state().body.material;
     const bool meshfree = material.model == MaterialModel::meshfree, springs = material.model == MaterialModel::springs;
-    poisson_->set_enabled(!springs);
-    bending_->set_enabled(springs);
-    plastic_->setEnabled(meshfree);
-    melts_->setEnabled(meshfree);
-    for (NumberControl* control : {yield_, creep_}) control->set_enabled(meshfree && material.is_plastic());
-    for (NumberControl* control : {melting_from_, melting_to_, viscosity_})
-        control->set_enabled(meshfree && material.melts());
+    poisson_->set_visible(!springs);
+    bending_->set_visible(springs);
+    plastic_->setVisible(meshfree);
+    melts_->setVisible(meshfree);
+    for (NumberControl* control : {yield_, creep_}) control->set_visible(meshfree && material.is_plastic());
+    for (NumberControl* control : {melting_from_, melting_to_, viscosity_, temperature_, heating_})
+        control->set_visible(meshfree && material.melts());
     drop_->set_enabled(workbench_.state().body.ground);
 }
 

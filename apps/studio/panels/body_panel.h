@@ -43,7 +43,8 @@ private:
     QCheckBox *ground_, *gravity_, *points_, *plastic_, *melts_;
     QToolButton *fold_, *play_;
     QWidget* advanced_;
-    NumberControl *poisson_, *bending_, *yield_, *creep_, *melting_from_, *melting_to_, *viscosity_, *drop_;
+    NumberControl *poisson_, *bending_, *yield_, *creep_, *melting_from_, *melting_to_, *viscosity_, *temperature_,
+        *heating_, *drop_;
 };
 
 } // namespace filigree::studio

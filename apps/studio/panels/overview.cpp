@@ -22,7 +22,7 @@ Overview::Overview(Workbench& workbench, const Actions& actions, QWidget* parent
 
     auto* rows = new QGridLayout(this);
     rows->setContentsMargins(12, 10, 12, 8);
-    rows->setHorizontalSpacing(8);
+    line_up(rows);
     rows->setVerticalSpacing(6);
     rows->addWidget(zoom_->label(), 0, 0);
     rows->addWidget(zoom_->slider(), 0, 1);

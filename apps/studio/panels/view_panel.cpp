@@ -3,43 +3,7 @@
 #include "status_bar.h"
 #include "window.h"
 
-#include "filigree/render/color_map.h"
-
-#include <QPainter>
-
 namespace filigree::studio {
-
-Legend::Legend(QWidget* parent) : QWidget(parent) {
-    setObjectName("view.legend");
-    setToolTip("The colours, from no error to the largest; fractions of the diagonal");
-    setAccessibleName("Legend of the error's colours");
-    setSizePolicy(QSizePolicy::Expanding, QSizePolicy::Fixed);
-}
-
-void Legend::set_ends(const QString& low, const QString& high) {
-    low_ = low;
-    high_ = high;
-    update();
-}
-
-QSize Legend::sizeHint() const { return {160, 14 + fontMetrics().height()}; }
-
-void Legend::paintEvent(QPaintEvent*) {
-    QPainter painter(this);
-    constexpr int kBar = 12;
-    QLinearGradient gradient(0, 0, width(), 0);
-    constexpr int kStops = 16;
-    for (int k = 0; k <= kStops; ++k) {
-        const float t = float(k) / kStops;
-        const Vec3f color = color_at(ColorMap::sequential, t);
-        gradient.setColorAt(double(t), QColor::fromRgbF(color.x(), color.y(), color.z()));
-    }
-    painter.fillRect(QRect(0, 0, width(), kBar), gradient);
-    const QRect words(0, kBar + 2, width(), height() - kBar - 2);
-    painter.setPen(palette().color(QPalette::WindowText));
-    painter.drawText(words, Qt::AlignLeft, low_);
-    painter.drawText(words, Qt::AlignRight, high_);
-}
 
 ViewPanel::ViewPanel(Workbench& workbench, Viewport& viewport, MainWindow& window, QWidget* parent)
     : Panel("view", parent), workbench_(workbench), viewport_(viewport), window_(window) {
@@ -56,8 +20,6 @@ ViewPanel::ViewPanel(Workbench& workbench, Viewport& viewport, MainWindow& windo
         choice(rows, "view.style", "Style", {"Shaded", "Shaded with edges", "Wireframe"}, "How the surface is drawn");
     coloring_ = choice(rows, "view.coloring", "Colours", {"Its own", "Error", "Levels"},
                        "The mesh's own; how far it is from the full deformation; at which level a vertex is added");
-    legend_ = new Legend(page());
-    rows->addWidget(legend_, rows->rowCount(), 0, 1, 3);
     error_ = text(rows, "view.error", Tone::quiet);
     measure_ = new ActionButton("view.measure", window.actions().find("view.measure_error"), {}, page());
     beside(rows, {measure_});
@@ -134,18 +96,10 @@ void ViewPanel::refresh() {
 
 void ViewPanel::show_error() {
     const bool shown = workbench_.view().settings().coloring == Coloring::error;
-    legend_->setVisible(shown);
     const QString text = error_text(workbench_, true);
     error_->setText(text.isEmpty() ? QStringLiteral("Not measured for what is shown.") : text);
     error_->setVisible(shown);
     measure_->setVisible(shown);
-    if (!shown || text.isEmpty()) {
-        legend_->set_ends("0", {});
-        return;
-    }
-    const auto& error = *workbench_.error();
-    const HeatMap map = heat_map(error.per_vertex, workbench_.state().source->topology.box.diagonal());
-    legend_->set_ends(number_text(double(map.range.least), 2), number_text(double(map.range.most), 2));
 }
 
 void ViewPanel::show_drawn() {

@@ -9,21 +9,6 @@ namespace filigree::studio {
 class Actions;
 class MainWindow;
 
-/// Colours and what they stand for.
-class Legend : public QWidget {
-    Q_OBJECT
-public:
-    explicit Legend(QWidget* parent = nullptr);
-    void set_ends(const QString& low, const QString& high);
-    QSize sizeHint() const override;
-
-protected:
-    void paintEvent(QPaintEvent* event) override;
-
-private:
-    QString low_, high_;
-};
-
 class ViewPanel : public Panel {
     Q_OBJECT
 public:
@@ -45,7 +30,6 @@ private:
     };
     std::vector<Switch> switches_;
     NumberControl *points_, *clip_;
-    Legend* legend_;
     QPushButton* measure_;
     Text *error_, *drawn_;
 };
