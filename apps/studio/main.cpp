@@ -82,11 +82,11 @@ Result<Options> parse(const QApplication& application) {
 }
 
 /// What a run that shows, saves and leaves does once the window is there.
-Status run_alone(const Options& options, MainWindow& window) {
+Status run_alone(const Options& options, ErrorWatch& watch, MainWindow& window) {
     constexpr double kPatience = 600; // seconds, for the largest meshes on the software renderer
     if (!wait_until_still(window, kPatience))
         return Error{ErrorCode::unsuitable, "The window was not still after ten minutes; nothing was saved."};
-    if (!window.last_error().isEmpty()) return Error{ErrorCode::bad_file, window.last_error().toStdString()};
+    if (Status opened = watch.take(); !opened) return opened;
     if (options.frames > 0)
         if (Status simulated = simulate_frames(options.frames, window); !simulated) return simulated;
     if (!options.script.isEmpty())
@@ -109,12 +109,13 @@ int main(int argc, char** argv) {
         return fail({ErrorCode::usage, "--panel: there is no panel '" + options->panel.toStdString() +
                                            "'; there are model, detail, deform, body and view."});
     window.show();
+    ErrorWatch watch(window.workbench());
     if (!options->file.isEmpty()) window.open_file(options->file);
     if (!options->leaves()) return QApplication::exec();
 
     Status status = Success{};
     QTimer::singleShot(0, &window, [&] {
-        status = run_alone(*options, window);
+        status = run_alone(*options, watch, window);
         QApplication::exit();
     });
     QApplication::exec();

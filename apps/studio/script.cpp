@@ -94,13 +94,10 @@ private:
         return Success{};
     }
     Status settle_well(const std::function<void()>& work) {
-        const QString before = window_.last_error();
-        window_.clear_last_error();
+        ErrorWatch watch(workbench());
         work();
         if (Status still = settle(); !still) return still;
-        const QString error = window_.last_error();
-        if (!error.isEmpty()) return Error{ErrorCode::bad_file, error.toStdString()};
-        return Success{};
+        return watch.take();
     }
 
     Status do_action(const QString& name) {
@@ -324,6 +321,15 @@ void prepare_application() {
     QCoreApplication::setAttribute(Qt::AA_ShareOpenGLContexts);
 }
 
+ErrorWatch::ErrorWatch(Workbench& workbench) {
+    QObject::connect(&workbench.jobs(), &Jobs::failed, &receiver_, [this](const Error& error) { last_ = error; });
+}
+
+Status ErrorWatch::take() {
+    if (!last_) return Success{};
+    return *std::exchange(last_, std::nullopt);
+}
+
 bool wait_until_still(MainWindow& window, double seconds) {
     QElapsedTimer clock;
     clock.start();
@@ -338,13 +344,18 @@ bool wait_until_still(MainWindow& window, double seconds) {
 
 Status simulate_frames(unsigned frames, MainWindow& window) {
     Workbench& workbench = window.workbench();
+    ErrorWatch watch(workbench);
     workbench.set_mode(Mode::body);
-    workbench.play();
-    workbench.wait_until_idle(); // the body has to be made first
-    workbench.playback().wait_for_frames(frames);
-    workbench.pause();
+    if (workbench.frame_count() == 0) workbench.make_body();
     workbench.wait_until_idle();
-    if (workbench.frame_count() <= 1) return Error{ErrorCode::unsuitable, window.last_error().toStdString()};
+    if (Status made = watch.take(); !made) return made;
+    for (unsigned i = 0; i < frames; ++i) {
+        const std::size_t before = workbench.frame();
+        workbench.step();
+        workbench.playback().wait_for_frames(1);
+        if (workbench.frame() == before)
+            return Error{ErrorCode::unsuitable, "The body does not move: " + window.message().toStdString()};
+    }
     return Success{};
 }
 

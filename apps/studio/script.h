@@ -7,6 +7,18 @@
 
 namespace filigree::studio {
 
+/// Keeps the last error of work in the background, with its code, for whoever has no eyes for the message bar.
+class ErrorWatch {
+public:
+    explicit ErrorWatch(Workbench& workbench);
+    /// Success, or the error since the last call.
+    Status take();
+
+private:
+    QObject receiver_;
+    std::optional<Error> last_;
+};
+
 /// What has to be set before the QApplication is made: its name, and the kind of OpenGL.
 void prepare_application();
 
