@@ -196,7 +196,7 @@ void BodyPanel::add_advanced() {
     viscosity_ = material(rows, "body.viscosity", "Viscosity",
                           {.least = 0.01, .most = 1e5, .decimals = 2, .unit = "Pa s", .logarithmic = true},
                           "Of the melt, pascal seconds", &Material::viscosity);
-    setting(
+    temperature_ = setting(
         rows, "body.temperature", "Temperature", temperature, "At the start, degrees Celsius",
         [](const BodySettings& s) { return s.material.temperature - kCelsius; },
         [](BodySettings& s, double v) {
