@@ -295,6 +295,8 @@ void Playback::step() {
     worker_->change([&] { ++worker_->steps; });
 }
 
+bool Playback::is_stepping() const { return has_body() && worker_->steps_awaited > 0; }
+
 void Playback::reset() {
     if (!has_body()) return;
     worker_->rewind();

@@ -58,6 +58,7 @@ public:
     void step();  ///< one frame
     void reset(); ///< to the start; the recording is emptied
     bool is_playing() const { return is_playing_; }
+    bool is_stepping() const; ///< frames asked for by step() are still to come
     /// Returns when the frames asked for by play() or step() so far have been delivered, or after `frames` more.
     void wait_for_frames(std::size_t frames);
 

@@ -725,7 +725,7 @@ void Workbench::follow_playback() {
         if (!wants_full_) playback_.want_full(false);
         measure_error();
     }
-    if (content_->commits_steps && !playback_.is_playing()) {
+    if (content_->commits_steps && !playback_.is_playing() && !playback_.is_stepping()) {
         content_->commits_steps = false;
         commit_recording("Simulate step by step", "step");
     }
