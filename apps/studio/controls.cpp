@@ -48,7 +48,7 @@ public:
         setKeyboardTracking(false);
         setFocusPolicy(Qt::StrongFocus);
         setAlignment(Qt::AlignRight);
-        setCorrectionMode(QAbstractSpinBox::CorrectToNearestValue);
+        if (!thousands) setCorrectionMode(QAbstractSpinBox::CorrectToNearestValue);
     }
 
     QString textFromValue(double value) const override {
@@ -69,7 +69,7 @@ public:
 
 private:
     std::optional<double> parsed(QString text) const {
-        if (text.endsWith(suffix())) text.chop(suffix().size());
+        while (!suffix().isEmpty() && text.endsWith(suffix())) text.chop(suffix().size()); // once more when typed
         text = text.trimmed();
         double factor = 1;
         for (const Prefix& prefix : kPrefixes)
