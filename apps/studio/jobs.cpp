@@ -111,13 +111,7 @@ Jobs::~Jobs() {
 }
 
 void Jobs::add(Job job) {
-    if (!job.topic.empty()) {
-        for (const auto& entry : content_->entries)
-            if (entry->job.topic == job.topic) {
-                entry->is_replaced = true;
-                entry->context.cancel();
-            }
-    }
+    if (!job.topic.empty()) drop(job.topic);
     auto entry = std::make_shared<Content::Entry>();
     entry->job = std::move(job);
     entry->context.progress = [content = content_.get(), to = entry.get()](std::string_view phase, double fraction) {
@@ -182,6 +176,14 @@ double Jobs::fraction() const {
 
 void Jobs::cancel() {
     for (const auto& entry : content_->entries) entry->context.cancel();
+}
+
+void Jobs::drop(const std::string& topic) {
+    for (const auto& entry : content_->entries)
+        if (entry->job.topic == topic) {
+            entry->is_replaced = true;
+            entry->context.cancel();
+        }
 }
 
 void Jobs::wait_until_idle() {

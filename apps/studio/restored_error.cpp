@@ -1,7 +1,5 @@
 #include "restored_error.h"
 
-#include "deformation.h"
-
 #include "filigree/mesh/normals.h"
 
 #include <algorithm>
@@ -46,20 +44,15 @@ VertexDistance vertex_distance(const Mesh& faces, std::span<const Vec3f> a, std:
 
 } // namespace
 
-Result<VertexDistance> restored_error(const State& state, const Pose& pose, std::vector<Vec3f> full,
+Result<VertexDistance> restored_error(const State& state, const Pose& pose, std::span<const Vec3f> full,
                                       const RunContext& context) {
     context.report("measuring the error", 0);
-    if (full.empty()) {
-        Result<std::vector<Vec3f>> deformed = full_deformation(state, context);
-        if (!deformed) return deformed.error();
-        full = std::move(*deformed);
-    }
     const Model& model = *state.model;
     const Mesh level = level_mesh(model, state.level());
+    std::vector<Vec3f> chosen;
     if (state.level() < model.finest_level()) {
-        std::vector<Vec3f> chosen;
         for (const Index v : model.levels[state.level()].vertices) chosen.push_back(full[v]);
-        full = std::move(chosen);
+        full = chosen;
     }
     if (pose.positions.empty()) return vertex_distance(level, level.positions, full, context);
     const Result<Restorer> restorer = Restorer::create(model, state.restore, context);

@@ -9,8 +9,8 @@
 namespace filigree::studio {
 
 /// The level shown, restored from `pose` (no positions: at rest), against its vertices in `full`: one place a vertex of
-/// the finest mesh; empty: by full_deformation.
-Result<VertexDistance> restored_error(const State& state, const Pose& pose, std::vector<Vec3f> full,
+/// the finest mesh.
+Result<VertexDistance> restored_error(const State& state, const Pose& pose, std::span<const Vec3f> full,
                                       const RunContext& context);
 
 } // namespace filigree::studio

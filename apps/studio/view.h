@@ -30,7 +30,7 @@ struct ViewSettings {
     bool keep_up = true;            ///< a coarser level while things move, where drawing is slow
     bool ground = true;
     UpAxis up = UpAxis::y;
-    bool gizmos = false;            ///< handles of the warps in the view; on while the Deform panel is shown
+    bool gizmos = false;              ///< handles of the warps in the view; on while the Deform panel is shown
     double grip = 0.06, reach = 0.45; ///< of a pull, fractions of the mesh's diagonal
 
     bool operator==(const ViewSettings&) const = default;

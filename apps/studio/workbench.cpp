@@ -17,6 +17,9 @@ namespace filigree::studio {
 
 namespace {
 
+/// Pulls of every vertex of larger meshes take minutes: they are only done when the error is asked for.
+constexpr std::size_t kMostPulledUnasked = 50'000;
+
 double milliseconds_since(std::chrono::steady_clock::time_point begin) {
     return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
 }
@@ -201,8 +204,15 @@ void Workbench::pose_is_new() {
     ++content_->pose_number;
     error_.reset();
     full_.clear();
+    forget_measuring();
     if (wants_full_) find_full();
     Q_EMIT pose_changed();
+}
+
+/// Long work about a pose that will not be shown much longer.
+void Workbench::forget_measuring() {
+    jobs_.drop("error");
+    jobs_.drop("full");
 }
 
 void Workbench::find_full() {
@@ -211,7 +221,7 @@ void Workbench::find_full() {
         full_is_new();
         return;
     }
-    if (is_pulling_) return;
+    if (is_pulling_ || (state().handle_pose && state().model->mesh.vertex_count() > kMostPulledUnasked)) return;
     const std::uint64_t number = content_->pose_number;
     jobs_.start<std::vector<Vec3f>>(
         "Deforming every vertex", "full",
@@ -251,14 +261,29 @@ void Workbench::measure_error() {
     }
     const std::uint64_t number = content_->pose_number;
     std::vector<Vec3f> full = mode_ == Mode::body ? playback_.moment()->full : full_;
-    jobs_.start<VertexDistance>(
+    struct Measured {
+        VertexDistance distance;
+        std::vector<Vec3f> full;
+    };
+    jobs_.start<Measured>(
         "Measuring the error", "error",
-        [state = state(), pose = pose_, full = std::move(full)](const RunContext& context) mutable {
-            return restored_error(state, pose, std::move(full), context);
+        [state = state(), pose = pose_, full = std::move(full)](const RunContext& context) mutable -> Result<Measured> {
+            if (full.empty()) {
+                Result<std::vector<Vec3f>> deformed = full_deformation(state, context);
+                if (!deformed) return deformed.error();
+                full = std::move(*deformed);
+            }
+            Result<VertexDistance> distance = restored_error(state, pose, full, context);
+            if (!distance) return distance.error();
+            return Measured{std::move(*distance), std::move(full)};
         },
-        [this, number](VertexDistance distance) {
+        [this, number](Measured measured) {
             if (number != content_->pose_number) return; // of a pose that is not shown any more
-            error_ = std::move(distance);
+            error_ = std::move(measured.distance);
+            if (wants_full_ && full_.empty()) {
+                full_ = std::move(measured.full);
+                Q_EMIT full_changed();
+            }
             Q_EMIT error_measured();
         });
 }
@@ -295,6 +320,7 @@ void Workbench::make_shape(const Shape& shape, const std::string& merge) {
     State next = state();
     const bool is_another = !next.shape || next.shape->name != shape.name;
     if (is_another) next.strip = {};
+    forget_measuring();
     jobs_.start<State>(
         "Making the " + shape_title(shape.name).toLower(), "model",
         [next = std::move(next), shape](const RunContext& context) { return state_of_shape(next, shape, context); },
@@ -313,6 +339,7 @@ void Workbench::make_shape(const Shape& shape, const std::string& merge) {
 void Workbench::set_strip(const StripOptions& options, const std::string& merge) {
     State next = state();
     next.strip = options;
+    forget_measuring();
     jobs_.start<State>(
         "Taking the detail off", "model",
         [next = std::move(next)](const RunContext& context) { return stripped_state(next, context); },

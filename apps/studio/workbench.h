@@ -112,6 +112,7 @@ private:
     void show_pose();
     void pose_is_new();
     void find_full();
+    void forget_measuring();
     void full_is_new();
     void show_drag(const std::shared_ptr<const Pose>& pose, double milliseconds);
     void take_model(State& now, const State& made) const;

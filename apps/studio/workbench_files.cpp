@@ -167,6 +167,7 @@ Result<QString> write_frames(const State& state, const PoseSequence& poses, cons
 } // namespace
 
 void Workbench::open(const std::string& path) {
+    forget_measuring();
     jobs_.start<State>(
         "Opening " + file_name(path), "model",
         [path, body = state().body](const RunContext& context) -> Result<State> {

@@ -57,6 +57,20 @@ TEST(Jobs, NewWorkOfATopicTakesThePlaceOfTheOld) {
     EXPECT_EQ(failed.count(), 0);
 }
 
+TEST(Jobs, WhatIsDroppedEndsWithoutAWord) {
+    Jobs jobs;
+    QSignalSpy cancelled(&jobs, &Jobs::cancelled);
+    std::vector<int> delivered;
+    const auto deliver = [&](int value) { delivered.push_back(value); };
+    jobs.start<int>("Measure", "error", until_cancelled, deliver);
+    jobs.start<int>(
+        "Open", "model", [](const RunContext&) -> Result<int> { return 2; }, deliver);
+    jobs.drop("error");
+    jobs.wait_until_idle();
+    EXPECT_EQ(delivered, std::vector<int>{2});
+    EXPECT_EQ(cancelled.count(), 0);
+}
+
 TEST(Jobs, CancelStopsAllAndDeliversNothing) {
     Jobs jobs;
     QSignalSpy cancelled(&jobs, &Jobs::cancelled);
