@@ -212,7 +212,7 @@ private:
         ValueRange written = legend.range;
         written.least *= static_cast<float>(legend.per_value);
         written.most *= static_cast<float>(legend.per_value);
-        for (const double tick : legend_ticks(written, legend.whole ? 9 : 4)) {
+        for (const double tick : legend_ticks(written, legend.whole ? 9 : 6)) {
             if (legend.whole && tick != std::round(tick)) continue;
             result.emplace_back(tick / legend.per_value, QString::number(tick, 'g', 3));
         }

@@ -200,12 +200,12 @@ Viewport::Viewport(Workbench& workbench, QWidget* parent)
 
 Viewport::~Viewport() {
     Content& c = *content_;
-    if (c.stage.is_started() && isValid()) {
-        makeCurrent();
-        c.stage.stop();
-        c.drawing.clear();
-        doneCurrent();
-    }
+    if (!c.stage.is_started() || !isValid()) return;
+    disconnect(context(), nullptr, this, nullptr); // it goes after what it would give back
+    makeCurrent();
+    c.stage.stop();
+    c.drawing.clear();
+    doneCurrent();
 }
 
 const Timings& Viewport::timings() const { return content_->timings; }
@@ -232,15 +232,12 @@ void Viewport::initializeGL() {
         return c.fail("The view needs OpenGL 4.3 and found " + std::to_string(version.first) + "." +
                       std::to_string(version.second) +
                       "; install a newer graphics driver, or start with LIBGL_ALWAYS_SOFTWARE=1.");
-    connect(
-        context(), &QOpenGLContext::aboutToBeDestroyed, this,
-        [this, &c] {
-            makeCurrent();
-            c.stage.stop();
-            c.drawing.clear();
-            doneCurrent();
-        },
-        Qt::UniqueConnection);
+    connect(context(), &QOpenGLContext::aboutToBeDestroyed, this, [this, &c] {
+        makeCurrent();
+        c.stage.stop();
+        c.drawing.clear();
+        doneCurrent();
+    });
     c.trouble.clear();
     c.needs_preview = true;
     // Not from in here: what follows asks for this context again.
@@ -347,6 +344,7 @@ void Viewport::Content::touch(bool pose) {
     pass_timer.stop();
     needs_preview = true;
     pose_moves = pose_moves || pose;
+    if (drag == Drag::none) hover.reset(); // what is there now is another place
     still_timer.start(kStillAfter);
     request_frame();
 }

@@ -1,0 +1,489 @@
+// What the mouse does in the picture, and what the picture shows.
+#include "viewport.h"
+
+#include "gizmo.h"
+#include "overlay.h"
+#include "stage.h"
+
+#include "filigree/mesh/shapes.h"
+
+#include <QApplication>
+#include <QMouseEvent>
+#include <QProcess>
+#include <QTest>
+#include <QVBoxLayout>
+#include <QWheelEvent>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <functional>
+
+#include <gtest/gtest.h>
+
+using namespace filigree;
+using namespace filigree::studio;
+
+namespace {
+
+constexpr int kPatience = 20'000; // ms
+
+/// A viewport with a bumpy ball, shown and drawn.
+struct Stand {
+    Workbench workbench;
+    QWidget window;
+    Viewport* viewport = nullptr;
+
+    explicit Stand(const std::string& shape = "wavy-cube", unsigned resolution = 24) {
+        ShapeOptions options;
+        options.resolution = resolution;
+        workbench.make_shape({shape, options});
+        workbench.wait_until_idle();
+        viewport = new Viewport(workbench, &window);
+        viewport->set_animated(false);
+        auto* layout = new QVBoxLayout(&window);
+        layout->setContentsMargins(0, 0, 0, 0);
+        layout->addWidget(viewport);
+        window.resize(360, 300);
+        window.show();
+    }
+    ~Stand() { delete viewport; }
+
+    bool is_drawn() {
+        return QTest::qWaitFor([&] { return viewport->is_ready() && viewport->is_still(); }, kPatience);
+    }
+    bool is_ready() {
+        return QTest::qWaitFor([&] { return viewport->is_ready(); }, kPatience);
+    }
+    QPoint middle() const { return viewport->rect().center(); }
+    QImage picture() {
+        viewport->finish_drawing();
+        return viewport->grabFramebuffer();
+    }
+    void set(const std::function<void(ViewSettings&)>& change) {
+        ViewSettings settings = workbench.view().settings();
+        change(settings);
+        workbench.view().set(settings);
+    }
+    void drag(const QPoint& from, const QPoint& to, Qt::MouseButton button = Qt::LeftButton,
+              Qt::KeyboardModifiers keys = {}) {
+        press(from, button, keys);
+        move(from, to, button);
+        release(to, button);
+    }
+    void press(const QPoint& at, Qt::MouseButton button = Qt::LeftButton, Qt::KeyboardModifiers keys = {}) {
+        QTest::mousePress(viewport, button, keys, at);
+    }
+    void move(const QPoint& from, const QPoint& to, Qt::MouseButton button = Qt::LeftButton) {
+        constexpr int kSteps = 8;
+        for (int i = 1; i <= kSteps; ++i) {
+            const QPointF at = QPointF(from) + QPointF(to - from) * i / kSteps;
+            QMouseEvent event(QEvent::MouseMove, at, viewport->mapToGlobal(at), Qt::NoButton, button, {});
+            QApplication::sendEvent(viewport, &event);
+            QApplication::processEvents();
+        }
+    }
+    void release(const QPoint& at, Qt::MouseButton button = Qt::LeftButton) {
+        QTest::mouseRelease(viewport, button, {}, at);
+    }
+    void wheel(const QPoint& at, int notches) {
+        for (int i = 0; i < std::abs(notches); ++i) {
+            QWheelEvent event(at, viewport->mapToGlobal(at), {}, {0, notches > 0 ? 120 : -120}, Qt::NoButton, {},
+                              Qt::NoScrollPhase, false);
+            QApplication::sendEvent(viewport, &event);
+        }
+    }
+    /// Where a vertex of the finest mesh is now.
+    Vec3d place_of_vertex(Index vertex) {
+        const State& state = workbench.state();
+        const Pose* pose = workbench.pose();
+        if (!pose) return state.model->mesh.world_position(vertex);
+        const Restorer restorer = Restorer::create(*state.model, {}, RunContext()).value();
+        return state.model->mesh.origin + restorer.positions(*pose, RunContext()).value()[vertex].cast<double>();
+    }
+};
+
+double distance(const QPointF& a, const QPointF& b) { return std::hypot(a.x() - b.x(), a.y() - b.y()); }
+
+/// The mean difference of two pictures' colours, 0 to 255, within a rectangle.
+double difference(const QImage& a, const QImage& b, const QRect& within) {
+    double sum = 0;
+    for (int y = within.top(); y <= within.bottom(); ++y)
+        for (int x = within.left(); x <= within.right(); ++x) {
+            const QRgb p = a.pixel(x, y), q = b.pixel(x, y);
+            sum += std::abs(qRed(p) - qRed(q)) + std::abs(qGreen(p) - qGreen(q)) + std::abs(qBlue(p) - qBlue(q));
+        }
+    return sum / (3.0 * within.width() * within.height());
+}
+
+TEST(Viewport, PicksWhatItProjects) {
+    Stand stand("wavy-sphere", 24);
+    ASSERT_TRUE(stand.is_ready());
+    ASSERT_EQ(stand.viewport->trouble(), "");
+    for (const QPoint& at : {stand.middle(), stand.middle() + QPoint(37, -22), stand.middle() + QPoint(-50, 31)}) {
+        const auto picked = stand.viewport->pick(at);
+        ASSERT_TRUE(picked) << at.x() << " " << at.y();
+        EXPECT_LT(distance(stand.viewport->place_of(picked->at), at), 0.01);
+        // The vertex is one of the triangle's corners, so near.
+        const Vec3d vertex = stand.workbench.state().model->mesh.world_position(picked->vertex);
+        EXPECT_LT((vertex - picked->at).norm(), 0.1);
+        // And nothing lies in front: the eye sees the near side.
+        EXPECT_GT((stand.workbench.view().camera().eye - picked->at).dot(picked->at), 0);
+    }
+    EXPECT_FALSE(stand.viewport->pick({2, 2}));
+    EXPECT_FALSE(stand.viewport->pick({-5, 100}));
+}
+
+TEST(Viewport, ADragOnTheShapePullsIt) {
+    Stand stand;
+    ASSERT_TRUE(stand.is_ready());
+    const std::string before = stand.workbench.document().bytes();
+    const QPoint from = stand.middle() + QPoint(-20, -15), to = from + QPoint(-45, -30);
+    const auto grabbed = stand.viewport->pick(from);
+    ASSERT_TRUE(grabbed);
+    const Vec3d rest = stand.place_of_vertex(grabbed->vertex);
+    const Camera camera = stand.workbench.view().camera();
+
+    stand.drag(from, to);
+    stand.workbench.wait_until_idle();
+    ASSERT_TRUE(stand.workbench.pose());
+    EXPECT_EQ(stand.workbench.view().camera().eye, camera.eye) << "the camera has nothing to do with it";
+    const QPointF moved =
+        stand.viewport->place_of(stand.place_of_vertex(grabbed->vertex)) - stand.viewport->place_of(rest);
+    EXPECT_LT(distance(moved, to - from), 4) << moved.x() << " " << moved.y();
+    // The picture agrees with the pose, wherever that was restored: the point held is under the pointer.
+    stand.viewport->finish_drawing();
+    const auto there = stand.viewport->pick(to);
+    ASSERT_TRUE(there);
+    EXPECT_LT((stand.place_of_vertex(there->vertex) - stand.place_of_vertex(grabbed->vertex)).norm(), 0.12);
+
+    QUndoStack& history = stand.workbench.document().undo_stack();
+    EXPECT_EQ(history.count(), history.index());
+    const std::string pulled = stand.workbench.document().bytes();
+    EXPECT_FALSE(pulled == before);
+    history.undo();
+    EXPECT_TRUE(stand.workbench.document().bytes() == before);
+    history.redo();
+    EXPECT_TRUE(stand.workbench.document().bytes() == pulled);
+}
+
+TEST(Viewport, EscapePutsBack) {
+    Stand stand;
+    ASSERT_TRUE(stand.is_ready());
+    const std::string before = stand.workbench.document().bytes();
+    const QPoint from = stand.middle();
+    stand.press(from);
+    stand.move(from, from + QPoint(60, 0));
+    EXPECT_TRUE(stand.workbench.is_pulling());
+    QTest::keyClick(stand.viewport, Qt::Key_Escape);
+    EXPECT_FALSE(stand.workbench.is_pulling());
+    stand.release(from + QPoint(60, 0));
+    stand.workbench.wait_until_idle();
+    EXPECT_TRUE(stand.workbench.document().bytes() == before);
+    EXPECT_FALSE(stand.workbench.pose());
+}
+
+TEST(Viewport, AClickChangesNothing) {
+    Stand stand;
+    ASSERT_TRUE(stand.is_ready());
+    const std::string before = stand.workbench.document().bytes();
+    const Camera camera = stand.workbench.view().camera();
+    QTest::mouseClick(stand.viewport, Qt::LeftButton, {}, stand.middle());
+    EXPECT_TRUE(stand.workbench.document().bytes() == before);
+    EXPECT_EQ(stand.workbench.view().camera().eye, camera.eye);
+}
+
+TEST(Viewport, ADragBesideTheShapeTurnsAndTheWheelZooms) {
+    Stand stand;
+    ASSERT_TRUE(stand.is_ready());
+    ViewState& view = stand.workbench.view();
+    const auto distance_to_target = [&] { return (view.camera().eye - view.camera().target).norm(); };
+    const Camera before = view.camera();
+    stand.drag({5, 5}, {65, 5});
+    EXPECT_GT((view.camera().eye - before.eye).norm(), 0.2 * distance_to_target());
+    EXPECT_EQ(view.camera().target, before.target);
+    EXPECT_FALSE(stand.workbench.pose());
+
+    // Right over the shape turns too; Shift moves.
+    const Camera turned = view.camera();
+    stand.drag(stand.middle(), stand.middle() + QPoint(0, 30), Qt::RightButton);
+    EXPECT_GT((view.camera().eye - turned.eye).norm(), 0.05 * distance_to_target());
+    const Camera raised = view.camera();
+    const QPointF target_at = stand.viewport->place_of(raised.target);
+    stand.drag(stand.middle(), stand.middle() + QPoint(40, 10), Qt::LeftButton, Qt::ShiftModifier);
+    EXPECT_LT(distance(stand.viewport->place_of(raised.target), target_at + QPointF(40, 10)), 0.01);
+    EXPECT_FALSE(stand.workbench.pose());
+
+    const double zoom = view.zoom();
+    const QPoint at = stand.middle() + QPoint(60, 20);
+    const auto fixed = stand.viewport->pick(stand.middle());
+    ASSERT_TRUE(fixed);
+    stand.wheel(at, 3);
+    EXPECT_GT(view.zoom(), 1.3 * zoom);
+    stand.wheel(at, -3);
+    EXPECT_NEAR(view.zoom(), zoom, 1e-6 * zoom);
+    EXPECT_LT(distance(stand.viewport->place_of(fixed->at), stand.middle()), 0.01) << "there and back again";
+    stand.wheel(at, 200);
+    EXPECT_LE(view.zoom(), ViewState::kMostZoom * 1.0001);
+    stand.wheel(at, -400);
+    EXPECT_GE(view.zoom(), ViewState::kLeastZoom * 0.9999);
+    QTest::mouseDClick(stand.viewport, Qt::LeftButton, {}, QPoint(3, 3));
+    EXPECT_NEAR(view.zoom(), 1, 1e-6) << "a double click beside the shape shows all";
+}
+
+TEST(Viewport, ThePinToolPinsAndUnpins) {
+    Stand stand;
+    ASSERT_TRUE(stand.is_ready());
+    stand.set([](ViewSettings& s) { s.tool = Tool::pin; });
+    const auto pinned = [&] {
+        std::size_t count = 0;
+        for (const Handle& handle : stand.workbench.state().handles)
+            if (handle.pinned) count += handle.vertices.size();
+        return count;
+    };
+    stand.drag(stand.middle(), stand.middle() + QPoint(30, 0));
+    const std::size_t some = pinned();
+    EXPECT_GT(some, 0u);
+    EXPECT_LT(some, stand.workbench.state().model->driver().vertices.size());
+    EXPECT_EQ(
+        stand.workbench.document().undo_stack().text(stand.workbench.document().undo_stack().index() - 1).isEmpty(),
+        false);
+    const auto* overlay = stand.viewport->findChild<QWidget*>("viewport.overlay");
+    ASSERT_TRUE(overlay);
+    EXPECT_EQ(static_cast<const Overlay*>(overlay)->content().pins.size(), some);
+    stand.drag(stand.middle(), stand.middle() + QPoint(30, 0), Qt::LeftButton, Qt::ControlModifier);
+    EXPECT_EQ(pinned(), 0u);
+}
+
+TEST(Viewport, ADragPullsABody) {
+    Stand stand("wavy-sphere", 16);
+    ASSERT_TRUE(stand.is_ready());
+    BodySettings body = stand.workbench.state().body;
+    body.particles = 300;
+    body.gravity = false;
+    stand.workbench.set_body(body);
+    stand.workbench.make_body();
+    stand.workbench.wait_until_idle();
+    stand.workbench.set_mode(Mode::body);
+    ASSERT_TRUE(stand.workbench.playback().has_body());
+    ASSERT_TRUE(stand.is_ready());
+    stand.viewport->show_all();
+    const auto grabbed = stand.viewport->pick(stand.middle());
+    ASSERT_TRUE(grabbed);
+    const QPointF before = stand.viewport->place_of(stand.place_of_vertex(grabbed->vertex));
+    const QPoint to = stand.middle() + QPoint(-60, 0);
+    stand.press(stand.middle());
+    stand.move(stand.middle(), to);
+    EXPECT_TRUE(stand.workbench.playback().is_grabbed());
+    const bool came = QTest::qWaitFor(
+        [&] { return stand.viewport->place_of(stand.place_of_vertex(grabbed->vertex)).x() < before.x() - 25; },
+        kPatience);
+    EXPECT_TRUE(came) << "the body does not follow the pointer";
+    const auto* overlay = static_cast<const Overlay*>(stand.viewport->findChild<QWidget*>("viewport.overlay"));
+    EXPECT_TRUE(overlay->content().pull) << "a line shows what pulls";
+    stand.release(to);
+    EXPECT_FALSE(stand.workbench.playback().is_grabbed());
+    stand.workbench.pause();
+    stand.workbench.wait_until_idle();
+}
+
+TEST(Viewport, SplitShowsThreePictures) {
+    Stand stand;
+    stand.window.resize(480, 240);
+    ASSERT_TRUE(stand.is_ready());
+    Warps warps;
+    warps.twist = 60;
+    stand.workbench.set_warps(warps);
+    stand.set([](ViewSettings& s) { s.split = true; });
+    stand.workbench.wait_until_idle();
+    const auto* overlay = static_cast<const Overlay*>(stand.viewport->findChild<QWidget*>("viewport.overlay"));
+    ASSERT_TRUE(QTest::qWaitFor([&] { return stand.viewport->is_still(); }, kPatience));
+    const QImage picture = stand.picture();
+    ASSERT_EQ(overlay->content().captions.size(), 3u);
+    EXPECT_EQ(overlay->content().captions[0].title, "Driver");
+    const int width = picture.width() / 3;
+    const QImage tiles[3] = {picture.copy(0, 0, width, picture.height()),
+                             picture.copy(width, 0, width, picture.height()),
+                             picture.copy(2 * width, 0, width, picture.height())};
+    const QRect all = tiles[0].rect();
+    // Each shows the shape; the driver is rougher than what is restored, which is nearly the full deformation.
+    const double driver = difference(tiles[0], tiles[1], all), full = difference(tiles[1], tiles[2], all);
+    EXPECT_GT(driver, 2 * full);
+    EXPECT_GT(full, 0);
+    EXPECT_LT(full, 4);
+    for (const QImage& tile : tiles)
+        EXPECT_GT(std::abs(qGray(tile.pixel(tile.width() / 2, tile.height() / 2)) - qGray(tile.pixel(3, 3))), 8);
+    // What is under the pointer is the same in each of them.
+    const QPoint at(width / 2, picture.height() / 2);
+    const auto left = stand.viewport->pick(at), right = stand.viewport->pick(at + QPoint(2 * width, 0));
+    ASSERT_TRUE(left && right);
+    EXPECT_LT((left->at - right->at).norm(), 0.05);
+}
+
+TEST(Viewport, TheLevelFollowsTheDistance) {
+    Stand stand("wavy-cube", 96);
+    ASSERT_TRUE(stand.is_ready());
+    ASSERT_GE(stand.workbench.state().model->finest_level(), 2u);
+    stand.set([](ViewSettings& s) { s.level_by_distance = true; });
+    ViewState& view = stand.workbench.view();
+    std::vector<std::size_t> counts;
+    std::vector<unsigned> levels;
+    for (const double zoom : {8.0, 1.0, 0.12, 0.03, 0.12, 1.0, 8.0}) {
+        view.set_zoom(zoom);
+        stand.viewport->finish_drawing();
+        counts.push_back(stand.viewport->timings().vertices);
+        levels.push_back(stand.viewport->timings().level);
+    }
+    EXPECT_EQ(levels.front(), stand.workbench.state().level());
+    EXPECT_TRUE(std::is_sorted(counts.rbegin() + 3, counts.rend()));
+    EXPECT_TRUE(std::is_sorted(counts.begin() + 3, counts.end()));
+    EXPECT_LT(levels[3], levels[0]);
+    EXPECT_LT(counts[3], counts[0] / 3);
+    EXPECT_EQ(counts.back(), counts.front());
+    stand.set([](ViewSettings& s) { s.level_by_distance = false; });
+    view.set_zoom(0.03);
+    stand.viewport->finish_drawing();
+    EXPECT_EQ(stand.viewport->timings().vertices, counts.front()) << "switched off";
+}
+
+/// Over a change of level the pictures differ from each other as they do where there is none.
+TEST(Viewport, LevelsChangeWithoutPops) {
+    Stand stand("wavy-cube", 96);
+    ASSERT_TRUE(stand.is_ready());
+    stand.set([](ViewSettings& s) { s.level_by_distance = true; });
+    ViewState& view = stand.workbench.view();
+    view.set_zoom(1);
+    stand.viewport->finish_drawing();
+    std::vector<double> steps;
+    std::vector<bool> changes;
+    QImage last;
+    unsigned level = 0;
+    for (double zoom = 1; zoom > 0.08; zoom *= 0.93) {
+        view.set_zoom(zoom);
+        const QImage picture = stand.picture();
+        if (!last.isNull()) {
+            steps.push_back(difference(last, picture, picture.rect()));
+            changes.push_back(stand.viewport->timings().level != level);
+        }
+        level = stand.viewport->timings().level;
+        last = picture;
+    }
+    std::size_t crossed = 0;
+    for (std::size_t i = 1; i + 1 < steps.size(); ++i) {
+        if (!changes[i]) continue;
+        ++crossed;
+        EXPECT_LT(steps[i], 1.25 * std::max(steps[i - 1], steps[i + 1]) + 0.3) << "at step " << i;
+    }
+    EXPECT_GT(crossed, 0u);
+}
+
+TEST(Viewport, GizmosDragTheWarps) {
+    Stand stand;
+    ASSERT_TRUE(stand.is_ready());
+    stand.set([](ViewSettings& s) { s.gizmos = true; });
+    const Box box = world_bounds(stand.workbench.state().source->mesh);
+    stand.workbench.view().set_zoom(0.6);
+    const std::string before = stand.workbench.document().bytes();
+    const auto steps = stand.workbench.document().undo_stack().index();
+    for (const GizmoShape& shape : gizmo_shapes({}, box)) {
+        const QPoint at = stand.viewport->place_of(shape.knob).toPoint();
+        ASSERT_TRUE(stand.viewport->rect().contains(at));
+        QPointF way = stand.viewport->place_of(shape.line.back()) - stand.viewport->place_of(shape.line.front());
+        if (shape.part == GizmoPart::twist) {
+            const QPointF next = stand.viewport->place_of(shape.line[2]);
+            way = next - stand.viewport->place_of(shape.knob);
+        }
+        way *= 25 / std::hypot(way.x(), way.y());
+        stand.drag(at, at + way.toPoint());
+        const Warps& warps = stand.workbench.state().warps;
+        const int changed =
+            (warps.stretch != 1) + (warps.squeeze != 1) + (warps.bend != 0) + (warps.twist != 0) + (warps.taper != 1);
+        EXPECT_EQ(changed, 1) << gizmo_label(shape.part, warps).toStdString();
+        EXPECT_TRUE(warps.stretch == 1 || warps.stretch > 1.1);
+        EXPECT_TRUE(warps.squeeze == 1 || warps.squeeze < 0.9) << "wider, so shorter";
+        EXPECT_TRUE(warps.taper == 1 || warps.taper > 1.1);
+        EXPECT_TRUE(warps.bend == 0 || warps.bend > 10);
+        EXPECT_TRUE(warps.twist == 0 || warps.twist > 10);
+        EXPECT_EQ(stand.workbench.document().undo_stack().index(), steps + 1) << "one drag is one step";
+        stand.workbench.document().undo_stack().undo();
+        EXPECT_TRUE(stand.workbench.document().bytes() == before);
+    }
+}
+
+/// Its knob stays under the pointer while a handle is dragged: what is shown is what is done.
+TEST(Gizmo, KnobsFollowThePointer) {
+    Box box;
+    box.min = {-0.5, -1, -0.4};
+    box.max = {0.5, 1, 0.4};
+    const std::array<Vec3f, 2> corners = {box.min.cast<float>(), box.max.cast<float>()};
+    const CameraPoints points{corners};
+    const Camera camera = fit_camera(std::span(&points, 1), Vec3d(0.4, 0.3, 1), Vec3d::UnitY(), 1);
+    const PictureSize size = {400, 400};
+    for (const GizmoPart part :
+         {GizmoPart::stretch, GizmoPart::squeeze, GizmoPart::bend, GizmoPart::twist, GizmoPart::taper}) {
+        const auto knob = [&](const Warps& warps) {
+            for (const GizmoShape& shape : gizmo_shapes(warps, box))
+                if (shape.part == part) return camera.project(shape.knob, size.width, size.height);
+            return Vec3d(Vec3d::Zero());
+        };
+        Warps wanted;
+        if (part == GizmoPart::stretch) wanted.stretch = 1.3;
+        if (part == GizmoPart::squeeze) wanted.squeeze = 0.8;
+        if (part == GizmoPart::bend) wanted.bend = 30;
+        if (part == GizmoPart::twist) wanted.twist = 40;
+        if (part == GizmoPart::taper) wanted.taper = 1.4;
+        const Vec3d from = knob({}), to = knob(wanted);
+        ASSERT_GT((to - from).head<2>().norm(), 3) << static_cast<int>(part);
+        GizmoDrag drag(part, {}, box, camera, from.x(), from.y(), size);
+        const Warps reached = drag.moved_to(to.x(), to.y());
+        EXPECT_LT((knob(reached) - to).head<2>().norm(), 0.35 * (to - from).head<2>().norm())
+            << gizmo_label(part, reached).toStdString();
+    }
+}
+
+TEST(Stage, FindsDefects) {
+    Mesh mesh;
+    mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, -1, 0}};
+    for (const auto& face : {std::array<Index, 3>{0, 1, 2}, {0, 1, 3}, {0, 1, 4}}) mesh.add_face(face);
+    const std::vector<DefectEdge> edges = defect_edges(mesh);
+    ASSERT_EQ(edges.size(), 7u);
+    EXPECT_EQ(std::count_if(edges.begin(), edges.end(), [](const DefectEdge& e) { return e.is_open; }), 6);
+    EXPECT_FALSE(edges[0].is_open);
+    EXPECT_EQ(edges[0].b, 1u);
+    EXPECT_TRUE(defect_edges(make_shape("bar", {}).value()).empty());
+}
+
+/// What a computer without OpenGL shows: runs in a process of its own, below.
+TEST(Viewport, WithoutOpenGlChild) {
+    if (!std::getenv("FILIGREE_TEST_WITHOUT_OPENGL")) GTEST_SKIP() << "for WithoutOpenGlItSaysSo";
+    Stand stand;
+    ASSERT_TRUE(QTest::qWaitFor([&] { return !stand.viewport->trouble().empty(); }, kPatience));
+    EXPECT_NE(stand.viewport->trouble().find("OpenGL"), std::string::npos);
+    stand.drag(stand.middle(), stand.middle() + QPoint(50, 0));
+    stand.wheel(stand.middle(), 2);
+    stand.viewport->show_all();
+    stand.viewport->finish_drawing();
+    EXPECT_FALSE(stand.viewport->pick(stand.middle()));
+    // The sentence can be read: not all of the picture has one colour.
+    const QImage picture = stand.window.grab().toImage();
+    std::size_t others = 0;
+    for (int y = 0; y < picture.height(); ++y)
+        for (int x = 0; x < picture.width(); ++x) others += picture.pixel(x, y) != picture.pixel(0, 0);
+    EXPECT_GT(others, 200u);
+}
+
+TEST(Viewport, WithoutOpenGlItSaysSo) {
+    QProcess child;
+    QProcessEnvironment environment = QProcessEnvironment::systemEnvironment();
+    environment.insert("FILIGREE_TEST_WITHOUT_OPENGL", "1");
+    environment.insert("QT_QPA_PLATFORM", "offscreen");
+    environment.insert("MESA_GL_VERSION_OVERRIDE", "3.3");
+    child.setProcessEnvironment(environment);
+    child.start(QApplication::applicationFilePath(), {"--gtest_filter=Viewport.WithoutOpenGlChild"});
+    ASSERT_TRUE(child.waitForFinished(60'000));
+    EXPECT_EQ(child.exitStatus(), QProcess::NormalExit);
+    EXPECT_EQ(child.exitCode(), 0) << child.readAllStandardOutput().toStdString();
+}
+
+} // namespace
