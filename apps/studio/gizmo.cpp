@@ -136,7 +136,7 @@ std::optional<GizmoPart> gizmo_at(std::span<const GizmoShape> shapes, const Came
 
 GizmoDrag::GizmoDrag(GizmoPart part, const Warps& start, const Box& rest_box, const Camera& camera, double x, double y,
                      const PictureSize& size)
-    : part_(part), start_(start), camera_(camera), size_(size) {
+    : part_(part), start_(start), camera_(camera), size_(size), press_x_(x), press_y_(y) {
     const Frame frame(start, rest_box);
     const auto follow_line = [&](const Vec3d& rest, const Vec3d& from, const Vec3d& direction) {
         centre_ = frame.place(rest);
@@ -158,6 +158,7 @@ GizmoDrag::GizmoDrag(GizmoPart part, const Warps& start, const Box& rest_box, co
         centre_ = circle.centre;
         along_ = circle.from;
         across_ = circle.towards;
+        look_at_circle(circle.angle, circle.radius);
         break;
     }
     case GizmoPart::twist: {
@@ -165,6 +166,7 @@ GizmoDrag::GizmoDrag(GizmoPart part, const Warps& start, const Box& rest_box, co
         centre_ = ring.centre;
         along_ = ring.from;
         across_ = ring.towards;
+        look_at_circle(0, ring.radius);
         break;
     }
     }
@@ -179,18 +181,29 @@ double GizmoDrag::distance_at(double x, double y) const {
 }
 
 double GizmoDrag::angle_at(double x, double y) const {
-    // Where the ray meets the circle's plane; seen nearly from the side, its direction on screen stands for it.
-    constexpr double kLeastSlope = 0.15;
+    if (is_seen_from_side_)
+        return (tangent_.x() * (x - press_x_) + tangent_.y() * (y - press_y_)) / tangent_.squaredNorm();
     const Vec3d normal = along_.cross(across_).normalized();
     const Camera::Ray ray = camera_.ray(x, y, size_.width, size_.height);
-    const double slope = ray.direction.dot(normal);
-    Vec3d point;
-    if (std::abs(slope) > kLeastSlope)
-        point = ray.origin + ray.direction * ((centre_ - ray.origin).dot(normal) / slope);
-    else
-        point = point_in_plane(camera_, centre_, x, y, size_);
-    const Vec3d d = point - centre_;
+    const Vec3d d =
+        ray.origin + ray.direction * ((centre_ - ray.origin).dot(normal) / ray.direction.dot(normal)) - centre_;
     return std::atan2(d.dot(across_), d.dot(along_));
+}
+
+void GizmoDrag::look_at_circle(double angle, double radius) {
+    constexpr double kLeastSlope = 0.35; // sine of the angle between the ray and the circle's plane
+    const Vec3d knob = centre_ + radius * (std::cos(angle) * along_ + std::sin(angle) * across_);
+    const Vec3d at = camera_.project(knob, size_.width, size_.height);
+    const Camera::Ray ray = camera_.ray(at.x(), at.y(), size_.width, size_.height);
+    is_seen_from_side_ = std::abs(ray.direction.dot(along_.cross(across_).normalized())) < kLeastSlope;
+    const Vec3d forward = radius * (std::cos(angle) * across_ - std::sin(angle) * along_);
+    constexpr double kStep = 1e-3;
+    tangent_ = (camera_.project(knob + kStep * forward, size_.width, size_.height) - at) / kStep;
+    tangent_.z() = 0;
+    // A knob that moves towards the viewer: its way on screen is short, and would turn too fast.
+    const double least = 0.4 * radius * pixels_a_unit(camera_, knob, size_);
+    if (tangent_.norm() < least)
+        tangent_ = tangent_.norm() > 0 ? Vec3d(least * tangent_.normalized()) : Vec3d(least * Vec3d::UnitX());
 }
 
 Warps GizmoDrag::moved_to(double x, double y) {

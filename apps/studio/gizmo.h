@@ -35,6 +35,7 @@ public:
     Warps moved_to(double x, double y);
 
 private:
+    void look_at_circle(double angle, double radius); ///< of the knob
     double angle_at(double x, double y) const;
     double distance_at(double x, double y) const;
 
@@ -46,6 +47,9 @@ private:
     double length_ = 1;             ///< from the centre to the knob
     double grabbed_ = 0;            ///< distance or angle where it was taken
     double last_angle_ = 0, turned_ = 0;
+    bool is_seen_from_side_ = false; ///< the circle: the pointer's way along the knob's is followed instead
+    Vec3d tangent_ = Vec3d::Zero();  ///< of the knob on screen, pixels a radian
+    double press_x_ = 0, press_y_ = 0;
 };
 
 /// "Bend 35°", for the label and the history.

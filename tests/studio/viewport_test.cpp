@@ -138,6 +138,7 @@ TEST(Viewport, PicksWhatItProjects) {
 TEST(Viewport, ADragOnTheShapePullsIt) {
     Stand stand;
     ASSERT_TRUE(stand.is_ready());
+    stand.set([](ViewSettings& s) { s.grip = 0.15; }); // some of the few driver vertices, not one
     const std::string before = stand.workbench.document().bytes();
     const QPoint from = stand.middle() + QPoint(-20, -15), to = from + QPoint(-45, -30);
     const auto grabbed = stand.viewport->pick(from);
