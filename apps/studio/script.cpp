@@ -7,10 +7,13 @@
 #include <QApplication>
 #include <QBuffer>
 #include <QComboBox>
+#include <QDialog>
 #include <QDoubleSpinBox>
 #include <QElapsedTimer>
 #include <QKeySequence>
 #include <QMouseEvent>
+#include <QPainter>
+#include <QPixmap>
 #include <QSpinBox>
 #include <QStringList>
 #include <QSurfaceFormat>
@@ -364,7 +367,12 @@ Status save_screenshot(const std::filesystem::path& path, MainWindow& window) {
         return Error{ErrorCode::unsuitable, path.string() + ": the window was not still after ten minutes."};
     window.viewport().finish_drawing();
     handle_events();
-    const QImage picture = window.grab().toImage();
+    QPixmap picture = window.grab();
+    for (QDialog* const dialog : window.findChildren<QDialog*>()) // what stands over the window belongs to it
+        if (dialog->isVisible()) {
+            const QPoint middle((window.width() - dialog->width()) / 2, (window.height() - dialog->height()) / 2);
+            QPainter(&picture).drawPixmap(middle, dialog->grab());
+        }
     QByteArray bytes;
     QBuffer buffer(&bytes);
     if (!buffer.open(QIODevice::WriteOnly) || !picture.save(&buffer, "PNG"))

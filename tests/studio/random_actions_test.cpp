@@ -5,6 +5,7 @@
 #include <QAbstractSlider>
 #include <QApplication>
 #include <QComboBox>
+#include <QMenu>
 #include <QSpinBox>
 #include <QTest>
 
