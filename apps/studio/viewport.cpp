@@ -200,8 +200,8 @@ Viewport::Viewport(Workbench& workbench, QWidget* parent)
 
 Viewport::~Viewport() {
     Content& c = *content_;
+    if (context()) disconnect(context(), nullptr, this, nullptr); // it goes after what it would give back
     if (!c.stage.is_started() || !isValid()) return;
-    disconnect(context(), nullptr, this, nullptr); // it goes after what it would give back
     makeCurrent();
     c.stage.stop();
     c.drawing.clear();

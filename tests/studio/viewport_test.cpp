@@ -323,7 +323,8 @@ TEST(Viewport, SplitShowsThreePictures) {
 }
 
 TEST(Viewport, TheLevelFollowsTheDistance) {
-    Stand stand("wavy-cube", 96);
+    Stand stand("wavy-cube", 64);
+    stand.window.resize(220, 180);
     ASSERT_TRUE(stand.is_ready());
     ASSERT_GE(stand.workbench.state().model->finest_level(), 2u);
     stand.set([](ViewSettings& s) { s.level_by_distance = true; });
@@ -350,7 +351,8 @@ TEST(Viewport, TheLevelFollowsTheDistance) {
 
 /// Over a change of level the pictures differ from each other as they do where there is none.
 TEST(Viewport, LevelsChangeWithoutPops) {
-    Stand stand("wavy-cube", 96);
+    Stand stand("wavy-cube", 64);
+    stand.window.resize(220, 180);
     ASSERT_TRUE(stand.is_ready());
     stand.set([](ViewSettings& s) { s.level_by_distance = true; });
     ViewState& view = stand.workbench.view();
@@ -360,7 +362,7 @@ TEST(Viewport, LevelsChangeWithoutPops) {
     std::vector<bool> changes;
     QImage last;
     unsigned level = 0;
-    for (double zoom = 1; zoom > 0.08; zoom *= 0.93) {
+    for (double zoom = 0.8; zoom > 0.1; zoom *= 0.9) {
         view.set_zoom(zoom);
         const QImage picture = stand.picture();
         if (!last.isNull()) {
@@ -455,7 +457,7 @@ TEST(Stage, FindsDefects) {
     EXPECT_TRUE(defect_edges(make_shape("bar", {}).value()).empty());
 }
 
-/// What a computer without OpenGL shows: runs in a process of its own, below.
+/// What a computer whose OpenGL is too old shows: runs in a process of its own, below.
 TEST(Viewport, WithoutOpenGlChild) {
     if (!std::getenv("FILIGREE_TEST_WITHOUT_OPENGL")) GTEST_SKIP() << "for WithoutOpenGlItSaysSo";
     Stand stand;
@@ -478,7 +480,7 @@ TEST(Viewport, WithoutOpenGlItSaysSo) {
     QProcess child;
     QProcessEnvironment environment = QProcessEnvironment::systemEnvironment();
     environment.insert("FILIGREE_TEST_WITHOUT_OPENGL", "1");
-    environment.insert("QT_QPA_PLATFORM", "offscreen");
+    // Not on Qt's offscreen platform: without OpenGL it falls over any QOpenGLWidget (Qt 6.4, rhiFlush).
     environment.insert("MESA_GL_VERSION_OVERRIDE", "3.3");
     child.setProcessEnvironment(environment);
     child.start(QApplication::applicationFilePath(), {"--gtest_filter=Viewport.WithoutOpenGlChild"});
