@@ -234,6 +234,8 @@ Overlay::Overlay(QWidget* parent) : QWidget(parent) {
 }
 
 void Overlay::set(OverlayContent content) {
+    // Painting it all takes longer than many a picture beneath.
+    if (content == content_) return;
     content_ = std::move(content);
     update();
 }

@@ -20,6 +20,7 @@ struct OverlayContent {
     struct Caption {
         QString title, detail;
         QRectF tile;
+        bool operator==(const Caption&) const = default;
     };
     std::vector<Caption> captions; ///< of the tiles; separators stand between them
     struct Legend {
@@ -28,6 +29,10 @@ struct OverlayContent {
         ValueRange range;
         double per_value = 1; ///< what is written: the value times this
         bool whole = false;   ///< whole numbers
+        bool operator==(const Legend& other) const {
+            return title == other.title && unit == other.unit && map == other.map && range.least == other.range.least &&
+                   range.most == other.range.most && per_value == other.per_value && whole == other.whole;
+        }
     };
     std::optional<Legend> legend;
     std::array<QPointF, 3> triad = {};      ///< where x, y and z point on screen, unit vectors foreshortened
@@ -36,6 +41,7 @@ struct OverlayContent {
     struct Dot {
         QPointF at;
         bool faces_away = false;
+        bool operator==(const Dot&) const = default;
     };
     std::vector<Dot> pins;
     std::optional<QPointF> hover; ///< the middle of what would be grabbed
@@ -47,14 +53,17 @@ struct OverlayContent {
         QPointF at;
         bool has_tip = false, is_hot = false;
         QString label;
+        bool operator==(const Knob&) const = default;
     };
     std::vector<Knob> knobs;
     struct Edge {
         QLineF line;
         bool is_open = false; ///< else non-manifold
+        bool operator==(const Edge&) const = default;
     };
     std::vector<Edge> defects;
     QString defect_summary;
+    bool operator==(const OverlayContent&) const = default;
 };
 
 /// A transparent child that covers the viewport and lets the mouse through: painted by the processor, so antialiased on
