@@ -211,8 +211,14 @@ void Stage::follow_inside_points() {
     if (!is_started_ || !shown_) return;
     if (!settings_.inside_points) {
         if (inside_) with_opengl_([this] { inside_.reset(); });
-        inside_points_stale_ = true;
+        inside_points_of_ = nullptr;
         return;
+    }
+    const std::shared_ptr<const Source> source = workbench_.state().source;
+    if (source != inside_points_of_ || settings_.inside_count != inside_points_asked_) {
+        inside_points_of_ = source;
+        inside_points_asked_ = settings_.inside_count;
+        workbench_.sample_inside_points(inside_points_asked_);
     }
     if (!inside_points_stale_) return;
     inside_points_stale_ = false;

@@ -99,7 +99,9 @@ private:
     std::uint64_t color_stamp_ = 0;
     std::vector<DefectEdge> defects_;
     std::shared_ptr<const Model> defects_of_;
-    bool inside_points_stale_ = true;
+    bool inside_points_stale_ = false;               ///< other points have come than are drawn
+    std::shared_ptr<const Source> inside_points_of_; ///< asked for of it, so many
+    std::size_t inside_points_asked_ = 0;
     unsigned by_size_ = 0;  ///< the level chosen by size on screen
     ViewSettings settings_; ///< as last followed
 
