@@ -243,7 +243,10 @@ void Actions::Content::add_edit_actions() {
     add(
         "edit.reset_deformation", "Reset &deformation", "Back to the shape at rest: no sliders, pulls or pins",
         "Ctrl+R", [this] { workbench.reset_deformation(); },
-        [this] { return !workbench.state().warps.none() || !workbench.state().handles.empty(); })
+        [this] {
+            return !workbench.state().warps.none() || !workbench.state().handles.empty() ||
+                   workbench.state().handle_pose != nullptr;
+        })
         ->setIcon(icon(Icon::reset));
     add(
         "edit.unpin_all", "Unp&in all", "Takes out all pins", "Ctrl+Shift+P", [this] { workbench.unpin_all(); },

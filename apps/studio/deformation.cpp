@@ -105,6 +105,9 @@ Pose deformed_pose(const State& state, const RunContext& context) {
 }
 
 Result<std::vector<Vec3f>> full_deformation(const State& state, const RunContext& context) {
+    if (state.pose_from_file)
+        return Error{ErrorCode::unsuitable, "The shape began with a pose from a file, and where that would take every "
+                                            "vertex is not known; reset the deformation to measure what you do."};
     const Mesh& mesh = state.model->mesh;
     std::vector<Vec3f> positions = mesh.positions;
     const auto is_pull = [](const Handle& handle) { return !handle.pinned; };

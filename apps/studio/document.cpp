@@ -143,6 +143,7 @@ std::string Document::bytes() const {
     for (const Handle& h : s.handles)
         out.all(h.vertices, h.targets, h.pinned, h.held, h.centre, h.grip, h.reach, h.move);
     out.add(s.handle_pose != nullptr);
+    out.add(s.pose_from_file);
     if (s.handle_pose) out.all(s.handle_pose->positions, s.handle_pose->gradients);
     const BodySettings& b = s.body;
     const Material& m = b.material;

@@ -87,6 +87,7 @@ struct State {
     Warps warps;
     std::vector<Handle> handles;
     std::shared_ptr<const Pose> handle_pose; ///< the driver as the pulls left it; null: at rest
+    bool pose_from_file = false;             ///< the first pull began at a pose that a file held, not at rest
     BodySettings body;
     std::shared_ptr<const PoseSequence> recording; ///< of the driver, the first frame is the start; null: none
 

@@ -98,6 +98,7 @@ Material material_of(std::string_view preset) {
 void drop_what_refers_to_driver(State& state) {
     state.handles.clear();
     state.handle_pose = nullptr;
+    state.pose_from_file = false;
     state.recording = nullptr;
 }
 
@@ -221,7 +222,9 @@ void Workbench::find_full() {
         full_is_new();
         return;
     }
-    if (is_pulling_ || (state().handle_pose && state().model->mesh.vertex_count() > kMostPulledUnasked)) return;
+    if (is_pulling_ || state().pose_from_file ||
+        (state().handle_pose && state().model->mesh.vertex_count() > kMostPulledUnasked))
+        return;
     const std::uint64_t number = content_->pose_number;
     jobs_.start<std::vector<Vec3f>>(
         "Deforming every vertex", "full",
@@ -412,6 +415,7 @@ void Workbench::reset_deformation() {
     next.warps = none;
     next.handles.clear();
     next.handle_pose = nullptr;
+    next.pose_from_file = false;
     document_.change("Reset the deformation", std::move(next));
 }
 

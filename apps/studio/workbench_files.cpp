@@ -37,7 +37,12 @@ Result<State> read_state(const std::string& path, const RunContext& context) {
         state.strip.code = model->code();
         if (model->code() == DetailCode::blend) state.strip.base = model->driver().vertices.size();
         state.model = std::make_shared<const Model>(std::move(*model));
-        if (!poses->empty()) state.recording = std::make_shared<const PoseSequence>(std::move(*poses));
+        if (poses->frames.size() == 1) { // a shape, not a motion
+            state.handle_pose = std::make_shared<const Pose>(std::move(poses->frames[0]));
+            state.pose_from_file = true;
+        } else if (!poses->empty()) {
+            state.recording = std::make_shared<const PoseSequence>(std::move(*poses));
+        }
         source->mesh = state.model->mesh;
     } else {
         Result<MeshFile> file = read_mesh(*bytes, path, context);
@@ -210,11 +215,21 @@ void Workbench::save_model(const std::string& path) {
     const std::uint64_t id = document_.state_id();
     save(
         "Saving " + file_name(path), path,
-        [path, model = state().model, poses = state().recording](const RunContext& context) -> Result<QString> {
-            const Status status =
-                poses ? write_model(*model, *poses, path, context) : write_model(*model, path, context);
+        [path, state = state()](const RunContext& context) -> Result<QString> {
+            PoseSequence poses;
+            Pose pose = deformed_pose(state, context);
+            const bool has_pose = !pose.positions.empty(), has_motion = state.recording != nullptr;
+            if (has_motion)
+                poses = *state.recording;
+            else if (has_pose)
+                poses.frames.push_back(std::move(pose));
+            const Status status = write_model(*state.model, poses, path, context);
             if (!status) return status.error();
-            return QString("Saved %1.").arg(file_name(path));
+            // A model file holds one motion or one pose, and no history.
+            QString kept;
+            if (has_motion) kept = has_pose ? " with its recording, not with the deformation" : " with its recording";
+            if (!has_motion && has_pose) kept = " as it is deformed";
+            return QString("Saved %1%2.").arg(file_name(path), kept);
         },
         [this, id] {
             if (document_.state_id() == id) document_.set_saved();

@@ -19,10 +19,10 @@
 namespace {
 
 /// An X server without a screen, for as long as this stands.
-class Display {
+class VirtualDisplay {
 public:
     /// Xvfb chooses a free number and writes it down; when it cannot be started the variable stays unset.
-    Display() {
+    VirtualDisplay() {
         int number[2];
         if (::pipe(number) != 0) return;
         server_ = ::fork();
@@ -41,14 +41,14 @@ public:
         ::close(number[0]);
         if (!text.empty()) ::setenv("DISPLAY", (":" + text).c_str(), 1);
     }
-    ~Display() {
+    ~VirtualDisplay() {
         if (server_ <= 0) return;
         ::kill(server_, SIGTERM);
         while (::waitpid(server_, nullptr, 0) < 0 && errno == EINTR) {
         }
     }
-    Display(const Display&) = delete;
-    Display& operator=(const Display&) = delete;
+    VirtualDisplay(const VirtualDisplay&) = delete;
+    VirtualDisplay& operator=(const VirtualDisplay&) = delete;
 
 private:
     pid_t server_ = -1;
@@ -59,7 +59,7 @@ private:
 int main(int argc, char** argv) {
     testing::InitGoogleTest(&argc, argv);
     if (GTEST_FLAG_GET(list_tests)) return RUN_ALL_TESTS(); // needs no display
-    std::optional<Display> display;
+    std::optional<VirtualDisplay> display;
     if (!std::getenv("DISPLAY") && !std::getenv("QT_QPA_PLATFORM")) {
         display.emplace();
         if (!std::getenv("DISPLAY")) {

@@ -349,6 +349,35 @@ TEST_F(WorkbenchTest, SavedModelsComeBackWithTheirRecording) {
     EXPECT_FALSE(undo_stack().canUndo());
 }
 
+TEST_F(WorkbenchTest, AShapeIsSavedAsItIsDeformed) {
+    make_small_shape();
+    bench.set_warps({.bend = 40});
+    pull_top({0.1, 0.2, 0});
+    bench.end_pull();
+    bench.wait_until_idle();
+    const Pose before = *bench.pose();
+    bench.save_model(path("pulled.fil"));
+    bench.open(path("pulled.fil"));
+    bench.wait_until_idle();
+    EXPECT_TRUE(errors.empty());
+    EXPECT_EQ(bench.mode(), Mode::deform);
+    ASSERT_NE(bench.pose(), nullptr);
+    EXPECT_TRUE(bench.pose()->positions == before.positions);
+    EXPECT_TRUE(bench.pose()->gradients == before.gradients);
+
+    // It can be pulled on, but not be compared with what is not known.
+    pull_top({0, 0.2, 0});
+    bench.end_pull();
+    bench.wait_until_idle();
+    EXPECT_FALSE(bench.pose()->positions == before.positions);
+    bench.measure_error();
+    bench.wait_until_idle();
+    ASSERT_EQ(errors.size(), 1u);
+    EXPECT_NE(errors[0].find("from a file"), std::string::npos) << errors[0];
+    bench.reset_deformation();
+    EXPECT_EQ(bench.pose(), nullptr);
+}
+
 TEST_F(WorkbenchTest, ASaveThatFailsLeavesTheDocumentUnsaved) {
     bench.remove_detail();
     bench.save_model(path("no/such/folder.fil"));
