@@ -3,10 +3,14 @@
 
 #include <QApplication>
 #include <QCommandLineParser>
+#include <QOpenGLContext>
 #include <QSurfaceFormat>
 #include <QTimer>
 
+#include <algorithm>
 #include <cstdio>
+#include <cstdlib>
+#include <string_view>
 
 using namespace filigree;
 using namespace filigree::studio;
@@ -95,13 +99,45 @@ Status run_alone(const Options& options, ErrorWatch& watch, MainWindow& window) 
     return Success{};
 }
 
+/// Qt's words on stderr, in our way; its last ones, before it would abort, as a sentence with an exit code.
+void hear_qt(QtMsgType type, const QMessageLogContext& context, const QString& text) {
+    if (type == QtFatalMsg) {
+        std::fprintf(stderr, "filigree-studio: There is no screen to show a window on; start it on a desktop, or under "
+                             "xvfb-run -a -s \"-screen 0 1600x1200x24\".\n");
+        std::_Exit(static_cast<int>(ErrorCode::unsupported));
+    }
+    const bool is_about_the_desktop =
+        QLatin1String(context.category).startsWith(QLatin1String("qt.qpa")) || text.contains("XDG_RUNTIME_DIR");
+    if ((type == QtWarningMsg || type == QtCriticalMsg) && !is_about_the_desktop)
+        std::fprintf(stderr, "filigree-studio: %s\n", qPrintable(text));
+}
+
+/// Words alone need no screen.
+bool asks_for_words(int argc, char** argv) {
+    return std::any_of(argv + 1, argv + argc, [](const std::string_view word) {
+        return word == "-h" || word == "--help" || word == "--help-all" || word == "-v" || word == "--version";
+    });
+}
+
+/// Qt 6.4 crashes in a window whose OpenGL is not there, so that is found out before.
+Status check_opengl() {
+    QOpenGLContext context;
+    if (context.create()) return Success{};
+    return Error{ErrorCode::unsupported, "This screen ('" + QGuiApplication::platformName().toStdString() +
+                                             "') has no OpenGL; install a graphics driver (apt-get install "
+                                             "libgl1-mesa-dri), or start on an X display."};
+}
+
 } // namespace
 
 int main(int argc, char** argv) {
+    qInstallMessageHandler(hear_qt);
+    if (asks_for_words(argc, argv)) qputenv("QT_QPA_PLATFORM", "offscreen");
     prepare_application();
     QApplication application(argc, argv);
     const Result<Options> options = parse(application);
     if (!options) return fail(options.error());
+    if (const Status able = check_opengl(); !able) return fail(able.error());
 
     MainWindow window(!options->leaves());
     if (options->leaves() || options->sizes) window.resize(options->size);

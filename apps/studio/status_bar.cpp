@@ -21,6 +21,7 @@ StatusBar::StatusBar(Workbench& workbench, Viewport& viewport, const Actions& ac
         auto* text = new Text(QLatin1String(name), Tone::plain, this);
         text->setToolTip(QLatin1String(tooltip));
         text->setContentsMargins(4, 0, 4, 0);
+        text->setMinimumWidth(1); // a longer text does not widen the window
         addPermanentWidget(text);
         return text;
     };

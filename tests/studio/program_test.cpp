@@ -4,6 +4,7 @@
 #include <QProcess>
 #include <QTemporaryDir>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <set>
@@ -21,8 +22,12 @@ protected:
         int code;
         std::string errors;
     };
-    Ran run(const QStringList& words) {
+    /// without: a variable that the program does not see.
+    Ran run(const QStringList& words, const QString& without = {}) {
         QProcess process;
+        QProcessEnvironment environment = QProcessEnvironment::systemEnvironment();
+        environment.remove(without);
+        process.setProcessEnvironment(environment);
         process.setWorkingDirectory(folder_.path());
         process.start(FILIGREE_STUDIO, words);
         if (!process.waitForFinished(300'000)) return {-1, "it does not end"};
@@ -86,6 +91,20 @@ TEST_F(Program, RefusesWhatMakesNoSense) {
     EXPECT_EQ(run({"--screenshot", "a.png", "--frames", "-1"}).code, 2);
     EXPECT_EQ(run({"--script", "no such.txt"}).code, 3);
     EXPECT_FALSE(fs::exists(file("a.png")));
+}
+
+TEST_F(Program, SaysThatThereIsNoScreen) {
+    const Ran ran = run({"--screenshot", "a.png"}, "DISPLAY");
+    EXPECT_EQ(ran.code, 5);
+    EXPECT_NE(ran.errors.find("There is no screen"), std::string::npos) << ran.errors;
+    EXPECT_EQ(std::count(ran.errors.begin(), ran.errors.end(), '\n'), 1) << ran.errors;
+    EXPECT_EQ(run({"--help"}, "DISPLAY").code, 0);
+}
+
+TEST_F(Program, SaysThatThereIsNoOpenGl) {
+    const Ran ran = run({"--platform", "offscreen", "--screenshot", "a.png"}, "DISPLAY");
+    EXPECT_EQ(ran.code, 5);
+    EXPECT_NE(ran.errors.find("no OpenGL"), std::string::npos) << ran.errors;
 }
 
 TEST_F(Program, SaysWhatIsWrongWithAFile) {
