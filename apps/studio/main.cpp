@@ -47,7 +47,8 @@ struct Options {
     QSize size = {1280, 800};
     unsigned frames = 0;
     bool sizes = false; ///< --size was given
-    bool leaves() const { return !screenshot.isEmpty() || !script.isEmpty(); }
+    bool names = false;
+    bool leaves() const { return !screenshot.isEmpty() || !script.isEmpty() || names; }
 };
 
 Result<Options> parse(const QApplication& application) {
@@ -61,6 +62,7 @@ Result<Options> parse(const QApplication& application) {
         {"size", "Size of the window, pixels.", "WxH"},
         {"panel", "Open with this panel: model, detail, deform, body or view.", "NAME"},
         {"frames", "Simulate so many frames first.", "N"},
+        {"names", "Print what scripts can name, leave."},
         {"script", "Run a script of actions (docs/studio.md), leave.", "FILE"},
     });
     parser.process(application);
@@ -71,6 +73,7 @@ Result<Options> parse(const QApplication& application) {
     options.screenshot = parser.value("screenshot");
     options.panel = parser.value("panel");
     options.script = parser.value("script");
+    options.names = parser.isSet("names");
     if (parser.isSet("size")) {
         Result<QSize> size = parse_size(parser.value("size"));
         if (!size) return size.error();
@@ -144,6 +147,10 @@ int main(int argc, char** argv) {
     if (!options->panel.isEmpty() && !window.show_panel(options->panel))
         return fail({ErrorCode::usage, "--panel: there is no panel '" + options->panel.toStdString() +
                                            "'; there are model, detail, deform, body and view."});
+    if (options->names) {
+        std::fputs(script_names(window).c_str(), stdout);
+        return 0;
+    }
     window.show();
     ErrorWatch watch(window.workbench());
     if (!options->file.isEmpty()) window.open_file(options->file);

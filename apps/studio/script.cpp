@@ -4,6 +4,7 @@
 
 #include <QAbstractButton>
 #include <QAbstractSlider>
+#include <QAbstractSpinBox>
 #include <QApplication>
 #include <QBuffer>
 #include <QComboBox>
@@ -11,6 +12,7 @@
 #include <QDoubleSpinBox>
 #include <QElapsedTimer>
 #include <QKeySequence>
+#include <QMenu>
 #include <QMouseEvent>
 #include <QPainter>
 #include <QPixmap>
@@ -379,6 +381,28 @@ Status save_screenshot(const std::filesystem::path& path, MainWindow& window) {
         return Error{ErrorCode::out_of_memory, path.string() + ": there is no memory for the picture."};
     const std::string_view piece(bytes.constData(), static_cast<std::size_t>(bytes.size()));
     return write_file(path, std::span(&piece, 1));
+}
+
+std::string script_names(MainWindow& window) {
+    QString text;
+    const auto row = [&](const QString& name, const QString& is) { text += name.leftJustified(26) + ' ' + is + '\n'; };
+    text += "do ACTION\n";
+    for (const QAction* action : window.actions().all())
+        if (!action->menu()) row("  " + action->objectName(), QString(action->text()).remove('&'));
+    text += "set CONTROL VALUE, expect CONTROL VALUE\n";
+    QStringList known;
+    for (const QWidget* widget : window.findChildren<QWidget*>()) {
+        QString name = widget->objectName();
+        if (name.endsWith(".number")) name.chop(7); // stands for its slider
+        const auto* button = qobject_cast<const QAbstractButton*>(widget);
+        const bool takes_values = qobject_cast<const QAbstractSlider*>(widget) ||
+                                  qobject_cast<const QAbstractSpinBox*>(widget) ||
+                                  qobject_cast<const QComboBox*>(widget) || (button && button->isCheckable());
+        if (!takes_values || !name.contains('.') || known.contains(name)) continue;
+        known << name;
+        row("  " + name, widget->toolTip().section('\n', 0, 0));
+    }
+    return text.toStdString();
 }
 
 Status run_script(const std::filesystem::path& path, MainWindow& window) {

@@ -22,6 +22,9 @@ private:
 /// What has to be set before the QApplication is made: its name, and the kind of OpenGL.
 void prepare_application();
 
+/// What a script can name, a line each: actions with their texts, controls with their tooltips.
+std::string script_names(MainWindow& window);
+
 /// Runs a script line by line; paths in it are relative to its folder. Errors: not_found, bad_file ("tour.txt:7: ..."),
 /// and whatever a command of it ends with.
 Status run_script(const std::filesystem::path& path, MainWindow& window);

@@ -20,7 +20,7 @@ class Program : public testing::Test {
 protected:
     struct Ran {
         int code;
-        std::string errors;
+        std::string errors, output = {};
     };
     /// without: a variable that the program does not see.
     Ran run(const QStringList& words, const QString& without = {}) {
@@ -32,7 +32,7 @@ protected:
         process.start(FILIGREE_STUDIO, words);
         if (!process.waitForFinished(300'000)) return {-1, "it does not end"};
         return {process.exitStatus() == QProcess::NormalExit ? process.exitCode() : -1,
-                process.readAllStandardError().toStdString()};
+                process.readAllStandardError().toStdString(), process.readAllStandardOutput().toStdString()};
     }
     fs::path file(const std::string& name) const { return fs::path(folder_.path().toStdString()) / name; }
     void write(const std::string& name, const std::string& text) const { std::ofstream(file(name)) << text; }
@@ -91,6 +91,14 @@ TEST_F(Program, RefusesWhatMakesNoSense) {
     EXPECT_EQ(run({"--screenshot", "a.png", "--frames", "-1"}).code, 2);
     EXPECT_EQ(run({"--script", "no such.txt"}).code, 3);
     EXPECT_FALSE(fs::exists(file("a.png")));
+}
+
+TEST_F(Program, NamesWhatScriptsCanName) {
+    const Ran ran = run({"--names"});
+    EXPECT_EQ(ran.code, 0) << ran.errors;
+    for (const char* name :
+         {"detail.remove", "body.animate", "edit.undo", "deform.bend", "view.zoom", "timeline.scrub"})
+        EXPECT_NE(ran.output.find(std::string("  ") + name + ' '), std::string::npos) << name;
 }
 
 TEST_F(Program, SaysThatThereIsNoScreen) {
