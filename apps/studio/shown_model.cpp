@@ -154,6 +154,7 @@ void ShownModel::measure(Background& background, std::function<void()> ready) {
 }
 
 std::optional<unsigned> ShownModel::nearest_ready(unsigned wanted) const {
+    wanted = std::min(wanted, finest_level());
     for (unsigned level = wanted + 1; level-- > 0;)
         if (levels_[level]) return level;
     for (unsigned level = wanted + 1; level < levels_.size(); ++level)

@@ -69,8 +69,10 @@ public:
     /// Measures the deviations of all levels in the background, once.
     void measure(Background& background, std::function<void()> ready);
 
-    ShownLevel* level(unsigned number) { return levels_[number].get(); } ///< null: not ready
-    /// The finest ready level up to `wanted`, else the coarsest beyond; none: nothing is ready.
+    /// Null: not ready, or there is none.
+    ShownLevel* level(unsigned number) { return number < levels_.size() ? levels_[number].get() : nullptr; }
+    /// The finest ready level up to `wanted`, which may be of a model to come with more levels than this one; else
+    /// the coarsest beyond; none: nothing is ready.
     std::optional<unsigned> nearest_ready(unsigned wanted) const;
 
     /// Poses and colours a level that is ready; with OpenGL. `stamp` tells poses (colours) apart.
