@@ -7,6 +7,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
@@ -50,6 +51,41 @@ struct PullSolver {
         return solver.solve(places, options, context);
     }
 };
+
+/// One vertex of the finest mesh, restored from pose after pose.
+class GrabbedVertex {
+public:
+    GrabbedVertex(const Model& model, Index vertex, const Pose* start)
+        : restorer_(std::get<BlendDetail>(model.detail), model.mesh.positions, model.driver().vertices,
+                    std::array{BlendRestorer::Item{vertex, 0}}),
+          start_(model.mesh.positions[vertex]) {
+        if (start) start_ = place(*start);
+    }
+    /// From where it started.
+    Vec3f way(const Pose& pose) const { return place(pose) - start_; }
+
+private:
+    Vec3f place(const Pose& pose) const {
+        Vec3f place;
+        restorer_.restore(pose.positions, pose.gradients, std::span(&place, 1), {}, true, RunContext());
+        return place;
+    }
+    BlendRestorer restorer_;
+    Vec3f start_;
+};
+
+/// The driver vertices that carry a vertex of the finest mesh, ascending; none for the reference code.
+std::vector<Index> carriers(const Model& model, Index vertex) {
+    const auto* detail = std::get_if<BlendDetail>(&model.detail);
+    if (!detail) return {};
+    const auto record = std::find(detail->order.begin(), detail->order.end(), vertex) - detail->order.begin();
+    const auto next = std::upper_bound(detail->cell_offsets.begin(), detail->cell_offsets.end(), record);
+    const auto cell = static_cast<std::size_t>(next - detail->cell_offsets.begin() - 1);
+    if (cell >= detail->cells.size()) return {};
+    std::vector<Index> result(detail->cells[cell].begin(), detail->cells[cell].end());
+    std::sort(result.begin(), result.end());
+    return result;
+}
 
 /// The rotations of a pull that began at `start` (null: at rest) follow the gradients there.
 void follow_start(Pose& pose, const Pose* start) {
@@ -132,7 +168,9 @@ Result<std::vector<Vec3f>> full_deformation(const State& state, const RunContext
     return warp ? warp_positions(*warp, positions, mesh.origin, context) : positions;
 }
 
-PullRegion pull_region(const State& state, const Vec3f& rest_point, double grip, double reach) {
+PullRegion pull_region(const State& state, const Vec3f& rest_point, double grip, double reach,
+                       std::optional<Index> vertex) {
+    const std::vector<Index> carried_by = vertex ? carriers(*state.model, *vertex) : std::vector<Index>();
     const std::vector<Vec3f> rest = driver_positions(*state.model);
     std::vector<char> is_pinned(rest.size());
     for (const Handle& handle : state.handles)
@@ -144,7 +182,7 @@ PullRegion pull_region(const State& state, const Vec3f& rest_point, double grip,
         if (is_pinned[v]) continue;
         const float distance = (rest[v] - rest_point).norm();
         if (nearest == kNoIndex || distance < (rest[nearest] - rest_point).norm()) nearest = v;
-        if (distance <= grip) region.grip.push_back(v);
+        if (distance <= grip || std::binary_search(carried_by.begin(), carried_by.end(), v)) region.grip.push_back(v);
     }
     if (region.grip.empty() && nearest != kNoIndex) region.grip.push_back(nearest);
     for (Index v = 0; v < rest.size(); ++v)
@@ -180,12 +218,14 @@ Vec3d unwarped(const SpaceWarp& warp, const Vec3d& place, const Vec3d& guess) {
 }
 
 struct HandleDrag::Content {
-    Content(std::shared_ptr<const Model> of, std::shared_ptr<const Pose> from, Handle by, const Bell& rings)
-        : model(std::move(of)), start(std::move(from)), pull(std::move(by)), bell(rings) {}
+    Content(std::shared_ptr<const Model> of, std::shared_ptr<const Pose> from, Handle by, std::optional<Index> held,
+            const Bell& rings)
+        : model(std::move(of)), start(std::move(from)), pull(std::move(by)), grabbed(held), bell(rings) {}
 
     std::shared_ptr<const Model> model;
     std::shared_ptr<const Pose> start;
     Handle pull;
+    std::optional<Index> grabbed;
     RunContext context;
     const Bell& bell;
     std::thread thread;
@@ -205,6 +245,8 @@ struct HandleDrag::Content {
     static constexpr unsigned kRounds = 8;
     static constexpr double kTolerance = 1e-4, kFinalTolerance = 1e-5;
     static constexpr unsigned kMostRounds = 400;                    ///< without a move
+    static constexpr double kOffPointer = 3e-4;                     ///< of the diagonal: a fraction of a pixel
+    static constexpr float kMostCorrection = 0.5f;                  ///< of the way: pins may hold what carries it
     static constexpr std::chrono::milliseconds kLongestEnding{250}; ///< a large driver is let go a little early
 
     void work() {
@@ -222,8 +264,13 @@ struct HandleDrag::Content {
         const std::vector<Vec3f> positions = start_positions(*model, start.get());
         Result<PullSolver> solver = PullSolver::create(positions, driver_triangles(*model), pull.vertices, pull.held);
         if (!solver) return solver.error();
+        std::optional<GrabbedVertex> vertex;
+        const bool is_known = model->code() == DetailCode::blend && (!start || !start->gradients.empty());
+        if (grabbed && is_known) vertex.emplace(*model, *grabbed, start.get());
+        const double off_pointer = kOffPointer * bounds(model->mesh.positions).diagonal();
+        Vec3f correction = Vec3f::Zero();
         std::uint64_t solved = 0;
-        double last_move = 1;
+        double last_move = 1, distance = 0; // of the vertex that was grabbed from where it should be
         unsigned rounds = 0;
         std::optional<std::chrono::steady_clock::time_point> ending_since;
         for (;;) {
@@ -232,7 +279,8 @@ struct HandleDrag::Content {
             {
                 std::unique_lock lock(mutex);
                 const auto settled = [&] {
-                    return last_move <= (is_ending ? kFinalTolerance : kTolerance) || rounds >= kMostRounds;
+                    return (last_move <= (is_ending ? kFinalTolerance : kTolerance) && distance <= off_pointer) ||
+                           rounds >= kMostRounds;
                 };
                 wake.wait(lock, [&] { return stops || is_ending || way_number != solved || !settled(); });
                 if (stops) return cancelled_error();
@@ -245,11 +293,19 @@ struct HandleDrag::Content {
                 if (is_ending) tolerance = kFinalTolerance;
             }
             const auto begin = std::chrono::steady_clock::now();
-            Result<HandleResult> result = solver->solve(to, {.iterations = kRounds, .tolerance = tolerance}, context);
+            Result<HandleResult> result =
+                solver->solve(to + correction, {.iterations = kRounds, .tolerance = tolerance}, context);
             if (!result) return result.error();
             rounds += std::max(1u, result->iterations);
             last_move = result->last_move;
             follow_start(result->pose, start.get());
+            if (vertex) {
+                const Vec3f rest = to - vertex->way(result->pose);
+                distance = double(rest.norm());
+                correction += rest;
+                const float most = kMostCorrection * to.norm();
+                if (correction.norm() > most) correction *= most / correction.norm();
+            }
             const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - begin;
             auto next = std::make_shared<const Pose>(std::move(result->pose));
             {
@@ -268,9 +324,10 @@ HandleDrag::HandleDrag(QObject* parent) : QObject(parent), bell_(std::make_uniqu
 }
 HandleDrag::~HandleDrag() { stop(); }
 
-void HandleDrag::begin(std::shared_ptr<const Model> model, std::shared_ptr<const Pose> start, Handle pull) {
+void HandleDrag::begin(std::shared_ptr<const Model> model, std::shared_ptr<const Pose> start, Handle pull,
+                       std::optional<Index> grabbed) {
     stop();
-    content_ = std::make_unique<Content>(std::move(model), std::move(start), std::move(pull), *bell_);
+    content_ = std::make_unique<Content>(std::move(model), std::move(start), std::move(pull), grabbed, *bell_);
     content_->thread = std::thread([content = content_.get()] { content->work(); });
 }
 

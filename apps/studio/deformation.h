@@ -24,11 +24,13 @@ Pose deformed_pose(const State& state, const RunContext& context);
 Result<std::vector<Vec3f>> full_deformation(const State& state, const RunContext& context);
 
 /// Which driver vertices a pull at a point takes and which stay: those within `grip` of it, and those beyond `reach`.
-/// Pins are among those that stay. Distances along straight lines at rest, model units.
+/// Pins are among those that stay. Distances along straight lines at rest, model units. With `vertex` (of the finest
+/// mesh) those that carry it are taken too, so that it comes along.
 struct PullRegion {
     std::vector<Index> grip, held; ///< of the driver, ascending, disjoint; grip is empty only where all is pinned
 };
-PullRegion pull_region(const State& state, const Vec3f& rest_point, double grip, double reach);
+PullRegion pull_region(const State& state, const Vec3f& rest_point, double grip, double reach,
+                       std::optional<Index> vertex = {});
 
 /// Where a point goes that the warp takes to `place`: Newton's method from `guess` (both in the world); where it does
 /// not arrive, the best place found.
@@ -42,8 +44,11 @@ public:
     ~HandleDrag() override;
 
     /// From the pose `start` (null: at rest), with the pull's vertices and those it holds. Prepares in the background.
-    void begin(std::shared_ptr<const Model> model, std::shared_ptr<const Pose> start, Handle pull);
-    /// How far the pull's vertices are to be from where they started.
+    /// `grabbed` (of the finest mesh; blend code): the vertex that is to go the way of the moves. What carries it turns
+    /// a little as it is pulled, so the driver's vertices are moved by so much more that the detail is where it should.
+    void begin(std::shared_ptr<const Model> model, std::shared_ptr<const Pose> start, Handle pull,
+               std::optional<Index> grabbed = {});
+    /// How far the pull's vertices, or what was grabbed, are to be from where they started.
     void move(const Vec3f& way);
     /// Waits for the solution of the last move and returns it; null when it failed. The drag is over.
     std::shared_ptr<const Pose> finish();

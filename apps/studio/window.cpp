@@ -112,6 +112,11 @@ MainWindow::MainWindow(bool keep_settings, QWidget* parent) : QMainWindow(parent
     content.follow_files(*this);
 
     connect(content.workbench.get(), &Workbench::told, this, &MainWindow::show_message);
+    connect(this, &MainWindow::panel_changed, this, [this] {
+        ViewSettings settings = workbench().view().settings();
+        settings.gizmos = panel() == "deform";
+        workbench().view().set(settings);
+    });
     resize(1280, 800);
     content.splitter->setSizes({1280 - kColumnWidth, kColumnWidth});
     if (keep_settings) content.read_settings(*this);

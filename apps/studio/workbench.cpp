@@ -489,7 +489,7 @@ void Workbench::begin_pull(Index vertex, const Vec3d& at) {
     pull.centre = rest;
     pull.grip = view_.settings().grip * diagonal;
     pull.reach = std::max(view_.settings().reach, view_.settings().grip) * diagonal;
-    PullRegion region = pull_region(state(), rest, pull.grip, pull.reach);
+    PullRegion region = pull_region(state(), rest, pull.grip, pull.reach, vertex);
     if (region.grip.empty()) {
         Q_EMIT told("Everything here is pinned: unpin something to pull it.", false);
         return;
@@ -501,7 +501,7 @@ void Workbench::begin_pull(Index vertex, const Vec3d& at) {
     content_->pull = pull;
     content_->pulls_body = false;
     is_pulling_ = true;
-    drag_.begin(state().model, state().handle_pose, std::move(pull));
+    drag_.begin(state().model, state().handle_pose, std::move(pull), vertex);
 }
 
 void Workbench::pull_to(const Vec3d& target) {
@@ -694,17 +694,8 @@ void Workbench::reset() {
 
 void Workbench::animate() {
     pause();
-    // Rubber so soft that falling half its size is seen: about a quarter of its height.
     BodySettings body = state().body;
-    body.preset = "custom";
-    body.material = material_of("rubber");
-    body.material.young_modulus = 1.2e5;
-    body.size = 1;
-    body.drop = 0.5;
-    body.particles = 2000;
     body.gravity = body.ground = true;
-    body.obstacle = ObstacleChoice::none;
-    body.restitution = 0.9;
     if (body == state().body && playback_.has_body()) {
         reset();
         return play();

@@ -169,6 +169,36 @@ TEST(Viewport, ADragOnTheShapePullsIt) {
     EXPECT_TRUE(stand.workbench.document().bytes() == pulled);
 }
 
+/// With the settings that the window starts with: what was grabbed is where the pointer is.
+TEST(Viewport, WhatIsGrabbedStaysUnderThePointer) {
+    Stand stand("wavy-cube", 64);
+    stand.window.resize(600, 480);
+    ASSERT_TRUE(stand.is_ready());
+    const auto check = [&](const QString& name) {
+        for (const QPoint& from : {QPoint(0, 0), QPoint(-90, 40), QPoint(70, -60), QPoint(110, 50), QPoint(-40, -90)}) {
+            const QPoint at = stand.middle() + from;
+            const auto grabbed = stand.viewport->pick(at);
+            if (!grabbed) continue;
+            const QPointF before = stand.viewport->place_of(stand.place_of_vertex(grabbed->vertex));
+            for (const QPoint& way : {QPoint(45, -30), QPoint(-20, 60)}) {
+                stand.drag(at, at + way);
+                stand.workbench.wait_until_idle();
+                const QPointF after = stand.viewport->place_of(stand.place_of_vertex(grabbed->vertex));
+                EXPECT_LT(distance(after - before, way), 2)
+                    << name.toStdString() << " " << from.x() << " " << from.y() << ": " << (after - before).x() << " "
+                    << (after - before).y();
+                stand.workbench.document().undo_stack().undo();
+            }
+        }
+    };
+    check("cube");
+    // And with a shape that is bent already.
+    Warps warps;
+    warps.bend = 40;
+    stand.workbench.set_warps(warps);
+    check("bent cube");
+}
+
 TEST(Viewport, EscapePutsBack) {
     Stand stand;
     ASSERT_TRUE(stand.is_ready());
