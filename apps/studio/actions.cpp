@@ -384,7 +384,7 @@ void Actions::Content::add_body_actions() {
         [this] { return workbench.playback().has_body() || has_recording(); })
         ->setIcon(icon(Icon::reset));
     add(
-        "body.animate", "A&nimate", "Drops the mesh as rubber on the ground and plays", "A",
+        "body.animate", "A&nimate", "Drops the mesh on the ground as a soft body and plays", "A",
         [this] {
             workbench.animate();
             window.show_panel("body");

@@ -65,14 +65,14 @@ enum class ObstacleChoice { none, ball, step, slope };
 
 /// How a body is made of the mesh, and the world it is put in. SI units.
 struct BodySettings {
-    std::string preset = "rubber"; ///< of named_materials(); "custom" once the material was changed by hand
-    Material material;             ///< starts as the preset's
-    std::size_t particles = 2000;  ///< about; the spacing follows
-    double size = 1;               ///< m, the longest side of the mesh's box
-    double drop = 0.5;             ///< m above the ground at the start
+    std::string preset = "soft-rubber"; ///< of named_materials(); "custom" once the material was changed by hand
+    Material material;                  ///< starts as the preset's
+    std::size_t particles = 2000;       ///< about; the spacing follows
+    double size = 1;                    ///< m, the longest side of the mesh's box
+    double drop = 0.5;                  ///< m above the ground at the start
     bool gravity = true, ground = true;
     ObstacleChoice obstacle = ObstacleChoice::none;
-    double friction = 0.5, restitution = 0.5;
+    double friction = 0.5, restitution = 0.9;
     bool operator==(const BodySettings& other) const;
 };
 

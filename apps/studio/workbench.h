@@ -68,7 +68,7 @@ public:
     void pause();
     void step();
     void reset();
-    void animate(); ///< the report's button: drops the mesh as rubber on the ground and plays
+    void animate(); ///< the report's button: drops the mesh on the ground and plays
     bool is_playing() const;
     // Timeline
     std::size_t frame_count() const; ///< recorded frames, the start included; 0: none

@@ -23,6 +23,7 @@ NamedMaterial made(std::string_view name, std::string_view text, double density,
 std::span<const NamedMaterial> named_materials() {
     static const std::array materials = {
         made("rubber", "bounces", 1100, 1e6, 0.45, [](Material& m) { m.damping = 0.2; }),
+        made("soft-rubber", "squashes and bounces", 1100, 1e5, 0.45, [](Material& m) { m.damping = 0.2; }),
         made("jelly", "wobbles", 1000, 2e4, 0.45, [](Material& m) { m.internal_damping = 0.002; }),
         made("foam", "light and soft", 60, 2e4, 0.1, [](Material& m) { m.damping = 1; }),
         made("wood", "stiff; a tenth of real wood's", 600, 1e9, 0.3, [](Material&) {}),

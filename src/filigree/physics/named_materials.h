@@ -12,7 +12,7 @@ struct NamedMaterial {
     std::string_view name, text; ///< text: what it does, a few words
     Material material;
 };
-/// Rubber, jelly, foam, wood, metal, lattice (springs), clay and wax.
+/// Rubber, soft-rubber, jelly, foam, wood, metal, lattice (springs), clay and wax.
 std::span<const NamedMaterial> named_materials();
 
 } // namespace filigree
