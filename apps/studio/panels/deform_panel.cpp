@@ -1,6 +1,7 @@
 #include "panels/deform_panel.h"
 
 #include "actions.h"
+#include "warp_ranges.h"
 
 namespace filigree::studio {
 
@@ -12,8 +13,7 @@ DeformPanel::DeformPanel(Workbench& workbench, const Actions& actions, QWidget* 
     beside(rows, {new ActionButton("deform.pull", actions.find("tool.pull"), {}, page()),
                   new ActionButton("deform.pin", actions.find("tool.pin"), {}, page()),
                   new ActionButton("deform.turn", actions.find("tool.turn"), {}, page())});
-    NumberSpec spec = {.least = 0.01, .most = 0.5, .decimals = 3, .logarithmic = true, .neutral = 0.06};
-    spec = {.least = 1, .most = 50, .decimals = 1, .unit = "%", .logarithmic = true, .neutral = 6};
+    NumberSpec spec = {.least = 1, .most = 50, .decimals = 1, .unit = "%", .logarithmic = true, .neutral = 6};
     grip_ = number(rows, "deform.grip", "Grip", spec,
                    "How far around the mouse the surface is held, per cent of the mesh's diagonal");
     spec.least = 5;
@@ -42,20 +42,21 @@ DeformPanel::DeformPanel(Workbench& workbench, const Actions& actions, QWidget* 
         connect(control, &NumberControl::released, this, [this] { workbench_.document().end_merge(); });
     };
     NumberSpec factor;
-    factor.least = 0.25;
-    factor.most = 4;
+    factor.least = kLeastFactor;
+    factor.most = kMostFactor;
     factor.decimals = 2;
     factor.unit = "×";
     factor.logarithmic = true;
     factor.digits = 3;
     factor.neutral = 1;
-    NumberSpec angle = {.least = -180, .most = 180, .step = 1, .decimals = 0, .unit = "°", .neutral = 0};
+    NumberSpec angle = {
+        .least = -kMostBend, .most = kMostBend, .step = 1, .decimals = 0, .unit = "°", .neutral = 0};
     add("stretch", "Stretch", factor, &Warps::stretch, 1, "Longer along the axis; a factor");
     add("squeeze", "Squeeze", factor, &Warps::squeeze, 1,
         "Longer along the axis and thinner across, the volume stays; a factor");
     add("bend", "Bend", angle, &Warps::bend, 1, "Into an arc from end to end, degrees");
-    angle.least = -720;
-    angle.most = 720;
+    angle.least = -kMostTwist;
+    angle.most = kMostTwist;
     angle.step = 5;
     add("twist", "Twist", angle, &Warps::twist, 1, "Turned about the axis from end to end, degrees");
     add("taper", "Taper", factor, &Warps::taper, 1, "Size of the far end, as a factor of the near end's");
@@ -87,13 +88,9 @@ void DeformPanel::refresh() {
     for (const WarpControl& warp : warps_) warp.control->set_value(state.warps.*warp.field * warp.scale);
     grip_->set_value(100 * workbench_.view().settings().grip);
     reach_->set_value(100 * workbench_.view().settings().reach);
-    std::size_t pinned = 0, pulls = 0;
-    for (const Handle& handle : state.handles) {
-        if (handle.pinned)
-            pinned += handle.vertices.size();
-        else
-            ++pulls;
-    }
+    std::size_t pinned = 0;
+    for (const Handle& handle : state.handles)
+        if (handle.pinned) pinned += handle.vertices.size();
     pins_->setText(pinned == 0 ? QStringLiteral("No pins") : counted(pinned, "vertex pinned", "vertices pinned"));
 }
 
