@@ -36,6 +36,22 @@ void handle_events(int milliseconds = 5) { QCoreApplication::processEvents(QEven
 
 constexpr double kPatience = 600; // seconds that a command may take
 
+/// The window as it is at this moment.
+Status grab_window(const std::filesystem::path& path, MainWindow& window) {
+    QPixmap picture = window.grab();
+    for (QDialog* const dialog : window.findChildren<QDialog*>()) // what stands over the window belongs to it
+        if (dialog->isVisible()) {
+            const QPoint middle((window.width() - dialog->width()) / 2, (window.height() - dialog->height()) / 2);
+            QPainter(&picture).drawPixmap(middle, dialog->grab());
+        }
+    QByteArray bytes;
+    QBuffer buffer(&bytes);
+    if (!buffer.open(QIODevice::WriteOnly) || !picture.save(&buffer, "PNG"))
+        return Error{ErrorCode::out_of_memory, path.string() + ": there is no memory for the picture."};
+    const std::string_view piece(bytes.constData(), static_cast<std::size_t>(bytes.size()));
+    return write_file(path, std::span(&piece, 1));
+}
+
 /// The words of a line: separated by spaces, "in quotes" where they hold some. A # begins a comment.
 QStringList words_of(const QString& line) {
     QStringList words;
@@ -58,6 +74,10 @@ QStringList words_of(const QString& line) {
     }
     if (has_word) words << word;
     return words;
+}
+
+Error out_of_range(const QString& value, double least, double most) {
+    return usage(QString("%1 is out of range; from %2 to %3 is allowed.").arg(value).arg(least).arg(most));
 }
 
 Result<bool> parse_switch(const QString& text) {
@@ -89,6 +109,35 @@ private:
         std::function<Status(Script&, const QStringList&)> run;
     };
     static const std::map<QString, Command>& commands();
+    static Command file_command(void (Workbench::*work)(const std::string&)) {
+        return {1, 1, [work](Script& s, const QStringList& w) {
+                    return s.settle_well([&] { (s.workbench().*work)(s.path(w[0])); });
+                }};
+    }
+
+    /// Whether the last word says that nothing is waited for.
+    static Result<bool> parse_now(const QStringList& words) {
+        if (words.size() == 1) return false;
+        if (words[1] == "now") return true;
+        return usage("'" + words[1] + "' means nothing here; there is 'now'.");
+    }
+    Status open(const QStringList& words) {
+        const Result<bool> now = parse_now(words);
+        if (!now) return now.error();
+        const auto work = [&] { workbench().open(path(words[0])); };
+        if (!*now) return settle_well(work);
+        work();
+        return Success{};
+    }
+    Status screenshot(const QStringList& words) {
+        const Result<bool> now = parse_now(words);
+        if (!now) return now.error();
+        return *now ? grab_window(path(words[0]), window_) : save_screenshot(path(words[0]), window_);
+    }
+    Status attempt(const QStringList& words) {
+        (void)run(words); // what it fails with is in the message bar, to be looked at
+        return Success{};
+    }
 
     std::string path(const QString& text) const { return (folder_ / text.toStdString()).string(); }
     Workbench& workbench() { return window_.workbench(); }
@@ -129,12 +178,18 @@ private:
         bool ok = true;
         if (auto* const number = qobject_cast<QDoubleSpinBox*>(widget)) {
             const double to = value.toDouble(&ok);
+            if (ok && (to < number->minimum() || to > number->maximum()))
+                return out_of_range(value, number->minimum(), number->maximum());
             if (ok) number->setValue(to);
         } else if (auto* const whole = qobject_cast<QSpinBox*>(widget)) {
             const int to = value.toInt(&ok);
+            if (ok && (to < whole->minimum() || to > whole->maximum()))
+                return out_of_range(value, whole->minimum(), whole->maximum());
             if (ok) whole->setValue(to);
         } else if (auto* const slider = qobject_cast<QAbstractSlider*>(widget)) {
             const int to = value.toInt(&ok);
+            if (ok && (to < slider->minimum() || to > slider->maximum()))
+                return out_of_range(value, slider->minimum(), slider->maximum());
             if (ok) slider->setValue(to);
         } else if (auto* const button = qobject_cast<QAbstractButton*>(widget); button && button->isCheckable()) {
             const Result<bool> on = parse_switch(value);
@@ -278,15 +333,11 @@ private:
 const std::map<QString, Script::Command>& Script::commands() {
     using Words = const QStringList&;
     static const std::map<QString, Command> table = {
-        {"open", {1, 1, [](Script& s, Words w) { return s.settle_well([&] { s.workbench().open(s.path(w[0])); }); }}},
-        {"save",
-         {1, 1, [](Script& s, Words w) { return s.settle_well([&] { s.workbench().save_model(s.path(w[0])); }); }}},
-        {"save_mesh",
-         {1, 1, [](Script& s, Words w) { return s.settle_well([&] { s.workbench().save_mesh(s.path(w[0])); }); }}},
-        {"save_driver",
-         {1, 1, [](Script& s, Words w) { return s.settle_well([&] { s.workbench().save_driver(s.path(w[0])); }); }}},
-        {"export_meshes",
-         {1, 1, [](Script& s, Words w) { return s.settle_well([&] { s.workbench().export_meshes(s.path(w[0])); }); }}},
+        {"open", {1, 2, [](Script& s, Words w) { return s.open(w); }}},
+        {"save", file_command(&Workbench::save_model)},
+        {"save_mesh", file_command(&Workbench::save_mesh)},
+        {"save_driver", file_command(&Workbench::save_driver)},
+        {"export_meshes", file_command(&Workbench::export_meshes)},
         {"export_film",
          {1, 1,
           [](Script& s, Words w) { return s.settle_well([&] { s.workbench().export_film(s.path(w[0]), {}); }); }}},
@@ -306,7 +357,8 @@ const std::map<QString, Script::Command>& Script::commands() {
         {"wheel", {3, 3, [](Script& s, Words w) { return s.wheel(w); }}},
         {"frames", {1, 1, [](Script& s, Words w) { return s.frames(w[0]); }}},
         {"wait", {0, 0, [](Script& s, Words) { return s.settle(); }}},
-        {"screenshot", {1, 1, [](Script& s, Words w) { return save_screenshot(s.path(w[0]), s.window_); }}},
+        {"screenshot", {1, 2, [](Script& s, Words w) { return s.screenshot(w); }}},
+        {"try", {1, 8, [](Script& s, Words w) { return s.attempt(w); }}},
     };
     return table;
 }
@@ -369,18 +421,7 @@ Status save_screenshot(const std::filesystem::path& path, MainWindow& window) {
         return Error{ErrorCode::unsuitable, path.string() + ": the window was not still after ten minutes."};
     window.viewport().finish_drawing();
     handle_events();
-    QPixmap picture = window.grab();
-    for (QDialog* const dialog : window.findChildren<QDialog*>()) // what stands over the window belongs to it
-        if (dialog->isVisible()) {
-            const QPoint middle((window.width() - dialog->width()) / 2, (window.height() - dialog->height()) / 2);
-            QPainter(&picture).drawPixmap(middle, dialog->grab());
-        }
-    QByteArray bytes;
-    QBuffer buffer(&bytes);
-    if (!buffer.open(QIODevice::WriteOnly) || !picture.save(&buffer, "PNG"))
-        return Error{ErrorCode::out_of_memory, path.string() + ": there is no memory for the picture."};
-    const std::string_view piece(bytes.constData(), static_cast<std::size_t>(bytes.size()));
-    return write_file(path, std::span(&piece, 1));
+    return grab_window(path, window);
 }
 
 std::string script_names(MainWindow& window) {

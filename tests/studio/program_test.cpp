@@ -85,6 +85,15 @@ TEST_F(Program, NamesTheLineOfAScriptThatFails) {
     EXPECT_NE(ran.errors.find("wrong.txt:3: there is no action 'view.sideways'"), std::string::npos) << ran.errors;
 }
 
+TEST_F(Program, ScriptsTryAndDoNotWait) {
+    write("try.txt", "try open \"no such.obj\"\nexpect message \"no such.obj\"\nscreenshot now.png now\n"
+                     "set model.frequency 999\n");
+    const Ran ran = run({"--script", "try.txt", "--size", "900x620"});
+    EXPECT_EQ(ran.code, 2) << ran.errors;
+    EXPECT_NE(ran.errors.find("try.txt:4: 999 is out of range"), std::string::npos) << ran.errors;
+    EXPECT_TRUE(fs::exists(file("now.png")));
+}
+
 TEST_F(Program, RefusesWhatMakesNoSense) {
     EXPECT_EQ(run({"--screenshot", "a.png", "--size", "big"}).code, 2);
     EXPECT_EQ(run({"--screenshot", "a.png", "--panel", "kitchen"}).code, 2);
