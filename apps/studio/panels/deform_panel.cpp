@@ -49,8 +49,7 @@ DeformPanel::DeformPanel(Workbench& workbench, const Actions& actions, QWidget* 
     factor.logarithmic = true;
     factor.digits = 3;
     factor.neutral = 1;
-    NumberSpec angle = {
-        .least = -kMostBend, .most = kMostBend, .step = 1, .decimals = 0, .unit = "°", .neutral = 0};
+    NumberSpec angle = {.least = -kMostBend, .most = kMostBend, .step = 1, .decimals = 0, .unit = "°", .neutral = 0};
     add("stretch", "Stretch", factor, &Warps::stretch, 1, "Longer along the axis; a factor");
     add("squeeze", "Squeeze", factor, &Warps::squeeze, 1,
         "Longer along the axis and thinner across, the volume stays; a factor");
