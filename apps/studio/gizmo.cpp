@@ -11,22 +11,23 @@ namespace filigree::studio {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr double kGap = 0.07;   // between the mesh and a handle, diagonals
-constexpr double kArrow = 0.10; // length of an arrow, diagonals
+constexpr double kGap = 0.03;   // between the mesh and a handle, diagonals
+constexpr double kArrow = 0.08; // length of an arrow, diagonals
 // Ranges of the panel's sliders.
 constexpr double kLeastFactor = 0.25, kMostFactor = 4, kMostBend = 270, kMostTwist = 360;
 
 /// The mesh's box along and across the axis of the warps, and where the warps carry points and directions of it.
 struct Frame {
-    Vec3d centre, axis, side, third; ///< side is the axis that bending goes towards
+    Vec3d centre, axis, side, third; ///< side: where bending goes; third: the side that the viewer sees
     double half = 0, half_side = 0, half_third = 0, diagonal = 0;
     std::unique_ptr<SpaceWarp> warp;
 
-    Frame(const Warps& warps, const Box& box) : centre(box.centre()), diagonal(box.diagonal()) {
+    Frame(const Warps& warps, const Box& box, const Vec3d& towards_viewer)
+        : centre(box.centre()), diagonal(box.diagonal()) {
         const int a = static_cast<int>(warps.axis), b = (a + 1) % 3, c = (a + 2) % 3;
         axis = Vec3d::Unit(a);
         side = Vec3d::Unit(b);
-        third = Vec3d::Unit(c);
+        third = (towards_viewer[c] < 0 ? -1 : 1) * Vec3d::Unit(c);
         half = box.size()[a] / 2;
         half_side = box.size()[b] / 2;
         half_third = box.size()[c] / 2;
@@ -39,6 +40,7 @@ struct Frame {
     }
     Vec3d high() const { return centre + half * axis; }
     Vec3d low() const { return centre - half * axis; }
+    Vec3d outer() const { return half_third * third; } ///< from the axis to the side that the viewer sees
 };
 
 std::vector<Vec3d> arc(const Vec3d& centre, const Vec3d& from, const Vec3d& towards, double radius, double begin,
@@ -61,13 +63,14 @@ GizmoShape arrow(GizmoPart part, const Vec3d& from, const Vec3d& direction, doub
     return {part, {from, from + length * direction}, from + length * direction, true};
 }
 
-/// The circle that the bending handle moves on: about the warped centre, from the low end towards the side.
+/// The circle that the bending handle moves on, in the plane of the side that the viewer sees: about its warped centre,
+/// from the low end towards the side.
 struct BendCircle {
     Vec3d centre, from, towards;
     double radius, angle;
     BendCircle(const Frame& frame, const Warps& warps)
-        : centre(frame.place(frame.centre)), from(-frame.axis), towards(frame.side),
-          radius((frame.place(frame.low()) - centre).norm() + kGap * frame.diagonal) {
+        : centre(frame.place(frame.centre + frame.outer())), from(-frame.axis), towards(frame.side),
+          radius((frame.place(frame.low() + frame.outer()) - centre).norm() + 1.5 * kGap * frame.diagonal) {
         // Both ends tilt towards the side by half the angle; from the middle of the arc an end is seen at half of that.
         angle = warps.bend / 4 * kPi / 180;
     }
@@ -83,29 +86,30 @@ struct TwistRing {
         axis = frame.turn(rest, frame.axis);
         from = across(frame.turn(rest, frame.side), axis);
         towards = axis.cross(from);
-        centre += 0.3 * kGap * frame.diagonal * axis;
-        radius = std::max(frame.half_side, frame.half_third) * 0.75 + 0.3 * kGap * frame.diagonal;
+        centre += kGap * frame.diagonal * axis;
+        radius = std::clamp(0.8 * std::sqrt(frame.half_side * frame.half_third), 0.05 * frame.diagonal,
+                            0.3 * frame.diagonal);
     }
 };
 
 } // namespace
 
-std::vector<GizmoShape> gizmo_shapes(const Warps& warps, const Box& rest_box) {
+std::vector<GizmoShape> gizmo_shapes(const Warps& warps, const Box& rest_box, const Vec3d& towards_viewer) {
     std::vector<GizmoShape> shapes;
     if (rest_box.empty() || !(rest_box.diagonal() > 0)) return shapes;
-    const Frame frame(warps, rest_box);
+    const Frame frame(warps, rest_box, towards_viewer);
     const double gap = kGap * frame.diagonal, length = kArrow * frame.diagonal;
 
     const Vec3d end = frame.turn(frame.high(), frame.axis);
     shapes.push_back(arrow(GizmoPart::stretch, frame.place(frame.high()) + gap * end, end, length));
 
-    const Vec3d middle = frame.centre - frame.half_third * frame.third;
-    const Vec3d out = -frame.turn(middle, frame.third);
-    shapes.push_back(arrow(GizmoPart::squeeze, frame.place(middle) + gap * out, out, 0.7 * length));
+    const Vec3d middle = frame.centre + frame.outer();
+    const Vec3d out = frame.turn(middle, frame.third);
+    shapes.push_back(arrow(GizmoPart::squeeze, frame.place(middle) + gap * out, out, length));
 
-    const Vec3d corner = frame.high() - frame.half_third * frame.third;
-    const Vec3d sideways = -frame.turn(corner, frame.third);
-    shapes.push_back(arrow(GizmoPart::taper, frame.place(corner) + gap * sideways, sideways, 0.7 * length));
+    const Vec3d corner = frame.high() + frame.outer();
+    const Vec3d sideways = frame.turn(corner, frame.third);
+    shapes.push_back(arrow(GizmoPart::taper, frame.place(corner) + gap * sideways, sideways, length));
 
     const BendCircle bend(frame, warps);
     constexpr double kReach = 0.30; // of an arc to both sides of its knob, radians
@@ -137,7 +141,7 @@ std::optional<GizmoPart> gizmo_at(std::span<const GizmoShape> shapes, const Came
 GizmoDrag::GizmoDrag(GizmoPart part, const Warps& start, const Box& rest_box, const Camera& camera, double x, double y,
                      const PictureSize& size)
     : part_(part), start_(start), camera_(camera), size_(size), press_x_(x), press_y_(y) {
-    const Frame frame(start, rest_box);
+    const Frame frame(start, rest_box, camera.eye - camera.target);
     const auto follow_line = [&](const Vec3d& rest, const Vec3d& from, const Vec3d& direction) {
         centre_ = frame.place(rest);
         along_ = frame.turn(rest, direction);
@@ -148,10 +152,10 @@ GizmoDrag::GizmoDrag(GizmoPart part, const Warps& start, const Box& rest_box, co
         follow_line(frame.high(), frame.centre, frame.axis);
         break;
     case GizmoPart::squeeze:
-        follow_line(frame.centre - frame.half_third * frame.third, frame.centre, -frame.third);
+        follow_line(frame.centre + frame.outer(), frame.centre, frame.third);
         break;
     case GizmoPart::taper:
-        follow_line(frame.high() - frame.half_third * frame.third, frame.high(), -frame.third);
+        follow_line(frame.high() + frame.outer(), frame.high(), frame.third);
         break;
     case GizmoPart::bend: {
         const BendCircle circle(frame, start);

@@ -18,8 +18,10 @@ struct GizmoShape {
     bool has_tip = false; ///< the line ends as an arrow at the knob
 };
 
-/// The handles around a mesh as warped; none for an empty box. rest_box: the mesh's at rest, in the world.
-std::vector<GizmoShape> gizmo_shapes(const Warps& warps, const Box& rest_box);
+/// The handles around a mesh as warped, on its sides towards the viewer; none for an empty box. rest_box: the mesh's at
+/// rest, in the world.
+std::vector<GizmoShape> gizmo_shapes(const Warps& warps, const Box& rest_box,
+                                     const Vec3d& towards_viewer = Vec3d::Zero());
 
 /// The handle whose knob is within `radius` pixels of a point, the nearest to it.
 std::optional<GizmoPart> gizmo_at(std::span<const GizmoShape> shapes, const Camera& camera, double x, double y,

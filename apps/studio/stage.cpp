@@ -2,6 +2,8 @@
 
 #include "theme.h"
 
+#include "filigree/core/parallel_for.h"
+
 #include <QElapsedTimer>
 
 #include <algorithm>
@@ -14,6 +16,8 @@ namespace {
 const Vec3f kDriverEdges(0.85f, 0.33f, 0.10f), kObstacles(0.62f, 0.65f, 0.70f), kParticles(0.88f, 0.55f, 0.25f),
     kInsidePoints(0.20f, 0.45f, 0.78f);
 
+constexpr float kSeenThrough = 0.4f; // of a surface whose inside is shown uncut
+
 double milliseconds(const QElapsedTimer& timer) { return 1e-6 * static_cast<double>(timer.nsecsElapsed()); }
 
 /// The finest mesh with its vertices elsewhere, and nothing that would no longer be true.
@@ -24,38 +28,63 @@ Mesh moved_mesh(const Mesh& mesh, std::span<const Vec3f> positions) {
     return moved;
 }
 
-VertexColors error_colors(std::span<const Vec3f> restored, std::span<const Vec3f> full) {
-    VertexColors colors;
-    colors.values.resize(full.size());
-    for (std::size_t v = 0; v < full.size(); ++v) colors.values[v] = (restored[v] - full[v]).norm();
-    colors.range = legend_range(colors.values, true);
-    return colors;
+VertexColors error_colors(std::vector<float> distances, double diagonal) {
+    HeatMap map = heat_map(std::move(distances), diagonal);
+    return {std::move(map.values), ColorMap::sequential, map.range};
 }
 
 } // namespace
 
 std::vector<DefectEdge> defect_edges(const Mesh& mesh) {
-    std::vector<std::pair<Index, Index>> edges;
-    edges.reserve(mesh.corner_count());
+    struct Side {
+        Index a, b;
+        bool is_forward;
+        auto operator<=>(const Side&) const = default;
+    };
+    const double diagonal = bounds(mesh.positions).diagonal(), least_area = 1e-14 * diagonal * diagonal;
+    std::vector<Side> sides;
+    sides.reserve(mesh.corner_count());
+    std::vector<Index> flat, corners;
     for (std::size_t face = 0; face < mesh.face_count(); ++face) {
-        const std::span<const Index> corners = mesh.face(face);
-        for (std::size_t k = 0; k < corners.size(); ++k) {
+        corners.clear();
+        for (const Index v : mesh.face(face))
+            if (corners.empty() || corners.back() != v) corners.push_back(v);
+        while (corners.size() > 1 && corners.front() == corners.back()) corners.pop_back();
+        Vec3d area = Vec3d::Zero();
+        for (std::size_t k = 2; k < corners.size(); ++k) {
+            const Vec3d from = mesh.positions[corners[0]].cast<double>();
+            area += (mesh.positions[corners[k - 1]].cast<double>() - from)
+                        .cross(mesh.positions[corners[k]].cast<double>() - from) /
+                    2;
+        }
+        std::vector<Index> once = corners;
+        std::sort(once.begin(), once.end());
+        const bool repeats = std::adjacent_find(once.begin(), once.end()) != once.end();
+        if (!corners.empty() && (repeats || corners.size() != mesh.face(face).size() || area.norm() < least_area))
+            flat.push_back(corners[0]);
+        for (std::size_t k = 0; corners.size() > 2 && k < corners.size(); ++k) {
             const Index a = corners[k], b = corners[(k + 1) % corners.size()];
-            if (a != b) edges.emplace_back(std::min(a, b), std::max(a, b));
+            sides.push_back({std::min(a, b), std::max(a, b), a < b});
         }
     }
-    std::sort(edges.begin(), edges.end());
+    std::sort(sides.begin(), sides.end());
     std::vector<DefectEdge> defects;
-    for (std::size_t i = 0, j = 0; i < edges.size(); i = j) {
-        while (j < edges.size() && edges[j] == edges[i]) ++j;
-        if (j - i != 2) defects.push_back({edges[i].first, edges[i].second, j - i == 1});
+    for (std::size_t i = 0, j = 0; i < sides.size(); i = j) {
+        while (j < sides.size() && sides[j].a == sides[i].a && sides[j].b == sides[i].b) ++j;
+        const bool is_opposed = j - i == 2 && sides[i] == sides[i + 1];
+        if (j - i != 2 || is_opposed) defects.push_back({sides[i].a, sides[i].b, j - i == 1, is_opposed});
     }
+    for (const Index v : flat) defects.push_back({v, v});
     return defects;
 }
 
 Stage::Stage(Workbench& workbench, WithOpenGl with_opengl)
     : workbench_(workbench), with_opengl_(std::move(with_opengl)) {
     settings_ = workbench.view().settings();
+    connect(&background_, &Background::failed, this, [this](const Error& error) {
+        problem_ = error.message;
+        Q_EMIT changed(false);
+    });
     connect(&workbench.document(), &Document::changed, this, [this] { follow_document(); });
     connect(&workbench, &Workbench::opened, this, [this] { follow_document(); });
     connect(&workbench, &Workbench::pose_changed, this, [this] { follow_pose(); });
@@ -91,6 +120,7 @@ void Stage::stop() {
     particles_.reset();
     inside_.reset();
     full_.reset();
+    full_asked_ = 0;
     obstacles_.clear();
     particles_of_ = surroundings_of_ = nullptr;
     defects_of_ = nullptr;
@@ -137,33 +167,35 @@ void Stage::adopt() {
 
 void Stage::drop_posed_extras() {
     full_.reset();
+    full_asked_ = 0;
     positions_.clear();
 }
 
 void Stage::follow_pose() {
     if (!shown_) return;
-    const Pose* pose = shows_inside_points() ? nullptr : workbench_.pose();
+    const Pose* pose = workbench_.pose();
     if (pose && pose->positions.size() != shown_->rest_pose().positions.size()) return; // of a model not shown yet
     pose_ = pose ? *pose : shown_->rest_pose();
     pose_stamp_ = pose ? ++last_stamp_ : 0;
-    if (!pose) with_opengl_([this] { full_.reset(); });
     follow_particles();
+    follow_inside_points();
+    follow_full();
     follow_colors();
     Q_EMIT changed(true);
 }
 
 void Stage::follow_view() {
     if (!is_started_) return;
-    const ViewSettings before = std::exchange(settings_, workbench_.view().settings());
+    settings_ = workbench_.view().settings();
     const bool wants_full = settings_.split || settings_.coloring == Coloring::error;
     workbench_.want_full(wants_full);
-    if (settings_.inside_points != before.inside_points) follow_pose();
     follow_surroundings();
     follow_particles();
     follow_inside_points();
     follow_defects();
     follow_full();
     follow_colors();
+    if (shown_ && settings_.driver) shown_->measure(background_, [this] { Q_EMIT changed(false); });
     if (shown_ && (settings_.driver || settings_.split))
         shown_->ask(0, true, background_, with_opengl_, [this](unsigned, const auto&) { Q_EMIT changed(false); });
     Q_EMIT changed(false);
@@ -216,82 +248,166 @@ void Stage::follow_inside_points() {
     }
     const std::shared_ptr<const Source> source = workbench_.state().source;
     if (source != inside_points_of_ || settings_.inside_count != inside_points_asked_) {
+        if (source != inside_points_of_) with_opengl_([this] { inside_.reset(); });
         inside_points_of_ = source;
         inside_points_asked_ = settings_.inside_count;
         workbench_.sample_inside_points(inside_points_asked_);
     }
-    if (!inside_points_stale_) return;
-    inside_points_stale_ = false;
+    if (std::exchange(inside_points_stale_, false))
+        with_opengl_([this] {
+            constexpr float kRadius = 0.6f; // of balls that nearly touch: what is behind them is seen too
+            inside_.reset();
+            inside_pose_ = 0;
+            const std::span<const Vec3f> points = workbench_.inside_points();
+            Result<Drawable> made = Drawable::points(points, origin(), {}, RunContext());
+            if (!made) return;
+            made = Drawable::points(points, origin(), {.radius = kRadius * made->point_radius()}, RunContext());
+            if (made) inside_ = std::move(made).value();
+        });
+    if (!inside_ || inside_pose_ == pose_stamp_) return;
     with_opengl_([this] {
-        inside_.reset();
-        Result<Drawable> made = Drawable::points(workbench_.inside_points(), origin(), {}, RunContext());
-        if (made) inside_ = std::move(made).value();
+        inside_pose_ = pose_stamp_;
+        if (!inside_->set_positions(carried_inside_points())) inside_.reset(); // of a mesh not shown yet
     });
     Q_EMIT changed(false);
 }
 
+/// Where the driver takes the points inside: each goes with all of its vertices (or enough of them, evenly chosen), by
+/// the inverse fourth power of their distances, so above all with the nearest.
+std::vector<Vec3f> Stage::carried_inside_points() const {
+    const std::span<const Vec3f> rest = workbench_.inside_points();
+    std::vector<Vec3f> carried(rest.begin(), rest.end());
+    if (pose_stamp_ == 0 || rest.empty()) return carried;
+    constexpr std::size_t kMostPairs = 1'500'000, kLeast = 64; // a few milliseconds
+    const std::vector<Vec3f>& driver = shown_->rest_pose().positions;
+    const std::size_t most = std::clamp(kMostPairs / rest.size(), kLeast, driver.size() + kLeast);
+    const std::size_t step = (driver.size() + most - 1) / most;
+    const float least = 1e-6f * bounds(driver).size().cast<float>().squaredNorm();
+    parallel_for(RunContext(), rest.size(), 64, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            Vec3f place = Vec3f::Zero();
+            float sum = 0;
+            for (std::size_t v = 0; v < driver.size(); v += step) {
+                const Vec3f offset = rest[i] - driver[v];
+                const float distance2 = offset.squaredNorm() + least, weight = 1 / (distance2 * distance2);
+                const Vec3f turned = pose_.gradients.empty() ? offset : Vec3f(pose_.gradients[v] * offset);
+                place += weight * (pose_.positions[v] + turned);
+                sum += weight;
+            }
+            carried[i] = place / sum;
+        }
+    });
+    return carried;
+}
+
+bool Stage::has_full_vertices() const {
+    return shown_ && pose_stamp_ != 0 && workbench_.full().size() == shown_->model().mesh.vertex_count();
+}
+
+/// The full deformation is drawn for the pose shown, or not at all.
 void Stage::follow_full() {
-    if (!shown_ || !settings_.split || workbench_.full().size() != shown_->model().mesh.vertex_count()) return;
-    const std::vector<Vec3f> positions(workbench_.full().begin(), workbench_.full().end());
-    background_.start("full",
-                      [this, positions, model = shown_->shared_model(),
-                       source = workbench_.state().source](const RunContext& context) -> Background::Delivery {
-                          SurfaceOptions options;
-                          options.materials = source->materials.materials;
-                          Result<DrawData> made =
-                              DrawData::surface(moved_mesh(model->mesh, positions), options, context);
-                          if (!made) return nullptr;
-                          return [this, source, data = std::make_shared<DrawData>(std::move(made).value())] {
-                              with_opengl_([&] {
-                                  Result<Drawable> drawable = Drawable::upload(std::move(*data));
-                                  if (drawable) full_ = std::move(drawable).value();
-                              });
-                              Q_EMIT changed(true);
-                          };
-                      });
+    const bool is_wanted = is_started_ && settings_.split && has_full_vertices();
+    if (is_wanted && full_asked_ == pose_stamp_) return;
+    if (full_) {
+        with_opengl_([this] { full_.reset(); });
+        Q_EMIT changed(false);
+    }
+    full_asked_ = is_wanted ? pose_stamp_ : 0;
+    full_error_.clear();
+    if (!is_wanted) return;
+    const auto fail = [this, stamp = pose_stamp_](const Error& error) {
+        if (stamp != full_asked_) return;
+        full_error_ = error.message;
+        Q_EMIT changed(false);
+    };
+    background_.start(
+        "full",
+        [this, fail, stamp = pose_stamp_,
+         positions = std::vector<Vec3f>(workbench_.full().begin(), workbench_.full().end()),
+         model = shown_->shared_model(),
+         source = workbench_.state().source](const RunContext& context) -> Background::Delivery {
+            SurfaceOptions options;
+            options.materials = source->materials.materials;
+            Result<DrawData> made = DrawData::surface(moved_mesh(model->mesh, positions), options, context);
+            if (context.is_cancelled()) return nullptr;
+            if (!made) return [fail, error = made.error()] { fail(error); };
+            return [this, fail, stamp, source, data = std::make_shared<DrawData>(std::move(made).value())] {
+                if (stamp != full_asked_) return; // of another moment
+                with_opengl_([&] {
+                    Result<Drawable> drawable = Drawable::upload(std::move(*data));
+                    if (!drawable) return fail(drawable.error());
+                    full_ = std::move(drawable).value();
+                });
+                Q_EMIT changed(true);
+            };
+        },
+        false, fail);
+}
+
+std::string Stage::full_problem() const {
+    if (full_ || pose_stamp_ == 0) return "";
+    if (!full_error_.empty()) return full_error_;
+    if (has_full_vertices() || workbench_.jobs().is_pending("full") || workbench_.jobs().is_pending("error"))
+        return "being computed";
+    if (workbench_.is_pulling()) return "computed when you let go";
+    if (workbench_.mode() == Mode::body)
+        return workbench_.is_playing() ? "being computed" : "known only where the simulation is, not for a recording";
+    if (workbench_.state().pose_from_file) return "not known for a pose that came from a file";
+    return "computed when the error is measured: pulls of so many vertices take long";
 }
 
 void Stage::follow_colors() {
     if (!shown_) return;
-    const auto put = [this](VertexColors colors) {
+    const auto put = [this](Coloring coloring, VertexColors colors) {
         colors_ = std::move(colors);
+        colors_are_ = coloring;
         color_stamp_ = ++last_stamp_;
         Q_EMIT changed(false);
     };
-    if (settings_.coloring == Coloring::own) {
-        if (color_stamp_ != 0) put({});
+    const auto put_none = [&] {
+        if (color_stamp_ != 0) put(Coloring::own, {});
         color_stamp_ = 0;
-        return;
-    }
+    };
     const std::size_t count = shown_->model().mesh.vertex_count();
-    if (settings_.coloring == Coloring::levels) {
-        if (color_stamp_ != 0 && colors_.values == shown_->arrival()) return;
-        const ValueRange levels = {0, static_cast<float>(std::max(1u, shown_->finest_level()))};
-        return put({shown_->arrival(), ColorMap::sequential, levels});
+    switch (settings_.coloring) {
+    case Coloring::own:
+        return put_none();
+    case Coloring::levels:
+        if (colors_are_ == Coloring::levels && color_stamp_ != 0) return;
+        return put(
+            Coloring::levels,
+            {shown_->arrival(), ColorMap::sequential, {0, static_cast<float>(std::max(1u, shown_->finest_level()))}});
+    case Coloring::error:
+        break;
     }
-    if (!workbench_.pose()) return put({std::vector<float>(count), ColorMap::sequential, {0, 1}});
-    if (workbench_.full().size() == count) {
-        std::vector<Vec3f> full(workbench_.full().begin(), workbench_.full().end());
-        background_.start("error colors",
-                          [put, this, full = std::move(full), pose = pose_, model = shown_->shared_model(),
-                           restore = workbench_.state().restore](const RunContext& context) -> Background::Delivery {
-                              RestoreOptions finest = restore;
-                              finest.level.reset();
-                              const Result<Restorer> restorer = Restorer::create(*model, finest, context);
-                              if (!restorer) return nullptr;
-                              const Result<std::vector<Vec3f>> restored = restorer->positions(pose, context);
-                              if (!restored || restored->size() != full.size()) return nullptr;
-                              return [this, put, model, colors = error_colors(*restored, full)] {
-                                  if (shown_ && shown_->shared_model() == model &&
-                                      settings_.coloring == Coloring::error)
-                                      put(colors);
-                              };
-                          });
-        return;
-    }
+    const double diagonal = bounds(shown_->model().mesh.positions).diagonal();
     const std::optional<VertexDistance>& error = workbench_.error();
-    if (error && error->per_vertex.size() == count)
-        put({error->per_vertex, ColorMap::sequential, legend_range(error->per_vertex, true)});
+    if (pose_stamp_ == 0) return put(Coloring::error, {std::vector<float>(count), ColorMap::sequential, {0, 0.01f}});
+    if (!has_full_vertices()) {
+        if (!error || error->per_vertex.size() != count) return put_none();
+        return put(Coloring::error, error_colors(error->per_vertex, diagonal));
+    }
+    if (colors_are_ != Coloring::error) put_none();
+    background_.start("error colors",
+                      [put, this, diagonal, stamp = pose_stamp_,
+                       full = std::vector<Vec3f>(workbench_.full().begin(), workbench_.full().end()), pose = pose_,
+                       model = shown_->shared_model(),
+                       restore = workbench_.state().restore](const RunContext& context) -> Background::Delivery {
+                          RestoreOptions finest = restore;
+                          finest.level.reset();
+                          const Result<Restorer> restorer = Restorer::create(*model, finest, context);
+                          if (!restorer) return nullptr;
+                          const Result<std::vector<Vec3f>> restored = restorer->positions(pose, context);
+                          if (!restored || restored->size() != full.size()) return nullptr;
+                          std::vector<float> distances(full.size());
+                          for (std::size_t v = 0; v < full.size(); ++v)
+                              distances[v] = ((*restored)[v] - full[v]).norm();
+                          return [this, put, stamp, model, colors = error_colors(std::move(distances), diagonal)] {
+                              if (shown_ && shown_->shared_model() == model && stamp == pose_stamp_ &&
+                                  settings_.coloring == Coloring::error)
+                                  put(Coloring::error, colors);
+                          };
+                      });
 }
 
 void Stage::follow_defects() {
@@ -336,6 +452,10 @@ double Stage::prepare(std::span<const unsigned> levels) {
     for (const unsigned number : levels) {
         ShownLevel* level = shown_->level(number);
         if (!level) continue;
+        if (number == 0 && levels[0] != 0 && settings_.driver && !settings_.split) {
+            pose_net();
+            continue;
+        }
         QElapsedTimer timer;
         timer.start();
         shown_->set_pose(*level, pose_, pose_stamp_, context);
@@ -343,6 +463,27 @@ double Stage::prepare(std::span<const unsigned> levels) {
         shown_->set_colors(*level, colors_, color_stamp_);
     }
     return spent;
+}
+
+/// The driver's vertices go towards the eye by as much as the detail may hide them: that changes nothing but what is in
+/// front, so its edges are one net over the shape.
+void Stage::pose_net() {
+    ShownLevel& net = *shown_->level(0);
+    const Camera& camera = workbench_.view().camera();
+    constexpr double kUnmeasured = 0.01, kMost = 0.05; // of the diagonal
+    const double diagonal = bounds(shown_->rest_pose().positions).diagonal();
+    const double offset = std::min(2 * shown_->facts()[0].deviation.value_or(kUnmeasured * diagonal), kMost * diagonal);
+    if (net.pose == net_stamp_ && net_pose_ == pose_stamp_ && net_eye_ == camera.eye && net_offset_ == offset) return;
+    net_pose_ = pose_stamp_;
+    net_eye_ = camera.eye;
+    net_offset_ = offset;
+    net_stamp_ = ++last_stamp_;
+    const Vec3f eye = (camera.eye - origin()).cast<float>(), back = camera.basis().col(2).cast<float>();
+    Pose near = pose_;
+    if (near.gradients.empty()) near.gradients.assign(near.positions.size(), Mat3f::Identity());
+    for (Vec3f& p : near.positions)
+        p += float(offset) * (camera.field_of_view_deg > 0 ? Vec3f((eye - p).normalized()) : back);
+    shown_->set_pose(net, near, net_stamp_, RunContext());
 }
 
 Scene Stage::scene(Content content, unsigned level, std::optional<unsigned> from, double part,
@@ -360,6 +501,7 @@ Scene Stage::scene(Content content, unsigned level, std::optional<unsigned> from
     if (!look.surface && dark) look.edge_color = {0.80f, 0.82f, 0.85f};
     if (look.surface) look.edge_width = 1;
     look.clip = clip();
+    look.own_colors = settings_.coloring == Coloring::own || !colors_.values.empty(); // grey: not known
     const auto add = [&](unsigned number, Appearance appearance) {
         ShownLevel* shown = shown_ ? shown_->level(number) : nullptr;
         if (shown) scene.objects.push_back({&shown->drawable, appearance});
@@ -381,11 +523,14 @@ Scene Stage::scene(Content content, unsigned level, std::optional<unsigned> from
         balls.color = kParticles;
         scene.objects.push_back({&*particles_, balls});
     } else {
-        Appearance coming = look, going = look;
+        Appearance coming = look;
         if (from) {
-            coming.coverage = static_cast<float>(part);
+            Appearance going = look;
             going.coverage = static_cast<float>(-part);
             add(*from, going);
+            coming.coverage = static_cast<float>(part);
+        } else if (inside_ && !settings_.clip) {
+            coming.coverage = kSeenThrough;
         }
         add(level, coming);
         if (settings_.driver && level > 0) {
@@ -401,6 +546,7 @@ Scene Stage::scene(Content content, unsigned level, std::optional<unsigned> from
         if (inside_) {
             Appearance balls;
             balls.color = kInsidePoints;
+            balls.clip = look.clip;
             scene.objects.push_back({&*inside_, balls});
         }
     }

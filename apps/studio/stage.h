@@ -11,12 +11,14 @@
 
 namespace filigree::studio {
 
-/// An edge that a closed, manifold mesh would not have. Vertices of the finest mesh.
+/// An edge that a closed, oriented manifold mesh would not have, or, with a = b, a corner of a face without area.
+/// Vertices of the finest mesh.
 struct DefectEdge {
     Index a = 0, b = 0;
-    bool is_open = false; ///< else it has three faces or more
+    bool is_open = false;
+    bool is_opposed = false; ///< its two faces run along it the same way; neither: it has three faces or more
 };
-/// All of them, ascending. Cost O(corners log corners).
+/// All of them, by the rules of TopologyReport: edges, ascending, then faces. Cost O(corners log corners).
 std::vector<DefectEdge> defect_edges(const Mesh& mesh);
 
 class Stage : public QObject {
@@ -38,9 +40,8 @@ public:
     bool is_preparing() const { return next_ != nullptr; }  ///< what is drawn is not the document's any more
     const std::string& problem() const { return problem_; } ///< why the document cannot be drawn; "" when it can
 
-    /// Where the driver of the model shown is, and a number that changes with it.
+    /// Where the driver of the model shown is.
     const Pose& pose() const { return pose_; }
-    std::uint64_t pose_stamp() const { return pose_stamp_; }
 
     /// The level meant when nothing is in a hurry.
     unsigned calm_level(double pixels_a_unit);
@@ -52,7 +53,8 @@ public:
     /// One tile's objects. `from` melts into `level`; part: of `level`.
     enum class Content { driver, restored, full };
     Scene scene(Content content, unsigned level, std::optional<unsigned> from, double part, const QPalette& palette);
-    bool has_full() const { return full_.has_value() || workbench_.pose() == nullptr; }
+    /// Why the full deformation of the pose shown is not there (yet), for its tile; "" when it is.
+    std::string full_problem() const;
 
     /// Positions of a level as posed, relative to the origin; kept until the pose changes.
     std::span<const Vec3f> positions(unsigned level);
@@ -76,6 +78,9 @@ private:
     void follow_particles();
     void follow_surroundings();
     void follow_inside_points();
+    std::vector<Vec3f> carried_inside_points() const;
+    void pose_net();
+    bool has_full_vertices() const;
     void follow_full();
     void follow_colors();
     void follow_defects();
@@ -94,14 +99,22 @@ private:
 
     std::optional<Drawable> particles_, inside_, full_;
     std::shared_ptr<const MadeBody> particles_of_, surroundings_of_;
+    std::uint64_t full_asked_ = 0; ///< which pose the full deformation is of, or will be; 0: none
+    std::string full_error_;       ///< why it cannot be drawn
     std::vector<Drawable> obstacles_;
     VertexColors colors_;
     std::uint64_t color_stamp_ = 0;
+    Coloring colors_are_ = Coloring::own;
     std::vector<DefectEdge> defects_;
     std::shared_ptr<const Model> defects_of_;
     bool inside_points_stale_ = false;               ///< other points have come than are drawn
     std::shared_ptr<const Source> inside_points_of_; ///< asked for of it, so many
     std::size_t inside_points_asked_ = 0;
+    std::uint64_t inside_pose_ = 0; ///< which pose the points inside have
+    // The driver's edges over the mesh: drawn nearer to the eye than they are.
+    std::uint64_t net_stamp_ = 0, net_pose_ = 0;
+    Vec3d net_eye_ = Vec3d::Zero();
+    double net_offset_ = 0;
     unsigned by_size_ = 0;  ///< the level chosen by size on screen
     ViewSettings settings_; ///< as last followed
 

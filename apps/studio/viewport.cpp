@@ -27,7 +27,8 @@ constexpr std::size_t kLarge = 40'000;      // triangles: from here on coarser l
 constexpr double kFlight = 0.25;            // s on the way to another camera
 constexpr double kHintFades = 0.8;          // s
 constexpr int kHoverAfter = 25;             // ms
-constexpr double kKnobRadius = 12;          // pixels around a gizmo's knob that take hold of it
+constexpr double kKnobRadius = 9;           // pixels around a gizmo's knob that take hold of it
+constexpr double kKnobMargin = 16;          // pixels between an arrow's knob and the picture's border
 constexpr std::size_t kMostDefects = 5'000; // edges drawn
 constexpr double kDegreesAPixel = 0.4;
 constexpr double kZoomAStep = 1.15; // of the wheel
@@ -86,6 +87,7 @@ struct Viewport::Content {
     Box fitted_box;
     std::string fitted_name;
     bool was_split = false;
+    std::shared_ptr<const MadeBody> framed_body; ///< that the view was widened for
 
     // Pointer
     Drag drag = Drag::none;
@@ -138,6 +140,8 @@ struct Viewport::Content {
     QPointF in_tile(const QPointF& point) const;
     QPointF from_tile(const Vec3d& place, int tile) const;
     void fit(const Vec3d& direction, bool may_fly);
+    Box body_room() const;
+    void follow_body();
     void fly_to_camera(const Camera& camera);
     void stop_flight();
     void follow_opened();
@@ -196,6 +200,8 @@ Viewport::Viewport(Workbench& workbench, QWidget* parent)
         c.touch(false);
     });
     connect(&workbench, &Workbench::opened, this, [&c] { c.follow_opened(); });
+    connect(&workbench, &Workbench::mode_changed, this, [&c] { c.follow_body(); });
+    connect(&workbench.playback(), &Playback::state_changed, this, [&c] { c.follow_body(); });
 }
 
 Viewport::~Viewport() {
@@ -203,6 +209,7 @@ Viewport::~Viewport() {
     if (context()) disconnect(context(), nullptr, this, nullptr); // it goes after what it would give back
     if (!c.stage.is_started() || !isValid()) return;
     makeCurrent();
+    c.pass_timer.stop();
     c.stage.stop();
     c.drawing.clear();
     doneCurrent();
@@ -234,6 +241,7 @@ void Viewport::initializeGL() {
                       "; install a newer graphics driver, or start with LIBGL_ALWAYS_SOFTWARE=1.");
     connect(context(), &QOpenGLContext::aboutToBeDestroyed, this, [this, &c] {
         makeCurrent();
+        c.pass_timer.stop();
         c.stage.stop();
         c.drawing.clear();
         doneCurrent();
@@ -443,6 +451,7 @@ void Viewport::Content::draw_preview() {
     if (restore > 0 && had_pose_moves && levels.size() == 1 && stage.shown()->where() == RestoreOn::cpu)
         cost.learn_restoring(restore, facts.vertices);
     was_drawn = true;
+    timings.part = melts ? change.part() : 1;
     note_timings(draw, restore);
     update_overlay();
     if (change.from()) touch(false);
@@ -534,11 +543,9 @@ QPointF Viewport::Content::from_tile(const Vec3d& place, int tile) const {
 void Viewport::Content::fit(const Vec3d& direction, bool may_fly) {
     Box box = stage.box();
     if (box.empty()) return;
-    const Vec3d up = up_vector(settings().up);
-    if (const auto made = workbench.playback().made();
-        made && workbench.mode() == Mode::body && made->surroundings.has_ground) {
-        const double level = made->surroundings.ground_level + up.dot(stage.origin());
-        box.extend(box.centre() + (level - up.dot(box.centre())) * up);
+    if (const Box room = body_room(); workbench.mode() == Mode::body && !room.empty()) {
+        box.extend(room.min);
+        box.extend(room.max);
     }
     stop_flight();
     const Camera from = camera();
@@ -547,6 +554,57 @@ void Viewport::Content::fit(const Vec3d& direction, bool may_fly) {
     fitted_box = box;
     const bool was_seen = std::exchange(was_fitted, true);
     if (may_fly && was_seen && is_animated) fly_to_camera(from);
+}
+
+/// Where the body starts, what it falls on and what stands around it; empty without a body.
+Box Viewport::Content::body_room() const {
+    const auto made = workbench.playback().made();
+    Box room;
+    if (!made) return room;
+    const Vec3d origin = made->model->mesh.origin;
+    room = world_bounds(made->model->mesh);
+    const Surroundings& around = made->surroundings;
+    if (around.has_ground) {
+        int axis = 0;
+        up_vector(settings().up).maxCoeff(&axis);
+        Vec3d low = room.min, high = room.max;
+        low[axis] = high[axis] = origin[axis] + around.ground_level;
+        room.extend(low);
+        room.extend(high);
+    }
+    for (const Mesh& obstacle : around.obstacles) {
+        const Box box = bounds(obstacle.positions);
+        room.extend(origin + box.min);
+        room.extend(origin + box.max);
+    }
+    return room;
+}
+
+/// A body that falls out of the picture would be a pity: the view is widened when it is made, never narrowed.
+void Viewport::Content::follow_body() {
+    const auto made = workbench.mode() == Mode::body ? workbench.playback().made() : nullptr;
+    if (made == framed_body) return;
+    framed_body = made;
+    const Box room = body_room();
+    if (!made || !was_fitted || room.empty()) return;
+    const PictureSize size = tile_size();
+    bool is_seen = true;
+    for (int k = 0; k < 8; ++k) {
+        const Vec3d corner(k & 1 ? room.max.x() : room.min.x(), k & 2 ? room.max.y() : room.min.y(),
+                           k & 4 ? room.max.z() : room.min.z());
+        const Vec3d at = camera().project(corner, size.width, size.height);
+        is_seen = is_seen && at.z() > 0 && at.x() >= 0 && at.y() >= 0 && at.x() <= size.width && at.y() <= size.height;
+    }
+    if (is_seen) return;
+    stop_flight();
+    const Camera from = camera();
+    ViewState& view = workbench.view();
+    view.fit(room, (from.eye - from.target).normalized(), size.aspect());
+    fitted = camera();
+    fitted_box = room;
+    const double before = (from.eye - from.target).norm(), after = (fitted.eye - fitted.target).norm();
+    if (before > after) view.set_zoom(after / before);
+    if (is_animated) fly_to_camera(from);
 }
 
 void Viewport::Content::fly_to_camera(const Camera& from) {
@@ -631,7 +689,21 @@ bool Viewport::Content::shows_gizmos() const {
 }
 
 std::vector<GizmoShape> Viewport::Content::gizmos() const {
-    return shows_gizmos() ? gizmo_shapes(workbench.state().warps, rest_box()) : std::vector<GizmoShape>();
+    if (!shows_gizmos()) return {};
+    std::vector<GizmoShape> shapes = gizmo_shapes(workbench.state().warps, rest_box(), camera().eye - camera().target);
+    const PictureSize size = tile_size();
+    const auto is_inside = [&](const Vec3d& place) {
+        const Vec3d at = camera().project(place, size.width, size.height);
+        return at.z() > 0 && std::min({at.x(), at.y(), size.width - at.x(), size.height - at.y()}) >= kKnobMargin;
+    };
+    // An arrow that leaves the picture is shorter, so that its knob can be reached.
+    for (GizmoShape& shape : shapes) {
+        if (!shape.has_tip || !is_inside(shape.line.front())) continue;
+        const Vec3d from = shape.line.front(), way = shape.knob - from;
+        for (double part = 0.9; part > 0.05 && !is_inside(shape.knob); part -= 0.1)
+            shape.knob = shape.line.back() = from + part * way;
+    }
+    return shapes;
 }
 
 void Viewport::mousePressEvent(QMouseEvent* event) {
@@ -872,20 +944,19 @@ void Viewport::Content::update_overlay() {
             content.captions = {{"Driver", count_of(shown->facts()[0].vertices, "vertices"), tile(0)},
                                 {"Restored", count_of(facts.vertices, "vertices"), tile(1)},
                                 {"Full deformation",
-                                 stage.has_full() ? count_of(shown->model().mesh.vertex_count(), "vertices")
-                                                  : QString("being computed"),
+                                 stage.full_problem().empty() ? count_of(shown->model().mesh.vertex_count(), "vertices")
+                                                              : QString::fromStdString(stage.full_problem()),
                                  tile(2)}};
         }
         const VertexColors& colors = stage.colors();
         if (!colors.values.empty() && settings().coloring != Coloring::own) {
             const bool is_error = settings().coloring == Coloring::error;
-            const double diagonal = rest_box().diagonal();
             content.legend = OverlayContent::Legend{is_error ? "Distance from the full deformation"
                                                              : "Level at which a vertex comes in",
                                                     is_error ? "% of the diagonal" : "",
                                                     colors.map,
                                                     colors.range,
-                                                    is_error && diagonal > 0 ? 100 / diagonal : 1,
+                                                    is_error ? 100.0 : 1.0,
                                                     !is_error};
         }
         overlay_tools(content);

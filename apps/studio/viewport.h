@@ -13,6 +13,7 @@ struct Timings {
     double frames_per_second = 0;             ///< drawn, while things move
     std::size_t vertices = 0, triangles = 0;  ///< of the mesh as drawn
     unsigned level = 0;                       ///< drawn; may be coarser than the document's
+    double part = 1;                          ///< of the level that is drawn, while another melts into it
     std::string renderer;                     ///< what OpenGL calls itself
 };
 

@@ -319,6 +319,80 @@ TEST(Viewport, ADragPullsABody) {
     stand.workbench.wait_until_idle();
 }
 
+TEST(Viewport, ABodyAndTheGroundBelowItAreInThePicture) {
+    Stand stand("wavy-sphere", 16);
+    ASSERT_TRUE(stand.is_ready());
+    ViewState& view = stand.workbench.view();
+    const Camera before = view.camera();
+    BodySettings body = stand.workbench.state().body;
+    body.particles = 300;
+    body.drop = 1;
+    stand.workbench.set_body(body);
+    stand.workbench.make_body();
+    stand.workbench.wait_until_idle();
+    const auto made = stand.workbench.playback().made();
+    ASSERT_TRUE(made && made->surroundings.has_ground);
+    const auto is_seen = [&](const Vec3d& place) {
+        return stand.viewport->rect().contains(stand.viewport->place_of(place).toPoint());
+    };
+    const Vec3d ground(0, made->surroundings.ground_level, 0);
+    EXPECT_TRUE(is_seen(ground)) << made->surroundings.ground_level;
+    EXPECT_TRUE(is_seen(Vec3d(0, 0.5, 0)));
+    const auto direction = [](const Camera& camera) { return (camera.eye - camera.target).normalized(); };
+    EXPECT_LT((direction(view.camera()) - direction(before)).norm(), 1e-9);
+    EXPECT_GT((view.camera().eye - view.camera().target).norm(), (before.eye - before.target).norm());
+
+    // What is far enough away stays where it is; what shows all shows the ground too.
+    view.set_zoom(0.5);
+    const Camera far = view.camera();
+    stand.workbench.make_body();
+    stand.workbench.wait_until_idle();
+    EXPECT_EQ(view.camera().eye, far.eye);
+    stand.viewport->show_all();
+    EXPECT_TRUE(is_seen(ground));
+    EXPECT_TRUE(is_seen(Vec3d(0, 0.5, 0)));
+}
+
+TEST(Viewport, PointsInsideAreSeenAndFollowThePose) {
+    Stand stand("wavy-cube", 24);
+    ASSERT_TRUE(stand.is_ready());
+    stand.set([](ViewSettings& s) { s.clip = true; });
+    const QImage without = stand.picture();
+    stand.set([](ViewSettings& s) {
+        s.inside_points = true;
+        s.inside_count = 500;
+    });
+    stand.workbench.wait_until_idle();
+    // Balls that are much bluer than anything else here.
+    const auto blue = [](const QImage& picture) {
+        std::size_t count = 0;
+        for (int y = 0; y < picture.height(); ++y)
+            for (int x = 0; x < picture.width(); ++x)
+                count += qBlue(picture.pixel(x, y)) > qRed(picture.pixel(x, y)) + 40;
+        return count;
+    };
+    const QImage rest = stand.picture();
+    EXPECT_EQ(blue(without), 0u);
+    EXPECT_GT(blue(rest), 2000u);
+    Warps warps;
+    warps.stretch = 0.4;
+    stand.workbench.set_warps(warps);
+    stand.workbench.wait_until_idle();
+    const QImage flat = stand.picture();
+    EXPECT_GT(blue(flat), 800u);
+    const auto height = [](const QImage& picture) { // of what is blue
+        int first = picture.height(), last = 0;
+        for (int y = 0; y < picture.height(); ++y)
+            for (int x = 0; x < picture.width(); ++x)
+                if (qBlue(picture.pixel(x, y)) > qRed(picture.pixel(x, y)) + 40) {
+                    first = std::min(first, y);
+                    last = std::max(last, y);
+                }
+        return last - first;
+    };
+    EXPECT_LT(height(flat), 0.8 * height(rest)) << "they stayed behind";
+}
+
 TEST(Viewport, SplitShowsThreePictures) {
     Stand stand;
     stand.window.resize(480, 240);
@@ -353,10 +427,10 @@ TEST(Viewport, SplitShowsThreePictures) {
 }
 
 TEST(Viewport, TheLevelFollowsTheDistance) {
-    Stand stand("wavy-cube", 64);
+    Stand stand("wavy-cube", 32);
     stand.window.resize(220, 180);
     ASSERT_TRUE(stand.is_ready());
-    ASSERT_GE(stand.workbench.state().model->finest_level(), 2u);
+    ASSERT_GE(stand.workbench.state().model->finest_level(), 1u);
     stand.set([](ViewSettings& s) { s.level_by_distance = true; });
     ViewState& view = stand.workbench.view();
     std::vector<std::size_t> counts;
@@ -379,36 +453,40 @@ TEST(Viewport, TheLevelFollowsTheDistance) {
     EXPECT_EQ(stand.viewport->timings().vertices, counts.front()) << "switched off";
 }
 
-/// Over a change of level the pictures differ from each other as they do where there is none.
+/// One level melts into the other while pictures are drawn, and over the change the pictures differ from each other as
+/// they do where there is none.
 TEST(Viewport, LevelsChangeWithoutPops) {
-    Stand stand("wavy-cube", 64);
-    stand.window.resize(220, 180);
-    ASSERT_TRUE(stand.is_ready());
+    Stand stand("wavy-cube", 32);
+    stand.window.resize(200, 160);
     stand.set([](ViewSettings& s) { s.level_by_distance = true; });
     ViewState& view = stand.workbench.view();
-    view.set_zoom(1);
-    stand.viewport->finish_drawing();
-    std::vector<double> steps;
-    std::vector<bool> changes;
-    QImage last;
-    unsigned level = 0;
-    for (double zoom = 0.8; zoom > 0.1; zoom *= 0.9) {
+    ASSERT_TRUE(stand.is_drawn());
+    const auto level = [&] { return stand.viewport->timings().level; };
+    std::vector<double> parts;
+    QObject::connect(stand.viewport, &Viewport::timings_changed, stand.viewport,
+                     [&] { parts.push_back(stand.viewport->timings().part); });
+    double zoom = 1;
+    const unsigned finest = level();
+    for (; zoom > 0.02 && level() == finest; zoom *= 0.8) {
+        parts.clear();
         view.set_zoom(zoom);
-        const QImage picture = stand.picture();
-        if (!last.isNull()) {
-            steps.push_back(difference(last, picture, picture.rect()));
-            changes.push_back(stand.viewport->timings().level != level);
-        }
-        level = stand.viewport->timings().level;
-        last = picture;
+        ASSERT_TRUE(QTest::qWaitFor([&] { return !parts.empty(); }, kPatience));
     }
-    std::size_t crossed = 0;
-    for (std::size_t i = 1; i + 1 < steps.size(); ++i) {
-        if (!changes[i]) continue;
-        ++crossed;
-        EXPECT_LT(steps[i], 1.25 * std::max(steps[i - 1], steps[i + 1]) + 0.3) << "at step " << i;
+    ASSERT_LT(level(), finest);
+    ASSERT_TRUE(QTest::qWaitFor([&] { return parts.back() == 1; }, kPatience));
+    EXPECT_TRUE(std::is_sorted(parts.begin(), parts.end()));
+    EXPECT_GT(std::count_if(parts.begin(), parts.end(), [](double part) { return part > 0 && part < 1; }), 0)
+        << "the level pops";
+
+    // Whole pictures, before and after the change.
+    zoom /= 0.8;
+    std::vector<QImage> pictures;
+    for (const double factor : {1.5, 1.35, 1.21, 1.0}) {
+        view.set_zoom(zoom * factor);
+        pictures.push_back(stand.picture());
     }
-    EXPECT_GT(crossed, 0u);
+    const auto step = [&](std::size_t i) { return difference(pictures[i - 1], pictures[i], pictures[i].rect()); };
+    EXPECT_LT(step(3), 1.5 * std::max(step(1), step(2)) + 0.3);
 }
 
 TEST(Viewport, GizmosDragTheWarps) {
