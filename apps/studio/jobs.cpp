@@ -5,6 +5,7 @@
 #include <QCoreApplication>
 #include <QEventLoop>
 
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <deque>
@@ -184,6 +185,12 @@ void Jobs::drop(const std::string& topic) {
             entry->is_replaced = true;
             entry->context.cancel();
         }
+}
+
+bool Jobs::is_pending(const std::string& topic) const {
+    return std::any_of(content_->entries.begin(), content_->entries.end(), [&](const auto& entry) {
+        return entry->job.topic == topic && !entry->is_replaced && !entry->context.is_cancelled();
+    });
 }
 
 void Jobs::wait_until_idle() {

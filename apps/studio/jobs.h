@@ -37,11 +37,12 @@ public:
              [done = std::move(done), value] { done(std::move(**value)); }});
     }
 
-    bool is_busy() const;                ///< something runs or waits
-    QString title() const;               ///< of what runs; "" when nothing does
-    QString phase() const;               ///< what it is at, in the library's words
-    double fraction() const;             ///< done of that phase, 0 to 1
-    void cancel();                       ///< what runs, and all that waits
+    bool is_busy() const;                            ///< something runs or waits
+    QString title() const;                           ///< of what runs; "" when nothing does
+    QString phase() const;                           ///< what it is at, in the library's words
+    double fraction() const;                         ///< done of that phase, 0 to 1
+    void cancel();                                   ///< what runs, and all that waits
+    bool is_pending(const std::string& topic) const; ///< such work runs or waits, neither cancelled nor dropped
     void drop(const std::string& topic); ///< work that nobody needs any more: cancelled, and nothing is told of it
     /// Returns when nothing runs or waits any more; deliveries happen inside. For tests, scripts and closing.
     void wait_until_idle();

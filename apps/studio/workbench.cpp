@@ -170,6 +170,7 @@ void Workbench::follow_document(const State& before) {
         playback_.remove();
     }
     if (now.source != before.source) inside_points_.clear();
+    if (now.model != before.model) jobs_.drop(kModelTopic); // what is being made was meant for the one before
     if (is_pulling_ && drag_.is_active()) {
         drag_.stop(); // something else has changed meanwhile, an undo say
         is_pulling_ = false;
@@ -318,40 +319,55 @@ void Workbench::wait_until_idle() {
 
 // ------------------------------------------------------------------------------------------------- model and detail
 
+const std::optional<Shape>& Workbench::wanted_shape() const {
+    return jobs_.is_pending(kModelTopic) ? content_->wanted_shape : state().shape;
+}
+
+const StripOptions& Workbench::wanted_strip() const {
+    return jobs_.is_pending(kModelTopic) ? content_->wanted_strip : state().strip;
+}
+
 void Workbench::make_shape(const Shape& shape, const std::string& merge) {
-    if (state().shape == shape) return;
-    State next = state();
-    const bool is_another = !next.shape || next.shape->name != shape.name;
-    if (is_another) next.strip = {};
-    forget_measuring();
-    jobs_.start<State>(
-        "Making the " + shape_title(shape.name).toLower(), "model",
-        [next = std::move(next), shape](const RunContext& context) { return state_of_shape(next, shape, context); },
-        [this, is_another, key = document_.merge_key(merge)](const State& made) {
-            State now = state(); // warps and settings may have changed meanwhile
-            const Shape before = now.shape.value_or(Shape{.name = "", .options = {}});
-            now.source = made.source;
-            now.shape = made.shape;
-            take_model(now, made);
-            content_->is_another_shape = is_another;
-            document_.change(name_of_change(before, *made.shape), std::move(now), key);
-            content_->is_another_shape = false;
-        });
+    if (wanted_shape() == shape) return;
+    const bool is_another = !wanted_shape() || wanted_shape()->name != shape.name;
+    make_model("Making the " + shape_title(shape.name).toLower(), shape, is_another ? StripOptions() : wanted_strip(),
+               merge);
 }
 
 void Workbench::set_strip(const StripOptions& options, const std::string& merge) {
+    make_model("Taking the detail off", wanted_shape(), options, merge);
+}
+
+/// In the background. Shape and options go together, so that a change of one does not lose one of the other that is
+/// still being made.
+void Workbench::make_model(const QString& title, std::optional<Shape> shape, const StripOptions& strip,
+                           const std::string& merge) {
+    if (jobs_.is_pending(kOpenTopic)) {
+        Q_EMIT told("A file is being opened: change the model once it is there, or cancel.", true);
+        return;
+    }
     State next = state();
-    next.strip = options;
+    next.strip = strip;
+    const bool is_new_shape = shape != next.shape;
+    content_->wanted_shape = shape;
+    content_->wanted_strip = strip;
     forget_measuring();
     jobs_.start<State>(
-        "Taking the detail off", "model",
-        [next = std::move(next)](const RunContext& context) { return stripped_state(next, context); },
-        [this, key = document_.merge_key(merge)](const State& made) {
-            State now = state();
-            if (now.source != made.source) return;
-            const QString name = name_of_change(now.strip, made.strip);
+        title, kModelTopic,
+        [next = std::move(next), shape = std::move(shape), is_new_shape](const RunContext& context) {
+            return is_new_shape ? state_of_shape(next, *shape, context) : stripped_state(next, context);
+        },
+        [this, is_new_shape, key = document_.merge_key(merge)](const State& made) {
+            State now = state(); // warps and settings may have changed meanwhile
+            const Shape before = now.shape.value_or(Shape{.name = "", .options = {}});
+            const QString name =
+                is_new_shape ? name_of_change(before, *made.shape) : name_of_change(now.strip, made.strip);
+            content_->is_another_shape = is_new_shape && before.name != made.shape->name;
+            now.source = made.source;
+            now.shape = made.shape;
             take_model(now, made);
             document_.change(name, std::move(now), key);
+            content_->is_another_shape = false;
         });
 }
 
@@ -541,6 +557,14 @@ void Workbench::end_pull() {
     next.handles.push_back(std::move(pull));
     next.handle_pose = std::move(pose);
     document_.change("Pull", std::move(next));
+}
+
+void Workbench::cancel_pull() {
+    if (!is_pulling_) return;
+    if (content_->pulls_body) return end_pull();
+    drag_.stop();
+    is_pulling_ = false;
+    show_pose();
 }
 
 // ------------------------------------------------------------------------------------------------------------- body

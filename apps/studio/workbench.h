@@ -42,8 +42,11 @@ public:
 
     // Model
     void make_shape(const Shape& shape, const std::string& merge = {});
+    /// The shape that is being made, else the one there is: where the next change starts from.
+    const std::optional<Shape>& wanted_shape() const;
     // Detail
     void set_strip(const StripOptions& options, const std::string& merge = {}); ///< strips again
+    const StripOptions& wanted_strip() const;                                   ///< as being stripped, else as it is
     void set_level(unsigned level, const std::string& merge = {});
     void remove_detail(); ///< one level coarser
     void add_detail();    ///< one level finer
@@ -60,6 +63,7 @@ public:
     void begin_pull(Index vertex, const Vec3d& at);
     void pull_to(const Vec3d& target);
     void end_pull();
+    void cancel_pull(); ///< the shape is what it was before; a body is let go
     bool is_pulling() const { return is_pulling_; }
     // Body
     void set_body(const BodySettings& settings, const std::string& merge = {}); ///< a body that was made is made again
@@ -101,6 +105,7 @@ Q_SIGNALS:
     void error_measured();
     void inside_points_ready();
     void opened();                                     ///< another mesh or model than before
+    void saved(const std::string& path);               ///< by save_model
     void told(const QString& sentence, bool is_error); ///< for the window's message bar
 
 private:
@@ -115,6 +120,8 @@ private:
     void forget_measuring();
     void full_is_new();
     void show_drag(const std::shared_ptr<const Pose>& pose, double milliseconds);
+    void make_model(const QString& title, std::optional<Shape> shape, const StripOptions& strip,
+                    const std::string& merge);
     void take_model(State& now, const State& made) const;
     void change_level(unsigned level, const QString& name, const std::string& merge);
     void make_body_then(After then);

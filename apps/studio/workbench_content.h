@@ -11,6 +11,9 @@ namespace filigree::studio {
 Result<State> stripped_state(State state, const RunContext& context);
 Result<State> state_of_shape(State state, const Shape& shape, const RunContext& context);
 
+// Topics of work.
+inline const std::string kModelTopic = "model", kOpenTopic = "open";
+
 struct Workbench::Content {
     RunContext context;            ///< of what is done at once
     std::uint64_t pose_number = 0; ///< of the pose shown: what was measured of an older one is dropped
@@ -20,6 +23,10 @@ struct Workbench::Content {
     Vec3d grabbed = Vec3d::Zero();
     Handle pull;
     bool pulls_body = false;
+
+    // What make_shape() and set_strip() asked for last, while it is being made.
+    std::optional<Shape> wanted_shape;
+    StripOptions wanted_strip;
 
     QTimer replay;
     After then = After::nothing; ///< once the body is made

@@ -173,8 +173,9 @@ Result<QString> write_frames(const State& state, const PoseSequence& poses, cons
 
 void Workbench::open(const std::string& path) {
     forget_measuring();
+    jobs_.drop(kModelTopic);
     jobs_.start<State>(
-        "Opening " + file_name(path), "model",
+        "Opening " + file_name(path), kOpenTopic,
         [path, body = state().body](const RunContext& context) -> Result<State> {
             Result<State> state = read_state(path, context);
             if (!state) return about(path, state.error());
@@ -231,8 +232,9 @@ void Workbench::save_model(const std::string& path) {
             if (!has_motion && has_pose) kept = " as it is deformed";
             return QString("Saved %1%2.").arg(file_name(path), kept);
         },
-        [this, id] {
+        [this, id, path] {
             if (document_.state_id() == id) document_.set_saved();
+            Q_EMIT saved(path);
         });
 }
 
