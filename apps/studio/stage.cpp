@@ -60,7 +60,7 @@ std::vector<DefectEdge> defect_edges(const Mesh& mesh) {
         std::vector<Index> once = corners;
         std::sort(once.begin(), once.end());
         const bool repeats = std::adjacent_find(once.begin(), once.end()) != once.end();
-        if (!corners.empty() && (repeats || corners.size() != mesh.face(face).size() || area.norm() < least_area))
+        if (!corners.empty() && (repeats || corners.size() != mesh.face(face).size() || !(area.norm() > least_area)))
             flat.push_back(corners[0]);
         for (std::size_t k = 0; corners.size() > 2 && k < corners.size(); ++k) {
             const Index a = corners[k], b = corners[(k + 1) % corners.size()];
@@ -502,9 +502,11 @@ Scene Stage::scene(Content content, unsigned level, std::optional<unsigned> from
     if (look.surface) look.edge_width = 1;
     look.clip = clip();
     look.own_colors = settings_.coloring == Coloring::own || !colors_.values.empty(); // grey: not known
-    const auto add = [&](unsigned number, Appearance appearance) {
+    const auto add = [&](unsigned number, const Appearance& appearance, float coverage = 1) {
         ShownLevel* shown = shown_ ? shown_->level(number) : nullptr;
-        if (shown) scene.objects.push_back({&shown->drawable, appearance});
+        if (!shown) return;
+        scene.objects.push_back({&shown->drawable, appearance});
+        scene.objects.back().appearance.coverage = coverage;
     };
 
     if (content == Content::driver) {
@@ -523,16 +525,9 @@ Scene Stage::scene(Content content, unsigned level, std::optional<unsigned> from
         balls.color = kParticles;
         scene.objects.push_back({&*particles_, balls});
     } else {
-        Appearance coming = look;
-        if (from) {
-            Appearance going = look;
-            going.coverage = static_cast<float>(-part);
-            add(*from, going);
-            coming.coverage = static_cast<float>(part);
-        } else if (inside_ && !settings_.clip) {
-            coming.coverage = kSeenThrough;
-        }
-        add(level, coming);
+        const bool sees_inside = inside_ && !settings_.clip;
+        if (from) add(*from, look, static_cast<float>(-part));
+        add(level, look, from ? static_cast<float>(part) : sees_inside ? kSeenThrough : 1.0f);
         if (settings_.driver && level > 0) {
             Appearance driver;
             driver.surface = false;
