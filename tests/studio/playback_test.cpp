@@ -12,6 +12,10 @@
 namespace filigree::studio {
 namespace {
 
+Material material_named(std::string_view name) {
+    return std::ranges::find(named_materials(), name, &NamedMaterial::name)->material;
+}
+
 State ball_state(const BodySettings& body = {}) {
     State state;
     ShapeOptions options;
@@ -25,7 +29,7 @@ State ball_state(const BodySettings& body = {}) {
     state.restore.level = state.model->finest_level();
     state.body = body;
     state.body.particles = 300;
-    state.body.material = named_materials()[1].material; // jelly
+    state.body.material = material_named("jelly");
     return state;
 }
 

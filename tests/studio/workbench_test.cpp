@@ -22,6 +22,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
+Material material_named(std::string_view name) {
+    return std::ranges::find(named_materials(), name, &NamedMaterial::name)->material;
+}
+
 /// A workbench with what it told, and a folder for files.
 class WorkbenchTest : public testing::Test {
 protected:
@@ -79,7 +83,7 @@ TEST_F(WorkbenchTest, StartsWithTheWavyCube) {
     EXPECT_EQ(bench.mode(), Mode::deform);
     EXPECT_EQ(bench.pose(), nullptr);
     EXPECT_EQ(bench.frame_count(), 0u);
-    EXPECT_EQ(state().body.material.young_modulus, named_materials()[0].material.young_modulus);
+    EXPECT_EQ(state().body.material.young_modulus, material_named("soft-rubber").young_modulus);
 }
 
 TEST_F(WorkbenchTest, FrequencyIsASliderThatIsOneStep) {
@@ -551,7 +555,7 @@ TEST_F(WorkbenchTest, BodySettingsMakeTheBodyAgain) {
     simulate(3);
     BodySettings body = state().body;
     body.preset = "jelly";
-    body.material = named_materials()[1].material;
+    body.material = material_named("jelly");
     bench.set_body(body);
     bench.wait_until_idle();
     EXPECT_EQ(undo_stack().undoText(), "Material: jelly");
