@@ -1,19 +1,24 @@
 #include "background.h"
 
+#include "bell.h"
+
 #include <algorithm>
 #include <condition_variable>
 #include <deque>
 #include <mutex>
+#include <new>
 #include <thread>
+#include <utility>
 
 namespace filigree::studio {
 
-namespace {
-
-struct Task {
+struct Background::Task {
     std::string topic;
-    Background::Work work;
+    Work work;
+    Otherwise otherwise;
 };
+
+namespace {
 
 struct Done {
     std::string topic;
@@ -30,6 +35,7 @@ struct Background::Content {
     std::string running; ///< its topic; "" when nothing runs
     RunContext context;  ///< of what runs
     bool is_dropped = false, ends = false;
+    Bell bell;
     std::thread thread;
 
     /// Under the lock.
@@ -45,6 +51,7 @@ struct Background::Content {
 };
 
 Background::Background(QObject* parent) : QObject(parent), content_(std::make_unique<Content>()) {
+    connect(&content_->bell, &Bell::rung, this, &Background::deliver);
     content_->thread = std::thread([this] {
         Content& c = *content_;
         std::unique_lock lock(c.mutex);
@@ -58,17 +65,33 @@ Background::Background(QObject* parent) : QObject(parent), content_(std::make_un
             c.context = RunContext();
             const RunContext context = c.context;
             lock.unlock();
-            Delivery delivery = task.work(context);
-            task.work = nullptr; // what it held may be large
+            Delivery delivery = run(task, context);
+            task = {}; // what it held may be large
             lock.lock();
+            if (delivery && !c.is_dropped) c.done.push_back({std::exchange(c.running, {}), std::move(delivery)});
             c.running.clear();
-            if (delivery && !c.is_dropped) c.done.push_back({task.topic, std::move(delivery)});
             c.changed.notify_all();
-            if (!c.ends)
-                QMetaObject::invokeMethod(
-                    this, [this] { deliver(); }, Qt::QueuedConnection);
+            c.bell.ring();
         }
     });
+}
+
+/// In the other thread.
+Background::Delivery Background::run(const Task& task, const RunContext& context) {
+    Error error{ErrorCode::out_of_memory, "There is not enough memory for the picture; a coarser level needs less."};
+    try {
+        return task.work(context);
+    } catch (const std::bad_alloc&) {
+    } catch (const std::exception& thrown) {
+        error = {ErrorCode::unsuitable, std::string("The picture was stopped by an error of our own (") +
+                                            thrown.what() + "); please report it."};
+    }
+    return [this, error, otherwise = task.otherwise] {
+        if (otherwise)
+            otherwise(error);
+        else
+            Q_EMIT failed(error);
+    };
 }
 
 Background::~Background() {
@@ -81,13 +104,13 @@ Background::~Background() {
     content_->thread.join();
 }
 
-void Background::start(const std::string& topic, Work work, bool urgent) {
+void Background::start(const std::string& topic, Work work, bool urgent, Otherwise otherwise) {
     const std::lock_guard lock(content_->mutex);
     content_->drop(topic);
     if (urgent)
-        content_->waiting.push_front({topic, std::move(work)});
+        content_->waiting.push_front({topic, std::move(work), std::move(otherwise)});
     else
-        content_->waiting.push_back({topic, std::move(work)});
+        content_->waiting.push_back({topic, std::move(work), std::move(otherwise)});
     content_->changed.notify_all();
 }
 

@@ -45,6 +45,13 @@ bool Drawing::add_pass() {
     return any;
 }
 
+void Drawing::clear() {
+    pictures_.clear();
+    shown_ = 0;
+    done_ = 0;
+    is_adding_ = false;
+}
+
 void Drawing::show(unsigned framebuffer) const {
     for (std::size_t i = 0; i < shown_; ++i)
         pictures_[i].renderer.show(framebuffer, static_cast<int>(pictures_[i].x), 0);

@@ -28,7 +28,7 @@ public:
     /// Whether the sum of the passes looks better than a preview.
     bool is_good_enough() const { return done_ >= kGoodPasses || (done_ > 0 && !is_adding_); }
     void show(unsigned framebuffer) const;
-    void clear() { pictures_.clear(); }
+    void clear(); ///< gives back what is in graphics memory: nothing is shown
 
 private:
     static constexpr unsigned kGoodPasses = 6; ///< shadows of six lights are no longer taken for six shadows

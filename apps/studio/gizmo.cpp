@@ -1,6 +1,7 @@
 #include "gizmo.h"
 
 #include "deformation.h"
+#include "warp_ranges.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,8 +14,6 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 constexpr double kGap = 0.03;   // between the mesh and a handle, diagonals
 constexpr double kArrow = 0.08; // length of an arrow, diagonals
-// Ranges of the panel's sliders.
-constexpr double kLeastFactor = 0.25, kMostFactor = 4, kMostBend = 270, kMostTwist = 360;
 
 /// The mesh's box along and across the axis of the warps, and where the warps carry points and directions of it.
 struct Frame {

@@ -14,8 +14,10 @@ namespace filigree::studio {
 namespace {
 
 constexpr double kMargin = 14; // from the widget's borders
+constexpr double kTriad = 70;  // the axes take, from the margins in the corner
 
-const QColor kPin(226, 74, 51), kOpen(235, 94, 40), kNonManifold(190, 50, 200);
+const QColor kPin(226, 74, 51), kOpen(235, 94, 40), kNonManifold(190, 50, 200), kOpposed(20, 110, 220),
+    kFlat(150, 110, 0);
 const std::array<QColor, 3> kAxes = {QColor(214, 69, 65), QColor(76, 160, 72), QColor(62, 116, 214)};
 
 QColor gizmo_color(GizmoPart part) {
@@ -84,7 +86,26 @@ public:
         }
     }
 
-    void legend(const OverlayContent::Legend& legend) {
+    /// At the bottom, between the axes and the legend's plate; else above that, in one line or one a sentence, or not
+    /// at all where it does not fit.
+    void hint(QString text, double strength, const QRectF& legend) {
+        const QFontMetricsF metrics(painter_.font());
+        const auto width = [&] {
+            double most = 0;
+            for (const QString& line : text.split('\n')) most = std::max(most, metrics.horizontalAdvance(line));
+            return most + 16;
+        };
+        const double left = area_.left() + kMargin + kTriad, right = legend.isNull() ? area_.right() : legend.left();
+        const bool is_beside = width() <= 2 * std::min(area_.center().x() - left, right - 6 - area_.center().x());
+        if (!is_beside && width() > area_.width() - 2 * kMargin) text.replace(". ", ".\n");
+        if (!is_beside && width() > area_.width() - 2 * kMargin) return;
+        const double above = legend.isNull() ? area_.bottom() - kMargin - kTriad : legend.top() - 6;
+        const double bottom = is_beside ? area_.bottom() - kMargin : std::min(above, area_.bottom() - kMargin - kTriad);
+        label(QPointF(area_.center().x(), bottom), text, Qt::AlignHCenter | Qt::AlignBottom, strength);
+    }
+
+    /// Returns the plate.
+    QRectF legend(const OverlayContent::Legend& legend) {
         constexpr double kWidth = 200, kHeight = 10;
         const QFontMetricsF metrics(painter_.font());
         const QString title = legend.unit.isEmpty() ? legend.title : legend.title + ", " + legend.unit;
@@ -117,6 +138,7 @@ public:
             painter_.drawText(QRectF(middle - half - 2, bar.bottom() + 4, 2 * half + 4, metrics.height()),
                               Qt::AlignCenter, text);
         }
+        return plate;
     }
 
     void triad(const OverlayContent& content) {
@@ -201,7 +223,14 @@ public:
             painter_.drawLine(edge.line);
         }
         for (const OverlayContent::Edge& edge : edges) {
-            painter_.setPen(QPen(edge.is_open ? kOpen : kNonManifold, 2.4, Qt::SolidLine, Qt::RoundCap));
+            if (edge.line.isNull()) {
+                painter_.setPen(QPen(QColor(255, 255, 255, 150), 1));
+                painter_.setBrush(kFlat);
+                painter_.drawEllipse(edge.line.p1(), 2.5, 2.5);
+                continue;
+            }
+            const QColor color = edge.is_open ? kOpen : edge.is_opposed ? kOpposed : kNonManifold;
+            painter_.setPen(QPen(color, 2.4, Qt::SolidLine, Qt::RoundCap));
             painter_.drawLine(edge.line);
         }
     }
@@ -259,10 +288,8 @@ void Overlay::paintEvent(QPaintEvent*) {
     for (const QString& text : {c.note, c.defect_summary})
         if (!text.isEmpty()) top = sheet.label(QPointF(kMargin, top), text, Qt::AlignLeft).bottom() + 6;
     if (c.shows_triad) sheet.triad(c);
-    if (c.legend) sheet.legend(*c.legend);
-    if (c.hint_strength > 0 && !c.hint.isEmpty())
-        sheet.label(QPointF(width() / 2.0, height() - kMargin), c.hint, Qt::AlignHCenter | Qt::AlignBottom,
-                    c.hint_strength);
+    const QRectF legend = c.legend ? sheet.legend(*c.legend) : QRectF();
+    if (c.hint_strength > 0 && !c.hint.isEmpty()) sheet.hint(c.hint, c.hint_strength, legend);
 }
 
 } // namespace filigree::studio

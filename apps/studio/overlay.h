@@ -57,8 +57,8 @@ struct OverlayContent {
     };
     std::vector<Knob> knobs;
     struct Edge {
-        QLineF line;
-        bool is_open = false; ///< else non-manifold
+        QLineF line;                              ///< without length: a dot, a face without area
+        bool is_open = false, is_opposed = false; ///< neither: non-manifold
         bool operator==(const Edge&) const = default;
     };
     std::vector<Edge> defects;

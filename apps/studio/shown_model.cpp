@@ -41,12 +41,12 @@ std::optional<double> deviation_of(const Mesh& points, const Mesh& level, const 
 
 } // namespace
 
-std::shared_ptr<const LevelShape> LevelShape::make(std::shared_ptr<const Model> model, RestoreOptions restore,
-                                                   unsigned level, const RunContext& context) {
+Result<std::shared_ptr<const LevelShape>> LevelShape::make(std::shared_ptr<const Model> model, RestoreOptions restore,
+                                                           unsigned level, const RunContext& context) {
     auto shape = std::make_shared<LevelShape>();
     restore.level = level;
     Result<Restorer> restorer = Restorer::create(*model, restore, context);
-    if (!restorer) return nullptr;
+    if (!restorer) return restorer.error();
     shape->restorer_ = std::move(restorer).value();
     shape->vertex_count_ = shape->restorer_->vertex_count();
     if (level == model->finest_level()) {
@@ -56,7 +56,7 @@ std::shared_ptr<const LevelShape> LevelShape::make(std::shared_ptr<const Model> 
         shape->triangles_ = triangulate(level_mesh(*model, level)).triangles;
     }
     shape->model_ = std::move(model);
-    return shape;
+    return std::shared_ptr<const LevelShape>(std::move(shape));
 }
 
 std::vector<Vec3f> LevelShape::positions(const Pose& pose, const RunContext& context) const {
@@ -78,11 +78,7 @@ bool ShownModel::is_of(const State& state) const {
 }
 
 const std::vector<float>& ShownModel::arrival() {
-    if (arrival_.empty()) {
-        arrival_.assign(model_->mesh.vertex_count(), static_cast<float>(finest_level()));
-        for (unsigned level = finest_level(); level-- > 0;)
-            for (const Index vertex : model_->levels[level].vertices) arrival_[vertex] = static_cast<float>(level);
-    }
+    if (arrival_.empty()) arrival_ = vertex_levels(*model_, finest_level());
     return arrival_;
 }
 
@@ -97,10 +93,15 @@ void ShownModel::ask(unsigned level, bool urgent, Background& background,
     restore.level = level;
     background.start(
         topic,
-        [this, life, upload = std::move(upload), ready = std::move(ready), level, restore, model = model_,
-         source = source_, where = where_](const RunContext& context) -> Background::Delivery {
-            const std::shared_ptr<const LevelShape> shape = LevelShape::make(model, restore, level, context);
-            if (!shape) return nullptr;
+        [this, life, upload = std::move(upload), ready, level, restore, model = model_, source = source_,
+         where = where_](const RunContext& context) -> Background::Delivery {
+            Result<std::shared_ptr<const LevelShape>> of_level = LevelShape::make(model, restore, level, context);
+            if (context.is_cancelled()) return nullptr;
+            if (!of_level)
+                return [life, ready, level, error = of_level.error()] {
+                    if (!life.expired()) ready(level, error);
+                };
+            const std::shared_ptr<const LevelShape> shape = std::move(of_level).value();
             SurfaceOptions options;
             options.materials = source->materials.materials;
             std::optional<Error> error;
@@ -128,7 +129,10 @@ void ShownModel::ask(unsigned level, bool urgent, Background& background,
                 ready(level, error);
             };
         },
-        urgent);
+        urgent,
+        [life, ready, level](const Error& error) {
+            if (!life.expired()) ready(level, error);
+        });
 }
 
 void ShownModel::measure(Background& background, std::function<void()> ready) {

@@ -13,9 +13,9 @@ namespace filigree::studio {
 /// A level in the processor's memory, for picking. Never changes once made.
 class LevelShape {
 public:
-    /// Null: cancelled, or there is no such level.
-    static std::shared_ptr<const LevelShape> make(std::shared_ptr<const Model> model, RestoreOptions restore,
-                                                  unsigned level, const RunContext& context);
+    /// Errors: as Restorer::create.
+    static Result<std::shared_ptr<const LevelShape>> make(std::shared_ptr<const Model> model, RestoreOptions restore,
+                                                          unsigned level, const RunContext& context);
 
     const std::vector<Triangle>& triangles() const { return triangles_; }
     std::size_t vertex_count() const { return vertex_count_; }

@@ -51,7 +51,10 @@ void ViewState::set_zoom(double zoom) {
 
 void ViewState::fit(const Box& box, const Vec3d& direction, double aspect) {
     std::array<Vec3f, 8> corners;
-    const Vec3d middle = box.centre(), half = 0.5 * box.size();
+    const Vec3d middle = box.centre();
+    // A single point has no size: any will do that numbers there can hold.
+    const double least = box.diagonal() > 0 ? 0 : std::max(0.5, 1e-6 * middle.norm());
+    const Vec3d half = (0.5 * box.size()).cwiseMax(least);
     for (int k = 0; k < 8; ++k)
         corners[std::size_t(k)] =
             half.cwiseProduct(Vec3d(k & 1 ? 1 : -1, k & 2 ? 1 : -1, k & 4 ? 1 : -1)).cast<float>();

@@ -91,6 +91,7 @@ struct Viewport::Content {
 
     // Pointer
     Drag drag = Drag::none;
+    int pressed_step = 0; ///< of the history when it began
     QPointF pressed, last;
     std::optional<Picked> held;
     std::optional<GizmoDrag> gizmo;
@@ -144,6 +145,7 @@ struct Viewport::Content {
     void follow_body();
     void fly_to_camera(const Camera& camera);
     void stop_flight();
+    Box opened_box() const;
     void follow_opened();
 
     // Pointer
@@ -154,6 +156,7 @@ struct Viewport::Content {
     void show_cursor();
     void paint_pins(const QPointF& point);
     void finish_drag();
+    void drop_drag();
     void fade_hint();
     void update_overlay();
     void overlay_tools(OverlayContent& content);
@@ -200,6 +203,9 @@ Viewport::Viewport(Workbench& workbench, QWidget* parent)
         c.touch(false);
     });
     connect(&workbench, &Workbench::opened, this, [&c] { c.follow_opened(); });
+    connect(&workbench.document(), &Document::changed, this, [&c](const State& before) {
+        if (before.model != c.workbench.state().model) c.drop_drag();
+    });
     connect(&workbench, &Workbench::mode_changed, this, [&c] { c.follow_body(); });
     connect(&workbench.playback(), &Playback::state_changed, this, [&c] { c.follow_body(); });
 }
@@ -621,11 +627,27 @@ void Viewport::Content::stop_flight() {
     fly_to.reset();
 }
 
+/// Of what was opened, as it is posed: the driver's box, and as much around it as the detail needs at rest.
+Box Viewport::Content::opened_box() const {
+    const State& state = workbench.state();
+    Box box = world_bounds(state.source->mesh);
+    const Pose* pose = workbench.pose();
+    if (!pose || !state.model || pose->positions.size() != state.model->driver().vertices.size()) return box;
+    const Vec3d origin = state.source->mesh.origin;
+    const Box rest = bounds(driver_positions(*state.model)), posed = bounds(pose->positions);
+    const double margin =
+        std::max((origin + rest.min - box.min).maxCoeff(), (box.max - (origin + rest.max)).maxCoeff());
+    if (posed.empty() || !posed.size().allFinite()) return box;
+    box.min = origin + posed.min - Vec3d::Constant(margin);
+    box.max = origin + posed.max + Vec3d::Constant(margin);
+    return box;
+}
+
 void Viewport::Content::follow_opened() {
     const State& state = workbench.state();
     if (!state.source) return;
     // A shape whose slider moves stays where it is, unless it leaves.
-    const Box box = world_bounds(state.source->mesh);
+    const Box box = opened_box();
     const std::string name = state.shape ? "shape " + state.shape->name : state.source->path;
     const bool is_same = was_fitted && name == fitted_name &&
                          (box.centre() - fitted_box.centre()).norm() < 0.25 * fitted_box.diagonal() &&
@@ -649,6 +671,7 @@ std::optional<Viewport::Picked> Viewport::pick(const QPointF& point) {
     Content& c = *content_;
     ShownModel* shown = c.stage.shown();
     if (!shown || !rect().contains(point.toPoint())) return std::nullopt;
+    if (shown->shared_model() != c.workbench.state().model) return std::nullopt; // its vertices are others
     const std::optional<unsigned> level = shown->nearest_ready(c.drawn_level);
     if (!level) return std::nullopt;
     const LevelShape& shape = *shown->level(*level)->shape;
@@ -712,6 +735,7 @@ void Viewport::mousePressEvent(QMouseEvent* event) {
     if (c.drag != Content::Drag::none) return; // a second button while the first is down
     c.stop_flight();
     c.pressed = c.last = event->position();
+    c.pressed_step = c.workbench.document().undo_stack().index();
     c.hover_timer.stop();
     using enum Content::Drag;
     const bool shift = event->modifiers() & Qt::ShiftModifier;
@@ -753,6 +777,7 @@ void Viewport::mouseMoveEvent(QMouseEvent* event) {
         return;
     }
     c.last = at;
+    if (c.drag != pending_pull) c.fade_hint();
     if (c.drag == pending_pull) {
         const QPointF way = at - c.pressed;
         if (std::hypot(way.x(), way.y()) < kDragFrom) return;
@@ -780,6 +805,19 @@ void Viewport::mouseMoveEvent(QMouseEvent* event) {
 void Viewport::mouseReleaseEvent(QMouseEvent* event) {
     event->accept();
     if (event->buttons() == Qt::NoButton) content_->finish_drag();
+}
+
+/// What is held belongs to a model that is not there any more.
+void Viewport::Content::drop_drag() {
+    if (drag == Drag::none || drag == Drag::orbit || drag == Drag::pan) return;
+    const Drag was = std::exchange(drag, Drag::none);
+    if (was == Drag::pull) workbench.cancel_pull();
+    if (was == Drag::gizmo) workbench.document().end_merge();
+    painted.clear();
+    gizmo.reset();
+    held.reset();
+    hover.reset();
+    show_cursor();
 }
 
 void Viewport::Content::finish_drag() {
@@ -842,14 +880,11 @@ void Viewport::keyPressEvent(QKeyEvent* event) {
     if (event->key() != Qt::Key_Escape || c.drag == Content::Drag::none) return QOpenGLWidget::keyPressEvent(event);
     const Content::Drag was = std::exchange(c.drag, Content::Drag::none);
     if (was == Content::Drag::pull) {
-        QUndoStack& history = c.workbench.document().undo_stack();
-        const int before = history.index();
-        c.workbench.pull_to(c.held->at);
-        c.workbench.end_pull();
-        if (history.index() > before) history.undo();
+        c.workbench.cancel_pull();
     } else if (was == Content::Drag::gizmo) {
+        QUndoStack& history = c.workbench.document().undo_stack();
         c.workbench.document().end_merge();
-        c.workbench.document().undo_stack().undo();
+        if (history.index() > c.pressed_step) history.undo();
     }
     c.painted.clear();
     c.gizmo.reset();
@@ -962,6 +997,12 @@ void Viewport::Content::update_overlay() {
         overlay_tools(content);
         overlay_defects(content);
     }
+    if (state.source && content.note.isEmpty()) {
+        if (!(rest_box().diagonal() > 0))
+            content.note = "All vertices are in one place, so there is no shape to show.";
+        else if (state.source->mesh.face_count() == 0)
+            content.note = "This mesh has no faces: its vertices are shown as balls.";
+    }
     if (!stage.problem().empty()) content.note = QString::fromStdString(stage.problem());
     if (stage.is_preparing()) content.note = "Preparing the picture\u2026";
     overlay->set(std::move(content));
@@ -1021,12 +1062,13 @@ void Viewport::Content::overlay_defects(OverlayContent& content) {
     if (!settings().defects) return;
     ShownModel& shown = *stage.shown();
     const TopologyReport& topology = workbench.state().source->topology;
-    const std::size_t open = topology.open_edges.count, wild = topology.nonmanifold_edges.count;
-    if (open + wild == 0)
-        content.defect_summary = "No defects: the mesh is closed and manifold";
-    else
-        content.defect_summary =
-            count_of(open, "open edges (orange), ") + count_of(wild, "non-manifold edges (violet)");
+    QStringList found;
+    for (const auto& [finding, name] : {std::pair(&topology.open_edges, "open edges (orange)"),
+                                        std::pair(&topology.nonmanifold_edges, "non-manifold edges (violet)"),
+                                        std::pair(&topology.inconsistent_edges, "edges of opposed faces (blue)"),
+                                        std::pair(&topology.degenerate_faces, "faces without area (dots)")})
+        if (finding->count > 0) found << count_of(finding->count, name);
+    content.defect_summary = found.empty() ? QString("No defects: the mesh is closed and manifold") : found.join(", ");
     if (stage.defects().empty()) return;
     const unsigned finest = shown.finest_level();
     shown.ask(
@@ -1035,14 +1077,14 @@ void Viewport::Content::overlay_defects(OverlayContent& content) {
     const std::span<const Vec3f> positions = stage.positions(finest);
     if (positions.empty()) return;
     const PictureSize size = tile_size();
-    const std::size_t step = std::max<std::size_t>(1, stage.defects().size() / kMostDefects);
+    const std::size_t step = (stage.defects().size() + kMostDefects - 1) / kMostDefects;
     for (std::size_t i = 0; i < stage.defects().size(); i += step) {
         const DefectEdge& edge = stage.defects()[i];
         const Vec3d a = camera().project(stage.origin() + positions[edge.a].cast<double>(), size.width, size.height);
         const Vec3d b = camera().project(stage.origin() + positions[edge.b].cast<double>(), size.width, size.height);
         if (a.z() <= 0 || b.z() <= 0) continue;
         const int tile = tile_count() / 2;
-        content.defects.push_back({QLineF(from_tile(a, tile), from_tile(b, tile)), edge.is_open});
+        content.defects.push_back({QLineF(from_tile(a, tile), from_tile(b, tile)), edge.is_open, edge.is_opposed});
     }
 }
 
