@@ -9,6 +9,8 @@
 #include <QFileInfo>
 #include <QKeyEvent>
 #include <QMessageBox>
+#include <QPushButton>
+#include <QRegularExpression>
 
 namespace filigree::studio {
 namespace {
@@ -20,11 +22,20 @@ const QString kAll = QStringLiteral("All files (*)");
 
 /// "bend.obj" becomes "bend_%04d.obj": a file a frame.
 QString numbered(const QString& path) {
-    if (path.contains('%')) return path;
     const QFileInfo file(path);
+    if (file.fileName().contains('%')) return path;
     const QString name =
         file.completeBaseName() + QStringLiteral("_%04d") + (file.suffix().isEmpty() ? QString() : '.' + file.suffix());
     return file.path() == QStringLiteral(".") && !path.startsWith('.') ? name : file.path() + '/' + name;
+}
+
+/// The first of the files that such a path stands for.
+QString first_of(QString path) {
+    static const QRegularExpression number("%0?([1-9]?)d(?=[^/]*$)");
+    const QRegularExpressionMatch found = number.match(path);
+    if (!found.hasMatch()) return path;
+    return path.replace(found.capturedStart(), found.capturedLength(),
+                        QString("1").rightJustified(std::max(1, found.captured(1).toInt()), '0'));
 }
 
 } // namespace
@@ -142,6 +153,23 @@ struct Actions::Content {
                          });
         dialog->open();
     }
+    /// Writes files by number: the dialog could not see that there are some already.
+    void write_numbered(const QString& path, std::function<void(const std::string&)> write) {
+        const QString pattern = numbered(path), first = first_of(pattern);
+        const auto start = [this, pattern, write = std::move(write)] {
+            window.write([&] { write(pattern.toStdString()); });
+        };
+        if (!QFileInfo::exists(first)) return start();
+        auto* box = new QMessageBox(QMessageBox::Question, "Files are there already",
+                                    QFileInfo(first).fileName() + " is there already. Replace it and those after it?",
+                                    QMessageBox::Cancel, &window);
+        box->setObjectName("file.replace");
+        box->setAttribute(Qt::WA_DeleteOnClose);
+        QPushButton* replace = box->addButton("Replace", QMessageBox::AcceptRole);
+        replace->setObjectName("file.replace.yes");
+        QObject::connect(replace, &QPushButton::clicked, &window, start);
+        box->open();
+    }
     /// The document's name with another ending, to begin with.
     QString proposal(const QString& ending) const {
         const auto& source = workbench.state().source;
@@ -177,17 +205,18 @@ void Actions::Content::add_file_actions() {
     add(
         "file.save_mesh", "Save &mesh…", "Saves the mesh at the level shown, as it is deformed now", "Ctrl+E",
         [this] {
-            ask_for_file("file.save_mesh", "Save the mesh", {kMeshes, kAll}, "obj", proposal("_deformed.obj"),
-                         [this](const QString& path) { workbench.save_mesh(path.toStdString()); });
+            ask_for_file(
+                "file.save_mesh", "Save the mesh", {kMeshes, kAll}, "obj", proposal("_deformed.obj"),
+                [this](const QString& path) { window.write([&] { workbench.save_mesh(path.toStdString()); }); });
         },
         with_model)
         ->setIcon(icon(Icon::meshes));
     add(
         "file.save_driver", "Save &driver…", "Saves the driver as it is posed now, for another program to move", "",
         [this] {
-            ask_for_file("file.save_driver", "Save the driver", {"Meshes (*.ply *.obj)", kAll}, "ply",
-                         proposal("_driver.ply"),
-                         [this](const QString& path) { workbench.save_driver(path.toStdString()); });
+            ask_for_file(
+                "file.save_driver", "Save the driver", {"Meshes (*.ply *.obj)", kAll}, "ply", proposal("_driver.ply"),
+                [this](const QString& path) { window.write([&] { workbench.save_driver(path.toStdString()); }); });
         },
         with_model);
     add(
@@ -197,8 +226,10 @@ void Actions::Content::add_file_actions() {
             ask_for_file("file.export_film", "Export a film",
                          {"Films (*.mp4 *.gif)", "Numbered pictures (*.png)", kAll}, "mp4", proposal(".mp4"),
                          [this](const QString& path) {
-                             const bool pictures = path.endsWith(QStringLiteral(".png"), Qt::CaseInsensitive);
-                             workbench.export_film((pictures ? numbered(path) : path).toStdString(), {});
+                             if (path.endsWith(QStringLiteral(".png"), Qt::CaseInsensitive))
+                                 write_numbered(path, [this](const std::string& to) { workbench.export_film(to, {}); });
+                             else
+                                 window.write([&] { workbench.export_film(path.toStdString(), {}); });
                          });
         },
         with_recording)
@@ -207,8 +238,9 @@ void Actions::Content::add_file_actions() {
         "file.export_meshes", "Export mes&hes…", "Writes a mesh for each frame of the recording", "",
         [this] {
             ask_for_file("file.export_meshes", "Export a mesh for each frame", {kMeshes, kAll}, "obj",
-                         proposal("_%04d.obj"),
-                         [this](const QString& path) { workbench.export_meshes(numbered(path).toStdString()); });
+                         proposal("_%04d.obj"), [this](const QString& path) {
+                             write_numbered(path, [this](const std::string& to) { workbench.export_meshes(to); });
+                         });
         },
         with_recording)
         ->setIcon(icon(Icon::meshes));
@@ -219,11 +251,7 @@ void Actions::Content::cancel() {
     if (workbench.is_pulling()) {
         QKeyEvent escape(QEvent::KeyPress, Qt::Key_Escape, Qt::NoModifier);
         QCoreApplication::sendEvent(&viewport, &escape); // it holds what is dragged
-        if (!workbench.is_pulling()) return;
-        QUndoStack& history = workbench.document().undo_stack(); // a pull without a mouse
-        const int before = history.index();
-        workbench.end_pull();
-        if (history.index() > before) history.undo();
+        workbench.cancel_pull();
     } else {
         workbench.jobs().cancel();
     }
@@ -255,7 +283,7 @@ void Actions::Content::add_edit_actions() {
                                [](const Handle& handle) { return handle.pinned; });
         });
     add(
-        "edit.cancel", "&Cancel", "Stops the work that runs, or lets go of a pull and undoes it", "Esc",
+        "edit.cancel", "&Cancel", "Stops the work that runs, or lets go of a pull as if it had not been", "Esc",
         [this] { cancel(); }, [this] { return workbench.jobs().is_busy() || workbench.is_pulling(); });
     add(
         "detail.remove", "&Remove detail", "One level coarser", "PgDown", [this] { workbench.remove_detail(); },
@@ -322,7 +350,7 @@ void Actions::Content::add_view_actions() {
     add_view_switch("view.driver", "&Driver over the mesh", "The driver's edges over the mesh", "D",
                     &ViewSettings::driver);
     add_view_switch("view.defects", "Defec&ts", "Marks open and non-manifold edges", "Shift+D", &ViewSettings::defects);
-    add_view_switch("view.particles", "Body's &points", "The particles of the body instead of its surface", "B",
+    add_view_switch("view.particles", "&Particles", "The particles of the body instead of its surface", "B",
                     &ViewSettings::particles, [this] { return workbench.playback().has_body(); });
     add_view_switch("view.inside_points", "&Inside points", "Points inside the mesh at rest", "I",
                     &ViewSettings::inside_points);

@@ -6,12 +6,15 @@
 #include <QEvent>
 #include <QFontMetrics>
 #include <QGuiApplication>
+#include <QHelpEvent>
 #include <QKeyEvent>
 #include <QLineEdit>
 #include <QLocale>
+#include <QPainter>
 #include <QSignalBlocker>
 #include <QStyleOptionToolButton>
 #include <QStylePainter>
+#include <QToolTip>
 
 #include <algorithm>
 #include <cmath>
@@ -100,22 +103,7 @@ void guard_wheel(QWidget* widget) { widget->installEventFilter(new WheelGuard(wi
 
 } // namespace
 
-QString count_text(std::size_t count) {
-    return QLocale(QLocale::English, QLocale::UnitedStates).toString(qulonglong(count));
-}
-
-QString counted(std::size_t count, const char* one, const char* many) {
-    return count_text(count) + ' ' + QLatin1String(count == 1 ? one : many);
-}
-
 QString number_text(double value, int digits) { return QString::number(value, 'g', digits); }
-
-QString pascal_text(double value) {
-    for (const Prefix& prefix : kPrefixes)
-        if (value >= prefix.factor)
-            return QStringLiteral("%1 %2Pa").arg(number_text(value / prefix.factor)).arg(prefix.letter);
-    return number_text(value) + QStringLiteral(" Pa");
-}
 
 Text::Text(const QString& name, Tone tone, QWidget* parent) : QLabel(parent), tone_(tone) {
     setObjectName(name);
@@ -146,6 +134,41 @@ void Text::color() {
         own.setColor(QPalette::Inactive, QPalette::WindowText, color);
     }
     setPalette(own);
+}
+
+ElidedText::ElidedText(const QString& name, Qt::TextElideMode mode, Tone tone, QWidget* parent)
+    : Text(name, tone, parent), mode_(mode) {
+    setTextFormat(Qt::PlainText);
+}
+
+bool ElidedText::is_elided() const { return fontMetrics().horizontalAdvance(text()) > contentsRect().width(); }
+
+QSize ElidedText::sizeHint() const {
+    const QMargins margins = contentsMargins();
+    return {fontMetrics().horizontalAdvance(text()) + margins.left() + margins.right(), Text::sizeHint().height()};
+}
+
+QSize ElidedText::minimumSizeHint() const {
+    const int least = fontMetrics().averageCharWidth() * int(std::min(qsizetype(6), text().size()));
+    const QMargins margins = contentsMargins();
+    return {least + margins.left() + margins.right(), Text::minimumSizeHint().height()};
+}
+
+bool ElidedText::event(QEvent* event) {
+    if (event->type() == QEvent::ToolTip && is_elided()) {
+        const QString whole = toolTip().isEmpty() || toolTip() == text() ? text() : text() + '\n' + toolTip();
+        QToolTip::showText(static_cast<QHelpEvent*>(event)->globalPos(), whole, this);
+        return true;
+    }
+    return Text::event(event);
+}
+
+void ElidedText::paintEvent(QPaintEvent*) {
+    QPainter painter(this);
+    const QRect room = contentsRect();
+    const QString shown = is_elided() ? fontMetrics().elidedText(text(), mode_, room.width()) : text();
+    style()->drawItemText(&painter, room, int(QStyle::visualAlignment(layoutDirection(), alignment())), palette(),
+                          isEnabled(), shown, foregroundRole());
 }
 
 NumberControl::NumberControl(const QString& name, const QString& label, const NumberSpec& spec, const QString& tooltip,
@@ -256,11 +279,6 @@ void NumberControl::set_enabled(bool enabled) {
 
 void NumberControl::set_visible(bool visible) {
     for (QWidget* widget : std::initializer_list<QWidget*>{label_, slider_, number_}) widget->setVisible(visible);
-}
-
-void NumberControl::set_label(const QString& label) {
-    label_->setText(label);
-    for (QWidget* widget : std::initializer_list<QWidget*>{label_, slider_, number_}) widget->setAccessibleName(label);
 }
 
 bool NumberControl::eventFilter(QObject* object, QEvent* event) {
@@ -406,9 +424,14 @@ ActionButton::ActionButton(const QString& name, QAction* action, const QString& 
     follow();
 }
 
+void ActionButton::set_icon_alone(bool alone) {
+    is_icon_alone_ = alone;
+    follow();
+}
+
 void ActionButton::follow() {
     QString text = text_.isEmpty() ? action_->text().remove('&') : text_;
-    setText(text);
+    setText(is_icon_alone_ ? QString() : text);
     setAccessibleName(text.remove(QChar(0x2026)));
     setIcon(action_->icon());
     setToolTip(action_->toolTip());

@@ -2,6 +2,8 @@
 // tooltips.
 #pragma once
 
+#include "words.h"
+
 #include <QCheckBox>
 #include <QComboBox>
 #include <QDoubleSpinBox>
@@ -18,10 +20,7 @@
 
 namespace filigree::studio {
 
-QString count_text(std::size_t count);                                 ///< "24,578"
-QString counted(std::size_t count, const char* one, const char* many); ///< "1 face", "24,576 faces"
 QString number_text(double value, int digits = 3); ///< significant digits, as short as they go: "0.0042", "1.2e-05"
-QString pascal_text(double value);                 ///< "20 kPa"
 
 enum class Tone { plain, quiet, good, bad };
 
@@ -38,6 +37,24 @@ protected:
 private:
     void color();
     Tone tone_;
+};
+
+/// One line that is shortened where there is no room for it; the tooltip has all of it then. Never widens its window.
+class ElidedText : public Text {
+    Q_OBJECT
+public:
+    explicit ElidedText(const QString& name, Qt::TextElideMode mode, Tone tone = Tone::plain,
+                        QWidget* parent = nullptr);
+    bool is_elided() const;
+    QSize sizeHint() const override; ///< all of the text
+    QSize minimumSizeHint() const override;
+
+protected:
+    bool event(QEvent* event) override;
+    void paintEvent(QPaintEvent* event) override;
+
+private:
+    Qt::TextElideMode mode_;
 };
 
 struct NumberSpec {
@@ -63,7 +80,6 @@ public:
     void set_range(double least, double most);
     void set_enabled(bool enabled);
     void set_visible(bool visible);
-    void set_label(const QString& label);
 
     QLabel* label() const { return label_; }
     QSlider* slider() const { return slider_; }
@@ -133,12 +149,15 @@ class ActionButton : public QPushButton {
 public:
     /// `text`: "" for the action's own.
     ActionButton(const QString& name, QAction* action, const QString& text = {}, QWidget* parent = nullptr);
+    void set_icon_alone(bool alone); ///< where there is no room for the text
 
 private:
     void follow();
     QAction* action_;
     QString text_;
+    bool is_icon_alone_ = false;
 };
+
 /// Shows or hides what belongs under it; says so by toggled().
 class FoldButton : public QToolButton {
     Q_OBJECT

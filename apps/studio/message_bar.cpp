@@ -42,7 +42,7 @@ MessageBar::MessageBar(QWidget* parent)
 
 void MessageBar::show_message(const QString& sentence, bool is_error) {
     is_error_ = is_error;
-    text_->setText(sentence);
+    sentence_ = sentence;
     text_->setTextFormat(Qt::PlainText);
     setAccessibleName(sentence);
     const int side = fontMetrics().height();
@@ -55,13 +55,24 @@ void MessageBar::show_message(const QString& sentence, bool is_error) {
     update();
 }
 
-QString MessageBar::message() const { return isHidden() ? QString() : text_->text(); }
+QString MessageBar::message() const { return isHidden() ? QString() : sentence_; }
 
 void MessageBar::place() {
     const int margin = 12,
               width = std::min(parentWidget()->width() - 2 * margin, 50 * fontMetrics().averageCharWidth() + 300);
+    const QMargins margins = layout()->contentsMargins();
+    show_text(width - margins.left() - margins.right() - 2 * layout()->spacing() - close_->sizeHint().width() -
+              (icon_->isHidden() ? 0 : icon_->sizeHint().width()));
     const int height = std::max(layout()->totalHeightForWidth(width), layout()->totalMinimumSize().height());
     setGeometry((parentWidget()->width() - width) / 2, margin, width, height);
+}
+
+void MessageBar::show_text(int width) {
+    QStringList words = sentence_.split(' ');
+    for (QString& word : words) word = text_->fontMetrics().elidedText(word, Qt::ElideMiddle, width);
+    const QString shown = words.join(' ');
+    if (text_->text() != shown) text_->setText(shown);
+    text_->setToolTip(shown == sentence_ ? QString() : sentence_);
 }
 
 bool MessageBar::eventFilter(QObject* object, QEvent* event) {

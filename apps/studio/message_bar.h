@@ -24,11 +24,13 @@ protected:
 
 private:
     void place();
+    void show_text(int width); ///< words that are wider than the line are shortened in the middle
 
     QLabel* icon_;
     Text* text_;
     QToolButton* close_;
     QTimer timer_;
+    QString sentence_;
     bool is_error_ = false;
 };
 

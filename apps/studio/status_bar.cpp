@@ -18,10 +18,9 @@ StatusBar::StatusBar(Workbench& workbench, Viewport& viewport, const Actions& ac
     : QStatusBar(parent), workbench_(workbench), viewport_(viewport) {
     setObjectName("status");
     const auto part = [&](const char* name, const char* tooltip) {
-        auto* text = new Text(QLatin1String(name), Tone::plain, this);
+        auto* text = new ElidedText(QLatin1String(name), Qt::ElideRight, Tone::plain, this);
         text->setToolTip(QLatin1String(tooltip));
         text->setContentsMargins(4, 0, 4, 0);
-        text->setMinimumWidth(1); // a longer text does not widen the window
         addPermanentWidget(text);
         return text;
     };
@@ -30,8 +29,9 @@ StatusBar::StatusBar(Workbench& workbench, Viewport& viewport, const Actions& ac
     auto* row = new QHBoxLayout(work_);
     row->setContentsMargins(4, 0, 8, 0);
     row->setSpacing(8);
-    job_ = new Text("status.job", Tone::plain, work_);
+    job_ = new ElidedText("status.job", Qt::ElideRight, Tone::plain, work_);
     job_->setToolTip("The work that runs, and what it is at");
+    job_->setMaximumWidth(32 * fontMetrics().averageCharWidth());
     progress_ = new QProgressBar(work_);
     progress_->setObjectName("status.progress");
     progress_->setAccessibleName("Progress");
@@ -81,7 +81,7 @@ void StatusBar::show_counts() {
     const Timings& timings = viewport_.timings();
     const std::size_t shown = timings.vertices > 0 ? timings.vertices : state.model->mesh.vertex_count();
     vertices_->setText(counted(shown, "vertex", "vertices") + QStringLiteral(" · driver ") +
-                       count_text(state.model->driver().vertices.size()));
+                       with_commas(state.model->driver().vertices.size()));
 }
 
 void StatusBar::show_timings() {
@@ -89,8 +89,9 @@ void StatusBar::show_timings() {
     const auto ms = [](double value) { return QString::number(value, 'f', value < 10 ? 1 : 0); };
     milliseconds_->setText(QStringLiteral("driver %1 · restore %2 · draw %3 ms")
                                .arg(ms(timings.driver), ms(timings.restore), ms(timings.draw)));
-    rate_->setText(timings.frames_per_second > 0 ? QStringLiteral("%1 fps").arg(timings.frames_per_second, 0, 'f', 0)
-                                                 : QStringLiteral("still"));
+    rate_->setText(timings.frames_per_second > 0
+                       ? QStringLiteral("%1 pictures/s").arg(timings.frames_per_second, 0, 'f', 0)
+                       : QStringLiteral("still"));
 }
 
 void StatusBar::show_error() {
@@ -105,8 +106,7 @@ void StatusBar::show_job() {
     work_->setVisible(jobs.is_busy());
     if (!jobs.is_busy()) return;
     const QString phase = jobs.phase(), whole = phase.isEmpty() ? jobs.title() : jobs.title() + ": " + phase;
-    job_->setText(fontMetrics().elidedText(whole, Qt::ElideRight, 32 * fontMetrics().averageCharWidth()));
-    job_->setToolTip(whole);
+    job_->setText(whole);
     progress_->setValue(int(1000 * jobs.fraction()));
 }
 

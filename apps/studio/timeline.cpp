@@ -23,18 +23,41 @@ Timeline::Timeline(Workbench& workbench, const Actions& actions, QWidget* parent
     row->addWidget(scrub_, 1);
     row->addSpacing(6);
     frame_->setAlignment(Qt::AlignRight | Qt::AlignVCenter);
-    frame_->setMinimumWidth(fontMetrics().horizontalAdvance("frame 9,999 of 9,999 · 99.99 s"));
     frame_->setToolTip("The frame shown, of how many, and its time in seconds");
     row->addWidget(frame_);
     row->addSpacing(6);
-    row->addWidget(new ActionButton("timeline.film", actions.find("file.export_film"), "Film…", this));
-    row->addWidget(new ActionButton("timeline.meshes", actions.find("file.export_meshes"), "Meshes…", this));
+    film_ = new ActionButton("timeline.film", actions.find("file.export_film"), "Film…", this);
+    meshes_ = new ActionButton("timeline.meshes", actions.find("file.export_meshes"), "Meshes…", this);
+    row->addWidget(film_);
+    row->addWidget(meshes_);
+    be_narrow(false);
+    whole_width_ = row->totalMinimumSize().width();
+    be_narrow(true);
+    narrow_width_ = row->totalMinimumSize().width();
 
     connect(scrub_, &QSlider::valueChanged, this, [this](int frame) { workbench_.go_to_frame(std::size_t(frame)); });
     connect(&workbench_, &Workbench::timeline_changed, this, &Timeline::refresh);
     connect(&workbench_.document(), &Document::changed, this, &Timeline::refresh);
     connect(&workbench_, &Workbench::mode_changed, this, &Timeline::refresh);
     refresh();
+}
+
+QSize Timeline::minimumSizeHint() const { return {narrow_width_, QWidget::minimumSizeHint().height()}; }
+
+void Timeline::resizeEvent(QResizeEvent* event) {
+    QWidget::resizeEvent(event);
+    if (const bool narrow = width() < whole_width_; narrow != is_narrow_) {
+        be_narrow(narrow);
+        refresh();
+    }
+}
+
+void Timeline::be_narrow(bool narrow) {
+    is_narrow_ = narrow;
+    film_->set_icon_alone(narrow);
+    meshes_->set_icon_alone(narrow);
+    frame_->setMinimumWidth(
+        fontMetrics().horizontalAdvance(narrow ? "9,999 of 9,999" : "frame 9,999 of 9,999 · 99.99 s"));
 }
 
 void Timeline::refresh() {
@@ -60,9 +83,9 @@ void Timeline::refresh() {
                         : recording                      ? recording->frames_per_second
                                                          : 60;
     frame_->set_tone(Tone::plain);
-    frame_->setText(QStringLiteral("frame %1 of %2 · %3 s")
-                        .arg(count_text(frame), count_text(count - 1))
-                        .arg(double(frame) / rate, 0, 'f', 2));
+    const QString place = QStringLiteral("%1 of %2").arg(with_commas(frame), with_commas(count - 1));
+    frame_->setText(is_narrow_ ? place
+                               : QStringLiteral("frame %1 · %2 s").arg(place).arg(double(frame) / rate, 0, 'f', 2));
 }
 
 } // namespace filigree::studio

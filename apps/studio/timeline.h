@@ -11,14 +11,23 @@ class Timeline : public QWidget {
 public:
     Timeline(Workbench& workbench, const Actions& actions, QWidget* parent = nullptr);
 
+    QSize minimumSizeHint() const override; ///< of the narrow form
+
+protected:
+    void resizeEvent(QResizeEvent* event) override;
+
 private:
     void refresh();
+    void be_narrow(bool narrow);
 
     Workbench& workbench_;
     QAction *play_, *pause_;
     QToolButton* play_button_;
     QSlider* scrub_;
     Text* frame_;
+    ActionButton *film_, *meshes_;
+    bool is_narrow_ = true;
+    int narrow_width_ = 0, whole_width_ = 0;
 };
 
 } // namespace filigree::studio

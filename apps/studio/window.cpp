@@ -24,6 +24,7 @@
 #include <QMessageBox>
 #include <QMimeData>
 #include <QPointer>
+#include <QProgressDialog>
 #include <QSettings>
 #include <QSplitter>
 #include <QStackedWidget>
@@ -68,13 +69,16 @@ struct MainWindow::Content {
     QPointer<HelpSheet> help;
     Theme theme = Theme::system;
     QStringList recent;
-    QString file_path, saving_to, last_error;
+    QString file_path;
+    bool is_writing = false;            ///< files that were asked for are still to come
+    QPointer<QProgressDialog> farewell; ///< the window is to close once they are there
 
     void add_menus(MainWindow& window);
     void add_toolbar(MainWindow& window);
     QWidget* make_stage(MainWindow& window);
     QWidget* make_column(MainWindow& window);
     void follow_files(MainWindow& window);
+    void wait_for_files(MainWindow& window);
     void show_title(MainWindow& window);
     void show_recent(MainWindow& window);
     void add_recent(MainWindow& window, const QString& path);
@@ -235,7 +239,6 @@ QWidget* MainWindow::Content::make_stage(MainWindow& window) {
     column->setSpacing(0);
     column->addWidget(picture, 1);
     column->addWidget(new Timeline(*workbench, *actions, stage));
-    stage->setMinimumWidth(320);
     return stage;
 }
 
@@ -307,19 +310,45 @@ void MainWindow::Content::follow_files(MainWindow& window) {
     connect(&workbench->document(), &Document::changed, &window, [this, &window] { show_title(window); });
     connect(&workbench->document().undo_stack(), &QUndoStack::cleanChanged, &window,
             [this, &window](bool clean) { window.setWindowModified(!clean); });
-    // A path counts once its file is there.
-    connect(&workbench->jobs(), &Jobs::finished, &window, [this, &window] {
-        if (saving_to.isEmpty() || workbench->jobs().is_busy()) return;
-        const QString path = std::exchange(saving_to, {});
-        if (workbench->document().is_modified()) return;
-        file_path = path;
-        add_recent(window, path);
+    connect(workbench.get(), &Workbench::saved, &window, [this, &window](const std::string& path) {
+        file_path = QString::fromStdString(path);
+        add_recent(window, file_path);
         show_title(window);
         Q_EMIT window.files_changed();
     });
-    const auto forget = [this] { saving_to.clear(); };
-    connect(&workbench->jobs(), &Jobs::failed, &window, forget);
-    connect(&workbench->jobs(), &Jobs::cancelled, &window, forget);
+    connect(&workbench->jobs(), &Jobs::failed, &window, [this] { // the window stays, to tell of it
+        if (farewell) std::exchange(farewell, {})->deleteLater();
+    });
+    connect(&workbench->jobs(), &Jobs::finished, &window, [this, &window] {
+        if (workbench->jobs().is_busy()) return;
+        is_writing = false;
+        if (!farewell) return;
+        std::exchange(farewell, {})->deleteLater();
+        QTimer::singleShot(0, &window, &QWidget::close);
+    });
+}
+
+void MainWindow::Content::wait_for_files(MainWindow& window) {
+    if (farewell) return;
+    auto* dialog = new QProgressDialog(&window);
+    farewell = dialog;
+    dialog->setObjectName("farewell");
+    dialog->setWindowTitle("Filigree");
+    dialog->setWindowModality(Qt::WindowModal);
+    dialog->setMinimumDuration(0);
+    dialog->setRange(0, 1000);
+    dialog->setAutoClose(false);
+    dialog->setAutoReset(false);
+    dialog->setCancelButtonText("Close without it");
+    const auto show = [this, dialog] {
+        dialog->setLabelText(workbench->jobs().title() + QStringLiteral(" – the window closes when it is done."));
+        dialog->setValue(int(1000 * workbench->jobs().fraction()));
+    };
+    show();
+    connect(&workbench->jobs(), &Jobs::progressed, dialog, show);
+    connect(&workbench->jobs(), &Jobs::started, dialog, show);
+    connect(dialog, &QProgressDialog::canceled, &window, [this] { workbench->jobs().cancel(); });
+    dialog->show();
 }
 
 void MainWindow::Content::show_title(MainWindow& window) {
@@ -360,11 +389,16 @@ void MainWindow::open_file(const QString& path) {
 }
 
 void MainWindow::save_file(const QString& path) {
-    content_->saving_to = path;
-    content_->workbench->save_model(path.toStdString());
+    write([&] { content_->workbench->save_model(path.toStdString()); });
+}
+
+void MainWindow::write(const std::function<void()>& start) {
+    start();
+    content_->is_writing = content_->workbench->jobs().is_busy();
 }
 
 bool MainWindow::may_discard() {
+    content_->workbench->pause(); // what was recorded so far is a change as well
     if (!content_->workbench->document().is_modified()) return true;
     QMessageBox box(this);
     box.setObjectName("unsaved");
@@ -395,12 +429,16 @@ bool MainWindow::may_discard() {
 }
 
 void MainWindow::closeEvent(QCloseEvent* event) {
+    if (content_->is_writing) {
+        content_->wait_for_files(*this);
+        event->ignore();
+        return;
+    }
     if (!may_discard()) {
         event->ignore();
         return;
     }
     content_->workbench->jobs().cancel();
-    content_->workbench->pause();
     if (content_->keep_settings) content_->write_settings(*this);
     event->accept();
 }
@@ -421,13 +459,10 @@ void MainWindow::dropEvent(QDropEvent* event) {
 // Messages, theme, layout
 
 void MainWindow::show_message(const QString& sentence, bool is_error) {
-    if (is_error) content_->last_error = sentence;
     content_->messages->show_message(sentence, is_error);
 }
 
 QString MainWindow::message() const { return content_->messages->message(); }
-QString MainWindow::last_error() const { return content_->last_error; }
-void MainWindow::clear_last_error() { content_->last_error.clear(); }
 
 Theme MainWindow::theme() const { return content_->theme; }
 

@@ -24,8 +24,10 @@ public:
     bool show_panel(const QString& name);
     /// Opens a file as the dialog would: asks first when there are unsaved changes.
     void open_file(const QString& path);
-    /// Asks about unsaved changes; false: the user wants to stay.
+    /// Stops what moves and asks about unsaved changes; false: the user wants to stay.
     bool may_discard();
+    /// Starts work that leaves a file: the window does not close before it is there.
+    void write(const std::function<void()>& start);
     /// The model is saved there, from now on by Save as well.
     void save_file(const QString& path);
     QString file_path() const;        ///< where Save writes; "" when it has to ask
@@ -38,8 +40,6 @@ public:
 
     void show_message(const QString& sentence, bool is_error); ///< in the window's message bar
     QString message() const;                                   ///< what stands there; "" when it is hidden
-    QString last_error() const;                                ///< the last error told; "" for none
-    void clear_last_error();
 
 Q_SIGNALS:
     void files_changed(); ///< recent files, or the one that Save writes

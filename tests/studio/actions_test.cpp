@@ -7,8 +7,11 @@
 #include <QFileInfo>
 #include <QMenu>
 #include <QMenuBar>
+#include <QMessageBox>
 #include <QTemporaryDir>
 #include <QTest>
+
+#include <fstream>
 
 #include <gtest/gtest.h>
 
@@ -263,6 +266,59 @@ TEST_F(ActionsTest, BodyMovesAndGoesBack) {
     EXPECT_TRUE(workbench().view().settings().particles);
     trigger("body.reset");
     EXPECT_LE(workbench().frame_count(), 1u);
+}
+
+TEST_F(ActionsTest, FilesByNumberAreNotOverwrittenUnasked) {
+    BodySettings body = workbench().state().body;
+    body.particles = 200;
+    workbench().set_body(body);
+    trigger("body.make");
+    trigger("body.step");
+    QTemporaryDir folder;
+    ASSERT_TRUE(QDir(folder.path()).mkdir("50% done"));
+    const QString path = folder.filePath("50% done/x.obj"), first = folder.filePath("50% done/x_0001.obj");
+    const auto ask = [&] {
+        action("file.export_meshes").trigger();
+        auto* box = dialog<QFileDialog>("file.export_meshes.dialog");
+        ASSERT_TRUE(box);
+        Q_EMIT box->fileSelected(path);
+        box->close();
+        QCoreApplication::sendPostedEvents(box, QEvent::DeferredDelete);
+    };
+    const auto answer = [&](const char* button) {
+        auto* question = dialog<QMessageBox>("file.replace");
+        ASSERT_TRUE(question);
+        for (QAbstractButton* one : question->buttons())
+            if (one->objectName() == button) one->click();
+        QCoreApplication::sendPostedEvents(question, QEvent::DeferredDelete);
+        workbench().wait_until_idle();
+    };
+    ask();
+    workbench().wait_until_idle();
+    EXPECT_FALSE(window->findChild<QMessageBox*>("file.replace"));
+    ASSERT_TRUE(QFileInfo::exists(first)) << window->message().toStdString();
+
+    const auto overwrite = [&] { std::ofstream(first.toStdString()) << "mine"; };
+    overwrite();
+    ask();
+    answer("");
+    EXPECT_EQ(QFileInfo(first).size(), 4);
+    ask();
+    answer("file.replace.yes");
+    EXPECT_GT(QFileInfo(first).size(), 4);
+}
+
+TEST_F(ActionsTest, EscDuringAPullLeavesNoStep) {
+    const std::string before = workbench().document().bytes();
+    const int steps = workbench().document().undo_stack().count();
+    const Vec3d at = workbench().state().model->mesh.positions[0].cast<double>();
+    workbench().begin_pull(0, at);
+    workbench().pull_to(at + Vec3d(0, 0.3, 0));
+    ASSERT_TRUE(action("edit.cancel").isEnabled());
+    trigger("edit.cancel");
+    EXPECT_FALSE(workbench().is_pulling());
+    EXPECT_EQ(workbench().document().undo_stack().count(), steps);
+    EXPECT_TRUE(workbench().document().bytes() == before);
 }
 
 TEST_F(ActionsTest, ErrorIsMeasured) {

@@ -37,7 +37,6 @@ protected:
     void SetUp() override {
         workbench().wait_until_idle();
         workbench().document().replace(start);
-        window->clear_last_error();
     }
 
     static Workbench& workbench() { return window->workbench(); }
@@ -46,6 +45,18 @@ protected:
         warps.twist = 45;
         workbench().set_warps(warps);
         ASSERT_TRUE(workbench().document().is_modified());
+    }
+    /// A body of few particles with two frames.
+    static void make_body_and_steps(Workbench& of) {
+        BodySettings body = of.state().body;
+        body.particles = 200;
+        of.set_body(body);
+        of.make_body();
+        of.wait_until_idle();
+        for (int k = 0; k < 2; ++k) {
+            of.step();
+            of.wait_until_idle();
+        }
     }
     /// Presses a button of the question as soon as it is there.
     static void answer(QMessageBox::StandardButton button) {
@@ -113,12 +124,10 @@ TEST_F(Window, ErrorsAreToldWithTheFilesName) {
     window->open_file(path("nothing.obj"));
     workbench().wait_until_idle();
     EXPECT_TRUE(window->message().contains("nothing.obj")) << window->message().toStdString();
-    EXPECT_EQ(window->last_error(), window->message());
     EXPECT_TRUE(workbench().document().bytes() == before);
     EXPECT_FALSE(window->recent_files().contains(path("nothing.obj")));
     window->findChild<QToolButton*>("message.close")->click();
     EXPECT_EQ(window->message(), "");
-    EXPECT_NE(window->last_error(), "");
     window->show_message("All is well.", false);
     EXPECT_EQ(window->message(), "All is well.");
 }
@@ -183,6 +192,108 @@ TEST_F(Window, ClosingAsksAndIsSafeDuringWork) {
     EXPECT_FALSE(other.isVisible());
 }
 
+TEST_F(Window, ClosingWaitsForFiles) {
+    const QString file = path("cube.obj");
+    {
+        MainWindow other(false);
+        other.show();
+        other.write([&] { other.workbench().save_mesh(file.toStdString()); });
+        ASSERT_TRUE(other.workbench().jobs().is_busy());
+        EXPECT_FALSE(other.close());
+        EXPECT_TRUE(other.findChild<QWidget*>("farewell"));
+        EXPECT_TRUE(QTest::qWaitFor([&] { return !other.isVisible(); }));
+    }
+    EXPECT_TRUE(QFileInfo::exists(file));
+}
+
+TEST_F(Window, AFileThatCannotBeWrittenKeepsTheWindowOpen) {
+    MainWindow other(false);
+    other.show();
+    other.write([&] { other.workbench().save_mesh(path("no_such_folder/cube.obj").toStdString()); });
+    EXPECT_FALSE(other.close());
+    other.workbench().wait_until_idle();
+    QCoreApplication::processEvents();
+    EXPECT_TRUE(other.isVisible());
+    EXPECT_TRUE(other.message().contains("no_such_folder"));
+    EXPECT_TRUE(other.close());
+}
+
+TEST_F(Window, WhatMovesIsAskedForAsWell) {
+    make_body_and_steps(workbench());
+    window->save_file(path("before.fil"));
+    workbench().wait_until_idle();
+    ASSERT_FALSE(workbench().document().is_modified());
+    const std::size_t before = workbench().frame_count();
+    workbench().play();
+    ASSERT_TRUE(QTest::qWaitFor([&] { return workbench().frame_count() > before; }));
+    answer(QMessageBox::Cancel);
+    EXPECT_FALSE(window->may_discard());
+    EXPECT_FALSE(workbench().is_playing());
+    EXPECT_TRUE(workbench().document().is_modified());
+}
+
+TEST_F(Window, LongNamesAreShortened) {
+    const QString name = QString("a_very_long_name_").repeated(12);
+    window->open_file(triangle((name + ".obj").toStdString().c_str()));
+    workbench().wait_until_idle();
+    EXPECT_TRUE(window->message().contains(name));
+    auto* text = window->findChild<QLabel*>("message.text");
+    EXPECT_FALSE(text->text().contains(name));
+    EXPECT_TRUE(text->text().contains(QChar(0x2026)));
+    EXPECT_TRUE(text->toolTip().contains(name));
+    auto* title = window->findChild<ElidedText*>("model.name");
+    EXPECT_TRUE(title->is_elided());
+    EXPECT_EQ(title->text(), name + ".obj");
+}
+
+TEST_F(Window, TheStatusBarHasRoomForWhatItSays) {
+    window->show();
+    ASSERT_TRUE(QTest::qWaitForWindowExposed(window));
+    window->resize(1280, 800);
+    const std::pair<const char*, const char*> texts[] = {
+        {"status.vertices", "9,999,999 vertices · driver 20,000"},
+        {"status.milliseconds", "driver 999 · restore 999 · draw 999 ms"},
+        {"status.rate", "999 pictures/s"},
+        {"status.error", "rms 0.00012 · max 0.00012 · 0.42°"},
+    };
+    for (const auto& [name, text] : texts) {
+        auto* label = window->findChild<ElidedText*>(name);
+        ASSERT_TRUE(label);
+        label->setText(QString::fromUtf8(text));
+        label->show();
+    }
+    for (int k = 0; k < 3; ++k) QCoreApplication::sendPostedEvents();
+    for (const auto& [name, text] : texts) EXPECT_FALSE(window->findChild<ElidedText*>(name)->is_elided()) << name;
+    EXPECT_EQ(window->size(), QSize(1280, 800));
+    window->findChild<ElidedText*>("status.error")->setText(QString("rms ").repeated(200));
+    for (int k = 0; k < 3; ++k) QCoreApplication::sendPostedEvents();
+    EXPECT_EQ(window->size(), QSize(1280, 800));
+}
+
+TEST_F(Window, SmallWindowsHaveNothingOnTopOfEachOther) {
+    make_body_and_steps(workbench());
+    window->show();
+    ASSERT_TRUE(QTest::qWaitForWindowExposed(window));
+    auto* timeline = window->findChild<QWidget*>("timeline");
+    for (const QSize size : {QSize(1280, 800), QSize(800, 500), QSize(700, 500)}) {
+        window->resize(size);
+        for (int k = 0; k < 5; ++k) QCoreApplication::processEvents();
+        EXPECT_EQ(window->size(), size);
+        std::vector<QWidget*> parts;
+        for (auto* part : timeline->findChildren<QWidget*>(QString(), Qt::FindDirectChildrenOnly))
+            if (part->isVisible()) parts.push_back(part);
+        for (QWidget* part : parts) {
+            const std::string name = part->objectName().toStdString();
+            EXPECT_TRUE(timeline->rect().contains(part->geometry())) << name << " at " << size.width();
+            EXPECT_GE(part->width(), part->minimumSizeHint().width()) << name << " at " << size.width();
+            for (QWidget* other : parts)
+                EXPECT_TRUE(part == other || !part->geometry().intersects(other->geometry()))
+                    << name << " and " << other->objectName().toStdString() << " at " << size.width();
+        }
+    }
+    window->resize(1280, 800);
+}
+
 TEST_F(Window, ClosingCanBeCalledOff) {
     change_something();
     answer(QMessageBox::Cancel);
@@ -209,20 +320,12 @@ TEST_F(Window, ControlsKeepTheKeysThatTheyNeed) {
 }
 
 TEST_F(Window, TheTimelineScrubs) {
-    BodySettings body = workbench().state().body;
-    body.particles = 200;
-    workbench().set_body(body);
-    workbench().make_body();
-    workbench().wait_until_idle();
-    for (int k = 0; k < 3; ++k) {
-        workbench().step();
-        workbench().wait_until_idle();
-    }
+    make_body_and_steps(workbench());
     auto* scrub = window->findChild<QSlider*>("timeline.scrub");
-    ASSERT_TRUE(QTest::qWaitFor([&] { return scrub->maximum() == 3; })) << workbench().frame_count();
+    ASSERT_TRUE(QTest::qWaitFor([&] { return scrub->maximum() == 2; })) << workbench().frame_count();
     EXPECT_TRUE(scrub->isEnabled());
-    EXPECT_EQ(scrub->value(), 3);
+    EXPECT_EQ(scrub->value(), 2);
     scrub->setValue(1);
     EXPECT_EQ(workbench().frame(), 1u);
-    EXPECT_TRUE(window->findChild<QLabel*>("timeline.frame")->text().startsWith("frame 1 of 3"));
+    EXPECT_TRUE(window->findChild<QLabel*>("timeline.frame")->text().startsWith("frame 1 of 2"));
 }

@@ -11,11 +11,7 @@ namespace {
 
 constexpr double kCelsius = 273.15; ///< K
 
-QString capitalised(std::string_view name) {
-    QString text = QString::fromUtf8(name.data(), qsizetype(name.size()));
-    if (!text.isEmpty()) text[0] = text[0].toUpper();
-    return text;
-}
+constexpr double kLeastParticles = 100, kMostParticles = 100000;
 
 /// What plasticity and melting begin with when they are switched on by hand.
 constexpr double kSomeYield = 1e4;                             // Pa: a tenth of a soft material's stiffness
@@ -37,19 +33,19 @@ BodyPanel::BodyPanel(Workbench& workbench, const Actions& actions, QWidget* pare
     buttons->addWidget(play_);
     buttons->addWidget(icon_button("body.step_button", actions.find("body.step"), page()));
     buttons->addStretch(1);
-    points_ = new QCheckBox("Show points", page());
-    points_->setObjectName("body.points");
-    points_->setToolTip("The particles of the body instead of its surface");
-    points_->setAccessibleName("Show points");
-    points_->setFocusPolicy(Qt::TabFocus);
-    buttons->addWidget(points_);
+    particles_ = new QCheckBox("Particles", page());
+    particles_->setObjectName("view.particles");
+    particles_->setToolTip("The particles of the body instead of its surface");
+    particles_->setAccessibleName("Particles");
+    particles_->setFocusPolicy(Qt::TabFocus);
+    buttons->addWidget(particles_);
     rows->addLayout(buttons, rows->rowCount(), 0, 1, 3);
     report_ = text(rows, "body.report", Tone::quiet);
 
     add_world();
     add_advanced();
 
-    connect(points_, &QCheckBox::toggled, this, [this](bool shown) {
+    connect(particles_, &QCheckBox::toggled, this, [this](bool shown) {
         ViewSettings settings = workbench_.view().settings();
         settings.particles = shown;
         workbench_.view().set(settings);
@@ -74,7 +70,7 @@ BodyPanel::BodyPanel(Workbench& workbench, const Actions& actions, QWidget* pare
 void BodyPanel::add_material() {
     QGridLayout* rows = section("Material");
     QStringList names;
-    for (const NamedMaterial& named : named_materials()) names << capitalised(named.name);
+    for (const NamedMaterial& named : named_materials()) names << shape_title(std::string(named.name));
     names << "Custom";
     preset_ = choice(rows, "body.preset", "Preset", names, "Materials to begin with");
     connect(preset_, &QComboBox::currentIndexChanged, this, [this](int index) {
@@ -96,10 +92,19 @@ void BodyPanel::add_material() {
              {.least = 10, .most = 20000, .decimals = 0, .unit = "kg/m³", .logarithmic = true},
              "Kilograms a cubic metre: foam 60, water 1,000, steel 7,800", &Material::density);
     setting(
-        rows, "body.particles", "Particles", {.least = 100, .most = 100000, .decimals = 0, .logarithmic = true},
-        "About so many points move; more are finer and slower",
+        rows, "body.particles", "Particles",
+        {.least = kLeastParticles, .most = kMostParticles, .decimals = 0, .logarithmic = true},
+        "About so many particles move; more are finer and slower",
         [](const BodySettings& s) { return double(s.particles); },
         [](BodySettings& s, double v) { s.particles = std::size_t(v); });
+    spacing_ = setting(
+        rows, "body.spacing", "Spacing", {.least = 0.1, .most = 1000, .decimals = 1, .unit = "mm", .logarithmic = true},
+        "How far apart the particles are, about, millimetres: another way to say how many there are",
+        [this](const BodySettings& s) { return 1000 * std::cbrt(volume(s) / double(s.particles)); },
+        [this](BodySettings& s, double v) {
+            const double count = std::round(volume(s) / std::pow(v / 1000, 3));
+            if (count > 0) s.particles = std::size_t(std::clamp(count, kLeastParticles, kMostParticles));
+        });
     setting(
         rows, "body.size", "Size", {.least = 0.01, .most = 100, .decimals = 2, .unit = "m", .logarithmic = true},
         "The longest side of the mesh, metres", [](const BodySettings& s) { return s.size; },
@@ -248,6 +253,13 @@ void BodyPanel::change_material(const std::string& merge, const std::function<vo
 bool BodyPanel::is_unfolded() const { return fold_->isChecked(); }
 void BodyPanel::set_unfolded(bool unfolded) { fold_->setChecked(unfolded); }
 
+double BodyPanel::volume(const BodySettings& settings) const {
+    const auto& source = workbench_.state().source;
+    if (!source || !source->topology.is_closed()) return 0;
+    const double scale = settings.size / source->topology.box.size().maxCoeff();
+    return std::abs(source->topology.volume) * scale * scale * scale;
+}
+
 void BodyPanel::refresh() {
     const BodySettings& settings = workbench_.state().body;
     const auto materials = named_materials();
@@ -256,8 +268,14 @@ void BodyPanel::refresh() {
     set_silently(preset_, int(named - materials.begin()));
     sentence_->setText(named == materials.end()
                            ? QStringLiteral("Changed by hand.")
-                           : capitalised(named->name) + ": " +
+                           : shape_title(std::string(named->name)) + ": " +
                                  QString::fromUtf8(named->text.data(), qsizetype(named->text.size())) + '.');
+    const double cubic_metres = volume(settings);
+    spacing_->set_visible(cubic_metres > 0);
+    const auto spacing = [&](double count) { // to what the number shows
+        return std::max(0.1, std::round(1e4 * std::cbrt(cubic_metres / count)) / 10);
+    };
+    if (cubic_metres > 0) spacing_->set_range(spacing(kMostParticles), spacing(kLeastParticles));
     for (const Setting& setting : settings_) setting.control->set_value(setting.get(settings));
     set_silently(ground_, settings.ground);
     set_silently(gravity_, settings.gravity);
@@ -265,8 +283,8 @@ void BodyPanel::refresh() {
     set_silently(model_, int(settings.material.model));
     set_silently(plastic_, settings.material.is_plastic());
     set_silently(melts_, settings.material.melts());
-    set_silently(points_, workbench_.view().settings().particles);
-    points_->setEnabled(workbench_.playback().has_body());
+    set_silently(particles_, workbench_.view().settings().particles);
+    particles_->setEnabled(workbench_.playback().has_body());
     show_rows();
     const QString text = report();
     if (report_->text() != text) report_->setText(text);
@@ -287,7 +305,9 @@ void BodyPanel::show_rows() {
 
 QString BodyPanel::report() const {
     const auto made = workbench_.playback().made();
-    if (!made) return QStringLiteral("No body yet.");
+    if (!made)
+        return workbench_.frame_count() > 1 ? QStringLiteral("Recorded; make the body again to go on.")
+                                            : QStringLiteral("No body yet.");
     QString text = QStringLiteral("%1, %2 mm apart, %3 kg.")
                        .arg(counted(made->body->particle_count(), "particle", "particles"),
                             number_text(1000 * made->body->spacing()), number_text(made->report.mass));

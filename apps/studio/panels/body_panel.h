@@ -28,6 +28,8 @@ private:
                             const QString& tooltip, double Material::*field, double off = 0);
     void change(const std::string& merge, const std::function<void(BodySettings&)>& edit);
     void change_material(const std::string& merge, const std::function<void(Material&)>& edit);
+    /// Of the mesh at that size, m³; 0 where it is open.
+    double volume(const BodySettings& settings) const;
     void refresh();
     void show_rows();
     QString report() const;
@@ -40,11 +42,11 @@ private:
     std::vector<Setting> settings_;
     QComboBox *preset_, *model_, *obstacle_;
     Text *sentence_, *report_;
-    QCheckBox *ground_, *gravity_, *points_, *plastic_, *melts_;
+    QCheckBox *ground_, *gravity_, *particles_, *plastic_, *melts_;
     QToolButton *fold_, *play_;
     QWidget* advanced_;
     NumberControl *poisson_, *bending_, *yield_, *creep_, *melting_from_, *melting_to_, *viscosity_, *temperature_,
-        *heating_, *drop_;
+        *heating_, *drop_, *spacing_;
 };
 
 } // namespace filigree::studio

@@ -8,6 +8,7 @@ namespace filigree::studio {
 namespace {
 
 constexpr std::array<unsigned, 3> kReferences = {3, 4, 6};
+constexpr std::size_t kLeastDriver = 3; // vertices: a face
 
 std::size_t level_faces(const Model& model, unsigned level) {
     return level < model.levels.size() ? model.levels[level].face_count() : model.mesh.face_count();
@@ -26,7 +27,7 @@ DetailPanel::DetailPanel(Workbench& workbench, QWidget* parent) : Panel("detail"
 
     rows = section("Driver");
     NumberSpec spec;
-    spec.least = 50;
+    spec.least = kLeastDriver;
     spec.most = 20000;
     spec.decimals = 0;
     spec.logarithmic = true;
@@ -59,7 +60,7 @@ DetailPanel::DetailPanel(Workbench& workbench, QWidget* parent) : Panel("detail"
     connect(level_, &NumberControl::released, this, [this] { workbench_.document().end_merge(); });
     const auto strip_again = [this](const std::function<void(StripOptions&)>& edit, const std::string& merge) {
         if (!workbench_.state().model) return;
-        StripOptions options = workbench_.state().strip;
+        StripOptions options = workbench_.wanted_strip();
         edit(options);
         workbench_.set_strip(options, merge);
     };
@@ -108,6 +109,7 @@ void DetailPanel::refresh() {
     level_->set_range(0, model.finest_level());
     level_->set_value(state.level());
     level_->set_enabled(model.finest_level() > 0);
+    driver_->set_range(kLeastDriver, double(std::max(model.mesh.vertex_count(), kLeastDriver)));
     driver_->set_value(double(state.strip.base.value_or(model.driver().vertices.size())));
     driver_->set_enabled(blend);
     set_silently(code_, blend ? 0 : 1);
@@ -136,8 +138,8 @@ void DetailPanel::show_levels() {
             return QStringLiteral("<td align='%1'>%2</td>")
                 .arg(QLatin1String(align), shown ? "<b>" + content + "</b>" : content);
         };
-        table += "<tr>" + cell(name, "left") + cell(count_text(level_vertices(model, level)) + " vertices", "right") +
-                 cell(count_text(level_faces(model, level)) + " faces", "right") + "</tr>";
+        table += "<tr>" + cell(name, "left") + cell(with_commas(level_vertices(model, level)) + " vertices", "right") +
+                 cell(with_commas(level_faces(model, level)) + " faces", "right") + "</tr>";
     }
     levels_->setText(table + "</table>");
 }
@@ -149,7 +151,7 @@ void DetailPanel::show_report() {
     QStringList lines;
     lines << QStringLiteral("%1 move %2, one in %3.")
                  .arg(counted(state.model->driver().vertices.size(), "vertex", "vertices"),
-                      count_text(state.model->mesh.vertex_count()),
+                      with_commas(state.model->mesh.vertex_count()),
                       number_text(double(state.model->mesh.vertex_count()) /
                                   double(std::max<std::size_t>(1, state.model->driver().vertices.size()))));
     if (seconds > 0) lines << QStringLiteral("Stripped in %1 s.").arg(number_text(seconds, 2));

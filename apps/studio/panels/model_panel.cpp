@@ -6,13 +6,6 @@
 namespace filigree::studio {
 namespace {
 
-/// What the combo box calls them, in the order of shape_names().
-QString shown_name(std::string_view name) {
-    QString text = QString::fromUtf8(name.data(), qsizetype(name.size())).replace('-', ' ');
-    text[0] = text[0].toUpper();
-    return text;
-}
-
 int index_of(const std::string& name) {
     const auto names = shape_names();
     return int(std::find(names.begin(), names.end(), name) - names.begin());
@@ -43,23 +36,22 @@ QString size_text(const Vec3d& size) {
 ModelPanel::ModelPanel(Workbench& workbench, const Actions& actions, QMenu* recent_files, QWidget* parent)
     : Panel("model", parent), workbench_(workbench) {
     QGridLayout* rows = section({});
-    name_ = text(rows, "model.name");
+    name_ = new ElidedText("model.name", Qt::ElideMiddle, Tone::plain, page());
+    rows->addWidget(name_, rows->rowCount(), 0, 1, 3);
     QFont font = name_->font();
     font.setBold(true);
     font.setPointSizeF(font.pointSizeF() * 1.15);
     name_->setFont(font);
-    name_->setWordWrap(false);
-    name_->setMinimumWidth(0);
     name_->setSizePolicy(QSizePolicy::Ignored, QSizePolicy::Preferred);
     facts_ = text(rows, "model.facts", Tone::quiet);
-    warnings_ = text(rows, "model.warnings", Tone::bad);
+    warnings_ = text(rows, "model.warnings");
     auto* recent = button("model.recent", "Recent", "Files opened lately");
     recent->setMenu(recent_files);
     beside(rows, {new ActionButton("model.open", actions.find("file.open"), {}, page()), recent});
 
     rows = section("Built-in shape");
     QStringList names;
-    for (const std::string_view name : shape_names()) names << shown_name(name);
+    for (const std::string_view name : shape_names()) names << shape_title(std::string(name));
     names << "None of these";
     shape_ = choice(rows, "model.shape", "Shape", names, "A shape to try things with, made anew at once");
     NumberSpec spec;
@@ -84,8 +76,7 @@ ModelPanel::ModelPanel(Workbench& workbench, const Actions& actions, QMenu* rece
     rows = section("Defects");
     verdict_ = text(rows, "model.verdict");
     defects_ = text(rows, "model.defects");
-    show_defects_ =
-        check(rows, "model.show_defects", "Show in the view", "Marks open and non-manifold edges in the view");
+    show_defects_ = check(rows, "view.defects", "Show in the view", "Marks open and non-manifold edges in the view");
 
     rows = section("Save");
     beside(rows, {new ActionButton("model.save", actions.find("file.save"), "Model", page()),
@@ -121,9 +112,9 @@ ModelPanel::ModelPanel(Workbench& workbench, const Actions& actions, QMenu* rece
 }
 
 void ModelPanel::change_shape(const std::string& merge, const std::function<void(studio::Shape&)>& edit) {
-    studio::Shape shape = workbench_.state().shape.value_or(studio::Shape{});
+    studio::Shape shape = workbench_.wanted_shape().value_or(studio::Shape{});
     edit(shape);
-    if (shape != workbench_.state().shape) workbench_.make_shape(shape, merge);
+    if (shape != workbench_.wanted_shape()) workbench_.make_shape(shape, merge);
 }
 
 void ModelPanel::refresh() {
@@ -147,14 +138,14 @@ void ModelPanel::refresh() {
         facts_->setText(counted(topology.vertices, "vertex", "vertices") + ", " +
                         counted(topology.faces, "face", "faces") + QStringLiteral(" (%1)\n").arg(kind) +
                         size_text(topology.box.size()) + '\n' +
-                        (topology.is_closed() ? QStringLiteral("closed, ") : QStringLiteral("open, ")) +
+                        (topology.faces == 0    ? QString()
+                         : topology.is_closed() ? QStringLiteral("closed, ")
+                                                : QStringLiteral("open, ")) +
                         counted(topology.components, "part", "parts"));
     }
     QStringList warnings;
-    if (source) {
+    if (source)
         for (const std::string& warning : source->warnings) warnings << QString::fromStdString(warning);
-        for (const std::string& warning : source->materials.warnings) warnings << QString::fromStdString(warning);
-    }
     constexpr qsizetype kShown = 4;
     const qsizetype left = warnings.size() - kShown;
     if (left > 0) warnings = warnings.mid(0, kShown) << QStringLiteral("… and %1 more").arg(left);
@@ -191,12 +182,14 @@ void ModelPanel::show_defects() {
         for (const DefectRow& row : kDefects)
             if (const std::size_t count = (shown_->topology.*row.finding).count; count > 0)
                 found << counted(count, row.one, row.many);
-    verdict_->setText(!shown_ ? QString() : found.isEmpty() ? QStringLiteral("✓ No defects") : QString());
-    verdict_->set_tone(Tone::good);
-    verdict_->setVisible(found.isEmpty() && shown_);
-    defects_->setText(found.join('\n'));
-    defects_->setVisible(!found.isEmpty());
-    show_defects_->setVisible(!found.isEmpty());
+    const bool is_surface = shown_ && shown_->topology.faces > 0, is_good = is_surface && found.isEmpty();
+    verdict_->setText(is_good ? QStringLiteral("✓ No defects") : QStringLiteral("Points have no defects to look for."));
+    verdict_->set_tone(is_good ? Tone::good : Tone::quiet);
+    verdict_->setVisible(is_good || (shown_ && !is_surface));
+    defects_->setText(is_surface ? found.join('\n') : QString());
+    defects_->setVisible(is_surface && !found.isEmpty());
+    show_defects_->setVisible(is_surface &&
+                              shown_->topology.open_edges.count + shown_->topology.nonmanifold_edges.count > 0);
 }
 
 } // namespace filigree::studio

@@ -23,29 +23,30 @@ ViewPanel::ViewPanel(Workbench& workbench, Viewport& viewport, MainWindow& windo
     error_ = text(rows, "view.error", Tone::quiet);
     measure_ = new ActionButton("view.measure", window.actions().find("view.measure_error"), {}, page());
     beside(rows, {measure_});
-    add_switch(rows, "view.split_view", "Split view", "Driver, restored mesh and full deformation side by side",
+    add_switch(rows, "view.split", "Split view", "Driver, restored mesh and full deformation side by side",
                &ViewSettings::split);
-    add_switch(rows, "view.driver_edges", "Driver over it", "The driver's edges over the mesh", &ViewSettings::driver);
+    add_switch(rows, "view.driver", "Driver over the mesh", "The driver's edges over the mesh", &ViewSettings::driver);
 
     rows = section("Inside");
-    add_switch(rows, "view.points", "Inside points", "Points inside the mesh at rest", &ViewSettings::inside_points);
+    add_switch(rows, "view.inside_points", "Inside points", "Points inside the mesh at rest",
+               &ViewSettings::inside_points);
     NumberSpec spec = {.least = 100, .most = 100000, .decimals = 0, .logarithmic = true, .neutral = 3000};
     points_ = number(rows, "view.point_count", "Count", spec, "About so many points");
-    add_switch(rows, "view.cut", "Clip plane", "Cuts the mesh open", &ViewSettings::clip);
+    add_switch(rows, "view.clip", "Clip plane", "Cuts the mesh open", &ViewSettings::clip);
     clip_axis_ = choice(rows, "view.clip_axis", "Across", {"x", "y", "z"}, "The axis that the plane stands across");
     spec = {.least = 0, .most = 100, .step = 1, .decimals = 0, .unit = "%", .neutral = 50};
     clip_ = number(rows, "view.clip_at", "At", spec, "Where along the axis, per cent of the box");
 
     rows = section("Speed");
-    add_switch(rows, "view.by_distance", "Level by distance",
+    add_switch(rows, "view.level_by_distance", "Level by distance",
                "The level shown follows the size on the screen: far away, fewer vertices are drawn",
                &ViewSettings::level_by_distance);
     drawn_ = text(rows, "view.drawn", Tone::quiet);
-    add_switch(rows, "view.coarser", "Coarser while moving", "A coarser level while things move, where drawing is slow",
+    add_switch(rows, "view.keep_up", "Coarser while moving", "A coarser level while things move, where drawing is slow",
                &ViewSettings::keep_up);
 
     rows = section("Scene");
-    add_switch(rows, "view.show_ground", "Ground", "The ground with the object's shadow", &ViewSettings::ground);
+    add_switch(rows, "view.ground", "Ground", "The ground with the object's shadow", &ViewSettings::ground);
     up_ = choice(rows, "view.up", "Up", {"x", "y", "z"}, "The axis that points up; gravity pulls the other way");
     theme_ = choice(rows, "view.theme", "Theme", {"As the system", "Light", "Dark"}, "The colours of the window");
 
