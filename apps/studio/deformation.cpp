@@ -11,6 +11,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
+#include <new>
 #include <thread>
 
 namespace filigree::studio {
@@ -237,9 +238,10 @@ struct HandleDrag::Content {
     std::uint64_t way_number = 1; ///< of the last move
     bool is_ending = false, stops = false;
     std::shared_ptr<const Pose> pose;
+    Vec3f applied = Vec3f::Zero(); ///< in that pose
     double milliseconds = 0;
     std::optional<Error> error;
-    bool is_new = false;
+    bool is_new = false, rests = false, has_ended = false;
 
     // A few rounds a picture while the mouse moves; the rest while it rests.
     static constexpr unsigned kRounds = 8;
@@ -248,15 +250,28 @@ struct HandleDrag::Content {
     static constexpr double kOffPointer = 3e-4;                     ///< of the diagonal: a fraction of a pixel
     static constexpr float kMostCorrection = 0.5f;                  ///< of the way: pins may hold what carries it
     static constexpr std::chrono::milliseconds kLongestEnding{250}; ///< a large driver is let go a little early
+    static constexpr std::chrono::seconds kLongestFinish{3};        ///< preparing included
 
     void work() {
-        const Status status = solve();
-        if (status || status.error().code == ErrorCode::cancelled) return;
+        Status status = Success{};
+        try {
+            status = solve();
+        } catch (const std::bad_alloc&) {
+            status = Error{ErrorCode::out_of_memory, "There is not enough memory to pull this driver: strip to fewer "
+                                                     "vertices."};
+        } catch (const std::exception& failure) {
+            status = Error{ErrorCode::unsuitable, std::string("The pull was stopped by an error of our own (") +
+                                                      failure.what() + "); please report it."};
+        }
         {
             const std::scoped_lock lock(mutex);
-            error = status.error();
-            pose = nullptr;
+            has_ended = rests = true;
+            if (!status && status.error().code != ErrorCode::cancelled) {
+                error = status.error();
+                pose = nullptr;
+            }
         }
+        wake.notify_all();
         bell.ring();
     }
 
@@ -282,7 +297,13 @@ struct HandleDrag::Content {
                     return (last_move <= (is_ending ? kFinalTolerance : kTolerance) && distance <= off_pointer) ||
                            rounds >= kMostRounds;
                 };
-                wake.wait(lock, [&] { return stops || is_ending || way_number != solved || !settled(); });
+                const auto has_work = [&] { return stops || is_ending || way_number != solved || !settled(); };
+                if (!has_work()) {
+                    rests = true;
+                    bell.ring();
+                    wake.wait(lock, has_work);
+                    rests = false;
+                }
                 if (stops) return cancelled_error();
                 if (is_ending && !ending_since) ending_since = std::chrono::steady_clock::now();
                 const bool is_late = ending_since && std::chrono::steady_clock::now() - *ending_since > kLongestEnding;
@@ -293,8 +314,9 @@ struct HandleDrag::Content {
                 if (is_ending) tolerance = kFinalTolerance;
             }
             const auto begin = std::chrono::steady_clock::now();
+            const Vec3f applying = to + correction;
             Result<HandleResult> result =
-                solver->solve(to + correction, {.iterations = kRounds, .tolerance = tolerance}, context);
+                solver->solve(applying, {.iterations = kRounds, .tolerance = tolerance}, context);
             if (!result) return result.error();
             rounds += std::max(1u, result->iterations);
             last_move = result->last_move;
@@ -311,6 +333,7 @@ struct HandleDrag::Content {
             {
                 const std::scoped_lock lock(mutex);
                 pose = std::move(next);
+                applied = applying;
                 milliseconds = took.count();
                 is_new = true;
             }
@@ -322,12 +345,15 @@ struct HandleDrag::Content {
 HandleDrag::HandleDrag(QObject* parent) : QObject(parent), bell_(std::make_unique<Bell>()) {
     connect(bell_.get(), &Bell::rung, this, &HandleDrag::listen);
 }
-HandleDrag::~HandleDrag() { stop(); }
+HandleDrag::~HandleDrag() {
+    stop();
+    for (const auto& content : retired_) content->thread.join();
+}
 
 void HandleDrag::begin(std::shared_ptr<const Model> model, std::shared_ptr<const Pose> start, Handle pull,
                        std::optional<Index> grabbed) {
     stop();
-    content_ = std::make_unique<Content>(std::move(model), std::move(start), std::move(pull), grabbed, *bell_);
+    content_ = std::make_shared<Content>(std::move(model), std::move(start), std::move(pull), grabbed, *bell_);
     content_->thread = std::thread([content = content_.get()] { content->work(); });
 }
 
@@ -338,21 +364,27 @@ void HandleDrag::move(const Vec3f& way) {
         if (way == content_->way) return;
         content_->way = way;
         ++content_->way_number;
+        content_->rests = false;
     }
-    content_->wake.notify_one();
+    content_->wake.notify_all();
 }
 
 std::shared_ptr<const Pose> HandleDrag::finish() {
     if (!content_) return nullptr;
+    std::shared_ptr<const Pose> pose;
+    std::optional<Error> error;
     {
-        const std::scoped_lock lock(content_->mutex);
+        std::unique_lock lock(content_->mutex);
         content_->is_ending = true;
+        content_->wake.notify_all();
+        content_->wake.wait_for(lock, Content::kLongestFinish, [&] { return content_->has_ended; });
+        pose = content_->pose;
+        applied_ = content_->applied;
+        error = content_->error;
     }
-    content_->wake.notify_one();
-    content_->thread.join();
-    const std::unique_ptr<Content> content = std::move(content_);
-    if (content->error) Q_EMIT failed(*content->error);
-    return content->pose;
+    stop();
+    if (error) Q_EMIT failed(*error);
+    return pose;
 }
 
 void HandleDrag::stop() {
@@ -362,14 +394,34 @@ void HandleDrag::stop() {
         content_->stops = true;
     }
     content_->context.cancel();
-    content_->wake.notify_one();
-    content_->thread.join();
-    content_.reset();
+    content_->wake.notify_all();
+    retired_.push_back(std::move(content_));
+    content_ = nullptr;
+    retire();
+}
+
+/// Joins the threads that have ended. Preparing a solver cannot be broken off, and nobody is to wait for it.
+void HandleDrag::retire() {
+    std::erase_if(retired_, [](const std::shared_ptr<Content>& content) {
+        {
+            const std::scoped_lock lock(content->mutex);
+            if (!content->has_ended) return false;
+        }
+        content->thread.join();
+        return true;
+    });
 }
 
 bool HandleDrag::is_active() const { return content_ != nullptr; }
 
+bool HandleDrag::is_busy() const {
+    if (!content_) return false;
+    const std::scoped_lock lock(content_->mutex);
+    return !content_->rests || content_->is_new;
+}
+
 void HandleDrag::listen() {
+    retire();
     if (!content_) return;
     std::shared_ptr<const Pose> pose;
     std::optional<Error> error;

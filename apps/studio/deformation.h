@@ -50,10 +50,14 @@ public:
                std::optional<Index> grabbed = {});
     /// How far the pull's vertices, or what was grabbed, are to be from where they started.
     void move(const Vec3f& way);
-    /// Waits for the solution of the last move and returns it; null when it failed. The drag is over.
+    /// Waits for the solution of the last move and returns it; null when it failed. The drag is over. Of a driver so
+    /// large that this takes seconds, what there is by then; null before the first solution.
     std::shared_ptr<const Pose> finish();
-    void stop(); ///< the drag is over, and leaves nothing
+    /// How far the pull's vertices went in the pose that finish() returned: the move and what was added to it.
+    const Vec3f& applied() const { return applied_; }
+    void stop(); ///< at once; the drag is over, and leaves nothing
     bool is_active() const;
+    bool is_busy() const; ///< on its way to the last move
 
 Q_SIGNALS:
     void solved(std::shared_ptr<const Pose> pose, double milliseconds); ///< in the main thread
@@ -63,7 +67,11 @@ private:
     struct Content;
     void listen();
     std::unique_ptr<Bell> bell_;
-    std::unique_ptr<Content> content_; ///< null: no drag
+    void retire();
+
+    std::shared_ptr<Content> content_;              ///< null: no drag
+    std::vector<std::shared_ptr<Content>> retired_; ///< over, but their threads are still to end
+    Vec3f applied_ = Vec3f::Zero();
 };
 
 } // namespace filigree::studio

@@ -57,7 +57,7 @@ struct Handle {
     std::vector<Index> held = {}; ///< of the driver, ascending: stayed where they were
     Vec3f centre = Vec3f::Zero(); ///< what was taken hold of, at rest
     double grip = 0, reach = 0;   ///< model units about it, at rest
-    Vec3f move = Vec3f::Zero();   ///< of what is within the grip
+    Vec3f move = Vec3f::Zero();   ///< of what is within the grip, as it was moved: see HandleDrag::applied()
     bool operator==(const Handle&) const = default;
 };
 

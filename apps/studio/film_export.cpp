@@ -76,7 +76,7 @@ Result<std::size_t> export_film(const FilmJob& job, const std::string& path, con
         scene.objects.push_back({&obstacle, plain});
     }
     scene.up = job.view.up;
-    scene.ground = job.view.ground;
+    scene.ground = job.has_surroundings ? job.surroundings.has_ground : job.view.ground; // as on the stage
     scene.fixed_ground = true;
     scene.ground_level = ground_level(job);
     Camera camera = job.camera;

@@ -149,10 +149,10 @@ void Jobs::listen() {
 
 void Jobs::finish(const Status& result, bool is_cancelled, bool is_replaced, const Job& job) {
     if (!is_replaced) {
-        if (is_cancelled || (!result && result.error().code == ErrorCode::cancelled))
-            Q_EMIT cancelled(job.title);
-        else if (result)
+        if (result) // also when it was cancelled too late
             job.deliver();
+        else if (is_cancelled || result.error().code == ErrorCode::cancelled)
+            Q_EMIT cancelled(job.title);
         else
             Q_EMIT failed(result.error());
     }

@@ -95,12 +95,12 @@ struct Playback::Worker {
     void rewind() {
         park();
         std::unique_lock lock(mutex);
-        outbox = {};
         hands.reset();
         resets = true;
         wake.notify_one();
-        parked.wait(lock, [&] { return is_idle && !resets; });
-        outbox = {};
+        parked.wait(lock, [&] { return is_idle && (!resets || quits); });
+        outbox.poses.clear(); // an error is still to be told
+        outbox.moment.reset();
     }
 
 private:
@@ -118,6 +118,9 @@ private:
         } catch (const std::bad_alloc&) {
             status = Error{ErrorCode::out_of_memory,
                            "There is not enough memory to simulate this body: choose fewer particles."};
+        } catch (const std::exception& error) {
+            status = Error{ErrorCode::unsuitable, std::string("The simulation was stopped by an error of our own (") +
+                                                      error.what() + "); please report it."};
         }
         {
             const std::scoped_lock lock(mutex);
@@ -358,9 +361,8 @@ void Playback::deliver() {
     if (news.error) {
         is_playing_ = is_grabbed_ = false;
         worker_->steps_awaited = 0;
-        Q_EMIT state_changed();
         Q_EMIT failed(*news.error);
-        return;
+        return remove(); // nothing moves it any more
     }
     if (!news.moment) return;
     *moment_ = std::move(*news.moment);

@@ -78,9 +78,9 @@ public:
     const PoseSequence& recording() const { return recording_; }
 
 Q_SIGNALS:
-    void moved();         ///< another moment
-    void state_changed(); ///< body there or not, playing or not
-    void failed(const Error& error);
+    void moved();                    ///< another moment
+    void state_changed();            ///< body there or not, playing or not
+    void failed(const Error& error); ///< of the simulation: the body is removed after this
 
 private:
     struct Worker;

@@ -94,6 +94,20 @@ Material material_of(std::string_view preset) {
     return {};
 }
 
+bool same_options(const StripOptions& a, const StripOptions& b) {
+    return a.code == b.code && a.base == b.base && a.levels == b.levels && a.error == b.error &&
+           a.precision == b.precision && a.references == b.references;
+}
+
+/// Where the user pinned the driver.
+std::vector<Index> pinned_vertices(const State& state) {
+    std::vector<Index> result;
+    for (const Handle& handle : state.handles)
+        if (handle.pinned) result.insert(result.end(), handle.vertices.begin(), handle.vertices.end());
+    std::sort(result.begin(), result.end());
+    return result;
+}
+
 /// What handles and recordings refer to is another driver now.
 void drop_what_refers_to_driver(State& state) {
     state.handles.clear();
@@ -132,12 +146,19 @@ Workbench::Workbench(QObject* parent) : QObject(parent), content_(std::make_uniq
     connect(&document_, &Document::changed, this, &Workbench::follow_document);
     connect(&playback_, &Playback::moved, this, &Workbench::follow_playback);
     connect(&playback_, &Playback::state_changed, this, [this] {
-        if (!playback_.has_body()) content_->measures_next = false;
+        if (!playback_.has_body()) {
+            content_->measures_next = content_->commits_steps = false;
+            if (content_->pulls_body) is_pulling_ = false;
+        }
+        if (mode_ == Mode::body && !recording() && !content_->keeps_body) set_mode(Mode::deform);
         Q_EMIT timeline_changed();
     });
     const auto tell = [this](const Error& error) { Q_EMIT told(QString::fromStdString(error.message), true); };
     connect(&playback_, &Playback::failed, this, tell);
-    connect(&playback_, &Playback::failed, this, [this] { content_->measures_next = false; });
+    connect(&playback_, &Playback::failed, this, [this] {
+        content_->measures_next = false;
+        commit_recording(); // what there was before
+    });
     connect(&jobs_, &Jobs::failed, this, tell);
     connect(&jobs_, &Jobs::failed, this, [this] { content_->then = After::nothing; });
     connect(&jobs_, &Jobs::cancelled, this, [this](const QString& title) {
@@ -192,6 +213,7 @@ void Workbench::follow_document(const State& before) {
 
 void Workbench::show_pose() {
     const auto begin = std::chrono::steady_clock::now();
+    if (std::exchange(content_->measures_next, false) && !wants_full_) playback_.want_full(false);
     pose_ = {};
     if (mode_ == Mode::deform) {
         pose_ = deformed_pose(state(), content_->context);
@@ -314,7 +336,8 @@ void Workbench::sample_inside_points(std::size_t count) {
 
 void Workbench::wait_until_idle() {
     jobs_.wait_until_idle();
-    while (content_->measures_next || jobs_.is_busy()) QCoreApplication::processEvents(QEventLoop::WaitForMoreEvents);
+    while (content_->measures_next || jobs_.is_busy() || drag_.is_busy())
+        QCoreApplication::processEvents(QEventLoop::WaitForMoreEvents);
 }
 
 // ------------------------------------------------------------------------------------------------- model and detail
@@ -330,8 +353,9 @@ const StripOptions& Workbench::wanted_strip() const {
 void Workbench::make_shape(const Shape& shape, const std::string& merge) {
     if (wanted_shape() == shape) return;
     const bool is_another = !wanted_shape() || wanted_shape()->name != shape.name;
-    make_model("Making the " + shape_title(shape.name).toLower(), shape, is_another ? StripOptions() : wanted_strip(),
-               merge);
+    const StripOptions strip = is_another ? StripOptions() : wanted_strip();
+    if (state().shape == shape && same_options(strip, state().strip)) return jobs_.drop(kModelTopic); // back again
+    make_model("Making the " + shape_title(shape.name).toLower(), shape, strip, merge);
 }
 
 void Workbench::set_strip(const StripOptions& options, const std::string& merge) {
@@ -452,6 +476,7 @@ void Workbench::pin(std::span<const Index> driver_vertices) {
     const QString name = "Pin " + counted(pins.vertices.size(), "vertex", "vertices");
     next.handles.push_back(std::move(pins));
     document_.change(name, std::move(next));
+    if (playback_.has_body()) Q_EMIT told("Make the body again for new pins to hold it.", false);
 }
 
 void Workbench::unpin(std::span<const Index> driver_vertices) {
@@ -475,6 +500,7 @@ void Workbench::unpin(std::span<const Index> driver_vertices) {
     if (count == 0) return;
     std::erase_if(next.handles, [](const Handle& handle) { return handle.vertices.empty(); });
     document_.change("Unpin " + counted(count, "vertex", "vertices"), std::move(next));
+    if (playback_.has_body()) Q_EMIT told("Make the body again for it to be free there.", false);
 }
 
 void Workbench::unpin_all() {
@@ -549,9 +575,11 @@ void Workbench::end_pull() {
         return;
     }
     std::shared_ptr<const Pose> pose = drag_.finish();
-    is_pulling_ = false;
+    if (!std::exchange(is_pulling_, false)) return; // it failed, and that was told
+    if (!pose) Q_EMIT told("The driver is large: hold it until it follows, then let go.", false);
     Handle& pull = content_->pull;
     if (!pose || pull.move.isZero(0)) return show_pose();
+    pull.move = drag_.applied();
     State next = state();
     for (const Index v : pull.vertices) pull.targets.push_back(pose->positions[v]);
     next.handles.push_back(std::move(pull));
@@ -580,23 +608,33 @@ void Workbench::set_body(const BodySettings& settings, const std::string& merge)
     content_->keeps_body = had_body; // until the new one is there
     document_.change(name_of_change(state().body, settings), std::move(next), merge);
     content_->keeps_body = false;
-    if (had_body) make_body_then(was_playing ? After::play : After::nothing);
+    if (had_body)
+        make_body_then(was_playing ? After::play : After::nothing);
+    else if (jobs_.is_pending(kBodyTopic))
+        make_body_then(content_->then);
 }
 
 void Workbench::make_body() { make_body_then(After::nothing); }
 
 void Workbench::make_body_then(After then) {
     content_->then = then;
-    const Vec3d up = up_vector(view_.settings().up);
+    const auto up_axis = view_.settings().up;
     using Made = Result<std::shared_ptr<const MadeBody>>; // an error is delivered too: no body fits the settings then
     jobs_.start<Made>(
-        "Making the body", "body",
-        [state = state(), up](const RunContext& context) -> Result<Made> {
-            Made made = make_body_of(state, up, context);
+        "Making the body", kBodyTopic,
+        [state = state(), up_axis](const RunContext& context) -> Result<Made> {
+            Made made = make_body_of(state, up_vector(up_axis), context);
             if (!made && made.error().code == ErrorCode::cancelled) return made.error();
             return Result<Made>(std::move(made));
         },
-        [this](const Made& made) {
+        [this, model = state().model, settings = state().body, pinned = pinned_vertices(state()),
+         up_axis](const Made& made) {
+            if (model != state().model || !(settings == state().body) || pinned != pinned_vertices(state()) ||
+                up_axis != view_.settings().up) {
+                content_->then = After::nothing;
+                Q_EMIT told("The body was not made: what it is made of was changed meanwhile.", false);
+                return;
+            }
             if (made) return put_body(*made);
             content_->then = After::nothing;
             playback_.remove();
@@ -607,7 +645,6 @@ void Workbench::make_body_then(After then) {
 
 void Workbench::put_body(std::shared_ptr<const MadeBody> made) {
     const After then = std::exchange(content_->then, After::nothing);
-    if (made->model != state().model) return; // another model was opened meanwhile
     content_->replay.stop();
     content_->keeps_body = true;
     if (state().recording) {
@@ -623,6 +660,9 @@ void Workbench::put_body(std::shared_ptr<const MadeBody> made) {
     show_pose();
     Q_EMIT timeline_changed();
     if (!made->report.warning.empty()) Q_EMIT told(QString::fromStdString(made->report.warning), false);
+    const bool is_deformed = !state().warps.none() || state().handle_pose;
+    if (is_deformed && !std::exchange(content_->told_of_rest, true))
+        Q_EMIT told("A body is made of the shape at rest, without its deformation.", false);
     if (then == After::play) play();
     if (then == After::step) step();
 }
@@ -659,7 +699,8 @@ void Workbench::play() {
         show_pose();
     }
     if (frame_count() < 2) return make_body_then(After::play);
-    content_->replay.start(int(std::lround(1000 / recording()->frames_per_second)));
+    // Rates come from files too.
+    content_->replay.start(int(std::lround(std::clamp(1000 / recording()->frames_per_second, 1.0, 10'000.0))));
     Q_EMIT timeline_changed();
 }
 
@@ -754,8 +795,10 @@ void Workbench::show_last_frame() {
 }
 
 void Workbench::follow_playback() {
-    if (mode_ != Mode::body || content_->keeps_body) return;
     const Moment& moment = *playback_.moment();
+    const bool is_another = std::exchange(content_->looked_at, moment.frame) != moment.frame;
+    if (mode_ != Mode::body || content_->keeps_body) return;
+    if (!is_another && frame_ != moment.frame) return; // looked at once more, for its vertices, and not shown
     frame_ = std::min(moment.frame, frame_count() - 1);
     if (pose_.positions != moment.pose.positions || pose_.gradients != moment.pose.gradients) {
         pose_ = moment.pose;
@@ -782,12 +825,15 @@ void Workbench::commit_recording(const QString& name, const std::string& merge) 
     if (!playback_.has_body()) return;
     const std::size_t count = playback_.recording().frames.size();
     if (count <= content_->committed && (state().recording || count < 2)) return;
-    const std::size_t added = count - std::min(count, content_->committed);
     State next = state();
     next.recording = std::make_shared<const PoseSequence>(playback_.recording());
     content_->committed = count;
     content_->keeps_body = true;
-    document_.change(name.isEmpty() ? "Simulate " + counted(added, "frame", "frames") : name, std::move(next), merge);
+    // Play and pause over and over are one step, which holds one copy.
+    if (name.isEmpty())
+        document_.change("Simulate " + counted(count - 1, "frame", "frames"), std::move(next), "play");
+    else
+        document_.change(name, std::move(next), merge);
     content_->keeps_body = false;
 }
 

@@ -18,6 +18,10 @@ struct FilmSettings {
     unsigned width = 960, height = 720, passes = 8;
 };
 
+/// The files that stand where an export of so many pictures or meshes to "frame_%04d.obj" would write; of a path
+/// without a number the file itself, if it is there. For whoever asks before they are replaced.
+std::vector<std::string> existing_outputs(const std::string& pattern, std::size_t frames);
+
 class Workbench : public QObject {
     Q_OBJECT
 public:
@@ -95,7 +99,7 @@ public:
     void sample_inside_points(std::size_t count);
     std::span<const Vec3f> inside_points() const { return inside_points_; }
 
-    void wait_until_idle(); ///< no job, no drag: for tests and scripts
+    void wait_until_idle(); ///< no job, and a pull has arrived where it was pulled to: for tests and scripts
 
 Q_SIGNALS:
     void pose_changed();

@@ -12,7 +12,7 @@ Result<State> stripped_state(State state, const RunContext& context);
 Result<State> state_of_shape(State state, const Shape& shape, const RunContext& context);
 
 // Topics of work.
-inline const std::string kModelTopic = "model", kOpenTopic = "open";
+inline const std::string kModelTopic = "model", kOpenTopic = "open", kBodyTopic = "body";
 
 struct Workbench::Content {
     RunContext context;            ///< of what is done at once
@@ -31,6 +31,8 @@ struct Workbench::Content {
     QTimer replay;
     After then = After::nothing; ///< once the body is made
     std::size_t committed = 0;   ///< frames of the live recording that the document has
+    std::size_t looked_at = 0;   ///< frame of the last moment of the body, shown or not
+    bool told_of_rest = false;   ///< that a body is made of the shape at rest
     bool keeps_body = false;     ///< a step of our own, after which the body still fits
     bool commits_steps = false;  ///< once they are delivered
     bool measures_next = false;  ///< the error, once every vertex is delivered

@@ -8,6 +8,7 @@
 #include "filigree/io/mesh_file.h"
 #include "filigree/io/model_file.h"
 
+#include <algorithm>
 #include <filesystem>
 
 namespace filigree::studio {
@@ -35,7 +36,12 @@ Result<State> read_state(const std::string& path, const RunContext& context) {
         Result<PoseSequence> poses = read_poses(*bytes, path, context);
         if (!poses) return poses.error();
         state.strip.code = model->code();
-        if (model->code() == DetailCode::blend) state.strip.base = model->driver().vertices.size();
+        if (const auto* blend = std::get_if<BlendDetail>(&model->detail)) {
+            state.strip.base = model->driver().vertices.size();
+            state.strip.precision = blend->precision;
+        }
+        if (const auto* reference = std::get_if<ReferenceDetail>(&model->detail))
+            state.strip.references = reference->references;
         state.model = std::make_shared<const Model>(std::move(*model));
         if (poses->frames.size() == 1) { // a shape, not a motion
             state.handle_pose = std::make_shared<const Pose>(std::move(poses->frames[0]));
@@ -115,7 +121,7 @@ Result<QString> write_checked(const Mesh& mesh, const std::string& path, const R
     return text;
 }
 
-/// "frame_%04d.obj" cut at its number.
+/// "frame_%04d.obj" cut at its number. Folders may have a '%' in their names.
 struct NumberedPath {
     std::string before, after;
     std::size_t digits = 1;
@@ -123,7 +129,8 @@ struct NumberedPath {
     static Result<NumberedPath> parse(const std::string& pattern) {
         const Error no_number{ErrorCode::usage, pattern + ": needs one place for the frame's number, such as %04d in "
                                                           "frame_%04d.obj."};
-        const std::size_t from = pattern.find('%');
+        const std::size_t slash = pattern.rfind('/'), name = slash == std::string::npos ? 0 : slash + 1;
+        const std::size_t from = pattern.find('%', name);
         if (from == std::string::npos || pattern.find('%', from + 1) != std::string::npos) return no_number;
         const std::size_t until = pattern.find_first_not_of("0123456789", from + 1);
         if (until == std::string::npos || pattern[until] != 'd' || until - from > 3) return no_number;
@@ -171,7 +178,20 @@ Result<QString> write_frames(const State& state, const PoseSequence& poses, cons
 
 } // namespace
 
+std::vector<std::string> existing_outputs(const std::string& pattern, std::size_t frames) {
+    std::vector<std::string> result;
+    const auto add = [&](const std::string& path) {
+        std::error_code ignored;
+        if (fs::exists(path, ignored)) result.push_back(path);
+    };
+    const Result<NumberedPath> numbered = NumberedPath::parse(pattern);
+    if (!numbered) add(pattern);
+    for (std::size_t frame = 1; numbered && frame <= frames; ++frame) add(numbered->at(frame));
+    return result;
+}
+
 void Workbench::open(const std::string& path) {
+    pause();
     forget_measuring();
     jobs_.drop(kModelTopic);
     jobs_.start<State>(
@@ -182,9 +202,13 @@ void Workbench::open(const std::string& path) {
             state->body = body;
             return state;
         },
-        [this](State state) {
+        [this, path, id = document_.state_id()](State state) {
             if (is_pulling_) end_pull();
-            content_->replay.stop();
+            pause();
+            if (document_.state_id() != id) {
+                Q_EMIT told("The document was changed while " + file_name(path) + " was read; open it again.", true);
+                return;
+            }
             const QString text = summary(state);
             const bool has_motion = state.recording != nullptr;
             frame_ = 0;
@@ -214,26 +238,36 @@ void Workbench::save(const QString& title, const std::string& path,
 void Workbench::save_model(const std::string& path) {
     commit_recording();
     const std::uint64_t id = document_.state_id();
+    // A model file holds one motion or one pose, and no history.
+    const bool has_motion = state().recording != nullptr;
+    const bool has_pose = !state().warps.none() || state().handle_pose;
+    const bool has_pins = std::ranges::any_of(state().handles, &Handle::pinned);
+    std::vector<QString> left_out;
+    if (has_motion && has_pose) left_out.push_back("the deformation");
+    if (has_pins) left_out.push_back("the pins");
+    const bool is_whole = left_out.empty(); // laws and settings are how it is shown
+    if (state().restore.law) left_out.push_back("the law");
+    if (state().restore.thin_shell) left_out.push_back("thin shell");
+    QString sentence = "Saved " + file_name(path);
+    if (has_motion) sentence += " with its recording";
+    if (!has_motion && has_pose) sentence += " as it is deformed";
+    for (std::size_t k = 0; k < left_out.size(); ++k) sentence += (k == 0 ? ", without " : " and ") + left_out[k];
+    sentence += '.';
     save(
         "Saving " + file_name(path), path,
-        [path, state = state()](const RunContext& context) -> Result<QString> {
+        [path, state = state(), sentence](const RunContext& context) -> Result<QString> {
             PoseSequence poses;
             Pose pose = deformed_pose(state, context);
-            const bool has_pose = !pose.positions.empty(), has_motion = state.recording != nullptr;
-            if (has_motion)
+            if (state.recording)
                 poses = *state.recording;
-            else if (has_pose)
+            else if (!pose.positions.empty())
                 poses.frames.push_back(std::move(pose));
             const Status status = write_model(*state.model, poses, path, context);
             if (!status) return status.error();
-            // A model file holds one motion or one pose, and no history.
-            QString kept;
-            if (has_motion) kept = has_pose ? " with its recording, not with the deformation" : " with its recording";
-            if (!has_motion && has_pose) kept = " as it is deformed";
-            return QString("Saved %1%2.").arg(file_name(path), kept);
+            return sentence;
         },
-        [this, id, path] {
-            if (document_.state_id() == id) document_.set_saved();
+        [this, id, path, is_whole] {
+            if (is_whole && document_.state_id() == id) document_.set_saved();
             Q_EMIT saved(path);
         });
 }
@@ -285,7 +319,15 @@ void Workbench::export_film(const std::string& path, const FilmSettings& setting
     save("Exporting " + file_name(path), path, [path, job](const RunContext& context) -> Result<QString> {
         const Result<std::size_t> frames = studio::export_film(*job, path, context);
         if (!frames) return frames.error();
-        return QString("Saved %1: %2.").arg(file_name(path), counted(*frames, "picture", "pictures"));
+        QString text = QString("Saved %1: %2.").arg(file_name(path), counted(*frames, "picture", "pictures"));
+        const ViewSettings& view = job->view;
+        std::vector<QString> left_out;
+        if (view.coloring != Coloring::own) left_out.push_back("colouring");
+        if (view.clip) left_out.push_back("the clip plane");
+        if (view.split) left_out.push_back("the split view");
+        if (view.particles || view.inside_points) left_out.push_back("points");
+        for (std::size_t k = 0; k < left_out.size(); ++k) text += (k == 0 ? " Films are without " : ", ") + left_out[k];
+        return left_out.empty() ? text : text + '.';
     });
 }
 

@@ -174,6 +174,24 @@ TEST(FullDeformation, RepeatsThePullsOnEveryVertex) {
     EXPECT_LT(rms(restored(state, pose), full), 0.03);
 }
 
+TEST(HandleDrag, TellsWhatWasAppliedSoThatItCanBeRepeated) {
+    const State state = cube_state(24, 600);
+    const Index grabbed = Index(state.model->mesh.vertex_count() / 3);
+    const PullRegion region = pull_region(state, state.model->mesh.positions[grabbed], 0.1, 0.6, grabbed);
+    Handle pull;
+    pull.vertices = region.grip;
+    pull.held = region.held;
+    HandleDrag drag;
+    drag.begin(state.model, nullptr, pull, grabbed);
+    drag.move(Vec3f(0, 0.3f, 0.1f));
+    EXPECT_TRUE(drag.is_busy());
+    EXPECT_TRUE(QTest::qWaitFor([&] { return !drag.is_busy(); }));
+    const auto pose = drag.finish();
+    ASSERT_NE(pose, nullptr);
+    const std::vector<Vec3f> rest = driver_positions(*state.model);
+    for (const Index v : pull.vertices) EXPECT_LT((pose->positions[v] - rest[v] - drag.applied()).norm(), 1e-5f);
+}
+
 TEST(FullDeformation, CanBeCancelled) {
     State state = cube_state();
     state = pulled(state, driver_positions(*state.model)[0], Vec3f(0, 0.3f, 0));

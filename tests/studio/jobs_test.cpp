@@ -85,6 +85,28 @@ TEST(Jobs, CancelStopsAllAndDeliversNothing) {
     EXPECT_EQ(cancelled.count(), 2);
 }
 
+TEST(Jobs, WorkThatEndedWellIsDeliveredThoughItWasCancelled) {
+    Jobs jobs;
+    QSignalSpy cancelled(&jobs, &Jobs::cancelled);
+    int delivered = 0;
+    jobs.start<int>(
+        "Save", "save",
+        [](const RunContext& context) -> Result<int> {
+            while (!context.is_cancelled()) std::this_thread::yield();
+            return 3; // the file was written
+        },
+        [&](int value) { delivered = value; });
+    EXPECT_TRUE(jobs.is_pending("save"));
+    EXPECT_TRUE(QTest::qWaitFor([&] { return jobs.title() == "Save"; }));
+    QSignalSpy started(&jobs, &Jobs::started);
+    EXPECT_TRUE(started.count() > 0 || QTest::qWaitFor([&] { return started.count() > 0; }));
+    jobs.cancel();
+    EXPECT_FALSE(jobs.is_pending("save"));
+    jobs.wait_until_idle();
+    EXPECT_EQ(delivered, 3);
+    EXPECT_EQ(cancelled.count(), 0);
+}
+
 TEST(Jobs, ErrorsAndExceptionsAreTold) {
     Jobs jobs;
     std::vector<Error> errors;

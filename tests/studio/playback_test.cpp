@@ -212,6 +212,25 @@ TEST(Playback, PinnedVerticesHoldTheBody) {
     EXPECT_LT(lowest(pose), -1.01f); // the rest hangs
 }
 
+TEST(Playback, ABodyThatCannotBeSimulatedIsToldAndRemoved) {
+    auto made = std::make_shared<MadeBody>(*made_of(ball_state()));
+    made->world.obstacles[0].stiffness = 2; // refused
+    for (const bool resets : {false, true}) {
+        Playback playback;
+        QSignalSpy failed(&playback, &Playback::failed);
+        playback.put(made);
+        playback.play();
+        if (resets) playback.reset(); // at work or not: it returns
+        EXPECT_TRUE(QTest::qWaitFor([&] { return failed.count() > 0; }));
+        EXPECT_FALSE(playback.has_body());
+        EXPECT_FALSE(playback.is_playing());
+        playback.reset();
+        playback.play();
+        playback.step();
+        EXPECT_FALSE(playback.is_playing() || playback.is_stepping());
+    }
+}
+
 TEST(Playback, GoesAwayInTheMiddleOfAFrame) {
     BodySettings settings;
     State state = ball_state(settings);

@@ -682,6 +682,180 @@ TEST_F(WorkbenchTest, FilmsAreDrawnWithoutTheWindow) {
     EXPECT_FALSE(fs::exists(path("cancelled_01.png")));
 }
 
+TEST_F(WorkbenchTest, ACancelledPullLeavesTheHistoryAlone) {
+    Warps warps;
+    warps.bend = 20;
+    bench.set_warps(warps);
+    undo_stack().undo();
+    const std::string before = bytes();
+    pull_top(Vec3d(0, 0.3, 0));
+    bench.wait_until_idle(); // until it has arrived
+    ASSERT_NE(bench.pose(), nullptr);
+    bench.cancel_pull();
+    EXPECT_FALSE(bench.is_pulling());
+    EXPECT_EQ(bench.pose(), nullptr);
+    EXPECT_TRUE(bytes() == before);
+    EXPECT_EQ(undo_stack().redoText(), "Bend");
+}
+
+TEST_F(WorkbenchTest, SettingsOfTheModelDoNotLoseEachOther) {
+    make_small_shape();
+    Shape shape = *bench.wanted_shape();
+    shape.options.frequency = 10;
+    bench.make_shape(shape, "frequency");
+    shape = *bench.wanted_shape();
+    EXPECT_EQ(shape.options.frequency, 10);
+    shape.options.amplitude = 0.08;
+    bench.make_shape(shape, "amplitude");
+    StripOptions strip = bench.wanted_strip();
+    strip.base = 80;
+    bench.set_strip(strip);
+    EXPECT_EQ(bench.wanted_shape()->options.amplitude, 0.08);
+    bench.wait_until_idle();
+    EXPECT_EQ(state().shape->options.frequency, 10);
+    EXPECT_EQ(state().shape->options.amplitude, 0.08);
+    EXPECT_EQ(state().strip.base, 80u);
+    EXPECT_EQ(undo_stack().count(), 1);
+
+    const Shape there = shape;
+    shape.options.frequency = 7;
+    bench.make_shape(shape);
+    bench.make_shape(there); // back before it was made: nothing is to be done
+    bench.wait_until_idle();
+    EXPECT_EQ(undo_stack().count(), 1);
+
+    shape.options.frequency = 7;
+    bench.make_shape(shape);
+    undo_stack().undo(); // what was to be made was meant for what is undone
+    bench.wait_until_idle();
+    EXPECT_EQ(bench.wanted_shape(), state().shape);
+    EXPECT_NE(state().shape->options.frequency, 7);
+}
+
+TEST_F(WorkbenchTest, OpeningIsNeitherDroppedNorDoesItDropChanges) {
+    make_small_shape();
+    bench.save_mesh(path("a.ply"));
+    bench.wait_until_idle();
+    Shape shape = *state().shape;
+    shape.options.frequency = 8;
+    bench.open(path("a.ply"));
+    bench.make_shape(shape); // refused
+    EXPECT_EQ(errors.size(), 1u);
+    bench.wait_until_idle();
+    EXPECT_EQ(state().source->name, "a.ply");
+
+    bench.open(path("a.ply"));
+    Warps warps;
+    warps.bend = 30;
+    bench.set_warps(warps);
+    bench.wait_until_idle();
+    EXPECT_EQ(state().warps.bend, 30);
+    ASSERT_EQ(errors.size(), 2u);
+    EXPECT_EQ(errors[1], "The document was changed while a.ply was read; open it again.");
+}
+
+TEST_F(WorkbenchTest, ADocumentIsSavedOnlyWhenTheFileHoldsItAll) {
+    make_small_shape();
+    QSignalSpy saved(&bench, &Workbench::saved);
+    bench.set_law(Law::keep);
+    bench.save_model(path("a.fil"));
+    bench.wait_until_idle();
+    EXPECT_EQ(saved.count(), 1);
+    EXPECT_FALSE(bench.document().is_modified()); // a law is how it is shown
+    EXPECT_EQ(notes.back(), "Saved a.fil, without the law.");
+    bench.pin(std::vector<Index>{0, 1});
+    bench.save_model(path("a.fil"));
+    bench.wait_until_idle();
+    EXPECT_TRUE(bench.document().is_modified());
+    EXPECT_EQ(notes.back(), "Saved a.fil, without the pins and the law.");
+    bench.unpin_all();
+    Warps warps;
+    warps.bend = 30;
+    bench.set_warps(warps);
+    simulate(2);
+    bench.save_model(path("a.fil"));
+    bench.wait_until_idle();
+    EXPECT_TRUE(bench.document().is_modified());
+    EXPECT_EQ(notes.back(), "Saved a.fil with its recording, without the deformation and the law.");
+}
+
+TEST_F(WorkbenchTest, AnOpenedModelKnowsHowItWasStripped) {
+    make_small_shape();
+    StripOptions strip;
+    strip.base = 80;
+    strip.precision = Precision::int16;
+    bench.set_strip(strip);
+    bench.wait_until_idle();
+    const std::size_t driver = state().model->driver().vertices.size();
+    bench.save_model(path("a.fil"));
+    bench.open(path("a.fil"));
+    bench.wait_until_idle();
+    EXPECT_EQ(state().strip.precision, Precision::int16);
+    EXPECT_EQ(state().strip.base, driver);
+}
+
+TEST_F(WorkbenchTest, WantingEveryVertexDoesNotMoveTheTimeline) {
+    make_small_shape();
+    simulate(4);
+    bench.go_to_frame(1);
+    QSignalSpy moved(&bench.playback(), &Playback::moved);
+    bench.want_full(true);
+    EXPECT_TRUE(QTest::qWaitFor([&] { return moved.count() > 0; }));
+    EXPECT_EQ(bench.frame(), 1u);
+    EXPECT_TRUE(bench.pose()->positions == state().recording->frames[1].positions);
+}
+
+TEST_F(WorkbenchTest, ABodyThatNoLongerFitsIsNotTaken) {
+    make_small_shape();
+    BodySettings body = state().body;
+    body.size = 2;
+    bench.set_body(body);
+    bench.make_body();
+    undo_stack().undo();
+    bench.wait_until_idle();
+    EXPECT_FALSE(bench.playback().has_body());
+    EXPECT_EQ(notes.size(), 1u);
+}
+
+TEST_F(WorkbenchTest, PlayAndPauseAgainAreOneStep) {
+    make_small_shape();
+    simulate(2);
+    bench.play();
+    bench.playback().wait_for_frames(2);
+    bench.pause();
+    EXPECT_EQ(undo_stack().count(), 1);
+    EXPECT_EQ(undo_stack().undoText(), QString("Simulate %1 frames").arg(bench.frame_count() - 1));
+    EXPECT_EQ(state().recording->frames.size(), bench.frame_count());
+}
+
+TEST_F(WorkbenchTest, WhatABodyDoesNotTakeIsTold) {
+    make_small_shape();
+    Warps warps;
+    warps.bend = 30;
+    bench.set_warps(warps);
+    bench.make_body();
+    bench.wait_until_idle();
+    ASSERT_EQ(notes.size(), 1u);
+    EXPECT_EQ(notes[0], "A body is made of the shape at rest, without its deformation.");
+    bench.pin(std::vector<Index>{3});
+    ASSERT_EQ(notes.size(), 2u);
+    EXPECT_EQ(notes[1], "Make the body again for new pins to hold it.");
+}
+
+TEST_F(WorkbenchTest, NumbersAreLookedForInTheFileNameAlone) {
+    make_small_shape();
+    simulate(2);
+    fs::create_directory(path("50% done"));
+    const std::string pattern = path("50% done/frame_%03d.obj");
+    EXPECT_TRUE(existing_outputs(pattern, bench.frame_count()).empty());
+    bench.export_meshes(pattern);
+    bench.wait_until_idle();
+    EXPECT_TRUE(errors.empty());
+    EXPECT_EQ(existing_outputs(pattern, 2),
+              (std::vector<std::string>{path("50% done/frame_001.obj"), path("50% done/frame_002.obj")}));
+    EXPECT_EQ(existing_outputs(path("50% done/frame_001.obj"), 9).size(), 1u);
+}
+
 TEST_F(WorkbenchTest, ClosingDuringWorkIsSafe) {
     Workbench other;
     other.open(path("missing.obj"));
