@@ -631,7 +631,7 @@ TEST_F(WorkbenchTest, AnimateSquashesTheCubeAndItBounces) {
     const float rest = heights[0], squashed = *std::min_element(heights.begin(), heights.end());
     EXPECT_LT(squashed, 0.85f * rest);
     EXPECT_GT(squashed, 0.5f * rest);
-    EXPECT_NEAR(*touch, bottoms[0] - 0.54f, 0.06f); // half its size below
+    EXPECT_NEAR(*touch, bottoms[0] - 0.54f, 0.1f); // half its size below, and the skin of so few soft particles lower
     EXPECT_GT(*std::max_element(touch, bottoms.end()), *touch + 0.15f);
     EXPECT_EQ(bench.playback().made()->world.obstacles.size(), 1u);
 }
