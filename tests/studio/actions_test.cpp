@@ -274,6 +274,7 @@ TEST_F(ActionsTest, FilesByNumberAreNotOverwrittenUnasked) {
     workbench().set_body(body);
     trigger("body.make");
     trigger("body.step");
+    workbench().playback().wait_for_frames(0);
     QTemporaryDir folder;
     ASSERT_TRUE(QDir(folder.path()).mkdir("50% done"));
     const QString path = folder.filePath("50% done/x.obj"), first = folder.filePath("50% done/x_0001.obj");
@@ -309,12 +310,13 @@ TEST_F(ActionsTest, FilesByNumberAreNotOverwrittenUnasked) {
 }
 
 TEST_F(ActionsTest, EscDuringAPullLeavesNoStep) {
+    workbench().set_mode(Mode::deform);
     const std::string before = workbench().document().bytes();
     const int steps = workbench().document().undo_stack().count();
     const Vec3d at = workbench().state().model->mesh.positions[0].cast<double>();
     workbench().begin_pull(0, at);
     workbench().pull_to(at + Vec3d(0, 0.3, 0));
-    ASSERT_TRUE(action("edit.cancel").isEnabled());
+    ASSERT_TRUE(QTest::qWaitFor([] { return action("edit.cancel").isEnabled(); }));
     trigger("edit.cancel");
     EXPECT_FALSE(workbench().is_pulling());
     EXPECT_EQ(workbench().document().undo_stack().count(), steps);

@@ -220,8 +220,8 @@ TEST_F(Window, AFileThatCannotBeWrittenKeepsTheWindowOpen) {
 
 TEST_F(Window, WhatMovesIsAskedForAsWell) {
     make_body_and_steps(workbench());
-    window->save_file(path("before.fil"));
-    workbench().wait_until_idle();
+    workbench().pause();
+    workbench().document().set_saved();
     ASSERT_FALSE(workbench().document().is_modified());
     const std::size_t before = workbench().frame_count();
     workbench().play();
