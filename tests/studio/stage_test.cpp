@@ -2,8 +2,13 @@
 #include "stage.h"
 #include "viewport.h"
 
+#include <QOffscreenSurface>
+#include <QOpenGLContext>
 #include <QTest>
 #include <QWidget>
+
+#include <algorithm>
+#include <new>
 
 #include <gtest/gtest.h>
 
@@ -11,6 +16,8 @@ using namespace filigree;
 using namespace filigree::studio;
 
 namespace {
+
+using studio::Background; // there is one of pictures too
 
 constexpr int kPatience = 20'000; // ms
 
@@ -39,6 +46,167 @@ TEST(Stage, AModelWithMoreLevelsThanTheOneDrawn) {
     ShownModel nothing_ready(workbench.state(), RestoreOn::cpu);
     EXPECT_FALSE(nothing_ready.nearest_ready(1'000));
     EXPECT_EQ(nothing_ready.level(1'000), nullptr);
+}
+
+/// A stage without a window.
+struct StageTest : testing::Test {
+    Workbench workbench;
+    QOffscreenSurface surface;
+    QOpenGLContext opengl;
+    std::unique_ptr<Stage> stage;
+
+    void SetUp() override {
+        QSurfaceFormat format;
+        format.setVersion(4, 3);
+        format.setProfile(QSurfaceFormat::CoreProfile);
+        surface.setFormat(format);
+        surface.create();
+        opengl.setFormat(format);
+        if (!opengl.create() || opengl.format().version() < std::pair(4, 3) || !opengl.makeCurrent(&surface))
+            GTEST_SKIP() << "no OpenGL";
+        workbench.make_shape({.name = "wavy-cube", .options = {.resolution = 12}});
+        workbench.wait_until_idle();
+        stage = std::make_unique<Stage>(workbench, [](const std::function<void()>& work) { work(); });
+        stage->start(RestoreOn::cpu);
+        settle();
+    }
+    void TearDown() override {
+        if (stage) stage->stop();
+        stage.reset();
+    }
+
+    void settle() {
+        workbench.wait_until_idle();
+        stage->background().wait();
+    }
+    void set(const std::function<void(ViewSettings&)>& change) {
+        ViewSettings settings = workbench.view().settings();
+        change(settings);
+        workbench.view().set(settings);
+    }
+    void bend(double degrees) {
+        Warps warps = workbench.state().warps;
+        warps.bend = degrees;
+        workbench.set_warps(warps);
+    }
+    Scene full() { return stage->scene(Stage::Content::full, workbench.state().level(), {}, 1, QPalette()); }
+    /// Three frames, of which the last is shown.
+    void simulate() {
+        BodySettings body = workbench.state().body;
+        body.particles = 300;
+        workbench.set_body(body);
+        for (int k = 0; k < 2; ++k) {
+            workbench.step();
+            workbench.wait_until_idle();
+            workbench.playback().wait_for_frames(0);
+        }
+        settle();
+    }
+};
+
+TEST_F(StageTest, TheFullDeformationIsOfThePoseShown) {
+    set([](ViewSettings& s) { s.split = true; });
+    settle();
+    EXPECT_EQ(stage->full_problem(), "") << "at rest there is nothing to compute";
+    bend(30);
+    EXPECT_EQ(stage->full_problem(), "being computed");
+    settle();
+    EXPECT_EQ(stage->full_problem(), "");
+    ASSERT_EQ(full().objects.size(), 1u);
+    const Box of_30 = full().objects[0].drawable->box();
+
+    bend(90);
+    EXPECT_EQ(stage->full_problem(), "being computed");
+    EXPECT_TRUE(full().objects.empty()) << "what is drawn is of the pose before";
+    settle();
+    ASSERT_EQ(full().objects.size(), 1u);
+    const Box of_90 = full().objects[0].drawable->box();
+    EXPECT_GT((of_90.size() - of_30.size()).norm(), 0.01);
+
+    // What is on its way when the pose changes again does not arrive.
+    bend(30);
+    workbench.wait_until_idle();
+    bend(90);
+    stage->background().wait();
+    EXPECT_TRUE(full().objects.empty());
+    settle();
+    ASSERT_EQ(full().objects.size(), 1u);
+    EXPECT_LT((full().objects[0].drawable->box().size() - of_90.size()).norm(), 1e-6);
+}
+
+TEST_F(StageTest, ARecordedMomentHasNoFullDeformationOfAnother) {
+    set([](ViewSettings& s) {
+        s.split = true;
+        s.ground = false;
+    });
+    simulate();
+    ASSERT_EQ(workbench.frame_count(), 3u);
+    ASSERT_EQ(workbench.full().size(), workbench.state().model->mesh.vertex_count());
+    EXPECT_EQ(stage->full_problem(), "");
+    const auto count = [&] { return full().objects.size(); };
+    const std::size_t at_the_end = count();
+    ASSERT_GE(at_the_end, 1u);
+    workbench.go_to_frame(1);
+    settle();
+    EXPECT_EQ(count(), at_the_end - 1) << "the last frame's full deformation is still drawn";
+    EXPECT_NE(stage->full_problem().find("recording"), std::string::npos) << stage->full_problem();
+    workbench.go_to_frame(2);
+    settle();
+    EXPECT_EQ(count(), at_the_end);
+}
+
+TEST_F(StageTest, ColorsAreOfWhatTheLegendSays) {
+    set([](ViewSettings& s) { s.coloring = Coloring::levels; });
+    settle();
+    const std::size_t count = workbench.state().model->mesh.vertex_count();
+    EXPECT_EQ(stage->colors().values, vertex_levels(*workbench.state().model, workbench.state().model->finest_level()));
+    bend(40);
+    EXPECT_EQ(stage->colors().values.size(), count);
+    set([](ViewSettings& s) { s.coloring = Coloring::error; });
+    EXPECT_TRUE(stage->colors().values.empty()) << "levels under the legend of an error";
+    const unsigned level = workbench.state().level();
+    const Scene grey = stage->scene(Stage::Content::restored, level, {}, 1, QPalette());
+    ASSERT_FALSE(grey.objects.empty());
+    EXPECT_FALSE(grey.objects[0].appearance.own_colors);
+    settle();
+    ASSERT_EQ(stage->colors().values.size(), count);
+    const float most = *std::max_element(stage->colors().values.begin(), stage->colors().values.end());
+    EXPECT_GT(most, 0);
+    EXPECT_LT(most, 0.2f) << "fractions of the diagonal";
+    bend(50);
+    EXPECT_TRUE(stage->colors().values.empty()) << "the error of the pose before";
+    settle();
+    EXPECT_EQ(stage->colors().values.size(), count);
+
+    simulate();
+    EXPECT_EQ(stage->colors().values.size(), count);
+    workbench.go_to_frame(1);
+    settle();
+    EXPECT_TRUE(stage->colors().values.empty()) << "nobody knows the error of a recorded moment";
+    set([](ViewSettings& s) { s.coloring = Coloring::own; });
+    EXPECT_TRUE(stage->colors().values.empty());
+}
+
+TEST(Background, WhatWorkThrowsIsToldAndTheNextIsDone) {
+    Background background;
+    std::vector<std::string> told;
+    QObject::connect(&background, &Background::failed, &background,
+                     [&](const Error& error) { told.push_back(error.message); });
+    int delivered = 0;
+    std::optional<Error> otherwise;
+    background.start("memory", [](const RunContext&) -> Background::Delivery { throw std::bad_alloc(); });
+    background.start(
+        "more memory", [](const RunContext&) -> Background::Delivery { throw std::bad_alloc(); }, false,
+        [&](const Error& error) { otherwise = error; });
+    background.start("odd", [](const RunContext&) -> Background::Delivery { throw std::runtime_error("odd"); });
+    background.start("good", [&](const RunContext&) -> Background::Delivery { return [&] { ++delivered; }; });
+    ASSERT_TRUE(QTest::qWaitFor([&] { return delivered == 1; }, kPatience));
+    ASSERT_EQ(told.size(), 2u);
+    EXPECT_NE(told[0].find("memory"), std::string::npos);
+    EXPECT_NE(told[1].find("odd"), std::string::npos);
+    ASSERT_TRUE(otherwise);
+    EXPECT_EQ(otherwise->code, ErrorCode::out_of_memory);
+    EXPECT_FALSE(background.is_busy());
 }
 
 } // namespace
