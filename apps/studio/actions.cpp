@@ -1,6 +1,7 @@
 #include "actions.h"
 
 #include "icons.h"
+#include "panels/overview.h"
 #include "window.h"
 
 #include <QActionGroup>
@@ -287,7 +288,11 @@ void Actions::Content::add_edit_actions() {
         [this] { cancel(); }, [this] { return workbench.jobs().is_busy() || workbench.is_pulling(); });
     add(
         "detail.remove", "&Remove detail", "One level coarser", "PgDown", [this] { workbench.remove_detail(); },
-        [this] { return has_model() && workbench.state().level() > 0; })
+        [this] {
+            const State& state = workbench.state();
+            return has_model() && state.level() > 0 &&
+                   level_vertices(*state.model, state.level() - 1) < level_vertices(*state.model, state.level());
+        })
         ->setIcon(icon(Icon::minus));
     add(
         "detail.add", "&Add detail", "One level finer", "PgUp", [this] { workbench.add_detail(); },

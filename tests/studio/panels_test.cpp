@@ -326,6 +326,7 @@ TEST_F(Panels, PointsHaveNoDefects) {
     ASSERT_EQ(state().source->topology.faces, 0u);
     EXPECT_TRUE(get<QLabel>("model.verdict").text().startsWith("Points have no"));
     EXPECT_TRUE(get<QCheckBox>("view.defects").isHidden());
+    EXPECT_FALSE(get<QPushButton>("overview.remove_detail").isEnabled()); // its driver has all of them
     const QStringList warnings = get<QLabel>("model.warnings").text().split('\n');
     EXPECT_EQ(QSet<QString>(warnings.begin(), warnings.end()).size(), warnings.size()); // each once
 }

@@ -135,13 +135,13 @@ void ModelPanel::refresh() {
                              : topology.quads == topology.faces     ? QStringLiteral("quads")
                              : topology.triangles == topology.faces ? QStringLiteral("triangles")
                                                                     : QStringLiteral("mixed polygons");
-        facts_->setText(counted(topology.vertices, "vertex", "vertices") + ", " +
+        QString facts = counted(topology.vertices, "vertex", "vertices") + ", " +
                         counted(topology.faces, "face", "faces") + QStringLiteral(" (%1)\n").arg(kind) +
-                        size_text(topology.box.size()) + '\n' +
-                        (topology.faces == 0    ? QString()
-                         : topology.is_closed() ? QStringLiteral("closed, ")
-                                                : QStringLiteral("open, ")) +
-                        counted(topology.components, "part", "parts"));
+                        size_text(topology.box.size());
+        if (topology.faces > 0)
+            facts += (topology.is_closed() ? QStringLiteral("\nclosed, ") : QStringLiteral("\nopen, ")) +
+                     counted(topology.components, "part", "parts");
+        facts_->setText(facts);
     }
     QStringList warnings;
     if (source)

@@ -144,7 +144,7 @@ Result<MeshFile> read_checked(std::string_view bytes, const std::string& name, c
     if (file->mesh.positions.empty()) return source.error("has no vertices.");
     if (file->mesh.face_count() == 0)
         file->warnings.push_back("There are no faces: read as " + std::to_string(file->mesh.vertex_count()) +
-                                 " points.");
+                                 (file->mesh.vertex_count() == 1 ? " point." : " points."));
     mend_attributes(*file);
     scale_colors(*file);
     assert(check_mesh(file->mesh).empty());
