@@ -81,7 +81,8 @@ public:
                 const double x = std::round(tile.left()) + 0.5;
                 painter_.drawLine(QPointF(x, tile.top()), QPointF(x, tile.bottom()));
             }
-            label(QPointF(tile.center().x(), tile.top() + kMargin), detail.isEmpty() ? title : title + "\n" + detail,
+            label(QPointF(tile.center().x(), tile.top() + kMargin),
+                  detail.isEmpty() ? title : title + "\n" + wrapped(detail, tile.width() - 2 * kMargin - 16),
                   Qt::AlignHCenter);
         }
     }
@@ -236,6 +237,19 @@ public:
     }
 
 private:
+    QString wrapped(const QString& text, double width) const {
+        const QFontMetricsF metrics(painter_.font());
+        QString lines, line;
+        for (const QString& word : text.split(' ')) {
+            if (!line.isEmpty() && metrics.horizontalAdvance(line + ' ' + word) > width) {
+                lines += line + '\n';
+                line = word;
+            } else {
+                line += line.isEmpty() ? word : ' ' + word;
+            }
+        }
+        return lines + line;
+    }
     static std::vector<std::pair<double, QString>> ticks(const OverlayContent::Legend& legend) {
         std::vector<std::pair<double, QString>> result;
         ValueRange written = legend.range;

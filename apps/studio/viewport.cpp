@@ -1068,7 +1068,7 @@ void Viewport::Content::overlay_defects(OverlayContent& content) {
                                         std::pair(&topology.inconsistent_edges, "edges of opposed faces (blue)"),
                                         std::pair(&topology.degenerate_faces, "faces without area (dots)")})
         if (finding->count > 0) found << count_of(finding->count, name);
-    content.defect_summary = found.empty() ? QString("No defects: the mesh is closed and manifold") : found.join(", ");
+    content.defect_summary = found.empty() ? QString("No defects: the mesh is closed and manifold") : found.join("\n");
     if (stage.defects().empty()) return;
     const unsigned finest = shown.finest_level();
     shown.ask(
