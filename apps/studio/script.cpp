@@ -147,6 +147,15 @@ private:
         if (!wait_until_still(window_, kPatience)) return usage("the window is still at work after ten minutes.");
         return Success{};
     }
+    Status wait_for(const QString& text) {
+        bool ok = false;
+        const double seconds = text.toDouble(&ok);
+        if (!ok || !(seconds >= 0 && seconds <= kPatience)) return usage("'" + text + "' is no number of seconds.");
+        QElapsedTimer clock;
+        clock.start();
+        while (double(clock.elapsed()) < 1000 * seconds) handle_events();
+        return Success{};
+    }
     Status settle_well(const std::function<void()>& work) {
         ErrorWatch watch(workbench());
         work();
@@ -356,7 +365,7 @@ const std::map<QString, Script::Command>& Script::commands() {
         {"drag", {4, 5, [](Script& s, Words w) { return s.drag(w); }}},
         {"wheel", {3, 3, [](Script& s, Words w) { return s.wheel(w); }}},
         {"frames", {1, 1, [](Script& s, Words w) { return s.frames(w[0]); }}},
-        {"wait", {0, 0, [](Script& s, Words) { return s.settle(); }}},
+        {"wait", {0, 1, [](Script& s, Words w) { return w.isEmpty() ? s.settle() : s.wait_for(w[0]); }}},
         {"screenshot", {1, 2, [](Script& s, Words w) { return s.screenshot(w); }}},
         {"try", {1, 8, [](Script& s, Words w) { return s.attempt(w); }}},
     };
