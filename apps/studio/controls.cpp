@@ -145,7 +145,9 @@ bool ElidedText::is_elided() const { return fontMetrics().horizontalAdvance(text
 
 QSize ElidedText::sizeHint() const {
     const QMargins margins = contentsMargins();
-    return {fontMetrics().horizontalAdvance(text()) + margins.left() + margins.right(), Text::sizeHint().height()};
+    const int slack = fontMetrics().averageCharWidth(); // a text that just fits is not to be shortened
+    return {fontMetrics().horizontalAdvance(text()) + slack + margins.left() + margins.right(),
+            Text::sizeHint().height()};
 }
 
 QSize ElidedText::minimumSizeHint() const {
