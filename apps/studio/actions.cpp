@@ -11,7 +11,6 @@
 #include <QKeyEvent>
 #include <QMessageBox>
 #include <QPushButton>
-#include <QRegularExpression>
 
 namespace filigree::studio {
 namespace {
@@ -28,15 +27,6 @@ QString numbered(const QString& path) {
     const QString name =
         file.completeBaseName() + QStringLiteral("_%04d") + (file.suffix().isEmpty() ? QString() : '.' + file.suffix());
     return file.path() == QStringLiteral(".") && !path.startsWith('.') ? name : file.path() + '/' + name;
-}
-
-/// The first of the files that such a path stands for.
-QString first_of(QString path) {
-    static const QRegularExpression number("%0?([1-9]?)d(?=[^/]*$)");
-    const QRegularExpressionMatch found = number.match(path);
-    if (!found.hasMatch()) return path;
-    return path.replace(found.capturedStart(), found.capturedLength(),
-                        QString("1").rightJustified(std::max(1, found.captured(1).toInt()), '0'));
 }
 
 } // namespace
@@ -156,14 +146,15 @@ struct Actions::Content {
     }
     /// Writes files by number: the dialog could not see that there are some already.
     void write_numbered(const QString& path, std::function<void(const std::string&)> write) {
-        const QString pattern = numbered(path), first = first_of(pattern);
-        const auto start = [this, pattern, write = std::move(write)] {
-            window.write([&] { write(pattern.toStdString()); });
-        };
-        if (!QFileInfo::exists(first)) return start();
-        auto* box = new QMessageBox(QMessageBox::Question, "Files are there already",
-                                    QFileInfo(first).fileName() + " is there already. Replace it and those after it?",
-                                    QMessageBox::Cancel, &window);
+        const std::string pattern = numbered(path).toStdString();
+        const auto start = [this, pattern, write = std::move(write)] { window.write([&] { write(pattern); }); };
+        const std::vector<std::string> existing =
+            existing_outputs(pattern, std::max<std::size_t>(1, workbench.frame_count()));
+        if (existing.empty()) return start();
+        const QString first = QFileInfo(QString::fromStdString(existing.front())).fileName();
+        auto* box =
+            new QMessageBox(QMessageBox::Question, "Files are there already",
+                            first + " is there already. Replace it and those after it?", QMessageBox::Cancel, &window);
         box->setObjectName("file.replace");
         box->setAttribute(Qt::WA_DeleteOnClose);
         QPushButton* replace = box->addButton("Replace", QMessageBox::AcceptRole);
