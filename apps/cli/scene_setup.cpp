@@ -53,24 +53,6 @@ private:
 
 Box body_box(const SetUpBody& body) { return bounds(body.model.mesh.positions); }
 
-Mesh box_mesh(const Cuboid& box) {
-    Mesh mesh;
-    for (int k = 0; k < 8; ++k)
-        mesh.positions.push_back(
-            (box.centre + 0.5 * box.size.cwiseProduct(Vec3d(k & 1 ? 1 : -1, k & 2 ? 1 : -1, k & 4 ? 1 : -1)))
-                .cast<float>());
-    for (const std::array<Index, 4>& face :
-         {std::array<Index, 4>{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}})
-        mesh.add_face(face);
-    return mesh;
-}
-
-Mesh ball_mesh(const Ball& ball) {
-    Mesh mesh = make_wavy_sphere({.resolution = 48, .amplitude = 0, .size = 2 * ball.radius});
-    for (Vec3f& p : mesh.positions) p += ball.centre.cast<float>();
-    return mesh;
-}
-
 class Builder {
 public:
     Builder(const SceneFile& scene, Session& session) : scene_(scene), session_(session) {}
@@ -205,11 +187,11 @@ private:
         } else if (from.shape == "ball") {
             obstacle.shape = from.ball;
             middle = from.ball.centre;
-            drawn.mesh = ball_mesh(from.ball);
+            drawn.mesh = make_ball(from.ball.centre, from.ball.radius);
         } else if (from.shape == "box") {
             obstacle.shape = from.box;
             middle = from.box.centre;
-            drawn.mesh = box_mesh(from.box);
+            drawn.mesh = make_box(from.box.centre, from.box.size);
         } else {
             drawn.mesh = at_line(scene_, from.line, [&] { return session_.read_mesh(from.mesh); });
             Mesh& mesh = drawn.mesh;

@@ -30,28 +30,6 @@ struct Directions {
     }
 };
 
-Mesh box_mesh(const Cuboid& box) {
-    Mesh mesh;
-    for (int k = 0; k < 8; ++k)
-        mesh.positions.push_back(
-            (box.centre + 0.5 * box.size.cwiseProduct(Vec3d(k & 1 ? 1 : -1, k & 2 ? 1 : -1, k & 4 ? 1 : -1)))
-                .cast<float>());
-    for (const std::array<Index, 4>& face :
-         {std::array<Index, 4>{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}})
-        mesh.add_face(face);
-    return mesh;
-}
-
-Mesh ball_mesh(const Ball& ball) {
-    ShapeOptions options;
-    options.resolution = 32;
-    options.amplitude = 0;
-    options.size = 2 * ball.radius;
-    Mesh mesh = make_wavy_sphere(options);
-    for (Vec3f& p : mesh.positions) p += ball.centre.cast<float>();
-    return mesh;
-}
-
 /// Adds an obstacle whose highest point is at `top` (m along up), and says how far down it reaches.
 class WorldBuilder {
 public:
@@ -100,7 +78,7 @@ private:
         const double radius = kBallRadius * size_;
         const Ball ball{place(kBallAside * size_, lowest_ - radius), radius};
         add(ball, {});
-        draw(ball_mesh(ball), Eigen::Isometry3d::Identity());
+        draw(make_ball(ball.centre, ball.radius), Eigen::Isometry3d::Identity());
         return lowest_ - 2 * radius;
     }
     double add_step() {
@@ -108,7 +86,7 @@ private:
         // Its edge is under the middle, so that the body tips over it.
         const Cuboid step{place(-0.5 * width, lowest_ - 0.5 * height), along_axes(width, height, width)};
         add(step, {});
-        draw(box_mesh(step), Eigen::Isometry3d::Identity());
+        draw(make_box(step.centre, step.size), Eigen::Isometry3d::Identity());
         return lowest_ - height;
     }
     double add_slope() {
@@ -123,7 +101,7 @@ private:
         motion.angle.constant = angle * at_.front;
         add(slope, motion);
         const Eigen::Isometry3d turned = motion.at(0);
-        Mesh mesh = box_mesh(slope);
+        Mesh mesh = make_box(slope.centre, slope.size);
         double ground = std::numeric_limits<double>::infinity();
         for (const Vec3f& p : mesh.positions) ground = std::min(ground, (turned * p.cast<double>()).dot(at_.up));
         draw(std::move(mesh), turned);

@@ -1,5 +1,5 @@
 #include "controls.h"
-#include "window.h"
+#include "one_window.h"
 
 #include <QApplication>
 #include <QDialog>
@@ -20,24 +20,8 @@ using namespace filigree::studio;
 
 namespace {
 
-class ActionsTest : public testing::Test {
+class ActionsTest : public OneWindow {
 protected:
-    static void SetUpTestSuite() {
-        window = new MainWindow(false);
-        start = window->workbench().state();
-    }
-    static void TearDownTestSuite() {
-        start = {};
-        delete window;
-    }
-    void SetUp() override {
-        workbench().wait_until_idle();
-        workbench().document().replace(start);
-        workbench().view().set({});
-    }
-    void TearDown() override { workbench().wait_until_idle(); }
-
-    static Workbench& workbench() { return window->workbench(); }
     static QAction& action(const char* name) {
         QAction* const found = window->actions().find(name);
         if (!found) throw std::runtime_error(std::string("no action ") + name);
@@ -55,9 +39,6 @@ protected:
         EXPECT_TRUE(found) << name;
         return found;
     }
-
-    static inline MainWindow* window = nullptr;
-    static inline State start;
 };
 
 } // namespace

@@ -1,5 +1,5 @@
 #include "controls.h"
-#include "window.h"
+#include "one_window.h"
 
 #include <QApplication>
 #include <QScrollBar>
@@ -17,28 +17,13 @@ using namespace filigree::studio;
 
 namespace {
 
-/// One window for all tests; each begins with the document and the view as they were.
-class Panels : public testing::Test {
+class Panels : public OneWindow {
 protected:
     static void SetUpTestSuite() {
-        window = new MainWindow(false);
-        window->resize(1280, 800);
+        OneWindow::SetUpTestSuite();
         window->show();
         ASSERT_TRUE(QTest::qWaitForWindowExposed(window));
-        start = window->workbench().state();
     }
-    static void TearDownTestSuite() {
-        start = {};
-        delete window;
-    }
-    void SetUp() override {
-        workbench().wait_until_idle();
-        workbench().document().replace(start);
-        workbench().view().set({});
-    }
-    void TearDown() override { workbench().wait_until_idle(); }
-
-    static Workbench& workbench() { return window->workbench(); }
     static const State& state() { return workbench().state(); }
     static int steps() { return workbench().document().undo_stack().index(); }
 
@@ -60,9 +45,6 @@ protected:
         get<QComboBox>(name).setCurrentIndex(index);
         workbench().wait_until_idle();
     }
-
-    static inline MainWindow* window = nullptr;
-    static inline State start;
 };
 
 bool is_control(const QWidget* widget) {

@@ -1,5 +1,5 @@
 #include "controls.h"
-#include "window.h"
+#include "one_window.h"
 
 #include <QApplication>
 #include <QCloseEvent>
@@ -23,23 +23,8 @@ using namespace filigree::studio;
 
 namespace {
 
-class Window : public testing::Test {
+class Window : public OneWindow {
 protected:
-    static void SetUpTestSuite() {
-        window = new MainWindow(false);
-        window->resize(1280, 800);
-        start = window->workbench().state();
-    }
-    static void TearDownTestSuite() {
-        start = {};
-        delete window;
-    }
-    void SetUp() override {
-        workbench().wait_until_idle();
-        workbench().document().replace(start);
-    }
-
-    static Workbench& workbench() { return window->workbench(); }
     static void change_something() {
         Warps warps;
         warps.twist = 45;
@@ -85,8 +70,6 @@ protected:
     }
 
     QTemporaryDir folder;
-    static inline MainWindow* window = nullptr;
-    static inline State start;
 };
 
 } // namespace

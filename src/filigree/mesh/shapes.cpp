@@ -257,6 +257,23 @@ std::string check_options(std::string_view name, const ShapeOptions& options) {
 
 } // namespace
 
+Mesh make_box(const Vec3d& centre, const Vec3d& size) {
+    Mesh mesh;
+    for (int k = 0; k < 8; ++k)
+        mesh.positions.push_back(
+            (centre + 0.5 * size.cwiseProduct(Vec3d(k & 1 ? 1 : -1, k & 2 ? 1 : -1, k & 4 ? 1 : -1))).cast<float>());
+    for (const std::array<Index, 4>& face :
+         {std::array<Index, 4>{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}})
+        mesh.add_face(face);
+    return mesh;
+}
+
+Mesh make_ball(const Vec3d& centre, double radius) {
+    Mesh mesh = make_wavy_sphere({.resolution = 48, .amplitude = 0, .size = 2 * radius});
+    for (Vec3f& p : mesh.positions) p += centre.cast<float>();
+    return mesh;
+}
+
 Result<Mesh> make_shape(std::string_view name, const ShapeOptions& options) {
     const auto shape = std::ranges::find(kShapes, name, &NamedShape::name);
     if (shape == std::end(kShapes)) {

@@ -36,6 +36,11 @@ Mesh make_cylinder(const ShapeOptions& options);
 /// rounded to whole waves, so that they meet themselves; amplitude and thickness are fractions of the ring's radius.
 Mesh make_torus(const ShapeOptions& options);
 
+/// Plain ones to draw what is not a mesh itself: a box of six quads; a smooth ball of 6 * 48^2 quads. Positions in
+/// float, so not far from the world's origin.
+Mesh make_box(const Vec3d& centre, const Vec3d& size);
+Mesh make_ball(const Vec3d& centre, double radius);
+
 /// The shape called `name`: wavy-cube, wavy-sphere, wavy-plane, bar, cylinder or torus. Errors: usage, for an unknown
 /// name or an option outside its range.
 Result<Mesh> make_shape(std::string_view name, const ShapeOptions& options);
