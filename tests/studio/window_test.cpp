@@ -310,5 +310,5 @@ TEST_F(Window, TheTimelineScrubs) {
     EXPECT_EQ(scrub->value(), 2);
     scrub->setValue(1);
     EXPECT_EQ(workbench().frame(), 1u);
-    EXPECT_TRUE(window->findChild<QLabel*>("timeline.frame")->text().startsWith("frame 1 of 2"));
+    EXPECT_TRUE(window->findChild<QLabel*>("timeline.frame")->text().contains("1 of 2"));
 }
