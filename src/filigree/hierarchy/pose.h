@@ -1,7 +1,10 @@
 // Where a driver is now.
 #pragma once
 
+#include "filigree/core/result.h"
 #include "filigree/core/types.h"
+
+#include <functional>
 
 namespace filigree {
 
@@ -21,5 +24,19 @@ struct PoseSequence {
 
     bool empty() const { return frames.empty(); }
 };
+
+/// The same fetched one frame at a time, for sequences that need not fit into memory.
+struct PoseStream {
+    std::size_t frames = 0;
+    double frames_per_second = 60;
+    /// The pose of a frame, 0 .. frames - 1; in any order, and again. Positions are relative to the mesh's origin.
+    std::function<Result<Pose>(std::size_t frame)> pose;
+};
+
+/// The sequence as a stream; it must outlive the stream.
+inline PoseStream stream_of(const PoseSequence& sequence) {
+    return {sequence.frames.size(), sequence.frames_per_second,
+            [&sequence](std::size_t frame) -> Result<Pose> { return sequence.frames[frame]; }};
+}
 
 } // namespace filigree

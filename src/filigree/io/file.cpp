@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <cstring>
 #include <new>
+#include <optional>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
@@ -29,6 +30,10 @@ public:
 
     bool is_open() const { return descriptor_ >= 0; }
     int get() const { return descriptor_; }
+    void reset(int descriptor) {
+        close();
+        descriptor_ = descriptor;
+    }
     bool close() {
         const int descriptor = std::exchange(descriptor_, -1);
         return descriptor < 0 || ::close(descriptor) == 0;
@@ -103,14 +108,12 @@ Result<std::string> read_descriptor(int descriptor, const fs::path& path) {
 }
 
 /// 0 or the error number.
-int write_pieces(int descriptor, std::span<const std::string_view> pieces) {
-    for (std::string_view piece : pieces) {
-        while (!piece.empty()) {
-            const ssize_t written = ::write(descriptor, piece.data(), piece.size());
-            if (written < 0 && errno == EINTR) continue;
-            if (written < 0) return errno;
-            piece.remove_prefix(static_cast<std::size_t>(written));
-        }
+int write_piece(int descriptor, std::string_view piece) {
+    while (!piece.empty()) {
+        const ssize_t written = ::write(descriptor, piece.data(), piece.size());
+        if (written < 0 && errno == EINTR) continue;
+        if (written < 0) return errno;
+        piece.remove_prefix(static_cast<std::size_t>(written));
     }
     return 0;
 }
@@ -148,32 +151,6 @@ void sync_folder(const fs::path& folder) {
     if (descriptor.is_open()) ::fsync(descriptor.get()); // best effort: some file systems cannot
 }
 
-Status write_in_place(const fs::path& path, std::span<const std::string_view> pieces) {
-    FileDescriptor descriptor(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
-    if (!descriptor.is_open()) return cannot_write(path, errno);
-    if (const int failed = write_pieces(descriptor.get(), pieces)) return cannot_write(path, failed);
-    if (!descriptor.close()) return cannot_write(path, errno);
-    return Success{};
-}
-
-Status replace_file(const fs::path& path, const fs::path& target, const struct stat* existing,
-                    std::span<const std::string_view> pieces) {
-    fs::path temporary;
-    FileDescriptor descriptor(open_temporary(target, temporary));
-    if (!descriptor.is_open()) return cannot_write(path, errno);
-    int failed = write_pieces(descriptor.get(), pieces);
-    if (!failed && existing && ::fchmod(descriptor.get(), existing->st_mode & 07777) != 0) failed = errno;
-    if (!failed && ::fsync(descriptor.get()) != 0) failed = errno;
-    if (!descriptor.close() && !failed) failed = errno;
-    if (!failed && ::rename(temporary.c_str(), target.c_str()) != 0) failed = errno;
-    if (failed) {
-        ::unlink(temporary.c_str());
-        return cannot_write(path, failed);
-    }
-    sync_folder(target.parent_path());
-    return Success{};
-}
-
 } // namespace
 
 Result<std::string> read_file(const fs::path& path) {
@@ -189,21 +166,84 @@ Result<std::string> read_file(const fs::path& path) {
     }
 }
 
-Status write_file(const fs::path& path, std::span<const std::string_view> pieces) {
-    if (path == "-") {
-        if (const int failed = write_pieces(STDOUT_FILENO, pieces)) return cannot_write("standard output", failed);
-        return Success{};
+struct FileWriter::Content {
+    fs::path path;      ///< as the caller named it
+    fs::path target;    ///< where that leads
+    fs::path temporary; ///< empty: written in place
+    FileDescriptor descriptor{-1};
+    bool is_standard_output = false;
+    std::optional<mode_t> permissions; ///< of the file that is replaced
+
+    int get() const { return is_standard_output ? STDOUT_FILENO : descriptor.get(); }
+    ~Content() {
+        descriptor.close();
+        if (!temporary.empty()) ::unlink(temporary.c_str());
     }
-    const fs::path target = follow_links(path);
+};
+
+FileWriter::FileWriter(std::unique_ptr<Content> content) : content_(std::move(content)) {}
+FileWriter::FileWriter(FileWriter&&) noexcept = default;
+FileWriter& FileWriter::operator=(FileWriter&&) noexcept = default;
+FileWriter::~FileWriter() = default;
+
+Result<FileWriter> FileWriter::create(const fs::path& path) {
+    auto content = std::make_unique<Content>();
+    content->path = path;
+    if (path == "-") {
+        content->path = "standard output";
+        content->is_standard_output = true;
+        return FileWriter(std::move(content));
+    }
+    const fs::path target = content->target = follow_links(path);
     std::error_code ignored;
     if (fs::is_symlink(target, ignored)) return cannot_write(path, ELOOP);
     struct stat existing {};
     const bool exists = ::stat(target.c_str(), &existing) == 0;
     if (exists && S_ISDIR(existing.st_mode)) return cannot_write(path, EISDIR);
-    if (exists && !S_ISREG(existing.st_mode)) return write_in_place(path, pieces); // a device or pipe stays what it is
-    if (exists && ::access(target.c_str(), W_OK) != 0) return cannot_write(path, errno); // read-only means hands off
-    if (!target.has_filename()) return cannot_write(path, ENOENT);
-    return replace_file(path, target, exists ? &existing : nullptr, pieces);
+    if (exists && !S_ISREG(existing.st_mode)) { // a device or pipe stays what it is
+        content->descriptor.reset(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
+    } else {
+        if (exists && ::access(target.c_str(), W_OK) != 0) return cannot_write(path, errno); // read-only: hands off
+        if (!target.has_filename()) return cannot_write(path, ENOENT);
+        if (exists) content->permissions = existing.st_mode & 07777;
+        fs::path temporary;
+        content->descriptor.reset(open_temporary(target, temporary));
+        if (content->descriptor.is_open()) content->temporary = temporary;
+    }
+    if (!content->descriptor.is_open()) return cannot_write(path, errno);
+    return FileWriter(std::move(content));
+}
+
+Status FileWriter::write(std::string_view bytes) {
+    if (const int failed = write_piece(content_->get(), bytes)) return cannot_write(content_->path, failed);
+    return Success{};
+}
+
+Status FileWriter::finish() {
+    Content& content = *content_;
+    if (content.is_standard_output) return Success{};
+    const int descriptor = content.descriptor.get();
+    int failed = 0;
+    if (content.permissions && ::fchmod(descriptor, *content.permissions) != 0) failed = errno;
+    if (!failed && !content.temporary.empty() && ::fsync(descriptor) != 0) failed = errno;
+    if (!content.descriptor.close() && !failed) failed = errno;
+    if (!failed && !content.temporary.empty()) {
+        if (::rename(content.temporary.c_str(), content.target.c_str()) != 0)
+            failed = errno;
+        else
+            content.temporary.clear();
+    }
+    if (failed) return cannot_write(content.path, failed);
+    if (!content.target.empty()) sync_folder(content.target.parent_path());
+    return Success{};
+}
+
+Status write_file(const fs::path& path, std::span<const std::string_view> pieces) {
+    Result<FileWriter> writer = FileWriter::create(path);
+    if (!writer) return writer.error();
+    for (const std::string_view piece : pieces)
+        if (Status written = writer->write(piece); !written) return written;
+    return writer->finish();
 }
 
 } // namespace filigree

@@ -4,6 +4,7 @@
 #include "filigree/core/result.h"
 
 #include <filesystem>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -18,5 +19,25 @@ Result<std::string> read_file(const std::filesystem::path& path);
 /// is written in place: it cannot be replaced, and keeps what it got before an error. Symbolic links are followed, and
 /// the permissions of an existing file are kept. Errors: unwritable.
 Status write_file(const std::filesystem::path& path, std::span<const std::string_view> pieces);
+
+/// A file that is written piece by piece without being in memory, under the same promises as write_file.
+class FileWriter {
+public:
+    /// Opens the temporary file. "-" is standard output. Errors: unwritable.
+    static Result<FileWriter> create(const std::filesystem::path& path);
+    FileWriter(FileWriter&&) noexcept;
+    FileWriter& operator=(FileWriter&&) noexcept;
+    /// Unless it was finished, `path` is as it was.
+    ~FileWriter();
+
+    Status write(std::string_view bytes);
+    /// Puts what was written in the place of `path`.
+    Status finish();
+
+private:
+    struct Content;
+    explicit FileWriter(std::unique_ptr<Content> content);
+    std::unique_ptr<Content> content_;
+};
 
 } // namespace filigree

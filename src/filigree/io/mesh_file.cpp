@@ -84,6 +84,8 @@ Result<MeshFile> parse(const MeshSource& source, MeshFormat format) {
         return read_stl(source);
     case MeshFormat::off:
         return read_off(source);
+    case MeshFormat::gltf:
+        return read_gltf(source);
     }
     return source.unsupported("this format is not read.");
 }
@@ -215,6 +217,9 @@ Result<std::vector<std::string>> write_mesh(const Mesh& mesh, MeshFormat format,
             break;
         case MeshFormat::off:
             name = "OFF", lost = write_off(mesh, bytes);
+            break;
+        case MeshFormat::gltf:
+            name = "GLB", lost = write_glb(mesh, bytes);
             break;
         }
     } catch (const std::bad_alloc&) {

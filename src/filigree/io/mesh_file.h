@@ -1,4 +1,4 @@
-// Meshes in files: OBJ, PLY, STL, OFF.
+// Meshes in files: OBJ, PLY, STL, OFF, glTF.
 #pragma once
 
 #include "filigree/core/result.h"
@@ -13,7 +13,7 @@
 
 namespace filigree {
 
-enum class MeshFormat { obj, ply, stl, off };
+enum class MeshFormat { obj, ply, stl, off, gltf };
 
 /// A mesh and what could not be kept or had to be mended while reading it, one sentence each.
 struct MeshFile {

@@ -35,12 +35,14 @@ Result<MeshFile> read_obj(const MeshSource& source);
 Result<MeshFile> read_ply(const MeshSource& source);
 Result<MeshFile> read_stl(const MeshSource& source);
 Result<MeshFile> read_off(const MeshSource& source);
+Result<MeshFile> read_gltf(const MeshSource& source);
 
 /// Writers append to `bytes` and return what the format cannot hold, a noun each ("materials").
 std::vector<std::string> write_obj(const Mesh& mesh, std::string& bytes);
 std::vector<std::string> write_ply(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes);
 std::vector<std::string> write_stl(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes);
 std::vector<std::string> write_off(const Mesh& mesh, std::string& bytes);
+std::vector<std::string> write_glb(const Mesh& mesh, std::string& bytes);
 
 /// Whether the content says so: "solid", and a facet or the end near the start.
 bool is_ascii_stl(std::string_view bytes);

@@ -4,6 +4,8 @@
 #include "filigree/core/types.h"
 
 #include <array>
+#include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -35,6 +37,21 @@ struct VertexScalar {
     std::vector<float> values;
 };
 
+/// How a surface looks: what we use of a file's material.
+struct MeshMaterial {
+    std::string name;
+    /// Base colour, sRGB 0 to 1; multiplied with the picture. (OBJ: Kd; white beside a texture when the file says nothing
+    /// or black, as some programs do.)
+    Vec3f color = {0.8f, 0.8f, 0.8f};
+    float opacity = 1, metallic = 0, roughness = 1; ///< 0 to 1
+    bool double_sided = true;
+    std::filesystem::path picture; ///< base colour texture, ready to be opened; empty: none, or `picture_bytes`
+    /// The same as its PNG or JPEG file's bytes, where it came inside the mesh's file; materials may share it.
+    std::shared_ptr<const std::string> picture_bytes = {};
+
+    bool has_picture() const { return picture_bytes || !picture.empty(); }
+};
+
 /// Polygons over shared vertices. Face f has the corners face_offsets[f] .. face_offsets[f + 1] - 1, each at least
 /// three, counter-clockwise seen from outside. Vertex and face order is the file's and is never changed.
 /// What holds between the arrays is said by `check_mesh`.
@@ -52,6 +69,9 @@ struct Mesh {
     FaceLabels objects, groups, materials;
     std::vector<Index> smoothing;            ///< empty or one smoothing group a face; 0 is "off"
     std::vector<std::string> material_files; ///< names of material libraries, as the file gave them
+    /// Materials that came inside the mesh's own file (glTF): empty, or one for each of materials.names, with pictures
+    /// as bytes. They go before material_files.
+    std::vector<MeshMaterial> embedded_materials;
 
     std::size_t vertex_count() const { return positions.size(); }
     std::size_t face_count() const { return face_offsets.size() - 1; }
