@@ -20,7 +20,8 @@ struct AnimationOutput {
 /// --morph-normals.
 void add_animation_options(CLI::App& command, AnimationOutput& output);
 
-/// Whether a name stands for an animation: .pc2, .mdd, .usda, .glb, a folder (ends in '/' or is there) or NAME_####.ply.
+/// Whether a name stands for an animation: .pc2, .mdd, .usda, .glb, a folder (ends in '/' or is there) or
+/// NAME_####.ply.
 bool is_animation_path(const std::string& path);
 
 /// Refuses, before any work, what cannot be written: an unknown ending, a folder that is not there.
@@ -29,7 +30,7 @@ void check_animation_path(const std::string& path);
 /// Writes a model's poses to `path`: .glb as a skin (or morph targets), everything else restored frame by frame, one in
 /// memory at a time. Adds rows and keys that say what was written. materials_beside: the model's or mesh's own path.
 void write_animation_output(const Model& model, const PoseStream& poses, const RestoreOptions& restore,
-                            const AnimationOutput& output, const std::string& path,
-                            const std::string& materials_beside, Session& session, Table& table, Json& json);
+                            const AnimationOutput& output, const std::string& path, const std::string& materials_beside,
+                            Session& session, Table& table, Json& json);
 
 } // namespace filigree::cli

@@ -80,7 +80,6 @@ private:
 /// The bytes of plain values.
 template <class T>
 std::string bytes_of(std::span<const T> values) {
-    static_assert(std::is_trivially_copyable_v<T>);
     return {reinterpret_cast<const char*>(values.data()), values.size_bytes()};
 }
 

@@ -24,16 +24,16 @@ struct GltfAnimation {
 /// scene's roots. Vertices are the file's, in its order and not welded; primitives of one node that share their
 /// attributes share their vertices. A mesh that several nodes use comes once a node.
 ///
-/// Points and lines are left out, with a warning. Objects are the names of the nodes (of the mesh where a node has none)
-/// when there is more than one. Attributes: NORMAL, TEXCOORD_0 (v turned up: ours is 1 - v), COLOR_0, and single floats
-/// under names of their own (_confidence) as scalars. Materials are embedded, with their pictures' bytes.
+/// Points and lines are left out, with a warning. Objects are the names of the nodes (of the mesh where a node has
+/// none) when there is more than one. Attributes: NORMAL, TEXCOORD_0 (v turned up: ours is 1 - v), COLOR_0, and single
+/// floats under names of their own (_confidence) as scalars. Materials are embedded, with their pictures' bytes.
 ///
 /// Nothing in the file is trusted. Buffers and pictures are read from the file's own folder and below it only; other
 /// places are an error for a buffer and a warning for a picture.
 class GltfScene {
 public:
-    /// Errors: not_found, bad_file ("x.gltf: accessors[3].count: ..."), unsupported (a required extension that we do not
-    /// know: Draco, meshopt), out_of_memory, cancelled. Cost: one pass; memory a small multiple of the file.
+    /// Errors: not_found, bad_file ("x.gltf: accessors[3].count: ..."), unsupported (a required extension that we do
+    /// not know: Draco, meshopt), out_of_memory, cancelled. Cost: one pass; memory a small multiple of the file.
     static Result<GltfScene> read(const std::filesystem::path& path, const RunContext& context);
     /// From bytes; `name` stands in messages, and its folder is where other files are looked for (none: "" as folder).
     static Result<GltfScene> read(std::string_view bytes, const std::string& name, const RunContext& context);

@@ -45,8 +45,8 @@ struct ExportReport {
     std::size_t bytes = 0, vertices = 0, joints = 0, keys = 0;
     double seconds = 0; ///< of the animation
     /// Largest and RMS distance of the file, evaluated as a viewer would, from our own restore, as fractions of the
-    /// diagonal of the mesh at rest: at keys, and between them (at the poses' own frames where keys are sparser; else half
-    /// way, against the restore of the driver half way).
+    /// diagonal of the mesh at rest: at keys, and between them (at the poses' own frames where keys are sparser; else
+    /// half way, against the restore of the driver half way).
     double error_at_keys = 0, error_between_keys = 0;
     double rms_at_keys = 0, rms_between_keys = 0;
     std::size_t moments_checked = 0; ///< keys and moments between that were evaluated
@@ -58,8 +58,8 @@ struct ExportReport {
 
 /// The model's animation as a plain glTF 2.0 skin (docs/exchange.md): no extension, and the mesh at rest while nothing
 /// plays. The error is measured by reading the file's own bytes, and stored in asset.extras.filigree.
-/// Errors: unsuitable (reference code; no frames), mismatch (a pose of another driver), usage (level, rates), unwritable,
-/// unsupported (4 GiB), out_of_memory, cancelled. Cost: a few restores a key.
+/// Errors: unsuitable (reference code; no frames), mismatch (a pose of another driver), usage (level, rates),
+/// unwritable, unsupported (4 GiB), out_of_memory, cancelled. Cost: a few restores a key.
 Result<ExportReport> write_skin_glb(const Model& model, const PoseStream& poses, const SkinOptions& options,
                                     const std::filesystem::path& path, const RunContext& context);
 

@@ -40,8 +40,8 @@ struct VertexScalar {
 /// How a surface looks: what we use of a file's material.
 struct MeshMaterial {
     std::string name;
-    /// Base colour, sRGB 0 to 1; multiplied with the picture. (OBJ: Kd; white beside a texture when the file says nothing
-    /// or black, as some programs do.)
+    /// Base colour, sRGB 0 to 1; multiplied with the picture. (OBJ: Kd; white beside a texture when the file says
+    /// nothing or black, as some programs do.)
     Vec3f color = {0.8f, 0.8f, 0.8f};
     float opacity = 1, metallic = 0, roughness = 1; ///< 0 to 1
     bool double_sided = true;

@@ -14,8 +14,8 @@ struct MeshAnimation {
     const Mesh* rest = nullptr; ///< faces, attributes, and the origin of all positions
     std::size_t frames = 0;
     double frames_per_second = 60;
-    /// Writes the positions of a frame, 0 .. frames - 1, relative to rest->origin; one a vertex. Frames may be asked for
-    /// in any order, and again.
+    /// Writes the positions of a frame, 0 .. frames - 1, relative to rest->origin; one a vertex. Frames may be asked
+    /// for in any order, and again.
     std::function<Status(std::size_t frame, std::span<Vec3f> positions)> positions;
 };
 
