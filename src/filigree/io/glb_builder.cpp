@@ -30,16 +30,32 @@ std::size_t GlbBuilder::add_part(Part part, GltfTarget target) {
     return parts_.size() - 1;
 }
 
-std::size_t GlbBuilder::add(GltfAccessor accessor, std::size_t byte_count, Producer producer) {
-    const std::size_t view = add_part({byte_count, {}, std::move(producer)}, accessor.target);
-    Json entry = {{"bufferView", view},
-                  {"componentType", static_cast<int>(accessor.component)},
-                  {"count", accessor.count},
-                  {"type", accessor.type}};
+std::size_t GlbBuilder::add_accessor(const GltfAccessor& accessor, std::size_t view, std::size_t offset) {
+    Json entry = {{"bufferView", view}};
+    if (offset > 0) entry["byteOffset"] = offset;
+    entry["componentType"] = static_cast<int>(accessor.component);
+    entry["count"] = accessor.count;
+    entry["type"] = accessor.type;
     if (accessor.normalized) entry["normalized"] = true;
     if (!accessor.min.empty()) entry["min"] = accessor.min, entry["max"] = accessor.max;
     json["accessors"].push_back(std::move(entry));
     return json["accessors"].size() - 1;
+}
+
+std::size_t GlbBuilder::add(GltfAccessor accessor, std::size_t byte_count, Producer producer) {
+    const std::size_t view = add_part({byte_count, {}, std::move(producer)}, accessor.target);
+    return add_accessor(accessor, view, 0);
+}
+
+std::size_t GlbBuilder::append(GltfAccessor accessor, std::string_view bytes) {
+    Part& part = parts_.back();
+    const std::size_t before = padded(part.byte_count);
+    part.bytes.resize(before);
+    part.bytes += bytes;
+    part.byte_count = part.bytes.size();
+    data_bytes_ += padded(part.byte_count) - before;
+    json["bufferViews"].back()["byteLength"] = part.byte_count;
+    return add_accessor(accessor, parts_.size() - 1, before);
 }
 
 std::size_t GlbBuilder::add(GltfAccessor accessor, std::string bytes) {

@@ -45,6 +45,8 @@ public:
 
     /// An accessor over bytes that are kept until the file is written. Returns its number.
     std::size_t add(GltfAccessor accessor, std::string bytes);
+    /// The same at the end of the buffer view that was added last, for many small ones (none of them vertices).
+    std::size_t append(GltfAccessor accessor, std::string_view bytes);
     /// Over bytes that are made while the file is written; the producer must give exactly `byte_count`.
     std::size_t add(GltfAccessor accessor, std::size_t byte_count, Producer producer);
     /// A picture's bytes as a buffer view. Returns the view's number.
@@ -73,6 +75,7 @@ private:
     std::size_t data_bytes_ = 0;
 
     std::size_t add_part(Part part, GltfTarget target);
+    std::size_t add_accessor(const GltfAccessor& accessor, std::size_t view, std::size_t offset);
     std::string json_chunk() const;
     Status write_to(const std::function<Status(std::string_view)>& write);
 };
