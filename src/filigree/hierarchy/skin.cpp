@@ -101,6 +101,7 @@ struct Decomposition {
 
 Decomposition decompose(const Mat3d& matrix) {
     const Eigen::JacobiSVD<Mat3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    if (svd.info() != Eigen::Success) return {Mat3d::Identity(), Mat3d::Identity(), Vec3d::Zero()}; // not finite
     Decomposition parts{svd.matrixU(), svd.matrixV(), svd.singularValues()};
     if (parts.u.determinant() < 0) parts.u.col(2) *= -1, parts.s[2] *= -1;
     if (parts.v.determinant() < 0) parts.v.col(2) *= -1, parts.s[2] *= -1;

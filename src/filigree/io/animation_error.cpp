@@ -1,0 +1,113 @@
+#include "filigree/io/animation_error.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace filigree {
+
+PoseSampler::PoseSampler(const PoseStream& stream, std::function<Status(const Pose&)> check)
+    : stream_(stream), check_(std::move(check)) {}
+
+Result<const Pose*> PoseSampler::frame(std::size_t number) {
+    for (const Kept& kept : kept_)
+        if (kept.frame == number) return &kept.pose;
+    Result<Pose> pose = stream_.pose(number);
+    if (!pose) return pose.error();
+    if (Status fine = check_(*pose); !fine) return fine.error();
+    if (kept_.size() == 2) kept_.erase(kept_.begin());
+    kept_.push_back({number, std::move(*pose)});
+    return &kept_.back().pose;
+}
+
+Result<Pose> PoseSampler::at(double seconds) {
+    constexpr double kSameMoment = 1e-6; // of a frame
+    const double place = std::clamp(seconds * stream_.frames_per_second, 0.0, double(stream_.frames - 1));
+    const auto before = static_cast<std::size_t>(std::floor(place + kSameMoment));
+    const auto part = static_cast<float>(place - double(before));
+    Result<const Pose*> first = frame(before);
+    if (!first) return first.error();
+    if (part <= kSameMoment || before + 1 >= stream_.frames) return **first;
+    Pose pose = **first;
+    const Result<const Pose*> second = frame(before + 1);
+    if (!second) return second.error();
+    const auto blend = [part](auto& from, const auto& to) {
+        if (from.size() != to.size()) from.clear();
+        for (std::size_t i = 0; i < from.size(); ++i) from[i] = (1 - part) * from[i] + part * to[i];
+    };
+    blend(pose.positions, (*second)->positions);
+    blend(pose.gradients, (*second)->gradients);
+    blend(pose.ghosts, (*second)->ghosts);
+    return pose;
+}
+
+namespace {
+
+/// The frame nearest the middle of two keys when one lies strictly between, else the middle.
+double moment_between(double first, double second, double frames_per_second) {
+    constexpr double kSameMoment = 1e-3; // of a frame
+    const double middle = 0.5 * (first + second), frame = std::round(middle * frames_per_second);
+    const bool inside =
+        frame > first * frames_per_second + kSameMoment && frame < second * frames_per_second - kSameMoment;
+    return inside ? frame / frames_per_second : middle;
+}
+
+struct ErrorSum {
+    double largest = 0, squares = 0;
+    std::size_t count = 0;
+
+    void add(std::span<const Vec3f> a, std::span<const Vec3f> b) {
+        for (std::size_t v = 0; v < b.size(); ++v) {
+            const double square = (a[v].cast<double>() - b[v].cast<double>()).squaredNorm();
+            largest = std::max(largest, square);
+            squares += square;
+        }
+        count += b.size();
+    }
+    double max() const { return std::sqrt(largest); }
+    double rms() const { return count ? std::sqrt(squares / double(count)) : 0; }
+};
+
+} // namespace
+
+Status measure_animation(const PositionsAt& played, std::size_t played_count, const PositionsAt& restored,
+                         std::size_t restored_count, std::span<const double> keys, double frames_per_second,
+                         double diagonal, ExportReport& report, const RunContext& context) {
+    constexpr double kVerticesChecked = 1e8;
+    if (played_count < restored_count)
+        return Error{ErrorCode::unsuitable, "The exported GLB has fewer vertices than the mesh: please report this."};
+    const std::size_t most =
+        std::max<std::size_t>(8, static_cast<std::size_t>(kVerticesChecked / 2 / double(restored_count)));
+    const std::size_t checked = std::min(keys.size(), most);
+    std::vector<Vec3f> a(played_count), b(restored_count);
+    ErrorSum at_keys, between;
+    const auto compare = [&](double seconds, ErrorSum& sum) -> Status {
+        if (context.is_cancelled()) return cancelled_error();
+        if (Status s = played(seconds, a); !s) return s;
+        if (Status s = restored(seconds, b); !s) return s;
+        sum.add(a, b);
+        ++report.moments_checked;
+        return Success{};
+    };
+    for (std::size_t i = 0; i < checked; ++i) {
+        context.report("measuring the error", double(i) / double(checked));
+        const std::size_t key = checked > 1 ? i * (keys.size() - 1) / (checked - 1) : 0;
+        if (Status s = compare(keys[key], at_keys); !s) return s;
+        if (key + 1 == keys.size()) continue;
+        if (Status s = compare(moment_between(keys[key], keys[key + 1], frames_per_second), between); !s) return s;
+    }
+    const double scale = diagonal > 0 ? 1 / diagonal : 0;
+    report.error_at_keys = scale * at_keys.max();
+    report.rms_at_keys = scale * at_keys.rms();
+    report.error_between_keys = scale * between.max();
+    report.rms_between_keys = scale * between.rms();
+    return Success{};
+}
+
+std::string cannot_hold(const std::string& what, const std::vector<std::string>& lost) {
+    std::string sentence = what + " cannot hold ";
+    for (std::size_t i = 0; i < lost.size(); ++i)
+        sentence += (i == 0 ? "" : i + 1 < lost.size() ? ", " : " and ") + lost[i];
+    return sentence + "; left out.";
+}
+
+} // namespace filigree

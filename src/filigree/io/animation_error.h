@@ -1,0 +1,45 @@
+// How far an exported animation is from our own restore, at its keys and between them.
+#pragma once
+
+#include "filigree/hierarchy/pose.h"
+#include "filigree/io/gltf_export.h"
+
+#include <functional>
+#include <span>
+
+namespace filigree {
+
+/// Poses at any moment: the stream's frames, linearly interpolated in between.
+class PoseSampler {
+public:
+    /// check: asked of every frame before it is used. The stream must outlive the sampler.
+    PoseSampler(const PoseStream& stream, std::function<Status(const Pose&)> check);
+    /// seconds: 0 .. (frames - 1) / frames_per_second; held at the ends.
+    Result<Pose> at(double seconds);
+
+private:
+    struct Kept {
+        std::size_t frame;
+        Pose pose;
+    };
+    const PoseStream& stream_;
+    std::function<Status(const Pose&)> check_;
+    std::vector<Kept> kept_; ///< the last two frames asked for
+
+    Result<const Pose*> frame(std::size_t number);
+};
+
+/// Positions at a moment into `out`.
+using PositionsAt = std::function<Status(double seconds, std::span<Vec3f> out)>;
+
+/// Sets the errors of `report`: the first `restored_count` of the played vertices against the restored ones. `keys` in
+/// seconds; between two keys the moment looked at is the frame nearest their middle, or the middle where no frame lies
+/// between. Of many keys some are looked at, evenly chosen, so that about 10^8 vertices are.
+Status measure_animation(const PositionsAt& played, std::size_t played_count, const PositionsAt& restored,
+                         std::size_t restored_count, std::span<const double> keys, double frames_per_second,
+                         double diagonal, ExportReport& report, const RunContext& context);
+
+/// "X cannot hold a, b and c; left out."
+std::string cannot_hold(const std::string& what, const std::vector<std::string>& lost);
+
+} // namespace filigree
