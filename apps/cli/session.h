@@ -141,5 +141,6 @@ void add_render(CLI::App& app, Session& session);
 void add_sample(CLI::App& app, Session& session);
 void add_simulate(CLI::App& app, Session& session);
 void add_figures(CLI::App& app, Session& session);
+void add_export(CLI::App& app, Session& session);
 
 } // namespace filigree::cli
