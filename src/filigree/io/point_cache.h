@@ -7,6 +7,7 @@
 #include "filigree/mesh/mesh_animation.h"
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -21,19 +22,24 @@ enum class AnimationFormat {
     glb,      ///< .glb, morph targets
 };
 
-/// The format that an output's or input's name stands for. Errors: unsupported, with the list.
+/// The format that an output's or input's name stands for: its ending, a folder (ends in '/' or is there), or #### or
+/// %04d before a mesh's ending. Errors: unsupported, with the list.
 Result<AnimationFormat> animation_format(const std::filesystem::path& path);
 
 struct PoseFileOptions {
-    std::optional<double> frames_per_second = {}; ///< for files that do not say (PC2, numbered); unset: 60
-    std::string animation;                        ///< glTF: by name; empty: the first
+    /// Of files that do not say (PC2, numbered; unset: 60), and instead of what an MDD or a .fil says. A PC2's sample
+    /// rate divides it. glTF: frames to take a second.
+    std::optional<double> frames_per_second = {};
+    std::string animation; ///< glTF: by name; empty: the first
 };
 
 /// Poses of a driver that another program moved, opened for reading frame by frame: PC2, MDD, numbered meshes (with
 /// gradients where a PLY has f00 .. f22), an animated glTF sampled at the frame rate, or the poses of a .fil. Sizes are
-/// held against the file's length when it is opened; only one frame is in memory (a .fil: all).
+/// held against the file's length when it is opened; only one frame is in memory (a .fil: all). An MDD whose times are
+/// not even needs a rate. Of numbered meshes the first is looked at; the others must be as many points and have
+/// gradients as it has, which is found when they are fetched.
 /// points: the driver's vertices; origin: the mesh's. Errors: not_found, bad_file, mismatch (other number of points),
-/// unsupported, usage (no such animation).
+/// unsupported (pipes too: frames are fetched in any order), usage (no such animation, several sequences in a folder).
 Result<PoseStream> open_poses(const std::filesystem::path& path, std::size_t points, const Vec3d& origin,
                               const PoseFileOptions& options, const RunContext& context);
 
@@ -42,9 +48,22 @@ Result<MeshAnimation> open_animation(const std::filesystem::path& path, const Me
                                      const PoseFileOptions& options, const RunContext& context);
 
 /// Writes every frame, one in memory at a time, whole or not at all. World coordinates (the origin is added) in 32-bit
-/// floats; a warning says when that loses digits. Numbered meshes are PLY in a folder, or what the #### name ends in.
-/// Same errors as write_mesh, and cancelled. Cost: writing; memory one frame.
+/// floats; a warning says when that loses digits. Numbered meshes are PLY in a folder (under its name), or what the
+/// #### name ends in, counted from 1; they have the rest's attributes, and where it has normals, normals of their own.
+/// Same errors as write_mesh, unsuitable (a position that is not finite; no frames), and cancelled. Cost: writing;
+/// memory one frame.
 Result<std::vector<std::string>> write_animation(const MeshAnimation& animation, const std::filesystem::path& path,
                                                  const RunContext& context);
+
+/// Numbered meshes alone, from whoever makes them: `mesh` gives that of a frame, 0 .. frames - 1.
+Result<std::vector<std::string>> write_numbered_meshes(std::size_t frames,
+                                                       const std::function<Result<Mesh>(std::size_t frame)>& mesh,
+                                                       const std::filesystem::path& path, const RunContext& context);
+
+/// The pose that a moved driver has in a mesh's file: its positions, and the gradients in its vertex scalars f00 .. f22
+/// where all nine are there. origin: the model's.
+Pose pose_of_mesh(const Mesh& moved, const Vec3d& origin);
+/// Puts a pose's gradients, where it has any, into a mesh of its vertices as those nine scalars.
+void add_gradients(Mesh& mesh, const Pose& pose);
 
 } // namespace filigree

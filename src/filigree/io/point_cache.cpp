@@ -1,0 +1,254 @@
+#include "filigree/io/point_cache.h"
+#include "filigree/io/file.h"
+#include "filigree/io/gltf_export.h"
+#include "filigree/io/mesh_file.h"
+#include "filigree/io/model_file.h"
+#include "filigree/io/point_cache_formats.h"
+#include "filigree/io/usd.h"
+#include "filigree/mesh/normals.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace filigree {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kKnownFormats =
+    "use .pc2, .mdd, .usda, .glb, a folder (NAME/), or NAME_####.ply for numbered meshes";
+
+std::string gradient_name(int k) { return {'f', static_cast<char>('0' + k / 3), static_cast<char>('0' + k % 3)}; }
+
+const std::vector<float>* find_scalar(const Mesh& mesh, const std::string& name) {
+    for (const VertexScalar& scalar : mesh.scalars)
+        if (scalar.name == name) return &scalar.values;
+    return nullptr;
+}
+
+void take_origin_off(std::span<Vec3f> positions, const Vec3d& origin) {
+    if (origin.isZero()) return;
+    for (Vec3f& p : positions) p = (p.cast<double>() - origin).cast<float>();
+}
+
+Result<PoseStream> open_own_poses(const fs::path& path, std::size_t points, const PoseFileOptions& options,
+                                  const RunContext& context) {
+    Result<PoseSequence> poses = read_poses(path, context);
+    if (!poses) return poses.error();
+    if (poses->empty())
+        return Error{ErrorCode::unsuitable,
+                     path.string() + ": has no poses of its own; 'filigree simulate' writes models that have."};
+    if (poses->frames[0].positions.size() != points)
+        return Error{ErrorCode::mismatch,
+                     path.string() + ": its poses have " + std::to_string(poses->frames[0].positions.size()) +
+                         " vertices and the driver has " + std::to_string(points) + "; they are of another model."};
+    const auto kept = std::make_shared<PoseSequence>(std::move(*poses));
+    return PoseStream{kept->frames.size(), options.frames_per_second.value_or(kept->frames_per_second),
+                      [kept](std::size_t frame) -> Result<Pose> { return kept->frames[frame]; }};
+}
+
+/// Positions of a stream's poses alone.
+MeshAnimation animation_of(PoseStream stream, const Mesh& rest) {
+    return {&rest, stream.frames, stream.frames_per_second,
+            [pose = std::move(stream.pose)](std::size_t frame, std::span<Vec3f> positions) -> Status {
+                const Result<Pose> moved = pose(frame);
+                if (!moved) return moved.error();
+                std::copy(moved->positions.begin(), moved->positions.end(), positions.begin());
+                return Success{};
+            }};
+}
+
+bool is_cache(const std::string& ending) { return ending == ".pc2" || ending == ".mdd"; }
+
+Result<PointSource> open_cache(const fs::path& path, const std::string& ending, std::size_t points,
+                               const PoseFileOptions& options) {
+    return ending == ".pc2" ? open_pc2(path, points, options.frames_per_second)
+                            : open_mdd(path, points, options.frames_per_second);
+}
+
+Status check_rate(const PoseFileOptions& options) {
+    if (options.frames_per_second && !(std::isfinite(*options.frames_per_second) && *options.frames_per_second > 0))
+        return Error{ErrorCode::usage, "A frame rate must be a number above 0."};
+    return Success{};
+}
+
+/// Adds the origin, checks, and keeps account of the digits that 32 bits lose.
+class WorldFrames {
+public:
+    WorldFrames(const MeshAnimation& animation, fs::path path) : animation_(animation), path_(std::move(path)) {}
+
+    Status fetch(std::size_t frame, std::span<Vec3f> positions) {
+        if (Status fetched = animation_.positions(frame, positions); !fetched) return fetched;
+        const Vec3d& origin = animation_.rest->origin;
+        const bool is_far = !origin.isZero();
+        for (Vec3f& p : positions) {
+            if (is_far) {
+                const Vec3d world = origin + p.cast<double>();
+                p = world.cast<float>();
+                lost_ = std::max(lost_, (p.cast<double>() - world).cwiseAbs().maxCoeff());
+            }
+            if (!p.allFinite())
+                return Error{ErrorCode::unsuitable, path_.string() + ": not written: frame " +
+                                                        std::to_string(frame + 1) +
+                                                        " is beyond what numbers can hold; deform less."};
+        }
+        return Success{};
+    }
+    void warn(std::vector<std::string>& warnings) const {
+        constexpr double kUnseen = 1e-7; // of the diagonal: what 32 bits lose anyway
+        const double diagonal = bounds(animation_.rest->positions).diagonal();
+        if (!(lost_ > kUnseen * diagonal)) return;
+        std::string digits = std::to_string(lost_ / diagonal * 1e6);
+        warnings.push_back("The mesh is far from the world's origin, and the format holds 32 bits a coordinate: "
+                           "positions are up to " +
+                           digits.substr(0, digits.find('.') + 2) + " millionths of the diagonal off.");
+    }
+
+private:
+    const MeshAnimation& animation_;
+    fs::path path_;
+    double lost_ = 0;
+};
+
+/// The rest mesh as a frame moves it.
+Result<Mesh> mesh_at(const MeshAnimation& animation, std::size_t frame, const RunContext& context) {
+    Mesh mesh = *animation.rest;
+    if (Status fetched = animation.positions(frame, mesh.positions); !fetched) return fetched.error();
+    if (!mesh.normals.empty()) mesh.normals = {vertex_normals(mesh, mesh.positions, context), {}};
+    return mesh;
+}
+
+} // namespace
+
+std::string lower_ending(const fs::path& path) {
+    std::string ending = path.extension().string();
+    for (char& c : ending)
+        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+    return ending;
+}
+
+Result<AnimationFormat> animation_format(const fs::path& path) {
+    std::error_code ignored;
+    const std::string ending = lower_ending(path);
+    if (!path.has_filename() || fs::is_directory(path, ignored) || numbered_name(path)) {
+        if (!numbered_name(path)) return AnimationFormat::numbered;
+        if (const Result<MeshFormat> format = mesh_format(path); !format) return format.error();
+        return AnimationFormat::numbered;
+    }
+    if (ending == ".pc2") return AnimationFormat::pc2;
+    if (ending == ".mdd") return AnimationFormat::mdd;
+    if (ending == ".usda") return AnimationFormat::usda;
+    if (ending == ".glb") return AnimationFormat::glb;
+    return Error{ErrorCode::unsupported,
+                 path.string() + ": is no name for an animation; " + std::string(kKnownFormats) + "."};
+}
+
+Pose pose_of_mesh(const Mesh& moved, const Vec3d& origin) {
+    Pose pose;
+    pose.positions.resize(moved.vertex_count());
+    for (std::size_t v = 0; v < pose.positions.size(); ++v)
+        pose.positions[v] = (moved.world_position(v) - origin).cast<float>();
+    std::array<const std::vector<float>*, 9> entries;
+    for (int k = 0; k < 9; ++k)
+        if (!(entries[std::size_t(k)] = find_scalar(moved, gradient_name(k)))) return pose;
+    pose.gradients.resize(pose.positions.size());
+    for (std::size_t v = 0; v < pose.gradients.size(); ++v)
+        for (int k = 0; k < 9; ++k) pose.gradients[v](k / 3, k % 3) = (*entries[std::size_t(k)])[v];
+    return pose;
+}
+
+void add_gradients(Mesh& mesh, const Pose& pose) {
+    for (int k = 0; k < 9 && !pose.gradients.empty(); ++k) {
+        VertexScalar& scalar = mesh.scalars.emplace_back(VertexScalar{gradient_name(k), {}});
+        for (const Mat3f& gradient : pose.gradients) scalar.values.push_back(gradient(k / 3, k % 3));
+    }
+}
+
+Result<PoseStream> open_poses(const fs::path& path, std::size_t points, const Vec3d& origin,
+                              const PoseFileOptions& options, const RunContext& context) {
+    if (Status sound = check_rate(options); !sound) return sound.error();
+    const std::string ending = lower_ending(path);
+    if (is_cache(ending)) {
+        Result<PointSource> source = open_cache(path, ending, points, options);
+        if (!source) return source.error();
+        return PoseStream{
+            source->frames, source->frames_per_second,
+            [points, origin, positions = std::move(source->positions)](std::size_t frame) -> Result<Pose> {
+                Pose pose;
+                pose.positions.resize(points);
+                if (Status read = positions(frame, pose.positions); !read) return read.error();
+                take_origin_off(pose.positions, origin);
+                return pose;
+            }};
+    }
+    if (ending == ".fil") return open_own_poses(path, points, options, context);
+    if (ending == ".glb" || ending == ".gltf") {
+        if (!numbered_name(path)) return open_gltf_poses(path, points, origin, options, context);
+    } else if (ending == ".usda") {
+        return Error{ErrorCode::unsupported, path.string() + ": USD is written, not read; export a .pc2 there."};
+    }
+    if (const Result<AnimationFormat> format = animation_format(path); !format) return format.error();
+    return open_numbered(path, points, origin, options, context);
+}
+
+Result<MeshAnimation> open_animation(const fs::path& path, const Mesh& rest, const PoseFileOptions& options,
+                                     const RunContext& context) {
+    if (Status sound = check_rate(options); !sound) return sound.error();
+    const std::string ending = lower_ending(path);
+    if (is_cache(ending)) {
+        Result<PointSource> source = open_cache(path, ending, rest.vertex_count(), options);
+        if (!source) return source.error();
+        return MeshAnimation{
+            &rest, source->frames, source->frames_per_second,
+            [&rest, read = std::move(source->positions)](std::size_t frame, std::span<Vec3f> positions) -> Status {
+                if (Status done = read(frame, positions); !done) return done;
+                take_origin_off(positions, rest.origin);
+                return Success{};
+            }};
+    }
+    Result<PoseStream> stream = open_poses(path, rest.vertex_count(), rest.origin, options, context);
+    if (!stream) return stream.error();
+    return animation_of(std::move(*stream), rest);
+}
+
+Result<std::vector<std::string>> write_animation(const MeshAnimation& animation, const fs::path& path,
+                                                 const RunContext& context) {
+    const Result<AnimationFormat> format = animation_format(path);
+    if (!format) return format.error();
+    if (animation.frames == 0)
+        return Error{ErrorCode::unsuitable, path.string() + ": not written: there are no frames."};
+    std::vector<std::string> warnings;
+    WorldFrames frames(animation, path);
+    const WorldPositions positions = [&](std::size_t frame, std::span<Vec3f> out) { return frames.fetch(frame, out); };
+    Status written = Success{};
+    switch (*format) {
+    case AnimationFormat::pc2:
+        written = write_pc2(animation, positions, path, context);
+        break;
+    case AnimationFormat::mdd:
+        written = write_mdd(animation, positions, path, context);
+        break;
+    case AnimationFormat::usda: {
+        Result<std::vector<std::string>> said = write_usda(animation, path, context);
+        if (!said) return said;
+        warnings = std::move(*said);
+        break;
+    }
+    case AnimationFormat::glb: {
+        Result<ExportReport> report = write_morph_glb(animation, {}, path, context);
+        if (!report) return report.error();
+        warnings = std::move(report->warnings);
+        break;
+    }
+    case AnimationFormat::numbered:
+        return write_numbered_meshes(
+            animation.frames, [&](std::size_t frame) { return mesh_at(animation, frame, context); }, path, context);
+    }
+    if (!written) return written.error();
+    frames.warn(warnings);
+    return warnings;
+}
+
+} // namespace filigree

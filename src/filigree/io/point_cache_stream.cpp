@@ -1,0 +1,256 @@
+// PC2 (PointCache 2) and MDD (Motion Designer): a header, then positions frame after frame. PC2 is little-endian, as we
+// are; MDD is big-endian and has a time for each frame.
+#include "filigree/io/file.h"
+#include "filigree/io/point_cache_formats.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+namespace filigree {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kPc2Magic("POINTCACHE2\0", 12);
+constexpr std::int32_t kPc2Version = 1;
+constexpr std::uint64_t kPc2Header = 32, kMddHeader = 8;
+constexpr std::size_t kPointBytes = sizeof(Vec3f);
+static_assert(kPointBytes == 12);
+
+/// A file that is read here and there.
+class RandomFile {
+public:
+    static Result<std::shared_ptr<const RandomFile>> open(const fs::path& path) {
+        auto file = std::make_shared<RandomFile>();
+        file->name_ = path.string();
+        // a pipe would wait here for its writer
+        file->descriptor_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+        struct stat status {};
+        if (file->descriptor_ < 0 || ::fstat(file->descriptor_, &status) != 0)
+            return Error{ErrorCode::not_found,
+                         file->name_ + ": cannot be read: " +
+                             (errno == ENOENT ? "there is no such file or folder." : "it cannot be opened.")};
+        if (S_ISDIR(status.st_mode))
+            return Error{ErrorCode::not_found, file->name_ + ": cannot be read: it is a folder."};
+        if (!S_ISREG(status.st_mode))
+            return Error{ErrorCode::unsupported,
+                         file->name_ + ": is a pipe or device, and point caches are read here and there; write it to a "
+                                       "file first."};
+        file->size_ = static_cast<std::uint64_t>(status.st_size);
+        return std::shared_ptr<const RandomFile>(std::move(file));
+    }
+    RandomFile() = default;
+    ~RandomFile() {
+        if (descriptor_ >= 0) ::close(descriptor_);
+    }
+    RandomFile(const RandomFile&) = delete;
+    RandomFile& operator=(const RandomFile&) = delete;
+
+    const std::string& name() const { return name_; }
+    std::uint64_t size() const { return size_; }
+    Error error(const std::string& cause) const { return {ErrorCode::bad_file, name_ + ": " + cause}; }
+
+    Status read(std::uint64_t offset, void* to, std::size_t bytes) const {
+        for (char* out = static_cast<char*>(to); bytes > 0;) {
+            const ssize_t got = ::pread(descriptor_, out, bytes, static_cast<off_t>(offset));
+            if (got < 0 && errno == EINTR) continue;
+            if (got < 0) return Error{ErrorCode::not_found, name_ + ": cannot be read: the device failed."};
+            if (got == 0) return error("ends too early; it was cut off, or changed while it was read.");
+            out += got;
+            offset += static_cast<std::uint64_t>(got);
+            bytes -= static_cast<std::size_t>(got);
+        }
+        return Success{};
+    }
+
+private:
+    std::string name_;
+    int descriptor_ = -1;
+    std::uint64_t size_ = 0;
+};
+
+using FilePointer = std::shared_ptr<const RandomFile>;
+
+/// Turns the bytes of 32-bit words around.
+void swap_words(void* words, std::size_t count) {
+    auto* bytes = static_cast<char*>(words);
+    for (std::size_t i = 0; i < count; ++i, bytes += 4) {
+        std::uint32_t word;
+        std::memcpy(&word, bytes, 4);
+        word = __builtin_bswap32(word);
+        std::memcpy(bytes, &word, 4);
+    }
+}
+
+std::string plural(std::uint64_t count, const char* noun) {
+    return std::to_string(count) + " " + noun + (count == 1 ? "" : "s");
+}
+
+/// Holds counts of a header against the file's length and the mesh. bytes: of one frame; `before` of all else.
+Status check_counts(const RandomFile& file, std::int32_t frames, std::int32_t points, std::uint64_t before,
+                    std::size_t expected_points) {
+    if (frames <= 0 || points <= 0)
+        return file.error("its header says " + std::to_string(frames) + " frames of " + std::to_string(points) +
+                          " points; there must be one at least.");
+    const std::uint64_t bytes = before + std::uint64_t(frames) * std::uint64_t(points) * kPointBytes;
+    if (file.size() != bytes)
+        return file.error("its header says " + plural(std::uint64_t(frames), "frame") + " of " +
+                          plural(std::uint64_t(points), "point") + ", which is " + plural(bytes, "byte") +
+                          ", and it has " + std::to_string(file.size()) + "; it was cut off, or is damaged.");
+    if (std::uint64_t(points) != expected_points)
+        return Error{ErrorCode::mismatch, file.name() + ": has " + plural(std::uint64_t(points), "point") +
+                                              ", and what it should move has " + std::to_string(expected_points) +
+                                              "; it is of another mesh."};
+    return Success{};
+}
+
+Status read_frame(const RandomFile& file, std::uint64_t start, std::size_t frame, std::span<Vec3f> positions,
+                  bool is_big_endian) {
+    const std::size_t bytes = positions.size_bytes();
+    if (Status read = file.read(start + std::uint64_t(frame) * bytes, positions.data(), bytes); !read) return read;
+    if (is_big_endian) swap_words(positions.data(), 3 * positions.size());
+    const auto bad = std::find_if(positions.begin(), positions.end(), [](const Vec3f& p) { return !p.allFinite(); });
+    if (bad == positions.end()) return Success{};
+    return file.error("frame " + std::to_string(frame + 1) + ", point " + std::to_string(bad - positions.begin()) +
+                      " is not a finite number.");
+}
+
+PointSource source_of(FilePointer file, std::int32_t frames, double rate, std::uint64_t start, bool is_big_endian) {
+    return {static_cast<std::size_t>(frames), rate,
+            [file = std::move(file), start, is_big_endian](std::size_t frame, std::span<Vec3f> positions) {
+                return read_frame(*file, start, frame, positions, is_big_endian);
+            }};
+}
+
+/// The rate that an MDD's times give. A float's rounding is taken off, so that 60 comes back as 60.
+Result<double> rate_of(const RandomFile& file, std::span<const float> times) {
+    constexpr double kUneven = 0.01, kRounding = 1e-5;
+    if (std::any_of(times.begin(), times.end(), [](float t) { return !std::isfinite(t); }))
+        return file.error("one of its times is not a finite number.");
+    const double first = times.front(), length = times.back() - first;
+    if (std::all_of(times.begin(), times.end(), [&](float t) { return t == times.front(); }))
+        return kUnsaidRate; // one frame, or a program that leaves them zero
+    const double step = length / double(times.size() - 1);
+    for (std::size_t i = 0; i < times.size(); ++i)
+        if (!(step > 0) || std::abs(times[i] - (first + step * double(i))) > kUneven * step)
+            return Error{ErrorCode::unsupported,
+                         file.name() + ": its frames are not evenly spaced in time; give a frame rate to take them one "
+                                       "after the other."};
+    const double rate = 1 / step, whole = std::round(rate);
+    return whole > 0 && std::abs(rate - whole) <= kRounding * rate ? whole : rate;
+}
+
+Status check_sizes(const MeshAnimation& animation, const fs::path& path) {
+    constexpr std::size_t kMost = std::numeric_limits<std::int32_t>::max();
+    if (animation.frames <= kMost && animation.rest->vertex_count() <= kMost) return Success{};
+    return Error{ErrorCode::unsupported, path.string() + ": point caches hold at most 2147483647 frames and points."};
+}
+
+Status write_frames(FileWriter& file, const MeshAnimation& animation, const WorldPositions& positions,
+                    bool is_big_endian, const RunContext& context) {
+    std::vector<Vec3f> points(animation.rest->vertex_count());
+    const std::string_view bytes(reinterpret_cast<const char*>(points.data()), points.size() * kPointBytes);
+    for (std::size_t frame = 0; frame < animation.frames; ++frame) {
+        context.report("writing", double(frame) / double(animation.frames));
+        if (context.is_cancelled()) return cancelled_error();
+        if (Status fetched = positions(frame, points); !fetched) return fetched;
+        if (is_big_endian) swap_words(points.data(), 3 * points.size());
+        if (Status written = file.write(bytes); !written) return written;
+    }
+    if (context.is_cancelled()) return cancelled_error();
+    context.report("writing", 1);
+    return file.finish();
+}
+
+template <class T>
+void append(std::string& bytes, T value) {
+    bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
+}
+
+} // namespace
+
+Result<PointSource> open_pc2(const fs::path& path, std::size_t points, std::optional<double> frames_per_second) {
+    struct {
+        std::int32_t version, points;
+        float first_frame, sample_rate;
+        std::int32_t frames;
+    } header{};
+    constexpr double kMostRate = 1000; // frames a sample, or samples a frame: beyond, the number is no rate
+    static_assert(kPc2Magic.size() + sizeof header == kPc2Header);
+    const Result<FilePointer> file = RandomFile::open(path);
+    if (!file) return file.error();
+    const RandomFile& in = **file;
+    char magic[kPc2Magic.size()];
+    if (in.size() < kPc2Header) return in.error("is too short for a PC2 point cache.");
+    if (Status read = in.read(0, magic, sizeof magic); !read) return read.error();
+    if (Status read = in.read(sizeof magic, &header, sizeof header); !read) return read.error();
+    if (std::string_view(magic, sizeof magic) != kPc2Magic)
+        return in.error("does not begin with POINTCACHE2 and is no PC2 point cache.");
+    if (header.version != kPc2Version)
+        return Error{ErrorCode::unsupported, in.name() + ": is PC2 of version " + std::to_string(header.version) +
+                                                 ", and only version 1 is known."};
+    const double samples = header.sample_rate;
+    if (!std::isfinite(header.first_frame) || !(samples >= 1 / kMostRate && samples <= kMostRate))
+        return in.error("its header's start frame or sample rate makes no sense; it is damaged.");
+    if (Status sound = check_counts(in, header.frames, header.points, kPc2Header, points); !sound) return sound.error();
+    const double rate = frames_per_second.value_or(kUnsaidRate) / samples;
+    return source_of(*file, header.frames, rate, kPc2Header, false);
+}
+
+Result<PointSource> open_mdd(const fs::path& path, std::size_t points, std::optional<double> frames_per_second) {
+    std::int32_t counts[2] = {}; // frames, points
+    const Result<FilePointer> file = RandomFile::open(path);
+    if (!file) return file.error();
+    const RandomFile& in = **file;
+    if (in.size() < kMddHeader) return in.error("is too short for an MDD point cache.");
+    if (Status read = in.read(0, counts, sizeof counts); !read) return read.error();
+    swap_words(counts, 2);
+    const std::uint64_t start = kMddHeader + sizeof(float) * std::uint64_t(std::max(counts[0], 0));
+    if (Status sound = check_counts(in, counts[0], counts[1], start, points); !sound) return sound.error();
+    std::vector<float> times(static_cast<std::size_t>(counts[0]));
+    if (Status read = in.read(kMddHeader, times.data(), sizeof(float) * times.size()); !read) return read.error();
+    swap_words(times.data(), times.size());
+    Result<double> rate = frames_per_second ? Result<double>(*frames_per_second) : rate_of(in, times);
+    if (!rate) return rate.error();
+    return source_of(*file, counts[0], *rate, start, true);
+}
+
+Status write_pc2(const MeshAnimation& animation, const WorldPositions& positions, const fs::path& path,
+                 const RunContext& context) {
+    if (Status sound = check_sizes(animation, path); !sound) return sound;
+    Result<FileWriter> file = FileWriter::create(path);
+    if (!file) return file.error();
+    std::string header(kPc2Magic);
+    append(header, kPc2Version);
+    append(header, static_cast<std::int32_t>(animation.rest->vertex_count()));
+    append(header, 0.0f); // the first frame's number in the scene
+    append(header, 1.0f); // frames of the scene from one to the next
+    append(header, static_cast<std::int32_t>(animation.frames));
+    if (Status written = file->write(header); !written) return written;
+    return write_frames(*file, animation, positions, false, context);
+}
+
+Status write_mdd(const MeshAnimation& animation, const WorldPositions& positions, const fs::path& path,
+                 const RunContext& context) {
+    if (Status sound = check_sizes(animation, path); !sound) return sound;
+    Result<FileWriter> file = FileWriter::create(path);
+    if (!file) return file.error();
+    std::string header;
+    append(header, static_cast<std::int32_t>(animation.frames));
+    append(header, static_cast<std::int32_t>(animation.rest->vertex_count()));
+    for (std::size_t frame = 0; frame < animation.frames; ++frame)
+        append(header, static_cast<float>(double(frame) / animation.frames_per_second));
+    swap_words(header.data(), header.size() / 4);
+    if (Status written = file->write(header); !written) return written;
+    return write_frames(*file, animation, positions, true, context);
+}
+
+} // namespace filigree
