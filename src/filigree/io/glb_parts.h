@@ -2,6 +2,7 @@
 #pragma once
 
 #include "filigree/io/glb_builder.h"
+#include "filigree/io/material_file.h"
 #include "filigree/mesh/mesh.h"
 
 #include <span>
@@ -32,6 +33,7 @@ struct GlbParts {
     std::vector<Vec2f> uvs = {}; ///< empty or one an output vertex; v points down, as in glTF
     std::vector<GlbObject> objects = {};
     bool is_points = false;             ///< no faces: primitives are points
+    bool has_colors = false;            ///< the mesh has some a vertex
     std::vector<std::string> lost = {}; ///< what glTF cannot hold, a noun each ("groups")
 
     std::size_t vertex_count() const { return mesh_vertices + repeats.size(); }
@@ -61,9 +63,12 @@ GlbParts make_glb_parts(const Mesh& mesh, const GlbPartsOptions& options = {});
 /// POSITION, which is the caller's.
 GlbBuilder::Json add_glb_attributes(GlbBuilder& builder, const GlbParts& parts, const Mesh& mesh);
 
-/// Adds one material for each of `materials` (as read_materials gives them), with their pictures, and one more for
-/// faces without a material, where there are some (glTF's own default is metal). Returns the number of the first, and
-/// a sentence for every picture that cannot be embedded. `has_uvs`: whether pictures can be drawn at all.
+/// The materials of a mesh as read_materials finds them beside its path. Without a path no library is looked for: those
+/// that are not embedded are grey, and a warning says so. None where no face has one.
+MeshMaterials find_glb_materials(const Mesh& mesh, const std::filesystem::path& materials_beside);
+
+/// Adds these materials with their pictures, and one more for faces without a material, where there are some (glTF's
+/// own default is metal). Warns of pictures that cannot be embedded.
 struct GlbMaterials {
     std::size_t first = 0;
     std::size_t none = 0; ///< for faces without a material
@@ -83,5 +88,10 @@ GlbBuilder::Json add_glb_mesh(GlbBuilder& builder, const GlbParts& parts, const 
 ///     "extras": {"filigree": {"vertices": V, "repeats": <accessor: uint32 SCALAR, source of vertex V + i>}}
 /// ("repeats" is left out when there are none.) A material for faces without one has "extras": {"filigree": "none"}.
 GlbBuilder::Json add_glb_repeats(GlbBuilder& builder, const GlbParts& parts);
+
+/// All of it for a mesh that stands still: attributes, positions, and a node for each object at the mesh's origin (in
+/// double). Returns the numbers of the nodes, which are in no scene yet.
+std::vector<std::size_t> add_glb_nodes(GlbBuilder& builder, const GlbParts& parts, const Mesh& mesh,
+                                       const GlbMaterials& materials);
 
 } // namespace filigree

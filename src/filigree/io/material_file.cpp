@@ -1,10 +1,12 @@
-// Wavefront MTL, as far as we draw it: Kd and map_Kd.
+// Wavefront MTL, as far as we keep it: Kd, map_Kd, d, Tr, and Pm and Pr, which many programs have added.
 #include "filigree/io/material_file.h"
 #include "filigree/io/file.h"
 #include "filigree/io/text_scanner.h"
+#include "filigree/io/text_writer.h"
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <unordered_map>
 #include <unordered_set>
@@ -86,7 +88,7 @@ public:
 
 private:
     struct State {
-        bool defined = false, has_color = false;
+        bool defined = false, has_color = false, has_d = false;
     };
 
     /// Where a file's name leads, as seen from the mesh's folder; none when that is out of it. `beside`: the folder of
@@ -146,6 +148,8 @@ private:
                 current = begin_material(text.rest_of_line());
             } else if (current && keyword == "kd") {
                 read_color(*current, text.rest_of_line());
+            } else if (current && (keyword == "d" || keyword == "tr" || keyword == "pm" || keyword == "pr")) {
+                read_number(*current, keyword, text.rest_of_line());
             } else if (current && keyword == "map_kd") {
                 read_picture(*current, text.rest_of_line(), path.parent_path());
             }
@@ -172,6 +176,20 @@ private:
         for (int i = 0; i < 3; ++i)
             materials_[material].color[i] = static_cast<float>(std::clamp(numbers[count == 3 ? i : 0], 0.0, 1.0));
         states_[material].has_color = true;
+    }
+
+    /// Programs disagree on Tr: where d stands, d counts; and a material that Tr alone would hide is opaque.
+    void read_number(std::size_t material, std::string_view keyword, std::string_view rest) {
+        double value = 0;
+        std::string_view text = rest, word = take_word(text);
+        if (word == "-halo") word = take_word(text);
+        if (!is_number(word, value) || !std::isfinite(value)) return;
+        const auto number = static_cast<float>(std::clamp(value, 0.0, 1.0));
+        MeshMaterial& result = materials_[material];
+        if (keyword == "pm") result.metallic = number;
+        if (keyword == "pr") result.roughness = number;
+        if (keyword == "d") result.opacity = number, states_[material].has_d = true;
+        if (keyword == "tr" && !states_[material].has_d) result.opacity = number < 1 ? 1 - number : 1;
     }
 
     void read_picture(std::size_t material, std::string_view rest, const fs::path& beside) {
@@ -242,10 +260,139 @@ private:
         moved_pictures_, outside_;
 };
 
+// ---------------------------------------------------------------------------------------------------------- writing
+
+constexpr std::string_view kOurMark = "# Filigree";
+
+/// A name for files that every system and every reader of OBJ takes.
+std::string as_file_name(std::string_view name) {
+    constexpr std::size_t kLongest = 60;
+    std::string plain(name.substr(0, kLongest));
+    for (char& c : plain) {
+        const bool is_ascii_word = (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z');
+        const bool is_other_script = static_cast<signed char>(c) < 0;
+        if (!is_ascii_word && !is_other_script && c != '-' && c != '.') c = '_';
+    }
+    if (name.size() > kLongest) // not inside a character
+        while (!plain.empty() && static_cast<signed char>(plain.back()) < 0) plain.pop_back();
+    if (plain.empty() || plain.front() == '-' || plain.front() == '.') plain.insert(plain.begin(), '_');
+    return plain;
+}
+
+class LibraryMaker {
+public:
+    LibraryMaker(const Mesh& mesh, const fs::path& obj_path)
+        : mesh_(mesh), folder_(obj_path.parent_path()), stem_(as_file_name(obj_path.stem().string())) {}
+
+    MaterialLibrary make() {
+        library_.name = free_name(stem_, ".mtl", [&](const std::string& name) { return is_ours(name); });
+        find_our_pictures();
+        std::string text(kOurMark);
+        text += ": the materials of an OBJ\n";
+        {
+            TextWriter out(text);
+            const std::vector<std::string> names = obj_material_names(mesh_);
+            for (std::size_t m = 0; m < names.size(); ++m) write(out, names[m], mesh_.embedded_materials[m]);
+        }
+        library_.files.push_back({library_.name, std::make_shared<const std::string>(std::move(text))});
+        return std::move(library_);
+    }
+
+private:
+    bool exists(const std::string& name) const {
+        std::error_code ignored;
+        return fs::exists(fs::symlink_status(folder_ / name, ignored));
+    }
+
+    bool is_ours(const std::string& name) const {
+        std::error_code ignored;
+        if (!fs::is_regular_file(folder_ / name, ignored)) return false;
+        const Result<std::string> bytes = read_file(folder_ / name);
+        return bytes && bytes->starts_with(kOurMark);
+    }
+
+    /// The name, with a number where another file has it.
+    template <class MayReplace>
+    std::string free_name(const std::string& stem, std::string_view ending, const MayReplace& may_replace) {
+        std::string name = stem + std::string(ending);
+        for (int number = 2; taken_.contains(name) || (exists(name) && !may_replace(name)); ++number)
+            name = stem + "_" + std::to_string(number) + std::string(ending);
+        taken_.insert(name);
+        return name;
+    }
+
+    /// Those that the library names which is about to be replaced.
+    void find_our_pictures() {
+        if (!exists(library_.name)) return;
+        const Result<std::string> bytes = read_file(folder_ / library_.name);
+        if (!bytes) return;
+        for (TextScanner text(*bytes); !text.at_end(); text.next_line())
+            if (text.word() == "map_Kd") our_pictures_.insert(std::string(text.rest_of_line()));
+    }
+
+    void write(TextWriter& out, const std::string& name, const MeshMaterial& material) {
+        out.text("\nnewmtl ").text(name).text("\nKd");
+        for (const float c : material.color) out.text(" ").number(c);
+        out.text("\nd ").number(material.opacity);
+        out.text("\nPr ").number(material.roughness).text("\nPm ").number(material.metallic).text("\n");
+        const bool is_black =
+            material.color.maxCoeff() <= 0; // which readers, ours too, take for white beside a picture
+        if (material.picture_bytes && !is_black)
+            if (const std::string picture = picture_name(material, name); !picture.empty())
+                out.text("map_Kd ").text(picture).text("\n");
+    }
+
+    std::string picture_name(const MeshMaterial& material, const std::string& name) {
+        const auto [entry, is_new] = pictures_.try_emplace(material.picture_bytes.get());
+        if (!is_new) return entry->second;
+        const std::string_view ending = picture_ending(*material.picture_bytes);
+        if (ending.empty()) {
+            library_.warnings.push_back("The texture of the material " + in_quotes(name) +
+                                        " is neither PNG nor JPEG and was left out.");
+            return "";
+        }
+        entry->second = free_name(stem_ + "_" + as_file_name(name), ending,
+                                  [&](const std::string& taken) { return our_pictures_.contains(taken); });
+        library_.files.push_back({entry->second, material.picture_bytes});
+        return entry->second;
+    }
+
+    const Mesh& mesh_;
+    fs::path folder_;
+    std::string stem_;
+    MaterialLibrary library_;
+    std::unordered_set<std::string> taken_, our_pictures_;
+    std::map<const std::string*, std::string> pictures_;
+};
+
 } // namespace
 
 MeshMaterials read_materials(const Mesh& mesh, const fs::path& mesh_path) {
+    if (!mesh.embedded_materials.empty()) return {mesh.embedded_materials, {}};
     return MaterialReader(mesh, mesh_path).read();
+}
+
+std::vector<std::string> obj_material_names(const Mesh& mesh) {
+    std::vector<std::string> names;
+    std::unordered_set<std::string> taken;
+    for (const std::string& given : mesh.materials.names) {
+        std::string line;
+        TextWriter(line).name(given);
+        const std::string name = trimmed(line).empty() ? "material" : std::string(trimmed(line));
+        std::string free_name = name;
+        for (int number = 2; !taken.insert(free_name).second; ++number) free_name = name + "_" + std::to_string(number);
+        names.push_back(free_name);
+    }
+    return names;
+}
+
+MaterialLibrary make_material_library(const Mesh& mesh, const fs::path& obj_path) {
+    return LibraryMaker(mesh, obj_path).make();
+}
+
+std::string_view picture_ending(std::string_view bytes) {
+    if (bytes.starts_with("\x89PNG\r\n\x1a\n")) return ".png";
+    return bytes.starts_with("\xff\xd8\xff") ? ".jpg" : "";
 }
 
 } // namespace filigree

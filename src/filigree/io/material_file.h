@@ -5,6 +5,7 @@
 #include "filigree/mesh/mesh.h"
 
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -19,5 +20,25 @@ struct MeshMaterials {
     std::vector<std::string> warnings;
 };
 MeshMaterials read_materials(const Mesh& mesh, const std::filesystem::path& mesh_path);
+
+/// mesh.materials.names as an OBJ can hold them: on one line, without blanks around them, none empty, none twice.
+std::vector<std::string> obj_material_names(const Mesh& mesh);
+
+/// The embedded materials of a mesh as the files that go beside its OBJ x.obj: x.mtl, and x_NAME.png or .jpg for each
+/// picture, NAME being that of its material. Nothing is written. A name that a file has already gets a number (x_2.mtl)
+/// unless that file is a library we wrote, or a picture that one names.
+struct MaterialLibrary {
+    struct File {
+        std::string name;
+        std::shared_ptr<const std::string> bytes;
+    };
+    std::string name;        ///< of the library
+    std::vector<File> files; ///< pictures, then the library
+    std::vector<std::string> warnings;
+};
+MaterialLibrary make_material_library(const Mesh& mesh, const std::filesystem::path& obj_path);
+
+/// How a picture's file begins: ".png", ".jpg", or "" for what is neither.
+std::string_view picture_ending(std::string_view bytes);
 
 } // namespace filigree

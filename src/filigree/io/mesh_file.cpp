@@ -1,5 +1,6 @@
 #include "filigree/io/mesh_file.h"
 #include "filigree/io/file.h"
+#include "filigree/io/material_file.h"
 #include "filigree/io/mesh_formats.h"
 
 #include <algorithm>
@@ -11,7 +12,7 @@ namespace filigree {
 
 namespace {
 
-constexpr std::string_view kKnownFormats = "use .obj, .ply, .stl or .off";
+constexpr std::string_view kKnownFormats = "use .obj, .ply, .stl, .off or .glb";
 
 std::string lower_case(std::string text) {
     for (char& c : text)
@@ -165,6 +166,38 @@ Error out_of_memory(const std::string& name) {
     return {ErrorCode::out_of_memory, name + ": does not fit into memory."};
 }
 
+std::vector<std::string> with_losses(const std::string& format, const std::vector<std::string>& lost,
+                                     std::vector<std::string> warnings) {
+    if (!lost.empty()) warnings.insert(warnings.begin(), format + " cannot hold " + join(lost) + "; left out.");
+    return warnings;
+}
+
+/// An OBJ with its embedded materials beside it: pictures first, the mesh last, each whole or not at all.
+Result<std::vector<std::string>> write_obj_with_materials(const Mesh& mesh, const std::filesystem::path& path) {
+    MaterialLibrary library;
+    std::string bytes;
+    std::vector<std::string> lost;
+    try {
+        library = make_material_library(mesh, path);
+        lost = write_obj(mesh, library.name, bytes);
+    } catch (const std::bad_alloc&) {
+        return out_of_memory("OBJ");
+    }
+    library.files.push_back({path.filename().string(), std::make_shared<const std::string>(std::move(bytes))});
+    for (const MaterialLibrary::File& file : library.files) {
+        const std::string_view pieces[] = {*file.bytes};
+        if (const Status written = write_file(path.parent_path() / file.name, pieces); !written) return written.error();
+    }
+    return with_losses("OBJ", lost, std::move(library.warnings));
+}
+
+/// Whether other files can lie beside it: no pipe or device.
+bool is_file_in_folder(const std::filesystem::path& path) {
+    std::error_code ignored;
+    const std::filesystem::file_status status = std::filesystem::status(path, ignored);
+    return path != "-" && (!std::filesystem::exists(status) || std::filesystem::is_regular_file(status));
+}
+
 } // namespace
 
 Result<MeshFormat> mesh_format(const std::filesystem::path& path) {
@@ -173,6 +206,7 @@ Result<MeshFormat> mesh_format(const std::filesystem::path& path) {
     if (ending == ".ply") return MeshFormat::ply;
     if (ending == ".stl") return MeshFormat::stl;
     if (ending == ".off") return MeshFormat::off;
+    if (ending == ".glb" || ending == ".gltf") return MeshFormat::gltf;
     return Error{ErrorCode::unsupported, path.string() + ": " + (ending.empty() ? "a name without an ending" : ending) +
                                              " is not of a mesh format we know; " + std::string(kKnownFormats) + "."};
 }
@@ -202,12 +236,12 @@ Result<std::vector<std::string>> write_mesh(const Mesh& mesh, MeshFormat format,
                                             const WriteMeshOptions& options) {
     assert(check_mesh(mesh).empty());
     bytes.clear();
-    std::vector<std::string> lost;
+    std::vector<std::string> lost, warnings;
     const char* name = "";
     try {
         switch (format) {
         case MeshFormat::obj:
-            name = "OBJ", lost = write_obj(mesh, bytes);
+            name = "OBJ", lost = write_obj(mesh, "", bytes);
             break;
         case MeshFormat::ply:
             name = "PLY", lost = write_ply(mesh, options, bytes);
@@ -219,7 +253,13 @@ Result<std::vector<std::string>> write_mesh(const Mesh& mesh, MeshFormat format,
             name = "OFF", lost = write_off(mesh, bytes);
             break;
         case MeshFormat::gltf:
-            name = "GLB", lost = write_glb(mesh, bytes);
+            name = "GLB";
+            if (Result<GlbNotes> notes = write_glb(mesh, options, bytes)) {
+                lost = std::move(notes->lost);
+                warnings = std::move(notes->warnings);
+            } else {
+                return notes.error();
+            }
             break;
         }
     } catch (const std::bad_alloc&) {
@@ -227,16 +267,18 @@ Result<std::vector<std::string>> write_mesh(const Mesh& mesh, MeshFormat format,
     } catch (const std::length_error&) {
         return out_of_memory(name);
     }
-    std::vector<std::string> warnings;
-    if (!lost.empty()) warnings.push_back(std::string(name) + " cannot hold " + join(lost) + "; left out.");
-    return warnings;
+    return with_losses(name, lost, std::move(warnings));
 }
 
 Result<std::vector<std::string>> write_mesh(const Mesh& mesh, const std::filesystem::path& path,
                                             const RunContext& context, const WriteMeshOptions& options) {
     const Result<MeshFormat> format = options.format ? Result<MeshFormat>(*options.format) : mesh_format(path);
     if (!format.ok()) return format.error();
+    if (*format == MeshFormat::gltf && lower_case(path.extension().string()) == ".gltf")
+        return Error{ErrorCode::unsupported, path.string() + ": glTF is written as one file; write .glb."};
     if (context.is_cancelled()) return cancelled_error();
+    if (*format == MeshFormat::obj && !mesh.embedded_materials.empty() && is_file_in_folder(path))
+        return write_obj_with_materials(mesh, path);
     std::string bytes;
     Result<std::vector<std::string>> warnings = write_mesh(mesh, *format, bytes, options);
     if (!warnings.ok()) return warnings;

@@ -42,11 +42,16 @@ struct WriteMeshOptions {
     std::optional<MeshFormat> format = std::nullopt; ///< unset: from the file name's ending
     bool ascii = false;                              ///< PLY and STL: text instead of binary
     bool big_endian = false;                         ///< PLY: binary, most significant byte first
+    /// GLB: the mesh's own path; colours and textures from the material libraries beside it are embedded. Empty: no
+    /// library is looked for.
+    std::filesystem::path materials_beside = {};
 };
 
 /// Writes a mesh through a temporary file beside `path` and a rename, so that `path` is either whole or untouched;
-/// "-" writes standard output and needs `options.format`. Returns the warnings: one sentence that lists what the format
-/// cannot hold. Errors: unsupported, unwritable, out_of_memory, cancelled.
+/// "-" writes standard output and needs `options.format`. Embedded materials go beside an OBJ x.obj as x.mtl and
+/// x_NAME.png or .jpg; other files that have these names already are not replaced (x_2.mtl). Returns the warnings: one
+/// sentence that lists what the format cannot hold, and one for each texture that is missing.
+/// Errors: unsupported, unwritable, out_of_memory, cancelled.
 Result<std::vector<std::string>> write_mesh(const Mesh& mesh, const std::filesystem::path& path,
                                             const RunContext& context, const WriteMeshOptions& options = {});
 /// The bytes of a file of that format (options.format does not count here). Same warnings.

@@ -38,11 +38,18 @@ Result<MeshFile> read_off(const MeshSource& source);
 Result<MeshFile> read_gltf(const MeshSource& source);
 
 /// Writers append to `bytes` and return what the format cannot hold, a noun each ("materials").
-std::vector<std::string> write_obj(const Mesh& mesh, std::string& bytes);
+/// library: the name of the .mtl that holds the embedded materials; empty: they are lost.
+std::vector<std::string> write_obj(const Mesh& mesh, std::string_view library, std::string& bytes);
 std::vector<std::string> write_ply(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes);
 std::vector<std::string> write_stl(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes);
 std::vector<std::string> write_off(const Mesh& mesh, std::string& bytes);
-std::vector<std::string> write_glb(const Mesh& mesh, std::string& bytes);
+
+/// What is lost, and further sentences (textures that are not there).
+struct GlbNotes {
+    std::vector<std::string> lost, warnings;
+};
+/// Errors: unsupported (4 GiB or more).
+Result<GlbNotes> write_glb(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes);
 
 /// Whether the content says so: "solid", and a facet or the end near the start.
 bool is_ascii_stl(std::string_view bytes);

@@ -34,7 +34,7 @@ static_assert(sizeof(Header) == 32);
 
 struct Section {
     char name[8];            ///< padded with zeros
-    std::uint32_t index;     ///< of a level, a scalar or a pose; else 0
+    std::uint32_t index;     ///< of a level, a scalar, a picture or a pose; else 0
     std::uint32_t item_size; ///< bytes
     std::uint64_t offset;    ///< from the start of the file, a multiple of 8
     std::uint64_t count;     ///< items
@@ -53,6 +53,9 @@ public:
     template <class T>
     void value(std::string_view name, const T& item) {
         raw(name, 0, &item, sizeof(T), 1);
+    }
+    void bytes(std::string_view name, std::string_view items, std::uint32_t index) {
+        raw(name, index, items.data(), 1, items.size());
     }
     void strings(std::string_view name, const std::vector<std::string>& items) {
         std::vector<char> bytes; // each ended by a zero byte, so a name that holds one ends there
@@ -116,6 +119,36 @@ void write_faces(SectionWriter& out, const std::string& name, std::uint32_t inde
     out.array(name + ".cor", corners, index);
 }
 
+/// An embedded material; its name stands in mat.nam.
+struct FileMaterial {
+    std::array<float, 3> color;
+    float opacity, metallic, roughness;
+    std::uint32_t double_sided;
+    std::uint32_t picture; ///< index of a mat.pic, or kNoIndex
+};
+static_assert(sizeof(FileMaterial) == 32);
+
+void write_material_sections(SectionWriter& out, const std::vector<MeshMaterial>& materials) {
+    std::vector<FileMaterial> records;
+    std::vector<const std::string*> pictures;
+    for (const MeshMaterial& m : materials) {
+        std::uint32_t picture = kNoIndex;
+        if (m.picture_bytes && !m.picture_bytes->empty()) {
+            const auto known = std::find(pictures.begin(), pictures.end(), m.picture_bytes.get());
+            picture = static_cast<std::uint32_t>(known - pictures.begin());
+            if (known == pictures.end()) pictures.push_back(m.picture_bytes.get());
+        }
+        records.push_back({{m.color[0], m.color[1], m.color[2]},
+                           m.opacity,
+                           m.metallic,
+                           m.roughness,
+                           m.double_sided ? 1u : 0u,
+                           picture});
+    }
+    out.array("mat.emb", records);
+    for (std::uint32_t i = 0; i < pictures.size(); ++i) out.bytes("mat.pic", *pictures[i], i);
+}
+
 void write_mesh_sections(SectionWriter& out, const Mesh& mesh, bool with_positions) {
     if (with_positions) out.array("mesh.pos", mesh.positions);
     out.value("mesh.org", std::array<double, 3>{mesh.origin[0], mesh.origin[1], mesh.origin[2]});
@@ -134,6 +167,7 @@ void write_mesh_sections(SectionWriter& out, const Mesh& mesh, bool with_positio
     write_labels(out, "obj", mesh.objects);
     write_labels(out, "grp", mesh.groups);
     write_labels(out, "mat", mesh.materials);
+    write_material_sections(out, mesh.embedded_materials);
     out.array("smooth", mesh.smoothing);
     out.strings("mtllib", mesh.material_files);
 }
@@ -317,6 +351,33 @@ void read_faces(const SectionReader& in, const std::string& name, std::uint32_t 
     for (std::size_t f = 0; f < offsets.size(); ++f) offsets[f] = static_cast<Index>(f * size[0]);
 }
 
+std::vector<MeshMaterial> read_material_sections(const SectionReader& in, const std::vector<std::string>& names) {
+    const std::vector<FileMaterial> records = in.array<FileMaterial>("mat.emb");
+    if (records.empty()) return {};
+    if (records.size() != names.size()) throw Damage{"has another number of materials than of their names"};
+    std::map<std::uint32_t, std::shared_ptr<const std::string>> pictures;
+    std::vector<MeshMaterial> materials;
+    for (std::size_t i = 0; i < records.size(); ++i) {
+        const FileMaterial& record = records[i];
+        MeshMaterial& material = materials.emplace_back();
+        material.name = names[i];
+        material.color = {record.color[0], record.color[1], record.color[2]};
+        material.opacity = record.opacity;
+        material.metallic = record.metallic;
+        material.roughness = record.roughness;
+        material.double_sided = record.double_sided != 0;
+        if (record.picture == kNoIndex) continue;
+        std::shared_ptr<const std::string>& picture = pictures[record.picture];
+        if (!picture) {
+            const std::vector<char> bytes = in.array<char>("mat.pic", record.picture);
+            if (bytes.empty()) throw Damage{"lacks the picture of a material"};
+            picture = std::make_shared<const std::string>(bytes.begin(), bytes.end());
+        }
+        material.picture_bytes = picture;
+    }
+    return materials;
+}
+
 Mesh read_mesh_sections(const SectionReader& in) {
     Mesh mesh;
     mesh.positions = in.array<Vec3f>("mesh.pos");
@@ -332,6 +393,7 @@ Mesh read_mesh_sections(const SectionReader& in) {
     mesh.objects = read_labels(in, "obj");
     mesh.groups = read_labels(in, "grp");
     mesh.materials = read_labels(in, "mat");
+    mesh.embedded_materials = read_material_sections(in, mesh.materials.names);
     mesh.smoothing = in.array<Index>("smooth");
     mesh.material_files = in.strings("mtllib");
     return mesh;

@@ -1,5 +1,6 @@
 // Wavefront OBJ, polygons only.
 #include "filigree/io/large_memory.h"
+#include "filigree/io/material_file.h"
 #include "filigree/io/mesh_formats.h"
 #include "filigree/io/text_scanner.h"
 #include "filigree/io/text_writer.h"
@@ -345,18 +346,21 @@ void write_values(TextWriter& out, std::string_view keyword, const std::vector<T
 /// Writes "keyword name" where the label changes.
 class LabelWriter {
 public:
-    LabelWriter(std::string_view keyword, const FaceLabels& labels) : keyword_(keyword), labels_(labels) {}
+    LabelWriter(std::string_view keyword, const FaceLabels& labels) : LabelWriter(keyword, labels, labels.names) {}
+    LabelWriter(std::string_view keyword, const FaceLabels& labels, const std::vector<std::string>& names)
+        : keyword_(keyword), labels_(labels), names_(names) {}
     void start_face(TextWriter& out, std::size_t face) {
         if (labels_.empty() || labels_.of_face[face] == current_) return;
         current_ = labels_.of_face[face];
         out.text(keyword_);
-        if (current_ != kNoIndex) out.text(" ").name(labels_.names[current_]);
+        if (current_ != kNoIndex) out.text(" ").name(names_[current_]);
         out.text("\n");
     }
 
 private:
     std::string_view keyword_;
     const FaceLabels& labels_;
+    const std::vector<std::string>& names_;
     Index current_ = kNoIndex;
 };
 
@@ -377,7 +381,9 @@ void write_corner(TextWriter& out, const Mesh& mesh, std::size_t corner) {
 }
 
 void write_faces(TextWriter& out, const Mesh& mesh) {
-    LabelWriter objects("o", mesh.objects), groups("g", mesh.groups), materials("usemtl", mesh.materials);
+    const std::vector<std::string> names =
+        mesh.embedded_materials.empty() ? mesh.materials.names : obj_material_names(mesh); // as the library has them
+    LabelWriter objects("o", mesh.objects), groups("g", mesh.groups), materials("usemtl", mesh.materials, names);
     Index smoothing = 0;
     for (std::size_t f = 0; f < mesh.face_count(); ++f) {
         objects.start_face(out, f);
@@ -397,9 +403,11 @@ void write_faces(TextWriter& out, const Mesh& mesh) {
 
 Result<MeshFile> read_obj(const MeshSource& source) { return ObjReader(source).read(); }
 
-std::vector<std::string> write_obj(const Mesh& mesh, std::string& bytes) {
+std::vector<std::string> write_obj(const Mesh& mesh, std::string_view library, std::string& bytes) {
     TextWriter out(bytes);
-    for (const std::string& file : mesh.material_files) out.text("mtllib ").name(file).text("\n");
+    if (!library.empty()) out.text("mtllib ").name(library).text("\n");
+    for (const std::string& file : mesh.material_files)
+        if (library.empty()) out.text("mtllib ").name(file).text("\n");
     for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
         out.text("v ").position(mesh.origin, mesh.positions[v]);
         for (int i = 0; i < 3 && !mesh.colors.empty(); ++i) out.text(" ").number(mesh.colors[v][i]);
@@ -409,6 +417,7 @@ std::vector<std::string> write_obj(const Mesh& mesh, std::string& bytes) {
     write_values(out, "vn", mesh.normals.values);
     write_faces(out, mesh);
     std::vector<std::string> lost;
+    if (library.empty() && !mesh.embedded_materials.empty()) lost.push_back("embedded materials");
     if (!mesh.colors.empty() && mesh.colors_have_alpha) lost.push_back("the colours' alpha");
     add_scalar_losses(mesh, lost);
     return lost;

@@ -81,6 +81,16 @@ std::string check_labels(const FaceLabels& labels, const Mesh& mesh, const std::
     return "";
 }
 
+std::string check_materials(const Mesh& mesh) {
+    if (mesh.embedded_materials.empty()) return "";
+    if (mesh.embedded_materials.size() != mesh.materials.names.size())
+        return "There is not one embedded material for each name.";
+    for (const MeshMaterial& m : mesh.embedded_materials)
+        for (const float x : {m.color[0], m.color[1], m.color[2], m.opacity, m.metallic, m.roughness})
+            if (!(x >= 0 && x <= 1)) return "An embedded material has a number that is not from 0 to 1.";
+    return "";
+}
+
 std::string check_vertex_data(const Mesh& mesh) {
     if (!mesh.origin.allFinite()) return "The origin is not finite.";
     if (!all_finite(mesh.positions)) return "Not all positions are finite.";
@@ -120,6 +130,7 @@ std::string check_mesh(const Mesh& mesh) {
     if (problem.empty()) problem = check_labels(mesh.objects, mesh, "objects");
     if (problem.empty()) problem = check_labels(mesh.groups, mesh, "groups");
     if (problem.empty()) problem = check_labels(mesh.materials, mesh, "materials");
+    if (problem.empty()) problem = check_materials(mesh);
     if (problem.empty() && !mesh.smoothing.empty() && mesh.smoothing.size() != mesh.face_count())
         problem = "There is not one smoothing group a face.";
     return problem;

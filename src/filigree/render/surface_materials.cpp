@@ -6,22 +6,35 @@
 
 namespace filigree {
 
+namespace {
+
+/// How messages call a picture inside the mesh's file.
+std::string texture_name(const MeshMaterial& material, const std::filesystem::path& mesh_path) {
+    return mesh_path.string() + ", the texture of the material '" + material.name + "'";
+}
+
+} // namespace
+
 SurfaceMaterials load_surface_materials(const Mesh& mesh, const std::filesystem::path& mesh_path) {
     SurfaceMaterials loaded;
     if (mesh.materials.empty()) return loaded;
     MeshMaterials found = read_materials(mesh, mesh_path);
     loaded.warnings = std::move(found.warnings);
-    std::map<std::filesystem::path, const Picture*> known;
+    using Source = std::pair<std::filesystem::path, const std::string*>;
+    std::map<Source, const Picture*> known;
     for (const MeshMaterial& material : found.materials) {
         SurfaceMaterial& surface = loaded.materials.emplace_back(SurfaceMaterial{material.color, nullptr});
-        if (material.picture.empty() || mesh.uvs.empty()) continue;
-        if (!known.contains(material.picture)) {
-            Result<Picture> picture = read_picture(material.picture);
+        if (!material.has_picture() || mesh.uvs.empty()) continue;
+        const auto [entry, is_new] = known.try_emplace({material.picture, material.picture_bytes.get()}, nullptr);
+        if (is_new) {
+            Result<Picture> picture = material.picture_bytes
+                                          ? decode_picture(*material.picture_bytes, texture_name(material, mesh_path))
+                                          : read_picture(material.picture);
             if (!picture) loaded.warnings.push_back(picture.error().message);
             if (picture) loaded.pictures.push_back(std::make_shared<Picture>(std::move(*picture)));
-            known[material.picture] = picture ? loaded.pictures.back().get() : nullptr;
+            entry->second = picture ? loaded.pictures.back().get() : nullptr;
         }
-        surface.picture = known[material.picture];
+        surface.picture = entry->second;
     }
     return loaded;
 }
