@@ -1,0 +1,273 @@
+// The page: a model, its stage, and the controls around it.
+import { make_driver } from './driver.js';
+import { count_text, facts_of, size_text, sizes_of } from './facts.js';
+import { load_bytes, Model } from './model.js';
+import { correct_skinned_normals } from './normals.js';
+import { Stage } from './stage.js';
+import { Wireframe } from './wireframe.js';
+
+const element = (id) => document.getElementById(id);
+const is_narrow = () => innerWidth <= 640;
+
+class Page {
+  constructor(model) {
+    this.model = model;
+    this.stage = new Stage(element('picture'), model, () => this.draw());
+    this.driver = make_driver(model, 2 * this.stage.radius);
+    if (this.driver) {
+      this.driver.object.visible = false;
+      this.stage.scene.add(this.driver.object);
+    }
+    this.wireframe = new Wireframe(model);
+    this.time = 0;
+    this.speed = 1;
+    this.loops = true;
+    this.is_playing = false;
+
+    this.fill_levels();
+    this.fill_clips();
+    this.fill_facts();
+    this.set_dark(matchMedia('(prefers-color-scheme: dark)').matches);
+    this.listen();
+    element('buttons').hidden = element('panel').hidden = false;
+    element('panel').open = !is_narrow();
+    element('timeline').hidden = !model.action;
+    this.resize();
+    this.stage.frame();
+    this.show_level(0);
+    this.seek(0);
+    if (model.action && !matchMedia('(prefers-reduced-motion: reduce)').matches) this.toggle_play();
+  }
+
+  // ---- drawing
+
+  /// Soon, once for all that changes until then.
+  draw() { this.request ??= requestAnimationFrame((now) => this.draw_now(now)); }
+
+  draw_now(now) {
+    this.request = undefined;
+    if (this.is_playing) {
+      const passed = Math.min((now - (this.last_drawn ?? now)) / 1000, 0.25); // a page in the background does not jump
+      this.advance(passed * this.speed);
+    }
+    this.last_drawn = now;
+    if (this.stage.draw() || this.is_playing) this.draw();
+  }
+
+  advance(seconds) {
+    const { duration } = this.model;
+    let time = this.time + seconds;
+    if (time >= duration) {
+      if (!this.loops) this.toggle_play();
+      time = this.loops && duration > 0 ? time % duration : duration;
+    }
+    this.seek(time);
+  }
+
+  resize() {
+    const panel = element('panel'), timeline = element('timeline');
+    const covered = panel.hidden || !panel.open ? 0 : panel.offsetWidth + 16;
+    const bottom = timeline.hidden ? 0 : timeline.offsetHeight + 18;
+    if (is_narrow()) this.stage.resize(innerWidth, innerHeight, 0, bottom + panel.offsetHeight + 12);
+    else this.stage.resize(innerWidth, innerHeight, covered, bottom);
+    this.draw();
+  }
+
+  set_dark(dark) {
+    this.is_dark = dark;
+    document.documentElement.dataset.theme = dark ? 'dark' : 'light';
+    this.stage.set_dark(dark);
+    this.driver?.color(dark ? 0x8fbcff : 0x1b5cc4);
+    this.wireframe.set_dark(dark);
+    this.draw();
+  }
+
+  // ---- time
+
+  seek(seconds) {
+    const { model } = this;
+    this.time = Math.min(Math.max(seconds, 0), model.duration);
+    model.seek(this.time);
+    if (this.driver?.object.visible) this.driver.follow();
+    element('scrub').value = this.time;
+    element('scrub').style.setProperty('--played', `${(100 * this.time) / (model.duration || 1)}%`);
+    element('moment').innerHTML = `${this.time.toFixed(2)} <small>/ ${model.duration.toFixed(2)} s</small>`;
+    this.draw();
+  }
+
+  toggle_play() {
+    if (!this.model.action) return;
+    if (!this.is_playing && this.time >= this.model.duration) this.seek(0);
+    this.is_playing = !this.is_playing;
+    this.last_drawn = undefined;
+    element('play').classList.toggle('playing', this.is_playing);
+    element('play').setAttribute('aria-label', this.is_playing ? 'Pause' : 'Play');
+    this.draw();
+  }
+
+  /// To the next key in a direction, 1 or -1.
+  step(direction) {
+    if (this.is_playing) this.toggle_play();
+    const slack = 1e-4, times = Array.from(this.model.times);
+    const next = direction > 0 ? times.find((time) => time > this.time + slack)
+      : times.findLast((time) => time < this.time - slack);
+    if (next !== undefined) this.seek(next);
+  }
+
+  toggle_loop() {
+    this.loops = !this.loops;
+    element('loop').setAttribute('aria-pressed', this.loops);
+  }
+
+  // ---- what is shown
+
+  /// number: as in the file, 0 the finest.
+  show_level(number) {
+    if (number < 0 || number >= this.model.levels.length) return;
+    const { levels } = this.model;
+    this.model.show_level(number);
+    this.wireframe.follow_level();
+    const { vertices, triangles } = levels[number];
+    for (const button of element('levels').children) {
+      const chosen = Number(button.dataset.level) === number;
+      button.setAttribute('aria-checked', chosen);
+      button.tabIndex = chosen ? 0 : -1;
+    }
+    const counts = `${count_text(vertices)} vertices, ${count_text(triangles)} triangles`;
+    element('level-note').textContent = number === levels.length - 1 && number > 0 ? `The driver: ${counts}` : counts;
+    this.draw();
+  }
+
+  show_driver(shown) {
+    if (!this.driver) return;
+    element('driver').checked = this.driver.object.visible = shown;
+    if (shown) this.driver.follow();
+    this.draw();
+  }
+
+  show_wireframe(shown) {
+    element('wireframe').checked = shown;
+    this.wireframe.show(shown);
+    this.draw();
+  }
+
+  // ---- the panel
+
+  fill_levels() {
+    const { levels } = this.model;
+    element('levels-section').hidden = levels.length < 2;
+    for (let number = levels.length - 1; number >= 0; --number) {
+      const button = document.createElement('button');
+      button.textContent = levels.length - 1 - number;
+      button.dataset.level = number;
+      button.title = `${count_text(levels[number].triangles)} triangles`;
+      button.setAttribute('role', 'radio');
+      button.onclick = () => this.show_level(number);
+      element('levels').append(button);
+    }
+    element('driver').disabled = !this.driver;
+    if (!this.driver) element('driver-label').title = 'This file has one level and no joints';
+  }
+
+  fill_clips() {
+    const { clips } = this.model;
+    element('clips-section').hidden = clips.length < 2;
+    clips.forEach((clip, i) => element('clips').add(new Option(clip.name || `Animation ${i + 1}`, i)));
+    element('scrub').max = this.model.duration;
+  }
+
+  fill_facts() {
+    const sizes = sizes_of(this.model), largest = Math.max(...sizes.map(({ bytes }) => bytes));
+    element('sizes').replaceChildren(...sizes.map(({ name, bytes }) => {
+      const bar = document.createElement('div');
+      bar.className = 'bar';
+      bar.append(text_in('span', name), text_in('b', size_text(bytes)), document.createElement('i'));
+      bar.lastChild.style.setProperty('--share', `${(100 * bytes) / largest}%`);
+      return bar;
+    }));
+    const ratio = sizes.length > 1 ? sizes[1].bytes / sizes[0].bytes : 0;
+    element('sizes-note').textContent = ratio >= 1.05
+      ? `${ratio >= 10 ? Math.round(ratio) : ratio.toFixed(1)} times smaller than every vertex at every key`
+      : '';
+    element('facts').replaceChildren(...facts_of(this.model).flatMap(([name, value]) => [text_in('dt', name), text_in('dd', value)]));
+    element('summary').textContent = `${count_text(this.model.levels[0].triangles)} triangles, ${size_text(this.model.bytes)}`;
+  }
+
+  choose_clip(number) {
+    this.model.play(number);
+    element('scrub').max = this.model.duration;
+    this.fill_facts();
+    this.seek(0);
+  }
+
+  // ---- what the user does
+
+  listen() {
+    const on = (id, event, action) => element(id).addEventListener(event, action);
+    on('play', 'click', () => this.toggle_play());
+    on('loop', 'click', () => this.toggle_loop());
+    on('scrub', 'input', () => {
+      if (this.is_playing) this.toggle_play();
+      this.seek(Number(element('scrub').value));
+    });
+    on('speed', 'change', () => { this.speed = Number(element('speed').value); });
+    on('clips', 'change', () => this.choose_clip(Number(element('clips').value)));
+    on('driver', 'change', () => this.show_driver(element('driver').checked));
+    on('wireframe', 'change', () => this.show_wireframe(element('wireframe').checked));
+    on('theme', 'click', () => this.set_dark(!this.is_dark));
+    on('help-button', 'click', () => element('help').showModal());
+    on('panel', 'toggle', () => this.resize());
+    on('picture', 'dblclick', () => { this.stage.frame(); this.draw(); });
+    addEventListener('resize', () => this.resize());
+    addEventListener('keydown', (event) => this.press(event));
+  }
+
+  press(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey || element('help').open) return;
+    const on_control = event.target.closest('select, summary, button');
+    if (event.target.closest('select') || (on_control && [' ', 'Enter'].includes(event.key))) return;
+    const { levels } = this.model;
+    const keys = {
+      ' ': () => this.toggle_play(),
+      ArrowLeft: () => this.step(-1),
+      ArrowRight: () => this.step(1),
+      ArrowUp: () => this.show_level(this.model.level - 1),
+      ArrowDown: () => this.show_level(this.model.level + 1),
+      d: () => this.show_driver(!element('driver').checked),
+      w: () => this.show_wireframe(!element('wireframe').checked),
+      l: () => this.toggle_loop(),
+      f: () => { this.stage.frame(); this.draw(); },
+      t: () => this.set_dark(!this.is_dark),
+      h: () => element('help').showModal(),
+      '?': () => element('help').showModal(),
+    };
+    const action = /^[0-9]$/.test(event.key) ? () => this.show_level(levels.length - 1 - Number(event.key))
+      : keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+    if (!action) return;
+    event.preventDefault();
+    action();
+  }
+}
+
+function text_in(name, text) {
+  const made = document.createElement(name);
+  made.textContent = text;
+  return made;
+}
+
+async function open() {
+  try {
+    correct_skinned_normals();
+    const model = await Model.load(await load_bytes());
+    window.filigree = new Page(model);
+  } catch (cause) {
+    document.documentElement.dataset.theme = matchMedia('(prefers-color-scheme: dark)').matches ? 'dark' : 'light';
+    element('failure').hidden = false;
+    element('failure-cause').textContent = /WebGL/.test(cause.message)
+      ? 'This browser does not draw in three dimensions (WebGL 2); try another one, or allow it in the settings.'
+      : cause.message;
+  }
+  element('loading').remove();
+}
+
+open();

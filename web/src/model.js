@@ -1,0 +1,157 @@
+// The model: its bytes, its levels of detail, its animations, and how far they reach.
+import * as THREE from 'three';
+import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
+
+const kFramingMoments = 32, kFramingVertices = 1500;
+
+/// The bytes of model.glb. A page that was opened from disk may not read other files, but may run scripts: there they
+/// come from model.glb.js.
+export async function load_bytes() {
+  if (location.protocol.startsWith('http')) {
+    const response = await fetch('model.glb');
+    if (!response.ok) throw new Error(`model.glb cannot be fetched: the server answers ${response.status}.`);
+    return response.arrayBuffer();
+  }
+  const parts = [];
+  window.filigree_part = (text) => parts.push(Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)));
+  await new Promise((resolve, reject) => {
+    const script = document.createElement('script');
+    script.src = 'model.glb.js';
+    script.onload = resolve;
+    script.onerror = () => reject(new Error('model.glb.js is not beside this page; it holds the model when the page is opened from disk.'));
+    document.head.append(script);
+  });
+  return new Blob(parts).arrayBuffer();
+}
+
+export class Model {
+  /// bytes: of a GLB.
+  static async load(bytes) {
+    const loader = new GLTFLoader();
+    let gltf;
+    try {
+      gltf = await loader.parseAsync(bytes, '');
+    } catch (cause) {
+      throw new Error(`model.glb is damaged or no GLB: ${cause.message}`);
+    }
+    const model = new Model();
+    model.bytes = bytes.byteLength;
+    model.json = gltf.parser.json;
+    model.scene = gltf.scene;
+    model.levels = await levels_of(gltf);
+    if (model.levels.length === 0) throw new Error('model.glb has nothing to show: no mesh in its scene.');
+    model.clips = gltf.animations;
+    model.mixer = new THREE.AnimationMixer(gltf.scene);
+    gltf.scene.traverse((node) => {
+      if (!node.isMesh && !node.isPoints) return;
+      node.frustumCulled = false; // its bounding sphere is that of one pose
+      node.castShadow = node.receiveShadow = true;
+      prepare(node.material);
+    });
+    model.show_level(0);
+    model.play(0);
+    model.box = model.animated_box();
+    return model;
+  }
+
+  /// What Filigree's own exports say about themselves; an empty object where the file is another's.
+  get report() {
+    const report = this.json.asset?.extras?.filigree ?? {};
+    return typeof report === 'object' ? report : {};
+  }
+
+  /// Chooses an animation, by its number; holds it at its beginning.
+  play(number) {
+    this.mixer.stopAllAction();
+    this.action = undefined;
+    this.times = [];
+    if (number < this.clips.length) {
+      this.action = this.mixer.clipAction(this.clips[number]).play();
+      for (const track of this.clips[number].tracks) if (track.times.length > this.times.length) this.times = track.times;
+    }
+    this.seek(0);
+  }
+  get duration() { return this.action?.getClip().duration ?? 0; }
+
+  /// The pose at a time, in seconds, the animation's end included.
+  seek(seconds) {
+    if (this.action) {
+      this.action.time = Math.min(Math.max(seconds, 0), this.duration);
+      this.mixer.update(0);
+    }
+    this.scene.updateMatrixWorld(true);
+  }
+
+  /// Shows one level: 0 is the finest here, as in the file.
+  show_level(number) {
+    this.level = number;
+    this.levels.forEach((level, i) => level.nodes.forEach((node) => { node.visible = i === number; }));
+  }
+
+  /// The box of all moments, from some of the vertices, with some room.
+  animated_box() {
+    const box = new THREE.Box3(), p = new THREE.Vector3();
+    const moments = this.action ? kFramingMoments : 0;
+    for (let i = 0; i <= moments; ++i) {
+      this.seek((this.duration * i) / Math.max(moments, 1));
+      for (const mesh of this.levels[0].meshes) {
+        const count = mesh.geometry.attributes.position.count, step = Math.max(1, Math.floor(count / kFramingVertices));
+        for (let vertex = 0; vertex < count; vertex += step) {
+          mesh.getVertexPosition(vertex, p);
+          box.expandByPoint(p.applyMatrix4(mesh.matrixWorld));
+        }
+      }
+    }
+    this.seek(0);
+    const room = 0.004 * box.getSize(p).length();
+    return box.expandByScalar(room);
+  }
+}
+
+/// [{ nodes, meshes, vertices, triangles }], finest first. Coarser levels are nodes that MSFT_lod names, which three.js
+/// does not know: they are loaded here, on the same joints, and put beside the finest.
+async function levels_of(gltf) {
+  const { parser, scene } = gltf;
+  const levels = [[]];
+  for (const [number, node] of (parser.json.nodes ?? []).entries()) {
+    const coarser = node.extensions?.MSFT_lod?.ids ?? [];
+    const object = coarser.length > 0 ? await parser.getDependency('node', number) : undefined;
+    if (!object?.parent) continue;
+    levels[0].push(object);
+    for (const [i, id] of coarser.entries()) {
+      const level = await parser.getDependency('node', id);
+      object.parent.add(level);
+      (levels[i + 1] ??= []).push(level);
+    }
+  }
+  if (levels.length === 1) levels[0] = [scene];
+  return levels.map(level_of).filter((level) => level.meshes.length > 0);
+}
+
+function level_of(nodes) {
+  const meshes = [];
+  for (const node of nodes) node.traverse((object) => { if (object.isMesh) meshes.push(object); });
+  let triangles = 0, vertices = 0;
+  const counted = new Set(); // parts with different materials share their vertices
+  for (const { geometry, userData } of meshes) {
+    triangles += (geometry.index?.count ?? geometry.attributes.position.count) / 3;
+    if (counted.has(geometry.attributes.position)) continue;
+    counted.add(geometry.attributes.position);
+    vertices += userData.filigree?.vertices ?? geometry.attributes.position.count;
+  }
+  return { nodes, meshes, vertices, triangles };
+}
+
+/// Materials are kept; only what a file left open is chosen here.
+function prepare(material) {
+  material.side = THREE.DoubleSide; // cloth has two, and a mirrored part shows its inside
+  material.shadowSide = THREE.DoubleSide;
+  const is_default = material.userData.filigree === 'none' || (!material.name && material.metalness === 1 && !material.map);
+  if (!is_default) {
+    material.metalness = Math.min(material.metalness, 0.4); // there are no surroundings to mirror
+    return;
+  }
+  material.metalness = 0;
+  material.roughness = 0.62;
+  if (!material.vertexColors) material.color.set(0xb9a58c);
+}
