@@ -1,0 +1,104 @@
+#include "web_page.h"
+
+#include "filigree/io/file.h"
+
+#include <cstdlib>
+#include <fstream>
+
+namespace filigree::cli {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kPieceBytes = 3 * (std::size_t{1} << 18); // browsers limit a string, and base64 takes threes
+
+void require_written(const Status& status) {
+    if (!status) throw Failure{status.error()};
+}
+
+/// FILIGREE_WEB, or where the build and the installation put them, seen from the program.
+fs::path find_parts() {
+    std::error_code failed;
+    fs::path folder;
+    if (const char* named = std::getenv("FILIGREE_WEB"); named && *named)
+        folder = named;
+    else
+        folder = fs::read_symlink("/proc/self/exe", failed).parent_path() / FILIGREE_WEB_FROM_PROGRAM;
+    if (fs::exists(folder / "filigree.js", failed)) return folder;
+    throw Failure{{ErrorCode::unsupported,
+                   folder.lexically_normal().string() +
+                       ": the parts of the web page are not there, as they are made with node and npm's packages; run "
+                       "scripts/setup and build again, or say with FILIGREE_WEB where they are."}};
+}
+
+std::string html_text(const std::string& text) {
+    std::string escaped;
+    for (const char c : text) {
+        if (c == '&')
+            escaped += "&amp;";
+        else if (c == '<')
+            escaped += "&lt;";
+        else if (c == '>')
+            escaped += "&gt;";
+        else
+            escaped += c;
+    }
+    return escaped;
+}
+
+std::string replaced(std::string text, std::string_view what, const std::string& by) {
+    for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + by.size()))
+        text.replace(at, what.size(), by);
+    return text;
+}
+
+std::string base64(std::string_view bytes) {
+    constexpr char kLetters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    std::string text;
+    text.reserve((bytes.size() + 2) / 3 * 4);
+    for (std::size_t i = 0; i < bytes.size(); i += 3) {
+        const std::size_t count = std::min<std::size_t>(3, bytes.size() - i);
+        unsigned bits = 0;
+        for (std::size_t k = 0; k < 3; ++k)
+            bits = bits << 8 | (k < count ? static_cast<unsigned char>(bytes[i + k]) : 0u);
+        for (std::size_t k = 0; k < 4; ++k) text += k <= count ? kLetters[bits >> (18 - 6 * k) & 63] : '=';
+    }
+    return text;
+}
+
+void write_text(const std::string& path, const std::string& text) {
+    const std::string_view piece = text;
+    require_written(write_file(path, {&piece, 1}));
+}
+
+} // namespace
+
+WebPage::WebPage(OutputFolder& folder, std::string title)
+    : parts_(find_parts()), title_(std::move(title)), index_(folder.file("index.html")),
+      script_(folder.file("filigree.js")), style_(folder.file("filigree.css")),
+      license_(folder.file("three-license.txt")), model_(folder.file("model.glb")),
+      model_script_(folder.file("model.glb.js")) {}
+
+void WebPage::write(Session& session) {
+    const std::string index = require(read_file(parts_ / "index.html"));
+    write_text(index_, replaced(index, "{{title}}", html_text(title_)));
+    for (const std::string& file : {script_, style_, license_})
+        write_text(file, require(read_file(parts_ / fs::path(file).filename())));
+    write_model_script(session);
+}
+
+void WebPage::write_model_script(Session& session) const {
+    std::ifstream model(model_, std::ios::binary);
+    FileWriter script = require(FileWriter::create(model_script_));
+    std::string piece(kPieceBytes, '\0');
+    while (model.read(piece.data(), std::streamsize(piece.size())), model.gcount() > 0) {
+        if (session.context().is_cancelled()) throw Failure{cancelled_error()};
+        const std::string_view read(piece.data(), std::size_t(model.gcount()));
+        require_written(script.write("filigree_part(\"" + base64(read) + "\");\n"));
+    }
+    if (!model.eof()) throw Failure{{ErrorCode::not_found, model_ + ": cannot be read again; try once more."}};
+    require_written(script.finish());
+}
+
+} // namespace filigree::cli
