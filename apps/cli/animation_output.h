@@ -11,7 +11,8 @@ namespace filigree::cli {
 
 /// How an animation leaves.
 struct AnimationOutput {
-    bool as_morph = false; ///< GLB: morph targets instead of a skin
+    /// GLB: morph targets or a skin because --as says so; neither: a skin where the model's code makes one.
+    bool as_morph = false, as_skin = false;
     SkinOptions skin;
     MorphOptions morph;
 };
@@ -27,10 +28,17 @@ bool is_animation_path(const std::string& path);
 /// Refuses, before any work, what cannot be written: an unknown ending, a folder that is not there.
 void check_animation_path(const std::string& path);
 
+/// Refuses an output that is one of the inputs, or lies in a folder of numbered meshes that is one.
+void check_not_input(const std::string& output, const std::vector<std::string>& inputs);
+
 /// Writes a model's poses to `path`: .glb as a skin (or morph targets), everything else restored frame by frame, one in
 /// memory at a time. Adds rows and keys that say what was written. materials_beside: the model's or mesh's own path.
 void write_animation_output(const Model& model, const PoseStream& poses, const RestoreOptions& restore,
                             const AnimationOutput& output, const std::string& path, const std::string& materials_beside,
                             Session& session, Table& table, Json& json);
+
+/// The same for any mesh that moves: .glb as morph targets, everything else as it is.
+void write_animation_output(const MeshAnimation& animation, const AnimationOutput& output, const std::string& path,
+                            const std::string& materials_beside, Session& session, Table& table, Json& json);
 
 } // namespace filigree::cli

@@ -1,18 +1,9 @@
-#include "output_folder.h"
+#include "animation_output.h"
 #include "restore_options.h"
 
 namespace filigree::cli {
 
 namespace {
-
-/// Name of the gradient's entry in row r and column c, as the PLY property is called.
-std::string gradient_name(int r, int c) { return fmt::format("f{}{}", r, c); }
-
-const std::vector<float>* find_scalar(const Mesh& mesh, const std::string& name) {
-    for (const VertexScalar& scalar : mesh.scalars)
-        if (scalar.name == name) return &scalar.values;
-    return nullptr;
-}
 
 std::vector<Vec3f> positions_for(const Mesh& mesh, const Model& model) {
     std::vector<Vec3f> positions(mesh.vertex_count());
@@ -33,17 +24,7 @@ void add_restore_options(CLI::App& command, RestoreOptions& options) {
     command.add_flag("--thin-shell", options.thin_shell, "Bumps keep their shape, as on cloth and skin");
 }
 
-Pose pose_from_mesh(const Mesh& mesh, const Model& model) {
-    Pose pose;
-    pose.positions = positions_for(mesh, model);
-    std::array<const std::vector<float>*, 9> entries;
-    for (int k = 0; k < 9; ++k)
-        if (!(entries[k] = find_scalar(mesh, gradient_name(k / 3, k % 3)))) return pose;
-    pose.gradients.resize(pose.positions.size());
-    for (std::size_t v = 0; v < pose.gradients.size(); ++v)
-        for (int k = 0; k < 9; ++k) pose.gradients[v](k / 3, k % 3) = (*entries[k])[v];
-    return pose;
-}
+Pose pose_from_mesh(const Mesh& mesh, const Model& model) { return pose_of_mesh(mesh, model.mesh.origin); }
 
 const Pose& own_pose(const PoseSequence& poses, std::size_t frame, const std::string& path) {
     if (poses.empty())
@@ -65,28 +46,46 @@ Mesh posed_driver(const Model& model, const Pose& pose) {
     Mesh driver = driver_mesh(model);
     driver.positions = pose.positions;
     driver.normals = {};
-    for (int k = 0; k < 9 && !pose.gradients.empty(); ++k) {
-        VertexScalar& scalar = driver.scalars.emplace_back(VertexScalar{gradient_name(k / 3, k % 3), {}});
-        for (const Mat3f& gradient : pose.gradients) scalar.values.push_back(gradient(k / 3, k % 3));
-    }
+    add_gradients(driver, pose);
     return driver;
 }
 
 namespace {
 
 struct Options {
-    std::string model, pose, ghosts, output;
+    std::string model, pose, poses, ghosts, output;
     std::size_t frame = 0; ///< of the model's own, from 1; 0: none
     bool all_frames = false;
+    PoseFileOptions poses_file;
     RestoreOptions restore;
+    AnimationOutput animation;
+
+    bool is_animation() const { return all_frames || !poses.empty(); }
 };
+
+/// A name without an ending is a folder to come.
+std::string animation_place(const std::string& output) {
+    const bool is_plain = !std::filesystem::path(output).has_extension() && !is_animation_path(output) && output != "-";
+    return is_plain ? output + "/" : output;
+}
 
 void check(const Options& options) {
     const auto refuse = [](const std::string& sentence) { throw Failure{{ErrorCode::usage, sentence}}; };
-    if (!options.pose.empty() + (options.frame > 0) + options.all_frames != 1)
-        refuse("Say what moved the driver: --pose FILE, or for a model that holds poses --frame N or --frames.");
+    if (!options.pose.empty() + !options.poses.empty() + (options.frame > 0) + options.all_frames != 1)
+        refuse("Say what moved the driver: --pose FILE for a mesh, --poses FILE for an animation, or for a model that "
+               "holds poses --frame N or --frames.");
     if (options.pose.empty() && !options.ghosts.empty()) refuse("--ghosts belongs to --pose.");
-    if (options.all_frames && options.output == "-") refuse("--frames writes many meshes; give -o a folder.");
+    if (options.poses.empty() && !options.poses_file.animation.empty()) refuse("--animation belongs to --poses.");
+    if (!options.is_animation() && options.poses_file.frames_per_second)
+        refuse("--frame-rate belongs to --poses or --frames.");
+    if (!options.is_animation()) return;
+    if (options.output == "-") refuse("An animation cannot go to standard output; give -o a file or a folder.");
+    const std::string place = animation_place(options.output);
+    if (!is_animation_path(place) && mesh_format(place))
+        refuse(place + ": is the name of one mesh, and there are many; put #### where their numbers go, or give -o a "
+                       "folder (NAME/), .pc2, .mdd, .usda or .glb.");
+    check_animation_path(place);
+    check_not_input(place, {options.model, options.poses});
 }
 
 const char* source_of(const Model& model, const Pose& pose) {
@@ -105,7 +104,7 @@ void restore_one(const Options& options, Session& session) {
     const double start = now_seconds();
     const Mesh mesh = require(restorer.mesh(pose, session.context()));
     const double seconds = now_seconds() - start;
-    session.write_mesh(mesh, options.output);
+    session.write_mesh(mesh, options.output, options.model);
     const char* from = source_of(model, pose);
     session.print(
         fmt::format("{}: {} vertices restored from {} in {}\n", options.output, with_commas(mesh.vertex_count()), from,
@@ -113,38 +112,36 @@ void restore_one(const Options& options, Session& session) {
         {{"output", options.output}, {"vertices", mesh.vertex_count()}, {"from", from}, {"seconds", seconds}});
 }
 
-/// A mesh a frame, one in memory at a time.
-void restore_all(const Options& options, Session& session) {
-    PoseSequence poses;
-    const Model model = session.read_model(options.model, &poses);
-    own_pose(poses, 1, options.model);
-    const Restorer restorer = require(Restorer::create(model, options.restore, session.context()));
-    OutputFolder folder(options.output, options.model);
-    const std::string name = std::filesystem::path(options.model).stem().string();
-    std::vector<std::string> files;
-    for (std::size_t frame = 1; frame <= poses.frames.size(); ++frame)
-        files.push_back(folder.file(fmt::format("{}_{:04}.ply", name, frame)));
-    RunContext without_bar = session.context(); // the bar tells of frames
-    without_bar.progress = nullptr;
-    double seconds = 0;
-    for (std::size_t frame = 0; frame < files.size(); ++frame) {
-        session.context().report("restoring", double(frame) / double(files.size()));
-        const double start = now_seconds();
-        const Mesh mesh = require(restorer.mesh(poses.frames[frame], without_bar));
-        seconds += now_seconds() - start;
-        session.write_mesh(mesh, files[frame]);
+/// The poses of a file or the model's own (which `own` keeps), one frame in memory where the file allows it.
+PoseStream poses_of(const Options& options, const Model& model, const PoseSequence& own, Session& session) {
+    if (options.poses.empty()) {
+        own_pose(own, 1, options.model);
+        PoseStream stream = stream_of(own);
+        stream.frames_per_second = options.poses_file.frames_per_second.value_or(own.frames_per_second);
+        return stream;
     }
-    session.context().report("restoring", 1);
-    folder.keep();
-    session.print(fmt::format("{}: {} meshes of {} vertices, restored in {} each\n", options.output,
-                              with_commas(files.size()), with_commas(restorer.vertex_count()),
-                              seconds_text(seconds / double(files.size()))),
-                  {{"output", options.output},
-                   {"frames", files.size()},
-                   {"frames_per_second", poses.frames_per_second},
-                   {"vertices", restorer.vertex_count()},
-                   {"from", source_of(model, poses.frames[0])},
-                   {"seconds", seconds}});
+    return require(open_poses(options.poses, model.driver().vertices.size(), model.mesh.origin, options.poses_file,
+                              session.context()));
+}
+
+void restore_all(const Options& options, Session& session) {
+    PoseSequence own;
+    const Model model = session.read_model(options.model, options.all_frames ? &own : nullptr);
+    const PoseStream poses = poses_of(options, model, own, session);
+    Table table;
+    Json json;
+    const double start = now_seconds();
+    write_animation_output(model, poses, options.restore, options.animation, animation_place(options.output),
+                           options.model, session, table, json);
+    const double seconds = now_seconds() - start;
+    const char* from = source_of(model, require(poses.pose(0)));
+    table.row("restored from", fmt::format("{} in {}", from, seconds_text(seconds)));
+    json["output"] = options.output;
+    json["frames"] = poses.frames;
+    json["frames_per_second"] = poses.frames_per_second;
+    json["from"] = from;
+    json["seconds"] = seconds;
+    session.print(table.text(), json);
 }
 
 } // namespace
@@ -160,18 +157,33 @@ void add_restore(CLI::App& app, Session& session) {
     command->add_option("--ghosts", options->ghosts, "The moved ghost points (see level --ghosts)");
     command->add_option("--frame", options->frame, "Or one of the poses that the model holds, from 1")
         ->check(whole_number(1));
-    command->add_flag("--frames", options->all_frames, "Or all of them: -o is a folder for NAME_0001.ply and so on");
-    command->add_option("-o,--output", options->output, "Mesh file to write, or a folder")->required();
+    command->add_flag("--frames", options->all_frames, "Or all of them, as an animation");
+    command->add_option("--poses", options->poses,
+                        "Or an animation of the driver: .pc2, .mdd, a folder of numbered meshes or NAME_####.ply, an "
+                        "animated .glb, another .fil's poses");
+    command
+        ->add_option_function<double>(
+            "--frame-rate", [options](const double& rate) { options->poses_file.frames_per_second = rate; },
+            "Frames a second (unset: as the file says; 60 for .pc2 and numbered meshes)")
+        ->check(positive_number());
+    command->add_option("--animation", options->poses_file.animation, "Of a .glb with several (unset: the first)");
+    command
+        ->add_option("-o,--output", options->output,
+                     "Mesh to write; an animation: .pc2, .mdd, .glb, .usda, a folder for NAME_0001.ply and so on, or "
+                     "NAME_####.obj")
+        ->required();
     add_restore_options(*command, options->restore);
+    add_animation_options(*command, options->animation);
     session.add_common_options(*command,
                                "  filigree restore scan.fil --pose moved.obj -o restored.ply\n"
                                "  filigree restore scan.fil --pose moved.obj -o skin.ply --thin-shell --law keep\n"
                                "  filigree restore bounce.fil --frame 30 -o half_a_second.ply\n"
-                               "  filigree restore bounce.fil --frames -o frames/");
+                               "  filigree restore bounce.fil --frames -o frames/\n"
+                               "  filigree restore scan.fil --poses cloth.pc2 --frame-rate 24 -o detailed.pc2");
     command->callback([options, &session] {
         session.begin();
         check(*options);
-        if (options->all_frames)
+        if (options->is_animation())
             restore_all(*options, session);
         else
             restore_one(*options, session);

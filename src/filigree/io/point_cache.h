@@ -30,7 +30,7 @@ struct PoseFileOptions {
     /// Of files that do not say (PC2, numbered; unset: 60), and instead of what an MDD or a .fil says. A PC2's sample
     /// rate divides it. glTF: frames to take a second.
     std::optional<double> frames_per_second = {};
-    std::string animation; ///< glTF: by name; empty: the first
+    std::string animation = {}; ///< glTF: by name; empty: the first
 };
 
 /// Poses of a driver that another program moved, opened for reading frame by frame: PC2, MDD, numbered meshes (with
