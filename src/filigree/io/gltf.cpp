@@ -1,8 +1,175 @@
 #include "filigree/io/gltf.h"
+#include "filigree/io/file.h"
+#include "filigree/io/gltf_scene.h"
 #include "filigree/io/mesh_formats.h"
+
+#include <atomic>
+#include <new>
+#include <stdexcept>
 
 namespace filigree {
 
-Result<MeshFile> read_gltf(const MeshSource& source) { return source.unsupported("glTF is not read yet."); }
+namespace {
+
+constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
+
+/// Extensions that a file may ask for and still be shown: they change how it looks, or are read.
+bool is_harmless(const std::string& extension) {
+    static constexpr std::string_view kKnown[] = {"KHR_mesh_quantization", "KHR_texture_transform",
+                                                  "KHR_texture_basisu",    "KHR_lights_punctual",
+                                                  "KHR_animation_pointer", "MSFT_lod",
+                                                  "EXT_texture_webp",      "EXT_texture_avif",
+                                                  "MSFT_texture_dds",      "KHR_xmp",
+                                                  "KHR_xmp_json_ld"};
+    return extension.starts_with("KHR_materials_") ||
+           std::find(std::begin(kKnown), std::end(kKnown), extension) != std::end(kKnown);
+}
+
+void check_extensions(gltf::Scene& scene) {
+    using gltf::Value;
+    const Value required = scene.document->root()["extensionsRequired"];
+    for (std::size_t e = 0; e < required.size(); ++e) {
+        const std::string name = required[e].text();
+        if (is_harmless(name)) continue;
+        const bool packed = name == "KHR_draco_mesh_compression" || name == "EXT_meshopt_compression" ||
+                            name == "KHR_meshopt_compression";
+        required[e].fail(packed ? name + " (compressed data) is not read; unpack the file with 'gltf-transform copy'."
+                                : "the extension " + in_quotes(name) + " is not known; export the file without it.",
+                         ErrorCode::unsupported);
+    }
+    const Value used = scene.document->root()["extensionsUsed"];
+    for (std::size_t e = 0; e < used.size(); ++e)
+        if (used[e].text() == "EXT_mesh_gpu_instancing")
+            scene.warnings.push_back("Instances of EXT_mesh_gpu_instancing are left out; nodes are read once each.");
+}
+
+void read_export_report(gltf::Scene& scene) {
+    const gltf::Value extras = scene.document->root()["asset"]["extras"];
+    if (!extras || !extras.json().is_object()) return;
+    if (const gltf::Value report = extras["filigree"]) scene.export_report = report.json().dump(-1, ' ', true);
+}
+
+void place_rest(gltf::Scene& scene, const RunContext& context) {
+    Mesh& mesh = scene.mesh;
+    std::vector<Vec3d> world(mesh.positions.size());
+    const gltf::ScenePose pose = gltf::rest_pose(scene);
+    gltf::place_vertices(scene, pose, context, [&](std::size_t first, std::span<const Vec3d> positions) {
+        std::copy(positions.begin(), positions.end(), world.begin() + static_cast<std::ptrdiff_t>(first));
+    });
+    for (std::size_t v = 0; v < world.size(); ++v)
+        if (!(world[v].allFinite() && fits_float(world[v].cwiseAbs().maxCoeff())))
+            throw gltf::Damage{"its nodes carry vertex " + std::to_string(v) +
+                               " to no place that 32-bit float can hold."};
+    SplitPositions split = split_origin(world);
+    mesh.positions = std::move(split.positions);
+    mesh.origin = split.origin;
+    if (!mesh.normals.empty()) mesh.normals.values = gltf::turned_normals(scene, pose, context);
+}
+
+std::filesystem::path folder_of(const std::string& name) {
+    const std::filesystem::path folder = std::filesystem::path(name).parent_path();
+    return folder.empty() ? "." : folder;
+}
+
+/// All of it, into `scene`. The bytes must stay.
+Status read_scene(std::string_view bytes, gltf::Scene& scene, const RunContext& context) {
+    try {
+        if (bytes.starts_with(kByteOrderMark)) bytes.remove_prefix(kByteOrderMark.size());
+        if (context.is_cancelled()) return cancelled_error();
+        scene.document = std::make_unique<gltf::Document>(bytes, folder_of(scene.name), scene.name);
+        check_extensions(scene);
+        gltf::read_nodes(scene);
+        gltf::read_skins(scene);
+        gltf::read_animations(scene);
+        gltf::read_meshes(scene, context);
+        place_rest(scene, context);
+        read_export_report(scene);
+    } catch (const gltf::Damage& damage) {
+        if (damage.code == ErrorCode::cancelled) return cancelled_error();
+        return Error{damage.code, scene.name + ": " + damage.what};
+    } catch (const std::bad_alloc&) {
+        return Error{ErrorCode::out_of_memory, scene.name + ": does not fit into memory."};
+    } catch (const std::length_error&) {
+        return Error{ErrorCode::out_of_memory, scene.name + ": does not fit into memory."};
+    }
+    return Success{};
+}
+
+} // namespace
+
+struct GltfScene::Content : gltf::Scene {};
+
+GltfScene::GltfScene(std::unique_ptr<Content> content) : content_(std::move(content)) {}
+GltfScene::GltfScene(GltfScene&&) noexcept = default;
+GltfScene& GltfScene::operator=(GltfScene&&) noexcept = default;
+GltfScene::~GltfScene() = default;
+
+Result<GltfScene> GltfScene::read(const std::filesystem::path& path, const RunContext& context) {
+    Result<std::string> bytes = read_file(path);
+    if (!bytes) return bytes.error();
+    auto content = std::make_unique<Content>();
+    content->name = path == "-" ? "standard input" : path.string();
+    content->owned = *std::move(bytes);
+    if (Status read = read_scene(content->owned, *content, context); !read) return read.error();
+    return GltfScene(std::move(content));
+}
+
+Result<GltfScene> GltfScene::read(std::string_view bytes, const std::string& name, const RunContext& context) {
+    auto content = std::make_unique<Content>();
+    content->name = name;
+    content->owned = bytes;
+    if (Status read = read_scene(content->owned, *content, context); !read) return read.error();
+    return GltfScene(std::move(content));
+}
+
+const Mesh& GltfScene::mesh() const { return content_->mesh; }
+const std::vector<std::string>& GltfScene::warnings() const { return content_->warnings; }
+const std::vector<GltfAnimation>& GltfScene::animations() const { return content_->summaries; }
+const std::string& GltfScene::export_report() const { return content_->export_report; }
+
+Status GltfScene::positions(std::size_t animation, double seconds, std::span<Vec3f> out,
+                            const RunContext& context) const {
+    assert(animation < content_->animations.size() && out.size() == content_->mesh.vertex_count());
+    if (context.is_cancelled()) return cancelled_error();
+    const gltf::ScenePose pose = gltf::pose_at(*content_, content_->animations[animation], seconds);
+    std::atomic<bool> finite = true;
+    const Vec3d origin = content_->mesh.origin;
+    gltf::place_vertices(*content_, pose, context, [&](std::size_t first, std::span<const Vec3d> positions) {
+        bool all_finite = true;
+        for (std::size_t i = 0; i < positions.size(); ++i) {
+            out[first + i] = (positions[i] - origin).cast<float>();
+            all_finite = all_finite && out[first + i].allFinite();
+        }
+        if (!all_finite) finite = false;
+    });
+    if (!finite)
+        return Error{ErrorCode::bad_file, content_->name + ": animations[" + std::to_string(animation) +
+                                              "]: carries vertices to no place that 32-bit float can hold."};
+    return Success{};
+}
+
+Result<Mesh> GltfScene::mesh_at(std::size_t animation, double seconds, const RunContext& context) const {
+    Mesh mesh = content_->mesh;
+    if (Status placed = positions(animation, seconds, mesh.positions, context); !placed) return placed.error();
+    if (!mesh.normals.empty())
+        mesh.normals.values = gltf::turned_normals(
+            *content_, gltf::pose_at(*content_, content_->animations[animation], seconds), context);
+    return mesh;
+}
+
+bool is_gltf(std::string_view bytes) {
+    constexpr std::string_view kBlanks = " \t\r\n";
+    if (bytes.starts_with("glTF")) return true;
+    if (bytes.starts_with(kByteOrderMark)) bytes.remove_prefix(kByteOrderMark.size());
+    const std::size_t first = bytes.find_first_not_of(kBlanks);
+    return first != std::string_view::npos && bytes[first] == '{';
+}
+
+Result<MeshFile> read_gltf(const MeshSource& source) {
+    gltf::Scene scene;
+    scene.name = source.name;
+    if (Status read = read_scene(source.bytes, scene, source.context); !read) return read.error();
+    return MeshFile{std::move(scene.mesh), std::move(scene.warnings)};
+}
 
 } // namespace filigree

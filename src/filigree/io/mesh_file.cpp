@@ -37,10 +37,8 @@ constexpr std::array kForeign = {
     Foreign{"\x28\xb5\x2f\xfd", ErrorCode::unsupported, "is compressed with zstd; unpack it first"},
     Foreign{"\x89PNG", ErrorCode::bad_file, "is a PNG picture, not a mesh"},
     Foreign{"\xff\xd8\xff", ErrorCode::bad_file, "is a JPEG picture, not a mesh"},
-    Foreign{"glTF", ErrorCode::unsupported, "is glTF, which is not read; export it as OBJ or PLY"},
     Foreign{"Kaydara FBX", ErrorCode::unsupported, "is FBX, which is not read; export it as OBJ or PLY"},
     Foreign{"<", ErrorCode::unsupported, "holds XML or a web page, which is not read; export it as OBJ or PLY"},
-    Foreign{"{", ErrorCode::unsupported, "holds JSON (perhaps glTF), which is not read; export it as OBJ or PLY"},
     Foreign{"version https://git-lfs", ErrorCode::bad_file,
             "is only a Git LFS pointer; fetch the real file with 'git lfs pull'"},
     Foreign{"\xff\xfe", ErrorCode::bad_file, "is text in UTF-16; save it as UTF-8"},
@@ -63,6 +61,7 @@ std::optional<MeshFormat> sniff_format(std::string_view bytes) {
     if (bytes.starts_with("ply\n") || bytes.starts_with("ply\r") || bytes.starts_with("ply ")) return MeshFormat::ply;
     if (is_ascii_stl(bytes) || is_binary_stl(bytes)) return MeshFormat::stl;
     if (is_off(bytes)) return MeshFormat::off;
+    if (is_gltf(bytes)) return MeshFormat::gltf;
     return {};
 }
 

@@ -1,0 +1,627 @@
+// The meshes of a glTF scene: vertices, faces and attributes, node by node.
+#include "filigree/core/srgb.h"
+#include "filigree/io/gltf_scene.h"
+#include "filigree/io/text_scanner.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+namespace filigree::gltf {
+
+namespace {
+
+constexpr double kSumTolerance = 0.01; // of a vertex's weights; rounded weights are within it
+
+template <class T>
+std::size_t mend(std::vector<T>& values) {
+    std::size_t mended = 0;
+    for (T& value : values) {
+        if constexpr (std::is_same_v<T, float>) {
+            if (std::isfinite(value)) continue;
+            value = 0;
+        } else {
+            if (value.allFinite()) continue;
+            value.setZero();
+        }
+        ++mended;
+    }
+    return mended;
+}
+
+std::vector<Component> components(bool with_uint32 = false) {
+    std::vector<Component> all = {Component::float32, Component::int8, Component::uint8, Component::int16,
+                                  Component::uint16};
+    if (with_uint32) all.push_back(Component::uint32);
+    return all;
+}
+
+/// Reads the attributes and morph targets of a primitive.
+class GeometryReader {
+public:
+    GeometryReader(Document& document, const Value& primitive, std::vector<std::string>& warnings,
+                   std::set<std::string>& left_out)
+        : document_(document), primitive_(primitive), attributes_(primitive["attributes"]), warnings_(warnings),
+          left_out_(left_out) {}
+
+    Geometry read() {
+        refuse_compressed();
+        read_positions();
+        read_normals();
+        read_uvs();
+        read_colors();
+        for (const std::string& name : attributes_.members()) read_other(name);
+        read_influences();
+        read_targets();
+        geometry_.kept = count_;
+        return std::move(geometry_);
+    }
+
+private:
+    void refuse_compressed() {
+        const Value position = attributes_["POSITION"];
+        if (!primitive_["extensions"]["KHR_draco_mesh_compression"] || !position) return;
+        const std::size_t number = position.index(document_.count("accessors"), "accessors");
+        if (!document_.item("accessors", number)["bufferView"])
+            primitive_.fail("is compressed with Draco, which is not read; unpack the file with 'gltf-transform copy'.",
+                            ErrorCode::unsupported);
+    }
+
+    Accessor attribute(const Value& reference, const Wanted& wanted) {
+        Accessor accessor = document_.accessor(reference, wanted);
+        if (accessor.count != count_)
+            reference.fail("has " + std::to_string(accessor.count) + " elements, but there are " +
+                           std::to_string(count_) + " positions.");
+        document_.charge(accessor.count, reference.path());
+        return accessor;
+    }
+
+    void read_positions() {
+        const Value reference = attributes_["POSITION"];
+        const Accessor accessor = document_.accessor(reference, {.types = {"VEC3"}, .components = components()});
+        count_ = accessor.count;
+        document_.charge(count_, reference.path());
+        if (count_ >= kNoIndex)
+            reference.fail("has more vertices than 32-bit indices can count.", ErrorCode::unsupported);
+        geometry_.positions.resize(count_);
+        accessor.read_all(geometry_.positions.front().data());
+        for (std::size_t v = 0; v < count_; ++v)
+            if (!geometry_.positions[v].allFinite())
+                reference.fail("vertex " + std::to_string(v) + " is not at a finite place.");
+    }
+
+    void read_normals() {
+        const Value reference = attributes_["NORMAL"];
+        if (!reference) return;
+        geometry_.normals.resize(count_);
+        attribute(reference, {.types = {"VEC3"}, .components = components()})
+            .read_all(geometry_.normals.front().data());
+        warn_mended(mend(geometry_.normals), "normals", reference);
+    }
+
+    void read_uvs() {
+        const Value reference = attributes_["TEXCOORD_0"];
+        if (!reference) return;
+        geometry_.uvs.resize(count_);
+        attribute(reference, {.types = {"VEC2"}, .components = components()}).read_all(geometry_.uvs.front().data());
+        for (Vec2f& uv : geometry_.uvs) uv.y() = 1 - uv.y();
+        warn_mended(mend(geometry_.uvs), "UVs", reference);
+    }
+
+    void read_colors() {
+        const Value reference = attributes_["COLOR_0"];
+        if (!reference) return;
+        const Accessor accessor =
+            attribute(reference, {.types = {"VEC3", "VEC4"},
+                                  .components = {Component::float32, Component::uint8, Component::uint16},
+                                  .normalized_if_integer = true});
+        geometry_.colors_have_alpha = accessor.width == 4;
+        geometry_.colors.reserve(count_);
+        std::size_t mended = 0;
+        for (std::size_t v = 0; v < count_; ++v) {
+            double rgba[4] = {0, 0, 0, 1};
+            accessor.read(v, rgba);
+            if (!std::all_of(rgba, rgba + 4, [](double c) { return std::isfinite(c); })) {
+                std::fill(rgba, rgba + 4, 0.0);
+                ++mended;
+            }
+            Vec4f& color = geometry_.colors.emplace_back();
+            for (int k = 0; k < 3; ++k) color[k] = static_cast<float>(srgb_from_linear(rgba[k]));
+            color[3] = static_cast<float>(std::clamp(rgba[3], 0.0, 1.0));
+        }
+        warn_mended(mended, "colours", reference);
+    }
+
+    /// Numbers under names of their own become scalars. TANGENT follows from the rest.
+    void read_other(const std::string& name) {
+        if (name == "POSITION" || name == "NORMAL" || name == "TANGENT" || name == "TEXCOORD_0" || name == "COLOR_0" ||
+            name.starts_with("JOINTS_") || name.starts_with("WEIGHTS_"))
+            return;
+        const Value reference = attributes_[name.c_str()];
+        const std::size_t number = reference.index(document_.count("accessors"), "accessors");
+        if (name.size() < 2 || name[0] != '_' || document_.item("accessors", number)["type"].text() != "SCALAR") {
+            left_out_.insert(name);
+            return;
+        }
+        VertexScalar scalar{name.substr(1), std::vector<float>(count_)};
+        attribute(reference, {.types = {"SCALAR"}, .components = components(true)}).read_all(scalar.values.data());
+        warn_mended(mend(scalar.values), "values of the scalar " + in_quotes(scalar.name), reference);
+        geometry_.scalars.push_back(std::move(scalar));
+    }
+
+    void read_influences() {
+        struct Set {
+            Accessor joints, weights;
+        };
+        std::vector<Set> sets;
+        for (std::size_t s = 0;; ++s) {
+            const std::string number = std::to_string(s);
+            const Value joints = attributes_[std::string("JOINTS_").append(number).c_str()],
+                        weights = attributes_[std::string("WEIGHTS_").append(number).c_str()];
+            if (!joints && !weights) break;
+            if (!joints) weights.fail("has no joints beside it.");
+            if (!weights) joints.fail("has no weights beside it.");
+            sets.push_back({attribute(joints, {.types = {"VEC4"}, .components = {Component::uint8, Component::uint16}}),
+                            attribute(weights, {.types = {"VEC4"},
+                                                .components = {Component::float32, Component::uint8, Component::uint16},
+                                                .normalized_if_integer = true})});
+        }
+        if (sets.empty()) return;
+        Influences& influences = geometry_.influences;
+        influences.first = {0};
+        influences.first.reserve(count_ + 1);
+        std::size_t odd_sums = 0;
+        for (std::size_t v = 0; v < count_; ++v) {
+            double sum = 0;
+            for (const Set& set : sets) {
+                double joints[4], weights[4];
+                set.joints.read(v, joints);
+                set.weights.read(v, weights);
+                for (int k = 0; k < 4; ++k) {
+                    if (!std::isfinite(weights[k]))
+                        primitive_.fail("vertex " + std::to_string(v) + " has a weight that is not finite.");
+                    if (weights[k] == 0) continue;
+                    const auto joint = static_cast<Index>(joints[k]);
+                    influences.joints_used = std::max<std::size_t>(influences.joints_used, joint + std::size_t{1});
+                    influences.joints.push_back(joint);
+                    influences.weights.push_back(weights[k]);
+                    sum += weights[k];
+                }
+            }
+            if (influences.joints.size() >= kNoIndex)
+                primitive_.fail("has more weights than 32-bit indices can count.", ErrorCode::unsupported);
+            influences.first.push_back(static_cast<Index>(influences.joints.size()));
+            if (!(std::abs(sum - 1) <= kSumTolerance)) ++odd_sums;
+        }
+        if (odd_sums > 0)
+            warnings_.push_back(primitive_.path() + ": the weights of " + std::to_string(odd_sums) +
+                                " vertices do not add up to 1; they were taken as they are.");
+    }
+
+    void read_targets() {
+        const Value targets = primitive_["targets"];
+        for (std::size_t t = 0; t < targets.size(); ++t) {
+            MorphTarget& target = geometry_.targets.emplace_back();
+            const auto differences = [&](const char* name, std::optional<Accessor>& accessor) {
+                if (const Value reference = targets[t][name])
+                    accessor = attribute(reference, {.types = {"VEC3"}, .components = components()});
+            };
+            differences("POSITION", target.positions);
+            differences("NORMAL", target.normals);
+        }
+    }
+
+    void warn_mended(std::size_t count, const std::string& what, const Value& where) {
+        if (count > 0)
+            warnings_.push_back(where.path() + ": " + std::to_string(count) + " " + what +
+                                " were not finite and became zero.");
+    }
+
+    Document& document_;
+    const Value& primitive_;
+    Value attributes_;
+    std::vector<std::string>& warnings_;
+    std::set<std::string>& left_out_;
+    Geometry geometry_;
+    std::size_t count_ = 0;
+};
+
+/// Faces that came from one primitive of one node.
+struct FaceRun {
+    std::size_t block = 0;
+    std::size_t first_corner = 0, first_face = 0;
+    Index material = kNoIndex, object = kNoIndex;
+};
+
+class MeshReader {
+public:
+    MeshReader(Scene& scene, const RunContext& context)
+        : scene_(scene), document_(*scene.document), context_(context), mesh_(scene.mesh), rest_(rest_pose(scene)) {}
+
+    void read() {
+        materials_ = read_materials(document_, scene_.warnings);
+        describe_motions();
+        walk();
+        if (runs_.empty()) read_points();
+        if (scene_.blocks.empty()) throw Damage{"has no mesh in its scene."};
+        lay_out();
+        label_faces();
+        finish_corners();
+        collect_warnings();
+    }
+
+private:
+    // ------------------------------------------------------------------------------------------------------- walking
+
+    std::vector<std::size_t> roots() const {
+        std::vector<std::size_t> roots;
+        const std::size_t scenes = document_.count("scenes");
+        const Value chosen = document_.root()["scene"];
+        if (scenes == 0 && !chosen) {
+            for (const std::size_t n : scene_.order)
+                if (scene_.nodes[n].parent == n) roots.push_back(n);
+            return roots;
+        }
+        const std::size_t number = chosen ? chosen.index(scenes, "scenes") : 0;
+        const Value nodes = document_.item("scenes", number)["nodes"];
+        std::set<std::size_t> met;
+        for (std::size_t i = 0; i < nodes.size(); ++i) {
+            const std::size_t n = nodes[i].index(scene_.nodes.size(), "nodes");
+            if (scene_.nodes[n].parent != n) nodes[i].fail("node " + std::to_string(n) + " is a child of another.");
+            if (!met.insert(n).second) nodes[i].fail("node " + std::to_string(n) + " comes twice.");
+            roots.push_back(n);
+        }
+        return roots;
+    }
+
+    void walk() {
+        std::vector<std::size_t> ahead = roots();
+        std::reverse(ahead.begin(), ahead.end());
+        while (!ahead.empty()) {
+            const std::size_t n = ahead.back();
+            ahead.pop_back();
+            if (scene_.nodes[n].mesh) read_node(n);
+            const std::vector<std::size_t>& children = scene_.nodes[n].children;
+            ahead.insert(ahead.end(), children.rbegin(), children.rend());
+        }
+    }
+
+    void read_node(std::size_t n) {
+        constexpr std::size_t kPoints = 0, kLastLines = 3, kTriangles = 4, kFan = 6;
+        const Value mesh = document_.item("meshes", *scene_.nodes[n].mesh), primitives = mesh["primitives"];
+        if (primitives.size() == 0) primitives.fail("has no primitives.");
+        for (std::size_t p = 0; p < primitives.size(); ++p) {
+            const Value primitive = primitives[p];
+            const std::size_t mode = primitive["mode"].whole(kTriangles);
+            if (mode > kFan) primitive["mode"].fail("is " + std::to_string(mode) + ", which is not known.");
+            if (mode == kPoints) points_.push_back({n, p});
+            if (mode <= kLastLines) {
+                ++without_area_;
+                continue;
+            }
+            const std::size_t block = block_of(n, mesh, primitive);
+            begin_run(block, n, mesh, primitive);
+            add_triangles(primitive, mode, block);
+        }
+    }
+
+    void read_points() {
+        for (const auto& [n, p] : points_) {
+            const Value mesh = document_.item("meshes", *scene_.nodes[n].mesh);
+            block_of(n, mesh, mesh["primitives"][p]);
+            --without_area_;
+        }
+    }
+
+    // -------------------------------------------------------------------------------------------- vertices and blocks
+
+    std::size_t geometry_of(const Value& mesh, const Value& primitive) {
+        std::string key;
+        for (const char* part : {"attributes", "targets"})
+            if (const Value value = primitive[part]) key += value.json().dump(-1, ' ', true);
+        const std::optional<Value> note = our_note(mesh);
+        if (note) key += note->json().dump(-1, ' ', true);
+        const auto [entry, is_new] = geometry_numbers_.try_emplace(key, scene_.geometries.size());
+        if (is_new) {
+            if (context_.is_cancelled()) throw Damage{"", ErrorCode::cancelled};
+            scene_.geometries.push_back(GeometryReader(document_, primitive, scene_.warnings, left_out_).read());
+            if (note) read_repeats(*note, scene_.geometries.back());
+        }
+        return entry->second;
+    }
+
+    static std::optional<Value> our_note(const Value& mesh) {
+        const Value extras = mesh["extras"];
+        if (!extras || !extras.json().is_object()) return {};
+        const Value note = extras["filigree"];
+        if (!note || !note.json().is_object()) return {};
+        return note;
+    }
+
+    /// Believes what our own writer says of copied vertices when it is true.
+    void read_repeats(const Value& note, Geometry& geometry) {
+        try {
+            const std::size_t kept = note["vertices"].whole(), count = geometry.vertex_count();
+            if (kept == 0 || kept > count) note["vertices"].fail("does not fit the positions.");
+            std::vector<Index> repeats;
+            if (const Value reference = note["repeats"]) {
+                const Accessor accessor =
+                    document_.accessor(reference, {.types = {"SCALAR"}, .components = {Component::uint32}});
+                document_.charge(accessor.count, reference.path());
+                for (std::size_t i = 0; i < accessor.count; ++i) repeats.push_back(accessor.integer(i));
+            }
+            if (repeats.size() != count - kept) note["repeats"].fail("does not fit the positions.");
+            for (std::size_t i = 0; i < repeats.size(); ++i)
+                if (repeats[i] >= kept || geometry.positions[repeats[i]] != geometry.positions[kept + i])
+                    note["repeats"].fail("does not fit the positions.");
+            geometry.kept = kept;
+            geometry.repeats = std::move(repeats);
+            geometry.is_ours = true;
+        } catch (const Damage& damage) {
+            scene_.warnings.push_back(damage.what + " Vertices at seams stay apart.");
+        }
+    }
+
+    std::size_t block_of(std::size_t n, const Value& mesh, const Value& primitive) {
+        const std::size_t geometry = geometry_of(mesh, primitive);
+        const Node& node = scene_.nodes[n];
+        const bool shared = scene_.geometries[geometry].is_ours && node.parent == n;
+        const std::string owner = shared ? motion_of(n, mesh) : std::to_string(n);
+        const auto [entry, is_new] = block_numbers_.try_emplace({geometry, owner}, scene_.blocks.size());
+        if (!is_new) return entry->second;
+        document_.charge(scene_.geometries[geometry].vertex_count(), primitive.path());
+        Block& block = scene_.blocks.emplace_back();
+        block.node = n;
+        block.geometry = geometry;
+        block.skinned = is_skinned(node, scene_.geometries[geometry], primitive);
+        block.mirrored = !block.skinned && rest_.world[n].linear.determinant() < 0;
+        check_weights(node, mesh, scene_.geometries[geometry]);
+        return entry->second;
+    }
+
+    bool is_skinned(const Node& node, const Geometry& geometry, const Value& primitive) {
+        if (!node.skin) return false;
+        if (geometry.influences.empty()) {
+            scene_.warnings.push_back(primitive.path() +
+                                      ": has a skin but no joints and weights; it was left unskinned.");
+            return false;
+        }
+        const std::size_t joints = scene_.skins[*node.skin].joints.size();
+        if (geometry.influences.joints_used > joints)
+            primitive.fail("has weights for joint " + std::to_string(geometry.influences.joints_used - 1) +
+                           " of a skin that has " + std::to_string(joints) + ".");
+        return true;
+    }
+
+    static void check_weights(const Node& node, const Value& mesh, const Geometry& geometry) {
+        const Value weights = mesh["weights"];
+        for (const std::size_t count : {node.weights.size(), weights.size()})
+            if (count > 0 && count != geometry.targets.size())
+                mesh.fail("has " + std::to_string(geometry.targets.size()) + " morph targets and " +
+                          std::to_string(count) + " weights.");
+    }
+
+    /// What decides where a root node's vertices are, as text. Nodes of one text are one mesh in our own files.
+    std::string motion_of(std::size_t n, const Value& mesh) const {
+        Json node = document_.item("nodes", n).json();
+        for (const char* member : {"name", "mesh", "extras", "extensions", "children"}) node.erase(member);
+        std::string motion = node.dump(-1, ' ', true); // begins with a brace, unlike a node's number
+        if (const Value weights = mesh["weights"]) motion += weights.json().dump(-1, ' ', true);
+        const auto moved = motions_.find(n);
+        return moved == motions_.end() ? motion : motion + moved->second;
+    }
+
+    void describe_motions() {
+        for (std::size_t a = 0; a < scene_.animations.size(); ++a)
+            for (const Channel& channel : scene_.animations[a].channels) {
+                const Sampler& sampler = scene_.animations[a].samplers[channel.sampler];
+                motions_[channel.node] += " " + std::to_string(a) + ":" +
+                                          std::to_string(static_cast<int>(channel.path)) + ":" + sampler.times.path +
+                                          ":" + sampler.values.path + ":" +
+                                          std::to_string(static_cast<int>(sampler.interpolation));
+            }
+    }
+
+    // --------------------------------------------------------------------------------------------------------- faces
+
+    void begin_run(std::size_t block, std::size_t n, const Value& mesh, const Value& primitive) {
+        FaceRun& run = runs_.emplace_back();
+        run.block = block;
+        run.first_corner = mesh_.corners.size();
+        run.first_face = mesh_.face_count();
+        if (const Value material = primitive["material"])
+            run.material = materials_.number[material.index(materials_.number.size(), "materials")];
+        std::string name = scene_.nodes[n].name;
+        if (const Value mesh_name = mesh["name"]; name.empty() && mesh_name && mesh_name.json().is_string())
+            name = mesh_name.text();
+        if (name.empty()) name = "node_" + std::to_string(n);
+        nodes_with_faces_.insert(n);
+        const auto [entry, is_new] = object_numbers_.try_emplace(name, static_cast<Index>(objects_.size()));
+        if (is_new) objects_.push_back(name);
+        run.object = entry->second;
+    }
+
+    /// Indices of the geometry's vertices, checked.
+    std::vector<Index> indices_of(const Value& primitive, std::size_t vertices) {
+        std::vector<Index> indices;
+        const Value reference = primitive["indices"];
+        if (!reference) {
+            document_.charge(vertices, primitive.path());
+            indices.resize(vertices);
+            for (Index i = 0; i < vertices; ++i) indices[i] = i;
+            return indices;
+        }
+        const Accessor accessor = document_.accessor(
+            reference, {.types = {"SCALAR"}, .components = {Component::uint8, Component::uint16, Component::uint32}});
+        document_.charge(accessor.count, reference.path());
+        indices.resize(accessor.count);
+        for (std::size_t i = 0; i < accessor.count; ++i) {
+            indices[i] = accessor.integer(i);
+            if (indices[i] >= vertices)
+                reference.fail("index " + std::to_string(i) + " refers to vertex " + std::to_string(indices[i]) +
+                               ", and there are " + std::to_string(vertices) + ".");
+        }
+        return indices;
+    }
+
+    void add_triangles(const Value& primitive, std::size_t mode, std::size_t block_number) {
+        constexpr std::size_t kTriangles = 4, kStrip = 5;
+        const Block& block = scene_.blocks[block_number];
+        const std::vector<Index> indices = indices_of(primitive, scene_.geometries[block.geometry].vertex_count());
+        const std::size_t triangles =
+            mode == kTriangles ? indices.size() / 3 : std::max<std::size_t>(indices.size(), 2) - 2;
+        if (mesh_.corners.size() + 3 * triangles >= kNoIndex - 1)
+            primitive.fail("gives the scene more corners than 32-bit indices can count.", ErrorCode::unsupported);
+        if (mode == kTriangles && indices.size() % 3 != 0) ++cut_triangles_;
+        mesh_.corners.reserve(mesh_.corners.size() + 3 * triangles);
+        for (std::size_t t = 0; t < triangles; ++t) {
+            Triangle triangle;
+            if (mode == kTriangles)
+                triangle = {indices[3 * t], indices[3 * t + 1], indices[3 * t + 2]};
+            else if (mode == kStrip)
+                triangle = {indices[t], indices[t + 1 + t % 2], indices[t + 2 - t % 2]};
+            else
+                triangle = {indices[t + 1], indices[t + 2], indices[0]};
+            const auto [a, b, c] = triangle;
+            if (mode != kTriangles && (a == b || b == c || c == a)) continue; // strips are sewn together with these
+            if (block.mirrored) std::swap(triangle[1], triangle[2]);
+            mesh_.add_face(triangle);
+        }
+    }
+
+    // ----------------------------------------------------------------------------------------------------- attributes
+
+    const Geometry& geometry(const Block& block) const { return scene_.geometries[block.geometry]; }
+
+    /// Gives every block its place in the mesh's arrays and fills them, positions apart.
+    void lay_out() {
+        std::size_t vertices = 0;
+        for (Block& block : scene_.blocks) {
+            block.first_vertex = vertices;
+            vertices += geometry(block).kept;
+            if (vertices >= kNoIndex)
+                throw Damage{"has more vertices than 32-bit indices can count.", ErrorCode::unsupported};
+        }
+        mesh_.positions.resize(vertices);
+        gather(&Geometry::normals, &Block::first_normal, mesh_.normals, normals_of_corners_);
+        gather(&Geometry::uvs, &Block::first_uv, mesh_.uvs, uvs_of_corners_);
+        lay_out_colors();
+        lay_out_scalars();
+    }
+
+    /// One value a vertex where every block has them and no vertex has several.
+    template <class T>
+    void gather(std::vector<T> Geometry::*values, std::size_t Block::*first, CornerAttribute<T>& attribute,
+                bool& of_corners) {
+        for (Block& block : scene_.blocks) {
+            const Geometry& from = geometry(block);
+            block.*first = attribute.values.size();
+            attribute.values.insert(attribute.values.end(), (from.*values).begin(), (from.*values).end());
+            if ((from.*values).empty() || !from.repeats.empty()) of_corners = true;
+        }
+        if (attribute.values.empty()) of_corners = false;
+    }
+
+    void lay_out_colors() {
+        const auto has_colors = [&](const Block& block) { return !geometry(block).colors.empty(); };
+        if (std::none_of(scene_.blocks.begin(), scene_.blocks.end(), has_colors)) return;
+        mesh_.colors.resize(mesh_.positions.size(), Vec4f::Ones());
+        for (const Block& block : scene_.blocks) {
+            const Geometry& from = geometry(block);
+            if (from.colors.empty()) continue;
+            std::copy_n(from.colors.begin(), from.kept,
+                        mesh_.colors.begin() + static_cast<std::ptrdiff_t>(block.first_vertex));
+            mesh_.colors_have_alpha |= from.colors_have_alpha;
+        }
+    }
+
+    void lay_out_scalars() {
+        std::map<std::string, std::size_t> numbers;
+        for (const Block& block : scene_.blocks)
+            for (const VertexScalar& scalar : geometry(block).scalars) {
+                const auto [entry, is_new] = numbers.try_emplace(scalar.name, mesh_.scalars.size());
+                if (is_new) {
+                    document_.charge(mesh_.positions.size(), "the attribute _" + scalar.name);
+                    mesh_.scalars.push_back({scalar.name, std::vector<float>(mesh_.positions.size())});
+                }
+                std::copy_n(scalar.values.begin(), geometry(block).kept,
+                            mesh_.scalars[entry->second].values.begin() +
+                                static_cast<std::ptrdiff_t>(block.first_vertex));
+            }
+    }
+
+    void label_faces() {
+        const bool has_materials =
+            std::any_of(runs_.begin(), runs_.end(), [](const FaceRun& run) { return run.material != kNoIndex; });
+        const bool has_objects = nodes_with_faces_.size() > 1;
+        if (has_materials) {
+            for (const MeshMaterial& material : materials_.materials) mesh_.materials.names.push_back(material.name);
+            mesh_.embedded_materials = std::move(materials_.materials);
+        }
+        if (has_objects) mesh_.objects.names = objects_;
+        for (std::size_t r = 0; r < runs_.size(); ++r) {
+            const std::size_t end = r + 1 < runs_.size() ? runs_[r + 1].first_face : mesh_.face_count();
+            if (has_materials) mesh_.materials.of_face.resize(end, runs_[r].material);
+            if (has_objects) mesh_.objects.of_face.resize(end, runs_[r].object);
+        }
+    }
+
+    /// Corners so far are vertices of the geometry of their run's block.
+    void finish_corners() {
+        if (normals_of_corners_) mesh_.normals.corners.resize(mesh_.corners.size(), kNoIndex);
+        if (uvs_of_corners_) mesh_.uvs.corners.resize(mesh_.corners.size(), kNoIndex);
+        for (std::size_t r = 0; r < runs_.size(); ++r) {
+            const std::size_t end = r + 1 < runs_.size() ? runs_[r + 1].first_corner : mesh_.corners.size();
+            const Block& block = scene_.blocks[runs_[r].block];
+            const Geometry& from = geometry(block);
+            const bool normals = normals_of_corners_ && !from.normals.empty(),
+                       uvs = uvs_of_corners_ && !from.uvs.empty();
+            for (std::size_t c = runs_[r].first_corner; c < end; ++c) {
+                Index& corner = mesh_.corners[c];
+                if (normals) mesh_.normals.corners[c] = static_cast<Index>(block.first_normal + corner);
+                if (uvs) mesh_.uvs.corners[c] = static_cast<Index>(block.first_uv + corner);
+                corner = static_cast<Index>(block.first_vertex + from.source(corner));
+            }
+        }
+    }
+
+    void collect_warnings() {
+        constexpr std::size_t kMostNames = 5;
+        const auto warn = [&](std::size_t count, const std::string& what) {
+            if (count > 0) scene_.warnings.push_back(std::to_string(count) + " " + what);
+        };
+        warn(without_area_, "primitives of points or lines were left out.");
+        warn(cut_triangles_, "primitives end within a triangle, which was left out.");
+        if (left_out_.empty()) return;
+        std::string names;
+        std::size_t count = 0;
+        for (const std::string& name : left_out_)
+            if (count++ < kMostNames) names += (names.empty() ? "" : ", ") + in_quotes(name);
+        scene_.warnings.push_back("Attributes that are not read were left out: " + names +
+                                  (count > kMostNames ? " and " + std::to_string(count - kMostNames) + " more." : "."));
+    }
+
+    Scene& scene_;
+    Document& document_;
+    const RunContext& context_;
+    Mesh& mesh_;
+    ScenePose rest_;
+    Materials materials_;
+    std::map<std::string, std::size_t> geometry_numbers_;
+    std::map<std::pair<std::size_t, std::string>, std::size_t> block_numbers_;
+    std::map<std::size_t, std::string> motions_; ///< of animated nodes
+    std::vector<FaceRun> runs_;
+    std::set<std::size_t> nodes_with_faces_;
+    std::vector<std::string> objects_;
+    std::map<std::string, Index> object_numbers_;
+    std::vector<std::pair<std::size_t, std::size_t>> points_; ///< node and primitive
+    std::set<std::string> left_out_;
+    std::size_t without_area_ = 0, cut_triangles_ = 0;
+    bool normals_of_corners_ = false, uvs_of_corners_ = false;
+};
+
+} // namespace
+
+void read_meshes(Scene& scene, const RunContext& context) { MeshReader(scene, context).read(); }
+
+} // namespace filigree::gltf
