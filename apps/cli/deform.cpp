@@ -115,7 +115,7 @@ void add_deform(CLI::App& app, Session& session) {
         const Mesh mesh = model ? restore_pose(*model, pose, *options, session.context())
                                 : deform_mesh(std::get<Mesh>(content.value), *options, session.context());
         const double seconds = now_seconds() - start;
-        session.write_mesh(mesh, options->output);
+        session.write_mesh(mesh, options->output, options->input);
         if (!options->pose_output.empty()) session.write_mesh(posed_driver(*model, pose), options->pose_output);
         session.print(fmt::format("{}: {} vertices deformed {} in {}\n", options->output,
                                   with_commas(mesh.vertex_count()), model ? "through the driver" : "one by one",

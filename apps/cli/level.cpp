@@ -33,7 +33,7 @@ void add_level(CLI::App& app, Session& session) {
                 throw Failure{
                     {ErrorCode::unsuitable, "A reference model has no ghost points; strip with --code blend."}};
         }
-        session.write_mesh(mesh, options->output);
+        session.write_mesh(mesh, options->output, options->model);
         if (!options->ghosts.empty()) session.write_mesh(ghosts, options->ghosts);
         session.print(fmt::format("{}: {} vertices, {} faces\n", options->output, with_commas(mesh.vertex_count()),
                                   with_commas(mesh.face_count())),

@@ -169,12 +169,13 @@ void Session::begin_writing(const std::string& path) {
     standard_output_taken_ |= path == "-";
 }
 
-void Session::write_mesh(const Mesh& mesh, const std::string& path) {
+void Session::write_mesh(const Mesh& mesh, const std::string& path, const std::string& source) {
     if (const std::string wrong = check_mesh(mesh); !wrong.empty())
         throw Failure{{ErrorCode::unsuitable, path + ": not written: the result is beyond what numbers can hold (" +
                                                   wrong + "); deform less."}};
     begin_writing(path);
     WriteMeshOptions options;
+    if (source != "-") options.materials_beside = source;
     if (path == "-") options.format = MeshFormat::ply; // no name to tell the format by: PLY holds the most
     for (const std::string& warning : require(filigree::write_mesh(mesh, path, context(), options))) warn(warning);
 }

@@ -57,7 +57,8 @@ public:
     };
     /// A mesh or a model, told by the content.
     Content read_any(const std::string& path);
-    void write_mesh(const Mesh& mesh, const std::string& path);
+    /// source: the file that the mesh came from, for formats that take materials in (GLB); empty: none.
+    void write_mesh(const Mesh& mesh, const std::string& path, const std::string& source = {});
     void write_model(const Model& model, const std::string& path, const PoseSequence& poses = {});
 
     /// To be called before a file is written in another way: the last chance to cancel.
