@@ -1,5 +1,6 @@
 #include "filigree/io/mesh_file.h"
 #include "filigree/io/file.h"
+#include "filigree/io/gltf.h"
 #include "filigree/io/material_file.h"
 #include "filigree/io/mesh_formats.h"
 
