@@ -1,7 +1,7 @@
 // A small skinned, animated GLB and the same animation as PC2, made from formulas: what the other scripts are tried
 // with before they are believed.
 
-const kRings = 24, kAround = 12, kKeys = 7, kSeconds = 2;
+const kRings = 25, kCoarse = 6, kAround = 12, kKeys = 7, kSeconds = 2;
 
 /// A tube along y whose upper joint turns, moves and is stretched; the transforms of a key are a joint's T R S.
 function upper_joint(key) {
@@ -21,7 +21,7 @@ function transformed({ translation, rotation, scale }, [x, y, z]) {
 
 /// { glb, pc2, vertices, keys, rate }: files as buffers. The frames of the PC2 are the keys.
 export function made_skin() {
-    const positions = [], normals = [], joints = [], weights = [], triangles = [];
+    const positions = [], normals = [], joints = [], weights = [], triangles = [], coarse = [];
     for (let ring = 0; ring < kRings; ++ring) {
         const v = ring / (kRings - 1);
         for (let i = 0; i < kAround; ++i) {
@@ -32,7 +32,9 @@ export function made_skin() {
             weights.push([1 - v, v, 0, 0]);
             if (ring === 0) continue;
             const [p, q] = [ring * kAround + i, ring * kAround + ((i + 1) % kAround)];
-            triangles.push([p - kAround, p, q], [p - kAround, q, q - kAround]);
+            const quad = (below) => [[p - below, p, q], [p - below, q, q - below]];
+            triangles.push(...quad(kAround));
+            if (ring % kCoarse === 0) coarse.push(...quad(kCoarse * kAround));
         }
     }
     const stored = Float32Array.from(positions.flat()), blend = Float32Array.from(weights.flat());
@@ -52,15 +54,18 @@ export function made_skin() {
             { min: [0], max: [kSeconds] }],
         ...['translation', 'rotation', 'scale'].map((word) =>
             [numbers(word), word === 'rotation' ? 'VEC4' : 'VEC3', 5126]),
+        [Uint16Array.from(coarse.flat()), 'SCALAR', 5123, 34963],
     ];
+    const attributes = { POSITION: 0, NORMAL: 1, JOINTS_0: 2, WEIGHTS_0: 3 };
     const paths = ['translation', 'rotation', 'scale'];
     return {
         glb: glb(parts, {
             scene: 0,
             scenes: [{ nodes: [0, 1] }],
-            nodes: [{ mesh: 0, skin: 0 }, { name: 'driver', children: [2, 3] }, {}, { translation: [0, 1, 0] }],
-            meshes: [{ primitives: [{
-                attributes: { POSITION: 0, NORMAL: 1, JOINTS_0: 2, WEIGHTS_0: 3 }, indices: 4, material: 0 }] }],
+            nodes: [{ mesh: 0, skin: 0, extensions: { MSFT_lod: { ids: [4] } } },
+                { name: 'driver', children: [2, 3] }, {}, { translation: [0, 1, 0] }, { mesh: 1, skin: 0 }],
+            extensionsUsed: ['MSFT_lod'],
+            meshes: [4, 10].map((indices) => ({ primitives: [{ attributes, indices, material: 0 }] })),
             materials: [{ pbrMetallicRoughness: { metallicFactor: 0, roughnessFactor: 0.7 } }],
             skins: [{ joints: [2, 3], inverseBindMatrices: 5, skeleton: 1 }],
             animations: [{

@@ -1,5 +1,5 @@
-// Plays a GLB in three.js, in a browser without a window, and compares every vertex with a point cache of ours.
-// Usage: node three.mjs FILE.glb REFERENCE.pc2 [--rate FRAMES_A_SECOND] [--frames 0,10,20] [--limit 1e-5] [--no-pictures]
+// Plays GLBs in three.js, in a browser without a window, and compares every vertex with a point cache of ours.
+// Usage: node three.mjs FILE.glb... REFERENCE.pc2 [--rate FRAMES_A_SECOND] [--frames 0,10,20] [--limit 1e-5] [--no-pictures]
 // rate: of the PC2, 60 unless said. frames: which to compare, five spread over all unless said; the limit is for each.
 import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
@@ -76,12 +76,15 @@ if (process.argv[1] === fileURLToPath(import.meta.url)) {
         options: { rate: { type: 'string', default: '60' }, frames: { type: 'string' },
             limit: { type: 'string', default: '1e-5' }, 'no-pictures': { type: 'boolean', default: false } },
     });
-    if (positionals.length !== 2) fail('three.mjs: name a GLB and a PC2');
-    const compared = await compare_in_three(positionals[0], positionals[1], {
-        rate: Number(values.rate),
-        frames: values.frames?.split(',').map(Number),
-        pictures: !values['no-pictures'],
-    });
-    print_comparison(positionals[0], compared);
-    check_comparison(compared, Number(values.limit));
+    if (positionals.length < 2) fail('three.mjs: name GLBs and a PC2');
+    const reference = positionals.pop();
+    for (const file of positionals) {
+        const compared = await compare_in_three(file, reference, {
+            rate: Number(values.rate),
+            frames: values.frames?.split(',').map(Number),
+            pictures: !values['no-pictures'],
+        });
+        print_comparison(file, compared);
+        check_comparison(compared, Number(values.limit));
+    }
 }

@@ -1,5 +1,6 @@
 // Khronos' glTF-Validator on files: fails unless there are no errors and no warnings. Infos are printed.
-// Usage: node validate.mjs FILE...
+// Usage: node validate.mjs FILE...     (of a folder, all .glb and .gltf in it and below)
+import { readdirSync, statSync } from 'node:fs';
 import { readFile } from 'node:fs/promises';
 import { dirname, join, basename } from 'node:path';
 import { fileURLToPath } from 'node:url';
@@ -36,8 +37,10 @@ export async function validate(file) {
 }
 
 if (process.argv[1] === fileURLToPath(import.meta.url)) {
-    const files = process.argv.slice(2);
-    if (files.length === 0) fail('validate.mjs: name the files to validate');
+    const files = process.argv.slice(2).flatMap((path) => (statSync(path).isDirectory()
+        ? readdirSync(path, { recursive: true }).filter((name) => /\.(glb|gltf)$/.test(name)).map((name) => join(path, name))
+        : path));
+    if (files.length === 0) fail('validate.mjs: there is nothing to validate');
     let wrong = 0;
     for (const file of files) {
         const { errors, warnings } = await validate(file);
