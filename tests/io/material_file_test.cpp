@@ -225,3 +225,109 @@ TEST_F(MaterialFile, WorksWithTheObjReader) {
     expect_color(result.materials[0], {1, 0, 0});
     EXPECT_EQ(result.materials[1].picture, folder_ / "wood.png");
 }
+
+TEST_F(MaterialFile, OpacityAndSurfaceAreRead) {
+    const MeshMaterial metal = material("Kd 1 0 0\nd 0.5\nTr 0.9\nPr 0.25\nPm 1 # all\n");
+    EXPECT_EQ(metal.opacity, 0.5f); // d counts, whatever Tr says
+    EXPECT_EQ(metal.roughness, 0.25f);
+    EXPECT_EQ(metal.metallic, 1.0f);
+    EXPECT_EQ(material("Tr 0.25\n").opacity, 0.75f);
+    EXPECT_EQ(material("Tr 1\n").opacity, 1.0f); // means opaque to some programs, and nothing is to be hidden
+    EXPECT_EQ(material("d -halo 0.5\n").opacity, 0.5f);
+    EXPECT_EQ(material("d 7\nPr -1\nPm nan\nPm x\n").opacity, 1.0f);
+    const MeshMaterial plain = material("Kd 1 0 0\n");
+    EXPECT_EQ(plain.opacity, 1.0f);
+    EXPECT_EQ(plain.roughness, 1.0f);
+    EXPECT_EQ(plain.metallic, 0.0f);
+}
+
+namespace {
+
+const std::string kPng = "\x89PNG\r\n\x1a\n one", kOtherPng = "\x89PNG\r\n\x1a\n two", kJpeg = "\xff\xd8\xff three";
+
+/// A triangle for each embedded material.
+Mesh mesh_with(const std::vector<std::pair<std::string, std::string>>& names_and_pictures) {
+    Mesh mesh;
+    mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    mesh.uvs.values.assign(3, Vec2f(0.5f, 0.25f));
+    for (const auto& [name, picture] : names_and_pictures) {
+        mesh.add_face(Triangle{0, 1, 2});
+        mesh.materials.of_face.push_back(static_cast<Index>(mesh.materials.names.size()));
+        mesh.materials.names.push_back(name);
+        MeshMaterial& material = mesh.embedded_materials.emplace_back();
+        material.name = name;
+        if (!picture.empty()) material.picture_bytes = std::make_shared<const std::string>(picture);
+    }
+    return mesh;
+}
+
+std::string bytes_of_file(const fs::path& path) {
+    std::ifstream in(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+}
+
+} // namespace
+
+TEST_F(MaterialFile, EmbeddedMaterialsGoBeforeLibraries) {
+    write("m.mtl", "newmtl m\nKd 1 0 0\n");
+    Mesh mesh = mesh_with({{"m", kPng}});
+    mesh.material_files = {"m.mtl", "gone.mtl"};
+    const MeshMaterials result = read_materials(mesh, folder_ / "mesh.obj");
+    EXPECT_TRUE(result.warnings.empty());
+    ASSERT_EQ(result.materials.size(), 1u);
+    expect_color(result.materials[0], {0.8f, 0.8f, 0.8f});
+    EXPECT_EQ(result.materials[0].picture_bytes, mesh.embedded_materials[0].picture_bytes);
+}
+
+TEST_F(MaterialFile, EmbeddedMaterialsComeBackFromFilesBesideAnObj) {
+    Mesh mesh = mesh_with({{"red paint", ""}, {"../wood #1", kPng}, {"", kJpeg}, {"", kOtherPng}});
+    MeshMaterial& paint = mesh.embedded_materials[0];
+    paint.color = {1, 0.1f, 0};
+    paint.opacity = 0.3f;
+    paint.metallic = 0.7f;
+    paint.roughness = 0.1f;
+    const fs::path obj = folder_ / "a b.obj";
+    const Result<std::vector<std::string>> written = write_mesh(mesh, obj, RunContext(1));
+    ASSERT_TRUE(written.ok());
+    EXPECT_TRUE(written->empty()) << testing::PrintToString(*written);
+    EXPECT_TRUE(bytes_of_file(folder_ / "a_b__.._wood__1.png") == kPng) << "a name stays in the folder";
+    const Result<MeshFile> file = read_mesh(obj, RunContext(1));
+    ASSERT_TRUE(file.ok());
+    EXPECT_EQ(file->mesh.material_files, std::vector<std::string>{"a_b.mtl"});
+    const MeshMaterials back = read_materials(file->mesh, obj);
+    EXPECT_TRUE(back.warnings.empty()) << testing::PrintToString(back.warnings);
+    ASSERT_EQ(back.materials.size(), 4u);
+    EXPECT_EQ(file->mesh.materials.names,
+              (std::vector<std::string>{"red paint", "../wood #1", "material", "material_2"}));
+    EXPECT_EQ(back.materials[0].color, paint.color);
+    EXPECT_EQ(back.materials[0].opacity, paint.opacity);
+    EXPECT_EQ(back.materials[0].metallic, paint.metallic);
+    EXPECT_EQ(back.materials[0].roughness, paint.roughness);
+    const std::string pictures[] = {"", kPng, kJpeg, kOtherPng};
+    for (std::size_t m = 1; m < 4; ++m) EXPECT_TRUE(bytes_of_file(back.materials[m].picture) == pictures[m]);
+}
+
+TEST_F(MaterialFile, FilesOfOthersAreNotReplaced) {
+    write("x.mtl", "newmtl mine\nKd 1 0 0\n");
+    write("x_wood.png", "mine");
+    ASSERT_TRUE(write_mesh(mesh_with({{"wood", kPng}}), folder_ / "x.obj", RunContext(1)).ok());
+    EXPECT_TRUE(bytes_of_file(folder_ / "x.mtl").starts_with("newmtl mine"));
+    EXPECT_TRUE(bytes_of_file(folder_ / "x_wood.png") == "mine");
+    EXPECT_TRUE(bytes_of_file(folder_ / "x_wood_2.png") == kPng);
+    EXPECT_TRUE(bytes_of_file(folder_ / "x.obj").starts_with("mtllib x_2.mtl\n"));
+    // Our own are, when the mesh is written again.
+    ASSERT_TRUE(write_mesh(mesh_with({{"wood", kOtherPng}}), folder_ / "x.obj", RunContext(1)).ok());
+    EXPECT_TRUE(bytes_of_file(folder_ / "x_wood_2.png") == kOtherPng);
+    EXPECT_FALSE(fs::exists(folder_ / "x_3.mtl"));
+    EXPECT_FALSE(fs::exists(folder_ / "x_wood_3.png"));
+}
+
+TEST_F(MaterialFile, WithoutAFolderMaterialsAreLostAndSaid) {
+    std::string bytes;
+    const Result<std::vector<std::string>> warnings =
+        write_mesh(mesh_with({{"wood", kPng}}), MeshFormat::obj, bytes, {});
+    ASSERT_TRUE(warnings.ok());
+    EXPECT_EQ(*warnings, std::vector<std::string>{"OBJ cannot hold embedded materials; left out."});
+    EXPECT_EQ(bytes.find("mtllib"), std::string::npos);
+    EXPECT_NE(bytes.find("usemtl wood"), std::string::npos);
+}

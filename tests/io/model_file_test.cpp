@@ -424,3 +424,58 @@ TEST(ModelFile, WritingFailsWithoutHarm) {
     ASSERT_TRUE(read_model(folder / "a.fil", kContext).ok());
     fs::remove_all(folder);
 }
+
+namespace {
+
+/// A model of the sample mesh whose two materials came inside the file; both have the same picture.
+Model model_with_materials() {
+    Mesh mesh = filigree_test::make_corner_attribute_mesh();
+    mesh.material_files.clear();
+    mesh.embedded_materials.resize(2);
+    mesh.embedded_materials[0].name = "stone";
+    mesh.embedded_materials[0].color = {0.1f, 0.5f, 1};
+    mesh.embedded_materials[0].picture_bytes = std::make_shared<const std::string>(std::string("a\0picture", 9));
+    mesh.embedded_materials[1].name = "wood";
+    mesh.embedded_materials[1].opacity = 0.25f;
+    mesh.embedded_materials[1].metallic = 0.5f;
+    mesh.embedded_materials[1].roughness = 0.75f;
+    mesh.embedded_materials[1].double_sided = false;
+    mesh.embedded_materials[1].picture_bytes = mesh.embedded_materials[0].picture_bytes;
+    return stripped(mesh);
+}
+
+} // namespace
+
+TEST(ModelFile, MaterialsThatCameInsideTheMeshsFileAreKept) {
+    const Model model = model_with_materials();
+    const Result<Model> back = read(write_model(model));
+    ASSERT_TRUE(back.ok());
+    ASSERT_EQ(back->mesh.embedded_materials.size(), 2u);
+    for (std::size_t m = 0; m < 2; ++m) {
+        const MeshMaterial &a = model.mesh.embedded_materials[m], &b = back->mesh.embedded_materials[m];
+        EXPECT_EQ(b.name, a.name);
+        EXPECT_EQ(b.color, a.color);
+        EXPECT_EQ(b.opacity, a.opacity);
+        EXPECT_EQ(b.metallic, a.metallic);
+        EXPECT_EQ(b.roughness, a.roughness);
+        EXPECT_EQ(b.double_sided, a.double_sided);
+        ASSERT_TRUE(b.picture_bytes);
+        EXPECT_TRUE(*b.picture_bytes == *a.picture_bytes);
+    }
+    EXPECT_EQ(back->mesh.embedded_materials[0].picture_bytes, back->mesh.embedded_materials[1].picture_bytes);
+}
+
+TEST(ModelFile, MaterialsAreNotTrusted) {
+    const std::string bytes = write_model(model_with_materials());
+    for (const float number : {-1.0f, 2.0f, std::numeric_limits<float>::quiet_NaN()}) {
+        Patcher patcher(bytes);
+        patcher.set("mat.emb", 3, number); // opacity
+        EXPECT_NE(error_of(patcher.bytes()).find("from 0 to 1"), std::string::npos);
+    }
+    Patcher picture(bytes);
+    picture.set("mat.emb", 7, std::uint32_t{5});
+    EXPECT_NE(error_of(picture.bytes()).find("lacks the picture"), std::string::npos);
+    Patcher names(bytes);
+    names.set("mat.nam", 5, '+'); // two names become one
+    EXPECT_NE(error_of(names.bytes()).find("number of materials"), std::string::npos);
+}
