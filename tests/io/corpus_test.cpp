@@ -2,6 +2,7 @@
 
 #include "filigree/io/mesh_file.h"
 #include "filigree/mesh/topology.h"
+#include "io/welded.h"
 
 #include <gtest/gtest.h>
 
@@ -20,10 +21,15 @@ bool is_of_formats(const CorpusRow& row, std::initializer_list<const char*> endi
     return std::find(endings.begin(), endings.end(), ending) != endings.end();
 }
 
-bool is_ours(const CorpusRow& row) { return is_of_formats(row, {".obj", ".ply", ".stl", ".off"}); }
+bool is_gltf(const CorpusRow& row) { return is_of_formats(row, {".gltf", ".glb"}); }
+
+bool is_ours(const CorpusRow& row) { return is_of_formats(row, {".obj", ".ply", ".stl", ".off"}) || is_gltf(row); }
 
 /// The manifest counts every face statement; those with fewer than three corners are left out, with a warning.
 const std::set<std::string> kHasShortFaces = {"bad/trimesh/notenoughindices.obj", "bad/assimp/malformed2.obj"};
+
+/// The manifest counts places before nodes have carried the parts to theirs, where fewer of them touch.
+const std::set<std::string> kCountedUnplaced = {"bad/trimesh/mode5.gltf"};
 
 /// Accepted with a warning where the manifest wants none: the mesh is right, and we say what of the file is not in it.
 const std::map<std::string, std::string> kWarnsMore = {
@@ -33,10 +39,10 @@ const std::map<std::string, std::string> kWarnsMore = {
 
 /// "accept", "accept with warning" or "clear error". What is wrong with the surface (not with the file) is told by
 /// the topology report, so a defect there counts as a warning.
-std::string outcome(const Result<MeshFile>& file, const RunContext& context) {
+std::string outcome(const Result<MeshFile>& file, const Mesh& mesh, const RunContext& context) {
     if (!file.ok()) return "clear error";
     if (!file->warnings.empty()) return "accept with warning";
-    const TopologyReport report = analyse_topology(file->mesh, context);
+    const TopologyReport report = analyse_topology(mesh, context);
     const bool clean = report.is_manifold() && report.is_oriented() && report.degenerate_faces.count == 0 &&
                        report.duplicate_faces.count == 0 && report.duplicate_vertices.count == 0;
     return clean ? "accept" : "accept, with defects";
@@ -61,7 +67,8 @@ TEST(Corpus, EveryFileIsReadOrRefusedAsExpected) {
         SCOPED_TRACE(row.file + " (" + row.what + ")");
         ++tried;
         const Result<MeshFile> file = read_mesh(row.path, context);
-        const std::string got = outcome(file, context);
+        const Mesh mesh = !file.ok() ? Mesh() : is_gltf(row) ? welded(file->mesh) : file->mesh;
+        const std::string got = outcome(file, mesh, context);
         const bool expected = got == "accept, with defects"
                                   ? row.expects("accept") || row.expects("accept with warning")
                                   : row.expects(got);
@@ -80,26 +87,15 @@ TEST(Corpus, EveryFileIsReadOrRefusedAsExpected) {
             continue;
         }
         EXPECT_EQ(check_mesh(file->mesh), "");
-        if (!row.vertices.empty()) {
-            EXPECT_EQ(std::to_string(file->mesh.vertex_count()), row.vertices);
+        if (!row.vertices.empty() && !kCountedUnplaced.contains(row.file)) {
+            EXPECT_EQ(std::to_string(mesh.vertex_count()), row.vertices);
         }
         if (!row.faces.empty() && !kHasShortFaces.contains(row.file)) {
-            EXPECT_EQ(std::to_string(file->mesh.face_count()), row.faces);
+            EXPECT_EQ(std::to_string(mesh.face_count()), row.faces);
         }
         if (!row.sizes.empty()) {
-            EXPECT_EQ(sizes(file->mesh), row.sizes);
+            EXPECT_EQ(sizes(mesh), row.sizes);
         }
     }
-    EXPECT_GT(tried, 100u);
-}
-
-TEST(Corpus, OtherFormatsAreRefusedWithASentence) {
-    const std::vector<CorpusRow> rows = read_corpus();
-    if (rows.empty()) GTEST_SKIP() << "no corpus at " << corpus_folder();
-    for (const CorpusRow& row : rows) {
-        if (!is_of_formats(row, {".gltf", ".glb"})) continue;
-        const Result<MeshFile> file = read_mesh(row.path, RunContext());
-        ASSERT_FALSE(file.ok()) << row.file;
-        EXPECT_TRUE(file.error().message.ends_with(".")) << file.error().message;
-    }
+    EXPECT_GT(tried, 200u);
 }

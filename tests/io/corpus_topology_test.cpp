@@ -3,6 +3,7 @@
 
 #include "filigree/io/mesh_file.h"
 #include "filigree/mesh/topology.h"
+#include "io/welded.h"
 
 #include <gtest/gtest.h>
 
@@ -38,7 +39,12 @@ const std::set<std::pair<std::string, std::string>> kOurs = {
     {"bad/trimesh/notenoughindices.obj", "faces"}, // the reader leaves out faces of fewer than three corners
     {"bad/assimp/malformed2.obj", "faces"},
     {"bad/gen/far_from_origin_1e9.obj", "signed_volume"}, // it is 1; 666700000 is rounding far from the origin
+    {"good/gltf/AnimatedMorphCube/AnimatedMorphCube.gltf",
+     "signed_volume"}, // it is 8: its node makes it 100 times larger
 };
+
+/// Parts that nodes carry apart; the manifest has them where they were before.
+const std::string kPlacedByNodes = "bad/trimesh/mode5.gltf";
 
 std::string yes_no(bool value) { return value ? "yes" : "no"; }
 
@@ -64,12 +70,13 @@ TEST(CorpusTopology, AgreesWithTheManifest) {
     std::size_t compared = 0;
     for (const Row& row : rows) {
         const std::string file = row.at("file");
-        if (!mesh_format(file).ok() || row.at("border_edges").empty()) continue;
+        if (!mesh_format(file).ok() || row.at("border_edges").empty() || file == kPlacedByNodes) continue;
         const Result<MeshFile> read = read_mesh(filigree_test::corpus_folder() / file, context);
         if (!read.ok()) continue; // corpus_test says which may be refused
         ++compared;
         SCOPED_TRACE(file + " (" + row.at("class") + ")");
-        const TopologyReport report = analyse_topology(read->mesh, context);
+        const bool gltf = mesh_format(file).value() == MeshFormat::gltf;
+        const TopologyReport report = analyse_topology(gltf ? filigree_test::welded(read->mesh) : read->mesh, context);
         for (const auto& [column, value] : described(report)) {
             if (kOurs.contains({file, column})) continue;
             EXPECT_EQ(value, row.at(column)) << column;

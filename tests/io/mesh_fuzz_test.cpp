@@ -78,6 +78,7 @@ TEST(MeshFuzz, DamagedFilesOfOurWriters) {
         {"a.stl", {MeshFormat::stl, {}}},
         {"a.stl", {MeshFormat::stl, {.ascii = true}}},
         {"a.off", {MeshFormat::off, {}}},
+        {"a.glb", {MeshFormat::gltf, {}}},
     };
     std::mt19937 random(1);
     for (const auto& [name, kind] : kinds) {
@@ -92,7 +93,7 @@ TEST(MeshFuzz, DamagedFilesOfOurWriters) {
 }
 
 TEST(MeshFuzz, EveryCutOfASmallFile) {
-    for (const MeshFormat format : {MeshFormat::obj, MeshFormat::ply, MeshFormat::stl, MeshFormat::off}) {
+    for (const MeshFormat format : {MeshFormat::obj, MeshFormat::ply, MeshFormat::stl, MeshFormat::off, MeshFormat::gltf}) {
         std::string bytes;
         ASSERT_TRUE(write_mesh(make_vertex_attribute_mesh(), format, bytes).ok());
         for (std::size_t size = 0; size < bytes.size(); ++size)
