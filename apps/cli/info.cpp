@@ -1,5 +1,6 @@
 #include "session.h"
 
+#include "filigree/io/gltf.h"
 #include "filigree/mesh/topology.h"
 
 namespace filigree::cli {
@@ -142,6 +143,33 @@ void describe_model(const Model& model, const PoseSequence& poses, std::size_t b
     json["bytes"] = bytes;
 }
 
+/// What a glTF file has beside its mesh: animations, and what an export of ours measured about itself.
+void describe_scene(const GltfScene& scene, Table& table, Json& json) {
+    json["animations"] = Json::array();
+    for (const GltfAnimation& animation : scene.animations()) {
+        table.row("animation",
+                  fmt::format("{}, {:.4g} to {:.4g} s", animation.name.empty() ? "unnamed" : animation.name,
+                              animation.first_key, animation.last_key));
+        json["animations"].push_back(
+            {{"name", animation.name}, {"first_key", animation.first_key}, {"last_key", animation.last_key}});
+    }
+    const Json report = Json::parse(scene.export_report(), nullptr, false);
+    if (!report.is_object()) return;
+    json["export"] = report;
+    const auto number = [&](const char* key) -> std::optional<double> {
+        const auto found = report.find(key);
+        return found != report.end() && found->is_number() ? std::optional(found->get<double>()) : std::nullopt;
+    };
+    const auto row = [&](const char* title, const char* key, const char* unit) {
+        if (const auto value = number(key)) table.row(title, fmt::format("{:.3g}{}", *value, unit));
+    };
+    row("joints", "joints", "");
+    row("keys", "keys", "");
+    row("error at keys", "error_at_keys", " of the diagonal, as measured when it was exported");
+    row("error between keys", "error_between_keys", " of the diagonal");
+    row("normals off by", "normal_error_degrees", " degrees (95th percentile) in viewers that do not correct them");
+}
+
 } // namespace
 
 void add_info(CLI::App& app, Session& session) {
@@ -160,6 +188,8 @@ void add_info(CLI::App& app, Session& session) {
         if (const auto* mesh = std::get_if<Mesh>(&content.value)) {
             json["kind"] = "mesh";
             describe_mesh(*mesh, session, table, json);
+            if (path->ends_with(".glb") || path->ends_with(".gltf"))
+                describe_scene(require(GltfScene::read(*path, session.context())), table, json);
         } else {
             json["kind"] = "model";
             const auto& model = std::get<Model>(content.value);

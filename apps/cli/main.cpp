@@ -51,6 +51,7 @@ int run(int argc, char** argv) {
     cli::add_render(app, session);
     cli::add_sample(app, session);
     cli::add_simulate(app, session);
+    cli::add_export(app, session);
     cli::add_figures(app, session);
     try {
         app.parse(argc, argv);

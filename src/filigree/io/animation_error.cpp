@@ -71,7 +71,7 @@ struct ErrorSum {
 
 Status measure_animation(const PositionsAt& played, std::size_t played_count, const PositionsAt& restored,
                          std::size_t restored_count, std::span<const double> keys, double frames_per_second,
-                         double diagonal, ExportReport& report, const RunContext& context) {
+                         ExportReport& report, const RunContext& context) {
     constexpr double kVerticesChecked = 1e8;
     if (played_count < restored_count)
         return Error{ErrorCode::unsuitable, "The exported GLB has fewer vertices than the mesh: please report this."};
@@ -80,10 +80,12 @@ Status measure_animation(const PositionsAt& played, std::size_t played_count, co
     const std::size_t checked = std::min(keys.size(), most);
     std::vector<Vec3f> a(played_count), b(restored_count);
     ErrorSum at_keys, between;
+    double diagonal = 0;
     const auto compare = [&](double seconds, ErrorSum& sum) -> Status {
         if (context.is_cancelled()) return cancelled_error();
         if (Status s = played(seconds, a); !s) return s;
         if (Status s = restored(seconds, b); !s) return s;
+        if (report.moments_checked == 0) diagonal = bounds(b).diagonal();
         sum.add(a, b);
         ++report.moments_checked;
         return Success{};

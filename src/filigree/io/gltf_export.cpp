@@ -467,9 +467,8 @@ private:
         };
         std::vector<double> keys;
         for (const std::size_t key : sampling.keys) keys.push_back(sampling.times[key]);
-        const double diagonal = bounds(model_.mesh.positions).diagonal();
         return measure_animation(played, scene->mesh().vertex_count(), restored, restorer.vertex_count(), keys,
-                                 poses_.frames_per_second, diagonal, report_, context_);
+                                 poses_.frames_per_second, report_, context_);
     }
 
     Json report_json() const {

@@ -45,7 +45,7 @@ struct ExportReport {
     std::size_t bytes = 0, vertices = 0, joints = 0, keys = 0;
     double seconds = 0; ///< of the animation
     /// Largest and RMS distance of the file, evaluated as a viewer would, from our own restore, as fractions of the
-    /// diagonal of the mesh at rest: at keys, and between them (at the poses' own frames where keys are sparser; else
+    /// diagonal at the first key: at keys, and between them (at the poses' own frames where keys are sparser; else
     /// half way, against the restore of the driver half way).
     double error_at_keys = 0, error_between_keys = 0;
     double rms_at_keys = 0, rms_between_keys = 0;

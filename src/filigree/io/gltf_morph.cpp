@@ -109,10 +109,11 @@ private:
         std::vector<Vec3f> moved(mesh_.vertex_count());
         Offsets offsets;
         Json targets = Json::array();
-        double largest = 0, squares = 0;
+        double largest = 0, squares = 0, diagonal = 0;
         for (std::size_t frame = 0; frame < animation_.frames; ++frame) {
             context_.report("measuring frames", double(frame) / double(animation_.frames));
             if (Status s = fetch(frame, moved, offsets); !s) return s;
+            if (frame == 0) diagonal = bounds(moved).diagonal();
             for (std::size_t v = 0; v < moved.size(); ++v) { // as a viewer adds
                 const Vec3f shown = mesh_.positions[v] + offsets.positions[v];
                 const double square = (shown.cast<double>() - moved[v].cast<double>()).squaredNorm();
@@ -128,7 +129,6 @@ private:
             target["POSITION"] = add_streamed(accessor, frame, false);
             targets.push_back(std::move(target));
         }
-        const double diagonal = bounds(mesh_.positions).diagonal();
         const double scale = diagonal > 0 ? 1 / diagonal : 0;
         report_.error_at_keys = scale * std::sqrt(largest);
         report_.rms_at_keys = scale * std::sqrt(squares / double(animation_.frames * mesh_.vertex_count()));
