@@ -107,12 +107,13 @@ Mesh posed_driver(const Model& model, const Pose& pose) {
     return driver;
 }
 
-/// Returns what to tell.
-Result<QString> write_checked(const Mesh& mesh, const std::string& path, const RunContext& context) {
+/// Returns what to tell. source: the file that the mesh came from; "" for none.
+Result<QString> write_checked(const Mesh& mesh, const std::string& path, const RunContext& context,
+                              const std::string& source = {}) {
     if (const std::string wrong = check_mesh(mesh); !wrong.empty())
         return Error{ErrorCode::unsuitable,
                      path + ": not written: the result is beyond what numbers can hold (" + wrong + "); deform less."};
-    const Result<std::vector<std::string>> warnings = write_mesh(mesh, path, context);
+    const Result<std::vector<std::string>> warnings = write_mesh(mesh, path, context, {.materials_beside = source});
     if (!warnings) return warnings.error();
     QString text = QString("Saved %1: %2, %3.")
                        .arg(file_name(path), counted(mesh.vertex_count(), "vertex", "vertices"),
@@ -277,7 +278,7 @@ void Workbench::save_mesh(const std::string& path) {
          [path, state = state(), pose = pose_](const RunContext& context) -> Result<QString> {
              const Result<Mesh> mesh = posed_mesh(state, pose, context);
              if (!mesh) return mesh.error();
-             return write_checked(*mesh, path, context);
+             return write_checked(*mesh, path, context, state.source ? state.source->path : "");
          });
 }
 

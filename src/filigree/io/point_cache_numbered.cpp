@@ -225,6 +225,8 @@ Result<std::vector<std::string>> write_numbered_meshes(std::size_t frames,
     std::vector<std::string> warnings;
     RunContext silent = context; // the bar tells of frames
     silent.progress = nullptr;
+    const Result<MeshFormat> format = mesh_format(name->file(1));
+    const bool is_obj = format && *format == MeshFormat::obj;
     const auto write_all = [&]() -> Status {
         const TemporaryFolder temporary(folder);
         if (!temporary.is_there()) return cannot_write(folder, "nothing can be made in the folder");
@@ -236,8 +238,12 @@ Result<std::vector<std::string>> write_numbered_meshes(std::size_t frames,
             if (context.is_cancelled()) return cancelled_error();
             if (fs::is_directory(name->file(frame + 1), ignored))
                 return cannot_write(name->file(frame + 1), "it is a folder");
-            const Result<Mesh> moved = mesh(frame);
+            Result<Mesh> moved = mesh(frame);
             if (!moved) return moved.error();
+            if (is_obj && !moved->embedded_materials.empty()) { // a library and its pictures for every frame, else
+                moved->embedded_materials.clear();
+                add_new(warnings, {"OBJ files of a sequence do not have embedded materials; left out."});
+            }
             if (const std::string wrong = check_mesh(*moved); !wrong.empty())
                 return Error{ErrorCode::unsuitable, name->file(frame + 1).string() +
                                                         ": not written: it is beyond what numbers can hold (" + wrong +
