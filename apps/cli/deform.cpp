@@ -1,3 +1,4 @@
+#include "animation_output.h"
 #include "handles_file.h"
 #include "restore_options.h"
 
@@ -11,6 +12,13 @@ namespace {
 struct WarpStep {
     std::string kind;
     double amount;
+
+    /// On the way from nothing (0) to all of it (1).
+    WarpStep part(double fraction) const {
+        const bool is_factor = kind == "stretch" || kind == "squeeze" || kind == "taper";
+        const double nothing = is_factor ? 1 : 0;
+        return {kind, nothing + fraction * (amount - nothing)};
+    }
 };
 
 std::unique_ptr<SpaceWarp> make_warp(const WarpStep& step, const Box& box, Axis axis, std::uint64_t seed) {
@@ -36,29 +44,120 @@ struct Options {
     std::optional<Axis> axis = {};
     std::uint64_t seed = 1;
     RestoreOptions restore;
+    std::size_t frames = 0; ///< of an animation; 0: the full deformation alone
+    double frames_per_second = 60;
+    AnimationOutput animation;
+
+    double fraction(std::size_t frame) const { return double(frame) / double(frames - 1); }
 };
 
-Mesh deform_mesh(Mesh mesh, const Options& options, const RunContext& context) {
-    if (options.handles.empty()) {
-        warp_mesh(*chain_steps(options.steps, world_bounds(mesh), options.axis, options.seed), mesh, context);
+/// What is done to the file, wholly or a part of the way there.
+class Deformation {
+public:
+    explicit Deformation(const Options& options) : options_(options) {
+        if (!options.handles.empty()) handles_ = require(read_handles(options.handles));
+    }
+
+    Mesh mesh(Mesh mesh, double fraction, const RunContext& context) const {
+        if (handles_) return require(move_mesh_by_handles(std::move(mesh), handles_at(fraction), context));
+        warp_mesh(*warp_at(fraction, world_bounds(mesh)), mesh, context);
         return mesh;
     }
-    const HandlesFile handles = require(read_handles(options.handles));
-    return require(move_mesh_by_handles(std::move(mesh), handles, context));
-}
-
-Pose deform_driver(const Model& model, const Options& options, const RunContext& context) {
-    if (options.handles.empty()) {
-        const auto warp = chain_steps(options.steps, world_bounds(model.mesh), options.axis, options.seed);
-        return warp_pose(*warp, driver_positions(model), model.mesh.origin, context);
+    Pose driver(const Model& model, double fraction, const RunContext& context) const {
+        if (handles_) return require(pose_by_handles(model, handles_at(fraction), context));
+        return warp_pose(*warp_at(fraction, world_bounds(model.mesh)), driver_positions(model), model.mesh.origin,
+                         context);
     }
-    const HandlesFile handles = require(read_handles(options.handles));
-    return require(pose_by_handles(model, handles, context));
-}
+
+private:
+    std::unique_ptr<SpaceWarp> warp_at(double fraction, const Box& box) const {
+        std::vector<WarpStep> steps;
+        for (const WarpStep& step : options_.steps) steps.push_back(fraction == 1 ? step : step.part(fraction));
+        return chain_steps(steps, box, options_.axis, options_.seed);
+    }
+    HandlesFile handles_at(double fraction) const {
+        HandlesFile part = *handles_;
+        for (HandleEntry& entry : part.handles) {
+            entry.move *= fraction;
+            entry.rotation.angle() *= fraction;
+        }
+        return part;
+    }
+
+    const Options& options_;
+    std::optional<HandlesFile> handles_;
+};
 
 Mesh restore_pose(const Model& model, const Pose& pose, const Options& options, const RunContext& context) {
     const Restorer restorer = require(Restorer::create(model, options.restore, context));
     return require(restorer.mesh(pose, context));
+}
+
+std::string lower_case_ending(const std::string& path) {
+    std::string ending = std::filesystem::path(path).extension().string();
+    for (char& c : ending) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+    return ending;
+}
+
+bool is_model_path(const std::string& path) { return lower_case_ending(path) == ".fil"; }
+
+void check(const Options& options) {
+    const auto refuse = [](const std::string& sentence) { throw Failure{{ErrorCode::usage, sentence}}; };
+    check_second_output("--pose", options.pose_output, options.output);
+    if (options.steps.empty() == options.handles.empty())
+        refuse("Say how to deform: one or more of --stretch, --squeeze, --bend, --twist, --taper and --random, or "
+               "--handles FILE.");
+    if (options.frames == 0) return;
+    if (!options.pose_output.empty()) refuse("--pose writes one pose; with --frames give -o a .fil for all of them.");
+    check_not_input(options.output, {options.input});
+    if (!is_model_path(options.output)) check_animation_path(options.output);
+}
+
+void deform_animation(const Options& options, const Session::Content& content, Session& session) {
+    const Deformation deformation(options);
+    RunContext silent = session.context(); // the bar tells of frames
+    silent.progress = nullptr;
+    Table table;
+    Json json;
+    const double start = now_seconds();
+    const auto* model = std::get_if<Model>(&content.value);
+    if (model) {
+        const PoseStream poses{options.frames, options.frames_per_second, [&](std::size_t frame) -> Result<Pose> {
+                                   return deformation.driver(*model, options.fraction(frame), silent);
+                               }};
+        if (is_model_path(options.output)) {
+            PoseSequence sequence{options.frames_per_second, {}};
+            for (std::size_t frame = 0; frame < options.frames; ++frame) {
+                session.context().report("deforming", double(frame) / double(options.frames));
+                sequence.frames.push_back(require(poses.pose(frame)));
+            }
+            session.context().report("deforming", 1);
+            session.write_model(*model, options.output, sequence);
+            table.row("model", fmt::format("{} with {} poses at {:.6g} a second", options.output,
+                                           with_commas(options.frames), options.frames_per_second));
+        } else {
+            write_animation_output(*model, poses, options.restore, options.animation, options.output, options.input,
+                                   session, table, json);
+        }
+    } else {
+        const Mesh& rest = std::get<Mesh>(content.value);
+        if (is_model_path(options.output))
+            throw Failure{{ErrorCode::usage, options.output + ": a model with poses comes from a model, and " +
+                                                 options.input + " is a mesh; 'filigree strip' makes one of it."}};
+        const MeshAnimation animation{&rest, options.frames, options.frames_per_second,
+                                      [&](std::size_t frame, std::span<Vec3f> positions) -> Status {
+                                          const Mesh moved = deformation.mesh(rest, options.fraction(frame), silent);
+                                          std::copy(moved.positions.begin(), moved.positions.end(), positions.begin());
+                                          return Success{};
+                                      }};
+        write_animation_output(animation, options.animation, options.output, options.input, session, table, json);
+    }
+    json["output"] = options.output;
+    json["frames"] = options.frames;
+    json["frames_per_second"] = options.frames_per_second;
+    json["through_driver"] = model != nullptr;
+    json["seconds"] = now_seconds() - start;
+    session.print(table.text(), json);
 }
 
 } // namespace
@@ -69,7 +168,11 @@ void add_deform(CLI::App& app, Session& session) {
         "deform",
         "Deform a mesh (every vertex) or a model (its driver, then restore); options apply in the order given");
     command->add_option("file", options->input, "Mesh or model")->required();
-    command->add_option("-o,--output", options->output, "Mesh file to write")->required();
+    command
+        ->add_option("-o,--output", options->output,
+                     "Mesh file to write; with --frames an animation: .glb, .pc2, .mdd, .usda, a folder (NAME/), "
+                     "NAME_####.ply, or for a model .fil, the model with these poses")
+        ->required();
     const auto add_step = [&](const std::string& kind, const std::string& text, const CLI::Validator& check) {
         command
             ->add_option_function<double>(
@@ -96,24 +199,30 @@ void add_deform(CLI::App& app, Session& session) {
     command->add_option("--handles", options->handles,
                         "Pull parts and let the rest follow as rigidly as possible: a JSON file, see docs/handles.md");
     command->add_option("--pose", options->pose_output, "Models: also write the moved driver, with its gradients");
+    command->add_option("--frames", options->frames, "This many frames from the rest shape to the full deformation")
+        ->check(whole_number(2));
+    command->add_option("--frame-rate", options->frames_per_second, "Frames a second")
+        ->check(positive_number())
+        ->capture_default_str();
     add_restore_options(*command, options->restore);
+    add_animation_options(*command, options->animation);
     session.add_common_options(*command, "  filigree deform scan.fil -o bent.ply --bend 90 --twist 45\n"
                                          "  filigree deform scan.ply -o full.ply --bend 90 --twist 45\n"
-                                         "  filigree deform scan.fil -o pulled.ply --handles pull.json");
+                                         "  filigree deform scan.fil -o pulled.ply --handles pull.json\n"
+                                         "  filigree deform scan.fil -o bent.glb --bend 90 --frames 60");
     command->callback([options, &session] {
         session.begin();
-        check_second_output("--pose", options->pose_output, options->output);
-        if (options->steps.empty() == options->handles.empty())
-            throw Failure{{ErrorCode::usage, "Say how to deform: one or more of --stretch, --squeeze, --bend, --twist, "
-                                             "--taper and --random, or --handles FILE."}};
+        check(*options);
         const Session::Content content = session.read_any(options->input);
+        if (options->frames > 0) return deform_animation(*options, content, session);
+        const Deformation deformation(*options);
         const double start = now_seconds();
         const auto* model = std::get_if<Model>(&content.value);
         if (!model && !options->pose_output.empty())
             throw Failure{{ErrorCode::usage, "--pose writes a model's driver, and " + options->input + " is a mesh."}};
-        const Pose pose = model ? deform_driver(*model, *options, session.context()) : Pose{};
+        const Pose pose = model ? deformation.driver(*model, 1, session.context()) : Pose{};
         const Mesh mesh = model ? restore_pose(*model, pose, *options, session.context())
-                                : deform_mesh(std::get<Mesh>(content.value), *options, session.context());
+                                : deformation.mesh(std::get<Mesh>(content.value), 1, session.context());
         const double seconds = now_seconds() - start;
         session.write_mesh(mesh, options->output, options->input);
         if (!options->pose_output.empty()) session.write_mesh(posed_driver(*model, pose), options->pose_output);

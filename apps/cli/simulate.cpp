@@ -1,3 +1,4 @@
+#include "animation_output.h"
 #include "output_folder.h"
 #include "simulate_film.h"
 #include "simulate_recording.h"
@@ -21,13 +22,14 @@ struct Options {
     std::vector<std::string> outputs;
     std::size_t frames = 0, stop_at = 0; ///< 0: as the scene says; not before the end
     bool check = false, keys = false;
+    AnimationOutput animation;
 };
 
 [[noreturn]] void refuse(const std::string& sentence) { throw Failure{{ErrorCode::usage, sentence}}; }
 
 /// Where a run's results go, sorted by kind, and everything that can be refused before the work.
 struct Outputs {
-    std::vector<std::string> models, films, folders;
+    std::vector<std::string> models, films, folders, animations;
 
     explicit Outputs(const std::vector<std::string>& paths) {
         for (std::size_t i = 0; i < paths.size(); ++i) {
@@ -45,11 +47,14 @@ struct Outputs {
                 models.push_back(path);
             else if (is_film_path(path))
                 films.push_back(path);
+            else if (is_animation_path(path))
+                animations.push_back(path);
             else
                 throw Failure{{ErrorCode::unsupported,
                                path +
                                    ": is no name for a simulation's output; end it in .fil (a model with its poses), "
-                                   ".mp4, .gif or _%04d.png (a film), or / (a folder of meshes)."}};
+                                   ".mp4, .gif or _%04d.png (a film), .glb, .pc2, .mdd or .usda (the detailed mesh "
+                                   "moving), or / (a folder of meshes)."}};
         }
     }
 };
@@ -96,6 +101,8 @@ void check_places(const Options& options, const SceneFile& scene, const Outputs&
     if (!options.save.empty()) take(options.save, "where the state goes");
     if (!options.resume.empty()) taken.emplace_back(options.resume, "the state to go on from"); // may be saved over
     for (const std::string& path : outputs.models)
+        for (const SceneBody& body : scene.bodies) take(model_path(path, scene.bodies.size(), body.name), "an output");
+    for (const std::string& path : outputs.animations)
         for (const SceneBody& body : scene.bodies) take(model_path(path, scene.bodies.size(), body.name), "an output");
     const auto take_numbered = [&](const std::string& path, const fs::path& folder, const std::string& before,
                                    const std::string& after) {
@@ -177,12 +184,23 @@ public:
                 session_.write_model(ready_.bodies[b].model,
                                      model_path(path, ready_.bodies.size(), ready_.bodies[b].name),
                                      recording_.poses[b]);
+        write_animations();
         write_seconds_ = now_seconds() - start;
     }
 
     void report() const;
 
 private:
+    void write_animations() {
+        for (const std::string& path : outputs_.animations)
+            for (std::size_t b = 0; b < ready_.bodies.size(); ++b) {
+                Json json;
+                write_animation_output(ready_.bodies[b].model, stream_of(recording_.poses[b]), {}, options_.animation,
+                                       model_path(path, ready_.bodies.size(), ready_.bodies[b].name),
+                                       scene_.bodies[b].mesh, session_, animation_rows_, json);
+                animations_.push_back(json);
+            }
+    }
     void open_outputs() {
         if (!outputs_.films.empty()) stage_.emplace(session_);
         for (const std::string& path : outputs_.films)
@@ -395,6 +413,8 @@ private:
     Recording recording_;
     std::map<std::size_t, std::size_t> lost_; ///< by body: the first frame that hold_lost met
     float last_volume_ratio_ = 1;
+    Table animation_rows_;
+    Json animations_ = Json::array();
     double film_seconds_ = 0, write_seconds_ = 0;
 };
 
@@ -499,7 +519,8 @@ void Run::report() const {
     if (!options_.save.empty()) table.row("state", options_.save);
     json["write_seconds"] = write_seconds_;
     json["film_seconds"] = film_seconds_;
-    session_.print(table.text(), json);
+    if (!animations_.empty()) json["animations"] = animations_;
+    session_.print(table.text() + animation_rows_.text(), json);
 }
 
 void check(const Options& options) {
@@ -509,7 +530,9 @@ void check(const Options& options) {
         throw Failure{{ErrorCode::unwritable, options.save + ": cannot be written: it is a folder, or in none."}};
     if (options.scene.empty()) refuse("Give a scene: filigree simulate SCENE.toml -o OUT.");
     if (options.outputs.empty() && options.save.empty() && !options.check)
-        refuse("Say where the motion goes: -o OUT.fil, -o FILM.mp4 or -o FOLDER/; or give --save or --check.");
+        refuse("Say where the motion goes: -o OUT.fil, -o OUT.glb, -o OUT.pc2, -o FILM.mp4 or -o FOLDER/; or give "
+               "--save or "
+               "--check.");
     if (options.stop_at && options.save.empty())
         refuse("--stop-at stops a run that goes on later; say where with --save.");
 }
@@ -524,8 +547,8 @@ void add_simulate(CLI::App& app, Session& session) {
     command
         ->add_option(
             "-o,--output", options->outputs,
-            "A model with its poses (.fil), a film (.mp4, .gif, NAME_%04d.png), or a folder of meshes (NAME/); "
-            "may come several times")
+            "A model with its poses (.fil), a film (.mp4, .gif, NAME_%04d.png), the detailed mesh moving (.glb, .pc2, "
+            ".mdd, .usda), or a folder of meshes (NAME/); may come several times")
         ->allow_extra_args(false);
     command->add_option("--frames", options->frames, "Frames to compute (unset: as the scene says)")
         ->check(whole_number(1));
@@ -535,8 +558,10 @@ void add_simulate(CLI::App& app, Session& session) {
         ->check(whole_number(1));
     command->add_option("--save", options->save, "Write the state at the end, or when cancelled, to go on from");
     command->add_option("--resume", options->resume, "Go on from a state that --save wrote");
+    add_animation_options(*command, options->animation);
     command->add_flag("--keys", options->keys, "Print every key that a scene can have, and the materials");
     session.add_common_options(*command, "  filigree simulate bounce.toml -o bounce.mp4 -o bounce.fil\n"
+                                         "  filigree simulate bounce.toml -o bounce.glb -o bounce.pc2\n"
                                          "  filigree simulate bounce.toml -o meshes/ --frames 60 --check\n"
                                          "  filigree simulate long.toml --save state --stop-at 100\n"
                                          "  filigree simulate long.toml --resume state -o long.mp4\n"

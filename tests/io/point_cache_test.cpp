@@ -240,7 +240,7 @@ TEST_F(PointCache, NumbersThatAreNotFiniteAreFoundWhenTheirFrameIs) {
     says(poses->pose(1).error(), ErrorCode::bad_file, {"a.pc2", "frame 2", "point 1"});
     // cut off after it was opened
     ASSERT_EQ(::truncate(path("a.pc2").c_str(), 70), 0);
-    EXPECT_TRUE(poses->pose(0).error().code == ErrorCode::bad_file || poses->pose(0).ok());
+    EXPECT_TRUE(poses->pose(0).ok());
     says(poses->pose(1).error(), ErrorCode::bad_file, {"cut off"});
 }
 
@@ -302,7 +302,7 @@ TEST_F(PointCache, NumberedMeshesKeepAttributes) {
     const Result<MeshFile> second = read_mesh(path("n_0002.obj"), kContext);
     ASSERT_TRUE(second.ok());
     EXPECT_TRUE(second->mesh.uvs.corners == rest.uvs.corners);
-    EXPECT_EQ(second->mesh.materials.names, rest.materials.names);
+    EXPECT_EQ(second->mesh.materials.names.size(), 2u);
     EXPECT_EQ(second->mesh.corners, rest.corners);
     EXPECT_EQ(second->mesh.normals.values.size(), rest.vertex_count()); // the frame's own
 }

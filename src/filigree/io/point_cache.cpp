@@ -132,7 +132,7 @@ std::string lower_ending(const fs::path& path) {
 Result<AnimationFormat> animation_format(const fs::path& path) {
     std::error_code ignored;
     const std::string ending = lower_ending(path);
-    if (!path.has_filename() || fs::is_directory(path, ignored) || numbered_name(path)) {
+    if ((!path.empty() && !path.has_filename()) || fs::is_directory(path, ignored) || numbered_name(path)) {
         if (!numbered_name(path)) return AnimationFormat::numbered;
         if (const Result<MeshFormat> format = mesh_format(path); !format) return format.error();
         return AnimationFormat::numbered;
@@ -230,12 +230,9 @@ Result<std::vector<std::string>> write_animation(const MeshAnimation& animation,
     case AnimationFormat::mdd:
         written = write_mdd(animation, positions, path, context);
         break;
-    case AnimationFormat::usda: {
-        Result<std::vector<std::string>> said = write_usda(animation, path, context);
-        if (!said) return said;
-        warnings = std::move(*said);
+    case AnimationFormat::usda:
+        written = write_usda(animation, positions, path, warnings, context);
         break;
-    }
     case AnimationFormat::glb: {
         Result<ExportReport> report = write_morph_glb(animation, {}, path, context);
         if (!report) return report.error();
