@@ -49,6 +49,15 @@ void read_export_report(gltf::Scene& scene) {
     if (const gltf::Value report = extras["filigree"]) scene.export_report = report.json().dump(-1, ' ', true);
 }
 
+/// A damaged file can have one for each of its parts.
+void shorten(std::vector<std::string>& warnings) {
+    constexpr std::size_t kMost = 20;
+    if (warnings.size() <= kMost) return;
+    const std::size_t more = warnings.size() - kMost;
+    warnings.resize(kMost);
+    warnings.push_back("There are " + std::to_string(more) + " more warnings of this kind.");
+}
+
 void place_rest(gltf::Scene& scene, const RunContext& context) {
     Mesh& mesh = scene.mesh;
     std::vector<Vec3d> world(mesh.positions.size());
@@ -84,6 +93,7 @@ Status read_scene(std::string_view bytes, gltf::Scene& scene, const RunContext& 
         gltf::read_meshes(scene, context);
         place_rest(scene, context);
         read_export_report(scene);
+        shorten(scene.warnings);
     } catch (const gltf::Damage& damage) {
         if (damage.code == ErrorCode::cancelled) return cancelled_error();
         return Error{damage.code, scene.name + ": " + damage.what};

@@ -354,7 +354,7 @@ std::string_view Document::unpack_glb(std::string_view bytes) {
 void Document::check_header() const {
     if (!json_.is_object()) throw Damage{"its JSON is not an object."};
     const Value asset = root()["asset"];
-    if (!asset) throw Damage{"has no \"asset\", so it is JSON but not glTF 2.0."};
+    if (!asset || !asset.json().is_object()) throw Damage{"has no \"asset\", so it is JSON but not glTF 2.0."};
     for (const char* member : {"version", "minVersion"}) {
         const Value version = asset[member];
         if (!version && std::string_view(member) == "minVersion") continue;

@@ -248,6 +248,8 @@ public:
         label_faces();
         finish_corners();
         collect_warnings();
+        for (Geometry& geometry : scene_.geometries) // the mesh has them now
+            geometry.uvs = {}, geometry.colors = {}, geometry.scalars = {};
     }
 
 private:
@@ -415,10 +417,10 @@ private:
         for (std::size_t a = 0; a < scene_.animations.size(); ++a)
             for (const Channel& channel : scene_.animations[a].channels) {
                 const Sampler& sampler = scene_.animations[a].samplers[channel.sampler];
-                motions_[channel.node] += " " + std::to_string(a) + ":" +
-                                          std::to_string(static_cast<int>(channel.path)) + ":" + sampler.times.path +
-                                          ":" + sampler.values.path + ":" +
-                                          std::to_string(static_cast<int>(sampler.interpolation));
+                for (const std::string& part :
+                     {std::to_string(a), std::to_string(static_cast<int>(channel.path)), sampler.times.path,
+                      sampler.values.path, std::to_string(static_cast<int>(sampler.interpolation))})
+                    motions_[channel.node].append(part).append(" ");
             }
     }
 
