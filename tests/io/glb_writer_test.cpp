@@ -224,6 +224,23 @@ TEST(GlbWriter, TexturesThatCannotBeKeptAreSaid) {
     EXPECT_FALSE(written.glb.json.contains("textures"));
 }
 
+TEST(GlbWriter, PicturesLoseWhatGltfIgnores) {
+    const auto chunk = [](const std::string& name, const std::string& content) {
+        return std::string(3, '\0') + static_cast<char>(content.size()) + name + content + "sum!";
+    };
+    const std::string start = "\x89PNG\r\n\x1a\n" + chunk("IHDR", "as it was"), end = chunk("IEND", "");
+    const std::string profile = chunk("iCCP", "a profile") + chunk("pHYs", "not square");
+    for (const std::string& cut : {std::string(), end}) { // a damaged file stays as it is
+        Mesh mesh = square();
+        mesh.materials = {{"a"}, {0, 0}};
+        mesh.embedded_materials = {material("a", start + profile + cut)};
+        const Glb glb = write(mesh).glb;
+        const Json& view = glb.json["bufferViews"][glb.json["images"][0]["bufferView"].get<std::size_t>()];
+        const std::string kept = glb.data.substr(view["byteOffset"], view["byteLength"]);
+        EXPECT_TRUE(kept == (cut.empty() ? start + profile : start + end));
+    }
+}
+
 TEST(GlbWriter, LibrariesBesideTheMeshAreEmbedded) {
     std::string name = (fs::temp_directory_path() / "filigree-XXXXXX").string();
     const fs::path folder = ::mkdtemp(name.data());

@@ -228,6 +228,25 @@ std::string attribute_name(const std::string& scalar, const Json& attributes) {
 
 // --------------------------------------------------------------------------------------------------------- materials
 
+/// A PNG without what glTF wants ignored and its validator warns of: colour profiles, pixels that are not square,
+/// further frames of an animation. The bytes as they are where there is nothing of it, or they are damaged.
+std::string plain_png(const std::string& bytes) {
+    constexpr std::size_t kSignature = 8, kFrame = 12; // of a chunk: length, name, checksum
+    constexpr std::string_view kLeftOut[] = {"iCCP", "pHYs", "acTL", "fcTL", "fdAT"};
+    std::string plain = bytes.substr(0, kSignature);
+    for (std::size_t at = kSignature; at + kFrame <= bytes.size();) {
+        std::size_t length = 0;
+        for (std::size_t i = 0; i < 4; ++i) length = length << 8 | static_cast<unsigned char>(bytes[at + i]);
+        if (length > bytes.size() - at - kFrame) return bytes;
+        const std::string_view name = std::string_view(bytes).substr(at + 4, 4);
+        if (std::find(std::begin(kLeftOut), std::end(kLeftOut), name) == std::end(kLeftOut))
+            plain.append(bytes, at, kFrame + length);
+        at += kFrame + length;
+        if (name == "IEND") return plain;
+    }
+    return bytes;
+}
+
 /// Pictures as textures, each once.
 class TextureAdder {
 public:
@@ -262,7 +281,7 @@ private:
         if (!json.contains("samplers")) // smooth, repeated
             json["samplers"] =
                 Json::array({{{"magFilter", 9729}, {"minFilter", 9987}, {"wrapS", 10497}, {"wrapT", 10497}}});
-        Json image = {{"bufferView", builder_.add_view(bytes)},
+        Json image = {{"bufferView", builder_.add_view(ending == ".png" ? plain_png(bytes) : bytes)},
                       {"mimeType", ending == ".png" ? "image/png" : "image/jpeg"}};
         if (!name.empty()) image["name"] = name;
         json["images"].push_back(std::move(image));
