@@ -117,6 +117,7 @@ async function visit(browser, url, { thorough, pictures }) {
         await page.screenshot({ path: join(pictures, 'page.png') });
         await page.click('#theme');
         await page.setViewportSize({ width: 390, height: 780 });
+        await page.click('#panel summary');
         await on_page.picture(page);
         await page.screenshot({ path: join(pictures, 'page_dark_phone.png') });
     }

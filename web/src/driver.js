@@ -4,8 +4,8 @@ import { LineMaterial } from 'three/addons/lines/LineMaterial.js';
 import { LineSegments2 } from 'three/addons/lines/LineSegments2.js';
 import { LineSegmentsGeometry } from 'three/addons/lines/LineSegmentsGeometry.js';
 
-const kNearer = 0.012; // lines are drawn this much nearer, as a fraction of the diagonal: the driver cuts through the surface
-const kHidden = 0.16;  // opacity of what lies behind the surface
+const kNearer = 0.02; // lines are drawn this much nearer, as a fraction of the diagonal: the driver cuts through the surface
+const kHidden = 0.28; // opacity of what lies behind the surface
 
 /// Lines that follow the coarsest level's mesh. Null where there is nothing to show.
 export function make_driver(model, diagonal) {

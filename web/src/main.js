@@ -33,7 +33,6 @@ class Page {
     element('panel').open = !is_narrow();
     element('timeline').hidden = !model.action;
     this.resize();
-    this.stage.frame();
     this.show_level(0);
     this.seek(0);
     if (model.action && !matchMedia('(prefers-reduced-motion: reduce)').matches) this.toggle_play();

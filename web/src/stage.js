@@ -26,6 +26,7 @@ export class Stage {
     this.controls.minDistance = 0.05 * this.radius;
     this.controls.maxDistance = 30 * this.radius;
     this.controls.addEventListener('change', on_change);
+    this.controls.addEventListener('start', () => { this.was_turned = true; });
   }
 
   lights() {
@@ -103,10 +104,12 @@ export class Stage {
     this.camera.aspect = width / height;
     this.free = { width: width - right, height: height - bottom };
     this.camera.setViewOffset(width, height, right / 2, bottom / 2, width, height);
+    if (!this.was_turned) this.frame(); // a view that the user chose stays
   }
 
   /// All of the animation in the picture, seen from the front and a little from above.
   frame() {
+    this.was_turned = false;
     const { width, height } = this.free, full = this.renderer.getSize(new THREE.Vector2());
     const tangent = Math.tan((kFieldOfView / 2) * (Math.PI / 180));
     const direction = new THREE.Vector3(0.45, 0.32, 1).normalize();
