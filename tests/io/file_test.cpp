@@ -121,3 +121,46 @@ TEST_F(File, FollowsLinksAndKeepsPermissions) {
     fs::create_symlink("circle", folder_ / "circle");
     EXPECT_FALSE(write(folder_ / "circle", "x").ok());
 }
+
+TEST_F(File, PieceByPieceIsWholeOrNotAtAll) {
+    const fs::path target = folder_ / "a";
+    ASSERT_TRUE(write(target, "old").ok());
+    fs::permissions(target, fs::perms::owner_read | fs::perms::owner_write | fs::perms::others_read);
+    {
+        Result<FileWriter> unfinished = FileWriter::create(target);
+        ASSERT_TRUE(unfinished.ok());
+        ASSERT_TRUE(unfinished->write("half").ok());
+        EXPECT_EQ(files_in_folder(), 2u); // the temporary file is beside it
+    }
+    EXPECT_EQ(*read_file(target), "old");
+    EXPECT_EQ(files_in_folder(), 1u);
+
+    Result<FileWriter> writer = FileWriter::create(target);
+    ASSERT_TRUE(writer.ok());
+    FileWriter moved = std::move(*writer);
+    for (const std::string_view piece : {"n", "", "ew"}) ASSERT_TRUE(moved.write(piece).ok());
+    EXPECT_EQ(*read_file(target), "old"); // until it is finished
+    ASSERT_TRUE(moved.finish().ok());
+    EXPECT_EQ(*read_file(target), "new");
+    EXPECT_EQ(fs::status(target).permissions(),
+              fs::perms::owner_read | fs::perms::owner_write | fs::perms::others_read);
+    EXPECT_EQ(files_in_folder(), 1u);
+
+    ASSERT_TRUE(FileWriter::create("/dev/full")->write("").ok());
+    EXPECT_EQ(FileWriter::create("/dev/full")->write("x").error().code, ErrorCode::unwritable);
+    EXPECT_EQ(FileWriter::create(folder_ / "missing" / "a").error().code, ErrorCode::unwritable);
+    EXPECT_EQ(FileWriter::create(folder_).error().code, ErrorCode::unwritable);
+}
+
+TEST_F(File, PiecesGoToStandardOutput) {
+    const int kept = ::dup(STDOUT_FILENO);
+    ASSERT_NE(std::freopen((folder_ / "out").c_str(), "w", stdout), nullptr);
+    Result<FileWriter> writer = FileWriter::create("-");
+    const bool done =
+        writer.ok() && writer->write("to ").ok() && writer->write("standard output").ok() && writer->finish().ok();
+    std::fflush(stdout);
+    ::dup2(kept, STDOUT_FILENO);
+    ::close(kept);
+    EXPECT_TRUE(done);
+    EXPECT_EQ(*read_file(folder_ / "out"), "to standard output");
+}
