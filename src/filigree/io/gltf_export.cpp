@@ -22,10 +22,16 @@ namespace {
 
 using Json = GlbBuilder::Json;
 
-/// Moments of the animation at which the driver is looked at: keys, and for cubic keys what lies around each.
+/// A key, and how its tangent follows from what lies around it: sum of weights times samples.
+struct Key {
+    std::size_t sample;
+    std::array<std::pair<std::size_t, double>, 3> slope = {};
+};
+
+/// Moments of the animation at which the driver is looked at: keys, and for cubic keys two more for each.
 struct Sampling {
-    std::vector<double> times;     ///< seconds, ascending
-    std::vector<std::size_t> keys; ///< positions in `times`
+    std::vector<double> times; ///< seconds
+    std::vector<Key> keys;     ///< ascending
 };
 
 Sampling plan_samples(const PoseStream& poses, const SkinOptions& options) {
@@ -37,13 +43,27 @@ Sampling plan_samples(const PoseStream& poses, const SkinOptions& options) {
     if (duration - keys.back() > 1e-6 / rate) keys.push_back(duration); // the last frame is always a key
 
     Sampling sampling;
-    const double aside =
-        options.interpolation == KeyInterpolation::cubic ? std::min(1 / poses.frames_per_second, 0.5 / rate) : 0;
-    for (const double key : keys) {
-        if (aside > 0 && key > 0) sampling.times.push_back(std::max(0.0, key - aside));
-        sampling.keys.push_back(sampling.times.size());
-        sampling.times.push_back(key);
-        if (aside > 0 && key < duration) sampling.times.push_back(std::min(duration, key + aside));
+    const auto sample = [&](double time) {
+        sampling.times.push_back(std::clamp(time, 0.0, duration));
+        return sampling.times.size() - 1;
+    };
+    // Differences of second order: from both sides, and at the ends from two steps inwards.
+    const double aside = std::min({1 / poses.frames_per_second, 0.5 / rate, 0.5 * duration});
+    const bool tangents = options.interpolation == KeyInterpolation::cubic && keys.size() > 1;
+    for (const double time : keys) {
+        const double side = time == 0 ? 1 : time == duration ? -1 : 0;
+        if (!tangents) {
+            sampling.keys.push_back({sample(time)});
+        } else if (side == 0) {
+            const std::size_t before = sample(time - aside), at = sample(time), after = sample(time + aside);
+            const double weight = 0.5 / aside;
+            sampling.keys.push_back({at, {{{before, -weight}, {at, 0}, {after, weight}}}});
+        } else {
+            const double weight = 0.5 * side / aside;
+            const std::size_t at = sample(time), near = sample(time + side * aside),
+                              far = sample(time + 2 * side * aside);
+            sampling.keys.push_back({at, {{{at, -3 * weight}, {near, 4 * weight}, {far, -weight}}}});
+        }
     }
     return sampling;
 }
@@ -83,7 +103,7 @@ Result<Motion> sample_motion(const Skin& skin, const Sampling& sampling, PoseSam
                 motion.translations[j][s] = joint.translation;
             }
         });
-        if (sampling.keys[next_key] != s) continue;
+        if (sampling.keys[next_key].sample != s) continue;
         next_key = std::min(next_key + 1, sampling.keys.size() - 1);
         std::vector<float> errors(gradients.size());
         parallel_for(context, errors.size(), 256, [&](std::size_t begin, std::size_t end) {
@@ -126,15 +146,13 @@ std::array<Track, 4> make_tracks(const std::vector<NestedRotations>& parts, std:
 std::vector<double> key_values(const Track& track, const Sampling& sampling, bool cubic) {
     std::vector<double> values;
     const auto number = [&](std::size_t sample, std::size_t k) { return track.values[sample * track.width + k]; };
-    for (const std::size_t key : sampling.keys) {
-        const std::size_t before = key > 0 ? key - 1 : key, after = std::min(key + 1, sampling.times.size() - 1);
-        const double span = sampling.times[after] - sampling.times[before];
+    for (const Key& key : sampling.keys)
         for (int part = cubic ? -1 : 0; part <= (cubic ? 1 : 0); ++part)
-            for (std::size_t k = 0; k < track.width; ++k)
-                values.push_back(part == 0  ? number(key, k)
-                                 : span > 0 ? (number(after, k) - number(before, k)) / span
-                                            : 0);
-    }
+            for (std::size_t k = 0; k < track.width; ++k) {
+                double slope = 0;
+                for (const auto& [sample, weight] : key.slope) slope += weight * number(sample, k);
+                values.push_back(part == 0 ? number(key.sample, k) : slope);
+            }
     return values;
 }
 
@@ -146,7 +164,7 @@ public:
           cubic_(options.interpolation == KeyInterpolation::cubic && sampling.keys.size() > 1),
           small_rotations_(!options.full_precision && !cubic_) {
         std::vector<float> times;
-        for (const std::size_t key : sampling.keys) times.push_back(float(sampling.times[key]));
+        for (const Key& key : sampling.keys) times.push_back(float(sampling.times[key.sample]));
         input_ = builder_.add_scalars(times, GltfTarget::none, true);
     }
 
@@ -466,7 +484,7 @@ private:
             return restorer.positions(*pose, out, context_);
         };
         std::vector<double> keys;
-        for (const std::size_t key : sampling.keys) keys.push_back(sampling.times[key]);
+        for (const Key& key : sampling.keys) keys.push_back(sampling.times[key.sample]);
         return measure_animation(played, scene->mesh().vertex_count(), restored, restorer.vertex_count(), keys,
                                  poses_.frames_per_second, report_, context_);
     }
