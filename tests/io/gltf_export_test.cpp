@@ -6,6 +6,7 @@
 #include "filigree/hierarchy/strip.h"
 #include "filigree/io/file.h"
 #include "filigree/io/gltf.h"
+#include "filigree/io/point_cache.h"
 #include "filigree/mesh/shapes.h"
 
 #include <cstring>
@@ -271,6 +272,24 @@ TEST_F(GltfExport, RefusesWhatItCannotWrite) {
     cancelled.cancel();
     EXPECT_EQ(write_skin_glb(model, stream_of(poses), {}, file(), cancelled).error().code, ErrorCode::cancelled);
     EXPECT_FALSE(fs::exists(file()));
+}
+
+TEST_F(GltfExport, ADriverThatLeftAsAnAnimationComesBackAsPoses) {
+    const Model& model = wavy_model();
+    const PoseSequence poses = make_poses(model, 7, 24);
+    skin(model, poses, {.restore = {.level = 0}, .full_precision = true});
+    const Result<PoseStream> back =
+        open_poses(file(), model.driver().vertices.size(), model.mesh.origin, {.frames_per_second = 24}, kContext);
+    ASSERT_TRUE(back.ok()) << back.error().message;
+    ASSERT_EQ(back->frames, 7u);
+    for (const std::size_t frame : {0u, 3u, 6u}) {
+        const Pose pose = back->pose(frame).value();
+        for (std::size_t i = 0; i < pose.positions.size(); ++i)
+            ASSERT_LT((pose.positions[i] - poses.frames[frame].positions[i]).norm(), 1e-6);
+    }
+    const Result<PoseStream> other = open_poses(file(), 3, Vec3d::Zero(), {}, kContext);
+    ASSERT_FALSE(other.ok());
+    EXPECT_EQ(other.error().code, ErrorCode::mismatch);
 }
 
 TEST_F(GltfExport, MorphTargetsHoldEveryFrame) {
