@@ -265,6 +265,7 @@ TEST_F(GltfExport, RefusesWhatItCannotWrite) {
     EXPECT_EQ(refused(poses, {.restore = {.level = 99}}), ErrorCode::usage);
     EXPECT_EQ(refused(poses, {.key_rate = 0}), ErrorCode::usage);
     EXPECT_EQ(refused(poses, {.influences = 4}), ErrorCode::usage);
+    EXPECT_EQ(refused(make_poses(model, 100, 24), {.key_rate = 1e6}), ErrorCode::unsupported); // 17 GB, found at once
     PoseSequence other = poses;
     other.frames[1].positions.pop_back();
     EXPECT_EQ(refused(other, {}), ErrorCode::mismatch);

@@ -42,13 +42,24 @@ Result<Pose> PoseSampler::at(double seconds) {
 
 namespace {
 
-/// The frame nearest the middle of two keys when one lies strictly between, else the middle.
-double moment_between(double first, double second, double frames_per_second) {
+struct Moment {
+    double seconds;
+    bool is_key;
+};
+
+/// Keys, and between two of them every frame that lies strictly between, or the middle where none does.
+std::vector<Moment> list_moments(std::span<const double> keys, double frames_per_second) {
     constexpr double kSameMoment = 1e-3; // of a frame
-    const double middle = 0.5 * (first + second), frame = std::round(middle * frames_per_second);
-    const bool inside =
-        frame > first * frames_per_second + kSameMoment && frame < second * frames_per_second - kSameMoment;
-    return inside ? frame / frames_per_second : middle;
+    std::vector<Moment> moments;
+    for (std::size_t k = 0; k < keys.size(); ++k) {
+        moments.push_back({keys[k], true});
+        if (k + 1 == keys.size()) break;
+        const double first = std::floor(keys[k] * frames_per_second + kSameMoment) + 1;
+        const double end = keys[k + 1] * frames_per_second - kSameMoment;
+        for (double frame = first; frame < end; ++frame) moments.push_back({frame / frames_per_second, false});
+        if (moments.back().is_key) moments.push_back({0.5 * (keys[k] + keys[k + 1]), false});
+    }
+    return moments;
 }
 
 struct ErrorSum {
@@ -73,30 +84,26 @@ Status measure_animation(const PositionsAt& played, std::size_t played_count, co
                          std::size_t restored_count, std::span<const double> keys, double frames_per_second,
                          ExportReport& report, const RunContext& context) {
     constexpr double kVerticesChecked = 1e8;
-    if (played_count < restored_count)
+    if (restored_count == 0 || played_count < restored_count)
         return Error{ErrorCode::unsuitable, "The exported GLB has fewer vertices than the mesh: please report this."};
+    const std::vector<Moment> moments = list_moments(keys, frames_per_second);
     const std::size_t most =
-        std::max<std::size_t>(8, static_cast<std::size_t>(kVerticesChecked / 2 / double(restored_count)));
-    const std::size_t checked = std::min(keys.size(), most);
+        std::max<std::size_t>(16, static_cast<std::size_t>(kVerticesChecked / double(restored_count)));
+    const std::size_t checked = std::min(moments.size(), most);
     std::vector<Vec3f> a(played_count), b(restored_count);
     ErrorSum at_keys, between;
     double diagonal = 0;
-    const auto compare = [&](double seconds, ErrorSum& sum) -> Status {
-        if (context.is_cancelled()) return cancelled_error();
-        if (Status s = played(seconds, a); !s) return s;
-        if (Status s = restored(seconds, b); !s) return s;
-        if (report.moments_checked == 0) diagonal = bounds(b).diagonal();
-        sum.add(a, b);
-        ++report.moments_checked;
-        return Success{};
-    };
     for (std::size_t i = 0; i < checked; ++i) {
+        if (context.is_cancelled()) return cancelled_error();
         context.report("measuring the error", double(i) / double(checked));
-        const std::size_t key = checked > 1 ? i * (keys.size() - 1) / (checked - 1) : 0;
-        if (Status s = compare(keys[key], at_keys); !s) return s;
-        if (key + 1 == keys.size()) continue;
-        if (Status s = compare(moment_between(keys[key], keys[key + 1], frames_per_second), between); !s) return s;
+        const Moment& moment = moments[checked > 1 ? i * (moments.size() - 1) / (checked - 1) : 0];
+        if (Status s = played(moment.seconds, a); !s) return s;
+        if (Status s = restored(moment.seconds, b); !s) return s;
+        if (i == 0) diagonal = bounds(b).diagonal();
+        (moment.is_key ? at_keys : between).add(a, b);
     }
+    report.moments = moments.size();
+    report.moments_checked = checked;
     const double scale = diagonal > 0 ? 1 / diagonal : 0;
     report.error_at_keys = scale * at_keys.max();
     report.rms_at_keys = scale * at_keys.rms();

@@ -34,8 +34,8 @@ using PositionsAt = std::function<Status(double seconds, std::span<Vec3f> out)>;
 
 /// Sets the errors of `report`: the first `restored_count` of the played vertices against the restored ones, as
 /// fractions of the restored mesh's diagonal at the first key (a pose may be in other units than the rest shape).
-/// `keys` in seconds; between two keys the moment looked at is the frame nearest their middle, or the middle where no
-/// frame lies between. Of many keys some are looked at, evenly chosen, so that about 10^8 vertices are.
+/// Looked at are all keys (in seconds) and all frames between them, or the middle of two keys where no frame lies
+/// between; of very many some, evenly chosen, so that about 10^8 vertices are.
 Status measure_animation(const PositionsAt& played, std::size_t played_count, const PositionsAt& restored,
                          std::size_t restored_count, std::span<const double> keys, double frames_per_second,
                          ExportReport& report, const RunContext& context);

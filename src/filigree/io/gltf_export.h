@@ -49,7 +49,8 @@ struct ExportReport {
     /// half way, against the restore of the driver half way).
     double error_at_keys = 0, error_between_keys = 0;
     double rms_at_keys = 0, rms_between_keys = 0;
-    std::size_t moments_checked = 0; ///< keys and moments between that were evaluated
+    std::size_t moments = 0;         ///< keys, and moments between them
+    std::size_t moments_checked = 0; ///< of these, how many were evaluated: all, unless there are very many
     /// 95th percentile, over driver vertices and keys, of how far normals may be off, in degrees, in viewers that turn
     /// them with the skin matrix (three.js, Babylon.js): atan r - atan(1/r) of the stretch ratio r.
     double normal_error_degrees = 0;

@@ -42,7 +42,9 @@ public:
             mesh_.normals = {};
         }
         parts_ = make_glb_parts(mesh_);
-        if (parts_.vertex_count() * (options_.morph_normals ? 24 : 12) * animation_.frames > (std::size_t{1} << 32))
+        const std::size_t a_frame =
+            parts_.vertex_count() * (options_.morph_normals ? 24 : 12) + 4 * animation_.frames; // offsets and weights
+        if (a_frame > (std::size_t{1} << 32) / animation_.frames)
             return Error{ErrorCode::unsupported,
                          path.string() + ": " + std::to_string(animation_.frames) + " morph targets of " +
                              std::to_string(parts_.vertex_count()) +
@@ -132,7 +134,7 @@ private:
         const double scale = diagonal > 0 ? 1 / diagonal : 0;
         report_.error_at_keys = scale * std::sqrt(largest);
         report_.rms_at_keys = scale * std::sqrt(squares / double(animation_.frames * mesh_.vertex_count()));
-        report_.moments_checked = animation_.frames;
+        report_.moments = report_.moments_checked = animation_.frames;
         for (Json& mesh : meshes_)
             for (Json& primitive : mesh["primitives"]) primitive["targets"] = targets;
         builder_.json["meshes"] = std::move(meshes_);
