@@ -28,4 +28,5 @@ for (const file of positionals) {
             + `RMS there ${worst.rms.toExponential(2)}`);
     }
     if (status !== 0) fail(`${file}: ${stderr.trim() || stdout.trim().split('\n').slice(-8).join('\n')}`);
+    if (compared.length === 0) fail(`${file}: no frame was compared`);
 }

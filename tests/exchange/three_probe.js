@@ -4,16 +4,12 @@ import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 
 let scene, mixer, action, mesh;
 
-/// Loads the model. Returns { vertices, triangles, joints, duration, diagonal }; the diagonal is that of the mesh while
-/// nothing plays.
+/// Loads the model. Returns { vertices, triangles, joints, duration }.
 export async function load(url) {
     const gltf = await new GLTFLoader().loadAsync(url);
     scene = gltf.scene;
     scene.updateMatrixWorld(true);
     scene.traverse((node) => { if (node.isMesh && !mesh) mesh = node; });
-    const box = new THREE.Box3();
-    const positions = evaluated();
-    for (let i = 0; i < positions.length; i += 3) box.expandByPoint(new THREE.Vector3().fromArray(positions, i));
     mixer = new THREE.AnimationMixer(scene);
     if (gltf.animations.length > 0) {
         action = mixer.clipAction(gltf.animations[0]);
@@ -24,7 +20,6 @@ export async function load(url) {
         triangles: mesh.geometry.index.count / 3,
         joints: mesh.skeleton?.bones.length ?? 0,
         duration: action?.getClip().duration ?? 0,
-        diagonal: box.getSize(new THREE.Vector3()).length(),
     };
 }
 
@@ -46,13 +41,14 @@ function evaluated(count = mesh.geometry.attributes.position.count) {
 
 let reference; // { points, frames, positions(frame) }
 
-/// Reads a PC2. Returns { points, frames }.
+/// Reads a PC2. Returns { points, frames, diagonal }, the diagonal of its first frame.
 export async function load_reference(url) {
     const bytes = await (await fetch(url)).arrayBuffer(), head = new DataView(bytes, 0, 32);
     if (new TextDecoder('latin1').decode(new Uint8Array(bytes, 0, 11)) !== 'POINTCACHE2') throw new Error('not a PC2');
     const points = head.getInt32(16, true), frames = head.getInt32(28, true);
     reference = { points, positions: (frame) => new Float32Array(bytes, 32 + 12 * points * frame, 3 * points) };
-    return { points, frames };
+    const box = new THREE.Box3().setFromArray(reference.positions(0));
+    return { points, frames, diagonal: box.getSize(new THREE.Vector3()).length() };
 }
 
 /// Largest and RMS distance from a frame of the reference, in the file's units, over all of the reference's vertices.
