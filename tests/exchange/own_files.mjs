@@ -1,7 +1,7 @@
 // Makes the files that the other tests try: everything the program writes as GLB, and point caches to compare with.
 // Usage: node own_files.mjs PROGRAM FOLDER
 import { execFileSync } from 'node:child_process';
-import { existsSync, mkdirSync, rmSync } from 'node:fs';
+import { existsSync, mkdirSync, rmSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { root } from './tools.mjs';
 
@@ -33,9 +33,51 @@ filigree('export', ...moving, '-o', 'skin_flat.glb', '--no-normals', '--key-rate
 filigree('export', ...moving, '-o', 'morph.glb', '--as', 'morph', '--morph-normals');
 filigree('export', ...moving, '-o', 'page', '--web');
 
+// Two objects, two materials and a UV seam: a tube of which each half is an object, its texture's ends at one edge.
+const kAround = 24, kRings = 16;
+const lines = ['mtllib tube.mtl'];
+for (let ring = 0; ring <= kRings; ++ring)
+    for (let i = 0; i < kAround; ++i) {
+        const angle = (2 * Math.PI * i) / kAround;
+        lines.push(`v ${0.3 * Math.cos(angle)} ${(2 * ring) / kRings} ${0.3 * Math.sin(angle)}`);
+    }
+for (let ring = 0; ring <= kRings; ++ring)
+    for (let i = 0; i <= kAround; ++i) lines.push(`vt ${i / kAround} ${ring / kRings}`);
+for (let ring = 0; ring < kRings; ++ring) {
+    if (ring === 0) lines.push('o lower', 'usemtl red');
+    if (ring === kRings / 2) lines.push('o upper', 'usemtl blue');
+    for (let i = 0; i < kAround; ++i) {
+        const corner = (up, along) => `${(ring + up) * kAround + ((i + along) % kAround) + 1}/${(ring + up) * (kAround + 1) + i + along + 1}`;
+        lines.push(`f ${corner(0, 0)} ${corner(1, 0)} ${corner(1, 1)}`, `f ${corner(0, 0)} ${corner(1, 1)} ${corner(0, 1)}`);
+    }
+}
+writeFileSync(join(folder, 'tube.obj'), lines.join('\n') + '\n');
+writeFileSync(join(folder, 'tube.mtl'), 'newmtl red\nKd 0.8 0.1 0.1\nnewmtl blue\nKd 0.1 0.2 0.8\n');
+filigree('deform', 'tube.obj', '-o', 'tube_bent.glb', '--bend', '60');
+filigree('strip', 'tube.obj', '-o', 'tube.fil', '--base', '60');
+filigree('export', 'tube.fil', '-o', 'tube.glb');
+filigree('deform', 'tube.fil', '-o', 'tube_moved.fil', '--bend', '60', '--frames', '5');
+filigree('export', 'tube_moved.fil', '-o', 'tube_skin.glb');
+filigree('export', 'tube_moved.fil', '-o', 'tube_morph.glb', '--as', 'morph', '--morph-normals');
+
+// What falls: poses that a scene makes.
+writeFileSync(join(folder, 'fall.toml'), '[simulation]\nduration = 0.2\n\n[[body]]\nmesh = "tube.fil"\nmaterial = "rubber"\nparticles = 300\n');
+filigree('simulate', 'fall.toml', '-o', 'simulated.glb');
+
+// Far from the origin, where 32-bit float is coarse.
+const far = lines.map((line) => line.replace(/^v (\S+) (\S+) (\S+)$/, (_, x, y, z) => `v ${Number(x) + 1e5} ${Number(y) - 2e5} ${Number(z) + 3e5}`));
+writeFileSync(join(folder, 'far.obj'), far.join('\n') + '\n');
+filigree('strip', 'far.obj', '-o', 'far.fil', '--base', '60');
+filigree('deform', 'far.fil', '-o', 'far_moved.fil', '--bend', '60', '--frames', '5');
+filigree('export', 'far_moved.fil', '-o', 'far_skin.glb');
+
 // With UVs, seams and a picture, where the corpus is there.
 const fox = join(root, '../shared/corpus/good/gltf/Fox/Fox.gltf');
 if (existsSync(fox)) {
     filigree('strip', fox, '-o', 'fox.fil', '--base', '100');
     filigree('export', 'fox.fil', '-o', 'fox.glb');
+    filigree('deform', 'fox.fil', '-o', 'fox_moved.fil', '--bend', '40', '--frames', '5');
+    filigree('export', 'fox_moved.fil', '-o', 'fox_skin.glb', '--all-levels');
+} else {
+    console.log('the corpus is not there: files without the Fox');
 }
