@@ -364,7 +364,6 @@ TEST_F(PointCache, WhatFailsLeavesNothing) {
         ASSERT_FALSE(stopped.ok());
         EXPECT_EQ(stopped.error().code, ErrorCode::cancelled);
         EXPECT_FALSE(fs::exists(path(std::string(name) == "folder/" ? "folder" : name)));
-        fs::remove(path("new")); // the outer of two new folders
         EXPECT_EQ(files(), 0u);
     }
     // and what was there stays
@@ -376,6 +375,62 @@ TEST_F(PointCache, WhatFailsLeavesNothing) {
     EXPECT_EQ(*read_file(path("n_0001.ply")), "old");
     EXPECT_FALSE(write_animation(moving(mesh_, 1), path("missing/a.pc2"), kContext).ok());
     EXPECT_EQ(files(), 2u);
+}
+
+TEST_F(PointCache, PipesInASequenceAreRefused) {
+    ASSERT_TRUE(write_animation(moving(mesh_, 3), path("n/m_####.ply"), kContext).ok());
+    const auto poses = open_poses(path("n"), mesh_.vertex_count(), Vec3d::Zero(), {}, kContext);
+    ASSERT_TRUE(poses.ok());
+    fs::remove(path("n/m_0002.ply"));
+    ASSERT_EQ(::mkfifo(path("n/m_0002.ply").c_str(), 0600), 0);
+    says(poses->pose(1).error(), ErrorCode::unsupported, {"m_0002.ply", "pipe"}); // and does not wait for a writer
+    fs::rename(path("n/m_0001.ply"), path("elsewhere.ply"));
+    fs::create_symlink(path("elsewhere.ply"), path("n/m_0001.ply"));
+    EXPECT_TRUE(poses->pose(0).ok()); // links are followed
+}
+
+TEST_F(PointCache, NumberedMeshesReplaceFilesAllOrNone) {
+    put("n_0001.ply", "old"), put("n_0002.ply", "old");
+    fs::permissions(path("n_0001.ply"), fs::perms(0640));
+    const auto refused = [&](const std::vector<std::string>& words) {
+        const auto written = write_animation(moving(mesh_, 3), path("n_####.ply"), kContext);
+        ASSERT_FALSE(written.ok());
+        says(written.error(), ErrorCode::unwritable, words);
+        EXPECT_EQ(*read_file(path("n_0001.ply")), "old");
+        EXPECT_EQ(*read_file(path("n_0002.ply")), "old");
+    };
+    fs::create_symlink(path("n_0001.ply"), path("n_0003.ply"));
+    refused({"n_0003.ply", "symbolic link"});
+    fs::remove(path("n_0003.ply"));
+    ASSERT_EQ(::mkfifo(path("n_0003.ply").c_str(), 0600), 0);
+    refused({"n_0003.ply", "pipe"});
+    fs::remove(path("n_0003.ply"));
+    EXPECT_EQ(files(), 2u);
+    // found only when it is its turn: those before it are put back
+    MeshAnimation late = moving(mesh_, 3);
+    late.positions = [&, inner = late.positions](std::size_t frame, std::span<Vec3f> positions) {
+        if (frame == 2) fs::remove(path("n_0002.ply")), fs::create_directory(path("n_0002.ply"));
+        return inner(frame, positions);
+    };
+    EXPECT_FALSE(write_animation(late, path("n_####.ply"), kContext).ok());
+    EXPECT_EQ(*read_file(path("n_0001.ply")), "old");
+    EXPECT_EQ(files(), 2u);
+    fs::remove(path("n_0002.ply"));
+    ASSERT_TRUE(write_animation(moving(mesh_, 3), path("n_####.ply"), kContext).ok());
+    EXPECT_EQ(fs::status(path("n_0001.ply")).permissions(), fs::perms(0640));
+    EXPECT_EQ(files(), 3u);
+}
+
+TEST_F(PointCache, ManyTimesOfAnMddAreWrittenInPieces) {
+    constexpr std::size_t kFrames = 40'000; // more than a piece holds
+    Mesh rest;
+    rest.positions = {{1, 2, 3}};
+    ASSERT_TRUE(write_animation(moving(rest, kFrames, 50), path("a.mdd"), kContext).ok());
+    const auto back = open_animation(path("a.mdd"), rest, {}, kContext);
+    ASSERT_TRUE(back.ok()) << back.error().message;
+    EXPECT_EQ(back->frames, kFrames);
+    EXPECT_EQ(back->frames_per_second, 50);
+    EXPECT_TRUE(frame_of(*back, kFrames - 1) == frame_of(moving(rest, kFrames), kFrames - 1));
 }
 
 TEST_F(PointCache, LongerSequencesFromBeforeAreTold) {

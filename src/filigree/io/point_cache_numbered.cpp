@@ -1,11 +1,13 @@
 // Numbered meshes: NAME_0001.ply, NAME_0002.ply and so on, a mesh a frame.
 #include "filigree/io/mesh_file.h"
+#include "filigree/io/new_folders.h"
 #include "filigree/io/point_cache_formats.h"
 
 #include <algorithm>
 #include <charconv>
 #include <map>
 
+#include <sys/stat.h>
 #include <unistd.h>
 
 namespace filigree {
@@ -98,6 +100,11 @@ Result<std::vector<fs::path>> numbered_files(const NumberedName& name, const std
 /// A moved mesh as a pose. has_gradients: as the first of its sequence, where that is known.
 Result<Pose> read_pose(const fs::path& file, std::size_t points, const Vec3d& origin, std::optional<bool> has_gradients,
                        const RunContext& context) {
+    std::error_code ignored;
+    const fs::file_status status = fs::status(file, ignored); // a pipe would wait for its writer
+    if (fs::exists(status) && !fs::is_regular_file(status))
+        return Error{ErrorCode::unsupported, file.string() + ": is a pipe, a device or a folder, and the meshes of a "
+                                                             "sequence are files; take it out of the sequence."};
     const Result<MeshFile> read = read_mesh(file, context);
     if (!read) return read.error();
     if (read->mesh.vertex_count() != points)
@@ -138,6 +145,62 @@ private:
 Error cannot_write(const fs::path& path, const std::string& cause) {
     return {ErrorCode::unwritable, path.string() + ": cannot be written: " + cause + "."};
 }
+
+/// Whether a file can be put there. What a link leads to would not be replaced, so links are refused.
+Status check_target(const fs::path& target) {
+    struct stat status {};
+    if (::lstat(target.c_str(), &status) != 0) return Success{};
+    if (S_ISDIR(status.st_mode)) return cannot_write(target, "it is a folder");
+    if (S_ISLNK(status.st_mode))
+        return cannot_write(target, "it is a symbolic link; remove it, or choose another name");
+    if (!S_ISREG(status.st_mode)) return cannot_write(target, "it is a pipe or a device");
+    if (::access(target.c_str(), W_OK) != 0) return cannot_write(target, "permission is denied");
+    return Success{};
+}
+
+/// Puts files in the places of others, all or none.
+class Replacement {
+public:
+    /// aside: a folder for what was there before.
+    explicit Replacement(fs::path aside) : aside_(std::move(aside)) {}
+    ~Replacement() {
+        std::error_code ignored;
+        for (auto place = replaced_.rbegin(); place != replaced_.rend() && !is_kept_; ++place)
+            if (place->before.empty())
+                fs::remove(place->target, ignored);
+            else
+                fs::rename(place->before, place->target, ignored);
+    }
+    Replacement(const Replacement&) = delete;
+    Replacement& operator=(const Replacement&) = delete;
+
+    Status replace(const fs::path& file, const fs::path& target) {
+        if (Status free = check_target(target); !free) return free;
+        std::error_code failed;
+        Place place{target, {}};
+        struct stat status {};
+        if (::stat(target.c_str(), &status) == 0) {
+            ::chmod(file.c_str(), status.st_mode & 07777); // best effort, as for some mounts
+            place.before = aside_ / ("before-" + std::to_string(replaced_.size()));
+            fs::create_hard_link(target, place.before, failed); // the target is never away
+            if (failed) fs::rename(target, place.before, failed);
+            if (failed) return cannot_write(target, "it cannot be replaced");
+        }
+        replaced_.push_back(std::move(place));
+        fs::rename(file, target, failed);
+        if (failed) return cannot_write(target, "it cannot be replaced");
+        return Success{};
+    }
+    void keep() { is_kept_ = true; }
+
+private:
+    struct Place {
+        fs::path target, before; ///< before: empty where nothing was
+    };
+    fs::path aside_;
+    std::vector<Place> replaced_;
+    bool is_kept_ = false;
+};
 
 void add_new(std::vector<std::string>& warnings, const std::vector<std::string>& more) {
     for (const std::string& warning : more)
@@ -187,6 +250,18 @@ std::optional<NumberedName> numbered_name(const fs::path& path) {
     return around(percent, end + 1, digits);
 }
 
+std::vector<fs::path> animation_files(const fs::path& path) {
+    std::error_code ignored;
+    const std::optional<NumberedName> name = numbered_name(path);
+    if (!name && !fs::is_directory(path, ignored)) return {path};
+    const fs::path folder = name ? name->folder : path;
+    std::vector<fs::path> files;
+    const Result<std::vector<std::string>> names = names_in(folder);
+    for (const std::string& file : names ? *names : std::vector<std::string>{})
+        if (!name || number_of(file, *name)) files.push_back(folder / file);
+    return files;
+}
+
 Result<PoseStream> open_numbered(const fs::path& path, std::size_t points, const Vec3d& origin,
                                  const PoseFileOptions& options, const RunContext& context) {
     std::optional<NumberedName> name = numbered_name(path);
@@ -219,9 +294,8 @@ Result<std::vector<std::string>> write_numbered_meshes(std::size_t frames,
         name = NumberedName{folder, folder.filename().string() + "_", ".ply"};
     }
     const fs::path folder = name->folder.empty() ? fs::path(".") : name->folder;
-    std::error_code failed, ignored;
-    const bool is_new = fs::create_directories(folder, failed);
-    if (failed) return cannot_write(folder, "the folder cannot be made");
+    const NewFolders folders(folder);
+    if (!folders.are_there()) return cannot_write(folder, "the folder cannot be made");
     std::vector<std::string> warnings;
     RunContext silent = context; // the bar tells of frames
     silent.progress = nullptr;
@@ -236,8 +310,7 @@ Result<std::vector<std::string>> write_numbered_meshes(std::size_t frames,
         for (std::size_t frame = 0; frame < frames; ++frame) {
             context.report("writing", double(frame) / double(frames));
             if (context.is_cancelled()) return cancelled_error();
-            if (fs::is_directory(name->file(frame + 1), ignored))
-                return cannot_write(name->file(frame + 1), "it is a folder");
+            if (Status free = check_target(name->file(frame + 1)); !free) return free;
             Result<Mesh> moved = mesh(frame);
             if (!moved) return moved.error();
             if (is_obj && !moved->embedded_materials.empty()) { // a library and its pictures for every frame, else
@@ -253,15 +326,15 @@ Result<std::vector<std::string>> write_numbered_meshes(std::size_t frames,
             add_new(warnings, *written);
         }
         if (context.is_cancelled()) return cancelled_error();
-        for (std::size_t number = 1; number <= frames; ++number) {
-            fs::rename(temporary_file(number), name->file(number), failed);
-            if (failed) return cannot_write(name->file(number), "it cannot be replaced");
-        }
+        Replacement replacement(temporary.path());
+        for (std::size_t number = 1; number <= frames; ++number)
+            if (Status done = replacement.replace(temporary_file(number), name->file(number)); !done) return done;
+        replacement.keep();
         return Success{};
     };
     const Status written = write_all();
     if (!written) {
-        if (is_new) fs::remove(folder, ignored);
+        folders.remove();
         return written.error();
     }
     context.report("writing", 1);

@@ -246,10 +246,16 @@ Status write_mdd(const MeshAnimation& animation, const WorldPositions& positions
     std::string header;
     append(header, static_cast<std::int32_t>(animation.frames));
     append(header, static_cast<std::int32_t>(animation.rest->vertex_count()));
-    for (std::size_t frame = 0; frame < animation.frames; ++frame)
-        append(header, static_cast<float>(double(frame) / animation.frames_per_second));
-    swap_words(header.data(), header.size() / 4);
-    if (Status written = file->write(header); !written) return written;
+    constexpr std::size_t kPiece = std::size_t{1} << 16; // bytes
+    for (std::size_t frame = 0; frame <= animation.frames; ++frame) {
+        if (header.size() >= kPiece || frame == animation.frames) {
+            swap_words(header.data(), header.size() / 4);
+            if (Status written = file->write(header); !written) return written;
+            if (context.is_cancelled()) return cancelled_error();
+            header.clear();
+        }
+        if (frame < animation.frames) append(header, static_cast<float>(double(frame) / animation.frames_per_second));
+    }
     return write_frames(*file, animation, positions, true, context);
 }
 

@@ -1,4 +1,5 @@
 #include "filigree/io/usd.h"
+#include "filigree/core/srgb.h"
 #include "filigree/io/file.h"
 #include "filigree/io/mesh_formats.h"
 #include "filigree/io/text_writer.h"
@@ -105,13 +106,11 @@ void write_uvs(UsdText& out, const Mesh& mesh) {
     if (!corners.empty()) out.text("    int[] primvars:st:indices = ").list(corners).text("\n");
 }
 
-/// sRGB as light: USD's colours are linear.
-float linear(float x) { return x <= 0.04045f ? x / 12.92f : std::pow((x + 0.055f) / 1.055f, 2.4f); }
-
 void write_colors(UsdText& out, const Mesh& mesh) {
     if (mesh.colors.empty()) return;
     std::vector<Vec3f> colors;
     std::vector<float> opacities;
+    const auto linear = [](float channel) { return static_cast<float>(linear_from_srgb(channel)); };
     for (const Vec4f& color : mesh.colors) {
         colors.emplace_back(linear(color.x()), linear(color.y()), linear(color.z()));
         opacities.push_back(color.w());
