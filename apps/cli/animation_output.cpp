@@ -1,4 +1,9 @@
 #include "animation_output.h"
+#include "restore_options.h"
+
+#include <set>
+
+#include <sys/stat.h>
 
 namespace filigree::cli {
 
@@ -30,18 +35,27 @@ void add_size(const std::string& path, std::size_t bytes, Table& table, Json& js
     json["bytes"] = bytes;
 }
 
+void add_moments(std::size_t frames, double rate, Json& json) {
+    json["frames"] = frames;
+    json["frames_per_second"] = rate;
+}
+
 void add_frames(std::size_t frames, double rate, std::size_t vertices, Table& table, Json& json) {
     table.row("frames",
               fmt::format("{} at {:.6g} a second, {} vertices each", with_commas(frames), rate, with_commas(vertices)));
-    json["frames"] = frames;
-    json["frames_per_second"] = rate;
+    add_moments(frames, rate, json);
     json["vertices"] = vertices;
 }
 
 /// What an export as skin or morph targets came to.
-void add_report(const ExportReport& report, bool is_skin, const std::string& path, Session& session, Table& table,
-                Json& json) {
+void add_report(const ExportReport& report, bool is_skin, bool has_normals, const std::string& path, Session& session,
+                Table& table, Json& json) {
+    constexpr double kSeen = 10; // degrees
     for (const std::string& warning : report.warnings) session.warn(warning);
+    if (has_normals && report.normal_error_degrees > kSeen)
+        session.warn(fmt::format("{}: normals are up to {:.0f} degrees off in viewers that do not correct them "
+                                 "(three.js): --no-normals makes them flat and right; see docs/exchange.md.",
+                                 path, report.normal_error_degrees));
     add_size(path, report.bytes, table, json);
     table.row(is_skin ? "skin" : "morph targets",
               is_skin ? fmt::format("{} vertices, {} joints, {} keys in {:.4g} s", with_commas(report.vertices),
@@ -53,7 +67,7 @@ void add_report(const ExportReport& report, bool is_skin, const std::string& pat
                                                    "(rms {:.1e}); {} moments evaluated",
                                                    report.error_at_keys, report.rms_at_keys, report.error_between_keys,
                                                    report.rms_between_keys, with_commas(report.moments_checked)));
-    if (report.normal_error_degrees > 0)
+    if (has_normals && report.normal_error_degrees > 0)
         table.row("normals", fmt::format("up to {:.3g} degrees off (95th percentile) in viewers that turn them with "
                                          "the skin's matrix, such as three.js",
                                          report.normal_error_degrees));
@@ -61,7 +75,7 @@ void add_report(const ExportReport& report, bool is_skin, const std::string& pat
     json["vertices"] = report.vertices;
     json["joints"] = report.joints;
     json["keys"] = report.keys;
-    json["seconds_long"] = report.seconds;
+    json["seconds"] = report.seconds;
     json["error_at_keys"] = report.error_at_keys;
     json["error_between_keys"] = report.error_between_keys;
     json["rms_at_keys"] = report.rms_at_keys;
@@ -96,10 +110,20 @@ void write_numbered(const Restorer& restorer, const PoseStream& poses, const std
 } // namespace
 
 void add_animation_options(CLI::App& command, AnimationOutput& output) {
-    const auto set_normals = [&output](ExportNormals normals) { output.skin.normals = output.morph.normals = normals; };
+    const auto given = [&output](const char* name) { output.given.emplace_back(name); };
+    const auto add_flag = [&](const char* name, const std::function<void()>& set, const char* text) {
+        command.add_flag_callback(
+            name,
+            [given, name, set] {
+                given(name);
+                set();
+            },
+            text);
+    };
     add_choice<bool>(
         command, "--as", {{"skin", false}, {"morph", true}},
-        [&output](bool as_morph) {
+        [&output, given](bool as_morph) {
+            given("--as");
             output.as_morph = as_morph;
             output.as_skin = !as_morph;
         },
@@ -107,28 +131,44 @@ void add_animation_options(CLI::App& command, AnimationOutput& output) {
         "model's code makes one)");
     command
         .add_option_function<double>(
-            "--key-rate", [&output](const double& rate) { output.skin.key_rate = rate; },
+            "--key-rate",
+            [&output, given](const double& rate) {
+                given("--key-rate");
+                output.skin.key_rate = rate;
+            },
             "Skin: keys a second (unset: one a frame)")
         ->check(positive_number());
     add_choice<KeyInterpolation>(
         command, "--interpolation", {{"linear", KeyInterpolation::linear}, {"cubic", KeyInterpolation::cubic}},
-        [&output](KeyInterpolation interpolation) { output.skin.interpolation = interpolation; },
+        [&output, given](KeyInterpolation interpolation) {
+            given("--interpolation");
+            output.skin.interpolation = interpolation;
+        },
         "Skin: between keys (unset: linear; cubic needs fewer keys, but Blender ignores it)");
     add_choice<unsigned>(
         command, "--influences", {{"3", 3U}, {"6", 6U}},
-        [&output](unsigned influences) { output.skin.influences = influences; },
+        [&output, given](unsigned influences) {
+            given("--influences");
+            output.skin.influences = influences;
+        },
         "Skin: joints a vertex (unset: 3, which plays in everything; 6 shows Blender the true rest shape)");
-    command.add_flag("--full-precision", output.skin.full_precision, "Skin: float rotations and weights");
-    command.add_flag("--all-levels", output.skin.all_levels, "Skin: coarser levels too (MSFT_lod)");
-    command.add_flag_callback(
-        "--no-normals", [set_normals] { set_normals(ExportNormals::leave); },
+    add_flag(
+        "--full-precision", [&output] { output.skin.full_precision = true; }, "Skin: float rotations and weights");
+    add_flag(
+        "--all-levels", [&output] { output.skin.all_levels = true; }, "Skin: coarser levels too (MSFT_lod)");
+    add_flag(
+        "--no-normals", [&output] { output.skin.normals = output.morph.normals = ExportNormals::leave; },
         "GLB: leave normals out; viewers then shade flat, which is right under any stretch");
-    command.add_flag("--morph-normals", output.morph.morph_normals, "Morph targets: normals of each frame too");
+    add_flag(
+        "--morph-normals", [&output] { output.morph.morph_normals = true; },
+        "Morph targets: normals of each frame too");
 }
 
 bool is_animation_path(const std::string& path) { return animation_format(path).ok(); }
 
 void check_animation_path(const std::string& path) {
+    if (path == "-")
+        throw Failure{{ErrorCode::usage, "An animation cannot go to standard output; give -o a file or a folder."}};
     const AnimationFormat format = require(animation_format(path));
     std::error_code ignored;
     const fs::path folder = fs::path(path).parent_path();
@@ -136,14 +176,43 @@ void check_animation_path(const std::string& path) {
         throw Failure{{ErrorCode::unwritable, path + ": cannot be written: there is no such folder."}};
 }
 
+void check_animation_options(const AnimationOutput& output, const std::vector<std::string>& paths) {
+    const auto is_glb = [](const std::string& path) {
+        const Result<AnimationFormat> format = animation_format(path);
+        return format && *format == AnimationFormat::glb;
+    };
+    if (!output.given.empty() && std::none_of(paths.begin(), paths.end(), is_glb))
+        throw Failure{{ErrorCode::usage, output.given.front() + " belongs to an animation that goes to a .glb."}};
+}
+
 void check_not_input(const std::string& output, const std::vector<std::string>& inputs) {
-    std::error_code failed;
-    for (const std::string& input : inputs) {
-        const bool is_one = fs::equivalent(output, input, failed) && !failed;
-        if (is_one || (!input.empty() && fs::path(output) == fs::path(input)))
-            throw Failure{{ErrorCode::usage, output + ": is the input and would be overwritten; choose another with "
-                                                      "-o."}};
+    std::set<std::pair<dev_t, ino_t>> taken; // whatever names lead there
+    const auto file_of = [](const fs::path& path) -> std::optional<std::pair<dev_t, ino_t>> {
+        struct stat status {};
+        if (::stat(path.c_str(), &status) != 0) return {};
+        return std::pair(status.st_dev, status.st_ino);
+    };
+    for (const std::string& input : inputs)
+        for (const fs::path& path : animation_files(input))
+            if (const auto file = file_of(path)) taken.insert(*file);
+    for (const fs::path& path : animation_files(numbered_path(output, inputs.front()))) {
+        const auto file = file_of(path);
+        if (file && taken.contains(*file))
+            throw Failure{{ErrorCode::usage,
+                           path.string() + ": is the input and would be overwritten; choose another place with -o."}};
     }
+}
+
+PoseStream poses_of(const std::string& poses, const PoseFileOptions& options, const Model& model,
+                    const PoseSequence& own, const std::string& model_path, Session& session) {
+    if (!poses.empty())
+        return require(
+            open_poses(poses, model.driver().vertices.size(), model.mesh.origin, options, session.context()));
+    if (!options.animation.empty()) throw Failure{{ErrorCode::usage, "--animation belongs to --poses."}};
+    own_pose(own, 1, model_path);
+    PoseStream stream = stream_of(own);
+    stream.frames_per_second = options.frames_per_second.value_or(own.frames_per_second);
+    return stream;
 }
 
 void write_animation_output(const Model& model, const PoseStream& poses, const RestoreOptions& restore,
@@ -157,8 +226,9 @@ void write_animation_output(const Model& model, const PoseStream& poses, const R
         options.restore = restore;
         options.materials_beside = materials_beside;
         session.begin_writing(path);
-        add_report(require(write_skin_glb(model, poses, options, path, session.context())), true, path, session, table,
-                   json);
+        add_report(require(write_skin_glb(model, poses, options, path, session.context())), true,
+                   options.normals != ExportNormals::leave, path, session, table, json);
+        add_moments(poses.frames, poses.frames_per_second, json);
         return;
     }
     const Restorer restorer = require(Restorer::create(model, restore, session.context()));
@@ -186,8 +256,9 @@ void write_animation_output(const MeshAnimation& animation, const AnimationOutpu
                                                          "out --as skin for morph targets."}};
         MorphOptions options = output.morph;
         options.materials_beside = materials_beside;
-        add_report(require(write_morph_glb(animation, options, path, session.context())), false, path, session, table,
-                   json);
+        add_report(require(write_morph_glb(animation, options, path, session.context())), false,
+                   options.normals != ExportNormals::leave, path, session, table, json);
+        add_moments(animation.frames, animation.frames_per_second, json);
         return;
     }
     const std::string place = format == AnimationFormat::numbered ? numbered_path(path, materials_beside) : path;

@@ -15,6 +15,7 @@ struct AnimationOutput {
     bool as_morph = false, as_skin = false;
     SkinOptions skin;
     MorphOptions morph;
+    std::vector<std::string> given; ///< the options' names, as the user wrote them
 };
 
 /// Adds --as, --key-rate, --interpolation, --influences, --full-precision, --all-levels, --no-normals and
@@ -25,11 +26,18 @@ void add_animation_options(CLI::App& command, AnimationOutput& output);
 /// NAME_####.ply.
 bool is_animation_path(const std::string& path);
 
-/// Refuses, before any work, what cannot be written: an unknown ending, a folder that is not there.
+/// Refuses, before any work, what cannot be written: an unknown ending, a folder that is not there, standard output.
 void check_animation_path(const std::string& path);
+/// Refuses options of animated GLB where none is written.
+void check_animation_options(const AnimationOutput& output, const std::vector<std::string>& paths);
 
-/// Refuses an output that is one of the inputs, or lies in a folder of numbered meshes that is one.
+/// Refuses an output that would go over an input, under whatever name, numbered meshes too. The first input names
+/// meshes in an output folder.
 void check_not_input(const std::string& output, const std::vector<std::string>& inputs);
+
+/// The poses of a file, one frame in memory where it allows that, or the model's own, which `own` keeps.
+PoseStream poses_of(const std::string& poses, const PoseFileOptions& options, const Model& model,
+                    const PoseSequence& own, const std::string& model_path, Session& session);
 
 /// Writes a model's poses to `path`: .glb as a skin (or morph targets), everything else restored frame by frame, one in
 /// memory at a time. Adds rows and keys that say what was written. materials_beside: the model's or mesh's own path.

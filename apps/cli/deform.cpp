@@ -1,6 +1,7 @@
 #include "animation_output.h"
 #include "handles_file.h"
 #include "restore_options.h"
+#include "stage.h"
 
 #include "filigree/deform/space_warp.h"
 
@@ -93,13 +94,7 @@ Mesh restore_pose(const Model& model, const Pose& pose, const Options& options, 
     return require(restorer.mesh(pose, context));
 }
 
-std::string lower_case_ending(const std::string& path) {
-    std::string ending = std::filesystem::path(path).extension().string();
-    for (char& c : ending) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-    return ending;
-}
-
-bool is_model_path(const std::string& path) { return lower_case_ending(path) == ".fil"; }
+bool is_model_path(const std::string& path) { return lower_ending(path) == ".fil"; }
 
 void check(const Options& options) {
     const auto refuse = [](const std::string& sentence) { throw Failure{{ErrorCode::usage, sentence}}; };
@@ -107,10 +102,26 @@ void check(const Options& options) {
     if (options.steps.empty() == options.handles.empty())
         refuse("Say how to deform: one or more of --stretch, --squeeze, --bend, --twist, --taper and --random, or "
                "--handles FILE.");
-    if (options.frames == 0) return;
+    if (options.frames == 0) {
+        if (!options.animation.given.empty()) refuse(options.animation.given.front() + " belongs to --frames.");
+        return;
+    }
     if (!options.pose_output.empty()) refuse("--pose writes one pose; with --frames give -o a .fil for all of them.");
-    check_not_input(options.output, {options.input});
+    check_not_input(options.output, {options.input, options.handles});
     if (!is_model_path(options.output)) check_animation_path(options.output);
+    check_animation_options(options.animation, {options.output});
+}
+
+/// A model's poses are all in memory until they are written.
+void check_poses_fit(std::size_t frames, std::size_t driver_vertices, const std::string& output) {
+    constexpr std::size_t kVertexBytes = sizeof(Vec3f) + sizeof(Mat3f), kMost = std::size_t{4} << 30;
+    const double bytes = double(frames) * double(driver_vertices * kVertexBytes);
+    if (bytes > double(kMost))
+        throw Failure{
+            {ErrorCode::usage,
+             fmt::format("{}: {} poses of {} vertices are {:.3g} GB, and a model's poses may be {:.3g}; ask "
+                         "for fewer --frames, or write a .pc2.",
+                         output, with_commas(frames), with_commas(driver_vertices), bytes / 1e9, double(kMost) / 1e9)}};
 }
 
 void deform_animation(const Options& options, const Session::Content& content, Session& session) {
@@ -126,6 +137,7 @@ void deform_animation(const Options& options, const Session::Content& content, S
                                    return deformation.driver(*model, options.fraction(frame), silent);
                                }};
         if (is_model_path(options.output)) {
+            check_poses_fit(options.frames, model->driver().vertices.size(), options.output);
             PoseSequence sequence{options.frames_per_second, {}};
             for (std::size_t frame = 0; frame < options.frames; ++frame) {
                 session.context().report("deforming", double(frame) / double(options.frames));

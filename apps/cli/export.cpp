@@ -1,5 +1,6 @@
 #include "animation_output.h"
 #include "restore_options.h"
+#include "stage.h"
 #include "web_page.h"
 
 #include "filigree/io/gltf_export.h"
@@ -18,19 +19,21 @@ struct Options {
     bool at_rest = false, web = false;
     RestoreOptions restore;
     AnimationOutput animation;
+    std::vector<std::string> moving; ///< options given that a model at rest has no use for
 };
 
 [[noreturn]] void refuse(ErrorCode code, const std::string& sentence) { throw Failure{{code, sentence}}; }
 
-bool is_glb(const std::string& path) { return path.ends_with(".glb") || path.ends_with(".GLB"); }
-
 /// Levels at rest, one beside the other.
 void export_levels(const Model& model, const Options& options, Session& session, Table& table, Json& json) {
-    if (!is_glb(options.output))
+    if (const AnimationFormat format = require(animation_format(options.output)); format != AnimationFormat::glb)
         refuse(ErrorCode::unsuitable,
-               options.input +
-                   ": has no poses, and a model at rest goes to .glb alone; 'filigree simulate' makes poses, "
-                   "and --poses takes another program's.");
+               options.input + (options.at_rest ? ": a" : ": has no poses, and a") +
+                   " model at rest goes to .glb, or with --web to a folder with a page; 'filigree simulate' makes "
+                   "poses, and --poses takes another program's.");
+    if (!options.moving.empty())
+        refuse(ErrorCode::usage, options.moving.front() + " belongs to a model that moves, and " + options.input +
+                                     " is exported at rest; 'filigree level' writes one level of it.");
     session.begin_writing(options.output);
     for (const std::string& warning :
          require(write_levels_glb(model, options.output, options.input, session.context())))
@@ -38,14 +41,21 @@ void export_levels(const Model& model, const Options& options, Session& session,
     const auto bytes = fs::file_size(options.output);
     table.row("levels", fmt::format("{}, as MSFT_lod", model.finest_level() + 1));
     table.row("bytes", with_commas(bytes));
+    json["vertices"] = model.mesh.vertex_count();
     json["levels"] = model.finest_level() + 1;
     json["bytes"] = bytes;
 }
 
 /// A moving file of another program, frame by frame, as another format.
 void convert_animation(const Mesh& rest, const Options& options, Session& session, Table& table, Json& json) {
+    const bool may_move =
+        !options.poses.empty() || lower_ending(options.input) == ".glb" || lower_ending(options.input) == ".gltf";
+    if (!may_move)
+        refuse(ErrorCode::unsuitable, options.input + ": is a mesh that does not move; --poses FILE moves it, and "
+                                                      "'filigree strip' makes a model of it.");
     const MeshAnimation animation = require(open_animation(options.poses.empty() ? options.input : options.poses, rest,
                                                            options.pose_file, session.context()));
+    check_animation_options(options.animation, {options.output});
     write_animation_output(animation, options.animation, options.output, options.input, session, table, json);
 }
 
@@ -53,10 +63,8 @@ void export_model(const Model& model, const PoseSequence& own, const Options& op
                   Json& json) {
     const bool moves = !options.at_rest && (!options.poses.empty() || !own.empty());
     if (!moves) return export_levels(model, options, session, table, json);
-    const PoseStream poses = options.poses.empty()
-                                 ? stream_of(own)
-                                 : require(open_poses(options.poses, model.driver().vertices.size(), model.mesh.origin,
-                                                      options.pose_file, session.context()));
+    const PoseStream poses = poses_of(options.poses, options.pose_file, model, own, options.input, session);
+    if (!options.web) check_animation_options(options.animation, {options.output});
     write_animation_output(model, poses, options.restore, options.animation, options.output, options.input, session,
                            table, json);
 }
@@ -66,6 +74,7 @@ void export_page(const Model& model, const PoseSequence& own, Options options, S
                  Json& json) {
     const std::string folder_name = options.output;
     OutputFolder folder(folder_name, options.input);
+    folder.protect(animation_files(options.poses));
     WebPage page(folder, fs::path(options.input).stem().string());
     options.output = page.model_path();
     options.animation.skin.all_levels = true;
@@ -81,7 +90,10 @@ void export_page(const Model& model, const PoseSequence& own, Options options, S
 void run(const Options& options, Session& session) {
     if (options.at_rest && !options.poses.empty())
         refuse(ErrorCode::usage, "--rest leaves the poses out that --poses names.");
-    if (!options.web) check_animation_path(options.output);
+    if (!options.web) {
+        check_animation_path(options.output);
+        check_not_input(options.output, {options.input, options.poses});
+    }
     const Session::Content content = session.read_any(options.input);
     Table table;
     Json json = {{"output", options.output}};
@@ -111,7 +123,7 @@ void add_export(CLI::App& app, Session& session) {
         ->required();
     command
         ->add_option("-o,--output", options->output,
-                     "GLB (a skin, or levels at rest), .pc2, .mdd, .usda, a folder or NAME_####.ply")
+                     "GLB (a skin, or levels at rest), .pc2, .mdd, .usda, a folder (NAME/) or NAME_####.ply")
         ->required();
     command->add_option("--poses", options->poses,
                         "What moves the driver (or the mesh): .pc2, .mdd, numbered meshes, an animated glTF, a model; "
@@ -131,8 +143,12 @@ void add_export(CLI::App& app, Session& session) {
                                "  filigree export scan.fil --poses driver.pc2 -o scan.pc2\n"
                                "  filigree export scan.fil -o levels.glb\n"
                                "  filigree export bounce.fil -o page/ --web");
-    command->callback([options, &session] {
+    command->callback([options, command, &session] {
         session.begin();
+        for (const char* name :
+             {"--as", "--key-rate", "--interpolation", "--influences", "--full-precision", "--no-normals",
+              "--morph-normals", "--law", "--level", "--thin-shell", "--frame-rate", "--animation"})
+            if (command->count(name) > 0) options->moving.emplace_back(name);
         run(*options, session);
     });
 }

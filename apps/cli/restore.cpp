@@ -78,13 +78,15 @@ void check(const Options& options) {
     if (options.poses.empty() && !options.poses_file.animation.empty()) refuse("--animation belongs to --poses.");
     if (!options.is_animation() && options.poses_file.frames_per_second)
         refuse("--frame-rate belongs to --poses or --frames.");
+    if (!options.is_animation() && !options.animation.given.empty())
+        refuse(options.animation.given.front() + " belongs to --poses or --frames.");
     if (!options.is_animation()) return;
-    if (options.output == "-") refuse("An animation cannot go to standard output; give -o a file or a folder.");
     const std::string place = animation_place(options.output);
     if (!is_animation_path(place) && mesh_format(place))
         refuse(place + ": is the name of one mesh, and there are many; put #### where their numbers go, or give -o a "
                        "folder (NAME/), .pc2, .mdd, .usda or .glb.");
     check_animation_path(place);
+    check_animation_options(options.animation, {place});
     check_not_input(place, {options.model, options.poses});
 }
 
@@ -112,29 +114,17 @@ void restore_one(const Options& options, Session& session) {
         {{"output", options.output}, {"vertices", mesh.vertex_count()}, {"from", from}, {"seconds", seconds}});
 }
 
-/// The poses of a file or the model's own (which `own` keeps), one frame in memory where the file allows it.
-PoseStream poses_of(const Options& options, const Model& model, const PoseSequence& own, Session& session) {
-    if (options.poses.empty()) {
-        own_pose(own, 1, options.model);
-        PoseStream stream = stream_of(own);
-        stream.frames_per_second = options.poses_file.frames_per_second.value_or(own.frames_per_second);
-        return stream;
-    }
-    return require(open_poses(options.poses, model.driver().vertices.size(), model.mesh.origin, options.poses_file,
-                              session.context()));
-}
-
 void restore_all(const Options& options, Session& session) {
     PoseSequence own;
     const Model model = session.read_model(options.model, options.all_frames ? &own : nullptr);
-    const PoseStream poses = poses_of(options, model, own, session);
+    const PoseStream poses = poses_of(options.poses, options.poses_file, model, own, options.model, session);
+    const char* from = source_of(model, require(poses.pose(0)));
     Table table;
     Json json;
     const double start = now_seconds();
     write_animation_output(model, poses, options.restore, options.animation, animation_place(options.output),
                            options.model, session, table, json);
     const double seconds = now_seconds() - start;
-    const char* from = source_of(model, require(poses.pose(0)));
     table.row("restored from", fmt::format("{} in {}", from, seconds_text(seconds)));
     json["output"] = options.output;
     json["frames"] = poses.frames;

@@ -98,11 +98,11 @@ void check_places(const Options& options, const SceneFile& scene, const Outputs&
             if (is_one_file(path, file)) refuse(fmt::format("{}: is {} and would be overwritten.", path, is));
         taken.emplace_back(path, what);
     };
+    std::vector<std::string> files_read;
+    for (const auto& [file, is] : taken) files_read.push_back(file.string());
     if (!options.save.empty()) take(options.save, "where the state goes");
     if (!options.resume.empty()) taken.emplace_back(options.resume, "the state to go on from"); // may be saved over
     for (const std::string& path : outputs.models)
-        for (const SceneBody& body : scene.bodies) take(model_path(path, scene.bodies.size(), body.name), "an output");
-    for (const std::string& path : outputs.animations)
         for (const SceneBody& body : scene.bodies) take(model_path(path, scene.bodies.size(), body.name), "an output");
     const auto take_numbered = [&](const std::string& path, const fs::path& folder, const std::string& before,
                                    const std::string& after) {
@@ -117,6 +117,12 @@ void check_places(const Options& options, const SceneFile& scene, const Outputs&
             take_numbered(path, fs::path(path).parent_path(), name.substr(0, from), name.substr(until + 1));
         take(path, "an output");
     }
+    for (const std::string& path : outputs.animations)
+        for (const SceneBody& body : scene.bodies) {
+            const std::string place = model_path(path, scene.bodies.size(), body.name);
+            check_not_input(place, files_read);
+            take(place, "an output");
+        }
     for (const std::string& path : outputs.folders) {
         for (const SceneBody& body : scene.bodies) take_numbered(path, path, body.name + "_", ".ply");
         take(path, "an output");
@@ -533,6 +539,7 @@ void check(const Options& options) {
         refuse("Say where the motion goes: -o OUT.fil, -o OUT.glb, -o OUT.pc2, -o FILM.mp4 or -o FOLDER/; or give "
                "--save or "
                "--check.");
+    check_animation_options(options.animation, options.outputs);
     if (options.stop_at && options.save.empty())
         refuse("--stop-at stops a run that goes on later; say where with --save.");
 }

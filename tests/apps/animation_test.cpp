@@ -8,6 +8,8 @@
 #include "filigree/io/point_cache.h"
 #include "filigree/mesh/shapes.h"
 
+#include <sys/stat.h>
+
 using namespace filigree_test;
 using namespace filigree;
 
@@ -113,6 +115,85 @@ TEST_F(Animation, SimulationsLeaveAsCachesAndSkins) {
     fails(2, {"simulate", "drop.toml", "-o", "x.pc2", "-o", "x.pc2"}, {"x.pc2", "one place"});
 }
 
+TEST_F(Animation, InputsAreNeverOverwrittenUnderAnyName) {
+    const std::string before = bytes_of(path("driver/driver_0001.ply"));
+    ASSERT_FALSE(before.empty());
+    for (const std::string poses : {"driver", "driver/", "driver/driver_####.ply", "driver/driver_%04d.ply"})
+        for (const std::string out : {"driver/driver_####.ply", "./driver/driver_%04d.ply"})
+            for (const std::string command : {"restore", "export"})
+                fails(2, {command, "moving.fil", "--poses", poses, "-o", out}, {"driver_0001.ply", "input"});
+    std::filesystem::create_directory(path("link"));
+    std::filesystem::create_symlink(path("driver"), path("link/to"));
+    fails(2, {"restore", "moving.fil", "--poses", "driver", "-o", "link/to/driver_####.ply"}, {"input"});
+    EXPECT_TRUE(bytes_of(path("driver/driver_0001.ply")) == before);
+    const std::string cache = bytes_of(path("driver.pc2"));
+    fails(2, {"export", "moving.fil", "--poses", "driver.pc2", "-o", "driver.pc2"}, {"driver.pc2", "input"});
+    fails(2, {"export", "moving.fil", "--poses", "driver.pc2", "-o", "./driver.pc2"}, {"driver.pc2", "input"});
+    EXPECT_TRUE(bytes_of(path("driver.pc2")) == cache);
+    ok({"export", "moving.fil", "-o", "m.glb"});
+    const std::string glb = bytes_of(path("m.glb"));
+    fails(2, {"export", "m.glb", "-o", "m.glb"}, {"m.glb", "input"});
+    EXPECT_TRUE(bytes_of(path("m.glb")) == glb);
+    ok({"deform", "moving.fil", "--bend", "9", "--frames", "2", "-o", "seq_####.ply"});
+    fails(2, {"deform", "seq_0001.ply", "--bend", "9", "--frames", "2", "-o", "seq_####.ply"}, {"input"});
+    ok({"restore", "moving.fil", "--poses", "driver", "-o", "driver/else_####.ply"}); // beside them is fine
+}
+
+TEST_F(Animation, ExportSaysWhatItsDocumentationPromises) {
+    const Json glb = json({"export", "moving.fil", "-o", "m.GLB", "--frame-rate", "50"});
+    for (const char* key : {"output", "bytes", "vertices", "frames", "frames_per_second", "export_seconds", "as",
+                            "joints", "keys", "seconds", "error_at_keys", "rms_at_keys", "error_between_keys",
+                            "rms_between_keys", "moments_checked", "normal_error_degrees", "warnings"})
+        EXPECT_TRUE(glb.contains(key)) << key;
+    EXPECT_EQ(glb["frames"], 3);
+    EXPECT_EQ(glb["frames_per_second"], 50); // instead of the model's 25
+    EXPECT_NEAR(glb["seconds"].get<double>(), 2 / 50.0, 1e-6);
+    const Json morph = json({"export", "moving.fil", "-o", "m.glb", "--as", "morph"});
+    EXPECT_EQ(morph["frames"], 3);
+    EXPECT_EQ(morph["frames_per_second"], 25);
+    const Json cache = json({"export", "moving.fil", "-o", "m.pc2"});
+    EXPECT_EQ(cache["bytes"], 32 + 3 * 12 * model_.mesh.vertex_count());
+    EXPECT_EQ(cache["frames"], 3);
+    EXPECT_EQ(cache["vertices"], model_.mesh.vertex_count());
+    const Json rest = json({"export", "moving.fil", "--rest", "-o", "m.Glb"});
+    for (const char* key : {"output", "bytes", "vertices", "levels", "export_seconds"})
+        EXPECT_TRUE(rest.contains(key)) << key;
+}
+
+TEST_F(Animation, NormalsFarOffAreWarnedOf) {
+    const auto stretched = [&](const std::vector<std::string>& more) {
+        std::vector<std::string> words = {"deform", "moving.fil", "--stretch", "3", "--frames", "2", "-o", "s.glb"};
+        words.insert(words.end(), more.begin(), more.end());
+        return json(words)["warnings"].dump();
+    };
+    EXPECT_NE(stretched({}).find("--no-normals"), std::string::npos);
+    EXPECT_EQ(stretched({"--no-normals"}).find("--no-normals"), std::string::npos);
+    EXPECT_EQ(run({"deform", "moving.fil", "--stretch", "3", "--frames", "2", "-o", "s.glb", "--no-normals"})
+                  .out.find("normals"),
+              std::string::npos);
+}
+
+TEST_F(Animation, OptionsWithoutEffectAreRefused) {
+    ok({"strip", "mesh.ply", "-o", "still.fil"});
+    for (const std::vector<std::string>& option : std::vector<std::vector<std::string>>{
+             {"--level", "0"}, {"--no-normals"}, {"--as", "skin"}, {"--influences", "6"}, {"--frame-rate", "24"}}) {
+        std::vector<std::string> words = {"export", "still.fil", "-o", "x.glb"};
+        words.insert(words.end(), option.begin(), option.end());
+        fails(2, words, {option[0], "at rest"});
+    }
+    fails(2, {"export", "moving.fil", "--animation", "Run", "-o", "x.glb"}, {"--animation", "--poses"});
+    fails(2, {"export", "moving.fil", "--key-rate", "9", "-o", "x.pc2"}, {"--key-rate", ".glb"});
+    fails(2, {"restore", "moving.fil", "--frames", "--no-normals", "-o", "x.pc2"}, {"--no-normals", ".glb"});
+    fails(2, {"restore", "moving.fil", "--frame", "1", "--as", "skin", "-o", "x.ply"}, {"--as", "--frames"});
+    fails(2, {"deform", "moving.fil", "--bend", "9", "--full-precision", "-o", "x.ply"},
+          {"--full-precision", "--frames"});
+    fails(7, {"export", "mesh.ply", "-o", "x.glb"}, {"mesh.ply", "does not move", "--poses"});
+    fails(7, {"export", "still.fil", "-o", "page/"}, {"still.fil", "--web"});
+    fails(2, {"deform", "moving.fil", "--bend", "9", "--frames", "3", "-o", "-"}, {"standard output"});
+    fails(2, {"deform", "moving.fil", "--bend", "9", "--frames", "100000000", "-o", "x.fil"}, {"x.fil", "GB", ".pc2"});
+    for (const std::string& file : files()) EXPECT_FALSE(file.starts_with("x.") || file == "page") << file;
+}
+
 TEST_F(Animation, WhatCannotBeIsSaidBeforeTheWork) {
     const auto refuses = [&](int code, const std::vector<std::string>& more, const std::vector<std::string>& words) {
         std::vector<std::string> all = {"restore", "moving.fil"};
@@ -124,6 +205,10 @@ TEST_F(Animation, WhatCannotBeIsSaidBeforeTheWork) {
     refuses(6, {"--poses", "driver.pc2", "-o", "missing/x.pc2"}, {"missing/x.pc2", "no such folder"});
     refuses(2, {"--poses", "driver.pc2", "-o", "driver.pc2"}, {"driver.pc2", "input"});
     refuses(2, {"--poses", "driver.pc2", "-o", "-"}, {"standard output"});
+    std::filesystem::remove(path("driver/driver_0002.ply"));
+    ASSERT_EQ(::mkfifo(path("driver/driver_0002.ply").c_str(), 0600), 0);
+    refuses(5, {"--poses", "driver", "-o", "new/er/"}, {"driver_0002.ply", "pipe"}); // without waiting for a writer
+    EXPECT_FALSE(std::filesystem::exists(path("new")));
     refuses(2, {"--poses", "driver.pc2", "--frames", "-o", "x.pc2"}, {"--poses"});
     refuses(3, {"--poses", "missing.pc2", "-o", "x.pc2"}, {"missing.pc2"});
     refuses(2, {"--frame", "1", "--frame-rate", "24", "-o", "x.ply"}, {"--frame-rate"});
