@@ -263,3 +263,20 @@ TEST(GltfAnimation, SameBytesForAnyNumberOfThreads) {
     ASSERT_TRUE(scene->positions(1, 0.2, more, RunContext(0)).ok());
     EXPECT_EQ(std::memcmp(one.data(), more.data(), 12 * one.size()), 0);
 }
+
+TEST(GltfAnimation, NodesThatNothingShowsCostNoWeights) {
+    // 20,000 nodes of 2,000 weights would be 320 MB; only one is in the scene.
+    std::string nodes = R"({"mesh":0})", targets = R"({"POSITION":0})", weights = "0.5";
+    for (int n = 1; n < 20000; ++n) nodes += R"(,{"mesh":0})";
+    for (int t = 1; t < 2000; ++t) targets += R"(,{"POSITION":0})", weights += ",0";
+    GltfText file;
+    file.add(kTriangle, "VEC3");
+    const std::string mesh = R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"targets":[)" + targets +
+                             R"(]}],"weights":[)" + weights + R"(]}],"nodes":[)" + nodes + "]";
+    const GltfScene scene = read(file.text(R"("scenes":[{"nodes":[0]}],)" + mesh));
+    expect_near(scene.mesh().positions[1], {1.5, 0, 0});
+    // Without a scene all of them are shown: refused before it takes memory.
+    const Result<GltfScene> all = GltfScene::read(file.text(mesh), "a.gltf", RunContext(1));
+    ASSERT_FALSE(all.ok());
+    EXPECT_EQ(all.error().code, ErrorCode::unsupported);
+}

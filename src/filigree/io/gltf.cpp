@@ -65,6 +65,7 @@ void place_rest(gltf::Scene& scene, const RunContext& context) {
     gltf::place_vertices(scene, pose, context, [&](std::size_t first, std::span<const Vec3d> positions) {
         std::copy(positions.begin(), positions.end(), world.begin() + static_cast<std::ptrdiff_t>(first));
     });
+    if (context.is_cancelled()) throw gltf::Damage{"", ErrorCode::cancelled};
     for (std::size_t v = 0; v < world.size(); ++v)
         if (!(world[v].allFinite() && fits_float(world[v].cwiseAbs().maxCoeff())))
             throw gltf::Damage{"its nodes carry vertex " + std::to_string(v) +
@@ -92,6 +93,7 @@ Status read_scene(std::string_view bytes, gltf::Scene& scene, const RunContext& 
         gltf::read_animations(scene);
         gltf::read_meshes(scene, context);
         place_rest(scene, context);
+        if (context.is_cancelled()) return cancelled_error();
         read_export_report(scene);
         shorten(scene.warnings);
     } catch (const gltf::Damage& damage) {
@@ -152,6 +154,7 @@ Status GltfScene::positions(std::size_t animation, double seconds, std::span<Vec
         }
         if (!all_finite) finite = false;
     });
+    if (context.is_cancelled()) return cancelled_error();
     if (!finite)
         return Error{ErrorCode::bad_file, content_->name + ": animations[" + std::to_string(animation) +
                                               "]: carries vertices to no place that 32-bit float can hold."};
@@ -164,6 +167,7 @@ Result<Mesh> GltfScene::mesh_at(std::size_t animation, double seconds, const Run
     if (!mesh.normals.empty())
         mesh.normals.values = gltf::turned_normals(
             *content_, gltf::pose_at(*content_, content_->animations[animation], seconds), context);
+    if (context.is_cancelled()) return cancelled_error();
     return mesh;
 }
 

@@ -93,11 +93,39 @@ std::vector<double> rest_weights(const Scene& scene, const Node& node) {
     return numbers;
 }
 
+/// Weights of the blocks' nodes as they are, one a morph target.
+std::vector<std::vector<double>> rest_weights(const Scene& scene) {
+    std::vector<std::vector<double>> weights(scene.nodes.size());
+    for (const Block& block : scene.blocks) {
+        std::vector<double>& own = weights[block.node];
+        const std::size_t targets = scene.geometries[block.geometry].targets.size();
+        if (own.empty() && targets > 0) own = rest_weights(scene, scene.nodes[block.node]);
+        if (own.size() < targets) own.resize(targets);
+    }
+    return weights;
+}
+
 /// Turns transforms within parents into transforms in the world.
 void apply_parents(const Scene& scene, std::vector<Affine>& transforms) {
     for (const std::size_t n : scene.order)
         if (const std::size_t parent = scene.nodes[n].parent; parent != n)
             transforms[n] = transforms[parent] * transforms[n];
+}
+
+/// What follows from where the nodes are within their parents.
+void finish_pose(const Scene& scene, ScenePose& pose) {
+    apply_parents(scene, pose.world);
+    pose.joints.resize(scene.skins.size());
+    for (const Block& block : scene.blocks) {
+        if (!block.skinned) continue;
+        const std::size_t number = *scene.nodes[block.node].skin;
+        const Skin& skin = scene.skins[number];
+        std::vector<Affine>& joints = pose.joints[number];
+        if (!joints.empty()) continue;
+        joints.reserve(skin.joints.size());
+        for (std::size_t j = 0; j < skin.joints.size(); ++j)
+            joints.push_back(pose.world[skin.joints[j]] * skin.inverse_binds[j]);
+    }
 }
 
 Mat3d cofactor(const Mat3d& a) {
@@ -114,10 +142,7 @@ public:
         const std::vector<double>& weights = pose.weights[block.node];
         for (std::size_t t = 0; t < std::min(weights.size(), geometry_.targets.size()); ++t)
             if (weights[t] != 0) targets_.push_back({&geometry_.targets[t], weights[t]});
-        if (!block.skinned) return;
-        const Skin& skin = scene.skins[*scene.nodes[block.node].skin];
-        for (std::size_t j = 0; j < skin.joints.size(); ++j)
-            joints_.push_back(pose.world[skin.joints[j]] * skin.inverse_binds[j]);
+        if (block.skinned) joints_ = pose.joints[*scene.nodes[block.node].skin];
     }
 
     const Geometry& geometry() const { return geometry_; }
@@ -170,34 +195,33 @@ private:
     const Geometry& geometry_;
     const Affine& world_;
     std::vector<std::pair<const MorphTarget*, double>> targets_;
-    std::vector<Affine> joints_; ///< with the inverse binds
+    std::span<const Affine> joints_; ///< with the inverse binds
 };
 
 } // namespace
 
 ScenePose rest_pose(const Scene& scene) {
     ScenePose pose;
-    for (const Node& node : scene.nodes) {
-        pose.world.push_back(local(node));
-        pose.weights.push_back(rest_weights(scene, node));
-    }
-    apply_parents(scene, pose.world);
+    pose.weights = rest_weights(scene);
+    pose.world.reserve(scene.nodes.size());
+    for (const Node& node : scene.nodes) pose.world.push_back(local(node));
+    finish_pose(scene, pose);
     return pose;
 }
 
 ScenePose pose_at(const Scene& scene, const Animation& animation, double seconds) {
     std::vector<Node> moved(scene.nodes.size());
     ScenePose pose;
-    pose.weights.resize(scene.nodes.size());
+    pose.weights = rest_weights(scene);
     for (std::size_t n = 0; n < moved.size(); ++n) {
         moved[n].translation = scene.nodes[n].translation;
         moved[n].rotation = scene.nodes[n].rotation;
         moved[n].scale = scene.nodes[n].scale;
         moved[n].matrix = scene.nodes[n].matrix;
-        if (scene.nodes[n].mesh) pose.weights[n] = rest_weights(scene, scene.nodes[n]);
     }
     SamplerReader reader;
     for (const Channel& channel : animation.channels) {
+        if (channel.path == Path::weights && pose.weights[channel.node].empty()) continue; // it is not shown
         const std::vector<double>& values = reader.read(animation.samplers[channel.sampler], channel.path, seconds);
         Node& node = moved[channel.node];
         switch (channel.path) {
@@ -219,13 +243,14 @@ ScenePose pose_at(const Scene& scene, const Animation& animation, double seconds
         }
     }
     for (const Node& node : moved) pose.world.push_back(local(node));
-    apply_parents(scene, pose.world);
+    finish_pose(scene, pose);
     return pose;
 }
 
 void place_vertices(const Scene& scene, const ScenePose& pose, const RunContext& context,
                     const std::function<void(std::size_t first_vertex, std::span<const Vec3d> positions)>& take) {
     for (const Block& block : scene.blocks) {
+        if (context.is_cancelled()) break;
         const PosedBlock posed(scene, block, pose);
         parallel_for(context, posed.geometry().kept, kGrain, [&](std::size_t begin, std::size_t end) {
             std::array<Vec3d, kGrain> positions;
@@ -238,6 +263,7 @@ void place_vertices(const Scene& scene, const ScenePose& pose, const RunContext&
 std::vector<Vec3f> turned_normals(const Scene& scene, const ScenePose& pose, const RunContext& context) {
     std::vector<Vec3f> normals(scene.mesh.normals.values.size());
     for (const Block& block : scene.blocks) {
+        if (context.is_cancelled()) break;
         const PosedBlock posed(scene, block, pose);
         parallel_for(context, posed.geometry().normals.size(), kGrain, [&](std::size_t begin, std::size_t end) {
             posed.normals(begin, end, std::span(normals).subspan(block.first_normal + begin, end - begin));

@@ -371,7 +371,9 @@ private:
         const std::string owner = shared ? motion_of(n, mesh) : std::to_string(n);
         const auto [entry, is_new] = block_numbers_.try_emplace({geometry, owner}, scene_.blocks.size());
         if (!is_new) return entry->second;
-        document_.charge(scene_.geometries[geometry].vertex_count(), primitive.path());
+        const std::size_t targets = scene_.geometries[geometry].targets.size();
+        document_.charge(scene_.geometries[geometry].vertex_count() * (1 + targets), primitive.path());
+        if (context_.is_cancelled()) throw Damage{"", ErrorCode::cancelled};
         Block& block = scene_.blocks.emplace_back();
         block.node = n;
         block.geometry = geometry;

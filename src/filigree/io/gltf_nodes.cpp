@@ -10,6 +10,7 @@ namespace filigree::gltf {
 
 namespace {
 
+constexpr std::size_t kMatrixNumbers = 16;
 constexpr double kUnitTolerance = 1e-3; // of a rotation; beyond it is worth a warning
 
 bool is_affine(const double* columns) {
@@ -151,6 +152,7 @@ private:
         } else if (scene_.nodes[read.node].matrix) {
             node.fail("moves a node that has a matrix; only translation, rotation and scale can be moved.");
         }
+        document_.charge(width, path.path());
         read.sampler = sampler(channel["sampler"], read.path, width);
         animation_.channels.push_back(read);
     }
@@ -224,6 +226,7 @@ void read_skins(Scene& scene) {
         const Value place = document.item("skins", s), joints = place["joints"];
         Skin& skin = scene.skins.emplace_back();
         if (joints.size() == 0) joints.fail("has no joints.");
+        document.charge(kMatrixNumbers * joints.size(), joints.path());
         for (std::size_t j = 0; j < joints.size(); ++j)
             skin.joints.push_back(joints[j].index(scene.nodes.size(), "nodes"));
         skin.inverse_binds.resize(skin.joints.size());
@@ -234,9 +237,9 @@ void read_skins(Scene& scene) {
             binds.fail("has " + std::to_string(matrices.count) + " matrices for " + std::to_string(skin.joints.size()) +
                        " joints.");
         for (std::size_t j = 0; j < skin.joints.size(); ++j) {
-            double columns[16];
+            double columns[kMatrixNumbers];
             matrices.read(j, columns);
-            const bool finite = std::all_of(columns, columns + 16, [](double x) { return std::isfinite(x); });
+            const bool finite = std::all_of(columns, columns + kMatrixNumbers, [](double x) { return std::isfinite(x); });
             if (!finite || !is_affine(columns))
                 binds.fail("matrix " + std::to_string(j) + " is not finite or has a last row that is not 0 0 0 1.");
             skin.inverse_binds[j] = affine_of(columns);

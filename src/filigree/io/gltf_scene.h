@@ -129,15 +129,18 @@ struct Materials {
 };
 Materials read_materials(Document& document, std::vector<std::string>& warnings);
 
-/// Where nodes are: with an animation at a moment, else as they are. World matrices, and morph weights of each node.
+/// Where nodes are: with an animation at a moment, else as they are. Weights and skins are of the scene's blocks only,
+/// as a file may have far more nodes that nothing shows.
 struct ScenePose {
-    std::vector<Affine> world;
-    std::vector<std::vector<double>> weights;
+    std::vector<Affine> world;                ///< of nodes
+    std::vector<std::vector<double>> weights; ///< of morph targets, by node
+    std::vector<std::vector<Affine>> joints;  ///< by skin: its joints' matrices with the inverse binds
 };
 ScenePose rest_pose(const Scene& scene);
 ScenePose pose_at(const Scene& scene, const Animation& animation, double seconds);
 
-/// Hands out the world positions of the mesh's vertices, a piece at a time, from many threads at once.
+/// Hands out the world positions of the mesh's vertices, a piece at a time, from many threads at once. These two stop
+/// between blocks when the work is cancelled, which the caller must look at.
 void place_vertices(const Scene& scene, const ScenePose& pose, const RunContext& context,
                     const std::function<void(std::size_t first_vertex, std::span<const Vec3d> positions)>& take);
 /// Values of mesh.normals, turned along.
