@@ -160,11 +160,15 @@ void describe_scene(const GltfScene& scene, Table& table, Json& json) {
         const auto found = report.find(key);
         return found != report.end() && found->is_number() ? std::optional(found->get<double>()) : std::nullopt;
     };
+    const auto count = [&](const char* key) {
+        const auto found = report.find(key);
+        if (found != report.end() && found->is_number_unsigned()) table.row(key, with_commas(found->get<std::size_t>()));
+    };
     const auto row = [&](const char* title, const char* key, const char* unit) {
         if (const auto value = number(key)) table.row(title, fmt::format("{:.3g}{}", *value, unit));
     };
-    row("joints", "joints", "");
-    row("keys", "keys", "");
+    count("joints");
+    count("keys");
     row("error at keys", "error_at_keys", " of the diagonal, as measured when it was exported");
     row("error between keys", "error_between_keys", " of the diagonal");
     row("normals off by", "normal_error_degrees", " degrees (95th percentile) in viewers that do not correct them");
@@ -181,15 +185,14 @@ void add_info(CLI::App& app, Session& session) {
                                          "  filigree info scan.fil");
     command->callback([path, &session] {
         session.begin();
-        const Session::Content content = session.read_any(*path);
+        const Session::Content content = session.read_any(*path, true);
         Table table;
         Json json = {{"file", *path}};
         table.row("file", *path);
         if (const auto* mesh = std::get_if<Mesh>(&content.value)) {
             json["kind"] = "mesh";
             describe_mesh(*mesh, session, table, json);
-            if (path->ends_with(".glb") || path->ends_with(".gltf"))
-                describe_scene(require(GltfScene::read(*path, session.context())), table, json);
+            if (content.scene) describe_scene(*content.scene, table, json);
         } else {
             json["kind"] = "model";
             const auto& model = std::get<Model>(content.value);

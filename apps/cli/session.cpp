@@ -156,11 +156,17 @@ Model Session::read_model(const std::string& path, PoseSequence* poses) {
     return require(filigree::read_model(bytes, shown_name(path), context()));
 }
 
-Session::Content Session::read_any(const std::string& path) {
+Session::Content Session::read_any(const std::string& path, bool keep_scene) {
     const std::string bytes = read_bytes(path);
-    if (!is_model_file(bytes)) return {parse_mesh(bytes, path), bytes.size(), {}};
+    if (keep_scene && is_gltf(bytes)) {
+        GltfScene scene = require(GltfScene::read(bytes, shown_name(path), context()));
+        for (const std::string& warning : scene.warnings()) warn(warning);
+        return {scene.mesh(), bytes.size(), {}, std::move(scene)};
+    }
+    if (!is_model_file(bytes)) return {parse_mesh(bytes, path), bytes.size(), {}, {}};
     return {require(filigree::read_model(bytes, shown_name(path), context())), bytes.size(),
-            require(read_poses(bytes, shown_name(path), context()))};
+            require(read_poses(bytes, shown_name(path), context())),
+            {}};
 }
 
 void Session::begin_writing(const std::string& path) {

@@ -5,6 +5,7 @@
 #include "filigree/core/run_context.h"
 #include "filigree/hierarchy/model.h"
 #include "filigree/hierarchy/pose.h"
+#include "filigree/io/gltf.h"
 #include "filigree/io/mesh_file.h"
 #include "filigree/mesh/mesh_distance.h"
 
@@ -52,11 +53,12 @@ public:
     Model read_model(const std::string& path, PoseSequence* poses = nullptr);
     struct Content {
         std::variant<Mesh, Model> value;
-        std::size_t bytes;  ///< of the file
-        PoseSequence poses; ///< of a model that has been moved
+        std::size_t bytes;              ///< of the file
+        PoseSequence poses;             ///< of a model that has been moved
+        std::optional<GltfScene> scene; ///< that the mesh is of, where it was asked for
     };
-    /// A mesh or a model, told by the content.
-    Content read_any(const std::string& path);
+    /// A mesh or a model, told by the content. keep_scene: whether what else a glTF file holds is wanted.
+    Content read_any(const std::string& path, bool keep_scene = false);
     /// source: the file that the mesh came from, for formats that take materials in (GLB); empty: none.
     void write_mesh(const Mesh& mesh, const std::string& path, const std::string& source = {});
     void write_model(const Model& model, const std::string& path, const PoseSequence& poses = {});
