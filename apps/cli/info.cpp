@@ -162,7 +162,8 @@ void describe_scene(const GltfScene& scene, Table& table, Json& json) {
     };
     const auto count = [&](const char* key) {
         const auto found = report.find(key);
-        if (found != report.end() && found->is_number_unsigned()) table.row(key, with_commas(found->get<std::size_t>()));
+        if (found != report.end() && found->is_number_unsigned())
+            table.row(key, with_commas(found->get<std::size_t>()));
     };
     const auto row = [&](const char* title, const char* key, const char* unit) {
         if (const auto value = number(key)) table.row(title, fmt::format("{:.3g}{}", *value, unit));

@@ -164,7 +164,8 @@ Session::Content Session::read_any(const std::string& path, bool keep_scene) {
         return {scene.mesh(), bytes.size(), {}, std::move(scene)};
     }
     if (!is_model_file(bytes)) return {parse_mesh(bytes, path), bytes.size(), {}, {}};
-    return {require(filigree::read_model(bytes, shown_name(path), context())), bytes.size(),
+    return {require(filigree::read_model(bytes, shown_name(path), context())),
+            bytes.size(),
             require(read_poses(bytes, shown_name(path), context())),
             {}};
 }

@@ -239,7 +239,8 @@ void read_skins(Scene& scene) {
         for (std::size_t j = 0; j < skin.joints.size(); ++j) {
             double columns[kMatrixNumbers];
             matrices.read(j, columns);
-            const bool finite = std::all_of(columns, columns + kMatrixNumbers, [](double x) { return std::isfinite(x); });
+            const bool finite =
+                std::all_of(columns, columns + kMatrixNumbers, [](double x) { return std::isfinite(x); });
             if (!finite || !is_affine(columns))
                 binds.fail("matrix " + std::to_string(j) + " is not finite or has a last row that is not 0 0 0 1.");
             skin.inverse_binds[j] = affine_of(columns);
