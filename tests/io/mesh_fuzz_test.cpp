@@ -93,7 +93,8 @@ TEST(MeshFuzz, DamagedFilesOfOurWriters) {
 }
 
 TEST(MeshFuzz, EveryCutOfASmallFile) {
-    for (const MeshFormat format : {MeshFormat::obj, MeshFormat::ply, MeshFormat::stl, MeshFormat::off, MeshFormat::gltf}) {
+    for (const MeshFormat format :
+         {MeshFormat::obj, MeshFormat::ply, MeshFormat::stl, MeshFormat::off, MeshFormat::gltf}) {
         std::string bytes;
         ASSERT_TRUE(write_mesh(make_vertex_attribute_mesh(), format, bytes).ok());
         for (std::size_t size = 0; size < bytes.size(); ++size)
