@@ -15,9 +15,9 @@
 namespace filigree::studio {
 namespace {
 
-const QString kMeshes = QStringLiteral("Meshes (*.obj *.ply *.stl *.off)");
+const QString kMeshes = QStringLiteral("Meshes (*.obj *.ply *.stl *.off *.glb)");
 const QString kModels = QStringLiteral("Filigree models (*.fil)");
-const QString kOpenable = QStringLiteral("Meshes and models (*.fil *.obj *.ply *.stl *.off)");
+const QString kOpenable = QStringLiteral("Meshes and models (*.fil *.obj *.ply *.stl *.off *.glb *.gltf)");
 const QString kAll = QStringLiteral("All files (*)");
 
 /// "bend.obj" becomes "bend_%04d.obj": a file a frame.
