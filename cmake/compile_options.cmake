@@ -1,7 +1,7 @@
 # What every target of ours is compiled with. One place, so that the same input gives the same bytes everywhere.
 add_library(filigree_options INTERFACE)
 target_compile_options(filigree_options INTERFACE
-  -Wall -Wextra -Wno-restrict -Wno-array-bounds -Wno-stringop-overflow  # false alarms about std::string in GCC 12
+  -Wall -Wextra -Wno-restrict -Wno-array-bounds -Wno-stringop-overflow -Wno-stringop-overread  # false alarms about std::string, GCC 12
   -Wshadow -Wconversion -Wno-sign-conversion -Wno-psabi
   -ffp-contract=off      # no fused multiply-add: the same bytes whatever the processor has
   $<$<BOOL:${FILIGREE_STRICT}>:-Werror>)
