@@ -62,11 +62,13 @@ void add_report(const ExportReport& report, bool is_skin, bool has_normals, cons
                                     with_commas(report.joints), with_commas(report.keys), report.seconds)
                       : fmt::format("{} of {} vertices in {:.4g} s", with_commas(report.keys),
                                     with_commas(report.vertices), report.seconds));
+    std::string error =
+        fmt::format("{:.1e} of the diagonal at keys (rms {:.1e})", report.error_at_keys, report.rms_at_keys);
+    if (is_skin)
+        error += fmt::format(", {:.1e} between them (rms {:.1e})", report.error_between_keys, report.rms_between_keys);
     if (report.moments_checked > 0)
-        table.row("error of the file", fmt::format("{:.1e} of the diagonal at keys (rms {:.1e}), {:.1e} between them "
-                                                   "(rms {:.1e}); {} moments evaluated",
-                                                   report.error_at_keys, report.rms_at_keys, report.error_between_keys,
-                                                   report.rms_between_keys, with_commas(report.moments_checked)));
+        table.row("error of the file", fmt::format("{}; {} of {} moments evaluated", error,
+                                                   with_commas(report.moments_checked), with_commas(report.moments)));
     if (has_normals && report.normal_error_degrees > 0)
         table.row("normals", fmt::format("up to {:.3g} degrees off (95th percentile) in viewers that turn them with "
                                          "the skin's matrix, such as three.js",
@@ -201,6 +203,15 @@ void check_not_input(const std::string& output, const std::vector<std::string>& 
             throw Failure{{ErrorCode::usage,
                            path.string() + ": is the input and would be overwritten; choose another place with -o."}};
     }
+}
+
+void add_pose_file_options(CLI::App& command, PoseFileOptions& options) {
+    command
+        .add_option_function<double>(
+            "--frame-rate", [&options](const double& rate) { options.frames_per_second = rate; },
+            "Frames a second (unset: as the file says; 60 for .pc2 and numbered meshes)")
+        ->check(positive_number());
+    command.add_option("--animation", options.animation, "Of a .glb with several (unset: the first)");
 }
 
 PoseStream poses_of(const std::string& poses, const PoseFileOptions& options, const Model& model,

@@ -35,6 +35,9 @@ void check_animation_options(const AnimationOutput& output, const std::vector<st
 /// meshes in an output folder.
 void check_not_input(const std::string& output, const std::vector<std::string>& inputs);
 
+/// Adds --frame-rate and --animation: how a file of poses is read.
+void add_pose_file_options(CLI::App& command, PoseFileOptions& options);
+
 /// The poses of a file, one frame in memory where it allows that, or the model's own, which `own` keeps.
 PoseStream poses_of(const std::string& poses, const PoseFileOptions& options, const Model& model,
                     const PoseSequence& own, const std::string& model_path, Session& session);

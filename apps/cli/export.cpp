@@ -128,11 +128,7 @@ void add_export(CLI::App& app, Session& session) {
     command->add_option("--poses", options->poses,
                         "What moves the driver (or the mesh): .pc2, .mdd, numbered meshes, an animated glTF, a model; "
                         "unset: the file's own poses");
-    command
-        ->add_option("--frame-rate", options->pose_file.frames_per_second,
-                     "Frames a second of --poses that do not say (unset: 60)")
-        ->check(positive_number());
-    command->add_option("--animation", options->pose_file.animation, "Which animation of a glTF (unset: the first)");
+    add_pose_file_options(*command, options->pose_file);
     command->add_flag("--rest", options->at_rest, "The levels at rest, though the model has poses");
     command->add_flag("--web", options->web, "A folder that shows the model in a browser, without a network");
     add_animation_options(*command, options->animation);

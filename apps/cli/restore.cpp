@@ -151,12 +151,7 @@ void add_restore(CLI::App& app, Session& session) {
     command->add_option("--poses", options->poses,
                         "Or an animation of the driver: .pc2, .mdd, a folder of numbered meshes or NAME_####.ply, an "
                         "animated .glb, another .fil's poses");
-    command
-        ->add_option_function<double>(
-            "--frame-rate", [options](const double& rate) { options->poses_file.frames_per_second = rate; },
-            "Frames a second (unset: as the file says; 60 for .pc2 and numbered meshes)")
-        ->check(positive_number());
-    command->add_option("--animation", options->poses_file.animation, "Of a .glb with several (unset: the first)");
+    add_pose_file_options(*command, options->poses_file);
     command
         ->add_option("-o,--output", options->output,
                      "Mesh to write; an animation: .pc2, .mdd, .glb, .usda, a folder for NAME_0001.ply and so on, or "

@@ -53,9 +53,9 @@ public:
     Model read_model(const std::string& path, PoseSequence* poses = nullptr);
     struct Content {
         std::variant<Mesh, Model> value;
-        std::size_t bytes;              ///< of the file
-        PoseSequence poses;             ///< of a model that has been moved
-        std::optional<GltfScene> scene; ///< that the mesh is of, where it was asked for
+        std::size_t bytes;                   ///< of the file
+        PoseSequence poses;                  ///< of a model that has been moved
+        std::optional<GltfScene> scene = {}; ///< that the mesh is of, where it was asked for
     };
     /// A mesh or a model, told by the content. keep_scene: whether what else a glTF file holds is wanted.
     Content read_any(const std::string& path, bool keep_scene = false);

@@ -2,7 +2,6 @@
 #include "filigree/io/animation_error.h"
 #include "filigree/io/glb_parts.h"
 #include "filigree/io/gltf_export.h"
-#include "filigree/io/material_file.h"
 #include "filigree/mesh/normals.h"
 
 #include <cmath>
@@ -72,8 +71,7 @@ private:
     ExportReport report_;
 
     void add_mesh() {
-        MeshMaterials found;
-        if (!mesh_.materials.empty()) found = read_materials(mesh_, options_.materials_beside);
+        const MeshMaterials found = find_glb_materials(mesh_, options_.materials_beside);
         const GlbMaterials materials = add_glb_materials(builder_, parts_, found.materials);
         report_.warnings = found.warnings;
         report_.warnings.insert(report_.warnings.end(), materials.warnings.begin(), materials.warnings.end());
