@@ -1,0 +1,66 @@
+// What remeshing works on: an oriented triangle manifold that remembers the mesh it came from.
+#pragma once
+
+#include "filigree/core/run_context.h"
+#include "filigree/mesh/mesh.h"
+
+#include <vector>
+
+namespace filigree {
+
+/// Triangles over welded vertices. Every edge has one or two triangles, which run along it in opposite directions;
+/// the triangles of a vertex form one fan. Triangles may have no area, but never repeat a vertex.
+struct ManifoldSurface {
+    std::vector<Vec3d> positions;    ///< model units, relative to the mesh's origin; every one is used
+    std::vector<Triangle> triangles; ///< counter-clockwise seen from outside
+    /// The corners of the mesh (indices into Mesh::corners) that each triangle's vertices come from, in the triangle's
+    /// order; kNoIndex three times for triangles that were filled in. Empty when the surface is not the mesh's own (a
+    /// wrap).
+    std::vector<Triangle> source_corners;
+};
+
+/// What was changed on the way to a manifold.
+struct CleanReport {
+    std::size_t welded_vertices = 0;    ///< vertices at the place of an earlier one
+    std::size_t unused_vertices = 0;    ///< in no triangle
+    std::size_t degenerate_faces = 0;   ///< dropped: triangles that repeat a vertex after welding
+    std::size_t duplicate_faces = 0;    ///< dropped: triangles over the same vertices as an earlier one
+    std::size_t flipped_faces = 0;      ///< turned, so that neighbours agree; the majority of a component's area stays
+    std::size_t cut_edges = 0;          ///< edges with three or more triangles, or two that cannot agree: left open
+    std::size_t split_vertices = 0;     ///< further copies of vertices whose triangles form more than one fan
+    std::size_t removed_components = 0; ///< see remove_small_components
+    double removed_area = 0;            ///< of those, as a fraction of all
+    std::size_t closed_handles = 0;     ///< see close_handles
+    std::size_t filled_triangles = 0;   ///< that closed them
+};
+
+/// Counts of a manifold surface.
+struct SurfaceTopology {
+    std::size_t components = 0;
+    std::size_t border_edges = 0, border_loops = 0;
+    std::int64_t euler = 0; ///< vertices - edges + triangles
+    /// Handles of all components together: (2 components - border loops - euler) / 2.
+    std::int64_t genus() const { return (2 * std::int64_t(components) - std::int64_t(border_loops) - euler) / 2; }
+};
+
+/// Any mesh as a manifold: triangulates, welds vertices at the same position, drops triangles that repeat a vertex or
+/// the vertices of an earlier one, glues edges with exactly two triangles, orients each component (the majority by area
+/// stays), cuts what cannot be glued, and gives each fan its own vertex. Nothing else moves or goes.
+/// Adds to `report`. Errors: unsuitable (no face with an area is left), cancelled. Cost O(F log F).
+Result<ManifoldSurface> make_manifold(const Mesh& mesh, CleanReport& report, const RunContext& context);
+
+/// Cost O(F).
+SurfaceTopology surface_topology(const ManifoldSurface& surface);
+
+/// Drops components whose box has a diagonal below `smallest` (model units), except the largest by area. Adds to
+/// `report`. Cost O(F).
+void remove_small_components(ManifoldSurface& surface, double smallest, CleanReport& report);
+
+/// Cuts tiny handles open and closes both cuts with triangles, where a loop around the handle (or through it) is
+/// shorter than `longest_loop` (model units), shortest first; the genus goes down by one each time, nothing else
+/// changes. Method: loops of a tree-cotree decomposition [Erickson 2005], cut and filled as in [Guskov 2001]; disjoint
+/// loops of one decomposition are independent, so cutting many of them at once never takes a surface apart.
+/// Adds to `report`. Errors: cancelled. Cost O(F log F) a round; a handful of rounds.
+Status close_handles(ManifoldSurface& surface, double longest_loop, CleanReport& report, const RunContext& context);
+
+} // namespace filigree

@@ -1,0 +1,17 @@
+// Maximum weighted matching of a triangle mesh's dual graph.
+#pragma once
+
+#include "filigree/core/types.h"
+
+#include <span>
+#include <vector>
+
+namespace filigree {
+
+/// The triangle that each triangle is paired with, or kNoIndex: of all matchings with the most pairs, one with the
+/// greatest sum of weights. Half-edge 3 t + i belongs to triangle t.
+/// opposite: 3 F twins, kNoIndex on borders. weights: 3 F, alike on twins, 0 to 1; below 0: this pair must not be.
+/// Method: [Edmonds 1965], as LEMON has it. Cost O(F^2 log F) at worst, near-linear on surfaces.
+std::vector<Index> match_triangles(std::span<const Index> opposite, std::span<const double> weights);
+
+} // namespace filigree

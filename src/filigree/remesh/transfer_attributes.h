@@ -1,0 +1,26 @@
+// UVs, colours, normals, labels and further numbers, carried from a mesh to another that lies on it.
+#pragma once
+
+#include "filigree/core/run_context.h"
+#include "filigree/mesh/mesh.h"
+
+#include <vector>
+
+namespace filigree {
+
+/// A point of a mesh's surface: barycentric coordinates over three of its corners (indices into Mesh::corners, all of
+/// one face).
+struct CornerPoint {
+    Triangle corners = {kNoIndex, kNoIndex, kNoIndex};
+    Vec3f barycentric = Vec3f::Zero();
+};
+
+/// Gives `to` the attributes of `from`. points: for each vertex of `to` where it lies on `from`.
+/// Colours and scalars are interpolated; labels and smoothing groups are those of the face under each face's centre.
+/// UVs and normals belong to corners: where `from` has a seam, each face of `to` takes the side that most of it lies on,
+/// and its vertices beyond the seam are continued from that side, so that no face stretches across the texture.
+/// Normals are renormalised, and left out where `from` has none. Material files and materials are copied.
+/// Cost O(V + F), and a short search per corner beyond a seam. Errors: cancelled.
+Status transfer_attributes(const Mesh& from, std::span<const CornerPoint> points, Mesh& to, const RunContext& context);
+
+} // namespace filigree
