@@ -27,6 +27,7 @@ struct CleanReport {
     std::size_t duplicate_faces = 0;    ///< dropped: triangles over the same vertices as an earlier one
     std::size_t flipped_faces = 0;      ///< turned, so that neighbours agree; the majority of a component's area stays
     std::size_t cut_edges = 0;          ///< edges with three or more triangles, or two that cannot agree: left open
+    std::size_t separated_edges = 0;    ///< edges with four or more triangles where the sheets came apart, all closed
     std::size_t split_vertices = 0;     ///< further copies of vertices whose triangles form more than one fan
     std::size_t removed_components = 0; ///< see remove_small_components
     double removed_area = 0;            ///< of those, as a fraction of all

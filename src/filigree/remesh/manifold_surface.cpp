@@ -1,0 +1,420 @@
+// Based on:
+//   [Gueziec 2001] (cutting along singular edges, then gluing what agrees). Where more than two triangles meet, we pair
+//   the two sides of each solid wedge, so that bodies which touch along an edge come apart closed.
+#include "filigree/remesh/manifold_surface.h"
+
+#include "filigree/core/parallel_for.h"
+#include "filigree/mesh/triangulate.h"
+#include "filigree/mesh/weld.h"
+#include "filigree/remesh/half_edges.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <numeric>
+
+namespace filigree {
+namespace {
+
+constexpr double kNoArea = 1e-14;      // of the diagonal squared: float's rounding of the positions, squared
+constexpr std::size_t kGrain = 32'768; // triangles a piece
+
+/// Triangles over welded vertices, and the mesh corners and faces they come from.
+struct Soup {
+    std::vector<Triangle> triangles, corners;
+    std::vector<Index> source_face;
+
+    void resize(std::size_t count) {
+        triangles.resize(count);
+        corners.resize(count);
+        source_face.resize(count);
+    }
+    /// Keeps the triangles that `keep` says true of.
+    template <class Keep>
+    void filter(const Keep& keep) {
+        std::size_t kept = 0;
+        for (std::size_t t = 0; t < triangles.size(); ++t) {
+            if (!keep(t)) continue;
+            triangles[kept] = triangles[t];
+            corners[kept] = corners[t];
+            source_face[kept++] = source_face[t];
+        }
+        resize(kept);
+    }
+};
+
+double double_area(const Vec3d& a, const Vec3d& b, const Vec3d& c) { return (b - a).cross(c - a).norm(); }
+
+double double_area(std::span<const Vec3d> positions, const Triangle& t) {
+    return double_area(positions[t[0]], positions[t[1]], positions[t[2]]);
+}
+
+/// Triangles over corners: every corner is a vertex of its own, so that faces which repeat a vertex name the right one.
+Triangulation triangulate_corners(const Mesh& mesh) {
+    Mesh loose;
+    loose.positions.resize(mesh.corner_count());
+    for (std::size_t c = 0; c < mesh.corner_count(); ++c) loose.positions[c] = mesh.positions[mesh.corners[c]];
+    loose.face_offsets = mesh.face_offsets;
+    loose.corners.resize(mesh.corner_count());
+    std::iota(loose.corners.begin(), loose.corners.end(), Index{0});
+    return triangulate(loose);
+}
+
+Soup triangle_soup(const Mesh& mesh, std::span<const Index> welded) {
+    Soup soup;
+    if (mesh.corner_count() == 3 * mesh.face_count()) {
+        soup.resize(mesh.face_count());
+        for (Index f = 0; f < mesh.face_count(); ++f) {
+            soup.corners[f] = {3 * f, 3 * f + 1, 3 * f + 2};
+            soup.source_face[f] = f;
+        }
+    } else {
+        Triangulation triangulation = triangulate_corners(mesh);
+        soup.corners = std::move(triangulation.triangles);
+        soup.source_face = std::move(triangulation.source_face);
+    }
+    soup.triangles.resize(soup.corners.size());
+    for (std::size_t t = 0; t < soup.corners.size(); ++t)
+        for (std::size_t i = 0; i < 3; ++i) soup.triangles[t][i] = welded[mesh.corners[soup.corners[t][i]]];
+    return soup;
+}
+
+void drop_degenerate(Soup& soup, CleanReport& report) {
+    const std::size_t before = soup.triangles.size();
+    soup.filter([&](std::size_t t) {
+        const auto& [a, b, c] = soup.triangles[t];
+        return a != b && b != c && c != a;
+    });
+    report.degenerate_faces += before - soup.triangles.size();
+}
+
+/// For each triangle the first one over the same vertices, in any order.
+std::vector<Index> first_copies(std::span<const Triangle> triangles, std::span<const Index> sorted) {
+    std::vector<Index> first(triangles.size());
+    std::iota(first.begin(), first.end(), Index{0});
+    std::vector<std::pair<Index, Index>> apexes; // and triangles, of one edge
+    for_each_edge(triangles, sorted, [&](std::span<const Index> edge) {
+        if (edge.size() < 2) return;
+        apexes.clear();
+        for (const Index h : edge) apexes.emplace_back(half_edge_start(triangles, previous_half_edge(h)), h / 3);
+        std::ranges::sort(apexes);
+        for (std::size_t i = 1; i < apexes.size(); ++i)
+            if (apexes[i].first == apexes[i - 1].first) first[apexes[i].second] = first[apexes[i - 1].second];
+    });
+    return first;
+}
+
+/// Drops later copies. Returns whether there were any.
+bool drop_duplicates(Soup& soup, std::span<const Index> sorted, CleanReport& report) {
+    const std::vector<Index> first = first_copies(soup.triangles, sorted);
+    const std::size_t before = soup.triangles.size();
+    soup.filter([&](std::size_t t) { return first[t] == t; });
+    report.duplicate_faces += before - soup.triangles.size();
+    return soup.triangles.size() != before;
+}
+
+/// The opposite of each half-edge on edges with exactly two triangles, whichever way they run.
+std::vector<Index> pair_neighbours(std::span<const Triangle> triangles, std::span<const Index> sorted) {
+    std::vector<Index> neighbour(sorted.size(), kNoIndex);
+    for_each_edge(triangles, sorted, [&](std::span<const Index> edge) {
+        if (edge.size() != 2) return;
+        neighbour[edge[0]] = edge[1];
+        neighbour[edge[1]] = edge[0];
+    });
+    return neighbour;
+}
+
+/// Which triangles to turn so that neighbours agree, as far as they can; of each component the smaller area turns.
+std::vector<std::uint8_t> triangles_to_flip(std::span<const Triangle> triangles, std::span<const Index> neighbour,
+                                            std::span<const double> areas) {
+    std::vector<std::uint8_t> flip(triangles.size(), 0), seen(triangles.size(), 0);
+    std::vector<Index> component;
+    for (Index seed = 0; seed < triangles.size(); ++seed) {
+        if (seen[seed]) continue;
+        component.assign(1, seed);
+        seen[seed] = 1;
+        double kept = 0, turned = 0;
+        for (std::size_t i = 0; i < component.size(); ++i) {
+            const Index t = component[i];
+            (flip[t] ? turned : kept) += areas[t];
+            for (Index h = 3 * t; h < 3 * t + 3; ++h) {
+                const Index other = neighbour[h];
+                if (other == kNoIndex || seen[other / 3]) continue;
+                seen[other / 3] = 1;
+                const bool agree = half_edge_start(triangles, h) != half_edge_start(triangles, other);
+                flip[other / 3] = flip[t] ^ !agree;
+                component.push_back(other / 3);
+            }
+        }
+        if (turned > kept)
+            for (const Index t : component) flip[t] ^= 1;
+    }
+    return flip;
+}
+
+/// Turns triangles over, and renumbers their half-edges: the edge i becomes the edge 2 - i.
+void flip_triangles(Soup& soup, std::span<Index> sorted, std::span<const std::uint8_t> flip, CleanReport& report) {
+    Index last_face = kNoIndex;
+    for (std::size_t t = 0; t < flip.size(); ++t) {
+        if (!flip[t]) continue;
+        std::swap(soup.triangles[t][1], soup.triangles[t][2]);
+        std::swap(soup.corners[t][1], soup.corners[t][2]);
+        report.flipped_faces += soup.source_face[t] != last_face;
+        last_face = soup.source_face[t];
+    }
+    for (Index& h : sorted)
+        if (flip[h / 3]) h = h / 3 * 3 + 2 - h % 3;
+}
+
+/// Glues the half-edges of oriented triangles, so that their fans make a manifold.
+class Gluer {
+public:
+    Gluer(std::span<const Vec3d> positions, std::span<const Triangle> triangles, std::span<const Index> sorted)
+        : positions_(positions), triangles_(triangles), opposite_(sorted.size(), kNoIndex) {
+        for_each_edge(triangles, sorted, [&](std::span<const Index> edge) {
+            if (edge.size() == 2 && run_apart(edge[0], edge[1])) return glue(edge[0], edge[1]);
+            if (edge.size() < 2) return;
+            singular_.push_back(edge);
+            if (edge.size() > 2) pair_wedges(edge);
+        });
+        if (!singular_.empty()) mend();
+    }
+
+    void count(CleanReport& report) const {
+        for (const auto& edge : singular_) {
+            const bool closed = std::ranges::all_of(edge, [&](Index h) { return opposite_[h] != kNoIndex; });
+            ++(closed ? report.separated_edges : report.cut_edges);
+        }
+    }
+
+    std::span<const Index> opposite() const { return opposite_; }
+
+private:
+    bool run_apart(Index a, Index b) const { return half_edge_start(triangles_, a) != half_edge_start(triangles_, b); }
+    void glue(Index a, Index b) {
+        opposite_[a] = b;
+        opposite_[b] = a;
+    }
+    void cut(Index a) {
+        if (opposite_[a] == kNoIndex) return;
+        opposite_[opposite_[a]] = kNoIndex;
+        opposite_[a] = kNoIndex;
+    }
+
+    /// Around the edge, seen from its higher end, counter-clockwise: a triangle that runs down the edge has its inside
+    /// ahead, one that runs up has it behind. So each one that runs down is glued to the next that runs up, as brackets
+    /// are matched.
+    void pair_wedges(std::span<const Index> edge) {
+        const Index a = half_edge_start(triangles_, edge[0]), b = half_edge_end(triangles_, edge[0]);
+        const Vec3d &low = positions_[std::min(a, b)], axis = (positions_[std::max(a, b)] - low).normalized();
+        const Vec3d u = axis.unitOrthogonal(), v = axis.cross(u);
+        around_.clear();
+        for (const Index h : edge) {
+            const Vec3d arm = positions_[half_edge_start(triangles_, previous_half_edge(h))] - low;
+            around_.emplace_back(std::atan2(v.dot(arm), u.dot(arm)), h);
+        }
+        std::ranges::sort(around_);
+        open_.clear();
+        for (int turn = 0; turn < 2; ++turn) // the second time for wedges over the angle where we began
+            for (const auto& [angle, h] : around_) {
+                if (opposite_[h] != kNoIndex) continue;
+                const bool up = half_edge_start(triangles_, h) == std::min(a, b);
+                if (!up && turn == 0) open_.push_back(h);
+                if (!up || open_.empty()) continue;
+                glue(open_.back(), h);
+                open_.pop_back();
+            }
+    }
+
+    /// Edges between the same two fans must be one. Where they are not, what was paired there is cut, which gives the
+    /// fans fewer triangles, until each such edge is one pair, one border, or two borders that close on each other.
+    void mend() {
+        for (bool again = true; again;) {
+            again = false;
+            const Labels fan = fans(opposite_);
+            for (const auto& edge : singular_)
+                for_same_ends(edge, fan, [&](std::span<const Index> same) {
+                    if (same.size() < 2 || (same.size() == 2 && (opposite_[same[0]] == same[1] || is_slit(same))))
+                        return;
+                    for (const Index h : same) {
+                        again = again || opposite_[h] != kNoIndex;
+                        cut(h);
+                    }
+                });
+        }
+        const Labels fan = fans(opposite_);
+        for (const auto& edge : singular_)
+            for_same_ends(edge, fan, [&](std::span<const Index> same) {
+                if (same.size() == 2 && is_slit(same)) glue(same[0], same[1]);
+            });
+    }
+
+    bool is_slit(std::span<const Index> same) const {
+        return opposite_[same[0]] == kNoIndex && opposite_[same[1]] == kNoIndex && run_apart(same[0], same[1]);
+    }
+
+    /// Calls visit for the half-edges of `edge` that lie between the same two fans.
+    template <class Visit>
+    void for_same_ends(std::span<const Index> edge, const Labels& fan, const Visit& visit) const {
+        const auto ends = [&](Index h) -> std::pair<Index, Index> {
+            return std::minmax(fan.of[h], fan.of[next_half_edge(h)]);
+        };
+        std::vector<Index> grouped(edge.begin(), edge.end());
+        std::ranges::stable_sort(grouped, {}, ends);
+        for (std::size_t begin = 0; begin < grouped.size();) {
+            std::size_t end = begin + 1;
+            while (end < grouped.size() && ends(grouped[end]) == ends(grouped[begin])) ++end;
+            visit(std::span<const Index>(grouped).subspan(begin, end - begin));
+            begin = end;
+        }
+    }
+
+    std::span<const Vec3d> positions_;
+    std::span<const Triangle> triangles_;
+    std::vector<Index> opposite_;
+    std::vector<std::span<const Index>> singular_; ///< edges that are neither a border nor a plain pair
+    std::vector<std::pair<double, Index>> around_; ///< angles and half-edges of one edge
+    std::vector<Index> open_;
+};
+
+/// Gives each fan a vertex, in the order of the mesh's vertices, and within one in that of its first triangle.
+ManifoldSurface split_into_fans(Soup soup, std::span<const Vec3d> positions, const Labels& fan) {
+    std::vector<Index> place(fan.count); // the welded vertex of each fan
+    for (Index h = 0; h < fan.of.size(); ++h) place[fan.of[h]] = half_edge_start(soup.triangles, h);
+    std::vector<Index> next(positions.size() + 1, 0);
+    for (const Index vertex : place) ++next[vertex + 1];
+    std::inclusive_scan(next.begin(), next.end(), next.begin());
+    ManifoldSurface surface;
+    surface.positions.resize(fan.count);
+    std::vector<Index> number(fan.count);
+    for (std::size_t f = 0; f < fan.count; ++f) {
+        number[f] = next[place[f]]++;
+        surface.positions[number[f]] = positions[place[f]];
+    }
+    for (std::size_t h = 0; h < fan.of.size(); ++h) soup.triangles[h / 3][h % 3] = number[fan.of[h]];
+    surface.triangles = std::move(soup.triangles);
+    surface.source_corners = std::move(soup.corners);
+    return surface;
+}
+
+std::vector<double> double_areas(std::span<const Vec3d> positions, std::span<const Triangle> triangles,
+                                 const RunContext& context) {
+    std::vector<double> areas(triangles.size());
+    parallel_for(context, triangles.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t t = begin; t < end; ++t) areas[t] = double_area(positions, triangles[t]);
+    });
+    return areas;
+}
+
+std::size_t used_count(std::span<const Triangle> triangles, std::size_t vertex_count) {
+    std::vector<std::uint8_t> used(vertex_count, 0);
+    for (const Triangle& t : triangles)
+        for (const Index vertex : t) used[vertex] = 1;
+    return static_cast<std::size_t>(std::ranges::count(used, 1));
+}
+
+} // namespace
+
+Result<ManifoldSurface> make_manifold(const Mesh& mesh, CleanReport& report, const RunContext& context) {
+    const auto step = [&](double fraction) {
+        context.report("cleaning", fraction);
+        return !context.is_cancelled();
+    };
+    if (!step(0)) return cancelled_error();
+    const std::vector<Index> welded = weld_map(mesh.positions);
+    std::size_t places = 0;
+    for (Index v = 0; v < welded.size(); ++v) places += welded[v] == v;
+    Soup soup = triangle_soup(mesh, welded);
+    drop_degenerate(soup, report);
+    if (!step(0.2)) return cancelled_error();
+
+    std::vector<Index> sorted = half_edges_by_edge(soup.triangles, mesh.vertex_count());
+    if (drop_duplicates(soup, sorted, report)) sorted = half_edges_by_edge(soup.triangles, mesh.vertex_count());
+    std::vector<Vec3d> positions(mesh.vertex_count());
+    std::ranges::transform(mesh.positions, positions.begin(), [](const Vec3f& p) { return p.cast<double>(); });
+    const std::vector<double> areas = double_areas(positions, soup.triangles, context);
+    const double diagonal = bounds(mesh.positions).diagonal();
+    if (!(std::reduce(areas.begin(), areas.end()) > kNoArea * diagonal * diagonal))
+        return Error{ErrorCode::unsuitable, "The mesh has no face with an area; there is no surface to work on."};
+    if (!step(0.5)) return cancelled_error();
+
+    const std::vector<Index> neighbour = pair_neighbours(soup.triangles, sorted);
+    flip_triangles(soup, sorted, triangles_to_flip(soup.triangles, neighbour, areas), report);
+    if (!step(0.7)) return cancelled_error();
+    const Gluer gluer(positions, soup.triangles, sorted);
+    const Labels fan = fans(gluer.opposite());
+    const std::size_t used = used_count(soup.triangles, mesh.vertex_count());
+    gluer.count(report);
+    report.welded_vertices += mesh.vertex_count() - places;
+    report.unused_vertices += places - used;
+    report.split_vertices += fan.count - used;
+    ManifoldSurface surface = split_into_fans(std::move(soup), positions, fan);
+    if (!step(1)) return cancelled_error();
+    return surface;
+}
+
+SurfaceTopology surface_topology(const ManifoldSurface& surface) {
+    const std::vector<Index> opposite = opposite_half_edges(surface.triangles, surface.positions.size());
+    SurfaceTopology topology;
+    topology.components = components(opposite).count;
+    std::vector<Index> next(surface.positions.size(), kNoIndex); // along the border
+    for (Index h = 0; h < opposite.size(); ++h) {
+        if (opposite[h] != kNoIndex) continue;
+        ++topology.border_edges;
+        assert(next[half_edge_start(surface.triangles, h)] == kNoIndex);
+        next[half_edge_start(surface.triangles, h)] = half_edge_end(surface.triangles, h);
+    }
+    const std::size_t edges = (opposite.size() + topology.border_edges) / 2;
+    topology.euler = std::int64_t(surface.positions.size()) - std::int64_t(edges) + std::int64_t(opposite.size() / 3);
+    for (Index v = 0; v < next.size(); ++v) {
+        if (next[v] == kNoIndex) continue;
+        ++topology.border_loops;
+        for (Index at = v; next[at] != kNoIndex;) at = std::exchange(next[at], kNoIndex);
+    }
+    return topology;
+}
+
+void remove_small_components(ManifoldSurface& surface, double smallest, CleanReport& report) {
+    const Labels component = components(opposite_half_edges(surface.triangles, surface.positions.size()));
+    if (component.count < 2) return;
+    std::vector<Box> boxes(component.count);
+    std::vector<double> areas(component.count, 0);
+    for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
+        areas[component.of[t]] += double_area(surface.positions, surface.triangles[t]);
+        for (const Index vertex : surface.triangles[t]) boxes[component.of[t]].extend(surface.positions[vertex]);
+    }
+    const auto largest = static_cast<std::size_t>(std::ranges::max_element(areas) - areas.begin());
+    const double all = std::reduce(areas.begin(), areas.end());
+    std::vector<std::uint8_t> keep(component.count);
+    double removed = 0;
+    for (std::size_t c = 0; c < component.count; ++c) {
+        keep[c] = c == largest || !(boxes[c].diagonal() < smallest);
+        if (keep[c]) continue;
+        ++report.removed_components;
+        removed += areas[c];
+    }
+    if (all > 0) report.removed_area += removed / all;
+
+    std::vector<Index> number(surface.positions.size(), kNoIndex);
+    std::size_t kept = 0;
+    for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
+        if (!keep[component.of[t]]) continue;
+        for (const Index vertex : surface.triangles[t]) number[vertex] = 0;
+        surface.triangles[kept] = surface.triangles[t];
+        if (!surface.source_corners.empty()) surface.source_corners[kept] = surface.source_corners[t];
+        ++kept;
+    }
+    surface.triangles.resize(kept);
+    if (!surface.source_corners.empty()) surface.source_corners.resize(kept);
+    Index count = 0;
+    for (std::size_t v = 0; v < number.size(); ++v) {
+        if (number[v] == kNoIndex) continue;
+        surface.positions[count] = surface.positions[v];
+        number[v] = count++;
+    }
+    surface.positions.resize(count);
+    for (Triangle& t : surface.triangles)
+        for (Index& vertex : t) vertex = number[vertex];
+}
+
+} // namespace filigree
