@@ -88,8 +88,11 @@ TEST(ClosestPointTree, AgreesWithBruteForceToTheBit) {
             std::vector<Vec3f> positions(30);
             for (Vec3f& p : positions) p = point();
             std::vector<Triangle> triangles(1 + random() % 100);
-            for (Triangle& t : triangles) t = {Index(random() % 30), Index(random() % 30), Index(random() % 30)};
-            const ClosestPointTree tree(positions, triangles);
+            for (std::size_t t = 0; t < triangles.size(); ++t) { // some share an edge with the one before
+                triangles[t] = {Index(random() % 30), Index(random() % 30), Index(random() % 30)};
+                if (t % 3 == 1) triangles[t][0] = triangles[t - 1][2], triangles[t][1] = triangles[t - 1][1];
+            }
+            const ClosestPointTree tree(positions, triangles, round % 2 ? TreeLeaves::pairs : TreeLeaves::single);
             for (int i = 0; i < 50; ++i) {
                 const float times = i % 5 ? 1.0f : 100.0f;
                 const Vec3f query = times * (point() - point() / 3);
@@ -106,12 +109,13 @@ TEST(ClosestPointTree, AgreesWithBruteForceToTheBit) {
 TEST(ClosestPointTree, AgreesWithBruteForceOnASmoothSurface) {
     const Mesh mesh = make_wavy_sphere({.resolution = 12});
     const std::vector<Triangle> triangles = triangulate(mesh).triangles;
-    const ClosestPointTree tree(mesh.positions, triangles);
+    const ClosestPointTree tree(mesh.positions, triangles), pairs(mesh.positions, triangles, TreeLeaves::pairs);
     std::mt19937 random(4);
     const auto coordinate = [&] { return float(random() % 100000) / 50000 - 1; };
     for (int i = 0; i < 300; ++i) {
         const Vec3f query(coordinate(), coordinate(), coordinate());
         expect_same(tree.closest(query), brute_force(mesh.positions, triangles, query));
+        expect_same(pairs.closest(query), tree.closest(query));
     }
     for (std::size_t v = 0; v < mesh.vertex_count(); ++v) { // a vertex is on its own triangles, the lowest wins
         expect_same(tree.closest(mesh.positions[v]), brute_force(mesh.positions, triangles, mesh.positions[v]));

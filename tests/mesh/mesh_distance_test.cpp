@@ -1,6 +1,8 @@
 #include "filigree/mesh/mesh_distance.h"
 
+#include "filigree/mesh/closest_point.h"
 #include "filigree/mesh/shapes.h"
+#include "filigree/mesh/triangulate.h"
 #include "threads.h"
 
 #include <algorithm>
@@ -47,6 +49,8 @@ TEST(MeshDistance, OfParallelSquaresInAnyScale) {
 TEST(MeshDistance, IsNotTheSameBothWays) {
     const MeshDistance d = distance(square(1, 0), square(3, 0)); // the small one lies in the large one
     EXPECT_LT(d.surfaces->max_a_to_b, 1e-7);
+    EXPECT_LT(d.surfaces->rms_a_to_b, 1e-7);
+    EXPECT_GT(d.surfaces->rms_b_to_a, 0.1);
     EXPECT_NEAR(d.surfaces->max_b_to_a, std::sqrt(2), 1e-6); // corner to corner
     EXPECT_EQ(d.surfaces->hausdorff, d.surfaces->max_b_to_a);
 }
@@ -62,6 +66,8 @@ TEST(MeshDistance, OfSamplesConvergesToTheIntegral) {
     EXPECT_NEAR(d.surfaces->max_b_to_a, 1.2, 1e-6);
     EXPECT_NEAR(d.surfaces->mean_distance, 0.6, 1e-3);
     EXPECT_NEAR(d.surfaces->rms_distance, 1.2 / std::sqrt(3), 1e-3);
+    EXPECT_NEAR(d.surfaces->rms_a_to_b, 1.2 / std::sqrt(3), 1e-3);
+    EXPECT_NEAR(d.surfaces->rms_b_to_a, 1.2 / std::sqrt(3), 1e-3);
     EXPECT_NEAR(d.vertices->normal_mean_deg, 36.8698976, 1e-5);
     EXPECT_NEAR(d.vertices->normal_p95_deg, 36.8698976, 1e-5);
 }
@@ -110,6 +116,34 @@ TEST(MeshDistance, LeavesOutWhatDoesNotApply) {
     Mesh collapsed = sphere; // faces, but no area
     for (Vec3f& p : collapsed.positions) p.setZero();
     EXPECT_NEAR(distance(collapsed, sphere).surfaces->max_b_to_a, 0.52, 0.02);
+}
+
+TEST(MeshDistance, OfTheTwoWaysGivesTheWhole) {
+    const Mesh a = make_wavy_cube({.resolution = 12}), b = make_wavy_sphere({.resolution = 12}); // as many vertices
+    const SurfaceDistance d = *distance(a, b, 5000).surfaces;
+    const double both = (d.rms_a_to_b * d.rms_a_to_b + d.rms_b_to_a * d.rms_b_to_a) / 2;
+    EXPECT_NEAR(d.rms_distance, std::sqrt(both), 1e-12);
+    EXPECT_GT(std::abs(d.rms_a_to_b - d.rms_b_to_a), 1e-3); // corners stand out of a ball
+    const SurfaceDistance back = *distance(b, a, 5000).surfaces;
+    EXPECT_NEAR(back.rms_a_to_b, d.rms_b_to_a, 1e-6);
+    EXPECT_NEAR(back.rms_b_to_a, d.rms_a_to_b, 1e-6);
+}
+
+TEST(MeshDistance, OfManyVerticesIsThatOfEachOne) { // the search goes from sample to sample
+    const Mesh a = make_wavy_cube({.resolution = 40}), b = make_wavy_sphere({.resolution = 10});
+    const std::vector<Triangle> triangles = triangulate(b).triangles;
+    double max = 0, squares = 0;
+    for (const Vec3f& p : a.positions) {
+        double closest = std::numeric_limits<double>::infinity();
+        for (const auto& [i, j, k] : triangles)
+            closest = std::min(closest,
+                               closest_point_on_triangle(p, b.positions[i], b.positions[j], b.positions[k]).distance);
+        max = std::max(max, closest);
+        squares += closest * closest;
+    }
+    const SurfaceDistance d = *distance(a, b, 0).surfaces;
+    EXPECT_EQ(d.max_a_to_b, max);
+    EXPECT_EQ(d.rms_a_to_b, std::sqrt(squares / double(a.vertex_count())));
 }
 
 TEST(MeshDistance, IsSeededAndIndependentOfThreads) {

@@ -68,6 +68,10 @@ SurfacePoint surface_point(const TrianglePoint& point, Index triangle) {
     return {triangle, point.barycentric.cast<float>(), point.position.cast<float>(), std::sqrt(point.squared_distance)};
 }
 
+bool share_an_edge(const Triangle& s, const Triangle& t) {
+    return std::ranges::count_if(t, [&](Index vertex) { return std::ranges::find(s, vertex) != s.end(); }) == 2;
+}
+
 /// One for the process: a device is slow to make, and its own threads are TBB's.
 RTCDevice embree_device() {
     struct Device {
@@ -92,10 +96,12 @@ struct ClosestPointTree::Tree {
     Vec3d centre = Vec3d::Zero();
     double scale = 1; ///< Embree's units in a model unit: the box becomes -1 to 1
     RTCScene scene = nullptr;
+    /// Leaf i has the triangles leaf_begin[i] .. leaf_begin[i + 1] - 1; empty: one triangle each.
+    std::vector<Index> leaf_begin;
     /// In Embree's units, during the build only: Embree flushes denormal floats to zero while it calls set_bounds.
     std::vector<Vec3f> local_positions;
 
-    Tree(std::span<const Vec3f> positions_, std::span<const Triangle> triangles_)
+    Tree(std::span<const Vec3f> positions_, std::span<const Triangle> triangles_, TreeLeaves leaves)
         : positions(positions_), triangles(triangles_) {
         if (triangles.empty()) return;
         Box box;
@@ -106,6 +112,7 @@ struct ClosestPointTree::Tree {
         if (size > 0) scale = 2 / size;
         local_positions.reserve(positions.size());
         for (const Vec3f& p : positions) local_positions.push_back(to_local(p.cast<double>()).cast<float>());
+        if (leaves == TreeLeaves::pairs) pair_triangles();
         build();
         local_positions = {};
     }
@@ -121,10 +128,25 @@ struct ClosestPointTree::Tree {
         return {positions[a].cast<double>(), positions[b].cast<double>(), positions[c].cast<double>()};
     }
 
+    std::size_t leaf_count() const { return leaf_begin.empty() ? triangles.size() : leaf_begin.size() - 1; }
+    std::span<const Triangle> leaf(Index i) const {
+        return leaf_begin.empty() ? triangles.subspan(i, 1)
+                                  : triangles.subspan(leaf_begin[i], leaf_begin[i + 1] - leaf_begin[i]);
+    }
+
+    void pair_triangles() {
+        leaf_begin.reserve(triangles.size() / 2 + 1);
+        for (std::size_t t = 0; t < triangles.size(); ++t) {
+            leaf_begin.push_back(static_cast<Index>(t));
+            if (t + 1 < triangles.size() && share_an_edge(triangles[t], triangles[t + 1])) ++t;
+        }
+        leaf_begin.push_back(static_cast<Index>(triangles.size()));
+    }
+
     void build() {
         const RTCDevice device = embree_device();
         const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
-        rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(triangles.size()));
+        rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(leaf_count()));
         rtcSetGeometryUserData(geometry, this);
         rtcSetGeometryBoundsFunction(geometry, set_bounds, nullptr);
         rtcCommitGeometry(geometry);
@@ -140,9 +162,12 @@ struct ClosestPointTree::Tree {
 
     static void set_bounds(const RTCBoundsFunctionArguments* args) {
         const Tree& tree = *static_cast<const Tree*>(args->geometryUserPtr);
-        const auto& [a, b, c] = tree.triangles[args->primID];
-        const Vec3f &p = tree.local_positions[a], &q = tree.local_positions[b], &r = tree.local_positions[c];
-        const Vec3f low = p.cwiseMin(q).cwiseMin(r), high = p.cwiseMax(q).cwiseMax(r);
+        Vec3f low = Vec3f::Constant(std::numeric_limits<float>::infinity()), high = -low;
+        for (const auto& [a, b, c] : tree.leaf(args->primID)) {
+            const Vec3f &p = tree.local_positions[a], &q = tree.local_positions[b], &r = tree.local_positions[c];
+            low = low.cwiseMin(p).cwiseMin(q).cwiseMin(r);
+            high = high.cwiseMax(p).cwiseMax(q).cwiseMax(r);
+        }
         *args->bounds_o = {low.x(), low.y(), low.z(), 0, high.x(), high.y(), high.z(), 0};
     }
 
@@ -158,21 +183,27 @@ struct ClosestPointTree::Tree {
             const double local = distance * tree.scale * (1 + kRadiusSlack) + slack;
             return static_cast<float>(std::min(local, 10 * kFarthest)); // that reaches all
         }
+
+        /// Whether the triangle is closer than all before.
+        bool visit_triangle(Index candidate) {
+            const std::array<Vec3d, 3> corners = tree.corners(candidate);
+            if (!facing.isZero(0) && !((corners[1] - corners[0]).cross(corners[2] - corners[0]).dot(facing) > 0))
+                return false;
+            const double found = std::sqrt(closest_on_triangle(query, corners).squared_distance); // as it is returned
+            const bool closer = found < distance;
+            if (!closer && !(found == distance && candidate < triangle)) return false;
+            distance = found;
+            triangle = candidate;
+            return closer;
+        }
     };
 
     static bool visit(RTCPointQueryFunctionArguments* args) {
         Search& search = *static_cast<Search*>(args->userPtr);
-        const Index triangle = args->primID;
-        const std::array<Vec3d, 3> corners = search.tree.corners(triangle);
-        if (!search.facing.isZero(0) &&
-            !((corners[1] - corners[0]).cross(corners[2] - corners[0]).dot(search.facing) > 0))
-            return false;
-        const TrianglePoint point = closest_on_triangle(search.query, corners);
-        const double distance = std::sqrt(point.squared_distance); // compared as it is returned
-        const bool closer = distance < search.distance;
-        if (!closer && !(distance == search.distance && triangle < search.triangle)) return false;
-        search.distance = distance;
-        search.triangle = triangle;
+        const std::span<const Triangle> leaf = search.tree.leaf(args->primID);
+        const Index first = static_cast<Index>(leaf.data() - search.tree.triangles.data());
+        bool closer = false;
+        for (Index i = 0; i < leaf.size(); ++i) closer |= search.visit_triangle(first + i);
         if (closer) args->query->radius = search.radius();
         return closer;
     }
@@ -202,8 +233,9 @@ struct ClosestPointTree::Tree {
     }
 };
 
-ClosestPointTree::ClosestPointTree(std::span<const Vec3f> positions, std::span<const Triangle> triangles)
-    : tree_(std::make_unique<Tree>(positions, triangles)) {}
+ClosestPointTree::ClosestPointTree(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
+                                   TreeLeaves leaves)
+    : tree_(std::make_unique<Tree>(positions, triangles, leaves)) {}
 ClosestPointTree::~ClosestPointTree() = default;
 ClosestPointTree::ClosestPointTree(ClosestPointTree&&) noexcept = default;
 ClosestPointTree& ClosestPointTree::operator=(ClosestPointTree&&) noexcept = default;

@@ -24,6 +24,7 @@ struct SurfaceDistance {
     double hausdorff = 0;                       ///< the larger of the two maxima
     double mean_distance = 0, rms_distance = 0; ///< over the samples of both ways
     double max_a_to_b = 0, max_b_to_a = 0;
+    double rms_a_to_b = 0, rms_b_to_a = 0; ///< over the samples of one way
 };
 
 struct MeshDistance {
