@@ -92,6 +92,10 @@ void add_compare(CLI::App& app, Session& session) {
         if (const auto& s = distance.surfaces) {
             add("hausdorff", "Hausdorff distance", s->hausdorff);
             add("mean_distance", "mean surface distance", s->mean_distance);
+            add("rms_a_to_b", "rms, first to second", s->rms_a_to_b);
+            add("max_a_to_b", "max, first to second", s->max_a_to_b);
+            add("rms_b_to_a", "rms, second to first", s->rms_b_to_a);
+            add("max_b_to_a", "max, second to first", s->max_b_to_a);
         }
         if (!options->picture.empty()) {
             draw_errors(a, b, Page::plain(file_name(options->a)) + " against " + Page::plain(file_name(options->b)),

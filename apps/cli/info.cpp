@@ -2,6 +2,7 @@
 
 #include "filigree/io/gltf.h"
 #include "filigree/mesh/topology.h"
+#include "filigree/remesh/quad_quality.h"
 
 namespace filigree::cli {
 
@@ -53,6 +54,23 @@ std::vector<std::string> attribute_names(const Mesh& mesh) {
     return names;
 }
 
+/// Shape and regularity of a mesh's quads.
+void describe_quads(const Mesh& mesh, Session& session, Table& table, Json& json) {
+    const QuadQuality quality = measure_quads(mesh, session.context());
+    table.row("irregular vertices", with_commas(quality.irregular_vertices) + " inside, with other than four quads");
+    table.row("scaled Jacobian",
+              fmt::format("{:.3f} at least (face {}), {:.3f} for 99 %, {:.3f} on average", quality.min_scaled_jacobian,
+                          quality.worst_quad, quality.low_scaled_jacobian, quality.mean_scaled_jacobian));
+    table.row("inverted quads", with_commas(quality.inverted));
+    json["quad_quality"] = {{"irregular_vertices", quality.irregular_vertices},
+                            {"scaled_jacobian",
+                             {{"min", quality.min_scaled_jacobian},
+                              {"percentile_1", quality.low_scaled_jacobian},
+                              {"mean", quality.mean_scaled_jacobian}}},
+                            {"inverted", quality.inverted},
+                            {"worst_quad", quality.worst_quad}};
+}
+
 void describe_mesh(const Mesh& mesh, Session& session, Table& table, Json& json) {
     const TopologyReport report = analyse_topology(mesh, session.context());
     table.row("vertices", with_commas(report.vertices));
@@ -97,6 +115,7 @@ void describe_mesh(const Mesh& mesh, Session& session, Table& table, Json& json)
         table.row(title, places_text(finding));
         defects[key] = {{"count", finding.count}, {"places", finding.places}};
     }
+    if (report.quads > 0) describe_quads(mesh, session, table, json);
 }
 
 void describe_model(const Model& model, const PoseSequence& poses, std::size_t bytes, Table& table, Json& json) {
