@@ -41,6 +41,7 @@ int run(int argc, char** argv) {
                "7 unsuitable input, 8 inputs do not belong together, 9 out of memory, 130 cancelled.");
     cli::add_make(app, session);
     cli::add_info(app, session);
+    cli::add_remesh(app, session);
     cli::add_strip(app, session);
     cli::add_level(app, session);
     cli::add_deform(app, session);

@@ -133,6 +133,7 @@ constexpr std::size_t wavy_cube_vertices(std::size_t resolution) { return 6 * re
 // One command each, in the file of its name.
 void add_make(CLI::App& app, Session& session);
 void add_info(CLI::App& app, Session& session);
+void add_remesh(CLI::App& app, Session& session);
 void add_strip(CLI::App& app, Session& session);
 void add_level(CLI::App& app, Session& session);
 void add_deform(CLI::App& app, Session& session);
