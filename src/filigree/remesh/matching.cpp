@@ -10,11 +10,13 @@ namespace filigree {
 
 namespace {
 
+constexpr std::uint32_t kNone = 0xffffffff; // kNoIndex
 constexpr std::int64_t kUnit = 4096; // of a weight's 0 to 1: whole numbers keep the algorithm exact
 
 } // namespace
 
-std::vector<Index> match_triangles(std::span<const Index> opposite, std::span<const double> weights) {
+std::vector<std::uint32_t> match_triangles(const std::vector<std::uint32_t>& opposite,
+                                           const std::vector<double>& weights) {
     const std::size_t triangle_count = opposite.size() / 3;
     lemon::SmartGraph graph;
     graph.reserveNode(static_cast<int>(triangle_count));
@@ -23,17 +25,17 @@ std::vector<Index> match_triangles(std::span<const Index> opposite, std::span<co
     // More than all weights together can gain, so that no pair is ever given up for better ones.
     const std::int64_t any_pair = kUnit * static_cast<std::int64_t>(triangle_count + 1);
     for (std::size_t h = 0; h < opposite.size(); ++h) {
-        if (opposite[h] == kNoIndex || opposite[h] < h || weights[h] < 0) continue;
+        if (opposite[h] == kNone || opposite[h] < h || weights[h] < 0) continue;
         const auto edge = graph.addEdge(graph.nodeFromId(static_cast<int>(h / 3)),
                                         graph.nodeFromId(static_cast<int>(opposite[h] / 3)));
         worth[edge] = any_pair + std::llround(weights[h] * kUnit);
     }
     lemon::MaxWeightedMatching<lemon::SmartGraph, lemon::SmartGraph::EdgeMap<std::int64_t>> matching(graph, worth);
     matching.run();
-    std::vector<Index> partner(triangle_count, kNoIndex);
+    std::vector<std::uint32_t> partner(triangle_count, kNone);
     for (std::size_t t = 0; t < triangle_count; ++t) {
         const auto mate = matching.mate(graph.nodeFromId(static_cast<int>(t)));
-        if (mate != lemon::INVALID) partner[t] = static_cast<Index>(graph.id(mate));
+        if (mate != lemon::INVALID) partner[t] = static_cast<std::uint32_t>(graph.id(mate));
     }
     return partner;
 }

@@ -1,9 +1,7 @@
 // Maximum weighted matching of a triangle mesh's dual graph.
 #pragma once
 
-#include "filigree/core/types.h"
-
-#include <span>
+#include <cstdint>
 #include <vector>
 
 namespace filigree {
@@ -12,6 +10,8 @@ namespace filigree {
 /// greatest sum of weights. Half-edge 3 t + i belongs to triangle t.
 /// opposite: 3 F twins, kNoIndex on borders. weights: 3 F, alike on twins, 0 to 1; below 0: this pair must not be.
 /// Method: [Edmonds 1965], as LEMON has it. Cost O(F^2 log F) at worst, near-linear on surfaces.
-std::vector<Index> match_triangles(std::span<const Index> opposite, std::span<const double> weights);
+/// Plain vectors of plain numbers, as LEMON's headers keep this file to C++17.
+std::vector<std::uint32_t> match_triangles(const std::vector<std::uint32_t>& opposite,
+                                           const std::vector<double>& weights);
 
 } // namespace filigree

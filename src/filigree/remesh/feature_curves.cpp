@@ -1,0 +1,196 @@
+#include "filigree/remesh/feature_curves.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace filigree {
+
+namespace {
+
+constexpr double kCornerTurn = 45 * std::numbers::pi / 180; // between chords of kCornerReach
+constexpr double kCornerReach = 0.4;                        // patch sides, to either side of a vertex
+constexpr double kShortestChain = 1.0;                      // patch sides, of a chain with a free end
+constexpr double kShortestLoop = 0.5;                       // patch sides, of a closed curve
+
+struct Curves {
+    const ManifoldSurface& surface;
+    /// Up to kNoIndex-many neighbours of each vertex along sharp edges and borders.
+    std::vector<Index> offsets, neighbours;
+
+    std::size_t degree(Index v) const { return offsets[v + 1] - offsets[v]; }
+    double length(Index a, Index b) const { return (surface.positions[a] - surface.positions[b]).norm(); }
+    /// The neighbour of a curve vertex that is not `from`.
+    Index onward(Index v, Index from) const {
+        return neighbours[offsets[v]] == from ? neighbours[offsets[v] + 1] : neighbours[offsets[v]];
+    }
+};
+
+Index other_end(const ManifoldSurface& surface, Index h) { return surface.triangles[h / 3][(h % 3 + 1) % 3]; }
+
+/// marked: of half-edges; each edge counts once.
+Curves collect(const ManifoldSurface& surface, std::span<const Index> twins, std::span<const std::uint8_t> marked) {
+    Curves curves{surface, std::vector<Index>(surface.positions.size() + 1, 0), {}};
+    const auto for_each_edge = [&](const auto& act) {
+        for (Index h = 0; h < twins.size(); ++h)
+            if (twins[h] == kNoIndex || (marked[h] && h < twins[h]))
+                act(surface.triangles[h / 3][h % 3], other_end(surface, h));
+    };
+    for_each_edge([&](Index a, Index b) {
+        ++curves.offsets[a + 1];
+        ++curves.offsets[b + 1];
+    });
+    for (std::size_t v = 0; v < surface.positions.size(); ++v) curves.offsets[v + 1] += curves.offsets[v];
+    curves.neighbours.resize(curves.offsets.back());
+    std::vector<Index> next(curves.offsets.begin(), curves.offsets.end() - 1);
+    for_each_edge([&](Index a, Index b) {
+        curves.neighbours[next[a]++] = b;
+        curves.neighbours[next[b]++] = a;
+    });
+    return curves;
+}
+
+struct Chain {
+    std::vector<Index> vertices; ///< end to end; a closed one repeats its first
+    double length = 0;
+};
+
+/// Chains between vertices of degree other than two, then closed ones.
+std::vector<Chain> chains_of(const Curves& curves) {
+    std::vector<Chain> chains;
+    const std::size_t vertex_count = curves.surface.positions.size();
+    std::vector<std::uint8_t> seen(vertex_count, 0);
+    const auto walk = [&](Index start, Index second) {
+        Chain chain;
+        chain.vertices = {start};
+        Index from = start, at = second;
+        for (;;) {
+            chain.vertices.push_back(at);
+            chain.length += curves.length(from, at);
+            if (curves.degree(at) != 2 || at == start) return chain;
+            seen[at] = 1;
+            const Index onward = curves.onward(at, from);
+            from = at;
+            at = onward;
+        }
+    };
+    for (Index v = 0; v < vertex_count; ++v) {
+        if (curves.degree(v) == 0 || curves.degree(v) == 2) continue;
+        for (Index i = curves.offsets[v]; i < curves.offsets[v + 1]; ++i) {
+            const Index w = curves.neighbours[i];
+            if (curves.degree(w) == 2 && seen[w]) continue;
+            if (curves.degree(w) != 2 && w < v) continue; // a single edge between two nodes, from its other end
+            chains.push_back(walk(v, w));
+        }
+    }
+    for (Index v = 0; v < vertex_count; ++v)
+        if (curves.degree(v) == 2 && !seen[v]) {
+            seen[v] = 1;
+            chains.push_back(walk(v, curves.neighbours[curves.offsets[v]]));
+        }
+    return chains;
+}
+
+/// Takes short loose ends and tiny loops off, until none is left. Borders never go.
+void prune(const ManifoldSurface& surface, std::span<const Index> twins, double patch_side,
+           std::vector<std::uint8_t>& marked) {
+    for (int round = 0; round < 4; ++round) {
+        const Curves curves = collect(surface, twins, marked);
+        std::vector<std::uint8_t> gone(surface.positions.size(), 0); // inner vertices of chains that go
+        std::vector<std::pair<Index, Index>> single;                 // chains of one edge
+        for (const Chain& chain : chains_of(curves)) {
+            const Index first = chain.vertices.front(), last = chain.vertices.back();
+            const bool closed = first == last && curves.degree(first) == 2;
+            const bool loose = curves.degree(first) == 1 || curves.degree(last) == 1;
+            if (!(closed && chain.length < kShortestLoop * patch_side) &&
+                !(loose && chain.length < kShortestChain * patch_side))
+                continue;
+            if (chain.vertices.size() == 2) single.push_back(std::minmax(first, last));
+            for (std::size_t i = 1; i + 1 < chain.vertices.size(); ++i) gone[chain.vertices[i]] = 1;
+            if (closed) gone[first] = 1;
+        }
+        std::sort(single.begin(), single.end());
+        bool changed = false;
+        for (Index h = 0; h < marked.size(); ++h) {
+            if (!marked[h]) continue;
+            const Index a = surface.triangles[h / 3][h % 3], b = other_end(surface, h);
+            if (gone[a] || gone[b] || std::binary_search(single.begin(), single.end(), std::pair<Index, Index>(std::minmax(a, b)))) {
+                marked[h] = 0;
+                changed = true;
+            }
+        }
+        if (!changed) return;
+    }
+}
+
+/// The vertex `reach` further along, and how far that is.
+Vec3d chord(const Curves& curves, Index from, Index first, double reach) {
+    Index before = from, at = first;
+    double gone = curves.length(from, first);
+    while (gone < reach && curves.degree(at) == 2 && at != from) {
+        const Index onward = curves.onward(at, before);
+        gone += curves.length(at, onward);
+        before = at;
+        at = onward;
+    }
+    return curves.surface.positions[at] - curves.surface.positions[from];
+}
+
+/// Vertices where a curve turns most within `reach` to both sides, and by enough.
+std::vector<std::uint8_t> find_corners(const Curves& curves, double reach) {
+    const std::size_t vertex_count = curves.surface.positions.size();
+    std::vector<float> turn(vertex_count, 0);
+    for (Index v = 0; v < vertex_count; ++v) {
+        if (curves.degree(v) != 2) continue;
+        const Index a = curves.neighbours[curves.offsets[v]], b = curves.neighbours[curves.offsets[v] + 1];
+        if (a == b) continue;
+        const Vec3d to_a = chord(curves, v, a, reach), to_b = chord(curves, v, b, reach);
+        turn[v] = static_cast<float>(std::numbers::pi - std::atan2(to_a.cross(to_b).norm(), to_a.dot(to_b)));
+    }
+    std::vector<std::uint8_t> corners(vertex_count, 0);
+    for (Index v = 0; v < vertex_count; ++v) {
+        if (turn[v] < kCornerTurn) continue;
+        bool largest = true;
+        for (Index i = curves.offsets[v]; i < curves.offsets[v + 1] && largest; ++i) {
+            Index before = v, at = curves.neighbours[i];
+            double gone = curves.length(v, at);
+            while (gone < reach && curves.degree(at) == 2 && at != v && largest) {
+                largest = turn[at] < turn[v] || (turn[at] == turn[v] && at > v);
+                const Index onward = curves.onward(at, before);
+                gone += curves.length(at, onward);
+                before = at;
+                at = onward;
+            }
+        }
+        corners[v] = largest;
+    }
+    return corners;
+}
+
+} // namespace
+
+FeatureCurves find_feature_curves(const ManifoldSurface& surface, std::span<const Index> twins,
+                                  const FeatureOptions& options) {
+    FeatureCurves result;
+    result.half_edges.assign(twins.size(), 0);
+    std::vector<Vec3d> normals;
+    normals.reserve(surface.triangles.size());
+    for (const Triangle& t : surface.triangles) {
+        const Vec3d& a = surface.positions[t[0]];
+        normals.push_back((surface.positions[t[1]] - a).cross(surface.positions[t[2]] - a).normalized());
+    }
+    const double cosine = std::cos(options.angle_deg * std::numbers::pi / 180);
+    if (options.angle_deg < 180)
+        for (Index h = 0; h < twins.size(); ++h) {
+            if (twins[h] == kNoIndex) continue;
+            const Vec3d &n = normals[h / 3], &m = normals[twins[h] / 3];
+            // a triangle without an area has no normal, and its edges are not sharp
+            if (n.squaredNorm() > 0 && m.squaredNorm() > 0 && n.dot(m) < cosine) result.half_edges[h] = 1;
+        }
+    prune(surface, twins, options.patch_side, result.half_edges);
+    result.corners = find_corners(collect(surface, twins, result.half_edges), kCornerReach * options.patch_side);
+    result.edge_count = static_cast<std::size_t>(std::count(result.half_edges.begin(), result.half_edges.end(), 1)) / 2;
+    return result;
+}
+
+} // namespace filigree

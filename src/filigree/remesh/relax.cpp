@@ -1,0 +1,255 @@
+#include "filigree/remesh/relax.h"
+
+#include "filigree/core/parallel_for.h"
+#include "filigree/remesh/quad_quality.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace filigree {
+
+namespace {
+
+constexpr std::size_t kGrain = 512;
+constexpr double kGoodEnough = 0.5;  // scaled Jacobian: a move that leaves quads above this is always welcome
+constexpr double kStill = 2e-3;      // of the mean edge length at a vertex: shorter moves are not worth their price
+constexpr double kOffSurface = 0.02; // scaled Jacobian that points leave the surface for, when nothing else helps
+
+/// Which quads each vertex has, and groups of vertices that share none.
+struct Neighbourhoods {
+    std::vector<std::array<Index, 4>> quads;
+    std::vector<Index> offsets, of_vertex; ///< quads of vertex v: of_vertex[offsets[v]] ..
+    std::vector<std::vector<Index>> groups;
+
+    explicit Neighbourhoods(const PatchGrid& grid) : quads(grid.quads()) {
+        const std::size_t vertex_count = grid.positions.size();
+        offsets.assign(vertex_count + 1, 0);
+        for (const auto& quad : quads)
+            for (const Index v : quad) ++offsets[v + 1];
+        for (std::size_t v = 0; v < vertex_count; ++v) offsets[v + 1] += offsets[v];
+        of_vertex.resize(offsets.back());
+        std::vector<Index> next(offsets.begin(), offsets.end() - 1);
+        for (Index q = 0; q < quads.size(); ++q)
+            for (const Index v : quads[q]) of_vertex[next[v]++] = q;
+        color();
+    }
+
+    std::span<const Index> around(Index v) const {
+        return std::span(of_vertex).subspan(offsets[v], offsets[v + 1] - offsets[v]);
+    }
+
+    void color() {
+        std::vector<std::uint8_t> colors(offsets.size() - 1, 255);
+        for (Index v = 0; v + 1 < offsets.size(); ++v) {
+            std::array<bool, 256> used = {};
+            for (const Index q : around(v))
+                for (const Index w : quads[q]) used[colors[w]] = true;
+            std::uint8_t color = 0;
+            while (used[color]) ++color;
+            colors[v] = color;
+            if (groups.size() <= color) groups.resize(color + 1u);
+            groups[color].push_back(v);
+        }
+    }
+};
+
+/// One vertex and its quads, with the vertex tried elsewhere.
+class Mover {
+public:
+    Mover(PatchGrid& grid, const SurfaceWalk& walk, const Neighbourhoods& near) : grid_(grid), walk_(walk), near_(near) {}
+
+    void relax_vertex(Index v) {
+        if (grid_.kinds[v] == VertexKind::corner) return;
+        const Vec3d here = grid_.positions[v];
+        double edge = 0;
+        const Vec3d target = mean_target(v, edge);
+        if ((target - here).squaredNorm() < kStill * kStill * edge * edge) return;
+        const double least = std::min(worst(v, here), kGoodEnough);
+        for (const double share : {1.0, 0.5}) {
+            const SurfaceWalk::Place place = move(v, here + share * (target - here));
+            if ((place.position - here).squaredNorm() < kStill * kStill * edge * edge) return;
+            if (is_turned(v, place.position) || worst(v, place.position) < least) continue;
+            accept(v, place);
+            return;
+        }
+    }
+
+    /// Tries places around the vertex for a larger smallest scaled Jacobian. Returns whether it moved.
+    bool search(Index v, double reach, bool off_surface) {
+        const VertexKind kind = grid_.kinds[v];
+        if (kind == VertexKind::corner) return false;
+        const Vec3d here = grid_.positions[v];
+        double edge = 0;
+        const Vec3d target = mean_target(v, edge);
+        double best = worst(v, here);
+        SurfaceWalk::Place found;
+        bool moved = false;
+        const auto attempt = [&](const Vec3d& towards) {
+            SurfaceWalk::Place place = off_surface ? SurfaceWalk::Place{grid_.source[v], towards} : move(v, towards);
+            if (off_surface) place.point = walk_.walk(grid_.source[v], towards).point;
+            const double value = worst(v, place.position);
+            if (value <= best + 1e-6) return;
+            best = value;
+            found = place;
+            moved = true;
+        };
+        const Vec3d normal = quad_normal(v);
+        const Vec3d x = normal.unitOrthogonal(), y = normal.cross(x);
+        attempt(target);
+        attempt(here + 0.5 * (target - here));
+        constexpr int kDirections = 12;
+        for (const double step : {reach, 0.5 * reach, 0.2 * reach})
+            for (int i = 0; i < kDirections; ++i) {
+                const double angle = 2 * std::numbers::pi * i / kDirections;
+                attempt(here + step * edge * (std::cos(angle) * x + std::sin(angle) * y));
+            }
+        if (off_surface)
+            for (const double step : {reach, 0.5 * reach, 0.2 * reach})
+                for (const double sign : {-1.0, 1.0}) attempt(here + sign * step * edge * normal);
+        if (moved) accept(v, found);
+        return moved;
+    }
+
+    double worst(Index v, const Vec3d& place) const {
+        double least = 1;
+        for (const Index q : near_.around(v)) {
+            const auto& quad = near_.quads[q];
+            const auto at = [&](int k) -> const Vec3d& { return quad[k] == v ? place : grid_.positions[quad[k]]; };
+            least = std::min(least, scaled_jacobian(at(0), at(1), at(2), at(3)));
+        }
+        return least;
+    }
+
+private:
+    SurfaceWalk::Place move(Index v, const Vec3d& target) const {
+        return grid_.kinds[v] == VertexKind::curve ? walk_.slide(grid_.source[v], target)
+                                                   : walk_.walk(grid_.source[v], target);
+    }
+
+    void accept(Index v, const SurfaceWalk::Place& place) {
+        grid_.positions[v] = place.position;
+        grid_.source[v] = place.point;
+    }
+
+    /// Where the neighbours would have it; on a curve, between the two along it.
+    Vec3d mean_target(Index v, double& edge) const {
+        const Vec3d& here = grid_.positions[v];
+        if (grid_.kinds[v] == VertexKind::curve && grid_.along[v][1] != kNoIndex) {
+            const Vec3d &a = grid_.positions[grid_.along[v][0]], &b = grid_.positions[grid_.along[v][1]];
+            edge = 0.5 * ((a - here).norm() + (b - here).norm());
+            return 0.5 * (a + b);
+        }
+        Vec3d sum = Vec3d::Zero();
+        double areas = 0;
+        edge = 0;
+        const std::span<const Index> around = near_.around(v);
+        for (const Index q : around) {
+            const auto& quad = near_.quads[q];
+            const int k = quad[0] == v ? 0 : quad[1] == v ? 1 : quad[2] == v ? 2 : 3;
+            const Vec3d &next = grid_.positions[quad[(k + 1) % 4]], &across = grid_.positions[quad[(k + 2) % 4]],
+                        &before = grid_.positions[quad[(k + 3) % 4]];
+            const double area = (across - here).cross(before - next).norm();
+            sum += area * 0.5 * (next + before);
+            areas += area;
+            edge += (next - here).norm();
+        }
+        edge /= double(around.size());
+        return areas > 0 ? Vec3d(sum / areas) : here;
+    }
+
+    Vec3d quad_normal(Index v) const {
+        Vec3d sum = Vec3d::Zero();
+        for (const Index q : near_.around(v)) sum += normal_of(near_.quads[q], kNoIndex, Vec3d::Zero());
+        const double length = sum.norm();
+        return length > 0 ? Vec3d(sum / length) : Vec3d::UnitZ();
+    }
+
+    Vec3d normal_of(const std::array<Index, 4>& quad, Index v, const Vec3d& place) const {
+        const auto at = [&](int k) -> const Vec3d& { return quad[k] == v ? place : grid_.positions[quad[k]]; };
+        return (at(2) - at(0)).cross(at(3) - at(1));
+    }
+
+    /// Whether one of the quads would face the other way.
+    bool is_turned(Index v, const Vec3d& place) const {
+        for (const Index q : near_.around(v))
+            if (normal_of(near_.quads[q], v, place).dot(normal_of(near_.quads[q], kNoIndex, place)) < 0) return true;
+        return false;
+    }
+
+    PatchGrid& grid_;
+    const SurfaceWalk& walk_;
+    const Neighbourhoods& near_;
+};
+
+} // namespace
+
+void relax(PatchGrid& grid, const SurfaceWalk& walk, unsigned sweeps, const RunContext& context) {
+    const Neighbourhoods near(grid);
+    for (unsigned sweep = 0; sweep < sweeps && !context.is_cancelled(); ++sweep) {
+        context.report("relaxing", double(sweep) / sweeps);
+        for (const std::vector<Index>& group : near.groups)
+            parallel_for(context, group.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+                Mover mover(grid, walk, near);
+                for (std::size_t i = begin; i < end; ++i) mover.relax_vertex(group[i]);
+            });
+    }
+}
+
+Untangled untangle(PatchGrid& grid, const SurfaceWalk& walk, double least, const RunContext& context) {
+    const Neighbourhoods near(grid);
+    Mover mover(grid, walk, near);
+    const auto jacobian = [&](Index q) {
+        const auto& [a, b, c, d] = near.quads[q];
+        return scaled_jacobian(grid.positions[a], grid.positions[b], grid.positions[c], grid.positions[d]);
+    };
+    const auto bad_quads = [&](double limit) {
+        std::vector<std::uint8_t> is_bad(near.quads.size(), 0);
+        parallel_for(context, near.quads.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t q = begin; q < end; ++q) is_bad[q] = jacobian(static_cast<Index>(q)) < limit;
+        });
+        std::vector<Index> bad;
+        for (Index q = 0; q < is_bad.size(); ++q)
+            if (is_bad[q]) bad.push_back(q);
+        return bad;
+    };
+    /// The vertices of the quads, and of `rings` rings of quads around them.
+    const auto vertices_near = [&](const std::vector<Index>& bad, int rings) {
+        std::vector<Index> vertices;
+        for (const Index q : bad) vertices.insert(vertices.end(), near.quads[q].begin(), near.quads[q].end());
+        const auto tidy = [&] {
+            std::sort(vertices.begin(), vertices.end());
+            vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+        };
+        tidy();
+        for (int ring = 0; ring < rings; ++ring) {
+            for (std::size_t i = 0, end = vertices.size(); i < end; ++i)
+                for (const Index q : near.around(vertices[i]))
+                    vertices.insert(vertices.end(), near.quads[q].begin(), near.quads[q].end());
+            tidy();
+        }
+        return vertices;
+    };
+    Untangled result;
+    for (int round = 0; round < 24 && !context.is_cancelled(); ++round) {
+        const std::vector<Index> bad = bad_quads(least);
+        if (bad.empty()) return result;
+        bool moved = false;
+        const std::vector<Index> vertices = vertices_near(bad, round % 4 == 3 ? 2 : round % 2);
+        for (const Index v : vertices) moved |= mover.search(v, round % 3 == 0 ? 0.6 : 0.25, false);
+        if (!moved && round % 4 == 3) break;
+    }
+    std::vector<std::uint8_t> off(grid.positions.size(), 0);
+    for (int round = 0; round < 40 && !context.is_cancelled(); ++round) {
+        const std::vector<Index> bad = bad_quads(kOffSurface);
+        result.inverted = bad.size();
+        if (bad.empty()) break;
+        for (const Index v : vertices_near(bad, round / 8))
+            if (mover.search(v, round % 2 == 0 ? 0.5 : 0.2, true)) off[v] = 1;
+    }
+    result.off_surface = static_cast<std::size_t>(std::count(off.begin(), off.end(), 1));
+    result.inverted = bad_quads(1e-9).size();
+    return result;
+}
+
+} // namespace filigree
