@@ -31,6 +31,7 @@ constexpr FigureEntry kFigures[] = {
     {"3.1", draw_extreme_deformation, "an extreme deformation"},
     {"border", draw_border_rays, "rays through vertices and edges, answered"},
     {"codes", draw_fidelity, "the codes and a wrap deformer compared"},
+    {"scan", draw_remeshed_scan, "a scan as regular quads: levels, stretched, twisted"},
 };
 
 /// figure_2_10 for "2.10".
@@ -57,7 +58,25 @@ struct Options {
     std::string output = "filigree-figures", format = "png";
     std::vector<std::string> only;
     unsigned width = 1440, passes = 0;
+    std::string scan;
+    UpAxis up = UpAxis::y;
 };
+
+/// The scan as figures have it: z up, and without attributes that would take the colours' place.
+std::optional<Mesh> read_scan(const Options& options, Session& session) {
+    if (options.scan.empty()) return {};
+    const Mesh mesh = session.read_mesh(options.scan);
+    if (mesh.face_count() == 0)
+        throw Failure{{ErrorCode::unsuitable, options.scan + ": has no faces; give a scan with a surface."}};
+    Mesh scan;
+    scan.face_offsets = mesh.face_offsets;
+    scan.corners = mesh.corners;
+    const Vec3d front = view_direction(View::front, options.up), up = up_vector(options.up);
+    Mat3f turn;
+    turn << up.cross(front).transpose().cast<float>(), -front.transpose().cast<float>(), up.transpose().cast<float>();
+    for (const Vec3f& p : mesh.positions) scan.positions.push_back(turn * p);
+    return scan;
+}
 
 void run_figures(const Options& options, Session& session) {
     const RunContext& context = session.context();
@@ -68,7 +87,7 @@ void run_figures(const Options& options, Session& session) {
         paths.push_back(folder.file(file_stem(figure.name) + "." + options.format));
 
     const double scale = options.width / kFigureWidth;
-    FigureRenderer renderer(session, scale, options.passes);
+    FigureRenderer renderer(session, scale, options.passes, read_scan(options, session));
     std::vector<Figure> drawn; // all of them before the first is written, so that a cancel changes nothing
     for (const FigureEntry& figure : chosen) {
         context.report("figures", double(drawn.size()) / double(chosen.size()));
@@ -94,7 +113,7 @@ void add_figures(CLI::App& app, Session& session) {
     auto options = std::make_shared<Options>();
     CLI::App* command = app.add_subcommand("figures", "The report's figures, drawn from what the program computes");
     command->add_option("-o,--output", options->output, "Folder for the figures")->capture_default_str();
-    command->add_option("--only", options->only, "Figures to draw: 1.1, 2.1, ... 3.1, border, codes (unset: all)")
+    command->add_option("--only", options->only, "Figures to draw: 1.1, 2.1, ... 3.1, border, codes, scan (unset: all)")
         ->type_name("NAME");
     add_choice<std::string>(
         *command, "--format", {{"png", "png"}, {"svg", "svg"}, {"pdf", "pdf"}},
@@ -104,8 +123,13 @@ void add_figures(CLI::App& app, Session& session) {
         ->capture_default_str();
     command->add_option("--passes", options->passes, "Passes of light in rendered figures (unset: as the mesh needs)")
         ->check(CLI::Range(1, 4096));
+    command->add_option("--scan", options->scan, "Mesh that figure 'scan' shows (unset: a shape of ours)");
+    add_choice<UpAxis>(
+        *command, "--up", {{"x", UpAxis::x}, {"y", UpAxis::y}, {"z", UpAxis::z}},
+        [options](UpAxis up) { options->up = up; }, "Which axis of the scan is up (unset: y)");
     session.add_common_options(*command, "  filigree figures -o figures\n"
-                                         "  filigree figures --only 1.1 2.10 --format pdf");
+                                         "  filigree figures --only 1.1 2.10 --format pdf\n"
+                                         "  filigree figures --only scan --scan koala.obj");
     command->callback([options, &session] {
         session.begin();
         run_figures(*options, session);

@@ -13,6 +13,7 @@
 namespace filigree::cli {
 
 class Stage;
+struct Panel;
 
 /// A figure, and the numbers in it.
 struct Figure {
@@ -23,8 +24,9 @@ struct Figure {
 /// Draws meshes for figures; OpenGL starts with the first of them.
 class FigureRenderer {
 public:
-    /// scale: pixels for each page unit. passes: as in PictureOptions.
-    FigureRenderer(Session& session, double scale, unsigned passes);
+    /// scale: pixels for each page unit. passes: as in PictureOptions. scan: what figures of scans show, z up; none: a
+    /// shape of our own.
+    FigureRenderer(Session& session, double scale, unsigned passes, std::optional<Mesh> scan);
     ~FigureRenderer();
 
     struct Look {
@@ -40,13 +42,25 @@ public:
     Picture picture(const Mesh& mesh, const Look& look, const Camera& camera, double width, double height);
 
     const RunContext& context() const { return session_.context(); }
+    const std::optional<Mesh>& scan() const { return scan_; }
+    /// A line's width in pixels.
+    float pixels(double page_units) const { return static_cast<float>(scale_ * page_units); }
 
 private:
     Session& session_;
     double scale_;
     unsigned passes_;
+    std::optional<Mesh> scan_;
     std::unique_ptr<Stage> stage_;
 };
+
+/// Flat faces with their edges drawn, in page units.
+FigureRenderer::Look with_edges(float width);
+/// The camera from which all of the meshes fill a panel.
+Camera common_camera(std::span<const Mesh* const> meshes, const Vec3d& direction, const Panel& panel);
+/// A mesh's picture in a panel.
+void draw_mesh(Page& page, const Panel& panel, FigureRenderer& renderer, const Mesh& mesh,
+               const FigureRenderer::Look& look, const Camera& camera);
 
 // One function a figure, in the report's order.
 Figure draw_simple_triangle(FigureRenderer& renderer);     // 1.1
@@ -63,5 +77,6 @@ Figure draw_deformation_process(FigureRenderer& renderer); // 2.10
 Figure draw_extreme_deformation(FigureRenderer& renderer); // 3.1
 Figure draw_border_rays(FigureRenderer& renderer);         // our own
 Figure draw_fidelity(FigureRenderer& renderer);            // our own
+Figure draw_remeshed_scan(FigureRenderer& renderer);       // our own: 2.9, 2.10 and 3.1 on a scan
 
 } // namespace filigree::cli

@@ -120,6 +120,17 @@ bool is_inside(Point p, std::span<const Point> outline) {
     return inside;
 }
 
+std::string power_text(double value) {
+    if (!(value > 0)) return "0";
+    int exponent = static_cast<int>(std::floor(std::log10(value)));
+    double digits = value / std::pow(10.0, exponent);
+    if (digits >= 9.95) {
+        digits /= 10;
+        ++exponent;
+    }
+    return fmt::format("{:.1f}\u00a0·\u00a010^{{{}{}}}", digits, exponent < 0 ? "−" : "", std::abs(exponent));
+}
+
 void line_behind(Page& page, Point from, Point to, std::span<const Point> cover, const Stroke& stroke, bool arrow) {
     double hidden = 0, visible = 1; // bisection for where it comes out
     if (is_inside(to, cover))

@@ -68,6 +68,8 @@ void label(Page& page, const std::string& name, Point at, Point offset, const In
 void dimension(Page& page, Point from, Point to, const std::string& text, const Ink& ink = kGrey);
 /// The number with a minus instead of a hyphen.
 std::string signed_number(double value, int decimals);
+/// "2.3 · 10^{-4}".
+std::string power_text(double value);
 /// A line that is dashed where `cover` (a convex outline on the page) hides it, from the end `from` on.
 void line_behind(Page& page, Point from, Point to, std::span<const Point> cover, const Stroke& stroke, bool arrow);
 bool is_inside(Point p, std::span<const Point> outline);

@@ -16,8 +16,8 @@
 
 namespace filigree::cli {
 
-FigureRenderer::FigureRenderer(Session& session, double scale, unsigned passes)
-    : session_(session), scale_(scale), passes_(passes) {}
+FigureRenderer::FigureRenderer(Session& session, double scale, unsigned passes, std::optional<Mesh> scan)
+    : session_(session), scale_(scale), passes_(passes), scan_(std::move(scan)) {}
 FigureRenderer::~FigureRenderer() = default;
 
 namespace {
@@ -65,11 +65,8 @@ Picture FigureRenderer::picture(Scene scene, const Camera& camera, double width,
     return picture;
 }
 
-namespace {
-
 using Look = FigureRenderer::Look;
 
-/// Flat quads with their edges drawn, in page units.
 Look with_edges(float width) {
     Look look;
     look.surface.shading = Shading::flat;
@@ -78,7 +75,6 @@ Look with_edges(float width) {
     return look;
 }
 
-/// The camera from which all of the meshes fill a panel.
 Camera common_camera(std::span<const Mesh* const> meshes, const Vec3d& direction, const Panel& panel) {
     std::vector<CameraPoints> points;
     for (const Mesh* mesh : meshes) points.push_back({mesh->positions, mesh->origin});
@@ -91,22 +87,12 @@ void draw_mesh(Page& page, const Panel& panel, FigureRenderer& renderer, const M
                  panel.height);
 }
 
+namespace {
+
 const Vec3d kFromCorner(0.62, -0.86, 0.52); // over the cube's front right edge
 
 Model stripped_model(const Mesh& mesh, const StripOptions& options, const RunContext& context) {
     return std::move(require(strip(mesh, options, context)).model);
-}
-
-/// "2.3 · 10^{-4}".
-std::string power_text(double value) {
-    if (!(value > 0)) return "0";
-    int exponent = static_cast<int>(std::floor(std::log10(value)));
-    double digits = value / std::pow(10.0, exponent);
-    if (digits >= 9.95) {
-        digits /= 10;
-        ++exponent;
-    }
-    return fmt::format("{:.1f}\u00a0·\u00a010^{{{}{}}}", digits, exponent < 0 ? "−" : "", std::abs(exponent));
 }
 
 /// Mean distance of the vertices of a cube's upper side along an axis from the plane that their rim is in. The

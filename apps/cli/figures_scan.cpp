@@ -1,0 +1,154 @@
+// Figures 2.9, 2.10 and 3.1 on a mesh that comes as triangles without any regularity.
+#include "figures.h"
+#include "figures_layout.h"
+#include "patch_drawing.h"
+
+#include "filigree/deform/space_warp.h"
+#include "filigree/hierarchy/restore.h"
+#include "filigree/hierarchy/strip.h"
+#include "filigree/mesh/mesh_distance.h"
+#include "filigree/mesh/shapes.h"
+#include "filigree/remesh/quad_remesh.h"
+
+#include <cmath>
+
+namespace filigree::cli {
+
+namespace {
+
+constexpr double kPanelHeight = 200;
+constexpr std::size_t kQuads = 50'000;
+constexpr unsigned kLevels = 3;            // as in the report's figure 2.9
+constexpr double kStretch = 1.6;           // upwards
+constexpr double kTwist = 100, kBend = 80; // degrees, about the vertical axis and of it
+const Vec3d kFromFront(0.42, -0.90, 0.30);
+
+/// Stands in for a scan: a wavy sphere whose vertices a simplification has picked, in triangles of any valence.
+Mesh irregular_shape(const RunContext& context) {
+    const Mesh sphere = make_wavy_sphere({.resolution = 128, .frequency = 4, .amplitude = 0.07});
+    const Stripped stripped = require(strip(sphere, {.base = 25'000}, context));
+    return level_mesh(stripped.model, 0);
+}
+
+struct Views {
+    Camera rest, stretched, twisted;
+};
+
+/// One warp of the driver, and what is put back on it.
+struct Returned {
+    Mesh driver, mesh;
+    double rms; ///< from where a warp of every vertex puts them, fraction of the diagonal
+};
+
+Returned put_back(const Model& model, const RestoreOptions& law, const SpaceWarp& warp, const RunContext& context) {
+    Returned result;
+    const Pose pose = warp_pose(warp, driver_positions(model), model.mesh.origin, context);
+    const Restorer restorer = require(Restorer::create(model, law, context));
+    result.driver = level_mesh(model, 0);
+    result.driver.positions = pose.positions;
+    result.mesh = model.mesh;
+    result.mesh.positions = require(restorer.positions(pose, context));
+    Mesh direct = model.mesh;
+    direct.positions = warp_positions(warp, model.mesh.positions, model.mesh.origin, context);
+    const MeshDistance distance = require(mesh_distance(result.mesh, direct, 0, context));
+    result.rms = distance.relative(distance.vertices->rms);
+    return result;
+}
+
+std::unique_ptr<SpaceWarp> extreme_warp(const Box& box) {
+    std::vector<std::unique_ptr<SpaceWarp>> warps;
+    warps.push_back(make_twist(box, Axis::z, kTwist));
+    warps.push_back(make_bend(box, Axis::z, kBend));
+    return make_chain(std::move(warps));
+}
+
+void draw_patched(Page& page, const Panel& panel, FigureRenderer& renderer, const QuadRemeshed& remeshed,
+                  const Camera& camera) {
+    renderer.start();
+    const PatchDrawing drawing(remeshed.mesh, remeshed.patches, renderer.pixels(0.25), renderer.context());
+    Scene scene;
+    drawing.add_to(scene);
+    page.picture(renderer.picture(std::move(scene), camera, panel.width, panel.height), panel.top_left, panel.width,
+                 panel.height);
+}
+
+} // namespace
+
+Figure draw_remeshed_scan(FigureRenderer& renderer) {
+    const RunContext& context = renderer.context();
+    const Mesh scan = renderer.scan() ? *renderer.scan() : irregular_shape(context);
+    QuadRemeshed remeshed =
+        require(quad_remesh(scan, {.quads = kQuads, .levels = kLevels, .attributes = false}, context));
+    const Model reference =
+        std::move(require(strip(remeshed.mesh, {.code = DetailCode::reference, .levels = kLevels}, context)).model);
+    const std::size_t driver_count = reference.driver().vertices.size();
+    const Model blend = std::move(require(strip(remeshed.mesh, {.base = driver_count}, context)).model);
+
+    const Box box = world_bounds(remeshed.mesh);
+    const auto stretch = make_stretch(box, Axis::z, kStretch), extreme = extreme_warp(box);
+    const Returned stretched = put_back(reference, {.law = Law::inverse}, *stretch, context);
+    const Returned twisted = put_back(reference, {}, *extreme, context),
+                   blended = put_back(blend, {}, *extreme, context);
+    const Mesh once = level_mesh(reference, kLevels - 1), coarsest = level_mesh(reference, 0);
+
+    const QuadRemeshReport& report = remeshed.report;
+    Page page = captioned_page(
+        content_height(3, kPanelHeight), "The report’s process on a scan",
+        fmt::format(
+            "{} (i) becomes {} quads (ii): {} patches, each a grid of {} by {}; the quads leave the scan by "
+            "{} of its diagonal (rms). As in figure 2.9, one round (iii) and {} rounds (iv) of removing "
+            "every second row and column. As in 2.10, what is left is stretched to {:.1f} times the height (v), "
+            "and the detail returned by the inverse law (vi). As in 3.1, an extreme deformation: the same driver "
+            "twisted and bent (vii), detail returned by the report’s code (viii) and by the blend code (ix).",
+            renderer.scan() ? fmt::format("A scan of {} triangles", with_commas(scan.face_count()))
+                            : fmt::format("A built-in shape in {} irregular triangles, in place of a scan,",
+                                          with_commas(scan.face_count())),
+            with_commas(remeshed.mesh.face_count()), with_commas(report.patches), std::size_t{1} << kLevels,
+            std::size_t{1} << kLevels, power_text(report.from_input.rms), kLevels, kStretch));
+    const std::vector<Panel> panels = panels_in_rows(3, 3, kPanelHeight);
+    const Mesh *rest[] = {&scan}, *tall[] = {&stretched.mesh, &stretched.driver},
+               *turned[] = {&twisted.mesh, &twisted.driver, &blended.mesh};
+    const Views views{common_camera(rest, kFromFront, panels[0]), common_camera(tall, kFromFront, panels[0]),
+                      common_camera(turned, kFromFront, panels[0])};
+    struct Part {
+        const char* number;
+        std::string text;
+        const Mesh* mesh;
+        const Camera* camera;
+        bool edges;
+    };
+    const auto vertices = [](const char* text, const Mesh& mesh) {
+        return fmt::format("{}, {} vertices", text, with_commas(mesh.vertex_count()));
+    };
+    const Part parts[] = {
+        {"i", vertices("original", scan), &scan, &views.rest, false},
+        {"ii", vertices("quads", remeshed.mesh), nullptr, &views.rest, false},
+        {"iii", vertices("1 iteration", once), &once, &views.rest, true},
+        {"iv", vertices(fmt::format("{} iterations", kLevels).c_str(), coarsest), &coarsest, &views.rest, true},
+        {"v", "stretched", &stretched.driver, &views.stretched, true},
+        {"vi", "detail returned", &stretched.mesh, &views.stretched, false},
+        {"vii", "twisted and bent", &twisted.driver, &views.twisted, true},
+        {"viii", "detail returned, report’s code", &twisted.mesh, &views.twisted, false},
+        {"ix", "detail returned, blend code", &blended.mesh, &views.twisted, false}};
+    for (std::size_t k = 0; k < std::size(parts); ++k) {
+        const Part& part = parts[k];
+        if (part.mesh)
+            draw_mesh(page, panels[k], renderer, *part.mesh, part.edges ? with_edges(0.5f) : FigureRenderer::Look{},
+                      *part.camera);
+        else
+            draw_patched(page, panels[k], renderer, remeshed, *part.camera);
+        subcaption(page, panels[k], part.number, part.text);
+    }
+    return {std::move(page),
+            {{"input_faces", scan.face_count()},
+             {"quads", remeshed.mesh.face_count()},
+             {"patches", report.patches},
+             {"levels", report.levels},
+             {"vertices", {remeshed.mesh.vertex_count(), once.vertex_count(), coarsest.vertex_count()}},
+             {"min_scaled_jacobian", report.quality.min_scaled_jacobian},
+             {"rms_from_input", report.from_input.rms},
+             {"rms_stretched", stretched.rms},
+             {"rms_twisted", {{"reference code", twisted.rms}, {"blend code", blended.rms}}}}};
+}
+
+} // namespace filigree::cli
