@@ -4,11 +4,14 @@
 // A tree-cotree decomposition leaves two edges a handle, which lie close behind it, and with them one number an edge:
 // the exclusive or of those along a loop is zero where the loop bounds a piece of the surface. So, unlike in [Guskov
 // 2001], a short walk around each of these edges finds the handle's shortest loop, and no region is grown everywhere.
+#include "filigree/remesh/disjoint_sets.h"
 #include "filigree/remesh/half_edges.h"
 #include "filigree/remesh/manifold_surface.h"
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
+#include <functional>
 #include <numeric>
 #include <optional>
 
@@ -23,8 +26,10 @@ std::uint64_t random_bits(std::uint64_t counter) {
     return x ^ (x >> 31);
 }
 
-/// How far from its edges a handle is looked for: closed walks up to this many times the longest loop.
-constexpr double kWalk = 3;
+/// Closed walks up to this many times the longest loop are looked for. What is not found says more than that no loop
+/// passes the vertex: none passes its neighbours either, up to half the difference away. With 2 the searches that cover
+/// a stretch of the surface cost least.
+constexpr double kWalk = 2;
 constexpr int kShorten = 8; ///< times a loop is tried to become shorter, from vertices of its own
 
 /// A surface without borders: each border loop has a vertex of its own, joined to all of the loop by triangles that are
@@ -85,27 +90,6 @@ CappedSurface cap_surface(const ManifoldSurface& surface) {
     capped.genus = (2 * std::int64_t(components(capped.opposite).count) - euler) / 2;
     return capped;
 }
-
-/// Disjoint sets; the root of a set is found by halving paths.
-class DisjointSets {
-public:
-    explicit DisjointSets(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), Index{0}); }
-    Index root(Index i) {
-        while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-        return i;
-    }
-    /// Whether a and b were apart.
-    bool join(Index a, Index b) {
-        a = root(a);
-        b = root(b);
-        if (a == b) return false;
-        parent_[std::max(a, b)] = std::min(a, b);
-        return true;
-    }
-
-private:
-    std::vector<Index> parent_;
-};
 
 /// What a tree-cotree decomposition says about loops.
 struct Homology {
@@ -222,14 +206,32 @@ struct Loop {
 /// Finds shortest loops that bound nothing, by Dijkstra's algorithm around one vertex after another.
 class LoopSearch {
 public:
-    LoopSearch(const CappedSurface& surface, const Homology& homology, std::span<const Vec3d> positions)
-        : surface_(surface), signature_(homology.signature), positions_(positions), nodes_(surface.real_vertices) {}
+    LoopSearch(const CappedSurface& surface, const Homology& homology, std::span<const Vec3d> positions, double longest)
+        : surface_(surface), signature_(homology.signature), positions_(positions), longest_(longest),
+          nodes_(surface.real_vertices), done_(surface.real_vertices, 0) {}
 
-    /// The shortest closed walk through `vertex` that bounds nothing, if it is shorter than `limit`, without the part
-    /// it goes both out and back.
-    std::optional<Loop> shortest_through(Index vertex, double limit) {
+    /// The shortest loop near `vertex`, if there is one no longer than the longest asked for. Not found: none passes
+    /// the vertex. Vertices where the answer is known already are passed over.
+    std::optional<Loop> shortest_near(Index vertex) {
+        if (done_[vertex]) return std::nullopt;
+        double walk = kWalk * longest_;
+        std::optional<Loop> loop = shortest_through(vertex, walk);
+        // a loop of length l at a distance d from here is a walk of l + 2 d; where one was found, one is enough
+        const double known = walk > longest_ ? 0.5 * (walk - longest_) : 0.5 * longest_;
+        for (const Index v : settled_)
+            if (nodes_[v].distance < known) done_[v] = 1;
+        if (loop) shorten(*loop);
+        if (!loop || !(loop->length <= longest_)) return std::nullopt;
+        return loop;
+    }
+
+private:
+    /// The shortest closed walk through `vertex` that bounds nothing, if it is shorter than `limit`, which becomes its
+    /// length; without the part that it goes both out and back.
+    std::optional<Loop> shortest_through(Index vertex, double& limit) {
         ++search_;
         heap_.clear();
+        settled_.clear();
         reach(vertex, 0, kNoIndex, 0);
         Index closing = kNoIndex;
         while (!heap_.empty()) {
@@ -237,30 +239,26 @@ public:
             const auto [distance, at] = heap_.back();
             heap_.pop_back();
             if (2 * distance >= limit) break;
-            if (nodes_[at].settled || distance > nodes_[at].distance) continue;
+            if (nodes_[at].settled) continue;
             nodes_[at].settled = true;
+            settled_.push_back(at);
             settle(at, limit, closing);
         }
         if (closing == kNoIndex) return std::nullopt;
         return trimmed(closing);
     }
 
-    /// The shortest loop near `vertex`, if the search finds one no longer than `longest`.
-    std::optional<Loop> shortest_near(Index vertex, double longest) {
-        std::optional<Loop> loop = shortest_through(vertex, kWalk * longest);
-        if (!loop) return loop;
+    void shorten(Loop& loop) {
         for (int i = 0; i < kShorten; ++i) {
             // the golden ratio spreads the vertices tried, however often the loop changes
-            const std::size_t at =
-                static_cast<std::size_t>(0.6180339887 * i * double(loop->half_edges.size())) % loop->half_edges.size();
-            std::optional<Loop> shorter = shortest_through(surface_.start(loop->half_edges[at]), loop->length);
-            if (shorter && shorter->length < loop->length) loop = std::move(shorter);
+            const double place = 0.6180339887 * i - std::floor(0.6180339887 * i);
+            const Index h = loop.half_edges[static_cast<std::size_t>(place * double(loop.half_edges.size()))];
+            double limit = loop.length;
+            std::optional<Loop> shorter = shortest_through(surface_.start(h), limit);
+            if (shorter && shorter->length < loop.length) loop = std::move(*shorter);
         }
-        if (!(loop->length <= longest)) return std::nullopt;
-        return loop;
     }
 
-private:
     struct Node {
         double distance = 0;
         std::uint64_t signature = 0; ///< of the way from the vertex searched from
@@ -284,7 +282,7 @@ private:
         Index h = first;
         do {
             const Index other = surface_.end(h);
-            if (surface_.is_real(other) && h != nodes_[at].arrival) visit(at, other, h, limit, closing);
+            if (surface_.is_real(other)) visit(at, other, h, limit, closing);
             h = surface_.turn(h);
         } while (h != first);
     }
@@ -324,8 +322,11 @@ private:
     const CappedSurface& surface_;
     std::span<const std::uint64_t> signature_;
     std::span<const Vec3d> positions_;
+    double longest_;
     std::vector<Node> nodes_;
+    std::vector<std::uint8_t> done_; ///< a vertex: whether no loop passes it, or one was found close by
     std::vector<std::pair<double, Index>> heap_;
+    std::vector<Index> settled_;
     std::uint32_t search_ = 0;
 };
 
@@ -395,19 +396,33 @@ void cut_and_fill(ManifoldSurface& surface, const CappedSurface& capped, const L
     ++report.closed_handles;
 }
 
+/// Short loops near the generators; if there is none, near any vertex on an edge with a signature. Every loop that
+/// bounds nothing has such an edge, so if there is none again, the surface has none.
+std::vector<Loop> find_loops(const CappedSurface& surface, const Homology& homology, LoopSearch& search,
+                             const RunContext& context) {
+    std::vector<Loop> loops;
+    const auto look = [&](Index h) {
+        if (context.is_cancelled() || !surface.is_real(surface.start(h))) return;
+        if (auto loop = search.shortest_near(surface.start(h))) loops.push_back(std::move(*loop));
+    };
+    for (const Index h : homology.generators) {
+        look(h);
+        look(surface.opposite[h]);
+    }
+    if (!loops.empty()) return loops;
+    for (Index h = 0; h < surface.opposite.size(); ++h)
+        if (homology.signature[h] != 0) look(h);
+    return loops;
+}
+
 /// One round with new trees. Returns how many handles it closed.
 std::size_t close_round(ManifoldSurface& surface, const CappedSurface& capped, double longest_loop, std::uint64_t round,
                         CleanReport& report, const RunContext& context) {
     const Index root = static_cast<Index>(random_bits(context.seed + round) % capped.leaving.size());
     const Homology homology = decompose(capped, root);
-    LoopSearch search(capped, homology, surface.positions);
-    std::vector<Loop> loops;
-    for (const Index h : homology.generators) {
-        if (context.is_cancelled()) return 0;
-        const Index seed = capped.is_real(capped.start(h)) ? capped.start(h) : capped.end(h);
-        if (auto loop = search.shortest_near(seed, longest_loop)) loops.push_back(std::move(*loop));
-    }
-    loops = disjoint_loops(capped, std::move(loops));
+    LoopSearch search(capped, homology, surface.positions, longest_loop);
+    std::vector<Loop> loops = disjoint_loops(capped, find_loops(capped, homology, search, context));
+    if (context.is_cancelled()) return 0;
     keep_connected(capped, loops);
     for (const Loop& loop : loops) cut_and_fill(surface, capped, loop, report);
     return loops.size();

@@ -6,6 +6,7 @@
 #include "filigree/core/parallel_for.h"
 #include "filigree/mesh/triangulate.h"
 #include "filigree/mesh/weld.h"
+#include "filigree/remesh/disjoint_sets.h"
 #include "filigree/remesh/half_edges.h"
 
 #include <algorithm>
@@ -104,13 +105,53 @@ std::vector<Index> first_copies(std::span<const Triangle> triangles, std::span<c
     return first;
 }
 
-/// Drops later copies. Returns whether there were any.
+/// Which triangles belong to walls inside: patches of triangles that are there an even number of times, where the
+/// surface goes on without them all along their rim. The parts on both sides of a wall become one when it goes.
+/// first: from first_copies.
+std::vector<std::uint8_t> triangles_of_walls(std::span<const Triangle> triangles, std::span<const Index> sorted,
+                                             std::span<const Index> first) {
+    std::vector<std::uint8_t> odd(triangles.size(), 0);
+    for (const Index t : first) odd[t] ^= 1;
+    DisjointSets patches(triangles.size());
+    std::vector<std::uint8_t> has_rim(triangles.size(), 0), is_loose(triangles.size(), 0);
+    // twice: patches must be whole before what is found along them counts
+    for (const bool joining : {true, false})
+        for_each_edge(triangles, sorted, [&](std::span<const Index> edge) {
+            std::size_t odd_count = 0, even_count = 0, up_count = 0;
+            Index even = kNoIndex;
+            for (const Index h : edge) {
+                const Index t = h / 3;
+                if (first[t] != t) continue;
+                ++(odd[t] ? odd_count : even_count);
+                up_count += odd[t] && half_edge_start(triangles, h) < half_edge_end(triangles, h);
+                if (odd[t]) continue;
+                if (joining && even != kNoIndex) patches.join(even, t);
+                even = t;
+            }
+            if (joining || even == kNoIndex) return;
+            if (odd_count > 0) has_rim[patches.root(even)] = 1;
+            if (2 * up_count != odd_count || odd_count + even_count == 1) is_loose[patches.root(even)] = 1;
+        });
+    std::vector<std::uint8_t> of_wall(triangles.size(), 0);
+    for (Index t = 0; t < triangles.size(); ++t) {
+        const Index patch = patches.root(first[t]);
+        of_wall[t] = !odd[first[t]] && has_rim[patch] && !is_loose[patch];
+    }
+    return of_wall;
+}
+
+/// Drops later copies, and walls altogether. Returns whether there were any.
 bool drop_duplicates(Soup& soup, std::span<const Index> sorted, CleanReport& report) {
     const std::vector<Index> first = first_copies(soup.triangles, sorted);
+    const auto is_first = [&](std::size_t t) { return first[t] == t; };
     const std::size_t before = soup.triangles.size();
-    soup.filter([&](std::size_t t) { return first[t] == t; });
+    bool any = false;
+    for (std::size_t t = 0; t < before && !any; ++t) any = !is_first(t);
+    if (!any) return false;
+    const std::vector<std::uint8_t> of_wall = triangles_of_walls(soup.triangles, sorted, first);
+    soup.filter([&](std::size_t t) { return is_first(t) && !of_wall[t]; });
     report.duplicate_faces += before - soup.triangles.size();
-    return soup.triangles.size() != before;
+    return true;
 }
 
 /// The opposite of each half-edge on edges with exactly two triangles, whichever way they run.

@@ -24,7 +24,7 @@ struct CleanReport {
     std::size_t welded_vertices = 0;    ///< vertices at the place of an earlier one
     std::size_t unused_vertices = 0;    ///< in no triangle
     std::size_t degenerate_faces = 0;   ///< dropped: triangles that repeat a vertex after welding
-    std::size_t duplicate_faces = 0;    ///< dropped: triangles over the same vertices as an earlier one
+    std::size_t duplicate_faces = 0;    ///< dropped: triangles over the same vertices as an earlier one, and walls
     std::size_t flipped_faces = 0;      ///< turned, so that neighbours agree; the majority of a component's area stays
     std::size_t cut_edges = 0;          ///< edges with three or more triangles, or two that cannot agree: left open
     std::size_t separated_edges = 0;    ///< edges with four or more triangles where the sheets came apart, all closed
@@ -47,6 +47,9 @@ struct SurfaceTopology {
 /// Any mesh as a manifold: triangulates, welds vertices at the same position, drops triangles that repeat a vertex or
 /// the vertices of an earlier one, glues edges with exactly two triangles, orients each component (the majority by area
 /// stays), cuts what cannot be glued, and gives each fan its own vertex. Nothing else moves or goes.
+/// Where bodies touch along an edge they come apart closed: the two sides of each solid wedge are glued. Where they
+/// share a wall (triangles that are there twice, with the surface going on all around them) the wall goes and they
+/// become one. Vertices and triangles keep the mesh's order.
 /// Adds to `report`. Errors: unsuitable (no face with an area is left), cancelled. Cost O(F log F).
 Result<ManifoldSurface> make_manifold(const Mesh& mesh, CleanReport& report, const RunContext& context);
 
@@ -57,11 +60,12 @@ SurfaceTopology surface_topology(const ManifoldSurface& surface);
 /// `report`. Cost O(F).
 void remove_small_components(ManifoldSurface& surface, double smallest, CleanReport& report);
 
-/// Cuts tiny handles open and closes both cuts with triangles, where a loop around the handle (or through it) is
-/// shorter than `longest_loop` (model units), shortest first; the genus goes down by one each time, nothing else
-/// changes. Method: loops of a tree-cotree decomposition [Erickson 2005], cut and filled as in [Guskov 2001]; disjoint
-/// loops of one decomposition are independent, so cutting many of them at once never takes a surface apart.
-/// Adds to `report`. Errors: cancelled. Cost O(F log F) a round; a handful of rounds.
+/// Cuts tiny handles open and closes both cuts with triangles, where a loop of edges around the handle (or through it)
+/// is no longer than `longest_loop` (model units), the shortest first, until no such loop is left. The genus goes down
+/// by one each time; components, borders and all triangles stay, and filled ones come after them. Loops around open
+/// borders are no handles. Method: loops from tree-cotree decompositions [Erickson 2005], cut and filled as in [Guskov
+/// 2001]. Adds to `report`. Errors: cancelled (what was closed by then stays closed). Cost O(F log F) a round; a
+/// handful of rounds.
 Status close_handles(ManifoldSurface& surface, double longest_loop, CleanReport& report, const RunContext& context);
 
 } // namespace filigree
