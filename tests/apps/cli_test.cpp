@@ -11,8 +11,8 @@ using namespace filigree_test;
 
 namespace {
 
-const std::vector<std::string> kCommands = {"make",  "info", "strip",  "level",   "deform", "restore", "compare",
-                                            "bench", "demo", "render", "figures", "sample", "simulate"};
+const std::vector<std::string> kCommands = {"make",  "info", "strip",  "level",   "deform", "restore",  "compare",
+                                            "bench", "demo", "render", "figures", "sample", "simulate", "remesh"};
 
 std::vector<std::string> lines_of(const std::string& text) {
     std::vector<std::string> lines;

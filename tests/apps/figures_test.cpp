@@ -65,8 +65,8 @@ protected:
 TEST_F(Figures, EveryFigureBecomesAFile) {
     if (!can_render()) GTEST_SKIP() << "no OpenGL";
     const Json result = json(command({}));
-    std::vector<std::string> names, in_order = {"1.1", "2.1", "2.2", "2.3",  "2.4", "2.5",    "2.6",
-                                                "2.7", "2.8", "2.9", "2.10", "3.1", "border", "codes"};
+    std::vector<std::string> names, in_order = {"1.1", "2.1", "2.2",  "2.3", "2.4",    "2.5",   "2.6", "2.7",
+                                                "2.8", "2.9", "2.10", "3.1", "border", "codes", "scan"};
     for (const Json& figure : result.at("figures")) {
         names.push_back(figure.at("name"));
         const std::string bytes = bytes_of(path(figure.at("file")));
@@ -76,7 +76,7 @@ TEST_F(Figures, EveryFigureBecomesAFile) {
         EXPECT_EQ(bytes.substr(16, 4), std::string("\0\0\0\xb4", 4)) << figure.at("name");
     }
     EXPECT_EQ(names, in_order);
-    EXPECT_EQ(std::distance(std::filesystem::directory_iterator(path("out")), {}), 14);
+    EXPECT_EQ(std::distance(std::filesystem::directory_iterator(path("out")), {}), 15);
 }
 
 TEST_F(Figures, SimpleTriangleObeysTheInverseLaw) {
@@ -147,6 +147,29 @@ TEST_F(Figures, DeformedCubesKeepWhatTheCaptionsSay) {
     const Json methods = values("codes").at("methods");
     EXPECT_LT(methods.at("blend code").at("rms"), 0.1 * methods.at("wrap deformer").at("rms").get<double>());
     EXPECT_LT(methods.at("blend code").at("rms"), 0.1 * methods.at("reference code").at("rms").get<double>());
+}
+
+TEST_F(Figures, ScansGoThroughTheReportsProcess) {
+    if (!can_render()) GTEST_SKIP() << "no OpenGL";
+    const auto check = [](const Json& v) {
+        EXPECT_EQ(v.at("quads").get<int>(), 64 * v.at("patches").get<int>());
+        EXPECT_EQ(v.at("levels"), 3);
+        EXPECT_GT(v.at("vertices")[0], v.at("vertices")[1]);
+        EXPECT_GT(v.at("vertices")[1], v.at("vertices")[2]);
+        EXPECT_GT(v.at("min_scaled_jacobian"), 0);
+        EXPECT_LT(v.at("rms_from_input"), 1e-3);
+        const Json twisted = v.at("rms_twisted");
+        EXPECT_LT(twisted.at("blend code").get<double>(), twisted.at("reference code").get<double>());
+    };
+    const Json own = values("scan");
+    check(own);
+    EXPECT_GT(own.at("input_faces"), 40'000);
+    ok({"make", "torus", "-o", "torus.ply", "--resolution", "40", "--quiet"});
+    const Json result =
+        json(command({"scan"}, {"--width", "180", "--passes", "1", "--scan", "torus.ply", "--up", "z"}));
+    check(result.at("figures")[0].at("values"));
+    EXPECT_EQ(result.at("figures")[0].at("values").at("input_faces"), 3200);
+    fails(3, command({"scan"}, {"--scan", "missing.ply"}), {"missing.ply"});
 }
 
 TEST_F(Figures, RaysAtTheBorderAreAnsweredRight) {
