@@ -51,13 +51,19 @@ double double_area(std::span<const Vec3d> positions, const Triangle& t) {
 }
 
 /// Triangles over corners: every corner is a vertex of its own, so that faces which repeat a vertex name the right one.
-Triangulation triangulate_corners(const Mesh& mesh) {
+/// Faces begin at their lowest vertex, so that two copies of a square get the same diagonal.
+Triangulation triangulate_corners(const Mesh& mesh, std::span<const Index> welded) {
     Mesh loose;
     loose.positions.resize(mesh.corner_count());
     for (std::size_t c = 0; c < mesh.corner_count(); ++c) loose.positions[c] = mesh.positions[mesh.corners[c]];
     loose.face_offsets = mesh.face_offsets;
     loose.corners.resize(mesh.corner_count());
     std::iota(loose.corners.begin(), loose.corners.end(), Index{0});
+    for (std::size_t f = 0; f < mesh.face_count(); ++f) {
+        const auto face = std::span(loose.corners).subspan(mesh.face_offsets[f], mesh.face_size(f));
+        const auto lowest = std::ranges::min_element(face, {}, [&](Index c) { return welded[mesh.corners[c]]; });
+        std::ranges::rotate(face, lowest);
+    }
     return triangulate(loose);
 }
 
@@ -70,7 +76,7 @@ Soup triangle_soup(const Mesh& mesh, std::span<const Index> welded) {
             soup.source_face[f] = f;
         }
     } else {
-        Triangulation triangulation = triangulate_corners(mesh);
+        Triangulation triangulation = triangulate_corners(mesh, welded);
         soup.corners = std::move(triangulation.triangles);
         soup.source_face = std::move(triangulation.source_face);
     }
