@@ -233,6 +233,24 @@ TEST(MakeManifold, SheetsThereTwiceStayOnce) {
     }
 }
 
+TEST(MakeManifold, FinsComeOffClosedBodies) {
+    for (int angle = 0; angle < 360; angle += 30) { // outwards, inwards and along the sides
+        Mesh mesh = voxel_body({{0, 0, 0}}, false);
+        const auto vertex = [&](float x, float y, float z) {
+            return Index(std::ranges::find(mesh.positions, Vec3f(x, y, z)) - mesh.positions.begin());
+        };
+        const Index low = vertex(0, 0, 0), high = vertex(0, 0, 1), tip = Index(mesh.vertex_count());
+        const double radians = angle * std::numbers::pi / 180;
+        mesh.positions.emplace_back(float(std::cos(radians)), float(std::sin(radians)), 0.5f);
+        add_triangle(mesh, low, high, tip);
+        add_triangle(mesh, high, low, tip);
+        const Cleaned cleaned = clean(mesh);
+        EXPECT_EQ(cleaned.topology.components, 2u) << angle;
+        EXPECT_EQ(cleaned.topology.border_edges, 3u) << angle;
+        EXPECT_EQ(cleaned.report.cut_edges, 1u) << angle;
+    }
+}
+
 TEST(MakeManifold, TrianglesWithoutAreaKeepNeighboursTogether) {
     // a square whose lower half meets the upper in a T: the flat triangle (0, 4, 1) joins them
     Mesh mesh;

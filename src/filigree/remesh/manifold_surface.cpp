@@ -24,11 +24,13 @@ constexpr std::size_t kGrain = 32'768; // triangles a piece
 struct Soup {
     std::vector<Triangle> triangles, corners;
     std::vector<Index> source_face;
+    std::vector<std::uint8_t> doubled; ///< a triangle: whether it was there an even number of times
 
     void resize(std::size_t count) {
         triangles.resize(count);
         corners.resize(count);
         source_face.resize(count);
+        doubled.resize(count);
     }
     /// Keeps the triangles that `keep` says true of.
     template <class Keep>
@@ -38,6 +40,7 @@ struct Soup {
             if (!keep(t)) continue;
             triangles[kept] = triangles[t];
             corners[kept] = corners[t];
+            doubled[kept] = doubled[t];
             source_face[kept++] = source_face[t];
         }
         resize(kept);
@@ -80,7 +83,7 @@ Soup triangle_soup(const Mesh& mesh, std::span<const Index> welded) {
         soup.corners = std::move(triangulation.triangles);
         soup.source_face = std::move(triangulation.source_face);
     }
-    soup.triangles.resize(soup.corners.size());
+    soup.resize(soup.corners.size());
     for (std::size_t t = 0; t < soup.corners.size(); ++t)
         for (std::size_t i = 0; i < 3; ++i) soup.triangles[t][i] = welded[mesh.corners[soup.corners[t][i]]];
     return soup;
@@ -111,37 +114,38 @@ std::vector<Index> first_copies(std::span<const Triangle> triangles, std::span<c
     return first;
 }
 
-/// Which triangles belong to walls inside: patches of triangles that are there an even number of times, where the
-/// surface goes on without them all along their rim. The parts on both sides of a wall become one when it goes.
-/// first: from first_copies.
-std::vector<std::uint8_t> triangles_of_walls(std::span<const Triangle> triangles, std::span<const Index> sorted,
+/// Which triangles belong to walls inside: patches of triangles that are doubled, where the surface goes on without
+/// them all along their rim. The parts on both sides of a wall become one when it goes. first: from first_copies.
+std::vector<std::uint8_t> triangles_of_walls(const Soup& soup, std::span<const Index> sorted,
                                              std::span<const Index> first) {
-    std::vector<std::uint8_t> odd(triangles.size(), 0);
-    for (const Index t : first) odd[t] ^= 1;
+    const std::vector<Triangle>& triangles = soup.triangles;
     DisjointSets patches(triangles.size());
     std::vector<std::uint8_t> has_rim(triangles.size(), 0), is_loose(triangles.size(), 0);
     // twice: patches must be whole before what is found along them counts
     for (const bool joining : {true, false})
         for_each_edge(triangles, sorted, [&](std::span<const Index> edge) {
-            std::size_t odd_count = 0, even_count = 0, up_count = 0;
-            Index even = kNoIndex;
+            std::size_t single_count = 0, doubled_count = 0, up_count = 0;
+            Index doubled = kNoIndex;
             for (const Index h : edge) {
                 const Index t = h / 3;
                 if (first[t] != t) continue;
-                ++(odd[t] ? odd_count : even_count);
-                up_count += odd[t] && half_edge_start(triangles, h) < half_edge_end(triangles, h);
-                if (odd[t]) continue;
-                if (joining && even != kNoIndex) patches.join(even, t);
-                even = t;
+                if (!soup.doubled[t]) {
+                    ++single_count;
+                    up_count += half_edge_start(triangles, h) < half_edge_end(triangles, h);
+                    continue;
+                }
+                ++doubled_count;
+                if (joining && doubled != kNoIndex) patches.join(doubled, t);
+                doubled = t;
             }
-            if (joining || even == kNoIndex) return;
-            if (odd_count > 0) has_rim[patches.root(even)] = 1;
-            if (2 * up_count != odd_count || odd_count + even_count == 1) is_loose[patches.root(even)] = 1;
+            if (joining || doubled == kNoIndex) return;
+            if (single_count > 0) has_rim[patches.root(doubled)] = 1;
+            if (2 * up_count != single_count || single_count + doubled_count == 1) is_loose[patches.root(doubled)] = 1;
         });
     std::vector<std::uint8_t> of_wall(triangles.size(), 0);
     for (Index t = 0; t < triangles.size(); ++t) {
         const Index patch = patches.root(first[t]);
-        of_wall[t] = !odd[first[t]] && has_rim[patch] && !is_loose[patch];
+        of_wall[t] = soup.doubled[first[t]] && has_rim[patch] && !is_loose[patch];
     }
     return of_wall;
 }
@@ -154,19 +158,36 @@ bool drop_duplicates(Soup& soup, std::span<const Index> sorted, CleanReport& rep
     bool any = false;
     for (std::size_t t = 0; t < before && !any; ++t) any = !is_first(t);
     if (!any) return false;
-    const std::vector<std::uint8_t> of_wall = triangles_of_walls(soup.triangles, sorted, first);
+    std::ranges::fill(soup.doubled, 1); // turned by each copy
+    for (const Index t : first) soup.doubled[t] ^= 1;
+    const std::vector<std::uint8_t> of_wall = triangles_of_walls(soup, sorted, first);
     soup.filter([&](std::size_t t) { return is_first(t) && !of_wall[t]; });
     report.duplicate_faces += before - soup.triangles.size();
     return true;
 }
 
+/// The half-edges to glue along an edge: all of them, but where a sheet that was there twice meets a surface that goes
+/// on without it, only that surface's. `buffer` may hold them.
+std::span<const Index> sides_to_glue(const Soup& soup, std::span<const Index> edge, std::vector<Index>& buffer) {
+    if (edge.size() < 3) return edge;
+    buffer.clear();
+    std::size_t up = 0;
+    for (const Index h : edge) {
+        if (soup.doubled[h / 3]) continue;
+        buffer.push_back(h);
+        up += half_edge_start(soup.triangles, h) < half_edge_end(soup.triangles, h);
+    }
+    return !buffer.empty() && 2 * up == buffer.size() ? std::span<const Index>(buffer) : edge;
+}
+
 /// The opposite of each half-edge on edges with exactly two triangles, whichever way they run.
-std::vector<Index> pair_neighbours(std::span<const Triangle> triangles, std::span<const Index> sorted) {
-    std::vector<Index> neighbour(sorted.size(), kNoIndex);
-    for_each_edge(triangles, sorted, [&](std::span<const Index> edge) {
-        if (edge.size() != 2) return;
-        neighbour[edge[0]] = edge[1];
-        neighbour[edge[1]] = edge[0];
+std::vector<Index> pair_neighbours(const Soup& soup, std::span<const Index> sorted) {
+    std::vector<Index> neighbour(sorted.size(), kNoIndex), buffer;
+    for_each_edge(soup.triangles, sorted, [&](std::span<const Index> edge) {
+        const std::span<const Index> sides = sides_to_glue(soup, edge, buffer);
+        if (sides.size() != 2) return;
+        neighbour[sides[0]] = sides[1];
+        neighbour[sides[1]] = sides[0];
     });
     return neighbour;
 }
@@ -216,13 +237,15 @@ void flip_triangles(Soup& soup, std::span<Index> sorted, std::span<const std::ui
 /// Glues the half-edges of oriented triangles, so that their fans make a manifold.
 class Gluer {
 public:
-    Gluer(std::span<const Vec3d> positions, std::span<const Triangle> triangles, std::span<const Index> sorted)
-        : positions_(positions), triangles_(triangles), opposite_(sorted.size(), kNoIndex) {
-        for_each_edge(triangles, sorted, [&](std::span<const Index> edge) {
+    Gluer(std::span<const Vec3d> positions, const Soup& soup, std::span<const Index> sorted)
+        : positions_(positions), triangles_(soup.triangles), opposite_(sorted.size(), kNoIndex) {
+        std::vector<Index> buffer;
+        for_each_edge(soup.triangles, sorted, [&](std::span<const Index> edge) {
             if (edge.size() == 2 && run_apart(edge[0], edge[1])) return glue(edge[0], edge[1]);
             if (edge.size() < 2) return;
             singular_.push_back(edge);
-            if (edge.size() > 2) pair_wedges(edge);
+            pair_wedges(sides_to_glue(soup, edge, buffer));
+            pair_wedges(edge); // what is still open: sheets that were there twice, among themselves
         });
         if (!singular_.empty()) mend();
     }
@@ -257,6 +280,7 @@ private:
         const Vec3d u = axis.unitOrthogonal(), v = axis.cross(u);
         around_.clear();
         for (const Index h : edge) {
+            if (opposite_[h] != kNoIndex) continue;
             const Vec3d arm = positions_[half_edge_start(triangles_, previous_half_edge(h))] - low;
             around_.emplace_back(std::atan2(v.dot(arm), u.dot(arm)), h);
         }
@@ -385,10 +409,10 @@ Result<ManifoldSurface> make_manifold(const Mesh& mesh, CleanReport& report, con
         return Error{ErrorCode::unsuitable, "The mesh has no face with an area; there is no surface to work on."};
     if (!step(0.5)) return cancelled_error();
 
-    const std::vector<Index> neighbour = pair_neighbours(soup.triangles, sorted);
+    const std::vector<Index> neighbour = pair_neighbours(soup, sorted);
     flip_triangles(soup, sorted, triangles_to_flip(soup.triangles, neighbour, areas), report);
     if (!step(0.7)) return cancelled_error();
-    const Gluer gluer(positions, soup.triangles, sorted);
+    const Gluer gluer(positions, soup, sorted);
     const Labels fan = fans(gluer.opposite());
     const std::size_t used = used_count(soup.triangles, mesh.vertex_count());
     gluer.count(report);

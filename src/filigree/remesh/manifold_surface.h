@@ -49,7 +49,8 @@ struct SurfaceTopology {
 /// stays), cuts what cannot be glued, and gives each fan its own vertex. Nothing else moves or goes.
 /// Where bodies touch along an edge they come apart closed: the two sides of each solid wedge are glued. Where they
 /// share a wall (triangles that are there twice, with the surface going on all around them) the wall goes and they
-/// become one. Vertices and triangles keep the mesh's order.
+/// become one; a sheet that is there twice and meets a closed surface along some edges becomes a component of its own.
+/// Vertices and triangles keep the mesh's order.
 /// Adds to `report`. Errors: unsuitable (no face with an area is left), cancelled. Cost O(F log F).
 Result<ManifoldSurface> make_manifold(const Mesh& mesh, CleanReport& report, const RunContext& context);
 
