@@ -18,7 +18,7 @@ constexpr double kLightness = 0.80, kChroma = 0.095; // of OKLab: as colourful a
 constexpr std::size_t kCandidates = 8;               // hues a patch chooses from
 constexpr double kRibbon = 0.022;                    // a border's half width, of a patch's side
 constexpr double kWidestRibbon = 0.0011;             // the same, of the diagonal: large patches have no thicker lines
-constexpr double kLift = 0.3;                        // of a ribbon's width, above the surface
+constexpr double kLift = 0.6;                        // of a ribbon's width, above the surface: quads are not flat
 
 /// sRGB of a hue, 0 to 1, at the lightness and chroma of all patches.
 Vec3f color_of_hue(double hue) {
