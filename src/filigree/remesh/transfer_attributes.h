@@ -17,8 +17,8 @@ struct CornerPoint {
 
 /// Gives `to` the attributes of `from`. points: for each vertex of `to` where it lies on `from`.
 /// Colours and scalars are interpolated; labels and smoothing groups are those of the face under each face's centre.
-/// UVs and normals belong to corners: where `from` has a seam, each face of `to` takes the side that most of it lies on,
-/// and its vertices beyond the seam are continued from that side, so that no face stretches across the texture.
+/// UVs and normals belong to corners: where `from` has a seam, each face of `to` takes the side that most of it lies
+/// on, and its vertices beyond the seam are continued from that side, so that no face stretches across the texture.
 /// Values agree across an edge of `from` when they are the same at its ends, whether corners share a value, a vertex or
 /// only a position. There is one value a vertex where `to` needs no seam.
 /// Normals are renormalised, and left out where `from` has none. Material files and materials are copied.

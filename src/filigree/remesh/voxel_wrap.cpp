@@ -1,0 +1,682 @@
+// Based on:
+//   [Gibson 1998], surface nets: the vertices of the voxels' border are smoothed, each within a box of its own, so that
+//   steps go and thin parts stay. Ours start at the voxels' corners, which the next makes possible.
+//   [Latecki 1997]: the border of a set of voxels is a manifold when it is one around each corner (the set is well
+//   composed); as his repair, ours adds voxels.
+// A triangle is cut to each row of voxels that it crosses; the interval left along the row touches those voxels which
+// the separating axes of triangle and voxel would find, at the cost of rows instead of voxels.
+#include "filigree/remesh/voxel_wrap.h"
+
+#include "filigree/core/parallel_for.h"
+#include "filigree/mesh/closest_point.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <numeric>
+#include <optional>
+
+namespace filigree {
+namespace {
+
+constexpr std::size_t kSlab = 8;     // layers of voxels a piece
+constexpr std::size_t kGrain = 2048; // vertices or triangles a piece
+constexpr double kTouch = 1e-9;      // voxels: what is closer than this touches
+constexpr int kSmoothRounds = 6;
+constexpr double kFreedom = 0.45; // voxels that smoothing moves a vertex along each axis: sides never meet
+constexpr int kPullRounds = 3;
+constexpr double kProbe = 1.5;      // voxels below the surface that are looked at to see whether a part is thin
+constexpr double kShell = 0.2;      // voxels between a sheet and each side of the shell around it
+constexpr int kHalvings = 5;        // of a step that turns a triangle over, before it is not made at all
+constexpr double kMostTurn = 0.3;   // cosine: further than this no triangle turns in a step
+constexpr double kLeastArea = 1e-4; // voxels squared, twice the area: smaller, a triangle only grows
+
+using Cell = std::array<int, 3>;
+
+/// A bit a voxel, rows along x.
+struct BitGrid {
+    Cell size;
+    std::size_t words; ///< of a row
+    std::vector<std::uint64_t> bits;
+
+    explicit BitGrid(const Cell& size_)
+        : size(size_), words((std::size_t(size_[0]) + 63) / 64), bits(words * row_count()) {}
+
+    std::size_t row_count() const { return std::size_t(size[1]) * std::size_t(size[2]); }
+    std::span<std::uint64_t> row(std::size_t r) { return std::span(bits).subspan(r * words, words); }
+    std::span<const std::uint64_t> row(std::size_t r) const { return std::span(bits).subspan(r * words, words); }
+    std::size_t row_of(int y, int z) const { return std::size_t(z) * std::size_t(size[1]) + std::size_t(y); }
+    bool inside(const Cell& c) const {
+        for (int k = 0; k < 3; ++k)
+            if (c[k] < 0 || c[k] >= size[k]) return false;
+        return true;
+    }
+    std::size_t word_of(const Cell& c) const { return row_of(c[1], c[2]) * words + std::size_t(c[0]) / 64; }
+    bool test(const Cell& c) const { return bits[word_of(c)] >> (c[0] % 64) & 1; }
+    void set(const Cell& c) { bits[word_of(c)] |= std::uint64_t(1) << (c[0] % 64); }
+};
+
+/// Bits from one x below: bit x of the result is bit x - 1 of the row.
+std::uint64_t from_below(std::span<const std::uint64_t> row, std::size_t word) {
+    return row[word] << 1 | (word > 0 ? row[word - 1] >> 63 : 0);
+}
+std::uint64_t from_above(std::span<const std::uint64_t> row, std::size_t word) {
+    return row[word] >> 1 | (word + 1 < row.size() ? row[word + 1] << 63 : 0);
+}
+/// The bits of a row's word that are voxels.
+std::uint64_t valid_bits(const BitGrid& grid, std::size_t word) {
+    const std::size_t left = std::size_t(grid.size[0]) - 64 * word;
+    return left >= 64 ? ~std::uint64_t(0) : (std::uint64_t(1) << left) - 1;
+}
+
+template <class Visit>
+void for_each_bit(std::uint64_t bits, const Visit& visit) {
+    for (; bits; bits &= bits - 1) visit(std::countr_zero(bits));
+}
+
+// ---- Touched voxels
+
+/// A triangle cut by planes: convex, at most one corner more for each.
+struct Polygon {
+    std::array<Vec3d, 8> corners;
+    int count = 0;
+
+    double lowest(int axis) const {
+        double low = corners[0][axis];
+        for (int k = 1; k < count; ++k) low = std::min(low, corners[k][axis]);
+        return low;
+    }
+    double highest(int axis) const {
+        double high = corners[0][axis];
+        for (int k = 1; k < count; ++k) high = std::max(high, corners[k][axis]);
+        return high;
+    }
+};
+
+/// What of the polygon lies where sign * (coordinate - at) >= 0.
+Polygon cut(const Polygon& polygon, int axis, double at, double sign) {
+    Polygon result;
+    for (int k = 0; k < polygon.count; ++k) {
+        const Vec3d &p = polygon.corners[k], &q = polygon.corners[(k + 1) % polygon.count];
+        const double dp = sign * (p[axis] - at), dq = sign * (q[axis] - at);
+        if (dp >= 0) result.corners[result.count++] = p;
+        if ((dp < 0) != (dq < 0)) result.corners[result.count++] = p + dp / (dp - dq) * (q - p);
+    }
+    return result;
+}
+
+Polygon cut_to_layer(const Polygon& polygon, int axis, int layer) {
+    return cut(cut(polygon, axis, layer - kTouch, 1), axis, layer + 1 + kTouch, -1);
+}
+
+/// The layers that the polygon reaches into, of those from low to high.
+std::pair<int, int> layers(const Polygon& polygon, int axis, int low, int high) {
+    return {std::max(low, int(std::floor(polygon.lowest(axis) - kTouch))),
+            std::min(high, int(std::floor(polygon.highest(axis) + kTouch)))};
+}
+
+void mark_run(std::span<std::uint64_t> row, int low, int high) {
+    for (int x = low; x <= high;) {
+        const int in_word = x % 64, count = std::min(64 - in_word, high - x + 1);
+        const std::uint64_t run = count == 64 ? ~std::uint64_t(0) : (std::uint64_t(1) << count) - 1;
+        row[std::size_t(x) / 64] |= run << in_word;
+        x += count;
+    }
+}
+
+/// Marks the voxels that the triangle touches, in the layers from low to high along z.
+void mark_triangle(const Polygon& triangle, int low, int high, BitGrid& grid) {
+    const auto [z_low, z_high] = layers(triangle, 2, low, high);
+    for (int z = z_low; z <= z_high; ++z) {
+        const Polygon slice = cut_to_layer(triangle, 2, z);
+        if (slice.count == 0) continue;
+        const auto [y_low, y_high] = layers(slice, 1, 0, grid.size[1] - 1);
+        for (int y = y_low; y <= y_high; ++y) {
+            const Polygon piece = cut_to_layer(slice, 1, y);
+            if (piece.count == 0) continue;
+            const auto [x_low, x_high] = layers(piece, 0, 0, grid.size[0] - 1);
+            mark_run(grid.row(grid.row_of(y, z)), x_low, x_high);
+        }
+    }
+}
+
+/// The triangles that reach into each slab of layers: slab s has triangles[first[s]] .. triangles[first[s + 1] - 1].
+struct SlabTriangles {
+    std::vector<std::size_t> first;
+    std::vector<Index> triangles;
+};
+
+SlabTriangles sort_into_slabs(std::span<const Vec3d> positions, std::span<const Triangle> triangles, int layer_count) {
+    const std::size_t slabs = (std::size_t(layer_count) + kSlab - 1) / kSlab;
+    const auto range = [&](const Triangle& t) {
+        const auto [low, high] = std::minmax({positions[t[0]].z(), positions[t[1]].z(), positions[t[2]].z()});
+        const auto slab = [&](double z) {
+            return std::min(slabs - 1, std::size_t(std::max(0.0, std::floor(z))) / kSlab);
+        };
+        return std::pair(slab(low - kTouch), slab(high + kTouch));
+    };
+    SlabTriangles sorted;
+    sorted.first.assign(slabs + 1, 0);
+    for (const Triangle& t : triangles) {
+        const auto [low, high] = range(t);
+        for (std::size_t s = low; s <= high; ++s) ++sorted.first[s + 1];
+    }
+    std::partial_sum(sorted.first.begin(), sorted.first.end(), sorted.first.begin());
+    sorted.triangles.resize(sorted.first.back());
+    std::vector<std::size_t> next(sorted.first.begin(), sorted.first.end() - 1);
+    for (Index t = 0; t < triangles.size(); ++t) {
+        const auto [low, high] = range(triangles[t]);
+        for (std::size_t s = low; s <= high; ++s) sorted.triangles[next[s]++] = t;
+    }
+    return sorted;
+}
+
+/// positions: in voxels.
+BitGrid touched_voxels(std::span<const Vec3d> positions, std::span<const Triangle> triangles, const Cell& size,
+                       const RunContext& context) {
+    BitGrid grid(size);
+    const SlabTriangles slabs = sort_into_slabs(positions, triangles, size[2]);
+    parallel_for(context, slabs.first.size() - 1, 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t s = begin; s < end && !context.is_cancelled(); ++s) {
+            const int low = int(s * kSlab), high = std::min(low + int(kSlab), size[2]) - 1;
+            for (std::size_t i = slabs.first[s]; i < slabs.first[s + 1]; ++i) {
+                const auto& [a, b, c] = triangles[slabs.triangles[i]];
+                mark_triangle({{positions[a], positions[b], positions[c]}, 3}, low, high, grid);
+            }
+        }
+    });
+    return grid;
+}
+
+// ---- Inside and outside
+
+/// Every voxel that shares at least a corner with one of the grid's, and those.
+BitGrid dilated(const BitGrid& grid, const RunContext& context) {
+    BitGrid across(grid.size), result(grid.size);
+    const auto for_each_layer = [&](const auto& visit) {
+        parallel_for(context, std::size_t(grid.size[2]), 1, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t z = begin; z < end; ++z) visit(int(z));
+        });
+    };
+    for_each_layer([&](int z) { // along x and y
+        for (int y = 0; y < grid.size[1]; ++y)
+            for (int other = std::max(0, y - 1); other <= std::min(grid.size[1] - 1, y + 1); ++other) {
+                const auto source = grid.row(grid.row_of(other, z));
+                const auto target = across.row(grid.row_of(y, z));
+                for (std::size_t w = 0; w < grid.words; ++w)
+                    target[w] |= (source[w] | from_below(source, w) | from_above(source, w)) & valid_bits(grid, w);
+            }
+    });
+    for_each_layer([&](int z) {
+        const std::size_t layer = std::size_t(grid.size[1]) * grid.words;
+        for (int other = std::max(0, z - 1); other <= std::min(grid.size[2] - 1, z + 1); ++other)
+            for (std::size_t i = 0; i < layer; ++i)
+                result.bits[std::size_t(z) * layer + i] |= across.bits[std::size_t(other) * layer + i];
+    });
+    return result;
+}
+
+/// Spreads the seeds of a row along its free voxels.
+void spread_along(std::span<std::uint64_t> seeds, std::span<const std::uint64_t> closed) {
+    std::uint64_t carry = 0;
+    for (std::size_t w = 0; w < seeds.size(); ++w) {
+        std::uint64_t free = ~closed[w], s = seeds[w] | (carry & free);
+        for (int step = 1; step < 64; step *= 2) {
+            s |= free & (s << step);
+            free &= free << step;
+        }
+        seeds[w] = s;
+        carry = s >> 63;
+    }
+    carry = 0;
+    for (std::size_t w = seeds.size(); w-- > 0;) {
+        std::uint64_t free = ~closed[w], s = seeds[w] | (carry & free);
+        for (int step = 1; step < 64; step *= 2) {
+            s |= free & (s >> step);
+            free &= free >> step;
+        }
+        seeds[w] = s;
+        carry = s << 63;
+    }
+}
+
+/// The voxels that are not closed and connected, through faces, to the first of the grid.
+BitGrid flood_outside(const BitGrid& closed) {
+    BitGrid outside(closed.size);
+    std::vector<std::size_t> queue = {0};
+    std::vector<std::uint8_t> queued(closed.row_count());
+    std::vector<std::uint64_t> seeds(closed.words);
+    const std::size_t across = std::size_t(closed.size[1]);
+    for (std::size_t done = 0; done < queue.size(); ++done) {
+        const std::size_t row = queue[done];
+        queued[row] = 0;
+        std::array<std::size_t, 4> beside;
+        std::size_t count = 0;
+        if (row % across > 0) beside[count++] = row - 1;
+        if (row % across + 1 < across) beside[count++] = row + 1;
+        if (row >= across) beside[count++] = row - across;
+        if (row + across < closed.row_count()) beside[count++] = row + across;
+        const auto here = outside.row(row);
+        for (std::size_t w = 0; w < closed.words; ++w) {
+            seeds[w] = here[w];
+            for (std::size_t k = 0; k < count; ++k) seeds[w] |= outside.row(beside[k])[w];
+            seeds[w] &= ~closed.row(row)[w];
+        }
+        if (row == 0) seeds[0] |= 1;
+        spread_along(seeds, closed.row(row));
+        seeds.back() &= valid_bits(closed, closed.words - 1);
+        if (std::ranges::equal(seeds, here)) continue;
+        std::ranges::copy(seeds, here.begin());
+        for (std::size_t k = 0; k < count; ++k)
+            if (!queued[beside[k]]) {
+                queued[beside[k]] = 1;
+                queue.push_back(beside[k]);
+            }
+    }
+    return outside;
+}
+
+BitGrid complement(BitGrid grid) {
+    for (std::size_t i = 0; i < grid.bits.size(); ++i) grid.bits[i] = ~grid.bits[i] & valid_bits(grid, i % grid.words);
+    return grid;
+}
+
+/// Everything that cannot be reached from outside once openings up to twice `radius` are closed.
+BitGrid solid_voxels(const BitGrid& touched, unsigned radius, const RunContext& context) {
+    BitGrid closed = touched;
+    for (unsigned i = 0; i < radius; ++i) closed = dilated(closed, context);
+    BitGrid outside = flood_outside(closed);
+    for (unsigned i = 0; i < radius; ++i) outside = dilated(outside, context); // the solid back to where it was
+    return complement(std::move(outside));
+}
+
+// ---- A manifold border
+
+/// Whether the bits, voxels around a corner (bit i has its x, y, z in the bits of i), are connected through faces.
+bool is_connected(unsigned bits) {
+    unsigned reached = bits & -bits;
+    for (unsigned before = 0; before != reached;) {
+        before = reached;
+        for (unsigned i = 0; i < 8; ++i)
+            for (unsigned axis = 1; axis < 8; axis *= 2)
+                if (reached >> i & 1) reached |= bits & (1u << (i ^ axis));
+    }
+    return reached == bits;
+}
+
+/// For the solid voxels around a corner, which of the others to fill so that the border is one fan there.
+std::array<std::uint8_t, 256> fills() {
+    std::array<std::uint8_t, 256> table{};
+    const auto is_manifold = [](unsigned solid) { return is_connected(solid) && is_connected(~solid & 255u); };
+    for (unsigned solid = 0; solid < 256; ++solid) {
+        unsigned best = 255;
+        for (unsigned more = solid; more < 256; ++more)
+            if ((more & solid) == solid && is_manifold(more) && std::popcount(more) < std::popcount(best)) best = more;
+        table[solid] = std::uint8_t(best & ~solid);
+    }
+    table[0] = 0;
+    return table;
+}
+
+/// The corners at the lower end of each voxel that have solid and other voxels around them, for one row and word.
+std::uint64_t border_corners(const BitGrid& solid, int y, int z, std::size_t word) {
+    std::uint64_t any = 0, all = ~std::uint64_t(0);
+    for (const auto& [v, w] : {std::pair(y, z), {y - 1, z}, {y, z - 1}, {y - 1, z - 1}}) {
+        const auto row = solid.row(solid.row_of(v, w));
+        const std::uint64_t below = from_below(row, word);
+        any |= row[word] | below;
+        all &= row[word] & below;
+    }
+    return any & ~all;
+}
+
+/// Calls visit(corner) for every corner of the border, in the order of the grid.
+template <class Visit>
+void for_each_border_corner(const BitGrid& solid, const Visit& visit) {
+    for (int z = 1; z < solid.size[2]; ++z)
+        for (int y = 1; y < solid.size[1]; ++y)
+            for (std::size_t w = 0; w < solid.words; ++w)
+                for_each_bit(border_corners(solid, y, z, w), [&](int x) { visit(Cell{int(64 * w) + x, y, z}); });
+}
+
+Cell voxel_at(const Cell& corner, unsigned i) {
+    return {corner[0] - 1 + int(i & 1), corner[1] - 1 + int(i >> 1 & 1), corner[2] - 1 + int(i >> 2)};
+}
+
+/// Fills voxels until the border is a manifold and nothing outside is shut in. Voxels are only added, so this ends.
+void make_border_manifold(BitGrid& solid) {
+    static const std::array<std::uint8_t, 256> table = fills();
+    for (bool changed = true; changed;) {
+        changed = false;
+        for_each_border_corner(solid, [&](const Cell& corner) {
+            unsigned around = 0;
+            for (unsigned i = 0; i < 8; ++i) around |= unsigned(solid.test(voxel_at(corner, i))) << i;
+            for (unsigned i = 0; i < 8; ++i)
+                if (table[around] >> i & 1) solid.set(voxel_at(corner, i));
+            changed = changed || table[around];
+        });
+        if (changed) solid = complement(flood_outside(solid));
+    }
+}
+
+// ---- The border as a mesh
+
+struct QuadSurface {
+    std::vector<Vec3d> positions; ///< in voxels
+    std::vector<std::array<Index, 4>> quads;
+};
+
+/// Numbers the corners of the border in the grid's order.
+class CornerNumbers {
+public:
+    explicit CornerNumbers(const BitGrid& solid) : corners_(solid.size), before_(solid.bits.size()) {
+        for_each_border_corner(solid, [&](const Cell& corner) { corners_.set(corner); });
+        for (std::size_t i = 0; i < corners_.bits.size(); ++i) {
+            before_[i] = count_;
+            count_ += Index(std::popcount(corners_.bits[i]));
+        }
+    }
+    Index operator()(const Cell& corner) const {
+        const std::size_t word = corners_.word_of(corner);
+        const std::uint64_t below = (std::uint64_t(1) << (corner[0] % 64)) - 1;
+        return before_[word] + Index(std::popcount(corners_.bits[word] & below));
+    }
+
+private:
+    BitGrid corners_;
+    std::vector<Index> before_;
+    Index count_ = 0;
+};
+
+/// The side of a voxel that faces along an axis, counter-clockwise from outside.
+std::array<Cell, 4> voxel_side(Cell corner, int axis, bool positive) {
+    const int b = (axis + 1) % 3, c = (axis + 2) % 3;
+    corner[axis] += positive;
+    std::array<Cell, 4> side = {corner, corner, corner, corner};
+    ++side[1][b], ++side[2][b], ++side[2][c], ++side[3][c];
+    if (!positive) std::swap(side[1], side[3]);
+    return side;
+}
+
+QuadSurface extract_border(const BitGrid& solid) {
+    QuadSurface surface;
+    const CornerNumbers number(solid);
+    for_each_border_corner(solid, [&](const Cell& c) { surface.positions.emplace_back(c[0], c[1], c[2]); });
+    for (int z = 1; z + 1 < solid.size[2]; ++z)
+        for (int y = 1; y + 1 < solid.size[1]; ++y) {
+            const auto row = [&](int v, int w) { return solid.row(solid.row_of(v, w)); };
+            const auto here = row(y, z);
+            for (std::size_t w = 0; w < solid.words; ++w) {
+                if (here[w] == 0) continue;
+                const std::array<std::uint64_t, 6> beside = {from_below(here, w), from_above(here, w),
+                                                             row(y - 1, z)[w],    row(y + 1, z)[w],
+                                                             row(y, z - 1)[w],    row(y, z + 1)[w]};
+                for (int side = 0; side < 6; ++side)
+                    for_each_bit(here[w] & ~beside[side], [&](int x) {
+                        const auto corners = voxel_side({int(64 * w) + x, y, z}, side / 2, side % 2);
+                        surface.quads.push_back(
+                            {number(corners[0]), number(corners[1]), number(corners[2]), number(corners[3])});
+                    });
+            }
+        }
+    return surface;
+}
+
+/// The neighbours of each vertex along edges: vertex v has ends[first[v]] .. ends[first[v + 1] - 1].
+struct Neighbours {
+    std::vector<Index> first, ends;
+    std::span<const Index> of(std::size_t v) const {
+        return std::span(ends).subspan(first[v], first[v + 1] - first[v]);
+    }
+};
+
+/// Each edge of a closed surface is left once from each end.
+template <class Face>
+Neighbours find_neighbours(std::span<const Face> faces, std::size_t vertex_count) {
+    Neighbours neighbours;
+    neighbours.first.assign(vertex_count + 1, 0);
+    for (const Face& face : faces)
+        for (const Index v : face) ++neighbours.first[v + 1];
+    std::partial_sum(neighbours.first.begin(), neighbours.first.end(), neighbours.first.begin());
+    neighbours.ends.resize(neighbours.first.back());
+    std::vector<Index> next(neighbours.first.begin(), neighbours.first.end() - 1);
+    for (const Face& face : faces)
+        for (std::size_t k = 0; k < face.size(); ++k) neighbours.ends[next[face[k]]++] = face[(k + 1) % face.size()];
+    return neighbours;
+}
+
+Vec3d mean_of(std::span<const Index> vertices, std::span<const Vec3d> positions) {
+    Vec3d sum = Vec3d::Zero();
+    for (const Index v : vertices) sum += positions[v];
+    return sum / double(vertices.size());
+}
+
+/// Takes the steps off, each vertex within its own box.
+void smooth_steps(QuadSurface& surface, const RunContext& context) {
+    const std::vector<Vec3d> corners = surface.positions;
+    const Neighbours neighbours =
+        find_neighbours(std::span<const std::array<Index, 4>>(surface.quads), surface.positions.size());
+    std::vector<Vec3d> moved(corners.size());
+    for (int round = 0; round < kSmoothRounds; ++round) {
+        parallel_for(context, corners.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t v = begin; v < end; ++v)
+                moved[v] = mean_of(neighbours.of(v), surface.positions)
+                               .cwiseMax(corners[v] - Vec3d::Constant(kFreedom))
+                               .cwiseMin(corners[v] + Vec3d::Constant(kFreedom));
+        });
+        surface.positions.swap(moved);
+    }
+}
+
+/// Along the shorter diagonals.
+std::vector<Triangle> cut_quads(const QuadSurface& surface) {
+    std::vector<Triangle> triangles;
+    triangles.reserve(2 * surface.quads.size());
+    for (const auto& [a, b, c, d] : surface.quads) {
+        const auto& p = surface.positions;
+        if ((p[a] - p[c]).squaredNorm() <= (p[b] - p[d]).squaredNorm())
+            triangles.insert(triangles.end(), {{a, b, c}, {a, c, d}});
+        else
+            triangles.insert(triangles.end(), {{a, b, d}, {b, c, d}});
+    }
+    return triangles;
+}
+
+// ---- Onto the input
+
+Vec3d doubled_area(std::span<const Vec3d> positions, const Triangle& t) {
+    return (positions[t[1]] - positions[t[0]]).cross(positions[t[2]] - positions[t[0]]);
+}
+
+std::vector<Vec3d> unit_normals(std::span<const Vec3d> positions, std::span<const Triangle> triangles) {
+    std::vector<Vec3d> normals(positions.size(), Vec3d::Zero());
+    for (const Triangle& t : triangles) {
+        const Vec3d normal = doubled_area(positions, t);
+        for (const Index v : t) normals[v] += normal;
+    }
+    for (Vec3d& n : normals) n.normalize(); // stays zero where it is
+    return normals;
+}
+
+/// Whether a triangle may go from one shape to another: it neither turns far nor vanishes.
+bool may_become(const Vec3d& from, const Vec3d& to) {
+    const double before = from.norm(), after = to.norm();
+    return after > std::min(before, kLeastArea) && from.dot(to) >= kMostTurn * before * after;
+}
+
+/// Moves vertices towards their targets, in smaller steps, or not at all, where a triangle would turn over.
+void move_towards(std::span<const Vec3d> targets, std::span<const Triangle> triangles, std::vector<Vec3d>& positions,
+                  const RunContext& context) {
+    std::vector<double> step(positions.size(), 1.0);
+    std::vector<Vec3d> moved(positions.size());
+    std::vector<std::uint8_t> bad(triangles.size());
+    for (int round = 0;; ++round) {
+        parallel_for(context, positions.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t v = begin; v < end; ++v) moved[v] = positions[v] + step[v] * (targets[v] - positions[v]);
+        });
+        parallel_for(context, triangles.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t t = begin; t < end; ++t) {
+                const auto& [a, b, c] = triangles[t];
+                bad[t] = (step[a] > 0 || step[b] > 0 || step[c] > 0) &&
+                         !may_become(doubled_area(positions, triangles[t]), doubled_area(moved, triangles[t]));
+            }
+        });
+        bool any = false;
+        std::vector<std::uint8_t> shorten(positions.size());
+        for (std::size_t t = 0; t < triangles.size(); ++t) {
+            if (!bad[t]) continue;
+            any = true;
+            for (const Index v : triangles[t]) shorten[v] = 1;
+        }
+        if (!any) break; // at the latest when nothing around moves
+        for (std::size_t v = 0; v < step.size(); ++v)
+            if (shorten[v]) step[v] = round < kHalvings ? step[v] / 2 : 0.0;
+    }
+    positions.swap(moved);
+}
+
+/// The input, to be asked for its closest points; positions in voxels.
+struct PullTarget {
+    std::vector<Vec3f> positions;
+    std::vector<Triangle> triangles;
+    const BitGrid& solid;
+};
+
+/// Where each vertex should go: onto the input, and a little off it where the part is a sheet, so that the two sides of
+/// the shell around it stay apart.
+std::vector<Vec3d> pull_targets(const PullTarget& input, const ClosestPointTree& tree, std::span<const Vec3d> positions,
+                                std::span<const Vec3d> normals, const RunContext& context) {
+    std::vector<Vec3d> targets(positions.size());
+    parallel_for(context, positions.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t v = begin; v < end; ++v) {
+            const SurfacePoint closest = tree.closest(positions[v].cast<float>());
+            targets[v] = closest.position.cast<double>();
+            const Vec3d below = targets[v] - kProbe * normals[v];
+            const Cell voxel = {int(std::floor(below.x())), int(std::floor(below.y())), int(std::floor(below.z()))};
+            if (!input.solid.inside(voxel) || !input.solid.test(voxel)) targets[v] += kShell * normals[v];
+        }
+    });
+    return targets;
+}
+
+/// Each vertex to the middle of its neighbours, along the surface.
+std::vector<Vec3d> tangential_targets(std::span<const Vec3d> positions, std::span<const Vec3d> normals,
+                                      const Neighbours& neighbours, const RunContext& context) {
+    std::vector<Vec3d> targets(positions.size());
+    parallel_for(context, positions.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t v = begin; v < end; ++v) {
+            const Vec3d offset = mean_of(neighbours.of(v), positions) - positions[v];
+            targets[v] = positions[v] + 0.5 * (offset - offset.dot(normals[v]) * normals[v]);
+        }
+    });
+    return targets;
+}
+
+void pull_onto_input(const PullTarget& input, std::span<const Triangle> triangles, std::vector<Vec3d>& positions,
+                     const RunContext& context) {
+    std::optional<ClosestPointTree> tree; // in our arena: Embree builds on the threads of the one it is called in
+    context.arena().execute([&] { tree.emplace(input.positions, input.triangles); });
+    const Neighbours neighbours = find_neighbours(triangles, positions.size());
+    for (int round = 0; round < kPullRounds && !context.is_cancelled(); ++round) {
+        context.report("pulling the wrap onto the surface", double(round) / kPullRounds);
+        std::vector<Vec3d> normals = unit_normals(positions, triangles);
+        if (round > 0) {
+            move_towards(tangential_targets(positions, normals, neighbours, context), triangles, positions, context);
+            normals = unit_normals(positions, triangles);
+        }
+        move_towards(pull_targets(input, *tree, positions, normals, context), triangles, positions, context);
+    }
+}
+
+/// Vertices of one component have one number.
+std::vector<Index> find_components(std::span<const Triangle> triangles, std::size_t vertex_count) {
+    std::vector<Index> parent(vertex_count);
+    std::iota(parent.begin(), parent.end(), Index(0));
+    const auto root = [&](Index v) {
+        while (parent[v] != v) v = parent[v] = parent[parent[v]];
+        return v;
+    };
+    for (const auto& [a, b, c] : triangles)
+        for (const Index v : {b, c}) {
+            const Index p = root(a), q = root(v);
+            parent[std::max(p, q)] = std::min(p, q);
+        }
+    for (Index v = 0; v < vertex_count; ++v) parent[v] = root(v);
+    return parent;
+}
+
+/// Puts components that were pulled inside out, which only those of a few voxels can be, back to where they began.
+void restore_flattened(std::span<const Vec3d> before, std::span<const Triangle> triangles,
+                       std::vector<Vec3d>& positions) {
+    const std::vector<Index> component = find_components(triangles, positions.size());
+    std::vector<double> volume(positions.size());
+    for (const Triangle& t : triangles) { // from a vertex of the component: small ones lose no digits
+        const Vec3d& origin = positions[component[t[0]]];
+        volume[component[t[0]]] +=
+            (positions[t[0]] - origin).dot((positions[t[1]] - origin).cross(positions[t[2]] - origin));
+    }
+    for (std::size_t v = 0; v < positions.size(); ++v)
+        if (!(volume[component[v]] > 0)) positions[v] = before[v];
+}
+
+// ---- From the model to voxels and back
+
+struct VoxelFrame {
+    Vec3d origin; ///< of the grid's first voxel
+    double voxel; ///< its side
+    Cell size;
+
+    Vec3d to_voxels(const Vec3d& p) const { return (p - origin) / voxel; }
+    Vec3d to_model(const Vec3d& p) const { return origin + voxel * p; }
+};
+
+/// The box lies in the middle of a whole number of voxels, so that its sides are not on the voxels' own.
+VoxelFrame make_frame(const Box& box, unsigned resolution, unsigned margin) {
+    VoxelFrame frame;
+    frame.voxel = box.size().maxCoeff() / resolution;
+    for (int k = 0; k < 3; ++k) {
+        const double length = box.size()[k] / frame.voxel;
+        const int inside = int(std::floor(length * (1 + kTouch))) + 1;
+        frame.size[k] = inside + 2 * int(margin);
+        frame.origin[k] = box.min[k] - frame.voxel * ((inside - length) / 2 + margin);
+    }
+    return frame;
+}
+
+} // namespace
+
+Result<ManifoldSurface> voxel_wrap(std::span<const Vec3d> positions, std::span<const Triangle> triangles,
+                                   const WrapOptions& options, const RunContext& context) {
+    Box box;
+    for (const Triangle& t : triangles)
+        for (const Index v : t) box.extend(positions[v]);
+    if (!(box.size().maxCoeff() > 0))
+        return Error{ErrorCode::unsuitable, "The mesh has no extent, so nothing can be wrapped around it."};
+
+    const unsigned radius = (options.closing + 1) / 2;
+    const VoxelFrame frame = make_frame(box, options.resolution, radius + 2);
+    std::vector<Vec3d> in_voxels(positions.size());
+    for (std::size_t v = 0; v < positions.size(); ++v) in_voxels[v] = frame.to_voxels(positions[v]);
+
+    context.report("finding the outside", 0);
+    BitGrid solid = solid_voxels(touched_voxels(in_voxels, triangles, frame.size, context), radius, context);
+    if (context.is_cancelled()) return cancelled_error();
+    make_border_manifold(solid);
+    if (context.is_cancelled()) return cancelled_error();
+
+    QuadSurface border = extract_border(solid);
+    const std::vector<Vec3d> corners = border.positions;
+    smooth_steps(border, context);
+    ManifoldSurface surface{{}, cut_quads(border), {}};
+    surface.positions = std::move(border.positions);
+    PullTarget input{{}, {triangles.begin(), triangles.end()}, solid};
+    for (const Vec3d& p : in_voxels) input.positions.push_back(p.cast<float>());
+    pull_onto_input(input, surface.triangles, surface.positions, context);
+    if (context.is_cancelled()) return cancelled_error();
+    restore_flattened(corners, surface.triangles, surface.positions);
+    for (Vec3d& p : surface.positions) p = frame.to_model(p);
+    return surface;
+}
+
+} // namespace filigree
