@@ -3,6 +3,7 @@
 
 #include "filigree/mesh/mesh.h"
 
+#include <utility>
 #include <vector>
 
 namespace filigree {

@@ -13,6 +13,7 @@
 #include <cassert>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 namespace filigree {
 namespace {
