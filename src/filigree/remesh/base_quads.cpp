@@ -36,6 +36,7 @@ public:
         match();
         if (context.is_cancelled()) return cancelled_error();
         remove_doublets();
+        std::fprintf(stderr,"left %zu\n",(size_t)std::count_if(partner_.begin(),partner_.end(),[&](Index&p){return p==kNoIndex && !map_.is_removed(Index(&p-partner_.data()));}));
         return collect();
     }
 
@@ -69,7 +70,8 @@ private:
     /// Sectors of one triangle that should be two quads get a second one: the edge across is flipped, or split.
     void widen_sectors() {
         for (Index h = 0; h < 3 * map_.slot_count(); ++h) {
-            if (!map_.is_feature(h) || !map_.is_feature(SurfaceMap::previous(h)) || !needs_two(h)) continue;
+            if (map_.is_removed(h / 3) || !map_.is_feature(h) || !map_.is_feature(SurfaceMap::previous(h)) || !needs_two(h))
+                continue;
             const Index across = SurfaceMap::next(h);
             if (!map_.is_feature(across) && flips_well(across))
                 map_.flip(across);
@@ -89,7 +91,7 @@ private:
         }
         const SurfaceMap::Unfolded flat = map_.unfold(h);
         const Vec2d to = flat.to.cast<double>(), above = flat.above.cast<double>(), below = flat.below.cast<double>();
-        const double least = 0.1 * to.squaredNorm();
+        const double least = 0.3 * to.squaredNorm();
         return cross(-above, below - above) > least && cross(to - below, above - below) > least;
     }
 

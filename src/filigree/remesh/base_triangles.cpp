@@ -115,7 +115,10 @@ private:
             if (!(next.length > 0)) break;
             const Index middle = map_.split(next.half_edge);
             map_.star(middle, star_);
-            for (const Index h : star_.half_edges) push(h);
+            for (const Index h : star_.half_edges) {
+                push(h);
+                push(SurfaceMap::next(h)); // as long as before, but its half-edge may be another now
+            }
             if (star_.open) push(SurfaceMap::previous(star_.half_edges.back()));
         }
     }
@@ -331,7 +334,8 @@ private:
         }
         const int size = static_cast<int>(map_.sector_size(h)) + change;
         const double off = size - (map_.kind(v) == VertexKind::curve ? 3.0 : wanted_at_corner(h));
-        return off * off + (size < (map_.kind(v) == VertexKind::curve ? 2 : 1) ? 100 : 0);
+        const int least = map_.kind(v) == VertexKind::curve ? 2 : 1; // quads beside a curve need two
+        return off * off + (size < least ? 100 : size == least && least == 2 ? 3 : 0);
     }
 
     double wanted_at_corner(Index half_edge) const {

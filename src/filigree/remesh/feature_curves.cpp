@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kCornerTurn = 45 * std::numbers::pi / 180; // between chords of kCornerReach
 constexpr double kCornerReach = 0.4;                        // patch sides, to either side of a vertex
-constexpr double kShortestChain = 1.0;                      // patch sides, of a chain with a free end
+constexpr double kShortestChain = 3.0;                      // patch sides, of a chain with a free end
 constexpr double kShortestLoop = 0.5;                       // patch sides, of a closed curve
 
 struct Curves {

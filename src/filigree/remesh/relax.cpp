@@ -86,7 +86,7 @@ public:
         SurfaceWalk::Place found;
         bool moved = false;
         const auto attempt = [&](const Vec3d& towards) {
-            SurfaceWalk::Place place = off_surface ? SurfaceWalk::Place{grid_.source[v], towards} : move(v, towards);
+            SurfaceWalk::Place place = off_surface ? SurfaceWalk::Place{grid_.source[v], rounded(towards)} : move(v, towards);
             if (off_surface) place.point = walk_.walk(grid_.source[v], towards).point;
             const double value = worst(v, place.position);
             if (value <= best + 1e-6) return;
@@ -123,14 +123,19 @@ public:
 
 private:
     SurfaceWalk::Place move(Index v, const Vec3d& target) const {
-        return grid_.kinds[v] == VertexKind::curve ? walk_.slide(grid_.source[v], target)
-                                                   : walk_.walk(grid_.source[v], target);
+        SurfaceWalk::Place place = grid_.kinds[v] == VertexKind::curve ? walk_.slide(grid_.source[v], target)
+                                                                       : walk_.walk(grid_.source[v], target);
+        place.position = rounded(place.position);
+        return place;
     }
 
     void accept(Index v, const SurfaceWalk::Place& place) {
         grid_.positions[v] = place.position;
         grid_.source[v] = place.point;
     }
+
+    /// As a file will have it: what is judged is what is written.
+    static Vec3d rounded(const Vec3d& p) { return p.cast<float>().cast<double>(); }
 
     /// Where the neighbours would have it; on a curve, between the two along it.
     Vec3d mean_target(Index v, double& edge) const {
@@ -186,6 +191,7 @@ private:
 
 void relax(PatchGrid& grid, const SurfaceWalk& walk, unsigned sweeps, const RunContext& context) {
     const Neighbourhoods near(grid);
+    for (Vec3d& p : grid.positions) p = p.cast<float>().cast<double>();
     for (unsigned sweep = 0; sweep < sweeps && !context.is_cancelled(); ++sweep) {
         context.report("relaxing", double(sweep) / sweeps);
         for (const std::vector<Index>& group : near.groups)
