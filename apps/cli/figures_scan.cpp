@@ -18,9 +18,9 @@ namespace {
 
 constexpr double kPanelHeight = 200;
 constexpr std::size_t kQuads = 50'000;
-constexpr unsigned kLevels = 3;            // as in the report's figure 2.9
-constexpr double kStretch = 1.6;           // upwards
-constexpr double kTwist = 100, kBend = 80; // degrees, about the vertical axis and of it
+constexpr unsigned kLevels = 3;           // as in the report's figure 2.9, unless triangles are left over
+constexpr double kStretch = 1.6;          // upwards
+constexpr double kTwist = 80, kBend = 60; // degrees, about and of the longest axis
 const Vec3d kFromFront(0.42, -0.90, 0.30);
 
 /// Stands in for a scan: a wavy sphere whose vertices a simplification has picked, in triangles of any valence.
@@ -56,9 +56,10 @@ Returned put_back(const Model& model, const RestoreOptions& law, const SpaceWarp
 }
 
 std::unique_ptr<SpaceWarp> extreme_warp(const Box& box) {
+    const Axis axis = longest_axis(box);
     std::vector<std::unique_ptr<SpaceWarp>> warps;
-    warps.push_back(make_twist(box, Axis::z, kTwist));
-    warps.push_back(make_bend(box, Axis::z, kBend));
+    warps.push_back(make_twist(box, axis, kTwist));
+    warps.push_back(make_bend(box, axis, kBend));
     return make_chain(std::move(warps));
 }
 
@@ -79,8 +80,9 @@ Figure draw_remeshed_scan(FigureRenderer& renderer) {
     const Mesh scan = renderer.scan() ? *renderer.scan() : irregular_shape(context);
     QuadRemeshed remeshed =
         require(quad_remesh(scan, {.quads = kQuads, .levels = kLevels, .attributes = false}, context));
+    const unsigned levels = remeshed.patches.levels;
     const Model reference =
-        std::move(require(strip(remeshed.mesh, {.code = DetailCode::reference, .levels = kLevels}, context)).model);
+        std::move(require(strip(remeshed.mesh, {.code = DetailCode::reference, .levels = levels}, context)).model);
     const std::size_t driver_count = reference.driver().vertices.size();
     const Model blend = std::move(require(strip(remeshed.mesh, {.base = driver_count}, context)).model);
 
@@ -89,7 +91,7 @@ Figure draw_remeshed_scan(FigureRenderer& renderer) {
     const Returned stretched = put_back(reference, {.law = Law::inverse}, *stretch, context);
     const Returned twisted = put_back(reference, {}, *extreme, context),
                    blended = put_back(blend, {}, *extreme, context);
-    const Mesh once = level_mesh(reference, kLevels - 1), coarsest = level_mesh(reference, 0);
+    const Mesh once = level_mesh(reference, levels - 1), coarsest = level_mesh(reference, 0);
 
     const QuadRemeshReport& report = remeshed.report;
     Page page = captioned_page(
@@ -103,8 +105,8 @@ Figure draw_remeshed_scan(FigureRenderer& renderer) {
             renderer.scan() ? fmt::format("A scan of {} triangles", with_commas(scan.face_count()))
                             : fmt::format("A built-in shape in {} irregular triangles, in place of a scan,",
                                           with_commas(scan.face_count())),
-            with_commas(remeshed.mesh.face_count()), with_commas(report.patches), std::size_t{1} << kLevels,
-            std::size_t{1} << kLevels, power_text(report.from_input.rms), kLevels, kStretch));
+            with_commas(remeshed.mesh.face_count()), with_commas(report.patches), remeshed.patches.side(),
+            remeshed.patches.side(), power_text(report.from_input.rms), levels, kStretch));
     const std::vector<Panel> panels = panels_in_rows(3, 3, kPanelHeight);
     const Mesh *rest[] = {&scan}, *tall[] = {&stretched.mesh, &stretched.driver},
                *turned[] = {&twisted.mesh, &twisted.driver, &blended.mesh};
@@ -124,7 +126,7 @@ Figure draw_remeshed_scan(FigureRenderer& renderer) {
         {"i", vertices("original", scan), &scan, &views.rest, false},
         {"ii", vertices("quads", remeshed.mesh), nullptr, &views.rest, false},
         {"iii", vertices("1 iteration", once), &once, &views.rest, true},
-        {"iv", vertices(fmt::format("{} iterations", kLevels).c_str(), coarsest), &coarsest, &views.rest, true},
+        {"iv", vertices(fmt::format("{} iterations", levels).c_str(), coarsest), &coarsest, &views.rest, true},
         {"v", "stretched", &stretched.driver, &views.stretched, true},
         {"vi", "detail returned", &stretched.mesh, &views.stretched, false},
         {"vii", "twisted and bent", &twisted.driver, &views.twisted, true},

@@ -152,8 +152,8 @@ TEST_F(Figures, DeformedCubesKeepWhatTheCaptionsSay) {
 TEST_F(Figures, ScansGoThroughTheReportsProcess) {
     if (!can_render()) GTEST_SKIP() << "no OpenGL";
     const auto check = [](const Json& v) {
-        EXPECT_EQ(v.at("quads").get<int>(), 64 * v.at("patches").get<int>());
-        EXPECT_EQ(v.at("levels"), 3);
+        EXPECT_EQ(v.at("quads").get<int>(), v.at("patches").get<int>() << 2 * v.at("levels").get<int>());
+        EXPECT_GE(v.at("levels"), 2);
         EXPECT_GT(v.at("vertices")[0], v.at("vertices")[1]);
         EXPECT_GT(v.at("vertices")[1], v.at("vertices")[2]);
         EXPECT_GT(v.at("min_scaled_jacobian"), 0);
