@@ -26,7 +26,7 @@ Vec3d weights_in(const std::array<Vec2d, 3>& t, const Vec2d& p) {
 
 class Pairing {
 public:
-    explicit Pairing(SurfaceMap& map) : map_(map) {}
+    Pairing(SurfaceMap& map, bool halve) : map_(map) { result_.halved = halve; }
 
     Result<BaseQuads> run(const RunContext& context) {
         context.report("pairing", 0);
@@ -36,7 +36,6 @@ public:
         match();
         if (context.is_cancelled()) return cancelled_error();
         remove_doublets();
-        std::fprintf(stderr,"left %zu\n",(size_t)std::count_if(partner_.begin(),partner_.end(),[&](Index&p){return p==kNoIndex && !map_.is_removed(Index(&p-partner_.data()));}));
         return collect();
     }
 
@@ -405,6 +404,8 @@ TrianglePoint BaseQuad::at(double s, double t) const {
     return point;
 }
 
-Result<BaseQuads> make_base_quads(SurfaceMap& map, const RunContext& context) { return Pairing(map).run(context); }
+Result<BaseQuads> make_base_quads(SurfaceMap& map, bool halve, const RunContext& context) {
+    return Pairing(map, halve).run(context);
+}
 
 } // namespace filigree

@@ -21,11 +21,12 @@ struct BaseQuad {
 struct BaseQuads {
     std::vector<BaseQuad> quads;
     std::vector<VertexKind> kinds; ///< of the base's vertices
-    bool halved = false; ///< some triangle found no partner: every patch was cut into four (a triangle into three)
+    bool halved = false; ///< every patch was cut into four, a triangle without a partner into three
 };
 
 /// Pairs the triangles (maximum weighted matching; shape and valence decide), after edge splits that give every region
-/// between features an even number of them. May change the map. Errors: cancelled. Cost: see match_triangles.
-Result<BaseQuads> make_base_quads(SurfaceMap& map, const RunContext& context);
+/// between features an even number of them. If some triangle finds no partner, or if asked to, halves all sides. May
+/// change the map. Errors: cancelled. Cost: see match_triangles.
+Result<BaseQuads> make_base_quads(SurfaceMap& map, bool halve, const RunContext& context);
 
 } // namespace filigree

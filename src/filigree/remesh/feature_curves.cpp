@@ -1,5 +1,7 @@
 #include "filigree/remesh/feature_curves.h"
 
+#include "filigree/remesh/half_edges.h"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -10,40 +12,48 @@ namespace {
 
 constexpr double kCornerTurn = 45 * std::numbers::pi / 180; // between chords of kCornerReach
 constexpr double kCornerReach = 0.4;                        // patch sides, to either side of a vertex
-constexpr double kShortestChain = 3.0;                      // patch sides, of a chain with a free end
-constexpr double kShortestLoop = 0.5;                       // patch sides, of a closed curve
+// Noise makes short curves that are hardly sharp. In patch sides, for chains with a free end and for closed ones: what is
+// too short in any case, and from where on a curve need not be clearly sharp.
+constexpr double kShortestChain = 1, kLongChain = 3;
+constexpr double kShortestLoop = 0.5, kLongLoop = 3;
+constexpr double kClearlySharp = 20 * std::numbers::pi / 180; // beyond the asked angle, on average along the curve
 
 struct Curves {
     const ManifoldSurface& surface;
-    /// Up to kNoIndex-many neighbours of each vertex along sharp edges and borders.
-    std::vector<Index> offsets, neighbours;
+    std::vector<Index> offsets, neighbours; ///< of each vertex, along sharp edges and borders
+    std::vector<float> angles;              ///< of the edges to those neighbours, radians
 
     std::size_t degree(Index v) const { return offsets[v + 1] - offsets[v]; }
     double length(Index a, Index b) const { return (surface.positions[a] - surface.positions[b]).norm(); }
+    double angle(Index from, Index to) const {
+        Index i = offsets[from];
+        while (neighbours[i] != to) ++i;
+        return angles[i];
+    }
     /// The neighbour of a curve vertex that is not `from`.
     Index onward(Index v, Index from) const {
         return neighbours[offsets[v]] == from ? neighbours[offsets[v] + 1] : neighbours[offsets[v]];
     }
 };
 
-Index other_end(const ManifoldSurface& surface, Index h) { return surface.triangles[h / 3][(h % 3 + 1) % 3]; }
-
-/// marked: of half-edges; each edge counts once.
-Curves collect(const ManifoldSurface& surface, std::span<const Index> twins, std::span<const std::uint8_t> marked) {
-    Curves curves{surface, std::vector<Index>(surface.positions.size() + 1, 0), {}};
+/// marked: the angle of half-edges that are sharp, else 0; each edge counts once.
+Curves collect(const ManifoldSurface& surface, std::span<const Index> twins, std::span<const float> marked) {
+    Curves curves{surface, std::vector<Index>(surface.positions.size() + 1, 0), {}, {}};
     const auto for_each_edge = [&](const auto& act) {
         for (Index h = 0; h < twins.size(); ++h)
-            if (twins[h] == kNoIndex || (marked[h] && h < twins[h]))
-                act(surface.triangles[h / 3][h % 3], other_end(surface, h));
+            if (twins[h] == kNoIndex || (marked[h] > 0 && h < twins[h]))
+                act(half_edge_start(surface.triangles, h), half_edge_end(surface.triangles, h), marked[h]);
     };
-    for_each_edge([&](Index a, Index b) {
+    for_each_edge([&](Index a, Index b, float) {
         ++curves.offsets[a + 1];
         ++curves.offsets[b + 1];
     });
     for (std::size_t v = 0; v < surface.positions.size(); ++v) curves.offsets[v + 1] += curves.offsets[v];
     curves.neighbours.resize(curves.offsets.back());
+    curves.angles.resize(curves.offsets.back());
     std::vector<Index> next(curves.offsets.begin(), curves.offsets.end() - 1);
-    for_each_edge([&](Index a, Index b) {
+    for_each_edge([&](Index a, Index b, float angle) {
+        curves.angles[next[a]] = curves.angles[next[b]] = angle;
         curves.neighbours[next[a]++] = b;
         curves.neighbours[next[b]++] = a;
     });
@@ -53,6 +63,7 @@ Curves collect(const ManifoldSurface& surface, std::span<const Index> twins, std
 struct Chain {
     std::vector<Index> vertices; ///< end to end; a closed one repeats its first
     double length = 0;
+    double angle = 0; ///< of its edges, the mean by length
 };
 
 /// Chains between vertices of degree other than two, then closed ones.
@@ -66,8 +77,13 @@ std::vector<Chain> chains_of(const Curves& curves) {
         Index from = start, at = second;
         for (;;) {
             chain.vertices.push_back(at);
-            chain.length += curves.length(from, at);
-            if (curves.degree(at) != 2 || at == start) return chain;
+            const double step = curves.length(from, at);
+            chain.length += step;
+            chain.angle += step * curves.angle(from, at);
+            if (curves.degree(at) != 2 || at == start) {
+                if (chain.length > 0) chain.angle /= chain.length;
+                return chain;
+            }
             seen[at] = 1;
             const Index onward = curves.onward(at, from);
             from = at;
@@ -92,8 +108,13 @@ std::vector<Chain> chains_of(const Curves& curves) {
 }
 
 /// Takes short loose ends and tiny loops off, until none is left. Borders never go.
-void prune(const ManifoldSurface& surface, std::span<const Index> twins, double patch_side,
-           std::vector<std::uint8_t>& marked) {
+void prune(const ManifoldSurface& surface, std::span<const Index> twins, const FeatureOptions& options,
+           std::vector<float>& marked) {
+    const double clear = options.angle_deg * std::numbers::pi / 180 + kClearlySharp;
+    const auto is_noise = [&](const Chain& chain, double shortest, double longest) {
+        const double length = chain.length / options.patch_side;
+        return length < shortest || (length < longest && chain.angle < clear);
+    };
     for (int round = 0; round < 4; ++round) {
         const Curves curves = collect(surface, twins, marked);
         std::vector<std::uint8_t> gone(surface.positions.size(), 0); // inner vertices of chains that go
@@ -102,8 +123,8 @@ void prune(const ManifoldSurface& surface, std::span<const Index> twins, double 
             const Index first = chain.vertices.front(), last = chain.vertices.back();
             const bool closed = first == last && curves.degree(first) == 2;
             const bool loose = curves.degree(first) == 1 || curves.degree(last) == 1;
-            if (!(closed && chain.length < kShortestLoop * patch_side) &&
-                !(loose && chain.length < kShortestChain * patch_side))
+            if (!(closed && is_noise(chain, kShortestLoop, kLongLoop)) &&
+                !(loose && is_noise(chain, kShortestChain, kLongChain)))
                 continue;
             if (chain.vertices.size() == 2) single.push_back(std::minmax(first, last));
             for (std::size_t i = 1; i + 1 < chain.vertices.size(); ++i) gone[chain.vertices[i]] = 1;
@@ -112,8 +133,8 @@ void prune(const ManifoldSurface& surface, std::span<const Index> twins, double 
         std::sort(single.begin(), single.end());
         bool changed = false;
         for (Index h = 0; h < marked.size(); ++h) {
-            if (!marked[h]) continue;
-            const Index a = surface.triangles[h / 3][h % 3], b = other_end(surface, h);
+            if (marked[h] == 0) continue;
+            const Index a = half_edge_start(surface.triangles, h), b = half_edge_end(surface.triangles, h);
             if (gone[a] || gone[b] || std::binary_search(single.begin(), single.end(), std::pair<Index, Index>(std::minmax(a, b)))) {
                 marked[h] = 0;
                 changed = true;
@@ -179,16 +200,19 @@ FeatureCurves find_feature_curves(const ManifoldSurface& surface, std::span<cons
         const Vec3d& a = surface.positions[t[0]];
         normals.push_back((surface.positions[t[1]] - a).cross(surface.positions[t[2]] - a).normalized());
     }
-    const double cosine = std::cos(options.angle_deg * std::numbers::pi / 180);
+    const double least = options.angle_deg * std::numbers::pi / 180;
+    std::vector<float> angles(twins.size(), 0);
     if (options.angle_deg < 180)
         for (Index h = 0; h < twins.size(); ++h) {
             if (twins[h] == kNoIndex) continue;
             const Vec3d &n = normals[h / 3], &m = normals[twins[h] / 3];
             // a triangle without an area has no normal, and its edges are not sharp
-            if (n.squaredNorm() > 0 && m.squaredNorm() > 0 && n.dot(m) < cosine) result.half_edges[h] = 1;
+            const double angle = n.squaredNorm() > 0 && m.squaredNorm() > 0 ? std::atan2(n.cross(m).norm(), n.dot(m)) : 0;
+            if (angle > least) angles[h] = static_cast<float>(angle);
         }
-    prune(surface, twins, options.patch_side, result.half_edges);
-    result.corners = find_corners(collect(surface, twins, result.half_edges), kCornerReach * options.patch_side);
+    prune(surface, twins, options, angles);
+    result.corners = find_corners(collect(surface, twins, angles), kCornerReach * options.patch_side);
+    for (Index h = 0; h < twins.size(); ++h) result.half_edges[h] = angles[h] > 0;
     result.edge_count = static_cast<std::size_t>(std::count(result.half_edges.begin(), result.half_edges.end(), 1)) / 2;
     return result;
 }

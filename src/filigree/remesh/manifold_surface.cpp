@@ -54,8 +54,26 @@ double double_area(std::span<const Vec3d> positions, const Triangle& t) {
     return double_area(positions[t[0]], positions[t[1]], positions[t[2]]);
 }
 
+/// Faces of four corners or more over the same vertices as another.
+std::vector<Index> repeated_polygons(const Mesh& mesh, std::span<const Index> welded) {
+    std::vector<std::pair<std::uint64_t, Index>> keys; // alike for the same vertices in any order; rarely for others
+    for (Index f = 0; f < mesh.face_count(); ++f) {
+        if (mesh.face_size(f) < 4) continue;
+        std::uint64_t key = mesh.face_size(f);
+        for (const Index v : mesh.face(f)) key += (welded[v] + 1) * 0x9E3779B97F4A7C15u ^ (welded[v] + 1) >> 7;
+        keys.emplace_back(key, f);
+    }
+    std::sort(keys.begin(), keys.end());
+    std::vector<Index> repeated;
+    for (std::size_t i = 0; i < keys.size(); ++i)
+        if ((i > 0 && keys[i - 1].first == keys[i].first) || (i + 1 < keys.size() && keys[i + 1].first == keys[i].first))
+            repeated.push_back(keys[i].second);
+    return repeated;
+}
+
 /// Triangles over corners: every corner is a vertex of its own, so that faces which repeat a vertex name the right one.
-/// Faces begin at their lowest vertex, so that two copies of a square get the same diagonal.
+/// Polygons that are there twice begin at their lowest vertex, so that both get the same diagonals; all others are cut
+/// as `triangulate` cuts them everywhere else.
 Triangulation triangulate_corners(const Mesh& mesh, std::span<const Index> welded) {
     Mesh loose;
     loose.positions.resize(mesh.corner_count());
@@ -63,7 +81,7 @@ Triangulation triangulate_corners(const Mesh& mesh, std::span<const Index> welde
     loose.face_offsets = mesh.face_offsets;
     loose.corners.resize(mesh.corner_count());
     std::iota(loose.corners.begin(), loose.corners.end(), Index{0});
-    for (std::size_t f = 0; f < mesh.face_count(); ++f) {
+    for (const Index f : repeated_polygons(mesh, welded)) {
         const auto face = std::span(loose.corners).subspan(mesh.face_offsets[f], mesh.face_size(f));
         const auto lowest = std::ranges::min_element(face, {}, [&](Index c) { return welded[mesh.corners[c]]; });
         std::ranges::rotate(face, lowest);

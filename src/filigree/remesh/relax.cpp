@@ -13,8 +13,26 @@ namespace {
 
 constexpr std::size_t kGrain = 512;
 constexpr double kGoodEnough = 0.5;  // scaled Jacobian: a move that leaves quads above this is always welcome
+constexpr double kOverRelaxation = 1.5; // of the way to the mean: half the sweeps do
 constexpr double kStill = 2e-3;      // of the mean edge length at a vertex: shorter moves are not worth their price
 constexpr double kOffSurface = 0.02; // scaled Jacobian that points leave the surface for, when nothing else helps
+
+/// The scaled Jacobian at each corner of a quad, as in quad_quality.h.
+std::array<double, 4> corner_jacobians(const std::array<Vec3d, 4>& p) {
+    const Vec3d normal = (p[2] - p[0]).cross(p[3] - p[1]);
+    const double size = normal.norm();
+    std::array<Vec3d, 4> edges;
+    std::array<double, 4> lengths, jacobians;
+    for (int k = 0; k < 4; ++k) {
+        edges[k] = p[(k + 1) % 4] - p[k];
+        lengths[k] = edges[k].norm();
+    }
+    for (int k = 0; k < 4; ++k) {
+        const double scale = size * lengths[k] * lengths[(k + 3) % 4];
+        jacobians[k] = scale > 0 ? edges[(k + 3) % 4].cross(edges[k]).dot(normal) / scale : -1;
+    }
+    return jacobians;
+}
 
 /// Which quads each vertex has, and groups of vertices that share none.
 struct Neighbourhoods {
@@ -66,7 +84,7 @@ public:
         const Vec3d target = mean_target(v, edge);
         if ((target - here).squaredNorm() < kStill * kStill * edge * edge) return;
         const double least = std::min(worst(v, here), kGoodEnough);
-        for (const double share : {1.0, 0.5}) {
+        for (const double share : {kOverRelaxation, 0.7}) {
             const SurfaceWalk::Place place = move(v, here + share * (target - here));
             if ((place.position - here).squaredNorm() < kStill * kStill * edge * edge) return;
             if (is_turned(v, place.position) || worst(v, place.position) < least) continue;
@@ -75,21 +93,21 @@ public:
         }
     }
 
-    /// Tries places around the vertex for a larger smallest scaled Jacobian. Returns whether it moved.
+    /// Tries places around the vertex for better quads. Returns whether it moved.
     bool search(Index v, double reach, bool off_surface) {
         const VertexKind kind = grid_.kinds[v];
         if (kind == VertexKind::corner) return false;
         const Vec3d here = grid_.positions[v];
         double edge = 0;
         const Vec3d target = mean_target(v, edge);
-        double best = worst(v, here);
+        double best = badness(v, here);
         SurfaceWalk::Place found;
         bool moved = false;
         const auto attempt = [&](const Vec3d& towards) {
             SurfaceWalk::Place place = off_surface ? SurfaceWalk::Place{grid_.source[v], rounded(towards)} : move(v, towards);
             if (off_surface) place.point = walk_.walk(grid_.source[v], towards).point;
-            const double value = worst(v, place.position);
-            if (value <= best + 1e-6) return;
+            const double value = badness(v, place.position);
+            if (value >= best - 1e-9) return;
             best = value;
             found = place;
             moved = true;
@@ -113,15 +131,33 @@ public:
 
     double worst(Index v, const Vec3d& place) const {
         double least = 1;
-        for (const Index q : near_.around(v)) {
-            const auto& quad = near_.quads[q];
-            const auto at = [&](int k) -> const Vec3d& { return quad[k] == v ? place : grid_.positions[quad[k]]; };
-            least = std::min(least, scaled_jacobian(at(0), at(1), at(2), at(3)));
-        }
+        for (const Index q : near_.around(v))
+            for (const double jacobian : corner_jacobians(corners(near_.quads[q], v, place)))
+                least = std::min(least, jacobian);
         return least;
     }
 
 private:
+    /// What the quads at the vertex lack, the worst by far the most. A sum, so that the whole mesh's can only fall, and so
+    /// that a quad with several things wrong can be mended one at a time.
+    double badness(Index v, const Vec3d& place) const {
+        double sum = 0;
+        for (const Index q : near_.around(v)) {
+            for (const double jacobian : corner_jacobians(corners(near_.quads[q], v, place))) {
+                const double lack = std::max(0.0, kGoodEnough - jacobian);
+                sum += lack * lack * lack * lack;
+            }
+        }
+        return sum;
+    }
+
+    /// The quad's corners, with v put at `place`.
+    std::array<Vec3d, 4> corners(const std::array<Index, 4>& quad, Index v, const Vec3d& place) const {
+        std::array<Vec3d, 4> points;
+        for (int k = 0; k < 4; ++k) points[k] = quad[k] == v ? place : grid_.positions[quad[k]];
+        return points;
+    }
+
     SurfaceWalk::Place move(Index v, const Vec3d& target) const {
         SurfaceWalk::Place place = grid_.kinds[v] == VertexKind::curve ? walk_.slide(grid_.source[v], target)
                                                                        : walk_.walk(grid_.source[v], target);

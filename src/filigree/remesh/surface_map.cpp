@@ -39,32 +39,11 @@ void scale_angles(std::span<double> angles, double turn) {
 
 } // namespace
 
-std::vector<Index> half_edge_twins(std::span<const Triangle> triangles) {
-    struct Side {
-        std::uint64_t key;
-        Index half_edge;
-    };
-    std::vector<Side> sides;
-    sides.reserve(3 * triangles.size());
-    for (Index h = 0; h < 3 * triangles.size(); ++h) {
-        const Index a = triangles[h / 3][h % 3], b = triangles[h / 3][(h % 3 + 1) % 3];
-        sides.push_back({std::uint64_t{std::min(a, b)} << 32 | std::max(a, b), h});
-    }
-    std::sort(sides.begin(), sides.end(),
-              [](const Side& a, const Side& b) { return a.key != b.key ? a.key < b.key : a.half_edge < b.half_edge; });
-    std::vector<Index> twins(sides.size(), kNoIndex);
-    for (std::size_t i = 0; i + 1 < sides.size(); ++i)
-        if (sides[i].key == sides[i + 1].key) {
-            twins[sides[i].half_edge] = sides[i + 1].half_edge;
-            twins[sides[i + 1].half_edge] = sides[i].half_edge;
-        }
-    return twins;
-}
-
-SurfaceMap::SurfaceMap(const ManifoldSurface& surface, std::span<const std::uint8_t> feature,
+SurfaceMap::SurfaceMap(const ManifoldSurface& surface, std::span<const Index> twins,
+                       std::span<const std::uint8_t> feature,
                        std::span<const std::uint8_t> corner)
     : surface_(surface), positions_(surface.positions), triangles_(surface.triangles),
-      twin_(half_edge_twins(surface.triangles)), feature_(feature.begin(), feature.end()),
+      twin_(twins.begin(), twins.end()), feature_(feature.begin(), feature.end()),
       triangle_count_(surface.triangles.size()) {
     face_.resize(triangles_.size());
     covered_.resize(triangles_.size());

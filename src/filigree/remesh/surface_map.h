@@ -45,9 +45,9 @@ struct Star {
 /// any chain of them. Memory: about 200 bytes a change.
 class SurfaceMap {
 public:
-    /// feature: 3 F, whether a half-edge's edge must stay an edge (alike on twins; borders always do).
+    /// twins: opposite_half_edges of the surface, which must outlive the map. feature: 3 F, whether a half-edge's edge must stay an edge (alike on twins; borders always do).
     /// corner: V, whether a vertex must stay; vertices with other than none or two feature edges are made corners.
-    SurfaceMap(const ManifoldSurface& surface, std::span<const std::uint8_t> feature,
+    SurfaceMap(const ManifoldSurface& surface, std::span<const Index> twins, std::span<const std::uint8_t> feature,
                std::span<const std::uint8_t> corner);
 
     std::size_t slot_count() const { return triangles_.size(); }
@@ -149,8 +149,5 @@ private:
     std::vector<OldFace> old_faces_;
     std::vector<NewFace> new_faces_; ///< of face id - number of original triangles
 };
-
-/// Twins of half-edges, kNoIndex on borders. triangles: an oriented manifold. Cost O(F log F).
-std::vector<Index> half_edge_twins(std::span<const Triangle> triangles);
 
 } // namespace filigree
