@@ -232,7 +232,7 @@ TEST_F(Remesh, LimitThatCannotBeKeptIsARefusalWithItsReason) {
     make_scan();
     const std::vector<std::string> command = {"remesh", "scan.ply",       "-o",   "x.ply",  "--quads", "500", "--wrap",
                                               "never",  "--max-distance", "1e-9", "--quiet"};
-    fails(7, command, {"distance"});
+    fails(7, command, {"of the diagonal from the mesh", "1e-09"});
     EXPECT_FALSE(std::filesystem::exists(path("x.ply")));
 }
 
