@@ -123,6 +123,30 @@ TEST(ClosestPointTree, AgreesWithBruteForceOnASmoothSurface) {
     }
 }
 
+TEST(ClosestPointTree, AgreesWithBruteForceOnNeedles) { // which have several boxes each
+    std::vector<Vec3f> positions = {{0.1f, 0.2f, 0.3f}};
+    std::vector<Triangle> triangles;
+    std::mt19937 random(6);
+    const auto coordinate = [&] { return float(random() % 100000) / 50000 - 1; };
+    for (Index t = 0; t < 400; ++t) {
+        const Vec3f end(coordinate(), coordinate(), coordinate());
+        positions.push_back(end);
+        positions.push_back(end + 1e-3f * Vec3f(coordinate(), coordinate(), coordinate()));
+        triangles.push_back({0, 2 * t + 1, 2 * t + 2});
+    }
+    triangles.push_back({0, 1, 0}); // a line, and a point
+    triangles.push_back({7, 7, 7});
+    for (const TreeLeaves leaves : {TreeLeaves::single, TreeLeaves::pairs}) {
+        const ClosestPointTree tree(positions, triangles, leaves);
+        for (int i = 0; i < 500; ++i) {
+            const Vec3f query = Vec3f(coordinate(), coordinate(), coordinate()) * (i % 7 ? 1.0f : 30.0f);
+            expect_same(tree.closest(query), brute_force(positions, triangles, query));
+            const Vec3f facing(coordinate(), coordinate(), coordinate());
+            expect_same(tree.closest(query, 0.1, facing), brute_force(positions, triangles, query, 0.1, facing));
+        }
+    }
+}
+
 TEST(ClosestPointTree, FacingPicksTheRightSideOfAThinPart) {
     const std::vector<Vec3f> positions = {{0, 0, 0},      {1, 0, 0},      {0, 1, 0},
                                           {0, 0, -0.01f}, {1, 0, -0.01f}, {0, 1, -0.01f}};

@@ -14,8 +14,11 @@
 namespace filigree {
 namespace {
 
-constexpr double kFlat = 1e-20;       // squared sine of a corner, below which a triangle has no plane in double
-constexpr double kFarthest = 1e4;     // box sizes: from further out, a query is moved here first
+constexpr double kFlat = 1e-20;    // squared sine of a corner, below which a triangle has no plane in double
+constexpr double kFarthest = 1e4;  // box sizes: from further out, a query is moved here first
+constexpr double kNeedle = 4;      // times its doubled area: a larger box is mostly empty
+constexpr double kMostPieces = 64; // of a needle as long as the whole
+constexpr std::size_t kMostMorePieces = std::size_t(1) << 20; // for all needles together
 constexpr double kRadiusSlack = 1e-6; // of the coordinates' size: several roundings of Embree's floats
 
 struct TrianglePoint {
@@ -68,6 +71,8 @@ SurfacePoint surface_point(const TrianglePoint& point, Index triangle) {
     return {triangle, point.barycentric.cast<float>(), point.position.cast<float>(), std::sqrt(point.squared_distance)};
 }
 
+double half_surface(const Vec3d& size) { return size.x() * size.y() + size.y() * size.z() + size.z() * size.x(); }
+
 bool share_an_edge(const Triangle& s, const Triangle& t) {
     return std::ranges::count_if(t, [&](Index vertex) { return std::ranges::find(s, vertex) != s.end(); }) == 2;
 }
@@ -91,17 +96,22 @@ SurfacePoint closest_point_on_triangle(const Vec3f& p, const Vec3f& a, const Vec
 }
 
 struct ClosestPointTree::Tree {
+    /// Triangles from `first` on with one box; of a needle only a piece, between planes across its box's longest axis.
+    struct Leaf {
+        Index first;
+        std::uint8_t count = 1, piece = 0, pieces = 1;
+    };
+
     std::span<const Vec3f> positions;
     std::span<const Triangle> triangles;
     Vec3d centre = Vec3d::Zero();
     double scale = 1; ///< Embree's units in a model unit: the box becomes -1 to 1
     RTCScene scene = nullptr;
-    /// Leaf i has the triangles leaf_begin[i] .. leaf_begin[i + 1] - 1; empty: one triangle each.
-    std::vector<Index> leaf_begin;
+    std::vector<Leaf> leaves; ///< empty: one triangle each
     /// In Embree's units, during the build only: Embree flushes denormal floats to zero while it calls set_bounds.
     std::vector<Vec3f> local_positions;
 
-    Tree(std::span<const Vec3f> positions_, std::span<const Triangle> triangles_, TreeLeaves leaves)
+    Tree(std::span<const Vec3f> positions_, std::span<const Triangle> triangles_, TreeLeaves kind)
         : positions(positions_), triangles(triangles_) {
         if (triangles.empty()) return;
         Box box;
@@ -112,7 +122,7 @@ struct ClosestPointTree::Tree {
         if (size > 0) scale = 2 / size;
         local_positions.reserve(positions.size());
         for (const Vec3f& p : positions) local_positions.push_back(to_local(p.cast<double>()).cast<float>());
-        if (leaves == TreeLeaves::pairs) pair_triangles();
+        make_leaves(kind);
         build();
         local_positions = {};
     }
@@ -128,25 +138,83 @@ struct ClosestPointTree::Tree {
         return {positions[a].cast<double>(), positions[b].cast<double>(), positions[c].cast<double>()};
     }
 
-    std::size_t leaf_count() const { return leaf_begin.empty() ? triangles.size() : leaf_begin.size() - 1; }
-    std::span<const Triangle> leaf(Index i) const {
-        return leaf_begin.empty() ? triangles.subspan(i, 1)
-                                  : triangles.subspan(leaf_begin[i], leaf_begin[i + 1] - leaf_begin[i]);
+    Leaf leaf(Index i) const { return leaves.empty() ? Leaf{i} : leaves[i]; }
+
+    Box local_box(const Triangle& triangle) const {
+        Box box;
+        for (const Index vertex : triangle) box.extend(local_positions[vertex].cast<double>());
+        return box;
     }
 
-    void pair_triangles() {
-        leaf_begin.reserve(triangles.size() / 2 + 1);
+    /// How many boxes each triangle should have: several where it is much thinner than its own box, and the box not
+    /// small. Queries would find hundreds of such needles in place of a few.
+    std::vector<std::uint8_t> count_pieces() const {
+        const double whole = half_surface(2 * Vec3d::Ones());
+        std::vector<std::uint8_t> pieces(triangles.size(), 1);
+        std::size_t more = 0;
         for (std::size_t t = 0; t < triangles.size(); ++t) {
-            leaf_begin.push_back(static_cast<Index>(t));
-            if (t + 1 < triangles.size() && share_an_edge(triangles[t], triangles[t + 1])) ++t;
+            const auto& [a, b, c] = triangles[t];
+            const Vec3d p = local_positions[a].cast<double>();
+            const Vec3d doubled_area =
+                (local_positions[b].cast<double>() - p).cross(local_positions[c].cast<double>() - p);
+            const double excess = half_surface(local_box(triangles[t]).size()) - kNeedle * doubled_area.norm();
+            if (excess > 0) pieces[t] = std::uint8_t(std::max(1.0, kMostPieces * std::sqrt(excess / whole)));
+            more += pieces[t] - 1u;
         }
-        leaf_begin.push_back(static_cast<Index>(triangles.size()));
+        if (more > kMostMorePieces)
+            for (std::uint8_t& n : pieces) n = std::uint8_t(1 + (n - 1) * kMostMorePieces / more);
+        return pieces;
+    }
+
+    void make_leaves(TreeLeaves kind) {
+        const std::vector<std::uint8_t> pieces = count_pieces();
+        const auto is_whole = [](std::uint8_t n) { return n == 1; };
+        if (kind == TreeLeaves::single && std::ranges::all_of(pieces, is_whole)) return;
+        for (std::size_t t = 0; t < triangles.size(); ++t) {
+            const Index first = static_cast<Index>(t);
+            const bool pair = kind == TreeLeaves::pairs && t + 1 < triangles.size() && is_whole(pieces[t]) &&
+                              is_whole(pieces[t + 1]) && share_an_edge(triangles[t], triangles[t + 1]);
+            for (std::uint8_t i = 0; i < pieces[t]; ++i)
+                leaves.push_back({first, std::uint8_t(pair ? 2 : 1), i, pieces[t]});
+            if (pair) ++t;
+        }
+    }
+
+    Box leaf_box(const Leaf& leaf) const {
+        Box box;
+        for (Index i = 0; i < leaf.count; ++i) {
+            const Box whole = local_box(triangles[leaf.first + i]);
+            box.extend(whole.min);
+            box.extend(whole.max);
+        }
+        return leaf.pieces == 1 ? box : piece_box(triangles[leaf.first], box, leaf);
+    }
+
+    /// The box of what of a triangle lies between two planes: its edges have all corners of that.
+    Box piece_box(const Triangle& triangle, const Box& whole, const Leaf& leaf) const {
+        int axis = 0;
+        const double length = whole.size().maxCoeff(&axis);
+        const auto plane = [&](int i) { return whole.min[axis] + length * i / leaf.pieces; };
+        const double low = plane(leaf.piece), high = plane(leaf.piece + 1);
+        Box box;
+        for (int k = 0; k < 3; ++k) {
+            const Vec3d p = local_positions[triangle[k]].cast<double>();
+            const Vec3d q = local_positions[triangle[(k + 1) % 3]].cast<double>();
+            if (std::max(p[axis], q[axis]) < low || std::min(p[axis], q[axis]) > high) continue;
+            for (const double at : {std::clamp(p[axis], low, high), std::clamp(q[axis], low, high)}) {
+                const double t = p[axis] == q[axis] ? 0 : (at - p[axis]) / (q[axis] - p[axis]);
+                box.extend(p + t * (q - p));
+            }
+            if (p[axis] == q[axis]) box.extend(q);
+        }
+        return box;
     }
 
     void build() {
         const RTCDevice device = embree_device();
         const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
-        rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(leaf_count()));
+        rtcSetGeometryUserPrimitiveCount(geometry,
+                                         static_cast<unsigned>(leaves.empty() ? triangles.size() : leaves.size()));
         rtcSetGeometryUserData(geometry, this);
         rtcSetGeometryBoundsFunction(geometry, set_bounds, nullptr);
         rtcCommitGeometry(geometry);
@@ -162,12 +230,8 @@ struct ClosestPointTree::Tree {
 
     static void set_bounds(const RTCBoundsFunctionArguments* args) {
         const Tree& tree = *static_cast<const Tree*>(args->geometryUserPtr);
-        Vec3f low = Vec3f::Constant(std::numeric_limits<float>::infinity()), high = -low;
-        for (const auto& [a, b, c] : tree.leaf(args->primID)) {
-            const Vec3f &p = tree.local_positions[a], &q = tree.local_positions[b], &r = tree.local_positions[c];
-            low = low.cwiseMin(p).cwiseMin(q).cwiseMin(r);
-            high = high.cwiseMax(p).cwiseMax(q).cwiseMax(r);
-        }
+        const Box box = tree.leaf_box(tree.leaf(args->primID));
+        const Vec3f low = box.min.cast<float>(), high = box.max.cast<float>();
         *args->bounds_o = {low.x(), low.y(), low.z(), 0, high.x(), high.y(), high.z(), 0};
     }
 
@@ -200,10 +264,9 @@ struct ClosestPointTree::Tree {
 
     static bool visit(RTCPointQueryFunctionArguments* args) {
         Search& search = *static_cast<Search*>(args->userPtr);
-        const std::span<const Triangle> leaf = search.tree.leaf(args->primID);
-        const Index first = static_cast<Index>(leaf.data() - search.tree.triangles.data());
+        const Leaf leaf = search.tree.leaf(args->primID);
         bool closer = false;
-        for (Index i = 0; i < leaf.size(); ++i) closer |= search.visit_triangle(first + i);
+        for (Index i = 0; i < leaf.count; ++i) closer |= search.visit_triangle(leaf.first + i);
         if (closer) args->query->radius = search.radius();
         return closer;
     }
