@@ -179,6 +179,26 @@ TEST(VoxelWrap, OfSheetsIsAShell) {
     EXPECT_NEAR(topology(wrap).area, 2 * topology(plane).area, 0.3);
 }
 
+TEST(VoxelWrap, OfAFanOfNeedlesIsThatOfItsCone) {
+    constexpr Index kNeedles = 5000;
+    Mesh cone;
+    cone.positions.emplace_back(0.0f, 0.0f, 1.0f);
+    for (Index i = 0; i < kNeedles; ++i) {
+        const double t = 2 * std::numbers::pi * i / kNeedles;
+        cone.positions.push_back(Vec3d(std::cos(t), std::sin(t), 0).cast<float>());
+    }
+    for (Index i = 0; i < kNeedles; ++i) cone.add_face(Triangle{0, i + 1, (i + 1) % kNeedles + 1});
+    const Mesh open = wrapped(cone);
+    EXPECT_EQ(topology(open).euler, 2);
+    EXPECT_LT(distance(open, cone, 48).rms_a_to_b, 0.35); // a shell
+    std::vector<Index> base(kNeedles);
+    for (Index i = 0; i < kNeedles; ++i) base[i] = kNeedles - i;
+    cone.add_face(base);
+    const Mesh closed = wrapped(cone);
+    EXPECT_NEAR(topology(closed).volume, std::numbers::pi / 3, 0.03);
+    EXPECT_LT(distance(closed, cone, 48).rms_a_to_b, 0.15);
+}
+
 TEST(VoxelWrap, OfOneTriangleALineAndTwoPoints) {
     Mesh triangle;
     triangle.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};

@@ -20,9 +20,11 @@
 namespace filigree {
 namespace {
 
-constexpr std::size_t kSlab = 8;     // layers of voxels a piece
-constexpr std::size_t kGrain = 2048; // vertices or triangles a piece
-constexpr double kTouch = 1e-9;      // voxels: what is closer than this touches
+constexpr std::uint8_t kMostCrossings = 16;
+constexpr double kNeedleLength = 8, kNeedleWidth = 0.5; // voxels: longer and thinner, a triangle is a needle
+constexpr std::size_t kSlab = 8;                        // layers of voxels a piece; even, as blocks must not be shared
+constexpr std::size_t kGrain = 2048;                    // vertices or triangles a piece
+constexpr double kTouch = 1e-9;                         // voxels: what is closer than this touches
 constexpr int kSmoothRounds = 6;
 constexpr double kFreedom = 0.45; // voxels that smoothing moves a vertex along each axis: sides never meet
 constexpr int kPullRounds = 3;
@@ -125,8 +127,61 @@ void mark_run(std::span<std::uint64_t> row, int low, int high) {
     }
 }
 
-/// Marks the voxels that the triangle touches, in the layers from low to high along z.
-void mark_triangle(const Polygon& triangle, int low, int high, BitGrid& grid) {
+/// What the triangles touch, and what of needles the wrap is pulled onto: pieces as long as a voxel is wide, and no
+/// more than enough for each place. A fan of 100,000 around one vertex would otherwise cost minutes.
+struct Touched {
+    BitGrid grid;
+    std::vector<std::uint8_t> crossings; ///< pieces in each block of 2 x 2 x 2 voxels; at most kMostCrossings
+
+    explicit Touched(const Cell& size)
+        : grid(size),
+          crossings((std::size_t(size[0]) / 2 + 1) * (std::size_t(size[1]) / 2 + 1) * (std::size_t(size[2]) / 2 + 1)) {}
+
+    /// Whether one of the blocks with the voxels from low to high of a row has too few pieces; counts one more there.
+    bool needs_piece(int y, int z, int low, int high) {
+        const std::size_t row = std::size_t(z / 2) * (std::size_t(grid.size[1]) / 2 + 1) + std::size_t(y / 2);
+        std::uint8_t* const blocks = crossings.data() + row * (std::size_t(grid.size[0]) / 2 + 1);
+        bool needs = false;
+        for (int x = low / 2; x <= high / 2; ++x) {
+            if (blocks[x] == kMostCrossings) continue;
+            ++blocks[x];
+            needs = true;
+        }
+        return needs;
+    }
+};
+
+bool is_needle(const Polygon& triangle) {
+    double longest = 0;
+    for (int k = 0; k < 3; ++k)
+        longest = std::max(longest, (triangle.corners[(k + 1) % 3] - triangle.corners[k]).norm());
+    const Vec3d& a = triangle.corners[0];
+    const double doubled_area = (triangle.corners[1] - a).cross(triangle.corners[2] - a).norm();
+    return longest > kNeedleLength && doubled_area < kNeedleWidth * longest;
+}
+
+/// What the wrap is pulled onto; positions in voxels.
+struct PullTarget {
+    std::vector<Vec3f> positions;
+    std::vector<Triangle> triangles;
+
+    void add(const Polygon& polygon) {
+        const Index first = Index(positions.size());
+        for (int k = 0; k < polygon.count; ++k) positions.push_back(polygon.corners[k].cast<float>());
+        for (Index k = 2; k < Index(polygon.count); ++k) triangles.push_back({first, first + k - 1, first + k});
+        if (polygon.count < 3) triangles.push_back({first, first, first + Index(polygon.count) - 1});
+    }
+    void add(const PullTarget& other) {
+        const Index first = Index(positions.size());
+        positions.insert(positions.end(), other.positions.begin(), other.positions.end());
+        for (const auto& [a, b, c] : other.triangles) triangles.push_back({first + a, first + b, first + c});
+    }
+};
+
+/// Marks the voxels that the triangle touches, in the layers from low to high along z. Adds the pieces of needles.
+void mark_triangle(const Polygon& triangle, int low, int high, Touched& touched, PullTarget& pieces) {
+    BitGrid& grid = touched.grid;
+    const bool needle = is_needle(triangle);
     const auto [z_low, z_high] = layers(triangle, 2, low, high);
     for (int z = z_low; z <= z_high; ++z) {
         const Polygon slice = cut_to_layer(triangle, 2, z);
@@ -137,6 +192,7 @@ void mark_triangle(const Polygon& triangle, int low, int high, BitGrid& grid) {
             if (piece.count == 0) continue;
             const auto [x_low, x_high] = layers(piece, 0, 0, grid.size[0] - 1);
             mark_run(grid.row(grid.row_of(y, z)), x_low, x_high);
+            if (needle && touched.needs_piece(y, z, x_low, x_high)) pieces.add(piece);
         }
     }
 }
@@ -172,21 +228,27 @@ SlabTriangles sort_into_slabs(std::span<const Vec3d> positions, std::span<const 
     return sorted;
 }
 
-/// positions: in voxels.
+/// Marks what the triangles touch, and finds what the wrap will be pulled onto. positions: in voxels.
 BitGrid touched_voxels(std::span<const Vec3d> positions, std::span<const Triangle> triangles, const Cell& size,
-                       const RunContext& context) {
-    BitGrid grid(size);
+                       PullTarget& target, const RunContext& context) {
+    Touched touched(size);
+    const auto polygon = [&](const Triangle& t) {
+        return Polygon{{positions[t[0]], positions[t[1]], positions[t[2]]}, 3};
+    };
     const SlabTriangles slabs = sort_into_slabs(positions, triangles, size[2]);
-    parallel_for(context, slabs.first.size() - 1, 1, [&](std::size_t begin, std::size_t end) {
+    std::vector<PullTarget> pieces(slabs.first.size() - 1); // of each slab
+    parallel_for(context, pieces.size(), 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t s = begin; s < end && !context.is_cancelled(); ++s) {
             const int low = int(s * kSlab), high = std::min(low + int(kSlab), size[2]) - 1;
-            for (std::size_t i = slabs.first[s]; i < slabs.first[s + 1]; ++i) {
-                const auto& [a, b, c] = triangles[slabs.triangles[i]];
-                mark_triangle({{positions[a], positions[b], positions[c]}, 3}, low, high, grid);
-            }
+            for (std::size_t i = slabs.first[s]; i < slabs.first[s + 1]; ++i)
+                mark_triangle(polygon(triangles[slabs.triangles[i]]), low, high, touched, pieces[s]);
         }
     });
-    return grid;
+    for (const Vec3d& p : positions) target.positions.push_back(p.cast<float>());
+    for (const Triangle& t : triangles)
+        if (!is_needle(polygon(t))) target.triangles.push_back(t);
+    for (const PullTarget& slab : pieces) target.add(slab);
+    return std::move(touched.grid);
 }
 
 // ---- Inside and outside
@@ -536,16 +598,9 @@ void move_towards(std::span<const Vec3d> targets, std::span<const Triangle> tria
     positions.swap(moved);
 }
 
-/// The input, to be asked for its closest points; positions in voxels.
-struct PullTarget {
-    std::vector<Vec3f> positions;
-    std::vector<Triangle> triangles;
-    const BitGrid& solid;
-};
-
 /// Where each vertex should go: onto the input, and a little off it where the part is a sheet, so that the two sides of
 /// the shell around it stay apart.
-std::vector<Vec3d> pull_targets(const PullTarget& input, const ClosestPointTree& tree, std::span<const Vec3d> positions,
+std::vector<Vec3d> pull_targets(const ClosestPointTree& tree, const BitGrid& solid, std::span<const Vec3d> positions,
                                 std::span<const Vec3d> normals, const RunContext& context) {
     std::vector<Vec3d> targets(positions.size());
     parallel_for(context, positions.size(), kGrain, [&](std::size_t begin, std::size_t end) {
@@ -554,7 +609,7 @@ std::vector<Vec3d> pull_targets(const PullTarget& input, const ClosestPointTree&
             targets[v] = closest.position.cast<double>();
             const Vec3d below = targets[v] - kProbe * normals[v];
             const Cell voxel = {int(std::floor(below.x())), int(std::floor(below.y())), int(std::floor(below.z()))};
-            if (!input.solid.inside(voxel) || !input.solid.test(voxel)) targets[v] += kShell * normals[v];
+            if (!solid.inside(voxel) || !solid.test(voxel)) targets[v] += kShell * normals[v];
         }
     });
     return targets;
@@ -573,8 +628,8 @@ std::vector<Vec3d> tangential_targets(std::span<const Vec3d> positions, std::spa
     return targets;
 }
 
-void pull_onto_input(const PullTarget& input, std::span<const Triangle> triangles, std::vector<Vec3d>& positions,
-                     const RunContext& context) {
+void pull_onto_input(const PullTarget& input, const BitGrid& solid, std::span<const Triangle> triangles,
+                     std::vector<Vec3d>& positions, const RunContext& context) {
     std::optional<ClosestPointTree> tree; // in our arena: Embree builds on the threads of the one it is called in
     context.arena().execute([&] { tree.emplace(input.positions, input.triangles); });
     const Neighbours neighbours = find_neighbours(triangles, positions.size());
@@ -585,7 +640,7 @@ void pull_onto_input(const PullTarget& input, std::span<const Triangle> triangle
             move_towards(tangential_targets(positions, normals, neighbours, context), triangles, positions, context);
             normals = unit_normals(positions, triangles);
         }
-        move_towards(pull_targets(input, *tree, positions, normals, context), triangles, positions, context);
+        move_towards(pull_targets(*tree, solid, positions, normals, context), triangles, positions, context);
     }
 }
 
@@ -660,7 +715,8 @@ Result<ManifoldSurface> voxel_wrap(std::span<const Vec3d> positions, std::span<c
     for (std::size_t v = 0; v < positions.size(); ++v) in_voxels[v] = frame.to_voxels(positions[v]);
 
     context.report("finding the outside", 0);
-    BitGrid solid = solid_voxels(touched_voxels(in_voxels, triangles, frame.size, context), radius, context);
+    PullTarget input;
+    BitGrid solid = solid_voxels(touched_voxels(in_voxels, triangles, frame.size, input, context), radius, context);
     if (context.is_cancelled()) return cancelled_error();
     make_border_manifold(solid);
     if (context.is_cancelled()) return cancelled_error();
@@ -670,9 +726,7 @@ Result<ManifoldSurface> voxel_wrap(std::span<const Vec3d> positions, std::span<c
     smooth_steps(border, context);
     ManifoldSurface surface{{}, cut_quads(border), {}};
     surface.positions = std::move(border.positions);
-    PullTarget input{{}, {triangles.begin(), triangles.end()}, solid};
-    for (const Vec3d& p : in_voxels) input.positions.push_back(p.cast<float>());
-    pull_onto_input(input, surface.triangles, surface.positions, context);
+    pull_onto_input(input, solid, surface.triangles, surface.positions, context);
     if (context.is_cancelled()) return cancelled_error();
     restore_flattened(corners, surface.triangles, surface.positions);
     for (Vec3d& p : surface.positions) p = frame.to_model(p);
