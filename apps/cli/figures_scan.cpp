@@ -19,6 +19,7 @@ namespace {
 constexpr double kPanelHeight = 200;
 constexpr std::size_t kQuads = 50'000;
 constexpr unsigned kLevels = 3;           // as in the report's figure 2.9, unless triangles are left over
+constexpr double kFeatureAngle = 180;     // none: what is sharp on a scan is noise
 constexpr double kStretch = 1.6;          // upwards
 constexpr double kTwist = 80, kBend = 60; // degrees, about and of the longest axis
 const Vec3d kFromFront(0.42, -0.90, 0.30);
@@ -78,8 +79,8 @@ void draw_patched(Page& page, const Panel& panel, FigureRenderer& renderer, cons
 Figure draw_remeshed_scan(FigureRenderer& renderer) {
     const RunContext& context = renderer.context();
     const Mesh scan = renderer.scan() ? *renderer.scan() : irregular_shape(context);
-    QuadRemeshed remeshed =
-        require(quad_remesh(scan, {.quads = kQuads, .levels = kLevels, .attributes = false}, context));
+    QuadRemeshed remeshed = require(quad_remesh(
+        scan, {.quads = kQuads, .levels = kLevels, .feature_angle_deg = kFeatureAngle, .attributes = false}, context));
     const unsigned levels = remeshed.patches.levels;
     const Model reference =
         std::move(require(strip(remeshed.mesh, {.code = DetailCode::reference, .levels = levels}, context)).model);
@@ -97,11 +98,12 @@ Figure draw_remeshed_scan(FigureRenderer& renderer) {
     Page page = captioned_page(
         content_height(3, kPanelHeight), "The report’s process on a scan",
         fmt::format(
-            "{} (i) becomes {} quads (ii): {} patches, each a grid of {} by {}; the quads leave the scan by "
-            "{} of its diagonal (rms). As in figure 2.9, one round (iii) and {} rounds (iv) of removing "
+            "{} (i) becomes {} quads (ii): {} patches, each a grid of {} by {}; it is {} "
+            "of its diagonal (rms) away from them. As in figure 2.9, one round (iii) and {} rounds (iv) of removing "
             "every second row and column. As in 2.10, what is left is stretched to {:.1f} times the height (v), "
             "and the detail returned by the inverse law (vi). As in 3.1, an extreme deformation: the same driver "
-            "twisted and bent (vii), detail returned by the report’s code (viii) and by the blend code (ix).",
+            "twisted and bent (vii), detail returned by the report’s code (viii), and by the blend "
+            "code with a driver as large (ix).",
             renderer.scan() ? fmt::format("A scan of {} triangles", with_commas(scan.face_count()))
                             : fmt::format("A built-in shape in {} irregular triangles, in place of a scan,",
                                           with_commas(scan.face_count())),
