@@ -1,14 +1,13 @@
 // Based on:
 //   [Gibson 1998], surface nets: the vertices of the voxels' border are smoothed, each within a box of its own, so that
-//   steps go and thin parts stay. Ours start at the voxels' corners, which the next makes possible.
-//   [Latecki 1997]: the border of a set of voxels is a manifold when it is one around each corner (the set is well
-//   composed); as his repair, ours adds voxels.
+//   steps go and thin parts stay. Ours start at the voxels' corners.
 // A triangle is cut to each row of voxels that it crosses; the interval left along the row touches those voxels which
 // the separating axes of triangle and voxel would find, at the cost of rows instead of voxels.
 #include "filigree/remesh/voxel_wrap.h"
 
 #include "filigree/core/parallel_for.h"
 #include "filigree/mesh/closest_point.h"
+#include "filigree/remesh/voxel_grid.h"
 
 #include <algorithm>
 #include <array>
@@ -33,49 +32,6 @@ constexpr double kShell = 0.2;      // voxels between a sheet and each side of t
 constexpr int kHalvings = 5;        // of a step that turns a triangle over, before it is not made at all
 constexpr double kMostTurn = 0.3;   // cosine: further than this no triangle turns in a step
 constexpr double kLeastArea = 1e-4; // voxels squared, twice the area: smaller, a triangle only grows
-
-using Cell = std::array<int, 3>;
-
-/// A bit a voxel, rows along x.
-struct BitGrid {
-    Cell size;
-    std::size_t words; ///< of a row
-    std::vector<std::uint64_t> bits;
-
-    explicit BitGrid(const Cell& size_)
-        : size(size_), words((std::size_t(size_[0]) + 63) / 64), bits(words * row_count()) {}
-
-    std::size_t row_count() const { return std::size_t(size[1]) * std::size_t(size[2]); }
-    std::span<std::uint64_t> row(std::size_t r) { return std::span(bits).subspan(r * words, words); }
-    std::span<const std::uint64_t> row(std::size_t r) const { return std::span(bits).subspan(r * words, words); }
-    std::size_t row_of(int y, int z) const { return std::size_t(z) * std::size_t(size[1]) + std::size_t(y); }
-    bool inside(const Cell& c) const {
-        for (int k = 0; k < 3; ++k)
-            if (c[k] < 0 || c[k] >= size[k]) return false;
-        return true;
-    }
-    std::size_t word_of(const Cell& c) const { return row_of(c[1], c[2]) * words + std::size_t(c[0]) / 64; }
-    bool test(const Cell& c) const { return bits[word_of(c)] >> (c[0] % 64) & 1; }
-    void set(const Cell& c) { bits[word_of(c)] |= std::uint64_t(1) << (c[0] % 64); }
-};
-
-/// Bits from one x below: bit x of the result is bit x - 1 of the row.
-std::uint64_t from_below(std::span<const std::uint64_t> row, std::size_t word) {
-    return row[word] << 1 | (word > 0 ? row[word - 1] >> 63 : 0);
-}
-std::uint64_t from_above(std::span<const std::uint64_t> row, std::size_t word) {
-    return row[word] >> 1 | (word + 1 < row.size() ? row[word + 1] << 63 : 0);
-}
-/// The bits of a row's word that are voxels.
-std::uint64_t valid_bits(const BitGrid& grid, std::size_t word) {
-    const std::size_t left = std::size_t(grid.size[0]) - 64 * word;
-    return left >= 64 ? ~std::uint64_t(0) : (std::uint64_t(1) << left) - 1;
-}
-
-template <class Visit>
-void for_each_bit(std::uint64_t bits, const Visit& visit) {
-    for (; bits; bits &= bits - 1) visit(std::countr_zero(bits));
-}
 
 // ---- Touched voxels
 
@@ -130,10 +86,10 @@ void mark_run(std::span<std::uint64_t> row, int low, int high) {
 /// What the triangles touch, and what of needles the wrap is pulled onto: pieces as long as a voxel is wide, and no
 /// more than enough for each place. A fan of 100,000 around one vertex would otherwise cost minutes.
 struct Touched {
-    BitGrid grid;
+    VoxelGrid grid;
     std::vector<std::uint8_t> crossings; ///< pieces in each block of 2 x 2 x 2 voxels; at most kMostCrossings
 
-    explicit Touched(const Cell& size)
+    explicit Touched(const VoxelIndex& size)
         : grid(size),
           crossings((std::size_t(size[0]) / 2 + 1) * (std::size_t(size[1]) / 2 + 1) * (std::size_t(size[2]) / 2 + 1)) {}
 
@@ -180,7 +136,7 @@ struct PullTarget {
 
 /// Marks the voxels that the triangle touches, in the layers from low to high along z. Adds the pieces of needles.
 void mark_triangle(const Polygon& triangle, int low, int high, Touched& touched, PullTarget& pieces) {
-    BitGrid& grid = touched.grid;
+    VoxelGrid& grid = touched.grid;
     const bool needle = is_needle(triangle);
     const auto [z_low, z_high] = layers(triangle, 2, low, high);
     for (int z = z_low; z <= z_high; ++z) {
@@ -229,8 +185,8 @@ SlabTriangles sort_into_slabs(std::span<const Vec3d> positions, std::span<const 
 }
 
 /// Marks what the triangles touch, and finds what the wrap will be pulled onto. positions: in voxels.
-BitGrid touched_voxels(std::span<const Vec3d> positions, std::span<const Triangle> triangles, const Cell& size,
-                       PullTarget& target, const RunContext& context) {
+VoxelGrid touched_voxels(std::span<const Vec3d> positions, std::span<const Triangle> triangles, const VoxelIndex& size,
+                         PullTarget& target, const RunContext& context) {
     Touched touched(size);
     const auto polygon = [&](const Triangle& t) {
         return Polygon{{positions[t[0]], positions[t[1]], positions[t[2]]}, 3};
@@ -251,175 +207,13 @@ BitGrid touched_voxels(std::span<const Vec3d> positions, std::span<const Triangl
     return std::move(touched.grid);
 }
 
-// ---- Inside and outside
-
-/// Every voxel that shares at least a corner with one of the grid's, and those.
-BitGrid dilated(const BitGrid& grid, const RunContext& context) {
-    BitGrid across(grid.size), result(grid.size);
-    const auto for_each_layer = [&](const auto& visit) {
-        parallel_for(context, std::size_t(grid.size[2]), 1, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t z = begin; z < end; ++z) visit(int(z));
-        });
-    };
-    for_each_layer([&](int z) { // along x and y
-        for (int y = 0; y < grid.size[1]; ++y)
-            for (int other = std::max(0, y - 1); other <= std::min(grid.size[1] - 1, y + 1); ++other) {
-                const auto source = grid.row(grid.row_of(other, z));
-                const auto target = across.row(grid.row_of(y, z));
-                for (std::size_t w = 0; w < grid.words; ++w)
-                    target[w] |= (source[w] | from_below(source, w) | from_above(source, w)) & valid_bits(grid, w);
-            }
-    });
-    for_each_layer([&](int z) {
-        const std::size_t layer = std::size_t(grid.size[1]) * grid.words;
-        for (int other = std::max(0, z - 1); other <= std::min(grid.size[2] - 1, z + 1); ++other)
-            for (std::size_t i = 0; i < layer; ++i)
-                result.bits[std::size_t(z) * layer + i] |= across.bits[std::size_t(other) * layer + i];
-    });
-    return result;
-}
-
-/// Spreads the seeds of a row along its free voxels.
-void spread_along(std::span<std::uint64_t> seeds, std::span<const std::uint64_t> closed) {
-    std::uint64_t carry = 0;
-    for (std::size_t w = 0; w < seeds.size(); ++w) {
-        std::uint64_t free = ~closed[w], s = seeds[w] | (carry & free);
-        for (int step = 1; step < 64; step *= 2) {
-            s |= free & (s << step);
-            free &= free << step;
-        }
-        seeds[w] = s;
-        carry = s >> 63;
-    }
-    carry = 0;
-    for (std::size_t w = seeds.size(); w-- > 0;) {
-        std::uint64_t free = ~closed[w], s = seeds[w] | (carry & free);
-        for (int step = 1; step < 64; step *= 2) {
-            s |= free & (s >> step);
-            free &= free >> step;
-        }
-        seeds[w] = s;
-        carry = s << 63;
-    }
-}
-
-/// The voxels that are not closed and connected, through faces, to the first of the grid.
-BitGrid flood_outside(const BitGrid& closed) {
-    BitGrid outside(closed.size);
-    std::vector<std::size_t> queue = {0};
-    std::vector<std::uint8_t> queued(closed.row_count());
-    std::vector<std::uint64_t> seeds(closed.words);
-    const std::size_t across = std::size_t(closed.size[1]);
-    for (std::size_t done = 0; done < queue.size(); ++done) {
-        const std::size_t row = queue[done];
-        queued[row] = 0;
-        std::array<std::size_t, 4> beside;
-        std::size_t count = 0;
-        if (row % across > 0) beside[count++] = row - 1;
-        if (row % across + 1 < across) beside[count++] = row + 1;
-        if (row >= across) beside[count++] = row - across;
-        if (row + across < closed.row_count()) beside[count++] = row + across;
-        const auto here = outside.row(row);
-        for (std::size_t w = 0; w < closed.words; ++w) {
-            seeds[w] = here[w];
-            for (std::size_t k = 0; k < count; ++k) seeds[w] |= outside.row(beside[k])[w];
-            seeds[w] &= ~closed.row(row)[w];
-        }
-        if (row == 0) seeds[0] |= 1;
-        spread_along(seeds, closed.row(row));
-        seeds.back() &= valid_bits(closed, closed.words - 1);
-        if (std::ranges::equal(seeds, here)) continue;
-        std::ranges::copy(seeds, here.begin());
-        for (std::size_t k = 0; k < count; ++k)
-            if (!queued[beside[k]]) {
-                queued[beside[k]] = 1;
-                queue.push_back(beside[k]);
-            }
-    }
-    return outside;
-}
-
-BitGrid complement(BitGrid grid) {
-    for (std::size_t i = 0; i < grid.bits.size(); ++i) grid.bits[i] = ~grid.bits[i] & valid_bits(grid, i % grid.words);
-    return grid;
-}
-
 /// Everything that cannot be reached from outside once openings up to twice `radius` are closed.
-BitGrid solid_voxels(const BitGrid& touched, unsigned radius, const RunContext& context) {
-    BitGrid closed = touched;
+VoxelGrid solid_voxels(const VoxelGrid& touched, unsigned radius, const RunContext& context) {
+    VoxelGrid closed = touched;
     for (unsigned i = 0; i < radius; ++i) closed = dilated(closed, context);
-    BitGrid outside = flood_outside(closed);
+    VoxelGrid outside = flood_outside(closed);
     for (unsigned i = 0; i < radius; ++i) outside = dilated(outside, context); // the solid back to where it was
     return complement(std::move(outside));
-}
-
-// ---- A manifold border
-
-/// Whether the bits, voxels around a corner (bit i has its x, y, z in the bits of i), are connected through faces.
-bool is_connected(unsigned bits) {
-    unsigned reached = bits & -bits;
-    for (unsigned before = 0; before != reached;) {
-        before = reached;
-        for (unsigned i = 0; i < 8; ++i)
-            for (unsigned axis = 1; axis < 8; axis *= 2)
-                if (reached >> i & 1) reached |= bits & (1u << (i ^ axis));
-    }
-    return reached == bits;
-}
-
-/// For the solid voxels around a corner, which of the others to fill so that the border is one fan there.
-std::array<std::uint8_t, 256> fills() {
-    std::array<std::uint8_t, 256> table{};
-    const auto is_manifold = [](unsigned solid) { return is_connected(solid) && is_connected(~solid & 255u); };
-    for (unsigned solid = 0; solid < 256; ++solid) {
-        unsigned best = 255;
-        for (unsigned more = solid; more < 256; ++more)
-            if ((more & solid) == solid && is_manifold(more) && std::popcount(more) < std::popcount(best)) best = more;
-        table[solid] = std::uint8_t(best & ~solid);
-    }
-    table[0] = 0;
-    return table;
-}
-
-/// The corners at the lower end of each voxel that have solid and other voxels around them, for one row and word.
-std::uint64_t border_corners(const BitGrid& solid, int y, int z, std::size_t word) {
-    std::uint64_t any = 0, all = ~std::uint64_t(0);
-    for (const auto& [v, w] : {std::pair(y, z), {y - 1, z}, {y, z - 1}, {y - 1, z - 1}}) {
-        const auto row = solid.row(solid.row_of(v, w));
-        const std::uint64_t below = from_below(row, word);
-        any |= row[word] | below;
-        all &= row[word] & below;
-    }
-    return any & ~all;
-}
-
-/// Calls visit(corner) for every corner of the border, in the order of the grid.
-template <class Visit>
-void for_each_border_corner(const BitGrid& solid, const Visit& visit) {
-    for (int z = 1; z < solid.size[2]; ++z)
-        for (int y = 1; y < solid.size[1]; ++y)
-            for (std::size_t w = 0; w < solid.words; ++w)
-                for_each_bit(border_corners(solid, y, z, w), [&](int x) { visit(Cell{int(64 * w) + x, y, z}); });
-}
-
-Cell voxel_at(const Cell& corner, unsigned i) {
-    return {corner[0] - 1 + int(i & 1), corner[1] - 1 + int(i >> 1 & 1), corner[2] - 1 + int(i >> 2)};
-}
-
-/// Fills voxels until the border is a manifold and nothing outside is shut in. Voxels are only added, so this ends.
-void make_border_manifold(BitGrid& solid) {
-    static const std::array<std::uint8_t, 256> table = fills();
-    for (bool changed = true; changed;) {
-        changed = false;
-        for_each_border_corner(solid, [&](const Cell& corner) {
-            unsigned around = 0;
-            for (unsigned i = 0; i < 8; ++i) around |= unsigned(solid.test(voxel_at(corner, i))) << i;
-            for (unsigned i = 0; i < 8; ++i)
-                if (table[around] >> i & 1) solid.set(voxel_at(corner, i));
-            changed = changed || table[around];
-        });
-        if (changed) solid = complement(flood_outside(solid));
-    }
 }
 
 // ---- The border as a mesh
@@ -432,48 +226,48 @@ struct QuadSurface {
 /// Numbers the corners of the border in the grid's order.
 class CornerNumbers {
 public:
-    explicit CornerNumbers(const BitGrid& solid) : corners_(solid.size), before_(solid.bits.size()) {
-        for_each_border_corner(solid, [&](const Cell& corner) { corners_.set(corner); });
+    explicit CornerNumbers(const VoxelGrid& solid) : corners_(solid.size), before_(solid.bits.size()) {
+        for_each_border_corner(solid, [&](const VoxelIndex& corner) { corners_.set(corner); });
         for (std::size_t i = 0; i < corners_.bits.size(); ++i) {
             before_[i] = count_;
             count_ += Index(std::popcount(corners_.bits[i]));
         }
     }
-    Index operator()(const Cell& corner) const {
+    Index operator()(const VoxelIndex& corner) const {
         const std::size_t word = corners_.word_of(corner);
         const std::uint64_t below = (std::uint64_t(1) << (corner[0] % 64)) - 1;
         return before_[word] + Index(std::popcount(corners_.bits[word] & below));
     }
 
 private:
-    BitGrid corners_;
+    VoxelGrid corners_;
     std::vector<Index> before_;
     Index count_ = 0;
 };
 
 /// The side of a voxel that faces along an axis, counter-clockwise from outside.
-std::array<Cell, 4> voxel_side(Cell corner, int axis, bool positive) {
+std::array<VoxelIndex, 4> voxel_side(VoxelIndex corner, int axis, bool positive) {
     const int b = (axis + 1) % 3, c = (axis + 2) % 3;
     corner[axis] += positive;
-    std::array<Cell, 4> side = {corner, corner, corner, corner};
+    std::array<VoxelIndex, 4> side = {corner, corner, corner, corner};
     ++side[1][b], ++side[2][b], ++side[2][c], ++side[3][c];
     if (!positive) std::swap(side[1], side[3]);
     return side;
 }
 
-QuadSurface extract_border(const BitGrid& solid) {
+QuadSurface extract_border(const VoxelGrid& solid) {
     QuadSurface surface;
     const CornerNumbers number(solid);
-    for_each_border_corner(solid, [&](const Cell& c) { surface.positions.emplace_back(c[0], c[1], c[2]); });
+    for_each_border_corner(solid, [&](const VoxelIndex& c) { surface.positions.emplace_back(c[0], c[1], c[2]); });
     for (int z = 1; z + 1 < solid.size[2]; ++z)
         for (int y = 1; y + 1 < solid.size[1]; ++y) {
             const auto row = [&](int v, int w) { return solid.row(solid.row_of(v, w)); };
             const auto here = row(y, z);
             for (std::size_t w = 0; w < solid.words; ++w) {
                 if (here[w] == 0) continue;
-                const std::array<std::uint64_t, 6> beside = {from_below(here, w), from_above(here, w),
-                                                             row(y - 1, z)[w],    row(y + 1, z)[w],
-                                                             row(y, z - 1)[w],    row(y, z + 1)[w]};
+                const std::array<std::uint64_t, 6> beside = {voxels_below(here, w), voxels_above(here, w),
+                                                             row(y - 1, z)[w],      row(y + 1, z)[w],
+                                                             row(y, z - 1)[w],      row(y, z + 1)[w]};
                 for (int side = 0; side < 6; ++side)
                     for_each_bit(here[w] & ~beside[side], [&](int x) {
                         const auto corners = voxel_side({int(64 * w) + x, y, z}, side / 2, side % 2);
@@ -600,7 +394,7 @@ void move_towards(std::span<const Vec3d> targets, std::span<const Triangle> tria
 
 /// Where each vertex should go: onto the input, and a little off it where the part is a sheet, so that the two sides of
 /// the shell around it stay apart.
-std::vector<Vec3d> pull_targets(const ClosestPointTree& tree, const BitGrid& solid, std::span<const Vec3d> positions,
+std::vector<Vec3d> pull_targets(const ClosestPointTree& tree, const VoxelGrid& solid, std::span<const Vec3d> positions,
                                 std::span<const Vec3d> normals, const RunContext& context) {
     std::vector<Vec3d> targets(positions.size());
     parallel_for(context, positions.size(), kGrain, [&](std::size_t begin, std::size_t end) {
@@ -608,7 +402,8 @@ std::vector<Vec3d> pull_targets(const ClosestPointTree& tree, const BitGrid& sol
             const SurfacePoint closest = tree.closest(positions[v].cast<float>());
             targets[v] = closest.position.cast<double>();
             const Vec3d below = targets[v] - kProbe * normals[v];
-            const Cell voxel = {int(std::floor(below.x())), int(std::floor(below.y())), int(std::floor(below.z()))};
+            const VoxelIndex voxel = {int(std::floor(below.x())), int(std::floor(below.y())),
+                                      int(std::floor(below.z()))};
             if (!solid.inside(voxel) || !solid.test(voxel)) targets[v] += kShell * normals[v];
         }
     });
@@ -628,7 +423,7 @@ std::vector<Vec3d> tangential_targets(std::span<const Vec3d> positions, std::spa
     return targets;
 }
 
-void pull_onto_input(const PullTarget& input, const BitGrid& solid, std::span<const Triangle> triangles,
+void pull_onto_input(const PullTarget& input, const VoxelGrid& solid, std::span<const Triangle> triangles,
                      std::vector<Vec3d>& positions, const RunContext& context) {
     std::optional<ClosestPointTree> tree; // in our arena: Embree builds on the threads of the one it is called in
     context.arena().execute([&] { tree.emplace(input.positions, input.triangles); });
@@ -680,7 +475,7 @@ void restore_flattened(std::span<const Vec3d> before, std::span<const Triangle> 
 struct VoxelFrame {
     Vec3d origin; ///< of the grid's first voxel
     double voxel; ///< its side
-    Cell size;
+    VoxelIndex size;
 
     Vec3d to_voxels(const Vec3d& p) const { return (p - origin) / voxel; }
     Vec3d to_model(const Vec3d& p) const { return origin + voxel * p; }
@@ -716,7 +511,7 @@ Result<ManifoldSurface> voxel_wrap(std::span<const Vec3d> positions, std::span<c
 
     context.report("finding the outside", 0);
     PullTarget input;
-    BitGrid solid = solid_voxels(touched_voxels(in_voxels, triangles, frame.size, input, context), radius, context);
+    VoxelGrid solid = solid_voxels(touched_voxels(in_voxels, triangles, frame.size, input, context), radius, context);
     if (context.is_cancelled()) return cancelled_error();
     make_border_manifold(solid);
     if (context.is_cancelled()) return cancelled_error();
