@@ -33,7 +33,8 @@ def run(command, limit=None):
 def run_json(command, limit=None):
     ran = run(command, limit)
     if ran.returncode != 0:
-        raise Failed(f"code {ran.returncode}: {ran.stderr.strip().removeprefix('filigree: ')}")
+        reason = (ran.stderr.strip().splitlines() or ["no reason"])[-1]
+        raise Failed(f"code {ran.returncode}: {reason.removeprefix('filigree: ')}")
     return json.loads(ran.stdout)
 
 
