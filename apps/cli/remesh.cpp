@@ -109,7 +109,7 @@ Table report_table(const QuadRemeshed& result, const RunSeconds& run) {
     table.row("input, cleaned", topology_text(report.input));
     table.row("output", topology_text(report.output));
     if (report.feature_edges) table.row("feature edges", with_commas(report.feature_edges));
-    if (report.tries > 1) table.row("tries", fmt::format("{}; again because {}", report.tries, report.retried));
+    if (report.tries > 1) table.row("tries", fmt::format("{}; the last but one: {}", report.tries, report.retried));
     std::string phases;
     for (const PhaseSeconds& phase : report.seconds) phases += fmt::format("{:.2f} {}, ", phase.seconds, phase.phase);
     table.row("seconds",
