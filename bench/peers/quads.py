@@ -80,14 +80,24 @@ def measure(options, quads, mesh):
     }
 
 
-def row(name, who, seconds, m):
-    def pair(p):
-        return f"{p[0]:.1e} / {p[1]:.1e}"
+COLUMNS = [  # title, of a measurement
+    ("s", lambda m: f"{m['seconds']:.3g}"),
+    ("quads", lambda m: f"{m['quads']:,}"),
+    ("irregular", lambda m: f"{m['irregular']:,}"),
+    ("SJ, least", lambda m: f"{m['sj_min']:.2f}"),
+    ("SJ, mean", lambda m: f"{m['sj_mean']:.3f}"),
+    ("inverted", lambda m: f"{m['inverted']:,}"),
+    ("from input, rms", lambda m: f"{m['back'][0]:.1e}"),
+    ("from input, max", lambda m: f"{m['back'][1]:.1e}"),
+    ("to input, max", lambda m: f"{m['out'][1]:.1e}"),
+]
 
-    return (
-        f"| {name} | {who} | {seconds:.2f} | {m['quads']:,} | {m['irregular']:,} | {m['sj_min']:.2f} / {m['sj_mean']:.3f} "
-        f"| {m['inverted']:,} | {pair(m['out'])} | {pair(m['back'])} |"
-    )
+
+def row(name, ours, theirs):
+    def cell(value, m):
+        return value(m) if m else "-"
+
+    return f"| {name} | " + " | ".join(f"{cell(value, ours)}, {cell(value, theirs)}" for _, value in COLUMNS) + " |"
 
 
 def summary(count, results):
@@ -120,10 +130,10 @@ def main():
     options.work.mkdir(parents=True, exist_ok=True)
 
     for count in options.quads:
-        print(f"\nAbout {count:,} quads:\n")
-        print("| mesh | | s | quads | irregular | SJ min / mean | inverted | to the input, rms / max | from it, rms / max |")
-        print("|---|---|---|---|---|---|---|---|---|")
-        results = []
+        print(f"\nAbout {count:,} quads; each ours, QuadriFlow:\n")
+        print("| mesh | " + " | ".join(title for title, _ in COLUMNS) + " |")
+        print("|---" * (len(COLUMNS) + 1) + "|")
+        results, failures = [], []
         for name in options.meshes:
             mesh = options.corpus / "good" / name
             found = []
@@ -131,13 +141,13 @@ def main():
                 out = options.work / f"{mesh.stem}-{count}-{who}.ply"
                 try:
                     seconds = remesh(options, mesh, count, out)
-                    measured = measure(options, out, mesh) | {"seconds": seconds}
-                    print(row(mesh.stem, who, seconds, measured), flush=True)
-                    found.append(measured)
+                    found.append(measure(options, out, mesh) | {"seconds": seconds})
                 except Failed as failed:
-                    print(f"| {mesh.stem} | {who} | {failed} | | | | | | |", flush=True)
+                    failures.append(f"{mesh.stem}, {who}: {failed}")
                     found.append(None)
+            print(row(mesh.stem, *found), flush=True)
             results.append(tuple(found))
+        print("\n" + "\n".join(failures))
         summary(count, results)
 
 
