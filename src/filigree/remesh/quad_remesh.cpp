@@ -135,7 +135,7 @@ private:
 
     void retry(const std::string& reason) {
         ++report().tries;
-        report().retried = reason;
+        report().retried = reason; std::fprintf(stderr,"RETRY %s  (neg %zu, patches %zu tri)\n",reason.c_str(),report().quality.inverted,report().patches); for(auto&x:report().seconds) std::fprintf(stderr,"%s %.2f ",x.phase,x.seconds);
     }
 
     Status prepare() {
