@@ -278,6 +278,13 @@ void Actions::Content::add_edit_actions() {
         "edit.cancel", "&Cancel", "Stops the work that runs, or lets go of a pull as if it had not been", "Esc",
         [this] { cancel(); }, [this] { return workbench.jobs().is_busy() || workbench.is_pulling(); });
     add(
+        "quads.make", "Make &quads", "Makes the mesh regular quads in patches, as the Quads panel says", "Q",
+        [this] {
+            window.show_panel("quads");
+            workbench.make_quads();
+        },
+        [this] { return has_model() && workbench.state().source->topology.faces > 0; });
+    add(
         "detail.remove", "&Remove detail", "One level coarser", "PgDown", [this] { workbench.remove_detail(); },
         [this] {
             const State& state = workbench.state();
@@ -341,6 +348,9 @@ void Actions::Content::add_view_actions() {
     colors->addAction(add_view_choice("view.color_levels", "&Levels as colours",
                                       "The level at which each vertex is added", "Shift+3", &ViewSettings::coloring,
                                       Coloring::levels));
+    colors->addAction(add_view_choice("view.color_patches", "Patc&hes as colours",
+                                      "The patches of regular quads, each in a colour unlike its neighbours'",
+                                      "Shift+4", &ViewSettings::coloring, Coloring::patches));
     add_view_switch("view.split", "S&plit view", "Driver, restored mesh and full deformation side by side", "V",
                     &ViewSettings::split);
     add_view_switch("view.driver", "&Driver over the mesh", "The driver's edges over the mesh", "D",
@@ -372,7 +382,7 @@ void Actions::Content::add_view_actions() {
 
     auto* panels = new QActionGroup(&actions);
     int number = 1;
-    for (const char* name : {"model", "detail", "deform", "body", "view"}) {
+    for (const char* name : {"model", "quads", "detail", "deform", "body", "view"}) {
         QString title = QLatin1String(name);
         title[0] = title[0].toUpper();
         panels->addAction(add_switch(("panel." + std::string(name)).c_str(), title + " panel",

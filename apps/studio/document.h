@@ -20,6 +20,8 @@
 
 namespace filigree::studio {
 
+struct MadeQuads;
+
 /// A mesh as it came and what is known of it. Never changes once made.
 struct Source {
     Mesh mesh;
@@ -28,6 +30,7 @@ struct Source {
     std::vector<std::string> warnings;
     TopologyReport topology;
     SurfaceMaterials materials;
+    std::shared_ptr<const MadeQuads> quads; ///< how they were made, when the mesh is quads of another; null: it is not
 };
 
 /// A built-in shape and its settings.

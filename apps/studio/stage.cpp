@@ -1,5 +1,6 @@
 #include "stage.h"
 
+#include "quads.h"
 #include "theme.h"
 
 #include "filigree/core/parallel_for.h"
@@ -7,6 +8,7 @@
 #include <QElapsedTimer>
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 namespace filigree::studio {
@@ -121,6 +123,8 @@ void Stage::stop() {
     inside_.reset();
     full_.reset();
     full_asked_ = 0;
+    patches_.reset();
+    patches_of_ = nullptr;
     obstacles_.clear();
     particles_of_ = surroundings_of_ = nullptr;
     defects_of_ = nullptr;
@@ -168,6 +172,8 @@ void Stage::adopt() {
 void Stage::drop_posed_extras() {
     full_.reset();
     full_asked_ = 0;
+    patches_.reset();
+    patches_of_ = nullptr;
     positions_.clear();
 }
 
@@ -195,6 +201,7 @@ void Stage::follow_view() {
     follow_defects();
     follow_full();
     follow_colors();
+    follow_patches();
     if (shown_ && settings_.driver) shown_->measure(background_, [this] { Q_EMIT changed(false); });
     if (shown_ && (settings_.driver || settings_.split))
         shown_->ask(0, true, background_, with_opengl_, [this](unsigned, const auto&) { Q_EMIT changed(false); });
@@ -356,6 +363,56 @@ std::string Stage::full_problem() const {
     return "computed when the error is measured: pulls of so many vertices take long";
 }
 
+/// The patches of the model shown, when they are wanted.
+void Stage::follow_patches() {
+    const std::shared_ptr<const Model> model =
+        shown_ && settings_.coloring == Coloring::patches ? shown_->shared_model() : nullptr;
+    const bool is_there = patches_ || !patches_problem_.empty() || background_.is_busy("patches");
+    if (model == patches_of_ && (is_there || !model)) return;
+    if (patches_) with_opengl_([this] { patches_.reset(); });
+    patches_problem_.clear();
+    patches_of_ = model;
+    Q_EMIT changed(false);
+    if (!model) return;
+    const auto& source = workbench_.state().source;
+    const unsigned most_levels =
+        source && source->quads ? source->quads->report.levels : std::numeric_limits<unsigned>::max();
+    const auto fail = [this, model](const Error& error) {
+        if (patches_of_ != model) return;
+        patches_problem_ = error.code == ErrorCode::unsuitable
+                               ? "This mesh is not made of patches: Make quads (the Quads panel) gives it some."
+                               : error.message;
+        Q_EMIT changed(false);
+    };
+    background_.start(
+        "patches",
+        [this, model, fail, most_levels, restore = workbench_.state().restore,
+         where = where_](const RunContext& context) -> Background::Delivery {
+            Result<PatchData> made = PatchData::make(*model, restore, most_levels, where, context);
+            if (context.is_cancelled()) return nullptr;
+            if (!made) return [fail, error = made.error()] { fail(error); };
+            return [this, model, fail, patches = std::make_shared<PatchData>(std::move(*made))] {
+                if (patches_of_ != model) return;
+                with_opengl_([&] {
+                    Result<Drawable> drawable = Drawable::upload(std::move(patches->data));
+                    if (!drawable) return fail(drawable.error());
+                    patches_.emplace(PatchSurface{patches->model, std::move(*drawable)});
+                });
+                Q_EMIT changed(false);
+            };
+        },
+        false, fail);
+}
+
+std::string Stage::patches_problem() const {
+    if (!patches_problem_.empty() || !patches_ || !shown_) return patches_problem_;
+    return workbench_.state().level() < shown_->finest_level() ? "Patches are coloured at the finest level alone." : "";
+}
+
+PatchSurface* Stage::patches_at(unsigned level) {
+    return patches_ && shown_ && level == shown_->finest_level() ? &*patches_ : nullptr;
+}
+
 void Stage::follow_colors() {
     if (!shown_) return;
     const auto put = [this](Coloring coloring, VertexColors colors) {
@@ -371,6 +428,7 @@ void Stage::follow_colors() {
     const std::size_t count = shown_->model().mesh.vertex_count();
     switch (settings_.coloring) {
     case Coloring::own:
+    case Coloring::patches: // as another surface
         return put_none();
     case Coloring::levels:
         if (colors_are_ == Coloring::levels && color_stamp_ != 0) return;
@@ -458,7 +516,11 @@ double Stage::prepare(std::span<const unsigned> levels) {
         }
         QElapsedTimer timer;
         timer.start();
-        shown_->set_pose(*level, pose_, pose_stamp_, context);
+        if (PatchSurface* patches = patches_at(number)) {
+            if (patches->pose != pose_stamp_ && patches->drawable.set_pose(pose_, context)) patches->pose = pose_stamp_;
+        } else {
+            shown_->set_pose(*level, pose_, pose_stamp_, context);
+        }
         spent += milliseconds(timer);
         shown_->set_colors(*level, colors_, color_stamp_);
     }
@@ -505,8 +567,10 @@ Scene Stage::scene(Content content, unsigned level, std::optional<unsigned> from
     const auto add = [&](unsigned number, const Appearance& appearance, float coverage = 1) {
         ShownLevel* shown = shown_ ? shown_->level(number) : nullptr;
         if (!shown) return;
-        scene.objects.push_back({&shown->drawable, appearance});
+        PatchSurface* const patches = patches_at(number);
+        scene.objects.push_back({patches ? &patches->drawable : &shown->drawable, appearance});
         scene.objects.back().appearance.coverage = coverage;
+        if (patches) scene.objects.back().appearance.own_colors = true;
     };
 
     if (content == Content::driver) {

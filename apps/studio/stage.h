@@ -2,6 +2,7 @@
 #pragma once
 
 #include "drawing.h"
+#include "patch_surface.h"
 #include "shown_model.h"
 #include "workbench.h"
 
@@ -55,6 +56,7 @@ public:
     Scene scene(Content content, unsigned level, std::optional<unsigned> from, double part, const QPalette& palette);
     /// Why the full deformation of the pose shown is not there (yet), for its tile; "" when it is.
     std::string full_problem() const;
+    std::string patches_problem() const; ///< why patches are wanted and not seen; "" when they are
 
     /// Positions of a level as posed, relative to the origin; kept until the pose changes.
     std::span<const Vec3f> positions(unsigned level);
@@ -82,6 +84,8 @@ private:
     void pose_net();
     bool has_full_vertices() const;
     void follow_full();
+    void follow_patches();
+    PatchSurface* patches_at(unsigned level); ///< what is drawn in its place; null: itself
     void follow_colors();
     void follow_defects();
     void adopt();
@@ -102,6 +106,9 @@ private:
     std::uint64_t full_asked_ = 0; ///< which pose the full deformation is of, or will be; 0: none
     std::string full_error_;       ///< why it cannot be drawn
     std::vector<Drawable> obstacles_;
+    std::optional<PatchSurface> patches_;
+    std::shared_ptr<const Model> patches_of_; ///< asked for of it
+    std::string patches_problem_;
     VertexColors colors_;
     std::uint64_t color_stamp_ = 0;
     Coloring colors_are_ = Coloring::own;

@@ -984,7 +984,8 @@ void Viewport::Content::update_overlay() {
                                  tile(2)}};
         }
         const VertexColors& colors = stage.colors();
-        if (!colors.values.empty() && settings().coloring != Coloring::own) {
+        const bool has_numbers = settings().coloring == Coloring::error || settings().coloring == Coloring::levels;
+        if (!colors.values.empty() && has_numbers) {
             const bool is_error = settings().coloring == Coloring::error;
             content.legend = OverlayContent::Legend{is_error ? "Distance from the full deformation"
                                                              : "Level at which a vertex comes in",
@@ -994,6 +995,8 @@ void Viewport::Content::update_overlay() {
                                                     is_error ? 100.0 : 1.0,
                                                     !is_error};
         }
+        if (settings().coloring == Coloring::patches && content.note.isEmpty())
+            content.note = QString::fromStdString(stage.patches_problem());
         overlay_tools(content);
         overlay_defects(content);
     }

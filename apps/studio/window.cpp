@@ -9,6 +9,7 @@
 #include "panels/detail_panel.h"
 #include "panels/model_panel.h"
 #include "panels/overview.h"
+#include "panels/quads_panel.h"
 #include "panels/view_panel.h"
 #include "status_bar.h"
 #include "timeline.h"
@@ -38,8 +39,8 @@ namespace filigree::studio {
 namespace {
 
 constexpr qsizetype kRecentFiles = 10;
-constexpr int kColumnWidth = 328; // device-independent pixels, at the start
-constexpr std::array<const char*, 5> kPanels = {"model", "detail", "deform", "body", "view"};
+constexpr int kColumnWidth = 356; // device-independent pixels, at the start
+constexpr std::array<const char*, 6> kPanels = {"model", "quads", "detail", "deform", "body", "view"};
 
 /// Whether a widget needs a key for itself that is a shortcut of the window as well.
 bool keeps_key(const QWidget* widget, int key) {
@@ -162,8 +163,8 @@ void MainWindow::Content::add_menus(MainWindow& window) {
          {"file.open", "file.open_recent", "", "file.save", "file.save_as", "", "file.save_mesh", "file.save_driver",
           "", "file.export_film", "file.export_meshes", "", "file.quit"});
     menu("edit", "&Edit",
-         {"edit.undo", "edit.redo", "", "detail.remove", "detail.add", "", "deform.open", "edit.reset_deformation",
-          "edit.unpin_all", "", "tool.pull", "tool.pin", "tool.turn", "", "edit.cancel"});
+         {"edit.undo", "edit.redo", "", "quads.make", "detail.remove", "detail.add", "", "deform.open",
+          "edit.reset_deformation", "edit.unpin_all", "", "tool.pull", "tool.pin", "tool.turn", "", "edit.cancel"});
     menu("view", "&View",
          {"view.front",
           "view.side",
@@ -178,6 +179,7 @@ void MainWindow::Content::add_menus(MainWindow& window) {
           "view.color_own",
           "view.color_error",
           "view.color_levels",
+          "view.color_patches",
           "view.measure_error",
           "",
           "view.split",
@@ -191,6 +193,7 @@ void MainWindow::Content::add_menus(MainWindow& window) {
           "view.keep_up",
           "",
           "panel.model",
+          "panel.quads",
           "panel.detail",
           "panel.deform",
           "panel.body",
@@ -255,8 +258,9 @@ QWidget* MainWindow::Content::make_column(MainWindow& window) {
     panels = new QStackedWidget(column);
     panels->setObjectName("panels.pages");
     body = new BodyPanel(*workbench, *actions);
-    const std::array<std::pair<Panel*, const char*>, 5> pages = {{
+    const std::array<std::pair<Panel*, const char*>, 6> pages = {{
         {new ModelPanel(*workbench, *actions, recent_menu), "The mesh: open, shapes, defects, save"},
+        {new QuadsPanel(*workbench, *actions), "Regular quads of any mesh, in patches"},
         {new DetailPanel(*workbench), "Levels, the driver and how detail is stored"},
         {new DeformPanel(*workbench, *actions), "Pull by hand or deform by numbers"},
         {body, "A body that falls, bounces and can be pulled"},
@@ -279,7 +283,7 @@ QWidget* MainWindow::Content::make_column(MainWindow& window) {
     layout->addWidget(new Overview(*workbench, *actions, column));
     layout->addWidget(tabs);
     layout->addWidget(panels, 1);
-    column->setMinimumWidth(290);
+    column->setMinimumWidth(std::max(290, tabs->sizeHint().width())); // no tab is cut off
     return column;
 }
 

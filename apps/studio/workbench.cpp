@@ -190,7 +190,10 @@ void Workbench::follow_document(const State& before) {
         content_->replay.stop();
         playback_.remove();
     }
-    if (now.source != before.source) inside_points_.clear();
+    if (now.source != before.source) {
+        inside_points_.clear();
+        jobs_.drop(kQuadsTopic); // of the mesh before
+    }
     if (now.model != before.model) jobs_.drop(kModelTopic); // what is being made was meant for the one before
     if (is_pulling_ && drag_.is_active()) {
         drag_.stop(); // something else has changed meanwhile, an undo say
@@ -368,6 +371,10 @@ void Workbench::make_model(const QString& title, std::optional<Shape> shape, con
                            const std::string& merge) {
     if (jobs_.is_pending(kOpenTopic)) {
         Q_EMIT told("A file is being opened: change the model once it is there, or cancel.", true);
+        return;
+    }
+    if (jobs_.is_pending(kQuadsTopic)) {
+        Q_EMIT told("Quads are being made: change the model once they are there, or cancel.", true);
         return;
     }
     State next = state();

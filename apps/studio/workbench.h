@@ -8,6 +8,7 @@
 #include "view.h"
 
 #include "filigree/mesh/mesh_distance.h"
+#include "filigree/remesh/quad_remesh.h"
 
 namespace filigree::studio {
 
@@ -48,6 +49,10 @@ public:
     void make_shape(const Shape& shape, const std::string& merge = {});
     /// The shape that is being made, else the one there is: where the next change starts from.
     const std::optional<Shape>& wanted_shape() const;
+    // Quads
+    const QuadRemeshOptions& quad_options() const; ///< of the quads made next; no part of the document
+    void set_quad_options(const QuadRemeshOptions& options);
+    void make_quads(); ///< the mesh becomes quads, in the background; quads again: of the mesh before
     // Detail
     void set_strip(const StripOptions& options, const std::string& merge = {}); ///< strips again
     const StripOptions& wanted_strip() const;                                   ///< as being stripped, else as it is
@@ -108,6 +113,7 @@ Q_SIGNALS:
     void timeline_changed(); ///< playing, frame, frame count
     void error_measured();
     void inside_points_ready();
+    void quad_options_changed();
     void opened();                                     ///< another mesh or model than before
     void saved(const std::string& path);               ///< by save_model
     void told(const QString& sentence, bool is_error); ///< for the window's message bar

@@ -12,7 +12,7 @@ Result<State> stripped_state(State state, const RunContext& context);
 Result<State> state_of_shape(State state, const Shape& shape, const RunContext& context);
 
 // Topics of work.
-inline const std::string kModelTopic = "model", kOpenTopic = "open", kBodyTopic = "body";
+inline const std::string kModelTopic = "model", kOpenTopic = "open", kBodyTopic = "body", kQuadsTopic = "quads";
 
 struct Workbench::Content {
     RunContext context;            ///< of what is done at once
@@ -27,6 +27,8 @@ struct Workbench::Content {
     // What make_shape() and set_strip() asked for last, while it is being made.
     std::optional<Shape> wanted_shape;
     StripOptions wanted_strip;
+
+    QuadRemeshOptions quad_options;
 
     QTimer replay;
     After then = After::nothing; ///< once the body is made

@@ -329,7 +329,7 @@ TEST_F(Panels, NothingIsCutOff) {
     settings.coloring = Coloring::error;
     workbench().view().set(settings);
     choose("body.preset", 8); // wax: all of its rows
-    for (const char* panel : {"model", "detail", "deform", "body", "view"}) {
+    for (const char* panel : {"model", "quads", "detail", "deform", "body", "view"}) {
         ASSERT_TRUE(window->show_panel(panel));
         for (int k = 0; k < 5; ++k) QCoreApplication::processEvents();
         const auto& area = get<QScrollArea>(panel);
@@ -356,7 +356,7 @@ TEST_F(Panels, NothingIsCutOff) {
 }
 
 TEST_F(Panels, TheColumnShowsWhatTheScriptNames) {
-    for (const char* panel : {"model", "detail", "deform", "body", "view"}) {
+    for (const char* panel : {"model", "quads", "detail", "deform", "body", "view"}) {
         EXPECT_TRUE(window->show_panel(panel));
         EXPECT_EQ(window->panel(), panel);
         EXPECT_TRUE(get<QScrollArea>(panel).isVisible());

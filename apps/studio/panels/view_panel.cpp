@@ -18,8 +18,10 @@ ViewPanel::ViewPanel(Workbench& workbench, Viewport& viewport, MainWindow& windo
     QGridLayout* rows = section("Surface");
     style_ =
         choice(rows, "view.style", "Style", {"Shaded", "Shaded with edges", "Wireframe"}, "How the surface is drawn");
-    coloring_ = choice(rows, "view.coloring", "Colours", {"Its own", "Error", "Levels"},
-                       "The mesh's own; how far it is from the full deformation; at which level a vertex is added");
+    coloring_ =
+        choice(rows, "view.coloring", "Colours", {"Its own", "Error", "Levels", "Patches"},
+               "The mesh's own; how far it is from the full deformation; at which level a vertex is added; patches of "
+               "regular quads");
     error_ = text(rows, "view.error", Tone::quiet);
     measure_ = new ActionButton("view.measure", window.actions().find("view.measure_error"), {}, page());
     beside(rows, {measure_});
