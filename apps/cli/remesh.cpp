@@ -10,6 +10,8 @@ namespace filigree::cli {
 
 namespace {
 
+constexpr double kShownSeconds = 0.005; // phases that would be written as 0.00 are left out
+
 struct Options {
     std::string input, output, base, picture;
     QuadRemeshOptions remesh;
@@ -110,10 +112,11 @@ Table report_table(const QuadRemeshed& result, const RunSeconds& run) {
     table.row("output", topology_text(report.output));
     if (report.feature_edges) table.row("feature edges", with_commas(report.feature_edges));
     if (report.tries > 1) table.row("tries", fmt::format("{}; the last but one: {}", report.tries, report.retried));
-    std::string phases;
-    for (const PhaseSeconds& phase : report.seconds) phases += fmt::format("{:.2f} {}, ", phase.seconds, phase.phase);
-    table.row("seconds",
-              fmt::format("{:.2f}: {}and {:.2f} read, {:.2f} write", run.remesh, phases, run.read, run.write));
+    table.row("seconds", fmt::format("{:.2f}, and {:.2f} read, {:.2f} write", run.remesh, run.read, run.write));
+    std::vector<std::string> phases;
+    for (const PhaseSeconds& phase : report.seconds)
+        if (phase.seconds >= kShownSeconds) phases.push_back(fmt::format("{:.2f} {}", phase.seconds, phase.phase));
+    if (!phases.empty()) table.row("", fmt::format("{}", fmt::join(phases, ", ")));
     return table;
 }
 
