@@ -130,7 +130,7 @@ TEST(MeshDistance, OfTheTwoWaysGivesTheWhole) {
 }
 
 TEST(MeshDistance, OfManyVerticesIsThatOfEachOne) { // the search goes from sample to sample
-    const Mesh a = make_wavy_cube({.resolution = 40}), b = make_wavy_sphere({.resolution = 10});
+    const Mesh a = make_wavy_cube({.resolution = 20}), b = make_wavy_sphere({.resolution = 6});
     const std::vector<Triangle> triangles = triangulate(b).triangles;
     double max = 0, squares = 0;
     for (const Vec3f& p : a.positions) {
