@@ -108,17 +108,7 @@ public:
     Result<QuadRemeshed> run() {
         if (Status prepared = prepare(); !prepared) return prepared.error();
         std::string reason;
-        if (options_.wrap != WrapUse::always) {
-            reason = try_surface(surface_, layout_, options_.feature_angle_deg);
-            if (worth_another_try(reason) && !options_.levels && layout_.levels > 1) {
-                retry(reason);
-                reason = try_surface(surface_, {4 * layout_.patches, layout_.levels - 1}, options_.feature_angle_deg);
-            }
-            if (worth_another_try(reason) && result_.report.feature_edges > 0) {
-                retry(reason);
-                reason = try_surface(surface_, layout_, 180);
-            }
-        }
+        if (options_.wrap != WrapUse::always) reason = try_own_surface();
         if (options_.wrap == WrapUse::always || (options_.wrap == WrapUse::automatic && worth_another_try(reason))) {
             if (!reason.empty()) retry(reason);
             reason = try_wrap();
@@ -135,7 +125,7 @@ private:
 
     void retry(const std::string& reason) {
         ++report().tries;
-        report().retried = reason; std::fprintf(stderr,"RETRY %s  (neg %zu, patches %zu tri)\n",reason.c_str(),report().quality.inverted,report().patches); for(auto&x:report().seconds) std::fprintf(stderr,"%s %.2f ",x.phase,x.seconds);
+        report().retried = reason;
     }
 
     Status prepare() {
@@ -185,6 +175,25 @@ private:
                                                 "; ask for more quads, or take small parts away."};
     }
 
+    /// The surface itself, with what may help when it fails: features let go where they need too much, more patches, both.
+    std::string try_own_surface() {
+        Layout layout = layout_;
+        double angle = options_.feature_angle_deg;
+        for (;;) {
+            const std::string reason = try_surface(surface_, layout, angle);
+            if (!worth_another_try(reason)) return reason;
+            const bool has_features = angle < 180 && report().feature_edges > 0;
+            const bool can_be_finer = !options_.levels && layout_.levels > 1 && layout.levels == layout_.levels;
+            if (has_features && (features_need_more_ || !can_be_finer))
+                angle = 180;
+            else if (can_be_finer)
+                layout = {4 * layout_.patches, layout_.levels - 1};
+            else
+                return reason;
+            retry(reason);
+        }
+    }
+
     std::string try_wrap() {
         const double side = std::sqrt(area_of(surface_) / double(options_.quads));
         WrapOptions wrap;
@@ -213,12 +222,19 @@ private:
         const FeatureCurves curves = find_feature_curves(surface, twins, {feature_angle, patch_side()});
         report().feature_edges = curves.edge_count;
         watch_.end("features");
+        const auto corners = static_cast<std::size_t>(std::ranges::count(curves.corners, 1));
+        features_need_more_ = corners > layout.patches;
+        if (features_need_more_)
+            return "The mesh's sharp edges have " + std::to_string(corners) + " corners, too many for " +
+                   std::to_string(layout.patches) + " patches; ask for more quads, or keep fewer features.";
 
         std::optional<SurfaceMap> map;
         std::optional<BaseQuads> base = make_base(surface, twins, curves, layout, map);
         if (!base) return error_->message;
-        if (base->quads.size() << (2 * layout.levels) > std::size_t(kMostOverdrawn * double(options_.quads)) + 24)
-            return "The mesh's features and handles need " + counted(base->quads.size() << (2 * layout.levels), layout.levels) +
+        const std::size_t quads = base->quads.size() << (2 * layout.levels);
+        features_need_more_ = double(quads) > kMostOverdrawn * double(options_.quads) + 24;
+        if (features_need_more_)
+            return "The mesh's features and handles need " + counted(quads, layout.levels) +
                    "; ask for more quads or fewer levels, or keep fewer features.";
 
         std::vector<std::uint8_t> features = curves.half_edges;
@@ -352,6 +368,7 @@ private:
     ManifoldSurface surface_, wrapped_;
     Mesh cleaned_; ///< surface_ as a mesh: what distances are measured from
     Layout layout_;
+    bool features_need_more_ = false; ///< what the last try failed by
     std::optional<Error> error_; ///< what no other try can mend: cancelled, no memory
 
     std::vector<TrianglePoint> source_;

@@ -15,7 +15,17 @@ constexpr std::size_t kGrain = 512;
 constexpr double kGoodEnough = 0.5;  // scaled Jacobian: a move that leaves quads above this is always welcome
 constexpr double kOverRelaxation = 1.5; // of the way to the mean: half the sweeps do
 constexpr double kStill = 2e-3;      // of the mean edge length at a vertex: shorter moves are not worth their price
+constexpr int kOnRounds = 24, kOffRounds = 96; // of untangling; nearly all end after a few
+constexpr std::array<double, 4> kReaches = {0.5, 0.2, 1.0, 0.07}; // mean edge lengths at the vertex
 constexpr double kOffSurface = 0.02; // scaled Jacobian that points leave the surface for, when nothing else helps
+
+/// As a file will have it: what is judged is what is written. Through memory, as GCC 12 vectorises a cast to float and
+/// back into nothing at all.
+double rounded(double x) {
+    volatile float stored = static_cast<float>(x);
+    return stored;
+}
+Vec3d rounded(const Vec3d& p) { return {rounded(p.x()), rounded(p.y()), rounded(p.z())}; }
 
 /// The scaled Jacobian at each corner of a quad, as in quad_quality.h.
 std::array<double, 4> corner_jacobians(const std::array<Vec3d, 4>& p) {
@@ -94,7 +104,7 @@ public:
     }
 
     /// Tries places around the vertex for better quads. Returns whether it moved.
-    bool search(Index v, double reach, bool off_surface) {
+    bool search(Index v, double reach, bool off_surface, int round) {
         const VertexKind kind = grid_.kinds[v];
         if (kind == VertexKind::corner) return false;
         const Vec3d here = grid_.positions[v];
@@ -119,12 +129,16 @@ public:
         constexpr int kDirections = 12;
         for (const double step : {reach, 0.5 * reach, 0.2 * reach})
             for (int i = 0; i < kDirections; ++i) {
-                const double angle = 2 * std::numbers::pi * i / kDirections;
+                const double angle = 2 * std::numbers::pi * (i + 0.382 * round) / kDirections;
                 attempt(here + step * edge * (std::cos(angle) * x + std::sin(angle) * y));
             }
         if (off_surface)
             for (const double step : {reach, 0.5 * reach, 0.2 * reach})
-                for (const double sign : {-1.0, 1.0}) attempt(here + sign * step * edge * normal);
+                for (const double sign : {-1.0, 1.0}) {
+                    attempt(here + sign * step * edge * normal);
+                    const double angle = 2.4 * round; // the golden angle: every round looks elsewhere
+                    attempt(here + sign * step * edge * (normal + std::cos(angle) * x + std::sin(angle) * y).normalized());
+                }
         if (moved) accept(v, found);
         return moved;
     }
@@ -170,8 +184,7 @@ private:
         grid_.source[v] = place.point;
     }
 
-    /// As a file will have it: what is judged is what is written.
-    static Vec3d rounded(const Vec3d& p) { return p.cast<float>().cast<double>(); }
+
 
     /// Where the neighbours would have it; on a curve, between the two along it.
     Vec3d mean_target(Index v, double& edge) const {
@@ -227,7 +240,7 @@ private:
 
 void relax(PatchGrid& grid, const SurfaceWalk& walk, unsigned sweeps, const RunContext& context) {
     const Neighbourhoods near(grid);
-    for (Vec3d& p : grid.positions) p = p.cast<float>().cast<double>();
+    for (Vec3d& p : grid.positions) p = rounded(p);
     for (unsigned sweep = 0; sweep < sweeps && !context.is_cancelled(); ++sweep) {
         context.report("relaxing", double(sweep) / sweeps);
         for (const std::vector<Index>& group : near.groups)
@@ -273,21 +286,21 @@ Untangled untangle(PatchGrid& grid, const SurfaceWalk& walk, double least, const
         return vertices;
     };
     Untangled result;
-    for (int round = 0; round < 24 && !context.is_cancelled(); ++round) {
+    for (int round = 0; round < kOnRounds && !context.is_cancelled(); ++round) {
         const std::vector<Index> bad = bad_quads(least);
         if (bad.empty()) return result;
         bool moved = false;
         const std::vector<Index> vertices = vertices_near(bad, round % 4 == 3 ? 2 : round % 2);
-        for (const Index v : vertices) moved |= mover.search(v, round % 3 == 0 ? 0.6 : 0.25, false);
+        for (const Index v : vertices) moved |= mover.search(v, round % 3 == 0 ? 0.6 : 0.25, false, round);
         if (!moved && round % 4 == 3) break;
     }
     std::vector<std::uint8_t> off(grid.positions.size(), 0);
-    for (int round = 0; round < 40 && !context.is_cancelled(); ++round) {
+    for (int round = 0; round < kOffRounds && !context.is_cancelled(); ++round) {
         const std::vector<Index> bad = bad_quads(kOffSurface);
         result.inverted = bad.size();
         if (bad.empty()) break;
-        for (const Index v : vertices_near(bad, round / 8))
-            if (mover.search(v, round % 2 == 0 ? 0.5 : 0.2, true)) off[v] = 1;
+        for (const Index v : vertices_near(bad, round / 12))
+            if (mover.search(v, kReaches[round % 4], true, round)) off[v] = 1;
     }
     result.off_surface = static_cast<std::size_t>(std::count(off.begin(), off.end(), 1));
     result.inverted = bad_quads(1e-9).size();
