@@ -85,7 +85,9 @@ const std::vector<float>& ShownModel::arrival() {
 void ShownModel::ask(unsigned level, bool urgent, Background& background,
                      std::function<void(std::function<void()>)> upload,
                      std::function<void(unsigned, const std::optional<Error>&)> ready) {
-    const std::string topic = "level " + std::to_string(level);
+    // The model before is drawn until this one is there, and may ask for a level of the same number meanwhile.
+    const std::string topic =
+        "level " + std::to_string(level) + " of " + std::to_string(reinterpret_cast<std::uintptr_t>(this));
     if (asked_[level]) return;
     asked_[level] = 1;
     const std::weak_ptr<int> life = life_;

@@ -119,6 +119,16 @@ double difference(const QImage& a, const QImage& b, const QRect& within) {
     return sum / (3.0 * within.width() * within.height());
 }
 
+TEST(Viewport, ShowsAModelOfFewerLevels) {
+    Stand stand("torus", 64);
+    ASSERT_TRUE(stand.is_drawn());
+    const unsigned before = stand.workbench.state().model->finest_level();
+    stand.workbench.set_strip({.base = 3000});
+    stand.workbench.wait_until_idle();
+    ASSERT_LT(stand.workbench.state().model->finest_level(), before);
+    EXPECT_TRUE(stand.is_drawn()) << "the model before has a level of that number too";
+}
+
 TEST(Viewport, PicksWhatItProjects) {
     Stand stand("wavy-sphere", 24);
     ASSERT_TRUE(stand.is_ready());
