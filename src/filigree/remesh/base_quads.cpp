@@ -14,6 +14,7 @@ namespace filigree {
 namespace {
 
 constexpr double kWideAngle = 0.75 * std::numbers::pi; // a sector this wide needs two quads: one would be near straight
+constexpr double kTipAngle = 1.6 * std::numbers::pi; // of a cone's triangles together: below it, its tip stays
 constexpr double kConvex = 0.15; // sine of the unfolded quad's corners, below which it is laid out as a square instead
 
 double cross(const Vec2d& a, const Vec2d& b) { return a.x() * b.y() - a.y() * b.x(); }
@@ -292,7 +293,7 @@ private:
     BaseQuads collect() {
         vertex_.assign(map_.vertex_count(), kNoIndex);
         for (Index v = 0; v < map_.vertex_count(); ++v)
-            if (!map_.is_vertex_removed(v)) vertex_[v] = add_vertex(map_.kind(v));
+            if (!map_.is_vertex_removed(v)) vertex_[v] = add_vertex(is_tip(v) ? VertexKind::corner : map_.kind(v));
         for (Index s = 0; s < map_.slot_count(); ++s)
             if (!map_.is_removed(s) && partner_[s] == kNoIndex) result_.halved = true;
         for (Index s = 0; s < map_.slot_count(); ++s) {
@@ -303,6 +304,21 @@ private:
                 add_pair(s);
         }
         return std::move(result_);
+    }
+
+    /// Whether the triangles at a vertex inside make a sharp cone: the end of a thin part, which would be lost if the
+    /// vertex slid down from it.
+    bool is_tip(Index v) const {
+        if (map_.kind(v) != VertexKind::inside) return false;
+        double angle = 0;
+        Index h = map_.out(v);
+        do {
+            const Vec3d& p = map_.position(v);
+            const Vec3d a = map_.position(map_.to(h)) - p, b = map_.position(map_.from(SurfaceMap::previous(h))) - p;
+            angle += std::atan2(a.cross(b).norm(), a.dot(b));
+            h = map_.twin(SurfaceMap::previous(h));
+        } while (h != map_.out(v));
+        return angle < kTipAngle;
     }
 
     Index add_vertex(VertexKind kind) {

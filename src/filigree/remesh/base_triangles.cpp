@@ -13,11 +13,14 @@ namespace {
 
 constexpr double kLengthWeight = 1e-3;        // of (edge length)^2 x area, beside the quadric: spreads vertices
 constexpr std::size_t kLargestStar = 60;      // triangles; records count corners in bytes, and cost grows with them
-constexpr double kFinestBefore = 3;           // triangles before decimation, at least, times those wanted after
+constexpr double kFinestBefore = 3;           // triangles before the last decimation, at least, times those wanted
+constexpr double kLongestEdge = 1.6;          // before it, in edges of the wanted triangles were they equilateral
+constexpr std::size_t kMostRefined = 8;       // times those: where needles meet, splitting has to end
 // A star that is poor already may get this much poorer: where tiny triangles lie among large ones, each collapse but the
 // last leaves slivers. Without it the dragon's base stops at 7,100 triangles and comes to 1,562 through the last stages.
 constexpr double kWorsening = 0.1;
 constexpr double kSmallDetail = 0.5;          // of a wanted triangle's area: what the area guard lets go
+constexpr double kNeedle = 0.1, kManyNeedles = 0.05; // shape, and the part of all triangles
 constexpr int kImprovingRounds = 8;
 constexpr double kRelocationBound = 0.005;    // of (star area)^2: how far a vertex may leave its quadric's planes
 constexpr double kPositive = 1e-5;            // area in the plane, of the star's radius squared
@@ -56,6 +59,11 @@ struct Quadric {
         b += other.b;
         c += other.c;
     }
+    void scale(double factor) {
+        a *= factor;
+        b *= factor;
+        c *= factor;
+    }
     double at(const Vec3d& p) const {
         const double x = p.x(), y = p.y(), z = p.z();
         const double quadratic = a[0] * x * x + a[3] * y * y + a[5] * z * z + 2 * (a[1] * x * y + a[2] * x * z + a[4] * y * z);
@@ -77,29 +85,35 @@ public:
     BaseMaker(SurfaceMap& map, const RunContext& context) : map_(map), context_(context) {}
 
     Status run(std::size_t target) {
-        refine(target);
-        make_quadrics();
         double area = 0;
         for (Index s = 0; s < map_.slot_count(); ++s) area += map_.covered_area(s);
         small_detail_ = kSmallDetail * area / double(target);
-        for (std::size_t i = 0; i < kStages.size() && map_.triangle_count() > target; ++i) {
-            decimate(kStages[i], target);
-            if (context_.is_cancelled()) return cancelled_error();
-        }
+        make_quadrics();
+        if (is_poor()) flip_edges(4);
+        const std::size_t fine = static_cast<std::size_t>(kFinestBefore * double(target));
+        decimate_to(fine);
+        refine(fine, kLongestEdge * std::sqrt(4 / std::sqrt(3.0) * area / double(target)));
+        decimate_to(target);
+        if (context_.is_cancelled()) return cancelled_error();
         for (int round = 0; round < kImprovingRounds; ++round) {
-            flip_edges();
+            flip_edges(2);
             relocate_vertices();
             if (context_.is_cancelled()) return cancelled_error();
         }
         remove_low_valences();
-        flip_edges();
+        flip_edges(2);
         return Success{};
     }
 
 private:
-    void refine(std::size_t target) {
-        const std::size_t wanted = static_cast<std::size_t>(kFinestBefore * double(target));
-        if (map_.triangle_count() >= wanted) return;
+    void decimate_to(std::size_t target) {
+        for (std::size_t i = 0; i < kStages.size() && map_.triangle_count() > target && !context_.is_cancelled(); ++i)
+            decimate(kStages[i], target);
+    }
+
+    /// Splits edges, the longest first, until none is longer than `longest` and there are enough triangles.
+    void refine(std::size_t least_count, double longest) {
+        const std::size_t most = kMostRefined * least_count;
         struct Long {
             double length;
             Index from, to, half_edge;
@@ -114,13 +128,18 @@ private:
                         map_.to(h), h});
         };
         for (Index h = 0; h < 3 * map_.slot_count(); ++h)
-            if (map_.is_border(h) || h < map_.twin(h)) push(h);
-        while (map_.triangle_count() < wanted && !queue.empty() && !context_.is_cancelled()) {
+            if (!map_.is_removed(h / 3) && (map_.is_border(h) || h < map_.twin(h))) push(h);
+        while (map_.triangle_count() < most && !queue.empty() && !context_.is_cancelled()) {
             const Long next = queue.top();
             queue.pop();
+            if (map_.triangle_count() >= least_count && next.length <= longest * longest) break;
             if (map_.from(next.half_edge) != next.from || map_.to(next.half_edge) != next.to) continue;
             if (!(next.length > 0)) break;
             const Index middle = map_.split(next.half_edge);
+            Quadric half = quadrics_[next.from];
+            half += quadrics_[next.to];
+            half.scale(0.5);
+            quadrics_.push_back(half);
             map_.star(middle, star_);
             for (const Index h : star_.half_edges) {
                 push(h);
@@ -257,7 +276,7 @@ private:
         const std::size_t n = star_.ring.size();
         const Index u = star_.centre, v = star_.ring[target];
         const bool first_open = star_.open && target == 0, last_open = star_.open && target + 1 == n;
-        if (map_.valence(u) + map_.valence(v) > stage_.valence + 4u && map_.valence(u) > 3) return false;
+        if (map_.valence(u) > 4 && map_.valence(u) + map_.valence(v) > stage_.valence + 4u) return false;
         if (!keeps_ends(target, first_open, last_open) || !is_linked(v, first_open || last_open ? 1 : 2)) return false;
         const bool curve = map_.kind(u) == VertexKind::curve;
         const Vec3d& p = map_.position(v);
@@ -306,6 +325,10 @@ private:
 
     /// The link condition: the ends share no neighbours but those beside the edge.
     bool is_linked(Index v, std::size_t expected) {
+        if (map_.valence(v) > kLargestStar)
+            return static_cast<std::size_t>(std::count_if(star_.ring.begin(), star_.ring.end(), [&](Index w) {
+                       return w != v && map_.are_neighbours(w, v);
+                   })) == expected;
         if (marks_.size() < map_.vertex_count()) marks_.resize(map_.vertex_count(), 0);
         ++mark_;
         for (const Index w : star_.ring) marks_[w] = mark_;
@@ -333,6 +356,7 @@ private:
             const double off = double(map_.valence(v)) + change - 6;
             return off * off + (off <= -2 ? 4 : 0); // 4 or fewer make poor quads
         }
+        if (map_.sector_size(h) >= SurfaceMap::kMostCounted) return 0; // whatever it is, less is better: no collapse adds
         const int size = static_cast<int>(map_.sector_size(h)) + change;
         const double off = size - (map_.kind(v) == VertexKind::curve ? 3.0 : wanted_at_corner(h));
         const int least = map_.kind(v) == VertexKind::curve ? 2 : 1; // quads beside a curve need two
@@ -353,8 +377,18 @@ private:
         return std::max(1.0, std::round(angle / (std::numbers::pi / 3)));
     }
 
-    void flip_edges() {
-        for (int pass = 0; pass < 2; ++pass) {
+    /// Whether many triangles are needles, as in tessellated parts: flips first, as no collapse would pass its tests.
+    bool is_poor() const {
+        std::size_t needles = 0;
+        for (Index s = 0; s < map_.slot_count(); ++s) {
+            const Triangle& t = map_.triangle(s);
+            needles += shape(map_.position(t[0]), map_.position(t[1]), map_.position(t[2])) < kNeedle;
+        }
+        return double(needles) > kManyNeedles * double(map_.triangle_count());
+    }
+
+    void flip_edges(int passes) {
+        for (int pass = 0; pass < passes && !context_.is_cancelled(); ++pass) {
             std::size_t flips = 0;
             for (Index h = 0; h < 3 * map_.slot_count(); ++h)
                 if (!map_.is_removed(h / 3) && !map_.is_feature(h) && h < map_.twin(h) && should_flip(h)) {

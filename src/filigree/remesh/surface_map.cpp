@@ -50,13 +50,17 @@ SurfaceMap::SurfaceMap(const ManifoldSurface& surface, std::span<const Index> tw
     out_.assign(positions_.size(), kNoIndex);
     valence_.assign(positions_.size(), 0);
     kind_.assign(positions_.size(), VertexKind::inside);
+    on_border_.assign(positions_.size(), 0);
     std::vector<std::uint8_t> curve_edges(positions_.size(), 0);
     const auto count = [&](Index v) { curve_edges[v] = static_cast<std::uint8_t>(std::min(curve_edges[v] + 1, 3)); };
     for (Index s = 0; s < triangles_.size(); ++s) {
         face_[s] = s;
         covered_[s] = area(s);
         for (Index h = 3 * s; h < 3 * s + 3; ++h) {
-            if (is_border(h)) feature_[h] = 1;
+            if (is_border(h)) {
+                feature_[h] = 1;
+                on_border_[from(h)] = on_border_[to(h)] = 1;
+            }
             ++valence_[from(h)];
             if (out_[from(h)] == kNoIndex || is_border(h)) out_[from(h)] = h;
             if (is_feature(h)) {
@@ -90,15 +94,16 @@ bool SurfaceMap::are_neighbours(Index a, Index b) const {
 }
 
 std::size_t SurfaceMap::sector_size(Index half_edge) const {
+    if (kind_[from(half_edge)] == VertexKind::inside) return valence_[from(half_edge)];
     std::size_t size = 1;
     Index h = half_edge;
-    while (!is_feature(previous(h))) { // counter-clockwise
+    while (!is_feature(previous(h)) && size < kMostCounted) { // counter-clockwise
         h = twin_[previous(h)];
         if (h == half_edge) return size;
         ++size;
     }
     h = half_edge;
-    while (!is_feature(h)) {
+    while (!is_feature(h) && size < kMostCounted) {
         h = next(twin_[h]);
         ++size;
     }
@@ -276,28 +281,27 @@ void SurfaceMap::collapse(const Star& star, std::size_t target) {
         const Index outer_u = twin_[at_u], outer_v = twin_[at_v];
         link(outer_u, outer_v, feature);
         --valence_[apex];
-        const Index outer = outer_u != kNoIndex ? outer_u : outer_v;
-        const Index other = outer == outer_u ? outer_v : outer_u;
-        // any half-edge out of the apex that is left; borders are put right below
-        out_[apex] = triangles_[outer / 3][outer % 3] == apex ? outer : next(outer);
-        if (other != kNoIndex && triangles_[other / 3][other % 3] == apex) out_[apex] = other;
-        start = triangles_[outer / 3][outer % 3] == apex ? next(outer) : outer;
+        // half-edges that leave the apex and v along the edge that is left; kept only where theirs has gone
+        for (const Index outer : {outer_u, outer_v}) {
+            if (outer == kNoIndex) continue;
+            for (const Index leaving : {outer, next(outer)}) {
+                const Index vertex = from(leaving);
+                if (vertex == apex && out_[apex] / 3 == slot) out_[apex] = leaving;
+                if (vertex == v) start = leaving;
+            }
+        }
         triangles_[slot] = {kNoIndex, kNoIndex, kNoIndex};
         --triangle_count_;
     }
     const Index sides = static_cast<Index>(gone[1] != kNoIndex) + 1;
     valence_[v] += valence_[u] - 2 * sides;
-    out_[v] = start;
+    if (is_removed(out_[v] / 3) || from(out_[v]) != v) out_[v] = start;
     out_[u] = kNoIndex;
     valence_[u] = 0;
-    const auto to_border = [&](Index vertex) { // the first, counter-clockwise: turn clockwise while that goes
-        const Index first = out_[vertex];
-        Index h = first;
-        while (!is_border(h)) {
-            h = next(twin_[h]);
-            if (h == first) return;
-        }
-        out_[vertex] = h;
+    // on borders the first, counter-clockwise: clockwise until there is no further
+    const auto to_border = [&](Index vertex) {
+        if (!on_border_[vertex]) return;
+        while (!is_border(out_[vertex])) out_[vertex] = next(twin_[out_[vertex]]);
     };
     to_border(v);
     const std::size_t n = star.ring.size();
@@ -413,12 +417,9 @@ void SurfaceMap::flip(Index half_edge) {
     const auto leave = [&](Index vertex, Index candidate) {
         const Index old = out_[vertex];
         if (from(old) == vertex && old / 3 != s && old / 3 != t) return; // untouched, and first already
-        Index h = candidate;
-        while (!is_border(h)) {
-            h = next(twin_[h]);
-            if (h == candidate) break;
-        }
-        out_[vertex] = h;
+        out_[vertex] = candidate;
+        if (!on_border_[vertex]) return;
+        while (!is_border(out_[vertex])) out_[vertex] = next(twin_[out_[vertex]]);
     };
     leave(a, 3 * s + 1);
     leave(b, 3 * t + 1);
@@ -438,6 +439,7 @@ Index SurfaceMap::split(Index half_edge, double share) {
     middle.barycentric[next(half_edge) % 3] = share;
     positions_.push_back(original_position(trace(middle)));
     kind_.push_back(feature ? VertexKind::curve : VertexKind::inside);
+    on_border_.push_back(other == kNoIndex);
     out_.push_back(kNoIndex);
     valence_.push_back(other == kNoIndex ? 2 : 4);
 

@@ -75,7 +75,8 @@ public:
     double covered_area(Index slot) const { return covered_[slot]; }
     bool are_neighbours(Index a, Index b) const;
     /// How many triangles lie at the half-edge's first vertex between two feature edges, this one's among them; all of
-    /// them where there is no feature.
+    /// them where there is no feature. On curves and at corners no further than kMostCounted are counted.
+    static constexpr std::size_t kMostCounted = 64;
     std::size_t sector_size(Index half_edge) const;
 
     void star(Index vertex, Star& star) const;
@@ -142,6 +143,7 @@ private:
     std::vector<Index> out_;
     std::vector<Index> valence_;
     std::vector<VertexKind> kind_;
+    std::vector<std::uint8_t> on_border_;
     std::size_t triangle_count_ = 0;
 
     std::vector<Record> records_;
