@@ -18,10 +18,11 @@ struct Closest {
 };
 
 Closest closest_on_triangle(const Vec3d& p, const Vec3d& a, const Vec3d& b, const Vec3d& c) {
-    const auto found = [&](double v, double w) {
+    const auto found_at = [&](double u, double v, double w) {
         const Vec3d position = a + v * (b - a) + w * (c - a);
-        return Closest{{1 - v - w, v, w}, position, (p - position).squaredNorm()};
+        return Closest{{u, v, w}, position, (p - position).squaredNorm()};
     };
+    const auto found = [&](double v, double w) { return found_at(std::max(0.0, 1 - v - w), v, w); };
     const Vec3d ab = b - a, ac = c - a, ap = p - a;
     const double d1 = ab.dot(ap), d2 = ac.dot(ap);
     if (d1 <= 0 && d2 <= 0) return found(0, 0);
@@ -38,7 +39,7 @@ Closest closest_on_triangle(const Vec3d& p, const Vec3d& a, const Vec3d& b, cons
     const double va = d3 * d6 - d5 * d4;
     if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
         const double sum = (d4 - d3) + (d5 - d6), w = sum > 0 ? (d4 - d3) / sum : 0;
-        return found(1 - w, w);
+        return found_at(0, 1 - w, w); // exactly on the edge, or the walk would end here
     }
     const double sum = va + vb + vc;
     return sum > 0 ? found(vb / sum, vc / sum) : found(0, 0);
