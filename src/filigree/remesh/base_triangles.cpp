@@ -59,11 +59,6 @@ struct Quadric {
         b += other.b;
         c += other.c;
     }
-    void scale(double factor) {
-        a *= factor;
-        b *= factor;
-        c *= factor;
-    }
     double at(const Vec3d& p) const {
         const double x = p.x(), y = p.y(), z = p.z();
         const double quadratic = a[0] * x * x + a[3] * y * y + a[5] * z * z + 2 * (a[1] * x * y + a[2] * x * z + a[4] * y * z);
@@ -136,12 +131,10 @@ private:
             if (map_.from(next.half_edge) != next.from || map_.to(next.half_edge) != next.to) continue;
             if (!(next.length > 0)) break;
             const Index middle = map_.split(next.half_edge);
-            Quadric half = quadrics_[next.from];
-            half += quadrics_[next.to];
-            half.scale(0.5);
-            quadrics_.push_back(half);
+            quadrics_.emplace_back();
             map_.star(middle, star_);
             for (const Index h : star_.half_edges) {
+                add_planes(h / 3, middle);
                 push(h);
                 push(SurfaceMap::next(h)); // as long as before, but its half-edge may be another now
             }
@@ -151,21 +144,21 @@ private:
 
     void make_quadrics() {
         quadrics_.assign(map_.vertex_count(), {});
-        for (Index s = 0; s < map_.slot_count(); ++s) {
-            const Vec3d normal = map_.normal(s);
-            const double doubled = normal.norm();
-            if (!(doubled > 0)) continue;
-            const Triangle& t = map_.triangle(s);
-            for (const Index v : t) quadrics_[v].add_plane(normal / doubled, map_.position(t[0]), doubled / 6);
-            for (Index h = 3 * s; h < 3 * s + 3; ++h) {
-                if (!map_.is_feature(h)) continue;
-                const Vec3d &a = map_.position(map_.from(h)), along = map_.position(map_.to(h)) - a;
-                const Vec3d side = along.cross(normal);
-                const double length = side.norm();
-                if (!(length > 0)) continue;
-                for (const Index v : {map_.from(h), map_.to(h)})
-                    quadrics_[v].add_plane(side / length, a, along.squaredNorm() / 2);
-            }
+        for (Index s = 0; s < map_.slot_count(); ++s)
+            for (const Index v : map_.triangle(s)) add_planes(s, v);
+    }
+
+    /// What a triangle means to one of its vertices: its plane, and those that stand on its features.
+    void add_planes(Index slot, Index vertex) {
+        const Vec3d normal = map_.normal(slot);
+        const double doubled = normal.norm();
+        if (!(doubled > 0)) return;
+        quadrics_[vertex].add_plane(normal / doubled, map_.position(vertex), doubled / 6);
+        for (Index h = 3 * slot; h < 3 * slot + 3; ++h) {
+            if (!map_.is_feature(h) || (map_.from(h) != vertex && map_.to(h) != vertex)) continue;
+            const Vec3d along = map_.position(map_.to(h)) - map_.position(map_.from(h)), side = along.cross(normal);
+            const double length = side.norm();
+            if (length > 0) quadrics_[vertex].add_plane(side / length, map_.position(vertex), along.squaredNorm() / 2);
         }
     }
 
