@@ -14,7 +14,7 @@ constexpr double kCornerTurn = 45 * std::numbers::pi / 180; // between chords of
 constexpr double kCornerReach = 0.4;                        // patch sides, to either side of a vertex
 // Noise makes short curves that are hardly sharp. In patch sides, for chains with a free end and for closed ones: what is
 // too short in any case, and from where on a curve need not be clearly sharp.
-constexpr double kShortestChain = 2.5, kLongChain = 4;
+constexpr double kShortestChain = 1, kLongChain = 3;
 constexpr double kShortestLoop = 0.5, kLongLoop = 3;
 constexpr double kClearlySharp = 20 * std::numbers::pi / 180; // beyond the asked angle, on average along the curve
 
