@@ -1,5 +1,6 @@
 #include "filigree/remesh/feature_curves.h"
 
+#include "filigree/remesh/disjoint_sets.h"
 #include "filigree/remesh/half_edges.h"
 
 #include <algorithm>
@@ -16,6 +17,7 @@ constexpr double kCornerReach = 0.4;                        // patch sides, to e
 // too short in any case, and from where on a curve need not be clearly sharp.
 constexpr double kShortestChain = 1, kLongChain = 3;
 constexpr double kShortestLoop = 0.5, kLongLoop = 3;
+constexpr double kSmallNetwork = 1.5; // patch sides, of all its edges together
 constexpr double kClearlySharp = 20 * std::numbers::pi / 180; // beyond the asked angle, on average along the curve
 
 struct Curves {
@@ -144,6 +146,24 @@ void prune(const ManifoldSurface& surface, std::span<const Index> twins, const F
     }
 }
 
+/// Takes networks of sharp edges off that are small all together: spikes of noise, too small for patches of their own.
+void drop_small_networks(const ManifoldSurface& surface, double patch_side, std::vector<float>& marked) {
+    DisjointSets networks(surface.positions.size());
+    const auto ends = [&](Index h) {
+        return std::pair(half_edge_start(surface.triangles, h), half_edge_end(surface.triangles, h));
+    };
+    for (Index h = 0; h < marked.size(); ++h)
+        if (marked[h] > 0) networks.join(ends(h).first, ends(h).second);
+    std::vector<double> length(surface.positions.size(), 0);
+    for (Index h = 0; h < marked.size(); ++h)
+        if (marked[h] > 0) {
+            const auto [a, b] = ends(h);
+            length[networks.root(a)] += 0.5 * (surface.positions[a] - surface.positions[b]).norm(); // met from both sides
+        }
+    for (Index h = 0; h < marked.size(); ++h)
+        if (marked[h] > 0 && length[networks.root(ends(h).first)] < kSmallNetwork * patch_side) marked[h] = 0;
+}
+
 /// The vertex `reach` further along, and how far that is.
 Vec3d chord(const Curves& curves, Index from, Index first, double reach) {
     Index before = from, at = first;
@@ -211,6 +231,7 @@ FeatureCurves find_feature_curves(const ManifoldSurface& surface, std::span<cons
             if (angle > least) angles[h] = static_cast<float>(angle);
         }
     prune(surface, twins, options, angles);
+    drop_small_networks(surface, options.patch_side, angles);
     result.corners = find_corners(collect(surface, twins, angles), kCornerReach * options.patch_side);
     for (Index h = 0; h < twins.size(); ++h) result.half_edges[h] = angles[h] > 0;
     result.edge_count = static_cast<std::size_t>(std::count(result.half_edges.begin(), result.half_edges.end(), 1)) / 2;
