@@ -93,11 +93,11 @@ public:
         double edge = 0;
         const Vec3d target = mean_target(v, edge);
         if ((target - here).squaredNorm() < kStill * kStill * edge * edge) return;
-        const double least = std::min(worst(v, here), kGoodEnough);
         for (const double share : {kOverRelaxation, 0.7}) {
             const SurfaceWalk::Place place = move(v, here + share * (target - here));
             if ((place.position - here).squaredNorm() < kStill * kStill * edge * edge) return;
-            if (is_turned(v, place.position) || worst(v, place.position) < least) continue;
+            const double after = worst(v, place.position);
+            if ((after < kGoodEnough && after < worst(v, here)) || is_turned(v, place.position)) continue;
             accept(v, place);
             return;
         }
