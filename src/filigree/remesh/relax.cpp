@@ -16,6 +16,7 @@ constexpr double kGoodEnough = 0.5;  // scaled Jacobian: a move that leaves quad
 constexpr double kOverRelaxation = 1.5; // of the way to the mean: half the sweeps do
 constexpr double kStill = 2e-3;      // of the mean edge length at a vertex: shorter moves are not worth their price
 constexpr int kOnRounds = 24, kOffRounds = 96; // of untangling; nearly all end after a few
+constexpr int kTutteRings = 4, kTutteSweeps = 30;
 constexpr std::array<double, 4> kReaches = {0.5, 0.2, 1.0, 0.07}; // mean edge lengths at the vertex
 constexpr double kOffSurface = 0.02; // scaled Jacobian that points leave the surface for, when nothing else helps
 
@@ -143,6 +144,18 @@ public:
         return moved;
     }
 
+    /// Puts the vertex between its neighbours, whatever that does to its quads.
+    void centre(Index v) {
+        if (grid_.kinds[v] != VertexKind::inside) return;
+        Vec3d sum = Vec3d::Zero();
+        for (const Index q : near_.around(v)) {
+            const auto& quad = near_.quads[q];
+            const int k = quad[0] == v ? 0 : quad[1] == v ? 1 : quad[2] == v ? 2 : 3;
+            sum += 0.5 * (grid_.positions[quad[(k + 1) % 4]] + grid_.positions[quad[(k + 3) % 4]]);
+        }
+        accept(v, move(v, sum / double(near_.around(v).size())));
+    }
+
     double worst(Index v, const Vec3d& place) const {
         double least = 1;
         for (const Index q : near_.around(v))
@@ -151,7 +164,6 @@ public:
         return least;
     }
 
-private:
     /// What the quads at the vertex lack, the worst by far the most. A sum, so that the whole mesh's can only fall, and so
     /// that a quad with several things wrong can be mended one at a time.
     double badness(Index v, const Vec3d& place) const {
@@ -165,6 +177,7 @@ private:
         return sum;
     }
 
+private:
     /// The quad's corners, with v put at `place`.
     std::array<Vec3d, 4> corners(const std::array<Index, 4>& quad, Index v, const Vec3d& place) const {
         std::array<Vec3d, 4> points;
@@ -294,6 +307,28 @@ Untangled untangle(PatchGrid& grid, const SurfaceWalk& walk, double least, const
         for (const Index v : vertices) moved |= mover.search(v, round % 3 == 0 ? 0.6 : 0.25, false, round);
         if (!moved && round % 4 == 3) break;
     }
+    // What single moves cannot undo: whole neighbourhoods evened out, as in a Tutte embedding, where that helps.
+    for (int rings = 1; rings <= kTutteRings && !context.is_cancelled(); ++rings)
+        for (const Index q : bad_quads(kOffSurface)) {
+            const std::vector<Index> vertices = vertices_near({q}, rings);
+            const auto badness = [&] {
+                double sum = 0;
+                for (const Index v : vertices) sum += mover.badness(v, grid.positions[v]);
+                return sum;
+            };
+            std::vector<SurfaceWalk::Place> before;
+            for (const Index v : vertices) before.push_back({grid.source[v], grid.positions[v]});
+            const double bad_before = badness();
+            for (int sweep = 0; sweep < kTutteSweeps; ++sweep)
+                for (const Index v : vertices) mover.centre(v);
+            for (int round = 0; round < 6; ++round)
+                for (const Index v : vertices) mover.search(v, 0.25, false, round);
+            if (badness() < bad_before) continue;
+            for (std::size_t i = 0; i < vertices.size(); ++i) {
+                grid.source[vertices[i]] = before[i].point;
+                grid.positions[vertices[i]] = before[i].position;
+            }
+        }
     std::vector<std::uint8_t> off(grid.positions.size(), 0);
     for (int round = 0; round < kOffRounds && !context.is_cancelled(); ++round) {
         const std::vector<Index> bad = bad_quads(kOffSurface);
