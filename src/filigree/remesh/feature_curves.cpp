@@ -12,7 +12,7 @@ namespace filigree {
 namespace {
 
 constexpr double kCornerTurn = 45 * std::numbers::pi / 180; // between chords of kCornerReach
-constexpr double kCornerReach = 0.4;                        // patch sides, to either side of a vertex
+constexpr double kCornerReach = 0.25;                       // patch sides, to either side of a vertex
 // Noise makes short curves that are hardly sharp. In patch sides, for chains with a free end and for closed ones: what is
 // too short in any case, and from where on a curve need not be clearly sharp.
 constexpr double kShortestChain = 1, kLongChain = 3;
