@@ -20,6 +20,7 @@ namespace filigree {
 namespace {
 
 constexpr unsigned kMostLevels = 8;
+constexpr std::size_t kFewestQuads = 6, kMostQuads = 100'000'000; // each takes some 200 bytes on the way
 constexpr double kEnoughPatches = 500;       // levels that were not asked for leave about so many, or more
 constexpr double kMostOverdrawn = 1.3;       // quads over those asked for
 constexpr std::size_t kLeastTriangles = 8;   // of the base, for each component
@@ -130,7 +131,7 @@ private:
 
     Status prepare() {
         const auto fail = [](std::string message) { return Error{ErrorCode::usage, std::move(message)}; };
-        if (options_.quads < 6) return fail("Ask for 6 quads or more.");
+        if (options_.quads < kFewestQuads || options_.quads > kMostQuads) return fail("Ask for 6 to 100,000,000 quads.");
         if (options_.levels && (*options_.levels < 1 || *options_.levels > kMostLevels))
             return fail("Levels are 1 to " + std::to_string(kMostLevels) + ".");
         if (!(options_.feature_angle_deg >= 0 && options_.feature_angle_deg <= 180))
@@ -169,10 +170,11 @@ private:
         const std::size_t least = kLeastTriangles / 2 * report().input.components;
         while (layout_.patches < least && !options_.levels && layout_.levels > 1) --layout_.levels, layout_.patches *= 4;
         if (layout_.patches >= least) return Success{};
-        return Error{ErrorCode::unsuitable, "The mesh has " + std::to_string(report().input.components) +
-                                                " separate parts, which need at least " +
-                                                counted(least << (2 * layout_.levels), layout_.levels) +
-                                                "; ask for more quads, or take small parts away."};
+        const std::size_t parts = report().input.components;
+        const std::string need = counted(least << (2 * layout_.levels), layout_.levels);
+        if (parts == 1) return Error{ErrorCode::unsuitable, "The mesh needs at least " + need + "; ask for more quads."};
+        return Error{ErrorCode::unsuitable, "The mesh has " + std::to_string(parts) + " separate parts, which need at least " +
+                                                need + "; ask for more quads, or take small parts away."};
     }
 
     /// The surface itself, with what may help when it fails: features let go where they need too much, more patches, both.
