@@ -19,6 +19,7 @@ namespace filigree {
 namespace {
 
 constexpr double kNoArea = 1e-14;      // of the diagonal squared: float's rounding of the positions, squared
+constexpr double kTinyArea = 1e-7;     // of the whole surface's: of a component that is nothing but needles
 constexpr std::size_t kGrain = 32'768; // triangles a piece
 
 /// Triangles over welded vertices, and the mesh corners and faces they come from.
@@ -478,7 +479,7 @@ void remove_small_components(ManifoldSurface& surface, double smallest, CleanRep
     std::vector<std::uint8_t> keep(component.count);
     double removed = 0;
     for (std::size_t c = 0; c < component.count; ++c) {
-        keep[c] = c == largest || !(boxes[c].diagonal() < smallest);
+        keep[c] = c == largest || (areas[c] > kTinyArea * all && !(boxes[c].diagonal() < smallest));
         if (keep[c]) continue;
         ++report.removed_components;
         removed += areas[c];

@@ -57,8 +57,8 @@ Result<ManifoldSurface> make_manifold(const Mesh& mesh, CleanReport& report, con
 /// Cost O(F).
 SurfaceTopology surface_topology(const ManifoldSurface& surface);
 
-/// Drops components whose box has a diagonal below `smallest` (model units), except the largest by area. Adds to
-/// `report`. Cost O(F).
+/// Drops components whose box has a diagonal below `smallest` (model units), and those with next to no area (needles on
+/// cut edges), except the largest by area. Adds to `report`. Cost O(F).
 void remove_small_components(ManifoldSurface& surface, double smallest, CleanReport& report);
 
 /// Cuts tiny handles open and closes both cuts with triangles, where a loop of edges around the handle (or through it)
