@@ -148,11 +148,15 @@ TEST(BaseQuads, CoverEveryTriangleOnce) {
                 ASSERT_TRUE(base.ok());
                 ASSERT_NO_FATAL_FAILURE(expect_sound(map, on));
                 ASSERT_NO_FATAL_FAILURE(expect_patches(map, *base, on));
+                for (const std::size_t size : region_sizes(map)) EXPECT_EQ(size % 2, 0u) << "an odd region";
                 if (halve) {
                     EXPECT_TRUE(base->halved);
                 } else if (!base->halved) {
                     EXPECT_EQ(2 * base->quads.size(), map.triangle_count());
-                    for (const std::size_t size : region_sizes(map)) EXPECT_EQ(size % 2, 0u) << "an odd region";
+                }
+                // parts between sharp corners may be even and still have triangles that fight for a partner
+                if (region_sizes(map).size() <= 2) {
+                    EXPECT_EQ(base->halved, halve);
                 }
             }
 }

@@ -66,12 +66,22 @@ TEST(SurfaceWalk, StaysOnItsSheet) {
 }
 
 TEST(SurfaceWalk, DoesNotCrossFeatures) {
-    const Prepared on(ridged_sheet());
-    const SurfaceWalk walk = on.walk();
-    for (Index t = 0; t < on.surface.triangles.size(); ++t) {
-        const TrianglePoint start{t, Vec3d::Constant(1.0 / 3)};
-        const Vec3d here = walk.position(start), mirrored(-here.x(), here.y(), here.z());
-        EXPECT_GE(walk.walk(start, mirrored).position.x() * here.x(), -1e-12) << "over the ridge";
+    // a roof so flat that the way over its ridge is always downhill
+    Mesh roof = make_wavy_plane({.resolution = 16, .amplitude = 0});
+    for (Vec3f& p : roof.positions) p.z() = -0.5f * std::abs(p.x());
+    for (const double angle : {40.0, 180.0}) {
+        const Prepared on(roof, 100, angle);
+        const SurfaceWalk walk = on.walk();
+        for (Index t = 0; t < on.surface.triangles.size(); ++t) {
+            const TrianglePoint start{t, Vec3d::Constant(1.0 / 3)};
+            const Vec3d here = walk.position(start), mirrored(-here.x(), here.y(), here.z());
+            const Vec3d there = walk.walk(start, mirrored).position;
+            if (angle < 180) {
+                EXPECT_NEAR(there.x(), 0, 1e-9) << "not at the ridge";
+            } else {
+                EXPECT_LT((there - mirrored).norm(), 1e-9) << "there is no feature in the way";
+            }
+        }
     }
 }
 
@@ -91,10 +101,11 @@ TEST(SurfaceWalk, SlidesAlongCurvesAndStopsAtCorners) {
             EXPECT_LT((place.position - walk.position(place.point)).norm(), 1e-12);
             EXPECT_LE((place.position - here - step).norm(), step.norm() + 1e-12);
             slid += (place.position - here).norm() > 0.05;
-            // straight curves: both ends of the way are on the same one
-            const bool on_ridge = std::abs(here.x()) < 1e-6;
-            if (on_ridge) {
-                EXPECT_NEAR(place.position.x(), 0, 1e-6);
+            // straight curves, from corner to corner: both ends of the way are on the same one
+            if (std::abs(here.x()) < 1e-6 || std::abs(here.x()) > 0.499999) {
+                EXPECT_NEAR(place.position.x(), here.x(), 1e-6);
+            } else {
+                EXPECT_NEAR(place.position.y(), here.y(), 1e-6);
             }
         }
     }
