@@ -24,6 +24,7 @@ constexpr std::size_t kFewestQuads = 6, kMostQuads = 100'000'000; // each takes 
 constexpr double kEnoughPatches = 500;       // levels that were not asked for leave about so many, or more
 constexpr double kMostOverdrawn = 1.3;       // quads over those asked for
 constexpr std::size_t kLeastTriangles = 8;   // of the base, for each component
+constexpr double kLeastArea = 1e-6;          // of the diagonal squared; a wire a thousand times its thickness has 1e-3
 constexpr double kShortHandle = 2;           // patch sides: loops up to this are closed, when small parts go
 constexpr double kSmallComponent = 0.5;      // patch sides, of a component's diagonal
 constexpr unsigned kSampledLevels = 3;       // taken from the map; finer ones are halved from there
@@ -143,6 +144,10 @@ private:
         surface_ = std::move(*manifold);
         watch_.end("cleaning");
 
+        const double diagonal = bounds(surface_mesh(surface_, mesh_.origin).positions).diagonal();
+        if (!(area_of(surface_) > kLeastArea * diagonal * diagonal))
+            return Error{ErrorCode::unsuitable, "The mesh is all but a line: its area is too small for its length."};
+
         layout_.levels = options_.levels.value_or(1);
         if (!options_.levels)
             while (layout_.levels < kMostLevels && double(options_.quads) / std::pow(4.0, layout_.levels + 1) >= kEnoughPatches)
@@ -254,8 +259,9 @@ private:
             relax(grid, walk, kFineSweeps, context_);
         }
         watch_.end("relaxing");
-        untangle(grid, walk, kWantedJacobian, context_);
+        const Untangled untangled = untangle(grid, walk, kWantedJacobian, context_);
         watch_.end("untangling");
+        features_need_more_ = untangled.inverted > 0; // where there are any, they are the likeliest cause
         return gate(std::move(grid), surface);
     }
 

@@ -15,9 +15,13 @@ constexpr std::size_t kGrain = 512;
 constexpr double kGoodEnough = 0.5;  // scaled Jacobian: a move that leaves quads above this is always welcome
 constexpr double kOverRelaxation = 1.5; // of the way to the mean: half the sweeps do
 constexpr double kStill = 2e-3;      // of the mean edge length at a vertex: shorter moves are not worth their price
+constexpr int kShapeRounds = 6; // for quads that are poor; the rest for those about to turn over
 constexpr int kOnRounds = 24, kOffRounds = 96; // of untangling; nearly all end after a few
 constexpr int kTutteRings = 4, kTutteSweeps = 30;
+constexpr std::size_t kMostEvened = 200; // quads whose neighbourhoods are, for each size; more are not worth the time
 constexpr std::array<double, 4> kReaches = {0.5, 0.2, 1.0, 0.07}; // mean edge lengths at the vertex
+constexpr double kInverted = 1e-9;   // scaled Jacobian of quads that are not above zero
+constexpr double kHopeless = 0.002;  // of all quads inverted at the start: another base will do better, and sooner
 constexpr double kOffSurface = 0.02; // scaled Jacobian that points leave the surface for, when nothing else helps
 
 /// As a file will have it: what is judged is what is written. Through memory, as GCC 12 vectorises a cast to float and
@@ -299,17 +303,22 @@ Untangled untangle(PatchGrid& grid, const SurfaceWalk& walk, double least, const
         return vertices;
     };
     Untangled result;
+    result.inverted = bad_quads(kInverted).size();
+    if (double(result.inverted) > kHopeless * double(near.quads.size()) + 8) return result;
     for (int round = 0; round < kOnRounds && !context.is_cancelled(); ++round) {
-        const std::vector<Index> bad = bad_quads(least);
-        if (bad.empty()) return result;
+        context.report("untangling", double(round) / kOnRounds);
+        const std::vector<Index> bad = bad_quads(round < kShapeRounds ? least : kOffSurface);
+        if (bad.empty()) break;
         bool moved = false;
         const std::vector<Index> vertices = vertices_near(bad, round % 4 == 3 ? 2 : round % 2);
         for (const Index v : vertices) moved |= mover.search(v, round % 3 == 0 ? 0.6 : 0.25, false, round);
         if (!moved && round % 4 == 3) break;
     }
     // What single moves cannot undo: whole neighbourhoods evened out, as in a Tutte embedding, where that helps.
-    for (int rings = 1; rings <= kTutteRings && !context.is_cancelled(); ++rings)
-        for (const Index q : bad_quads(kOffSurface)) {
+    for (int rings = 1; rings <= kTutteRings; ++rings) {
+        const std::vector<Index> bad = bad_quads(kOffSurface);
+        for (const Index q : std::span(bad).first(std::min(bad.size(), kMostEvened))) {
+            if (context.is_cancelled()) return result;
             const std::vector<Index> vertices = vertices_near({q}, rings);
             const auto badness = [&] {
                 double sum = 0;
@@ -329,6 +338,7 @@ Untangled untangle(PatchGrid& grid, const SurfaceWalk& walk, double least, const
                 grid.positions[vertices[i]] = before[i].position;
             }
         }
+    }
     std::vector<std::uint8_t> off(grid.positions.size(), 0);
     for (int round = 0; round < kOffRounds && !context.is_cancelled(); ++round) {
         const std::vector<Index> bad = bad_quads(kOffSurface);
@@ -338,7 +348,7 @@ Untangled untangle(PatchGrid& grid, const SurfaceWalk& walk, double least, const
             if (mover.search(v, kReaches[round % 4], true, round)) off[v] = 1;
     }
     result.off_surface = static_cast<std::size_t>(std::count(off.begin(), off.end(), 1));
-    result.inverted = bad_quads(1e-9).size();
+    result.inverted = bad_quads(kInverted).size();
     return result;
 }
 

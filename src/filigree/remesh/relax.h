@@ -16,7 +16,7 @@ struct Untangled {
 };
 
 /// Searches around every quad whose scaled Jacobian is below `least` for better places: on the surface first, then, for
-/// those not above zero, off it. Cost O(bad quads).
+/// those not above zero, off it. Nothing is tried when too many are inverted from the start. Cost O(bad quads).
 Untangled untangle(PatchGrid& grid, const SurfaceWalk& walk, double least, const RunContext& context);
 
 } // namespace filigree
