@@ -87,6 +87,32 @@ TEST(FeatureCurves, LeaveNoiseOut) {
     EXPECT_GT(Prepared(creased_square(9), 25).curves.edge_count, 60u);
 }
 
+TEST(FeatureCurves, LeaveSpikesOut) {
+    // its edges close rings, so none has a free end; all together they are shorter than a patch's side
+    Mesh mesh = make_wavy_plane({.resolution = 32, .amplitude = 0});
+    mesh.positions[16 * 33 + 16].z() += 0.1f;
+    EXPECT_EQ(Prepared(mesh, 4).curves.edge_count, 0u);
+    EXPECT_GT(Prepared(mesh, 40'000).curves.edge_count, 0u);
+}
+
+TEST(FeatureCurves, LeaveShortSpursOut) {
+    Mesh mesh = creased_square(9);
+    for (Vec3f& p : mesh.positions)
+        p.z() += float(0.6 * std::abs(p.y()) * std::exp(-100 * p.y() * p.y() - 150 * p.x() * p.x()));
+    const auto spur_edges = [](const Prepared& on) {
+        std::size_t count = 0;
+        for (Index h = 0; h < on.twins.size(); ++h) {
+            const Vec3d &a = on.surface.positions[half_edge_start(on.surface.triangles, h)],
+                        &b = on.surface.positions[half_edge_end(on.surface.triangles, h)];
+            count += on.curves.half_edges[h] && a.y() == 0 && b.y() == 0;
+        }
+        return count;
+    };
+    EXPECT_EQ(spur_edges(Prepared(mesh, 25)), 0u);
+    EXPECT_GT(spur_edges(Prepared(mesh, 40'000)), 0u);
+    EXPECT_GT(Prepared(mesh, 25).curves.edge_count, 40u); // the ridge stays
+}
+
 TEST(FeatureCurves, TurnsAreCorners) {
     // the border of a square: its four corners and no others
     const Prepared square(make_wavy_plane({.resolution = 16, .amplitude = 0}));
