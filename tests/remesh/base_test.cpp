@@ -97,6 +97,18 @@ TEST(BaseTriangles, KeepEveryCorner) {
     }
 }
 
+TEST(BaseTriangles, KeepTheTopologyHoweverFewAreWanted) {
+    const Mesh ring = make_torus({.resolution = 12, .amplitude = 0, .thickness = 0.1}); // loops of few edges
+    for (const Mesh& mesh :
+         {ring, bumpy_torus(), ridged_sheet(), machined_part(), make_wavy_sphere({.resolution = 24})}) {
+        const Prepared on(mesh, 4, 180);
+        SurfaceMap map = on.map();
+        ASSERT_TRUE(make_base_triangles(map, {.triangles = 4}, kSingle).ok());
+        ASSERT_NO_FATAL_FAILURE(expect_sound(map, on));
+        EXPECT_LT(map.triangle_count(), 200u);
+    }
+}
+
 TEST(BaseTriangles, StandForAboutTheirOwnArea) {
     const Prepared on(make_wavy_sphere({.resolution = 48, .frequency = 3, .amplitude = 0.1}), 250);
     SurfaceMap map = on.map();
