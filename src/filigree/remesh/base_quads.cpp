@@ -14,7 +14,7 @@ namespace filigree {
 namespace {
 
 constexpr double kWideAngle = 0.75 * std::numbers::pi; // a sector this wide needs two quads: one would be near straight
-constexpr double kTipAngle = 1.6 * std::numbers::pi; // of a cone's triangles together: below it, its tip stays
+constexpr double kTipAngle = 1.6 * std::numbers::pi;   // of a cone's triangles together: below it, its tip stays
 constexpr double kConvex = 0.15; // sine of the unfolded quad's corners, below which it is laid out as a square instead
 
 double cross(const Vec2d& a, const Vec2d& b) { return a.x() * b.y() - a.y() * b.x(); }
@@ -70,7 +70,8 @@ private:
     /// Sectors of one triangle that should be two quads get a second one: the edge across is flipped, or split.
     void widen_sectors() {
         for (Index h = 0; h < 3 * map_.slot_count(); ++h) {
-            if (map_.is_removed(h / 3) || !map_.is_feature(h) || !map_.is_feature(SurfaceMap::previous(h)) || !needs_two(h))
+            if (map_.is_removed(h / 3) || !map_.is_feature(h) || !map_.is_feature(SurfaceMap::previous(h)) ||
+                !needs_two(h))
                 continue;
             const Index across = SurfaceMap::next(h);
             if (!map_.is_feature(across) && flips_well(across))
@@ -273,7 +274,8 @@ private:
             }
             if (star.ring.size() == 4) possible &= !map_.are_neighbours(v, star.ring[(target + 2) % 4]);
             for (const std::size_t beside : {star.next(target), (target + star.ring.size() - 1) % star.ring.size()})
-                possible &= map_.valence(star.ring[beside]) > (map_.kind(star.ring[beside]) == VertexKind::inside ? 3u : 2u);
+                possible &=
+                    map_.valence(star.ring[beside]) > (map_.kind(star.ring[beside]) == VertexKind::inside ? 3u : 2u);
             if (!possible) continue;
             map_.collapse(star, target);
             if (left.size() == 2) {
@@ -353,7 +355,8 @@ private:
         corner(1, SurfaceMap::next(g), 0);
         corner(1, SurfaceMap::previous(g), 1);
         // sides from a to d, d to b, b to c, c to a
-        add(quad, outline, {SurfaceMap::next(g), SurfaceMap::previous(g), SurfaceMap::next(h), SurfaceMap::previous(h)});
+        add(quad, outline,
+            {SurfaceMap::next(g), SurfaceMap::previous(g), SurfaceMap::next(h), SurfaceMap::previous(h)});
     }
 
     void add_triangle(Index s) {

@@ -21,7 +21,7 @@ struct BaseQuad {
 struct BaseQuads {
     std::vector<BaseQuad> quads;
     std::vector<VertexKind> kinds; ///< of the base's vertices
-    bool halved = false; ///< every patch was cut into four, a triangle without a partner into three
+    bool halved = false;           ///< every patch was cut into four, a triangle without a partner into three
 };
 
 /// Pairs the triangles (maximum weighted matching; shape and valence decide), after edge splits that give every region

@@ -11,19 +11,20 @@ namespace filigree {
 
 namespace {
 
-constexpr double kLengthWeight = 1e-3;        // of (edge length)^2 x area, beside the quadric: spreads vertices
-constexpr std::size_t kLargestStar = 60;      // triangles; records count corners in bytes, and cost grows with them
-constexpr double kFinestBefore = 3;           // triangles before the last decimation, at least, times those wanted
-constexpr double kLongestEdge = 1.6;          // before it, in edges of the wanted triangles were they equilateral
-constexpr std::size_t kMostRefined = 8;       // times those: where needles meet, splitting has to end
-// A star that is poor already may get this much poorer: where tiny triangles lie among large ones, each collapse but the
-// last leaves slivers. Without it the dragon's base stops at 7,100 triangles and comes to 1,562 through the last stages.
+constexpr double kLengthWeight = 1e-3;   // of (edge length)^2 x area, beside the quadric: spreads vertices
+constexpr std::size_t kLargestStar = 60; // triangles; records count corners in bytes, and cost grows with them
+constexpr double kFinestBefore = 3;      // triangles before the last decimation, at least, times those wanted
+constexpr double kLongestEdge = 1.6;     // before it, in edges of the wanted triangles were they equilateral
+constexpr std::size_t kMostRefined = 8;  // times those: where needles meet, splitting has to end
+// A star that is poor already may get this much poorer: where tiny triangles lie among large ones, each collapse but
+// the last leaves slivers. Without it the dragon's base stops at 7,100 triangles and comes to 1,562 through the last
+// stages.
 constexpr double kWorsening = 0.1;
-constexpr double kSmallDetail = 0.5;          // of a wanted triangle's area: what the area guard lets go
+constexpr double kSmallDetail = 0.5;                 // of a wanted triangle's area: what the area guard lets go
 constexpr double kNeedle = 0.1, kManyNeedles = 0.05; // shape, and the part of all triangles
 constexpr int kImprovingRounds = 8;
-constexpr double kRelocationBound = 0.005;    // of (star area)^2: how far a vertex may leave its quadric's planes
-constexpr double kPositive = 1e-5;            // area in the plane, of the star's radius squared
+constexpr double kRelocationBound = 0.005; // of (star area)^2: how far a vertex may leave its quadric's planes
+constexpr double kPositive = 1e-5;         // area in the plane, of the star's radius squared
 
 /// What a collapse must satisfy; each stage asks for less than the one before.
 struct Stage {
@@ -32,11 +33,8 @@ struct Stage {
     Index valence;
     double cover; ///< area guard: original area over new area
 };
-constexpr std::array<Stage, 5> kStages = {{{0.3, 0.5, 9, 1.3},
-                                           {0.2, 0.2, 10, 1.7},
-                                           {0.1, 0.0, 11, 2.6},
-                                           {0.03, -0.5, 13, 5.2},
-                                           {0.0, -1.1, 16, 1e30}}};
+constexpr std::array<Stage, 5> kStages = {
+    {{0.3, 0.5, 9, 1.3}, {0.2, 0.2, 10, 1.7}, {0.1, 0.0, 11, 2.6}, {0.03, -0.5, 13, 5.2}, {0.0, -1.1, 16, 1e30}}};
 
 struct Quadric {
     Eigen::Matrix<double, 6, 1> a = Eigen::Matrix<double, 6, 1>::Zero(); // xx xy xz yy yz zz
@@ -61,7 +59,8 @@ struct Quadric {
     }
     double at(const Vec3d& p) const {
         const double x = p.x(), y = p.y(), z = p.z();
-        const double quadratic = a[0] * x * x + a[3] * y * y + a[5] * z * z + 2 * (a[1] * x * y + a[2] * x * z + a[4] * y * z);
+        const double quadratic =
+            a[0] * x * x + a[3] * y * y + a[5] * z * z + 2 * (a[1] * x * y + a[2] * x * z + a[4] * y * z);
         return std::max(0.0, quadratic + 2 * b.dot(p) + c);
     }
 };
@@ -119,8 +118,8 @@ private:
         std::priority_queue<Long> queue;
         const auto push = [&](Index h) {
             if (!map_.is_border(h) && map_.twin(h) < h) h = map_.twin(h);
-            queue.push({(map_.position(map_.from(h)) - map_.position(map_.to(h))).squaredNorm(), map_.from(h),
-                        map_.to(h), h});
+            queue.push(
+                {(map_.position(map_.from(h)) - map_.position(map_.to(h))).squaredNorm(), map_.from(h), map_.to(h), h});
         };
         for (Index h = 0; h < 3 * map_.slot_count(); ++h)
             if (!map_.is_removed(h / 3) && (map_.is_border(h) || h < map_.twin(h))) push(h);
@@ -167,7 +166,9 @@ private:
     struct Candidate {
         double cost;
         Index from, to, stamp, rank;
-        bool operator>(const Candidate& other) const { return cost != other.cost ? cost > other.cost : from > other.from; }
+        bool operator>(const Candidate& other) const {
+            return cost != other.cost ? cost > other.cost : from > other.from;
+        }
     };
 
     void decimate(const Stage& stage, std::size_t target) {
@@ -185,8 +186,8 @@ private:
             queue_.pop();
             if (next.stamp != stamps_[next.from]) continue;
             map_.star(next.from, star_);
-            const std::size_t at = static_cast<std::size_t>(std::find(star_.ring.begin(), star_.ring.end(), next.to) -
-                                                            star_.ring.begin());
+            const std::size_t at =
+                static_cast<std::size_t>(std::find(star_.ring.begin(), star_.ring.end(), next.to) - star_.ring.begin());
             if (at == star_.ring.size() || !map_.flatten(star_)) continue;
             measure_star();
             if (!may_collapse(at)) {
@@ -221,8 +222,8 @@ private:
         const auto price = [&](std::size_t i) {
             const Index v = star_.ring[i];
             const Vec3d& p = map_.position(v);
-            const double cost = quadrics_[u].at(p) + quadrics_[v].at(p) +
-                                kLengthWeight * (p - map_.position(u)).squaredNorm() * area;
+            const double cost =
+                quadrics_[u].at(p) + quadrics_[v].at(p) + kLengthWeight * (p - map_.position(u)).squaredNorm() * area;
             costs_.push_back({cost, v});
         };
         if (map_.kind(u) == VertexKind::curve) {
@@ -296,7 +297,8 @@ private:
             // the sides of this triangle other than the edge that collapses
             const Index to_ring = SurfaceMap::next(arm);
             const Index at_centre = beside == triangle ? arm : SurfaceMap::previous(arm);
-            if (map_.is_feature(at_centre) && (map_.is_feature(to_ring) || map_.kind(star_.centre) != VertexKind::inside))
+            if (map_.is_feature(at_centre) &&
+                (map_.is_feature(to_ring) || map_.kind(star_.centre) != VertexKind::inside))
                 return false;
             const Index at_w = beside == triangle ? to_ring : SurfaceMap::previous(arm);
             const std::size_t left = map_.sector_size(at_w) - 1;
@@ -311,7 +313,8 @@ private:
             return left >= 1;
         };
         if (!last_open && !keeps(star_.next(target), target)) return false;
-        if (!first_open && !keeps(target > 0 ? target - 1 : n - 1, target > 0 ? target - 1 : star_.triangle_count() - 1))
+        if (!first_open &&
+            !keeps(target > 0 ? target - 1 : n - 1, target > 0 ? target - 1 : star_.triangle_count() - 1))
             return false;
         return true;
     }
@@ -349,7 +352,8 @@ private:
             const double off = double(map_.valence(v)) + change - 6;
             return off * off + (off <= -2 ? 4 : 0); // 4 or fewer make poor quads
         }
-        if (map_.sector_size(h) >= SurfaceMap::kMostCounted) return 0; // whatever it is, less is better: no collapse adds
+        if (map_.sector_size(h) >= SurfaceMap::kMostCounted)
+            return 0; // whatever it is, less is better: no collapse adds
         const int size = static_cast<int>(map_.sector_size(h)) + change;
         const double off = size - (map_.kind(v) == VertexKind::curve ? 3.0 : wanted_at_corner(h));
         const int least = map_.kind(v) == VertexKind::curve ? 2 : 1; // quads beside a curve need two
@@ -420,10 +424,12 @@ private:
         const Vec3d &a = map_.position(map_.from(h)), &b = map_.position(map_.to(h));
         const Index at_c = SurfaceMap::previous(h), at_d = SurfaceMap::previous(g);
         const Vec3d &c = map_.position(map_.from(at_c)), &d = map_.position(map_.from(at_d));
-        const double before = std::min(shape(a, b, c), shape(b, a, d)), after = std::min(shape(c, a, d), shape(d, b, c));
+        const double before = std::min(shape(a, b, c), shape(b, a, d)),
+                     after = std::min(shape(c, a, d), shape(d, b, c));
         if (after < std::min(0.45, before)) return false;
-        const double gain = valence_price(h, 0) + valence_price(g, 0) + valence_price(at_c, 0) + valence_price(at_d, 0) -
-                            valence_price(h, -1) - valence_price(g, -1) - valence_price(at_c, 1) - valence_price(at_d, 1);
+        const double gain = valence_price(h, 0) + valence_price(g, 0) + valence_price(at_c, 0) +
+                            valence_price(at_d, 0) - valence_price(h, -1) - valence_price(g, -1) -
+                            valence_price(at_c, 1) - valence_price(at_d, 1);
         if (gain + 4 * (after - before) <= 0.5) return false;
         return can_flip(h);
     }

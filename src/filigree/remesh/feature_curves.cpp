@@ -13,11 +13,11 @@ namespace {
 
 constexpr double kCornerTurn = 45 * std::numbers::pi / 180; // between chords of kCornerReach
 constexpr double kCornerReach = 0.25;                       // patch sides, to either side of a vertex
-// Noise makes short curves that are hardly sharp. In patch sides, for chains with a free end and for closed ones: what is
-// too short in any case, and from where on a curve need not be clearly sharp.
+// Noise makes short curves that are hardly sharp. In patch sides, for chains with a free end and for closed ones: what
+// is too short in any case, and from where on a curve need not be clearly sharp.
 constexpr double kShortestChain = 1, kLongChain = 3;
 constexpr double kShortestLoop = 0.5, kLongLoop = 3;
-constexpr double kSmallNetwork = 1.5; // patch sides, of all its edges together
+constexpr double kSmallNetwork = 1.5;                         // patch sides, of all its edges together
 constexpr double kClearlySharp = 20 * std::numbers::pi / 180; // beyond the asked angle, on average along the curve
 
 struct Curves {
@@ -137,7 +137,8 @@ void prune(const ManifoldSurface& surface, std::span<const Index> twins, const F
         for (Index h = 0; h < marked.size(); ++h) {
             if (marked[h] == 0) continue;
             const Index a = half_edge_start(surface.triangles, h), b = half_edge_end(surface.triangles, h);
-            if (gone[a] || gone[b] || std::binary_search(single.begin(), single.end(), std::pair<Index, Index>(std::minmax(a, b)))) {
+            if (gone[a] || gone[b] ||
+                std::binary_search(single.begin(), single.end(), std::pair<Index, Index>(std::minmax(a, b)))) {
                 marked[h] = 0;
                 changed = true;
             }
@@ -158,7 +159,8 @@ void drop_small_networks(const ManifoldSurface& surface, double patch_side, std:
     for (Index h = 0; h < marked.size(); ++h)
         if (marked[h] > 0) {
             const auto [a, b] = ends(h);
-            length[networks.root(a)] += 0.5 * (surface.positions[a] - surface.positions[b]).norm(); // met from both sides
+            length[networks.root(a)] +=
+                0.5 * (surface.positions[a] - surface.positions[b]).norm(); // met from both sides
         }
     for (Index h = 0; h < marked.size(); ++h)
         if (marked[h] > 0 && length[networks.root(ends(h).first)] < kSmallNetwork * patch_side) marked[h] = 0;
@@ -227,7 +229,8 @@ FeatureCurves find_feature_curves(const ManifoldSurface& surface, std::span<cons
             if (twins[h] == kNoIndex) continue;
             const Vec3d &n = normals[h / 3], &m = normals[twins[h] / 3];
             // a triangle without an area has no normal, and its edges are not sharp
-            const double angle = n.squaredNorm() > 0 && m.squaredNorm() > 0 ? std::atan2(n.cross(m).norm(), n.dot(m)) : 0;
+            const double angle =
+                n.squaredNorm() > 0 && m.squaredNorm() > 0 ? std::atan2(n.cross(m).norm(), n.dot(m)) : 0;
             if (angle > least) angles[h] = static_cast<float>(angle);
         }
     prune(surface, twins, options, angles);

@@ -8,8 +8,8 @@
 namespace filigree {
 
 struct FeatureOptions {
-    double angle_deg = 40;  ///< between the normals of an edge's two triangles
-    double patch_side = 0;  ///< model units: curves are judged at this scale
+    double angle_deg = 40; ///< between the normals of an edge's two triangles
+    double patch_side = 0; ///< model units: curves are judged at this scale
 };
 
 struct FeatureCurves {

@@ -67,7 +67,8 @@ std::vector<Index> repeated_polygons(const Mesh& mesh, std::span<const Index> we
     std::sort(keys.begin(), keys.end());
     std::vector<Index> repeated;
     for (std::size_t i = 0; i < keys.size(); ++i)
-        if ((i > 0 && keys[i - 1].first == keys[i].first) || (i + 1 < keys.size() && keys[i + 1].first == keys[i].first))
+        if ((i > 0 && keys[i - 1].first == keys[i].first) ||
+            (i + 1 < keys.size() && keys[i + 1].first == keys[i].first))
             repeated.push_back(keys[i].second);
     return repeated;
 }

@@ -11,7 +11,7 @@ namespace filigree {
 namespace {
 
 constexpr std::uint32_t kNone = 0xffffffff; // kNoIndex
-constexpr std::int64_t kUnit = 4096; // of a weight's 0 to 1: whole numbers keep the algorithm exact
+constexpr std::int64_t kUnit = 4096;        // of a weight's 0 to 1: whole numbers keep the algorithm exact
 
 } // namespace
 

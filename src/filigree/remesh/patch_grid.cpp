@@ -183,7 +183,8 @@ PatchGrid halve_grid(const PatchGrid& coarse, const SurfaceWalk& walk, const Run
                     if (!mine[at]) continue;
                     const Index v = grid.patches.grid[at];
                     const Index a = coarse.patches.at(p, i / 2, j / 2);
-                    const Index b = coarse.patches.at(p, (i + 1) / 2, j / 2), c = coarse.patches.at(p, i / 2, (j + 1) / 2);
+                    const Index b = coarse.patches.at(p, (i + 1) / 2, j / 2),
+                                c = coarse.patches.at(p, i / 2, (j + 1) / 2);
                     const Index d = coarse.patches.at(p, (i + 1) / 2, (j + 1) / 2);
                     if (i % 2 == 0 && j % 2 == 0) {
                         grid.positions[v] = coarse.positions[a];
@@ -191,8 +192,8 @@ PatchGrid halve_grid(const PatchGrid& coarse, const SurfaceWalk& walk, const Run
                         grid.kinds[v] = coarse.kinds[a];
                         continue;
                     }
-                    const Vec3d middle = 0.25 * (coarse.positions[a] + coarse.positions[b] + coarse.positions[c] +
-                                                 coarse.positions[d]);
+                    const Vec3d middle =
+                        0.25 * (coarse.positions[a] + coarse.positions[b] + coarse.positions[c] + coarse.positions[d]);
                     const bool straight = i % 2 == 0 || j % 2 == 0; // between a and d, which then is b or c
                     const std::array<bool, 4>& sides_kept = coarse.features[p];
                     const bool on_curve = straight && ((j == 0 && sides_kept[0]) || (i == fine && sides_kept[1]) ||

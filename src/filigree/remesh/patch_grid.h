@@ -10,7 +10,8 @@ namespace filigree {
 /// Vertices are numbered corners first, then side by side, then patch by patch.
 struct PatchGrid {
     RegularPatches patches;
-    std::vector<std::array<bool, 4>> features; ///< of each patch: whether the side from base vertex k to k + 1 is a curve
+    std::vector<std::array<bool, 4>>
+        features; ///< of each patch: whether the side from base vertex k to k + 1 is a curve
     std::vector<Vec3d> positions;
     std::vector<TrianglePoint> source; ///< on the original surface; kept in step with positions while points stay on it
     std::vector<VertexKind> kinds;

@@ -21,17 +21,17 @@ namespace {
 
 constexpr unsigned kMostLevels = 8;
 constexpr std::size_t kFewestQuads = 6, kMostQuads = 100'000'000; // each takes some 200 bytes on the way
-constexpr double kEnoughPatches = 500;       // levels that were not asked for leave about so many, or more
-constexpr double kMostOverdrawn = 1.3;       // quads over those asked for
-constexpr std::size_t kLeastTriangles = 8;   // of the base, for each component
-constexpr double kLeastArea = 1e-6;          // of the diagonal squared; a wire a thousand times its thickness has 1e-3
-constexpr double kShortHandle = 2;           // patch sides: loops up to this are closed, when small parts go
-constexpr double kSmallComponent = 0.5;      // patch sides, of a component's diagonal
-constexpr unsigned kSampledLevels = 3;       // taken from the map; finer ones are halved from there
+constexpr double kEnoughPatches = 500;     // levels that were not asked for leave about so many, or more
+constexpr double kMostOverdrawn = 1.3;     // quads over those asked for
+constexpr std::size_t kLeastTriangles = 8; // of the base, for each component
+constexpr double kLeastArea = 1e-6;        // of the diagonal squared; a wire a thousand times its thickness has 1e-3
+constexpr double kShortHandle = 2;         // patch sides: loops up to this are closed, when small parts go
+constexpr double kSmallComponent = 0.5;    // patch sides, of a component's diagonal
+constexpr unsigned kSampledLevels = 3;     // taken from the map; finer ones are halved from there
 constexpr unsigned kCoarseSweeps = 20, kFineSweeps = 4;
-constexpr double kWantedJacobian = 0.2;      // below it, places are searched
+constexpr double kWantedJacobian = 0.2; // below it, places are searched
 constexpr std::size_t kDistanceSamples = 100'000;
-constexpr double kVoxelsPerQuad = 0.7;       // along a quad's side, of the wrap
+constexpr double kVoxelsPerQuad = 0.7; // along a quad's side, of the wrap
 
 class Stopwatch {
 public:
@@ -132,7 +132,8 @@ private:
 
     Status prepare() {
         const auto fail = [](std::string message) { return Error{ErrorCode::usage, std::move(message)}; };
-        if (options_.quads < kFewestQuads || options_.quads > kMostQuads) return fail("Ask for 6 to 100,000,000 quads.");
+        if (options_.quads < kFewestQuads || options_.quads > kMostQuads)
+            return fail("Ask for 6 to 100,000,000 quads.");
         if (options_.levels && (*options_.levels < 1 || *options_.levels > kMostLevels))
             return fail("Levels are 1 to " + std::to_string(kMostLevels) + ".");
         if (!(options_.feature_angle_deg >= 0 && options_.feature_angle_deg <= 180))
@@ -150,14 +151,16 @@ private:
 
         layout_.levels = options_.levels.value_or(1);
         if (!options_.levels)
-            while (layout_.levels < kMostLevels && double(options_.quads) / std::pow(4.0, layout_.levels + 1) >= kEnoughPatches)
+            while (layout_.levels < kMostLevels &&
+                   double(options_.quads) / std::pow(4.0, layout_.levels + 1) >= kEnoughPatches)
                 ++layout_.levels;
         layout_.patches = patches_for(options_.quads, layout_.levels);
         if (options_.small_parts == SmallParts::remove) {
             context_.report("small parts", 0);
             remove_small_components(surface_, kSmallComponent * patch_side(), report().clean);
             if (surface_topology(surface_).genus() > 0)
-                if (Status closed = close_handles(surface_, kShortHandle * patch_side(), report().clean, context_); !closed)
+                if (Status closed = close_handles(surface_, kShortHandle * patch_side(), report().clean, context_);
+                    !closed)
                     return closed;
             watch_.end("small parts");
         }
@@ -173,16 +176,20 @@ private:
     /// Many parts need many patches: fewer levels where that is ours to choose, else a refusal.
     Status make_room() {
         const std::size_t least = kLeastTriangles / 2 * report().input.components;
-        while (layout_.patches < least && !options_.levels && layout_.levels > 1) --layout_.levels, layout_.patches *= 4;
+        while (layout_.patches < least && !options_.levels && layout_.levels > 1)
+            --layout_.levels, layout_.patches *= 4;
         if (layout_.patches >= least) return Success{};
         const std::size_t parts = report().input.components;
         const std::string need = counted(least << (2 * layout_.levels), layout_.levels);
-        if (parts == 1) return Error{ErrorCode::unsuitable, "The mesh needs at least " + need + "; ask for more quads."};
-        return Error{ErrorCode::unsuitable, "The mesh has " + std::to_string(parts) + " separate parts, which need at least " +
-                                                need + "; ask for more quads, or take small parts away."};
+        if (parts == 1)
+            return Error{ErrorCode::unsuitable, "The mesh needs at least " + need + "; ask for more quads."};
+        return Error{ErrorCode::unsuitable, "The mesh has " + std::to_string(parts) +
+                                                " separate parts, which need at least " + need +
+                                                "; ask for more quads, or take small parts away."};
     }
 
-    /// The surface itself, with what may help when it fails: features let go where they need too much, more patches, both.
+    /// The surface itself, with what may help when it fails: features let go where they need too much, more patches,
+    /// both.
     std::string try_own_surface() {
         Layout layout = layout_;
         double angle = options_.feature_angle_deg;
@@ -353,7 +360,8 @@ private:
                 lost.push_back(v);
         }
         if (lost.empty()) return;
-        const std::vector<Triangle>& corners = surface_.source_corners; // the cleaned input has its own, but for fillings
+        const std::vector<Triangle>& corners =
+            surface_.source_corners; // the cleaned input has its own, but for fillings
         std::vector<Triangle> triangles;
         std::vector<Index> ids;
         for (Index t = 0; t < corners.size(); ++t)
@@ -377,7 +385,7 @@ private:
     Mesh cleaned_; ///< surface_ as a mesh: what distances are measured from
     Layout layout_;
     bool features_need_more_ = false; ///< what the last try failed by
-    std::optional<Error> error_; ///< what no other try can mend: cancelled, no memory
+    std::optional<Error> error_;      ///< what no other try can mend: cancelled, no memory
 
     std::vector<TrianglePoint> source_;
     const ManifoldSurface* source_surface_ = nullptr; ///< what source_ lies on

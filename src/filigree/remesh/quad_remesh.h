@@ -25,11 +25,12 @@ enum class WrapUse {
 };
 
 struct QuadRemeshOptions {
-    std::size_t quads = 50'000; ///< about how many, 6 to 100 million; smooth surfaces meet it within 2 %, features add some
+    std::size_t quads =
+        50'000; ///< about how many, 6 to 100 million; smooth surfaces meet it within 2 %, features add some
     /// How often each patch is halved, 1 to 8. Unset: as many as leave about 700 patches or more.
     std::optional<unsigned> levels = {};
-    /// Edges whose faces meet at more than this angle stay edges, degrees, 0 to 180; 180 keeps none (open borders always
-    /// stay).
+    /// Edges whose faces meet at more than this angle stay edges, degrees, 0 to 180; 180 keeps none (open borders
+    /// always stay).
     double feature_angle_deg = 40;
     SmallParts small_parts = SmallParts::remove;
     WrapUse wrap = WrapUse::automatic;

@@ -12,15 +12,15 @@ namespace filigree {
 namespace {
 
 constexpr std::size_t kGrain = 512;
-constexpr double kGoodEnough = 0.5;  // scaled Jacobian: a move that leaves quads above this is always welcome
+constexpr double kGoodEnough = 0.5;     // scaled Jacobian: a move that leaves quads above this is always welcome
 constexpr double kOverRelaxation = 1.5; // of the way to the mean: half the sweeps do
-constexpr double kStill = 2e-3;      // of the mean edge length at a vertex: shorter moves are not worth their price
-constexpr int kShapeRounds = 6; // for quads that are poor; the rest for those about to turn over
+constexpr double kStill = 2e-3;         // of the mean edge length at a vertex: shorter moves are not worth their price
+constexpr int kShapeRounds = 6;         // for quads that are poor; the rest for those about to turn over
 constexpr int kOnRounds = 24, kOffRounds = 96; // of untangling; nearly all end after a few
 constexpr int kTutteRings = 4, kTutteSweeps = 30;
 constexpr std::size_t kMostEvened = 200; // quads whose neighbourhoods are, for each size; more are not worth the time
 constexpr std::array<double, 4> kReaches = {0.5, 0.2, 1.0, 0.07}; // mean edge lengths at the vertex
-constexpr double kInverted = 1e-9;   // scaled Jacobian of quads that are not above zero
+constexpr double kInverted = 1e-9;                                // scaled Jacobian of quads that are not above zero
 constexpr double kHopeless = 0.002;  // of all quads inverted at the start: another base will do better, and sooner
 constexpr double kOffSurface = 0.02; // scaled Jacobian that points leave the surface for, when nothing else helps
 
@@ -90,7 +90,8 @@ struct Neighbourhoods {
 /// One vertex and its quads, with the vertex tried elsewhere.
 class Mover {
 public:
-    Mover(PatchGrid& grid, const SurfaceWalk& walk, const Neighbourhoods& near) : grid_(grid), walk_(walk), near_(near) {}
+    Mover(PatchGrid& grid, const SurfaceWalk& walk, const Neighbourhoods& near)
+        : grid_(grid), walk_(walk), near_(near) {}
 
     void relax_vertex(Index v) {
         if (grid_.kinds[v] == VertexKind::corner) return;
@@ -119,7 +120,8 @@ public:
         SurfaceWalk::Place found;
         bool moved = false;
         const auto attempt = [&](const Vec3d& towards) {
-            SurfaceWalk::Place place = off_surface ? SurfaceWalk::Place{grid_.source[v], rounded(towards)} : move(v, towards);
+            SurfaceWalk::Place place =
+                off_surface ? SurfaceWalk::Place{grid_.source[v], rounded(towards)} : move(v, towards);
             if (off_surface) place.point = walk_.walk(grid_.source[v], towards).point;
             const double value = badness(v, place.position);
             if (value >= best - 1e-9) return;
@@ -142,7 +144,8 @@ public:
                 for (const double sign : {-1.0, 1.0}) {
                     attempt(here + sign * step * edge * normal);
                     const double angle = 2.4 * round; // the golden angle: every round looks elsewhere
-                    attempt(here + sign * step * edge * (normal + std::cos(angle) * x + std::sin(angle) * y).normalized());
+                    attempt(here +
+                            sign * step * edge * (normal + std::cos(angle) * x + std::sin(angle) * y).normalized());
                 }
         if (moved) accept(v, found);
         return moved;
@@ -168,8 +171,8 @@ public:
         return least;
     }
 
-    /// What the quads at the vertex lack, the worst by far the most. A sum, so that the whole mesh's can only fall, and so
-    /// that a quad with several things wrong can be mended one at a time.
+    /// What the quads at the vertex lack, the worst by far the most. A sum, so that the whole mesh's can only fall, and
+    /// so that a quad with several things wrong can be mended one at a time.
     double badness(Index v, const Vec3d& place) const {
         double sum = 0;
         for (const Index q : near_.around(v)) {
@@ -200,8 +203,6 @@ private:
         grid_.positions[v] = place.position;
         grid_.source[v] = place.point;
     }
-
-
 
     /// Where the neighbours would have it; on a curve, between the two along it.
     Vec3d mean_target(Index v, double& edge) const {
@@ -307,7 +308,7 @@ Untangled untangle(PatchGrid& grid, const SurfaceWalk& walk, double least, const
     if (double(result.inverted) > kHopeless * double(near.quads.size()) + 8) return result;
     for (int round = 0; round < kOnRounds && !context.is_cancelled(); ++round) {
         context.report("untangling", double(round) / kOnRounds);
-        const std::vector<Index> bad = bad_quads(round < kShapeRounds ? least : kOffSurface);
+        const std::vector<Index> bad = bad_quads(round < kShapeRounds ? least : 0.5 * least);
         if (bad.empty()) break;
         bool moved = false;
         const std::vector<Index> vertices = vertices_near(bad, round % 4 == 3 ? 2 : round % 2);

@@ -11,7 +11,7 @@ namespace filigree {
 void relax(PatchGrid& grid, const SurfaceWalk& walk, unsigned sweeps, const RunContext& context);
 
 struct Untangled {
-    std::size_t inverted = 0;   ///< quads left whose scaled Jacobian is not above zero
+    std::size_t inverted = 0;    ///< quads left whose scaled Jacobian is not above zero
     std::size_t off_surface = 0; ///< vertices that had to leave the surface
 };
 

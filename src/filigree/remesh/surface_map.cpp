@@ -1,5 +1,6 @@
 // Based on: [Lee 1998] (MAPS: a parametrisation kept through vertex removals). Where we differ: half-edge collapses,
-// flips, relocations and splits all make one kind of record, and feature curves are straight lines in every one of them.
+// flips, relocations and splits all make one kind of record, and feature curves are straight lines in every one of
+// them.
 #include "filigree/remesh/surface_map.h"
 
 #include <algorithm>
@@ -10,10 +11,10 @@ namespace filigree {
 
 namespace {
 
-constexpr double kSmallestAngle = 1e-3;                    // radians; needles get at least so much of the turn
-constexpr double kLargestAngle = 0.92 * std::numbers::pi;  // no triangle takes half a turn
-constexpr double kSmallestRadius = 1e-3;                   // of the largest in a star
-constexpr double kSmallestHeight = 1e-3;                   // of an edge's length, when it is unfolded
+constexpr double kSmallestAngle = 1e-3;                   // radians; needles get at least so much of the turn
+constexpr double kLargestAngle = 0.92 * std::numbers::pi; // no triangle takes half a turn
+constexpr double kSmallestRadius = 1e-3;                  // of the largest in a star
+constexpr double kSmallestHeight = 1e-3;                  // of an edge's length, when it is unfolded
 
 double cross(const Vec2f& a, const Vec2f& b) { return double(a.x()) * b.y() - double(a.y()) * b.x(); }
 double doubled_area(const Vec2f& a, const Vec2f& b, const Vec2f& c) { return cross(b - a, c - a); }
@@ -40,8 +41,7 @@ void scale_angles(std::span<double> angles, double turn) {
 } // namespace
 
 SurfaceMap::SurfaceMap(const ManifoldSurface& surface, std::span<const Index> twins,
-                       std::span<const std::uint8_t> feature,
-                       std::span<const std::uint8_t> corner)
+                       std::span<const std::uint8_t> feature, std::span<const std::uint8_t> corner)
     : surface_(surface), positions_(surface.positions), triangles_(surface.triangles),
       twin_(twins.begin(), twins.end()), feature_(feature.begin(), feature.end()),
       triangle_count_(surface.triangles.size()) {
@@ -70,8 +70,7 @@ SurfaceMap::SurfaceMap(const ManifoldSurface& surface, std::span<const Index> tw
         }
     }
     for (Index v = 0; v < positions_.size(); ++v)
-        if (curve_edges[v] != 0)
-            kind_[v] = curve_edges[v] == 2 && !corner[v] ? VertexKind::curve : VertexKind::corner;
+        if (curve_edges[v] != 0) kind_[v] = curve_edges[v] == 2 && !corner[v] ? VertexKind::curve : VertexKind::corner;
 }
 
 Vec3d SurfaceMap::normal(Index slot) const {
@@ -219,8 +218,7 @@ void SurfaceMap::record_star(const Star& star) {
     const std::size_t first = records_.back().points;
     std::copy(star.flat.begin(), star.flat.end(), points_.begin() + std::ptrdiff_t(first));
     points_[first + star.ring.size()] = Vec2f::Zero();
-    for (std::size_t i = 0; i < star.triangle_count(); ++i)
-        add_old(star.half_edges[i] / 3, star_corners(star, i));
+    for (std::size_t i = 0; i < star.triangle_count(); ++i) add_old(star.half_edges[i] / 3, star_corners(star, i));
 }
 
 void SurfaceMap::link(Index a, Index b, bool feature) {
@@ -261,7 +259,8 @@ void SurfaceMap::collapse(const Star& star, std::size_t target) {
         local[h % 3] = static_cast<std::uint8_t>(target);
         add_new(slot, local);
         slots.push_back(slot);
-        areas.push_back(doubled_area(points_[points + local[0]], points_[points + local[1]], points_[points + local[2]]));
+        areas.push_back(
+            doubled_area(points_[points + local[0]], points_[points + local[1]], points_[points + local[2]]));
         triangles_[slot][h % 3] = v;
     }
     hand_on_area(slots, areas, covered);
@@ -483,7 +482,7 @@ Index SurfaceMap::split(Index half_edge, double share) {
         add_new(fresh, corners(fresh));
         return 3 * fresh; // m to y
     };
-    const Index first = half_edge; // now a to m
+    const Index first = half_edge;                // now a to m
     const Index second = halve(half_edge, share); // m to b
     if (other == kNoIndex) {
         link(first, kNoIndex, true);

@@ -2,6 +2,7 @@
 // changed, every point of it knows its place on the surface it began as.
 #pragma once
 
+#include "filigree/remesh/half_edges.h"
 #include "filigree/remesh/manifold_surface.h"
 
 #include <cstdint>
@@ -45,8 +46,9 @@ struct Star {
 /// any chain of them. Memory: about 200 bytes a change.
 class SurfaceMap {
 public:
-    /// twins: opposite_half_edges of the surface, which must outlive the map. feature: 3 F, whether a half-edge's edge must stay an edge (alike on twins; borders always do).
-    /// corner: V, whether a vertex must stay; vertices with other than none or two feature edges are made corners.
+    /// twins: opposite_half_edges of the surface, which must outlive the map. feature: 3 F, whether a half-edge's edge
+    /// must stay an edge (alike on twins; borders always do). corner: V, whether a vertex must stay; vertices with
+    /// other than none or two feature edges are made corners.
     SurfaceMap(const ManifoldSurface& surface, std::span<const Index> twins, std::span<const std::uint8_t> feature,
                std::span<const std::uint8_t> corner);
 
@@ -64,8 +66,8 @@ public:
     bool is_feature(Index half_edge) const { return feature_[half_edge] != 0; } ///< borders too
     Index from(Index half_edge) const { return triangles_[half_edge / 3][half_edge % 3]; }
     Index to(Index half_edge) const { return from(next(half_edge)); }
-    static Index next(Index half_edge) { return half_edge % 3 == 2 ? half_edge - 2 : half_edge + 1; }
-    static Index previous(Index half_edge) { return half_edge % 3 == 0 ? half_edge + 2 : half_edge - 1; }
+    static Index next(Index half_edge) { return next_half_edge(half_edge); }
+    static Index previous(Index half_edge) { return previous_half_edge(half_edge); }
     /// A half-edge that leaves the vertex; on borders the first, counter-clockwise.
     Index out(Index vertex) const { return out_[vertex]; }
     double area(Index slot) const;
@@ -80,9 +82,9 @@ public:
     std::size_t sector_size(Index half_edge) const;
 
     void star(Index vertex, Star& star) const;
-    /// Lays the star out: distances to the centre as they are, angles scaled to a full turn, to half a turn on each side
-    /// of a curve, so that the curve is straight. False when it cannot be (a curve with a single triangle at its side).
-    /// Not for corners.
+    /// Lays the star out: distances to the centre as they are, angles scaled to a full turn, to half a turn on each
+    /// side of a curve, so that the curve is straight. False when it cannot be (a curve with a single triangle at its
+    /// side). Not for corners.
     bool flatten(Star& star) const;
 
     /// Moves everything at the star's centre to ring[target]. Needs: the link condition, a flat star, and that in the

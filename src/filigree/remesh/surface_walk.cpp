@@ -62,7 +62,8 @@ Vec3d SurfaceWalk::normal(const TrianglePoint& point) const {
 SurfaceWalk::Place SurfaceWalk::walk(const TrianglePoint& start, const Vec3d& target) const {
     const auto closest = [&](Index t) {
         const Triangle& v = surface_.triangles[t];
-        return closest_on_triangle(target, surface_.positions[v[0]], surface_.positions[v[1]], surface_.positions[v[2]]);
+        return closest_on_triangle(target, surface_.positions[v[0]], surface_.positions[v[1]],
+                                   surface_.positions[v[2]]);
     };
     Index triangle = start.triangle;
     Closest best = closest(triangle);

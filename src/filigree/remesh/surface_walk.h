@@ -5,8 +5,8 @@
 
 namespace filigree {
 
-/// Steps from triangle to triangle downhill in distance, so that a point never jumps to another sheet that happens to be
-/// near. Features and borders are not crossed. Views: everything must outlive it. Safe from many threads at once.
+/// Steps from triangle to triangle downhill in distance, so that a point never jumps to another sheet that happens to
+/// be near. Features and borders are not crossed. Views: everything must outlive it. Safe from many threads at once.
 class SurfaceWalk {
 public:
     /// twins, features (borders too): of the surface's half-edges; kinds: of its vertices.
