@@ -33,6 +33,7 @@ std::vector<Counted> clean_counts(const CleanReport& clean) {
             {"duplicate_faces", clean.duplicate_faces, "duplicate faces"},
             {"flipped_faces", clean.flipped_faces, "faces turned"},
             {"cut_edges", clean.cut_edges, "edges cut"},
+            {"separated_edges", clean.separated_edges, "edges where bodies touched came apart"},
             {"split_vertices", clean.split_vertices, "vertices split"},
             {"removed_components", clean.removed_components, "small components removed"},
             {"closed_handles", clean.closed_handles, "small handles closed"},
@@ -208,7 +209,7 @@ void add_remesh_options(CLI::App& command, const std::shared_ptr<Options>& optio
     command.add_option("--quads", remesh.quads, "About how many")->check(whole_number(1))->capture_default_str();
     command
         .add_option("--levels", remesh.levels,
-                    "How often each patch is halved, 1 to 8 (unset: as leaves about 700 patches or more)")
+                    "How often each patch is halved, 1 to 8 (unset: as leaves 500 patches or more)")
         ->check(CLI::Range(1, 8));
     command
         .add_option("--feature-angle", remesh.feature_angle_deg,

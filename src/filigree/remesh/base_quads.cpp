@@ -131,7 +131,8 @@ private:
         for (const Index r : region)
             if (r != kNoIndex) odd[r] ^= 1;
         if (std::none_of(odd.begin(), odd.end(), [](auto o) { return o != 0; })) return;
-        // for each pair of neighbouring regions, the longest edge between them
+        // for each pair of neighbouring regions, the longest edge between them; by its ends, as a split before may give
+        // it another half-edge
         std::unordered_map<std::uint64_t, Index> between;
         const auto length = [&](Index h) {
             return (map_.position(map_.from(h)) - map_.position(map_.to(h))).squaredNorm();
@@ -152,18 +153,19 @@ private:
         }
         for (auto& list : neighbours) std::sort(list.begin(), list.end());
         std::vector<std::pair<Index, Index>> crossed;
+        std::vector<Index> before(count + 1), reached(count + 1, kNoIndex); // from which start a region was reached
         for (Index start = 0; start < count; ++start) {
             if (!odd[start]) continue;
-            std::vector<Index> before(count + 1, kNoIndex);
             std::queue<Index> front;
             front.push(start);
-            before[start] = start;
+            reached[start] = start;
             Index end = kNoIndex;
             while (!front.empty() && end == kNoIndex) {
                 const Index at = front.front();
                 front.pop();
                 for (const Index r : neighbours[at]) {
-                    if (before[r] != kNoIndex) continue;
+                    if (reached[r] == start) continue;
+                    reached[r] = start;
                     before[r] = at;
                     if (r == outside || odd[r]) {
                         end = r;
@@ -177,14 +179,32 @@ private:
             if (end != outside) odd[end] = 0;
             for (Index r = end; r != start; r = before[r]) crossed.push_back(std::minmax(r, before[r]));
         }
+        std::unordered_map<std::uint64_t, std::pair<Index, Index>> ends;
+        for (const auto& [k, h] : between) ends[k] = {map_.from(h), map_.to(h)};
         // two chains over the same border cancel each other
         std::sort(crossed.begin(), crossed.end());
         for (std::size_t i = 0; i < crossed.size();) {
             std::size_t j = i;
             while (j < crossed.size() && crossed[j] == crossed[i]) ++j;
-            if ((j - i) % 2 == 1) map_.split(between.at(key(crossed[i].first, crossed[i].second)));
+            if ((j - i) % 2 == 1) {
+                const auto [from, to] = ends.at(key(crossed[i].first, crossed[i].second));
+                if (const Index h = find_edge(from, to); h != kNoIndex) map_.split(h);
+            }
             i = j;
         }
+    }
+
+    /// A half-edge between the two, in either direction.
+    Index find_edge(Index from, Index to) const {
+        Index h = map_.out(from);
+        do {
+            if (map_.to(h) == to) return h;
+            const Index p = SurfaceMap::previous(h);
+            if (map_.from(p) == to) return p;
+            if (map_.is_border(p)) return kNoIndex;
+            h = map_.twin(p);
+        } while (h != map_.out(from));
+        return kNoIndex;
     }
 
     // --- matching

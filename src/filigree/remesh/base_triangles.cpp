@@ -387,7 +387,7 @@ private:
     void flip_edges(int passes) {
         for (int pass = 0; pass < passes && !context_.is_cancelled(); ++pass) {
             std::size_t flips = 0;
-            for (Index h = 0; h < 3 * map_.slot_count(); ++h)
+            for (Index h = 0; h < 3 * map_.slot_count() && !(h % 65536 == 0 && context_.is_cancelled()); ++h)
                 if (!map_.is_removed(h / 3) && !map_.is_feature(h) && h < map_.twin(h) && should_flip(h)) {
                     map_.flip(h);
                     ++flips;

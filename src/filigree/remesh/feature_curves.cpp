@@ -12,6 +12,7 @@ namespace filigree {
 namespace {
 
 constexpr double kCornerTurn = 45 * std::numbers::pi / 180; // between chords of kCornerReach
+constexpr int kMostSteps = 512;                             // along a curve, however densely its vertices lie
 constexpr double kCornerReach = 0.25;                       // patch sides, to either side of a vertex
 // Noise makes short curves that are hardly sharp. In patch sides, for chains with a free end and for closed ones: what
 // is too short in any case, and from where on a curve need not be clearly sharp.
@@ -28,6 +29,7 @@ struct Curves {
     std::size_t degree(Index v) const { return offsets[v + 1] - offsets[v]; }
     double length(Index a, Index b) const { return (surface.positions[a] - surface.positions[b]).norm(); }
     double angle(Index from, Index to) const {
+        if (degree(to) < degree(from)) std::swap(from, to); // the ends of spokes know them sooner than the hub
         Index i = offsets[from];
         while (neighbours[i] != to) ++i;
         return angles[i];
@@ -170,7 +172,7 @@ void drop_small_networks(const ManifoldSurface& surface, double patch_side, std:
 Vec3d chord(const Curves& curves, Index from, Index first, double reach) {
     Index before = from, at = first;
     double gone = curves.length(from, first);
-    while (gone < reach && curves.degree(at) == 2 && at != from) {
+    for (int i = 0; i < kMostSteps && gone < reach && curves.degree(at) == 2 && at != from; ++i) {
         const Index onward = curves.onward(at, before);
         gone += curves.length(at, onward);
         before = at;
@@ -197,7 +199,7 @@ std::vector<std::uint8_t> find_corners(const Curves& curves, double reach) {
         for (Index i = curves.offsets[v]; i < curves.offsets[v + 1] && largest; ++i) {
             Index before = v, at = curves.neighbours[i];
             double gone = curves.length(v, at);
-            while (gone < reach && curves.degree(at) == 2 && at != v && largest) {
+            for (int k = 0; k < kMostSteps && gone < reach && curves.degree(at) == 2 && at != v && largest; ++k) {
                 largest = turn[at] < turn[v] || (turn[at] == turn[v] && at > v);
                 const Index onward = curves.onward(at, before);
                 gone += curves.length(at, onward);

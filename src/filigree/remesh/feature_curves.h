@@ -18,7 +18,8 @@ struct FeatureCurves {
     std::size_t edge_count = 0;
 };
 
-/// Edges sharper than the angle, without those that noise makes: chains shorter than a patch's side with a free end.
+/// Edges sharper than the angle, without those that noise makes: short loose chains, small loops,
+/// networks that are small all together.
 /// twins: of the surface's half-edges. Cost O(F).
 FeatureCurves find_feature_curves(const ManifoldSurface& surface, std::span<const Index> twins,
                                   const FeatureOptions& options);

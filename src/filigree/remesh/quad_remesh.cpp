@@ -1,9 +1,9 @@
 // Based on: [Lee 1998] (the parametrisation), and docs/remesh.md, which says where we differ and what was measured.
 #include "filigree/remesh/quad_remesh.h"
 
+#include "filigree/core/parallel_for.h"
 #include "filigree/mesh/closest_point.h"
 #include "filigree/mesh/mesh_distance.h"
-#include "filigree/mesh/triangulate.h"
 #include "filigree/remesh/base_triangles.h"
 #include "filigree/remesh/feature_curves.h"
 #include "filigree/remesh/half_edges.h"
@@ -21,13 +21,15 @@ namespace {
 
 constexpr unsigned kMostLevels = 8;
 constexpr std::size_t kFewestQuads = 6, kMostQuads = 100'000'000; // each takes some 200 bytes on the way
-constexpr double kEnoughPatches = 500;     // levels that were not asked for leave about so many, or more
-constexpr double kMostOverdrawn = 1.3;     // quads over those asked for
-constexpr std::size_t kLeastTriangles = 8; // of the base, for each component
-constexpr double kLeastArea = 1e-6;        // of the diagonal squared; a wire a thousand times its thickness has 1e-3
-constexpr double kShortHandle = 2;         // patch sides: loops up to this are closed, when small parts go
-constexpr double kSmallComponent = 0.5;    // patch sides, of a component's diagonal
-constexpr unsigned kSampledLevels = 3;     // taken from the map; finer ones are halved from there
+constexpr double kEnoughPatches = 500;          // levels that were not asked for leave about so many, or more
+constexpr double kMostOverdrawn = 1.3;          // quads over those asked for
+constexpr std::size_t kLeastTriangles = 8;      // of the base, for each component
+constexpr std::size_t kMostPatches = 4'000'000; // indices are 32 bits, and a base is refined before it is decimated
+constexpr double kMostRemoved = 0.05;           // of the area, by small parts
+constexpr double kLeastArea = 1e-6;     // of the diagonal squared; a wire a thousand times its thickness has 1e-3
+constexpr double kShortHandle = 2;      // patch sides: loops up to this are closed, when small parts go
+constexpr double kSmallComponent = 0.5; // patch sides, of a component's diagonal
+constexpr unsigned kSampledLevels = 3;  // taken from the map; finer ones are halved from there
 constexpr unsigned kCoarseSweeps = 20, kFineSweeps = 4;
 constexpr double kWantedJacobian = 0.2; // below it, places are searched
 constexpr std::size_t kDistanceSamples = 100'000;
@@ -110,10 +112,15 @@ public:
     Result<QuadRemeshed> run() {
         if (Status prepared = prepare(); !prepared) return prepared.error();
         std::string reason;
-        if (options_.wrap != WrapUse::always) reason = try_own_surface();
+        if (options_.wrap != WrapUse::always) reason = make_room();
+        if (options_.wrap != WrapUse::always && reason.empty()) reason = try_own_surface();
         if (options_.wrap == WrapUse::always || (options_.wrap == WrapUse::automatic && worth_another_try(reason))) {
             if (!reason.empty()) retry(reason);
-            reason = try_wrap();
+            const std::string wrap_reason = try_wrap();
+            if (wrap_reason.empty() || options_.wrap == WrapUse::always)
+                reason = wrap_reason;
+            else
+                reason += " (A wrap around it failed as well: " + wrap_reason + ")";
         }
         if (error_) return *error_;
         if (!reason.empty()) return Error{ErrorCode::unsuitable, reason};
@@ -157,7 +164,7 @@ private:
         layout_.patches = patches_for(options_.quads, layout_.levels);
         if (options_.small_parts == SmallParts::remove) {
             context_.report("small parts", 0);
-            remove_small_components(surface_, kSmallComponent * patch_side(), report().clean);
+            remove_small_parts();
             if (surface_topology(surface_).genus() > 0)
                 if (Status closed = close_handles(surface_, kShortHandle * patch_side(), report().clean, context_);
                     !closed)
@@ -168,24 +175,35 @@ private:
         cleaned_ = surface_mesh(surface_, mesh_.origin);
         report().diagonal = bounds(cleaned_.positions).diagonal();
         report().max_distance = options_.max_distance.value_or(patch_side() / report().diagonal);
-        return make_room();
+        return Success{};
+    }
+
+    /// Where most of a mesh is small parts, they are the mesh, and stay.
+    void remove_small_parts() {
+        ManifoldSurface rest = surface_;
+        CleanReport clean = report().clean;
+        remove_small_components(rest, kSmallComponent * patch_side(), clean);
+        if (clean.removed_area > kMostRemoved) return;
+        surface_ = std::move(rest);
+        report().clean = clean;
     }
 
     double patch_side() const { return std::sqrt(area_of(surface_) / double(layout_.patches)); }
 
-    /// Many parts need many patches: fewer levels where that is ours to choose, else a refusal.
-    Status make_room() {
+    /// Many parts need many patches: fewer levels where that is ours to choose, else the reason why it cannot be.
+    std::string make_room() {
         const std::size_t least = kLeastTriangles / 2 * report().input.components;
         while (layout_.patches < least && !options_.levels && layout_.levels > 1)
             --layout_.levels, layout_.patches *= 4;
-        if (layout_.patches >= least) return Success{};
+        if (layout_.patches > kMostPatches)
+            return "Those are " + std::to_string(layout_.patches) + " patches, more than " +
+                   std::to_string(kMostPatches) + "; ask for fewer quads or more levels.";
+        if (layout_.patches >= least) return "";
         const std::size_t parts = report().input.components;
         const std::string need = counted(least << (2 * layout_.levels), layout_.levels);
-        if (parts == 1)
-            return Error{ErrorCode::unsuitable, "The mesh needs at least " + need + "; ask for more quads."};
-        return Error{ErrorCode::unsuitable, "The mesh has " + std::to_string(parts) +
-                                                " separate parts, which need at least " + need +
-                                                "; ask for more quads, or take small parts away."};
+        if (parts == 1) return "The mesh needs at least " + need + "; ask for more quads.";
+        return "The mesh has " + std::to_string(parts) + " separate parts, which need at least " + need +
+               "; ask for more quads, or for a wrap around them.";
     }
 
     /// The surface itself, with what may help when it fails: features let go where they need too much, more patches,
@@ -221,12 +239,15 @@ private:
         }
         report().wrapped = true;
         wrapped_ = std::move(*wrapped);
-        remove_small_components(wrapped_, kSmallComponent * patch_side(), report().clean);
-        if (Status closed = close_handles(wrapped_, kShortHandle * patch_side(), report().clean, context_); !closed) {
-            error_ = closed.error();
-            return error_->message;
+        if (options_.small_parts == SmallParts::remove) {
+            CleanReport of_the_wrap; // says nothing about the mesh
+            remove_small_components(wrapped_, kSmallComponent * patch_side(), of_the_wrap);
+            if (Status closed = close_handles(wrapped_, kShortHandle * patch_side(), of_the_wrap, context_); !closed) {
+                error_ = closed.error();
+                return error_->message;
+            }
         }
-        report().input = surface_topology(wrapped_);
+        watch_.end("small parts");
         return try_surface(wrapped_, layout_, 180);
     }
 
@@ -237,7 +258,7 @@ private:
         report().feature_edges = curves.edge_count;
         watch_.end("features");
         const auto corners = static_cast<std::size_t>(std::ranges::count(curves.corners, 1));
-        features_need_more_ = corners > layout.patches;
+        features_need_more_ = curves.edge_count > 0 && corners > layout.patches;
         if (features_need_more_)
             return "The mesh's sharp edges have " + std::to_string(corners) + " corners, too many for " +
                    std::to_string(layout.patches) + " patches; ask for more quads, or keep fewer features.";
@@ -326,7 +347,7 @@ private:
         if (report().quality.inverted > 0)
             return std::to_string(report().quality.inverted) + " of " + std::to_string(report().quality.quads) +
                    " quads came out inverted; ask for more quads, or fewer levels.";
-        const SurfaceTopology &in = report().input, &out = report().output;
+        const SurfaceTopology in = surface_topology(surface), &out = report().output;
         if (in.euler != out.euler || in.components != out.components || in.border_loops != out.border_loops)
             return "The quads' topology is not the mesh's (Euler number " + std::to_string(out.euler) + " instead of " +
                    std::to_string(in.euler) + "); please report this.";
@@ -369,11 +390,15 @@ private:
                 triangles.push_back(surface_.triangles[t]);
                 ids.push_back(t);
             }
-        const ClosestPointTree tree(cleaned_.positions, triangles);
-        for (const std::size_t v : lost) {
-            const SurfacePoint closest = tree.closest(result_.mesh.positions[v]);
-            result_.source[v] = {corners[ids[closest.triangle]], closest.barycentric};
-        }
+        context_.arena().execute([&] {
+            const ClosestPointTree tree(cleaned_.positions, triangles);
+            parallel_for(context_, lost.size(), 256, [&](std::size_t begin, std::size_t end) {
+                for (std::size_t i = begin; i < end; ++i) {
+                    const SurfacePoint closest = tree.closest(result_.mesh.positions[lost[i]]);
+                    result_.source[lost[i]] = {corners[ids[closest.triangle]], closest.barycentric};
+                }
+            });
+        });
     }
 
     const Mesh& mesh_;

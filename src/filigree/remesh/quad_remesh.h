@@ -27,14 +27,15 @@ enum class WrapUse {
 struct QuadRemeshOptions {
     std::size_t quads =
         50'000; ///< about how many, 6 to 100 million; smooth surfaces meet it within 2 %, features add some
-    /// How often each patch is halved, 1 to 8. Unset: as many as leave about 700 patches or more.
+    /// How often each patch is halved, 1 to 8. Unset: as many as leave 500 patches or more.
     std::optional<unsigned> levels = {};
     /// Edges whose faces meet at more than this angle stay edges, degrees, 0 to 180; 180 keeps none (open borders
     /// always stay).
     double feature_angle_deg = 40;
     SmallParts small_parts = SmallParts::remove;
     WrapUse wrap = WrapUse::automatic;
-    /// The gate's limit on both distances, fraction of the diagonal. Unset: one patch's side.
+    /// The gate's limit on both distances, fraction of the diagonal. Unset: one patch's side, of the layout
+    /// asked for.
     std::optional<double> max_distance = {};
     bool attributes = true; ///< carry UVs, colours, normals, labels and scalars over
 };

@@ -117,6 +117,7 @@ public:
         double edge = 0;
         const Vec3d target = mean_target(v, edge);
         double best = badness(v, here);
+        const bool was_good = worst(v, here) > 0; // then no quad may be folded over to look better
         SurfaceWalk::Place found;
         bool moved = false;
         const auto attempt = [&](const Vec3d& towards) {
@@ -124,7 +125,7 @@ public:
                 off_surface ? SurfaceWalk::Place{grid_.source[v], rounded(towards)} : move(v, towards);
             if (off_surface) place.point = walk_.walk(grid_.source[v], towards).point;
             const double value = badness(v, place.position);
-            if (value >= best - 1e-9) return;
+            if (value >= best - 1e-9 || (was_good && is_turned(v, place.position))) return;
             best = value;
             found = place;
             moved = true;
@@ -312,7 +313,10 @@ Untangled untangle(PatchGrid& grid, const SurfaceWalk& walk, double least, const
         if (bad.empty()) break;
         bool moved = false;
         const std::vector<Index> vertices = vertices_near(bad, round % 4 == 3 ? 2 : round % 2);
-        for (const Index v : vertices) moved |= mover.search(v, round % 3 == 0 ? 0.6 : 0.25, false, round);
+        for (const Index v : vertices) {
+            if (context.is_cancelled()) return result;
+            moved |= mover.search(v, round % 3 == 0 ? 0.6 : 0.25, false, round);
+        }
         if (!moved && round % 4 == 3) break;
     }
     // What single moves cannot undo: whole neighbourhoods evened out, as in a Tutte embedding, where that helps.
@@ -343,7 +347,6 @@ Untangled untangle(PatchGrid& grid, const SurfaceWalk& walk, double least, const
     std::vector<std::uint8_t> off(grid.positions.size(), 0);
     for (int round = 0; round < kOffRounds && !context.is_cancelled(); ++round) {
         const std::vector<Index> bad = bad_quads(kOffSurface);
-        result.inverted = bad.size();
         if (bad.empty()) break;
         for (const Index v : vertices_near(bad, round / 12))
             if (mover.search(v, kReaches[round % 4], true, round)) off[v] = 1;

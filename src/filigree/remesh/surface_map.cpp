@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace filigree {
@@ -364,9 +365,9 @@ SurfaceMap::Unfolded SurfaceMap::unfold(Index half_edge) const {
         const Vec3d arm = positions_[from(previous(half))] - origin;
         const double x = arm.dot(direction);
         const double y = std::max((arm - x * direction).norm(), kSmallestHeight * length);
-        return Vec2d(x, sign * y).cast<float>().eval();
+        return Vec2d(x / length, sign * y / length).cast<float>().eval();
     };
-    return {Vec2d(length, 0).cast<float>(), place(half_edge, 1),
+    return {Vec2f(1, 0), place(half_edge, 1),
             is_border(half_edge) ? Vec2f::Zero().eval() : place(twin_[half_edge], -1)};
 }
 
@@ -508,6 +509,8 @@ TrianglePoint SurfaceMap::trace(const TrianglePoint& point) const {
         const Vec2d p = b[0] * points[now.local[0]].cast<double>() + b[1] * points[now.local[1]].cast<double>() +
                         b[2] * points[now.local[2]].cast<double>();
         double best = -std::numeric_limits<double>::infinity();
+        face = old_faces_[record.old_faces].face; // if no number means anything, at least this ends
+        b.setConstant(1.0 / 3);
         for (std::size_t i = 0; i < record.old_count && best < 0; ++i) {
             const OldFace& old = old_faces_[record.old_faces + i];
             const Vec2d x = points[old.local[0]].cast<double>() - p, y = points[old.local[1]].cast<double>() - p,

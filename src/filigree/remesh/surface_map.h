@@ -95,8 +95,8 @@ public:
     void relocate(const Star& star, const Vec2f& place);
     /// Where relocate would put the centre.
     TrianglePoint locate(const Star& star, const Vec2f& place) const;
-    /// The two triangles of an edge unfolded: from at zero, to at (length, 0), the half-edge's own opposite corner
-    /// above, the twin's below.
+    /// The two triangles of an edge unfolded, in edge lengths: from at zero, to at (1, 0), the half-edge's own opposite
+    /// corner above, the twin's below.
     struct Unfolded {
         Vec2f to, above, below;
     };

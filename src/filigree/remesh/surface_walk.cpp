@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace filigree {
 
@@ -120,8 +121,12 @@ Index SurfaceWalk::curve_at(const TrianglePoint& point) const {
         const Index p = SurfaceMap::previous(h);
         if (features_[p]) return p;
         h = twins_[p];
-        if (h == first) return kNoIndex;
+        if (h == first) break;
     }
+    // further off than rounding explains: the triangle's own, if it has one
+    for (Index h = 3 * point.triangle; h < 3 * point.triangle + 3; ++h)
+        if (features_[h]) return h;
+    return kNoIndex;
 }
 
 /// The next feature half-edge of the same curve, from where this one ends; kNoIndex at a corner.
