@@ -47,24 +47,10 @@ private:
             if (!map_.is_removed(h / 3)) act(h);
     }
 
-    double sector_angle(Index half_edge) const {
-        double angle = 0;
-        Index h = half_edge;
-        while (!map_.is_feature(h)) h = SurfaceMap::next(map_.twin(h));
-        for (;;) {
-            const Vec3d& p = map_.position(map_.from(h));
-            const Vec3d a = map_.position(map_.to(h)) - p;
-            const Vec3d b = map_.position(map_.from(SurfaceMap::previous(h))) - p;
-            angle += std::atan2(a.cross(b).norm(), a.dot(b));
-            if (map_.is_feature(SurfaceMap::previous(h))) return angle;
-            h = map_.twin(SurfaceMap::previous(h));
-        }
-    }
-
     bool needs_two(Index half_edge) const {
         const VertexKind kind = map_.kind(map_.from(half_edge));
         if (kind == VertexKind::inside) return false;
-        return kind == VertexKind::curve || sector_angle(half_edge) > kWideAngle;
+        return kind == VertexKind::curve || map_.sector_angle(half_edge) > kWideAngle;
     }
 
     /// Sectors of one triangle that should be two quads get a second one: the edge across is flipped, or split.
@@ -228,7 +214,7 @@ private:
         }
         const double size = double(map_.sector_size(h));
         if (size <= 2 && needs_two(h)) return -10;
-        const double wanted = std::max(1.0, std::round(sector_angle(h) / (std::numbers::pi / 2)));
+        const double wanted = std::max(1.0, std::round(map_.sector_angle(h) / (std::numbers::pi / 2)));
         return size > wanted ? 0.4 : -0.8;
     }
 
@@ -335,9 +321,7 @@ private:
         double angle = 0;
         Index h = map_.out(v);
         do {
-            const Vec3d& p = map_.position(v);
-            const Vec3d a = map_.position(map_.to(h)) - p, b = map_.position(map_.from(SurfaceMap::previous(h))) - p;
-            angle += std::atan2(a.cross(b).norm(), a.dot(b));
+            angle += map_.corner_angle(h);
             h = map_.twin(SurfaceMap::previous(h));
         } while (h != map_.out(v));
         return angle < kTipAngle;

@@ -361,17 +361,7 @@ private:
     }
 
     double wanted_at_corner(Index half_edge) const {
-        double angle = 0;
-        Index h = half_edge;
-        while (!map_.is_feature(h)) h = SurfaceMap::next(map_.twin(h));
-        for (;;) {
-            const Vec3d& p = map_.position(map_.from(h));
-            const Vec3d a = map_.position(map_.to(h)) - p, b = map_.position(map_.from(SurfaceMap::previous(h))) - p;
-            angle += std::atan2(a.cross(b).norm(), a.dot(b));
-            if (map_.is_feature(SurfaceMap::previous(h))) break;
-            h = map_.twin(SurfaceMap::previous(h));
-        }
-        return std::max(1.0, std::round(angle / (std::numbers::pi / 3)));
+        return std::max(1.0, std::round(map_.sector_angle(half_edge) / (std::numbers::pi / 3)));
     }
 
     /// Whether many triangles are needles, as in tessellated parts: flips first, as no collapse would pass its tests.

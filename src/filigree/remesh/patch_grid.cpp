@@ -81,6 +81,17 @@ void for_each_on_side(const RegularPatches& patches, std::size_t p, std::size_t 
                      : patches.at(p, 0, n - i));
 }
 
+/// For each place of the grids, whether its vertex is there for the first time: vertices that patches share, the first
+/// `shared`, are made by the first patch that has them.
+std::vector<std::uint8_t> first_uses(const RegularPatches& patches, std::size_t shared) {
+    std::vector<std::uint8_t> taken(shared, 0), first(patches.grid.size(), 1);
+    for (std::size_t i = 0; i < first.size(); ++i) {
+        const Index v = patches.grid[i];
+        if (v < shared) first[i] = !std::exchange(taken[v], 1);
+    }
+    return first;
+}
+
 /// Kinds and neighbours of the vertices on curves, from the patches' sides.
 void mark_curves(PatchGrid& grid) {
     grid.along.assign(grid.kinds.size(), {kNoIndex, kNoIndex});
@@ -130,13 +141,7 @@ PatchGrid sample_patches(const SurfaceMap& map, const BaseQuads& base, const Sur
     grid.source.resize(count);
     grid.kinds.assign(count, VertexKind::inside);
 
-    // Shared vertices are sampled by the first patch that has them.
-    std::vector<std::uint8_t> taken(base.kinds.size() + sides.count * inner, 0);
-    std::vector<std::uint8_t> mine(grid.patches.grid.size(), 1);
-    for (std::size_t i = 0; i < mine.size(); ++i) {
-        const Index v = grid.patches.grid[i];
-        if (v < taken.size()) mine[i] = !std::exchange(taken[v], 1);
-    }
+    const std::vector<std::uint8_t> mine = first_uses(grid.patches, base.kinds.size() + sides.count * inner);
     parallel_for(context, corners.size(), 8, [&](std::size_t begin, std::size_t end) {
         for (std::size_t p = begin; p < end; ++p)
             for (std::size_t j = 0; j <= n; ++j)
@@ -168,13 +173,7 @@ PatchGrid halve_grid(const PatchGrid& coarse, const SurfaceWalk& walk, const Run
     grid.source.resize(count);
     grid.kinds.assign(count, VertexKind::inside);
     grid.features = coarse.features;
-    // Shared vertices come out alike from both patches but for the place they start from, so the first patch decides.
-    std::vector<std::uint8_t> taken(corners + sides.count * inner, 0);
-    std::vector<std::uint8_t> mine(grid.patches.grid.size(), 1);
-    for (std::size_t i = 0; i < mine.size(); ++i) {
-        const Index v = grid.patches.grid[i];
-        if (v < taken.size()) mine[i] = !std::exchange(taken[v], 1);
-    }
+    const std::vector<std::uint8_t> mine = first_uses(grid.patches, corners + sides.count * inner);
     parallel_for(context, coarse.patches.patch_count(), 8, [&](std::size_t begin, std::size_t end) {
         for (std::size_t p = begin; p < end; ++p)
             for (std::size_t j = 0; j <= fine; ++j)

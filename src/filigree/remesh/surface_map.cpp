@@ -110,6 +110,23 @@ std::size_t SurfaceMap::sector_size(Index half_edge) const {
     return size;
 }
 
+double SurfaceMap::corner_angle(Index half_edge) const {
+    const Vec3d& p = positions_[from(half_edge)];
+    const Vec3d a = positions_[to(half_edge)] - p, b = positions_[from(previous(half_edge))] - p;
+    return std::atan2(a.cross(b).norm(), a.dot(b));
+}
+
+double SurfaceMap::sector_angle(Index half_edge) const {
+    Index h = half_edge;
+    while (!is_feature(h)) h = next(twin_[h]);
+    double angle = corner_angle(h);
+    while (!is_feature(previous(h))) {
+        h = twin_[previous(h)];
+        angle += corner_angle(h);
+    }
+    return angle;
+}
+
 void SurfaceMap::star(Index vertex, Star& star) const {
     star.centre = vertex;
     star.open = false;

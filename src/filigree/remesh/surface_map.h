@@ -81,6 +81,11 @@ public:
     static constexpr std::size_t kMostCounted = 64;
     std::size_t sector_size(Index half_edge) const;
 
+    /// The angle of a half-edge's triangle where it starts, radians.
+    double corner_angle(Index half_edge) const;
+    /// The sum of those between two feature edges, this one's among them. Needs a feature at the half-edge's start.
+    double sector_angle(Index half_edge) const;
+
     void star(Index vertex, Star& star) const;
     /// Lays the star out: distances to the centre as they are, angles scaled to a full turn, to half a turn on each
     /// side of a curve, so that the curve is straight. False when it cannot be (a curve with a single triangle at its

@@ -26,7 +26,6 @@ public:
     Vec3d position(const TrianglePoint& point) const;
     /// Unit normal of the point's triangle; zero where it has no area.
     Vec3d normal(const TrianglePoint& point) const;
-    const ManifoldSurface& surface() const { return surface_; }
 
 private:
     Index from(Index h) const { return surface_.triangles[h / 3][h % 3]; }
