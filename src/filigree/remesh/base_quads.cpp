@@ -367,7 +367,7 @@ private:
         BaseQuad quad;
         quad.slots = {s, kNoIndex};
         const std::array<Vec2d, 3> outline = {Vec2d(0, 0), Vec2d(1, 0), Vec2d(0.5, 0.866)};
-        quad.corners[0] = outline;
+        quad.corners.fill(outline);
         const std::array<Index, 3> sides = {3 * s, 3 * s + 1, 3 * s + 2};
         add(quad, outline, sides);
     }

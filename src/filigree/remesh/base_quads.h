@@ -8,11 +8,11 @@ namespace filigree {
 
 /// A patch over one or two triangles, laid out in a plane of its own.
 struct BaseQuad {
-    std::array<Index, 4> vertices;               ///< of the base, counter-clockwise
-    std::array<Vec2d, 4> places;                 ///< of those, in the plane
-    std::array<Index, 2> slots;                  ///< the triangles; the second kNoIndex when there is one
-    std::array<std::array<Vec2d, 3>, 2> corners; ///< the triangles' corners in the plane
-    std::array<bool, 4> features;                ///< whether the side from vertex i to i + 1 must stay
+    std::array<Index, 4> vertices = {};                ///< of the base, counter-clockwise
+    std::array<Vec2d, 4> places;                       ///< of those, in the plane
+    std::array<Index, 2> slots = {kNoIndex, kNoIndex}; ///< the triangles; the second kNoIndex when there is one
+    std::array<std::array<Vec2d, 3>, 2> corners;       ///< the triangles' corners in the plane
+    std::array<bool, 4> features = {};                 ///< whether the side from vertex i to i + 1 must stay
 
     /// The point (s, t) of the patch, 0 to 1: vertices 0 to 3 are at (0, 0), (1, 0), (1, 1), (0, 1).
     TrianglePoint at(double s, double t) const;
