@@ -112,9 +112,13 @@ public:
     Result<QuadRemeshed> run() {
         if (Status prepared = prepare(); !prepared) return prepared.error();
         std::string reason;
-        if (options_.wrap != WrapUse::always) reason = make_room();
-        if (options_.wrap != WrapUse::always && reason.empty()) reason = try_own_surface();
-        if (options_.wrap == WrapUse::always || (options_.wrap == WrapUse::automatic && worth_another_try(reason))) {
+        if (options_.wrap != WrapUse::always) reason = make_room(report().input.components);
+        const bool has_room = reason.empty();
+        if (options_.wrap != WrapUse::always && has_room) reason = try_own_surface();
+        // a wrap joins parts that lie close: not what it takes to keep them
+        const bool may_wrap =
+            options_.wrap == WrapUse::automatic && (has_room || options_.small_parts == SmallParts::remove);
+        if (options_.wrap == WrapUse::always || (may_wrap && worth_another_try(reason))) {
             if (!reason.empty()) retry(reason);
             const std::string wrap_reason = try_wrap();
             if (wrap_reason.empty() || options_.wrap == WrapUse::always)
@@ -191,15 +195,14 @@ private:
     double patch_side() const { return std::sqrt(area_of(surface_) / double(layout_.patches)); }
 
     /// Many parts need many patches: fewer levels where that is ours to choose, else the reason why it cannot be.
-    std::string make_room() {
-        const std::size_t least = kLeastTriangles / 2 * report().input.components;
+    std::string make_room(std::size_t parts) {
+        const std::size_t least = kLeastTriangles / 2 * parts;
         while (layout_.patches < least && !options_.levels && layout_.levels > 1)
             --layout_.levels, layout_.patches *= 4;
         if (layout_.patches > kMostPatches)
             return "Those are " + std::to_string(layout_.patches) + " patches, more than " +
                    std::to_string(kMostPatches) + "; ask for fewer quads or more levels.";
         if (layout_.patches >= least) return "";
-        const std::size_t parts = report().input.components;
         const std::string need = counted(least << (2 * layout_.levels), layout_.levels);
         if (parts == 1) return "The mesh needs at least " + need + "; ask for more quads.";
         return "The mesh has " + std::to_string(parts) + " separate parts, which need at least " + need +
@@ -248,6 +251,7 @@ private:
             }
         }
         watch_.end("small parts");
+        if (const std::string reason = make_room(surface_topology(wrapped_).components); !reason.empty()) return reason;
         return try_surface(wrapped_, layout_, 180);
     }
 
