@@ -4,6 +4,8 @@
 
 #include "session.h"
 
+#include "filigree/core/srgb.h"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -30,12 +32,7 @@ Vec3f color_of_hue(double hue) {
     const Vec3d linear(4.0767416621 * l - 3.3077115913 * m + 0.2309699292 * s,
                        -1.2684380046 * l + 2.6097574011 * m - 0.3413193965 * s,
                        -0.0041960863 * l - 0.7034186147 * m + 1.7076147010 * s);
-    return linear
-        .unaryExpr([](double x) {
-            x = std::clamp(x, 0.0, 1.0);
-            return x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1 / 2.4) - 0.055;
-        })
-        .cast<float>();
+    return linear.unaryExpr([](double x) { return srgb_from_linear(x); }).cast<float>();
 }
 
 /// How far two hues are from each other, 0 to 0.5.
