@@ -38,7 +38,7 @@ const GpuRestorer& restorer_of(unsigned resolution, Precision precision) {
     std::vector<Index> vertices(scene.model.mesh.vertex_count());
     std::iota(vertices.begin(), vertices.end(), Index{0});
     scene.restorer.emplace(GpuRestorer::create(scene.model, vertices, normals, {}, context).value());
-    Pose pose{driver_positions(scene.model), {}, {}};
+    Pose pose = rest_pose(scene.model);
     for (Vec3f& p : pose.positions) p.z() += 0.3f * p.x() * p.x();
     scene.restorer->set_pose(pose, context).value();
     return *scene.restorer;

@@ -52,7 +52,7 @@ double seconds(auto&& body) {
 void BM_restore_grids(benchmark::State& state) {
     const Cube& c = cube(static_cast<unsigned>(state.range(0)), static_cast<unsigned>(state.range(3)));
     const RunContext context(static_cast<unsigned>(state.range(1)));
-    const ReferenceRestorer restorer(c.detail, static_cast<Law>(state.range(2)), context);
+    const ReferenceRestorer restorer(c.detail, static_cast<HeightLaw>(state.range(2)), context);
     const std::size_t side = c.detail.patches.side() + 1;
     std::vector<Vec3f> grids(c.detail.patches.patch_count() * side * side);
     double best = 1e9, best_triad = 1e9;
@@ -75,7 +75,7 @@ void BM_restore_grids(benchmark::State& state) {
     state.counters["bytes/s"] = rate;
     state.counters["of_triad"] = rate / triad_rate;
     state.SetLabel(std::to_string(c.vertices) + " vertices, " +
-                   std::string(law_name(static_cast<Law>(state.range(2)))));
+                   std::string(height_law_name(static_cast<HeightLaw>(state.range(2)))));
 }
 BENCHMARK(BM_restore_grids)
     ->ArgNames({"resolution", "threads", "law", "references"})

@@ -42,7 +42,7 @@ Drawable& drawable_of(unsigned level, RestoreOn where) {
 Pose next_pose() {
     static float more = 0;
     more = more > 0.5f ? 0 : more + 0.01f;
-    Pose pose{driver_positions(model), {}, {}};
+    Pose pose = rest_pose(model);
     const Box box = bounds(pose.positions);
     const auto size = static_cast<float>(box.diagonal());
     for (Vec3f& p : pose.positions) p.z() += more * p.x() * p.x() / size;

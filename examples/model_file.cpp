@@ -19,7 +19,7 @@ int main() {
 
     const Model read = read_model("sphere.fil", context).value();
     const auto restore_at_rest = [&](const Model& m) {
-        return Restorer::create(m, {}, context).value().positions({driver_positions(m), {}, {}}, context).value();
+        return Restorer::create(m, {}, context).value().positions(rest_pose(m), context).value();
     };
     const bool is_same = restore_at_rest(read) == restore_at_rest(model);
 

@@ -26,8 +26,8 @@ int main() {
     // The levels are found again from the mesh alone.
     const Model model = strip(quads.mesh, {.code = DetailCode::reference}, context).value().model;
     std::printf("%u levels below the finest\n", model.finest_level());
-    const Restorer restorer = Restorer::create(model, {.law = Law::inverse}, context).value();
-    const std::vector<Vec3f> restored = restorer.positions(Pose{driver_positions(model), {}, {}}, context).value();
+    const Restorer restorer = Restorer::create(model, {.law = HeightLaw::inverse}, context).value();
+    const std::vector<Vec3f> restored = restorer.positions(rest_pose(model), context).value();
     float error = 0;
     for (std::size_t v = 0; v < restored.size(); ++v)
         error = std::max(error, (restored[v] - quads.mesh.positions[v]).norm());

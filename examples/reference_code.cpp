@@ -29,15 +29,15 @@ int main() {
         std::printf("level %u: %zu vertices\n", k, level_mesh(model, k).vertex_count());
 
     // At rest the cube comes back, to float's rounding.
-    const Restorer restorer = Restorer::create(model, {.law = Law::inverse}, context).value();
-    Pose pose{driver_positions(model), {}, {}};
+    const Restorer restorer = Restorer::create(model, {.law = HeightLaw::inverse}, context).value();
+    Pose pose = rest_pose(model);
     const std::vector<Vec3f> at_rest = restorer.positions(pose, context).value();
     float error = 0;
     for (std::size_t v = 0; v < at_rest.size(); ++v) error = std::max(error, (at_rest[v] - cube.positions[v]).norm());
 
     // Stretched both ways, the waves of the upper face get lower (eq. 2.14); a law that keeps heights leaves them.
     for (Vec3f& p : pose.positions) p.x() *= 2, p.z() *= 2;
-    const Restorer keeper = Restorer::create(model, {.law = Law::keep}, context).value();
+    const Restorer keeper = Restorer::create(model, {.law = HeightLaw::keep}, context).value();
     const double rest = wave_height(cube, at_rest);
     const double inverse = wave_height(cube, restorer.positions(pose, context).value());
     const double keep = wave_height(cube, keeper.positions(pose, context).value());

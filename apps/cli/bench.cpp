@@ -212,12 +212,12 @@ private:
             require(strip(make_wavy_cube({.resolution = resolution}), {.code = DetailCode::reference}, context_));
         const auto& detail = std::get<ReferenceDetail>(stripped.model.detail);
         const std::vector<Vec3f> driver = driver_positions(stripped.model);
-        for (const Law law : {Law::inverse, Law::keep}) {
+        for (const HeightLaw law : {HeightLaw::inverse, HeightLaw::keep}) {
             const ReferenceRestorer restorer(detail, law, context_);
             std::vector<Vec3f> positions(6 * std::size_t(resolution + 1) * (resolution + 1));
             const double seconds =
                 median_seconds([&] { restorer.restore_grids(driver, detail.patches.levels, positions, context_); });
-            const std::string name = law == Law::keep ? "restore.reference_keep" : "restore.reference";
+            const std::string name = law == HeightLaw::keep ? "restore.reference_keep" : "restore.reference";
             add(name, double(positions.size()) / seconds, "vertices/s");
             // Records once; of the points a level writes, those of all but the finest are read again.
             const double bytes =

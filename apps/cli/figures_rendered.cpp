@@ -266,7 +266,7 @@ Figure draw_deformation_process(FigureRenderer& renderer) {
     const Model model = stripped_model(cube, {.code = DetailCode::reference, .levels = 5}, context);
     const auto warp = make_stretch(world_bounds(cube), Axis::x, kStretch);
     const Pose pose{warp_positions(*warp, driver_positions(model), model.mesh.origin, context), {}, {}};
-    const Restorer restorer = require(Restorer::create(model, {.law = Law::inverse}, context));
+    const Restorer restorer = require(Restorer::create(model, {.law = HeightLaw::inverse}, context));
     const Mesh low = level_mesh(model, 0);
     Mesh stretched = low;
     stretched.positions = pose.positions;

@@ -89,7 +89,7 @@ Figure draw_remeshed_scan(FigureRenderer& renderer) {
 
     const Box box = world_bounds(remeshed.mesh);
     const auto stretch = make_stretch(box, Axis::z, kStretch), extreme = extreme_warp(box);
-    const Returned stretched = put_back(reference, {.law = Law::inverse}, *stretch, context);
+    const Returned stretched = put_back(reference, {.law = HeightLaw::inverse}, *stretch, context);
     const Returned twisted = put_back(reference, {}, *extreme, context),
                    blended = put_back(blend, {}, *extreme, context);
     const Mesh once = level_mesh(reference, levels - 1), coarsest = level_mesh(reference, 0);

@@ -15,10 +15,10 @@ std::vector<Vec3f> positions_for(const Mesh& mesh, const Model& model) {
 } // namespace
 
 void add_restore_options(CLI::App& command, RestoreOptions& options) {
-    std::map<std::string, Law> laws;
-    for (std::string_view name : kLawNames) laws[std::string(name)] = *law_from_name(name);
-    add_choice<Law>(
-        command, "--law", laws, [&options](Law law) { options.law = law; },
+    std::map<std::string, HeightLaw> laws;
+    for (std::string_view name : kHeightLawNames) laws[std::string(name)] = *height_law_from_name(name);
+    add_choice<HeightLaw>(
+        command, "--law", laws, [&options](HeightLaw law) { options.law = law; },
         "How high detail is when its surroundings grow (unset: proportional, or inverse for a reference model)");
     command.add_option("--level", options.level, "Restore up to this level (unset: the finest)");
     command.add_flag("--thin-shell", options.thin_shell, "Bumps keep their shape, as on cloth and skin");

@@ -428,11 +428,11 @@ void Workbench::remove_detail() {
 }
 void Workbench::add_detail() { change_level(state().level() + 1, "Add detail", {}); }
 
-void Workbench::set_law(std::optional<Law> law) {
+void Workbench::set_law(std::optional<HeightLaw> law) {
     if (law == state().restore.law) return;
     State next = state();
     next.restore.law = law;
-    const std::string_view name = law ? law_name(*law) : "as usual";
+    const std::string_view name = law ? height_law_name(*law) : "as usual";
     document_.change("Law: " + QString::fromUtf8(name.data(), qsizetype(name.size())), std::move(next));
 }
 

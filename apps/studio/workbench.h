@@ -59,7 +59,7 @@ public:
     void set_level(unsigned level, const std::string& merge = {});
     void remove_detail(); ///< one level coarser
     void add_detail();    ///< one level finer
-    void set_law(std::optional<Law> law);
+    void set_law(std::optional<HeightLaw> law);
     void set_thin_shell(bool thin);
     // Deform
     void set_warps(const Warps& warps, const std::string& merge = {});

@@ -38,7 +38,7 @@ void expect_round_trip(const Mesh& mesh, const RunContext& context) {
     ASSERT_TRUE(model.ok()) << model.error().message;
     const Result<Restorer> restorer = Restorer::create(*model, {}, context);
     ASSERT_TRUE(restorer.ok()) << restorer.error().message;
-    const Result<Mesh> restored = restorer->mesh({driver_positions(*model), {}, {}}, context);
+    const Result<Mesh> restored = restorer->mesh(rest_pose(*model), context);
     ASSERT_TRUE(restored.ok()) << restored.error().message;
     EXPECT_EQ(check_mesh(*restored), "");
     EXPECT_EQ(restored->corners, mesh.corners);

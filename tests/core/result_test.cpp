@@ -25,7 +25,13 @@ TEST(Result, IsAValueOrAnError) {
     EXPECT_FALSE(error.ok() || error);
     EXPECT_EQ(error.error().code, ErrorCode::bad_file);
     EXPECT_EQ(error.error().message, kError.message);
-    EXPECT_THROW((void)error.value(), std::bad_variant_access);
+    try {
+        (void)error.value();
+        FAIL() << "a failed result gave a value";
+    } catch (const BadResultAccess& thrown) {
+        EXPECT_EQ(thrown.what(), kError.message);
+        EXPECT_EQ(thrown.error().code, ErrorCode::bad_file);
+    }
 }
 
 TEST(Result, ATemporarysValueOutlivesIt) {

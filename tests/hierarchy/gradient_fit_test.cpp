@@ -10,7 +10,7 @@ namespace filigree {
 namespace {
 
 const RunContext kOneThread(1);
-constexpr Law kLaws[] = {Law::keep, Law::inverse, Law::proportional, Law::volume};
+constexpr HeightLaw kLaws[] = {HeightLaw::keep, HeightLaw::inverse, HeightLaw::proportional, HeightLaw::volume};
 
 template <class Map>
 std::vector<Vec3f> mapped(std::span<const Vec3f> positions, const Map& map) {
@@ -51,10 +51,10 @@ TEST(GradientFit, IsTheIdentityAtRest) {
     for (std::size_t m = 0; m < meshes.size(); ++m) {
         const Mesh& mesh = meshes[m];
         const GradientFit fit(mesh, kOneThread);
-        for (const Law law : kLaws)
+        for (const HeightLaw law : kLaws)
             for (const NormalColumn column : {NormalColumn::fitted, NormalColumn::shell})
                 EXPECT_LT(largest_error(fit.fit(mesh.positions, column, law, kOneThread), Mat3d::Identity()), 1e-6)
-                    << m << ' ' << law_name(law);
+                    << m << ' ' << height_law_name(law);
         const auto ghosts = fit.rest_ghosts(); // of float length: a tenth of an edge has a digit less
         EXPECT_LT(largest_error(fit.fit_to_ghosts(mesh.positions, ghosts, kOneThread), Mat3d::Identity()), 1e-5) << m;
     }
@@ -68,7 +68,7 @@ TEST(GradientFit, RigidMotionsAndProportionalScaleAreExact) {
         const auto moved =
             mapped(mesh.positions, [&](const Vec3d& p) { return Vec3d(scale * turn * (p + Vec3d(1, 2, 3))); });
         for (const NormalColumn column : {NormalColumn::fitted, NormalColumn::shell})
-            EXPECT_LT(largest_error(fit.fit(moved, column, Law::proportional, kOneThread), scale * turn), 1e-4 * scale);
+            EXPECT_LT(largest_error(fit.fit(moved, column, HeightLaw::proportional, kOneThread), scale * turn), 1e-4 * scale);
     }
 }
 
@@ -77,13 +77,13 @@ TEST(GradientFit, ShellsHaveTheLawsNormalColumn) {
     const GradientFit fit(mesh, kOneThread);
     const auto moved = mapped(mesh.positions, [](const Vec3d& p) { return Vec3d(2 * p.x(), p.y(), p.z()); });
     const double expected[] = {1, 1 / std::sqrt(2.0), std::sqrt(2.0), 0.5};
-    for (const Law law : kLaws) {
+    for (const HeightLaw law : kLaws) {
         const Mat3d a = Vec3d(2, 1, expected[static_cast<int>(law)]).asDiagonal();
-        EXPECT_LT(largest_error(fit.fit(moved, NormalColumn::shell, law, kOneThread), a), 1e-3) << law_name(law);
+        EXPECT_LT(largest_error(fit.fit(moved, NormalColumn::shell, law, kOneThread), a), 1e-3) << height_law_name(law);
         // Given gradients keep their plane part, and get the same column.
         std::vector<Mat3f> given(mesh.vertex_count(), Mat3f(Vec3f(2, 1, 7).asDiagonal()));
         fit.make_shell(given, law);
-        EXPECT_LT(largest_error(given, a), 1e-5) << law_name(law);
+        EXPECT_LT(largest_error(given, a), 1e-5) << height_law_name(law);
     }
 }
 
@@ -95,7 +95,7 @@ TEST(GradientFit, QuadraticsToFirstOrder) {
         const GradientFit fit(mesh, kOneThread);
         const auto moved = mapped(mesh.positions, f);
         const std::vector<Vec3f> rest_normals = vertex_normals(mesh, mesh.positions, kOneThread);
-        const auto a = fit.fit(moved, NormalColumn::fitted, Law::proportional, kOneThread);
+        const auto a = fit.fit(moved, NormalColumn::fitted, HeightLaw::proportional, kOneThread);
         const auto with_ghosts = fit.fit_to_ghosts(moved, mapped(fit.rest_ghosts(), f), kOneThread);
         double in_plane = 0, whole = 0;
         for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
@@ -115,16 +115,16 @@ TEST(GradientFit, QuadraticsToFirstOrder) {
 }
 
 TEST(GradientFit, LawsAreBoundedWhereTheyHaveToBe) {
-    EXPECT_EQ(law_scale(Law::keep, 1, 100), 1);
-    EXPECT_DOUBLE_EQ(law_scale(Law::inverse, 1, 4), 0.5);
-    EXPECT_DOUBLE_EQ(law_scale(Law::proportional, 1, 4), 2);
-    EXPECT_DOUBLE_EQ(law_scale(Law::volume, 1, 2), 0.5);
-    for (const Law law : {Law::inverse, Law::volume}) {
-        EXPECT_DOUBLE_EQ(law_scale(law, 1, 0), kMaxLawScale);
-        EXPECT_DOUBLE_EQ(law_scale(law, 1, 1e12), 1 / kMaxLawScale);
+    EXPECT_EQ(height_law_scale(HeightLaw::keep, 1, 100), 1);
+    EXPECT_DOUBLE_EQ(height_law_scale(HeightLaw::inverse, 1, 4), 0.5);
+    EXPECT_DOUBLE_EQ(height_law_scale(HeightLaw::proportional, 1, 4), 2);
+    EXPECT_DOUBLE_EQ(height_law_scale(HeightLaw::volume, 1, 2), 0.5);
+    for (const HeightLaw law : {HeightLaw::inverse, HeightLaw::volume}) {
+        EXPECT_DOUBLE_EQ(height_law_scale(law, 1, 0), kMaxHeightScale);
+        EXPECT_DOUBLE_EQ(height_law_scale(law, 1, 1e12), 1 / kMaxHeightScale);
     }
-    EXPECT_EQ(law_scale(Law::proportional, 1, 0), 0);
-    for (const Law law : kLaws) EXPECT_EQ(law_scale(law, 0, 5), 1); // nothing to compare with
+    EXPECT_EQ(height_law_scale(HeightLaw::proportional, 1, 0), 0);
+    for (const HeightLaw law : kLaws) EXPECT_EQ(height_law_scale(law, 0, 5), 1); // nothing to compare with
 }
 
 TEST(GradientFit, CollapsedDriversGiveFiniteGradients) {
@@ -133,10 +133,10 @@ TEST(GradientFit, CollapsedDriversGiveFiniteGradients) {
     for (const float squash : {0.0f, 1e-20f}) {
         const auto moved =
             mapped(mesh.positions, [&](const Vec3d& p) { return Vec3d(squash * p.x(), squash * p.y(), 0); });
-        for (const Law law : kLaws)
+        for (const HeightLaw law : kLaws)
             for (const NormalColumn column : {NormalColumn::fitted, NormalColumn::shell})
                 for (const Mat3f& a : fit.fit(moved, column, law, kOneThread))
-                    ASSERT_TRUE(a.allFinite()) << law_name(law);
+                    ASSERT_TRUE(a.allFinite()) << height_law_name(law);
     }
 }
 
@@ -145,9 +145,9 @@ TEST(GradientFit, NoThreadChangesAByte) {
     const Mesh mesh = make_wavy_sphere({.resolution = 32});
     const auto moved =
         mapped(mesh.positions, [](const Vec3d& p) { return Vec3d(p.x() * p.y(), p.y(), p.z() + p.x()); });
-    const auto one = GradientFit(mesh, kOneThread).fit(moved, NormalColumn::fitted, Law::proportional, kOneThread);
+    const auto one = GradientFit(mesh, kOneThread).fit(moved, NormalColumn::fitted, HeightLaw::proportional, kOneThread);
     const RunContext two(2);
-    EXPECT_EQ(GradientFit(mesh, two).fit(moved, NormalColumn::fitted, Law::proportional, two), one);
+    EXPECT_EQ(GradientFit(mesh, two).fit(moved, NormalColumn::fitted, HeightLaw::proportional, two), one);
 }
 
 } // namespace

@@ -19,7 +19,7 @@ ReferenceDetail encoded(const Mesh& mesh, unsigned references = 3, unsigned max_
     return std::move(*detail);
 }
 
-std::vector<Vec3f> restored(const ReferenceDetail& detail, Law law, std::span<const Vec3f> driver,
+std::vector<Vec3f> restored(const ReferenceDetail& detail, HeightLaw law, std::span<const Vec3f> driver,
                             const RunContext& context = kOneThread) {
     const ReferenceRestorer restorer(detail, law, context);
     std::vector<Vec3f> positions(restorer.level_vertices(detail.patches.levels).size(), Vec3f::Constant(NAN));
@@ -87,27 +87,27 @@ TEST(ReferenceCode, LawsOnAStretchedQuad) {
     const Mesh mesh = one_level(4, {0, 0, 0.125f});
     const ReferenceDetail detail = encoded(mesh);
     const auto driver = mapped(detail.rest_driver, [](const Vec3f& p) { return Vec3f(2 * p.x(), p.y(), p.z()); });
-    const std::pair<Law, float> expected[] = {
-        {Law::keep, 1.0f}, {Law::inverse, 0.5f}, {Law::proportional, std::sqrt(2.0f)}, {Law::volume, 0.5f}};
+    const std::pair<HeightLaw, float> expected[] = {
+        {HeightLaw::keep, 1.0f}, {HeightLaw::inverse, 0.5f}, {HeightLaw::proportional, std::sqrt(2.0f)}, {HeightLaw::volume, 0.5f}};
     for (const auto& [law, factor] : expected)
         for (const unsigned references : {3u, 4u, 6u}) {
             const auto positions = restored(encoded(mesh, references), law, driver);
-            EXPECT_LT((positions[4] - Vec3f(1, 0.5f, factor * 0.125f)).norm(), 1e-6f) << law_name(law) << references;
+            EXPECT_LT((positions[4] - Vec3f(1, 0.5f, factor * 0.125f)).norm(), 1e-6f) << height_law_name(law) << references;
         }
 }
 
 TEST(ReferenceCode, LawsAreBounded) {
     const Mesh mesh = one_level(4, {0, 0, 0.125f});
     const ReferenceDetail detail = encoded(mesh);
-    const auto height = [&](Law law, float scale) {
+    const auto height = [&](HeightLaw law, float scale) {
         const auto driver = mapped(detail.rest_driver, [&](const Vec3f& p) { return Vec3f(scale * p); });
         return restored(detail, law, driver)[4].z() / 0.125f;
     };
-    for (const Law law : {Law::inverse, Law::volume}) {
+    for (const HeightLaw law : {HeightLaw::inverse, HeightLaw::volume}) {
         EXPECT_NEAR(height(law, 1e-3f), 4, 1e-5);
         EXPECT_NEAR(height(law, 1e3f), 0.25, 1e-5);
     }
-    for (const float scale : {1e-3f, 3.0f, 1e3f}) EXPECT_NEAR(height(Law::proportional, scale) / scale, 1, 1e-5);
+    for (const float scale : {1e-3f, 3.0f, 1e3f}) EXPECT_NEAR(height(HeightLaw::proportional, scale) / scale, 1, 1e-5);
 }
 
 TEST(ReferenceCode, RoundTrip) {
@@ -117,11 +117,11 @@ TEST(ReferenceCode, RoundTrip) {
                            make_torus({.resolution = 32}),       make_wavy_plane({.resolution = 2})};
     for (std::size_t m = 0; m < std::size(meshes); ++m)
         for (const unsigned references : {3u, 4u, 6u})
-            for (const Law law : {Law::keep, Law::inverse, Law::proportional, Law::volume}) {
+            for (const HeightLaw law : {HeightLaw::keep, HeightLaw::inverse, HeightLaw::proportional, HeightLaw::volume}) {
                 const ReferenceDetail detail = encoded(meshes[m], references);
                 EXPECT_EQ(detail.records.size() + detail.rest_driver.size(), meshes[m].vertex_count());
                 EXPECT_LE(distance(restored(detail, law, detail.rest_driver), meshes[m].positions), 2e-7)
-                    << m << ' ' << references << ' ' << law_name(law);
+                    << m << ' ' << references << ' ' << height_law_name(law);
             }
 }
 
@@ -129,8 +129,8 @@ TEST(ReferenceCode, RoundTripAtSixMillionPoints) {
     const Mesh mesh = make_wavy_cube({.resolution = 1024});
     const ReferenceDetail detail = encoded(mesh);
     EXPECT_EQ(detail.patches.levels, 10u);
-    for (const Law law : {Law::keep, Law::inverse})
-        EXPECT_LE(distance(restored(detail, law, detail.rest_driver), mesh.positions), 2e-7) << law_name(law);
+    for (const HeightLaw law : {HeightLaw::keep, HeightLaw::inverse})
+        EXPECT_LE(distance(restored(detail, law, detail.rest_driver), mesh.positions), 2e-7) << height_law_name(law);
 }
 
 /// Points in no order: every coordinate of every level is anything, so float rounds everywhere.
@@ -147,7 +147,7 @@ TEST(ReferenceCode, RoundTripOfRoughMeshes) {
         const Mesh mesh = rough_cube(32, roughness);
         for (const unsigned references : {3u, 4u, 6u}) {
             const ReferenceDetail detail = encoded(mesh, references);
-            EXPECT_LE(distance(restored(detail, Law::keep, detail.rest_driver), mesh.positions), 2e-7)
+            EXPECT_LE(distance(restored(detail, HeightLaw::keep, detail.rest_driver), mesh.positions), 2e-7)
                 << roughness << ' ' << references << " loose: " << detail.loose.size();
         }
     }
@@ -158,7 +158,7 @@ TEST(ReferenceCode, RigidMotionIsExact) {
     const auto move = [&](const Vec3f& p) { return Vec3f(turn * p + Vec3f(0.3f, -0.2f, 0.5f)); };
     for (const Mesh& mesh : {make_wavy_cube({.resolution = 64}), rough_cube(32, 0.05f)})
         for (const unsigned references : {3u, 4u, 6u})
-            for (const Law law : {Law::keep, Law::inverse, Law::proportional, Law::volume}) {
+            for (const HeightLaw law : {HeightLaw::keep, HeightLaw::inverse, HeightLaw::proportional, HeightLaw::volume}) {
                 const ReferenceDetail detail = encoded(mesh, references);
                 EXPECT_LE(
                     distance(restored(detail, law, mapped(detail.rest_driver, move)), mapped(mesh.positions, move)),
@@ -171,7 +171,7 @@ TEST(ReferenceCode, UniformScaleIsExactWhenProportional) {
     const ReferenceDetail detail = encoded(mesh);
     for (const float scale : {0.01f, 0.3f, 1.7f, 50.0f}) {
         const auto grow = [&](const Vec3f& p) { return Vec3f(scale * p); };
-        EXPECT_LE(distance(restored(detail, Law::proportional, mapped(detail.rest_driver, grow)),
+        EXPECT_LE(distance(restored(detail, HeightLaw::proportional, mapped(detail.rest_driver, grow)),
                            mapped(mesh.positions, grow)),
                   1e-6);
     }
@@ -180,7 +180,7 @@ TEST(ReferenceCode, UniformScaleIsExactWhenProportional) {
 TEST(ReferenceCode, WorksAtAnySize) {
     const Mesh mesh = make_wavy_sphere({.resolution = 16});
     for (const float size : {1e-30f, 1e-12f, 1e12f, 1e30f})
-        for (const Law law : {Law::keep, Law::inverse, Law::proportional, Law::volume}) {
+        for (const HeightLaw law : {HeightLaw::keep, HeightLaw::inverse, HeightLaw::proportional, HeightLaw::volume}) {
             Mesh scaled = mesh;
             for (Vec3f& p : scaled.positions) p *= size;
             const ReferenceDetail detail = encoded(scaled);
@@ -204,7 +204,7 @@ TEST(ReferenceCode, NoSpikesWhenTheDriverCollapses) {
         {"small", [](const Vec3f& p) { return Vec3f(0.01f * p); }},
         {"tiny", [](const Vec3f& p) { return Vec3f(1e-30f * p); }}};
     for (const unsigned references : {3u, 4u, 6u})
-        for (const Law law : {Law::keep, Law::inverse, Law::proportional, Law::volume}) {
+        for (const HeightLaw law : {HeightLaw::keep, HeightLaw::inverse, HeightLaw::proportional, HeightLaw::volume}) {
             const ReferenceDetail detail = encoded(mesh, references);
             for (const auto& [name, map] : collapses) {
                 const auto driver = mapped(detail.rest_driver, map);
@@ -212,12 +212,12 @@ TEST(ReferenceCode, NoSpikesWhenTheDriverCollapses) {
                 const Vec3d centre = bounds(driver).centre();
                 double furthest = 0;
                 for (const Vec3f& p : positions) {
-                    ASSERT_TRUE(p.allFinite()) << name << ' ' << law_name(law);
+                    ASSERT_TRUE(p.allFinite()) << name << ' ' << height_law_name(law);
                     furthest = std::max(furthest, (p.cast<double>() - centre).norm());
                 }
                 // Half of it holds the driver; the waves, four times as high at most, and twice for good measure.
                 EXPECT_LE(furthest, 0.5 * diagonal + 2 * 4 * 0.04 * std::sqrt(3.0))
-                    << name << ' ' << law_name(law) << ' ' << references;
+                    << name << ' ' << height_law_name(law) << ' ' << references;
             }
         }
 }
@@ -237,24 +237,24 @@ TEST(ReferenceCode, DegenerateRestShapesAreLoose) {
         for (const unsigned references : {3u, 4u, 6u}) {
             const ReferenceDetail detail = encoded(mesh, references);
             EXPECT_FALSE(detail.loose.empty());
-            EXPECT_LE(distance(restored(detail, Law::keep, detail.rest_driver), mesh.positions), 2e-7);
+            EXPECT_LE(distance(restored(detail, HeightLaw::keep, detail.rest_driver), mesh.positions), 2e-7);
             // Heights here are as large as the mesh, and so is what rounding the law's factor does to them.
-            EXPECT_LE(distance(restored(detail, Law::inverse, detail.rest_driver), mesh.positions), 1e-6);
+            EXPECT_LE(distance(restored(detail, HeightLaw::inverse, detail.rest_driver), mesh.positions), 1e-6);
             const auto open =
                 mapped(detail.rest_driver, [](const Vec3f& p) { return Vec3f(p.x(), 1000 * p.y(), p.x() * p.x()); });
-            for (const Vec3f& p : restored(detail, Law::inverse, open)) ASSERT_TRUE(p.allFinite());
+            for (const Vec3f& p : restored(detail, HeightLaw::inverse, open)) ASSERT_TRUE(p.allFinite());
         }
     }
     Mesh point = make_wavy_cube({.resolution = 8});
     for (Vec3f& p : point.positions) p = Vec3f(1, 2, 3);
     const ReferenceDetail detail = encoded(point);
-    EXPECT_TRUE(same_bytes(restored(detail, Law::volume, detail.rest_driver), point.positions));
+    EXPECT_TRUE(same_bytes(restored(detail, HeightLaw::volume, detail.rest_driver), point.positions));
 }
 
 TEST(ReferenceCode, EveryLevelIsThere) {
     const Mesh mesh = make_wavy_sphere({.resolution = 32});
     const ReferenceDetail detail = encoded(mesh);
-    const ReferenceRestorer restorer(detail, Law::keep, kOneThread);
+    const ReferenceRestorer restorer(detail, HeightLaw::keep, kOneThread);
     for (unsigned level = 0; level <= 5; ++level) {
         const std::size_t m = std::size_t{1} << level;
         const auto vertices = restorer.level_vertices(level);
@@ -282,7 +282,7 @@ TEST(ReferenceCode, GridsAreWhatRestoreGives) {
          {make_wavy_cube({.resolution = 64}), make_wavy_plane({.resolution = 24}), make_torus({.resolution = 16}),
           rough_cube(16, 0.2f), make_wavy_cube({.resolution = 640})}) {
         const ReferenceDetail detail = encoded(mesh);
-        const ReferenceRestorer restorer(detail, Law::inverse, kOneThread);
+        const ReferenceRestorer restorer(detail, HeightLaw::inverse, kOneThread);
         auto driver = mapped(detail.rest_driver, [](const Vec3f& p) {
             return Vec3f(p.x() + 0.3f * p.y() * p.y(), 1.5f * p.y(), p.z() - 0.2f * p.x());
         });
@@ -313,7 +313,7 @@ TEST(ReferenceCode, SameBytesForAnyThreadCount) {
     EXPECT_TRUE(same_bytes(one_detail.records, three_detail->records));
     const auto driver = mapped(one_detail.rest_driver, [](const Vec3f& p) { return Vec3f(2 * p.x(), p.y(), p.z()); });
     EXPECT_TRUE(
-        same_bytes(restored(one_detail, Law::inverse, driver), restored(one_detail, Law::inverse, driver, three)));
+        same_bytes(restored(one_detail, HeightLaw::inverse, driver), restored(one_detail, HeightLaw::inverse, driver, three)));
 }
 
 TEST(ReferenceCode, RefusesWhatItCannotDo) {

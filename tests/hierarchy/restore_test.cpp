@@ -76,12 +76,12 @@ TEST(Restore, AffineMapsAreExactWithGhosts) {
 TEST(Restore, RigidMotionIsExactFromPositions) {
     const Deformation f = affine(kTurn, kShift);
     for (const Mesh& mesh : some_shapes())
-        for (const Law law : {Law::keep, Law::inverse, Law::proportional, Law::volume})
+        for (const HeightLaw law : {HeightLaw::keep, HeightLaw::inverse, HeightLaw::proportional, HeightLaw::volume})
             for (const bool shell : {false, true}) {
                 const Model model = stripped(mesh).model;
                 const std::vector<Vec3f> moved =
                     restored(model, without_gradients(pose_by(f, model)), {.law = law, .thin_shell = shell});
-                EXPECT_LE(distance(moved, deformed(f, mesh.positions)).max, 2e-6) << law_name(law) << shell;
+                EXPECT_LE(distance(moved, deformed(f, mesh.positions)).max, 2e-6) << height_law_name(law) << shell;
             }
 }
 
@@ -170,10 +170,10 @@ TEST(Restore, ThinShellsKeepTheHeightTheLawSays) {
 
     const double stretch = 2.25;
     const Deformation f = affine(Vec3d(stretch, 1, 1).asDiagonal(), Vec3d::Zero());
-    const std::pair<Law, double> expected[] = {{Law::keep, 1},
-                                               {Law::inverse, 1 / std::sqrt(stretch)},
-                                               {Law::proportional, std::sqrt(stretch)},
-                                               {Law::volume, 1 / stretch}};
+    const std::pair<HeightLaw, double> expected[] = {{HeightLaw::keep, 1},
+                                               {HeightLaw::inverse, 1 / std::sqrt(stretch)},
+                                               {HeightLaw::proportional, std::sqrt(stretch)},
+                                               {HeightLaw::volume, 1 / stretch}};
     for (const auto& [law, factor] : expected)
         for (const bool with_gradients : {false, true}) {
             const Pose pose = with_gradients ? pose_by(f, model) : without_gradients(pose_by(f, model));
@@ -183,7 +183,7 @@ TEST(Restore, ThinShellsKeepTheHeightTheLawSays) {
                                             float(factor) * mesh.positions[v].z()))
                               .norm(),
                           1e-5f)
-                    << law_name(law) << ' ' << with_gradients << ' ' << v;
+                    << height_law_name(law) << ' ' << with_gradients << ' ' << v;
         }
 }
 

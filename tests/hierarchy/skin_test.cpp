@@ -56,7 +56,7 @@ double largest_distance(std::span<const Vec3d> a, std::span<const Vec3f> b) {
 }
 
 Pose rest_pose(const Model& model) {
-    Pose pose{driver_positions(model), {}, {}};
+    Pose pose = rest_pose(model);
     pose.gradients.assign(pose.positions.size(), Mat3f::Identity());
     return pose;
 }

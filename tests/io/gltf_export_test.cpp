@@ -185,7 +185,7 @@ TEST_F(GltfExport, JointNumbersAreAsSmallAsTheyCanBe) {
 
 TEST_F(GltfExport, WhatStaysAtRestTakesNoRoom) {
     PoseSequence poses = make_poses(wavy_model(), 1, 24);
-    Pose rest{driver_positions(wavy_model()), {}, {}};
+    Pose rest = rest_pose(wavy_model());
     rest.gradients.assign(rest.positions.size(), Mat3f::Identity());
     poses.frames = {rest, rest, rest};
     for (Vec3f& p : poses.frames[2].positions) p += Vec3f(1, 0, 0);
@@ -236,7 +236,7 @@ TEST_F(GltfExport, FarFromTheOriginKeepsItsDigits) {
 
 TEST_F(GltfExport, TellsHowFarNormalsMayBeOff) {
     const Model& model = wavy_model();
-    Pose rest{driver_positions(model), {}, {}};
+    Pose rest = rest_pose(model);
     rest.gradients.assign(rest.positions.size(), Mat3f::Identity());
     EXPECT_NEAR(skin(model, {24, {rest}}).normal_error_degrees, 0, 1e-4);
     for (Mat3f& gradient : rest.gradients) gradient.diagonal() = Vec3f(2, 1, 1);

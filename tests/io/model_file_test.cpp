@@ -50,7 +50,6 @@ std::vector<Model> small_models() {
     return models;
 }
 
-Pose rest_pose(const Model& model) { return {driver_positions(model), {}, {}}; }
 
 std::vector<Vec3f> bent(const Model& model) {
     Pose pose = rest_pose(model);

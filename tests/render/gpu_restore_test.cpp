@@ -147,7 +147,7 @@ TEST_F(GpuRestore, IsTheCpuForEveryLawAndForThinShells) {
         Pose ghosts = without_gradients(bent_and_twisted(model));
         ghosts.ghosts =
             warp_positions(*bend_and_twist(model), restorer_of(model).rest_ghosts(), Vec3d::Zero(), kOneThread);
-        for (const Law law : {Law::keep, Law::inverse, Law::proportional, Law::volume})
+        for (const HeightLaw law : {HeightLaw::keep, HeightLaw::inverse, HeightLaw::proportional, HeightLaw::volume})
             for (const bool shell : {false, true}) {
                 expect_same(model, bent_and_twisted(model), {.law = law, .thin_shell = shell});
                 expect_same(model, without_gradients(bent_and_twisted(model)), {.law = law, .thin_shell = shell});

@@ -122,7 +122,7 @@ TEST_P(PoseBoxes, HoldsWithEveryLawAndAsAThinShell) {
     const Model model = model_of(make_wavy_plane({.resolution = 24}));
     const Pose pose = without_gradients(pose_by(bend_and_twist(80, 30), model));
     for (const bool thin : {false, true})
-        for (const Law law : {Law::keep, Law::inverse, Law::proportional, Law::volume}) {
+        for (const HeightLaw law : {HeightLaw::keep, HeightLaw::inverse, HeightLaw::proportional, HeightLaw::volume}) {
             const Fit f = fit_at(model, pose, {.law = law, .thin_shell = thin});
             EXPECT_LE(f.outside, kRounding) << thin << int(law);
             EXPECT_LE(f.slack, 0.05) << thin << int(law);

@@ -108,7 +108,7 @@ TEST(Document, BytesKnowEverySetting) {
     };
     differs([](State& s) { s.warps.taper = 0.5; });
     differs([](State& s) { s.restore.level = 3; });
-    differs([](State& s) { s.restore.law = Law::keep; });
+    differs([](State& s) { s.restore.law = HeightLaw::keep; });
     differs([](State& s) { s.restore.thin_shell = true; });
     differs([](State& s) { s.strip.base = 100; });
     differs([](State& s) { s.body.material.viscosity = 3; });

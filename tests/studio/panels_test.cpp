@@ -146,7 +146,7 @@ TEST_F(Panels, ChoicesAndSwitchesReachTheWorkbench) {
     choose("deform.axis", 2);
     EXPECT_EQ(state().warps.axis, Axis::z);
     choose("detail.law", 2);
-    EXPECT_EQ(state().restore.law, std::optional(Law::inverse));
+    EXPECT_EQ(state().restore.law, std::optional(HeightLaw::inverse));
     choose("detail.law", 0);
     EXPECT_FALSE(state().restore.law);
     get<QCheckBox>("detail.thin_shell").click();

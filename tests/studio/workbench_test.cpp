@@ -134,12 +134,12 @@ TEST_F(WorkbenchTest, LevelsGoOneByOne) {
 }
 
 TEST_F(WorkbenchTest, LawAndThinShellAreSteps) {
-    bench.set_law(Law::volume);
+    bench.set_law(HeightLaw::volume);
     bench.set_thin_shell(true);
-    EXPECT_EQ(state().restore.law, Law::volume);
+    EXPECT_EQ(state().restore.law, HeightLaw::volume);
     EXPECT_TRUE(state().restore.thin_shell);
     EXPECT_EQ(undo_stack().count(), 2);
-    bench.set_law(Law::volume);
+    bench.set_law(HeightLaw::volume);
     EXPECT_EQ(undo_stack().count(), 2);
 }
 
@@ -757,7 +757,7 @@ TEST_F(WorkbenchTest, OpeningIsNeitherDroppedNorDoesItDropChanges) {
 TEST_F(WorkbenchTest, ADocumentIsSavedOnlyWhenTheFileHoldsItAll) {
     make_small_shape();
     QSignalSpy saved(&bench, &Workbench::saved);
-    bench.set_law(Law::keep);
+    bench.set_law(HeightLaw::keep);
     bench.save_model(path("a.fil"));
     bench.wait_until_idle();
     EXPECT_EQ(saved.count(), 1);

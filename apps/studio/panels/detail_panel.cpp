@@ -14,7 +14,7 @@ std::size_t level_faces(const Model& model, unsigned level) {
     return level < model.levels.size() ? model.levels[level].face_count() : model.mesh.face_count();
 }
 
-int law_index(const std::optional<Law>& law) { return law ? 1 + int(*law) : 0; }
+int law_index(const std::optional<HeightLaw>& law) { return law ? 1 + int(*law) : 0; }
 
 } // namespace
 
@@ -90,7 +90,7 @@ DetailPanel::DetailPanel(Workbench& workbench, QWidget* parent) : Panel("detail"
             [index](StripOptions& options) { options.precision = index ? Precision::int16 : Precision::float32; }, {});
     });
     connect(law_, &QComboBox::currentIndexChanged, this, [this](int index) {
-        workbench_.set_law(index == 0 ? std::nullopt : std::optional(static_cast<Law>(index - 1)));
+        workbench_.set_law(index == 0 ? std::nullopt : std::optional(static_cast<HeightLaw>(index - 1)));
     });
     connect(thin_shell_, &QCheckBox::toggled, this, [this](bool thin) { workbench_.set_thin_shell(thin); });
 

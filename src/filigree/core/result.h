@@ -1,6 +1,7 @@
 // How things go wrong: a named code and one sentence that says where, why, and what to do.
 #pragma once
 
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <variant>
@@ -26,6 +27,16 @@ struct Error {
     std::string message;
 };
 
+/// What a failed Result throws when its value is asked for; what() is the error's sentence.
+class BadResultAccess : public std::runtime_error {
+public:
+    explicit BadResultAccess(Error error) : std::runtime_error(error.message), error_(std::move(error)) {}
+    const Error& error() const { return error_; }
+
+private:
+    Error error_;
+};
+
 /// A value or an Error.
 template <class T>
 class [[nodiscard]] Result {
@@ -36,21 +47,34 @@ public:
     bool ok() const { return content_.index() == 0; }
     explicit operator bool() const { return ok(); }
 
-    /// The value; only when ok(), else std::bad_variant_access is thrown. By value from a temporary, so that it cannot
+    /// The value; a failed result throws BadResultAccess with its error. By value from a temporary, so that it cannot
     /// dangle in a loop over it.
-    T& value() & { return std::get<0>(content_); }
-    const T& value() const& { return std::get<0>(content_); }
-    T value() && { return std::get<0>(std::move(content_)); }
+    T& value() & {
+        require_value();
+        return *std::get_if<0>(&content_);
+    }
+    const T& value() const& {
+        require_value();
+        return *std::get_if<0>(&content_);
+    }
+    T value() && {
+        require_value();
+        return std::move(*std::get_if<0>(&content_));
+    }
     T& operator*() & { return value(); }
     const T& operator*() const& { return value(); }
     T operator*() && { return std::move(*this).value(); }
     T* operator->() { return &value(); }
     const T* operator->() const { return &value(); }
 
-    /// The error; only when not ok(), else the same is thrown.
+    /// The error; only of a failed result, else std::bad_variant_access is thrown.
     const Error& error() const { return std::get<1>(content_); }
 
 private:
+    void require_value() const {
+        if (const Error* error = std::get_if<1>(&content_)) throw BadResultAccess(*error);
+    }
+
     std::variant<T, Error> content_;
 };
 

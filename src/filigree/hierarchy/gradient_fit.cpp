@@ -156,13 +156,13 @@ std::vector<double> GradientFit::ring_areas(std::span<const Vec3f> positions) co
     return areas;
 }
 
-std::vector<Mat3f> GradientFit::fit(std::span<const Vec3f> positions, NormalColumn normal_column, Law law,
+std::vector<Mat3f> GradientFit::fit(std::span<const Vec3f> positions, NormalColumn normal_column, HeightLaw law,
                                     const RunContext& context) const {
     const std::vector<Vec3f> normals = vertex_normals(driver_, positions, context);
-    const std::vector<double> areas = law == Law::keep ? rest_areas_ : ring_areas(positions);
+    const std::vector<double> areas = law == HeightLaw::keep ? rest_areas_ : ring_areas(positions);
     std::vector<Vec3d> columns(positions.size());
     for (std::size_t i = 0; i < columns.size(); ++i)
-        columns[i] = law_scale(law, rest_areas_[i], areas[i]) * normals[i].cast<double>().normalized();
+        columns[i] = height_law_scale(law, rest_areas_[i], areas[i]) * normals[i].cast<double>().normalized();
     return apply(normal_column == NormalColumn::shell ? hard_ : soft_, positions, columns, context);
 }
 
@@ -177,7 +177,7 @@ std::vector<Mat3f> GradientFit::fit_to_ghosts(std::span<const Vec3f> positions, 
     return apply(hard_, positions, columns, context);
 }
 
-void GradientFit::make_shell(std::span<Mat3f> gradients, Law law) const {
+void GradientFit::make_shell(std::span<Mat3f> gradients, HeightLaw law) const {
     for (std::size_t i = 0; i < gradients.size(); ++i) {
         const Vec3d n = normals_[i].cast<double>().normalized();
         if (n.squaredNorm() == 0) continue;
@@ -186,7 +186,7 @@ void GradientFit::make_shell(std::span<Mat3f> gradients, Law law) const {
         const Vec3d across =
             (a * basis.col(0)).cross(a * basis.col(1)); // the deformed normal; its length is the area ratio
         const double area = across.norm();
-        const Vec3d column = area > 0 ? Vec3d(law_scale(law, 1, area) * across / area) : Vec3d(Vec3d::Zero());
+        const Vec3d column = area > 0 ? Vec3d(height_law_scale(law, 1, area) * across / area) : Vec3d(Vec3d::Zero());
         gradients[i] = (a + (column - a * n) * n.transpose()).cast<float>();
     }
 }

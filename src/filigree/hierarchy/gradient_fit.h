@@ -2,7 +2,7 @@
 #pragma once
 
 #include "filigree/core/run_context.h"
-#include "filigree/hierarchy/law.h"
+#include "filigree/hierarchy/height_law.h"
 #include "filigree/mesh/mesh.h"
 
 namespace filigree {
@@ -16,7 +16,7 @@ enum class NormalColumn {
 /// Precomputed least-squares fits over the two-ring of every driver vertex. In rest coordinates (u, v, z) about the
 /// vertex, z along its normal, positions are fitted by [u v z u^2 uv v^2] with a ridge on the quadratic terms; what is
 /// left at run time is A_i = sum_j (c_j' - c_i') alpha_ij^T + s n_i' beta_i^T. Exact at rest, for rigid motions, and
-/// with Law::proportional for uniform scale. A vertex without faces has the identity.
+/// with HeightLaw::proportional for uniform scale. A vertex without faces has the identity.
 class GradientFit {
 public:
     /// driver: the driver at rest. Cost O(V) fits of six unknowns.
@@ -24,13 +24,13 @@ public:
 
     /// One gradient a vertex of the driver, whose vertices are now at `positions`; s by the law, from the areas of the
     /// one-rings. Cost O(V); same bytes for any thread count.
-    std::vector<Mat3f> fit(std::span<const Vec3f> positions, NormalColumn normal_column, Law law,
+    std::vector<Mat3f> fit(std::span<const Vec3f> positions, NormalColumn normal_column, HeightLaw law,
                            const RunContext& context) const;
     /// The same, with the normal column given: ghosts[i] is where rest_ghosts()[i] went.
     std::vector<Mat3f> fit_to_ghosts(std::span<const Vec3f> positions, std::span<const Vec3f> ghosts,
                                      const RunContext& context) const;
     /// Replaces the normal column of given gradients by s n', n' and s from the gradients themselves.
-    void make_shell(std::span<Mat3f> gradients, Law law) const;
+    void make_shell(std::span<Mat3f> gradients, HeightLaw law) const;
 
     /// The points off the surface, a tenth of the mean edge along each vertex's normal (at the vertex where it has
     /// none).

@@ -45,6 +45,8 @@ std::vector<Vec3f> driver_positions(const Model& model) {
     return positions;
 }
 
+Pose rest_pose(const Model& model) { return {driver_positions(model), {}, {}}; }
+
 namespace {
 
 bool ascending_below(std::span<const Index> ids, std::size_t limit) {

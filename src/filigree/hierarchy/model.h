@@ -2,6 +2,7 @@
 #pragma once
 
 #include "filigree/hierarchy/blend_code.h"
+#include "filigree/hierarchy/pose.h"
 #include "filigree/hierarchy/reference_code.h"
 #include "filigree/mesh/mesh.h"
 
@@ -42,6 +43,8 @@ std::vector<float> vertex_levels(const Model& model, unsigned level);
 
 /// The driver's rest positions, in the driver's order.
 std::vector<Vec3f> driver_positions(const Model& model);
+/// The pose in which nothing has moved: the driver's rest positions, without gradients or ghost points.
+Pose rest_pose(const Model& model);
 
 /// The first thing wrong with a model, as a sentence, or "" when everything refers to what is there: indices in range,
 /// offsets ascending, records one a vertex, numbers finite. A model that passes can be restored. Cost O(size).

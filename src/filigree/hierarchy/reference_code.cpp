@@ -32,7 +32,7 @@ Vec3d coordinates(const Basis<float>& basis, const Vec3d& point) {
 class Encoder {
 public:
     Encoder(const Mesh& mesh, ReferenceDetail& detail, const RunContext& context)
-        : mesh_(mesh), detail_(detail), context_(context), plan_(detail, Law::keep),
+        : mesh_(mesh), detail_(detail), context_(context), plan_(detail, HeightLaw::keep),
           exponent_(exponent_of(detail.extent)) {}
 
     Status encode() {
@@ -140,13 +140,13 @@ Result<ReferenceDetail> encode_reference(const Mesh& mesh, const ReferenceOption
 
 /// The plan, and for each vertex its place in the finest grids.
 struct ReferenceRestorer::State {
-    State(const ReferenceDetail& detail, Law law) : plan(detail, law) {}
+    State(const ReferenceDetail& detail, HeightLaw law) : plan(detail, law) {}
 
     Plan plan;
     std::vector<Index> places;
 };
 
-ReferenceRestorer::ReferenceRestorer(const ReferenceDetail& detail, Law law, const RunContext& context)
+ReferenceRestorer::ReferenceRestorer(const ReferenceDetail& detail, HeightLaw law, const RunContext& context)
     : state_(std::make_unique<State>(detail, law)) {
     Plan& plan = state_->plan;
     Work work;
@@ -154,7 +154,7 @@ ReferenceRestorer::ReferenceRestorer(const ReferenceDetail& detail, Law law, con
     for (unsigned level = 0; level < detail.patches.levels; ++level) {
         plan.fold_level(work.coarse, context);
         // Without a law nobody asks what sizes were at rest.
-        if (law == Law::keep || level + 1 == detail.patches.levels) continue;
+        if (law == HeightLaw::keep || level + 1 == detail.patches.levels) continue;
         plan.refine(level, rest, work.coarse, work.fine, work.edges, context);
         std::swap(work.coarse, work.fine);
     }

@@ -13,7 +13,7 @@
 // references. When removed, the point is `loose` (see ReferenceDetail). So every answer is finite and bounded.
 #pragma once
 
-#include "filigree/hierarchy/law.h"
+#include "filigree/hierarchy/height_law.h"
 #include "filigree/hierarchy/regular_patches.h"
 
 #include <memory>
@@ -52,7 +52,7 @@ Result<ReferenceDetail> encode_reference(const Mesh& mesh, const ReferenceOption
 class ReferenceRestorer {
 public:
     /// Folds the law into the records. Keeps a reference to `detail`. Cost O(V).
-    ReferenceRestorer(const ReferenceDetail& detail, Law law, const RunContext& context);
+    ReferenceRestorer(const ReferenceDetail& detail, HeightLaw law, const RunContext& context);
     ~ReferenceRestorer();
     ReferenceRestorer(ReferenceRestorer&&) noexcept;
     ReferenceRestorer& operator=(ReferenceRestorer&&) noexcept;

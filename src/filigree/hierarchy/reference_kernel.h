@@ -6,7 +6,7 @@
 #pragma once
 
 #include "filigree/core/lanes.h"
-#include "filigree/hierarchy/law.h"
+#include "filigree/hierarchy/height_law.h"
 
 #include <algorithm>
 #include <bit>
@@ -119,18 +119,18 @@ FILIGREE_INLINE Basis<F> centre_basis(const References<F>& r) {
 
 /// What the law needs besides the records. Factors take the records' unit to the pose's.
 struct Scaling {
-    Law law = Law::keep;
+    HeightLaw law = HeightLaw::keep;
     float height = 1; ///< factor on heights
     float size = 1;   ///< factor on rest sizes
 };
 
 /// A basis's size, as the law stores it at rest: width, 1 / area, area.
 template <class F>
-FILIGREE_INLINE F rest_size(const Basis<F>& basis, Law law) {
+FILIGREE_INLINE F rest_size(const Basis<F>& basis, HeightLaw law) {
     const Point<F> normal = cross(basis.across, basis.up);
     const F width2 = dot(basis.across, basis.across), area2 = dot(normal, normal);
-    if (law == Law::inverse) return width2 * inverse_sqrt(width2);
-    if (law == Law::proportional) return inverse_sqrt(area2);
+    if (law == HeightLaw::inverse) return width2 * inverse_sqrt(width2);
+    if (law == HeightLaw::proportional) return inverse_sqrt(area2);
     return area2 * inverse_sqrt(area2);
 }
 
@@ -141,17 +141,17 @@ FILIGREE_INLINE Point<F> place(const Basis<F>& basis, const Point<F>& record, F 
     const F area2 = dot(normal, normal);
     const F inverse_area = inverse_sqrt(area2);
     F height = scaling.height * record.z;
-    if (scaling.law != Law::keep) {
+    if (scaling.law != HeightLaw::keep) {
         F s = scaling.size * size;
-        if (scaling.law == Law::inverse) {
+        if (scaling.law == HeightLaw::inverse) {
             s = s * inverse_sqrt(dot(basis.across, basis.across));
-        } else if (scaling.law == Law::proportional) {
+        } else if (scaling.law == HeightLaw::proportional) {
             s = at_most(s * (area2 * inverse_area), kHugeRatio);
             s = s * inverse_sqrt(s); // grows with its surroundings alone: no bound needed
         } else {
             s = s * inverse_area;
         }
-        if (scaling.law != Law::proportional) s = at_most(at_least(s, 1 / kMaxLawScale), kMaxLawScale);
+        if (scaling.law != HeightLaw::proportional) s = at_most(at_least(s, 1 / kMaxHeightScale), kMaxHeightScale);
         height = height * s;
     }
     return basis.origin + (record.x * basis.across + record.y * basis.up + (height * inverse_area) * normal);
@@ -182,11 +182,11 @@ struct EdgeRun {
 
 inline std::size_t block_width(std::size_t cells) { return std::min(cells, kLanes); }
 /// Kinds of basis with a size of their own in a cell: with six references the centre's is none of the edges'.
-inline std::size_t cell_sizes(int references, Law law) { return law == Law::keep ? 0 : references == 6 ? 3 : 2; }
+inline std::size_t cell_sizes(int references, HeightLaw law) { return law == HeightLaw::keep ? 0 : references == 6 ? 3 : 2; }
 /// A block of cells in blocks of up to kLanes: v, w, h of the edge points along the row, of those across it and of the
 /// centres, then the sizes.
-inline std::size_t cell_floats(int references, Law law) { return 9 + cell_sizes(references, law); }
-inline std::size_t edge_floats(Law law) { return law == Law::keep ? 3 : 4; }
+inline std::size_t cell_floats(int references, HeightLaw law) { return 9 + cell_sizes(references, law); }
+inline std::size_t edge_floats(HeightLaw law) { return law == HeightLaw::keep ? 3 : 4; }
 
 /// Refines one row of cells. The points on the patch's sides come out as anything; they are set from the edges.
 void refine_row(const CellRow& row, int references, const Scaling& scaling);

@@ -221,7 +221,7 @@ Basis<float> cell_basis(int references, const Grid& grid, CellPoint kind, std::s
         kind == CellPoint::along ? along_references(grid, patch, i, j) : upwards_references(grid, patch, i, j), true);
 }
 
-Plan::Plan(const ReferenceDetail& detail, Law law)
+Plan::Plan(const ReferenceDetail& detail, HeightLaw law)
     : detail_(detail), law_(law), references_(static_cast<int>(detail.references)),
       rest_exponent_(exponent_of(detail.extent)), edges_(find_base_edges(detail.patches)) {
     for (const auto& quad : detail.patches.base)
@@ -268,7 +268,7 @@ void Plan::fold_edges(Level& level, std::span<const Vec3f> records, const Grid& 
                     float* to = code + (edge * m + k / width * width) * floats + k % width;
                     const Vec3f& record = records[edge_record(m, edge, k)];
                     to[0] = record.x(), to[width] = record.y(), to[2 * width] = std::ldexp(record.z(), -rest_exponent_);
-                    if (law_ != Law::keep)
+                    if (law_ != HeightLaw::keep)
                         to[3 * width] = rest_size(edge_basis(references_, side_references(rest, edges_, edge, k),
                                                              edges_.twins[edge] != kNoIndex),
                                                   law_);
@@ -339,8 +339,8 @@ PlacedDriver Plan::begin(std::span<const Vec3f> driver, bool with_axes, Grid& gr
     placed.scaling.law = law_;
     placed.scaling.height = std::ldexp(1.0f, rest_exponent_ - exponent);
     const int area_exponent = 2 * (rest_exponent_ - exponent);
-    placed.scaling.size = law_ == Law::volume         ? std::ldexp(1.0f, area_exponent)
-                          : law_ == Law::proportional ? std::min(std::ldexp(1.0f, -area_exponent), kHugeRatio)
+    placed.scaling.size = law_ == HeightLaw::volume         ? std::ldexp(1.0f, area_exponent)
+                          : law_ == HeightLaw::proportional ? std::min(std::ldexp(1.0f, -area_exponent), kHugeRatio)
                                                       : placed.scaling.height;
     grid.resize(patches().patch_count(), 1);
     for (std::size_t slot = 0; slot < driver_slots_.size(); ++slot) {

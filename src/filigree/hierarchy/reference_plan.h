@@ -125,7 +125,7 @@ struct Work {
 /// A detail's records, folded for one law into the order and shape that the kernel reads, level by level.
 class Plan {
 public:
-    Plan(const ReferenceDetail& detail, Law law);
+    Plan(const ReferenceDetail& detail, HeightLaw law);
 
     const ReferenceDetail& detail() const { return detail_; }
     const RegularPatches& patches() const { return detail_.patches; }
@@ -137,7 +137,7 @@ public:
     std::size_t cell_record(std::size_t m, std::size_t patch, std::size_t i, std::size_t j, CellPoint kind) const;
     std::size_t record_count(std::size_t m) const;
 
-    /// Folds the records of the next level. rest: the level they refine, at rest (of no use for Law::keep).
+    /// Folds the records of the next level. rest: the level they refine, at rest (of no use for HeightLaw::keep).
     void fold_level(const Grid& rest, const RunContext& context);
 
     /// Sets the driver's grid.
@@ -182,7 +182,7 @@ private:
     const float* edge_point(const std::vector<float>& edges, std::size_t m, Index half, std::size_t k) const;
 
     const ReferenceDetail& detail_;
-    Law law_;
+    HeightLaw law_;
     int references_;
     int rest_exponent_;
     BaseEdges edges_;

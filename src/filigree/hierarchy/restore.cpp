@@ -8,7 +8,7 @@ struct Restorer::Content {
     const Model* model = nullptr;
     RestoreOptions options;
     unsigned level = 0;
-    Law law = Law::proportional;
+    HeightLaw law = HeightLaw::proportional;
     Mesh rest;                           ///< the level at rest, with split normals
     std::vector<Index> vertices;         ///< ids in the finest mesh; empty at the finest level
     std::vector<Index> vertex_of_normal; ///< of rest.normals.values, in the level's own ids
@@ -94,10 +94,10 @@ Result<Restorer> Restorer::create(const Model& model, const RestoreOptions& opti
     if (content->level < model.finest_level()) content->vertices = model.levels[content->level].vertices;
     content->vertex_of_normal = split_shared_normals(content->rest);
     if (model.code() == DetailCode::blend) {
-        content->law = options.law.value_or(Law::proportional);
+        content->law = options.law.value_or(HeightLaw::proportional);
         content->prepare_blend(context);
     } else {
-        content->law = options.law.value_or(Law::inverse);
+        content->law = options.law.value_or(HeightLaw::inverse);
         content->reference.emplace(std::get<ReferenceDetail>(model.detail), content->law, context);
     }
     return Restorer(std::move(content));

@@ -189,7 +189,7 @@ Result<Stripped> strip_reference(Mesh mesh, const StripOptions& options, const R
     }
     Result<ReferenceDetail> detail = encode_reference(mesh, reference_options, context);
     if (!detail) return detail.error();
-    const ReferenceRestorer restorer(*detail, Law::keep, context);
+    const ReferenceRestorer restorer(*detail, HeightLaw::keep, context);
     std::vector<Index> local(mesh.vertex_count(), kNoIndex);
     for (unsigned k = 0; k < detail->patches.levels; ++k) {
         Level level;

@@ -173,7 +173,7 @@ Result<GpuRestorer> GpuRestorer::prepare(const Model& model, std::span<const Ind
     for (Index r = 0; r < items.size(); ++r) content->drawn_at[restorer.slots()[r]] = r;
     if (context.is_cancelled()) return cancelled_error();
 
-    Pose rest{driver_positions(model), {}, {}};
+    Pose rest = rest_pose(model);
     rest.gradients.assign(rest.positions.size(), Mat3f::Identity());
     PackedRecords& packed = content->packed;
     packed = pack(restorer.records(), restorer.output_scale());

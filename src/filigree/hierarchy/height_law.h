@@ -8,27 +8,27 @@
 namespace filigree {
 
 /// The factor s on the height of detail, from a size of its surroundings at rest and now.
-enum class Law {
+enum class HeightLaw {
     keep,         ///< s = 1
     inverse,      ///< s = old width / new width (the report, eq. 2.14)
     proportional, ///< s = sqrt(new area / old area): exact under uniform scale
     volume,       ///< s = old area / new area
 };
 
-/// `inverse` and `volume` are held in [1 / kMaxLawScale, kMaxLawScale]: without it they have no bound as the
+/// `inverse` and `volume` are held in [1 / kMaxHeightScale, kMaxHeightScale]: without it they have no bound as the
 /// surroundings collapse (260 diagonals were measured). `proportional` needs none: it shrinks with its surroundings.
-inline constexpr float kMaxLawScale = 4;
+inline constexpr float kMaxHeightScale = 4;
 
-inline constexpr std::array<std::string_view, 4> kLawNames = {"keep", "inverse", "proportional", "volume"};
+inline constexpr std::array<std::string_view, 4> kHeightLawNames = {"keep", "inverse", "proportional", "volume"};
 
-inline std::string_view law_name(Law law) { return kLawNames[static_cast<std::size_t>(law)]; }
-inline std::optional<Law> law_from_name(std::string_view name) {
-    for (std::size_t i = 0; i < kLawNames.size(); ++i)
-        if (kLawNames[i] == name) return static_cast<Law>(i);
+inline std::string_view height_law_name(HeightLaw law) { return kHeightLawNames[static_cast<std::size_t>(law)]; }
+inline std::optional<HeightLaw> height_law_from_name(std::string_view name) {
+    for (std::size_t i = 0; i < kHeightLawNames.size(); ++i)
+        if (kHeightLawNames[i] == name) return static_cast<HeightLaw>(i);
     return std::nullopt;
 }
 
 /// s of a law from old and new area; `inverse` takes the square root of the area as its width.
-double law_scale(Law law, double rest_area, double area);
+double height_law_scale(HeightLaw law, double rest_area, double area);
 
 } // namespace filigree

@@ -1,24 +1,24 @@
-#include "filigree/hierarchy/law.h"
+#include "filigree/hierarchy/height_law.h"
 
 #include <algorithm>
 #include <cmath>
 
 namespace filigree {
 
-double law_scale(Law law, double rest_area, double area) {
+double height_law_scale(HeightLaw law, double rest_area, double area) {
     if (!(rest_area > 0)) return 1;
     const double ratio = area / rest_area;
     const auto bounded = [](double s) {
-        return std::clamp(s, 1.0 / kMaxLawScale, double{kMaxLawScale}); // also for ratio = 0, where s is infinite
+        return std::clamp(s, 1.0 / kMaxHeightScale, double{kMaxHeightScale}); // also for ratio = 0, where s is infinite
     };
     switch (law) {
-    case Law::keep:
+    case HeightLaw::keep:
         return 1;
-    case Law::inverse:
+    case HeightLaw::inverse:
         return bounded(1 / std::sqrt(ratio));
-    case Law::proportional:
+    case HeightLaw::proportional:
         return std::sqrt(ratio);
-    case Law::volume:
+    case HeightLaw::volume:
         return bounded(1 / ratio);
     }
     return 1;
