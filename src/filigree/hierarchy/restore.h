@@ -15,6 +15,7 @@ struct RestoreOptions {
     std::optional<HeightLaw> law = {};
     bool thin_shell = false; ///< blend code: bumps keep their shape (cloth, skin) instead of stretching with the body
     std::optional<unsigned> level = {}; ///< restore up to this level; unset: the finest
+    bool operator==(const RestoreOptions&) const = default;
 };
 
 /// The level that the options mean. Errors: usage (no such level).

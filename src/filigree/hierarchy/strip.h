@@ -16,6 +16,7 @@ struct StripOptions {
     std::optional<double> error = {};     ///< how far the driver may leave the mesh, fraction of the diagonal (rms)
     Precision precision = Precision::float32; ///< blend code only
     unsigned references = 3;                  ///< reference code only: 3, 4 or 6
+    bool operator==(const StripOptions&) const = default;
 };
 
 struct StripReport {
@@ -25,6 +26,7 @@ struct StripReport {
     std::size_t forced_collapses = 0; ///< see Simplified
     double simplify_error = 0;        ///< see Simplified::error; summed over the levels
     double simplify_seconds = 0, bind_seconds = 0, encode_seconds = 0;
+    bool operator==(const StripReport&) const = default;
 };
 
 struct Stripped {

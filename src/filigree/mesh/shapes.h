@@ -16,6 +16,7 @@ struct ShapeOptions {
     double size = 1;          ///< side or diameter, model units
     double length = 4;        ///< bar, cylinder: length as a multiple of the side or diameter
     double thickness = 0.3;   ///< torus: tube radius as a fraction of the ring's
+    bool operator==(const ShapeOptions&) const = default;
 };
 
 /// The report's cube (eq. 2.1, figure 2.1): each face carries z = amplitude sin(2 pi frequency u) sin(2 pi frequency v)

@@ -30,6 +30,8 @@ struct Material {
     double heating = 0;           ///< K/s: ambient heating of the surface
     double conductivity = 0;      ///< m^2/s: thermal diffusivity inside
 
+    bool operator==(const Material&) const = default;
+
     bool is_plastic() const { return yield_stress < kNever; }
     bool melts() const { return melting_to < kNever; }
 };
