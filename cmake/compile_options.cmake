@@ -5,6 +5,10 @@ target_compile_options(filigree_options INTERFACE
   -Wshadow -Wconversion -Wno-sign-conversion -Wno-psabi
   -ffp-contract=off      # no fused multiply-add: the same bytes whatever the processor has
   $<$<BOOL:${FILIGREE_STRICT}>:-Werror>)
+if(BUILD_SHARED_LIBS) # calls of our own stay direct, as in a static library
+  target_compile_options(filigree_options INTERFACE -fno-semantic-interposition)
+  target_link_options(filigree_options INTERFACE -Wl,-Bsymbolic-functions)
+endif()
 if(FILIGREE_SANITIZE)
   target_compile_options(filigree_options INTERFACE -fsanitize=${FILIGREE_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
   target_link_options(filigree_options INTERFACE -fsanitize=${FILIGREE_SANITIZE})
