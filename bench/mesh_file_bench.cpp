@@ -53,7 +53,7 @@ void set_bytes(benchmark::State& state, std::size_t bytes) {
 
 void read(benchmark::State& state, const Mesh& mesh, const Format& format) {
     std::string bytes;
-    const auto written = write_mesh(mesh, format.format, bytes, format.options);
+    const auto written = write_mesh(mesh, format.format, bytes, format.options, RunContext());
     if (!written.ok()) return state.SkipWithError(written.error().message.c_str());
     const RunContext context(1);
     for (auto _ : state) {
@@ -68,7 +68,7 @@ void write(benchmark::State& state, const Mesh& mesh, const Format& format) {
     std::size_t size = 0;
     for (auto _ : state) {
         std::string bytes;
-        const auto written = write_mesh(mesh, format.format, bytes, format.options);
+        const auto written = write_mesh(mesh, format.format, bytes, format.options, RunContext());
         if (!written.ok()) return state.SkipWithError(written.error().message.c_str());
         benchmark::DoNotOptimize(bytes.data());
         size = bytes.size();
@@ -79,7 +79,8 @@ void write(benchmark::State& state, const Mesh& mesh, const Format& format) {
 /// What nothing that keeps the bytes can beat.
 void copy(benchmark::State& state, const Mesh& mesh, const Format& format) {
     std::string bytes;
-    if (!write_mesh(mesh, format.format, bytes, format.options).ok()) return state.SkipWithError("not written");
+    if (!write_mesh(mesh, format.format, bytes, format.options, RunContext()).ok())
+        return state.SkipWithError("not written");
     for (auto _ : state) {
         const std::unique_ptr<char[]> target(new char[bytes.size()]);
         std::memcpy(target.get(), bytes.data(), bytes.size());

@@ -26,9 +26,7 @@ int main(int argc, char** argv) {
     const Camera camera = fit_camera({&points, 1}, view_direction(View::iso, UpAxis::y), up_vector(UpAxis::y), 4.0 / 3);
     const Picture picture = renderer.picture(scene, camera, {.width = 640, .height = 480}, context).value();
 
-    const std::string png = encode_png(picture);
-    const std::string_view bytes = png;
-    const Status written = write_file(argc > 1 ? argv[1] : "cube.png", {&bytes, 1});
+    const Status written = write_file(argc > 1 ? argv[1] : "cube.png", encode_png(picture));
     if (!written)
         std::cerr << written.error().message << '\n';
     else

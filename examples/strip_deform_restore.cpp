@@ -21,7 +21,7 @@ Mesh bend_through_driver(const char* input, const char* output) {
     const Pose pose = warp_pose(*bend, driver_positions(model), Vec3d::Zero(), context);
 
     const Mesh restored = restorer.mesh(pose, context).value();
-    const auto warnings = write_mesh(restored, output, context).value();
+    const auto warnings = write_mesh(restored, output, {}, context).value();
     // [/README]
     for (const std::string& warning : warnings) std::fprintf(stderr, "%s\n", warning.c_str());
     return restored;
@@ -30,7 +30,7 @@ Mesh bend_through_driver(const char* input, const char* output) {
 int main() {
     const RunContext context;
     Mesh full = make_wavy_sphere({.resolution = 96});
-    if (!write_mesh(full, "sphere.ply", context)) return 1;
+    if (!write_mesh(full, "sphere.ply", {}, context)) return 1;
     const Mesh restored = bend_through_driver("sphere.ply", "bent.ply");
 
     // The long way: every vertex. Nobody can tell the difference.

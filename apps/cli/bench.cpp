@@ -57,7 +57,7 @@ public:
             std::string bytes;
             const double write = median_seconds([&] {
                 bytes.clear();
-                require(write_mesh(mesh_, format, bytes));
+                require(write_mesh(mesh_, format, bytes, {}, RunContext()));
             });
             const double read =
                 median_seconds([&] { require(read_mesh(bytes, std::string("mesh.") + name, context_)); });

@@ -573,8 +573,7 @@ Status Page::write(const std::filesystem::path& path, double scale) const {
     } else
         return Error{ErrorCode::unsupported,
                      path.string() + ": pages are written as .png, .svg or .pdf; choose one of these endings."};
-    const std::string_view piece = bytes;
-    return write_file(path, {&piece, 1});
+    return write_file(path, bytes);
 }
 
 } // namespace filigree::cli

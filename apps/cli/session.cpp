@@ -184,7 +184,7 @@ void Session::write_mesh(const Mesh& mesh, const std::string& path, const std::s
     WriteMeshOptions options;
     if (source != "-") options.materials_beside = source;
     if (path == "-") options.format = MeshFormat::ply; // no name to tell the format by: PLY holds the most
-    for (const std::string& warning : require(filigree::write_mesh(mesh, path, context(), options))) warn(warning);
+    for (const std::string& warning : require(filigree::write_mesh(mesh, path, options, context()))) warn(warning);
 }
 
 void Session::write_model(const Model& model, const std::string& path, const PoseSequence& poses) {

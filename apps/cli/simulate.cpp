@@ -368,11 +368,7 @@ private:
         check.direct_seconds += seconds;
     }
 
-    void save() {
-        const std::string bytes = pack_state(recording_, *simulation_, ready_.hash);
-        const std::string_view piece = bytes;
-        require(write_file(options_.save, std::span(&piece, 1)));
-    }
+    void save() { require(write_file(options_.save, pack_state(recording_, *simulation_, ready_.hash))); }
 
     [[noreturn]] void cancelled(std::size_t frame) {
         if (options_.save.empty()) throw Failure{cancelled_error()};

@@ -55,9 +55,7 @@ void check_picture_path(const std::string& path) {
 
 void write_picture(const Picture& picture, const std::string& path, Session& session) {
     if (session.context().is_cancelled()) throw Failure{cancelled_error()};
-    const std::string bytes = encode_png(picture);
-    const std::string_view piece = bytes;
-    require(write_file(path, std::span(&piece, 1)));
+    require(write_file(path, encode_png(picture)));
 }
 
 } // namespace filigree::cli

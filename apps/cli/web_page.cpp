@@ -67,10 +67,7 @@ std::string base64(std::string_view bytes) {
     return text;
 }
 
-void write_text(const std::string& path, const std::string& text) {
-    const std::string_view piece = text;
-    require_written(write_file(path, {&piece, 1}));
-}
+void write_text(const std::string& path, const std::string& text) { require_written(write_file(path, text)); }
 
 } // namespace
 

@@ -48,8 +48,7 @@ Status grab_window(const std::filesystem::path& path, MainWindow& window) {
     QBuffer buffer(&bytes);
     if (!buffer.open(QIODevice::WriteOnly) || !picture.save(&buffer, "PNG"))
         return Error{ErrorCode::out_of_memory, path.string() + ": there is no memory for the picture."};
-    const std::string_view piece(bytes.constData(), static_cast<std::size_t>(bytes.size()));
-    return write_file(path, std::span(&piece, 1));
+    return write_file(path, std::string_view(bytes.constData(), static_cast<std::size_t>(bytes.size())));
 }
 
 /// The words of a line: separated by spaces, "in quotes" where they hold some. A # begins a comment.

@@ -113,7 +113,7 @@ Result<QString> write_checked(const Mesh& mesh, const std::string& path, const R
     if (const std::string wrong = check_mesh(mesh); !wrong.empty())
         return Error{ErrorCode::unsuitable,
                      path + ": not written: the result is beyond what numbers can hold (" + wrong + "); deform less."};
-    const Result<std::vector<std::string>> warnings = write_mesh(mesh, path, context, {.materials_beside = source});
+    const Result<std::vector<std::string>> warnings = write_mesh(mesh, path, {.materials_beside = source}, context);
     if (!warnings) return warnings.error();
     QString text = QString("Saved %1: %2, %3.")
                        .arg(file_name(path), counted(mesh.vertex_count(), "vertex", "vertices"),

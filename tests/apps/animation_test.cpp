@@ -28,7 +28,7 @@ protected:
                 pose.positions.emplace_back(p.x() + float(k) * p.y(), p.y(), p.z());
         }
         EXPECT_TRUE(write_model(model_, poses_, path("moving.fil"), kContext).ok());
-        EXPECT_TRUE(write_mesh(model_.mesh, path("mesh.ply"), kContext).ok());
+        EXPECT_TRUE(write_mesh(model_.mesh, path("mesh.ply"), {}, kContext).ok());
         driver_ = level_mesh(model_, 0);
         const MeshAnimation driver{&driver_, 3, 25, [this](std::size_t frame, std::span<Vec3f> positions) -> Status {
                                        const std::vector<Vec3f>& moved = poses_.frames[frame].positions;

@@ -36,10 +36,7 @@ protected:
     fs::path folder_;
 };
 
-Status write(const fs::path& path, std::string_view bytes) {
-    const std::array pieces = {bytes};
-    return write_file(path, pieces);
-}
+Status write(const fs::path& path, std::string_view bytes) { return write_file(path, bytes); }
 
 } // namespace
 

@@ -73,7 +73,7 @@ struct Written {
 
 Written write(const Mesh& mesh, const WriteMeshOptions& options = {}) {
     std::string bytes;
-    const Result<std::vector<std::string>> warnings = write_mesh(mesh, MeshFormat::gltf, bytes, options);
+    const Result<std::vector<std::string>> warnings = write_mesh(mesh, MeshFormat::gltf, bytes, options, RunContext());
     EXPECT_TRUE(warnings.ok());
     return {Glb(bytes), warnings.ok() ? *warnings : std::vector<std::string>()};
 }
@@ -303,13 +303,13 @@ TEST(GlbWriter, ManyVerticesHaveWideIndices) {
 
 TEST(GlbWriter, TheSameMeshGivesTheSameBytes) {
     std::string first, second;
-    ASSERT_TRUE(write_mesh(make_corner_attribute_mesh(), MeshFormat::gltf, first, {}).ok());
-    ASSERT_TRUE(write_mesh(make_corner_attribute_mesh(), MeshFormat::gltf, second, {}).ok());
+    ASSERT_TRUE(write_mesh(make_corner_attribute_mesh(), MeshFormat::gltf, first, {}, RunContext()).ok());
+    ASSERT_TRUE(write_mesh(make_corner_attribute_mesh(), MeshFormat::gltf, second, {}, RunContext()).ok());
     EXPECT_TRUE(first == second);
 }
 
 TEST(GlbWriter, GltfWithFilesBesideItIsNotWritten) {
-    const Result<std::vector<std::string>> result = write_mesh(square(), "x.gltf", RunContext(1));
+    const Result<std::vector<std::string>> result = write_mesh(square(), "x.gltf", {}, RunContext(1));
     ASSERT_FALSE(result.ok());
     EXPECT_EQ(result.error().code, ErrorCode::unsupported);
     EXPECT_NE(result.error().message.find("write .glb"), std::string::npos);

@@ -286,7 +286,7 @@ TEST(Gltf, APictureThatCannotBeHadIsAWarning) {
 TEST(Gltf, OurOwnFilesGiveTheMeshBack) {
     const Mesh mesh = make_corner_attribute_mesh();
     std::string bytes;
-    ASSERT_TRUE(write_mesh(mesh, MeshFormat::gltf, bytes).ok());
+    ASSERT_TRUE(write_mesh(mesh, MeshFormat::gltf, bytes, {}, RunContext()).ok());
     const Mesh back = read(bytes);
     ASSERT_EQ(back.vertex_count(), mesh.vertex_count());
     EXPECT_EQ(std::memcmp(back.positions.data(), mesh.positions.data(), 12 * mesh.vertex_count()), 0);

@@ -287,7 +287,7 @@ TEST_F(MaterialFile, EmbeddedMaterialsComeBackFromFilesBesideAnObj) {
     paint.metallic = 0.7f;
     paint.roughness = 0.1f;
     const fs::path obj = folder_ / "a b.obj";
-    const Result<std::vector<std::string>> written = write_mesh(mesh, obj, RunContext(1));
+    const Result<std::vector<std::string>> written = write_mesh(mesh, obj, {}, RunContext(1));
     ASSERT_TRUE(written.ok());
     EXPECT_TRUE(written->empty()) << testing::PrintToString(*written);
     EXPECT_TRUE(bytes_of_file(folder_ / "a_b__.._wood__1.png") == kPng) << "a name stays in the folder";
@@ -310,13 +310,13 @@ TEST_F(MaterialFile, EmbeddedMaterialsComeBackFromFilesBesideAnObj) {
 TEST_F(MaterialFile, FilesOfOthersAreNotReplaced) {
     write("x.mtl", "newmtl mine\nKd 1 0 0\n");
     write("x_wood.png", "mine");
-    ASSERT_TRUE(write_mesh(mesh_with({{"wood", kPng}}), folder_ / "x.obj", RunContext(1)).ok());
+    ASSERT_TRUE(write_mesh(mesh_with({{"wood", kPng}}), folder_ / "x.obj", {}, RunContext(1)).ok());
     EXPECT_TRUE(bytes_of_file(folder_ / "x.mtl").starts_with("newmtl mine"));
     EXPECT_TRUE(bytes_of_file(folder_ / "x_wood.png") == "mine");
     EXPECT_TRUE(bytes_of_file(folder_ / "x_wood_2.png") == kPng);
     EXPECT_TRUE(bytes_of_file(folder_ / "x.obj").starts_with("mtllib x_2.mtl\n"));
     // Our own are, when the mesh is written again.
-    ASSERT_TRUE(write_mesh(mesh_with({{"wood", kOtherPng}}), folder_ / "x.obj", RunContext(1)).ok());
+    ASSERT_TRUE(write_mesh(mesh_with({{"wood", kOtherPng}}), folder_ / "x.obj", {}, RunContext(1)).ok());
     EXPECT_TRUE(bytes_of_file(folder_ / "x_wood_2.png") == kOtherPng);
     EXPECT_FALSE(fs::exists(folder_ / "x_3.mtl"));
     EXPECT_FALSE(fs::exists(folder_ / "x_wood_3.png"));
@@ -325,7 +325,7 @@ TEST_F(MaterialFile, FilesOfOthersAreNotReplaced) {
 TEST_F(MaterialFile, WithoutAFolderMaterialsAreLostAndSaid) {
     std::string bytes;
     const Result<std::vector<std::string>> warnings =
-        write_mesh(mesh_with({{"wood", kPng}}), MeshFormat::obj, bytes, {});
+        write_mesh(mesh_with({{"wood", kPng}}), MeshFormat::obj, bytes, {}, RunContext());
     ASSERT_TRUE(warnings.ok());
     EXPECT_EQ(*warnings, std::vector<std::string>{"OBJ cannot hold embedded materials; left out."});
     EXPECT_EQ(bytes.find("mtllib"), std::string::npos);

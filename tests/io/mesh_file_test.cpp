@@ -19,7 +19,7 @@ const RunContext kContext(1);
 
 std::string to_bytes(const Mesh& mesh, MeshFormat format, const WriteMeshOptions& options = {}) {
     std::string bytes;
-    EXPECT_TRUE(write_mesh(mesh, format, bytes, options).ok());
+    EXPECT_TRUE(write_mesh(mesh, format, bytes, options, RunContext()).ok());
     return bytes;
 }
 
@@ -77,7 +77,7 @@ TEST(MeshFile, PlyKeepsWhatVerticesHave) {
     for (const auto& [kind, options] : kPlyKinds) {
         SCOPED_TRACE(kind);
         std::string bytes;
-        EXPECT_TRUE(write_mesh(mesh, MeshFormat::ply, bytes, options)->empty());
+        EXPECT_TRUE(write_mesh(mesh, MeshFormat::ply, bytes, options, RunContext())->empty());
         EXPECT_NE(bytes.find("property uchar alpha"), std::string::npos); // they are bytes
         const MeshFile file = from_bytes(bytes, "a.ply");
         EXPECT_TRUE(file.warnings.empty());
@@ -114,7 +114,7 @@ TEST(MeshFile, PlyKeepsUvsOfCorners) {
 TEST(MeshFile, ObjKeepsCornersAndLabels) {
     const Mesh mesh = make_corner_attribute_mesh();
     std::string bytes;
-    EXPECT_TRUE(write_mesh(mesh, MeshFormat::obj, bytes)->empty());
+    EXPECT_TRUE(write_mesh(mesh, MeshFormat::obj, bytes, {}, RunContext())->empty());
     const MeshFile file = from_bytes(bytes, "a.obj");
     EXPECT_TRUE(file.warnings.empty());
     expect_same_surface(file.mesh, mesh);
@@ -154,7 +154,7 @@ TEST(MeshFile, StlIsClosedAgainAfterWelding) {
         cube.add_face(quad);
     for (const bool ascii : {false, true}) {
         std::string bytes;
-        const auto warnings = write_mesh(cube, MeshFormat::stl, bytes, {.ascii = ascii});
+        const auto warnings = write_mesh(cube, MeshFormat::stl, bytes, {.ascii = ascii}, RunContext());
         ASSERT_EQ(warnings->size(), 1u); // quads are cut
         const MeshFile file = from_bytes(bytes, "a.stl");
         EXPECT_EQ(file.mesh.vertex_count(), 8u);
@@ -165,14 +165,16 @@ TEST(MeshFile, StlIsClosedAgainAfterWelding) {
 TEST(MeshFile, OneWarningListsWhatAFormatCannotHold) {
     const Mesh mesh = make_corner_attribute_mesh();
     std::string bytes;
-    const auto warnings = write_mesh(mesh, MeshFormat::stl, bytes);
+    const auto warnings = write_mesh(mesh, MeshFormat::stl, bytes, {}, RunContext());
     ASSERT_EQ(warnings->size(), 1u);
     for (const char* lost :
          {"UVs", "normals", "colours", "objects", "groups", "materials", "smoothing", "three corners"})
         EXPECT_NE(warnings->front().find(lost), std::string::npos) << lost << ": " << warnings->front();
     const Mesh scalars = make_vertex_attribute_mesh();
-    EXPECT_NE(write_mesh(scalars, MeshFormat::obj, bytes)->front().find("'quality'"), std::string::npos);
-    EXPECT_NE(write_mesh(make_far_mesh(), MeshFormat::stl, bytes)->front().find("digits"), std::string::npos);
+    EXPECT_NE(write_mesh(scalars, MeshFormat::obj, bytes, {}, RunContext())->front().find("'quality'"),
+              std::string::npos);
+    EXPECT_NE(write_mesh(make_far_mesh(), MeshFormat::stl, bytes, {}, RunContext())->front().find("digits"),
+              std::string::npos);
 }
 
 TEST(MeshFile, ContentDecidesTheFormat) {
@@ -204,13 +206,13 @@ TEST(MeshFile, EndingsNameFormatsInAnyCase) {
 
 TEST(MeshFile, FilesOnDiskComeBack) {
     const auto path = std::filesystem::temp_directory_path() / ("filigree_mesh_" + std::to_string(::getpid()) + ".PLY");
-    ASSERT_TRUE(write_mesh(make_plain_mesh(), path, kContext).ok());
+    ASSERT_TRUE(write_mesh(make_plain_mesh(), path, {}, kContext).ok());
     expect_same_surface(read_mesh(path, kContext)->mesh, make_plain_mesh());
-    ASSERT_TRUE(write_mesh(make_plain_mesh(), path, kContext, {.format = MeshFormat::off}).ok());
+    ASSERT_TRUE(write_mesh(make_plain_mesh(), path, {.format = MeshFormat::off}, kContext).ok());
     EXPECT_EQ(read_file(path)->substr(0, 3), "OFF");
     std::filesystem::remove(path);
     EXPECT_EQ(read_mesh(path, kContext).error().code, ErrorCode::not_found);
-    EXPECT_EQ(write_mesh(make_plain_mesh(), "-", kContext).error().code, ErrorCode::unsupported);
+    EXPECT_EQ(write_mesh(make_plain_mesh(), "-", {}, kContext).error().code, ErrorCode::unsupported);
 }
 
 TEST(MeshFile, CancelStopsReadingAndWriting) {
@@ -219,7 +221,7 @@ TEST(MeshFile, CancelStopsReadingAndWriting) {
     const std::string bytes = to_bytes(make_plain_mesh(), MeshFormat::obj);
     EXPECT_EQ(read_mesh(bytes, "a.obj", context).error().code, ErrorCode::cancelled);
     const auto path = std::filesystem::temp_directory_path() / "filigree_never_written.obj";
-    EXPECT_EQ(write_mesh(make_plain_mesh(), path, context).error().code, ErrorCode::cancelled);
+    EXPECT_EQ(write_mesh(make_plain_mesh(), path, {}, context).error().code, ErrorCode::cancelled);
     EXPECT_FALSE(std::filesystem::exists(path));
 }
 

@@ -57,7 +57,7 @@ void expect_right_or_refused(const std::string& bytes, const std::string& name) 
     if (file.ok()) {
         ASSERT_EQ(check_mesh(file->mesh), "") << name;
         std::string again;
-        ASSERT_TRUE(write_mesh(file->mesh, MeshFormat::obj, again).ok());
+        ASSERT_TRUE(write_mesh(file->mesh, MeshFormat::obj, again, {}, RunContext()).ok());
         const Result<MeshFile> back = read_mesh(again, "again.obj", RunContext(1));
         ASSERT_TRUE(back.ok()) << name << ": " << back.error().message;
         ASSERT_EQ(back->mesh.corners, file->mesh.corners) << name;
@@ -85,7 +85,7 @@ TEST(MeshFuzz, DamagedFilesOfOurWriters) {
         std::vector<std::string> seeds;
         for (const Mesh& mesh :
              {make_plain_mesh(), make_vertex_attribute_mesh(), make_corner_attribute_mesh(), make_far_mesh()})
-            ASSERT_TRUE(write_mesh(mesh, kind.first, seeds.emplace_back(), kind.second).ok());
+            ASSERT_TRUE(write_mesh(mesh, kind.first, seeds.emplace_back(), kind.second, RunContext()).ok());
         for (int i = 0; i < kMutationsOfOurs; ++i)
             ASSERT_NO_FATAL_FAILURE(
                 expect_right_or_refused(mutate(seeds[static_cast<std::size_t>(i) % seeds.size()], random), name));
@@ -96,7 +96,7 @@ TEST(MeshFuzz, EveryCutOfASmallFile) {
     for (const MeshFormat format :
          {MeshFormat::obj, MeshFormat::ply, MeshFormat::stl, MeshFormat::off, MeshFormat::gltf}) {
         std::string bytes;
-        ASSERT_TRUE(write_mesh(make_vertex_attribute_mesh(), format, bytes).ok());
+        ASSERT_TRUE(write_mesh(make_vertex_attribute_mesh(), format, bytes, {}, RunContext()).ok());
         for (std::size_t size = 0; size < bytes.size(); ++size)
             ASSERT_NO_FATAL_FAILURE(expect_right_or_refused(bytes.substr(0, size), "standard input"));
     }

@@ -61,7 +61,7 @@ Mesh any_mesh() {
 
 MeshFile written_and_read(const Mesh& mesh, MeshFormat format, const WriteMeshOptions& options = {}) {
     std::string bytes;
-    RC_ASSERT(write_mesh(mesh, format, bytes, options).ok());
+    RC_ASSERT(write_mesh(mesh, format, bytes, options, RunContext()).ok());
     const Result<MeshFile> file = read_mesh(bytes, format == MeshFormat::obj ? "a.obj" : "a.ply", RunContext(1));
     RC_ASSERT(file.ok());
     return *file;
@@ -147,7 +147,7 @@ Holds holds(MeshFormat format) {
 /// The mesh after a file of that format.
 Mesh through(const Mesh& mesh, MeshFormat format) {
     std::string bytes;
-    EXPECT_TRUE(write_mesh(mesh, format, bytes, {}).ok());
+    EXPECT_TRUE(write_mesh(mesh, format, bytes, {}, RunContext()).ok());
     const Result<MeshFile> file = read_mesh(bytes, "a." + name_of(format), RunContext(1));
     EXPECT_TRUE(file.ok()) << file.error().message;
     return file.ok() ? file->mesh : Mesh();

@@ -50,7 +50,6 @@ std::vector<Model> small_models() {
     return models;
 }
 
-
 std::vector<Vec3f> bent(const Model& model) {
     Pose pose = rest_pose(model);
     for (Vec3f& p : pose.positions) p += Vec3f(0.1f * p.y() * p.y(), 0.2f * p.x(), 0.3f * p.x() * p.y());
@@ -403,8 +402,7 @@ TEST(ModelFile, WritingFailsWithoutHarm) {
     std::string name = (fs::temp_directory_path() / "filigree-XXXXXX").string();
     const fs::path folder = ::mkdtemp(name.data());
     const Model model = small_models()[0];
-    const std::string_view old = "old";
-    ASSERT_TRUE(write_file(folder / "a.fil", std::span(&old, 1)).ok());
+    ASSERT_TRUE(write_file(folder / "a.fil", "old").ok());
     for (const fs::path& path : {folder / "missing" / "a.fil", folder}) {
         const Status status = write_model(model, path, kContext);
         ASSERT_FALSE(status.ok());

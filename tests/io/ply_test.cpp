@@ -62,7 +62,7 @@ TEST(Ply, LongFacesNeedLongLengths) {
     for (Index v = 0; v < 300; ++v) all[v] = v;
     mesh.add_face(all);
     std::string bytes;
-    ASSERT_TRUE(write_mesh(mesh, MeshFormat::ply, bytes).ok());
+    ASSERT_TRUE(write_mesh(mesh, MeshFormat::ply, bytes, {}, RunContext()).ok());
     EXPECT_EQ(read(bytes)->mesh.corners, all);
 }
 
@@ -122,7 +122,7 @@ TEST(Ply, ScalarsWhoseNamesAreTakenGetOthers) {
     mesh.add_face(Triangle{0, 1, 2});
     mesh.scalars = {{"x", {1, 2, 3}}, {"a b", {4, 5, 6}}, {"a_b", {7, 8, 9}}};
     std::string bytes;
-    const auto warnings = write_mesh(mesh, MeshFormat::ply, bytes);
+    const auto warnings = write_mesh(mesh, MeshFormat::ply, bytes, {}, RunContext());
     ASSERT_EQ(warnings->size(), 1u);
     EXPECT_NE((*warnings)[0].find("'x' of a scalar (now 'x_2')"), std::string::npos) << (*warnings)[0];
     const auto back = read(bytes);

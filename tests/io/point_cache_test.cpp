@@ -65,8 +65,7 @@ protected:
 
     std::string path(const std::string& name) const { return (folder_ / name).string(); }
     std::string put(const std::string& name, const std::string& bytes) const {
-        const std::string_view pieces[] = {bytes};
-        EXPECT_TRUE(write_file(path(name), pieces).ok());
+        EXPECT_TRUE(write_file(path(name), bytes).ok());
         return path(name);
     }
     std::size_t files() const {

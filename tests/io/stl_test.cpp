@@ -36,7 +36,7 @@ TEST(Stl, SolidsBecomeObjects) {
     EXPECT_EQ(file->mesh.objects.names, (std::vector<std::string>{"one piece", "two"}));
     EXPECT_EQ(file->mesh.objects.of_face, (std::vector<Index>{0, 1}));
     std::string bytes;
-    ASSERT_TRUE(write_mesh(file->mesh, MeshFormat::stl, bytes, {.ascii = true}).ok());
+    ASSERT_TRUE(write_mesh(file->mesh, MeshFormat::stl, bytes, {.ascii = true}, RunContext()).ok());
     EXPECT_EQ(read(bytes)->mesh.objects.of_face, file->mesh.objects.of_face);
 }
 

@@ -208,7 +208,7 @@ TEST_F(Quads, PointsHaveNone) {
     Mesh points;
     points.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
     const std::string path = folder.filePath("points.obj").toStdString();
-    ASSERT_TRUE(write_mesh(points, path, RunContext()).ok());
+    ASSERT_TRUE(write_mesh(points, path, {}, RunContext()).ok());
     workbench().open(path);
     workbench().wait_until_idle();
     ASSERT_EQ(state().source->topology.faces, 0u);
@@ -238,8 +238,7 @@ TEST_F(Quads, PatchesDifferFromTheirNeighbours) {
             around[v].insert(labels->of_face[f]);
             ++valence[v];
         }
-    for (const auto& [v, faces] : valence)
-        EXPECT_TRUE(faces != 3 || around[v].size() == 3u) << "vertex " << v;
+    for (const auto& [v, faces] : valence) EXPECT_TRUE(faces != 3 || around[v].size() == 3u) << "vertex " << v;
     EXPECT_FALSE(patch_labels(level_mesh(*state().model, 0), 6, RunContext()));
 }
 

@@ -430,14 +430,12 @@ TEST_F(WorkbenchTest, ErrorsOfFilesNameThemAndKeepTheDocument) {
     bench.wait_until_idle();
     ASSERT_EQ(errors.size(), 1u);
     EXPECT_NE(errors[0].find("missing.obj"), std::string::npos);
-    std::string_view junk = "FILIGREE but not a model";
-    ASSERT_TRUE(write_file(path("junk.fil"), std::span(&junk, 1)).ok());
+    ASSERT_TRUE(write_file(path("junk.fil"), "FILIGREE but not a model").ok());
     bench.open(path("junk.fil"));
     bench.wait_until_idle();
     ASSERT_EQ(errors.size(), 2u);
     EXPECT_NE(errors[1].find("junk.fil"), std::string::npos);
-    std::string_view empty = "# nothing\n";
-    ASSERT_TRUE(write_file(path("empty.obj"), std::span(&empty, 1)).ok());
+    ASSERT_TRUE(write_file(path("empty.obj"), "# nothing\n").ok());
     bench.open(path("empty.obj"));
     bench.wait_until_idle();
     ASSERT_EQ(errors.size(), 3u);
@@ -468,7 +466,7 @@ TEST_F(WorkbenchTest, BadFilesOfTheCorpusLeaveTheDocumentAlone) {
 
 TEST_F(WorkbenchTest, OpeningCanBeCancelled) {
     const std::string before = bytes();
-    ASSERT_TRUE(write_mesh(state().model->mesh, path("cube.ply"), RunContext()).ok());
+    ASSERT_TRUE(write_mesh(state().model->mesh, path("cube.ply"), {}, RunContext()).ok());
     bench.open(path("cube.ply"));
     bench.jobs().cancel();
     bench.wait_until_idle();
@@ -568,8 +566,7 @@ TEST_F(WorkbenchTest, BodySettingsMakeTheBodyAgain) {
 }
 
 TEST_F(WorkbenchTest, WhatCannotBeABodyIsTold) {
-    std::string_view point = "v 1 2 3\n";
-    ASSERT_TRUE(write_file(path("point.obj"), std::span(&point, 1)).ok());
+    ASSERT_TRUE(write_file(path("point.obj"), "v 1 2 3\n").ok());
     bench.open(path("point.obj"));
     bench.wait_until_idle();
     EXPECT_EQ(state().model->mesh.vertex_count(), 1u);

@@ -246,4 +246,6 @@ Status write_file(const fs::path& path, std::span<const std::string_view> pieces
     return writer->finish();
 }
 
+Status write_file(const fs::path& path, std::string_view bytes) { return write_file(path, std::span(&bytes, 1)); }
+
 } // namespace filigree

@@ -19,6 +19,8 @@ Result<std::string> read_file(const std::filesystem::path& path);
 /// is written in place: it cannot be replaced, and keeps what it got before an error. Symbolic links are followed, and
 /// the permissions of an existing file are kept. Errors: unwritable.
 Status write_file(const std::filesystem::path& path, std::span<const std::string_view> pieces);
+/// The same of one piece.
+Status write_file(const std::filesystem::path& path, std::string_view bytes);
 
 /// A file that is written piece by piece without being in memory, under the same promises as write_file.
 class FileWriter {

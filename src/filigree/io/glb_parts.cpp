@@ -6,10 +6,11 @@
 #include "filigree/mesh/triangulate.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <optional>
-#include <set>
+#include <unordered_map>
 
 namespace filigree {
 
@@ -23,7 +24,7 @@ using Json = GlbBuilder::Json;
 /// three decimals keep their digits.
 class UnitNormals {
 public:
-    explicit UnitNormals(const Mesh& mesh) : mesh_(mesh) {}
+    UnitNormals(const Mesh& mesh, const RunContext& context) : mesh_(mesh), context_(context) {}
 
     Vec3f at(Index vertex, const Vec3f* given) {
         constexpr double kUnitTolerance = 0.005;
@@ -32,21 +33,22 @@ public:
             if (std::abs(length - 1) <= kUnitTolerance) return *given;
             if (length > 0) return (given->cast<double>() / length).cast<float>();
         }
-        if (from_faces_.empty()) from_faces_ = vertex_normals(mesh_, mesh_.positions, RunContext(1));
+        if (from_faces_.empty()) from_faces_ = vertex_normals(mesh_, mesh_.positions, context_);
         const Vec3f& normal = from_faces_[vertex];
         return normal.isZero(0) ? Vec3f(0, 0, 1) : normal;
     }
 
 private:
     const Mesh& mesh_;
+    const RunContext& context_;
     std::vector<Vec3f> from_faces_; ///< made when they are first needed
 };
 
 /// Gives every corner an output vertex.
 class VertexSplitter {
 public:
-    VertexSplitter(const Mesh& mesh, bool with_normals, GlbParts& parts)
-        : mesh_(mesh), parts_(parts), unit_(mesh), has_uvs_(!mesh.uvs.empty()),
+    VertexSplitter(const Mesh& mesh, bool with_normals, GlbParts& parts, const RunContext& context)
+        : mesh_(mesh), parts_(parts), unit_(mesh, context), has_uvs_(!mesh.uvs.empty()),
           has_normals_(with_normals && !mesh.normals.empty()) {}
 
     /// The output vertex of each corner; empty where it is the mesh's vertex.
@@ -97,15 +99,22 @@ private:
     Index find_or_repeat(Index vertex, Index corner) {
         const Vec2f uv_here = has_uvs_ ? uv(vertex, corner) : Vec2f::Zero();
         const Vec3f normal_here = has_normals_ ? normal(vertex, corner) : Vec3f::Zero();
+        constexpr int kLongestChain = 16; // the hub of a fan can have thousands of UVs
         Index output = vertex;
-        for (;; output = next_[output]) {
+        int length = 1;
+        for (;; output = next_[output], ++length) {
             if ((!has_uvs_ || parts_.uvs[output] == uv_here) &&
                 (!has_normals_ || parts_.normals[output] == normal_here))
                 return output;
-            if (next_[output] == kNoIndex) break;
+            if (next_[output] == kNoIndex || length == kLongestChain) break;
         }
         const auto repeat = static_cast<Index>(parts_.vertex_count());
-        next_[output] = repeat;
+        if (length == kLongestChain) {
+            const auto [entry, is_new] = beyond_chains_.try_emplace(key(vertex, uv_here, normal_here), repeat);
+            if (!is_new) return entry->second;
+        } else {
+            next_[output] = repeat;
+        }
         next_.push_back(kNoIndex);
         parts_.repeats.push_back(vertex);
         if (has_uvs_) parts_.uvs.push_back(uv_here);
@@ -113,21 +122,49 @@ private:
         return repeat;
     }
 
+    /// A vertex with its values, as bytes: the same for equal values, as the two zeros are made one.
+    static std::string key(Index vertex, const Vec2f& uv, const Vec3f& normal) {
+        const std::array<float, 5> values = {uv.x() + 0.0f, uv.y() + 0.0f, normal.x() + 0.0f, normal.y() + 0.0f,
+                                             normal.z() + 0.0f};
+        return bytes_of(std::span<const Index>(&vertex, 1)) + bytes_of(std::span<const float>(values));
+    }
+
     const Mesh& mesh_;
     GlbParts& parts_;
     UnitNormals unit_;
     bool has_uvs_, has_normals_;
-    std::vector<Index> next_; ///< the next output vertex of the same mesh vertex
+    std::vector<Index> next_; ///< the next output vertex of the same mesh vertex, in a chain of bounded length
+    std::unordered_map<std::string, Index> beyond_chains_;
 };
 
 // -------------------------------------------------------------------------------------------------------- primitives
 
-/// The corner of a face that has this vertex: the first, where it has it twice.
-Index corner_of(const Mesh& mesh, Index face, Index vertex) {
-    for (Index c = mesh.face_offsets[face]; c < mesh.face_offsets[face + 1]; ++c)
-        if (mesh.corners[c] == vertex) return c;
-    return mesh.face_offsets[face];
-}
+/// The corner of a face that has a vertex: the first, where the face has it twice. Asked face after face.
+class CornerFinder {
+public:
+    explicit CornerFinder(const Mesh& mesh) : mesh_(mesh) {}
+
+    Index corner(Index face, Index vertex) {
+        constexpr Index kFewCorners = 8; // looking through them is quicker than a table
+        const Index begin = mesh_.face_offsets[face], end = mesh_.face_offsets[face + 1];
+        if (end - begin <= kFewCorners)
+            return static_cast<Index>(std::find(mesh_.corners.begin() + begin, mesh_.corners.begin() + end, vertex) -
+                                      mesh_.corners.begin());
+        if (face != face_in_table_) fill(face, begin, end);
+        return corner_of_vertex_[vertex];
+    }
+
+private:
+    const Mesh& mesh_;
+    Index face_in_table_ = kNoIndex;
+    std::vector<Index> corner_of_vertex_; ///< of the mesh's vertices; right for those of the face in the table
+
+    void fill(Index face, Index begin, Index end) {
+        corner_of_vertex_.resize(mesh_.vertex_count());
+        for (Index c = end; c-- > begin;) corner_of_vertex_[mesh_.corners[c]] = c;
+        face_in_table_ = face;
+    }
+};
 
 /// Sorts triangles into primitives. Labels that no face has do not appear; "none" comes last.
 class PrimitiveSorter {
@@ -136,6 +173,7 @@ public:
 
     std::vector<GlbObject> sort(std::span<const Index> vertex_of) {
         const Triangulation faces = triangulate(mesh_);
+        CornerFinder finder(mesh_);
         using Labels = std::pair<Index, Index>; // object and material
         std::map<Labels, std::size_t> counts;
         const auto labels_of = [&](Index face) {
@@ -160,7 +198,7 @@ public:
             std::vector<Index>& indices = objects[object].primitives[primitive].indices;
             for (std::size_t t = begin; t < end; ++t)
                 for (const Index v : faces.triangles[t])
-                    indices.push_back(vertex_of.empty() ? v : vertex_of[corner_of(mesh_, faces.source_face[t], v)]);
+                    indices.push_back(vertex_of.empty() ? v : vertex_of[finder.corner(faces.source_face[t], v)]);
         });
         return objects;
     }
@@ -321,9 +359,10 @@ bool has_unlabelled_faces(const GlbParts& parts) {
 
 } // namespace
 
-GlbParts make_glb_parts(const Mesh& mesh, const GlbPartsOptions& options) {
+Result<GlbParts> make_glb_parts(const Mesh& mesh, const GlbPartsOptions& options, const RunContext& context) {
     GlbParts parts;
-    const std::vector<Index> vertex_of = VertexSplitter(mesh, options.normals, parts).split();
+    const std::vector<Index> vertex_of = VertexSplitter(mesh, options.normals, parts, context).split();
+    if (context.is_cancelled()) return cancelled_error();
     parts.is_points = mesh.face_count() == 0;
     if (parts.is_points)
         parts.objects.push_back(all_points(mesh.vertex_count()));
@@ -331,6 +370,7 @@ GlbParts make_glb_parts(const Mesh& mesh, const GlbPartsOptions& options) {
         parts.objects = PrimitiveSorter(mesh, options.objects).sort(vertex_of);
     parts.has_colors = !mesh.colors.empty();
     parts.lost = what_is_lost(mesh, options.objects);
+    if (context.is_cancelled()) return cancelled_error();
     return parts;
 }
 

@@ -56,8 +56,8 @@ struct GlbPartsOptions {
 };
 
 /// Cuts polygons into triangles; primitives are in the order of objects and materials, faces within in the mesh's
-/// order. The mesh has vertices. Cost O(size).
-GlbParts make_glb_parts(const Mesh& mesh, const GlbPartsOptions& options = {});
+/// order. The mesh has vertices. Cost O(size), and what triangulate takes. Errors: cancelled.
+Result<GlbParts> make_glb_parts(const Mesh& mesh, const GlbPartsOptions& options, const RunContext& context);
 
 /// Adds NORMAL, TEXCOORD_0, COLOR_0 and the scalars (as _name), and returns the primitives' "attributes" without
 /// POSITION, which is the caller's.

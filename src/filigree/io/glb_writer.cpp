@@ -4,11 +4,14 @@
 
 namespace filigree {
 
-Result<GlbNotes> write_glb(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes) {
+Result<GlbNotes> write_glb(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes,
+                           const RunContext& context) {
     GlbNotes notes;
     GlbBuilder builder;
     {
-        const GlbParts parts = make_glb_parts(mesh);
+        const Result<GlbParts> made = make_glb_parts(mesh, {}, context);
+        if (!made) return made.error();
+        const GlbParts& parts = *made;
         notes.lost = parts.lost;
         MeshMaterials materials = find_glb_materials(mesh, options.materials_beside);
         notes.warnings = std::move(materials.warnings);

@@ -105,7 +105,7 @@ public:
             // Joints of edges are numbered as they are met, and coarser levels meet no others.
             if (k == level) skin = *made;
             if (k < level && made->influences == 6) renumber(*made, skin);
-            add_level(k, *made);
+            if (Status added = add_level(k, *made); !added) return added.error();
         }
         if (skin.joints.size() > 65536)
             return Error{ErrorCode::unsuitable, "The driver would need " + std::to_string(skin.joints.size()) +
@@ -162,10 +162,12 @@ private:
     }
 
     /// A node for each object of the level; the finest level's first names the coarser levels.
-    void add_level(unsigned level, const Skin& skin) {
+    Status add_level(unsigned level, const Skin& skin) {
         Mesh mesh = levels_.mesh(level);
         make_skinned(mesh, skin, options_.normals, context_);
-        const GlbParts parts = make_glb_parts(mesh, {.objects = !options_.all_levels});
+        const Result<GlbParts> cut = make_glb_parts(mesh, {.objects = !options_.all_levels}, context_);
+        if (!cut) return cut.error();
+        const GlbParts& parts = *cut;
         if (level_nodes_.empty()) lost_ = parts.lost;
         const GlbMaterials& materials = levels_.add_materials(builder_, parts);
         Json attributes = add_glb_attributes(builder_, parts, mesh);
@@ -181,6 +183,7 @@ private:
             meshes_.push_back(std::move(entry));
         }
         level_nodes_.push_back(nodes_.size() - 1);
+        return Success{};
     }
     void add_joints(const Skin& skin, const SkinAnimation& animation) {
         if (level_nodes_.size() > 1) {

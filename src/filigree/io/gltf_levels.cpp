@@ -21,7 +21,9 @@ public:
         std::vector<std::size_t> nodes;
         for (unsigned k = finest + 1; k-- > 0;) {
             if (context.is_cancelled()) return cancelled_error();
-            nodes.push_back(add_level(k));
+            const Result<std::size_t> node = add_level(k, context);
+            if (!node) return node.error();
+            nodes.push_back(*node);
             context.report("Writing levels", static_cast<double>(finest + 1 - k) / (finest + 2));
         }
         Json& first = builder_.json["nodes"][nodes[0]];
@@ -38,9 +40,11 @@ public:
 
 private:
     /// The level's node; with several objects, a node above theirs.
-    std::size_t add_level(unsigned k) {
+    Result<std::size_t> add_level(unsigned k, const RunContext& context) {
         const Mesh mesh = levels_.mesh(k);
-        const GlbParts parts = make_glb_parts(mesh);
+        const Result<GlbParts> made = make_glb_parts(mesh, {}, context);
+        if (!made) return made.error();
+        const GlbParts& parts = *made;
         const std::vector<std::size_t> nodes =
             add_glb_nodes(builder_, parts, mesh, levels_.add_materials(builder_, parts));
         if (k == model_.finest_level()) tell_losses(mesh, parts);

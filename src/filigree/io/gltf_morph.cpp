@@ -40,7 +40,9 @@ public:
         } else if (options_.normals == ExportNormals::leave) {
             mesh_.normals = {};
         }
-        parts_ = make_glb_parts(mesh_);
+        Result<GlbParts> parts = make_glb_parts(mesh_, {}, context_);
+        if (!parts) return parts.error();
+        parts_ = *std::move(parts);
         const std::size_t a_frame =
             parts_.vertex_count() * (options_.morph_normals ? 24 : 12) + 4 * animation_.frames; // offsets and weights
         if (a_frame > (std::size_t{1} << 32) / animation_.frames)

@@ -185,8 +185,8 @@ Result<std::vector<std::string>> write_obj_with_materials(const Mesh& mesh, cons
     }
     library.files.push_back({path.filename().string(), std::make_shared<const std::string>(std::move(bytes))});
     for (const MaterialLibrary::File& file : library.files) {
-        const std::string_view pieces[] = {*file.bytes};
-        if (const Status written = write_file(path.parent_path() / file.name, pieces); !written) return written.error();
+        if (const Status written = write_file(path.parent_path() / file.name, *file.bytes); !written)
+            return written.error();
     }
     return with_losses("OBJ", lost, std::move(library.warnings));
 }
@@ -233,7 +233,7 @@ Result<MeshFile> read_mesh(const std::filesystem::path& path, const RunContext& 
 }
 
 Result<std::vector<std::string>> write_mesh(const Mesh& mesh, MeshFormat format, std::string& bytes,
-                                            const WriteMeshOptions& options) {
+                                            const WriteMeshOptions& options, const RunContext& context) {
     assert(check_mesh(mesh).empty());
     bytes.clear();
     std::vector<std::string> lost, warnings;
@@ -254,7 +254,7 @@ Result<std::vector<std::string>> write_mesh(const Mesh& mesh, MeshFormat format,
             break;
         case MeshFormat::gltf:
             name = "GLB";
-            if (Result<GlbNotes> notes = write_glb(mesh, options, bytes)) {
+            if (Result<GlbNotes> notes = write_glb(mesh, options, bytes, context)) {
                 lost = std::move(notes->lost);
                 warnings = std::move(notes->warnings);
             } else {
@@ -271,7 +271,7 @@ Result<std::vector<std::string>> write_mesh(const Mesh& mesh, MeshFormat format,
 }
 
 Result<std::vector<std::string>> write_mesh(const Mesh& mesh, const std::filesystem::path& path,
-                                            const RunContext& context, const WriteMeshOptions& options) {
+                                            const WriteMeshOptions& options, const RunContext& context) {
     const Result<MeshFormat> format = options.format ? Result<MeshFormat>(*options.format) : mesh_format(path);
     if (!format.ok()) return format.error();
     if (*format == MeshFormat::gltf && lower_case(path.extension().string()) == ".gltf")
@@ -280,12 +280,10 @@ Result<std::vector<std::string>> write_mesh(const Mesh& mesh, const std::filesys
     if (*format == MeshFormat::obj && !mesh.embedded_materials.empty() && is_file_in_folder(path))
         return write_obj_with_materials(mesh, path);
     std::string bytes;
-    Result<std::vector<std::string>> warnings = write_mesh(mesh, *format, bytes, options);
+    Result<std::vector<std::string>> warnings = write_mesh(mesh, *format, bytes, options, context);
     if (!warnings.ok()) return warnings;
     if (context.is_cancelled()) return cancelled_error();
-    const std::string_view pieces[] = {bytes};
-    const Status written = write_file(path, pieces);
-    if (!written.ok()) return written.error();
+    if (const Status written = write_file(path, bytes); !written) return written.error();
     return warnings;
 }
 

@@ -53,9 +53,10 @@ struct WriteMeshOptions {
 /// sentence that lists what the format cannot hold, and one for each texture that is missing.
 /// Errors: unsupported, unwritable, out_of_memory, cancelled.
 Result<std::vector<std::string>> write_mesh(const Mesh& mesh, const std::filesystem::path& path,
-                                            const RunContext& context, const WriteMeshOptions& options = {});
-/// The bytes of a file of that format (options.format does not count here). Same warnings.
+                                            const WriteMeshOptions& options, const RunContext& context);
+/// The bytes of a file of that format into `bytes` (options.format does not count here). Same warnings; errors:
+/// unsupported, out_of_memory, cancelled.
 Result<std::vector<std::string>> write_mesh(const Mesh& mesh, MeshFormat format, std::string& bytes,
-                                            const WriteMeshOptions& options = {});
+                                            const WriteMeshOptions& options, const RunContext& context);
 
 } // namespace filigree

@@ -48,8 +48,9 @@ std::vector<std::string> write_off(const Mesh& mesh, std::string& bytes);
 struct GlbNotes {
     std::vector<std::string> lost, warnings;
 };
-/// Errors: unsupported (4 GiB or more).
-Result<GlbNotes> write_glb(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes);
+/// Errors: unsupported (4 GiB or more), cancelled.
+Result<GlbNotes> write_glb(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes,
+                           const RunContext& context);
 
 /// Whether the content says so: "solid", and a facet or the end near the start.
 bool is_ascii_stl(std::string_view bytes);

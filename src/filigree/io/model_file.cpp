@@ -554,8 +554,7 @@ Status write_model(const Model& model, const PoseSequence& poses, const std::fil
     context.report("write", 0);
     try {
         const std::string bytes = write_model(model, poses);
-        const std::string_view piece = bytes;
-        Status status = write_file(path, std::span(&piece, 1));
+        Status status = write_file(path, bytes);
         context.report("write", 1);
         return status;
     } catch (const std::bad_alloc&) {

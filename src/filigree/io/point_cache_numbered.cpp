@@ -321,7 +321,7 @@ Result<std::vector<std::string>> write_numbered_meshes(std::size_t frames,
                 return Error{ErrorCode::unsuitable, name->file(frame + 1).string() +
                                                         ": not written: it is beyond what numbers can hold (" + wrong +
                                                         "); deform less."};
-            const auto written = write_mesh(*moved, temporary_file(frame + 1), silent);
+            const auto written = write_mesh(*moved, temporary_file(frame + 1), {}, silent);
             if (!written) return written.error();
             add_new(warnings, *written);
         }

@@ -85,7 +85,7 @@ public:
             path = target.parent_path() /
                    (".filigree-" + std::to_string(::getpid()) + "-film" + std::to_string(next++) + ".tmp");
         } while (fs::exists(fs::symlink_status(path, ignored)));
-        const Status status = write_file(path, {&bytes, 1});
+        const Status status = write_file(path, bytes);
         if (status) return TemporaryFile(std::move(path));
         Error error = status.error();
         error.message.replace(0, path.string().size(), target.string());
