@@ -128,6 +128,22 @@ async function visit(browser, url, { thorough, pictures }) {
     return wrong;
 }
 
+/// Whether the page would fetch a picture from elsewhere, as a model may ask it to.
+async function asks_elsewhere(browser, url) {
+    const { page } = await watched_page(browser, url);
+    await page.goto(url);
+    await on_page.ready(page);
+    const asked = await page.evaluate(() => Promise.race([
+        new Promise((refused) => {
+            document.addEventListener('securitypolicyviolation', () => refused(false));
+            fetch('http://127.0.0.1:9/picture.png').catch(() => {});
+        }),
+        new Promise((timeout) => setTimeout(() => timeout(true), 5000)),
+    ]));
+    await page.close();
+    return asked;
+}
+
 /// Everything there is to check of one folder; returns what went wrong.
 export async function check_page(folder, pictures) {
     const browser = await open_browser();
@@ -138,6 +154,8 @@ export async function check_page(folder, pictures) {
             ...await visit(browser, pathToFileURL(join(resolve(folder), 'index.html')).href, { thorough: true, pictures }),
             ...await visit(browser, `${server.url}/index.html`, { thorough: false }),
         ];
+        for (const url of [pathToFileURL(join(resolve(folder), 'index.html')).href, `${server.url}/index.html`])
+            if (await asks_elsewhere(browser, url)) wrong.push(`${url} asks other machines for what a model names`);
         const { page } = await watched_page(browser, broken.url);
         await page.goto(`${broken.url}/index.html`);
         await on_page.ready(page);
