@@ -5,7 +5,6 @@
 #include "filigree/mesh/normals.h"
 #include "filigree/mesh/shapes.h"
 #include "filigree/mesh/triangulate.h"
-#include "filigree/mesh/weld.h"
 #include "threads.h"
 
 #include <gtest/gtest.h>
@@ -16,20 +15,18 @@ namespace {
 const RunContext kOneThread(1);
 
 struct Bound {
-    std::vector<Triangle> triangles, cells;
+    Surface surface;
+    std::vector<Triangle> cells;
     Binding binding;
 };
 
 Bound bound(const Mesh& mesh, std::vector<Triangle> cells, const RunContext& context = kOneThread) {
     Bound out;
-    const std::vector<Index> representative = weld_map(mesh.positions);
-    for (Triangle t : triangulate(mesh).triangles) {
-        for (Index& v : t) v = representative[v];
-        out.triangles.push_back(t);
-    }
+    out.surface = make_surface(mesh, kOneThread).value();
     out.cells = std::move(cells);
-    auto binding = bind_to_driver(mesh.positions, representative, out.triangles,
-                                  vertex_normals(out.triangles, mesh.positions, kOneThread), out.cells, context);
+    auto binding =
+        bind_to_driver(mesh.positions, out.surface, vertex_normals(out.surface.triangles, mesh.positions, kOneThread),
+                       out.cells, context);
     EXPECT_TRUE(binding.ok());
     out.binding = std::move(*binding);
     EXPECT_EQ(out.binding.bonds.size(), mesh.vertex_count());
@@ -157,10 +154,9 @@ TEST(Bind, CanBeCancelled) {
     const Bound bound = bound_to(mesh, 50);
     const RunContext cancelled(1);
     cancelled.cancel();
-    const std::vector<Index> representative = weld_map(mesh.positions);
     const auto binding =
-        bind_to_driver(mesh.positions, representative, bound.triangles,
-                       vertex_normals(bound.triangles, mesh.positions, kOneThread), bound.cells, cancelled);
+        bind_to_driver(mesh.positions, bound.surface,
+                       vertex_normals(bound.surface.triangles, mesh.positions, kOneThread), bound.cells, cancelled);
     EXPECT_EQ(binding.error().code, ErrorCode::cancelled);
 }
 

@@ -4,6 +4,7 @@
 
 #include "filigree/core/parallel_for.h"
 #include "filigree/mesh/closest_point.h"
+#include "filigree/mesh/incidence.h"
 
 #include <algorithm>
 #include <optional>
@@ -12,33 +13,11 @@ namespace filigree {
 
 namespace {
 
-/// Lists of numbers, one list an id, end to end.
-struct Lists {
-    std::vector<Index> offsets, items;
-    std::span<const Index> operator[](Index id) const {
-        return std::span(items).subspan(offsets[id], offsets[id + 1] - offsets[id]);
-    }
-};
-
-/// For each vertex the triangles that use it, ascending.
-Lists triangles_around(std::size_t vertex_count, std::span<const Triangle> triangles) {
-    Lists lists;
-    lists.offsets.assign(vertex_count + 1, 0);
-    for (const Triangle& t : triangles)
-        for (Index v : t) ++lists.offsets[v + 1];
-    for (std::size_t v = 0; v < vertex_count; ++v) lists.offsets[v + 1] += lists.offsets[v];
-    lists.items.resize(triangles.size() * 3);
-    std::vector<Index> next(lists.offsets.begin(), lists.offsets.end() - 1);
-    for (Index t = 0; t < triangles.size(); ++t)
-        for (Index v : triangles[t]) lists.items[next[v]++] = t;
-    return lists;
-}
-
 /// For each vertex the nearest vertex with `is_source`, by the length of the shortest path over edges; kNoIndex where
 /// there is none. Ties go to the path found first, which depends on the mesh alone.
 /// Instead of a heap, buckets as wide as a mean edge, emptied in order [Meyer 2003].
 std::vector<Index> nearest_sources(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
-                                   const Lists& around, const std::vector<bool>& is_source) {
+                                   const IndexLists& around, const std::vector<bool>& is_source) {
     std::vector<Index> source(positions.size(), kNoIndex);
     std::vector<float> distance(positions.size(), std::numeric_limits<float>::infinity());
     double length = 0;
@@ -101,7 +80,7 @@ constexpr double kAwayStart = 0.25; // and how far off it counts where it touche
 /// The walk of one vertex over the driver's triangles.
 class Walk {
 public:
-    Walk(std::span<const Vec3f> positions, std::span<const Triangle> cells, const Lists& around,
+    Walk(std::span<const Vec3f> positions, std::span<const Triangle> cells, const IndexLists& around,
          std::span<const CellShape> shapes)
         : positions_(positions), cells_(cells), around_(around), shapes_(shapes), visited_(cells.size(), 0) {}
 
@@ -150,7 +129,7 @@ private:
 
     std::span<const Vec3f> positions_;
     std::span<const Triangle> cells_;
-    const Lists& around_;
+    const IndexLists& around_;
     std::span<const CellShape> shapes_;
     std::vector<unsigned> visited_;
     unsigned stamp_ = 0;
@@ -158,67 +137,83 @@ private:
 
 Bond bond_at(const SurfacePoint& point) { return {point.triangle, point.barycentric[1], point.barycentric[2]}; }
 
-} // namespace
+/// How well a vertex could be bound; see Binding.
+enum class BondKind : std::uint8_t { good, away, gap };
 
-Result<Binding> bind_to_driver(std::span<const Vec3f> positions, std::span<const Index> representative,
-                               std::span<const Triangle> triangles, std::span<const Vec3f> normals,
-                               std::span<const Triangle> cells, const RunContext& context) {
-    context.report("bind", 0);
-    if (std::max(triangles.size(), cells.size()) > kNoIndex / 3) // lists of triangles around vertices
-        return Error{ErrorCode::unsuitable, "The mesh has more triangles than 32-bit indices can list (" +
-                                                std::to_string(kNoIndex / 3) + "); split it into parts."};
-    const std::size_t count = positions.size();
-    std::vector<bool> in_driver(count, false);
+std::vector<Index> nearest_driver_vertices(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
+                                           std::span<const Triangle> cells) {
+    std::vector<bool> in_driver(positions.size(), false);
     for (const Triangle& cell : cells)
         for (Index v : cell) in_driver[v] = true;
-    const std::vector<Index> source =
-        nearest_sources(positions, triangles, triangles_around(count, triangles), in_driver);
-    if (context.is_cancelled()) return cancelled_error();
-    context.report("bind", 0.4);
+    return nearest_sources(positions, triangles, triangles_at_vertices(triangles, positions.size()), in_driver);
+}
 
-    const Lists around = triangles_around(count, cells);
+/// Bonds of the representatives by a walk from their source, the nearest driver vertex; without one, a gap.
+void walk_to_bonds(std::span<const Vec3f> positions, const Surface& surface, std::span<const Vec3f> normals,
+                   std::span<const Triangle> cells, std::span<const Index> source, std::span<Bond> bonds,
+                   std::span<BondKind> kinds, const RunContext& context) {
+    const IndexLists around = triangles_at_vertices(cells, positions.size());
     std::vector<CellShape> shapes;
     for (const Triangle& cell : cells)
         shapes.push_back(cell_shape(positions[cell[0]], positions[cell[1]], positions[cell[2]]));
-
-    enum : std::uint8_t { good, away, gap };
-    Binding binding;
-    binding.bonds.resize(count);
-    std::vector<std::uint8_t> kind(count, good);
-    parallel_for(context, count, 1 << 14, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, positions.size(), 1 << 14, [&](std::size_t begin, std::size_t end) {
         if (context.is_cancelled()) return;
         Walk walk(positions, cells, around, shapes);
         for (std::size_t v = begin; v < end; ++v) {
-            if (representative[v] != v) continue;
+            if (surface.representative[v] != v) continue;
             if (source[v] == kNoIndex) {
-                kind[v] = gap;
+                kinds[v] = BondKind::gap;
                 continue;
             }
             const Walk::Found found = walk.closest(positions[v], normals[v], source[v]);
-            binding.bonds[v] = bond_at(found.point);
-            if (found.faces_away) kind[v] = away;
+            bonds[v] = bond_at(found.point);
+            if (found.faces_away) kinds[v] = BondKind::away;
         }
     });
-    if (context.is_cancelled()) return cancelled_error();
+}
 
-    if (std::find(kind.begin(), kind.end(), gap) != kind.end()) {
-        std::optional<ClosestPointTree> built; // in our arena: Embree builds on the threads of the one it is called in
-        context.arena().execute([&] { built.emplace(positions, cells); });
-        const ClosestPointTree& tree = *built;
-        parallel_for(context, count, 1 << 12, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t v = begin; v < end; ++v) {
-                if (kind[v] != gap || representative[v] != v) continue;
-                SurfacePoint point = tree.closest(positions[v], std::numeric_limits<double>::infinity(), normals[v]);
-                if (point.triangle == kNoIndex) point = tree.closest(positions[v]);
-                binding.bonds[v] = bond_at(point);
-            }
-        });
-    }
-    for (Index v = 0; v < count; ++v) {
-        const Index r = representative[v];
+/// Bonds of the gaps: the closest cell that faces the same way, else the closest.
+void bond_across_gaps(std::span<const Vec3f> positions, std::span<const Vec3f> normals, std::span<const Triangle> cells,
+                      std::span<const BondKind> kinds, std::span<Bond> bonds, const RunContext& context) {
+    if (std::find(kinds.begin(), kinds.end(), BondKind::gap) == kinds.end()) return;
+    std::optional<ClosestPointTree> built; // in our arena: Embree builds on the threads of the one it is called in
+    context.arena().execute([&] { built.emplace(positions, cells); });
+    const ClosestPointTree& tree = *built;
+    parallel_for(context, positions.size(), 1 << 12, [&](std::size_t begin, std::size_t end) {
+        if (context.is_cancelled()) return;
+        for (std::size_t v = begin; v < end; ++v) {
+            if (kinds[v] != BondKind::gap) continue;
+            SurfacePoint point = tree.closest(positions[v], std::numeric_limits<double>::infinity(), normals[v]);
+            if (point.triangle == kNoIndex) point = tree.closest(positions[v]);
+            bonds[v] = bond_at(point);
+        }
+    });
+}
+
+} // namespace
+
+Result<Binding> bind_to_driver(std::span<const Vec3f> positions, const Surface& surface, std::span<const Vec3f> normals,
+                               std::span<const Triangle> cells, const RunContext& context) {
+    context.report("bind", 0);
+    if (std::max(surface.triangles.size(), cells.size()) > kMostListedTriangles)
+        return Error{ErrorCode::unsuitable, "The mesh has more triangles than 32-bit indices can list (" +
+                                                std::to_string(kMostListedTriangles) + "); split it into parts."};
+    const std::vector<Index> source = nearest_driver_vertices(positions, surface.triangles, cells);
+    if (context.is_cancelled()) return cancelled_error();
+    context.report("bind", 0.4);
+
+    Binding binding;
+    binding.bonds.resize(positions.size());
+    std::vector<BondKind> kinds(positions.size(), BondKind::good);
+    walk_to_bonds(positions, surface, normals, cells, source, binding.bonds, kinds, context);
+    if (context.is_cancelled()) return cancelled_error();
+    bond_across_gaps(positions, normals, cells, kinds, binding.bonds, context);
+    if (context.is_cancelled()) return cancelled_error();
+    for (Index v = 0; v < positions.size(); ++v) {
+        const Index r = surface.representative[v];
         binding.bonds[v] = binding.bonds[r];
-        if (kind[r] == gap) binding.across_gap.push_back(v);
-        if (kind[r] == away) binding.facing_away.push_back(v);
+        if (kinds[r] == BondKind::gap) binding.across_gap.push_back(v);
+        if (kinds[r] == BondKind::away) binding.facing_away.push_back(v);
     }
     context.report("bind", 1);
     return binding;

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "filigree/core/run_context.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh/surface.h"
 
 namespace filigree {
 
@@ -26,11 +26,10 @@ struct Binding {
 /// Binds every vertex to the closest point of a driver triangle that it belongs to along the surface and that faces the
 /// same way: labels spread from the driver's vertices over the mesh's edges, then each vertex walks from its label's
 /// triangles downhill to the closest one. Plain closest points would take the other side of thin parts.
-/// positions: V points; triangles: over welded ids; normals: V, unit or zero; cells: driver triangles over the same ids
-/// (at least one). representative: weld_map(positions); a vertex gets its representative's bond.
-/// Cost O(V log V); same bytes for any thread count. Errors: cancelled.
-Result<Binding> bind_to_driver(std::span<const Vec3f> positions, std::span<const Index> representative,
-                               std::span<const Triangle> triangles, std::span<const Vec3f> normals,
+/// positions: V points; surface: over them; normals: V, unit or zero; cells: driver triangles over representatives (at
+/// least one). A vertex gets its representative's bond. Cost O(V log V); same bytes for any thread count.
+/// Errors: unsuitable (more than kMostListedTriangles), cancelled.
+Result<Binding> bind_to_driver(std::span<const Vec3f> positions, const Surface& surface, std::span<const Vec3f> normals,
                                std::span<const Triangle> cells, const RunContext& context);
 
 } // namespace filigree

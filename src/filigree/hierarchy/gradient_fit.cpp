@@ -147,11 +147,8 @@ std::vector<double> GradientFit::ring_areas(std::span<const Vec3f> positions) co
     std::vector<double> areas(positions.size(), 0);
     for (std::size_t f = 0; f < driver_.face_count(); ++f) {
         const std::span<const Index> face = driver_.face(f);
-        const Vec3d a = positions[face[0]].cast<double>();
-        Vec3d normal = Vec3d::Zero();
-        for (std::size_t k = 1; k + 1 < face.size(); ++k)
-            normal += (positions[face[k]].cast<double>() - a).cross(positions[face[k + 1]].cast<double>() - a);
-        for (Index v : face) areas[v] += normal.norm();
+        const double doubled_area = doubled_area_vector(positions, face).norm();
+        for (Index v : face) areas[v] += doubled_area;
     }
     return areas;
 }

@@ -2,8 +2,7 @@
 
 #include "filigree/hierarchy/simplify.h"
 #include "filigree/mesh/normals.h"
-#include "filigree/mesh/triangulate.h"
-#include "filigree/mesh/weld.h"
+#include "filigree/mesh/surface.h"
 
 #include <algorithm>
 #include <chrono>
@@ -28,16 +27,15 @@ std::size_t default_base(std::size_t vertices) {
     return std::min(vertices, std::max<std::size_t>(50, vertices / 20));
 }
 
-/// The mesh as the blend code sees it: around the origin and about one unit large, so that no product leaves float's
-/// range; one vertex a position; triangles.
+/// The mesh as the blend code sees it: welded, around the origin and about one unit large, so that no product leaves
+/// float's range.
 struct WorkingMesh {
     std::vector<Vec3f> positions;
-    std::vector<Index> representative;
-    std::vector<Triangle> triangles;
+    Surface surface;
     std::vector<Vec3f> normals;
 };
 
-WorkingMesh make_working_mesh(const Mesh& mesh, const RunContext& context) {
+Result<WorkingMesh> make_working_mesh(const Mesh& mesh, const RunContext& context) {
     WorkingMesh work;
     const Box box = bounds(mesh.positions);
     const double diagonal = box.diagonal();
@@ -45,12 +43,10 @@ WorkingMesh make_working_mesh(const Mesh& mesh, const RunContext& context) {
     work.positions.resize(mesh.vertex_count());
     for (std::size_t v = 0; v < mesh.vertex_count(); ++v)
         work.positions[v] = (scale * (mesh.positions[v].cast<double>() - box.centre())).cast<float>();
-    work.representative = weld_map(mesh.positions);
-    for (Triangle t : triangulate(mesh).triangles) {
-        for (Index& v : t) v = work.representative[v];
-        if (t[0] != t[1] && t[1] != t[2] && t[2] != t[0]) work.triangles.push_back(t);
-    }
-    work.normals = vertex_normals(work.triangles, work.positions, context);
+    Result<Surface> surface = make_surface(mesh, context);
+    if (!surface) return surface.error();
+    work.surface = std::move(*surface);
+    work.normals = vertex_normals(work.surface.triangles, work.positions, context);
     return work;
 }
 
@@ -73,18 +69,19 @@ Level make_level(std::vector<Triangle> triangles, std::size_t vertex_count) {
     return level;
 }
 
-/// A driver for a mesh without a triangle: every so many-th of its distinct points, and no faces.
+/// A driver for a mesh without a triangle: distinct points of it, evenly spread over their numbers, and no faces.
 Level make_point_level(const WorkingMesh& work, std::size_t target) {
     std::vector<Index> distinct;
     for (Index v = 0; v < work.positions.size(); ++v)
-        if (work.representative[v] == v) distinct.push_back(v);
+        if (work.surface.representative[v] == v) distinct.push_back(v);
     Level level;
     const std::size_t count = std::min(target, distinct.size());
     for (std::size_t i = 0; i < count; ++i) level.vertices.push_back(distinct[i * distinct.size() / count]);
     return level;
 }
 
-/// How many vertices each level should have, coarse to fine, without the finest.
+/// How many vertices each level should have, coarse to fine, without the finest. vertices: distinct ones, as vertices
+/// at one place are one here.
 std::vector<std::size_t> level_targets(std::size_t vertices, const StripOptions& options) {
     std::vector<std::size_t> targets;
     if (options.levels) {
@@ -104,13 +101,13 @@ std::vector<std::size_t> level_targets(std::size_t vertices, const StripOptions&
 /// The levels of a blend model, coarse to fine, each simplified from the next finer one.
 std::vector<Level> simplify_levels(const WorkingMesh& work, const StripOptions& options, StripReport& report,
                                    const RunContext& context) {
-    const std::vector<std::size_t> targets = level_targets(work.positions.size(), options);
+    const std::vector<std::size_t> targets = level_targets(work.surface.place_count, options);
     std::vector<Level> levels;
-    if (work.triangles.empty()) {
+    if (work.surface.triangles.empty()) {
         levels.push_back(make_point_level(work, targets.front()));
         return levels;
     }
-    std::vector<Triangle> current = work.triangles;
+    std::vector<Triangle> current = work.surface.triangles;
     for (std::size_t k = targets.size(); k-- > 0 && !context.is_cancelled();) {
         context.report("simplify", 1 - double(k + 1) / double(targets.size()));
         SimplifyOptions simplify_options{.target_vertices = targets[k]};
@@ -123,7 +120,8 @@ std::vector<Level> simplify_levels(const WorkingMesh& work, const StripOptions& 
         report.simplify_error += simplified.error;
         report.forced_collapses += simplified.forced;
         current = std::move(simplified.triangles);
-        if (stuck && !levels.empty()) continue; // a level that removes nothing is none
+        const bool is_driver = k == 0 && levels.empty(); // without it there is no model, so it may be all of the mesh
+        if (stuck && !is_driver) continue;               // a level that removes nothing is none
         levels.insert(levels.begin(), make_level(current, work.positions.size()));
     }
     return levels;
@@ -151,17 +149,16 @@ Cells make_cells(const Level& driver) {
 Result<Stripped> strip_blend(Mesh mesh, const StripOptions& options, const RunContext& context) {
     Stripped result;
     const Stopwatch simplify_time;
-    const WorkingMesh work = make_working_mesh(mesh, context);
-    for (Index v = 0; v < mesh.vertex_count(); ++v) result.report.welded_vertices += work.representative[v] != v;
-    if (context.is_cancelled()) return cancelled_error();
-    std::vector<Level> levels = simplify_levels(work, options, result.report, context);
+    const Result<WorkingMesh> work = make_working_mesh(mesh, context);
+    if (!work) return work.error();
+    result.report.welded_vertices = mesh.vertex_count() - work->surface.place_count;
+    std::vector<Level> levels = simplify_levels(*work, options, result.report, context);
     if (context.is_cancelled()) return cancelled_error();
     result.report.simplify_seconds = simplify_time.seconds();
 
     const Stopwatch bind_time;
     Cells cells = make_cells(levels.front());
-    Result<Binding> binding =
-        bind_to_driver(work.positions, work.representative, work.triangles, work.normals, cells.global, context);
+    Result<Binding> binding = bind_to_driver(work->positions, work->surface, work->normals, cells.global, context);
     if (!binding) return binding.error();
     result.report.across_gap = binding->across_gap.size();
     result.report.facing_away = binding->facing_away.size();

@@ -10,7 +10,8 @@ namespace filigree {
 struct StripOptions {
     DetailCode code = DetailCode::blend;
     // How coarse the driver is; at most one of the three. With none: 1,000 vertices, fewer for meshes below 20,000
-    // (a twentieth, at least 50) and all of them below 50; for the reference code as far as it goes.
+    // (a twentieth, at least 50) and all of them below 50; for the reference code as far as it goes. Vertices at one
+    // place count once.
     std::optional<std::size_t> base = {}; ///< driver vertices, about; 3 or more
     std::optional<unsigned> levels = {};  ///< levels below the finest, each with a quarter of the vertices of the next
     std::optional<double> error = {};     ///< how far the driver may leave the mesh, fraction of the diagonal (rms)

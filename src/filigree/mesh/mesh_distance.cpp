@@ -8,6 +8,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <numbers>
 #include <numeric>
@@ -32,9 +33,7 @@ double angle_deg(const Vec3d& a, const Vec3d& b) {
     return std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / std::numbers::pi; // exact near 0, where acos is not
 }
 
-void compare_normals(const Mesh& a, const Mesh& b, const RunContext& context, VertexDistance& result) {
-    const std::vector<Vec3f> normals_a = vertex_normals(a, a.positions, context);
-    const std::vector<Vec3f> normals_b = vertex_normals(b, b.positions, context);
+void compare_normals(std::span<const Vec3f> normals_a, std::span<const Vec3f> normals_b, VertexDistance& result) {
     std::vector<double> angles;
     angles.reserve(normals_a.size());
     for (std::size_t v = 0; v < normals_a.size(); ++v)
@@ -46,13 +45,13 @@ void compare_normals(const Mesh& a, const Mesh& b, const RunContext& context, Ve
     result.normal_p95_deg = percentile(angles, kPercentile);
 }
 
-VertexDistance compare_vertices(const Mesh& a, const Mesh& b, const RunContext& context) {
+/// between_origins: a's less b's. World positions would lose the digits.
+VertexDistance compare_positions(std::span<const Vec3f> a, std::span<const Vec3f> b, const Vec3d& between_origins) {
     VertexDistance result;
-    result.per_vertex.reserve(a.vertex_count());
-    const Vec3d between_origins = a.origin - b.origin; // first: world positions would lose the digits
+    result.per_vertex.reserve(a.size());
     double sum_of_squares = 0;
-    for (std::size_t v = 0; v < a.vertex_count(); ++v) {
-        const Vec3d offset = a.positions[v].cast<double>() - b.positions[v].cast<double>() + between_origins;
+    for (std::size_t v = 0; v < a.size(); ++v) {
+        const Vec3d offset = a[v].cast<double>() - b[v].cast<double>() + between_origins;
         const double distance = offset.norm();
         sum_of_squares += offset.squaredNorm();
         result.per_vertex.push_back(static_cast<float>(distance));
@@ -61,25 +60,30 @@ VertexDistance compare_vertices(const Mesh& a, const Mesh& b, const RunContext& 
             result.max_vertex = static_cast<Index>(v);
         }
     }
-    if (a.vertex_count() > 0) result.rms = std::sqrt(sum_of_squares / double(a.vertex_count()));
-    compare_normals(a, b, context, result);
+    if (!a.empty()) result.rms = std::sqrt(sum_of_squares / double(a.size()));
     return result;
 }
 
-struct Surface {
+/// A mesh's triangles, in the frame of the mesh that it is measured against.
+struct PlacedTriangles {
     std::vector<Vec3f> positions;
     std::vector<Triangle> triangles;
 };
 
-Surface make_surface(const Mesh& mesh, const Vec3d& shift) {
-    Surface surface{mesh.positions, triangulate(mesh).triangles};
+std::vector<Vec3f> shifted(std::vector<Vec3f> positions, const Vec3d& shift) {
     if (!shift.isZero(0))
-        for (Vec3f& p : surface.positions) p = (p.cast<double>() + shift).cast<float>();
-    return surface;
+        for (Vec3f& p : positions) p = (p.cast<double>() + shift).cast<float>();
+    return positions;
+}
+
+Result<PlacedTriangles> place_triangles(const Mesh& mesh, const Vec3d& shift, const RunContext& context) {
+    Result<Triangulation> triangulation = triangulate(mesh, context);
+    if (!triangulation) return triangulation.error();
+    return PlacedTriangles{shifted(mesh.positions, shift), std::move(triangulation->triangles)};
 }
 
 /// The vertices of faces, then `count` points: one at random in each of as many equal shares of the area.
-std::vector<Vec3f> sample_surface(const Surface& surface, std::size_t count, std::uint64_t seed) {
+std::vector<Vec3f> sample_surface(const PlacedTriangles& surface, std::size_t count, std::uint64_t seed) {
     std::vector<std::uint8_t> used(surface.positions.size());
     for (const Triangle& triangle : surface.triangles)
         for (const Index vertex : triangle) used[vertex] = 1;
@@ -108,7 +112,7 @@ std::vector<Vec3f> sample_surface(const Surface& surface, std::size_t count, std
 
 /// The distances of `samples`, into `result`. The triangle that is closest to one sample bounds how far the next,
 /// mostly its neighbour, has to search: up to a third less time, and the same distances to the bit.
-void search_in_turn(std::span<const Vec3f> samples, const Surface& to, const ClosestPointTree& tree,
+void search_in_turn(std::span<const Vec3f> samples, const PlacedTriangles& to, const ClosestPointTree& tree,
                     std::span<double> result) {
     Index last = 0;
     for (std::size_t i = 0; i < samples.size(); ++i) {
@@ -122,7 +126,7 @@ void search_in_turn(std::span<const Vec3f> samples, const Surface& to, const Clo
 }
 
 /// The distance of every sample to a surface; fewer when cancelled.
-std::vector<double> distances(std::span<const Vec3f> samples, const Surface& to, const RunContext& context) {
+std::vector<double> distances(std::span<const Vec3f> samples, const PlacedTriangles& to, const RunContext& context) {
     std::optional<ClosestPointTree> built; // in our arena: Embree builds on the threads of the one it is called in
     const auto leaves = samples.size() < to.triangles.size() ? TreeLeaves::pairs : TreeLeaves::single;
     context.arena().execute([&] { built.emplace(to.positions, to.triangles, leaves); });
@@ -139,10 +143,14 @@ std::vector<double> distances(std::span<const Vec3f> samples, const Surface& to,
     return result;
 }
 
-SurfaceDistance compare_surfaces(const Mesh& a, const Mesh& b, std::size_t samples, const RunContext& context) {
-    const Surface surface_a = make_surface(a, a.origin - b.origin), surface_b = make_surface(b, Vec3d::Zero());
-    const std::vector<double> there = distances(sample_surface(surface_a, samples, context.seed), surface_b, context);
-    const std::vector<double> back = distances(sample_surface(surface_b, samples, context.seed), surface_a, context);
+Result<SurfaceDistance> compare_surfaces(const Mesh& a, const Mesh& b, std::size_t samples, const RunContext& context) {
+    const Result<PlacedTriangles> placed_a = place_triangles(a, a.origin - b.origin, context);
+    if (!placed_a) return placed_a.error();
+    const Result<PlacedTriangles> placed_b = place_triangles(b, Vec3d::Zero(), context);
+    if (!placed_b) return placed_b.error();
+    const std::vector<double> there = distances(sample_surface(*placed_a, samples, context.seed), *placed_b, context);
+    const std::vector<double> back = distances(sample_surface(*placed_b, samples, context.seed), *placed_a, context);
+    if (context.is_cancelled()) return cancelled_error();
     SurfaceDistance result;
     double sum = 0, sum_of_squares = 0;
     const auto add = [&](const std::vector<double>& way, double& max, double& rms) {
@@ -166,21 +174,43 @@ SurfaceDistance compare_surfaces(const Mesh& a, const Mesh& b, std::size_t sampl
 
 } // namespace
 
+Result<VertexDistance> vertex_distance(const Mesh& a, const Mesh& b, const RunContext& context) {
+    if (a.vertex_count() != b.vertex_count())
+        return Error{ErrorCode::mismatch, "The meshes have " + std::to_string(a.vertex_count()) + " and " +
+                                              std::to_string(b.vertex_count()) +
+                                              " vertices; vertex by vertex, only meshes with as many can be compared."};
+    VertexDistance result = compare_positions(a.positions, b.positions, a.origin - b.origin);
+    compare_normals(vertex_normals(a, a.positions, context), vertex_normals(b, b.positions, context), result);
+    return result;
+}
+
+VertexDistance vertex_distance(const Mesh& mesh, std::span<const Vec3f> a, std::span<const Vec3f> b,
+                               const RunContext& context) {
+    assert(a.size() == mesh.vertex_count() && b.size() == mesh.vertex_count());
+    VertexDistance result = compare_positions(a, b, Vec3d::Zero());
+    compare_normals(vertex_normals(mesh, a, context), vertex_normals(mesh, b, context), result);
+    return result;
+}
+
 Result<MeshDistance> mesh_distance(const Mesh& a, const Mesh& b, std::size_t samples, const RunContext& context) {
     MeshDistance result;
     result.diagonal = bounds(b.positions).diagonal();
-    if (a.vertex_count() == b.vertex_count()) result.vertices = compare_vertices(a, b, context);
-    if (a.face_count() > 0 && b.face_count() > 0) result.surfaces = compare_surfaces(a, b, samples, context);
+    if (a.vertex_count() == b.vertex_count()) result.vertices = vertex_distance(a, b, context).value();
+    if (a.face_count() > 0 && b.face_count() > 0) {
+        Result<SurfaceDistance> surfaces = compare_surfaces(a, b, samples, context);
+        if (!surfaces) return surfaces.error();
+        result.surfaces = *surfaces;
+    }
     if (context.is_cancelled()) return cancelled_error();
     return result;
 }
 
 Result<std::vector<float>> distances_to_surface(const Mesh& a, const Mesh& b, const RunContext& context) {
     if (b.face_count() == 0)
-        return Error{ErrorCode::unsuitable, "The mesh to measure against has no faces, and the meshes do not have the "
-                                            "same number of vertices; give one with a surface."};
-    const Surface vertices = make_surface(a, a.origin - b.origin), surface = make_surface(b, Vec3d::Zero());
-    const std::vector<double> found = distances(vertices.positions, surface, context);
+        return Error{ErrorCode::unsuitable, "The mesh to measure against has no faces; give one with a surface."};
+    const Result<PlacedTriangles> surface = place_triangles(b, Vec3d::Zero(), context);
+    if (!surface) return surface.error();
+    const std::vector<double> found = distances(shifted(a.positions, a.origin - b.origin), *surface, context);
     if (context.is_cancelled()) return cancelled_error();
     return std::vector<float>(found.begin(), found.end());
 }

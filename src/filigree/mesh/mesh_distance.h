@@ -36,8 +36,14 @@ struct MeshDistance {
     double relative(double units) const { return diagonal > 0 ? units / diagonal : 0.0; }
 };
 
-/// a against b. samples: points spread over each surface besides its vertices (seeded by the context).
-/// Cost O((V + samples) log F). Origins are respected. Errors: cancelled.
+/// Vertex by vertex. Cost O(V + corners). Origins are respected. Errors: mismatch (another number of vertices).
+Result<VertexDistance> vertex_distance(const Mesh& a, const Mesh& b, const RunContext& context);
+/// The same for two shapes of one mesh. a, b: one position a vertex of `mesh`, whose faces give the normals.
+VertexDistance vertex_distance(const Mesh& mesh, std::span<const Vec3f> a, std::span<const Vec3f> b,
+                               const RunContext& context);
+
+/// a against b, vertex by vertex and surface to surface. samples: points spread over each surface besides its vertices
+/// (seeded by the context). Cost O((V + samples) log F). Origins are respected. Errors: cancelled.
 Result<MeshDistance> mesh_distance(const Mesh& a, const Mesh& b, std::size_t samples, const RunContext& context);
 
 /// The distance of each of a's vertices from b's surface, model units, for heat maps. Cost O(V log F). Origins are

@@ -2,7 +2,6 @@
 
 #include "filigree/core/parallel_for.h"
 
-#include <Eigen/Geometry>
 #include <cassert>
 #include <numeric>
 #include <unordered_map>
@@ -12,16 +11,9 @@ namespace {
 
 constexpr std::size_t kGrain = 16384;
 
-/// Adds twice the area vector of a face to the sums of its vertices. Newell's formula, from the first corner so that
-/// a small face far from the origin keeps its digits.
+/// Adds twice the area vector of a face to the sums of its vertices.
 void add_face(std::span<const Index> face, std::span<const Vec3f> positions, std::vector<Vec3d>& sums) {
-    const Vec3d origin = positions[face[0]].cast<double>();
-    Vec3d normal = Vec3d::Zero(), previous = positions[face[1]].cast<double>() - origin;
-    for (std::size_t i = 2; i < face.size(); ++i) {
-        const Vec3d current = positions[face[i]].cast<double>() - origin;
-        normal += previous.cross(current);
-        previous = current;
-    }
+    const Vec3d normal = doubled_area_vector(positions, face);
     for (const Index vertex : face) sums[vertex] += normal;
 }
 

@@ -1,10 +1,25 @@
-// Vertex normals from positions.
+// Normals from positions: of faces, weighted by area, and of vertices.
 #pragma once
 
 #include "filigree/core/run_context.h"
 #include "filigree/mesh/mesh.h"
 
+#include <Eigen/Geometry>
+
 namespace filigree {
+
+/// Twice the area vector of a face of three corners or more: along its normal, and twice as long as its area. Newell's
+/// formula, from the first corner so that a small face far from the origin keeps its digits.
+inline Vec3d doubled_area_vector(std::span<const Vec3f> positions, std::span<const Index> face) {
+    const Vec3d first = positions[face[0]].cast<double>();
+    Vec3d sum = Vec3d::Zero(), previous = positions[face[1]].cast<double>() - first;
+    for (std::size_t i = 2; i < face.size(); ++i) {
+        const Vec3d current = positions[face[i]].cast<double>() - first;
+        sum += previous.cross(current);
+        previous = current;
+    }
+    return sum;
+}
 
 /// Unit vertex normals, one a vertex: the faces' normals weighted by area and angle-free (sum of cross products,
 /// polygons by Newell's formula). Zero for a vertex without a face of positive area. Cost O(corners), deterministic.

@@ -2,13 +2,14 @@
 // edges side by side, and joined over those edges, its fans. So one pass over vertices, in parallel, finds it all.
 #include "filigree/mesh/topology.h"
 
+#include "filigree/core/disjoint_sets.h"
 #include "filigree/core/parallel_for.h"
+#include "filigree/mesh/incidence.h"
+#include "filigree/mesh/normals.h"
 #include "filigree/mesh/weld.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <atomic>
-#include <numeric>
 
 namespace filigree {
 namespace {
@@ -27,44 +28,10 @@ void append(Finding& finding, const Finding& later) {
     finding.places.insert(finding.places.end(), later.places.begin(), end);
 }
 
-/// Disjoint sets that many threads join at once. The root of a set is its lowest member, whatever the order.
-class DisjointSets {
-public:
-    explicit DisjointSets(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), Index{0}); }
-
-    Index root(Index i) {
-        for (;;) {
-            const Index parent = load(i);
-            if (parent == i) return i;
-            const Index above = load(parent);
-            if (above != parent) { // halve the path; losing the race only keeps it longer
-                Index expected = parent;
-                std::atomic_ref(parent_[i]).compare_exchange_weak(expected, above, std::memory_order_relaxed);
-            }
-            i = above;
-        }
-    }
-
-    void join(Index a, Index b) {
-        for (;;) {
-            a = root(a);
-            b = root(b);
-            if (a == b) return;
-            if (a > b) std::swap(a, b);
-            Index expected = b;
-            if (std::atomic_ref(parent_[b]).compare_exchange_strong(expected, a, std::memory_order_relaxed)) return;
-        }
-    }
-
-private:
-    Index load(Index i) { return std::atomic_ref(parent_[i]).load(std::memory_order_relaxed); }
-    std::vector<Index> parent_;
-};
-
 /// What the passes over vertices need to know of faces and corners.
 struct Incidence {
     std::vector<Index> face_of_corner;
-    std::vector<Index> corner_offsets, corners; ///< the corners at each vertex, ascending
+    IndexLists corners_at;                      ///< of each vertex
     std::vector<Index> lowest_vertex;           ///< of each face
     std::vector<std::uint64_t> vertex_set_hash; ///< of each face, whatever the order
     std::vector<std::uint8_t> collapsed;        ///< a face: fewer than three corners are left
@@ -107,12 +74,7 @@ Incidence gather_incidence(const Mesh& mesh, const RunContext& context) {
                 in.face_of_corner[c] = static_cast<Index>(f);
         }
     });
-    in.corner_offsets.assign(mesh.vertex_count() + 1, 0);
-    for (const Index vertex : mesh.corners) ++in.corner_offsets[vertex + 1];
-    std::inclusive_scan(in.corner_offsets.begin(), in.corner_offsets.end(), in.corner_offsets.begin());
-    in.corners.resize(mesh.corner_count());
-    std::vector<Index> next(in.corner_offsets.begin(), in.corner_offsets.end() - 1);
-    for (Index c = 0; c < mesh.corner_count(); ++c) in.corners[next[mesh.corners[c]]++] = c;
+    in.corners_at = corners_at_vertices(mesh.corners, mesh.vertex_count());
     return in;
 }
 
@@ -130,9 +92,7 @@ public:
         : mesh_(mesh), in_(incidence), components_(components) {}
 
     void visit(Index vertex, VertexFindings& found) {
-        const std::span<const Index> corners =
-            std::span(in_.corners)
-                .subspan(in_.corner_offsets[vertex], in_.corner_offsets[vertex + 1] - in_.corner_offsets[vertex]);
+        const std::span<const Index> corners = in_.corners_at[vertex];
         if (corners.empty()) return add(found.unused_vertices, {vertex});
         collect_sides(vertex, corners);
         find_duplicate_faces(vertex, corners, found);
@@ -281,33 +241,29 @@ void measure_faces(const Mesh& mesh, Incidence& incidence, const RunContext& con
     const double smallest = kDegenerateArea * box.diagonal() * box.diagonal();
     struct Sums {
         double area = 0, volume = 0; // volume: of tetrahedra over the box's centre, which keeps the digits
-        Vec3d twice_area_vector = Vec3d::Zero();
+        Vec3d doubled_area = Vec3d::Zero();
     };
     std::vector<Sums> pieces((mesh.face_count() + kGrain - 1) / kGrain);
     parallel_for(context, mesh.face_count(), kGrain, [&](std::size_t begin, std::size_t end) {
         Sums& sums = pieces[begin / kGrain];
         for (std::size_t f = begin; f < end; ++f) {
             const std::span<const Index> face = mesh.face(f);
-            const auto edge = [&](std::size_t i) {
-                return Vec3d(mesh.positions[face[i]].cast<double>() - mesh.positions[face[0]].cast<double>());
-            };
-            Vec3d twice_area = Vec3d::Zero();
-            for (std::size_t i = 2; i < face.size(); ++i) twice_area += edge(i - 1).cross(edge(i));
-            const double area = 0.5 * twice_area.norm();
-            sums.volume += twice_area.dot(mesh.positions[face[0]].cast<double>() - box.centre()) / 6;
-            sums.twice_area_vector += twice_area;
+            const Vec3d doubled_area = doubled_area_vector(mesh.positions, face);
+            const double area = 0.5 * doubled_area.norm();
+            sums.volume += doubled_area.dot(mesh.positions[face[0]].cast<double>() - box.centre()) / 6;
+            sums.doubled_area += doubled_area;
             sums.area += area;
             if (!(area > smallest)) incidence.degenerate[f] = 1;
         }
     });
-    Vec3d twice_area_vector = Vec3d::Zero();
+    Vec3d doubled_area = Vec3d::Zero();
     for (const Sums& sums : pieces) {
         report.area += sums.area;
         report.volume += sums.volume;
-        twice_area_vector += sums.twice_area_vector;
+        doubled_area += sums.doubled_area;
     }
     const bool encloses = report.is_closed() && report.is_oriented() && report.nonmanifold_edges.count == 0;
-    if (!encloses) report.volume += twice_area_vector.dot(mesh.origin + box.centre()) / 6;
+    if (!encloses) report.volume += doubled_area.dot(mesh.origin + box.centre()) / 6;
     for (Index f = 0; f < mesh.face_count(); ++f)
         if (incidence.degenerate[f]) add(report.degenerate_faces, {f});
 }
@@ -333,9 +289,9 @@ TopologyReport analyse_topology(const Mesh& mesh, const RunContext& context) {
     Incidence incidence = gather_incidence(mesh, context);
     analyse_vertices(mesh, incidence, context, report);
     measure_faces(mesh, incidence, context, report);
-    const std::vector<Index> first_at_place = weld_map(mesh.positions);
+    const std::vector<Index> representative = weld_map(mesh.positions);
     for (Index v = 0; v < mesh.vertex_count(); ++v)
-        if (first_at_place[v] != v) add(report.duplicate_vertices, {v});
+        if (representative[v] != v) add(report.duplicate_vertices, {v});
     return report;
 }
 

@@ -3,20 +3,15 @@
 //   outlines with bridged holes work too.
 #include "filigree/mesh/triangulate.h"
 
-#include <Eigen/Geometry>
+#include "filigree/mesh/normals.h"
+
+#include <algorithm>
 
 namespace filigree {
 namespace {
 
-constexpr std::size_t kTestsPerCorner = 1024; // point-in-ear tests a face may spend, times its corners
-
-Vec3d newell_normal(std::span<const Vec3f> positions, std::span<const Index> face) {
-    const Vec3d origin = positions[face[0]].cast<double>();
-    Vec3d normal = Vec3d::Zero();
-    for (std::size_t i = 2; i < face.size(); ++i)
-        normal += (positions[face[i - 1]].cast<double>() - origin).cross(positions[face[i]].cast<double>() - origin);
-    return normal;
-}
+constexpr std::size_t kTestsPerCorner = 1024;     // point-in-ear tests a face may spend, times its corners
+constexpr std::size_t kFacesBetweenLooks = 65536; // at the cancel flag
 
 /// The two triangles of a quad as positions in the face, cut from corner 0 to 2 or from 1 to 3.
 using Halves = std::array<std::array<Index, 3>, 2>;
@@ -63,10 +58,12 @@ public:
         tests_left_ = kTestsPerCorner * n;
     }
 
-    void clip(std::vector<Triangle>& out) {
+    /// Appends the outline's triangles to `out`; fewer when cancelled.
+    void clip(std::vector<Triangle>& out, const RunContext& context) {
         Index corner = 0, left = static_cast<Index>(face_.size()), since_last_ear = 0;
         bool flat_ears = false; // corners without an area are taken only when nothing better is left
         while (left > 3 && tests_left_ > 0) {
+            if (context.is_cancelled()) return;
             if (is_ear(corner, flat_ears)) {
                 out.push_back({face_[previous_[corner]], face_[corner], face_[next_[corner]]});
                 remove(corner);
@@ -126,23 +123,29 @@ private:
     std::size_t tests_left_;
 };
 
-void triangulate_polygon(std::span<const Vec3f> positions, std::span<const Index> face, std::vector<Triangle>& out) {
-    const Vec3d normal = newell_normal(positions, face);
+void triangulate_polygon(std::span<const Vec3f> positions, std::span<const Index> face, std::vector<Triangle>& out,
+                         const RunContext& context) {
+    const Vec3d normal = doubled_area_vector(positions, face);
     if (normal.isZero(0)) {
         for (std::size_t i = 2; i < face.size(); ++i) out.push_back({face[0], face[i - 1], face[i]});
     } else {
-        EarClipper(positions, face, normal).clip(out);
+        EarClipper(positions, face, normal).clip(out, context);
     }
 }
 
 } // namespace
 
 Triangulation triangulate(const Mesh& mesh) {
+    return triangulate(mesh, RunContext(1)).value(); // nobody else has the context, so nobody cancels
+}
+
+Result<Triangulation> triangulate(const Mesh& mesh, const RunContext& context) {
     Triangulation result;
     const std::size_t count = mesh.corner_count() - 2 * mesh.face_count();
     result.triangles.reserve(count);
     result.source_face.reserve(count);
     for (std::size_t f = 0; f < mesh.face_count(); ++f) {
+        if (f % kFacesBetweenLooks == 0 && context.is_cancelled()) return cancelled_error();
         const std::span<const Index> face = mesh.face(f);
         if (face.size() == 3) {
             result.triangles.push_back({face[0], face[1], face[2]});
@@ -150,10 +153,11 @@ Triangulation triangulate(const Mesh& mesh) {
             for (const auto& [a, b, c] : cut_quad(mesh.positions, face))
                 result.triangles.push_back({face[a], face[b], face[c]});
         } else {
-            triangulate_polygon(mesh.positions, face, result.triangles);
+            triangulate_polygon(mesh.positions, face, result.triangles, context);
         }
         result.source_face.resize(result.triangles.size(), static_cast<Index>(f));
     }
+    if (context.is_cancelled()) return cancelled_error(); // perhaps in the midst of a face
     return result;
 }
 

@@ -1,6 +1,7 @@
 // Polygons to triangles.
 #pragma once
 
+#include "filigree/core/run_context.h"
 #include "filigree/mesh/mesh.h"
 
 namespace filigree {
@@ -14,7 +15,9 @@ struct Triangulation {
 /// diagonal that keeps both halves facing the quad's normal (the shorter where both do); larger faces by ear clipping
 /// in the plane of their normal, and by a fan where no ear is left (self-crossing outlines).
 /// Cost O(corners) for triangles and quads, O(n r) for a face of n corners with r reflex ones; after 1024 n tests the
-/// rest of a face becomes a fan, to stay bounded.
+/// rest of a face becomes a fan, to stay bounded. That bound is a second for a face of 200,000 corners.
 Triangulation triangulate(const Mesh& mesh);
+/// The same, for meshes that may have such faces. Errors: cancelled.
+Result<Triangulation> triangulate(const Mesh& mesh, const RunContext& context);
 
 } // namespace filigree

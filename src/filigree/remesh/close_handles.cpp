@@ -4,7 +4,7 @@
 // A tree-cotree decomposition leaves two edges a handle, which lie close behind it, and with them one number an edge:
 // the exclusive or of those along a loop is zero where the loop bounds a piece of the surface. So, unlike in [Guskov
 // 2001], a short walk around each of these edges finds the handle's shortest loop, and no region is grown everywhere.
-#include "filigree/remesh/disjoint_sets.h"
+#include "filigree/core/disjoint_sets.h"
 #include "filigree/remesh/half_edges.h"
 #include "filigree/remesh/manifold_surface.h"
 

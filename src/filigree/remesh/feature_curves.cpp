@@ -1,6 +1,6 @@
 #include "filigree/remesh/feature_curves.h"
 
-#include "filigree/remesh/disjoint_sets.h"
+#include "filigree/core/disjoint_sets.h"
 #include "filigree/remesh/half_edges.h"
 
 #include <algorithm>

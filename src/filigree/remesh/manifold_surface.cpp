@@ -3,10 +3,10 @@
 //   the two sides of each solid wedge, so that bodies which touch along an edge come apart closed.
 #include "filigree/remesh/manifold_surface.h"
 
+#include "filigree/core/disjoint_sets.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/mesh/triangulate.h"
 #include "filigree/mesh/weld.h"
-#include "filigree/remesh/disjoint_sets.h"
 #include "filigree/remesh/half_edges.h"
 
 #include <algorithm>
