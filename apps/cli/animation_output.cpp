@@ -3,6 +3,7 @@
 
 #include <set>
 
+#include <fmt/format.h>
 #include <sys/stat.h>
 
 namespace filigree::cli {
@@ -29,61 +30,67 @@ std::string size_text(std::size_t bytes) {
                              : fmt::format("{:.4g} MB", double(bytes) / 1e6);
 }
 
-void add_size(const std::string& path, std::size_t bytes, Table& table, Json& json) {
-    table.row("file", fmt::format("{}, {}", path, size_text(bytes)));
-    json["output"] = path;
-    json["bytes"] = bytes;
+void report_size(const std::string& path, std::size_t bytes, Report& report) {
+    report.add("file", fmt::format("{}, {}", path, size_text(bytes)), "output", path);
+    report.set("bytes", bytes);
 }
 
-void add_moments(std::size_t frames, double rate, Json& json) {
-    json["frames"] = frames;
-    json["frames_per_second"] = rate;
+void set_moments(std::size_t frames, double rate, Report& report) {
+    report.set("frames", frames);
+    report.set("frames_per_second", rate);
 }
 
-void add_frames(std::size_t frames, double rate, std::size_t vertices, Table& table, Json& json) {
-    table.row("frames",
-              fmt::format("{} at {:.6g} a second, {} vertices each", with_commas(frames), rate, with_commas(vertices)));
-    add_moments(frames, rate, json);
-    json["vertices"] = vertices;
+void report_frames(std::size_t frames, double rate, std::size_t vertices, Report& report) {
+    report.row("frames", fmt::format("{} at {:.6g} a second, {} vertices each", with_commas(frames), rate,
+                                     with_commas(vertices)));
+    set_moments(frames, rate, report);
+    report.set("vertices", vertices);
+}
+
+std::string error_text(const ExportReport& exported, bool is_skin) {
+    std::string error =
+        fmt::format("{:.1e} of the diagonal at keys (rms {:.1e})", exported.error_at_keys, exported.rms_at_keys);
+    if (is_skin)
+        error +=
+            fmt::format(", {:.1e} between them (rms {:.1e})", exported.error_between_keys, exported.rms_between_keys);
+    return fmt::format("{}; {} of {} moments evaluated", error, with_commas(exported.moments_checked),
+                       with_commas(exported.moments));
+}
+
+void warn_of_export(const ExportReport& exported, bool has_normals, const std::string& path, Session& session) {
+    constexpr double kSeen = 10; // degrees
+    for (const std::string& warning : exported.warnings) session.warn(warning);
+    if (has_normals && exported.normal_error_degrees > kSeen)
+        session.warn(fmt::format("{}: normals are up to {:.0f} degrees off in viewers that do not correct them "
+                                 "(three.js): --no-normals makes them flat and right; see docs/exchange.md.",
+                                 path, exported.normal_error_degrees));
 }
 
 /// What an export as skin or morph targets came to.
-void add_report(const ExportReport& report, bool is_skin, bool has_normals, const std::string& path, Session& session,
-                Table& table, Json& json) {
-    constexpr double kSeen = 10; // degrees
-    for (const std::string& warning : report.warnings) session.warn(warning);
-    if (has_normals && report.normal_error_degrees > kSeen)
-        session.warn(fmt::format("{}: normals are up to {:.0f} degrees off in viewers that do not correct them "
-                                 "(three.js): --no-normals makes them flat and right; see docs/exchange.md.",
-                                 path, report.normal_error_degrees));
-    add_size(path, report.bytes, table, json);
-    table.row(is_skin ? "skin" : "morph targets",
-              is_skin ? fmt::format("{} vertices, {} joints, {} keys in {:.4g} s", with_commas(report.vertices),
-                                    with_commas(report.joints), with_commas(report.keys), report.seconds)
-                      : fmt::format("{} of {} vertices in {:.4g} s", with_commas(report.keys),
-                                    with_commas(report.vertices), report.seconds));
-    std::string error =
-        fmt::format("{:.1e} of the diagonal at keys (rms {:.1e})", report.error_at_keys, report.rms_at_keys);
-    if (is_skin)
-        error += fmt::format(", {:.1e} between them (rms {:.1e})", report.error_between_keys, report.rms_between_keys);
-    if (report.moments_checked > 0)
-        table.row("error of the file", fmt::format("{}; {} of {} moments evaluated", error,
-                                                   with_commas(report.moments_checked), with_commas(report.moments)));
-    if (has_normals && report.normal_error_degrees > 0)
-        table.row("normals", fmt::format("up to {:.3g} degrees off (95th percentile) in viewers that turn them with "
-                                         "the skin's matrix, such as three.js",
-                                         report.normal_error_degrees));
-    json["as"] = is_skin ? "skin" : "morph";
-    json["vertices"] = report.vertices;
-    json["joints"] = report.joints;
-    json["keys"] = report.keys;
-    json["seconds"] = report.seconds;
-    json["error_at_keys"] = report.error_at_keys;
-    json["error_between_keys"] = report.error_between_keys;
-    json["rms_at_keys"] = report.rms_at_keys;
-    json["rms_between_keys"] = report.rms_between_keys;
-    json["moments_checked"] = report.moments_checked;
-    json["normal_error_degrees"] = report.normal_error_degrees;
+void report_export(const ExportReport& exported, bool is_skin, bool has_normals, const std::string& path,
+                   Report& report) {
+    report_size(path, exported.bytes, report);
+    report.add(is_skin ? "skin" : "morph targets",
+               is_skin ? fmt::format("{} vertices, {} joints, {} keys in {:.4g} s", with_commas(exported.vertices),
+                                     with_commas(exported.joints), with_commas(exported.keys), exported.seconds)
+                       : fmt::format("{} of {} vertices in {:.4g} s", with_commas(exported.keys),
+                                     with_commas(exported.vertices), exported.seconds),
+               "as", is_skin ? "skin" : "morph");
+    if (exported.moments_checked > 0) report.row("error of the file", error_text(exported, is_skin));
+    if (has_normals && exported.normal_error_degrees > 0)
+        report.row("normals", fmt::format("up to {:.3g} degrees off (95th percentile) in viewers that turn them with "
+                                          "the skin's matrix, such as three.js",
+                                          exported.normal_error_degrees));
+    report.set("vertices", exported.vertices);
+    report.set("joints", exported.joints);
+    report.set("keys", exported.keys);
+    report.set("seconds", exported.seconds);
+    report.set("error_at_keys", exported.error_at_keys);
+    report.set("error_between_keys", exported.error_between_keys);
+    report.set("rms_at_keys", exported.rms_at_keys);
+    report.set("rms_between_keys", exported.rms_between_keys);
+    report.set("moments_checked", exported.moments_checked);
+    report.set("normal_error_degrees", exported.normal_error_degrees);
 }
 
 /// A model's poses as the restored level moves.
@@ -111,59 +118,28 @@ void write_numbered(const Restorer& restorer, const PoseStream& poses, const std
 
 } // namespace
 
-void add_animation_options(CLI::App& command, AnimationOutput& output) {
-    const auto given = [&output](const char* name) { output.given.emplace_back(name); };
-    const auto add_flag = [&](const char* name, const std::function<void()>& set, const char* text) {
-        command.add_flag_callback(
-            name,
-            [given, name, set] {
-                given(name);
-                set();
-            },
-            text);
-    };
-    add_choice<bool>(
-        command, "--as", {{"skin", false}, {"morph", true}},
-        [&output, given](bool as_morph) {
-            given("--as");
-            output.as_morph = as_morph;
-            output.as_skin = !as_morph;
-        },
-        "GLB: a skin, one joint a driver vertex, or morph targets, every frame's positions (unset: a skin where the "
-        "model's code makes one)");
-    command
-        .add_option_function<double>(
-            "--key-rate",
-            [&output, given](const double& rate) {
-                given("--key-rate");
-                output.skin.key_rate = rate;
-            },
-            "Skin: keys a second (unset: one a frame)")
-        ->check(positive_number());
-    add_choice<KeyInterpolation>(
-        command, "--interpolation", {{"linear", KeyInterpolation::linear}, {"cubic", KeyInterpolation::cubic}},
-        [&output, given](KeyInterpolation interpolation) {
-            given("--interpolation");
-            output.skin.interpolation = interpolation;
-        },
-        "Skin: between keys (unset: linear; cubic needs fewer keys, but Blender ignores it)");
-    add_choice<unsigned>(
-        command, "--influences", {{"3", 3U}, {"6", 6U}},
-        [&output, given](unsigned influences) {
-            given("--influences");
-            output.skin.influences = influences;
-        },
-        "Skin: joints a vertex (unset: 3, which plays in everything; 6 shows Blender the true rest shape)");
-    add_flag(
-        "--full-precision", [&output] { output.skin.full_precision = true; }, "Skin: float rotations and weights");
-    add_flag(
-        "--all-levels", [&output] { output.skin.all_levels = true; }, "Skin: coarser levels too (MSFT_lod)");
-    add_flag(
-        "--no-normals", [&output] { output.skin.normals = output.morph.normals = ExportNormals::leave; },
-        "GLB: leave normals out; viewers then shade flat, which is right under any stretch");
-    add_flag(
-        "--morph-normals", [&output] { output.morph.morph_normals = true; },
-        "Morph targets: normals of each frame too");
+OptionList animation_options(AnimationOutput& output) {
+    return {
+        choice<GlbMotion>("--as", output.glb, {{"skin", GlbMotion::skin}, {"morph", GlbMotion::morph}},
+                          "GLB: a skin, one joint a driver vertex, or morph targets, every frame's positions (unset: a "
+                          "skin where the model's code makes one)"),
+        Option("--key-rate", output.skin.key_rate, "Skin: keys a second (unset: one a frame)").above_zero(),
+        choice<KeyInterpolation>("--interpolation", output.skin.interpolation,
+                                 {{"linear", KeyInterpolation::linear}, {"cubic", KeyInterpolation::cubic}},
+                                 "Skin: between keys (unset: linear; cubic needs fewer keys, but Blender ignores it)"),
+        choice<unsigned>("--influences", output.skin.influences, {{"3", 3U}, {"6", 6U}},
+                         "Skin: joints a vertex (unset: 3, which plays in everything; 6 shows Blender the true rest "
+                         "shape)"),
+        Option("--full-precision", output.skin.full_precision, "Skin: float rotations and weights"),
+        Option("--all-levels", output.skin.all_levels, "Skin: coarser levels too (MSFT_lod)"),
+        Option("--no-normals", output.no_normals,
+               "GLB: leave normals out; viewers then shade flat, which is right under any stretch"),
+        Option("--morph-normals", output.morph.morph_normals, "Morph targets: normals of each frame too")};
+}
+
+std::string given_animation_option(const Session& session) {
+    return session.first_given({"--as", "--key-rate", "--interpolation", "--influences", "--full-precision",
+                                "--all-levels", "--no-normals", "--morph-normals"});
 }
 
 bool is_animation_path(const std::string& path) { return animation_format(path).ok(); }
@@ -178,13 +154,14 @@ void check_animation_path(const std::string& path) {
         throw Failure{{ErrorCode::unwritable, path + ": cannot be written: there is no such folder."}};
 }
 
-void check_animation_options(const AnimationOutput& output, const std::vector<std::string>& paths) {
+void check_animation_options(const std::vector<std::string>& paths, const Session& session) {
     const auto is_glb = [](const std::string& path) {
         const Result<AnimationFormat> format = animation_format(path);
         return format && *format == AnimationFormat::glb;
     };
-    if (!output.given.empty() && std::none_of(paths.begin(), paths.end(), is_glb))
-        throw Failure{{ErrorCode::usage, output.given.front() + " belongs to an animation that goes to a .glb."}};
+    const std::string given = given_animation_option(session);
+    if (!given.empty() && std::none_of(paths.begin(), paths.end(), is_glb))
+        throw Failure{{ErrorCode::usage, given + " belongs to an animation that goes to a .glb."}};
 }
 
 void check_not_input(const std::string& output, const std::vector<std::string>& inputs) {
@@ -205,13 +182,11 @@ void check_not_input(const std::string& output, const std::vector<std::string>& 
     }
 }
 
-void add_pose_file_options(CLI::App& command, PoseFileOptions& options) {
-    command
-        .add_option_function<double>(
-            "--frame-rate", [&options](const double& rate) { options.frames_per_second = rate; },
-            "Frames a second (unset: as the file says; 60 for .pc2 and numbered meshes)")
-        ->check(positive_number());
-    command.add_option("--animation", options.animation, "Of a .glb with several (unset: the first)");
+OptionList pose_file_options(PoseFileOptions& options) {
+    return {Option("--frame-rate", options.frames_per_second,
+                   "Frames a second (unset: as the file says; 60 for .pc2 and numbered meshes)")
+                .above_zero(),
+            Option("--animation", options.animation, "Of a .glb with several (unset: the first)")};
 }
 
 PoseStream poses_of(const std::string& poses, const PoseFileOptions& options, const Model& model,
@@ -228,58 +203,61 @@ PoseStream poses_of(const std::string& poses, const PoseFileOptions& options, co
 
 void write_animation_output(const Model& model, const PoseStream& poses, const RestoreOptions& restore,
                             const AnimationOutput& output, const std::string& path, const std::string& materials_beside,
-                            Session& session, Table& table, Json& json) {
+                            Session& session, Report& report) {
     const AnimationFormat format = require(animation_format(path));
-    const bool is_skin =
-        format == AnimationFormat::glb && !output.as_morph && (output.as_skin || model.code() == DetailCode::blend);
-    if (is_skin) {
+    const bool makes_skin =
+        output.glb == GlbMotion::skin || (output.glb == GlbMotion::automatic && model.code() == DetailCode::blend);
+    if (format == AnimationFormat::glb && makes_skin) {
         SkinOptions options = output.skin;
+        if (output.no_normals) options.normals = ExportNormals::leave;
         options.restore = restore;
         options.materials_beside = materials_beside;
         session.begin_writing(path);
-        add_report(require(write_skin_glb(model, poses, options, path, session.context())), true,
-                   options.normals != ExportNormals::leave, path, session, table, json);
-        add_moments(poses.frames, poses.frames_per_second, json);
+        const ExportReport exported = require(write_skin_glb(model, poses, options, path, session.context()));
+        warn_of_export(exported, !output.no_normals, path, session);
+        report_export(exported, true, !output.no_normals, path, report);
+        set_moments(poses.frames, poses.frames_per_second, report);
         return;
     }
     const Restorer restorer = require(Restorer::create(model, restore, session.context()));
-    RunContext silent = session.context(); // the bar tells of frames
-    silent.progress = nullptr;
+    const RunContext silent = session.silent_context(); // the bar tells of frames
     if (format == AnimationFormat::numbered) {
         session.begin_writing(path);
         write_numbered(restorer, poses, path, materials_beside, silent, session);
-        json["output"] = path;
-        add_frames(poses.frames, poses.frames_per_second, restorer.vertex_count(), table, json);
+        report.set("output", path);
+        report_frames(poses.frames, poses.frames_per_second, restorer.vertex_count(), report);
         return;
     }
     const Mesh rest = level_mesh(model, require(restored_level(model, restore)));
     write_animation_output(restored_animation(restorer, poses, rest, silent), output, path, materials_beside, session,
-                           table, json);
+                           report);
 }
 
 void write_animation_output(const MeshAnimation& animation, const AnimationOutput& output, const std::string& path,
-                            const std::string& materials_beside, Session& session, Table& table, Json& json) {
+                            const std::string& materials_beside, Session& session, Report& report) {
     const AnimationFormat format = require(animation_format(path));
     session.begin_writing(path);
     if (format == AnimationFormat::glb) {
-        if (output.as_skin)
+        if (output.glb == GlbMotion::skin)
             throw Failure{{ErrorCode::unsuitable, path + ": a skin needs a model ('filigree strip' makes one); leave "
                                                          "out --as skin for morph targets."}};
         MorphOptions options = output.morph;
+        if (output.no_normals) options.normals = ExportNormals::leave;
         options.materials_beside = materials_beside;
-        add_report(require(write_morph_glb(animation, options, path, session.context())), false,
-                   options.normals != ExportNormals::leave, path, session, table, json);
-        add_moments(animation.frames, animation.frames_per_second, json);
+        const ExportReport exported = require(write_morph_glb(animation, options, path, session.context()));
+        warn_of_export(exported, !output.no_normals, path, session);
+        report_export(exported, false, !output.no_normals, path, report);
+        set_moments(animation.frames, animation.frames_per_second, report);
         return;
     }
     const std::string place = format == AnimationFormat::numbered ? numbered_path(path, materials_beside) : path;
     for (const std::string& warning : require(write_animation(animation, place, session.context())))
         session.warn(warning);
     if (format == AnimationFormat::numbered)
-        json["output"] = path;
+        report.set("output", path);
     else
-        add_size(path, bytes_of_file(path), table, json);
-    add_frames(animation.frames, animation.frames_per_second, animation.rest->vertex_count(), table, json);
+        report_size(path, bytes_of_file(path), report);
+    report_frames(animation.frames, animation.frames_per_second, animation.rest->vertex_count(), report);
 }
 
 } // namespace filigree::cli

@@ -17,6 +17,8 @@
 #include <cstring>
 #include <random>
 
+#include <fmt/format.h>
+
 namespace filigree::cli {
 
 namespace {
@@ -148,12 +150,12 @@ public:
     }
 
     void simulate(std::size_t particles) {
-        for (Figure& figure : measure_simulation(mesh_, {.particles = particles, .base = base_}, context_))
+        for (BenchFigure& figure : measure_simulation(mesh_, {.particles = particles, .base = base_}, context_))
             figures_.push_back(std::move(figure));
     }
 
     void set_base(std::optional<std::size_t> base) { base_ = base; }
-    const std::vector<Figure>& figures() const { return figures_; }
+    const std::vector<BenchFigure>& figures() const { return figures_; }
     const std::vector<FidelityRow>& fidelity_rows() const { return rows_; }
 
 private:
@@ -230,75 +232,85 @@ private:
     const RunContext& context_;
     std::optional<std::size_t> base_ = {};
     std::array<std::optional<Model>, 2> models_;
-    std::vector<Figure> figures_;
+    std::vector<BenchFigure> figures_;
     std::vector<FidelityRow> rows_;
 };
 
+struct Options {
+    std::string name = "all", mesh;
+    std::optional<std::size_t> base = {};
+    std::size_t particles = 0;
+};
+
+void report_figures(const Bench& bench, Report& report) {
+    Json results = Json::array();
+    for (const BenchFigure& figure : bench.figures()) {
+        report.row(figure.name, fmt::format("{:10.4g} {}", figure.value, figure.unit));
+        results.push_back({{"name", figure.name}, {"value", figure.value}, {"unit", figure.unit}});
+    }
+    report.set("results", results);
+}
+
+void report_fidelity(const std::vector<FidelityRow>& rows, Report& report) {
+    Json values = Json::array();
+    if (!rows.empty())
+        report.say(fmt::format("\n{:<18} {:<12} {:>9} {:>9} {:>9}\n", "method", "warp", "rms", "max", "normals"));
+    for (const FidelityRow& row : rows) {
+        values.push_back({{"method", row.method},
+                          {"warp", row.warp},
+                          {"rms", row.rms},
+                          {"max", row.max},
+                          {"normal_p95_deg", row.normal_p95_deg}});
+        report.say(fmt::format("{:<18} {:<12} {:>9.2e} {:>9.2e} {:>9.3g}\n", row.method, row.warp, row.rms, row.max,
+                               row.normal_p95_deg));
+    }
+    report.set("fidelity", values);
+}
+
+void run(const Options& options, Session& session) {
+    Mesh mesh =
+        options.mesh.empty() ? make_wavy_cube({.resolution = kBenchResolution}) : session.read_mesh(options.mesh);
+    const RunContext silent = session.silent_context(); // a bar would cost time that is measured
+    Report report;
+    report.set("mesh", {{"name", options.mesh.empty() ? "wavy-cube" : options.mesh},
+                        {"vertices", mesh.vertex_count()},
+                        {"faces", mesh.face_count()}});
+    report.set("threads", silent.threads());
+    Bench bench(std::move(mesh), silent);
+    bench.set_base(options.base);
+    const auto wants = [&](const char* name) { return options.name == "all" || options.name == name; };
+    if (wants("restore")) bench.restore();
+    if (wants("strip")) bench.strip_phases();
+    if (wants("files")) bench.files();
+    if (wants("deform")) bench.deform();
+    if (wants("handles")) bench.handles();
+    if (wants("fidelity")) bench.fidelity();
+    if (wants("simulate")) bench.simulate(options.particles);
+    if (silent.is_cancelled()) throw Failure{cancelled_error()};
+    report_figures(bench, report);
+    report_fidelity(bench.fidelity_rows(), report);
+    session.print(report);
+}
+
 } // namespace
 
-void add_bench(CLI::App& app, Session& session) {
-    struct Options {
-        std::string name = "all", mesh;
-        std::optional<std::size_t> base = {};
-        std::size_t particles = 0;
-    };
-    auto options = std::make_shared<Options>();
-    CLI::App* command = app.add_subcommand("bench", "Measure this machine: speeds with their rivals, and fidelity");
-    const std::vector<std::string> names = {"all",    "restore", "strip",    "files",
-                                            "deform", "handles", "fidelity", "simulate"};
-    command->add_option("name", options->name, "What to measure")->check(CLI::IsMember(names))->capture_default_str();
-    command->add_option("--mesh", options->mesh,
-                        fmt::format("Mesh to measure on (unset: the wavy cube with {} vertices)",
-                                    with_commas(wavy_cube_vertices(kBenchResolution))));
-    command->add_option("--base", options->base, "Vertices of the driver (unset: as strip chooses)");
-    command->add_option("--particles", options->particles, "Particles of the bodies (unset: 1,000 to 200,000)")
-        ->check(CLI::Range(8, 1000000));
-    session.add_common_options(*command, "  filigree bench restore --threads 1\n"
-                                         "  filigree bench fidelity --mesh scan.ply --base 1000\n"
-                                         "  filigree bench --json > figures.json");
-    command->callback([options, &session] {
-        session.begin();
-        Mesh mesh =
-            options->mesh.empty() ? make_wavy_cube({.resolution = kBenchResolution}) : session.read_mesh(options->mesh);
-        const Json mesh_json = {{"name", options->mesh.empty() ? "wavy-cube" : options->mesh},
-                                {"vertices", mesh.vertex_count()},
-                                {"faces", mesh.face_count()}};
-        RunContext silent = session.context(); // a bar would cost time that is measured
-        silent.progress = nullptr;
-        Bench bench(std::move(mesh), silent);
-        bench.set_base(options->base);
-        const auto wants = [&](const char* name) { return options->name == "all" || options->name == name; };
-        if (wants("restore")) bench.restore();
-        if (wants("strip")) bench.strip_phases();
-        if (wants("files")) bench.files();
-        if (wants("deform")) bench.deform();
-        if (wants("handles")) bench.handles();
-        if (wants("fidelity")) bench.fidelity();
-        if (wants("simulate")) bench.simulate(options->particles);
-        if (silent.is_cancelled()) throw Failure{cancelled_error()};
-
-        Table table;
-        Json results = Json::array();
-        for (const Figure& figure : bench.figures()) {
-            table.row(figure.name, fmt::format("{:10.4g} {}", figure.value, figure.unit));
-            results.push_back({{"name", figure.name}, {"value", figure.value}, {"unit", figure.unit}});
-        }
-        Json rows = Json::array();
-        std::string text = table.text();
-        if (!bench.fidelity_rows().empty())
-            text += fmt::format("\n{:<18} {:<12} {:>9} {:>9} {:>9}\n", "method", "warp", "rms", "max", "normals");
-        for (const FidelityRow& row : bench.fidelity_rows()) {
-            rows.push_back({{"method", row.method},
-                            {"warp", row.warp},
-                            {"rms", row.rms},
-                            {"max", row.max},
-                            {"normal_p95_deg", row.normal_p95_deg}});
-            text += fmt::format("{:<18} {:<12} {:>9.2e} {:>9.2e} {:>9.3g}\n", row.method, row.warp, row.rms, row.max,
-                                row.normal_p95_deg);
-        }
-        session.print(text,
-                      {{"mesh", mesh_json}, {"threads", silent.threads()}, {"results", results}, {"fidelity", rows}});
-    });
+Command bench_command() {
+    const auto options = std::make_shared<Options>();
+    return {.name = "bench",
+            .text = "Measure this machine: speeds with their rivals, and fidelity",
+            .options = {Option("name", options->name, "What to measure")
+                            .one_of({"all", "restore", "strip", "files", "deform", "handles", "fidelity", "simulate"})
+                            .with_default(),
+                        Option("--mesh", options->mesh,
+                               fmt::format("Mesh to measure on (unset: the wavy cube with {} vertices)",
+                                           with_commas(wavy_cube_vertices(kBenchResolution)))),
+                        Option("--base", options->base, "Vertices of the driver (unset: as strip chooses)"),
+                        Option("--particles", options->particles, "Particles of the bodies (unset: 1,000 to 200,000)")
+                            .between(8, 1000000)},
+            .examples = "  filigree bench restore --threads 1\n"
+                        "  filigree bench fidelity --mesh scan.ply --base 1000\n"
+                        "  filigree bench --json > figures.json",
+            .run = [options](Session& session) { run(*options, session); }};
 }
 
 } // namespace filigree::cli

@@ -3,9 +3,17 @@
 
 #include <cmath>
 
+#include <fmt/format.h>
+
 namespace filigree::cli {
 
 namespace {
+
+struct Options {
+    std::string a, b, picture;
+    UpAxis up = UpAxis::y;
+    std::size_t samples = 100'000;
+};
 
 /// a coloured by how far each of its vertices is from b, with a legend; the vertices' rms and maximum stand below.
 void draw_errors(const Mesh& a, const Mesh& b, const std::string& names, const MeshDistance& distance, UpAxis up,
@@ -42,69 +50,70 @@ void draw_errors(const Mesh& a, const Mesh& b, const std::string& names, const M
     require(page.write(path, 1));
 }
 
+/// The distances: fractions of the diagonal under a key, model units under the key with "_units".
+void report_distances(const MeshDistance& distance, Report& report) {
+    const auto add = [&](const std::string& key, const char* title, double units) {
+        report.add(title, distance_text(distance, units), key, distance.relative(units));
+        report.set(key + "_units", units);
+    };
+    const auto add_angle = [&](const char* key, const char* title, double degrees) {
+        report.add(title, fmt::format("{:.3g} degrees", degrees), key, degrees);
+    };
+    if (const auto& v = distance.vertices) {
+        add("rms", "rms, vertex to vertex", v->rms);
+        add("max", "max, vertex to vertex", v->max);
+        if (v->max_vertex != kNoIndex) report.set("max_vertex", v->max_vertex);
+        add_angle("normal_mean_deg", "normals, mean", v->normal_mean_deg);
+        add_angle("normal_p95_deg", "normals, 95 %", v->normal_p95_deg);
+    }
+    if (const auto& s = distance.surfaces) {
+        add("hausdorff", "Hausdorff distance", s->hausdorff);
+        add("mean_distance", "mean surface distance", s->mean_distance);
+        add("rms_a_to_b", "rms, first to second", s->rms_a_to_b);
+        add("max_a_to_b", "max, first to second", s->max_a_to_b);
+        add("rms_b_to_a", "rms, second to first", s->rms_b_to_a);
+        add("max_b_to_a", "max, second to first", s->max_b_to_a);
+    }
+}
+
+void run(const Options& options, Session& session) {
+    if (!options.picture.empty()) check_picture_path(options.picture);
+    const Mesh a = session.read_mesh(options.a), b = session.read_mesh(options.b);
+    const MeshDistance distance = require(mesh_distance(a, b, options.samples, session.context()));
+    if (!distance.vertices)
+        session.warn(fmt::format("The meshes have {} and {} vertices, so only their surfaces are compared.",
+                                 with_commas(a.vertex_count()), with_commas(b.vertex_count())));
+    Report report;
+    report.set("a", options.a);
+    report.set("b", options.b);
+    report.set("diagonal_units", distance.diagonal);
+    report_distances(distance, report);
+    if (!options.picture.empty()) {
+        draw_errors(a, b, Page::plain(file_name(options.a)) + " against " + Page::plain(file_name(options.b)), distance,
+                    options.up, options.picture, session);
+        report.add("picture", options.picture, "picture", options.picture);
+    }
+    session.print(report);
+}
+
 } // namespace
 
-void add_compare(CLI::App& app, Session& session) {
-    struct Options {
-        std::string a, b, picture;
-        UpAxis up = UpAxis::y;
-        std::size_t samples = 100'000;
-    };
-    auto options = std::make_shared<Options>();
-    CLI::App* command = app.add_subcommand("compare", "Say how far one mesh is from another");
-    command->add_option("a", options->a, "Mesh")->required();
-    command->add_option("b", options->b, "Mesh to measure against; fractions are of its diagonal")->required();
-    command->add_option("--samples", options->samples, "Points on each surface, besides its vertices")
-        ->check(whole_number(0))
-        ->capture_default_str();
-    command->add_option("--picture", options->picture,
-                        "Also draw the first mesh coloured by its distance from the second (.png, .svg, .pdf)");
-    add_choice<UpAxis>(
-        *command, "--up", {{"x", UpAxis::x}, {"y", UpAxis::y}, {"z", UpAxis::z}},
-        [options](UpAxis up) { options->up = up; }, "Which axis is up in the picture (unset: y)");
-    session.add_common_options(*command, "  filigree compare restored.ply full.ply\n"
-                                         "  filigree compare restored.ply full.ply --picture heat.png\n"
-                                         "  filigree compare driver.ply scan.ply --json");
-    command->callback([options, &session] {
-        session.begin();
-        if (!options->picture.empty()) check_picture_path(options->picture);
-        const Mesh a = session.read_mesh(options->a), b = session.read_mesh(options->b);
-        const MeshDistance distance = require(mesh_distance(a, b, options->samples, session.context()));
-        Table table;
-        Json json = {{"a", options->a}, {"b", options->b}, {"diagonal_units", distance.diagonal}};
-        const auto add = [&](const char* key, const char* title, double units) {
-            table.row(title, distance_text(distance, units));
-            json[key] = distance.relative(units);
-            json[std::string(key) + "_units"] = units;
-        };
-        if (const auto& v = distance.vertices) {
-            add("rms", "rms, vertex to vertex", v->rms);
-            add("max", "max, vertex to vertex", v->max);
-            if (v->max_vertex != kNoIndex) json["max_vertex"] = v->max_vertex;
-            table.row("normals, mean", fmt::format("{:.3g} degrees", v->normal_mean_deg));
-            table.row("normals, 95 %", fmt::format("{:.3g} degrees", v->normal_p95_deg));
-            json["normal_mean_deg"] = v->normal_mean_deg;
-            json["normal_p95_deg"] = v->normal_p95_deg;
-        } else {
-            session.warn(fmt::format("The meshes have {} and {} vertices, so only their surfaces are compared.",
-                                     with_commas(a.vertex_count()), with_commas(b.vertex_count())));
-        }
-        if (const auto& s = distance.surfaces) {
-            add("hausdorff", "Hausdorff distance", s->hausdorff);
-            add("mean_distance", "mean surface distance", s->mean_distance);
-            add("rms_a_to_b", "rms, first to second", s->rms_a_to_b);
-            add("max_a_to_b", "max, first to second", s->max_a_to_b);
-            add("rms_b_to_a", "rms, second to first", s->rms_b_to_a);
-            add("max_b_to_a", "max, second to first", s->max_b_to_a);
-        }
-        if (!options->picture.empty()) {
-            draw_errors(a, b, Page::plain(file_name(options->a)) + " against " + Page::plain(file_name(options->b)),
-                        distance, options->up, options->picture, session);
-            table.row("picture", options->picture);
-            json["picture"] = options->picture;
-        }
-        session.print(table.text(), json);
-    });
+Command compare_command() {
+    const auto options = std::make_shared<Options>();
+    return {.name = "compare",
+            .text = "Say how far one mesh is from another",
+            .options = {Option("a", options->a, "Mesh").required(),
+                        Option("b", options->b, "Mesh to measure against; fractions are of its diagonal").required(),
+                        Option("--samples", options->samples, "Points on each surface, besides its vertices")
+                            .whole_from(0)
+                            .with_default(),
+                        Option("--picture", options->picture,
+                               "Also draw the first mesh coloured by its distance from the second (.png, .svg, .pdf)"),
+                        up_option(options->up, "Which axis is up in the picture (unset: y)")},
+            .examples = "  filigree compare restored.ply full.ply\n"
+                        "  filigree compare restored.ply full.ply --picture heat.png\n"
+                        "  filigree compare driver.ply scan.ply --json",
+            .run = [options](Session& session) { run(*options, session); }};
 }
 
 } // namespace filigree::cli

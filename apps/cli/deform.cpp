@@ -5,6 +5,8 @@
 
 #include "filigree/deform/space_warp.h"
 
+#include <fmt/format.h>
+
 namespace filigree::cli {
 
 namespace {
@@ -96,20 +98,21 @@ Mesh restore_pose(const Model& model, const Pose& pose, const Options& options, 
 
 bool is_model_path(const std::string& path) { return lower_ending(path) == ".fil"; }
 
-void check(const Options& options) {
+void check(const Options& options, const Session& session) {
     const auto refuse = [](const std::string& sentence) { throw Failure{{ErrorCode::usage, sentence}}; };
     check_second_output("--pose", options.pose_output, options.output);
     if (options.steps.empty() == options.handles.empty())
         refuse("Say how to deform: one or more of --stretch, --squeeze, --bend, --twist, --taper and --random, or "
                "--handles FILE.");
     if (options.frames == 0) {
-        if (!options.animation.given.empty()) refuse(options.animation.given.front() + " belongs to --frames.");
+        const std::string given = given_animation_option(session);
+        if (!given.empty()) refuse(given + " belongs to --frames.");
         return;
     }
     if (!options.pose_output.empty()) refuse("--pose writes one pose; with --frames give -o a .fil for all of them.");
     check_not_input(options.output, {options.input, options.handles});
     if (!is_model_path(options.output)) check_animation_path(options.output);
-    check_animation_options(options.animation, {options.output});
+    check_animation_options({options.output}, session);
 }
 
 /// A model's poses are all in memory until they are written.
@@ -124,128 +127,137 @@ void check_poses_fit(std::size_t frames, std::size_t driver_vertices, const std:
                          output, with_commas(frames), with_commas(driver_vertices), bytes / 1e9, double(kMost) / 1e9)}};
 }
 
-void deform_animation(const Options& options, const Session::Content& content, Session& session) {
+/// The model itself, with the poses.
+void write_posed_model(const Model& model, const PoseStream& poses, const std::string& output, Session& session,
+                       Report& report) {
+    check_poses_fit(poses.frames, model.driver().vertices.size(), output);
+    PoseSequence sequence{poses.frames_per_second, {}};
+    for (std::size_t frame = 0; frame < poses.frames; ++frame) {
+        session.context().report("deforming", double(frame) / double(poses.frames));
+        sequence.frames.push_back(require(poses.pose(frame)));
+    }
+    session.context().report("deforming", 1);
+    session.write_model(model, output, sequence);
+    report.row("model", fmt::format("{} with {} poses at {:.6g} a second", output, with_commas(poses.frames),
+                                    poses.frames_per_second));
+}
+
+void animate_model(const Model& model, const Options& options, Session& session, Report& report) {
     const Deformation deformation(options);
-    RunContext silent = session.context(); // the bar tells of frames
-    silent.progress = nullptr;
-    Table table;
-    Json json;
+    const RunContext silent = session.silent_context(); // the bar tells of frames
+    const PoseStream poses{options.frames, options.frames_per_second, [&](std::size_t frame) -> Result<Pose> {
+                               return deformation.driver(model, options.fraction(frame), silent);
+                           }};
+    if (is_model_path(options.output)) return write_posed_model(model, poses, options.output, session, report);
+    write_animation_output(model, poses, options.restore, options.animation, options.output, options.input, session,
+                           report);
+}
+
+void animate_mesh(const Mesh& rest, const Options& options, Session& session, Report& report) {
+    if (is_model_path(options.output))
+        throw Failure{{ErrorCode::usage, options.output + ": a model with poses comes from a model, and " +
+                                             options.input + " is a mesh; 'filigree strip' makes one of it."}};
+    const Deformation deformation(options);
+    const RunContext silent = session.silent_context();
+    const MeshAnimation animation{&rest, options.frames, options.frames_per_second,
+                                  [&](std::size_t frame, std::span<Vec3f> positions) -> Status {
+                                      const Mesh moved = deformation.mesh(rest, options.fraction(frame), silent);
+                                      std::copy(moved.positions.begin(), moved.positions.end(), positions.begin());
+                                      return Success{};
+                                  }};
+    write_animation_output(animation, options.animation, options.output, options.input, session, report);
+}
+
+void deform_animation(const Options& options, const Session::Content& content, Session& session) {
+    Report report;
     const double start = now_seconds();
     const auto* model = std::get_if<Model>(&content.value);
-    if (model) {
-        const PoseStream poses{options.frames, options.frames_per_second, [&](std::size_t frame) -> Result<Pose> {
-                                   return deformation.driver(*model, options.fraction(frame), silent);
-                               }};
-        if (is_model_path(options.output)) {
-            check_poses_fit(options.frames, model->driver().vertices.size(), options.output);
-            PoseSequence sequence{options.frames_per_second, {}};
-            for (std::size_t frame = 0; frame < options.frames; ++frame) {
-                session.context().report("deforming", double(frame) / double(options.frames));
-                sequence.frames.push_back(require(poses.pose(frame)));
-            }
-            session.context().report("deforming", 1);
-            session.write_model(*model, options.output, sequence);
-            table.row("model", fmt::format("{} with {} poses at {:.6g} a second", options.output,
-                                           with_commas(options.frames), options.frames_per_second));
-        } else {
-            write_animation_output(*model, poses, options.restore, options.animation, options.output, options.input,
-                                   session, table, json);
-        }
-    } else {
-        const Mesh& rest = std::get<Mesh>(content.value);
-        if (is_model_path(options.output))
-            throw Failure{{ErrorCode::usage, options.output + ": a model with poses comes from a model, and " +
-                                                 options.input + " is a mesh; 'filigree strip' makes one of it."}};
-        const MeshAnimation animation{&rest, options.frames, options.frames_per_second,
-                                      [&](std::size_t frame, std::span<Vec3f> positions) -> Status {
-                                          const Mesh moved = deformation.mesh(rest, options.fraction(frame), silent);
-                                          std::copy(moved.positions.begin(), moved.positions.end(), positions.begin());
-                                          return Success{};
-                                      }};
-        write_animation_output(animation, options.animation, options.output, options.input, session, table, json);
-    }
-    json["output"] = options.output;
-    json["frames"] = options.frames;
-    json["frames_per_second"] = options.frames_per_second;
-    json["through_driver"] = model != nullptr;
-    json["seconds"] = now_seconds() - start;
-    session.print(table.text(), json);
+    if (model)
+        animate_model(*model, options, session, report);
+    else
+        animate_mesh(std::get<Mesh>(content.value), options, session, report);
+    report.set("output", options.output);
+    report.set("frames", options.frames);
+    report.set("frames_per_second", options.frames_per_second);
+    report.set("through_driver", model != nullptr);
+    report.set("seconds", now_seconds() - start);
+    session.print(report);
+}
+
+void deform_once(const Options& options, const Session::Content& content, Session& session) {
+    const Deformation deformation(options);
+    const double start = now_seconds();
+    const auto* model = std::get_if<Model>(&content.value);
+    if (!model && !options.pose_output.empty())
+        throw Failure{{ErrorCode::usage, "--pose writes a model's driver, and " + options.input + " is a mesh."}};
+    const Pose pose = model ? deformation.driver(*model, 1, session.context()) : Pose{};
+    const Mesh mesh = model ? restore_pose(*model, pose, options, session.context())
+                            : deformation.mesh(std::get<Mesh>(content.value), 1, session.context());
+    const double seconds = now_seconds() - start;
+    session.write_mesh(mesh, options.output, options.input);
+    if (!options.pose_output.empty()) session.write_mesh(posed_driver(*model, pose), options.pose_output);
+    Report report;
+    report.say(fmt::format("{}: {} vertices deformed {} in {}\n", options.output, with_commas(mesh.vertex_count()),
+                           model ? "through the driver" : "one by one", seconds_text(seconds)));
+    report.set("output", options.output);
+    report.set("vertices", mesh.vertex_count());
+    report.set("through_driver", model != nullptr);
+    report.set("seconds", seconds);
+    session.print(report);
+}
+
+/// A warp of its own each time that it is given, in the order of the command line.
+OptionList warp_options(std::vector<WarpStep>& steps) {
+    const auto step = [&steps](const std::string& kind, const std::string& text) {
+        return Option("--" + kind, Option::EachNumber([&steps, kind](double amount) {
+                          steps.push_back({kind, amount});
+                      }),
+                      text);
+    };
+    return {step("stretch", "Scale along the axis by this factor").above_zero(),
+            step("squeeze", "Scale along the axis by this factor and across it so that the volume stays").above_zero(),
+            step("bend", "Bend the axis into an arc of this many degrees").finite(),
+            step("twist", "Turn the far end about the axis by this many degrees against the near end").finite(),
+            step("taper", "Scale cross-sections, from 1 at the near end to this factor at the far end").above_zero(),
+            step("random", "Smooth random displacement of up to this fraction of the diagonal").finite()};
 }
 
 } // namespace
 
-void add_deform(CLI::App& app, Session& session) {
-    auto options = std::make_shared<Options>();
-    CLI::App* command = app.add_subcommand(
-        "deform",
-        "Deform a mesh (every vertex) or a model (its driver, then restore); options apply in the order given");
-    command->add_option("file", options->input, "Mesh or model")->required();
-    command
-        ->add_option("-o,--output", options->output,
-                     "Mesh file to write; with --frames an animation: .glb, .pc2, .mdd, .usda, a folder (NAME/), "
-                     "NAME_####.ply, or for a model .fil, the model with these poses")
-        ->required();
-    const auto add_step = [&](const std::string& kind, const std::string& text, const CLI::Validator& check) {
-        command
-            ->add_option_function<double>(
-                "--" + kind,
-                [options, kind](const double& amount) {
-                    options->steps.push_back({kind, amount});
-                },
-                text)
-            ->check(check)
-            ->trigger_on_parse()
-            ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-    };
-    add_step("stretch", "Scale along the axis by this factor", positive_number());
-    add_step("squeeze", "Scale along the axis by this factor and across it so that the volume stays",
-             positive_number());
-    add_step("bend", "Bend the axis into an arc of this many degrees", finite_number());
-    add_step("twist", "Turn the far end about the axis by this many degrees against the near end", finite_number());
-    add_step("taper", "Scale cross-sections, from 1 at the near end to this factor at the far end", positive_number());
-    add_step("random", "Smooth random displacement of up to this fraction of the diagonal", finite_number());
-    command->add_option("--seed", options->seed, "Seed of --random")->check(whole_number(0))->capture_default_str();
-    add_choice<Axis>(
-        *command, "--axis", {{"x", Axis::x}, {"y", Axis::y}, {"z", Axis::z}},
-        [options](Axis axis) { options->axis = axis; }, "Of all of these (unset: the longest side of the box)");
-    command->add_option("--handles", options->handles,
-                        "Pull parts and let the rest follow as rigidly as possible: a JSON file, see docs/handles.md");
-    command->add_option("--pose", options->pose_output, "Models: also write the moved driver, with its gradients");
-    command->add_option("--frames", options->frames, "This many frames from the rest shape to the full deformation")
-        ->check(whole_number(2));
-    command->add_option("--frame-rate", options->frames_per_second, "Frames a second")
-        ->check(positive_number())
-        ->capture_default_str();
-    add_restore_options(*command, options->restore);
-    add_animation_options(*command, options->animation);
-    session.add_common_options(*command, "  filigree deform scan.fil -o bent.ply --bend 90 --twist 45\n"
-                                         "  filigree deform scan.ply -o full.ply --bend 90 --twist 45\n"
-                                         "  filigree deform scan.fil -o pulled.ply --handles pull.json\n"
-                                         "  filigree deform scan.fil -o bent.glb --bend 90 --frames 60");
-    command->callback([options, &session] {
-        session.begin();
-        check(*options);
-        const Session::Content content = session.read_any(options->input);
-        if (options->frames > 0) return deform_animation(*options, content, session);
-        const Deformation deformation(*options);
-        const double start = now_seconds();
-        const auto* model = std::get_if<Model>(&content.value);
-        if (!model && !options->pose_output.empty())
-            throw Failure{{ErrorCode::usage, "--pose writes a model's driver, and " + options->input + " is a mesh."}};
-        const Pose pose = model ? deformation.driver(*model, 1, session.context()) : Pose{};
-        const Mesh mesh = model ? restore_pose(*model, pose, *options, session.context())
-                                : deformation.mesh(std::get<Mesh>(content.value), 1, session.context());
-        const double seconds = now_seconds() - start;
-        session.write_mesh(mesh, options->output, options->input);
-        if (!options->pose_output.empty()) session.write_mesh(posed_driver(*model, pose), options->pose_output);
-        session.print(fmt::format("{}: {} vertices deformed {} in {}\n", options->output,
-                                  with_commas(mesh.vertex_count()), model ? "through the driver" : "one by one",
-                                  seconds_text(seconds)),
-                      {{"output", options->output},
-                       {"vertices", mesh.vertex_count()},
-                       {"through_driver", model != nullptr},
-                       {"seconds", seconds}});
-    });
+Command deform_command() {
+    const auto options = std::make_shared<Options>();
+    return {.name = "deform",
+            .text = "Deform a mesh (every vertex) or a model (its driver, then restore); options apply in the order "
+                    "given",
+            .options =
+                OptionList{Option("file", options->input, "Mesh or model").required(),
+                           Option("-o,--output", options->output,
+                                  "Mesh file to write; with --frames an animation: .glb, .pc2, .mdd, .usda, a folder "
+                                  "(NAME/), NAME_####.ply, or for a model .fil, the model with these poses")
+                               .required()} +
+                warp_options(options->steps) +
+                OptionList{
+                    Option("--seed", options->seed, "Seed of --random").whole_from(0).with_default(),
+                    choice<Axis>("--axis", options->axis, {{"x", Axis::x}, {"y", Axis::y}, {"z", Axis::z}},
+                                 "Of all of these (unset: the longest side of the box)"),
+                    Option("--handles", options->handles,
+                           "Pull parts and let the rest follow as rigidly as possible: a JSON file, see "
+                           "docs/handles.md"),
+                    Option("--pose", options->pose_output, "Models: also write the moved driver, with its gradients"),
+                    Option("--frames", options->frames, "This many frames from the rest shape to the full deformation")
+                        .whole_from(2),
+                    Option("--frame-rate", options->frames_per_second, "Frames a second").above_zero().with_default()} +
+                restore_options(options->restore) + animation_options(options->animation),
+            .examples = "  filigree deform scan.fil -o bent.ply --bend 90 --twist 45\n"
+                        "  filigree deform scan.ply -o full.ply --bend 90 --twist 45\n"
+                        "  filigree deform scan.fil -o pulled.ply --handles pull.json\n"
+                        "  filigree deform scan.fil -o bent.glb --bend 90 --frames 60",
+            .run = [options](Session& session) {
+                check(*options, session);
+                const Session::Content content = session.read_any(options->input);
+                options->frames > 0 ? deform_animation(*options, content, session)
+                                    : deform_once(*options, content, session);
+            }};
 }
 
 } // namespace filigree::cli

@@ -7,6 +7,8 @@
 #include "filigree/mesh/mesh_distance.h"
 #include "filigree/mesh/shapes.h"
 
+#include <fmt/format.h>
+
 namespace filigree::cli {
 
 namespace {
@@ -132,27 +134,27 @@ void run_demo(const std::string& input, const std::string& folder, bool pictures
                                  {"positions_only_normal_p95_deg", p.normal_p95_deg}});
 }
 
+struct Options {
+    std::string input, output = "filigree-demo";
+    bool no_pictures = false;
+};
+
 } // namespace
 
-void add_demo(CLI::App& app, Session& session) {
-    struct Options {
-        std::string input, output = "filigree-demo";
-        bool no_pictures = false;
-    };
-    auto options = std::make_shared<Options>();
-    CLI::App* command =
-        app.add_subcommand("demo", "The main job, start to end: strip, bend and twist the driver, restore, compare");
-    command->add_option("mesh", options->input,
-                        fmt::format("Mesh (unset: the report's wavy cube with {} vertices)",
-                                    with_commas(wavy_cube_vertices(kDemoResolution))));
-    command->add_option("-o,--output", options->output, "Folder for the meshes, the picture and the film")
-        ->capture_default_str();
-    command->add_flag("--no-pictures", options->no_pictures, "Draw no picture and no film");
-    session.add_common_options(*command, "  filigree demo\n  filigree demo scan.ply -o out");
-    command->callback([options, &session] {
-        session.begin();
-        run_demo(options->input, options->output, !options->no_pictures, session);
-    });
+Command demo_command() {
+    const auto options = std::make_shared<Options>();
+    return {.name = "demo",
+            .text = "The main job, start to end: strip, bend and twist the driver, restore, compare",
+            .options = {Option("mesh", options->input,
+                               fmt::format("Mesh (unset: the report's wavy cube with {} vertices)",
+                                           with_commas(wavy_cube_vertices(kDemoResolution)))),
+                        Option("-o,--output", options->output, "Folder for the meshes, the picture and the film")
+                            .with_default(),
+                        Option("--no-pictures", options->no_pictures, "Draw no picture and no film")},
+            .examples = "  filigree demo\n  filigree demo scan.ply -o out",
+            .run = [options](Session& session) {
+                run_demo(options->input, options->output, !options->no_pictures, session);
+            }};
 }
 
 } // namespace filigree::cli

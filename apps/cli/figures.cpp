@@ -2,8 +2,11 @@
 
 #include "figures_layout.h"
 #include "output_folder.h"
+#include "stage.h"
 
 #include <algorithm>
+
+#include <fmt/format.h>
 
 namespace filigree::cli {
 
@@ -94,46 +97,44 @@ void run_figures(const Options& options, Session& session) {
         drawn.push_back(figure.draw(renderer));
         if (context.is_cancelled()) throw Failure{cancelled_error()};
     }
-    Table table;
+    Report report;
+    report.set("output", options.output);
     Json figures = Json::array();
     for (std::size_t i = 0; i < chosen.size(); ++i) {
         session.begin_writing(paths[i]);
         require(drawn[i].page.write(paths[i], scale));
-        table.row(chosen[i].name, fmt::format("{}  ({})", paths[i], chosen[i].title));
+        report.row(chosen[i].name, fmt::format("{}  ({})", paths[i], chosen[i].title));
         figures.push_back({{"name", chosen[i].name}, {"file", paths[i]}, {"values", drawn[i].values}});
     }
     context.report("figures", 1);
     folder.keep();
-    session.print(table.text(), {{"output", options.output}, {"figures", figures}});
+    report.set("figures", figures);
+    session.print(report);
 }
 
 } // namespace
 
-void add_figures(CLI::App& app, Session& session) {
-    auto options = std::make_shared<Options>();
-    CLI::App* command = app.add_subcommand("figures", "The report's figures, drawn from what the program computes");
-    command->add_option("-o,--output", options->output, "Folder for the figures")->capture_default_str();
-    command->add_option("--only", options->only, "Figures to draw: 1.1, 2.1, ... 3.1, border, codes, scan (unset: all)")
-        ->type_name("NAME");
-    add_choice<std::string>(
-        *command, "--format", {{"png", "png"}, {"svg", "svg"}, {"pdf", "pdf"}},
-        [options](std::string format) { options->format = std::move(format); }, "png (unset), svg or pdf");
-    command->add_option("--width", options->width, "Width of a figure in pixels; SVG and PDF: of the pictures in it")
-        ->check(CLI::Range(180, 7200))
-        ->capture_default_str();
-    command->add_option("--passes", options->passes, "Passes of light in rendered figures (unset: as the mesh needs)")
-        ->check(CLI::Range(1, 4096));
-    command->add_option("--scan", options->scan, "Mesh that figure 'scan' shows (unset: a shape of ours)");
-    add_choice<UpAxis>(
-        *command, "--up", {{"x", UpAxis::x}, {"y", UpAxis::y}, {"z", UpAxis::z}},
-        [options](UpAxis up) { options->up = up; }, "Which axis of the scan is up (unset: y)");
-    session.add_common_options(*command, "  filigree figures -o figures\n"
-                                         "  filigree figures --only 1.1 2.10 --format pdf\n"
-                                         "  filigree figures --only scan --scan koala.obj");
-    command->callback([options, &session] {
-        session.begin();
-        run_figures(*options, session);
-    });
+Command figures_command() {
+    const auto options = std::make_shared<Options>();
+    return {.name = "figures",
+            .text = "The report's figures, drawn from what the program computes",
+            .options =
+                {Option("-o,--output", options->output, "Folder for the figures").with_default(),
+                 Option("--only", options->only, "Figures to draw: 1.1, 2.1, ... 3.1, border, codes, scan (unset: all)")
+                     .named("NAME"),
+                 choice<std::string>("--format", options->format, {{"png", "png"}, {"svg", "svg"}, {"pdf", "pdf"}},
+                                     "png (unset), svg or pdf"),
+                 Option("--width", options->width, "Width of a figure in pixels; SVG and PDF: of the pictures in it")
+                     .between(180, 7200)
+                     .with_default(),
+                 Option("--passes", options->passes, "Passes of light in rendered figures (unset: as the mesh needs)")
+                     .between(1, 4096),
+                 Option("--scan", options->scan, "Mesh that figure 'scan' shows (unset: a shape of ours)"),
+                 up_option(options->up, "Which axis of the scan is up (unset: y)")},
+            .examples = "  filigree figures -o figures\n"
+                        "  filigree figures --only 1.1 2.10 --format pdf\n"
+                        "  filigree figures --only scan --scan koala.obj",
+            .run = [options](Session& session) { run_figures(*options, session); }};
 }
 
 } // namespace filigree::cli

@@ -10,6 +10,8 @@
 
 #include <Eigen/Geometry>
 
+#include <fmt/format.h>
+
 namespace filigree::cli {
 
 namespace {
@@ -305,7 +307,8 @@ Figure draw_simple_triangle(FigureRenderer&) {
     constexpr double kPanelHeight = 158, kStretch = 1.6;
     const DetailOverLine rest{{-1, 0}, {1, 0}, 0.42, 1.2};
     DetailOverLine now{kStretch * rest.p1, kStretch * rest.p2, rest.along, 0};
-    now.height = rest.height * height_law_scale(HeightLaw::inverse, rest.width() * rest.width(), now.width() * now.width());
+    now.height =
+        rest.height * height_law_scale(HeightLaw::inverse, rest.width() * rest.width(), now.width() * now.width());
 
     Page page = captioned_page(
         content_height(2, kPanelHeight), "Figure 1.1",

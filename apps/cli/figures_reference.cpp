@@ -10,6 +10,8 @@
 
 #include <Eigen/Geometry>
 
+#include <fmt/format.h>
+
 namespace filigree::cli {
 
 namespace {

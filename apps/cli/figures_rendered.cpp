@@ -14,6 +14,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
+
 namespace filigree::cli {
 
 FigureRenderer::FigureRenderer(Session& session, double scale, unsigned passes, std::optional<Mesh> scan)

@@ -12,6 +12,8 @@
 
 #include <cmath>
 
+#include <fmt/format.h>
+
 namespace filigree::cli {
 
 namespace {

@@ -9,24 +9,29 @@
 #include <map>
 #include <numbers>
 
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
 namespace filigree::cli {
 
 namespace {
+
+using HandlesJson = nlohmann::ordered_json;
 
 struct BadHandle {
     std::string what;
 };
 
-Vec3d read_vec(const Json& json, const std::string& key) {
-    const Json& value = json.at(key);
+Vec3d read_vec(const HandlesJson& json, const std::string& key) {
+    const HandlesJson& value = json.at(key);
     if (!value.is_array() || value.size() != 3) throw BadHandle{"\"" + key + "\" must be three numbers"};
     return {value[0].get<double>(), value[1].get<double>(), value[2].get<double>()};
 }
 
-std::vector<Index> read_vertices(const Json& json) {
+std::vector<Index> read_vertices(const HandlesJson& json) {
     if (!json.is_array()) throw BadHandle{"\"vertices\" must be a list of vertex ids"};
     std::vector<Index> vertices;
-    for (const Json& id : json) {
+    for (const HandlesJson& id : json) {
         if (!id.is_number_unsigned() || id.get<std::uint64_t>() >= kNoIndex)
             throw BadHandle{"\"vertices\" must be whole numbers from 0 up, and " + id.dump() + " is no vertex id"};
         vertices.push_back(id.get<Index>());
@@ -34,7 +39,7 @@ std::vector<Index> read_vertices(const Json& json) {
     return vertices;
 }
 
-HandleEntry read_entry(const Json& json) {
+HandleEntry read_entry(const HandlesJson& json) {
     static const std::array<std::string_view, 9> known = {"name", "vertices", "box",    "sphere", "move",
                                                           "axis", "degrees",  "centre", "comment"};
     for (const auto& [key, value] : json.items())
@@ -127,7 +132,7 @@ auto guarded(const std::string& path, const Work& work) -> decltype(work()) {
         return work();
     } catch (const BadHandle& bad) {
         return Error{ErrorCode::usage, bad.what + "."};
-    } catch (const Json::exception& error) {
+    } catch (const HandlesJson::exception& error) {
         const std::string what = error.what(); // "[json.exception.type_error.302] type must be number, ..."
         const std::size_t bracket = what.find("] ");
         return Error{ErrorCode::bad_file, path + ": " + what.substr(bracket == std::string::npos ? 0 : bracket + 2) +
@@ -142,8 +147,8 @@ Result<HandlesFile> read_handles(const std::string& path) {
     if (!bytes) return bytes.error();
     HandlesFile file{path, {}};
     const Status status = guarded(path, [&]() -> Status {
-        const Json json = Json::parse(*bytes);
-        for (const Json& entry : json.at("handles")) try {
+        const HandlesJson json = HandlesJson::parse(*bytes);
+        for (const HandlesJson& entry : json.at("handles")) try {
                 file.handles.push_back(read_entry(entry));
             } catch (const BadHandle& bad) {
                 throw BadHandle{fmt::format("{}: handle {}: {}", path, file.handles.size() + 1, bad.what)};

@@ -4,6 +4,8 @@
 #include "filigree/mesh/topology.h"
 #include "filigree/remesh/quad_quality.h"
 
+#include <fmt/format.h>
+
 namespace filigree::cli {
 
 namespace {
@@ -55,137 +57,135 @@ std::vector<std::string> attribute_names(const Mesh& mesh) {
 }
 
 /// Shape and regularity of a mesh's quads.
-void describe_quads(const Mesh& mesh, Session& session, Table& table, Json& json) {
+void describe_quads(const Mesh& mesh, Session& session, Report& report) {
     const QuadQuality quality = measure_quads(mesh, session.context());
-    table.row("irregular vertices", with_commas(quality.irregular_vertices) + " inside, with other than four quads");
-    table.row("scaled Jacobian",
-              fmt::format("{:.3f} at least (face {}), {:.3f} for 99 %, {:.3f} on average", quality.min_scaled_jacobian,
-                          quality.worst_quad, quality.low_scaled_jacobian, quality.mean_scaled_jacobian));
-    table.row("inverted quads", with_commas(quality.inverted));
-    json["quad_quality"] = {{"irregular_vertices", quality.irregular_vertices},
-                            {"scaled_jacobian",
-                             {{"min", quality.min_scaled_jacobian},
-                              {"percentile_1", quality.low_scaled_jacobian},
-                              {"mean", quality.mean_scaled_jacobian}}},
-                            {"inverted", quality.inverted},
-                            {"worst_quad", quality.worst_quad}};
+    report.row("irregular vertices", with_commas(quality.irregular_vertices) + " inside, with other than four quads");
+    report.row("scaled Jacobian",
+               fmt::format("{:.3f} at least (face {}), {:.3f} for 99 %, {:.3f} on average", quality.min_scaled_jacobian,
+                           quality.worst_quad, quality.low_scaled_jacobian, quality.mean_scaled_jacobian));
+    report.row("inverted quads", with_commas(quality.inverted));
+    report.set("quad_quality", {{"irregular_vertices", quality.irregular_vertices},
+                                {"scaled_jacobian",
+                                 {{"min", quality.min_scaled_jacobian},
+                                  {"percentile_1", quality.low_scaled_jacobian},
+                                  {"mean", quality.mean_scaled_jacobian}}},
+                                {"inverted", quality.inverted},
+                                {"worst_quad", quality.worst_quad}});
 }
 
-void describe_mesh(const Mesh& mesh, Session& session, Table& table, Json& json) {
-    const TopologyReport report = analyse_topology(mesh, session.context());
-    table.row("vertices", with_commas(report.vertices));
-    table.row("faces",
-              fmt::format("{}  ({} triangles, {} quads, {} larger)", with_commas(report.faces),
-                          with_commas(report.triangles), with_commas(report.quads), with_commas(report.polygons)));
-    table.row("edges", with_commas(report.edges));
-    table.row("components", with_commas(report.components));
-    table.row("Euler number", std::to_string(report.euler));
-    table.row("closed", report.is_closed() ? "yes" : "no");
-    table.row("manifold", report.is_manifold() ? "yes" : "no");
-    table.row("oriented", report.is_oriented() ? "yes" : "no");
-    const Vec3d size = report.box.size();
-    if (!report.box.empty())
-        table.row("box", fmt::format("{:.6g} x {:.6g} x {:.6g}, diagonal {:.6g}, from ({:.9g}, {:.9g}, {:.9g})",
-                                     size[0], size[1], size[2], report.box.diagonal(), report.box.min[0],
-                                     report.box.min[1], report.box.min[2]));
-    table.row("area", fmt::format("{:.6g}", report.area));
-    if (report.is_closed() && report.is_oriented()) table.row("volume", fmt::format("{:.6g}", report.volume));
-    const std::vector<std::string> attributes = attribute_names(mesh);
-    if (!attributes.empty()) table.row("attributes", fmt::format("{}", fmt::join(attributes, ", ")));
-    json["vertices"] = report.vertices;
-    json["faces"] = report.faces;
-    json["triangles"] = report.triangles;
-    json["quads"] = report.quads;
-    json["polygons"] = report.polygons;
-    json["edges"] = report.edges;
-    json["components"] = report.components;
-    json["euler"] = report.euler;
-    json["closed"] = report.is_closed();
-    json["manifold"] = report.is_manifold();
-    json["oriented"] = report.is_oriented();
-    if (!report.box.empty()) {
-        json["box"] = {{"min", vec_json(report.box.min)}, {"max", vec_json(report.box.max)}};
-        json["diagonal_units"] = report.box.diagonal();
+void describe_counts(const TopologyReport& topology, Report& report) {
+    report.count("vertices", "vertices", topology.vertices);
+    report.row("faces", fmt::format("{}  ({} triangles, {} quads, {} larger)", with_commas(topology.faces),
+                                    with_commas(topology.triangles), with_commas(topology.quads),
+                                    with_commas(topology.polygons)));
+    report.set("faces", topology.faces);
+    report.set("triangles", topology.triangles);
+    report.set("quads", topology.quads);
+    report.set("polygons", topology.polygons);
+    report.count("edges", "edges", topology.edges);
+    report.count("components", "components", topology.components);
+    report.add("Euler number", std::to_string(topology.euler), "euler", topology.euler);
+    const auto add = [&](const char* key, bool is) { report.add(key, is ? "yes" : "no", key, is); };
+    add("closed", topology.is_closed());
+    add("manifold", topology.is_manifold());
+    add("oriented", topology.is_oriented());
+}
+
+void describe_size(const TopologyReport& topology, Report& report) {
+    const Box& box = topology.box;
+    if (!box.empty()) {
+        report.add("box",
+                   fmt::format("{:.6g} x {:.6g} x {:.6g}, diagonal {:.6g}, from ({:.9g}, {:.9g}, {:.9g})",
+                               box.size()[0], box.size()[1], box.size()[2], box.diagonal(), box.min[0], box.min[1],
+                               box.min[2]),
+                   "box", {{"min", vec_json(box.min)}, {"max", vec_json(box.max)}});
+        report.set("diagonal_units", box.diagonal());
     }
-    json["area"] = report.area;
-    json["volume"] = report.volume;
-    json["attributes"] = attributes;
-    Json& defects = json["defects"] = Json::object();
-    for (const auto& [key, title, finding] : findings(report)) {
-        table.row(title, places_text(finding));
+    report.add("area", fmt::format("{:.6g}", topology.area), "area", topology.area);
+    if (topology.is_closed() && topology.is_oriented()) report.row("volume", fmt::format("{:.6g}", topology.volume));
+    report.set("volume", topology.volume);
+}
+
+void describe_mesh(const Mesh& mesh, Session& session, Report& report) {
+    const TopologyReport topology = analyse_topology(mesh, session.context());
+    describe_counts(topology, report);
+    describe_size(topology, report);
+    const std::vector<std::string> attributes = attribute_names(mesh);
+    if (!attributes.empty()) report.row("attributes", fmt::format("{}", fmt::join(attributes, ", ")));
+    report.set("attributes", attributes);
+    Json& defects = report.set("defects");
+    defects = Json::object();
+    for (const auto& [key, title, finding] : findings(topology)) {
+        report.row(title, places_text(finding));
         defects[key] = {{"count", finding.count}, {"places", finding.places}};
     }
-    if (report.quads > 0) describe_quads(mesh, session, table, json);
+    if (topology.quads > 0) describe_quads(mesh, session, report);
 }
 
-void describe_model(const Model& model, const PoseSequence& poses, std::size_t bytes, Table& table, Json& json) {
-    table.row("code", model.code() == DetailCode::blend ? "blend" : "reference");
+void describe_levels(const Model& model, Report& report) {
     Json levels = Json::array();
     for (unsigned k = 0; k <= model.finest_level(); ++k) {
         const bool finest = k == model.finest_level();
         const std::size_t vertices = finest ? model.mesh.vertex_count() : model.levels[k].vertices.size();
         const std::size_t faces = finest ? model.mesh.face_count() : model.levels[k].face_count();
-        table.row(fmt::format("level {}", k), fmt::format("{} vertices, {} faces{}", with_commas(vertices),
-                                                          with_commas(faces), k == 0 ? "  (driver)" : ""));
+        report.row(fmt::format("level {}", k), fmt::format("{} vertices, {} faces{}", with_commas(vertices),
+                                                           with_commas(faces), k == 0 ? "  (driver)" : ""));
         levels.push_back({{"vertices", vertices}, {"faces", faces}});
     }
-    json["levels"] = levels;
-    if (const auto* blend = std::get_if<BlendDetail>(&model.detail)) {
-        const bool int16 = blend->precision == Precision::int16;
-        table.row("precision", int16 ? "int16, 10 bytes a vertex" : "float, 20 bytes a vertex");
-        table.row("bound across gaps", with_commas(blend->across_gap.size()));
-        table.row("bound facing away", with_commas(blend->facing_away.size()));
-        json["precision"] = int16 ? "int16" : "float";
-        const auto list = [](const std::vector<Index>& ids) {
-            return Json{{"count", ids.size()},
-                        {"places", std::vector<Index>(ids.begin(), ids.begin() + std::min<std::ptrdiff_t>(
-                                                                                     5, std::ptrdiff_t(ids.size())))}};
-        };
-        json["across_gap"] = list(blend->across_gap);
-        json["facing_away"] = list(blend->facing_away);
-    } else {
-        const auto& reference = std::get<ReferenceDetail>(model.detail);
-        table.row("references", std::to_string(reference.references));
-        table.row("patches", with_commas(reference.patches.patch_count()));
-        json["references"] = reference.references;
-        json["patches"] = reference.patches.patch_count();
-    }
-    if (!poses.empty()) {
-        table.row("poses",
-                  fmt::format("{} at {} frames a second{}", with_commas(poses.frames.size()), poses.frames_per_second,
-                              poses.frames[0].gradients.empty() ? "" : ", with gradients"));
-        json["poses"] = {{"frames", poses.frames.size()},
-                         {"frames_per_second", poses.frames_per_second},
-                         {"gradients", !poses.frames[0].gradients.empty()}};
-    }
-    table.row("bytes", with_commas(bytes));
-    json["bytes"] = bytes;
+    report.set("levels", levels);
 }
 
-/// What a glTF file has beside its mesh: animations, and what an export of ours measured about itself.
-void describe_scene(const GltfScene& scene, Table& table, Json& json) {
-    json["animations"] = Json::array();
-    for (const GltfAnimation& animation : scene.animations()) {
-        table.row("animation",
-                  fmt::format("{}, {:.4g} to {:.4g} s", animation.name.empty() ? "unnamed" : animation.name,
-                              animation.first_key, animation.last_key));
-        json["animations"].push_back(
-            {{"name", animation.name}, {"first_key", animation.first_key}, {"last_key", animation.last_key}});
+/// How many vertices, and the first few.
+Json vertices_json(const std::vector<Index>& ids) {
+    constexpr std::ptrdiff_t kShown = 5;
+    const auto end = ids.begin() + std::min(kShown, std::ptrdiff_t(ids.size()));
+    return {{"count", ids.size()}, {"places", std::vector<Index>(ids.begin(), end)}};
+}
+
+void describe_code(const Model& model, Report& report) {
+    if (const auto* blend = std::get_if<BlendDetail>(&model.detail)) {
+        const bool int16 = blend->precision == Precision::int16;
+        report.add("precision", int16 ? "int16, 10 bytes a vertex" : "float, 20 bytes a vertex", "precision",
+                   int16 ? "int16" : "float");
+        report.add("bound across gaps", with_commas(blend->across_gap.size()), "across_gap",
+                   vertices_json(blend->across_gap));
+        report.add("bound facing away", with_commas(blend->facing_away.size()), "facing_away",
+                   vertices_json(blend->facing_away));
+    } else {
+        const auto& reference = std::get<ReferenceDetail>(model.detail);
+        report.add("references", std::to_string(reference.references), "references", reference.references);
+        report.count("patches", "patches", reference.patches.patch_count());
     }
-    const Json report = Json::parse(scene.export_report(), nullptr, false);
-    if (!report.is_object()) return;
-    json["export"] = report;
-    const auto number = [&](const char* key) -> std::optional<double> {
-        const auto found = report.find(key);
-        return found != report.end() && found->is_number() ? std::optional(found->get<double>()) : std::nullopt;
-    };
+}
+
+void describe_model(const Model& model, const PoseSequence& poses, std::size_t bytes, Report& report) {
+    const char* code = model.code() == DetailCode::blend ? "blend" : "reference";
+    report.add("code", code, "code", code);
+    describe_levels(model, report);
+    describe_code(model, report);
+    if (!poses.empty()) {
+        const bool has_gradients = !poses.frames[0].gradients.empty();
+        report.add("poses",
+                   fmt::format("{} at {} frames a second{}", with_commas(poses.frames.size()), poses.frames_per_second,
+                               has_gradients ? ", with gradients" : ""),
+                   "poses",
+                   {{"frames", poses.frames.size()},
+                    {"frames_per_second", poses.frames_per_second},
+                    {"gradients", has_gradients}});
+    }
+    report.count("bytes", "bytes", bytes);
+}
+
+/// What an export of ours measured about itself.
+void describe_export(const Json& measured, Report& report) {
+    report.set("export", measured);
     const auto count = [&](const char* key) {
-        const auto found = report.find(key);
-        if (found != report.end() && found->is_number_unsigned())
-            table.row(key, with_commas(found->get<std::size_t>()));
+        const Json* value = measured.find(key);
+        if (value && value->count()) report.row(key, with_commas(*value->count()));
     };
     const auto row = [&](const char* title, const char* key, const char* unit) {
-        if (const auto value = number(key)) table.row(title, fmt::format("{:.3g}{}", *value, unit));
+        const Json* value = measured.find(key);
+        if (value && value->number()) report.row(title, fmt::format("{:.3g}{}", *value->number(), unit));
     };
     count("joints");
     count("keys");
@@ -194,33 +194,47 @@ void describe_scene(const GltfScene& scene, Table& table, Json& json) {
     row("normals off by", "normal_error_degrees", " degrees (95th percentile) in viewers that do not correct them");
 }
 
+/// What a glTF file has beside its mesh.
+void describe_scene(const GltfScene& scene, Report& report) {
+    Json& animations = report.set("animations");
+    animations = Json::array();
+    for (const GltfAnimation& animation : scene.animations()) {
+        report.row("animation",
+                   fmt::format("{}, {:.4g} to {:.4g} s", animation.name.empty() ? "unnamed" : animation.name,
+                               animation.first_key, animation.last_key));
+        animations.push_back(
+            {{"name", animation.name}, {"first_key", animation.first_key}, {"last_key", animation.last_key}});
+    }
+    const auto measured = Json::parse(scene.export_report());
+    if (measured && measured->is_object()) describe_export(*measured, report);
+}
+
+void run(const std::string& path, Session& session) {
+    const Session::Content content = session.read_any(path, true);
+    Report report;
+    report.add("file", path, "file", path);
+    if (const auto* mesh = std::get_if<Mesh>(&content.value)) {
+        report.set("kind", "mesh");
+        describe_mesh(*mesh, session, report);
+        if (content.scene) describe_scene(*content.scene, report);
+    } else {
+        report.set("kind", "model");
+        describe_model(std::get<Model>(content.value), content.poses, content.bytes, report);
+    }
+    session.print(report);
+}
+
 } // namespace
 
-void add_info(CLI::App& app, Session& session) {
-    auto path = std::make_shared<std::string>();
-    CLI::App* command = app.add_subcommand("info", "Say what a mesh or a model is, and what is wrong with it");
-    command->add_option("file", *path, "Mesh or model")->required();
-    session.add_common_options(*command, "  filigree info scan.ply\n"
-                                         "  filigree info scan.ply --json | jq .defects\n"
-                                         "  filigree info scan.fil");
-    command->callback([path, &session] {
-        session.begin();
-        const Session::Content content = session.read_any(*path, true);
-        Table table;
-        Json json = {{"file", *path}};
-        table.row("file", *path);
-        if (const auto* mesh = std::get_if<Mesh>(&content.value)) {
-            json["kind"] = "mesh";
-            describe_mesh(*mesh, session, table, json);
-            if (content.scene) describe_scene(*content.scene, table, json);
-        } else {
-            json["kind"] = "model";
-            const auto& model = std::get<Model>(content.value);
-            json["code"] = model.code() == DetailCode::blend ? "blend" : "reference";
-            describe_model(model, content.poses, content.bytes, table, json);
-        }
-        session.print(table.text(), json);
-    });
+Command info_command() {
+    const auto path = std::make_shared<std::string>();
+    return {.name = "info",
+            .text = "Say what a mesh or a model is, and what is wrong with it",
+            .options = {Option("file", *path, "Mesh or model").required()},
+            .examples = "  filigree info scan.ply\n"
+                        "  filigree info scan.ply --json | jq .defects\n"
+                        "  filigree info scan.fil",
+            .run = [path](Session& session) { run(*path, session); }};
 }
 
 } // namespace filigree::cli

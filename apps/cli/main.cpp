@@ -1,9 +1,9 @@
 // filigree: the command line. Each command is in the file of its name.
 #include "session.h"
 
-#include <algorithm>
 #include <new>
 #include <stdexcept>
+#include <system_error>
 
 using namespace filigree;
 
@@ -13,58 +13,55 @@ constexpr int kOwnError = 1; // what no ErrorCode foresees: a mistake in this pr
 
 int exit_code(ErrorCode code) { return static_cast<int>(code); }
 
-/// What is wrong with the arguments, in one line that says where help is; or the help or version that was asked for.
-int leave(const CLI::App& app, const CLI::ParseError& error, int argc, char** argv) {
-    if (error.get_exit_code() == 0) return app.exit(error);
-    std::string sentence = error.what(), command = "filigree";
-    std::replace(sentence.begin(), sentence.end(), '\n', ' ');
-    for (const CLI::App* chosen : app.get_subcommands()) command += " " + chosen->get_name();
-    if (app.get_subcommands().empty() && error.get_name() == "RequiredError")
-        sentence = argc > 1 ? fmt::format("'{}' is no command", argv[1]) : "A command is required";
-    cli::say(fmt::format("filigree: {}; '{} --help' says what there is.", sentence, command));
-    return exit_code(ErrorCode::usage);
+cli::Program make_program(cli::Session& session) {
+    return {.name = "filigree",
+            .text = "Filigree takes the detail off a mesh, lets anything move what is left, and puts the detail back.",
+            .version = FILIGREE_VERSION,
+            .examples = "  filigree demo\n"
+                        "  filigree strip scan.ply -o scan.fil && filigree level scan.fil 0 -o driver.obj\n"
+                        "  filigree restore scan.fil --pose moved_driver.obj -o restored.ply",
+            .notes = "FILE '-' is standard input or output. Each command has examples: 'filigree COMMAND --help'.\n"
+                     "Exit codes: 0 done, 1 an error of our own, 2 usage, 3 cannot read, 4 damaged file, 5 unknown "
+                     "format, 6 cannot write,\n"
+                     "7 unsuitable input, 8 inputs do not belong together, 9 out of memory, 130 cancelled.",
+            .common = session.common_options(),
+            .commands = {cli::make_command(), cli::info_command(), cli::remesh_command(), cli::strip_command(),
+                         cli::level_command(), cli::deform_command(), cli::restore_command(), cli::compare_command(),
+                         cli::bench_command(), cli::demo_command(), cli::render_command(), cli::sample_command(),
+                         cli::simulate_command(), cli::export_command(), cli::figures_command()}};
+}
+
+/// `filigree --man [COMMAND]`, for those who package the program; not in the help.
+int print_manual(const cli::Program& program, const std::string& command) {
+    const std::string page = cli::manual_page(program, command);
+    if (page.empty()) {
+        cli::say("filigree: '" + command + "' is no command; 'filigree --help' says what there is.");
+        return exit_code(ErrorCode::usage);
+    }
+    const bool is_written = std::fputs(page.c_str(), stdout) >= 0 && std::fflush(stdout) == 0;
+    return is_written ? 0 : exit_code(ErrorCode::unwritable);
 }
 
 int run(int argc, char** argv) {
     cli::Session session;
-    CLI::App app{"Filigree takes the detail off a mesh, lets anything move what is left, and puts the detail back.",
-                 "filigree"};
-    app.set_version_flag("--version", "filigree " FILIGREE_VERSION);
-    app.require_subcommand(1);
-    app.footer("Examples:\n"
-               "  filigree demo\n"
-               "  filigree strip scan.ply -o scan.fil && filigree level scan.fil 0 -o driver.obj\n"
-               "  filigree restore scan.fil --pose moved_driver.obj -o restored.ply\n\n"
-               "FILE '-' is standard input or output. Each command has examples: 'filigree COMMAND --help'.\n"
-               "Exit codes: 0 done, 1 an error of our own, 2 usage, 3 cannot read, 4 damaged file, 5 unknown format, 6 "
-               "cannot write,\n"
-               "7 unsuitable input, 8 inputs do not belong together, 9 out of memory, 130 cancelled.");
-    cli::add_make(app, session);
-    cli::add_info(app, session);
-    cli::add_remesh(app, session);
-    cli::add_strip(app, session);
-    cli::add_level(app, session);
-    cli::add_deform(app, session);
-    cli::add_restore(app, session);
-    cli::add_compare(app, session);
-    cli::add_bench(app, session);
-    cli::add_demo(app, session);
-    cli::add_render(app, session);
-    cli::add_sample(app, session);
-    cli::add_simulate(app, session);
-    cli::add_export(app, session);
-    cli::add_figures(app, session);
-    try {
-        app.parse(argc, argv);
-        return 0;
-    } catch (const CLI::ParseError& error) {
-        return leave(app, error, argc, argv);
-    }
+    const cli::Program program = make_program(session);
+    if (argc > 1 && argc <= 3 && std::string(argv[1]) == "--man") return print_manual(program, argc > 2 ? argv[2] : "");
+    return cli::run_command_line(program, session, argc, argv);
+}
+
+int fail(const Error& error) {
+    cli::say("filigree: " + error.message);
+    return exit_code(error.code);
 }
 
 int out_of_memory() {
-    cli::say("filigree: Out of memory; nothing was written. Close other programs or use a smaller mesh.");
-    return exit_code(ErrorCode::out_of_memory);
+    return fail(
+        {ErrorCode::out_of_memory, "Out of memory; nothing was written. Close other programs or use a smaller mesh."});
+}
+
+int own_error(const std::exception& error) {
+    cli::say(std::string("filigree: An error of our own (") + error.what() + "); please report it with the command.");
+    return kOwnError;
 }
 
 } // namespace
@@ -73,14 +70,16 @@ int main(int argc, char** argv) {
     try {
         return run(argc, argv);
     } catch (const cli::Failure& failure) {
-        cli::say("filigree: " + failure.error.message);
-        return exit_code(failure.error.code);
+        return fail(failure.error);
+    } catch (const BadResultAccess& failure) {
+        return fail(failure.error());
     } catch (const std::bad_alloc&) {
         return out_of_memory();
     } catch (const std::length_error&) { // more than any vector can hold
         return out_of_memory();
+    } catch (const std::system_error& error) { // a thread for which there is no room
+        return error.code() == std::errc::resource_unavailable_try_again ? out_of_memory() : own_error(error);
     } catch (const std::exception& error) {
-        cli::say(fmt::format("filigree: An error of our own ({}); please report it with the command.", error.what()));
-        return kOwnError;
+        return own_error(error);
     }
 }

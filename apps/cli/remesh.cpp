@@ -6,6 +6,8 @@
 
 #include <filesystem>
 
+#include <fmt/format.h>
+
 namespace filigree::cli {
 
 namespace {
@@ -40,21 +42,22 @@ std::vector<Counted> clean_counts(const CleanReport& clean) {
             {"filled_triangles", clean.filled_triangles, "triangles filled in"}};
 }
 
-/// What was changed, one line each; nothing for a mesh that was clean.
-void add_clean_rows(const CleanReport& clean, Table& table) {
-    const char* title = "cleaned";
-    for (const Counted& counted : clean_counts(clean)) {
-        if (counted.count == 0) continue;
-        table.row(title, with_commas(counted.count) + " " + counted.text);
-        title = "";
-    }
-}
-
 Json clean_json(const CleanReport& clean) {
     Json json = Json::object();
     for (const Counted& counted : clean_counts(clean)) json[counted.key] = counted.count;
     json["removed_area"] = clean.removed_area;
     return json;
+}
+
+/// What was changed, one line each; nothing for a mesh that was clean.
+void report_clean(const CleanReport& clean, Report& report) {
+    const char* title = "cleaned";
+    for (const Counted& counted : clean_counts(clean)) {
+        if (counted.count == 0) continue;
+        report.row(title, with_commas(counted.count) + " " + counted.text);
+        title = "";
+    }
+    report.set("clean", clean_json(clean));
 }
 
 std::string topology_text(const SurfaceTopology& t) {
@@ -90,65 +93,68 @@ struct RunSeconds {
     double read, remesh, write;
 };
 
-Table report_table(const QuadRemeshed& result, const RunSeconds& run) {
-    const QuadRemeshReport& report = result.report;
-    const QuadQuality& quality = report.quality;
-    const std::size_t side = std::size_t{1} << report.levels;
-    Table table;
-    table.row("quads", fmt::format("{} over {} vertices", with_commas(result.mesh.face_count()),
-                                   with_commas(result.mesh.vertex_count())));
-    table.row("patches", fmt::format("{} of {} x {} quads ({} level{})", with_commas(report.patches), side, side,
-                                     report.levels, report.levels == 1 ? "" : "s"));
-    table.row("irregular vertices",
-              fmt::format("{}, {:.2f} a patch", with_commas(quality.irregular_vertices),
-                          double(quality.irregular_vertices) / double(std::max<std::size_t>(1, report.patches))));
-    table.row("scaled Jacobian",
-              fmt::format("{:.3f} at least, {:.3f} for 99 %, {:.3f} on average", quality.min_scaled_jacobian,
-                          quality.low_scaled_jacobian, quality.mean_scaled_jacobian));
-    table.row("quads to input", deviation_text(report.to_input, report.diagonal));
-    table.row("input to quads", deviation_text(report.from_input, report.diagonal));
-    add_clean_rows(report.clean, table);
-    if (report.wrapped) table.row("wrapped", "the quads are those of a closed wrap around the input");
-    table.row("input, cleaned", topology_text(report.input));
-    table.row("output", topology_text(report.output));
-    if (report.feature_edges) table.row("feature edges", with_commas(report.feature_edges));
-    if (report.tries > 1) table.row("tries", fmt::format("{}; the last but one: {}", report.tries, report.retried));
-    table.row("seconds", fmt::format("{:.2f}, and {:.2f} read, {:.2f} write", run.remesh, run.read, run.write));
-    std::vector<std::string> phases;
-    for (const PhaseSeconds& phase : report.seconds)
-        if (phase.seconds >= kShownSeconds) phases.push_back(fmt::format("{:.2f} {}", phase.seconds, phase.phase));
-    if (!phases.empty()) table.row("", fmt::format("{}", fmt::join(phases, ", ")));
-    return table;
+void report_quality(const QuadRemeshed& result, Report& report) {
+    const QuadQuality& quality = result.report.quality;
+    const double per_patch =
+        double(quality.irregular_vertices) / double(std::max<std::size_t>(1, result.report.patches));
+    report.add("irregular vertices",
+               fmt::format("{}, {:.2f} a patch", with_commas(quality.irregular_vertices), per_patch),
+               "irregular_vertices", quality.irregular_vertices);
+    report.set("irregular_per_patch", per_patch);
+    report.add("scaled Jacobian",
+               fmt::format("{:.3f} at least, {:.3f} for 99 %, {:.3f} on average", quality.min_scaled_jacobian,
+                           quality.low_scaled_jacobian, quality.mean_scaled_jacobian),
+               "scaled_jacobian",
+               {{"min", quality.min_scaled_jacobian},
+                {"percentile_1", quality.low_scaled_jacobian},
+                {"mean", quality.mean_scaled_jacobian}});
+    report.set("inverted", quality.inverted);
 }
 
-Json report_json(const QuadRemeshed& result, const RunSeconds& run) {
-    const QuadRemeshReport& report = result.report;
-    const QuadQuality& quality = report.quality;
+void report_seconds(const QuadRemeshReport& remesh, const RunSeconds& run, Report& report) {
     Json phases = Json::object();
-    for (const PhaseSeconds& phase : report.seconds) phases[phase.phase] = phase.seconds;
-    return {
-        {"quads", result.mesh.face_count()},
-        {"vertices", result.mesh.vertex_count()},
-        {"patches", report.patches},
-        {"levels", report.levels},
-        {"irregular_vertices", quality.irregular_vertices},
-        {"irregular_per_patch", double(quality.irregular_vertices) / double(std::max<std::size_t>(1, report.patches))},
-        {"scaled_jacobian",
-         {{"min", quality.min_scaled_jacobian},
-          {"percentile_1", quality.low_scaled_jacobian},
-          {"mean", quality.mean_scaled_jacobian}}},
-        {"inverted", quality.inverted},
-        {"diagonal_units", report.diagonal},
-        {"to_input", deviation_json(report.to_input, report.diagonal)},
-        {"from_input", deviation_json(report.from_input, report.diagonal)},
-        {"max_distance", report.max_distance},
-        {"clean", clean_json(report.clean)},
-        {"topology", {{"input", topology_json(report.input)}, {"output", topology_json(report.output)}}},
-        {"feature_edges", report.feature_edges},
-        {"wrapped", report.wrapped},
-        {"tries", report.tries},
-        {"retried", report.retried},
-        {"seconds", {{"read", run.read}, {"remesh", run.remesh}, {"write", run.write}, {"phases", phases}}}};
+    std::vector<std::string> shown;
+    for (const PhaseSeconds& phase : remesh.seconds) {
+        phases[phase.phase] = phase.seconds;
+        if (phase.seconds >= kShownSeconds) shown.push_back(fmt::format("{:.2f} {}", phase.seconds, phase.phase));
+    }
+    report.add("seconds", fmt::format("{:.2f}, and {:.2f} read, {:.2f} write", run.remesh, run.read, run.write),
+               "seconds", {{"read", run.read}, {"remesh", run.remesh}, {"write", run.write}, {"phases", phases}});
+    if (!shown.empty()) report.row("", fmt::format("{}", fmt::join(shown, ", ")));
+}
+
+void report_remesh(const QuadRemeshed& result, const RunSeconds& run, Report& report) {
+    const QuadRemeshReport& remesh = result.report;
+    const std::size_t side = std::size_t{1} << remesh.levels;
+    report.add("quads",
+               fmt::format("{} over {} vertices", with_commas(result.mesh.face_count()),
+                           with_commas(result.mesh.vertex_count())),
+               "quads", result.mesh.face_count());
+    report.set("vertices", result.mesh.vertex_count());
+    report.add("patches",
+               fmt::format("{} of {} x {} quads ({} level{})", with_commas(remesh.patches), side, side, remesh.levels,
+                           remesh.levels == 1 ? "" : "s"),
+               "patches", remesh.patches);
+    report.set("levels", remesh.levels);
+    report_quality(result, report);
+    report.set("diagonal_units", remesh.diagonal);
+    report.add("quads to input", deviation_text(remesh.to_input, remesh.diagonal), "to_input",
+               deviation_json(remesh.to_input, remesh.diagonal));
+    report.add("input to quads", deviation_text(remesh.from_input, remesh.diagonal), "from_input",
+               deviation_json(remesh.from_input, remesh.diagonal));
+    report.set("max_distance", remesh.max_distance);
+    report_clean(remesh.clean, report);
+    if (remesh.wrapped) report.row("wrapped", "the quads are those of a closed wrap around the input");
+    report.row("input, cleaned", topology_text(remesh.input));
+    report.row("output", topology_text(remesh.output));
+    report.set("topology", {{"input", topology_json(remesh.input)}, {"output", topology_json(remesh.output)}});
+    if (remesh.feature_edges) report.row("feature edges", with_commas(remesh.feature_edges));
+    report.set("feature_edges", remesh.feature_edges);
+    report.set("wrapped", remesh.wrapped);
+    if (remesh.tries > 1) report.row("tries", fmt::format("{}; the last but one: {}", remesh.tries, remesh.retried));
+    report.set("tries", remesh.tries);
+    report.set("retried", remesh.retried);
+    report_seconds(remesh, run, report);
 }
 
 void draw_patches(const QuadRemeshed& result, const Options& options, Session& session) {
@@ -183,7 +189,7 @@ void warn_of_triangles(const std::string& path, Session& session) {
         session.warn(path + ": holds triangles only, so each quad is split in two; write .ply or .obj to keep quads.");
 }
 
-void run_remesh(const Options& options, Session& session) {
+void run(const Options& options, Session& session) {
     check_outputs(options);
     const double start = now_seconds();
     const Mesh mesh = session.read_mesh(options.input);
@@ -196,66 +202,57 @@ void run_remesh(const Options& options, Session& session) {
     const double written = now_seconds();
     if (!options.picture.empty()) draw_patches(result, options, session);
 
-    const RunSeconds seconds{read - start, remeshed - read, written - remeshed};
-    Json json = {{"output", options.output}};
-    if (!options.base.empty()) json["base"] = options.base;
-    if (!options.picture.empty()) json["picture"] = options.picture;
-    json.update(report_json(result, seconds));
-    session.print(report_table(result, seconds).text(), json);
+    Report report;
+    report.set("output", options.output);
+    if (!options.base.empty()) report.set("base", options.base);
+    if (!options.picture.empty()) report.set("picture", options.picture);
+    report_remesh(result, {read - start, remeshed - read, written - remeshed}, report);
+    session.print(report);
 }
 
-void add_remesh_options(CLI::App& command, const std::shared_ptr<Options>& options) {
-    QuadRemeshOptions& remesh = options->remesh;
-    command.add_option("--quads", remesh.quads, "About how many")->check(whole_number(1))->capture_default_str();
-    command
-        .add_option("--levels", remesh.levels,
-                    "How often each patch is halved, 1 to 8 (unset: as leaves 500 patches or more)")
-        ->check(CLI::Range(1, 8));
-    command
-        .add_option("--feature-angle", remesh.feature_angle_deg,
-                    "Edges whose faces meet at more than this stay edges, degrees; 180: none")
-        ->check(CLI::Range(0.0, 180.0))
-        ->capture_default_str();
-    add_choice<SmallParts>(
-        command, "--small-parts", {{"remove", SmallParts::remove}, {"keep", SmallParts::keep}},
-        [options](SmallParts parts) { options->remesh.small_parts = parts; },
-        "Handles and components too small for the patches: remove (unset) or keep");
-    add_choice<WrapUse>(
-        command, "--wrap", {{"auto", WrapUse::automatic}, {"never", WrapUse::never}, {"always", WrapUse::always}},
-        [options](WrapUse wrap) { options->remesh.wrap = wrap; },
-        "A closed wrap around the mesh instead of itself: where nothing else works (unset: auto), never or always");
-    command
-        .add_option("--max-distance", remesh.max_distance,
-                    "What both distances may reach, fraction of the diagonal (unset: a patch's side)")
-        ->check(positive_number());
-    command.add_flag("!--no-attributes", remesh.attributes, "Leave UVs, colours, normals and labels behind");
+OptionList remesh_options(QuadRemeshOptions& remesh) {
+    return {Option("--quads", remesh.quads, "About how many").whole_from(1).with_default(),
+            Option("--levels", remesh.levels,
+                   "How often each patch is halved, 1 to 8 (unset: as leaves 500 patches or more)")
+                .between(1, 8),
+            Option("--feature-angle", remesh.feature_angle_deg,
+                   "Edges whose faces meet at more than this stay edges, degrees; 180: none")
+                .between(0.0, 180.0)
+                .with_default(),
+            choice<SmallParts>("--small-parts", remesh.small_parts,
+                               {{"remove", SmallParts::remove}, {"keep", SmallParts::keep}},
+                               "Handles and components too small for the patches: remove (unset) or keep"),
+            choice<WrapUse>(
+                "--wrap", remesh.wrap,
+                {{"auto", WrapUse::automatic}, {"never", WrapUse::never}, {"always", WrapUse::always}},
+                "A closed wrap around the mesh instead of itself: where nothing else works (unset: auto), never or "
+                "always"),
+            Option("--max-distance", remesh.max_distance,
+                   "What both distances may reach, fraction of the diagonal (unset: a patch's side)")
+                .above_zero(),
+            Option("!--no-attributes", remesh.attributes, "Leave UVs, colours, normals and labels behind")};
 }
 
 } // namespace
 
-void add_remesh(CLI::App& app, Session& session) {
-    auto options = std::make_shared<Options>();
-    CLI::App* command = app.add_subcommand("remesh", "Turn any mesh into quads: patches of a regular grid");
-    command->add_option("mesh", options->input, "Mesh")->required();
-    command->add_option("-o,--output", options->output, "Quads to write")->required();
-    add_remesh_options(*command, options);
-    command->add_option("--base", options->base, "Also write the patches' corners as a mesh, a quad each");
-    command->add_option("--picture", options->picture, "Also draw the quads, their patches in colour (.png)");
-    add_choice<View>(
-        *command, "--view", {{"front", View::front}, {"side", View::side}, {"top", View::top}, {"iso", View::iso}},
-        [options](View view) { options->view = view; }, "Where to look from in the picture (unset: iso)");
-    add_choice<UpAxis>(
-        *command, "--up", {{"x", UpAxis::x}, {"y", UpAxis::y}, {"z", UpAxis::z}},
-        [options](UpAxis up) { options->up = up; }, "Which axis is up in the picture (unset: y)");
-    session.add_common_options(*command, "  filigree remesh scan.ply -o quads.ply\n"
-                                         "  filigree remesh scan.ply -o quads.obj --quads 20000 --picture quads.png\n"
-                                         "  filigree remesh part.stl -o quads.ply --feature-angle 30 --levels 3\n"
-                                         "  filigree remesh scan.ply -o quads.ply && "
-                                         "filigree strip quads.ply -o quads.fil --code reference");
-    command->callback([options, &session] {
-        session.begin();
-        run_remesh(*options, session);
-    });
+Command remesh_command() {
+    const auto options = std::make_shared<Options>();
+    return {.name = "remesh",
+            .text = "Turn any mesh into quads: patches of a regular grid",
+            .options =
+                OptionList{Option("mesh", options->input, "Mesh").required(),
+                           Option("-o,--output", options->output, "Quads to write").required()} +
+                remesh_options(options->remesh) +
+                OptionList{Option("--base", options->base, "Also write the patches' corners as a mesh, a quad each"),
+                           Option("--picture", options->picture, "Also draw the quads, their patches in colour (.png)"),
+                           view_option(options->view, "Where to look from in the picture (unset: iso)"),
+                           up_option(options->up, "Which axis is up in the picture (unset: y)")},
+            .examples = "  filigree remesh scan.ply -o quads.ply\n"
+                        "  filigree remesh scan.ply -o quads.obj --quads 20000 --picture quads.png\n"
+                        "  filigree remesh part.stl -o quads.ply --feature-angle 30 --levels 3\n"
+                        "  filigree remesh scan.ply -o quads.ply && "
+                        "filigree strip quads.ply -o quads.fil --code reference",
+            .run = [options](Session& session) { run(*options, session); }};
 }
 
 } // namespace filigree::cli

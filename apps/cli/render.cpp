@@ -7,6 +7,8 @@
 #include <filesystem>
 #include <numbers>
 
+#include <fmt/format.h>
+
 namespace filigree::cli {
 
 namespace {
@@ -553,109 +555,108 @@ void check(const Options& options, bool is_film) {
         refuse(kPosesWithoutScalars);
 }
 
+OptionList camera_options(Options& options) {
+    return {Option("--size", Option::EachText([&](const std::string& text) { options.size = parse_size(text); }),
+                   "Width and height in pixels, such as 1920x1080 (unset: by what is drawn)"),
+            view_option(options.view, "Where to look from (unset: iso)"),
+            up_option(options.up, "Which axis is up (unset: y)"),
+            Option("--camera", options.camera, "Eye and target, and up if need be: 6 or 9 numbers in model units")
+                .finite()
+                .values(6, 9)
+                .comma_separated(),
+            Option("--field-of-view", options.field_of_view, "Vertical, in degrees; 0 is parallel projection")
+                .between(0.0, 150.0)
+                .with_default(),
+            Option("--shared-camera", options.shared_camera, "Several files: one camera that shows all in place")};
+}
+
+OptionList look_options(Options& options) {
+    return {Option("--background", options.background,
+                   "#rrggbb, two of them from top to bottom (#rrggbb,#rrggbb), or transparent"),
+            Option("--color", options.color, "Of the objects, #rrggbb (unset: their own, or clay)"),
+            choice<Shading>("--shading", options.shading,
+                            {{"auto", Shading::automatic}, {"smooth", Shading::smooth}, {"flat", Shading::flat}},
+                            "auto: the file's normals, else smooth up to 45 degrees (unset: auto)"),
+            Option("--edges", options.edges, "Draw the polygons' edges over the surface"),
+            Option("--edge-color", options.edge_color, "#rrggbb"),
+            Option("--wireframe", options.wireframe, "Draw the edges alone"),
+            Option("--points", options.points, "Draw the vertices as balls"),
+            Option("--point-radius", options.point_radius, "Of the balls, model units (unset: by their spacing)")
+                .above_zero(),
+            Option("--clip", Option::EachText([&](const std::string& text) { options.clip = parse_clip(text); }),
+                   "Cut open: z=0.5 takes away what is above the middle along z, -z=0.5 what is below")};
+}
+
+OptionList scalar_options(Options& options) {
+    return {Option("--scalar", options.scalar,
+                   "Colour by a vertex scalar of the file, or by error, strain (both with --against) or level"),
+            Option("--against", options.against, "Mesh that error and strain are measured against"),
+            Option("--range", options.range, "Least and most value of the colours (unset: by the values)")
+                .finite()
+                .values(2),
+            Option("--unit", options.unit, "Unit to write over the legend"),
+            choice<ColorMap>("--map", options.map,
+                             {{"sequential", ColorMap::sequential}, {"diverging", ColorMap::diverging}},
+                             "Colours: for amounts, or for signed amounts (unset: sequential)")};
+}
+
+OptionList page_options(Options& options) {
+    return {Option("--caption", options.captions,
+                   "One a file (unset: the names, where there are several); C_m, 10^{-3}, *italic* and **bold** are "
+                   "set so")
+                .one_at_a_time(), // else it would take the files behind it
+            Option("--no-captions", options.no_captions, "Draw no captions"),
+            Option("--no-ground", options.no_ground, "Draw no shadow on the ground")};
+}
+
+OptionList film_options(Options& options) {
+    return {Option("--poses", options.poses,
+                   "Moved drivers of a model, one a frame (PLY with gradients where there are any)"),
+            Option("--turntable", options.turntable, "A film once around the object"),
+            Option("--frames", options.frames, "Frames of a turntable").whole_from(1).with_default(),
+            Option("--frame", options.frame,
+                   "One of the poses that the model holds, from 1 (unset: a film plays them all, a picture shows the "
+                   "model at rest)")
+                .whole_from(1),
+            Option("--fps", options.frames_per_second, "Frames a second (unset: those of the model's poses, or 30)")
+                .above_zero(),
+            Option("--passes", options.passes,
+                   "Light directions and positions within a pixel that are averaged (unset: 12 to 40 by the size of "
+                   "the mesh; films 12)")
+                .whole_from(1)};
+}
+
+void run(const Options& options, Session& session) {
+    const bool is_film = is_film_path(options.output);
+    check(options, is_film);
+    Rendering rendering(options, session);
+    is_film ? rendering.film() : rendering.still();
+}
+
 } // namespace
 
-void add_render(CLI::App& app, Session& session) {
-    auto options = std::make_shared<Options>();
-    CLI::App* command = app.add_subcommand("render", "Draw meshes, point sets and models: a picture or a film");
-    command
-        ->add_option("files", options->files,
-                     "Meshes, point sets or models, before the options; several stand side by side, or one "
-                     "after the other in a film")
-        ->required();
-    command
-        ->add_option("-o,--output", options->output, "Picture (.png, .svg, .pdf) or film (.mp4, .gif, frame_%04d.png)")
-        ->required();
-    command->add_option_function<std::string>(
-        "--size", [options](const std::string& text) { options->size = parse_size(text); },
-        "Width and height in pixels, such as 1920x1080 (unset: by what is drawn)");
-    add_choice<View>(
-        *command, "--view", {{"front", View::front}, {"side", View::side}, {"top", View::top}, {"iso", View::iso}},
-        [options](View view) { options->view = view; }, "Where to look from (unset: iso)");
-    add_choice<UpAxis>(
-        *command, "--up", {{"x", UpAxis::x}, {"y", UpAxis::y}, {"z", UpAxis::z}},
-        [options](UpAxis up) { options->up = up; }, "Which axis is up (unset: y)");
-    command->add_option("--camera", options->camera, "Eye and target, and up if need be: 6 or 9 numbers in model units")
-        ->check(finite_number())
-        ->expected(6, 9)
-        ->delimiter(',');
-    command->add_option("--field-of-view", options->field_of_view, "Vertical, in degrees; 0 is parallel projection")
-        ->check(CLI::Range(0.0, 150.0))
-        ->capture_default_str();
-    command->add_flag("--shared-camera", options->shared_camera, "Several files: one camera that shows all in place");
-    command->add_option("--background", options->background,
-                        "#rrggbb, two of them from top to bottom (#rrggbb,#rrggbb), or transparent");
-    command->add_option("--color", options->color, "Of the objects, #rrggbb (unset: their own, or clay)");
-    add_choice<Shading>(
-        *command, "--shading", {{"auto", Shading::automatic}, {"smooth", Shading::smooth}, {"flat", Shading::flat}},
-        [options](Shading shading) { options->shading = shading; },
-        "auto: the file's normals, else smooth up to 45 degrees (unset: auto)");
-    command->add_flag("--edges", options->edges, "Draw the polygons' edges over the surface");
-    command->add_option("--edge-color", options->edge_color, "#rrggbb");
-    command->add_flag("--wireframe", options->wireframe, "Draw the edges alone");
-    command->add_flag("--points", options->points, "Draw the vertices as balls");
-    command->add_option("--point-radius", options->point_radius, "Of the balls, model units (unset: by their spacing)")
-        ->check(positive_number());
-    command->add_option_function<std::string>(
-        "--clip", [options](const std::string& text) { options->clip = parse_clip(text); },
-        "Cut open: z=0.5 takes away what is above the middle along z, -z=0.5 what is below");
-    command->add_option("--scalar", options->scalar,
-                        "Colour by a vertex scalar of the file, or by error, strain (both with --against) or level");
-    command->add_option("--against", options->against, "Mesh that error and strain are measured against");
-    command->add_option("--range", options->range, "Least and most value of the colours (unset: by the values)")
-        ->check(finite_number())
-        ->expected(2);
-    command->add_option("--unit", options->unit, "Unit to write over the legend");
-    add_choice<ColorMap>(
-        *command, "--map", {{"sequential", ColorMap::sequential}, {"diverging", ColorMap::diverging}},
-        [options](ColorMap map) { options->map = map; },
-        "Colours: for amounts, or for signed amounts (unset: sequential)");
-    command
-        ->add_option(
-            "--caption", options->captions,
-            "One a file (unset: the names, where there are several); C_m, 10^{-3}, *italic* and **bold** are set so")
-        ->allow_extra_args(false); // else it would take the files behind it
-    command->add_flag("--no-captions", options->no_captions, "Draw no captions");
-    command->add_flag("--no-ground", options->no_ground, "Draw no shadow on the ground");
-    command->add_option("--poses", options->poses,
-                        "Moved drivers of a model, one a frame (PLY with gradients where there are any)");
-    command->add_flag("--turntable", options->turntable, "A film once around the object");
-    command->add_option("--frames", options->frames, "Frames of a turntable")
-        ->check(whole_number(1))
-        ->capture_default_str();
-    command
-        ->add_option("--frame", options->frame,
-                     "One of the poses that the model holds, from 1 (unset: a film plays them all, a picture shows "
-                     "the model at rest)")
-        ->check(whole_number(1));
-    command
-        ->add_option("--fps", options->frames_per_second, "Frames a second (unset: those of the model's poses, or 30)")
-        ->check(positive_number());
-    command
-        ->add_option("--passes", options->passes,
-                     "Light directions and positions within a pixel that are averaged "
-                     "(unset: 12 to 40 by the size of the mesh; films 12)")
-        ->check(whole_number(1));
-    add_restore_options(*command, options->restore);
-    session.add_common_options(
-        *command, "  filigree render scan.ply -o scan.png\n"
-                  "  filigree render scan.fil --level 0 --edges -o driver.png --view front --size 1920x1080\n"
-                  "  filigree render a.ply b.ply -o both.png --caption before --caption after\n"
-                  "  filigree render restored.ply --scalar error --against full.ply -o error.png\n"
-                  "  filigree render scan.fil --poses pose_*.ply -o film.mp4\n"
-                  "  filigree render bounce.fil -o bounce.mp4\n"
-                  "  filigree render bounce.fil --frame 30 -o half_a_second.png\n"
-                  "  filigree render scan.ply -o around.gif --turntable --size 480x480");
-    command->callback([options, &session] {
-        session.begin();
-        const bool is_film = is_film_path(options->output);
-        check(*options, is_film);
-        Rendering rendering(*options, session);
-        if (is_film)
-            rendering.film();
-        else
-            rendering.still();
-    });
+Command render_command() {
+    const auto options = std::make_shared<Options>();
+    return {.name = "render",
+            .text = "Draw meshes, point sets and models: a picture or a film",
+            .options = OptionList{Option("files", options->files,
+                                         "Meshes, point sets or models, before the options; several stand side by "
+                                         "side, or one after the other in a film")
+                                      .required(),
+                                  Option("-o,--output", options->output,
+                                         "Picture (.png, .svg, .pdf) or film (.mp4, .gif, frame_%04d.png)")
+                                      .required()} +
+                       camera_options(*options) + look_options(*options) + scalar_options(*options) +
+                       page_options(*options) + film_options(*options) + restore_options(options->restore),
+            .examples = "  filigree render scan.ply -o scan.png\n"
+                        "  filigree render scan.fil --level 0 --edges -o driver.png --view front --size 1920x1080\n"
+                        "  filigree render a.ply b.ply -o both.png --caption before --caption after\n"
+                        "  filigree render restored.ply --scalar error --against full.ply -o error.png\n"
+                        "  filigree render scan.fil --poses pose_*.ply -o film.mp4\n"
+                        "  filigree render bounce.fil -o bounce.mp4\n"
+                        "  filigree render bounce.fil --frame 30 -o half_a_second.png\n"
+                        "  filigree render scan.ply -o around.gif --turntable --size 480x480",
+            .run = [options](Session& session) { run(*options, session); }};
 }
 
 } // namespace filigree::cli

@@ -1,6 +1,10 @@
 #include "animation_output.h"
 #include "restore_options.h"
 
+#include <filesystem>
+
+#include <fmt/format.h>
+
 namespace filigree::cli {
 
 namespace {
@@ -14,14 +18,14 @@ std::vector<Vec3f> positions_for(const Mesh& mesh, const Model& model) {
 
 } // namespace
 
-void add_restore_options(CLI::App& command, RestoreOptions& options) {
-    std::map<std::string, HeightLaw> laws;
-    for (std::string_view name : kHeightLawNames) laws[std::string(name)] = *height_law_from_name(name);
-    add_choice<HeightLaw>(
-        command, "--law", laws, [&options](HeightLaw law) { options.law = law; },
-        "How high detail is when its surroundings grow (unset: proportional, or inverse for a reference model)");
-    command.add_option("--level", options.level, "Restore up to this level (unset: the finest)");
-    command.add_flag("--thin-shell", options.thin_shell, "Bumps keep their shape, as on cloth and skin");
+OptionList restore_options(RestoreOptions& options) {
+    std::vector<std::pair<std::string, HeightLaw>> laws;
+    for (std::string_view name : kHeightLawNames) laws.emplace_back(name, *height_law_from_name(name));
+    return {choice("--law", options.law, laws,
+                   "How high detail is when its surroundings grow (unset: proportional, or inverse for a reference "
+                   "model)"),
+            Option("--level", options.level, "Restore up to this level (unset: the finest)"),
+            Option("--thin-shell", options.thin_shell, "Bumps keep their shape, as on cloth and skin")};
 }
 
 Pose pose_from_mesh(const Mesh& mesh, const Model& model) { return pose_of_mesh(mesh, model.mesh.origin); }
@@ -69,7 +73,7 @@ std::string animation_place(const std::string& output) {
     return is_plain ? output + "/" : output;
 }
 
-void check(const Options& options) {
+void check(const Options& options, const Session& session) {
     const auto refuse = [](const std::string& sentence) { throw Failure{{ErrorCode::usage, sentence}}; };
     if (!options.pose.empty() + !options.poses.empty() + (options.frame > 0) + options.all_frames != 1)
         refuse("Say what moved the driver: --pose FILE for a mesh, --poses FILE for an animation, or for a model that "
@@ -78,15 +82,15 @@ void check(const Options& options) {
     if (options.poses.empty() && !options.poses_file.animation.empty()) refuse("--animation belongs to --poses.");
     if (!options.is_animation() && options.poses_file.frames_per_second)
         refuse("--frame-rate belongs to --poses or --frames.");
-    if (!options.is_animation() && !options.animation.given.empty())
-        refuse(options.animation.given.front() + " belongs to --poses or --frames.");
+    const std::string given = given_animation_option(session);
+    if (!options.is_animation() && !given.empty()) refuse(given + " belongs to --poses or --frames.");
     if (!options.is_animation()) return;
     const std::string place = animation_place(options.output);
     if (!is_animation_path(place) && mesh_format(place))
         refuse(place + ": is the name of one mesh, and there are many; put #### where their numbers go, or give -o a "
                        "folder (NAME/), .pc2, .mdd, .usda or .glb.");
     check_animation_path(place);
-    check_animation_options(options.animation, {place});
+    check_animation_options({place}, session);
     check_not_input(place, {options.model, options.poses});
 }
 
@@ -108,10 +112,14 @@ void restore_one(const Options& options, Session& session) {
     const double seconds = now_seconds() - start;
     session.write_mesh(mesh, options.output, options.model);
     const char* from = source_of(model, pose);
-    session.print(
-        fmt::format("{}: {} vertices restored from {} in {}\n", options.output, with_commas(mesh.vertex_count()), from,
-                    seconds_text(seconds)),
-        {{"output", options.output}, {"vertices", mesh.vertex_count()}, {"from", from}, {"seconds", seconds}});
+    Report report;
+    report.say(fmt::format("{}: {} vertices restored from {} in {}\n", options.output, with_commas(mesh.vertex_count()),
+                           from, seconds_text(seconds)));
+    report.set("output", options.output);
+    report.set("vertices", mesh.vertex_count());
+    report.set("from", from);
+    report.set("seconds", seconds);
+    session.print(report);
 }
 
 void restore_all(const Options& options, Session& session) {
@@ -119,60 +127,52 @@ void restore_all(const Options& options, Session& session) {
     const Model model = session.read_model(options.model, options.all_frames ? &own : nullptr);
     const PoseStream poses = poses_of(options.poses, options.poses_file, model, own, options.model, session);
     const char* from = source_of(model, require(poses.pose(0)));
-    Table table;
-    Json json;
+    Report report;
     const double start = now_seconds();
     write_animation_output(model, poses, options.restore, options.animation, animation_place(options.output),
-                           options.model, session, table, json);
+                           options.model, session, report);
     const double seconds = now_seconds() - start;
-    table.row("restored from", fmt::format("{} in {}", from, seconds_text(seconds)));
-    json["output"] = options.output;
-    json["frames"] = poses.frames;
-    json["frames_per_second"] = poses.frames_per_second;
-    json["from"] = from;
-    json["seconds"] = seconds;
-    session.print(table.text(), json);
+    report.set("output", options.output);
+    report.set("frames", poses.frames);
+    report.set("frames_per_second", poses.frames_per_second);
+    report.add("restored from", fmt::format("{} in {}", from, seconds_text(seconds)), "from", from);
+    report.set("seconds", seconds);
+    session.print(report);
 }
 
 } // namespace
 
-void add_restore(CLI::App& app, Session& session) {
-    auto options = std::make_shared<Options>();
-    CLI::App* command = app.add_subcommand("restore", "Put the detail back onto a moved driver");
-    command->add_option("model", options->model, "Model file")->required();
-    command->add_option(
-        "--pose", options->pose,
-        "The moved driver: level 0 with the same vertex order; a PLY with vertex properties f00 .. f22 gives "
-        "gradients too");
-    command->add_option("--ghosts", options->ghosts, "The moved ghost points (see level --ghosts)");
-    command->add_option("--frame", options->frame, "Or one of the poses that the model holds, from 1")
-        ->check(whole_number(1));
-    command->add_flag("--frames", options->all_frames, "Or all of them, as an animation");
-    command->add_option("--poses", options->poses,
-                        "Or an animation of the driver: .pc2, .mdd, a folder of numbered meshes or NAME_####.ply, an "
-                        "animated .glb, another .fil's poses");
-    add_pose_file_options(*command, options->poses_file);
-    command
-        ->add_option("-o,--output", options->output,
-                     "Mesh to write; an animation: .pc2, .mdd, .glb, .usda, a folder for NAME_0001.ply and so on, or "
-                     "NAME_####.obj")
-        ->required();
-    add_restore_options(*command, options->restore);
-    add_animation_options(*command, options->animation);
-    session.add_common_options(*command,
-                               "  filigree restore scan.fil --pose moved.obj -o restored.ply\n"
-                               "  filigree restore scan.fil --pose moved.obj -o skin.ply --thin-shell --law keep\n"
-                               "  filigree restore bounce.fil --frame 30 -o half_a_second.ply\n"
-                               "  filigree restore bounce.fil --frames -o frames/\n"
-                               "  filigree restore scan.fil --poses cloth.pc2 --frame-rate 24 -o detailed.pc2");
-    command->callback([options, &session] {
-        session.begin();
-        check(*options);
-        if (options->is_animation())
-            restore_all(*options, session);
-        else
-            restore_one(*options, session);
-    });
+Command restore_command() {
+    const auto options = std::make_shared<Options>();
+    return {.name = "restore",
+            .text = "Put the detail back onto a moved driver",
+            .options =
+                OptionList{
+                    Option("model", options->model, "Model file").required(),
+                    Option("--pose", options->pose,
+                           "The moved driver: level 0 with the same vertex order; a PLY with vertex properties f00 .. "
+                           "f22 gives gradients too"),
+                    Option("--ghosts", options->ghosts, "The moved ghost points (see level --ghosts)"),
+                    Option("--frame", options->frame, "Or one of the poses that the model holds, from 1").whole_from(1),
+                    Option("--frames", options->all_frames, "Or all of them, as an animation"),
+                    Option("--poses", options->poses,
+                           "Or an animation of the driver: .pc2, .mdd, a folder of numbered meshes or NAME_####.ply, "
+                           "an animated .glb, another .fil's poses")} +
+                pose_file_options(options->poses_file) +
+                OptionList{Option("-o,--output", options->output,
+                                  "Mesh to write; an animation: .pc2, .mdd, .glb, .usda, a folder for NAME_0001.ply "
+                                  "and so on, or NAME_####.obj")
+                               .required()} +
+                restore_options(options->restore) + animation_options(options->animation),
+            .examples = "  filigree restore scan.fil --pose moved.obj -o restored.ply\n"
+                        "  filigree restore scan.fil --pose moved.obj -o skin.ply --thin-shell --law keep\n"
+                        "  filigree restore bounce.fil --frame 30 -o half_a_second.ply\n"
+                        "  filigree restore bounce.fil --frames -o frames/\n"
+                        "  filigree restore scan.fil --poses cloth.pc2 --frame-rate 24 -o detailed.pc2",
+            .run = [options](Session& session) {
+                check(*options, session);
+                options->is_animation() ? restore_all(*options, session) : restore_one(*options, session);
+            }};
 }
 
 } // namespace filigree::cli

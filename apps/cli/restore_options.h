@@ -7,8 +7,8 @@
 
 namespace filigree::cli {
 
-/// Adds --law, --level and --thin-shell.
-void add_restore_options(CLI::App& command, RestoreOptions& options);
+/// --law, --level and --thin-shell.
+OptionList restore_options(RestoreOptions& options);
 
 /// A pose from a moved level 0: its positions, and the gradients in its vertex scalars f00 .. f22 where it has them.
 Pose pose_from_mesh(const Mesh& mesh, const Model& model);

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include <fmt/format.h>
+
 namespace filigree::cli {
 
 namespace {
@@ -35,8 +37,6 @@ const char* method_name(InsideMethod method) {
     }
     return "auto";
 }
-
-std::string with_commas_64(std::uint64_t count) { return with_commas(static_cast<std::size_t>(count)); }
 
 /// The report's points: in the view from the eye, in regular steps across the picture and in depth.
 std::vector<Vec3d> points_in_view(const Mesh& mesh, const Options& options, const RunContext& context,
@@ -96,144 +96,163 @@ void draw_points(const Mesh& mesh, const std::vector<Vec3f>& points, double spac
     write_picture(stage.take(scene, camera, {.width = 1280, .height = 960}), path, session);
 }
 
-void run_sample(Options options, Session& session) {
+/// Points inside, and how they were found.
+struct Found {
+    std::vector<Vec3d> points;
+    InsideReport inside;
+    std::size_t tested = 0;
+    double spacing = 0;
+    std::array<std::size_t, 3> counts = {};
+    std::array<double, 3> origin = {};
+};
+
+Found find_in_view(const Mesh& mesh, const Options& options, const RunContext& context) {
+    Found found;
+    found.points = points_in_view(mesh, options, context, found.inside, found.tested);
+    found.spacing = bounds(mesh.positions).diagonal() / double(options.frustum[2]);
+    return found;
+}
+
+Found find_on_lattice(const Mesh& mesh, const Options& options, const RunContext& context) {
+    Found found;
+    LatticeOptions lattice_options{.spacing = options.spacing};
+    if (options.count)
+        lattice_options.spacing = require(spacing_for_count(mesh, options.count, options.inside, context));
+    if (!options.origin.empty())
+        lattice_options.origin = Vec3d(options.origin[0], options.origin[1], options.origin[2]) - mesh.origin;
+    const Lattice lattice = require(make_lattice(bounds(mesh.positions), lattice_options));
+    found.points = require(spread_inside(mesh, lattice, options.pattern, options.inside, context, &found.inside));
+    found.spacing = lattice.spacing;
+    found.counts = lattice.counts();
+    for (int axis = 0; axis < 3; ++axis) found.origin[axis] = mesh.origin[axis] + lattice.coordinates[axis][0];
+    found.tested = static_cast<std::size_t>(lattice.point_count());
+    return found;
+}
+
+void warn_of_doubts(const Found& found, const std::string& input, Session& session) {
+    if (found.points.empty())
+        session.warn(fmt::format("{}: no point is inside; take a smaller spacing than {:.4g}.", input, found.spacing));
+    const auto& winding = found.inside.winding;
+    if (found.inside.used == InsideMethod::winding && winding.open_edges > 0)
+        session.warn(
+            fmt::format("{}: is not closed ({} edges do not close), so winding numbers decided; {:.2g} % of the "
+                        "points were near the border between inside and outside.",
+                        input, with_commas(winding.open_edges), 100 * winding.near_half));
+}
+
+Report make_report(const Found& found, const std::string& output) {
+    const InsideReport& inside = found.inside;
+    const ScanReport& scan = inside.scan;
+    Report report;
+    report.set("output", output);
+    report.row("points inside", fmt::format("{} of {}", with_commas(found.points.size()), with_commas(found.tested)));
+    report.set("points", found.points.size());
+    report.set("tested", found.tested);
+    report.set("lattice", found.counts);
+    report.set("lattice_origin", found.origin);
+    report.add("spacing", fmt::format("{:.6g} units", found.spacing), "spacing_units", found.spacing);
+    report.add("method",
+               fmt::format("{} in {}, set up in {}", method_name(inside.used), seconds_text(inside.seconds),
+                           seconds_text(inside.setup_seconds)),
+               "method", method_name(inside.used));
+    if (inside.used == InsideMethod::scan)
+        report.row("crossings",
+                   fmt::format("{} ({} decided in integers, {} in expansions)", with_commas(scan.crossings),
+                               with_commas(scan.tally.integers), with_commas(scan.tally.expansions)));
+    report.set("open_edges", inside.closure.open_edges);
+    report.set("crossings", scan.crossings);
+    report.set("integers", scan.tally.integers);
+    report.set("expansions", scan.tally.expansions);
+    report.set("near_half", inside.winding.near_half);
+    report.set("setup_seconds", inside.setup_seconds);
+    report.set("seconds", inside.seconds);
+    return report;
+}
+
+void check(const Options& options) {
+    if (!(options.spacing > 0) && !options.count && options.frustum.empty())
+        throw Failure{{ErrorCode::usage, "Say how many points: --spacing S, --count N, or --frustum NX NY NZ."}};
+    if (!options.frustum.empty() && options.pattern != Pattern::lattice)
+        throw Failure{{ErrorCode::usage, "--pattern spreads the points of a lattice; leave --frustum out."}};
+    if (!options.picture.empty() && !options.picture.ends_with(".png"))
+        throw Failure{{ErrorCode::unsupported, options.picture + ": the picture is a PNG; let its name end in .png."}};
+}
+
+void run(Options options, Session& session) {
+    check(options);
     RunContext context = session.context();
     context.seed = options.seed;
     const Mesh mesh = session.read_mesh(options.input);
     if (!options.eye.empty()) options.inside.eye = Vec3d(options.eye[0], options.eye[1], options.eye[2]) - mesh.origin;
-    const Box box = bounds(mesh.positions);
-    InsideReport report;
-    std::vector<Vec3d> points;
-    double spacing = options.spacing;
-    std::size_t tested = 0;
-    std::array<std::size_t, 3> counts = {};
-    std::array<double, 3> origin = {};
-    if (!options.frustum.empty()) {
-        points = points_in_view(mesh, options, context, report, tested);
-        spacing = box.diagonal() / double(options.frustum[2]);
-    } else {
-        if (options.count) spacing = require(spacing_for_count(mesh, options.count, options.inside, context));
-        LatticeOptions lattice_options{.spacing = spacing};
-        if (!options.origin.empty())
-            lattice_options.origin = Vec3d(options.origin[0], options.origin[1], options.origin[2]) - mesh.origin;
-        const Lattice lattice = require(make_lattice(box, lattice_options));
-        points = require(spread_inside(mesh, lattice, options.pattern, options.inside, context, &report));
-        spacing = lattice.spacing;
-        counts = lattice.counts();
-        for (int axis = 0; axis < 3; ++axis) origin[axis] = mesh.origin[axis] + lattice.coordinates[axis][0];
-        tested = static_cast<std::size_t>(lattice.point_count());
-    }
+    const Found found =
+        options.frustum.empty() ? find_on_lattice(mesh, options, context) : find_in_view(mesh, options, context);
+    warn_of_doubts(found, options.input, session);
     Mesh cloud;
     cloud.origin = mesh.origin;
-    cloud.positions.reserve(points.size());
-    for (const Vec3d& p : points) cloud.positions.push_back(p.cast<float>());
-    if (points.empty())
-        session.warn(
-            fmt::format("{}: no point is inside; take a smaller spacing than {:.4g}.", options.input, spacing));
-    if (report.used == InsideMethod::winding && report.winding.open_edges > 0)
-        session.warn(
-            fmt::format("{}: is not closed ({} edges do not close), so winding numbers decided; {:.2g} % of the "
-                        "points were near the border between inside and outside.",
-                        options.input, with_commas(report.winding.open_edges), 100 * report.winding.near_half));
+    cloud.positions.reserve(found.points.size());
+    for (const Vec3d& p : found.points) cloud.positions.push_back(p.cast<float>());
     session.write_mesh(cloud, options.output);
-    if (!options.picture.empty()) draw_points(mesh, cloud.positions, spacing, options.up, options.picture, session);
+    if (!options.picture.empty())
+        draw_points(mesh, cloud.positions, found.spacing, options.up, options.picture, session);
+    session.print(make_report(found, options.output));
+}
 
-    Table table;
-    table.row("points inside", fmt::format("{} of {}", with_commas(points.size()), with_commas(tested)));
-    table.row("spacing", fmt::format("{:.6g} units", spacing));
-    table.row("method", fmt::format("{} in {}, set up in {}", method_name(report.used), seconds_text(report.seconds),
-                                    seconds_text(report.setup_seconds)));
-    if (report.used == InsideMethod::scan)
-        table.row("crossings",
-                  fmt::format("{} ({} decided in integers, {} in expansions)", with_commas_64(report.scan.crossings),
-                              with_commas_64(report.scan.tally.integers),
-                              with_commas_64(report.scan.tally.expansions)));
-    session.print(table.text(), {{"output", options.output},
-                                 {"points", points.size()},
-                                 {"tested", tested},
-                                 {"lattice", counts},
-                                 {"lattice_origin", origin},
-                                 {"spacing_units", spacing},
-                                 {"method", method_name(report.used)},
-                                 {"open_edges", report.closure.open_edges},
-                                 {"crossings", report.scan.crossings},
-                                 {"integers", report.scan.tally.integers},
-                                 {"expansions", report.scan.tally.expansions},
-                                 {"near_half", report.winding.near_half},
-                                 {"setup_seconds", report.setup_seconds},
-                                 {"seconds", report.seconds}});
+OptionList point_options(Options& options) {
+    return {
+        Option("--spacing", options.spacing, "Between lattice points, model units").above_zero(),
+        Option("--count", options.count, "Choose the spacing so that about as many are inside")
+            .whole_from(1)
+            .excludes({"--spacing"}),
+        Option("--frustum", options.frustum, "Instead: the report's points in view, so many across, up and in depth")
+            .values(3)
+            .whole_from(1)
+            .excludes({"--spacing", "--count"})};
+}
+
+OptionList inside_options(Options& options) {
+    return {choice<InsideMethod>("--method", options.inside.method,
+                                 {{"auto", InsideMethod::automatic},
+                                  {"scan", InsideMethod::scan},
+                                  {"rays", InsideMethod::rays},
+                                  {"winding", InsideMethod::winding}},
+                                 "How to tell (unset: scan where the mesh is closed, else winding)"),
+            choice<Pattern>("--pattern", options.pattern,
+                            {{"lattice", Pattern::lattice}, {"jitter", Pattern::jitter}, {"poisson", Pattern::poisson}},
+                            "How the points are spread (unset: lattice)"),
+            choice<Overlap>("--overlap", options.inside.overlap,
+                            {{"parity", Overlap::parity}, {"merged", Overlap::merged}},
+                            "scan: closed parts that overlap are hollow there, or merged (unset: parity)"),
+            Option("--accuracy", options.inside.accuracy, "winding: largest error of a winding number")
+                .between(1e-4, 0.1)
+                .with_default(),
+            Option("--origin", options.origin, "A lattice point (unset: half a spacing inside the box)")
+                .values(3)
+                .comma_separated()
+                .finite(),
+            Option("--eye", options.eye, "rays and --frustum: where they start (unset: outside, in no special place)")
+                .values(3)
+                .comma_separated()
+                .finite(),
+            Option("--seed", options.seed, "Seed of the patterns").whole_from(0).with_default()};
 }
 
 } // namespace
 
-void add_sample(CLI::App& app, Session& session) {
-    auto options = std::make_shared<Options>();
-    CLI::App* command =
-        app.add_subcommand("sample", "Fill a mesh with points: those of a regular lattice that are inside");
-    command->add_option("mesh", options->input, "Mesh")->required();
-    command->add_option("-o,--output", options->output, "Points, as a mesh file without faces")->required();
-    CLI::Option* spacing = command->add_option("--spacing", options->spacing, "Between lattice points, model units")
-                               ->check(positive_number());
-    CLI::Option* count =
-        command->add_option("--count", options->count, "Choose the spacing so that about as many are inside")
-            ->check(whole_number(1))
-            ->excludes(spacing);
-    command
-        ->add_option("--frustum", options->frustum,
-                     "Instead: the report's points in view, so many across, up and in depth")
-        ->expected(3)
-        ->check(whole_number(1))
-        ->excludes(spacing)
-        ->excludes(count);
-    add_choice<InsideMethod>(
-        *command, "--method",
-        {{"auto", InsideMethod::automatic},
-         {"scan", InsideMethod::scan},
-         {"rays", InsideMethod::rays},
-         {"winding", InsideMethod::winding}},
-        [options](InsideMethod method) { options->inside.method = method; },
-        "How to tell (unset: scan where the mesh is closed, else winding)");
-    add_choice<Pattern>(
-        *command, "--pattern",
-        {{"lattice", Pattern::lattice}, {"jitter", Pattern::jitter}, {"poisson", Pattern::poisson}},
-        [options](Pattern pattern) { options->pattern = pattern; }, "How the points are spread (unset: lattice)");
-    add_choice<Overlap>(
-        *command, "--overlap", {{"parity", Overlap::parity}, {"merged", Overlap::merged}},
-        [options](Overlap overlap) { options->inside.overlap = overlap; },
-        "scan: closed parts that overlap are hollow there, or merged (unset: parity)");
-    command->add_option("--accuracy", options->inside.accuracy, "winding: largest error of a winding number")
-        ->check(CLI::Range(1e-4, 0.1))
-        ->capture_default_str();
-    command->add_option("--origin", options->origin, "A lattice point (unset: half a spacing inside the box)")
-        ->expected(3)
-        ->delimiter(',')
-        ->check(finite_number());
-    command
-        ->add_option("--eye", options->eye,
-                     "rays and --frustum: where they start (unset: outside, in no special place)")
-        ->expected(3)
-        ->delimiter(',')
-        ->check(finite_number());
-    command->add_option("--seed", options->seed, "Seed of the patterns")->check(whole_number(0))->capture_default_str();
-    command->add_option("--picture", options->picture, "Also draw the points, and the surface cut open (.png)");
-    add_choice<UpAxis>(
-        *command, "--up", {{"x", UpAxis::x}, {"y", UpAxis::y}, {"z", UpAxis::z}},
-        [options](UpAxis up) { options->up = up; }, "Which axis is up in the picture (unset: y)");
-    session.add_common_options(*command,
-                               "  filigree sample scan.ply -o points.ply --count 100000\n"
-                               "  filigree sample cube.obj -o points.ply --spacing 0.02 --picture points.png\n"
-                               "  filigree sample open.obj -o points.ply --count 20000 --pattern poisson");
-    command->callback([options, &session] {
-        session.begin();
-        if (!(options->spacing > 0) && !options->count && options->frustum.empty())
-            throw Failure{{ErrorCode::usage, "Say how many points: --spacing S, --count N, or --frustum NX NY NZ."}};
-        if (!options->frustum.empty() && options->pattern != Pattern::lattice)
-            throw Failure{{ErrorCode::usage, "--pattern spreads the points of a lattice; leave --frustum out."}};
-        if (!options->picture.empty() && !options->picture.ends_with(".png"))
-            throw Failure{
-                {ErrorCode::unsupported, options->picture + ": the picture is a PNG; let its name end in .png."}};
-        run_sample(*options, session);
-    });
+Command sample_command() {
+    const auto options = std::make_shared<Options>();
+    return {
+        .name = "sample",
+        .text = "Fill a mesh with points: those of a regular lattice that are inside",
+        .options =
+            OptionList{Option("mesh", options->input, "Mesh").required(),
+                       Option("-o,--output", options->output, "Points, as a mesh file without faces").required()} +
+            point_options(*options) + inside_options(*options) +
+            OptionList{Option("--picture", options->picture, "Also draw the points, and the surface cut open (.png)"),
+                       up_option(options->up, "Which axis is up in the picture (unset: y)")},
+        .examples = "  filigree sample scan.ply -o points.ply --count 100000\n"
+                    "  filigree sample cube.obj -o points.ply --spacing 0.02 --picture points.png\n"
+                    "  filigree sample open.obj -o points.ply --count 20000 --pattern poisson",
+        .run = [options](Session& session) { run(*options, session); }};
 }
 
 } // namespace filigree::cli

@@ -13,6 +13,8 @@
 
 #include <toml++/toml.h>
 
+#include <fmt/format.h>
+
 namespace filigree::cli {
 
 namespace {

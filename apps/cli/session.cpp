@@ -4,13 +4,13 @@
 #include "filigree/io/model_file.h"
 
 #include <algorithm>
-#include <charconv>
 #include <chrono>
-#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <unistd.h>
+
+#include <fmt/format.h>
 
 namespace filigree::cli {
 
@@ -37,11 +37,6 @@ void write_text(const std::string& text) {
 
 /// What messages call a file.
 std::string shown_name(const std::string& path) { return path == "-" ? "standard input" : path; }
-
-bool read_number(const std::string& text, double& number) {
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-    return error == std::errc() && end == text.data() + text.size() && std::isfinite(number);
-}
 
 /// A bar that is drawn over itself, at most ten times a second; in long phases with the time left.
 class ProgressBar {
@@ -100,12 +95,16 @@ double median_seconds(const std::function<void()>& work) {
     return seconds[seconds.size() / 2];
 }
 
-void Session::add_common_options(CLI::App& command, const std::string& examples) {
-    command.add_flag("--json", json, "Print the result as JSON");
-    command.add_option("--threads", threads, "Threads to use; 0 for all (results never depend on it)")
-        ->check(CLI::Range(0, 1024));
-    command.add_flag("--quiet", quiet, "No progress bar, no warnings, no summary of what was written");
-    command.footer("Examples:\n" + examples);
+OptionList Session::common_options() {
+    return {Option("--json", json, "Print the result as JSON"),
+            Option("--threads", threads, "Threads to use; 0 for all (results never depend on it)").between(0, 1024),
+            Option("--quiet", quiet, "No progress bar, no warnings, no summary of what was written")};
+}
+
+std::string Session::first_given(const std::vector<std::string>& options) const {
+    for (const std::string& given : given_)
+        if (std::find(options.begin(), options.end(), given) != options.end()) return given;
+    return "";
 }
 
 void Session::begin() {
@@ -120,6 +119,13 @@ void Session::begin() {
     std::signal(SIGTERM, on_interrupt);
     if (std::signal(SIGHUP, on_interrupt) == SIG_IGN) std::signal(SIGHUP, SIG_IGN); // under nohup
     std::signal(SIGPIPE, SIG_IGN);
+    std::signal(SIGXFSZ, SIG_IGN); // a file that may not grow fails like a full disk, and is removed
+}
+
+RunContext Session::silent_context() const {
+    RunContext silent = context();
+    silent.progress = nullptr;
+    return silent;
 }
 
 void Session::warn(const std::string& sentence) {
@@ -196,7 +202,7 @@ void Session::print(const std::string& text, Json object) {
     if (!wrote_file_ && context().is_cancelled()) throw Failure{cancelled_error()};
     if (!json && quiet && wrote_file_) return;
     object["warnings"] = warnings_;
-    const std::string shown = json ? object.dump(2, ' ', false, Json::error_handler_t::replace) + "\n" : text;
+    const std::string shown = json ? object.text() + "\n" : text;
     if (standard_output_taken_) return write_text(shown);
     if (std::fputs(shown.c_str(), stdout) == EOF || std::fflush(stdout) == EOF)
         throw Failure{{ErrorCode::unwritable,
@@ -211,56 +217,17 @@ void check_second_output(const std::string& option, const std::string& path, con
     if (path != "-") require(mesh_format(path));
 }
 
+void report_mesh_written(const Mesh& mesh, const std::string& path, Report& report) {
+    report.say(fmt::format("{}: {} vertices, {} faces\n", path, with_commas(mesh.vertex_count()),
+                           with_commas(mesh.face_count())));
+    report.set("vertices", mesh.vertex_count());
+    report.set("faces", mesh.face_count());
+}
+
 void say(const std::string& line) { write_text(line + "\n"); }
-
-CLI::Validator finite_number() {
-    return {[](std::string& text) {
-                double number;
-                return read_number(text, number) ? "" : "'" + text + "' is not a number";
-            },
-            ""};
-}
-
-CLI::Validator positive_number() {
-    return {[](std::string& text) {
-                double number;
-                return read_number(text, number) && number > 0 ? "" : "'" + text + "' is not a number above 0";
-            },
-            ""};
-}
-
-CLI::Validator whole_number(std::int64_t least) {
-    return {[least](std::string& text) {
-                std::int64_t number;
-                const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-                const bool is_whole = error == std::errc() && end == text.data() + text.size() && number >= least;
-                return is_whole ? "" : fmt::format("'{}' is not a whole number from {} up", text, least);
-            },
-            ""};
-}
-
-std::string Table::text() const {
-    std::size_t width = 0;
-    for (const auto& [name, value] : rows_) width = std::max(width, name.size());
-    std::string text;
-    for (const auto& [name, value] : rows_) text += fmt::format("{:<{}}  {}\n", name, width, value);
-    return text;
-}
-
-std::string with_commas(std::size_t count) {
-    std::string digits = std::to_string(count);
-    for (std::size_t at = digits.size(); at > 3;) digits.insert(at -= 3, ",");
-    return digits;
-}
 
 std::string distance_text(const MeshDistance& distance, double units) {
     return fmt::format("{:.2e} of the diagonal ({:.3g} units)", distance.relative(units), units);
-}
-
-std::string seconds_text(double seconds) {
-    if (seconds < 1e-3) return fmt::format("{:.3g} us", seconds * 1e6);
-    if (seconds < 1) return fmt::format("{:.3g} ms", seconds * 1e3);
-    return fmt::format("{:.3g} s", seconds);
 }
 
 } // namespace filigree::cli

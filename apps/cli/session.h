@@ -1,6 +1,9 @@
 // What every command shares: its common options, reading and writing, warnings, progress, output.
 #pragma once
 
+#include "options.h"
+#include "report.h"
+
 #include "filigree/core/result.h"
 #include "filigree/core/run_context.h"
 #include "filigree/hierarchy/model.h"
@@ -10,18 +13,12 @@
 #include "filigree/mesh/mesh_distance.h"
 
 #include <functional>
-#include <map>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-#include <fmt/format.h>
-#include <nlohmann/json.hpp>
-
 namespace filigree::cli {
-
-using Json = nlohmann::ordered_json;
 
 /// An Error on its way to main, which prints it and leaves with its code.
 struct Failure {
@@ -41,12 +38,19 @@ public:
     bool json = false, quiet = false;
     unsigned threads = 0;
 
-    /// Adds --json, --threads and --quiet, and a footer with examples.
-    void add_common_options(CLI::App& command, const std::string& examples);
+    /// --json, --threads and --quiet.
+    OptionList common_options();
+    /// Tells that an option was given, by its long name.
+    void note_given(const std::string& option) { given_.push_back(option); }
+    /// The first of these options that was given, as the command's table orders them; empty: none was.
+    std::string first_given(const std::vector<std::string>& options) const;
+
     /// Makes the context when the options are known; from here on Ctrl-C and its like (SIGTERM, SIGHUP) cancel, and a
     /// reader that has gone away is an error like any other.
     void begin();
     const RunContext& context() const { return *context_; }
+    /// The same without progress, for parts of a work whose whole is shown.
+    RunContext silent_context() const;
 
     Mesh read_mesh(const std::string& path);
     /// poses: where to put the model's own; null: not wanted.
@@ -69,8 +73,9 @@ public:
     /// Goes to stderr at once, unless quiet, and into the JSON; a sentence that was said is not said again.
     void warn(const std::string& sentence);
 
-    /// The result: `text` for people, or with --json `object` with the warnings added. Standard output, unless a mesh
-    /// or a model went there. With --quiet a text that only tells of a file written is left out.
+    /// The result: the table for people, or with --json the values with the warnings added. Standard output, unless a
+    /// mesh or a model went there. With --quiet a table that only tells of a file written is left out.
+    void print(const Report& report) { print(report.text(), report.json()); }
     void print(const std::string& text, Json object);
 
 private:
@@ -78,50 +83,23 @@ private:
     Mesh parse_mesh(const std::string& bytes, const std::string& path);
 
     std::optional<RunContext> context_;
-    std::vector<std::string> warnings_;
+    std::vector<std::string> warnings_, given_;
     bool wrote_file_ = false;
     bool standard_output_taken_ = false; ///< by a mesh or a model
 };
-
-/// An option that is one of a few words, each of which stands for a value.
-template <class T>
-CLI::Option* add_choice(CLI::App& command, const std::string& name, const std::map<std::string, T>& choices,
-                        std::function<void(T)> set, const std::string& text) {
-    return command
-        .add_option_function<std::string>(
-            name, [choices, set](const std::string& word) { set(choices.at(word)); }, text)
-        ->check(CLI::IsMember(choices))
-        ->type_name("WORD");
-}
-
-/// Checks of an option's number, by rules that are the same in every locale.
-CLI::Validator finite_number();
-CLI::Validator positive_number();
-CLI::Validator whole_number(std::int64_t least);
 
 /// Refuses, before any work, a second output (`option`; empty: none) that goes where the first goes, or has no format
 /// that we know.
 void check_second_output(const std::string& option, const std::string& path, const std::string& first);
 
+/// "x.ply: 8 vertices, 6 faces", and the counts.
+void report_mesh_written(const Mesh& mesh, const std::string& path, Report& report);
+
 /// A line on stderr.
 void say(const std::string& line);
 
-/// Lines "name   value" with the values in one column.
-class Table {
-public:
-    void row(std::string name, std::string value) { rows_.emplace_back(std::move(name), std::move(value)); }
-    std::string text() const;
-
-private:
-    std::vector<std::pair<std::string, std::string>> rows_;
-};
-
-/// 1234567 as "1,234,567".
-std::string with_commas(std::size_t count);
 /// "3.2e-05 of the diagonal (0.0012 units)".
 std::string distance_text(const MeshDistance& distance, double units);
-/// Seconds with three digits that matter.
-std::string seconds_text(double seconds);
 
 double now_seconds(); ///< a monotonic clock
 /// Median seconds of a call: at least five, for about 0.4 seconds.
@@ -131,20 +109,20 @@ double median_seconds(const std::function<void()>& work);
 constexpr std::size_t wavy_cube_vertices(std::size_t resolution) { return 6 * resolution * resolution + 2; }
 
 // One command each, in the file of its name.
-void add_make(CLI::App& app, Session& session);
-void add_info(CLI::App& app, Session& session);
-void add_remesh(CLI::App& app, Session& session);
-void add_strip(CLI::App& app, Session& session);
-void add_level(CLI::App& app, Session& session);
-void add_deform(CLI::App& app, Session& session);
-void add_restore(CLI::App& app, Session& session);
-void add_compare(CLI::App& app, Session& session);
-void add_bench(CLI::App& app, Session& session);
-void add_demo(CLI::App& app, Session& session);
-void add_render(CLI::App& app, Session& session);
-void add_sample(CLI::App& app, Session& session);
-void add_simulate(CLI::App& app, Session& session);
-void add_figures(CLI::App& app, Session& session);
-void add_export(CLI::App& app, Session& session);
+Command make_command();
+Command info_command();
+Command remesh_command();
+Command strip_command();
+Command level_command();
+Command deform_command();
+Command restore_command();
+Command compare_command();
+Command bench_command();
+Command demo_command();
+Command render_command();
+Command sample_command();
+Command simulate_command();
+Command export_command();
+Command figures_command();
 
 } // namespace filigree::cli

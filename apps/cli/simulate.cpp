@@ -11,6 +11,8 @@
 #include <filesystem>
 #include <numbers>
 
+#include <fmt/format.h>
+
 namespace filigree::cli {
 
 namespace {
@@ -200,11 +202,12 @@ private:
     void write_animations() {
         for (const std::string& path : outputs_.animations)
             for (std::size_t b = 0; b < ready_.bodies.size(); ++b) {
-                Json json;
+                Report report;
                 write_animation_output(ready_.bodies[b].model, stream_of(recording_.poses[b]), {}, options_.animation,
                                        model_path(path, ready_.bodies.size(), ready_.bodies[b].name),
-                                       scene_.bodies[b].mesh, session_, animation_rows_, json);
-                animations_.push_back(json);
+                                       scene_.bodies[b].mesh, session_, report);
+                animation_rows_.append(report.table());
+                animations_.push_back(report.json());
             }
     }
     void open_outputs() {
@@ -503,11 +506,11 @@ void Run::report() const {
                               "95 % of normals within {:.3g} degrees (worst frame {:.3g})",
                               check.rms_sum / frames, check.worst_rms, check.worst_max, check.p95_sum / frames,
                               check.worst_p95));
-        json["bodies"][b]["check"] = {{"rms_mean", check.rms_sum / frames},
-                                      {"rms_worst", check.worst_rms},
-                                      {"max_worst", check.worst_max},
-                                      {"normal_p95_deg_mean", check.p95_sum / frames},
-                                      {"normal_p95_deg_worst", check.worst_p95}};
+        json["bodies"].at(b)["check"] = {{"rms_mean", check.rms_sum / frames},
+                                         {"rms_worst", check.worst_rms},
+                                         {"max_worst", check.worst_max},
+                                         {"normal_p95_deg_mean", check.p95_sum / frames},
+                                         {"normal_p95_deg_worst", check.worst_p95}};
     }
     if (!recording_.checks.empty() && t.frames) {
         const double ratio = direct / (t.coupling_seconds + t.restore_seconds);
@@ -525,7 +528,7 @@ void Run::report() const {
     session_.print(table.text() + animation_rows_.text(), json);
 }
 
-void check(const Options& options) {
+void check(const Options& options, const Session& session) {
     std::error_code ignored;
     const fs::path folder = fs::path(options.save).parent_path();
     if (fs::is_directory(options.save, ignored) || (!folder.empty() && !fs::is_directory(folder, ignored)))
@@ -535,49 +538,49 @@ void check(const Options& options) {
         refuse("Say where the motion goes: -o OUT.fil, -o OUT.glb, -o OUT.pc2, -o FILM.mp4 or -o FOLDER/; or give "
                "--save or "
                "--check.");
-    check_animation_options(options.animation, options.outputs);
+    check_animation_options(options.outputs, session);
     if (options.stop_at && options.save.empty())
         refuse("--stop-at stops a run that goes on later; say where with --save.");
 }
 
+void run(const Options& options, Session& session) {
+    if (options.keys) return session.print(scene_manual(), {{"manual", scene_manual()}});
+    check(options, session);
+    Run run(options, session);
+    run.simulate();
+    run.write();
+    run.report();
+}
+
 } // namespace
 
-void add_simulate(CLI::App& app, Session& session) {
-    auto options = std::make_shared<Options>();
-    CLI::App* command =
-        app.add_subcommand("simulate", "Let the bodies of a scene move: a film, a model with poses, or meshes");
-    command->add_option("scene", options->scene, "Scene (.toml), see docs/scenes.md");
-    command
-        ->add_option(
-            "-o,--output", options->outputs,
-            "A model with its poses (.fil), a film (.mp4, .gif, NAME_%04d.png), the detailed mesh moving (.glb, .pc2, "
-            ".mdd, .usda), or a folder of meshes (NAME/); may come several times")
-        ->allow_extra_args(false);
-    command->add_option("--frames", options->frames, "Frames to compute (unset: as the scene says)")
-        ->check(whole_number(1));
-    command->add_flag("--check", options->check,
-                      "Also carry every vertex by the particles, and say how far the restored mesh is from that");
-    command->add_option("--stop-at", options->stop_at, "Stop after this frame, to go on later; with --save")
-        ->check(whole_number(1));
-    command->add_option("--save", options->save, "Write the state at the end, or when cancelled, to go on from");
-    command->add_option("--resume", options->resume, "Go on from a state that --save wrote");
-    add_animation_options(*command, options->animation);
-    command->add_flag("--keys", options->keys, "Print every key that a scene can have, and the materials");
-    session.add_common_options(*command, "  filigree simulate bounce.toml -o bounce.mp4 -o bounce.fil\n"
-                                         "  filigree simulate bounce.toml -o bounce.glb -o bounce.pc2\n"
-                                         "  filigree simulate bounce.toml -o meshes/ --frames 60 --check\n"
-                                         "  filigree simulate long.toml --save state --stop-at 100\n"
-                                         "  filigree simulate long.toml --resume state -o long.mp4\n"
-                                         "  filigree simulate --keys");
-    command->callback([options, &session] {
-        session.begin();
-        if (options->keys) return session.print(scene_manual(), {{"manual", scene_manual()}});
-        check(*options);
-        Run run(*options, session);
-        run.simulate();
-        run.write();
-        run.report();
-    });
+Command simulate_command() {
+    const auto options = std::make_shared<Options>();
+    return {.name = "simulate",
+            .text = "Let the bodies of a scene move: a film, a model with poses, or meshes",
+            .options =
+                OptionList{
+                    Option("scene", options->scene, "Scene (.toml), see docs/scenes.md"),
+                    Option("-o,--output", options->outputs,
+                           "A model with its poses (.fil), a film (.mp4, .gif, NAME_%04d.png), the detailed mesh "
+                           "moving (.glb, .pc2, .mdd, .usda), or a folder of meshes (NAME/); may come several times")
+                        .one_at_a_time(),
+                    Option("--frames", options->frames, "Frames to compute (unset: as the scene says)").whole_from(1),
+                    Option("--check", options->check,
+                           "Also carry every vertex by the particles, and say how far the restored mesh is from that"),
+                    Option("--stop-at", options->stop_at, "Stop after this frame, to go on later; with --save")
+                        .whole_from(1),
+                    Option("--save", options->save, "Write the state at the end, or when cancelled, to go on from"),
+                    Option("--resume", options->resume, "Go on from a state that --save wrote")} +
+                animation_options(options->animation) +
+                OptionList{Option("--keys", options->keys, "Print every key that a scene can have, and the materials")},
+            .examples = "  filigree simulate bounce.toml -o bounce.mp4 -o bounce.fil\n"
+                        "  filigree simulate bounce.toml -o bounce.glb -o bounce.pc2\n"
+                        "  filigree simulate bounce.toml -o meshes/ --frames 60 --check\n"
+                        "  filigree simulate long.toml --save state --stop-at 100\n"
+                        "  filigree simulate long.toml --resume state -o long.mp4\n"
+                        "  filigree simulate --keys",
+            .run = [options](Session& session) { run(*options, session); }};
 }
 
 } // namespace filigree::cli

@@ -11,6 +11,8 @@
 #include <cmath>
 #include <numbers>
 
+#include <fmt/format.h>
+
 namespace filigree::cli {
 
 namespace {
@@ -348,7 +350,7 @@ public:
         }
     }
 
-    std::vector<Figure> take() { return std::move(figures_); }
+    std::vector<BenchFigure> take() { return std::move(figures_); }
 
 private:
     void add(const std::string& name, double value, std::string unit) {
@@ -428,13 +430,13 @@ private:
     SimulateBenchOptions options_;
     const RunContext& context_;
     RunContext one_thread_{1};
-    std::vector<Figure> figures_;
+    std::vector<BenchFigure> figures_;
 };
 
 } // namespace
 
-std::vector<Figure> measure_simulation(const Mesh& mesh, const SimulateBenchOptions& options,
-                                       const RunContext& context) {
+std::vector<BenchFigure> measure_simulation(const Mesh& mesh, const SimulateBenchOptions& options,
+                                            const RunContext& context) {
     SimulateBench bench(options, context);
     bench.elastic();
     bench.swings();

@@ -11,7 +11,7 @@
 
 namespace filigree::cli {
 
-struct Figure {
+struct BenchFigure {
     std::string name;
     double value;
     std::string unit;
@@ -24,7 +24,7 @@ struct SimulateBenchOptions {
 
 /// Times are the least of a few runs of the same bytes, frame by frame. With several threads, their gain over one and
 /// the number of bytes in which the final states differ are measured as well. When cancelled, the figures so far.
-std::vector<Figure> measure_simulation(const Mesh& mesh, const SimulateBenchOptions& options,
-                                       const RunContext& context);
+std::vector<BenchFigure> measure_simulation(const Mesh& mesh, const SimulateBenchOptions& options,
+                                            const RunContext& context);
 
 } // namespace filigree::cli

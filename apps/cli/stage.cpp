@@ -16,6 +16,15 @@ Picture Stage::take(const Scene& scene, const Camera& camera, const PictureOptio
     return require(renderer_.picture(scene, camera, options, session_.context()));
 }
 
+Option up_option(UpAxis& up, const std::string& text) {
+    return choice<UpAxis>("--up", up, {{"x", UpAxis::x}, {"y", UpAxis::y}, {"z", UpAxis::z}}, text);
+}
+
+Option view_option(View& view, const std::string& text) {
+    return choice<View>("--view", view,
+                        {{"front", View::front}, {"side", View::side}, {"top", View::top}, {"iso", View::iso}}, text);
+}
+
 SurfaceMaterials load_materials(const Mesh& mesh, const std::string& path, Session& session) {
     SurfaceMaterials loaded = load_surface_materials(mesh, path);
     for (const std::string& warning : loaded.warnings) session.warn(warning);

@@ -25,6 +25,10 @@ private:
     Renderer renderer_;
 };
 
+/// --up and --view.
+Option up_option(UpAxis& up, const std::string& text);
+Option view_option(View& view, const std::string& text);
+
 /// As load_surface_materials; its warnings are said.
 SurfaceMaterials load_materials(const Mesh& mesh, const std::string& path, Session& session);
 

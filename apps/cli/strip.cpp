@@ -4,9 +4,20 @@
 
 #include <filesystem>
 
+#include <fmt/format.h>
+
 namespace filigree::cli {
 
 namespace {
+
+struct StripCommandOptions {
+    std::string input, output;
+    StripOptions strip;
+};
+
+struct StripSeconds {
+    double read, strip, write;
+};
 
 /// A model under a mesh's name is a slip, and could be the end of the mesh.
 void refuse_mesh_name(const std::string& path) {
@@ -15,96 +26,92 @@ void refuse_mesh_name(const std::string& path) {
                                              std::filesystem::path(path).stem().string() + ".fil."}};
 }
 
+/// Counts of what did not go as hoped: a row where there is any.
+void report_doubts(const StripReport& strip, Report& report) {
+    const auto add = [&](const char* title, const char* key, std::size_t count, const char* note) {
+        if (count > 0) report.row(title, with_commas(count) + note);
+        report.set(key, count);
+    };
+    add("vertices at one place", "welded_vertices", strip.welded_vertices, "");
+    add("forced collapses", "forced_collapses", strip.forced_collapses, " (scraps and handles dropped)");
+    add("bound across gaps", "across_gap", strip.across_gap, " (parts without a driver of their own)");
+    add("bound facing away", "facing_away", strip.facing_away, "");
+}
+
+Report make_report(const Stripped& stripped, const std::string& output, const StripSeconds& seconds) {
+    const Model& model = stripped.model;
+    const StripReport& strip = stripped.report;
+    const Level& driver = model.driver();
+    Json levels = Json::array();
+    for (const Level& level : model.levels) levels.push_back(level.vertices.size());
+
+    Report report;
+    report.set("output", output);
+    report.count("vertices", "vertices", model.mesh.vertex_count());
+    report.row("driver", fmt::format("{} vertices, {} faces", with_commas(driver.vertices.size()),
+                                     with_commas(driver.face_count())));
+    report.set("driver_vertices", driver.vertices.size());
+    report.set("driver_faces", driver.face_count());
+    report.add("levels", fmt::format("{} + the finest", model.levels.size()), "levels", levels);
+    report_doubts(strip, report);
+    report.set("simplify_error", strip.simplify_error);
+    report.set("simplify_error_units", strip.simplify_error * world_bounds(model.mesh).diagonal());
+    report.add("seconds",
+               fmt::format("{:.3f} read, {:.3f} simplify, {:.3f} bind, {:.3f} encode, {:.3f} write", seconds.read,
+                           strip.simplify_seconds, strip.bind_seconds, strip.encode_seconds, seconds.write),
+               "seconds",
+               {{"read", seconds.read},
+                {"simplify", strip.simplify_seconds},
+                {"bind", strip.bind_seconds},
+                {"encode", strip.encode_seconds},
+                {"strip", seconds.strip},
+                {"write", seconds.write}});
+    return report;
+}
+
+void run(const StripCommandOptions& options, Session& session) {
+    refuse_mesh_name(options.output);
+    const double start = now_seconds();
+    Mesh mesh = session.read_mesh(options.input);
+    const double read = now_seconds();
+    const Stripped stripped = require(strip(std::move(mesh), options.strip, session.context()));
+    const double done = now_seconds();
+    session.write_model(stripped.model, options.output);
+    session.print(make_report(stripped, options.output, {read - start, done - read, now_seconds() - done}));
+}
+
 } // namespace
 
-void add_strip(CLI::App& app, Session& session) {
-    struct Options {
-        std::string input, output;
-        StripOptions strip;
-    };
-    auto options = std::make_shared<Options>();
-    CLI::App* command = app.add_subcommand("strip", "Take the detail off a mesh: make a model with a light driver");
-    command->add_option("mesh", options->input, "Mesh to strip")->required();
-    command->add_option("-o,--output", options->output, "Model file to write (.fil)")->required();
-    StripOptions& strip_options = options->strip;
-    auto* base =
-        command
-            ->add_option("--base", strip_options.base, "Vertices of the driver (unset: 1,000, fewer for small meshes)")
-            ->check(whole_number(3));
-    auto* levels =
-        command->add_option("--levels", strip_options.levels, "Levels to remove, each leaves a quarter of the vertices")
-            ->check(whole_number(1));
-    auto* error = command
-                      ->add_option("--error", strip_options.error,
-                                   "How far the driver may leave the mesh (rms), fraction of the diagonal")
-                      ->check(positive_number());
-    base->excludes(levels)->excludes(error);
-    levels->excludes(error);
-    add_choice<DetailCode>(
-        *command, "--code", {{"blend", DetailCode::blend}, {"reference", DetailCode::reference}},
-        [options](DetailCode code) { options->strip.code = code; },
-        "blend: any mesh (default); reference: the report's, for regular quads");
-    add_choice<Precision>(
-        *command, "--precision", {{"float", Precision::float32}, {"int16", Precision::int16}},
-        [options](Precision precision) { options->strip.precision = precision; },
-        "Of the blend code: float, 20 bytes a vertex (default), or int16, 10 bytes");
-    command
-        ->add_option("--references", strip_options.references,
-                     "Of the reference code: coarse points that a point refers to")
-        ->check(CLI::IsMember({3, 4, 6}))
-        ->capture_default_str();
-    session.add_common_options(*command, "  filigree strip scan.ply -o scan.fil\n"
-                                         "  filigree strip scan.ply -o scan.fil --base 5000 --precision int16\n"
-                                         "  filigree strip cube.obj -o cube.fil --code reference");
-    command->callback([options, &session] {
-        session.begin();
-        refuse_mesh_name(options->output);
-        const double start = now_seconds();
-        Mesh mesh = session.read_mesh(options->input);
-        const double read = now_seconds();
-        const Stripped stripped = require(strip(std::move(mesh), options->strip, session.context()));
-        const double stripped_at = now_seconds();
-        session.write_model(stripped.model, options->output);
-        const double write_seconds = now_seconds() - stripped_at;
-        const Model& model = stripped.model;
-        const StripReport& report = stripped.report;
-
-        Table table;
-        Json levels_json = Json::array();
-        table.row("vertices", with_commas(model.mesh.vertex_count()));
-        for (const Level& level : model.levels) levels_json.push_back(level.vertices.size());
-        table.row("driver", fmt::format("{} vertices, {} faces", with_commas(model.driver().vertices.size()),
-                                        with_commas(model.driver().face_count())));
-        table.row("levels", fmt::format("{} + the finest", model.levels.size()));
-        if (report.welded_vertices) table.row("vertices at one place", with_commas(report.welded_vertices));
-        if (report.forced_collapses)
-            table.row("forced collapses", with_commas(report.forced_collapses) + " (scraps and handles dropped)");
-        if (report.across_gap)
-            table.row("bound across gaps", with_commas(report.across_gap) + " (parts without a driver of their own)");
-        if (report.facing_away) table.row("bound facing away", with_commas(report.facing_away));
-        table.row("seconds",
-                  fmt::format("{:.3f} read, {:.3f} simplify, {:.3f} bind, {:.3f} encode, {:.3f} write", read - start,
-                              report.simplify_seconds, report.bind_seconds, report.encode_seconds, write_seconds));
-        session.print(table.text(),
-                      {{"output", options->output},
-                       {"vertices", model.mesh.vertex_count()},
-                       {"driver_vertices", model.driver().vertices.size()},
-                       {"driver_faces", model.driver().face_count()},
-                       {"levels", levels_json},
-                       {"welded_vertices", report.welded_vertices},
-                       {"forced_collapses", report.forced_collapses},
-                       {"across_gap", report.across_gap},
-                       {"facing_away", report.facing_away},
-                       {"simplify_error", report.simplify_error},
-                       {"simplify_error_units", report.simplify_error * world_bounds(model.mesh).diagonal()},
-                       {"seconds",
-                        {{"read", read - start},
-                         {"simplify", report.simplify_seconds},
-                         {"bind", report.bind_seconds},
-                         {"encode", report.encode_seconds},
-                         {"strip", stripped_at - read},
-                         {"write", write_seconds}}}});
-    });
+Command strip_command() {
+    const auto options = std::make_shared<StripCommandOptions>();
+    StripOptions& strip = options->strip;
+    return {.name = "strip",
+            .text = "Take the detail off a mesh: make a model with a light driver",
+            .options = {Option("mesh", options->input, "Mesh to strip").required(),
+                        Option("-o,--output", options->output, "Model file to write (.fil)").required(),
+                        Option("--base", strip.base, "Vertices of the driver (unset: 1,000, fewer for small meshes)")
+                            .whole_from(3)
+                            .excludes({"--levels", "--error"}),
+                        Option("--levels", strip.levels, "Levels to remove, each leaves a quarter of the vertices")
+                            .whole_from(1)
+                            .excludes({"--error"}),
+                        Option("--error", strip.error,
+                               "How far the driver may leave the mesh (rms), fraction of the diagonal")
+                            .above_zero(),
+                        choice<DetailCode>("--code", strip.code,
+                                           {{"blend", DetailCode::blend}, {"reference", DetailCode::reference}},
+                                           "blend: any mesh (default); reference: the report's, for regular quads"),
+                        choice<Precision>("--precision", strip.precision,
+                                          {{"float", Precision::float32}, {"int16", Precision::int16}},
+                                          "Of the blend code: float, 20 bytes a vertex (default), or int16, 10 bytes"),
+                        Option("--references", strip.references,
+                               "Of the reference code: coarse points that a point refers to")
+                            .one_of({3, 4, 6})
+                            .with_default()},
+            .examples = "  filigree strip scan.ply -o scan.fil\n"
+                        "  filigree strip scan.ply -o scan.fil --base 5000 --precision int16\n"
+                        "  filigree strip cube.obj -o cube.fil --code reference",
+            .run = [options](Session& session) { run(*options, session); }};
 }
 
 } // namespace filigree::cli
