@@ -1,6 +1,6 @@
 // The fem material: cells a second for forces and for descent sweeps, against a plain loop of the same formulas.
 // One thread counts processor time, two count the clock's; items are cells.
-#include "cell_forces.h"
+#include "interactive/cell_forces.h"
 
 #include <benchmark/benchmark.h>
 #include <map>

@@ -1,6 +1,6 @@
 // Restoring, against the streaming triad of the same run: both are bound by memory, so the fraction says how much of
 // the machine the restore uses. Counters: vertices/s, bytes moved a vertex, fraction of the triad.
-#include "triad.h"
+#include "interactive/triad.h"
 
 #include "filigree/hierarchy/strip.h"
 #include "filigree/mesh/shapes.h"

@@ -7,6 +7,8 @@
 #include "filigree/mesh/mesh_distance.h"
 #include "filigree/mesh/shapes.h"
 
+#include "interactive/timing.h"
+
 #include <fmt/format.h>
 
 namespace filigree::cli {
@@ -60,7 +62,7 @@ void run_demo(const std::string& input, const std::string& folder, bool pictures
     const auto warp = bend_and_twist(world_bounds(mesh));
     Mesh full = mesh;
     const double full_seconds =
-        median_seconds([&] { full.positions = warp_positions(*warp, mesh.positions, mesh.origin, context); });
+        bench::median_seconds([&] { full.positions = warp_positions(*warp, mesh.positions, mesh.origin, context); });
     full = mesh;
     warp_mesh(*warp, full, context);
 
@@ -68,9 +70,10 @@ void run_demo(const std::string& input, const std::string& folder, bool pictures
     const Restorer restorer = require(Restorer::create(model, {}, context));
     Pose pose;
     const double driver_seconds =
-        median_seconds([&] { pose = warp_pose(*warp, driver_positions(model), model.mesh.origin, context); });
+        bench::median_seconds([&] { pose = warp_pose(*warp, driver_positions(model), model.mesh.origin, context); });
     std::vector<Vec3f> positions(mesh.vertex_count());
-    const double restore_seconds = median_seconds([&] { require(restorer.positions(pose, positions, context)); });
+    const double restore_seconds =
+        bench::median_seconds([&] { require(restorer.positions(pose, positions, context)); });
     const Mesh restored = require(restorer.mesh(pose, context));
     const MeshDistance with_gradients = require(mesh_distance(restored, full, 0, context));
     const Mesh from_positions = require(restorer.mesh({pose.positions, {}, {}}, context));

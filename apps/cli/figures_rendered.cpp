@@ -1,5 +1,4 @@
 // Figures 2.1, 2.5, 2.9, 2.10, 3.1 and our own: meshes as the renderer draws them.
-#include "fidelity.h"
 #include "figures.h"
 #include "figures_layout.h"
 #include "stage.h"
@@ -10,6 +9,8 @@
 #include "filigree/mesh/mesh_distance.h"
 #include "filigree/mesh/shapes.h"
 #include "filigree/sample/sample_inside.h"
+
+#include "interactive/fidelity.h"
 
 #include <algorithm>
 #include <cmath>
@@ -366,7 +367,7 @@ Figure draw_fidelity(FigureRenderer& renderer) {
     const Restorer blend_restorer = require(Restorer::create(blend, {}, context));
     const std::pair<const char*, std::vector<Vec3f>> methods[] = {
         {"reference code", require(reference_restorer.positions(reference_pose, context))},
-        {"wrap deformer", wrap_positions(blend, blend_pose, context)},
+        {"wrap deformer", bench::wrap_positions(blend, blend_pose, context)},
         {"blend code", require(blend_restorer.positions(blend_pose, context))}};
 
     Page page = captioned_page(

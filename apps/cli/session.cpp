@@ -83,18 +83,6 @@ double now_seconds() {
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-double median_seconds(const std::function<void()>& work) {
-    std::vector<double> seconds;
-    const double start = now_seconds();
-    while (seconds.size() < 5 || (now_seconds() - start < 0.4 && seconds.size() < 1000)) {
-        const double begin = now_seconds();
-        work();
-        seconds.push_back(now_seconds() - begin);
-    }
-    std::nth_element(seconds.begin(), seconds.begin() + std::ptrdiff_t(seconds.size() / 2), seconds.end());
-    return seconds[seconds.size() / 2];
-}
-
 OptionList Session::common_options() {
     return {Option("--json", json, "Print the result as JSON"),
             Option("--threads", threads, "Threads to use; 0 for all (results never depend on it)").between(0, 1024),

@@ -102,8 +102,6 @@ void say(const std::string& line);
 std::string distance_text(const MeshDistance& distance, double units);
 
 double now_seconds(); ///< a monotonic clock
-/// Median seconds of a call: at least five, for about 0.4 seconds.
-double median_seconds(const std::function<void()>& work);
 
 /// Vertices of make_wavy_cube with so many quads along a side.
 constexpr std::size_t wavy_cube_vertices(std::size_t resolution) { return 6 * resolution * resolution + 2; }

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace filigree::cli {
+namespace filigree::bench {
 
 /// One method under one warp, against warping every vertex.
 struct FidelityRow {
@@ -31,4 +31,4 @@ std::vector<FidelityRow> measure_fidelity(const Model& model, const Model* refer
 std::vector<Vec3f> wrap_positions(const Model& model, const Pose& pose, const RunContext& context);
 std::vector<FidelitySummary> summarise(const std::vector<FidelityRow>& rows);
 
-} // namespace filigree::cli
+} // namespace filigree::bench

@@ -1,21 +1,15 @@
 // What bodies cost, and how near they come: the part of `filigree bench` about physics.
 #pragma once
 
-#include "filigree/mesh/mesh.h"
+#include "measurement.h"
 
 #include "filigree/core/run_context.h"
+#include "filigree/mesh/mesh.h"
 
 #include <optional>
-#include <string>
 #include <vector>
 
-namespace filigree::cli {
-
-struct BenchFigure {
-    std::string name;
-    double value;
-    std::string unit;
-};
+namespace filigree::bench {
 
 struct SimulateBenchOptions {
     std::size_t particles = 0;            ///< of every body; 0: the sizes of docs/benchmarks.md
@@ -24,7 +18,7 @@ struct SimulateBenchOptions {
 
 /// Times are the least of a few runs of the same bytes, frame by frame. With several threads, their gain over one and
 /// the number of bytes in which the final states differ are measured as well. When cancelled, the figures so far.
-std::vector<BenchFigure> measure_simulation(const Mesh& mesh, const SimulateBenchOptions& options,
+std::vector<Measurement> measure_simulation(const Mesh& mesh, const SimulateBenchOptions& options,
                                             const RunContext& context);
 
-} // namespace filigree::cli
+} // namespace filigree::bench

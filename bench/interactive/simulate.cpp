@@ -1,7 +1,7 @@
-#include "simulate_bench.h"
+#include "simulate.h"
 
 #include "cell_forces.h"
-#include "session.h"
+#include "timing.h"
 
 #include "filigree/hierarchy/restore.h"
 #include "filigree/hierarchy/strip.h"
@@ -13,7 +13,7 @@
 
 #include <fmt/format.h>
 
-namespace filigree::cli {
+namespace filigree::bench {
 
 namespace {
 
@@ -24,18 +24,6 @@ constexpr double kDropHeight = 0.3;    // m
 constexpr double kYoung = 1e6, kSoftYoung = 1e5;
 
 using Corners = std::array<std::size_t, 3>;
-
-/// Seconds of one call at its quickest: what the machine can do when nothing else wants it.
-double least_seconds(const std::function<void()>& work) {
-    double least = std::numeric_limits<double>::infinity();
-    const double start = now_seconds();
-    for (int call = 0; call < 5 || now_seconds() - start < 0.2; ++call) {
-        const double begin = now_seconds();
-        work();
-        least = std::min(least, now_seconds() - begin);
-    }
-    return least;
-}
 
 /// Of one frame, s.
 struct Phases {
@@ -88,12 +76,12 @@ struct Timing {
 
 void time_run(const Scene& scene, const RunContext& context, Follower* follower, Timing& timing) {
     const bool is_first = timing.frames.empty();
-    Simulation simulation = require(Simulation::create(scene.world, {scene.actor}, scene.step, context));
+    Simulation simulation = Simulation::create(scene.world, {scene.actor}, scene.step, context).value();
     if (follower) follower->start(simulation, context);
     for (std::size_t frame = 0; frame < scene.frames; ++frame) {
         Phases phases;
         const double begin = now_seconds();
-        const FrameReport report = require(simulation.advance(context));
+        const FrameReport report = simulation.advance(context).value();
         phases.elastic = report.elastic_seconds;
         phases.contacts = report.contact_seconds;
         phases.other = now_seconds() - begin - phases.elastic - phases.contacts;
@@ -143,10 +131,10 @@ Scene swing(const Corners& particles, MaterialModel model, double young_modulus)
 }
 
 std::vector<Vectors> positions_of_frames(const Scene& scene, std::size_t steps_a_frame, const RunContext& context) {
-    Simulation simulation = require(Simulation::create(scene.world, {scene.actor}, scene.step, context));
+    Simulation simulation = Simulation::create(scene.world, {scene.actor}, scene.step, context).value();
     std::vector<Vectors> frames;
     for (std::size_t frame = 0; frame < scene.frames; ++frame) {
-        for (std::size_t step = 0; step < steps_a_frame; ++step) require(simulation.advance(context));
+        for (std::size_t step = 0; step < steps_a_frame; ++step) simulation.advance(context).value();
         frames.push_back(simulation.positions(0));
     }
     return frames;
@@ -175,7 +163,7 @@ double error_of_steps(const Scene& scene, double substeps, const RunContext& con
 class DetailFollower : public Follower {
 public:
     DetailFollower(const Model& model, double scale, const RunContext& context)
-        : model_(model), scale_(scale), restorer_(require(Restorer::create(model, {}, context))) {
+        : model_(model), scale_(scale), restorer_(Restorer::create(model, {}, context).value()) {
         pose_.positions.resize(model.driver().vertices.size());
         pose_.gradients.resize(pose_.positions.size());
         restored_.resize(model.mesh.vertex_count());
@@ -198,7 +186,7 @@ public:
         simulation.attached(driver_, pose_.positions, pose_.gradients, context);
         for (Mat3f& gradient : pose_.gradients) gradient *= float(scale_);
         const double moved = now_seconds();
-        require(restorer_.positions(pose_, restored_, context));
+        restorer_.positions(pose_, restored_, context).value();
         phases.coupling = moved - begin;
         phases.restore = now_seconds() - moved;
         if (frame_++ % kCheckEvery != 0) return;
@@ -330,7 +318,7 @@ public:
     /// The mesh, a metre long, dropped on the ground with all its detail.
     void fall(const Mesh& mesh) {
         Mesh copy = mesh;
-        const Model model = require(strip(std::move(copy), {.base = options_.base.value_or(1000)}, context_)).model;
+        const Model model = strip(std::move(copy), {.base = options_.base.value_or(1000)}, context_).value().model;
         for (const double young_modulus : {kYoung, kSoftYoung}) {
             const std::string name = young_modulus == kYoung ? "fall" : "fall_soft";
             const Box box = world_bounds(mesh);
@@ -340,7 +328,7 @@ public:
             Material material;
             material.young_modulus = young_modulus;
             Scene scene;
-            scene.actor.body = std::make_shared<Body>(require(make_body(mesh, material, body, context_)));
+            scene.actor.body = std::make_shared<Body>(make_body(mesh, material, body, context_).value());
             scene.actor.placement.translation() = Vec3d(0, kDropHeight - (box.min - mesh.origin).y() * body.scale, 0);
             scene.world.obstacles.emplace_back().shape = HalfSpace{};
             scene.frames = kFallFrames;
@@ -350,7 +338,7 @@ public:
         }
     }
 
-    std::vector<BenchFigure> take() { return std::move(figures_); }
+    std::vector<Measurement> take() { return std::move(figures_); }
 
 private:
     void add(const std::string& name, double value, std::string unit) {
@@ -430,12 +418,12 @@ private:
     SimulateBenchOptions options_;
     const RunContext& context_;
     RunContext one_thread_{1};
-    std::vector<BenchFigure> figures_;
+    std::vector<Measurement> figures_;
 };
 
 } // namespace
 
-std::vector<BenchFigure> measure_simulation(const Mesh& mesh, const SimulateBenchOptions& options,
+std::vector<Measurement> measure_simulation(const Mesh& mesh, const SimulateBenchOptions& options,
                                             const RunContext& context) {
     SimulateBench bench(options, context);
     bench.elastic();
@@ -446,4 +434,4 @@ std::vector<BenchFigure> measure_simulation(const Mesh& mesh, const SimulateBenc
     return bench.take();
 }
 
-} // namespace filigree::cli
+} // namespace filigree::bench

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <functional>
 
-namespace filigree::cli {
+namespace filigree::bench {
 
 namespace {
 
@@ -182,4 +182,4 @@ std::vector<FidelitySummary> summarise(const std::vector<FidelityRow>& rows) {
     return summaries;
 }
 
-} // namespace filigree::cli
+} // namespace filigree::bench
