@@ -93,10 +93,11 @@ void add(CLI::App& app, const Command& command, const OptionList& options, Sessi
     for (std::size_t i = 0; i < options.size(); ++i)
         for (const std::string& other : options[i].excluded) by_name[i].second->excludes(find(other)->second);
     added->footer("Examples:\n" + command.examples);
-    added->callback([by_name, run = command.run, &session] {
+    added->callback([by_name, options, run = command.run, &session] {
         for (const auto& [name, option] : by_name)
             if (option->count() > 0) session.note_given(name);
         session.begin();
+        refuse_to_overwrite_inputs(options);
         run(session);
     });
 }

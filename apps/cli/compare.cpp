@@ -102,14 +102,16 @@ Command compare_command() {
     const auto options = std::make_shared<Options>();
     return {.name = "compare",
             .text = "Say how far one mesh is from another",
-            .options = {Option("a", options->a, "Mesh").required(),
-                        Option("b", options->b, "Mesh to measure against; fractions are of its diagonal").required(),
-                        Option("--samples", options->samples, "Points on each surface, besides its vertices")
-                            .whole_from(0)
-                            .with_default(),
-                        Option("--picture", options->picture,
-                               "Also draw the first mesh coloured by its distance from the second (.png, .svg, .pdf)"),
-                        up_option(options->up, "Which axis is up in the picture (unset: y)")},
+            .options =
+                {Option("a", options->a, "Mesh").is_read().required(),
+                 Option("b", options->b, "Mesh to measure against; fractions are of its diagonal").is_read().required(),
+                 Option("--samples", options->samples, "Points on each surface, besides its vertices")
+                     .whole_from(0)
+                     .with_default(),
+                 Option("--picture", options->picture,
+                        "Also draw the first mesh coloured by its distance from the second (.png, .svg, .pdf)")
+                     .is_written(),
+                 up_option(options->up, "Which axis is up in the picture (unset: y)")},
             .examples = "  filigree compare restored.ply full.ply\n"
                         "  filigree compare restored.ply full.ply --picture heat.png\n"
                         "  filigree compare driver.ply scan.ply --json",

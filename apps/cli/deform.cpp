@@ -230,10 +230,11 @@ Command deform_command() {
             .text = "Deform a mesh (every vertex) or a model (its driver, then restore); options apply in the order "
                     "given",
             .options =
-                OptionList{Option("file", options->input, "Mesh or model").required(),
+                OptionList{Option("file", options->input, "Mesh or model").is_read().required(),
                            Option("-o,--output", options->output,
                                   "Mesh file to write; with --frames an animation: .glb, .pc2, .mdd, .usda, a folder "
                                   "(NAME/), NAME_####.ply, or for a model .fil, the model with these poses")
+                               .is_written()
                                .required()} +
                 warp_options(options->steps) +
                 OptionList{
@@ -242,8 +243,10 @@ Command deform_command() {
                                  "Of all of these (unset: the longest side of the box)"),
                     Option("--handles", options->handles,
                            "Pull parts and let the rest follow as rigidly as possible: a JSON file, see "
-                           "docs/handles.md"),
-                    Option("--pose", options->pose_output, "Models: also write the moved driver, with its gradients"),
+                           "docs/handles.md")
+                        .is_read(),
+                    Option("--pose", options->pose_output, "Models: also write the moved driver, with its gradients")
+                        .is_written(),
                     Option("--frames", options->frames, "This many frames from the rest shape to the full deformation")
                         .whole_from(2),
                     Option("--frame-rate", options->frames_per_second, "Frames a second").above_zero().with_default()} +

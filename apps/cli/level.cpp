@@ -42,12 +42,13 @@ Command level_command() {
     const auto options = std::make_shared<LevelOptions>();
     return {.name = "level",
             .text = "Write one level of a model as a mesh; level 0 is the driver",
-            .options = {Option("model", options->model, "Model file").required(),
+            .options = {Option("model", options->model, "Model file").is_read().required(),
                         Option("level", options->level, "Level, 0 the coarsest").required(),
-                        Option("-o,--output", options->output, "Mesh file to write").required(),
+                        Option("-o,--output", options->output, "Mesh file to write").is_written().required(),
                         Option("--ghosts", options->ghosts,
                                "Also write the driver's ghost points: moved along with it, they tell restore how "
-                               "space deforms")},
+                               "space deforms")
+                            .is_written()},
             .examples = "  filigree level scan.fil 0 -o driver.obj\n"
                         "  filigree level scan.fil 0 -o driver.ply --ghosts ghosts.ply",
             .run = [options](Session& session) { run(*options, session); }};

@@ -45,6 +45,9 @@ struct Option {
     /// What a value must be. Numbers are read by the same rules in every locale.
     using Check = std::variant<Any, Finite, AboveZero, WholeFrom, IntegerRange, Range, Words, Numbers>;
 
+    /// What the value is the name of. No command writes over a file that it reads.
+    enum class File { none, read, written };
+
     std::string name;
     Target target;
     std::string text; ///< what it is for
@@ -53,8 +56,9 @@ struct Option {
     int least_values = 0, most_values = 0; ///< of a list; 0: any number
     bool has_commas = false;               ///< a list may be written "1,2,3"
     bool takes_one = false;                ///< a list gets one value each time the option is given
-    std::string value_name;                ///< what help calls the value; empty: by its type
-    std::vector<std::string> excluded;     ///< options that cannot be given with this one
+    File file = File::none;
+    std::string value_name;            ///< what help calls the value; empty: by its type
+    std::vector<std::string> excluded; ///< options that cannot be given with this one
 
     template <class T>
     Option(std::string names, T& value, std::string purpose)
@@ -71,6 +75,8 @@ struct Option {
     Option required() const { return with(&Option::is_required, true); }
     /// Help shows the value that the target has at the start.
     Option with_default() const { return with(&Option::shows_default, true); }
+    Option is_read() const { return with(&Option::file, File::read); }
+    Option is_written() const { return with(&Option::file, File::written); }
     Option finite() const { return with(&Option::check, Finite{}); }
     Option above_zero() const { return with(&Option::check, AboveZero{}); }
     Option whole_from(std::int64_t least) const { return with(&Option::check, WholeFrom{least}); }
@@ -132,6 +138,9 @@ struct Program {
     OptionList common; ///< of every command
     std::vector<Command> commands;
 };
+
+/// Refuses an option that would have the command write over a file that another has it read, under whatever name.
+void refuse_to_overwrite_inputs(const OptionList& options);
 
 /// Runs the command that the arguments name, or prints the help or version that they ask for; returns the exit code.
 int run_command_line(const Program& program, Session& session, int argc, char** argv);

@@ -237,22 +237,25 @@ OptionList remesh_options(QuadRemeshOptions& remesh) {
 
 Command remesh_command() {
     const auto options = std::make_shared<Options>();
-    return {.name = "remesh",
-            .text = "Turn any mesh into quads: patches of a regular grid",
-            .options =
-                OptionList{Option("mesh", options->input, "Mesh").required(),
-                           Option("-o,--output", options->output, "Quads to write").required()} +
-                remesh_options(options->remesh) +
-                OptionList{Option("--base", options->base, "Also write the patches' corners as a mesh, a quad each"),
-                           Option("--picture", options->picture, "Also draw the quads, their patches in colour (.png)"),
-                           view_option(options->view, "Where to look from in the picture (unset: iso)"),
-                           up_option(options->up, "Which axis is up in the picture (unset: y)")},
-            .examples = "  filigree remesh scan.ply -o quads.ply\n"
-                        "  filigree remesh scan.ply -o quads.obj --quads 20000 --picture quads.png\n"
-                        "  filigree remesh part.stl -o quads.ply --feature-angle 30 --levels 3\n"
-                        "  filigree remesh scan.ply -o quads.ply && "
-                        "filigree strip quads.ply -o quads.fil --code reference",
-            .run = [options](Session& session) { run(*options, session); }};
+    return {
+        .name = "remesh",
+        .text = "Turn any mesh into quads: patches of a regular grid",
+        .options =
+            OptionList{Option("mesh", options->input, "Mesh").is_read().required(),
+                       Option("-o,--output", options->output, "Quads to write").is_written().required()} +
+            remesh_options(options->remesh) +
+            OptionList{
+                Option("--base", options->base, "Also write the patches' corners as a mesh, a quad each").is_written(),
+                Option("--picture", options->picture, "Also draw the quads, their patches in colour (.png)")
+                    .is_written(),
+                view_option(options->view, "Where to look from in the picture (unset: iso)"),
+                up_option(options->up, "Which axis is up in the picture (unset: y)")},
+        .examples = "  filigree remesh scan.ply -o quads.ply\n"
+                    "  filigree remesh scan.ply -o quads.obj --quads 20000 --picture quads.png\n"
+                    "  filigree remesh part.stl -o quads.ply --feature-angle 30 --levels 3\n"
+                    "  filigree remesh scan.ply -o quads.ply && "
+                    "filigree strip quads.ply -o quads.fil --code reference",
+        .run = [options](Session& session) { run(*options, session); }};
 }
 
 } // namespace filigree::cli

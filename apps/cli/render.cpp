@@ -590,7 +590,7 @@ OptionList look_options(Options& options) {
 OptionList scalar_options(Options& options) {
     return {Option("--scalar", options.scalar,
                    "Colour by a vertex scalar of the file, or by error, strain (both with --against) or level"),
-            Option("--against", options.against, "Mesh that error and strain are measured against"),
+            Option("--against", options.against, "Mesh that error and strain are measured against").is_read(),
             Option("--range", options.range, "Least and most value of the colours (unset: by the values)")
                 .finite()
                 .values(2),
@@ -611,7 +611,8 @@ OptionList page_options(Options& options) {
 
 OptionList film_options(Options& options) {
     return {Option("--poses", options.poses,
-                   "Moved drivers of a model, one a frame (PLY with gradients where there are any)"),
+                   "Moved drivers of a model, one a frame (PLY with gradients where there are any)")
+                .is_read(),
             Option("--turntable", options.turntable, "A film once around the object"),
             Option("--frames", options.frames, "Frames of a turntable").whole_from(1).with_default(),
             Option("--frame", options.frame,
@@ -642,9 +643,11 @@ Command render_command() {
             .options = OptionList{Option("files", options->files,
                                          "Meshes, point sets or models, before the options; several stand side by "
                                          "side, or one after the other in a film")
+                                      .is_read()
                                       .required(),
                                   Option("-o,--output", options->output,
                                          "Picture (.png, .svg, .pdf) or film (.mp4, .gif, frame_%04d.png)")
+                                      .is_written()
                                       .required()} +
                        camera_options(*options) + look_options(*options) + scalar_options(*options) +
                        page_options(*options) + film_options(*options) + restore_options(options->restore),

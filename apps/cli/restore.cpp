@@ -148,11 +148,12 @@ Command restore_command() {
             .text = "Put the detail back onto a moved driver",
             .options =
                 OptionList{
-                    Option("model", options->model, "Model file").required(),
+                    Option("model", options->model, "Model file").is_read().required(),
                     Option("--pose", options->pose,
                            "The moved driver: level 0 with the same vertex order; a PLY with vertex properties f00 .. "
-                           "f22 gives gradients too"),
-                    Option("--ghosts", options->ghosts, "The moved ghost points (see level --ghosts)"),
+                           "f22 gives gradients too")
+                        .is_read(),
+                    Option("--ghosts", options->ghosts, "The moved ghost points (see level --ghosts)").is_read(),
                     Option("--frame", options->frame, "Or one of the poses that the model holds, from 1").whole_from(1),
                     Option("--frames", options->all_frames, "Or all of them, as an animation"),
                     Option("--poses", options->poses,
@@ -162,6 +163,7 @@ Command restore_command() {
                 OptionList{Option("-o,--output", options->output,
                                   "Mesh to write; an animation: .pc2, .mdd, .glb, .usda, a folder for NAME_0001.ply "
                                   "and so on, or NAME_####.obj")
+                               .is_written()
                                .required()} +
                 restore_options(options->restore) + animation_options(options->animation),
             .examples = "  filigree restore scan.fil --pose moved.obj -o restored.ply\n"

@@ -240,19 +240,21 @@ OptionList inside_options(Options& options) {
 
 Command sample_command() {
     const auto options = std::make_shared<Options>();
-    return {
-        .name = "sample",
-        .text = "Fill a mesh with points: those of a regular lattice that are inside",
-        .options =
-            OptionList{Option("mesh", options->input, "Mesh").required(),
-                       Option("-o,--output", options->output, "Points, as a mesh file without faces").required()} +
-            point_options(*options) + inside_options(*options) +
-            OptionList{Option("--picture", options->picture, "Also draw the points, and the surface cut open (.png)"),
-                       up_option(options->up, "Which axis is up in the picture (unset: y)")},
-        .examples = "  filigree sample scan.ply -o points.ply --count 100000\n"
-                    "  filigree sample cube.obj -o points.ply --spacing 0.02 --picture points.png\n"
-                    "  filigree sample open.obj -o points.ply --count 20000 --pattern poisson",
-        .run = [options](Session& session) { run(*options, session); }};
+    return {.name = "sample",
+            .text = "Fill a mesh with points: those of a regular lattice that are inside",
+            .options = OptionList{Option("mesh", options->input, "Mesh").is_read().required(),
+                                  Option("-o,--output", options->output, "Points, as a mesh file without faces")
+                                      .is_written()
+                                      .required()} +
+                       point_options(*options) + inside_options(*options) +
+                       OptionList{Option("--picture", options->picture,
+                                         "Also draw the points, and the surface cut open (.png)")
+                                      .is_written(),
+                                  up_option(options->up, "Which axis is up in the picture (unset: y)")},
+            .examples = "  filigree sample scan.ply -o points.ply --count 100000\n"
+                        "  filigree sample cube.obj -o points.ply --spacing 0.02 --picture points.png\n"
+                        "  filigree sample open.obj -o points.ply --count 20000 --pattern poisson",
+            .run = [options](Session& session) { run(*options, session); }};
 }
 
 } // namespace filigree::cli

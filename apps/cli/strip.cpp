@@ -87,8 +87,8 @@ Command strip_command() {
     StripOptions& strip = options->strip;
     return {.name = "strip",
             .text = "Take the detail off a mesh: make a model with a light driver",
-            .options = {Option("mesh", options->input, "Mesh to strip").required(),
-                        Option("-o,--output", options->output, "Model file to write (.fil)").required(),
+            .options = {Option("mesh", options->input, "Mesh to strip").is_read().required(),
+                        Option("-o,--output", options->output, "Model file to write (.fil)").is_written().required(),
                         Option("--base", strip.base, "Vertices of the driver (unset: 1,000, fewer for small meshes)")
                             .whole_from(3)
                             .excludes({"--levels", "--error"}),

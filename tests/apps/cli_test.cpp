@@ -472,6 +472,21 @@ TEST_F(Cli, LocaleAndThreadsChangeNoByte) {
     EXPECT_TRUE(first.out == translated.out);
 }
 
+TEST_F(Cli, AFileThatMayNotGrowIsRemoved) {
+    const Ran ran = run_shell("ulimit -f 20; exec \"$0\" make wavy-cube --resolution 100 -o x.obj");
+    EXPECT_EQ(ran.code, 6) << ran.err; // a signal (SIGXFSZ) would be -1
+    EXPECT_NE(ran.err.find("x.obj"), std::string::npos) << ran.err;
+    EXPECT_TRUE(files().empty()) << testing::PrintToString(files());
+}
+
+TEST_F(Cli, ThreadsWithoutRoomAreOutOfMemory) {
+    make_cube(32);
+    const Ran ran = run_shell("ulimit -v 100000; exec \"$0\" remesh cube.obj -o quads.ply --threads 8");
+    EXPECT_EQ(ran.code, 9) << ran.err;
+    EXPECT_EQ(lines_of(ran.err).size(), 1u) << ran.err;
+    EXPECT_NE(ran.err.find("Out of memory"), std::string::npos) << ran.err;
+}
+
 TEST_F(Cli, WarningsAreSaidOnceAndQuietlyNot) {
     write("points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n");
     const Ran ran = ok({"compare", "points.obj", "points.obj"});
