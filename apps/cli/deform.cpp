@@ -1,4 +1,5 @@
 #include "animation_output.h"
+#include "commands.h"
 #include "handles_file.h"
 #include "restore_options.h"
 #include "stage.h"

@@ -1,3 +1,4 @@
+#include "commands.h"
 #include "demo_pictures.h"
 #include "output_folder.h"
 #include "restore_options.h"

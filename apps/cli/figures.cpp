@@ -1,4 +1,5 @@
 #include "figures.h"
+#include "commands.h"
 
 #include "figures_layout.h"
 #include "output_folder.h"

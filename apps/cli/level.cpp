@@ -1,3 +1,4 @@
+#include "commands.h"
 #include "restore_options.h"
 
 #include <fmt/format.h>

@@ -1,6 +1,8 @@
 // filigree: the command line. Each command is in the file of its name.
+#include "commands.h"
 #include "session.h"
 
+#include <cstdio>
 #include <new>
 #include <stdexcept>
 #include <system_error>
@@ -25,10 +27,7 @@ cli::Program make_program(cli::Session& session) {
                      "format, 6 cannot write,\n"
                      "7 unsuitable input, 8 inputs do not belong together, 9 out of memory, 130 cancelled.",
             .common = session.common_options(),
-            .commands = {cli::make_command(), cli::info_command(), cli::remesh_command(), cli::strip_command(),
-                         cli::level_command(), cli::deform_command(), cli::restore_command(), cli::compare_command(),
-                         cli::bench_command(), cli::demo_command(), cli::render_command(), cli::sample_command(),
-                         cli::simulate_command(), cli::export_command(), cli::figures_command()}};
+            .commands = cli::all_commands()};
 }
 
 /// `filigree --man [COMMAND]`, for those who package the program; not in the help.

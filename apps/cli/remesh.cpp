@@ -1,3 +1,4 @@
+#include "commands.h"
 #include "patch_drawing.h"
 #include "session.h"
 #include "stage.h"

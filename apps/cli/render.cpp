@@ -1,3 +1,4 @@
+#include "commands.h"
 #include "page.h"
 #include "restore_options.h"
 #include "stage.h"

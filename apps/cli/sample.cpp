@@ -1,3 +1,4 @@
+#include "commands.h"
 #include "session.h"
 #include "stage.h"
 

@@ -106,21 +106,4 @@ double now_seconds(); ///< a monotonic clock
 /// Vertices of make_wavy_cube with so many quads along a side.
 constexpr std::size_t wavy_cube_vertices(std::size_t resolution) { return 6 * resolution * resolution + 2; }
 
-// One command each, in the file of its name.
-Command make_command();
-Command info_command();
-Command remesh_command();
-Command strip_command();
-Command level_command();
-Command deform_command();
-Command restore_command();
-Command compare_command();
-Command bench_command();
-Command demo_command();
-Command render_command();
-Command sample_command();
-Command simulate_command();
-Command export_command();
-Command figures_command();
-
 } // namespace filigree::cli

@@ -1,4 +1,5 @@
 #include "animation_output.h"
+#include "commands.h"
 #include "output_folder.h"
 #include "simulate_film.h"
 #include "simulate_recording.h"

@@ -1,3 +1,4 @@
+#include "commands.h"
 #include "session.h"
 
 #include "filigree/hierarchy/strip.h"

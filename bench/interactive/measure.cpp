@@ -11,6 +11,7 @@
 #include "filigree/hierarchy/blend_code.h"
 #include "filigree/hierarchy/restore.h"
 #include "filigree/hierarchy/strip.h"
+#include "filigree/io/mesh_file.h"
 #include "filigree/io/model_file.h"
 #include "filigree/mesh/shapes.h"
 #include "filigree/mesh/triangulate.h"
