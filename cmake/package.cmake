@@ -1,3 +1,20 @@
+# Manual pages, made from the programs' own help.
+find_program(FILIGREE_HELP2MAN help2man DOC "Makes the studio's manual page")
+if(TARGET filigree_cli)
+  set(manual_pages ${PROJECT_BINARY_DIR}/man1)
+  set(programs -DPROGRAM=$<TARGET_FILE:filigree_cli>)
+  if(TARGET filigree_studio AND FILIGREE_HELP2MAN)
+    list(APPEND programs -DSTUDIO=$<TARGET_FILE:filigree_studio> -DHELP2MAN=${FILIGREE_HELP2MAN})
+    set(and_studio filigree_studio)
+  endif()
+  add_custom_command(OUTPUT ${manual_pages}/filigree.1.gz
+    COMMAND ${CMAKE_COMMAND} -DFOLDER=${manual_pages} ${programs} -P ${CMAKE_CURRENT_LIST_DIR}/manual_pages.cmake
+    DEPENDS filigree_cli ${and_studio} ${CMAKE_CURRENT_LIST_DIR}/manual_pages.cmake
+    COMMENT "Writing manual pages" VERBATIM)
+  add_custom_target(manual_pages ALL DEPENDS ${manual_pages}/filigree.1.gz)
+  install(DIRECTORY ${manual_pages} DESTINATION ${CMAKE_INSTALL_MANDIR} COMPONENT programs)
+endif()
+
 # Debian packages, by scripts/package: the programs, the library, the development files.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME filigree)
