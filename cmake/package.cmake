@@ -12,7 +12,7 @@ if(TARGET filigree_cli)
     DEPENDS filigree_cli ${and_studio} ${CMAKE_CURRENT_LIST_DIR}/manual_pages.cmake
     COMMENT "Writing manual pages" VERBATIM)
   add_custom_target(manual_pages ALL DEPENDS ${manual_pages}/filigree.1.gz)
-  install(DIRECTORY ${manual_pages} DESTINATION ${CMAKE_INSTALL_MANDIR} COMPONENT programs)
+  install(DIRECTORY ${manual_pages} DESTINATION ${CMAKE_INSTALL_MANDIR} COMPONENT programs OPTIONAL)
 endif()
 
 # Debian packages, by scripts/package: the programs, the library, the development files.
