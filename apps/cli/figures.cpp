@@ -1,9 +1,9 @@
-#include "figures.h"
 #include "commands.h"
 
-#include "figures_layout.h"
 #include "output_folder.h"
 #include "stage.h"
+
+#include "report/figures.h"
 
 #include <algorithm>
 
@@ -13,30 +13,7 @@ namespace filigree::cli {
 
 namespace {
 
-struct FigureEntry {
-    const char* name; ///< the report's number, or a word where it is ours
-    Figure (*draw)(FigureRenderer&);
-    const char* title;
-};
-
-// In the report's order. 2.11, the window, belongs behind 2.10.
-constexpr FigureEntry kFigures[] = {
-    {"1.1", draw_simple_triangle, "a simple deformation"},
-    {"2.1", draw_wavy_cube, "the object"},
-    {"2.2", draw_ray_and_triangle, "ray, plane and triangle"},
-    {"2.3", draw_border_cases, "rays on an edge"},
-    {"2.4", draw_shared_points, "rays at shared points"},
-    {"2.5", draw_inside_points, "points inside"},
-    {"2.6", draw_removed_level, "one level removed"},
-    {"2.7", draw_barycentric_areas, "barycentric areas"},
-    {"2.8", draw_recursive_storing, "recursive storing"},
-    {"2.9", draw_removed_detail, "one and three levels removed"},
-    {"2.10", draw_deformation_process, "stretched, detail returned"},
-    {"3.1", draw_extreme_deformation, "an extreme deformation"},
-    {"border", draw_border_rays, "rays through vertices and edges, answered"},
-    {"codes", draw_fidelity, "the codes and a wrap deformer compared"},
-    {"scan", draw_remeshed_scan, "a scan as regular quads: levels, stretched, twisted"},
-};
+using report::FigureEntry;
 
 /// figure_2_10 for "2.10".
 std::string file_stem(const std::string& name) {
@@ -46,14 +23,15 @@ std::string file_stem(const std::string& name) {
 }
 
 std::vector<FigureEntry> chosen_figures(const std::vector<std::string>& only) {
-    if (only.empty()) return {std::begin(kFigures), std::end(kFigures)};
+    const std::span<const FigureEntry> all = report::all_figures();
+    if (only.empty()) return {all.begin(), all.end()};
     std::string known;
-    for (const FigureEntry& figure : kFigures) known += std::string(known.empty() ? "" : ", ") + figure.name;
+    for (const FigureEntry& figure : all) known += std::string(known.empty() ? "" : ", ") + figure.name;
     for (const std::string& name : only)
-        if (std::none_of(std::begin(kFigures), std::end(kFigures), [&](const auto& f) { return f.name == name; }))
+        if (std::none_of(all.begin(), all.end(), [&](const auto& f) { return f.name == name; }))
             throw Failure{{ErrorCode::usage, fmt::format("There is no figure '{}'; --only takes {}.", name, known)}};
     std::vector<FigureEntry> chosen;
-    for (const FigureEntry& figure : kFigures)
+    for (const FigureEntry& figure : all)
         if (std::find(only.begin(), only.end(), figure.name) != only.end()) chosen.push_back(figure);
     return chosen;
 }
@@ -90,9 +68,9 @@ void run_figures(const Options& options, Session& session) {
     for (const FigureEntry& figure : chosen)
         paths.push_back(folder.file(file_stem(figure.name) + "." + options.format));
 
-    const double scale = options.width / kFigureWidth;
-    FigureRenderer renderer(session, scale, options.passes, read_scan(options, session));
-    std::vector<Figure> drawn; // all of them before the first is written, so that a cancel changes nothing
+    const double scale = options.width / report::kFigureWidth;
+    report::FigureRenderer renderer(scale, options.passes, read_scan(options, session), context);
+    std::vector<report::Figure> drawn; // all of them before the first is written, so that a cancel changes nothing
     for (const FigureEntry& figure : chosen) {
         context.report("figures", double(drawn.size()) / double(chosen.size()));
         drawn.push_back(figure.draw(renderer));
@@ -105,7 +83,8 @@ void run_figures(const Options& options, Session& session) {
         session.begin_writing(paths[i]);
         require(drawn[i].page.write(paths[i], scale));
         report.row(chosen[i].name, fmt::format("{}  ({})", paths[i], chosen[i].title));
-        figures.push_back({{"name", chosen[i].name}, {"file", paths[i]}, {"values", drawn[i].values}});
+        figures.push_back(
+            {{"name", chosen[i].name}, {"file", paths[i]}, {"values", Json::parse(drawn[i].values.dump()).value()}});
     }
     context.report("figures", 1);
     folder.keep();

@@ -3,6 +3,8 @@
 
 #include "json.h"
 
+#include "filigree/core/text.h"
+
 #include <string>
 #include <utility>
 #include <vector>
@@ -46,8 +48,6 @@ private:
     Json values_ = Json::object();
 };
 
-/// 1234567 as "1,234,567".
-std::string with_commas(std::size_t count);
 /// Seconds with three digits that matter: "12.3 ms".
 std::string seconds_text(double seconds);
 

@@ -12,7 +12,7 @@
 
 #include <fmt/format.h>
 
-namespace filigree::cli {
+namespace filigree::report {
 
 namespace {
 
@@ -43,7 +43,7 @@ public:
     static constexpr unsigned kSide = 8; // quads
     explicit StrippedSheet(const RunContext& context)
         : mesh_(make_wavy_plane({.resolution = kSide, .frequency = 1.3, .amplitude = 0.13})),
-          detail_(require(encode_reference(mesh_, {}, context))) {
+          detail_(encode_reference(mesh_, {}, context).value()) {
         read_records();
     }
 
@@ -326,4 +326,4 @@ Figure draw_recursive_storing(FigureRenderer& renderer) {
     return {std::move(page), {{"levels", values}, {"largest_error", sheet.largest_error()}}};
 }
 
-} // namespace filigree::cli
+} // namespace filigree::report

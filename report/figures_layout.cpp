@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-namespace filigree::cli {
+namespace filigree::report {
 
 namespace {
 
@@ -148,4 +148,4 @@ void line_behind(Page& page, Point from, Point to, std::span<const Point> cover,
         page.line(out, to, stroke);
 }
 
-} // namespace filigree::cli
+} // namespace filigree::report

@@ -1,16 +1,15 @@
 // What the figures share: pages with a caption below, panels in rows, solid things seen from the side, labels.
 #pragma once
 
-#include "page.h"
+#include "figures.h"
 
 #include "filigree/core/types.h"
 
 #include <string>
 #include <vector>
 
-namespace filigree::cli {
+namespace filigree::report {
 
-inline constexpr double kFigureWidth = 720;   ///< of every figure, page units
 inline constexpr double kFigureMargin = 20;   ///< around it
 inline constexpr double kPanelGap = 20;       ///< between panels
 inline constexpr double kSubcaptionRoom = 24; ///< below a panel, for a line of text
@@ -74,4 +73,4 @@ std::string power_text(double value);
 void line_behind(Page& page, Point from, Point to, std::span<const Point> cover, const Stroke& stroke, bool arrow);
 bool is_inside(Point p, std::span<const Point> outline);
 
-} // namespace filigree::cli
+} // namespace filigree::report

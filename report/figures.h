@@ -2,17 +2,27 @@
 #pragma once
 
 #include "page.h"
-#include "session.h"
 
+#include "filigree/core/run_context.h"
+#include "filigree/mesh/mesh.h"
 #include "filigree/render/camera.h"
 #include "filigree/render/renderer.h"
 
 #include <memory>
 #include <optional>
+#include <span>
 
-namespace filigree::cli {
+#include <nlohmann/json.hpp>
 
-class Stage;
+namespace filigree::cli {} // where Page is declared
+
+namespace filigree::report {
+
+using namespace cli;
+using Json = nlohmann::ordered_json;
+
+inline constexpr double kFigureWidth = 720; ///< of every figure, page units
+
 struct Panel;
 
 /// A figure, and the numbers in it.
@@ -21,12 +31,12 @@ struct Figure {
     Json values;
 };
 
-/// Draws meshes for figures; OpenGL starts with the first of them.
+/// Draws meshes for figures; OpenGL starts with the first of them. What it draws throws BadResultAccess where it fails.
 class FigureRenderer {
 public:
     /// scale: pixels for each page unit. passes: as in PictureOptions. scan: what figures of scans show, z up; none: a
     /// shape of our own.
-    FigureRenderer(Session& session, double scale, unsigned passes, std::optional<Mesh> scan);
+    FigureRenderer(double scale, unsigned passes, std::optional<Mesh> scan, const RunContext& context);
     ~FigureRenderer();
 
     struct Look {
@@ -41,17 +51,19 @@ public:
     /// A picture on white, `width` x `height` page units large. z is up.
     Picture picture(const Mesh& mesh, const Look& look, const Camera& camera, double width, double height);
 
-    const RunContext& context() const { return session_.context(); }
+    const RunContext& context() const { return context_; }
     const std::optional<Mesh>& scan() const { return scan_; }
     /// A line's width in pixels.
     float pixels(double page_units) const { return static_cast<float>(scale_ * page_units); }
 
 private:
-    Session& session_;
+    struct Graphics; ///< OpenGL and a renderer in it
+
     double scale_;
     unsigned passes_;
     std::optional<Mesh> scan_;
-    std::unique_ptr<Stage> stage_;
+    const RunContext& context_;
+    std::unique_ptr<Graphics> graphics_;
 };
 
 /// Flat faces with their edges drawn, in page units.
@@ -62,21 +74,13 @@ Camera common_camera(std::span<const Mesh* const> meshes, const Vec3d& direction
 void draw_mesh(Page& page, const Panel& panel, FigureRenderer& renderer, const Mesh& mesh,
                const FigureRenderer::Look& look, const Camera& camera);
 
-// One function a figure, in the report's order.
-Figure draw_simple_triangle(FigureRenderer& renderer);     // 1.1
-Figure draw_wavy_cube(FigureRenderer& renderer);           // 2.1
-Figure draw_ray_and_triangle(FigureRenderer& renderer);    // 2.2
-Figure draw_border_cases(FigureRenderer& renderer);        // 2.3
-Figure draw_shared_points(FigureRenderer& renderer);       // 2.4
-Figure draw_inside_points(FigureRenderer& renderer);       // 2.5
-Figure draw_removed_level(FigureRenderer& renderer);       // 2.6
-Figure draw_barycentric_areas(FigureRenderer& renderer);   // 2.7
-Figure draw_recursive_storing(FigureRenderer& renderer);   // 2.8
-Figure draw_removed_detail(FigureRenderer& renderer);      // 2.9
-Figure draw_deformation_process(FigureRenderer& renderer); // 2.10
-Figure draw_extreme_deformation(FigureRenderer& renderer); // 3.1
-Figure draw_border_rays(FigureRenderer& renderer);         // our own
-Figure draw_fidelity(FigureRenderer& renderer);            // our own
-Figure draw_remeshed_scan(FigureRenderer& renderer);       // our own: 2.9, 2.10 and 3.1 on a scan
+struct FigureEntry {
+    const char* name; ///< the report's number, or a word where it is ours
+    Figure (*draw)(FigureRenderer&);
+    const char* title;
+};
 
-} // namespace filigree::cli
+/// In the report's order.
+std::span<const FigureEntry> all_figures();
+
+} // namespace filigree::report

@@ -12,7 +12,7 @@
 
 #include <fmt/format.h>
 
-namespace filigree::cli {
+namespace filigree::report {
 
 namespace {
 
@@ -481,4 +481,4 @@ Figure draw_shared_points(FigureRenderer&) {
     return {std::move(page), {{"cases", values}}};
 }
 
-} // namespace filigree::cli
+} // namespace filigree::report

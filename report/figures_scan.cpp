@@ -3,6 +3,7 @@
 #include "figures_layout.h"
 #include "patch_drawing.h"
 
+#include "filigree/core/text.h"
 #include "filigree/deform/space_warp.h"
 #include "filigree/hierarchy/restore.h"
 #include "filigree/hierarchy/strip.h"
@@ -14,7 +15,7 @@
 
 #include <fmt/format.h>
 
-namespace filigree::cli {
+namespace filigree::report {
 
 namespace {
 
@@ -29,7 +30,7 @@ const Vec3d kFromFront(0.42, -0.90, 0.30);
 /// Stands in for a scan: a wavy sphere whose vertices a simplification has picked, in triangles of any valence.
 Mesh irregular_shape(const RunContext& context) {
     const Mesh sphere = make_wavy_sphere({.resolution = 128, .frequency = 4, .amplitude = 0.07});
-    const Stripped stripped = require(strip(sphere, {.base = 25'000}, context));
+    const Stripped stripped = strip(sphere, {.base = 25'000}, context).value();
     return level_mesh(stripped.model, 0);
 }
 
@@ -46,14 +47,14 @@ struct Returned {
 Returned put_back(const Model& model, const RestoreOptions& law, const SpaceWarp& warp, const RunContext& context) {
     Returned result;
     const Pose pose = warp_pose(warp, driver_positions(model), model.mesh.origin, context);
-    const Restorer restorer = require(Restorer::create(model, law, context));
+    const Restorer restorer = Restorer::create(model, law, context).value();
     result.driver = level_mesh(model, 0);
     result.driver.positions = pose.positions;
     result.mesh = model.mesh;
-    result.mesh.positions = require(restorer.positions(pose, context));
+    result.mesh.positions = restorer.positions(pose, context).value();
     Mesh direct = model.mesh;
     direct.positions = warp_positions(warp, model.mesh.positions, model.mesh.origin, context);
-    const MeshDistance distance = require(mesh_distance(result.mesh, direct, 0, context));
+    const MeshDistance distance = mesh_distance(result.mesh, direct, 0, context).value();
     result.rms = distance.relative(distance.vertices->rms);
     return result;
 }
@@ -81,13 +82,15 @@ void draw_patched(Page& page, const Panel& panel, FigureRenderer& renderer, cons
 Figure draw_remeshed_scan(FigureRenderer& renderer) {
     const RunContext& context = renderer.context();
     const Mesh scan = renderer.scan() ? *renderer.scan() : irregular_shape(context);
-    QuadRemeshed remeshed = require(quad_remesh(
-        scan, {.quads = kQuads, .levels = kLevels, .feature_angle_deg = kFeatureAngle, .attributes = false}, context));
+    QuadRemeshed remeshed =
+        quad_remesh(scan, {.quads = kQuads, .levels = kLevels, .feature_angle_deg = kFeatureAngle, .attributes = false},
+                    context)
+            .value();
     const unsigned levels = remeshed.patches.levels;
     const Model reference =
-        std::move(require(strip(remeshed.mesh, {.code = DetailCode::reference, .levels = levels}, context)).model);
+        strip(remeshed.mesh, {.code = DetailCode::reference, .levels = levels}, context).value().model;
     const std::size_t driver_count = reference.driver().vertices.size();
-    const Model blend = std::move(require(strip(remeshed.mesh, {.base = driver_count}, context)).model);
+    const Model blend = strip(remeshed.mesh, {.base = driver_count}, context).value().model;
 
     const Box box = world_bounds(remeshed.mesh);
     const auto stretch = make_stretch(box, Axis::z, kStretch), extreme = extreme_warp(box);
@@ -157,4 +160,4 @@ Figure draw_remeshed_scan(FigureRenderer& renderer) {
              {"rms_twisted", {{"reference code", twisted.rms}, {"blend code", blended.rms}}}}};
 }
 
-} // namespace filigree::cli
+} // namespace filigree::report

@@ -1,13 +1,14 @@
 // Figures 2.1, 2.5, 2.9, 2.10, 3.1 and our own: meshes as the renderer draws them.
 #include "figures.h"
 #include "figures_layout.h"
-#include "stage.h"
 
+#include "filigree/core/text.h"
 #include "filigree/deform/space_warp.h"
 #include "filigree/hierarchy/restore.h"
 #include "filigree/hierarchy/strip.h"
 #include "filigree/mesh/mesh_distance.h"
 #include "filigree/mesh/shapes.h"
+#include "filigree/render/gl_context.h"
 #include "filigree/sample/sample_inside.h"
 
 #include "interactive/fidelity.h"
@@ -17,10 +18,15 @@
 
 #include <fmt/format.h>
 
-namespace filigree::cli {
+namespace filigree::report {
 
-FigureRenderer::FigureRenderer(Session& session, double scale, unsigned passes, std::optional<Mesh> scan)
-    : session_(session), scale_(scale), passes_(passes), scan_(std::move(scan)) {}
+struct FigureRenderer::Graphics {
+    HeadlessContext gl = HeadlessContext::create().value();
+    Renderer renderer = Renderer::create().value();
+};
+
+FigureRenderer::FigureRenderer(double scale, unsigned passes, std::optional<Mesh> scan, const RunContext& context)
+    : scale_(scale), passes_(passes), scan_(std::move(scan)), context_(context) {}
 FigureRenderer::~FigureRenderer() = default;
 
 namespace {
@@ -41,12 +47,12 @@ void fade_borders(Picture& picture) {
 } // namespace
 
 void FigureRenderer::start() {
-    if (!stage_) stage_ = std::make_unique<Stage>(session_);
+    if (!graphics_) graphics_ = std::make_unique<Graphics>();
 }
 
 Picture FigureRenderer::picture(const Mesh& mesh, const Look& look, const Camera& camera, double width, double height) {
     start();
-    const Drawable drawable = require(Drawable::surface(mesh, look.surface, context()));
+    const Drawable drawable = Drawable::surface(mesh, look.surface, context()).value();
     Scene scene;
     scene.objects.push_back({&drawable, look.appearance});
     scene.objects.back().appearance.edge_width *= static_cast<float>(scale_);
@@ -63,7 +69,7 @@ Picture FigureRenderer::picture(Scene scene, const Camera& camera, double width,
     options.width = static_cast<unsigned>(std::lround(scale_ * width));
     options.height = static_cast<unsigned>(std::lround(scale_ * height));
     options.passes = passes_;
-    Picture picture = stage_->take(scene, camera, options);
+    Picture picture = graphics_->renderer.picture(scene, camera, options, context_).value();
     fade_borders(picture);
     return picture;
 }
@@ -95,7 +101,7 @@ namespace {
 const Vec3d kFromCorner(0.62, -0.86, 0.52); // over the cube's front right edge
 
 Model stripped_model(const Mesh& mesh, const StripOptions& options, const RunContext& context) {
-    return std::move(require(strip(mesh, options, context)).model);
+    return strip(mesh, options, context).value().model;
 }
 
 /// Mean distance of the vertices of a cube's upper side along an axis from the plane that their rim is in. The
@@ -135,10 +141,10 @@ Figure draw_inside_points(FigureRenderer& renderer) {
     const RunContext& context = renderer.context();
     const Mesh cube = make_wavy_cube({.resolution = 96});
     const Box box = bounds(cube.positions);
-    const double spacing = require(spacing_for_count(cube, 6000, {}, context));
-    const Lattice lattice = require(make_lattice(box, {.spacing = spacing}));
+    const double spacing = spacing_for_count(cube, 6000, {}, context).value();
+    const Lattice lattice = make_lattice(box, {.spacing = spacing}).value();
     InsideReport report;
-    const Occupancy inside = require(sample_inside(cube, lattice, {}, context, &report));
+    const Occupancy inside = sample_inside(cube, lattice, {}, context, &report).value();
     const LatticePoints points = points_inside(lattice, inside);
 
     Page page = captioned_page(
@@ -150,9 +156,10 @@ Figure draw_inside_points(FigureRenderer& renderer) {
             double(report.scan.crossings) / (double(lattice.counts()[1]) * double(lattice.counts()[2]))));
     const Panel panel{{100, kFigureMargin}, kFigureWidth - 200, kPanelHeight};
     renderer.start();
-    const Drawable surface = require(Drawable::surface(cube, {}, context));
-    const Drawable balls = require(Drawable::points(points.positions, cube.origin,
-                                                    {.radius = static_cast<float>(0.3 * lattice.spacing)}, context));
+    const Drawable surface = Drawable::surface(cube, {}, context).value();
+    const Drawable balls =
+        Drawable::points(points.positions, cube.origin, {.radius = static_cast<float>(0.3 * lattice.spacing)}, context)
+            .value();
     Appearance red, blue;
     red.color = {0.80f, 0.22f, 0.18f};
     blue.color = {0.20f, 0.42f, 0.80f};
@@ -195,12 +202,12 @@ Figure draw_border_rays(FigureRenderer& renderer) {
                                "of cases: the point counts as moved by an infinitely small step.");
     const std::vector<Panel> panels = panels_in_rows(2, 3, kPanelHeight);
     renderer.start();
-    const Drawable wires = require(Drawable::surface(cube, {}, context));
+    const Drawable wires = Drawable::surface(cube, {}, context).value();
     Json values = Json::array();
     for (std::size_t c = 0; c < std::size(cases); ++c) {
         const Case& shown = cases[c];
         const Vec3d eye = shown.through - 4 * shown.direction;
-        const RayParity rays = require(RayParity::create(cube.positions, triangles, &eye, context));
+        const RayParity rays = RayParity::create(cube.positions, triangles, &eye, context).value();
         std::vector<Vec3f> inside, outside;
         std::size_t wrong = 0;
         for (int step = -5; step <= 9; ++step) {
@@ -221,7 +228,7 @@ Figure draw_border_rays(FigureRenderer& renderer) {
         balls.reserve(2);
         for (const auto& [points, look] : {std::pair(&inside, blue), std::pair(&outside, grey)}) {
             if (points->empty()) continue;
-            balls.push_back(require(Drawable::points(*points, Vec3d::Zero(), {.radius = kRadius}, context)));
+            balls.push_back(Drawable::points(*points, Vec3d::Zero(), {.radius = kRadius}, context).value());
             scene.objects.push_back({&balls.back(), look});
         }
         scene.ground = false;
@@ -269,11 +276,11 @@ Figure draw_deformation_process(FigureRenderer& renderer) {
     const Model model = stripped_model(cube, {.code = DetailCode::reference, .levels = 5}, context);
     const auto warp = make_stretch(world_bounds(cube), Axis::x, kStretch);
     const Pose pose{warp_positions(*warp, driver_positions(model), model.mesh.origin, context), {}, {}};
-    const Restorer restorer = require(Restorer::create(model, {.law = HeightLaw::inverse}, context));
+    const Restorer restorer = Restorer::create(model, {.law = HeightLaw::inverse}, context).value();
     const Mesh low = level_mesh(model, 0);
     Mesh stretched = low;
     stretched.positions = pose.positions;
-    const Mesh returned = require(restorer.mesh(pose, context));
+    const Mesh returned = restorer.mesh(pose, context).value();
 
     const double before = mean_height(cube, cube, 2, 0.5), after = mean_height(cube, returned, 2, 0.5),
                  ends = mean_height(cube, returned, 0, 0.5 * kStretch);
@@ -320,8 +327,8 @@ Figure draw_extreme_deformation(FigureRenderer& renderer) {
     }
     Mesh moved = corners;
     moved.positions = pose.positions;
-    const Restorer restorer = require(Restorer::create(model, {}, context));
-    const Mesh returned = require(restorer.mesh(pose, context));
+    const Restorer restorer = Restorer::create(model, {}, context).value();
+    const Mesh returned = restorer.mesh(pose, context).value();
 
     Page page = captioned_page(
         content_height(2, kPanelHeight), "Figure 3.1",
@@ -363,12 +370,12 @@ Figure draw_fidelity(FigureRenderer& renderer) {
     const Model blend = stripped_model(cube, {.base = driver_count}, context);
     const Pose reference_pose = warp_pose(*warp, driver_positions(reference), cube.origin, context);
     const Pose blend_pose = warp_pose(*warp, driver_positions(blend), cube.origin, context);
-    const Restorer reference_restorer = require(Restorer::create(reference, {}, context));
-    const Restorer blend_restorer = require(Restorer::create(blend, {}, context));
+    const Restorer reference_restorer = Restorer::create(reference, {}, context).value();
+    const Restorer blend_restorer = Restorer::create(blend, {}, context).value();
     const std::pair<const char*, std::vector<Vec3f>> methods[] = {
-        {"reference code", require(reference_restorer.positions(reference_pose, context))},
+        {"reference code", reference_restorer.positions(reference_pose, context).value()},
         {"wrap deformer", bench::wrap_positions(blend, blend_pose, context)},
-        {"blend code", require(blend_restorer.positions(blend_pose, context))}};
+        {"blend code", blend_restorer.positions(blend_pose, context).value()}};
 
     Page page = captioned_page(
         kFigureMargin + 2 * kPanelHeight + kSubcaptionRoom + kRmsRoom + 10, "Codes compared",
@@ -398,7 +405,7 @@ Figure draw_fidelity(FigureRenderer& renderer) {
         draw_mesh(page, panel_at(0, k + 1), renderer, mesh, {}, camera);
         subcaption(page, panel_at(0, k + 1), numbers[k], methods[k].first);
 
-        const MeshDistance distance = require(mesh_distance(mesh, full, 0, context));
+        const MeshDistance distance = mesh_distance(mesh, full, 0, context).value();
         const VertexDistance& d = *distance.vertices;
         std::vector<float> exponents;
         for (const float units : d.per_vertex)
@@ -419,4 +426,4 @@ Figure draw_fidelity(FigureRenderer& renderer) {
             {{"vertices", cube.vertex_count()}, {"driver_vertices", driver_count}, {"methods", values}}};
 }
 
-} // namespace filigree::cli
+} // namespace filigree::report
