@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <new>
 #include <stdexcept>
+#include <string_view>
 #include <system_error>
 
 using namespace filigree;
@@ -63,6 +64,13 @@ int own_error(const std::exception& error) {
     return kOwnError;
 }
 
+/// Whether this is a thread for which there was no room: std::thread says so by its code, TBB in its message alone.
+bool is_thread_refused(const std::exception& error) {
+    const auto* system = dynamic_cast<const std::system_error*>(&error);
+    if (system) return system->code() == std::errc::resource_unavailable_try_again;
+    return std::string_view(error.what()).starts_with("pthread_create");
+}
+
 } // namespace
 
 int main(int argc, char** argv) {
@@ -76,9 +84,7 @@ int main(int argc, char** argv) {
         return out_of_memory();
     } catch (const std::length_error&) { // more than any vector can hold
         return out_of_memory();
-    } catch (const std::system_error& error) { // a thread for which there is no room
-        return error.code() == std::errc::resource_unavailable_try_again ? out_of_memory() : own_error(error);
     } catch (const std::exception& error) {
-        return own_error(error);
+        return is_thread_refused(error) ? out_of_memory() : own_error(error);
     }
 }

@@ -3,6 +3,7 @@
 #include <dlfcn.h>
 #include <epoxy/egl.h>
 #include <epoxy/gl.h>
+#include <sys/mman.h>
 
 #include <array>
 #include <vector>
@@ -75,9 +76,25 @@ HeadlessContext::~HeadlessContext() = default;
 
 const std::string& HeadlessContext::renderer_name() const { return content_->name; }
 
+namespace {
+
+/// Whether as many bytes of address space are to be had; nothing is taken.
+bool has_room(std::size_t bytes) {
+    void* place = ::mmap(nullptr, bytes, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+    if (place == MAP_FAILED) return false;
+    ::munmap(place, bytes);
+    return true;
+}
+
+} // namespace
+
 Result<HeadlessContext> HeadlessContext::create() {
     if (!can_load("libEGL.so.1")) return no_opengl("libEGL.so.1 is not installed");
     if (!can_load("libGL.so.1") && !can_load("libOpenGL.so.0")) return no_opengl("libOpenGL.so.0 is not installed");
+    constexpr std::size_t kDriverRoom = std::size_t{384}
+                                        << 20; // without it Mesa's compiler of shaders ends the program
+    if (!has_room(kDriverRoom))
+        return Error{ErrorCode::out_of_memory, "There is too little address space for OpenGL; allow more (ulimit -v)."};
     for (EGLDisplay display : displays()) {
         auto content = std::make_unique<Content>();
         if (!content->open(display)) continue;

@@ -13,7 +13,7 @@ namespace filigree {
 class HeadlessContext {
 public:
     /// Makes a context and makes it current in this thread.
-    /// Errors: unsupported (no EGL or no OpenGL 4.3: says what to install).
+    /// Errors: unsupported (no EGL or no OpenGL 4.3: says what to install), out_of_memory (too little address space).
     static Result<HeadlessContext> create();
     HeadlessContext(HeadlessContext&&) noexcept;
     HeadlessContext& operator=(HeadlessContext&&) noexcept;
