@@ -9,22 +9,27 @@ namespace filigree::studio {
 
 class MainWindow;
 
+struct ActionMenu {
+    const char* name;
+    QString title;
+    std::vector<QAction*> actions; ///< null: a separator
+};
+
 /// The actions' object names are "menu.command" ("file.open", "detail.remove", "body.play"). Each has a text, a
 /// tooltip, a shortcut where one is usual, and is enabled only when it can do something.
 class Actions : public QObject {
     Q_OBJECT
 public:
     Actions(Workbench& workbench, Viewport& viewport, MainWindow& window);
+    ~Actions() override;
 
     QAction* find(const QString& name) const; ///< null: there is none
-    std::vector<QAction*> all() const;        ///< in the order of the menus
+    const std::vector<ActionMenu>& menus() const;
+    std::vector<QAction*> all() const; ///< in the order of the menus
 
 private:
-    struct Content;
-    std::unique_ptr<Content> content_;
-
-public:
-    ~Actions() override;
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
 };
 
 } // namespace filigree::studio

@@ -1,6 +1,8 @@
 #include "deformation.h"
 
 #include "bell.h"
+#include "jobs.h"
+#include "pins.h"
 
 #include "filigree/mesh/triangulate.h"
 #include "filigree/mesh/weld.h"
@@ -11,7 +13,6 @@
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
-#include <new>
 #include <thread>
 
 namespace filigree::studio {
@@ -173,21 +174,18 @@ PullRegion pull_region(const State& state, const Vec3f& rest_point, double grip,
                        std::optional<Index> vertex) {
     const std::vector<Index> carried_by = vertex ? carriers(*state.model, *vertex) : std::vector<Index>();
     const std::vector<Vec3f> rest = driver_positions(*state.model);
-    std::vector<char> is_pinned(rest.size());
-    for (const Handle& handle : state.handles)
-        if (handle.pinned)
-            for (const Index v : handle.vertices) is_pinned[v] = 1;
+    const VertexSet pinned(rest.size(), pinned_vertices(state.handles));
     PullRegion region;
     Index nearest = kNoIndex;
     for (Index v = 0; v < rest.size(); ++v) {
-        if (is_pinned[v]) continue;
+        if (pinned.contains(v)) continue;
         const float distance = (rest[v] - rest_point).norm();
         if (nearest == kNoIndex || distance < (rest[nearest] - rest_point).norm()) nearest = v;
         if (distance <= grip || std::binary_search(carried_by.begin(), carried_by.end(), v)) region.grip.push_back(v);
     }
     if (region.grip.empty() && nearest != kNoIndex) region.grip.push_back(nearest);
     for (Index v = 0; v < rest.size(); ++v)
-        if (is_pinned[v] ||
+        if (pinned.contains(v) ||
             ((rest[v] - rest_point).norm() > reach && !std::binary_search(region.grip.begin(), region.grip.end(), v)))
             region.held.push_back(v);
     return region;
@@ -218,9 +216,9 @@ Vec3d unwarped(const SpaceWarp& warp, const Vec3d& place, const Vec3d& guess) {
     return point;
 }
 
-struct HandleDrag::Content {
-    Content(std::shared_ptr<const Model> of, std::shared_ptr<const Pose> from, Handle by, std::optional<Index> held,
-            const Bell& rings)
+struct HandleDrag::Impl {
+    Impl(std::shared_ptr<const Model> of, std::shared_ptr<const Pose> from, Handle by, std::optional<Index> held,
+         const Bell& rings)
         : model(std::move(of)), start(std::move(from)), pull(std::move(by)), grabbed(held), bell(rings) {}
 
     std::shared_ptr<const Model> model;
@@ -253,16 +251,7 @@ struct HandleDrag::Content {
     static constexpr std::chrono::seconds kLongestFinish{3};        ///< preparing included
 
     void work() {
-        Status status = Success{};
-        try {
-            status = solve();
-        } catch (const std::bad_alloc&) {
-            status = Error{ErrorCode::out_of_memory, "There is not enough memory to pull this driver: strip to fewer "
-                                                     "vertices."};
-        } catch (const std::exception& failure) {
-            status = Error{ErrorCode::unsuitable, std::string("The pull was stopped by an error of our own (") +
-                                                      failure.what() + "); please report it."};
-        }
+        const Status status = run_guarded("The pull", "Strip to fewer vertices.", [this] { return solve(); });
         {
             const std::scoped_lock lock(mutex);
             has_ended = rests = true;
@@ -353,34 +342,34 @@ HandleDrag::~HandleDrag() {
 void HandleDrag::begin(std::shared_ptr<const Model> model, std::shared_ptr<const Pose> start, Handle pull,
                        std::optional<Index> grabbed) {
     stop();
-    content_ = std::make_shared<Content>(std::move(model), std::move(start), std::move(pull), grabbed, *bell_);
-    content_->thread = std::thread([content = content_.get()] { content->work(); });
+    impl_ = std::make_shared<Impl>(std::move(model), std::move(start), std::move(pull), grabbed, *bell_);
+    impl_->thread = std::thread([content = impl_.get()] { content->work(); });
 }
 
 void HandleDrag::move(const Vec3f& way) {
-    if (!content_) return;
+    if (!impl_) return;
     {
-        const std::scoped_lock lock(content_->mutex);
-        if (way == content_->way) return;
-        content_->way = way;
-        ++content_->way_number;
-        content_->rests = false;
+        const std::scoped_lock lock(impl_->mutex);
+        if (way == impl_->way) return;
+        impl_->way = way;
+        ++impl_->way_number;
+        impl_->rests = false;
     }
-    content_->wake.notify_all();
+    impl_->wake.notify_all();
 }
 
 std::shared_ptr<const Pose> HandleDrag::finish() {
-    if (!content_) return nullptr;
+    if (!impl_) return nullptr;
     std::shared_ptr<const Pose> pose;
     std::optional<Error> error;
     {
-        std::unique_lock lock(content_->mutex);
-        content_->is_ending = true;
-        content_->wake.notify_all();
-        content_->wake.wait_for(lock, Content::kLongestFinish, [&] { return content_->has_ended; });
-        pose = content_->pose;
-        applied_ = content_->applied;
-        error = content_->error;
+        std::unique_lock lock(impl_->mutex);
+        impl_->is_ending = true;
+        impl_->wake.notify_all();
+        impl_->wake.wait_for(lock, Impl::kLongestFinish, [&] { return impl_->has_ended; });
+        pose = impl_->pose;
+        applied_ = impl_->applied;
+        error = impl_->error;
     }
     stop();
     if (error) Q_EMIT failed(*error);
@@ -388,21 +377,21 @@ std::shared_ptr<const Pose> HandleDrag::finish() {
 }
 
 void HandleDrag::stop() {
-    if (!content_) return;
+    if (!impl_) return;
     {
-        const std::scoped_lock lock(content_->mutex);
-        content_->stops = true;
+        const std::scoped_lock lock(impl_->mutex);
+        impl_->stops = true;
     }
-    content_->context.cancel();
-    content_->wake.notify_all();
-    retired_.push_back(std::move(content_));
-    content_ = nullptr;
+    impl_->context.cancel();
+    impl_->wake.notify_all();
+    retired_.push_back(std::move(impl_));
+    impl_ = nullptr;
     retire();
 }
 
 /// Joins the threads that have ended. Preparing a solver cannot be broken off, and nobody is to wait for it.
 void HandleDrag::retire() {
-    std::erase_if(retired_, [](const std::shared_ptr<Content>& content) {
+    std::erase_if(retired_, [](const std::shared_ptr<Impl>& content) {
         {
             const std::scoped_lock lock(content->mutex);
             if (!content->has_ended) return false;
@@ -412,25 +401,25 @@ void HandleDrag::retire() {
     });
 }
 
-bool HandleDrag::is_active() const { return content_ != nullptr; }
+bool HandleDrag::is_active() const { return impl_ != nullptr; }
 
 bool HandleDrag::is_busy() const {
-    if (!content_) return false;
-    const std::scoped_lock lock(content_->mutex);
-    return !content_->rests || content_->is_new;
+    if (!impl_) return false;
+    const std::scoped_lock lock(impl_->mutex);
+    return !impl_->rests || impl_->is_new;
 }
 
 void HandleDrag::listen() {
     retire();
-    if (!content_) return;
+    if (!impl_) return;
     std::shared_ptr<const Pose> pose;
     std::optional<Error> error;
     double milliseconds = 0;
     {
-        const std::scoped_lock lock(content_->mutex);
-        if (std::exchange(content_->is_new, false)) pose = content_->pose;
-        milliseconds = content_->milliseconds;
-        error = content_->error;
+        const std::scoped_lock lock(impl_->mutex);
+        if (std::exchange(impl_->is_new, false)) pose = impl_->pose;
+        milliseconds = impl_->milliseconds;
+        error = impl_->error;
     }
     if (error) {
         stop();

@@ -64,13 +64,13 @@ Q_SIGNALS:
     void failed(const Error& error);
 
 private:
-    struct Content;
+    struct Impl;
     void listen();
     std::unique_ptr<Bell> bell_;
     void retire();
 
-    std::shared_ptr<Content> content_;              ///< null: no drag
-    std::vector<std::shared_ptr<Content>> retired_; ///< over, but their threads are still to end
+    std::shared_ptr<Impl> impl_;                 ///< null: no drag
+    std::vector<std::shared_ptr<Impl>> retired_; ///< over, but their threads are still to end
     Vec3f applied_ = Vec3f::Zero();
 };
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "filigree/deform/space_warp.h"
+#include "filigree/hierarchy/pose.h"
 #include "filigree/hierarchy/restore.h"
 #include "filigree/hierarchy/strip.h"
 #include "filigree/mesh/shapes.h"
@@ -37,7 +38,7 @@ struct Source {
 struct Shape {
     std::string name = "wavy-cube"; ///< one of shape_names()
     ShapeOptions options;
-    bool operator==(const Shape& other) const;
+    bool operator==(const Shape&) const = default;
 };
 
 /// The five deformations, one after the other in this order, about the mesh's box at rest.
@@ -76,10 +77,22 @@ struct BodySettings {
     bool gravity = true, ground = true;
     ObstacleChoice obstacle = ObstacleChoice::none;
     double friction = 0.5, restitution = 0.9;
-    bool operator==(const BodySettings& other) const;
+    bool operator==(const BodySettings&) const = default;
 };
 
-/// Everything that is saved, undone and redone. Cheap to copy: what is large is shared and never changes.
+/// What a body did, for the driver. Frames are shared between the steps of the history, so a longer recording costs its
+/// new frames alone.
+struct Recording {
+    double frames_per_second = 60;
+    std::vector<std::shared_ptr<const Pose>> frames; ///< the first is the start; none is null
+
+    /// Adds the frames of `poses` that are beyond those there are.
+    void follow(const PoseSequence& poses);
+    PoseSequence poses() const; ///< a copy, for files
+};
+
+/// Everything that is saved, undone and redone. Cheap to copy: what is large is shared and never changes. Equal states
+/// share it.
 struct State {
     std::shared_ptr<const Source> source;
     std::optional<Shape> shape; ///< when the source is a built-in shape
@@ -92,10 +105,14 @@ struct State {
     std::shared_ptr<const Pose> handle_pose; ///< the driver as the pulls left it; null: at rest
     bool pose_from_file = false;             ///< the first pull began at a pose that a file held, not at rest
     BodySettings body;
-    std::shared_ptr<const PoseSequence> recording; ///< of the driver, the first frame is the start; null: none
+    std::shared_ptr<const Recording> recording; ///< null: none
 
     unsigned level() const { return *restore.level; }
+    bool operator==(const State&) const = default;
 };
+
+std::size_t level_vertices(const Model& model, unsigned level);
+std::size_t level_faces(const Model& model, unsigned level);
 
 /// The state and its history. Lives in the main thread.
 class Document : public QObject {
@@ -110,6 +127,13 @@ public:
     /// The next state, as a step with that name in the history ("Bend"). Steps in a row with one `merge` key that is
     /// not empty become one (a slider that is dragged), until end_merge().
     void change(const QString& name, State next, const std::string& merge = {});
+    /// The state as `edit(state)` leaves it, as the next step; no step when it leaves it as it was.
+    template <class Edit>
+    void edit(const QString& name, Edit&& edit, const std::string& merge = {}) {
+        State next = state_;
+        std::forward<Edit>(edit)(next);
+        if (!(next == state_)) change(name, std::move(next), merge);
+    }
     void end_merge() { ++merge_run_; }
     /// The key as it is now, for a change that comes later (from the background): end_merge() does not cut it off.
     std::string merge_key(const std::string& merge) const;
@@ -120,10 +144,6 @@ public:
     void set_saved() { undo_stack_.setClean(); }
     /// The same number means the same state, also after undo and redo.
     std::uint64_t state_id() const { return state_id_; }
-
-    /// Everything of the state as bytes: the model file with the recording, and all settings. For tests, and for
-    /// whoever wants to know whether two states are the same.
-    std::string bytes() const;
 
 Q_SIGNALS:
     /// The state is another one now; what differs can be seen by comparing.

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "document.h"
-#include "navigation.h"
+#include "filigree/render/camera_navigation.h"
 
 #include <QString>
 

@@ -2,8 +2,10 @@
 
 #include "controls.h"
 
+#include <QBoxLayout>
 #include <QDialogButtonBox>
 #include <QPushButton>
+#include <QScrollArea>
 
 #include <array>
 

@@ -1,4 +1,4 @@
-// Long work off the main thread: one at a time, with progress and cancel.
+// Work off the main thread: one at a time, with progress and cancel.
 #pragma once
 
 #include "filigree/core/result.h"
@@ -12,11 +12,20 @@
 
 namespace filigree::studio {
 
+/// Runs `work` and makes what it throws an error: too little memory, with what to do about it, or a defect of ours.
+Status run_guarded(const std::string& title, const std::string& advice, const std::function<Status()>& work);
+
+struct JobOptions {
+    bool is_urgent = false;                        ///< before all that waits
+    std::function<void(const Error&)> failed = {}; ///< is told of an error in place of Jobs::failed()
+};
+
 /// Lives in the main thread. Work runs in a thread of its own, in the order it was started.
 class Jobs : public QObject {
     Q_OBJECT
 public:
-    explicit Jobs(QObject* parent = nullptr);
+    /// advice: what a user can do when memory runs out; a sentence, or "".
+    explicit Jobs(std::string advice = {}, QObject* parent = nullptr);
     ~Jobs() override; ///< cancels what runs and waits for it; nothing is delivered any more
 
     /// `work` runs in the other thread; `done` gets its value in the main thread. Work that is started under the same
@@ -25,7 +34,7 @@ public:
     /// failed().
     template <class T>
     void start(const QString& title, const std::string& topic, std::function<Result<T>(const RunContext&)> work,
-               std::function<void(T)> done) {
+               std::function<void(T)> done, JobOptions options = {}) {
         auto value = std::make_shared<std::optional<T>>();
         add({title, topic,
              [work = std::move(work), value](const RunContext& context) -> Status {
@@ -34,7 +43,7 @@ public:
                  value->emplace(std::move(result).value());
                  return Success{};
              },
-             [done = std::move(done), value] { done(std::move(**value)); }});
+             [done = std::move(done), value] { done(std::move(**value)); }, std::move(options)});
     }
 
     bool is_busy() const;                            ///< something runs or waits
@@ -44,8 +53,11 @@ public:
     void cancel();                                   ///< what runs, and all that waits
     bool is_pending(const std::string& topic) const; ///< such work runs or waits, neither cancelled nor dropped
     void drop(const std::string& topic); ///< work that nobody needs any more: cancelled, and nothing is told of it
+    void drop_all();
     /// Returns when nothing runs or waits any more; deliveries happen inside. For tests, scripts and closing.
     void wait_until_idle();
+    /// The same, but no other events are handled meanwhile.
+    void finish_all();
 
 Q_SIGNALS:
     void started();
@@ -60,13 +72,15 @@ private:
         std::string topic;
         std::function<Status(const RunContext&)> work;
         std::function<void()> deliver;
+        JobOptions options;
     };
+    struct Entry;
+    struct Impl;
     void add(Job job);
     void listen();
-    void finish(const Status& result, bool is_cancelled, bool is_replaced, const Job& job);
+    void finish(const Entry& entry);
 
-    struct Content;
-    std::unique_ptr<Content> content_;
+    std::unique_ptr<Impl> impl_;
 };
 
 } // namespace filigree::studio

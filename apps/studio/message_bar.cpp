@@ -3,6 +3,7 @@
 #include "icons.h"
 #include "theme.h"
 
+#include <QBoxLayout>
 #include <QEvent>
 #include <QPainter>
 

@@ -16,7 +16,6 @@
 #include <QMouseEvent>
 #include <QPainter>
 #include <QPixmap>
-#include <QSpinBox>
 #include <QStringList>
 #include <QSurfaceFormat>
 #include <QWheelEvent>
@@ -75,14 +74,12 @@ QStringList words_of(const QString& line) {
     return words;
 }
 
-Error out_of_range(const QString& value, double least, double most) {
-    return usage(QString("%1 is out of range; from %2 to %3 is allowed.").arg(value).arg(least).arg(most));
-}
-
-Result<bool> parse_switch(const QString& text) {
-    if (text == "on") return true;
-    if (text == "off") return false;
-    return usage("'" + text + "' is neither on nor off.");
+Result<double> number_within(const QString& text, double least, double most) {
+    bool ok = false;
+    const double number = text.toDouble(&ok);
+    if (!ok) return usage("'" + text + "' is no number.");
+    if (number >= least && number <= most) return number;
+    return usage(QString("%1 is out of range; from %2 to %3 is allowed.").arg(text).arg(least).arg(most));
 }
 
 class Script {
@@ -147,12 +144,11 @@ private:
         return Success{};
     }
     Status wait_for(const QString& text) {
-        bool ok = false;
-        const double seconds = text.toDouble(&ok);
-        if (!ok || !(seconds >= 0 && seconds <= kPatience)) return usage("'" + text + "' is no number of seconds.");
+        const Result<double> seconds = number_within(text, 0, kPatience);
+        if (!seconds) return seconds.error();
         QElapsedTimer clock;
         clock.start();
-        while (double(clock.elapsed()) < 1000 * seconds) handle_events();
+        while (double(clock.elapsed()) < 1000 * *seconds) handle_events();
         return Success{};
     }
     Status settle_well(const std::function<void()>& work) {
@@ -181,29 +177,19 @@ private:
     Status set(const QString& name, const QString& value) {
         Result<QWidget*> found = control(name);
         if (!found) return found.error();
-        QWidget* const widget = *found;
-        if (!widget->isEnabled()) return usage("the control '" + name + "' cannot be changed now.");
-        bool ok = true;
-        if (auto* const number = qobject_cast<QDoubleSpinBox*>(widget)) {
-            const double to = value.toDouble(&ok);
-            if (ok && (to < number->minimum() || to > number->maximum()))
-                return out_of_range(value, number->minimum(), number->maximum());
-            if (ok) number->setValue(to);
-        } else if (auto* const whole = qobject_cast<QSpinBox*>(widget)) {
-            const int to = value.toInt(&ok);
-            if (ok && (to < whole->minimum() || to > whole->maximum()))
-                return out_of_range(value, whole->minimum(), whole->maximum());
-            if (ok) whole->setValue(to);
-        } else if (auto* const slider = qobject_cast<QAbstractSlider*>(widget)) {
-            const int to = value.toInt(&ok);
-            if (ok && (to < slider->minimum() || to > slider->maximum()))
-                return out_of_range(value, slider->minimum(), slider->maximum());
-            if (ok) slider->setValue(to);
-        } else if (auto* const button = qobject_cast<QAbstractButton*>(widget); button && button->isCheckable()) {
-            const Result<bool> on = parse_switch(value);
-            if (!on) return on.error();
-            if (button->isChecked() != *on) button->click();
-        } else if (auto* const choice = qobject_cast<QComboBox*>(widget)) {
+        if (!(*found)->isEnabled()) return usage("the control '" + name + "' cannot be changed now.");
+        if (auto* const number = qobject_cast<QDoubleSpinBox*>(*found)) {
+            const Result<double> to = number_within(value, number->minimum(), number->maximum());
+            if (!to) return to.error();
+            number->setValue(*to);
+        } else if (auto* const slider = qobject_cast<QAbstractSlider*>(*found)) {
+            const Result<double> to = number_within(value, slider->minimum(), slider->maximum());
+            if (!to) return to.error();
+            slider->setValue(int(*to));
+        } else if (auto* const button = qobject_cast<QAbstractButton*>(*found); button && button->isCheckable()) {
+            if (value != "on" && value != "off") return usage("'" + value + "' is neither on nor off.");
+            if (button->isChecked() != (value == "on")) button->click();
+        } else if (auto* const choice = qobject_cast<QComboBox*>(*found)) {
             const int index = choice->findText(value, Qt::MatchFixedString);
             if (index < 0) return usage("'" + name + "' has no choice '" + value + "'.");
             choice->setCurrentIndex(index);
@@ -211,7 +197,6 @@ private:
         } else {
             return usage("'" + name + "' is no control that takes a value.");
         }
-        if (!ok) return usage("'" + value + "' is no number.");
         handle_events();
         return Success{};
     }
@@ -223,16 +208,20 @@ private:
                        : usage("the message is '" + window_.message() + "', not '" + value + "'.");
         Result<QWidget*> found = control(name);
         if (!found) return found.error();
-        QString is;
-        if (const auto* number = qobject_cast<QDoubleSpinBox*>(*found))
-            return std::abs(number->value() - value.toDouble()) < 1e-6
-                       ? Status(Success{})
-                       : usage("'" + name + "' is " + QString::number(number->value()) + ", not " + value + ".");
-        if (const auto* whole = qobject_cast<QSpinBox*>(*found)) is = QString::number(whole->value());
-        if (const auto* slider = qobject_cast<QAbstractSlider*>(*found)) is = QString::number(slider->value());
-        if (const auto* button = qobject_cast<QAbstractButton*>(*found)) is = button->isChecked() ? "on" : "off";
-        if (const auto* choice = qobject_cast<QComboBox*>(*found)) is = choice->currentText();
-        return is == value ? Status(Success{}) : usage("'" + name + "' is '" + is + "', not '" + value + "'.");
+        const QString is = value_of(**found);
+        const bool is_number = qobject_cast<QDoubleSpinBox*>(*found) != nullptr;
+        const bool is_equal = is_number ? std::abs(is.toDouble() - value.toDouble()) < 1e-6 : is == value;
+        return is_equal ? Status(Success{}) : usage("'" + name + "' is '" + is + "', not '" + value + "'.");
+    }
+    static QString value_of(const QWidget& control) {
+        if (const auto* number = qobject_cast<const QDoubleSpinBox*>(&control))
+            return QString::number(number->value(), 'g', 15);
+        if (const auto* slider = qobject_cast<const QAbstractSlider*>(&control))
+            return QString::number(slider->value());
+        if (const auto* button = qobject_cast<const QAbstractButton*>(&control))
+            return button->isChecked() ? "on" : "off";
+        const auto* choice = qobject_cast<const QComboBox*>(&control);
+        return choice ? choice->currentText() : QString();
     }
 
     Result<QPointF> place(const QString& x, const QString& y) {

@@ -82,80 +82,72 @@ const std::vector<float>& ShownModel::arrival() {
     return arrival_;
 }
 
-void ShownModel::ask(unsigned level, bool urgent, Background& background,
+void ShownModel::ask(unsigned level, bool is_urgent, Jobs& background,
                      std::function<void(std::function<void()>)> upload,
-                     std::function<void(unsigned, const std::optional<Error>&)> ready) {
+                     std::function<void(const std::optional<Error>&)> ready) {
+    if (std::exchange(asked_[level], 1)) return;
     // The model before is drawn until this one is there, and may ask for a level of the same number meanwhile.
     const std::string topic =
         "level " + std::to_string(level) + " of " + std::to_string(reinterpret_cast<std::uintptr_t>(this));
-    if (asked_[level]) return;
-    asked_[level] = 1;
-    const std::weak_ptr<int> life = life_;
-    RestoreOptions restore = restore_;
-    restore.level = level;
-    background.start(
-        topic,
-        [this, life, upload = std::move(upload), ready, level, restore, model = model_, source = source_,
-         where = where_](const RunContext& context) -> Background::Delivery {
-            Result<std::shared_ptr<const LevelShape>> of_level = LevelShape::make(model, restore, level, context);
-            if (context.is_cancelled()) return nullptr;
-            if (!of_level)
-                return [life, ready, level, error = of_level.error()] {
-                    if (!life.expired()) ready(level, error);
-                };
-            const std::shared_ptr<const LevelShape> shape = std::move(of_level).value();
+    struct Prepared {
+        std::shared_ptr<const LevelShape> shape;
+        std::optional<DrawData> data; ///< unset: the mesh has no faces
+    };
+    background.start<Prepared>(
+        "The picture", topic,
+        [level, model = model_, source = source_, restore = restore_,
+         where = where_](const RunContext& context) mutable -> Result<Prepared> {
+            Result<std::shared_ptr<const LevelShape>> shape = LevelShape::make(model, restore, level, context);
+            if (!shape) return shape.error();
+            Prepared prepared{std::move(*shape), {}};
+            if (prepared.shape->triangles().empty()) return prepared;
             SurfaceOptions options;
             options.materials = source->materials.materials;
-            std::optional<Error> error;
-            std::shared_ptr<DrawData> data;
-            if (!shape->triangles().empty()) {
-                Result<DrawData> made = DrawData::model(*model, restore, options, where, context);
-                if (context.is_cancelled()) return nullptr;
-                if (made)
-                    data = std::make_shared<DrawData>(std::move(made).value());
-                else
-                    error = made.error();
-            }
-            return [this, life, upload, ready, level, model, source, shape, data, error]() mutable {
-                if (life.expired()) return;
-                if (!error)
-                    upload([&] {
-                        Result<Drawable> drawable = data ? Drawable::upload(std::move(*data))
-                                                         : Drawable::points(shape->positions(rest_pose_, RunContext()),
-                                                                            model->mesh.origin, {}, RunContext());
-                        if (drawable)
-                            levels_[level].reset(new ShownLevel{shape, std::move(drawable).value(), data == nullptr});
-                        else
-                            error = drawable.error();
-                    });
-                ready(level, error);
-            };
+            restore.level = level;
+            Result<DrawData> data = DrawData::model(*model, restore, options, where, context);
+            if (!data) return data.error();
+            prepared.data.emplace(std::move(*data));
+            return prepared;
         },
-        urgent,
-        [life, ready, level](const Error& error) {
-            if (!life.expired()) ready(level, error);
-        });
+        [this, life = std::weak_ptr(life_), upload = std::move(upload), ready, level](Prepared prepared) {
+            if (life.expired()) return;
+            std::optional<Error> error;
+            upload([&] {
+                const bool is_points = !prepared.data;
+                Result<Drawable> drawable = is_points
+                                                ? Drawable::points(prepared.shape->positions(rest_pose_, RunContext()),
+                                                                   model_->mesh.origin, {}, RunContext())
+                                                : Drawable::upload(std::move(*prepared.data));
+                if (drawable)
+                    levels_[level].reset(new ShownLevel{prepared.shape, std::move(drawable).value(), is_points});
+                else
+                    error = drawable.error();
+            });
+            ready(error);
+        },
+        {is_urgent, [life = std::weak_ptr(life_), ready](const Error& error) {
+             if (!life.expired()) ready(error);
+         }});
 }
 
-void ShownModel::measure(Background& background, std::function<void()> ready) {
-    if (is_measured_) return;
-    is_measured_ = true;
-    const std::weak_ptr<int> life = life_;
-    background.start(
-        "deviations",
-        [this, life, ready = std::move(ready), model = model_](const RunContext& context) -> Background::Delivery {
+void ShownModel::measure(Jobs& background, std::function<void()> ready) {
+    if (std::exchange(is_measured_, true)) return;
+    using Deviations = std::vector<std::optional<double>>;
+    background.start<Deviations>(
+        "The picture", "deviations",
+        [model = model_](const RunContext& context) -> Result<Deviations> {
             constexpr std::size_t kProbes = 20'000; // vertices: enough for a percentile
             const Mesh points = some_vertices(model->mesh, kProbes);
-            std::vector<std::optional<double>> deviations;
+            Deviations deviations;
             for (unsigned level = 0; level < model->finest_level(); ++level)
                 deviations.push_back(deviation_of(points, level_mesh(*model, level), context));
-            if (context.is_cancelled()) return nullptr;
-            return [this, life, ready, deviations] {
-                if (life.expired()) return;
-                for (std::size_t level = 0; level < deviations.size(); ++level)
-                    facts_[level].deviation = deviations[level];
-                ready();
-            };
+            if (context.is_cancelled()) return cancelled_error();
+            return deviations;
+        },
+        [this, life = std::weak_ptr(life_), ready = std::move(ready)](const Deviations& deviations) {
+            if (life.expired()) return;
+            for (std::size_t level = 0; level < deviations.size(); ++level) facts_[level].deviation = deviations[level];
+            ready();
         });
 }
 
@@ -196,10 +188,6 @@ void ShownModel::forget_unready() {
     for (std::size_t level = 0; level < levels_.size(); ++level) asked_[level] = levels_[level] != nullptr;
     is_measured_ =
         std::all_of(facts_.begin(), facts_.end(), [](const LevelFacts& f) { return f.deviation.has_value(); });
-}
-
-void ShownModel::clear() {
-    for (auto& level : levels_) level.reset();
 }
 
 } // namespace filigree::studio

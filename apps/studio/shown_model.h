@@ -2,9 +2,9 @@
 // background.
 #pragma once
 
-#include "background.h"
 #include "document.h"
-#include "level_choice.h"
+#include "filigree/render/level_choice.h"
+#include "jobs.h"
 
 #include "filigree/render/drawable.h"
 
@@ -63,11 +63,11 @@ public:
     const std::vector<float>& arrival();
 
     /// Prepares a level unless it was asked for before. `upload` runs its argument with OpenGL at hand; `ready` is
-    /// called with the level, or with the error that says why there will be none.
-    void ask(unsigned level, bool urgent, Background& background, std::function<void(std::function<void()>)> upload,
-             std::function<void(unsigned, const std::optional<Error>&)> ready);
+    /// called when the level is there, or with the error that says why there will be none.
+    void ask(unsigned level, bool is_urgent, Jobs& background, std::function<void(std::function<void()>)> upload,
+             std::function<void(const std::optional<Error>&)> ready);
     /// Measures the deviations of all levels in the background, once.
-    void measure(Background& background, std::function<void()> ready);
+    void measure(Jobs& background, std::function<void()> ready);
 
     /// Null: not ready, or there is none.
     ShownLevel* level(unsigned number) { return number < levels_.size() ? levels_[number].get() : nullptr; }
@@ -79,10 +79,8 @@ public:
     bool set_pose(ShownLevel& level, const Pose& pose, std::uint64_t stamp, const RunContext& context);
     void set_colors(ShownLevel& level, const VertexColors& colors, std::uint64_t stamp);
 
-    /// After Background::cancel_all(): levels that were asked for and did not come can be asked for again.
+    /// After Jobs::drop_all(): levels that were asked for and did not come can be asked for again.
     void forget_unready();
-    /// Gives back what is in graphics memory; with OpenGL.
-    void clear();
 
 private:
     std::shared_ptr<const Model> model_;

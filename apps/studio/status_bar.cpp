@@ -1,5 +1,7 @@
 #include "status_bar.h"
 
+#include "words.h"
+
 namespace filigree::studio {
 
 QString error_text(const Workbench& workbench, bool in_full) {

@@ -4,6 +4,7 @@
 #include "actions.h"
 #include "controls.h"
 
+#include <QBoxLayout>
 #include <QProgressBar>
 #include <QStatusBar>
 

@@ -1,19 +1,21 @@
 #include "timeline.h"
 
+#include "panel.h"
+
 #include <QSignalBlocker>
 
 namespace filigree::studio {
 
 Timeline::Timeline(Workbench& workbench, const Actions& actions, QWidget* parent)
-    : QWidget(parent), workbench_(workbench), play_(actions.find("body.play")), pause_(actions.find("body.pause")),
-      scrub_(new QSlider(Qt::Horizontal, this)), frame_(new Text("timeline.frame", Tone::plain, this)) {
+    : QWidget(parent), workbench_(workbench), scrub_(new QSlider(Qt::Horizontal, this)),
+      frame_(new Text("timeline.frame", Tone::plain, this)) {
     setObjectName("timeline");
     auto* row = new QHBoxLayout(this);
     row->setContentsMargins(8, 4, 8, 4);
     row->setSpacing(4);
     row->addWidget(icon_button("timeline.reset", actions.find("body.reset"), this));
-    play_button_ = icon_button("timeline.play", play_, this);
-    row->addWidget(play_button_);
+    row->addWidget(
+        play_button("timeline.play", workbench, actions.find("body.play"), actions.find("body.pause"), this));
     row->addWidget(icon_button("timeline.step", actions.find("body.step"), this));
     row->addSpacing(6);
     scrub_->setObjectName("timeline.scrub");
@@ -61,11 +63,6 @@ void Timeline::be_narrow(bool narrow) {
 }
 
 void Timeline::refresh() {
-    QAction* const shown = workbench_.is_playing() ? pause_ : play_;
-    if (play_button_->defaultAction() != shown) {
-        play_button_->removeAction(play_button_->defaultAction());
-        play_button_->setDefaultAction(shown);
-    }
     const std::size_t count = workbench_.frame_count(), frame = workbench_.frame();
     {
         const QSignalBlocker quiet(scrub_);
@@ -78,14 +75,12 @@ void Timeline::refresh() {
         frame_->set_tone(Tone::quiet);
         return;
     }
-    const auto& recording = workbench_.state().recording;
-    const double rate = workbench_.playback().has_body() ? workbench_.playback().recording().frames_per_second
-                        : recording                      ? recording->frames_per_second
-                                                         : 60;
     frame_->set_tone(Tone::plain);
     const QString place = QStringLiteral("%1 of %2").arg(with_commas(frame), with_commas(count - 1));
     frame_->setText(is_narrow_ ? place
-                               : QStringLiteral("frame %1 · %2 s").arg(place).arg(double(frame) / rate, 0, 'f', 2));
+                               : QStringLiteral("frame %1 · %2 s")
+                                     .arg(place)
+                                     .arg(double(frame) / workbench_.frames_per_second(), 0, 'f', 2));
 }
 
 } // namespace filigree::studio

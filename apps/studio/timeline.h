@@ -4,6 +4,8 @@
 #include "actions.h"
 #include "controls.h"
 
+#include <QSlider>
+
 namespace filigree::studio {
 
 class Timeline : public QWidget {
@@ -21,8 +23,6 @@ private:
     void be_narrow(bool narrow);
 
     Workbench& workbench_;
-    QAction *play_, *pause_;
-    QToolButton* play_button_;
     QSlider* scrub_;
     Text* frame_;
     ActionButton *film_, *meshes_;

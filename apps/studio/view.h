@@ -43,6 +43,13 @@ public:
 
     const ViewSettings& settings() const { return settings_; }
     void set(const ViewSettings& settings);
+    /// The settings as `edit(settings)` leaves them.
+    template <class Edit>
+    void edit(Edit&& edit) {
+        ViewSettings next = settings_;
+        std::forward<Edit>(edit)(next);
+        set(next);
+    }
 
     const Camera& camera() const { return camera_; }
     void set_camera(const Camera& camera);

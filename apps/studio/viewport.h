@@ -1,7 +1,7 @@
 // The picture in the middle: draws the document, turns with the mouse, and lets the mouse pull it.
 #pragma once
 
-#include "workbench.h"
+#include "pointer.h"
 
 #include <QOpenGLWidget>
 
@@ -33,12 +33,7 @@ public:
     void finish_drawing();
     /// The sentence shown instead of a picture; "" when all is well.
     const std::string& trouble() const;
-    /// World position under a point of the widget (device-independent pixels) and the vertex nearest to it; none
-    /// beside.
-    struct Picked {
-        Vec3d at;
-        Index vertex; ///< of the finest mesh
-    };
+    /// What of the surface is under a point of the widget (device-independent pixels); none beside.
     std::optional<Picked> pick(const QPointF& point);
     /// Where a point of the world is on the widget (device-independent pixels), in the tile of the restored mesh.
     QPointF place_of(const Vec3d& world) const;
@@ -66,8 +61,8 @@ protected:
     void resizeEvent(QResizeEvent* event) override;
 
 private:
-    struct Content;
-    std::unique_ptr<Content> content_;
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
 };
 
 } // namespace filigree::studio

@@ -56,7 +56,7 @@ bool keeps_key(const QWidget* widget, int key) {
 
 } // namespace
 
-struct MainWindow::Content {
+struct MainWindow::Impl {
     bool keep_settings = false;
     std::unique_ptr<Workbench> workbench;
     Viewport* viewport = nullptr;
@@ -76,9 +76,10 @@ struct MainWindow::Content {
 
     void add_menus(MainWindow& window);
     void add_toolbar(MainWindow& window);
-    QWidget* make_stage(MainWindow& window);
+    QWidget* make_middle(MainWindow& window);
     QWidget* make_column(MainWindow& window);
     void follow_files(MainWindow& window);
+    bool save_now(MainWindow& window, const QString& path);
     void wait_for_files(MainWindow& window);
     void show_title(MainWindow& window);
     void show_recent(MainWindow& window);
@@ -87,8 +88,8 @@ struct MainWindow::Content {
     void write_settings(const MainWindow& window);
 };
 
-MainWindow::MainWindow(bool keep_settings, QWidget* parent) : QMainWindow(parent), content_(new Content) {
-    Content& content = *content_;
+MainWindow::MainWindow(bool keep_settings, QWidget* parent) : QMainWindow(parent), impl_(new Impl) {
+    Impl& content = *impl_;
     content.keep_settings = keep_settings;
     if (keep_settings)
         content.theme = static_cast<Theme>(std::clamp(QSettings().value("window/theme", 0).toInt(), 0, 2));
@@ -108,7 +109,7 @@ MainWindow::MainWindow(bool keep_settings, QWidget* parent) : QMainWindow(parent
     content.splitter->setObjectName("splitter");
     content.splitter->setChildrenCollapsible(false);
     content.splitter->setHandleWidth(3);
-    content.splitter->addWidget(content.make_stage(*this));
+    content.splitter->addWidget(content.make_middle(*this));
     content.splitter->addWidget(content.make_column(*this));
     content.splitter->setStretchFactor(0, 1);
     content.splitter->setStretchFactor(1, 0);
@@ -118,9 +119,7 @@ MainWindow::MainWindow(bool keep_settings, QWidget* parent) : QMainWindow(parent
 
     connect(content.workbench.get(), &Workbench::told, this, &MainWindow::show_message);
     connect(this, &MainWindow::panel_changed, this, [this] {
-        ViewSettings settings = workbench().view().settings();
-        settings.gizmos = panel() == "deform";
-        workbench().view().set(settings);
+        workbench().view().edit([this](ViewSettings& settings) { settings.gizmos = panel() == "deform"; });
     });
     resize(1280, 800);
     content.splitter->setSizes({1280 - kColumnWidth, kColumnWidth});
@@ -134,81 +133,33 @@ MainWindow::MainWindow(bool keep_settings, QWidget* parent) : QMainWindow(parent
 
 MainWindow::~MainWindow() {
     qApp->removeEventFilter(this);
-    content_->workbench->disconnect(this);
-    delete content_->help.data();
+    impl_->workbench->disconnect(this);
+    delete impl_->help.data();
     delete takeCentralWidget(); // all that looks at the workbench goes before it
     setStatusBar(nullptr);
 }
 
-Workbench& MainWindow::workbench() { return *content_->workbench; }
-Viewport& MainWindow::viewport() { return *content_->viewport; }
-Actions& MainWindow::actions() { return *content_->actions; }
+Workbench& MainWindow::workbench() { return *impl_->workbench; }
+Viewport& MainWindow::viewport() { return *impl_->viewport; }
+Actions& MainWindow::actions() { return *impl_->actions; }
 
-void MainWindow::Content::add_menus(MainWindow& window) {
-    const auto menu = [&](const char* name, const QString& title, std::initializer_list<const char*> names) {
-        QMenu* result = window.menuBar()->addMenu(title);
-        result->setObjectName(QLatin1String("menu.") + name);
-        for (const char* action : names) {
-            if (!*action) {
-                result->addSeparator();
-            } else if (QLatin1String(action) == "file.open_recent") {
-                recent_menu = result->addMenu("Open &recent");
-                recent_menu->setObjectName(action);
-            } else {
-                result->addAction(actions->find(action));
-            }
+void MainWindow::Impl::add_menus(MainWindow& window) {
+    recent_menu = new QMenu("Open &recent", &window);
+    recent_menu->setObjectName("file.open_recent");
+    for (const ActionMenu& menu : actions->menus()) {
+        QMenu* shown = window.menuBar()->addMenu(menu.title);
+        shown->setObjectName(menu.name);
+        for (QAction* action : menu.actions) {
+            if (!action)
+                shown->addSeparator();
+            else
+                shown->addAction(action);
+            if (action == actions->find("file.open")) shown->addMenu(recent_menu);
         }
-    };
-    menu("file", "&File",
-         {"file.open", "file.open_recent", "", "file.save", "file.save_as", "", "file.save_mesh", "file.save_driver",
-          "", "file.export_film", "file.export_meshes", "", "file.quit"});
-    menu("edit", "&Edit",
-         {"edit.undo", "edit.redo", "", "quads.make", "detail.remove", "detail.add", "", "deform.open",
-          "edit.reset_deformation", "edit.unpin_all", "", "tool.pull", "tool.pin", "tool.turn", "", "edit.cancel"});
-    menu("view", "&View",
-         {"view.front",
-          "view.side",
-          "view.top",
-          "view.iso",
-          "view.show_all",
-          "",
-          "view.shaded",
-          "view.edges",
-          "view.wireframe",
-          "",
-          "view.color_own",
-          "view.color_error",
-          "view.color_levels",
-          "view.color_patches",
-          "view.measure_error",
-          "",
-          "view.split",
-          "view.driver",
-          "view.defects",
-          "view.inside_points",
-          "view.clip",
-          "view.ground",
-          "",
-          "view.level_by_distance",
-          "view.keep_up",
-          "",
-          "panel.model",
-          "panel.quads",
-          "panel.detail",
-          "panel.deform",
-          "panel.body",
-          "panel.view",
-          "",
-          "view.system_theme",
-          "view.light_theme",
-          "view.dark_theme"});
-    menu("body", "&Body",
-         {"body.make", "body.animate", "", "body.play", "body.pause", "body.step", "body.back", "body.reset", "",
-          "view.particles"});
-    menu("help", "&Help", {"help.shortcuts", "help.about"});
+    }
 }
 
-void MainWindow::Content::add_toolbar(MainWindow& window) {
+void MainWindow::Impl::add_toolbar(MainWindow& window) {
     auto* bar = new QToolBar("Tools", &window);
     bar->setObjectName("toolbar");
     bar->setMovable(false);
@@ -228,24 +179,24 @@ void MainWindow::Content::add_toolbar(MainWindow& window) {
     window.addToolBar(Qt::LeftToolBarArea, bar);
 }
 
-QWidget* MainWindow::Content::make_stage(MainWindow& window) {
-    auto* stage = new QWidget(&window);
-    stage->setObjectName("stage");
-    auto* picture = new QWidget(stage);
+QWidget* MainWindow::Impl::make_middle(MainWindow& window) {
+    auto* middle = new QWidget(&window);
+    middle->setObjectName("middle");
+    auto* picture = new QWidget(middle);
     picture->setObjectName("picture");
     auto* over = new QVBoxLayout(picture);
     over->setContentsMargins(0, 0, 0, 0);
     over->addWidget(viewport);
     messages = new MessageBar(picture);
-    auto* column = new QVBoxLayout(stage);
+    auto* column = new QVBoxLayout(middle);
     column->setContentsMargins(0, 0, 0, 0);
     column->setSpacing(0);
     column->addWidget(picture, 1);
-    column->addWidget(new Timeline(*workbench, *actions, stage));
-    return stage;
+    column->addWidget(new Timeline(*workbench, *actions, middle));
+    return middle;
 }
 
-QWidget* MainWindow::Content::make_column(MainWindow& window) {
+QWidget* MainWindow::Impl::make_column(MainWindow& window) {
     auto* column = new QWidget(&window);
     column->setObjectName("column");
     tabs = new QTabBar(column);
@@ -290,19 +241,19 @@ QWidget* MainWindow::Content::make_column(MainWindow& window) {
 bool MainWindow::show_panel(const QString& name) {
     for (std::size_t k = 0; k < kPanels.size(); ++k)
         if (name == QLatin1String(kPanels[k])) {
-            content_->tabs->setCurrentIndex(int(k));
+            impl_->tabs->setCurrentIndex(int(k));
             return true;
         }
     return false;
 }
 
 QString MainWindow::panel() const {
-    return content_->tabs ? QLatin1String(kPanels[std::size_t(content_->tabs->currentIndex())]) : QString();
+    return impl_->tabs ? QLatin1String(kPanels[std::size_t(impl_->tabs->currentIndex())]) : QString();
 }
 
 // Files
 
-void MainWindow::Content::follow_files(MainWindow& window) {
+void MainWindow::Impl::follow_files(MainWindow& window) {
     connect(workbench.get(), &Workbench::opened, &window, [this, &window] {
         const auto& source = workbench->state().source;
         const QString path = source ? QString::fromStdString(source->path) : QString();
@@ -332,7 +283,7 @@ void MainWindow::Content::follow_files(MainWindow& window) {
     });
 }
 
-void MainWindow::Content::wait_for_files(MainWindow& window) {
+void MainWindow::Impl::wait_for_files(MainWindow& window) {
     if (farewell) return;
     auto* dialog = new QProgressDialog(&window);
     farewell = dialog;
@@ -355,7 +306,7 @@ void MainWindow::Content::wait_for_files(MainWindow& window) {
     dialog->show();
 }
 
-void MainWindow::Content::show_title(MainWindow& window) {
+void MainWindow::Impl::show_title(MainWindow& window) {
     const auto& source = workbench->state().source;
     const QString name = !file_path.isEmpty() ? QFileInfo(file_path).fileName()
                          : source             ? QString::fromStdString(source->name)
@@ -364,7 +315,7 @@ void MainWindow::Content::show_title(MainWindow& window) {
     window.setWindowModified(workbench->document().is_modified());
 }
 
-void MainWindow::Content::add_recent(MainWindow& window, const QString& path) {
+void MainWindow::Impl::add_recent(MainWindow& window, const QString& path) {
     const QString whole = QFileInfo(path).absoluteFilePath();
     recent.removeAll(whole);
     recent.prepend(whole);
@@ -373,7 +324,7 @@ void MainWindow::Content::add_recent(MainWindow& window, const QString& path) {
     show_recent(window);
 }
 
-void MainWindow::Content::show_recent(MainWindow& window) {
+void MainWindow::Impl::show_recent(MainWindow& window) {
     recent_menu->clear();
     recent_menu->setEnabled(!recent.isEmpty());
     for (const QString& path : recent) {
@@ -385,39 +336,42 @@ void MainWindow::Content::show_recent(MainWindow& window) {
     recent_menu->setToolTipsVisible(true);
 }
 
-QString MainWindow::file_path() const { return content_->file_path; }
-QStringList MainWindow::recent_files() const { return content_->recent; }
+QString MainWindow::file_path() const { return impl_->file_path; }
+QStringList MainWindow::recent_files() const { return impl_->recent; }
 
 void MainWindow::open_file(const QString& path) {
-    if (may_discard()) content_->workbench->open(path.toStdString());
+    if (may_discard()) impl_->workbench->open(path.toStdString());
 }
 
 void MainWindow::save_file(const QString& path) {
-    write([&] { content_->workbench->save_model(path.toStdString()); });
+    write([&] { impl_->workbench->save_model(path.toStdString()); });
 }
 
 void MainWindow::write(const std::function<void()>& start) {
     start();
-    content_->is_writing = content_->workbench->jobs().is_busy();
+    impl_->is_writing = impl_->workbench->jobs().is_busy();
 }
 
 bool MainWindow::may_discard() {
-    content_->workbench->pause(); // what was recorded so far is a change as well
-    if (!content_->workbench->document().is_modified()) return true;
+    impl_->workbench->pause(); // what was recorded so far is a change as well
+    if (!impl_->workbench->document().is_modified()) return true;
     QMessageBox box(this);
     box.setObjectName("unsaved");
     box.setWindowTitle("Unsaved changes");
     box.setIcon(QMessageBox::Question);
-    const auto& source = content_->workbench->state().source;
+    const auto& source = impl_->workbench->state().source;
     box.setText(QStringLiteral("Save the changes of %1 first?")
                     .arg(source ? QString::fromStdString(source->name) : QStringLiteral("the model")));
-    box.setInformativeText("Without saving they are lost.");
+    QString explanation = "Without saving they are lost.";
+    if (const auto left_out = impl_->workbench->left_out_of_model(); !left_out.empty())
+        explanation += " A model file (.fil) is written without " + listed(left_out) + '.';
+    box.setInformativeText(explanation);
     box.setStandardButtons(QMessageBox::Save | QMessageBox::Discard | QMessageBox::Cancel);
     box.setDefaultButton(QMessageBox::Save);
     const int answer = box.exec();
     if (answer == QMessageBox::Discard) return true;
     if (answer != QMessageBox::Save) return false;
-    QString path = content_->file_path;
+    QString path = impl_->file_path;
     if (path.isEmpty()) {
         QFileDialog dialog(this, "Save the model");
         dialog.setObjectName("unsaved.save");
@@ -427,14 +381,23 @@ bool MainWindow::may_discard() {
         if (dialog.exec() != QDialog::Accepted) return false;
         path = dialog.selectedFiles().value(0);
     }
-    save_file(path);
-    content_->workbench->jobs().wait_until_idle();
-    return !content_->workbench->document().is_modified();
+    return impl_->save_now(*this, path);
+}
+
+/// The document is in the file, as far as a model file holds it, and was not changed meanwhile.
+bool MainWindow::Impl::save_now(MainWindow& window, const QString& path) {
+    bool is_written = false;
+    const auto heard = connect(workbench.get(), &Workbench::saved, &window, [&] { is_written = true; });
+    const std::uint64_t id = workbench->document().state_id();
+    window.save_file(path);
+    workbench->jobs().wait_until_idle();
+    disconnect(heard);
+    return is_written && workbench->document().state_id() == id;
 }
 
 void MainWindow::closeEvent(QCloseEvent* event) {
-    if (content_->is_writing) {
-        content_->wait_for_files(*this);
+    if (impl_->is_writing) {
+        impl_->wait_for_files(*this);
         event->ignore();
         return;
     }
@@ -442,8 +405,8 @@ void MainWindow::closeEvent(QCloseEvent* event) {
         event->ignore();
         return;
     }
-    content_->workbench->jobs().cancel();
-    if (content_->keep_settings) content_->write_settings(*this);
+    impl_->workbench->jobs().cancel();
+    if (impl_->keep_settings) impl_->write_settings(*this);
     event->accept();
 }
 
@@ -463,30 +426,30 @@ void MainWindow::dropEvent(QDropEvent* event) {
 // Messages, theme, layout
 
 void MainWindow::show_message(const QString& sentence, bool is_error) {
-    content_->messages->show_message(sentence, is_error);
+    impl_->messages->show_message(sentence, is_error);
 }
 
-QString MainWindow::message() const { return content_->messages->message(); }
+QString MainWindow::message() const { return impl_->messages->message(); }
 
-Theme MainWindow::theme() const { return content_->theme; }
+Theme MainWindow::theme() const { return impl_->theme; }
 
 void MainWindow::set_theme(Theme theme) {
-    content_->theme = theme;
+    impl_->theme = theme;
     apply_theme(theme);
-    if (content_->keep_settings) QSettings().setValue("window/theme", int(theme));
+    if (impl_->keep_settings) QSettings().setValue("window/theme", int(theme));
     Q_EMIT theme_changed();
 }
 
 void MainWindow::show_help() {
-    if (!content_->help) content_->help = new HelpSheet(*content_->actions, this);
-    content_->help->setAttribute(Qt::WA_DeleteOnClose);
-    content_->help->show();
-    content_->help->raise();
+    if (!impl_->help) impl_->help = new HelpSheet(*impl_->actions, this);
+    impl_->help->setAttribute(Qt::WA_DeleteOnClose);
+    impl_->help->show();
+    impl_->help->raise();
 }
 
 void MainWindow::changeEvent(QEvent* event) {
     QMainWindow::changeEvent(event);
-    if (event->type() == QEvent::ThemeChange && content_->theme == Theme::system) apply_theme(Theme::system);
+    if (event->type() == QEvent::ThemeChange && impl_->theme == Theme::system) apply_theme(Theme::system);
 }
 
 bool MainWindow::eventFilter(QObject* object, QEvent* event) {
@@ -502,7 +465,7 @@ bool MainWindow::eventFilter(QObject* object, QEvent* event) {
     return QMainWindow::eventFilter(object, event);
 }
 
-void MainWindow::Content::read_settings(MainWindow& window) {
+void MainWindow::Impl::read_settings(MainWindow& window) {
     const QSettings settings;
     recent = settings.value("files/recent").toStringList();
     window.restoreGeometry(settings.value("window/geometry").toByteArray());
@@ -511,7 +474,7 @@ void MainWindow::Content::read_settings(MainWindow& window) {
     body->set_unfolded(settings.value("window/advanced", false).toBool());
 }
 
-void MainWindow::Content::write_settings(const MainWindow& window) {
+void MainWindow::Impl::write_settings(const MainWindow& window) {
     QSettings settings;
     settings.setValue("window/geometry", window.saveGeometry());
     settings.setValue("window/splitter", splitter->saveState());

@@ -54,8 +54,8 @@ protected:
     void changeEvent(QEvent* event) override;
 
 private:
-    struct Content;
-    std::unique_ptr<Content> content_;
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
 };
 
 } // namespace filigree::studio

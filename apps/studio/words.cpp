@@ -6,10 +6,19 @@
 
 namespace filigree::studio {
 
+QString number_text(double value, int digits) { return QString::number(value, 'g', digits); }
+
 QString with_commas(std::size_t number) { return QLocale(QLocale::English).toString(qulonglong(number)); }
 
 QString counted(std::size_t number, const QString& one, const QString& many) {
     return with_commas(number) + ' ' + (number == 1 ? one : many);
+}
+
+QString listed(const std::vector<QString>& things) {
+    QString text;
+    for (std::size_t k = 0; k < things.size(); ++k)
+        text += (k == 0 ? "" : k + 1 == things.size() ? " and " : ", ") + things[k];
+    return text;
 }
 
 QString file_name(const std::string& path) {

@@ -5,16 +5,20 @@
 
 #include <cstddef>
 #include <string>
+#include <vector>
 
 namespace filigree::studio {
 
-QString with_commas(std::size_t number); ///< 12,345
+QString number_text(double value, int digits = 3); ///< significant digits, as short as they go: "0.0042", "1.2e-05"
+QString with_commas(std::size_t number);           ///< 12,345
 /// "1 vertex", "12,345 vertices".
 QString counted(std::size_t number, const QString& one, const QString& many);
 /// The last part of a path.
 QString file_name(const std::string& path);
 /// The sentence, with the file in front unless it is named in it.
 std::string about_file(const std::string& path, const std::string& sentence);
+/// "a", "a and b", "a, b and c".
+QString listed(const std::vector<QString>& things);
 /// What a built-in shape is called: "Wavy cube".
 QString shape_title(const std::string& name);
 

@@ -38,8 +38,11 @@ public:
     void set_mode(Mode mode);
 
     // Files. All in the background; errors come through told().
-    void open(const std::string& path);             ///< mesh or model, told by the content; history starts anew
-    void save_model(const std::string& path);       ///< .fil with the recording; the document counts as saved
+    void open(const std::string& path); ///< mesh or model, told by the content; history starts anew
+    /// .fil with the recording, or with the pose; the document counts as saved when the file holds its whole shape.
+    void save_model(const std::string& path);
+    /// What of the document a model file does not hold, as it would be said: "the pins". None: it holds all.
+    std::vector<QString> left_out_of_model() const;
     void save_mesh(const std::string& path);        ///< the level shown, as it is posed now
     void save_driver(const std::string& path);      ///< as posed, with gradients
     void export_meshes(const std::string& pattern); ///< a mesh a frame of the recording, "frame_%04d.obj"
@@ -86,6 +89,7 @@ public:
     // Timeline
     std::size_t frame_count() const; ///< recorded frames, the start included; 0: none
     std::size_t frame() const;       ///< shown, 0 .. frame_count() - 1
+    double frames_per_second() const;
     void go_to_frame(std::size_t frame);
 
     /// Measures what is shown against the full deformation, in the background; error_measured() tells.
@@ -119,7 +123,7 @@ Q_SIGNALS:
     void told(const QString& sentence, bool is_error); ///< for the window's message bar
 
 private:
-    struct Content;
+    struct Impl;
     enum class After { nothing, play, step };
 
     void follow_document(const State& before);
@@ -136,8 +140,9 @@ private:
     void change_level(unsigned level, const QString& name, const std::string& merge);
     void make_body_then(After then);
     void put_body(std::shared_ptr<const MadeBody> made);
-    const PoseSequence* recording() const; ///< the body's, else the document's; null: none
-    bool is_live_frame() const;            ///< what is shown is where the body is now
+    bool is_refused(const std::string& topic, const QString& sentence);
+    const Pose& recorded_pose(std::size_t frame) const; ///< the body's, else the document's
+    bool is_live_frame() const;                         ///< what is shown is where the body is now
     void show_last_frame();
     void replay_frame();
     void commit_recording(const QString& name = {}, const std::string& merge = {});
@@ -156,7 +161,7 @@ private:
     double driver_milliseconds_ = 0;
     bool is_pulling_ = false, wants_full_ = false;
     std::size_t frame_ = 0;
-    std::unique_ptr<Content> content_;
+    std::unique_ptr<Impl> impl_;
 };
 
 } // namespace filigree::studio

@@ -1,7 +1,8 @@
 // Files in and out.
-#include "workbench_content.h"
+#include "workbench_impl.h"
 
 #include "film_export.h"
+#include "pins.h"
 #include "words.h"
 
 #include "filigree/io/file.h"
@@ -47,7 +48,9 @@ Result<State> read_state(const std::string& path, const RunContext& context) {
             state.handle_pose = std::make_shared<const Pose>(std::move(poses->frames[0]));
             state.pose_from_file = true;
         } else if (!poses->empty()) {
-            state.recording = std::make_shared<const PoseSequence>(std::move(*poses));
+            auto recording = std::make_shared<Recording>();
+            recording->follow(*poses);
+            state.recording = std::move(recording);
         }
         source->mesh = state.model->mesh;
     } else {
@@ -107,6 +110,17 @@ Mesh posed_driver(const Model& model, const Pose& pose) {
     return driver;
 }
 
+bool is_deformed(const State& state) { return !state.warps.none() || state.handle_pose; }
+
+/// What of the shape is not there when the model is opened again: a model file holds one motion or one pose. The law
+/// and settings are how it is shown.
+std::vector<QString> lost_with_model(const State& state) {
+    std::vector<QString> result;
+    if (state.recording && is_deformed(state)) result.push_back("the deformation");
+    if (has_pins(state.handles)) result.push_back("the pins");
+    return result;
+}
+
 /// Returns what to tell. source: the file that the mesh came from; "" for none.
 Result<QString> write_checked(const Mesh& mesh, const std::string& path, const RunContext& context,
                               const std::string& source = {}) {
@@ -147,7 +161,7 @@ struct NumberedPath {
 };
 
 /// All or none: what was written is taken back when a later one fails, unless it took the place of a file.
-Result<QString> write_frames(const State& state, const PoseSequence& poses, const NumberedPath& path,
+Result<QString> write_frames(const State& state, const Recording& poses, const NumberedPath& path,
                              const RunContext& context) {
     const Result<Restorer> restorer = Restorer::create(*state.model, state.restore, context);
     if (!restorer) return restorer.error();
@@ -158,7 +172,7 @@ Result<QString> write_frames(const State& state, const PoseSequence& poses, cons
         for (std::size_t frame = 0; frame < poses.frames.size(); ++frame) {
             context.report("writing meshes", double(frame) / double(poses.frames.size()));
             if (context.is_cancelled()) return cancelled_error();
-            const Result<Mesh> mesh = restorer->mesh(poses.frames[frame], quiet);
+            const Result<Mesh> mesh = restorer->mesh(*poses.frames[frame], quiet);
             if (!mesh) return mesh.error();
             const std::string name = path.at(frame + 1);
             std::error_code ignored;
@@ -214,9 +228,9 @@ void Workbench::open(const std::string& path) {
             const QString text = summary(state);
             const bool has_motion = state.recording != nullptr;
             frame_ = 0;
-            content_->is_opening = true;
+            impl_->is_opening = true;
             document_.replace(std::move(state));
-            content_->is_opening = false;
+            impl_->is_opening = false;
             set_mode(has_motion ? Mode::body : Mode::deform);
             Q_EMIT told(text, false);
         });
@@ -237,23 +251,24 @@ void Workbench::save(const QString& title, const std::string& path,
         });
 }
 
+std::vector<QString> Workbench::left_out_of_model() const {
+    std::vector<QString> result = lost_with_model(state());
+    if (state().restore.law) result.push_back("the law");
+    if (state().restore.thin_shell) result.push_back("thin shell");
+    return result;
+}
+
 void Workbench::save_model(const std::string& path) {
     commit_recording();
     const std::uint64_t id = document_.state_id();
-    // A model file holds one motion or one pose, and no history.
-    const bool has_motion = state().recording != nullptr;
-    const bool has_pose = !state().warps.none() || state().handle_pose;
-    const bool has_pins = std::ranges::any_of(state().handles, &Handle::pinned);
-    std::vector<QString> left_out;
-    if (has_motion && has_pose) left_out.push_back("the deformation");
-    if (has_pins) left_out.push_back("the pins");
-    const bool is_whole = left_out.empty(); // laws and settings are how it is shown
-    if (state().restore.law) left_out.push_back("the law");
-    if (state().restore.thin_shell) left_out.push_back("thin shell");
+    const bool is_whole = lost_with_model(state()).empty();
     QString sentence = "Saved " + file_name(path);
-    if (has_motion) sentence += " with its recording";
-    if (!has_motion && has_pose) sentence += " as it is deformed";
-    for (std::size_t k = 0; k < left_out.size(); ++k) sentence += (k == 0 ? ", without " : " and ") + left_out[k];
+    if (state().recording)
+        sentence += " with its recording";
+    else if (is_deformed(state()))
+        sentence += " as it is deformed";
+    if (const std::vector<QString> left_out = left_out_of_model(); !left_out.empty())
+        sentence += ", without " + listed(left_out);
     sentence += '.';
     save(
         "Saving " + file_name(path), path,
@@ -261,7 +276,7 @@ void Workbench::save_model(const std::string& path) {
             PoseSequence poses;
             Pose pose = deformed_pose(state, context);
             if (state.recording)
-                poses = *state.recording;
+                poses = state.recording->poses();
             else if (!pose.positions.empty())
                 poses.frames.push_back(std::move(pose));
             const Status status = write_model(*state.model, poses, path, context);
@@ -310,7 +325,7 @@ void Workbench::export_film(const std::string& path, const FilmSettings& setting
     auto job = std::make_shared<FilmJob>();
     job->state = state();
     job->pose = pose_;
-    if (state().recording) job->poses = *state().recording;
+    if (state().recording) job->poses = state().recording->poses();
     if (playback_.has_body()) {
         job->surroundings = playback_.made()->surroundings;
         job->has_surroundings = true;
@@ -328,8 +343,7 @@ void Workbench::export_film(const std::string& path, const FilmSettings& setting
         if (view.clip) left_out.push_back("the clip plane");
         if (view.split) left_out.push_back("the split view");
         if (view.particles || view.inside_points) left_out.push_back("points");
-        for (std::size_t k = 0; k < left_out.size(); ++k) text += (k == 0 ? " Films are without " : ", ") + left_out[k];
-        return left_out.empty() ? text : text + '.';
+        return left_out.empty() ? text : text + " Films are without " + listed(left_out) + '.';
     });
 }
 

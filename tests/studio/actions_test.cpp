@@ -108,20 +108,20 @@ TEST_F(ActionsTest, AreEnabledOnlyWhereTheyCanDoSomething) {
 }
 
 TEST_F(ActionsTest, UndoAndRedoNameTheStep) {
-    const std::string before = workbench().document().bytes();
+    const State before = workbench().document().state();
     Warps warps;
     warps.bend = 30;
     workbench().set_warps(warps);
-    const std::string after = workbench().document().bytes();
+    const State after = workbench().document().state();
     const QString step = workbench().document().undo_stack().undoText();
     EXPECT_FALSE(step.isEmpty());
     EXPECT_EQ(action("edit.undo").text().remove('&'), "Undo " + step);
     trigger("edit.undo");
-    EXPECT_TRUE(workbench().document().bytes() == before);
+    EXPECT_TRUE(workbench().document().state() == before);
     EXPECT_EQ(action("edit.redo").text().remove('&'), "Redo " + step);
     EXPECT_EQ(action("edit.undo").text().remove('&'), "Undo");
     trigger("edit.redo");
-    EXPECT_TRUE(workbench().document().bytes() == after);
+    EXPECT_TRUE(workbench().document().state() == after);
     trigger("edit.reset_deformation");
     EXPECT_TRUE(workbench().state().warps.none());
 }
@@ -292,7 +292,7 @@ TEST_F(ActionsTest, FilesByNumberAreNotOverwrittenUnasked) {
 
 TEST_F(ActionsTest, EscDuringAPullLeavesNoStep) {
     workbench().set_mode(Mode::deform);
-    const std::string before = workbench().document().bytes();
+    const State before = workbench().document().state();
     const int steps = workbench().document().undo_stack().count();
     const Vec3d at = workbench().state().model->mesh.positions[0].cast<double>();
     workbench().begin_pull(0, at);
@@ -301,7 +301,7 @@ TEST_F(ActionsTest, EscDuringAPullLeavesNoStep) {
     trigger("edit.cancel");
     EXPECT_FALSE(workbench().is_pulling());
     EXPECT_EQ(workbench().document().undo_stack().count(), steps);
-    EXPECT_TRUE(workbench().document().bytes() == before);
+    EXPECT_TRUE(workbench().document().state() == before);
 }
 
 TEST_F(ActionsTest, ErrorIsMeasured) {

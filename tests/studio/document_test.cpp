@@ -11,16 +11,16 @@ State with_bend(const Document& document, double degrees) {
     return next;
 }
 
-TEST(Document, UndoAndRedoBringBackTheSameBytes) {
+TEST(Document, UndoAndRedoBringBackTheSameState) {
     Document document;
-    const std::string start = document.bytes();
+    const State start = document.state();
     document.change("Bend", with_bend(document, 30));
-    const std::string bent = document.bytes();
+    const State bent = document.state();
     EXPECT_FALSE(start == bent);
     document.undo_stack().undo();
-    EXPECT_TRUE(document.bytes() == start);
+    EXPECT_TRUE(document.state() == start);
     document.undo_stack().redo();
-    EXPECT_TRUE(document.bytes() == bent);
+    EXPECT_TRUE(document.state() == bent);
     EXPECT_EQ(document.undo_stack().undoText(), "Bend");
 }
 
@@ -96,15 +96,13 @@ TEST(Document, SavedStatesAreKnownAgain) {
     EXPECT_EQ(document.state_id(), id);
 }
 
-TEST(Document, BytesKnowEverySetting) {
+TEST(Document, StatesThatDifferInOneSettingAreNotTheSame) {
     Document document;
-    std::vector<std::string> all = {document.bytes()};
+    std::vector<State> all = {document.state()};
     const auto differs = [&](const auto& edit) {
-        State next = document.state();
-        edit(next);
-        document.change("Edit", next);
-        for (const std::string& earlier : all) EXPECT_FALSE(earlier == document.bytes());
-        all.push_back(document.bytes());
+        document.edit("Edit", edit);
+        for (const State& earlier : all) EXPECT_FALSE(earlier == document.state());
+        all.push_back(document.state());
     };
     differs([](State& s) { s.warps.taper = 0.5; });
     differs([](State& s) { s.restore.level = 3; });
@@ -117,6 +115,24 @@ TEST(Document, BytesKnowEverySetting) {
     differs([](State& s) { s.shape = Shape{}; });
     differs([](State& s) { s.handles.push_back({.vertices = {1}, .targets = {Vec3f::Zero()}, .pinned = true}); });
     differs([](State& s) { s.handle_pose = std::make_shared<const Pose>(); });
+    differs([](State& s) { s.recording = std::make_shared<const Recording>(); });
+    const int steps = document.undo_stack().count();
+    document.edit("Nothing", [](State& s) { s.warps.taper = 0.5; });
+    EXPECT_EQ(document.undo_stack().count(), steps);
+}
+
+TEST(Recording, FollowsWithoutCopyingWhatItHas) {
+    PoseSequence poses{24, {{.positions = {Vec3f(1, 2, 3)}, .gradients = {}, .ghosts = {}}}};
+    Recording first;
+    first.follow(poses);
+    poses.frames.push_back({.positions = {Vec3f(4, 5, 6)}, .gradients = {}, .ghosts = {}});
+    Recording longer = first;
+    longer.follow(poses);
+    ASSERT_EQ(longer.frames.size(), 2u);
+    EXPECT_EQ(longer.frames[0], first.frames[0]); // the same pose, not an equal one
+    const PoseSequence copy = longer.poses();
+    EXPECT_EQ(copy.frames_per_second, 24);
+    EXPECT_TRUE(copy.frames[1].positions == poses.frames[1].positions);
 }
 
 } // namespace

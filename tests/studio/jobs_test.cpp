@@ -129,6 +129,49 @@ TEST(Jobs, ErrorsAndExceptionsAreTold) {
     EXPECT_NE(errors[2].message.find("odd"), std::string::npos);
 }
 
+TEST(Jobs, ErrorsGoToWhoAsksForThemAndTheNextIsDone) {
+    Jobs jobs("Choose less.");
+    QSignalSpy failed(&jobs, &Jobs::failed);
+    std::optional<Error> error;
+    int delivered = 0;
+    jobs.start<int>(
+        "Memory", "memory", [](const RunContext&) -> Result<int> { throw std::bad_alloc(); }, [](int) { FAIL(); },
+        {.failed = [&](const Error& of_work) { error = of_work; }});
+    jobs.start<int>(
+        "Good", "good", [](const RunContext&) -> Result<int> { return 1; }, [&](int value) { delivered = value; });
+    jobs.finish_all();
+    EXPECT_FALSE(jobs.is_busy());
+    EXPECT_EQ(delivered, 1);
+    EXPECT_EQ(failed.count(), 0);
+    ASSERT_TRUE(error);
+    EXPECT_EQ(error->code, ErrorCode::out_of_memory);
+    EXPECT_EQ(error->message, "Memory: there is not enough memory for it. Choose less.");
+}
+
+TEST(Jobs, UrgentWorkIsDoneBeforeAllThatWaits) {
+    Jobs jobs;
+    std::vector<int> delivered;
+    std::atomic<bool> may_end = false;
+    const auto start = [&](int number, bool is_urgent) {
+        jobs.start<int>(
+            "Work", {},
+            [&may_end, number](const RunContext&) -> Result<int> {
+                while (!may_end) std::this_thread::yield();
+                return number;
+            },
+            [&](int value) { delivered.push_back(value); }, {.is_urgent = is_urgent});
+    };
+    QSignalSpy started(&jobs, &Jobs::started);
+    start(1, false);
+    EXPECT_TRUE(QTest::qWaitFor([&] { return started.count() == 1; }));
+    start(2, false);
+    start(3, true);
+    start(4, true);
+    may_end = true;
+    jobs.finish_all();
+    EXPECT_EQ(delivered, (std::vector<int>{1, 4, 3, 2}));
+}
+
 TEST(Jobs, TellWhereTheyAre) {
     Jobs jobs;
     QSignalSpy started(&jobs, &Jobs::started), progressed(&jobs, &Jobs::progressed), finished(&jobs, &Jobs::finished);

@@ -1,5 +1,5 @@
-#include "controls.h"
 #include "one_window.h"
+#include "panel.h"
 
 #include <QApplication>
 #include <QScrollBar>

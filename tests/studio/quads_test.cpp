@@ -36,7 +36,7 @@ protected:
         workbench().make_shape(shape);
         workbench().wait_until_idle();
         ASSERT_TRUE(folder.isValid());
-        ASSERT_TRUE(write_mesh(level_mesh(*state().model, 0), triangles(), RunContext()).ok());
+        ASSERT_TRUE(write_mesh(level_mesh(*state().model, 0), triangles(), {}, RunContext()).ok());
         ASSERT_GT(level_mesh(*state().model, 0).face_count(), 100u);
         workbench().open(triangles());
         workbench().wait_until_idle();
@@ -169,24 +169,24 @@ TEST_F(Quads, ThePanelSaysHowTheyAreMadeAndHowTheyCameOut) {
 
 TEST_F(Quads, WhatIsRefusedIsToldAndChangesNothing) {
     workbench().set_quad_options({.quads = 0});
-    const std::string before = workbench().document().bytes();
+    const State before = workbench().document().state();
     QSignalSpy failed(&workbench().jobs(), &Jobs::failed);
     make_quads();
     EXPECT_EQ(failed.count(), 1);
     EXPECT_TRUE(window->message().contains("No quads can be made")) << window->message().toStdString();
-    EXPECT_TRUE(workbench().document().bytes() == before);
+    EXPECT_TRUE(workbench().document().state() == before);
     EXPECT_EQ(undo_stack().count(), 0);
 }
 
 TEST_F(Quads, CancelLeavesTheMeshAsItWas) {
     workbench().set_quad_options({.quads = 200'000});
-    const std::string before = workbench().document().bytes();
+    const State before = workbench().document().state();
     workbench().make_quads();
     EXPECT_TRUE(workbench().jobs().is_busy());
     workbench().jobs().cancel();
     workbench().wait_until_idle();
     EXPECT_TRUE(window->message().contains("cancelled")) << window->message().toStdString();
-    EXPECT_TRUE(workbench().document().bytes() == before);
+    EXPECT_TRUE(workbench().document().state() == before);
 }
 
 TEST_F(Quads, WhatTakesTheMeshAwayTakesTheQuadsAlong) {

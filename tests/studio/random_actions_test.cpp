@@ -153,11 +153,11 @@ TEST(RandomActions, ThreadsSurviveThem) {
     Document& document = window.workbench().document();
     window.workbench().pause();
     window.workbench().wait_until_idle();
-    const std::string last = document.bytes();
+    const State last = document.state();
     const int steps = document.undo_stack().index();
     while (document.undo_stack().canUndo()) document.undo_stack().undo();
     while (document.undo_stack().index() < steps) document.undo_stack().redo();
-    EXPECT_TRUE(document.bytes() == last) << done.join(", ").toStdString();
+    EXPECT_TRUE(document.state() == last) << done.join(", ").toStdString();
 }
 
 } // namespace

@@ -1,9 +1,9 @@
 // What the mouse does in the picture, and what the picture shows.
 #include "viewport.h"
 
+#include "drawn_objects.h"
 #include "gizmo.h"
 #include "overlay.h"
-#include "stage.h"
 
 #include "filigree/mesh/shapes.h"
 
@@ -151,7 +151,7 @@ TEST(Viewport, ADragOnTheShapePullsIt) {
     Stand stand;
     ASSERT_TRUE(stand.is_ready());
     stand.set([](ViewSettings& s) { s.grip = 0.15; }); // some of the few driver vertices, not one
-    const std::string before = stand.workbench.document().bytes();
+    const State before = stand.workbench.document().state();
     const QPoint from = stand.middle() + QPoint(-20, -15), to = from + QPoint(-45, -30);
     const auto grabbed = stand.viewport->pick(from);
     ASSERT_TRUE(grabbed);
@@ -173,12 +173,12 @@ TEST(Viewport, ADragOnTheShapePullsIt) {
 
     QUndoStack& history = stand.workbench.document().undo_stack();
     EXPECT_EQ(history.count(), history.index());
-    const std::string pulled = stand.workbench.document().bytes();
+    const State pulled = stand.workbench.document().state();
     EXPECT_FALSE(pulled == before);
     history.undo();
-    EXPECT_TRUE(stand.workbench.document().bytes() == before);
+    EXPECT_TRUE(stand.workbench.document().state() == before);
     history.redo();
-    EXPECT_TRUE(stand.workbench.document().bytes() == pulled);
+    EXPECT_TRUE(stand.workbench.document().state() == pulled);
 }
 
 /// With the settings that the window starts with: what was grabbed is where the pointer is.
@@ -214,7 +214,7 @@ TEST(Viewport, WhatIsGrabbedStaysUnderThePointer) {
 TEST(Viewport, EscapePutsBack) {
     Stand stand;
     ASSERT_TRUE(stand.is_ready());
-    const std::string before = stand.workbench.document().bytes();
+    const State before = stand.workbench.document().state();
     const QPoint from = stand.middle();
     stand.press(from);
     stand.move(from, from + QPoint(60, 0));
@@ -223,17 +223,17 @@ TEST(Viewport, EscapePutsBack) {
     EXPECT_FALSE(stand.workbench.is_pulling());
     stand.release(from + QPoint(60, 0));
     stand.workbench.wait_until_idle();
-    EXPECT_TRUE(stand.workbench.document().bytes() == before);
+    EXPECT_TRUE(stand.workbench.document().state() == before);
     EXPECT_FALSE(stand.workbench.pose());
 }
 
 TEST(Viewport, AClickChangesNothing) {
     Stand stand;
     ASSERT_TRUE(stand.is_ready());
-    const std::string before = stand.workbench.document().bytes();
+    const State before = stand.workbench.document().state();
     const Camera camera = stand.workbench.view().camera();
     QTest::mouseClick(stand.viewport, Qt::LeftButton, {}, stand.middle());
-    EXPECT_TRUE(stand.workbench.document().bytes() == before);
+    EXPECT_TRUE(stand.workbench.document().state() == before);
     EXPECT_EQ(stand.workbench.view().camera().eye, camera.eye);
 }
 
@@ -516,7 +516,7 @@ TEST(Viewport, GizmosDragTheWarps) {
     stand.set([](ViewSettings& s) { s.gizmos = true; });
     const Box box = world_bounds(stand.workbench.state().source->mesh);
     stand.workbench.view().set_zoom(0.6);
-    const std::string before = stand.workbench.document().bytes();
+    const State before = stand.workbench.document().state();
     const auto steps = stand.workbench.document().undo_stack().index();
     for (const GizmoShape& shape : gizmo_shapes({}, box)) {
         const QPoint at = stand.viewport->place_of(shape.knob).toPoint();
@@ -539,7 +539,7 @@ TEST(Viewport, GizmosDragTheWarps) {
         EXPECT_TRUE(warps.twist == 0 || warps.twist > 10);
         EXPECT_EQ(stand.workbench.document().undo_stack().index(), steps + 1) << "one drag is one step";
         stand.workbench.document().undo_stack().undo();
-        EXPECT_TRUE(stand.workbench.document().bytes() == before);
+        EXPECT_TRUE(stand.workbench.document().state() == before);
     }
 }
 
@@ -587,12 +587,12 @@ TEST(Viewport, ADragEndsWithTheModelThatItIsOf) {
         stand.press(from);
         if (tool == Tool::pin) stand.move(from, to);
         strip_again(tool == Tool::pin ? 20 : 30);
-        const std::string before = stand.workbench.document().bytes();
+        const State before = stand.workbench.document().state();
         stand.move(from, to);
         stand.release(to);
         stand.workbench.wait_until_idle();
         EXPECT_TRUE(stand.workbench.state().handles.empty());
-        EXPECT_TRUE(stand.workbench.document().bytes() == before);
+        EXPECT_TRUE(stand.workbench.document().state() == before);
     }
 }
 
@@ -670,33 +670,6 @@ TEST(Gizmo, KnobsFollowThePointer) {
         EXPECT_LT((knob(reached) - to).head<2>().norm(), 0.35 * (to - from).head<2>().norm())
             << gizmo_label(part, reached).toStdString();
     }
-}
-
-TEST(Stage, FindsDefects) {
-    Mesh mesh;
-    mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, -1, 0}};
-    for (const auto& face : {std::array<Index, 3>{0, 1, 2}, {0, 1, 3}, {0, 1, 4}}) mesh.add_face(face);
-    const std::vector<DefectEdge> edges = defect_edges(mesh);
-    ASSERT_EQ(edges.size(), 7u);
-    EXPECT_EQ(std::count_if(edges.begin(), edges.end(), [](const DefectEdge& e) { return e.is_open; }), 6);
-    EXPECT_FALSE(edges[0].is_open);
-    EXPECT_EQ(edges[0].b, 1u);
-    EXPECT_TRUE(defect_edges(make_shape("bar", {}).value()).empty());
-
-    // A face turned over, and one that is a line: marked where the report counts them.
-    Mesh sheet;
-    sheet.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}, {2, 0, 0}};
-    for (const auto& face : {std::array<Index, 3>{0, 1, 2}, {1, 2, 3}, {0, 1, 4}}) sheet.add_face(face);
-    const std::vector<DefectEdge> marks = defect_edges(sheet);
-    const TopologyReport report = analyse_topology(sheet, RunContext());
-    const auto count = [&](auto is_it) {
-        return static_cast<std::size_t>(std::count_if(marks.begin(), marks.end(), is_it));
-    };
-    EXPECT_EQ(report.inconsistent_edges.count, 2u);
-    EXPECT_EQ(report.degenerate_faces.count, 1u);
-    EXPECT_EQ(count([](const DefectEdge& e) { return e.is_opposed; }), report.inconsistent_edges.count);
-    EXPECT_EQ(count([](const DefectEdge& e) { return e.is_open; }), report.open_edges.count);
-    EXPECT_EQ(count([](const DefectEdge& e) { return e.a == e.b; }), report.degenerate_faces.count);
 }
 
 /// What a computer whose OpenGL is too old shows: runs in a process of its own, below.

@@ -1,5 +1,5 @@
-#include "controls.h"
 #include "one_window.h"
+#include "panel.h"
 
 #include <QApplication>
 #include <QCloseEvent>
@@ -44,10 +44,11 @@ protected:
         }
     }
     /// Presses a button of the question as soon as it is there.
-    static void answer(QMessageBox::StandardButton button) {
-        QTimer::singleShot(0, window, [button] {
-            auto* box = window->findChild<QMessageBox*>("unsaved");
+    static void answer(QMessageBox::StandardButton button, MainWindow& of = *window, QString* explanation = nullptr) {
+        QTimer::singleShot(0, &of, [button, &of, explanation] {
+            auto* box = of.findChild<QMessageBox*>("unsaved");
             ASSERT_TRUE(box);
+            if (explanation) *explanation = box->informativeText();
             box->button(button)->click();
         });
     }
@@ -103,11 +104,11 @@ TEST_F(Window, WhatIsNoFileIsNotTaken) {
 }
 
 TEST_F(Window, ErrorsAreToldWithTheFilesName) {
-    const std::string before = workbench().document().bytes();
+    const State before = workbench().document().state();
     window->open_file(path("nothing.obj"));
     workbench().wait_until_idle();
     EXPECT_TRUE(window->message().contains("nothing.obj")) << window->message().toStdString();
-    EXPECT_TRUE(workbench().document().bytes() == before);
+    EXPECT_TRUE(workbench().document().state() == before);
     EXPECT_FALSE(window->recent_files().contains(path("nothing.obj")));
     window->findChild<QToolButton*>("message.close")->click();
     EXPECT_EQ(window->message(), "");
@@ -152,6 +153,36 @@ TEST_F(Window, SaveIsOneOfTheAnswers) {
     EXPECT_TRUE(window->may_discard());
     EXPECT_FALSE(workbench().document().is_modified());
     EXPECT_FALSE(window->isWindowModified());
+}
+
+TEST_F(Window, ClosesOnceTheModelIsWrittenThoughAModelHoldsNoPins) {
+    const QString file = path("pinned.fil");
+    MainWindow other(false);
+    other.show();
+    other.save_file(file);
+    other.workbench().wait_until_idle();
+    ASSERT_TRUE(QFile::remove(file));
+    other.workbench().pin(std::vector<Index>{0, 1});
+    QString explanation;
+    answer(QMessageBox::Save, other, &explanation);
+    EXPECT_TRUE(other.close());
+    EXPECT_FALSE(other.isVisible());
+    EXPECT_TRUE(QFileInfo::exists(file));
+    EXPECT_TRUE(explanation.contains("without the pins")) << explanation.toStdString();
+}
+
+TEST_F(Window, StaysWhenTheModelCannotBeWritten) {
+    const QString inside = path("gone");
+    ASSERT_TRUE(QDir().mkdir(inside));
+    MainWindow other(false);
+    other.show();
+    other.save_file(inside + "/cube.fil");
+    other.workbench().wait_until_idle();
+    ASSERT_TRUE(QDir(inside).removeRecursively());
+    other.workbench().pin(std::vector<Index>{0, 1});
+    answer(QMessageBox::Save, other);
+    EXPECT_FALSE(other.close());
+    EXPECT_TRUE(other.isVisible());
 }
 
 TEST_F(Window, AFailedSaveIsNotRemembered) {

@@ -1,8 +1,7 @@
 // Deforming by numbers and by hand.
 #pragma once
 
-#include "controls.h"
-#include "workbench.h"
+#include "panel.h"
 
 namespace filigree::studio {
 
@@ -14,17 +13,8 @@ public:
     DeformPanel(Workbench& workbench, const Actions& actions, QWidget* parent = nullptr);
 
 private:
-    void refresh();
+    void refresh() override;
 
-    struct WarpControl {
-        NumberControl* control;
-        double Warps::*field;
-        double scale; ///< of the number shown
-    };
-    Workbench& workbench_;
-    QComboBox* axis_;
-    std::vector<WarpControl> warps_;
-    NumberControl *grip_, *reach_;
     Text* pins_;
 };
 

@@ -1,8 +1,7 @@
 // Levels and the detail code: how coarse the driver is, how detail is stored, and by which law it returns.
 #pragma once
 
-#include "controls.h"
-#include "workbench.h"
+#include "panel.h"
 
 namespace filigree::studio {
 
@@ -12,14 +11,13 @@ public:
     explicit DetailPanel(Workbench& workbench, QWidget* parent = nullptr);
 
 private:
-    void refresh();
-    void show_levels();
-    void show_report();
+    void add_driver();
+    void add_law();
+    void refresh() override;
+    QString levels() const;
+    QString report() const;
 
-    Workbench& workbench_;
-    NumberControl *level_, *driver_;
-    QComboBox *code_, *references_, *precision_, *law_;
-    QCheckBox* thin_shell_;
+    NumberControl *level_, *driver_ = nullptr;
     Text *levels_, *report_;
 };
 

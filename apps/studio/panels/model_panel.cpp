@@ -1,15 +1,9 @@
 #include "panels/model_panel.h"
 
 #include "actions.h"
-#include "icons.h"
 
 namespace filigree::studio {
 namespace {
-
-int index_of(const std::string& name) {
-    const auto names = shape_names();
-    return int(std::find(names.begin(), names.end(), name) - names.begin());
-}
 
 struct DefectRow {
     const char *one, *many;
@@ -26,15 +20,37 @@ constexpr DefectRow kDefects[] = {
     {"vertex at the place of another", "vertices at the place of another", &TopologyReport::duplicate_vertices},
 };
 
-QString size_text(const Vec3d& size) {
-    return QStringLiteral("%1 × %2 × %3 units")
-        .arg(number_text(size.x()), number_text(size.y()), number_text(size.z()));
+/// A number of the shape's options.
+Field<studio::Shape> shape_field(const Field<ShapeOptions>& of) {
+    return {[of](const studio::Shape& shape) { return of.get(shape.options); },
+            [of](studio::Shape& shape, double number) { of.set(shape.options, number); }};
 }
 
 } // namespace
 
 ModelPanel::ModelPanel(Workbench& workbench, const Actions& actions, QMenu* recent_files, QWidget* parent)
-    : Panel("model", parent), workbench_(workbench) {
+    : Panel("model", workbench, parent) {
+    add_mesh(actions, recent_files);
+    add_shape();
+    QGridLayout* rows = section("Defects");
+    verdict_ = text(rows, "model.verdict");
+    defects_ = text(rows, "model.defects");
+    const auto has_edges_to_mark = [this](const ViewSettings&) {
+        const auto& source = state().source;
+        return source && source->topology.faces > 0 &&
+               source->topology.open_edges.count + source->topology.nonmanifold_edges.count > 0;
+    };
+    check(rows,
+          view_settings().setting("view.defects", "Show in the view", "Marks open and non-manifold edges in the view",
+                                  field(&ViewSettings::defects), has_edges_to_mark));
+    beside(section("Save"),
+           {new ActionButton("model.save", actions.find("file.save"), "Model", page()),
+            new ActionButton("model.save_mesh", actions.find("file.save_mesh"), "Mesh…", page()),
+            new ActionButton("model.save_driver", actions.find("file.save_driver"), "Driver…", page())});
+    refresh();
+}
+
+void ModelPanel::add_mesh(const Actions& actions, QMenu* recent_files) {
     QGridLayout* rows = section({});
     name_ = new ElidedText("model.name", Qt::ElideMiddle, Tone::plain, page());
     rows->addWidget(name_, rows->rowCount(), 0, 1, 3);
@@ -45,135 +61,104 @@ ModelPanel::ModelPanel(Workbench& workbench, const Actions& actions, QMenu* rece
     name_->setSizePolicy(QSizePolicy::Ignored, QSizePolicy::Preferred);
     facts_ = text(rows, "model.facts", Tone::quiet);
     warnings_ = text(rows, "model.warnings");
-    auto* recent = button("model.recent", "Recent", "Files opened lately");
+    auto* recent = new QPushButton("Recent", page());
+    recent->setObjectName("model.recent");
+    recent->setToolTip("Files opened lately");
+    recent->setAccessibleName("Recent");
+    recent->setFocusPolicy(Qt::TabFocus);
     recent->setMenu(recent_files);
     beside(rows, {new ActionButton("model.open", actions.find("file.open"), {}, page()), recent});
-
-    rows = section("Built-in shape");
-    QStringList names;
-    for (const std::string_view name : shape_names()) names << shape_title(std::string(name));
-    names << "None of these";
-    shape_ = choice(rows, "model.shape", "Shape", names, "A shape to try things with, made anew at once");
-    NumberSpec spec;
-    spec.least = 3;
-    spec.most = 512;
-    spec.decimals = 0;
-    spec.logarithmic = true;
-    spec.neutral = 64;
-    resolution_ = number(rows, "model.resolution", "Resolution", spec, "Quads along a side");
-    spec = {.least = 0, .most = 20, .step = 0.25, .decimals = 2, .neutral = 5};
-    frequency_ = number(rows, "model.frequency", "Frequency", spec, "Waves along a side, or around");
-    spec = {.least = 0, .most = 20, .step = 0.1, .decimals = 1, .unit = "%", .neutral = 4};
-    amplitude_ =
-        number(rows, "model.amplitude", "Amplitude", spec, "Height of the waves, per cent of the side or radius");
-    spec = {.least = 1, .most = 12, .step = 0.1, .decimals = 1, .unit = "×", .neutral = 4};
-    length_ = number(rows, "model.length", "Length", spec, "As a multiple of the side or diameter");
-    spec = {.least = 5, .most = 90, .step = 1, .decimals = 0, .unit = "%", .neutral = 30};
-    thickness_ = number(rows, "model.thickness", "Thickness", spec, "Of the tube, per cent of the ring's radius");
-    spec = {.least = 0.01, .most = 100, .decimals = 2, .unit = "units", .logarithmic = true, .neutral = 1};
-    size_ = number(rows, "model.size", "Size", spec, "Side or diameter, model units");
-
-    rows = section("Defects");
-    verdict_ = text(rows, "model.verdict");
-    defects_ = text(rows, "model.defects");
-    show_defects_ = check(rows, "view.defects", "Show in the view", "Marks open and non-manifold edges in the view");
-
-    rows = section("Save");
-    beside(rows, {new ActionButton("model.save", actions.find("file.save"), "Model", page()),
-                  new ActionButton("model.save_mesh", actions.find("file.save_mesh"), "Mesh…", page()),
-                  new ActionButton("model.save_driver", actions.find("file.save_driver"), "Driver…", page())});
-
-    connect(shape_, &QComboBox::currentIndexChanged, this, [this](int index) {
-        if (index < 0 || std::size_t(index) >= shape_names().size()) return refresh();
-        change_shape({}, [index](studio::Shape& shape) { shape.name = shape_names()[std::size_t(index)]; });
-    });
-    const auto connect_number = [this](NumberControl* control, const std::string& merge, auto set) {
-        connect(control, &NumberControl::changed, this, [this, merge, set](double value) {
-            change_shape(merge, [set, value](studio::Shape& shape) { set(shape.options, value); });
-        });
-        connect(control, &NumberControl::released, this, [this] { workbench_.document().end_merge(); });
-    };
-    connect_number(resolution_, "model.resolution", [](ShapeOptions& o, double v) { o.resolution = unsigned(v); });
-    connect_number(frequency_, "model.frequency", [](ShapeOptions& o, double v) { o.frequency = v; });
-    connect_number(amplitude_, "model.amplitude", [](ShapeOptions& o, double v) { o.amplitude = v / 100; });
-    connect_number(length_, "model.length", [](ShapeOptions& o, double v) { o.length = v; });
-    connect_number(thickness_, "model.thickness", [](ShapeOptions& o, double v) { o.thickness = v / 100; });
-    connect_number(size_, "model.size", [](ShapeOptions& o, double v) { o.size = v; });
-    connect(show_defects_, &QCheckBox::toggled, this, [this](bool shown) {
-        ViewSettings settings = workbench_.view().settings();
-        settings.defects = shown;
-        workbench_.view().set(settings);
-    });
-    connect(&workbench_.document(), &Document::changed, this, &ModelPanel::refresh);
-    connect(&workbench_, &Workbench::opened, this, &ModelPanel::refresh);
-    connect(&workbench_.jobs(), &Jobs::finished, this, &ModelPanel::refresh);
-    connect(&workbench_.view(), &ViewState::changed, this, &ModelPanel::refresh);
-    refresh();
 }
 
-void ModelPanel::change_shape(const std::string& merge, const std::function<void(studio::Shape&)>& edit) {
-    studio::Shape shape = workbench_.wanted_shape().value_or(studio::Shape{});
-    edit(shape);
-    if (shape != workbench_.wanted_shape()) workbench_.make_shape(shape, merge);
+void ModelPanel::add_shape() {
+    QGridLayout* rows = section("Built-in shape");
+    const OptionsAccess<studio::Shape> shape = {
+        [this] { return workbench().wanted_shape().value_or(studio::Shape{}); },
+        [this](const studio::Shape& to, const std::string& merge) { workbench().make_shape(to, merge); }};
+    QStringList titles;
+    for (const std::string_view name : shape_names()) titles << shape_title(std::string(name));
+    choice(rows,
+           {"model.shape", "Shape", "A shape to try things with, made anew at once",
+            [this] {
+                const auto& wanted = workbench().wanted_shape();
+                const auto names = shape_names();
+                return double(wanted ? std::ranges::find(names, wanted->name) - names.begin() : std::ssize(names));
+            },
+            [this, shape](double index) {
+                studio::Shape wanted = shape.get();
+                if (index < 0 || index >= double(shape_names().size())) return refresh();
+                wanted.name = shape_names()[std::size_t(index)];
+                shape.set(wanted, {});
+            }},
+           titles << "None of these");
+    using IsFor = bool (*)(std::string_view name); // whether a shape of that name has it
+    const auto add = [&](const char* name, const char* label, const char* tooltip, const Field<ShapeOptions>& of,
+                         const NumberSpec& spec, IsFor is_for) {
+        const auto is_shown = [this, is_for](const studio::Shape&) {
+            return state().shape && is_for(state().shape->name);
+        };
+        number(rows, shape.setting(name, label, tooltip, shape_field(of), is_shown), spec);
+    };
+    const IsFor any = [](std::string_view) { return true; };
+    const IsFor wavy = [](std::string_view name) { return name.starts_with("wavy") || name == "torus"; };
+    const IsFor is_long = [](std::string_view name) { return name == "bar" || name == "cylinder"; };
+    const IsFor torus = [](std::string_view name) { return name == "torus"; };
+    using Options = ShapeOptions;
+    add("model.resolution", "Resolution", "Quads along a side", field(&Options::resolution),
+        {.least = 3, .most = 512, .decimals = 0, .logarithmic = true, .neutral = 64}, any);
+    add("model.frequency", "Frequency", "Waves along a side, or around", field(&Options::frequency),
+        {.least = 0, .most = 20, .step = 0.25, .decimals = 2, .neutral = 5}, wavy);
+    add("model.amplitude", "Amplitude", "Height of the waves, per cent of the side or radius",
+        field(&Options::amplitude, 100),
+        {.least = 0, .most = 20, .step = 0.1, .decimals = 1, .unit = "%", .neutral = 4}, wavy);
+    add("model.length", "Length", "As a multiple of the side or diameter", field(&Options::length),
+        {.least = 1, .most = 12, .step = 0.1, .decimals = 1, .unit = "×", .neutral = 4}, is_long);
+    add("model.thickness", "Thickness", "Of the tube, per cent of the ring's radius", field(&Options::thickness, 100),
+        {.least = 5, .most = 90, .step = 1, .decimals = 0, .unit = "%", .neutral = 30}, torus);
+    add("model.size", "Size", "Side or diameter, model units", field(&Options::size),
+        {.least = 0.01, .most = 100, .decimals = 2, .unit = "units", .logarithmic = true, .neutral = 1}, any);
 }
 
 void ModelPanel::refresh() {
-    set_silently(show_defects_, workbench_.view().settings().defects);
-    show_shape();
-    const auto& source = workbench_.state().source;
-    if (source.get() == shown_ && source) return;
-    shown_ = source.get();
-    if (!source) {
+    Panel::refresh();
+    const Source* const source = state().source.get();
+    if (source && source == shown_) return;
+    shown_ = source;
+    show_facts();
+    show_warnings();
+    show_defects();
+}
+
+void ModelPanel::show_facts() {
+    if (!shown_) {
         name_->setText("No mesh");
-        facts_->setText("Open one, or choose a shape below.");
-    } else {
-        const TopologyReport& topology = source->topology;
-        name_->setText(QString::fromStdString(source->name));
-        name_->setToolTip(source->path.empty() ? QStringLiteral("A built-in shape")
-                                               : QString::fromStdString(source->path));
-        const QString kind = topology.faces == 0                    ? QStringLiteral("points only")
-                             : topology.quads == topology.faces     ? QStringLiteral("quads")
-                             : topology.triangles == topology.faces ? QStringLiteral("triangles")
-                                                                    : QStringLiteral("mixed polygons");
-        QString facts = counted(topology.vertices, "vertex", "vertices") + ", " +
-                        counted(topology.faces, "face", "faces") + QStringLiteral(" (%1)\n").arg(kind) +
-                        size_text(topology.box.size());
-        if (topology.faces > 0)
-            facts += (topology.is_closed() ? QStringLiteral("\nclosed, ") : QStringLiteral("\nopen, ")) +
-                     counted(topology.components, "part", "parts");
-        facts_->setText(facts);
+        return facts_->setText("Open one, or choose a shape below.");
     }
+    const TopologyReport& topology = shown_->topology;
+    name_->setText(QString::fromStdString(shown_->name));
+    name_->setToolTip(shown_->path.empty() ? QStringLiteral("A built-in shape") : QString::fromStdString(shown_->path));
+    const QString kind = topology.faces == 0                    ? "points only"
+                         : topology.quads == topology.faces     ? "quads"
+                         : topology.triangles == topology.faces ? "triangles"
+                                                                : "mixed polygons";
+    const Vec3d size = topology.box.size();
+    QString facts = QStringLiteral("%1, %2 (%3)\n%4 × %5 × %6 units")
+                        .arg(counted(topology.vertices, "vertex", "vertices"), counted(topology.faces, "face", "faces"),
+                             kind, number_text(size.x()), number_text(size.y()), number_text(size.z()));
+    if (topology.faces > 0)
+        facts += (topology.is_closed() ? "\nclosed, " : "\nopen, ") + counted(topology.components, "part", "parts");
+    facts_->setText(facts);
+}
+
+void ModelPanel::show_warnings() {
     QStringList warnings;
-    if (source)
-        for (const std::string& warning : source->warnings) warnings << QString::fromStdString(warning);
+    if (shown_)
+        for (const std::string& warning : shown_->warnings) warnings << QString::fromStdString(warning);
     constexpr qsizetype kShown = 4;
     const qsizetype left = warnings.size() - kShown;
     if (left > 0) warnings = warnings.mid(0, kShown) << QStringLiteral("… and %1 more").arg(left);
     warnings_->setText(warnings.join('\n'));
     warnings_->setVisible(!warnings.isEmpty());
-    show_defects();
-}
-
-void ModelPanel::show_shape() {
-    const auto& shape = workbench_.state().shape;
-    const auto names = shape_names();
-    set_silently(shape_, shape ? index_of(shape->name) : int(names.size()));
-    const std::string name = shape ? shape->name : "";
-    const bool waves = name.starts_with("wavy") || name == "torus", is_long = name == "bar" || name == "cylinder";
-    resolution_->set_visible(shape.has_value());
-    size_->set_visible(shape.has_value());
-    frequency_->set_visible(waves);
-    amplitude_->set_visible(waves);
-    length_->set_visible(is_long);
-    thickness_->set_visible(name == "torus");
-    if (!shape) return;
-    const ShapeOptions& options = shape->options;
-    resolution_->set_value(options.resolution);
-    frequency_->set_value(options.frequency);
-    amplitude_->set_value(100 * options.amplitude);
-    size_->set_value(options.size);
-    length_->set_value(options.length);
-    thickness_->set_value(100 * options.thickness);
 }
 
 void ModelPanel::show_defects() {
@@ -188,8 +173,6 @@ void ModelPanel::show_defects() {
     verdict_->setVisible(is_good || (shown_ && !is_surface));
     defects_->setText(is_surface ? found.join('\n') : QString());
     defects_->setVisible(is_surface && !found.isEmpty());
-    show_defects_->setVisible(is_surface &&
-                              shown_->topology.open_edges.count + shown_->topology.nonmanifold_edges.count > 0);
 }
 
 } // namespace filigree::studio

@@ -1,8 +1,7 @@
 // The mesh: where it came from, what it is, what is wrong with it, where to save it.
 #pragma once
 
-#include "controls.h"
-#include "workbench.h"
+#include "panel.h"
 
 #include <QMenu>
 
@@ -16,17 +15,14 @@ public:
     ModelPanel(Workbench& workbench, const Actions& actions, QMenu* recent_files, QWidget* parent = nullptr);
 
 private:
-    void refresh();
-    void show_shape();
+    void add_mesh(const Actions& actions, QMenu* recent_files);
+    void add_shape();
+    void refresh() override;
+    void show_facts();
+    void show_warnings();
     void show_defects();
-    /// A field of the shape's options, changed by its slider.
-    void change_shape(const std::string& merge, const std::function<void(studio::Shape&)>& edit);
 
-    Workbench& workbench_;
-    Text *name_, *facts_, *warnings_, *verdict_, *defects_;
-    QComboBox* shape_;
-    NumberControl *resolution_, *frequency_, *amplitude_, *size_, *length_, *thickness_;
-    QCheckBox* show_defects_;
+    Text *name_ = nullptr, *facts_ = nullptr, *warnings_ = nullptr, *verdict_, *defects_;
     const Source* shown_ = nullptr; ///< whose defects are listed
 };
 

@@ -3,6 +3,7 @@
 
 #include "actions.h"
 #include "controls.h"
+#include "number_control.h"
 
 namespace filigree::studio {
 
@@ -18,8 +19,5 @@ private:
     NumberControl* zoom_;
     Text* level_;
 };
-
-/// Vertices of a level.
-std::size_t level_vertices(const Model& model, unsigned level);
 
 } // namespace filigree::studio

@@ -7,27 +7,49 @@ namespace filigree::studio {
 namespace {
 
 constexpr int kMostLevels = 6;
-constexpr double kLeastQuads = 100, kMostQuads = 2'000'000;
+
+const Field<QuadRemeshOptions> kLevels = {
+    [](const QuadRemeshOptions& options) {
+        return double(std::min<unsigned>(kMostLevels, options.levels.value_or(0)));
+    },
+    [](QuadRemeshOptions& options, double levels) {
+        options.levels = levels > 0 ? std::optional(unsigned(levels)) : std::nullopt;
+    }};
+const Field<QuadRemeshOptions> kKeepsSmallParts = {
+    [](const QuadRemeshOptions& options) { return double(options.small_parts == SmallParts::keep); },
+    [](QuadRemeshOptions& options, double keep) {
+        options.small_parts = keep ? SmallParts::keep : SmallParts::remove;
+    }};
 
 } // namespace
 
 QuadsPanel::QuadsPanel(Workbench& workbench, const Actions& actions, QWidget* parent)
-    : Panel("quads", parent), workbench_(workbench) {
-    QGridLayout* rows = section("Quads of this mesh");
+    : Panel("quads", workbench, parent) {
     const QuadRemeshOptions usual;
-    NumberSpec spec = {.least = kLeastQuads, .most = kMostQuads, .decimals = 0, .logarithmic = true};
-    spec.neutral = double(usual.quads);
-    count_ = number(rows, "quads.count", "Quads", spec, "About so many");
+    const OptionsAccess<QuadRemeshOptions> options = {
+        [this] { return this->workbench().quad_options(); },
+        [this](const QuadRemeshOptions& to, const std::string&) { this->workbench().set_quad_options(to); }};
+    QGridLayout* rows = section("Quads of this mesh");
+    number(rows, options.setting("quads.count", "Quads", "About so many", field(&QuadRemeshOptions::quads)),
+           {.least = 100, .most = 2'000'000, .decimals = 0, .logarithmic = true, .neutral = double(usual.quads)});
     QStringList levels = {"Automatic"};
     for (int k = 1; k <= kMostLevels; ++k) levels << QString::number(k);
-    levels_ = choice(rows, "quads.levels", "Levels", levels,
-                     "How often each patch is halved: at 3 a patch has 8 × 8 quads, and three levels of detail can go. "
-                     "Automatic: as many as leave enough patches.");
-    spec = {.least = 0, .most = 180, .step = 1, .decimals = 0, .unit = "°", .neutral = usual.feature_angle_deg};
-    feature_angle_ = number(rows, "quads.feature_angle", "Features", spec,
-                            "Edges whose faces meet at more than this angle stay sharp; 180°: none do");
-    small_parts_ = choice(rows, "quads.small_parts", "Small parts", {"Remove", "Keep"},
-                          "Handles and parts too small for the patches, which in scans are mostly noise");
+    choice(rows,
+           options.setting("quads.levels", "Levels",
+                           "How often each patch is halved: at 3 a patch has 8 × 8 quads, and three levels of detail "
+                           "can go. Automatic: as many as leave enough patches.",
+                           kLevels),
+           levels);
+    number(rows,
+           options.setting("quads.feature_angle", "Features",
+                           "Edges whose faces meet at more than this angle stay sharp; 180°: none do",
+                           field(&QuadRemeshOptions::feature_angle_deg)),
+           {.least = 0, .most = 180, .step = 1, .decimals = 0, .unit = "°", .neutral = usual.feature_angle_deg});
+    choice(rows,
+           options.setting("quads.small_parts", "Small parts",
+                           "Handles and parts too small for the patches, which in scans are mostly noise",
+                           kKeepsSmallParts),
+           {"Remove", "Keep"});
     beside(rows, {new ActionButton("quads.make_button", actions.find("quads.make"), {}, page())});
 
     rows = section("Report");
@@ -37,43 +59,13 @@ QuadsPanel::QuadsPanel(Workbench& workbench, const Actions& actions, QWidget* pa
     figures_ = text(rows, "quads.figures");
     figures_->setTextFormat(Qt::RichText);
     remarks_ = text(rows, "quads.remarks", Tone::quiet);
-
-    connect(count_, &NumberControl::changed, this,
-            [this](double count) { change([count](QuadRemeshOptions& o) { o.quads = std::size_t(count); }); });
-    connect(levels_, &QComboBox::currentIndexChanged, this, [this](int index) {
-        change([index](QuadRemeshOptions& o) {
-            o.levels = index > 0 ? std::optional<unsigned>(unsigned(index)) : std::nullopt;
-        });
-    });
-    connect(feature_angle_, &NumberControl::changed, this,
-            [this](double angle) { change([angle](QuadRemeshOptions& o) { o.feature_angle_deg = angle; }); });
-    connect(small_parts_, &QComboBox::currentIndexChanged, this, [this](int index) {
-        change([index](QuadRemeshOptions& o) { o.small_parts = index == 1 ? SmallParts::keep : SmallParts::remove; });
-    });
-    connect(&workbench_, &Workbench::quad_options_changed, this, &QuadsPanel::show_options);
-    connect(&workbench_.document(), &Document::changed, this, &QuadsPanel::show_report);
-    connect(&workbench_, &Workbench::opened, this, &QuadsPanel::show_report);
-    show_options();
-    show_report();
+    connect(&workbench, &Workbench::quad_options_changed, this, &QuadsPanel::refresh);
+    refresh();
 }
 
-void QuadsPanel::change(const std::function<void(QuadRemeshOptions&)>& edit) {
-    QuadRemeshOptions options = workbench_.quad_options();
-    edit(options);
-    workbench_.set_quad_options(options);
-}
-
-void QuadsPanel::show_options() {
-    const QuadRemeshOptions& options = workbench_.quad_options();
-    count_->set_value(double(options.quads));
-    set_silently(levels_, std::min(kMostLevels, int(options.levels.value_or(0))));
-    feature_angle_->set_value(options.feature_angle_deg);
-    set_silently(small_parts_, options.small_parts == SmallParts::keep ? 1 : 0);
-}
-
-void QuadsPanel::show_report() {
-    const auto& source = workbench_.state().source;
-    const MadeQuads* const quads = source ? source->quads.get() : nullptr;
+void QuadsPanel::refresh() {
+    Panel::refresh();
+    const MadeQuads* const quads = state().source ? state().source->quads.get() : nullptr;
     none_->setVisible(!quads);
     figures_->setText(quads ? quads_table(*quads) : QString());
     figures_->setVisible(quads);

@@ -1,7 +1,7 @@
 // How the mesh is shown.
 #pragma once
 
-#include "controls.h"
+#include "panel.h"
 #include "viewport.h"
 
 namespace filigree::studio {
@@ -15,23 +15,14 @@ public:
     ViewPanel(Workbench& workbench, Viewport& viewport, MainWindow& window, QWidget* parent = nullptr);
 
 private:
-    void refresh();
+    void add_surface(MainWindow& window);
+    void refresh() override;
     void show_error();
     void show_drawn();
-    void change(const std::function<void(ViewSettings&)>& edit);
 
-    Workbench& workbench_;
     Viewport& viewport_;
-    MainWindow& window_;
-    QComboBox *style_, *coloring_, *clip_axis_, *up_, *theme_;
-    struct Switch {
-        QCheckBox* box;
-        bool ViewSettings::*field;
-    };
-    std::vector<Switch> switches_;
-    NumberControl *points_, *clip_;
-    QPushButton* measure_;
-    Text *error_, *drawn_;
+    QPushButton* measure_ = nullptr;
+    Text *error_ = nullptr, *drawn_;
 };
 
 } // namespace filigree::studio

@@ -2,9 +2,12 @@
 #pragma once
 
 #include "drawing.h"
+#include "jobs.h"
 #include "patch_surface.h"
 #include "shown_model.h"
 #include "workbench.h"
+
+#include "filigree/mesh/defect_edges.h"
 
 #include <QPalette>
 
@@ -12,30 +15,23 @@
 
 namespace filigree::studio {
 
-/// An edge that a closed, oriented manifold mesh would not have, or, with a = b, a corner of a face without area.
-/// Vertices of the finest mesh.
-struct DefectEdge {
-    Index a = 0, b = 0;
-    bool is_open = false;
-    bool is_opposed = false; ///< its two faces run along it the same way; neither: it has three faces or more
-};
-/// All of them, by the rules of TopologyReport: edges, ascending, then faces. Cost O(corners log corners).
-std::vector<DefectEdge> defect_edges(const Mesh& mesh);
+/// What a tile of the picture is of: the whole picture, or one of the three of the split view.
+enum class TileShows { driver, restored, full };
 
-class Stage : public QObject {
+class DrawnObjects : public QObject {
     Q_OBJECT
 public:
     /// Runs its argument with OpenGL current, or not at all.
     using WithOpenGl = std::function<void(std::function<void()>)>;
 
-    Stage(Workbench& workbench, WithOpenGl with_opengl);
-    ~Stage() override;
+    DrawnObjects(Workbench& workbench, WithOpenGl with_opengl);
+    ~DrawnObjects() override;
 
     void start(RestoreOn where); ///< OpenGL is there
     void stop();                 ///< it goes away; called while it is still current
     bool is_started() const { return is_started_; }
 
-    Background& background() { return background_; }
+    Jobs& background() { return background_; }
     /// Null: nothing to draw yet.
     ShownModel* shown() { return shown_.get(); }
     bool is_preparing() const { return next_ != nullptr; }  ///< what is drawn is not the document's any more
@@ -52,8 +48,7 @@ public:
     /// What a picture needs of levels: posed and coloured. Returns the milliseconds that posing took.
     double prepare(std::span<const unsigned> levels);
     /// One tile's objects. `from` melts into `level`; part: of `level`.
-    enum class Content { driver, restored, full };
-    Scene scene(Content content, unsigned level, std::optional<unsigned> from, double part, const QPalette& palette);
+    Scene scene(TileShows content, unsigned level, std::optional<unsigned> from, double part, const QPalette& palette);
     /// Why the full deformation of the pose shown is not there (yet), for its tile; "" when it is.
     std::string full_problem() const;
     std::string patches_problem() const; ///< why patches are wanted and not seen; "" when they are
@@ -80,7 +75,6 @@ private:
     void follow_particles();
     void follow_surroundings();
     void follow_inside_points();
-    std::vector<Vec3f> carried_inside_points() const;
     void pose_net();
     bool has_full_vertices() const;
     void follow_full();
@@ -88,12 +82,17 @@ private:
     PatchSurface* patches_at(unsigned level); ///< what is drawn in its place; null: itself
     void follow_colors();
     void follow_defects();
+    void ask_for(unsigned level, bool is_urgent);
     void adopt();
+    Appearance surface_look(bool is_dark);
+    void add_level(Scene& scene, unsigned level, const Appearance& look, float coverage = 1);
+    void add_restored(Scene& scene, unsigned level, std::optional<unsigned> from, double part, const Appearance& look);
+    void add_surroundings(Scene& scene) const;
     void drop_posed_extras();
 
     Workbench& workbench_;
     WithOpenGl with_opengl_;
-    Background background_;
+    Jobs background_{"A coarser level needs less."};
     bool is_started_ = false;
     RestoreOn where_ = RestoreOn::cpu;
     std::unique_ptr<ShownModel> shown_, next_;

@@ -3,6 +3,8 @@
 
 #include "workbench.h"
 
+#include <chrono>
+
 #include <QTimer>
 
 namespace filigree::studio {
@@ -11,10 +13,12 @@ namespace filigree::studio {
 Result<State> stripped_state(State state, const RunContext& context);
 Result<State> state_of_shape(State state, const Shape& shape, const RunContext& context);
 
+double milliseconds_since(std::chrono::steady_clock::time_point begin);
+
 // Topics of work.
 inline const std::string kModelTopic = "model", kOpenTopic = "open", kBodyTopic = "body", kQuadsTopic = "quads";
 
-struct Workbench::Content {
+struct Workbench::Impl {
     RunContext context;            ///< of what is done at once
     std::uint64_t pose_number = 0; ///< of the pose shown: what was measured of an older one is dropped
 
@@ -32,7 +36,6 @@ struct Workbench::Content {
 
     QTimer replay;
     After then = After::nothing; ///< once the body is made
-    std::size_t committed = 0;   ///< frames of the live recording that the document has
     std::size_t looked_at = 0;   ///< frame of the last moment of the body, shown or not
     bool told_of_rest = false;   ///< that a body is made of the shape at rest
     bool keeps_body = false;     ///< a step of our own, after which the body still fits

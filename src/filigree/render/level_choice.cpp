@@ -1,9 +1,9 @@
-#include "level_choice.h"
+#include "filigree/render/level_choice.h"
 
 #include <algorithm>
 #include <utility>
 
-namespace filigree::studio {
+namespace filigree {
 
 unsigned level_by_size(std::span<const LevelFacts> levels, unsigned finest, unsigned now, double pixels_a_unit) {
     const auto coarsest_below = [&](double pixels) {
@@ -78,4 +78,4 @@ bool LevelChange::advance(double now) {
     return from_.has_value();
 }
 
-} // namespace filigree::studio
+} // namespace filigree

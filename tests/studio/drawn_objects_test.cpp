@@ -1,5 +1,5 @@
 // What is drawn while the document is another already.
-#include "stage.h"
+#include "drawn_objects.h"
 #include "viewport.h"
 
 #include <QOffscreenSurface>
@@ -8,7 +8,6 @@
 #include <QWidget>
 
 #include <algorithm>
-#include <new>
 
 #include <gtest/gtest.h>
 
@@ -17,11 +16,9 @@ using namespace filigree::studio;
 
 namespace {
 
-using studio::Background; // there is one of pictures too
-
 constexpr int kPatience = 20'000; // ms
 
-TEST(Stage, AModelWithMoreLevelsThanTheOneDrawn) {
+TEST(DrawnObjects, AModelWithMoreLevelsThanTheOneDrawn) {
     Workbench workbench;
     workbench.make_shape({.name = "wavy-cube", .options = {.resolution = 16}});
     workbench.wait_until_idle();
@@ -48,12 +45,12 @@ TEST(Stage, AModelWithMoreLevelsThanTheOneDrawn) {
     EXPECT_EQ(nothing_ready.level(1'000), nullptr);
 }
 
-/// A stage without a window.
-struct StageTest : testing::Test {
+/// Without a window.
+struct DrawnObjectsTest : testing::Test {
     Workbench workbench;
     QOffscreenSurface surface;
     QOpenGLContext opengl;
-    std::unique_ptr<Stage> stage;
+    std::unique_ptr<DrawnObjects> drawn;
 
     void SetUp() override {
         QSurfaceFormat format;
@@ -66,18 +63,18 @@ struct StageTest : testing::Test {
             GTEST_SKIP() << "no OpenGL";
         workbench.make_shape({.name = "wavy-cube", .options = {.resolution = 12}});
         workbench.wait_until_idle();
-        stage = std::make_unique<Stage>(workbench, [](const std::function<void()>& work) { work(); });
-        stage->start(RestoreOn::cpu);
+        drawn = std::make_unique<DrawnObjects>(workbench, [](const std::function<void()>& work) { work(); });
+        drawn->start(RestoreOn::cpu);
         settle();
     }
     void TearDown() override {
-        if (stage) stage->stop();
-        stage.reset();
+        if (drawn) drawn->stop();
+        drawn.reset();
     }
 
     void settle() {
         workbench.wait_until_idle();
-        stage->background().wait();
+        drawn->background().finish_all();
     }
     void set(const std::function<void(ViewSettings&)>& change) {
         ViewSettings settings = workbench.view().settings();
@@ -89,7 +86,7 @@ struct StageTest : testing::Test {
         warps.bend = degrees;
         workbench.set_warps(warps);
     }
-    Scene full() { return stage->scene(Stage::Content::full, workbench.state().level(), {}, 1, QPalette()); }
+    Scene full() { return drawn->scene(TileShows::full, workbench.state().level(), {}, 1, QPalette()); }
     /// Three frames, of which the last is shown.
     void simulate() {
         BodySettings body = workbench.state().body;
@@ -104,19 +101,19 @@ struct StageTest : testing::Test {
     }
 };
 
-TEST_F(StageTest, TheFullDeformationIsOfThePoseShown) {
+TEST_F(DrawnObjectsTest, TheFullDeformationIsOfThePoseShown) {
     set([](ViewSettings& s) { s.split = true; });
     settle();
-    EXPECT_EQ(stage->full_problem(), "") << "at rest there is nothing to compute";
+    EXPECT_EQ(drawn->full_problem(), "") << "at rest there is nothing to compute";
     bend(30);
-    EXPECT_EQ(stage->full_problem(), "being computed");
+    EXPECT_EQ(drawn->full_problem(), "being computed");
     settle();
-    EXPECT_EQ(stage->full_problem(), "");
+    EXPECT_EQ(drawn->full_problem(), "");
     ASSERT_EQ(full().objects.size(), 1u);
     const Box of_30 = full().objects[0].drawable->box();
 
     bend(90);
-    EXPECT_EQ(stage->full_problem(), "being computed");
+    EXPECT_EQ(drawn->full_problem(), "being computed");
     EXPECT_TRUE(full().objects.empty()) << "what is drawn is of the pose before";
     settle();
     ASSERT_EQ(full().objects.size(), 1u);
@@ -127,14 +124,14 @@ TEST_F(StageTest, TheFullDeformationIsOfThePoseShown) {
     bend(30);
     workbench.wait_until_idle();
     bend(90);
-    stage->background().wait();
+    drawn->background().finish_all();
     EXPECT_TRUE(full().objects.empty());
     settle();
     ASSERT_EQ(full().objects.size(), 1u);
     EXPECT_LT((full().objects[0].drawable->box().size() - of_90.size()).norm(), 1e-6);
 }
 
-TEST_F(StageTest, ARecordedMomentHasNoFullDeformationOfAnother) {
+TEST_F(DrawnObjectsTest, ARecordedMomentHasNoFullDeformationOfAnother) {
     set([](ViewSettings& s) {
         s.split = true;
         s.ground = false;
@@ -142,71 +139,49 @@ TEST_F(StageTest, ARecordedMomentHasNoFullDeformationOfAnother) {
     simulate();
     ASSERT_EQ(workbench.frame_count(), 3u);
     ASSERT_EQ(workbench.full().size(), workbench.state().model->mesh.vertex_count());
-    EXPECT_EQ(stage->full_problem(), "");
+    EXPECT_EQ(drawn->full_problem(), "");
     const auto count = [&] { return full().objects.size(); };
     const std::size_t at_the_end = count();
     ASSERT_GE(at_the_end, 1u);
     workbench.go_to_frame(1);
     settle();
     EXPECT_EQ(count(), at_the_end - 1) << "the last frame's full deformation is still drawn";
-    EXPECT_NE(stage->full_problem().find("recording"), std::string::npos) << stage->full_problem();
+    EXPECT_NE(drawn->full_problem().find("recording"), std::string::npos) << drawn->full_problem();
     workbench.go_to_frame(2);
     settle();
     EXPECT_EQ(count(), at_the_end);
 }
 
-TEST_F(StageTest, ColorsAreOfWhatTheLegendSays) {
+TEST_F(DrawnObjectsTest, ColorsAreOfWhatTheLegendSays) {
     set([](ViewSettings& s) { s.coloring = Coloring::levels; });
     settle();
     const std::size_t count = workbench.state().model->mesh.vertex_count();
-    EXPECT_EQ(stage->colors().values, vertex_levels(*workbench.state().model, workbench.state().model->finest_level()));
+    EXPECT_EQ(drawn->colors().values, vertex_levels(*workbench.state().model, workbench.state().model->finest_level()));
     bend(40);
-    EXPECT_EQ(stage->colors().values.size(), count);
+    EXPECT_EQ(drawn->colors().values.size(), count);
     set([](ViewSettings& s) { s.coloring = Coloring::error; });
-    EXPECT_TRUE(stage->colors().values.empty()) << "levels under the legend of an error";
+    EXPECT_TRUE(drawn->colors().values.empty()) << "levels under the legend of an error";
     const unsigned level = workbench.state().level();
-    const Scene grey = stage->scene(Stage::Content::restored, level, {}, 1, QPalette());
+    const Scene grey = drawn->scene(TileShows::restored, level, {}, 1, QPalette());
     ASSERT_FALSE(grey.objects.empty());
     EXPECT_FALSE(grey.objects[0].appearance.own_colors);
     settle();
-    ASSERT_EQ(stage->colors().values.size(), count);
-    const float most = *std::max_element(stage->colors().values.begin(), stage->colors().values.end());
+    ASSERT_EQ(drawn->colors().values.size(), count);
+    const float most = *std::max_element(drawn->colors().values.begin(), drawn->colors().values.end());
     EXPECT_GT(most, 0);
     EXPECT_LT(most, 0.2f) << "fractions of the diagonal";
     bend(50);
-    EXPECT_TRUE(stage->colors().values.empty()) << "the error of the pose before";
+    EXPECT_TRUE(drawn->colors().values.empty()) << "the error of the pose before";
     settle();
-    EXPECT_EQ(stage->colors().values.size(), count);
+    EXPECT_EQ(drawn->colors().values.size(), count);
 
     simulate();
-    EXPECT_EQ(stage->colors().values.size(), count);
+    EXPECT_EQ(drawn->colors().values.size(), count);
     workbench.go_to_frame(1);
     settle();
-    EXPECT_TRUE(stage->colors().values.empty()) << "nobody knows the error of a recorded moment";
+    EXPECT_TRUE(drawn->colors().values.empty()) << "nobody knows the error of a recorded moment";
     set([](ViewSettings& s) { s.coloring = Coloring::own; });
-    EXPECT_TRUE(stage->colors().values.empty());
-}
-
-TEST(Background, WhatWorkThrowsIsToldAndTheNextIsDone) {
-    Background background;
-    std::vector<std::string> told;
-    QObject::connect(&background, &Background::failed, &background,
-                     [&](const Error& error) { told.push_back(error.message); });
-    int delivered = 0;
-    std::optional<Error> otherwise;
-    background.start("memory", [](const RunContext&) -> Background::Delivery { throw std::bad_alloc(); });
-    background.start(
-        "more memory", [](const RunContext&) -> Background::Delivery { throw std::bad_alloc(); }, false,
-        [&](const Error& error) { otherwise = error; });
-    background.start("odd", [](const RunContext&) -> Background::Delivery { throw std::runtime_error("odd"); });
-    background.start("good", [&](const RunContext&) -> Background::Delivery { return [&] { ++delivered; }; });
-    ASSERT_TRUE(QTest::qWaitFor([&] { return delivered == 1; }, kPatience));
-    ASSERT_EQ(told.size(), 2u);
-    EXPECT_NE(told[0].find("memory"), std::string::npos);
-    EXPECT_NE(told[1].find("odd"), std::string::npos);
-    ASSERT_TRUE(otherwise);
-    EXPECT_EQ(otherwise->code, ErrorCode::out_of_memory);
-    EXPECT_FALSE(background.is_busy());
+    EXPECT_TRUE(drawn->colors().values.empty());
 }
 
 } // namespace

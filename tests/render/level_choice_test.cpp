@@ -1,4 +1,4 @@
-#include "level_choice.h"
+#include "filigree/render/level_choice.h"
 
 #include <algorithm>
 #include <array>
@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-using namespace filigree::studio;
+using namespace filigree;
 
 namespace {
 

@@ -1,10 +1,10 @@
-#include "navigation.h"
+#include "filigree/render/camera_navigation.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
-namespace filigree::studio {
+namespace filigree {
 
 namespace {
 
@@ -27,7 +27,7 @@ Camera zoomed_about(const Camera& camera, double factor, double x, double y, con
     return result;
 }
 
-Camera between(const Camera& from, const Camera& to, double t) {
+Camera camera_between(const Camera& from, const Camera& to, double t) {
     const Vec3d back_from = from.eye - from.target, back_to = to.eye - to.target;
     const double distance_from = back_from.norm(), distance_to = back_to.norm();
     if (t >= 1 || !(distance_from > 0) || !(distance_to > 0)) return to;
@@ -73,4 +73,4 @@ std::optional<double> point_on_line(const Camera& camera, const Vec3d& through, 
     return (cosine * gap.dot(ray.direction) - gap.dot(along)) / sine2;
 }
 
-} // namespace filigree::studio
+} // namespace filigree

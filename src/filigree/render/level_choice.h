@@ -5,7 +5,7 @@
 #include <optional>
 #include <span>
 
-namespace filigree::studio {
+namespace filigree {
 
 /// What a level costs, and what is lost by drawing it instead of the finest.
 struct LevelFacts {
@@ -71,4 +71,4 @@ private:
     double part_ = 1, started_ = 0;
 };
 
-} // namespace filigree::studio
+} // namespace filigree

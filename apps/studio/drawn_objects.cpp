@@ -1,4 +1,4 @@
-#include "stage.h"
+#include "drawn_objects.h"
 
 #include "quads.h"
 #include "theme.h"
@@ -35,55 +35,38 @@ VertexColors error_colors(std::vector<float> distances, double diagonal) {
     return {std::move(map.values), ColorMap::sequential, map.range};
 }
 
-} // namespace
-
-std::vector<DefectEdge> defect_edges(const Mesh& mesh) {
-    struct Side {
-        Index a, b;
-        bool is_forward;
-        auto operator<=>(const Side&) const = default;
-    };
-    const double diagonal = bounds(mesh.positions).diagonal(), least_area = 1e-14 * diagonal * diagonal;
-    std::vector<Side> sides;
-    sides.reserve(mesh.corner_count());
-    std::vector<Index> flat, corners;
-    for (std::size_t face = 0; face < mesh.face_count(); ++face) {
-        corners.clear();
-        for (const Index v : mesh.face(face))
-            if (corners.empty() || corners.back() != v) corners.push_back(v);
-        while (corners.size() > 1 && corners.front() == corners.back()) corners.pop_back();
-        Vec3d area = Vec3d::Zero();
-        for (std::size_t k = 2; k < corners.size(); ++k) {
-            const Vec3d from = mesh.positions[corners[0]].cast<double>();
-            area += (mesh.positions[corners[k - 1]].cast<double>() - from)
-                        .cross(mesh.positions[corners[k]].cast<double>() - from) /
-                    2;
+/// Where the driver takes points inside the mesh: each goes with all of its vertices (or enough of them, evenly
+/// chosen), by the inverse fourth power of their distances, so above all with the nearest.
+std::vector<Vec3f> carried_points(std::span<const Vec3f> rest, std::span<const Vec3f> driver, const Pose& pose) {
+    std::vector<Vec3f> carried(rest.begin(), rest.end());
+    if (rest.empty()) return carried;
+    constexpr std::size_t kMostPairs = 1'500'000, kLeast = 64; // a few milliseconds
+    const std::size_t most = std::clamp(kMostPairs / rest.size(), kLeast, driver.size() + kLeast);
+    const std::size_t step = (driver.size() + most - 1) / most;
+    const float least = 1e-6f * bounds(driver).size().cast<float>().squaredNorm();
+    parallel_for(RunContext(), rest.size(), 64, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            Vec3f place = Vec3f::Zero();
+            float sum = 0;
+            for (std::size_t v = 0; v < driver.size(); v += step) {
+                const Vec3f offset = rest[i] - driver[v];
+                const float distance2 = offset.squaredNorm() + least, weight = 1 / (distance2 * distance2);
+                const Vec3f turned = pose.gradients.empty() ? offset : Vec3f(pose.gradients[v] * offset);
+                place += weight * (pose.positions[v] + turned);
+                sum += weight;
+            }
+            carried[i] = place / sum;
         }
-        std::vector<Index> once = corners;
-        std::sort(once.begin(), once.end());
-        const bool repeats = std::adjacent_find(once.begin(), once.end()) != once.end();
-        if (!corners.empty() && (repeats || corners.size() != mesh.face(face).size() || !(area.norm() > least_area)))
-            flat.push_back(corners[0]);
-        for (std::size_t k = 0; corners.size() > 2 && k < corners.size(); ++k) {
-            const Index a = corners[k], b = corners[(k + 1) % corners.size()];
-            sides.push_back({std::min(a, b), std::max(a, b), a < b});
-        }
-    }
-    std::sort(sides.begin(), sides.end());
-    std::vector<DefectEdge> defects;
-    for (std::size_t i = 0, j = 0; i < sides.size(); i = j) {
-        while (j < sides.size() && sides[j].a == sides[i].a && sides[j].b == sides[i].b) ++j;
-        const bool is_opposed = j - i == 2 && sides[i] == sides[i + 1];
-        if (j - i != 2 || is_opposed) defects.push_back({sides[i].a, sides[i].b, j - i == 1, is_opposed});
-    }
-    for (const Index v : flat) defects.push_back({v, v});
-    return defects;
+    });
+    return carried;
 }
 
-Stage::Stage(Workbench& workbench, WithOpenGl with_opengl)
+} // namespace
+
+DrawnObjects::DrawnObjects(Workbench& workbench, WithOpenGl with_opengl)
     : workbench_(workbench), with_opengl_(std::move(with_opengl)) {
     settings_ = workbench.view().settings();
-    connect(&background_, &Background::failed, this, [this](const Error& error) {
+    connect(&background_, &Jobs::failed, this, [this](const Error& error) {
         problem_ = error.message;
         Q_EMIT changed(false);
     });
@@ -105,17 +88,17 @@ Stage::Stage(Workbench& workbench, WithOpenGl with_opengl)
     connect(&workbench.view(), &ViewState::changed, this, [this] { follow_view(); });
 }
 
-Stage::~Stage() = default;
+DrawnObjects::~DrawnObjects() = default;
 
-void Stage::start(RestoreOn where) {
+void DrawnObjects::start(RestoreOn where) {
     where_ = where;
     is_started_ = true;
     follow_document();
     follow_view();
 }
 
-void Stage::stop() {
-    background_.cancel_all();
+void DrawnObjects::stop() {
+    background_.drop_all();
     is_started_ = false;
     shown_.reset();
     next_.reset();
@@ -130,14 +113,14 @@ void Stage::stop() {
     defects_of_ = nullptr;
 }
 
-void Stage::follow_document() {
+void DrawnObjects::follow_document() {
     if (!is_started_) return;
     const State& state = workbench_.state();
     if (!state.model) return;
     if (shown_ && shown_->is_of(state)) {
         if (next_) {
             next_.reset();
-            background_.cancel_all();
+            background_.drop_all();
             shown_->forget_unready();
         }
         ask_for_levels(state.level(), false);
@@ -145,18 +128,18 @@ void Stage::follow_document() {
         return;
     }
     if (!next_ || !next_->is_of(state)) {
-        background_.cancel_all();
+        background_.drop_all();
         if (shown_) shown_->forget_unready();
         next_ = std::make_unique<ShownModel>(state, where_);
     }
-    next_->ask(state.level(), true, background_, with_opengl_, [this](unsigned, const std::optional<Error>& error) {
+    next_->ask(state.level(), true, background_, with_opengl_, [this](const std::optional<Error>& error) {
         problem_ = error ? error->message : "";
         adopt();
     });
     Q_EMIT changed(false);
 }
 
-void Stage::adopt() {
+void DrawnObjects::adopt() {
     if (!next_) return;
     with_opengl_([this] {
         shown_ = std::move(next_);
@@ -169,7 +152,7 @@ void Stage::adopt() {
     Q_EMIT changed(false);
 }
 
-void Stage::drop_posed_extras() {
+void DrawnObjects::drop_posed_extras() {
     full_.reset();
     full_asked_ = 0;
     patches_.reset();
@@ -177,7 +160,7 @@ void Stage::drop_posed_extras() {
     positions_.clear();
 }
 
-void Stage::follow_pose() {
+void DrawnObjects::follow_pose() {
     if (!shown_) return;
     const Pose* pose = workbench_.pose();
     if (pose && pose->positions.size() != shown_->rest_pose().positions.size()) return; // of a model not shown yet
@@ -190,7 +173,7 @@ void Stage::follow_pose() {
     Q_EMIT changed(true);
 }
 
-void Stage::follow_view() {
+void DrawnObjects::follow_view() {
     if (!is_started_) return;
     settings_ = workbench_.view().settings();
     const bool wants_full = settings_.split || settings_.coloring == Coloring::error;
@@ -203,17 +186,16 @@ void Stage::follow_view() {
     follow_colors();
     follow_patches();
     if (shown_ && settings_.driver) shown_->measure(background_, [this] { Q_EMIT changed(false); });
-    if (shown_ && (settings_.driver || settings_.split))
-        shown_->ask(0, true, background_, with_opengl_, [this](unsigned, const auto&) { Q_EMIT changed(false); });
+    if (shown_ && (settings_.driver || settings_.split)) ask_for(0, true);
     Q_EMIT changed(false);
 }
 
-bool Stage::shows_particles() const {
+bool DrawnObjects::shows_particles() const {
     return settings_.particles && workbench_.mode() == Mode::body && workbench_.playback().has_body();
 }
-bool Stage::shows_inside_points() const { return workbench_.view().settings().inside_points; }
+bool DrawnObjects::shows_inside_points() const { return workbench_.view().settings().inside_points; }
 
-void Stage::follow_particles() {
+void DrawnObjects::follow_particles() {
     const Moment* moment = workbench_.playback().moment();
     if (!is_started_ || !shows_particles() || !moment || moment->particles.empty()) {
         if (particles_) with_opengl_([this] { particles_.reset(); });
@@ -230,7 +212,7 @@ void Stage::follow_particles() {
     Q_EMIT changed(true);
 }
 
-void Stage::follow_surroundings() {
+void DrawnObjects::follow_surroundings() {
     const std::shared_ptr<const MadeBody> made =
         workbench_.mode() == Mode::body ? workbench_.playback().made() : nullptr;
     if (made == surroundings_of_) return;
@@ -246,7 +228,7 @@ void Stage::follow_surroundings() {
     });
 }
 
-void Stage::follow_inside_points() {
+void DrawnObjects::follow_inside_points() {
     if (!is_started_ || !shown_) return;
     if (!settings_.inside_points) {
         if (inside_) with_opengl_([this] { inside_.reset(); });
@@ -274,45 +256,21 @@ void Stage::follow_inside_points() {
     if (!inside_ || inside_pose_ == pose_stamp_) return;
     with_opengl_([this] {
         inside_pose_ = pose_stamp_;
-        if (!inside_->set_positions(carried_inside_points())) inside_.reset(); // of a mesh not shown yet
+        const std::span<const Vec3f> rest = workbench_.inside_points();
+        const Status is_there = pose_stamp_ == 0
+                                  ? inside_->set_positions(rest)
+                                  : inside_->set_positions(carried_points(rest, shown_->rest_pose().positions, pose_));
+        if (!is_there) inside_.reset(); // of a mesh not shown yet
     });
     Q_EMIT changed(false);
 }
 
-/// Where the driver takes the points inside: each goes with all of its vertices (or enough of them, evenly chosen), by
-/// the inverse fourth power of their distances, so above all with the nearest.
-std::vector<Vec3f> Stage::carried_inside_points() const {
-    const std::span<const Vec3f> rest = workbench_.inside_points();
-    std::vector<Vec3f> carried(rest.begin(), rest.end());
-    if (pose_stamp_ == 0 || rest.empty()) return carried;
-    constexpr std::size_t kMostPairs = 1'500'000, kLeast = 64; // a few milliseconds
-    const std::vector<Vec3f>& driver = shown_->rest_pose().positions;
-    const std::size_t most = std::clamp(kMostPairs / rest.size(), kLeast, driver.size() + kLeast);
-    const std::size_t step = (driver.size() + most - 1) / most;
-    const float least = 1e-6f * bounds(driver).size().cast<float>().squaredNorm();
-    parallel_for(RunContext(), rest.size(), 64, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) {
-            Vec3f place = Vec3f::Zero();
-            float sum = 0;
-            for (std::size_t v = 0; v < driver.size(); v += step) {
-                const Vec3f offset = rest[i] - driver[v];
-                const float distance2 = offset.squaredNorm() + least, weight = 1 / (distance2 * distance2);
-                const Vec3f turned = pose_.gradients.empty() ? offset : Vec3f(pose_.gradients[v] * offset);
-                place += weight * (pose_.positions[v] + turned);
-                sum += weight;
-            }
-            carried[i] = place / sum;
-        }
-    });
-    return carried;
-}
-
-bool Stage::has_full_vertices() const {
+bool DrawnObjects::has_full_vertices() const {
     return shown_ && pose_stamp_ != 0 && workbench_.full().size() == shown_->model().mesh.vertex_count();
 }
 
 /// The full deformation is drawn for the pose shown, or not at all.
-void Stage::follow_full() {
+void DrawnObjects::follow_full() {
     const bool is_wanted = is_started_ && settings_.split && has_full_vertices();
     if (is_wanted && full_asked_ == pose_stamp_) return;
     if (full_) {
@@ -327,31 +285,27 @@ void Stage::follow_full() {
         full_error_ = error.message;
         Q_EMIT changed(false);
     };
-    background_.start(
-        "full",
-        [this, fail, stamp = pose_stamp_,
-         positions = std::vector<Vec3f>(workbench_.full().begin(), workbench_.full().end()),
-         model = shown_->shared_model(),
-         source = workbench_.state().source](const RunContext& context) -> Background::Delivery {
+    background_.start<DrawData>(
+        "The picture", "full",
+        [model = shown_->shared_model(), source = workbench_.state().source,
+         positions = std::vector(workbench_.full().begin(), workbench_.full().end())](const RunContext& context) {
             SurfaceOptions options;
             options.materials = source->materials.materials;
-            Result<DrawData> made = DrawData::surface(moved_mesh(model->mesh, positions), options, context);
-            if (context.is_cancelled()) return nullptr;
-            if (!made) return [fail, error = made.error()] { fail(error); };
-            return [this, fail, stamp, source, data = std::make_shared<DrawData>(std::move(made).value())] {
-                if (stamp != full_asked_) return; // of another moment
-                with_opengl_([&] {
-                    Result<Drawable> drawable = Drawable::upload(std::move(*data));
-                    if (!drawable) return fail(drawable.error());
-                    full_ = std::move(drawable).value();
-                });
-                Q_EMIT changed(true);
-            };
+            return DrawData::surface(moved_mesh(model->mesh, positions), options, context);
         },
-        false, fail);
+        [this, fail, stamp = pose_stamp_](DrawData data) {
+            if (stamp != full_asked_) return; // of another moment
+            with_opengl_([&] {
+                Result<Drawable> drawable = Drawable::upload(std::move(data));
+                if (!drawable) return fail(drawable.error());
+                full_ = std::move(drawable).value();
+            });
+            Q_EMIT changed(true);
+        },
+        {.failed = fail});
 }
 
-std::string Stage::full_problem() const {
+std::string DrawnObjects::full_problem() const {
     if (full_ || pose_stamp_ == 0) return "";
     if (!full_error_.empty()) return full_error_;
     if (has_full_vertices() || workbench_.jobs().is_pending("full") || workbench_.jobs().is_pending("error"))
@@ -364,10 +318,10 @@ std::string Stage::full_problem() const {
 }
 
 /// The patches of the model shown, when they are wanted.
-void Stage::follow_patches() {
+void DrawnObjects::follow_patches() {
     const std::shared_ptr<const Model> model =
         shown_ && settings_.coloring == Coloring::patches ? shown_->shared_model() : nullptr;
-    const bool is_there = patches_ || !patches_problem_.empty() || background_.is_busy("patches");
+    const bool is_there = patches_ || !patches_problem_.empty() || background_.is_pending("patches");
     if (model == patches_of_ && (is_there || !model)) return;
     if (patches_) with_opengl_([this] { patches_.reset(); });
     patches_problem_.clear();
@@ -384,36 +338,33 @@ void Stage::follow_patches() {
                                : error.message;
         Q_EMIT changed(false);
     };
-    background_.start(
-        "patches",
-        [this, model, fail, most_levels, restore = workbench_.state().restore,
-         where = where_](const RunContext& context) -> Background::Delivery {
-            Result<PatchData> made = PatchData::make(*model, restore, most_levels, where, context);
-            if (context.is_cancelled()) return nullptr;
-            if (!made) return [fail, error = made.error()] { fail(error); };
-            return [this, model, fail, patches = std::make_shared<PatchData>(std::move(*made))] {
-                if (patches_of_ != model) return;
-                with_opengl_([&] {
-                    Result<Drawable> drawable = Drawable::upload(std::move(patches->data));
-                    if (!drawable) return fail(drawable.error());
-                    patches_.emplace(PatchSurface{patches->model, std::move(*drawable)});
-                });
-                Q_EMIT changed(false);
-            };
+    background_.start<PatchData>(
+        "The picture", "patches",
+        [model, most_levels, restore = workbench_.state().restore, where = where_](const RunContext& context) {
+            return PatchData::make(*model, restore, most_levels, where, context);
         },
-        false, fail);
+        [this, model, fail](PatchData patches) {
+            if (patches_of_ != model) return;
+            with_opengl_([&] {
+                Result<Drawable> drawable = Drawable::upload(std::move(patches.data));
+                if (!drawable) return fail(drawable.error());
+                patches_.emplace(PatchSurface{patches.model, std::move(*drawable)});
+            });
+            Q_EMIT changed(false);
+        },
+        {.failed = fail});
 }
 
-std::string Stage::patches_problem() const {
+std::string DrawnObjects::patches_problem() const {
     if (!patches_problem_.empty() || !patches_ || !shown_) return patches_problem_;
     return workbench_.state().level() < shown_->finest_level() ? "Patches are coloured at the finest level alone." : "";
 }
 
-PatchSurface* Stage::patches_at(unsigned level) {
+PatchSurface* DrawnObjects::patches_at(unsigned level) {
     return patches_ && shown_ && level == shown_->finest_level() ? &*patches_ : nullptr;
 }
 
-void Stage::follow_colors() {
+void DrawnObjects::follow_colors() {
     if (!shown_) return;
     const auto put = [this](Coloring coloring, VertexColors colors) {
         colors_ = std::move(colors);
@@ -446,42 +397,53 @@ void Stage::follow_colors() {
         return put(Coloring::error, error_colors(error->per_vertex, diagonal));
     }
     if (colors_are_ != Coloring::error) put_none();
-    background_.start("error colors",
-                      [put, this, diagonal, stamp = pose_stamp_,
-                       full = std::vector<Vec3f>(workbench_.full().begin(), workbench_.full().end()), pose = pose_,
-                       model = shown_->shared_model(),
-                       restore = workbench_.state().restore](const RunContext& context) -> Background::Delivery {
-                          RestoreOptions finest = restore;
-                          finest.level.reset();
-                          const Result<Restorer> restorer = Restorer::create(*model, finest, context);
-                          if (!restorer) return nullptr;
-                          const Result<std::vector<Vec3f>> restored = restorer->positions(pose, context);
-                          if (!restored || restored->size() != full.size()) return nullptr;
-                          std::vector<float> distances(full.size());
-                          for (std::size_t v = 0; v < full.size(); ++v)
-                              distances[v] = ((*restored)[v] - full[v]).norm();
-                          return [this, put, stamp, model, colors = error_colors(std::move(distances), diagonal)] {
-                              if (shown_ && shown_->shared_model() == model && stamp == pose_stamp_ &&
-                                  settings_.coloring == Coloring::error)
-                                  put(Coloring::error, colors);
-                          };
-                      });
+    background_.start<VertexColors>(
+        "The picture", "error colors",
+        [diagonal, pose = pose_, model = shown_->shared_model(), restore = workbench_.state().restore,
+         full = std::vector(workbench_.full().begin(), workbench_.full().end())](
+            const RunContext& context) mutable -> Result<VertexColors> {
+            restore.level.reset();
+            const Result<Restorer> restorer = Restorer::create(*model, restore, context);
+            if (!restorer) return restorer.error();
+            const Result<std::vector<Vec3f>> restored = restorer->positions(pose, context);
+            if (!restored) return restored.error();
+            std::vector<float> distances(full.size());
+            for (std::size_t v = 0; v < full.size(); ++v) distances[v] = ((*restored)[v] - full[v]).norm();
+            return error_colors(std::move(distances), diagonal);
+        },
+        [this, put, stamp = pose_stamp_, model = shown_->shared_model()](VertexColors colors) {
+            if (shown_ && shown_->shared_model() == model && stamp == pose_stamp_ &&
+                settings_.coloring == Coloring::error)
+                put(Coloring::error, std::move(colors));
+        },
+        {.failed = [](const Error&) {}}); // the mesh is grey then: the error is not known
 }
 
-void Stage::follow_defects() {
+void DrawnObjects::follow_defects() {
     if (!shown_ || !settings_.defects || defects_of_ == shown_->shared_model()) return;
     defects_of_ = shown_->shared_model();
     defects_.clear();
-    background_.start("defects", [this, model = defects_of_](const RunContext&) -> Background::Delivery {
-        return [this, model, defects = defect_edges(model->mesh)] {
+    background_.start<std::vector<DefectEdge>>(
+        "The picture", "defects",
+        [model = defects_of_](const RunContext&) -> Result<std::vector<DefectEdge>> {
+            return defect_edges(model->mesh);
+        },
+        [this, model = defects_of_](std::vector<DefectEdge> defects) {
             if (defects_of_ != model) return;
-            defects_ = defects;
+            defects_ = std::move(defects);
             Q_EMIT changed(false);
-        };
+        });
+    ask_for(shown_->finest_level(), false); // they are marked there
+}
+
+void DrawnObjects::ask_for(unsigned level, bool is_urgent) {
+    shown_->ask(level, is_urgent, background_, with_opengl_, [this](const std::optional<Error>& error) {
+        if (error) problem_ = error->message;
+        Q_EMIT changed(false);
     });
 }
 
-unsigned Stage::calm_level(double pixels_a_unit) {
+unsigned DrawnObjects::calm_level(double pixels_a_unit) {
     const unsigned most = std::min(workbench_.state().level(), shown_->finest_level());
     if (!settings_.level_by_distance) return most;
     shown_->measure(background_, [this] { Q_EMIT changed(false); });
@@ -489,22 +451,18 @@ unsigned Stage::calm_level(double pixels_a_unit) {
     return by_size_;
 }
 
-void Stage::ask_for_levels(unsigned calm, bool all) {
+void DrawnObjects::ask_for_levels(unsigned calm, bool all) {
     constexpr std::size_t kSmall = 5'000; // triangles: drawn at once anywhere
-    const auto ready = [this](unsigned, const std::optional<Error>& error) {
-        if (error) problem_ = error->message;
-        Q_EMIT changed(false);
-    };
     if (!shown_) return;
     calm = std::min(calm, shown_->finest_level());
-    shown_->ask(calm, true, background_, with_opengl_, ready);
+    ask_for(calm, true);
     for (unsigned level = calm; all && level-- > 0;) {
-        shown_->ask(level, false, background_, with_opengl_, ready);
+        ask_for(level, false);
         if (shown_->facts()[level].triangles < kSmall) break;
     }
 }
 
-double Stage::prepare(std::span<const unsigned> levels) {
+double DrawnObjects::prepare(std::span<const unsigned> levels) {
     const RunContext context;
     double spent = 0;
     for (const unsigned number : levels) {
@@ -529,7 +487,7 @@ double Stage::prepare(std::span<const unsigned> levels) {
 
 /// The driver's vertices go towards the eye by as much as the detail may hide them: that changes nothing but what is in
 /// front, so its edges are one net over the shape.
-void Stage::pose_net() {
+void DrawnObjects::pose_net() {
     ShownLevel& net = *shown_->level(0);
     const Camera& camera = workbench_.view().camera();
     constexpr double kUnmeasured = 0.01, kMost = 0.05; // of the diagonal
@@ -548,8 +506,58 @@ void Stage::pose_net() {
     shown_->set_pose(net, near, net_stamp_, RunContext());
 }
 
-Scene Stage::scene(Content content, unsigned level, std::optional<unsigned> from, double part,
-                   const QPalette& palette) {
+/// As the view's settings have the surface.
+Appearance DrawnObjects::surface_look(bool is_dark) {
+    Appearance look;
+    look.edges = settings_.style != SurfaceStyle::shaded;
+    look.surface = settings_.style != SurfaceStyle::wireframe;
+    if (!look.surface && is_dark) look.edge_color = {0.80f, 0.82f, 0.85f};
+    if (look.surface) look.edge_width = 1;
+    look.clip = clip();
+    look.own_colors = settings_.coloring == Coloring::own || !colors_.values.empty(); // grey: not known
+    return look;
+}
+
+void DrawnObjects::add_level(Scene& scene, unsigned level, const Appearance& look, float coverage) {
+    ShownLevel* shown = shown_ ? shown_->level(level) : nullptr;
+    if (!shown) return;
+    PatchSurface* const patches = patches_at(level);
+    scene.objects.push_back({patches ? &patches->drawable : &shown->drawable, look});
+    scene.objects.back().appearance.coverage = coverage;
+    if (patches) scene.objects.back().appearance.own_colors = true;
+}
+
+/// The restored mesh, with what is seen in it and over it. `from` melts into `level`, of which `part` is drawn.
+void DrawnObjects::add_restored(Scene& scene, unsigned level, std::optional<unsigned> from, double part,
+                                const Appearance& look) {
+    const bool sees_inside = inside_ && !settings_.clip;
+    if (from) add_level(scene, *from, look, static_cast<float>(-part));
+    add_level(scene, level, look, from ? static_cast<float>(part) : sees_inside ? kSeenThrough : 1.0f);
+    if (settings_.driver && level > 0) {
+        Appearance driver;
+        driver.surface = false;
+        driver.edges = true;
+        driver.edge_color = kDriverEdges;
+        driver.edge_width = 1.6f;
+        driver.own_colors = false;
+        driver.clip = look.clip;
+        add_level(scene, 0, driver);
+    }
+    if (inside_) scene.objects.push_back({&*inside_, {.color = kInsidePoints, .clip = look.clip}});
+}
+
+void DrawnObjects::add_surroundings(Scene& scene) const {
+    if (!surroundings_of_) return;
+    for (const Drawable& obstacle : obstacles_)
+        scene.objects.push_back({&obstacle, {.color = kObstacles, .gloss = 0.15f}});
+    const Surroundings& around = surroundings_of_->surroundings;
+    scene.ground = around.has_ground;
+    scene.fixed_ground = true;
+    scene.ground_level = around.ground_level + up_vector(scene.up).dot(origin());
+}
+
+Scene DrawnObjects::scene(TileShows shows, unsigned level, std::optional<unsigned> from, double part,
+                          const QPalette& palette) {
     const bool dark = is_dark(palette);
     Scene scene;
     scene.up = settings_.up;
@@ -557,74 +565,28 @@ Scene Stage::scene(Content content, unsigned level, std::optional<unsigned> from
     scene.background.top = dark ? Vec3f(0.235f, 0.245f, 0.265f) : Vec3f(0.965f, 0.970f, 0.975f);
     scene.background.bottom = dark ? Vec3f(0.125f, 0.130f, 0.145f) : Vec3f(0.820f, 0.835f, 0.855f);
 
-    Appearance look;
-    look.edges = settings_.style != SurfaceStyle::shaded;
-    look.surface = settings_.style != SurfaceStyle::wireframe;
-    if (!look.surface && dark) look.edge_color = {0.80f, 0.82f, 0.85f};
-    if (look.surface) look.edge_width = 1;
-    look.clip = clip();
-    look.own_colors = settings_.coloring == Coloring::own || !colors_.values.empty(); // grey: not known
-    const auto add = [&](unsigned number, const Appearance& appearance, float coverage = 1) {
-        ShownLevel* shown = shown_ ? shown_->level(number) : nullptr;
-        if (!shown) return;
-        PatchSurface* const patches = patches_at(number);
-        scene.objects.push_back({patches ? &patches->drawable : &shown->drawable, appearance});
-        scene.objects.back().appearance.coverage = coverage;
-        if (patches) scene.objects.back().appearance.own_colors = true;
-    };
-
-    if (content == Content::driver) {
-        Appearance driver = look;
-        driver.edges = true;
-        driver.edge_color = look.surface ? Vec3f(0.16f, 0.17f, 0.20f) : look.edge_color;
-        add(0, driver);
-    } else if (content == Content::full && full_) {
-        Appearance full = look;
-        full.own_colors = settings_.coloring == Coloring::own;
-        scene.objects.push_back({&*full_, full});
-    } else if (content == Content::full && workbench_.pose()) {
+    Appearance look = surface_look(dark);
+    if (shows == TileShows::driver) {
+        look.edges = true;
+        if (look.surface) look.edge_color = Vec3f(0.16f, 0.17f, 0.20f);
+        add_level(scene, 0, look);
+    } else if (shows == TileShows::full && full_) {
+        look.own_colors = settings_.coloring == Coloring::own;
+        scene.objects.push_back({&*full_, look});
+    } else if (shows == TileShows::full && workbench_.pose()) {
         // nothing yet: the caption says so
     } else if (shows_particles() && particles_) {
-        Appearance balls;
-        balls.color = kParticles;
-        scene.objects.push_back({&*particles_, balls});
+        scene.objects.push_back({&*particles_, {.color = kParticles}});
     } else {
-        const bool sees_inside = inside_ && !settings_.clip;
-        if (from) add(*from, look, static_cast<float>(-part));
-        add(level, look, from ? static_cast<float>(part) : sees_inside ? kSeenThrough : 1.0f);
-        if (settings_.driver && level > 0) {
-            Appearance driver;
-            driver.surface = false;
-            driver.edges = true;
-            driver.edge_color = kDriverEdges;
-            driver.edge_width = 1.6f;
-            driver.own_colors = false;
-            driver.clip = look.clip;
-            add(0, driver);
-        }
-        if (inside_) {
-            Appearance balls;
-            balls.color = kInsidePoints;
-            balls.clip = look.clip;
-            scene.objects.push_back({&*inside_, balls});
-        }
+        add_restored(scene, level, from, part, look);
     }
-    if (surroundings_of_) {
-        Appearance stone;
-        stone.color = kObstacles;
-        stone.gloss = 0.15f;
-        for (const Drawable& obstacle : obstacles_) scene.objects.push_back({&obstacle, stone});
-        const Surroundings& around = surroundings_of_->surroundings;
-        scene.ground = around.has_ground;
-        scene.fixed_ground = true;
-        scene.ground_level = around.ground_level + up_vector(scene.up).dot(origin());
-    }
+    add_surroundings(scene);
     return scene;
 }
 
-Vec3d Stage::origin() const { return shown_ ? shown_->model().mesh.origin : Vec3d(Vec3d::Zero()); }
+Vec3d DrawnObjects::origin() const { return shown_ ? shown_->model().mesh.origin : Vec3d(Vec3d::Zero()); }
 
-std::span<const Vec3f> Stage::positions(unsigned level) {
+std::span<const Vec3f> DrawnObjects::positions(unsigned level) {
     ShownLevel* shown = shown_ ? shown_->level(level) : nullptr;
     if (!shown) return {};
     auto found =
@@ -639,7 +601,7 @@ std::span<const Vec3f> Stage::positions(unsigned level) {
     return found->values;
 }
 
-Box Stage::box() {
+Box DrawnObjects::box() {
     const std::optional<unsigned> ready =
         shown_ ? shown_->nearest_ready(workbench_.state().level()) : std::optional<unsigned>();
     Box box;
@@ -653,7 +615,7 @@ Box Stage::box() {
     return box;
 }
 
-std::optional<ClipPlane> Stage::clip() {
+std::optional<ClipPlane> DrawnObjects::clip() {
     if (!settings_.clip) return std::nullopt;
     const Box all = box();
     if (all.empty()) return std::nullopt;

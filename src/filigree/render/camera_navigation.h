@@ -1,11 +1,11 @@
-// Between the mouse and the camera: what ViewState does not have.
+// Moving a camera by a pointer: zoom about a point, the way to another camera, what a pixel is worth and points at.
 #pragma once
 
 #include "filigree/render/camera.h"
 
 #include <optional>
 
-namespace filigree::studio {
+namespace filigree {
 
 /// Size of a picture, or of a part of it, in pixels of any kind.
 struct PictureSize {
@@ -17,7 +17,7 @@ struct PictureSize {
 Camera zoomed_about(const Camera& camera, double factor, double x, double y, const PictureSize& size);
 
 /// On the way from one camera to another, t from 0 to 1: about the target, at an even pace to the eye.
-Camera between(const Camera& from, const Camera& to, double t);
+Camera camera_between(const Camera& from, const Camera& to, double t);
 
 /// Pixels that a model unit has at a point of the world; 0 where the camera does not see it.
 double pixels_a_unit(const Camera& camera, const Vec3d& world, const PictureSize& size);
@@ -31,4 +31,4 @@ Vec3d point_in_plane(const Camera& camera, const Vec3d& through, double x, doubl
 std::optional<double> point_on_line(const Camera& camera, const Vec3d& through, const Vec3d& along, double x, double y,
                                     const PictureSize& size);
 
-} // namespace filigree::studio
+} // namespace filigree

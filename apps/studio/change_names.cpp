@@ -1,0 +1,73 @@
+#include "change_names.h"
+
+#include "words.h"
+
+namespace filigree::studio {
+
+namespace {
+
+struct Part {
+    bool is_changed;
+    QString name;
+};
+
+/// The name of the part that has changed; of several: of the whole.
+QString name_of(std::initializer_list<Part> parts, const QString& whole) {
+    QString name;
+    for (const Part& part : parts) {
+        if (!part.is_changed) continue;
+        if (!name.isEmpty()) return whole;
+        name = part.name;
+    }
+    return name.isEmpty() ? whole : name;
+}
+
+} // namespace
+
+QString name_of_change(const Warps& before, const Warps& after) {
+    return name_of({{before.axis != after.axis, "Axis"},
+                    {before.stretch != after.stretch, "Stretch"},
+                    {before.squeeze != after.squeeze, "Squeeze"},
+                    {before.bend != after.bend, "Bend"},
+                    {before.twist != after.twist, "Twist"},
+                    {before.taper != after.taper, "Taper"}},
+                   "Deform");
+}
+
+QString name_of_change(const Shape& before, const Shape& after) {
+    if (before.name != after.name) return shape_title(after.name);
+    const ShapeOptions &a = before.options, &b = after.options;
+    return name_of({{a.frequency != b.frequency, QString("Frequency %1").arg(b.frequency)},
+                    {a.resolution != b.resolution, QString("Resolution %1").arg(b.resolution)},
+                    {a.amplitude != b.amplitude, QString("Amplitude %1").arg(b.amplitude)}},
+                   shape_title(after.name));
+}
+
+QString name_of_change(const StripOptions& before, const StripOptions& after) {
+    if (before.code != after.code)
+        return after.code == DetailCode::blend ? "Blend code" : "Reference code of the report";
+    if (before.precision != after.precision)
+        return after.precision == Precision::float32 ? "Full precision" : "Half-size precision";
+    if (before.references != after.references) return QString("%1 references").arg(after.references);
+    if (after.base) return "Driver of " + counted(*after.base, "vertex", "vertices");
+    if (after.levels) return counted(*after.levels, "level", "levels") + " of detail";
+    if (after.error) return QString("Driver within %1 % of the mesh").arg(100 * *after.error);
+    return "Driver of the usual size";
+}
+
+QString name_of_change(const BodySettings& before, const BodySettings& after) {
+    if (before.preset != after.preset && after.preset != "custom")
+        return "Material: " + QString::fromStdString(after.preset);
+    return name_of({{before.preset != after.preset || before.material != after.material, "Material"},
+                    {before.particles != after.particles, counted(after.particles, "particle", "particles")},
+                    {before.size != after.size, "Size of the body"},
+                    {before.drop != after.drop, "Height of the drop"},
+                    {before.gravity != after.gravity, after.gravity ? "Gravity on" : "Gravity off"},
+                    {before.ground != after.ground, after.ground ? "Ground on" : "Ground off"},
+                    {before.obstacle != after.obstacle, "Obstacle"},
+                    {before.friction != after.friction, "Friction"},
+                    {before.restitution != after.restitution, "Bounce"}},
+                   "Body");
+}
+
+} // namespace filigree::studio

@@ -1,0 +1,219 @@
+#include "picture_camera.h"
+
+#include "drawn_objects.h"
+
+#include <QStyle>
+
+#include <algorithm>
+#include <cmath>
+
+namespace filigree::studio {
+
+namespace {
+
+constexpr double kFlight = 0.25; // s on the way to another camera
+
+/// Where a mesh is looked at from when it is opened: from the front, a little from the right and above.
+Vec3d first_direction(UpAxis up) {
+    const Vec3d above = up_vector(up);
+    return (view_direction(View::front, up) + 0.55 * view_direction(View::side, up) + 0.42 * above).normalized();
+}
+
+double distance(const Camera& camera) { return (camera.eye - camera.target).norm(); }
+
+} // namespace
+
+PictureCamera::PictureCamera(Workbench& workbench, DrawnObjects& drawn, const QWidget& widget)
+    : workbench_(workbench), drawn_(drawn), widget_(widget),
+      is_animated_(widget.style()->styleHint(QStyle::SH_Widget_Animation_Duration, nullptr, &widget) > 0) {
+    connect(&timer_, &QTimer::timeout, this, &PictureCamera::fly_on);
+    connect(&workbench.view(), &ViewState::changed, this, &PictureCamera::follow_view);
+    connect(&workbench, &Workbench::opened, this, &PictureCamera::follow_opened);
+    connect(&workbench, &Workbench::mode_changed, this, &PictureCamera::follow_body);
+    connect(&workbench.playback(), &Playback::state_changed, this, &PictureCamera::follow_body);
+}
+
+// Tiles
+
+PictureSize PictureCamera::tile_size() const {
+    return {std::max(1.0, double(widget_.width()) / tile_count()), std::max(1.0, double(widget_.height()))};
+}
+
+QPointF PictureCamera::in_tile(const QPointF& point) const {
+    const double width = tile_size().width;
+    const double tile = std::clamp(std::floor(point.x() / width), 0.0, double(tile_count() - 1));
+    return {point.x() - tile * width, point.y()};
+}
+
+QPointF PictureCamera::from_tile(const Vec3d& place, int tile) const {
+    return {place.x() + tile * tile_size().width, place.y()};
+}
+
+Vec3d PictureCamera::project(const Vec3d& world) const {
+    const PictureSize size = tile_size();
+    return camera().project(world, size.width, size.height);
+}
+
+// What is shown
+
+void PictureCamera::show_all_from(const Vec3d& direction) { fit(direction, true); }
+
+void PictureCamera::show_all() {
+    const Vec3d direction = camera().eye - camera().target;
+    fit(direction.norm() > 0 ? direction : first_direction(workbench_.view().settings().up), true);
+}
+
+void PictureCamera::show(const Box& box, const Vec3d& direction) {
+    stop_flight();
+    workbench_.view().fit(box, direction.normalized(), tile_size().aspect());
+    fitted_ = camera();
+    fitted_box_ = box;
+}
+
+void PictureCamera::fit(const Vec3d& direction, bool may_fly) {
+    Box box = drawn_.box();
+    if (box.empty()) return;
+    if (const Box room = body_room(); workbench_.mode() == Mode::body && !room.empty()) {
+        box.extend(room.min);
+        box.extend(room.max);
+    }
+    const Camera from = camera();
+    show(box, direction);
+    if (std::exchange(was_fitted_, true) && may_fly) fly_from(from);
+}
+
+void PictureCamera::look_at(const Vec3d& point) {
+    const Camera from = camera();
+    Camera to = from;
+    to.target = point;
+    to.eye += to.target - from.target;
+    stop_flight();
+    workbench_.view().set_camera(to);
+    fly_from(from);
+}
+
+void PictureCamera::follow_size() {
+    const bool was_untouched = was_fitted_ && camera().eye == fitted_.eye && camera().target == fitted_.target;
+    if (was_untouched && !fly_to_) fit(camera().eye - camera().target, false);
+}
+
+void PictureCamera::follow_view() {
+    const bool is_split = workbench_.view().settings().split;
+    if (is_split == std::exchange(was_split_, is_split) || !was_fitted_) return;
+    const double zoom = workbench_.view().zoom();
+    fit(camera().eye - camera().target, false);
+    workbench_.view().set_zoom(zoom);
+    fitted_ = camera();
+}
+
+/// A shape whose slider moves stays where it is, unless it leaves the picture.
+void PictureCamera::follow_opened() {
+    const State& state = workbench_.state();
+    if (!state.source) return;
+    const Box box = opened_box();
+    const std::string name = state.shape ? "shape " + state.shape->name : state.source->path;
+    const bool is_same = was_fitted_ && name == fitted_name_ &&
+                         (box.centre() - fitted_box_.centre()).norm() < 0.25 * fitted_box_.diagonal() &&
+                         box.diagonal() < 1.5 * fitted_box_.diagonal() && box.diagonal() > 0.6 * fitted_box_.diagonal();
+    fitted_name_ = name;
+    if (is_same || box.empty()) return;
+    show(box, first_direction(workbench_.view().settings().up));
+    was_fitted_ = true;
+}
+
+/// Of what was opened, as it is posed: the driver's box, and as much around it as the detail needs at rest.
+Box PictureCamera::opened_box() const {
+    const State& state = workbench_.state();
+    Box box = world_bounds(state.source->mesh);
+    const Pose* pose = workbench_.pose();
+    if (!pose || !state.model || pose->positions.size() != state.model->driver().vertices.size()) return box;
+    const Vec3d origin = state.source->mesh.origin;
+    const Box rest = bounds(driver_positions(*state.model)), posed = bounds(pose->positions);
+    const double margin =
+        std::max((origin + rest.min - box.min).maxCoeff(), (box.max - (origin + rest.max)).maxCoeff());
+    if (posed.empty() || !posed.size().allFinite()) return box;
+    box.min = origin + posed.min - Vec3d::Constant(margin);
+    box.max = origin + posed.max + Vec3d::Constant(margin);
+    return box;
+}
+
+/// Where the body starts, what it falls on and what stands around it; empty without a body.
+Box PictureCamera::body_room() const {
+    const auto made = workbench_.playback().made();
+    Box room;
+    if (!made) return room;
+    const Vec3d origin = made->model->mesh.origin;
+    room = world_bounds(made->model->mesh);
+    const Surroundings& around = made->surroundings;
+    if (around.has_ground) {
+        int axis = 0;
+        up_vector(workbench_.view().settings().up).maxCoeff(&axis);
+        Vec3d low = room.min, high = room.max;
+        low[axis] = high[axis] = origin[axis] + around.ground_level;
+        room.extend(low);
+        room.extend(high);
+    }
+    for (const Mesh& obstacle : around.obstacles) {
+        const Box box = bounds(obstacle.positions);
+        room.extend(origin + box.min);
+        room.extend(origin + box.max);
+    }
+    return room;
+}
+
+bool PictureCamera::is_seen(const Box& box) const {
+    const PictureSize size = tile_size();
+    for (int k = 0; k < 8; ++k) {
+        const Vec3d at = project(Vec3d(k & 1 ? box.max.x() : box.min.x(), k & 2 ? box.max.y() : box.min.y(),
+                                       k & 4 ? box.max.z() : box.min.z()));
+        if (!(at.z() > 0 && at.x() >= 0 && at.y() >= 0 && at.x() <= size.width && at.y() <= size.height)) return false;
+    }
+    return true;
+}
+
+/// When a body is made, the view is widened so that its fall stays in the picture; it is never narrowed.
+void PictureCamera::follow_body() {
+    const auto made = workbench_.mode() == Mode::body ? workbench_.playback().made() : nullptr;
+    if (made == framed_body_) return;
+    framed_body_ = made;
+    const Box room = body_room();
+    if (!made || !was_fitted_ || room.empty() || is_seen(room)) return;
+    stop_flight();
+    const Camera from = camera();
+    show(room, from.eye - from.target);
+    if (distance(from) > distance(fitted_)) workbench_.view().set_zoom(distance(fitted_) / distance(from));
+    fly_from(from);
+}
+
+// On the way
+
+void PictureCamera::fly_from(const Camera& from) {
+    if (!is_animated_) return;
+    fly_to_ = camera();
+    fly_from_ = from;
+    flight_.start();
+    workbench_.view().set_camera(from);
+    timer_.start(15);
+}
+
+void PictureCamera::fly_on() {
+    if (!fly_to_) return timer_.stop();
+    const double t = 1e-9 * double(flight_.nsecsElapsed()) / kFlight;
+    if (t >= 1) return land();
+    workbench_.view().set_camera(camera_between(*fly_from_, *fly_to_, t * t * (3 - 2 * t)));
+}
+
+void PictureCamera::land() {
+    if (!fly_to_) return;
+    const Camera to = *fly_to_;
+    stop_flight();
+    workbench_.view().set_camera(to);
+}
+
+void PictureCamera::stop_flight() {
+    timer_.stop();
+    fly_from_.reset();
+    fly_to_.reset();
+}
+
+} // namespace filigree::studio

@@ -1,0 +1,251 @@
+// The body, what it does, and the recording of that.
+#include "workbench_impl.h"
+
+#include "change_names.h"
+#include "pins.h"
+#include "words.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace filigree::studio {
+
+void Workbench::set_body(const BodySettings& settings, const std::string& merge) {
+    if (settings == state().body) return;
+    const bool had_body = playback_.has_body(), was_playing = is_playing();
+    if (had_body) pause();
+    impl_->keeps_body = had_body; // until the new one is there
+    document_.edit(
+        name_of_change(state().body, settings),
+        [&](State& next) {
+            next.body = settings;
+            if (had_body) next.recording = nullptr; // of another body
+        },
+        merge);
+    impl_->keeps_body = false;
+    if (had_body)
+        make_body_then(was_playing ? After::play : After::nothing);
+    else if (jobs_.is_pending(kBodyTopic))
+        make_body_then(impl_->then);
+}
+
+void Workbench::make_body() { make_body_then(After::nothing); }
+
+void Workbench::make_body_then(After then) {
+    impl_->then = then;
+    const auto up_axis = view_.settings().up;
+    using Made = Result<std::shared_ptr<const MadeBody>>; // an error is delivered too: no body fits the settings then
+    jobs_.start<Made>(
+        "Making the body", kBodyTopic,
+        [state = state(), up_axis](const RunContext& context) -> Result<Made> {
+            Made made = make_body_of(state, up_vector(up_axis), context);
+            if (!made && made.error().code == ErrorCode::cancelled) return made.error();
+            return Result<Made>(std::move(made));
+        },
+        [this, model = state().model, settings = state().body, pinned = pinned_vertices(state().handles),
+         up_axis](const Made& made) {
+            if (model != state().model || !(settings == state().body) || pinned != pinned_vertices(state().handles) ||
+                up_axis != view_.settings().up) {
+                impl_->then = After::nothing;
+                Q_EMIT told("The body was not made: what it is made of was changed meanwhile.", false);
+                return;
+            }
+            if (made) return put_body(*made);
+            impl_->then = After::nothing;
+            playback_.remove();
+            if (mode_ == Mode::body && frame_count() == 0) set_mode(Mode::deform);
+            Q_EMIT told("No body can be made of this: " + QString::fromStdString(made.error().message), true);
+        });
+}
+
+void Workbench::put_body(std::shared_ptr<const MadeBody> made) {
+    const After then = std::exchange(impl_->then, After::nothing);
+    impl_->replay.stop();
+    impl_->keeps_body = true;
+    document_.edit("Make a body", [](State& next) { next.recording = nullptr; });
+    playback_.put(made);
+    impl_->keeps_body = false;
+    frame_ = 0;
+    set_mode(Mode::body);
+    show_pose();
+    Q_EMIT timeline_changed();
+    if (!made->report.warning.empty()) Q_EMIT told(QString::fromStdString(made->report.warning), false);
+    const bool is_deformed = !state().warps.none() || state().handle_pose;
+    if (is_deformed && !std::exchange(impl_->told_of_rest, true))
+        Q_EMIT told("A body is made of the shape at rest, without its deformation.", false);
+    if (then == After::play) play();
+    if (then == After::step) step();
+}
+
+void Workbench::set_mode(Mode mode) {
+    if (mode == mode_) return;
+    if (is_pulling_) end_pull();
+    if (mode == Mode::deform) pause();
+    mode_ = mode;
+    Q_EMIT mode_changed();
+    show_pose();
+    Q_EMIT timeline_changed();
+}
+
+const Pose& Workbench::recorded_pose(std::size_t frame) const {
+    return playback_.has_body() ? playback_.recording().frames[frame] : *state().recording->frames[frame];
+}
+std::size_t Workbench::frame_count() const {
+    if (playback_.has_body()) return playback_.recording().frames.size();
+    return state().recording ? state().recording->frames.size() : 0;
+}
+double Workbench::frames_per_second() const {
+    if (playback_.has_body()) return playback_.recording().frames_per_second;
+    return state().recording ? state().recording->frames_per_second : 60;
+}
+std::size_t Workbench::frame() const { return frame_; }
+bool Workbench::is_playing() const { return playback_.is_playing() || impl_->replay.isActive(); }
+bool Workbench::is_live_frame() const {
+    return mode_ == Mode::body && playback_.has_body() && frame_ + 1 == frame_count();
+}
+
+void Workbench::play() {
+    if (is_playing()) return;
+    if (frame_count() == 0) return make_body_then(After::play);
+    set_mode(Mode::body);
+    const bool is_at_end = frame_ + 1 >= frame_count();
+    if (is_at_end && playback_.has_body()) return playback_.play();
+    if (is_at_end) {
+        frame_ = 0;
+        show_pose();
+    }
+    if (frame_count() < 2) return make_body_then(After::play);
+    // Rates come from files too.
+    impl_->replay.start(int(std::lround(std::clamp(1000 / frames_per_second(), 1.0, 10'000.0))));
+    Q_EMIT timeline_changed();
+}
+
+/// The next recorded frame; after the last one the body goes on, where there is one.
+void Workbench::replay_frame() {
+    if (frame_ + 1 < frame_count()) {
+        ++frame_;
+        show_pose();
+        Q_EMIT timeline_changed();
+    }
+    if (frame_ + 1 < frame_count()) return;
+    impl_->replay.stop();
+    playback_.play();
+    Q_EMIT timeline_changed();
+}
+
+void Workbench::pause() {
+    const bool was_playing = is_playing();
+    impl_->replay.stop();
+    playback_.pause();
+    if (is_pulling_ && impl_->pulls_body) is_pulling_ = false;
+    commit_recording();
+    if (was_playing) Q_EMIT timeline_changed();
+    if (was_playing && wants_full_ && is_live_frame()) full_is_new();
+}
+
+void Workbench::step() {
+    if (is_playing()) pause();
+    if (frame_count() == 0) return make_body_then(After::step);
+    set_mode(Mode::body);
+    if (frame_ + 1 < frame_count()) return go_to_frame(frame_ + 1);
+    if (!playback_.has_body()) return;
+    impl_->commits_steps = true;
+    playback_.step();
+}
+
+void Workbench::reset() {
+    impl_->replay.stop();
+    playback_.pause();
+    if (is_pulling_ && impl_->pulls_body) is_pulling_ = false;
+    commit_recording();
+    frame_ = 0;
+    impl_->keeps_body = true;
+    playback_.reset();
+    document_.edit("Reset the body", [](State& next) { next.recording = nullptr; });
+    impl_->keeps_body = false;
+    if (mode_ == Mode::body && frame_count() == 0) return set_mode(Mode::deform);
+    if (mode_ == Mode::body) show_pose();
+    Q_EMIT timeline_changed();
+}
+
+void Workbench::animate() {
+    pause();
+    BodySettings body = state().body;
+    body.gravity = body.ground = true;
+    if (body == state().body && playback_.has_body()) {
+        reset();
+        return play();
+    }
+    if (body != state().body)
+        document_.edit("Animate", [&](State& next) {
+            next.body = body;
+            next.recording = nullptr;
+        });
+    make_body_then(After::play);
+}
+
+void Workbench::go_to_frame(std::size_t frame) {
+    if (frame_count() == 0) return;
+    if (is_playing()) pause();
+    frame = std::min(frame, frame_count() - 1);
+    if (mode_ == Mode::body && frame == frame_) return;
+    frame_ = frame;
+    if (mode_ == Mode::body)
+        show_pose();
+    else
+        set_mode(Mode::body);
+    Q_EMIT timeline_changed();
+}
+
+void Workbench::show_last_frame() {
+    if (frame_ + 1 == frame_count()) return;
+    frame_ = frame_count() - 1;
+    show_pose();
+    Q_EMIT timeline_changed();
+}
+
+void Workbench::follow_playback() {
+    const Moment& moment = *playback_.moment();
+    const bool is_another = std::exchange(impl_->looked_at, moment.frame) != moment.frame;
+    if (mode_ != Mode::body || impl_->keeps_body) return;
+    if (!is_another && frame_ != moment.frame) return; // looked at once more, for its vertices, and not shown
+    frame_ = std::min(moment.frame, frame_count() - 1);
+    if (pose_.positions != moment.pose.positions || pose_.gradients != moment.pose.gradients) {
+        pose_ = moment.pose;
+        driver_milliseconds_ = moment.milliseconds;
+        pose_is_new();
+        Q_EMIT timeline_changed();
+    } else if (wants_full_ && !moment.full.empty()) { // the same once more, now with every vertex
+        full_ = moment.full;
+        full_is_new();
+    }
+    if (impl_->measures_next && !moment.full.empty()) {
+        impl_->measures_next = false;
+        if (!wants_full_) playback_.want_full(false);
+        measure_error();
+    }
+    if (impl_->commits_steps && !playback_.is_playing() && !playback_.is_stepping()) {
+        impl_->commits_steps = false;
+        commit_recording("Simulate step by step", "step");
+    }
+}
+
+/// What was simulated becomes part of the document. The frames that the document has already are shared.
+void Workbench::commit_recording(const QString& name, const std::string& merge) {
+    if (!playback_.has_body()) return;
+    const std::size_t count = playback_.recording().frames.size();
+    if (count <= (state().recording ? state().recording->frames.size() : 1)) return;
+    auto recording =
+        state().recording ? std::make_shared<Recording>(*state().recording) : std::make_shared<Recording>();
+    recording->follow(playback_.recording());
+    State next = state();
+    next.recording = std::move(recording);
+    impl_->keeps_body = true;
+    if (name.isEmpty()) // play and pause over and over are one step
+        document_.change("Simulate " + counted(count - 1, "frame", "frames"), std::move(next), "play");
+    else
+        document_.change(name, std::move(next), merge);
+    impl_->keeps_body = false;
+}
+
+} // namespace filigree::studio

@@ -1,0 +1,172 @@
+// Shapes, quads, levels and the detail code.
+#include "workbench_impl.h"
+
+#include "change_names.h"
+#include "quads.h"
+#include "words.h"
+
+namespace filigree::studio {
+
+namespace {
+
+/// What handles and recordings refer to is another driver now.
+void drop_what_refers_to_driver(State& state) {
+    state.handles.clear();
+    state.handle_pose = nullptr;
+    state.pose_from_file = false;
+    state.recording = nullptr;
+}
+
+} // namespace
+
+Result<State> stripped_state(State state, const RunContext& context) {
+    const bool was_finest = !state.model || state.level() == state.model->finest_level();
+    Result<Stripped> stripped = strip(state.source->mesh, state.strip, context);
+    if (!stripped) return stripped.error();
+    state.strip_report = stripped->report;
+    state.model = std::make_shared<const Model>(std::move(stripped->model));
+    const unsigned finest = state.model->finest_level();
+    state.restore.level = was_finest ? finest : std::min(state.level(), finest);
+    drop_what_refers_to_driver(state);
+    return state;
+}
+
+Result<State> state_of_shape(State state, const Shape& shape, const RunContext& context) {
+    Result<Mesh> mesh = filigree::make_shape(shape.name, shape.options);
+    if (!mesh) return mesh.error();
+    auto source = std::make_shared<Source>();
+    source->mesh = std::move(*mesh);
+    source->name = shape_title(shape.name).toStdString();
+    source->topology = analyse_topology(source->mesh, context);
+    state.source = std::move(source);
+    state.shape = shape;
+    return stripped_state(std::move(state), context);
+}
+
+const std::optional<Shape>& Workbench::wanted_shape() const {
+    return jobs_.is_pending(kModelTopic) ? impl_->wanted_shape : state().shape;
+}
+
+const StripOptions& Workbench::wanted_strip() const {
+    return jobs_.is_pending(kModelTopic) ? impl_->wanted_strip : state().strip;
+}
+
+void Workbench::make_shape(const Shape& shape, const std::string& merge) {
+    if (wanted_shape() == shape) return;
+    const bool is_another = !wanted_shape() || wanted_shape()->name != shape.name;
+    const StripOptions strip = is_another ? StripOptions() : wanted_strip();
+    if (state().shape == shape && strip == state().strip) return jobs_.drop(kModelTopic); // back again
+    make_model("Making the " + shape_title(shape.name).toLower(), shape, strip, merge);
+}
+
+void Workbench::set_strip(const StripOptions& options, const std::string& merge) {
+    make_model("Taking the detail off", wanted_shape(), options, merge);
+}
+
+/// Tells why not, when work of that topic is to end first.
+bool Workbench::is_refused(const std::string& topic, const QString& sentence) {
+    if (!jobs_.is_pending(topic)) return false;
+    Q_EMIT told(sentence, true);
+    return true;
+}
+
+/// In the background. Shape and options go together, so that a change of one does not lose one of the other that is
+/// still being made.
+void Workbench::make_model(const QString& title, std::optional<Shape> shape, const StripOptions& strip,
+                           const std::string& merge) {
+    if (is_refused(kOpenTopic, "A file is being opened: change the model once it is there, or cancel.") ||
+        is_refused(kQuadsTopic, "Quads are being made: change the model once they are there, or cancel."))
+        return;
+    State next = state();
+    next.strip = strip;
+    const bool is_new_shape = shape != next.shape;
+    impl_->wanted_shape = shape;
+    impl_->wanted_strip = strip;
+    forget_measuring();
+    jobs_.start<State>(
+        title, kModelTopic,
+        [next = std::move(next), shape = std::move(shape), is_new_shape](const RunContext& context) {
+            return is_new_shape ? state_of_shape(next, *shape, context) : stripped_state(next, context);
+        },
+        [this, is_new_shape, key = document_.merge_key(merge)](const State& made) {
+            State now = state(); // warps and settings may have changed meanwhile
+            const Shape before = now.shape.value_or(Shape{.name = "", .options = {}});
+            const QString name =
+                is_new_shape ? name_of_change(before, *made.shape) : name_of_change(now.strip, made.strip);
+            impl_->is_another_shape = is_new_shape && before.name != made.shape->name;
+            now.source = made.source;
+            now.shape = made.shape;
+            take_model(now, made);
+            document_.change(name, std::move(now), key);
+            impl_->is_another_shape = false;
+        });
+}
+
+void Workbench::take_model(State& now, const State& made) const {
+    const bool is_finest = now.level() == now.model->finest_level();
+    now.strip = made.strip;
+    now.strip_report = made.strip_report;
+    now.model = made.model;
+    const unsigned finest = now.model->finest_level();
+    now.restore.level = is_finest ? finest : std::min(now.level(), finest);
+    drop_what_refers_to_driver(now);
+}
+
+void Workbench::change_level(unsigned level, const QString& name, const std::string& merge) {
+    document_.edit(
+        name, [&](State& next) { next.restore.level = std::min(level, next.model->finest_level()); }, merge);
+}
+
+void Workbench::set_level(unsigned level, const std::string& merge) {
+    change_level(level, QString("Level %1").arg(std::min(level, state().model->finest_level())), merge);
+}
+void Workbench::remove_detail() {
+    if (state().level() > 0) change_level(state().level() - 1, "Remove detail", {});
+}
+void Workbench::add_detail() { change_level(state().level() + 1, "Add detail", {}); }
+
+void Workbench::set_law(std::optional<HeightLaw> law) {
+    const std::string name(law ? height_law_name(*law) : "as usual");
+    document_.edit("Law: " + QString::fromStdString(name), [&](State& next) { next.restore.law = law; });
+}
+
+void Workbench::set_thin_shell(bool thin) {
+    document_.edit(thin ? "Thin shell" : "Solid", [&](State& next) { next.restore.thin_shell = thin; });
+}
+
+const QuadRemeshOptions& Workbench::quad_options() const { return impl_->quad_options; }
+
+void Workbench::set_quad_options(const QuadRemeshOptions& options) {
+    impl_->quad_options = options;
+    Q_EMIT quad_options_changed();
+}
+
+void Workbench::make_quads() {
+    if (is_refused(kOpenTopic, "A file is being opened: make quads of it once it is there, or cancel.") ||
+        is_refused(kModelTopic, "The mesh is still being made: make quads of it once it is there."))
+        return;
+    pause();
+    forget_measuring();
+    State next = state();
+    next.strip.levels.reset(); // quads have other levels
+    jobs_.start<State>(
+        "Making quads", kQuadsTopic,
+        [next = std::move(next), options = impl_->quad_options](const RunContext& context) mutable -> Result<State> {
+            Result<std::shared_ptr<const Source>> quads = make_quads_of(input_of_quads(next.source), options, context);
+            if (!quads) return quads.error();
+            next.source = std::move(*quads);
+            next.shape.reset();
+            return stripped_state(std::move(next), context);
+        },
+        [this](const State& made) {
+            if (is_pulling_) end_pull();
+            State now = state(); // warps and settings may have changed meanwhile
+            now.source = made.source;
+            now.shape = made.shape;
+            take_model(now, made);
+            document_.change("Make quads", std::move(now));
+            Q_EMIT told(quads_summary(*made.source), false);
+        });
+}
+
+} // namespace filigree::studio
