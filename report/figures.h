@@ -1,10 +1,9 @@
 // The report's figures, drawn by the program from what it computes.
 #pragma once
 
-#include "page.h"
-
 #include "filigree/core/run_context.h"
 #include "filigree/mesh/mesh.h"
+#include "filigree/present/page.h"
 #include "filigree/render/camera.h"
 #include "filigree/render/renderer.h"
 
@@ -14,11 +13,8 @@
 
 #include <nlohmann/json.hpp>
 
-namespace filigree::cli {} // where Page is declared
-
 namespace filigree::report {
 
-using namespace cli;
 using Json = nlohmann::ordered_json;
 
 inline constexpr double kFigureWidth = 720; ///< of every figure, page units

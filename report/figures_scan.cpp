@@ -1,7 +1,6 @@
 // Figures 2.9, 2.10 and 3.1 on a mesh that comes as triangles without any regularity.
 #include "figures.h"
 #include "figures_layout.h"
-#include "patch_drawing.h"
 
 #include "filigree/core/text.h"
 #include "filigree/deform/space_warp.h"
@@ -9,6 +8,7 @@
 #include "filigree/hierarchy/strip.h"
 #include "filigree/mesh/mesh_distance.h"
 #include "filigree/mesh/shapes.h"
+#include "filigree/present/patch_drawing.h"
 #include "filigree/remesh/quad_remesh.h"
 
 #include <cmath>
@@ -70,7 +70,8 @@ std::unique_ptr<SpaceWarp> extreme_warp(const Box& box) {
 void draw_patched(Page& page, const Panel& panel, FigureRenderer& renderer, const QuadRemeshed& remeshed,
                   const Camera& camera) {
     renderer.start();
-    const PatchDrawing drawing(remeshed.mesh, remeshed.patches, renderer.pixels(0.25), renderer.context());
+    const PatchDrawing drawing =
+        PatchDrawing::create(remeshed.mesh, remeshed.patches, renderer.pixels(0.25), renderer.context()).value();
     Scene scene;
     drawing.add_to(scene);
     page.picture(renderer.picture(std::move(scene), camera, panel.width, panel.height), panel.top_left, panel.width,

@@ -1,6 +1,7 @@
 #include "commands.h"
-#include "page.h"
 #include "stage.h"
+
+#include "filigree/present/page.h"
 
 #include <cmath>
 

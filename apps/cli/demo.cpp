@@ -7,6 +7,10 @@
 #include "filigree/hierarchy/strip.h"
 #include "filigree/mesh/mesh_distance.h"
 #include "filigree/mesh/shapes.h"
+#include "filigree/mesh/up_axis.h"
+
+#include <algorithm>
+#include <cmath>
 
 #include "interactive/timing.h"
 
@@ -18,13 +22,36 @@ namespace {
 
 constexpr unsigned kDemoResolution = 264; // of the wavy cube, as large as the report's
 
-/// A quarter turn about the longest side, then a quarter circle along it; or a part of both.
-std::unique_ptr<SpaceWarp> bend_and_twist(const Box& box, double part = 1) {
-    std::vector<std::unique_ptr<SpaceWarp>> warps;
-    warps.push_back(make_twist(box, longest_axis(box), 90 * part));
-    warps.push_back(make_bend(box, longest_axis(box), 90 * part));
-    return make_chain(std::move(warps));
-}
+/// What the demo does to a mesh: a twist and a bend along one axis, as far as the mesh is slim enough not to fold.
+struct Deformation {
+    Box box;
+    Axis axis;
+    double twist_deg, bend_deg;
+
+    /// What stands leans over, and its base stays on the ground; what lies is bent along its longest side.
+    Deformation(const Box& of, UpAxis up) : box(of), axis(static_cast<Axis>(up)) {
+        constexpr double kLying = 1.5; // longest side over height
+        if (box.size().maxCoeff() > kLying * box.size()[int(axis)]) axis = longest_axis(box);
+        const int a = int(axis);
+        const double length = box.size()[a];
+        const double half_width = 0.5 * std::hypot(box.size()[(a + 1) % 3], box.size()[(a + 2) % 3]);
+        const double slimness = length / std::max(half_width, 1e-9 * length);
+        twist_deg = std::min(90.0, 45 * slimness);
+        bend_deg = std::min(75.0, 25 * slimness); // the inner side keeps half of the radius or more
+        if (axis != static_cast<Axis>(up)) return;
+        box.min[a] -= length; // the middle of a box twice as high does not move, and that is the base
+        twist_deg *= 2;
+        bend_deg *= 2;
+    }
+
+    /// The way to it, from 0 to 1.
+    std::unique_ptr<SpaceWarp> warp(double part = 1) const {
+        std::vector<std::unique_ptr<SpaceWarp>> warps;
+        warps.push_back(make_twist(box, axis, twist_deg * part));
+        warps.push_back(make_bend(box, axis, bend_deg * part));
+        return make_chain(std::move(warps));
+    }
+};
 
 /// Neither is what the demo is about: where one cannot be made (no OpenGL, no ffmpeg, no room) it goes on with a
 /// warning. Returns the files.
@@ -44,7 +71,8 @@ std::vector<std::string> draw_and_film(const DemoScene& scene, const std::functi
     return made;
 }
 
-void run_demo(const std::string& input, const std::string& folder, bool pictures, Session& session) {
+void run_demo(const std::string& input, const std::string& folder, bool pictures, std::optional<UpAxis> asked_up,
+              Session& session) {
     const RunContext& context = session.context();
     OutputFolder files(folder, input);
     const std::string model_file = files.file("model.fil"), mesh_file = files.file("mesh.ply"),
@@ -60,7 +88,9 @@ void run_demo(const std::string& input, const std::string& folder, bool pictures
     const double strip_seconds = now_seconds() - read;
 
     // The long way: every vertex, and every normal where the mesh has them.
-    const auto warp = bend_and_twist(world_bounds(mesh));
+    const UpAxis up = asked_up.value_or(find_up_axis(mesh, usual_up_axis(input)));
+    const Deformation deformation(world_bounds(mesh), up);
+    const auto warp = deformation.warp();
     Mesh full = mesh;
     const double full_seconds =
         bench::median_seconds([&] { full.positions = warp_positions(*warp, mesh.positions, mesh.origin, context); });
@@ -88,10 +118,9 @@ void run_demo(const std::string& input, const std::string& folder, bool pictures
     session.write_mesh(restored, restored_file);
     std::vector<std::string> pictures_made;
     if (pictures && mesh.face_count() > 0) {
-        const DemoScene scene{mesh, model, pose, restored, with_gradients};
-        const Box box = world_bounds(mesh);
+        const DemoScene scene{mesh, model, pose, restored, with_gradients, up};
         const auto pose_at = [&](double part) {
-            return warp_pose(*bend_and_twist(box, part), driver_positions(model), model.mesh.origin, context);
+            return warp_pose(*deformation.warp(part), driver_positions(model), model.mesh.origin, context);
         };
         pictures_made = draw_and_film(scene, pose_at, picture_file, film_file, session);
     }
@@ -141,6 +170,7 @@ void run_demo(const std::string& input, const std::string& folder, bool pictures
 struct Options {
     std::string input, output = "filigree-demo";
     bool no_pictures = false;
+    std::optional<UpAxis> up;
 };
 
 } // namespace
@@ -154,10 +184,11 @@ Command demo_command() {
                                            with_commas(wavy_cube_vertices(kDemoResolution)))),
                         Option("-o,--output", options->output, "Folder for the meshes, the picture and the film")
                             .with_default(),
-                        Option("--no-pictures", options->no_pictures, "Draw no picture and no film")},
+                        Option("--no-pictures", options->no_pictures, "Draw no picture and no film"),
+                        found_up_option(options->up)},
             .examples = "  filigree demo\n  filigree demo scan.ply -o out",
             .run = [options](Session& session) {
-                run_demo(options->input, options->output, !options->no_pictures, session);
+                run_demo(options->input, options->output, !options->no_pictures, options->up, session);
             }};
 }
 

@@ -1,6 +1,8 @@
 #include "demo_pictures.h"
 
-#include "page.h"
+#include "filigree/present/film_extent.h"
+#include "filigree/present/film_frames.h"
+#include "filigree/present/page.h"
 
 #include <cmath>
 #include <numbers>
@@ -15,18 +17,11 @@ constexpr unsigned kPanelWidth = 460, kPanelHeight = 440;
 constexpr unsigned kFilmWidth = 640, kFilmHeight = 480, kFilmFrames = 30, kFilmPasses = 8;
 constexpr std::size_t kMostFilmTriangles = 150'000;
 
-Camera camera_for(std::span<const CameraPoints> points, double aspect) {
-    return fit_camera(points, view_direction(View::iso, UpAxis::y), up_vector(UpAxis::y), aspect, 30, 0.08);
-}
-
-unsigned film_level(const Model& model) {
-    unsigned level = model.finest_level();
-    const auto triangles = [&](unsigned k) {
-        return k == model.finest_level() ? model.mesh.corner_count() - 2 * model.mesh.face_count()
-                                         : model.levels[k].corners.size() - 2 * model.levels[k].face_count();
-    };
-    while (level > 0 && triangles(level) > kMostFilmTriangles) --level;
-    return level;
+/// From where a lean is seen from the side: bends go from an axis towards the next.
+Camera camera_for(std::span<const CameraPoints> points, UpAxis up, double aspect) {
+    const Vec3d direction =
+        view_direction(View::side, up) + 0.45 * view_direction(View::front, up) + 0.5 * up_vector(up);
+    return fit_camera(points, direction, up_vector(up), aspect, 30, 0.08);
 }
 
 } // namespace
@@ -36,7 +31,8 @@ void draw_demo(const DemoScene& scene, Stage& stage, const std::string& path, Se
     const double aspect = double(kPanelWidth) / kPanelHeight;
     const CameraPoints before{scene.mesh.positions, scene.mesh.origin},
         after{scene.restored.positions, scene.restored.origin};
-    const Camera at_rest = camera_for(std::span(&before, 1), aspect), moved = camera_for(std::span(&after, 1), aspect);
+    const Camera at_rest = camera_for(std::span(&before, 1), scene.up, aspect),
+                 moved = camera_for(std::span(&after, 1), scene.up, aspect);
     const HeatMap errors = heat_map(scene.error.vertices->per_vertex, scene.error.diagonal);
 
     constexpr double kGap = 8, kCaption = 40, kLegend = 130;
@@ -44,6 +40,7 @@ void draw_demo(const DemoScene& scene, Stage& stage, const std::string& path, Se
     unsigned panel = 0;
     const auto add = [&](const Drawable& drawable, const Camera& camera, bool edges, const std::string& caption) {
         Scene shown;
+        shown.up = scene.up;
         Appearance look;
         look.edges = edges;
         shown.objects.push_back({&drawable, look});
@@ -84,22 +81,15 @@ void film_demo(const DemoScene& scene, const std::function<Pose(double)>& pose_a
     without_bar.progress = nullptr;
     FilmWriter writer = require(FilmWriter::create(path, kFilmWidth, kFilmHeight, 30));
     RestoreOptions restore;
-    restore.level = film_level(scene.model);
+    restore.level = level_within(scene.model, kMostFilmTriangles);
     Drawable drawable = require(Drawable::model(scene.model, restore, {}, context));
 
     // One camera and one ground for the whole way: a few moments say where it leads.
-    std::vector<std::vector<Vec3f>> moments;
     const Restorer restorer = require(Restorer::create(scene.model, restore, context));
-    std::vector<CameraPoints> points;
-    Box box;
-    for (int k = 0; k <= 4; ++k) {
-        moments.push_back(require(restorer.positions(pose_at(k / 4.0), context)));
-        const Box here = bounds(moments.back());
-        box.extend(here.min + scene.mesh.origin);
-        box.extend(here.max + scene.mesh.origin);
-    }
-    for (const std::vector<Vec3f>& moment : moments) points.push_back({moment, scene.mesh.origin});
-    const Camera camera = camera_for(points, double(kFilmWidth) / kFilmHeight);
+    FilmExtent extent;
+    for (int k = 0; k <= 4; ++k) extent.add(require(restorer.positions(pose_at(k / 4.0), context)), scene.mesh.origin);
+    const CameraPoints points = extent.points();
+    const Camera camera = camera_for(std::span(&points, 1), scene.up, double(kFilmWidth) / kFilmHeight);
 
     std::vector<Picture> frames;
     for (unsigned f = 0; f < kFilmFrames; ++f) {
@@ -108,9 +98,10 @@ void film_demo(const DemoScene& scene, const std::function<Pose(double)>& pose_a
         const double t = 0.5 - 0.5 * std::cos(std::numbers::pi * f / (kFilmFrames - 1)); // starts and ends slowly
         require(drawable.set_pose(pose_at(t), context));
         Scene shown;
+        shown.up = scene.up;
         shown.objects.push_back({&drawable, {}});
         shown.fixed_ground = true;
-        shown.ground_level = box.min.y() - 1e-4 * box.diagonal();
+        shown.ground_level = extent.ground_level(scene.up);
         frames.push_back(require(stage.renderer().picture(
             shown, camera, {.width = kFilmWidth, .height = kFilmHeight, .passes = kFilmPasses}, without_bar)));
     }

@@ -16,6 +16,7 @@ struct DemoScene {
     const Pose& pose;          ///< of the driver, deformed
     const Mesh& restored;      ///< for the camera and its size; what is drawn is restored by the vertex shader
     const MeshDistance& error; ///< of the restored mesh against the full deformation
+    UpAxis up;
 };
 
 /// Five panels: mesh, driver, moved driver, restored mesh, its error as colours with a legend.

@@ -1,8 +1,8 @@
 #include "commands.h"
-#include "patch_drawing.h"
 #include "session.h"
 #include "stage.h"
 
+#include "filigree/present/patch_drawing.h"
 #include "filigree/remesh/quad_remesh.h"
 
 #include <filesystem>
@@ -161,7 +161,7 @@ void report_remesh(const QuadRemeshed& result, const RunSeconds& run, Report& re
 void draw_patches(const QuadRemeshed& result, const Options& options, Session& session) {
     const RunContext& context = session.context();
     Stage stage(session);
-    const PatchDrawing drawing(result.mesh, result.patches, 0.8f, context);
+    const PatchDrawing drawing = require(PatchDrawing::create(result.mesh, result.patches, 0.8f, context));
     Scene scene;
     drawing.add_to(scene);
     scene.up = options.up;

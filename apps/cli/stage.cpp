@@ -1,10 +1,10 @@
 #include "stage.h"
 
+#include "filigree/core/color.h"
 #include "filigree/io/file.h"
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <filesystem>
 
 namespace filigree::cli {
@@ -32,13 +32,13 @@ SurfaceMaterials load_materials(const Mesh& mesh, const std::string& path, Sessi
 }
 
 Vec3f parse_color(const std::string& text, const std::string& option) {
-    unsigned value = 0;
-    const char *first = text.data() + 1, *last = text.data() + text.size();
-    const bool is_hex = text.size() == 7 && text[0] == '#';
-    if (is_hex)
-        if (const auto [end, error] = std::from_chars(first, last, value, 16); error == std::errc() && end == last)
-            return Vec3f(float(value >> 16), float(value >> 8 & 255), float(value & 255)) / 255.0f;
+    if (const std::optional<Vec3f> color = filigree::parse_color(text)) return *color;
     throw Failure{{ErrorCode::usage, option + ": '" + text + "' is no colour; write it as #rrggbb, such as #d04030."}};
+}
+
+Option found_up_option(std::optional<UpAxis>& up) {
+    return choice<UpAxis>("--up", up, {{"x", UpAxis::x}, {"y", UpAxis::y}, {"z", UpAxis::z}},
+                          "Which axis is up (unset: by the mesh's flat base, else z for STL and y for all others)");
 }
 
 std::string file_name(const std::string& path) {

@@ -35,6 +35,9 @@ SurfaceMaterials load_materials(const Mesh& mesh, const std::string& path, Sessi
 /// "#d04030", sRGB; otherwise a Failure that names the option.
 Vec3f parse_color(const std::string& text, const std::string& option);
 
+/// --up, where the mesh says it itself (find_up_axis) unless it is given.
+Option found_up_option(std::optional<UpAxis>& up);
+
 /// What a picture calls a file.
 std::string file_name(const std::string& path);
 /// How a file's name ends, in small letters: ".png".

@@ -3,7 +3,7 @@
 #include "playback.h"
 
 #include "filigree/mesh/shapes.h"
-#include "filigree/render/camera.h"
+#include "filigree/scene/particles_near.h"
 
 #include <algorithm>
 #include <numbers>
@@ -117,25 +117,13 @@ private:
 
 /// Particles near the pinned vertices are held fast, where they are.
 void hold_pins(const State& state, MadeBody& made) {
-    const Vectors& rest = made.body->rest;
-    const float reach = float(0.87 * made.body->spacing()); // half a cell's diagonal
     const std::vector<Vec3f> driver = driver_positions(*state.model);
+    std::vector<Vec3f> points; // m
+    for (const Handle& handle : state.handles)
+        if (handle.pinned)
+            for (const Index v : handle.vertices) points.push_back(float(made.scale) * driver[v]);
     Pin pin;
-    for (const Handle& handle : state.handles) {
-        if (!handle.pinned) continue;
-        for (const Index v : handle.vertices) {
-            const Vec3f at = float(made.scale) * driver[v];
-            Index nearest = 0;
-            for (Index i = 0; i < rest.size(); ++i) {
-                const float distance = (rest[i] - at).norm();
-                if (distance <= reach) pin.particles.push_back(i);
-                if (distance < (rest[nearest] - at).norm()) nearest = i;
-            }
-            pin.particles.push_back(nearest);
-        }
-    }
-    std::sort(pin.particles.begin(), pin.particles.end());
-    pin.particles.erase(std::unique(pin.particles.begin(), pin.particles.end()), pin.particles.end());
+    pin.particles = particles_near(*made.body, points);
     if (!pin.particles.empty()) made.world.pins.push_back(std::move(pin));
 }
 

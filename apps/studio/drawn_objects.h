@@ -3,9 +3,10 @@
 
 #include "drawing.h"
 #include "jobs.h"
-#include "patch_surface.h"
 #include "shown_model.h"
 #include "workbench.h"
+
+#include "filigree/present/patch_surface.h"
 
 #include "filigree/mesh/defect_edges.h"
 

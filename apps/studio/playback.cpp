@@ -2,6 +2,8 @@
 
 #include "bell.h"
 
+#include "filigree/scene/recording.h"
+
 #include <QCoreApplication>
 #include <QEventLoop>
 
@@ -18,7 +20,6 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t kMostRecordedBytes = std::size_t{1} << 30;
-constexpr double kFar = 1e4; // diagonals: further than that nothing sensible goes in a frame
 
 std::size_t bytes_of(const Pose& pose) {
     return pose.positions.size() * sizeof(Vec3f) + pose.gradients.size() * sizeof(Mat3f);
@@ -211,12 +212,13 @@ private:
     void look(Moment& moment, bool with_full) {
         const RunContext always; // a frame that was simulated is delivered
         const float to_units = float(1 / made->scale);
+        const auto far = static_cast<float>(kFarInAFrame * bounds(made->model->mesh.positions).diagonal());
         moment.frame = simulation->frame();
         moment.pose.positions.resize(last.positions.size());
         moment.pose.gradients.resize(last.positions.size());
         simulation->attached(driver, moment.pose.positions, moment.pose.gradients, always);
         for (Vec3f& p : moment.pose.positions) p *= to_units;
-        hold_lost(moment.pose);
+        hold_lost(last, moment.pose, far, float(kFarInAFrame));
         last = moment.pose;
         const Vectors& particles = simulation->positions(0);
         moment.particles.reserve(particles.size());
@@ -230,18 +232,6 @@ private:
         moment.full.resize(made->model->mesh.vertex_count());
         simulation->attached(*all_vertices, moment.full, {}, always);
         for (Vec3f& p : moment.full) p *= to_units;
-    }
-
-    /// Driver vertices that went nowhere sensible stay where they were, so that one does not spoil all.
-    void hold_lost(Pose& pose) const {
-        const auto far = static_cast<float>(kFar * bounds(made->model->mesh.positions).diagonal());
-        for (std::size_t v = 0; v < pose.positions.size(); ++v) {
-            const bool is_near = (pose.positions[v] - last.positions[v]).norm() <= far &&
-                                 pose.gradients[v].norm() <= float(kFar); // false for what is not a number
-            if (is_near) continue;
-            pose.positions[v] = last.positions[v];
-            pose.gradients[v] = last.gradients[v];
-        }
     }
 };
 

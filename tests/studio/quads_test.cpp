@@ -2,7 +2,7 @@
 #include "quads.h"
 
 #include "one_window.h"
-#include "patch_surface.h"
+#include "filigree/present/patch_colors.h"
 #include "script.h"
 #include "words.h"
 

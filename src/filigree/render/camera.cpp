@@ -30,18 +30,6 @@ Mat3d basis_of(const Vec3d& back, const Vec3d& up) {
     return basis;
 }
 
-/// Turns directions of a world with y up.
-Mat3d turn_from_y(UpAxis up) {
-    switch (up) {
-    case UpAxis::x:
-        return (Mat3d() << 0, 1, 0, -1, 0, 0, 0, 0, 1).finished();
-    case UpAxis::z:
-        return (Mat3d() << 1, 0, 0, 0, 0, -1, 0, 1, 0).finished();
-    default:
-        return Mat3d::Identity();
-    }
-}
-
 /// How far points reach in the camera's axes, and along the normals of the frustum's four sides, whose slopes are
 /// `slope_x` and `slope_y`: a point is inside when x + slope_x z <= eye.x + slope_x eye.z, and so on.
 struct Reach {
@@ -120,22 +108,6 @@ Camera::Ray Camera::ray(double x, double y, double width, double picture_height)
     const Vec3d across = units_a_pixel * ((x - width / 2) * axes.col(0) + (picture_height / 2 - y) * axes.col(1));
     if (field_of_view_deg > 0) return {eye, (across - axes.col(2)).normalized()};
     return {eye + across, -axes.col(2)};
-}
-
-Vec3d up_vector(UpAxis up) { return turn_from_y(up) * Vec3d::UnitY(); }
-
-Vec3d view_direction(View view, UpAxis up) {
-    const auto from = [&](const Vec3d& direction) -> Vec3d { return turn_from_y(up) * direction.normalized(); };
-    switch (view) {
-    case View::front:
-        return from({0, 0, 1});
-    case View::side:
-        return from({1, 0, 0});
-    case View::top:
-        return from({0, 1, 0});
-    default:
-        return from({1, 1, 1});
-    }
 }
 
 Camera fit_camera(std::span<const CameraPoints> points, const Vec3d& direction, const Vec3d& up, double aspect,

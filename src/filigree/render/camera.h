@@ -1,6 +1,7 @@
 // Where a picture is taken from.
 #pragma once
 
+#include "filigree/core/view.h"
 #include "filigree/mesh/mesh.h"
 
 #include <Eigen/Geometry>
@@ -30,15 +31,6 @@ struct Camera {
     };
     Ray ray(double x, double y, double width, double height) const;
 };
-
-/// The usual directions. With y up: front looks along -z, side along -x (from the right), top along -y, iso from the
-/// front right above. With z up the same turned so that front looks along +y.
-enum class View { front, side, top, iso };
-enum class UpAxis { x, y, z };
-
-Vec3d up_vector(UpAxis up);
-/// Unit, from the object to the viewer.
-Vec3d view_direction(View view, UpAxis up);
 
 /// What fit_camera needs to know of an object: its points in the world.
 struct CameraPoints {

@@ -126,67 +126,101 @@ private:
     std::vector<Vec3f> areas_, units_;
 };
 
-} // namespace
-
-Result<DrawArrays> make_draw_arrays(const Mesh& mesh, std::span<const Vec3f> positions, const SurfaceOptions& options,
-                                    const RunContext& context, NormalFaces normal_faces) {
-    DrawArrays arrays;
-    const std::vector<Index> place = weld_map(positions);
-    const CornersAt at = corners_at_places(mesh, place);
+std::vector<Index> faces_of_corners(const Mesh& mesh) {
     std::vector<Index> face_of_corner(mesh.corner_count());
     for (Index f = 0; f < mesh.face_count(); ++f)
         std::fill(face_of_corner.begin() + mesh.face_offsets[f], face_of_corner.begin() + mesh.face_offsets[f + 1], f);
-    if (context.is_cancelled()) return cancelled_error();
+    return face_of_corner;
+}
 
-    // Draw vertices: the corners at one place fall together where vertex, normal and UV agree.
-    const auto uv_index = [&](Index corner) {
-        return mesh.uvs.per_vertex() ? mesh.corners[corner] : mesh.uvs.corners[corner];
-    };
-    std::vector<Index> draw_vertex(mesh.corner_count());
-    std::vector<Vec3f> normals;
-    std::vector<Index> faces, uv_of_draw;
-    CornerNormals corner_normals(mesh, positions, options, context);
-    for (std::size_t p = 0; p < place.size(); ++p) {
-        if (p % (1 << 18) == 0) {
-            if (context.is_cancelled()) return cancelled_error();
-            context.report("preparing to draw", double(p) / double(place.size()));
-        }
-        const std::span corners(at.corners.data() + at.offsets[p], at.offsets[p + 1] - at.offsets[p]);
-        if (corners.empty()) continue;
-        faces.clear();
-        for (Index c : corners) faces.push_back(face_of_corner[c]);
-        corner_normals.at(corners, faces, normals);
-        const std::size_t first = arrays.vertex.size();
+/// The vertices that are drawn: the corners at one place fall together where vertex, normal and UV agree.
+class DrawVertices {
+public:
+    DrawVertices(const Mesh& mesh, NormalFaces normal_faces, DrawArrays& arrays)
+        : of_corner(mesh.corner_count()), mesh_(mesh), normal_faces_(normal_faces), arrays_(arrays) {}
+
+    std::vector<Index> of_corner; ///< which of them a corner has
+
+    /// For the corners at one place, with the face and the normal of each.
+    void add(std::span<const Index> corners, std::span<const Index> faces, std::span<const Vec3f> normals,
+             const CornerNormals& made_by) {
+        const std::size_t first = arrays_.vertex.size();
         for (std::size_t i = 0; i < corners.size(); ++i) {
-            const Index vertex = mesh.corners[corners[i]];
-            const Index uv = mesh.uvs.empty() ? kNoIndex : uv_index(corners[i]);
-            std::size_t d = std::max(first, arrays.vertex.size() - std::min(arrays.vertex.size(), kMostCreased));
-            while (d < arrays.vertex.size() && !(arrays.vertex[d] == vertex && arrays.normals[d] == normals[i] &&
-                                                 (mesh.uvs.empty() || uv_of_draw[d] == uv)))
+            const Index vertex = mesh_.corners[corners[i]];
+            const Index uv = mesh_.uvs.empty() ? kNoIndex : uv_index(corners[i]);
+            std::size_t d = std::max(first, arrays_.vertex.size() - std::min(arrays_.vertex.size(), kMostCreased));
+            while (d < arrays_.vertex.size() && !(arrays_.vertex[d] == vertex && arrays_.normals[d] == normals[i] &&
+                                                  (mesh_.uvs.empty() || uv_of_draw_[d] == uv)))
                 ++d;
-            draw_vertex[corners[i]] = static_cast<Index>(d);
-            if (d < arrays.vertex.size()) continue;
-            arrays.vertex.push_back(vertex);
-            arrays.normals.push_back(normals[i]);
-            if (normal_faces == NormalFaces::keep) {
-                arrays.normal_offsets.push_back(static_cast<Index>(arrays.normal_faces.size()));
-                corner_normals.add_faces_of(i, faces, arrays.normal_faces);
+            of_corner[corners[i]] = static_cast<Index>(d);
+            if (d < arrays_.vertex.size()) continue;
+            arrays_.vertex.push_back(vertex);
+            arrays_.normals.push_back(normals[i]);
+            if (normal_faces_ == NormalFaces::keep) {
+                arrays_.normal_offsets.push_back(static_cast<Index>(arrays_.normal_faces.size()));
+                made_by.add_faces_of(i, faces, arrays_.normal_faces);
             }
-            if (mesh.uvs.empty()) continue;
-            uv_of_draw.push_back(uv);
-            arrays.uvs.push_back(uv == kNoIndex ? Vec2f(Vec2f::Zero()) : mesh.uvs.values[uv]);
+            if (mesh_.uvs.empty()) continue;
+            uv_of_draw_.push_back(uv);
+            arrays_.uvs.push_back(uv == kNoIndex ? Vec2f(Vec2f::Zero()) : mesh_.uvs.values[uv]);
         }
     }
+    void finish() {
+        if (normal_faces_ == NormalFaces::keep)
+            arrays_.normal_offsets.push_back(static_cast<Index>(arrays_.normal_faces.size()));
+    }
 
-    if (normal_faces == NormalFaces::keep)
-        arrays.normal_offsets.push_back(static_cast<Index>(arrays.normal_faces.size()));
+private:
+    Index uv_index(Index corner) const {
+        return mesh_.uvs.per_vertex() ? mesh_.corners[corner] : mesh_.uvs.corners[corner];
+    }
 
-    // Triangles, by material.
+    const Mesh& mesh_;
+    NormalFaces normal_faces_;
+    DrawArrays& arrays_;
+    std::vector<Index> uv_of_draw_;
+};
+
+/// Which corners of a face its triangles have, and which of their sides are the polygon's.
+class PolygonSides {
+public:
+    explicit PolygonSides(const Mesh& mesh) : mesh_(mesh), corner_of_vertex_(mesh.vertex_count(), kNoIndex) {}
+
+    void go_to(Index face) {
+        if (face == face_) return;
+        face_ = face;
+        begin_ = mesh_.face_offsets[face];
+        size_ = mesh_.face_size(face);
+        bool passes_twice = false;
+        for (Index c = begin_; c < begin_ + size_; ++c) {
+            Index& corner = corner_of_vertex_[mesh_.corners[c]];
+            passes_twice = passes_twice || (corner != kNoIndex && corner >= begin_);
+            corner = c;
+        }
+        outline_.clear();
+        for (Index k = 0; passes_twice && k < size_; ++k)
+            outline_.emplace(mesh_.corners[begin_ + k], mesh_.corners[begin_ + (k + 1) % size_]);
+    }
+    Index corner(Index vertex) const { return corner_of_vertex_[vertex]; }
+    bool is_side(Index a, Index b) const {
+        if (!outline_.empty()) return outline_.contains({a, b});
+        return corner(b) - begin_ == (corner(a) - begin_ + 1) % size_;
+    }
+
+private:
+    const Mesh& mesh_;
+    std::vector<Index> corner_of_vertex_;
+    std::set<std::pair<Index, Index>> outline_; ///< vertices of the sides of a face that passes some vertex twice
+    Index face_ = kNoIndex, begin_ = 0, size_ = 0;
+};
+
+/// Triangles by material; those without one come last.
+void add_triangles(const Mesh& mesh, const SurfaceOptions& options, std::span<const Index> draw_vertex,
+                   DrawArrays& arrays) {
     const Triangulation cut = triangulate(mesh);
     const bool by_material = !options.materials.empty() && !mesh.materials.empty();
-    const auto material_of = [&](Index face) { return by_material ? mesh.materials.of_face[face] : kNoIndex; };
-    const auto slot_of = [&](Index face) { // kNoIndex comes last
-        const Index m = material_of(face);
+    const auto slot_of = [&](Index face) {
+        const Index m = by_material ? mesh.materials.of_face[face] : kNoIndex;
         return m == kNoIndex ? mesh.materials.names.size() : m;
     };
     const auto is_hidden = [&](Index face) { return !options.hidden_faces.empty() && options.hidden_faces[face]; };
@@ -200,36 +234,48 @@ Result<DrawArrays> make_draw_arrays(const Mesh& mesh, std::span<const Vec3f> pos
                 {m == mesh.materials.names.size() ? kNoIndex : static_cast<Index>(m), next[m], next[m + 1] - next[m]});
     arrays.triangles.resize(next.back());
     arrays.edges.resize(next.back());
-    std::vector<Index> corner_of_vertex(mesh.vertex_count(), kNoIndex);
-    std::set<std::pair<Index, Index>> outline; // vertices of the sides of a face that passes some vertex twice
-    Index known = kNoIndex;
+    PolygonSides polygon(mesh);
     for (std::size_t t = 0; t < cut.triangles.size(); ++t) {
         const Index f = cut.source_face[t];
         if (is_hidden(f)) continue;
-        const Index begin = mesh.face_offsets[f], size = mesh.face_size(f);
-        if (f != known) {
-            bool passes_twice = false;
-            for (Index c = begin; c < begin + size; ++c) {
-                Index& corner = corner_of_vertex[mesh.corners[c]];
-                passes_twice = passes_twice || (corner != kNoIndex && corner >= begin);
-                corner = c;
-            }
-            outline.clear();
-            for (Index k = 0; passes_twice && k < size; ++k)
-                outline.emplace(mesh.corners[begin + k], mesh.corners[begin + (k + 1) % size]);
-        }
-        known = f;
+        polygon.go_to(f);
         const Index slot = next[slot_of(f)]++;
         std::uint8_t edges = 0;
         for (int k = 0; k < 3; ++k) {
             const Index a = cut.triangles[t][k], b = cut.triangles[t][(k + 1) % 3];
-            const Index from = corner_of_vertex[a] - begin, to = corner_of_vertex[b] - begin;
-            arrays.triangles[slot][k] = draw_vertex[begin + from];
-            if (outline.empty() ? to == (from + 1) % size : outline.contains({a, b}))
-                edges |= static_cast<std::uint8_t>(1 << k);
+            arrays.triangles[slot][k] = draw_vertex[polygon.corner(a)];
+            if (polygon.is_side(a, b)) edges |= static_cast<std::uint8_t>(1 << k);
         }
         arrays.edges[slot] = edges;
     }
+}
+
+} // namespace
+
+Result<DrawArrays> make_draw_arrays(const Mesh& mesh, std::span<const Vec3f> positions, const SurfaceOptions& options,
+                                    const RunContext& context, NormalFaces normal_faces) {
+    DrawArrays arrays;
+    const std::vector<Index> place = weld_map(positions), face_of_corner = faces_of_corners(mesh);
+    const CornersAt at = corners_at_places(mesh, place);
+    if (context.is_cancelled()) return cancelled_error();
+    CornerNormals corner_normals(mesh, positions, options, context);
+    DrawVertices vertices(mesh, normal_faces, arrays);
+    std::vector<Vec3f> normals;
+    std::vector<Index> faces;
+    for (std::size_t p = 0; p < place.size(); ++p) {
+        if (p % (1 << 18) == 0) {
+            if (context.is_cancelled()) return cancelled_error();
+            context.report("preparing to draw", double(p) / double(place.size()));
+        }
+        const std::span corners(at.corners.data() + at.offsets[p], at.offsets[p + 1] - at.offsets[p]);
+        if (corners.empty()) continue;
+        faces.clear();
+        for (Index c : corners) faces.push_back(face_of_corner[c]);
+        corner_normals.at(corners, faces, normals);
+        vertices.add(corners, faces, normals, corner_normals);
+    }
+    vertices.finish();
+    add_triangles(mesh, options, vertices.of_corner, arrays);
     return arrays;
 }
 

@@ -1,14 +1,11 @@
 // Every key of a scene file in one table: what the reader checks by and what docs/scenes.md shows.
 #pragma once
 
-#include "filigree/physics/named_materials.h"
-
-#include <limits>
 #include <span>
 #include <string>
 #include <string_view>
 
-namespace filigree::cli {
+namespace filigree {
 
 enum class KeyType { text, word, number, whole, flag, vector, keyed, color, box, ball, ids, rotation, pixels };
 
@@ -36,7 +33,10 @@ bool is_list(std::string_view table); ///< one of those that may come several ti
 std::string range_text(const KeyRule& rule);
 std::string type_text(KeyType type);
 
+/// The tables of docs/scenes.md: every key with its type, unit, default and range, and the materials by name.
+std::string scene_manual();
+
 /// Of `words` the one most like `word`, "" when none is like it.
 std::string most_alike(std::string_view word, std::span<const std::string_view> words);
 
-} // namespace filigree::cli
+} // namespace filigree

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-namespace filigree::cli {
+namespace filigree {
 
 using Point = Eigen::Vector2d; ///< on a page: units from its top left, y down
 
@@ -93,4 +93,4 @@ private:
     std::unique_ptr<Content> content_;
 };
 
-} // namespace filigree::cli
+} // namespace filigree

@@ -1,18 +1,22 @@
-#include "scene_setup.h"
+#include "filigree/scene/world_setup.h"
 
 #include "filigree/hierarchy/strip.h"
+#include "filigree/io/file.h"
+#include "filigree/io/mesh_file.h"
+#include "filigree/io/model_file.h"
 #include "filigree/mesh/closest_point.h"
 #include "filigree/mesh/triangulate.h"
+#include "filigree/scene/particles_near.h"
 
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
+
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
-#include <fmt/format.h>
-
-namespace filigree::cli {
+namespace filigree {
 
 namespace {
 
@@ -20,12 +24,8 @@ const Vec3f kBodyColors[] = {
     {0.86f, 0.52f, 0.36f}, {0.42f, 0.60f, 0.80f}, {0.55f, 0.70f, 0.45f}, {0.80f, 0.68f, 0.38f}, {0.62f, 0.50f, 0.72f}};
 const Vec3f kObstacleColor{0.62f, 0.63f, 0.65f};
 
-/// The value, or a failure that names the scene's line.
-template <class T>
-T require_at(const SceneFile& scene, unsigned line, Result<T> result) {
-    if (!result && result.error().code == ErrorCode::cancelled) throw Failure{result.error()};
-    if (!result) fail_in_scene(scene, line, result.error().code, result.error().message);
-    return std::move(result).value();
+[[noreturn]] void fail_in_scene(const SceneFile& scene, unsigned line, ErrorCode code, const std::string& what) {
+    throw BadResultAccess(scene_error(scene, line, code, what));
 }
 
 /// A failure inside `work` gets the scene's line.
@@ -33,9 +33,9 @@ template <class Work>
 auto at_line(const SceneFile& scene, unsigned line, const Work& work) -> decltype(work()) {
     try {
         return work();
-    } catch (const Failure& failure) {
-        if (failure.error.code == ErrorCode::cancelled) throw;
-        fail_in_scene(scene, line, failure.error.code, failure.error.message);
+    } catch (const BadResultAccess& failure) {
+        if (failure.error().code == ErrorCode::cancelled) throw;
+        fail_in_scene(scene, line, failure.error().code, failure.error().message);
     }
 }
 
@@ -53,13 +53,13 @@ private:
     XXH3_state_t state_;
 };
 
-Box body_box(const SetUpBody& body) { return bounds(body.model.mesh.positions); }
+Box body_box(const ReadyBody& body) { return bounds(body.model.mesh.positions); }
 
 class Builder {
 public:
-    Builder(const SceneFile& scene, Session& session) : scene_(scene), session_(session) {}
+    Builder(const SceneFile& scene, const RunContext& context) : scene_(scene), context_(context) {}
 
-    SetUpScene build() {
+    ReadyScene build() {
         hash_.add(scene_.content);
         result_.bodies.reserve(scene_.bodies.size());
         for (const SceneBody& body : scene_.bodies) add_body(body);
@@ -80,23 +80,37 @@ public:
     }
 
 private:
-    const RunContext& context() const { return session_.context(); }
+    void warn(std::string sentence) { result_.warnings.push_back(std::move(sentence)); }
+
+    Mesh mesh_of(const std::string& bytes, const std::string& path) {
+        MeshFile file = read_mesh(bytes, path, context_).value();
+        for (std::string& warning : file.warnings) warn(std::move(warning));
+        return std::move(file.mesh);
+    }
 
     Model model_of(const SceneBody& body) {
-        Session::Content content{Mesh(), 0, {}};
-        if (body.mesh.empty())
-            content.value = require(make_shape(body.shape, body.shape_options));
-        else
-            content = session_.read_any(body.mesh);
-        if (auto* model = std::get_if<Model>(&content.value)) return std::move(*model);
-        auto& mesh = std::get<Mesh>(content.value);
+        Mesh mesh;
+        if (body.mesh.empty()) {
+            mesh = make_shape(body.shape, body.shape_options).value();
+        } else {
+            const std::string bytes = read_file(body.mesh).value();
+            if (is_model_file(bytes)) return read_model(bytes, body.mesh, context_).value();
+            mesh = mesh_of(bytes, body.mesh);
+        }
         StripOptions options;
         options.base = std::min(body.driver, std::max<std::size_t>(mesh.vertex_count(), 3));
-        return require(strip(std::move(mesh), options, context())).model;
+        return strip(std::move(mesh), options, context_).value().model;
+    }
+
+    Mesh obstacle_mesh(const std::string& path) {
+        const std::string bytes = read_file(path).value();
+        if (!is_model_file(bytes)) return mesh_of(bytes, path);
+        throw BadResultAccess(
+            {ErrorCode::bad_file, path + ": is a model where a mesh belongs; write one of its levels as a mesh."});
     }
 
     void add_body(const SceneBody& from) {
-        SetUpBody body;
+        ReadyBody body;
         body.name = from.name;
         body.mesh_path = from.mesh;
         body.scale = from.body.scale;
@@ -105,9 +119,11 @@ private:
         const Vec3d origin = std::exchange(mesh.origin, Vec3d::Zero());
         hash_.add(mesh.positions);
         hash_.add(mesh.corners);
-        body.body = std::make_shared<const Body>(
-            require_at(scene_, from.line, make_body(mesh, from.material, from.body, context(), &body.report)));
-        if (!body.report.warning.empty()) session_.warn("body '" + body.name + "': " + body.report.warning);
+        body.body = at_line(scene_, from.line, [&] {
+            return std::make_shared<const Body>(
+                make_body(mesh, from.material, from.body, context_, &body.report).value());
+        });
+        if (!body.report.warning.empty()) warn("body '" + body.name + "': " + body.report.warning);
         body.color = from.color.value_or(kBodyColors[result_.bodies.size() % std::size(kBodyColors)]);
         body.has_own_color = !from.color;
 
@@ -124,7 +140,7 @@ private:
         constexpr double kFar = 100; // sizes of the scene
         Box box;
         for (std::size_t b = 0; b < result_.bodies.size(); ++b) {
-            const SetUpBody& body = result_.bodies[b];
+            const ReadyBody& body = result_.bodies[b];
             const Box own = body_box(body);
             const Vec3d middle = result_.actors[b].placement * (body.scale * own.centre());
             const double reach = 0.5 * body.scale * own.diagonal();
@@ -139,14 +155,14 @@ private:
         for (std::size_t b = 0; b < result_.bodies.size(); ++b) warn_of_distance(b);
     }
 
-    void warn_of_distance(std::size_t b) const {
+    void warn_of_distance(std::size_t b) {
         constexpr double kMost = 1e4; // spacings: beyond, a float's last digits are seen in the strain
-        const SetUpBody& body = result_.bodies[b];
+        const ReadyBody& body = result_.bodies[b];
         const Vec3d middle = result_.actors[b].placement * (body.scale * body_box(body).centre());
         if (middle.norm() <= kMost * body.body->spacing()) return;
-        session_.warn(fmt::format("body '{}' is {:.3g} m from the scene's origin, too far for float positions of "
-                                  "particles {:.3g} m apart; bring the bodies nearer to each other by centre",
-                                  body.name, middle.norm(), body.body->spacing()));
+        warn(fmt::format("body '{}' is {:.3g} m from the scene's origin, too far for float positions of "
+                         "particles {:.3g} m apart; bring the bodies nearer to each other by centre",
+                         body.name, middle.norm(), body.body->spacing()));
     }
 
     // What the file says in the world, as seen from the scene's origin.
@@ -177,7 +193,7 @@ private:
 
     void add_obstacle(const SceneObstacle& from) {
         Obstacle obstacle;
-        SetUpObstacle drawn;
+        ShownObstacle drawn;
         Vec3d middle = Vec3d::Zero();
         if (from.shape == "ground") {
             middle = from.ground.point;
@@ -195,13 +211,15 @@ private:
             middle = from.box.centre;
             drawn.mesh = make_box(from.box.centre, from.box.size);
         } else {
-            drawn.mesh = at_line(scene_, from.line, [&] { return session_.read_mesh(from.mesh); });
+            drawn.mesh = at_line(scene_, from.line, [&] { return obstacle_mesh(from.mesh); });
             Mesh& mesh = drawn.mesh;
             hash_.add(mesh.positions);
             hash_.add(mesh.corners);
             MeshObstacle shape;
-            shape.field = std::make_shared<const DistanceField>(
-                require_at(scene_, from.line, DistanceField::create(mesh, from.scale, from.spacing, context())));
+            shape.field = at_line(scene_, from.line, [&] {
+                return std::make_shared<const DistanceField>(
+                    DistanceField::create(mesh, from.scale, from.spacing, context_).value());
+            });
             const Vec3d own = from.scale * bounds(mesh.positions).centre();
             middle = from.centre.value_or(own + from.scale * mesh.origin - result_.origin);
             shape.offset = middle - own;
@@ -226,7 +244,7 @@ private:
         const Body& body = *actor.body;
         std::vector<Index> chosen;
         if (!region.vertices.empty()) {
-            chosen = particles_near(number, region.vertices, line);
+            chosen = particles_at(number, region.vertices, line);
         } else {
             for (Index i = 0; i < body.particle_count(); ++i) {
                 const Vec3d p = actor.placement * body.rest[i].cast<double>();
@@ -245,28 +263,21 @@ private:
         return chosen;
     }
 
-    std::vector<Index> particles_near(std::size_t number, std::span<const Index> vertices, unsigned line) const {
-        const SetUpBody& body = result_.bodies[number];
-        const Vectors& rest = body.body->rest;
-        const float reach = float(0.87 * body.body->spacing()); // half a cell's diagonal
-        std::vector<Index> chosen;
+    std::vector<Index> particles_at(std::size_t number, std::span<const Index> vertices, unsigned line) const {
+        const ReadyBody& body = result_.bodies[number];
+        std::vector<Vec3f> points;
         for (const Index vertex : vertices) {
-            if (vertex >= body.model.mesh.vertex_count())
-                fail_in_scene(scene_, line, ErrorCode::bad_file,
-                              fmt::format("there is no vertex {} in '{}', which has {}", vertex, body.name,
-                                          body.model.mesh.vertex_count()));
-            const Vec3f at = float(body.scale) * body.model.mesh.positions[vertex];
-            Index nearest = 0;
-            for (Index i = 0; i < rest.size(); ++i) {
-                const float distance = (rest[i] - at).norm();
-                if (distance <= reach) chosen.push_back(i);
-                if (distance < (rest[nearest] - at).norm()) nearest = i;
-            }
-            chosen.push_back(nearest);
+            check_vertex(body, vertex, line);
+            points.push_back(float(body.scale) * body.model.mesh.positions[vertex]);
         }
-        std::sort(chosen.begin(), chosen.end());
-        chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
-        return chosen;
+        return particles_near(*body.body, points);
+    }
+
+    void check_vertex(const ReadyBody& body, Index vertex, unsigned line) const {
+        const std::size_t count = body.model.mesh.vertex_count();
+        if (vertex >= count)
+            fail_in_scene(scene_, line, ErrorCode::bad_file,
+                          fmt::format("there is no vertex {} in '{}', which has {}", vertex, body.name, count));
     }
 
     void add_pin(const ScenePin& from) {
@@ -282,16 +293,13 @@ private:
     }
 
     void add_hand(const SceneHand& from) {
-        const SetUpBody& body = result_.bodies[from.body];
+        const ReadyBody& body = result_.bodies[from.body];
         const Mesh& mesh = body.model.mesh;
         Hand hand = from.hand;
         hand.target.constant -= result_.origin;
         for (Vec3d& target : hand.target.values) target -= result_.origin;
         if (from.vertex) {
-            if (*from.vertex >= mesh.vertex_count())
-                fail_in_scene(scene_, from.line, ErrorCode::bad_file,
-                              fmt::format("there is no vertex {} in '{}', which has {}", *from.vertex, body.name,
-                                          mesh.vertex_count()));
+            check_vertex(body, *from.vertex, from.line);
             hand.point = float(body.scale) * mesh.positions[*from.vertex];
         } else {
             const std::vector<Triangle> triangles = triangulate(mesh).triangles;
@@ -304,13 +312,19 @@ private:
     }
 
     const SceneFile& scene_;
-    Session& session_;
-    SetUpScene result_;
+    const RunContext& context_;
+    ReadyScene result_;
     Hash hash_;
 };
 
 } // namespace
 
-SetUpScene set_up(const SceneFile& scene, Session& session) { return Builder(scene, session).build(); }
+Result<ReadyScene> set_up(const SceneFile& scene, const RunContext& context) {
+    try {
+        return Builder(scene, context).build();
+    } catch (const BadResultAccess& failure) {
+        return failure.error();
+    }
+}
 
-} // namespace filigree::cli
+} // namespace filigree

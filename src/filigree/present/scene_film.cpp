@@ -1,26 +1,17 @@
-#include "simulate_film.h"
+#include "filigree/present/scene_film.h"
 
 #include "filigree/hierarchy/restore.h"
+#include "filigree/present/film_frames.h"
+#include "filigree/render/surface_materials.h"
 
 #include <algorithm>
 #include <cmath>
 
-namespace filigree::cli {
+namespace filigree {
 
 namespace {
 
 constexpr double kRoom = 0.4; // obstacles so near to the motion, in its diagonals, are in the picture
-
-/// The finest level with no more triangles.
-unsigned level_for(const Model& model, std::size_t most_triangles) {
-    unsigned level = model.finest_level();
-    const auto triangles = [&](unsigned k) {
-        return k == model.finest_level() ? model.mesh.corner_count() - 2 * model.mesh.face_count()
-                                         : model.levels[k].corners.size() - 2 * model.levels[k].face_count();
-    };
-    while (level > 0 && triangles(level) > most_triangles) --level;
-    return level;
-}
 
 std::vector<Vec3f> moved(std::span<const Vec3f> points, const Eigen::Isometry3d& motion) {
     std::vector<Vec3f> result;
@@ -36,20 +27,21 @@ void extend(Box& box, std::span<const Vec3f> points) {
     box.extend(other.max);
 }
 
+/// Throws BadResultAccess where something fails; film_scene returns its error.
 class SceneFilm {
 public:
-    SceneFilm(const SceneFile& scene, const SetUpScene& ready, const Recording& recording, Session& session)
-        : scene_(scene), ready_(ready), recording_(recording), session_(session),
-          frames_(recording.poses[0].frames.size()), quiet_(session.context()) {
+    SceneFilm(const SceneFile& scene, const ReadyScene& ready, const Recording& recording, const RunContext& context)
+        : scene_(scene), ready_(ready), recording_(recording), context_(context),
+          frames_(recording.poses[0].frames.size()), quiet_(context) {
         quiet_.progress = nullptr; // the bar tells of frames
         actors_.reserve(ready.bodies.size());
-        for (const SetUpBody& body : ready.bodies) prepare(body);
+        for (const ReadyBody& body : ready.bodies) prepare(body);
         look_ahead();
         choose_ground();
         obstacles_.resize(ready.drawn.size());
     }
 
-    Picture frame(std::size_t number, Stage& stage) {
+    Result<Picture> frame(std::size_t number, HeadlessRenderer& renderer) {
         Scene shown;
         for (std::size_t b = 0; b < actors_.size(); ++b) shown.objects.push_back(body_at(b, number));
         for (std::size_t k = 0; k < ready_.drawn.size() && scene_.picture.obstacles; ++k)
@@ -62,32 +54,36 @@ public:
         shown.ground = picture.ground;
         shown.fixed_ground = true;
         shown.ground_level = ground_level_;
-        return require(stage.renderer().picture(
-            shown, camera_, {.width = picture.width, .height = picture.height, .passes = picture.passes}, quiet_));
+        return renderer.picture(shown, camera_,
+                                {.width = picture.width, .height = picture.height, .passes = picture.passes}, quiet_);
     }
     std::size_t frames() const { return frames_; }
+    std::vector<std::string> warnings;
 
 private:
     struct ShownBody {
-        const SetUpBody* body;
+        const ReadyBody* body;
         SurfaceMaterials materials;
         RestoreOptions restore;
         std::optional<Drawable> drawable;
         float ball_radius = 0;
     };
 
-    void prepare(const SetUpBody& body) {
+    void prepare(const ReadyBody& body) {
         ShownBody& shown = actors_.emplace_back();
         shown.body = &body;
-        shown.restore.level = level_for(body.model, scene_.picture.most_triangles);
+        shown.restore.level = level_within(body.model, scene_.picture.most_triangles);
         if (scene_.picture.particles) {
             shown.ball_radius = float(0.4 * body.body->spacing());
             return;
         }
-        if (!body.mesh_path.empty()) shown.materials = load_materials(body.model.mesh, body.mesh_path, session_);
+        if (!body.mesh_path.empty()) {
+            shown.materials = load_surface_materials(body.model.mesh, body.mesh_path);
+            warnings.insert(warnings.end(), shown.materials.warnings.begin(), shown.materials.warnings.end());
+        }
         SurfaceOptions surface;
         surface.materials = shown.materials.materials;
-        shown.drawable = require(Drawable::model(body.model, shown.restore, surface, quiet_));
+        shown.drawable = Drawable::model(body.model, shown.restore, surface, quiet_).value();
     }
 
     SceneObject body_at(std::size_t b, std::size_t frame) {
@@ -96,9 +92,9 @@ private:
         if (scene_.picture.particles) {
             PointOptions points;
             points.radius = shown.ball_radius;
-            shown.drawable = require(Drawable::points(recording_.particles[b][frame], Vec3d::Zero(), points, quiet_));
+            shown.drawable = Drawable::points(recording_.particles[b][frame], Vec3d::Zero(), points, quiet_).value();
         } else {
-            require(shown.drawable->set_pose(pose, quiet_));
+            shown.drawable->set_pose(pose, quiet_).value();
         }
         return {&*shown.drawable, {.color = shown.body->color, .own_colors = shown.body->has_own_color}};
     }
@@ -107,18 +103,18 @@ private:
 
     /// Null where the level ground of the picture stands for it.
     const Drawable* obstacle_at(std::size_t k, std::size_t frame) {
-        const SetUpObstacle& obstacle = ready_.drawn[k];
+        const ShownObstacle& obstacle = ready_.drawn[k];
         if (is_level_ground(obstacle)) return nullptr;
         std::optional<Drawable>& drawable = obstacles_[k];
         if (drawable && !obstacle.moves) return &*drawable;
         Mesh mesh = obstacle.is_ground ? slab(obstacle.plane) : obstacle.mesh;
         mesh.positions = moved(mesh.positions, obstacle.motion.at(time_of(frame)));
         mesh.normals = {}; // of the mesh before it turned
-        drawable = require(Drawable::surface(mesh, {}, quiet_));
+        drawable = Drawable::surface(mesh, {}, quiet_).value();
         return &*drawable;
     }
 
-    bool is_level_ground(const SetUpObstacle& obstacle) const {
+    bool is_level_ground(const ShownObstacle& obstacle) const {
         return obstacle.is_ground && !obstacle.moves && obstacle.motion.angle.constant.isZero() &&
                obstacle.plane.normal.isApprox(up_vector(scene_.picture.up), 1e-9);
     }
@@ -150,18 +146,18 @@ private:
         std::vector<Vec3f> seen;
         for (ShownBody& shown : actors_) {
             const std::size_t b = std::size_t(&shown - actors_.data());
-            const Restorer restorer = require(Restorer::create(shown.body->model, shown.restore, quiet_));
+            const Restorer restorer = Restorer::create(shown.body->model, shown.restore, quiet_).value();
             const std::size_t stride = 1 + restorer.vertex_count() * frames_ / 400'000;
             std::vector<Vec3f> positions(restorer.vertex_count());
             for (std::size_t frame = 0; frame < frames_; ++frame) {
-                if (session_.context().is_cancelled()) throw Failure{cancelled_error()};
-                session_.context().report("looking ahead", double(frame) / double(frames_));
-                require(restorer.positions(recording_.poses[b].frames[frame], positions, quiet_));
+                if (context_.is_cancelled()) throw BadResultAccess(cancelled_error());
+                context_.report("looking ahead", double(frame) / double(frames_));
+                restorer.positions(recording_.poses[b].frames[frame], positions, quiet_).value();
                 extend(box_, positions);
                 for (std::size_t v = frame % stride; v < positions.size(); v += stride) seen.push_back(positions[v]);
             }
         }
-        session_.context().report("looking ahead", 1);
+        context_.report("looking ahead", 1);
         leave_out_strays(seen);
         if (scene_.picture.obstacles) see_obstacles(seen);
         const ScenePicture& picture = scene_.picture;
@@ -211,7 +207,7 @@ private:
         Box near = box_;
         near.min.array() -= kRoom * box_.diagonal();
         near.max.array() += kRoom * box_.diagonal();
-        for (const SetUpObstacle& obstacle : ready_.drawn) {
+        for (const ShownObstacle& obstacle : ready_.drawn) {
             const std::size_t moments = obstacle.moves ? frames_ : 1;
             for (std::size_t frame = 0; frame < moments; frame += 1 + moments / 32) {
                 const std::vector<Vec3f> points = moved(obstacle.mesh.positions, obstacle.motion.at(time_of(frame)));
@@ -229,7 +225,7 @@ private:
     /// The level ground where there is one, else the lowest point of all.
     void choose_ground() {
         ground_level_ = std::min(box_.min[axis()], lowest_obstacle_) - 1e-4 * box_.diagonal();
-        for (const SetUpObstacle& obstacle : ready_.drawn) {
+        for (const ShownObstacle& obstacle : ready_.drawn) {
             if (is_level_ground(obstacle)) {
                 // Deep enough not to cut off what rests on it by rounding.
                 ground_level_ =
@@ -244,9 +240,9 @@ private:
     int axis() const { return static_cast<int>(scene_.picture.up); }
 
     const SceneFile& scene_;
-    const SetUpScene& ready_;
+    const ReadyScene& ready_;
     const Recording& recording_;
-    Session& session_;
+    const RunContext& context_;
     std::size_t frames_;
     RunContext quiet_;
     std::vector<ShownBody> actors_;
@@ -258,18 +254,19 @@ private:
 
 } // namespace
 
-double film_scene(const SceneFile& scene, const SetUpScene& ready, const Recording& recording, Stage& stage,
-                  std::span<FilmWriter> writers, Session& session) {
-    const double start = now_seconds();
-    SceneFilm film(scene, ready, recording, session);
-    for (std::size_t frame = 0; frame < film.frames(); ++frame) {
-        if (session.context().is_cancelled()) throw Failure{cancelled_error()};
-        session.context().report("filming", double(frame) / double(film.frames()));
-        const Picture picture = film.frame(frame, stage);
-        for (FilmWriter& writer : writers) require(writer.add(picture));
+Result<std::vector<std::string>> film_scene(const SceneFile& scene, const ReadyScene& ready, const Recording& recording,
+                                            HeadlessRenderer& renderer, std::span<FilmWriter> writers,
+                                            const RunContext& context) {
+    try {
+        SceneFilm film(scene, ready, recording, context);
+        const Status filmed = film_frames(
+            film.frames(), [&](std::size_t frame, const RunContext&) { return film.frame(frame, renderer); }, writers,
+            "filming", context);
+        if (!filmed) return filmed.error();
+        return std::move(film.warnings);
+    } catch (const BadResultAccess& failure) {
+        return failure.error();
     }
-    session.context().report("filming", 1);
-    return now_seconds() - start;
 }
 
-} // namespace filigree::cli
+} // namespace filigree

@@ -1,11 +1,12 @@
 // From a scene's words to bodies, a world and what is drawn of it.
 #pragma once
 
-#include "scene_file.h"
+#include "filigree/hierarchy/model.h"
+#include "filigree/scene/scene_file.h"
 
-namespace filigree::cli {
+namespace filigree {
 
-struct SetUpBody {
+struct ReadyBody {
     std::string name;
     std::string mesh_path; ///< "" for a built-in shape
     Model model;           ///< its origin is zero: poses say where it is, from the scene's
@@ -17,7 +18,7 @@ struct SetUpBody {
 };
 
 /// An obstacle as it is drawn, before its motion.
-struct SetUpObstacle {
+struct ShownObstacle {
     Mesh mesh;
     RigidMotion motion;
     bool moves = false;
@@ -26,18 +27,20 @@ struct SetUpObstacle {
     Vec3f color = Vec3f::Zero();
 };
 
-struct SetUpScene {
+struct ReadyScene {
     /// Of everything below and of all that moves; not zero only where the bodies are far from the world's, so that
     /// float keeps their digits.
     Vec3d origin = Vec3d::Zero();
-    std::vector<SetUpBody> bodies;
+    std::vector<ReadyBody> bodies;
     std::vector<Actor> actors;
     World world;
-    std::vector<SetUpObstacle> drawn;
-    std::uint64_t hash = 0; ///< of all that the motion depends on
+    std::vector<ShownObstacle> drawn;
+    std::uint64_t hash = 0;            ///< of all that the motion depends on
+    std::vector<std::string> warnings; ///< sentences: of the meshes' files, and of bodies that are hard to simulate
 };
 
-/// Reads meshes, strips them, fills them with particles. Errors name the scene's line; warnings go to the session.
-SetUpScene set_up(const SceneFile& scene, Session& session);
+/// Reads the scene's meshes, strips them and fills them with particles. Errors name the scene's line: those of the
+/// readers, of strip, make_body and DistanceField; bad_file (a region without particles, a vertex that is not there).
+Result<ReadyScene> set_up(const SceneFile& scene, const RunContext& context);
 
-} // namespace filigree::cli
+} // namespace filigree

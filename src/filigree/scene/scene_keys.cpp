@@ -1,14 +1,16 @@
-#include "scene_keys.h"
+#include "filigree/scene/scene_keys.h"
 
-#include "scene_file.h"
+#include "filigree/physics/named_materials.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <vector>
 
 #include <fmt/format.h>
 
-namespace filigree::cli {
+namespace filigree {
 
 namespace {
 
@@ -293,4 +295,4 @@ std::string scene_manual() {
     return manual.substr(1);
 }
 
-} // namespace filigree::cli
+} // namespace filigree

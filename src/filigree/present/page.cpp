@@ -1,6 +1,6 @@
 // What is drawn is kept as a list of commands and replayed on each kind of surface, so that text and lines stay what
 // they are in SVG and PDF. (A recording surface would do the same, but puts a group and a clip around it all.)
-#include "page.h"
+#include "filigree/present/page.h"
 
 #include "filigree/io/file.h"
 
@@ -17,7 +17,7 @@
 #include <cairo.h>
 #include <fmt/format.h>
 
-namespace filigree::cli {
+namespace filigree {
 
 namespace {
 
@@ -576,4 +576,4 @@ Status Page::write(const std::filesystem::path& path, double scale) const {
     return write_file(path, bytes);
 }
 
-} // namespace filigree::cli
+} // namespace filigree

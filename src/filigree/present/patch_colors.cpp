@@ -1,23 +1,22 @@
-#include "patch_surface.h"
-
-#include "filigree/hierarchy/regular_patches.h"
+// Based on:
+// [Ottosson 2020] OKLab, so that the patches' colours are equally light.
+#include "filigree/present/patch_colors.h"
 
 #include <algorithm>
 #include <map>
 
-namespace filigree::studio {
+namespace filigree {
 
 namespace {
 
-// sRGB: eight hues, evenly around OKLab's circle of lightness 0.80 and chroma 0.095, so that none stands out.
-const std::array<Vec3f, 8> kColors = {{{0.95f, 0.64f, 0.73f},
-                                       {0.95f, 0.67f, 0.54f},
-                                       {0.84f, 0.73f, 0.46f},
-                                       {0.64f, 0.80f, 0.56f},
-                                       {0.45f, 0.82f, 0.75f},
-                                       {0.46f, 0.80f, 0.92f},
-                                       {0.65f, 0.73f, 0.99f},
-                                       {0.84f, 0.67f, 0.91f}}};
+const std::array<Vec3f, kPatchColorCount> kColors = {{{0.95f, 0.64f, 0.73f},
+                                                      {0.95f, 0.67f, 0.54f},
+                                                      {0.84f, 0.73f, 0.46f},
+                                                      {0.64f, 0.80f, 0.56f},
+                                                      {0.45f, 0.82f, 0.75f},
+                                                      {0.46f, 0.80f, 0.92f},
+                                                      {0.65f, 0.73f, 0.99f},
+                                                      {0.84f, 0.67f, 0.91f}}};
 
 /// Steps around the circle of colours from one to another.
 std::size_t color_distance(std::size_t a, std::size_t b) {
@@ -33,8 +32,11 @@ std::map<Index, std::vector<std::size_t>> patches_at_corners(const RegularPatche
     return at;
 }
 
-/// One of kColors a patch: the one that differs most from those its neighbours have by then.
-std::vector<Index> colors_of(const RegularPatches& patches) {
+} // namespace
+
+const std::array<Vec3f, kPatchColorCount>& patch_colors() { return kColors; }
+
+std::vector<Index> choose_patch_colors(const RegularPatches& patches) {
     const std::map<Index, std::vector<std::size_t>> at_corners = patches_at_corners(patches);
     std::vector<Index> result(patches.patch_count(), kNoIndex);
     for (std::size_t p = 0; p < result.size(); ++p) {
@@ -56,8 +58,6 @@ std::vector<Index> colors_of(const RegularPatches& patches) {
     return result;
 }
 
-} // namespace
-
 Result<FaceLabels> patch_labels(const Mesh& mesh, unsigned most_levels, const RunContext& context) {
     const Result<RegularPatches> patches = find_regular_patches(mesh, most_levels, context);
     if (!patches) return patches.error();
@@ -65,7 +65,7 @@ Result<FaceLabels> patch_labels(const Mesh& mesh, unsigned most_levels, const Ru
     for (std::size_t p = 0; p < patches->patch_count(); ++p)
         for (std::size_t j = 1; j < patches->side(); ++j)
             for (std::size_t i = 1; i < patches->side(); ++i) patch_inside[patches->at(p, i, j)] = Index(p);
-    const std::vector<Index> colors = colors_of(*patches);
+    const std::vector<Index> colors = choose_patch_colors(*patches);
     FaceLabels labels;
     labels.names.resize(kColors.size());
     labels.of_face.assign(mesh.face_count(), kNoIndex);
@@ -75,20 +75,4 @@ Result<FaceLabels> patch_labels(const Mesh& mesh, unsigned most_levels, const Ru
     return labels;
 }
 
-Result<PatchData> PatchData::make(const Model& model, RestoreOptions restore, unsigned most_levels, RestoreOn where,
-                                  const RunContext& context) {
-    Result<FaceLabels> labels = patch_labels(model.mesh, most_levels, context);
-    if (!labels) return labels.error();
-    auto colored = std::make_shared<Model>(model);
-    colored->mesh.materials = std::move(*labels);
-    colored->mesh.colors.clear();
-    colored->mesh.uvs = {};
-    SurfaceOptions options;
-    for (const Vec3f& color : kColors) options.materials.push_back({color, nullptr});
-    restore.level.reset();
-    Result<DrawData> data = DrawData::model(*colored, restore, options, where, context);
-    if (!data) return data.error();
-    return PatchData{std::move(colored), std::move(*data)};
-}
-
-} // namespace filigree::studio
+} // namespace filigree

@@ -5,11 +5,7 @@
 #include "filigree/hierarchy/regular_patches.h"
 #include "filigree/render/renderer.h"
 
-namespace filigree::cli {
-
-/// sRGB, one a patch: of even lightness, in hues a golden section of the circle apart; of several that come next, each
-/// patch takes the one that differs most from those of its neighbours.
-std::vector<Vec3f> patch_colors(const RegularPatches& patches);
+namespace filigree {
 
 /// The quads in their patches' colours: vertices on borders once for each patch. Patch by patch, row by row.
 Mesh colored_patches(const Mesh& mesh, const RegularPatches& patches);
@@ -20,13 +16,16 @@ Mesh border_ribbons(const Mesh& mesh, const RegularPatches& patches, double widt
 /// Both, in graphics memory.
 class PatchDrawing {
 public:
-    /// line_width: of the quads' edges, pixels; 0 draws none.
-    PatchDrawing(const Mesh& mesh, const RegularPatches& patches, float line_width, const RunContext& context);
+    /// line_width: of the quads' edges, pixels; 0 draws none. Errors: as of Drawable::surface.
+    static Result<PatchDrawing> create(const Mesh& mesh, const RegularPatches& patches, float line_width,
+                                       const RunContext& context);
     void add_to(Scene& scene) const;
 
 private:
+    PatchDrawing(Drawable surface, Drawable borders, float line_width);
+
     Drawable surface_, borders_;
     Appearance surface_look_, border_look_;
 };
 
-} // namespace filigree::cli
+} // namespace filigree

@@ -1,4 +1,4 @@
-// Patches of regular quads as colours: which face belongs to which patch, and the finest level drawn that way.
+// The finest level of a model, its patches of regular quads in colours.
 #pragma once
 
 #include "filigree/hierarchy/model.h"
@@ -7,11 +7,7 @@
 #include <cstdint>
 #include <memory>
 
-namespace filigree::studio {
-
-/// A label a face, its patch's, as few as tell neighbours apart where eight can; their names are empty.
-/// most_levels, errors: as of find_regular_patches.
-Result<FaceLabels> patch_labels(const Mesh& mesh, unsigned most_levels, const RunContext& context);
+namespace filigree {
 
 /// The processor's half of a surface whose patches have colours.
 struct PatchData {
@@ -30,4 +26,4 @@ struct PatchSurface {
     std::uint64_t pose = 0; ///< which pose it has; 0: at rest
 };
 
-} // namespace filigree::studio
+} // namespace filigree

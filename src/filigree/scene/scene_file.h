@@ -1,15 +1,16 @@
-// Scenes described in a TOML file: docs/scenes.md lists every key, from the same table that this reader goes by.
+// Scenes described in a TOML file. docs/scenes.md lists every key, from the table that the reader goes by
+// (scene_keys.h).
 #pragma once
 
-#include "session.h"
-
+#include "filigree/core/view.h"
 #include "filigree/mesh/shapes.h"
 #include "filigree/physics/simulation.h"
-#include "filigree/render/camera.h"
 
 #include <optional>
+#include <string>
+#include <vector>
 
-namespace filigree::cli {
+namespace filigree {
 
 /// A part of a body: what lies in a box or a ball at the start (world, m), or what is near vertices of its mesh. With
 /// none of the three: all of it.
@@ -105,14 +106,11 @@ struct SceneFile {
     ScenePicture picture;
 };
 
-/// Reads and checks a scene; meshes are not opened. Fails with file and line: bad_file (not TOML, unknown keys with a
-/// suggestion, wrong types and ranges), not_found.
-SceneFile read_scene(const std::string& path);
+/// Reads and checks a scene; meshes are not opened. A mesh's name is seen from the scene's folder. Errors, with file
+/// and line: bad_file (not TOML, unknown keys with a suggestion, wrong types and ranges), not_found.
+Result<SceneFile> read_scene(const std::string& path);
 
-/// The tables of docs/scenes.md: every key with its type, unit, default and range, and the materials by name.
-std::string scene_manual();
+/// An error in a line of the scene: "scene.toml:12: what".
+Error scene_error(const SceneFile& scene, unsigned line, ErrorCode code, const std::string& what);
 
-/// "scene.toml:12: what"
-[[noreturn]] void fail_in_scene(const SceneFile& scene, unsigned line, ErrorCode code, const std::string& what);
-
-} // namespace filigree::cli
+} // namespace filigree

@@ -1,0 +1,179 @@
+#include "rendering.h"
+
+#include "filigree/mesh/up_axis.h"
+
+#include <utility>
+
+#include <fmt/format.h>
+
+namespace filigree::cli {
+
+namespace {
+
+[[noreturn]] void refuse(const std::string& sentence) { throw Failure{{ErrorCode::usage, sentence}}; }
+
+Background parse_background(const std::string& text) {
+    Background background;
+    if (text.empty()) return background;
+    if (text == "transparent") {
+        background.transparent = true;
+        return background;
+    }
+    const std::size_t comma = text.find(',');
+    background.top = parse_color(text.substr(0, comma), "--background");
+    background.bottom =
+        comma == std::string::npos ? background.top : parse_color(text.substr(comma + 1), "--background");
+    return background;
+}
+
+} // namespace
+
+std::unique_ptr<Subject> Rendering::read(const std::string& path) {
+    auto subject = std::make_unique<Subject>();
+    Session::Content content = session_.read_any(path);
+    if (auto* model = std::get_if<Model>(&content.value)) {
+        subject->model = std::move(*model);
+        subject->poses = std::move(content.poses);
+        if (options_.frame > 0) own_pose(subject->poses, options_.frame, path);
+        const unsigned level = options_.restore.level.value_or(subject->model->finest_level());
+        if (level > subject->model->finest_level())
+            refuse(fmt::format("{}: has levels 0 to {}; there is no level {}.", path, subject->model->finest_level(),
+                               level));
+        subject->mesh = level_mesh(*subject->model, level);
+    } else {
+        if (!options_.poses.empty() || options_.frame > 0)
+            refuse(path + ": is a mesh, and --poses and --frame move a model; 'filigree strip' makes one of it.");
+        subject->mesh = std::move(std::get<Mesh>(content.value));
+    }
+    subject->materials = load_materials(subject->mesh, path, session_);
+    if (subject->mesh.vertex_count() == 0)
+        throw Failure{{ErrorCode::unsuitable, path + ": has no vertices, so there is nothing to draw."}};
+    if (!std::exchange(up_known_, true)) up_ = options_.up.value_or(find_up_axis(subject->mesh, usual_up_axis(path)));
+    choose_scalars(*subject, path);
+    return subject;
+}
+
+void Rendering::choose_scalars(Subject& subject, const std::string& path) {
+    const std::string& name = options_.scalar;
+    if (name.empty()) return;
+    subject.scalar_title = options_.unit.empty() ? name : name + " (" + options_.unit + ")";
+    if (name == "level") {
+        if (!subject.model)
+            refuse("--scalar level shows at which level of a model each vertex comes in, and " + path + " is a mesh.");
+        subject.scalars = vertex_levels(*subject.model, options_.restore.level.value_or(subject.model->finest_level()));
+    } else if (name == "error" || name == "strain") {
+        if (!against_) refuse("--scalar " + name + " is against another mesh; name it with --against MESH.");
+        if (name == "strain") {
+            subject.scalars = require(edge_strains(subject.mesh, *against_));
+        } else {
+            std::vector<float> values;
+            const MeshDistance distance = require(mesh_distance(subject.mesh, *against_, 0, context()));
+            values = distance.vertices ? distance.vertices->per_vertex
+                                       : require(distances_to_surface(subject.mesh, *against_, context()));
+            const bool in_units = !options_.unit.empty(); // else as fractions of the diagonal
+            subject.scalars = heat_map(std::move(values), in_units ? 1 : distance.diagonal).values;
+            if (!in_units) subject.scalar_title = "error / diagonal";
+        }
+    } else {
+        for (const VertexScalar& scalar : subject.mesh.scalars)
+            if (scalar.name == name) subject.scalars = scalar.values;
+        if (subject.scalars.empty()) {
+            std::string names = "error, strain, level";
+            for (const VertexScalar& scalar : subject.mesh.scalars) names += ", " + scalar.name;
+            throw Failure{{ErrorCode::unsuitable,
+                           fmt::format("{}: has no vertex scalar '{}'; there are: {}.", path, name, names)}};
+        }
+    }
+}
+
+ValueRange Rendering::range_of(std::span<const float> values) const {
+    if (!options_.range.empty()) return {static_cast<float>(options_.range[0]), static_cast<float>(options_.range[1])};
+    if (options_.scalar == "error" || options_.scalar == "strain")
+        return heat_map(std::vector<float>(values.begin(), values.end()), 1).range;
+    return legend_range(values, false);
+}
+
+void Rendering::upload(Subject& subject) {
+    ScalarColors scalars{subject.scalars, options_.map, range_};
+    if (options_.points || subject.mesh.face_count() == 0) {
+        const float radius = film_radius_ > 0 ? film_radius_ : static_cast<float>(options_.point_radius);
+        PointOptions points{radius, scalars, subject.mesh.colors};
+        subject.drawable = require(Drawable::points(subject.mesh.positions, subject.mesh.origin, points, context()));
+    } else {
+        SurfaceOptions surface;
+        surface.shading = options_.shading;
+        surface.scalars = scalars;
+        surface.materials = subject.materials.materials;
+        subject.drawable = subject.model
+                               ? require(Drawable::model(*subject.model, options_.restore, surface, context()))
+                               : require(Drawable::surface(subject.mesh, surface, context()));
+    }
+    triangles_ += subject.drawable->triangle_count();
+    points_ += subject.drawable->point_count();
+}
+
+void Rendering::set_pose(Subject& subject, const Pose& pose, bool on_screen) {
+    if (!subject.restorer) subject.restorer = require(Restorer::create(*subject.model, options_.restore, context()));
+    require(subject.restorer->positions(pose, subject.mesh.positions, context()));
+    if (!on_screen) return;
+    if (const std::size_t points = subject.drawable->point_count()) { // which are not restored on the GPU
+        points_ -= points;
+        upload(subject);
+    } else {
+        require(subject.drawable->set_pose(pose, context()));
+    }
+}
+
+Scene Rendering::scene_of(const Subject& subject) const {
+    Scene scene;
+    Appearance& look = scene.objects.emplace_back(SceneObject{&*subject.drawable, {}}).appearance;
+    if (!options_.color.empty()) {
+        look.color = parse_color(options_.color, "--color");
+        look.own_colors = has_scalars();
+    } else if (subject.mesh.face_count() == 0 || options_.points) {
+        look.color = {0.30f, 0.50f, 0.78f};
+    }
+    if (!options_.edge_color.empty()) look.edge_color = parse_color(options_.edge_color, "--edge-color");
+    look.edges = options_.edges;
+    look.surface = !options_.wireframe;
+    if (has_scalars()) look.gloss = 0.15f; // colours are to be read
+    if (options_.clip) {
+        const ClipOption& clip = *options_.clip;
+        const Box box = clip_box_.empty() ? world_bounds(subject.mesh) : clip_box_; // where the vertices are
+        const double sign = clip.keeps_far_side ? -1 : 1;
+        look.clip = ClipPlane{sign * Vec3d::Unit(clip.axis),
+                              sign * (box.min[clip.axis] + clip.fraction * box.size()[clip.axis])};
+    }
+    scene.background = parse_background(options_.background);
+    scene.up = up_;
+    scene.ground = !options_.no_ground;
+    return scene;
+}
+
+Camera Rendering::camera_for(std::span<const CameraPoints> points, double aspect) const {
+    if (options_.camera.empty())
+        return fit_camera(points, view_direction(options_.view, up_), up_vector(up_), aspect, options_.field_of_view);
+    const std::vector<double>& n = options_.camera;
+    Camera camera;
+    camera.eye = {n[0], n[1], n[2]};
+    camera.target = {n[3], n[4], n[5]};
+    camera.up = n.size() == 9 ? Vec3d(n[6], n[7], n[8]) : up_vector(up_);
+    camera.field_of_view_deg = options_.field_of_view;
+    const double distance = (camera.eye - camera.target).norm();
+    if (!(distance > 0)) refuse("--camera: eye and target are the same point; the camera looks nowhere.");
+    if (!(camera.up.norm() > 0)) refuse("--camera: the direction that is up has no length.");
+    camera.height = distance;
+    return camera;
+}
+
+Json Rendering::summary(const PictureSize& size, std::size_t frames) const {
+    return {{"output", options_.output},
+            {"width", size.width},
+            {"height", size.height},
+            {"frames", frames},
+            {"triangles", triangles_},
+            {"points", points_},
+            {"renderer", stage_.renderer_name()}};
+}
+
+} // namespace filigree::cli

@@ -1,0 +1,15 @@
+// The particles at a place of a body's surface: what a pin holds, what a force pushes.
+#pragma once
+
+#include "filigree/physics/body.h"
+
+#include <span>
+#include <vector>
+
+namespace filigree {
+
+/// Particles within half a cell's diagonal of any of the points, and the one nearest to each. points: in the body's
+/// rest space, m. Returns ascending ids, each once. Cost O(points x particles).
+std::vector<Index> particles_near(const Body& body, std::span<const Vec3f> points);
+
+} // namespace filigree

@@ -1,0 +1,136 @@
+#include "filigree/scene/saved_state.h"
+
+#include "filigree/physics/byte_stream.h"
+
+#include <cstring>
+
+#define XXH_INLINE_ALL
+#include <xxhash.h>
+
+namespace filigree {
+
+namespace {
+
+constexpr std::string_view kFormat = "FILSTAT", kMagic = "FILSTAT2"; // ends in the version
+
+void write_totals(ByteWriter& out, const RunTotals& t) {
+    for (const std::uint64_t count : {t.frames, t.explicit_frames, t.descent_frames, t.substeps, t.least_substeps,
+                                      t.most_substeps, t.clamped_particles, t.most_contacts})
+        out.value(count);
+    out.value(t.deepest_contact);
+    out.value(t.least_volume_ratio);
+    out.value(t.most_stretch);
+    for (const double joules : {t.start.kinetic, t.start.elastic, t.start.potential}) out.value(joules);
+}
+
+RunTotals read_totals(ByteReader& in) {
+    RunTotals t;
+    for (std::uint64_t* count : {&t.frames, &t.explicit_frames, &t.descent_frames, &t.substeps, &t.least_substeps,
+                                 &t.most_substeps, &t.clamped_particles, &t.most_contacts})
+        *count = in.value<std::uint64_t>();
+    t.deepest_contact = in.value<double>();
+    t.least_volume_ratio = in.value<float>();
+    t.most_stretch = in.value<float>();
+    for (double* joules : {&t.start.kinetic, &t.start.elastic, &t.start.potential}) *joules = in.value<double>();
+    return t;
+}
+
+void write_poses(ByteWriter& out, const PoseSequence& poses) {
+    out.value(poses.frames_per_second);
+    out.value(std::uint64_t{poses.frames.size()});
+    for (const Pose& pose : poses.frames) {
+        out.array(std::span(pose.positions));
+        out.array(std::span(pose.gradients));
+    }
+}
+
+PoseSequence read_poses(ByteReader& in) {
+    PoseSequence poses;
+    poses.frames_per_second = in.value<double>();
+    const std::uint64_t count = in.value<std::uint64_t>();
+    for (std::uint64_t frame = 0; frame < count && in.ok(); ++frame) {
+        Pose& pose = poses.frames.emplace_back();
+        pose.positions = in.array<Vec3f>();
+        pose.gradients = in.array<Mat3f>();
+    }
+    return poses;
+}
+
+std::vector<std::vector<Vec3f>> read_particles(ByteReader& in) {
+    std::vector<std::vector<Vec3f>> frames;
+    const std::uint64_t count = in.value<std::uint64_t>();
+    for (std::uint64_t frame = 0; frame < count && in.ok(); ++frame) frames.push_back(in.array<Vec3f>());
+    return frames;
+}
+
+/// What lies between the magic and the checksum, in the order of pack_state.
+struct SavedRun {
+    Recording recording;
+    std::vector<char> simulation;
+    bool is_whole = false;
+
+    SavedRun(ByteReader& in, std::size_t bodies) {
+        recording.totals = read_totals(in);
+        for (std::size_t b = 0; b < bodies; ++b) recording.poses.push_back(read_poses(in));
+        const std::uint64_t with_particles = in.value<std::uint64_t>();
+        for (std::uint64_t b = 0; b < with_particles && in.ok(); ++b) recording.particles.push_back(read_particles(in));
+        recording.checks = in.array<CheckTotals>();
+        simulation = in.array<char>();
+        is_whole = in.ok() && in.at_end();
+        for (const PoseSequence& poses : recording.poses)
+            is_whole = is_whole && poses.frames.size() == recording.totals.frames + 1;
+    }
+};
+
+} // namespace
+
+std::string pack_state(const Recording& recording, const Simulation& simulation, std::uint64_t hash) {
+    ByteWriter out;
+    out.value(hash);
+    write_totals(out, recording.totals);
+    for (const PoseSequence& poses : recording.poses) write_poses(out, poses);
+    out.value(std::uint64_t{recording.particles.size()});
+    for (const auto& frames : recording.particles) {
+        out.value(std::uint64_t{frames.size()});
+        for (const std::vector<Vec3f>& particles : frames) out.array(std::span(particles));
+    }
+    out.array(std::span(recording.checks));
+    const std::string state = simulation.save();
+    out.array(std::span(state));
+    std::string bytes = std::string(kMagic) + out.take();
+    const std::uint64_t sum = XXH3_64bits(bytes.data(), bytes.size());
+    bytes.append(reinterpret_cast<const char*>(&sum), sizeof sum);
+    return bytes;
+}
+
+Status unpack_state(std::string_view bytes, const std::string& name, std::uint64_t hash, Recording& recording,
+                    Simulation& simulation) {
+    const Error damaged{ErrorCode::bad_file, name + ": is damaged; run the scene from its start."};
+    if (!bytes.starts_with(kFormat)) return Error{ErrorCode::bad_file, name + ": is no saved state of a simulation."};
+    if (!bytes.starts_with(kMagic))
+        return Error{ErrorCode::bad_file,
+                     name + ": was saved by another version of Filigree; run the scene from its start."};
+    std::uint64_t sum = 0;
+    if (bytes.size() < kMagic.size() + sizeof sum) return damaged;
+    const std::string_view content = bytes.substr(0, bytes.size() - sizeof sum);
+    std::memcpy(&sum, content.data() + content.size(), sizeof sum);
+    if (sum != XXH3_64bits(content.data(), content.size())) return damaged;
+    ByteReader in(content.substr(kMagic.size()));
+    if (in.value<std::uint64_t>() != hash)
+        return Error{ErrorCode::mismatch, name + ": is the state of another scene, or of this one before it was "
+                                                 "changed; run the scene from its start."};
+    SavedRun saved(in, recording.poses.size());
+    if (!saved.is_whole || saved.recording.particles.size() != recording.particles.size()) return damaged;
+    if (saved.recording.checks.size() != recording.checks.size())
+        return Error{ErrorCode::usage,
+                     name + (recording.checks.empty() ? ": was saved by a run that checked the restored meshes; check "
+                                                        "them in this one too."
+                                                      : ": was saved by a run that did not check the restored meshes; "
+                                                        "leave the check out of this one.")};
+    if (const Status restored = simulation.restore({saved.simulation.data(), saved.simulation.size()}); !restored)
+        return Error{restored.error().code, name + ": " + restored.error().message};
+    recording = std::move(saved.recording);
+    return Success{};
+}
+
+} // namespace filigree

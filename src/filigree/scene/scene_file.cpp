@@ -1,0 +1,343 @@
+#include "filigree/scene/scene_file.h"
+
+#include "filigree/io/file.h"
+#include "filigree/physics/named_materials.h"
+#include "filigree/scene/scene_keys.h"
+#include "filigree/scene/scene_table.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+#include <sstream>
+
+#include <fmt/format.h>
+#include <toml++/toml.h>
+
+namespace filigree {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kDegree = std::numbers::pi / 180;
+
+/// A name that can be part of a file's name.
+std::string plain_name(const std::string& text) {
+    std::string name;
+    for (const char c : text) name += std::isalnum(static_cast<unsigned char>(c)) || c == '-' || c == '_' ? c : '_';
+    return name.empty() ? "body" : name;
+}
+
+class SceneReader {
+public:
+    explicit SceneReader(const std::string& path) {
+        scene_.path = path;
+        const std::string bytes = read_file(path).value();
+        try {
+            root_ = toml::parse(bytes, path);
+        } catch (const toml::parse_error& error) {
+            std::string what(error.description());
+            while (!what.empty() && what.back() == '.') what.pop_back();
+            fail_at(path, std::max(1u, error.source().begin.line), what);
+        }
+    }
+
+    SceneFile read() {
+        check_tables();
+        if (const toml::table* table = single("simulation")) read_simulation({scene_.path, "simulation", *table});
+        if (const toml::table* table = single("world")) read_world({scene_.path, "world", *table});
+        if (const toml::table* table = single("picture")) read_picture({scene_.path, "picture", *table});
+        each("body", [&](const SceneTable& section) { read_body(section); });
+        if (scene_.bodies.empty())
+            throw BadResultAccess({ErrorCode::bad_file, scene_.path + ": there is no [[body]], and a scene needs one "
+                                                                      "(docs/scenes.md)."});
+        each("obstacle", [&](const SceneTable& section) { read_obstacle(section); });
+        each("pin", [&](const SceneTable& section) {
+            scene_.pins.push_back({section.line(), body_of(section), section.region(), section.motion()});
+        });
+        each("force", [&](const SceneTable& section) {
+            scene_.forces.push_back({section.line(), body_of(section), section.region(), section.keyed("newtons")});
+        });
+        each("hand", [&](const SceneTable& section) { read_hand(section); });
+        scene_.content = spelled();
+        return std::move(scene_);
+    }
+
+private:
+    void check_tables() const {
+        std::vector<std::string_view> tables;
+        for (const KeyRule& rule : scene_keys())
+            if (tables.empty() || tables.back() != rule.table) tables.push_back(rule.table);
+        for (const auto& [key, value] : root_) {
+            if (std::find(tables.begin(), tables.end(), key.str()) == tables.end()) {
+                const std::string alike = most_alike(key.str(), tables);
+                fail_at(scene_.path, key.source().begin.line,
+                        fmt::format("unknown table '{}'{}", key.str(),
+                                    alike.empty() ? " (docs/scenes.md)"
+                                                  : fmt::format("; did you mean {}?", shown_table(alike))));
+            }
+            const bool is_right = is_list(key.str()) ? value.is_array_of_tables() : value.is_table();
+            if (!is_right)
+                fail_at(scene_.path, key.source().begin.line,
+                        fmt::format("'{}' must be written as a table {}", key.str(), shown_table(key.str())));
+        }
+    }
+    const toml::table* single(std::string_view name) const {
+        const toml::node* node = root_.get(name);
+        return node ? node->as_table() : nullptr;
+    }
+    template <class Read>
+    void each(std::string_view name, const Read& read) const {
+        const toml::node* node = root_.get(name);
+        if (!node) return;
+        for (const toml::node& entry : *node->as_array()) read(SceneTable(scene_.path, name, *entry.as_table()));
+    }
+
+    void read_simulation(const SceneTable& in) {
+        if (in.has("frames") && in.has("duration")) in.fail("duration", "give one of frames and duration");
+        StepOptions& step = scene_.step;
+        in.set("frames_per_second", step.frames_per_second);
+        in.set_whole("frames", scene_.frames);
+        if (in.has("duration")) {
+            const double frames = std::round(in.number("duration", 0) * step.frames_per_second);
+            const double most = find_key("simulation", "frames")->most;
+            if (frames > most)
+                in.fail("duration", fmt::format("the duration takes {:.0f} frames at {} a second, and {:.0f} are the "
+                                                "most; shorten it or lower frames_per_second",
+                                                frames, step.frames_per_second, most));
+            scene_.frames = static_cast<std::size_t>(std::max(frames, 1.0));
+        }
+        step.mode = static_cast<StepMode>(in.word("mode", 0));
+        in.set_whole("most_substeps", step.most_substeps);
+        in.set_whole("descent_substeps", step.descent_substeps);
+        in.set_whole("descent_iterations", step.descent_iterations);
+        step.contacts_between_bodies = in.flag("contacts_between_bodies", true);
+    }
+
+    void read_world(const SceneTable& in) {
+        in.set("gravity", scene_.gravity);
+        scene_.wind = in.keyed("wind");
+        constexpr double kAir = 1.2; // kg/m^3, at 20 degrees Celsius
+        scene_.air_density = in.number("air_density", in.has("wind") ? kAir : 0);
+        in.set("body_friction", scene_.body_friction);
+        in.set("body_restitution", scene_.body_restitution);
+    }
+
+    void read_body(const SceneTable& in) {
+        SceneBody body;
+        body.line = in.line();
+        body.shape = in.text("shape");
+        if (in.has("mesh") == in.has("shape")) in.fail(in.line(), "[[body]] takes one of mesh and shape");
+        in.word("shape", 0);
+        in.refuse_others(in.has("shape") ? "shape" : "mesh");
+        if (in.has("mesh")) body.mesh = in.file("mesh");
+        in.set_whole("resolution", body.shape_options.resolution);
+        in.set("frequency", body.shape_options.frequency);
+        in.set("amplitude", body.shape_options.amplitude);
+        in.set("size", body.shape_options.size);
+        in.set("length", body.shape_options.length);
+        in.set("thickness", body.shape_options.thickness);
+        in.set_whole("driver", body.driver);
+        in.set("scale", body.body.scale);
+        if (in.has("particles") && in.has("spacing")) in.fail("spacing", "give one of particles and spacing");
+        in.set_whole("particles", body.body.cells.count);
+        in.set("spacing", body.body.cells.spacing);
+        read_material(in, body.material);
+        in.set("centre", body.centre);
+        body.rotation = in.rotation("rotate");
+        in.set("velocity", body.velocity);
+        in.set("spin", body.spin);
+        body.spin *= kDegree;
+        in.set("color", body.color);
+        body.name = name_of(in, body);
+        scene_.bodies.push_back(std::move(body));
+    }
+
+    std::string name_of(const SceneTable& in, const SceneBody& body) const {
+        const auto is_taken = [&](const std::string& name) {
+            return std::any_of(scene_.bodies.begin(), scene_.bodies.end(),
+                               [&](const SceneBody& other) { return other.name == name; });
+        };
+        if (in.has("name")) {
+            const std::string name = in.text("name");
+            if (name != plain_name(name)) in.fail("name", "a body's name is made of letters, digits, - and _");
+            if (is_taken(name)) in.fail("name", "two bodies are called '" + name + "'");
+            return name;
+        }
+        const std::string base = plain_name(body.mesh.empty() ? body.shape : fs::path(body.mesh).stem().string());
+        std::string name = base;
+        for (int number = 2; is_taken(name); ++number) name = fmt::format("{}{}", base, number);
+        return name;
+    }
+
+    /// Refuses keys that do nothing for the body's model.
+    static void refuse_other_models(const SceneTable& in, MaterialModel model) {
+        constexpr std::array kNames = {"fem", "springs", "meshfree"};
+        const auto refuse = [&](std::string_view key, const char* models) {
+            if (in.has(key))
+                in.fail(key, fmt::format("'{}' in [[body]] is for model = {}, and this body's is \"{}\"", key, models,
+                                         kNames[std::size_t(model)]));
+        };
+        if (model != MaterialModel::meshfree)
+            for (const char* key : {"yield_stress", "creep_time", "temperature", "melting_from", "melting_to",
+                                    "viscosity", "heating", "conductivity"})
+                refuse(key, "\"meshfree\"");
+        if (model != MaterialModel::springs) refuse("bending", "\"springs\"");
+        if (model == MaterialModel::springs) refuse("poisson_ratio", "\"fem\" or \"meshfree\"");
+    }
+
+    static void read_material(const SceneTable& in, Material& material) {
+        std::vector<std::string_view> names;
+        for (const NamedMaterial& named : named_materials()) names.push_back(named.name);
+        const std::string name = in.has("material") ? in.text("material") : std::string(names[0]);
+        const auto found = std::find(names.begin(), names.end(), name);
+        if (found == names.end()) {
+            const std::string alike = most_alike(name, names);
+            in.fail("material", fmt::format("there is no material '{}'{}; there are {}", name,
+                                            alike.empty() ? "" : " ('" + alike + "'?)", fmt::join(names, ", ")));
+        }
+        material = named_materials()[std::size_t(found - names.begin())].material;
+        material.model = static_cast<MaterialModel>(in.word("model", static_cast<int>(material.model)));
+        refuse_other_models(in, material.model);
+        if (material.model != MaterialModel::meshfree) // a flowing material as another model does not flow
+            material.yield_stress = material.melting_from = material.melting_to = Material::kNever;
+        in.set("density", material.density);
+        in.set("young_modulus", material.young_modulus);
+        in.set("poisson_ratio", material.poisson_ratio);
+        in.set("damping", material.damping);
+        in.set("internal_damping", material.internal_damping);
+        in.set("bending", material.bending);
+        in.set("yield_stress", material.yield_stress);
+        in.set("creep_time", material.creep_time);
+        in.set("temperature", material.temperature);
+        in.set("melting_from", material.melting_from);
+        in.set("melting_to", material.melting_to);
+        in.set("viscosity", material.viscosity);
+        in.set("heating", material.heating);
+        in.set("conductivity", material.conductivity);
+        if (std::string wrong = check_material(material); !wrong.empty()) {
+            while (wrong.back() == '.') wrong.pop_back();
+            in.fail(in.line(), wrong);
+        }
+    }
+
+    void read_obstacle(const SceneTable& in) {
+        SceneObstacle obstacle;
+        obstacle.line = in.line();
+        if (!in.has("shape")) in.fail(in.line(), "[[obstacle]] needs a shape: ground, ball, box or mesh");
+        in.word("shape", 0);
+        obstacle.shape = in.text("shape");
+        in.refuse_others(obstacle.shape);
+        in.set("point", obstacle.ground.point);
+        in.set("normal", obstacle.ground.normal);
+        if (!(obstacle.ground.normal.norm() > 0)) in.fail("normal", "the normal has no length");
+        obstacle.ground.normal.normalize();
+        in.set("centre", obstacle.centre);
+        obstacle.ball.centre = obstacle.box.centre = obstacle.centre.value_or(Vec3d::Zero());
+        in.set("radius", obstacle.ball.radius);
+        in.set("size", obstacle.box.size);
+        if (!(obstacle.box.size.minCoeff() > 0)) in.fail("size", "the sides of a box must be above 0");
+        if (obstacle.shape == "mesh" && !in.has("mesh")) in.fail(in.line(), "an obstacle of shape mesh needs a mesh");
+        if (in.has("mesh")) obstacle.mesh = in.file("mesh");
+        in.set("scale", obstacle.scale);
+        in.set("spacing", obstacle.spacing);
+        obstacle.motion = in.motion();
+        in.set("friction", obstacle.friction);
+        in.set("restitution", obstacle.restitution);
+        obstacle.sets_restitution = in.has("restitution");
+        in.set("stiffness", obstacle.stiffness);
+        in.set("color", obstacle.color);
+        obstacle.visible = in.flag("visible", true);
+        scene_.obstacles.push_back(std::move(obstacle));
+    }
+
+    /// The body that a pin, force or hand names.
+    std::size_t body_of(const SceneTable& in) const {
+        if (!in.has("body")) {
+            if (scene_.bodies.size() > 1)
+                in.fail(in.line(), "there are several bodies; say which with body = \"name\"");
+            return 0;
+        }
+        std::vector<std::string_view> names;
+        for (const SceneBody& body : scene_.bodies) names.push_back(body.name);
+        const std::string name = in.text("body");
+        const auto found = std::find(names.begin(), names.end(), name);
+        if (found == names.end())
+            in.fail("body", fmt::format("there is no body '{}'; there are {}", name, fmt::join(names, ", ")));
+        return std::size_t(found - names.begin());
+    }
+
+    void read_hand(const SceneTable& in) {
+        SceneHand hand;
+        hand.line = in.line();
+        hand.body = hand.hand.body = body_of(in);
+        if (in.has("point") == in.has("vertex")) in.fail(in.line(), "[[hand]] takes one of point and vertex");
+        in.set("point", hand.point);
+        if (in.has("vertex")) in.set_whole("vertex", hand.vertex.emplace());
+        if (!in.has("target")) in.fail(in.line(), "[[hand]] needs a target: where it pulls to");
+        hand.hand.target = in.keyed("target");
+        in.set("stiffness", hand.hand.stiffness);
+        in.set("from", hand.hand.from);
+        in.set("until", hand.hand.until);
+        if (!(hand.hand.from < hand.hand.until)) in.fail("until", "a hand lets go after it takes hold");
+        scene_.hands.push_back(std::move(hand));
+    }
+
+    void read_picture(const SceneTable& in) {
+        ScenePicture& picture = scene_.picture;
+        picture.view = static_cast<View>(in.word("view", static_cast<int>(View::iso)));
+        picture.up = static_cast<UpAxis>(in.word("up", static_cast<int>(UpAxis::y)));
+        in.set("eye", picture.eye);
+        in.set("target", picture.target);
+        if (picture.eye.has_value() != picture.target.has_value())
+            in.fail(in.line(), "eye and target of the camera go together");
+        if (picture.eye && *picture.eye == *picture.target) in.fail("eye", "eye and target are the same point");
+        in.set("field_of_view", picture.field_of_view);
+        if (in.has("size")) std::tie(picture.width, picture.height) = in.pixels("size");
+        if (in.has("background")) {
+            const std::string colors = in.text("background");
+            const std::size_t comma = colors.find(',');
+            picture.background_top = in.color("background", colors.substr(0, comma));
+            picture.background_bottom =
+                comma == std::string::npos ? picture.background_top : in.color("background", colors.substr(comma + 1));
+        }
+        picture.ground = in.flag("ground", true);
+        picture.obstacles = in.flag("obstacles", true);
+        picture.particles = in.flag("particles", false);
+        in.set_whole("passes", picture.passes);
+        in.set_whole("most_triangles", picture.most_triangles);
+    }
+
+    /// The scene without its comments, its pictures and its length, always in one order.
+    std::string spelled() const {
+        toml::table kept = root_;
+        kept.erase("picture");
+        if (toml::table* simulation = kept["simulation"].as_table()) {
+            simulation->erase("frames");
+            simulation->erase("duration");
+        }
+        std::ostringstream text;
+        text << toml::toml_formatter(kept) << "\nparticles drawn: " << scene_.picture.particles;
+        return text.str();
+    }
+
+    toml::table root_;
+    SceneFile scene_;
+};
+
+} // namespace
+
+Result<SceneFile> read_scene(const std::string& path) {
+    try {
+        return SceneReader(path).read();
+    } catch (const BadResultAccess& failure) {
+        return failure.error();
+    }
+}
+
+Error scene_error(const SceneFile& scene, unsigned line, ErrorCode code, const std::string& what) {
+    return error_at(scene.path, line, code, what);
+}
+
+} // namespace filigree

@@ -1,0 +1,68 @@
+// A scene that moves: simulated frame by frame, each body's driver recorded, and what makes the motion doubtful said.
+#pragma once
+
+#include "filigree/hierarchy/restore.h"
+#include "filigree/scene/recording.h"
+#include "filigree/scene/world_setup.h"
+
+#include <map>
+#include <optional>
+#include <string>
+
+namespace filigree {
+
+class SceneRun {
+public:
+    /// A run at its start. scene and ready must outlive it and stay where they are. checks: whether every vertex is
+    /// also carried by the particles, and the restored mesh compared with that: dearer. Errors: as of
+    /// Simulation::create and Restorer::create.
+    static Result<SceneRun> create(const SceneFile& scene, const ReadyScene& ready, bool checks,
+                                   const RunContext& context);
+    /// Goes on from a state; name: what errors call it. Errors: as of unpack_state.
+    Status resume(std::string_view state, const std::string& name);
+    /// A state, for resume().
+    std::string save() const;
+
+    /// Simulates until that many frames are done; progress: "simulating". Errors: as of Simulation::advance and
+    /// Restorer::positions; what was recorded before is whole. Cancelled: the frame that was begun is left out.
+    Status advance_to(std::uint64_t frame, const RunContext& context);
+
+    std::uint64_t frame() const { return recording_.totals.frames; }
+    const Recording& recording() const { return recording_; }
+    const RunTimes& times() const { return times_; }
+    Energy energy() const { return simulation_.energy(always_); }
+    /// The body's mesh in one of the recorded poses, at the scene's origin. Errors: as of Restorer::mesh.
+    Result<Mesh> mesh(std::size_t body, std::size_t frame, const RunContext& context) const;
+    /// What makes the motion so far doubtful, or other than the scene says: sentences.
+    std::vector<std::string> warnings() const;
+
+private:
+    /// What goes along with a body.
+    struct Follower {
+        std::size_t driver = 0;            ///< attachment
+        std::optional<std::size_t> direct; ///< of every vertex, where that is checked
+        Restorer restorer;
+        std::vector<Vec3f> restored;             ///< the latest frame
+        std::optional<std::uint64_t> first_lost; ///< the first frame in which hold_lost held some
+    };
+
+    SceneRun(const SceneFile& scene, const ReadyScene& ready, Simulation simulation, unsigned threads);
+    Status follow(bool checks);
+    Status record_body(std::size_t body);
+    void hold_lost_of(std::size_t body);
+    void check_body(std::size_t body);
+    bool is_left_alone() const;
+    std::optional<std::string> energy_warning() const;
+    std::optional<std::string> descent_warning() const;
+
+    const SceneFile* scene_;
+    const ReadyScene* ready_;
+    RunContext always_; ///< not cancelled: what is recorded of a frame is whole
+    Simulation simulation_;
+    std::vector<Follower> followers_;
+    Recording recording_;
+    RunTimes times_;
+    float last_volume_ratio_ = 1;
+};
+
+} // namespace filigree

@@ -1,0 +1,58 @@
+#include "scene/scenes.h"
+
+#include "filigree/scene/scene_keys.h"
+
+namespace filigree {
+namespace {
+
+using SceneFileTest = filigree_test::Scenes;
+using filigree_test::kDrop;
+
+TEST_F(SceneFileTest, HoldsWhatIsWrittenAndTheDefaultsElse) {
+    const SceneFile scene = this->scene(kDrop + "color = \"#ff0000\"\nmove = [{ time = 0, value = [0, 0, 0] }, "
+                                                "{ time = 1, value = [0, 2, 0] }]\n[picture]\nup = \"z\"\n");
+    EXPECT_EQ(scene.frames, 6U);
+    ASSERT_EQ(scene.bodies.size(), 1U);
+    EXPECT_EQ(scene.bodies[0].name, "cube");
+    EXPECT_EQ(scene.bodies[0].driver, 60U);
+    EXPECT_EQ(scene.bodies[0].centre, Vec3d(0, 0.62, 0));
+    EXPECT_FALSE(scene.bodies[0].color);
+    EXPECT_EQ(scene.gravity, Vec3d(0, -9.81, 0));
+    ASSERT_EQ(scene.obstacles.size(), 1U);
+    EXPECT_EQ(scene.obstacles[0].color, Vec3f(1, 0, 0));
+    EXPECT_TRUE(scene.obstacles[0].motion.moves());
+    EXPECT_EQ(scene.obstacles[0].motion.move.values[1], Vec3d(0, 2, 0));
+    EXPECT_EQ(scene.picture.up, UpAxis::z);
+}
+
+TEST_F(SceneFileTest, RefusesWithLineAndSuggestion) {
+    EXPECT_EQ(refusal("[[body]]\nshpe = \"bar\"\n"), "2: unknown key 'shpe' in [[body]]; did you mean 'shape'?");
+    EXPECT_EQ(refusal("[bodi]\n"), "1: unknown table 'bodi'; did you mean [[body]]?");
+    EXPECT_EQ(refusal("[[body]]\nshape = \"bar\"\nradius = 3\n"),
+              "3: unknown key 'radius' in [[body]]; it belongs to [[obstacle]].");
+    EXPECT_EQ(refusal("[[body]]\nshape = \"bar\"\ncolor = \"red\"\n"),
+              "3: color: 'red' is no colour; write it as #rrggbb, such as #d04030.");
+    EXPECT_EQ(refusal("[[body]]\nshape = \"bar\"\nsize = 0\n"),
+              "3: 'size' in [[body]] must be a number, above 0, and is 0.");
+}
+
+TEST_F(SceneFileTest, ContentIsTheMotionsAlone) {
+    const std::string content = scene(kDrop).content;
+    EXPECT_EQ(scene("# a comment\n" + kDrop + "[picture]\nview = \"top\"\n").content, content);
+    EXPECT_NE(scene(kDrop + "friction = 0.1\n").content, content);
+}
+
+TEST_F(SceneFileTest, ErrorsInALineEndInOneFullStop) {
+    const SceneFile scene = this->scene(kDrop);
+    for (const char* what : {"no such thing", "no such thing.", "no such thing.."})
+        EXPECT_EQ(scene_error(scene, 7, ErrorCode::mismatch, what).message, scene.path + ":7: no such thing.");
+}
+
+TEST(SceneKeys, EveryKeyIsInTheManual) {
+    const std::string manual = scene_manual();
+    for (const KeyRule& rule : scene_keys())
+        EXPECT_NE(manual.find("| `" + std::string(rule.key) + "` |"), std::string::npos) << rule.key;
+}
+
+} // namespace
+} // namespace filigree

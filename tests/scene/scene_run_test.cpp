@@ -1,0 +1,139 @@
+#include "scene/scenes.h"
+
+#include "filigree/scene/particles_near.h"
+#include "filigree/scene/saved_state.h"
+
+namespace filigree {
+namespace {
+
+const RunContext kContext(1);
+
+class SceneRunTest : public filigree_test::Scenes {
+protected:
+    /// A scene and its run, which refers to it.
+    struct Made {
+        SceneFile scene;
+        ReadyScene ready;
+        std::optional<SceneRun> run;
+    };
+    std::unique_ptr<Made> made(const std::string& text = filigree_test::kDrop, bool checks = false) const {
+        auto made = std::make_unique<Made>();
+        made->scene = scene(text);
+        made->ready = set_up(made->scene, kContext).value();
+        made->run.emplace(SceneRun::create(made->scene, made->ready, checks, kContext).value());
+        return made;
+    }
+    static std::string state_after(Made& made, std::uint64_t frame) {
+        EXPECT_TRUE(made.run->advance_to(frame, kContext));
+        return made.run->save();
+    }
+};
+
+TEST_F(SceneRunTest, EqualRunsSaveEqualBytes) {
+    EXPECT_EQ(state_after(*made(), 4), state_after(*made(), 4));
+    EXPECT_EQ(state_after(*made(filigree_test::kDrop, true), 4), state_after(*made(filigree_test::kDrop, true), 4));
+}
+
+TEST_F(SceneRunTest, AResumedRunSavesWhatOneThatWentThroughSaves) {
+    const std::string half = state_after(*made(), 3), through = state_after(*made(), 6);
+    const auto resumed = made();
+    ASSERT_TRUE(resumed->run->resume(half, "half"));
+    EXPECT_EQ(resumed->run->frame(), 3U);
+    EXPECT_EQ(state_after(*resumed, 6), through);
+    EXPECT_EQ(resumed->run->times().frames, 3U);
+}
+
+TEST_F(SceneRunTest, StatesThatDoNotFitAreRefusedAndChangeNothing) {
+    const auto run = made();
+    const std::string state = state_after(*run, 2);
+    const auto code = [&](const std::string& bytes) { return run->run->resume(bytes, "state").error().code; };
+    EXPECT_EQ(code("nonsense"), ErrorCode::bad_file);
+    std::string older = state;
+    older[7] = '1';
+    EXPECT_NE(run->run->resume(older, "state").error().message.find("another version"), std::string::npos);
+    for (std::size_t size = 0; size < state.size(); size += 97)
+        EXPECT_EQ(code(state.substr(0, size)), ErrorCode::bad_file);
+    for (std::size_t at = 8; at < state.size(); at += state.size() / 23) {
+        std::string damaged = state;
+        damaged[at] = char(damaged[at] ^ 0x40);
+        EXPECT_EQ(code(damaged), ErrorCode::bad_file) << at;
+    }
+    EXPECT_EQ(made(filigree_test::kDrop + "friction = 0.1\n")->run->resume(state, "state").error().code,
+              ErrorCode::mismatch);
+    EXPECT_EQ(made(filigree_test::kDrop, true)->run->resume(state, "state").error().code, ErrorCode::usage);
+    EXPECT_EQ(run->run->save(), state);
+}
+
+TEST_F(SceneRunTest, CancelledLeavesWholeFrames) {
+    const auto run = made();
+    RunContext context(1);
+    context.progress = [&](std::string_view, double fraction) {
+        if (fraction >= 0.5) context.cancel();
+    };
+    const Status status = run->run->advance_to(4, context);
+    ASSERT_FALSE(status);
+    EXPECT_EQ(status.error().code, ErrorCode::cancelled);
+    EXPECT_EQ(run->run->frame(), 2U);
+    EXPECT_EQ(run->run->recording().poses[0].frames.size(), 3U);
+    EXPECT_EQ(run->run->save(), state_after(*made(), 2));
+}
+
+TEST_F(SceneRunTest, ChecksFindTheRestoredMeshNear) {
+    const auto run = made(filigree_test::kDrop, true);
+    ASSERT_TRUE(run->run->advance_to(3, kContext));
+    ASSERT_EQ(run->run->recording().checks.size(), 1U);
+    const CheckTotals& check = run->run->recording().checks[0];
+    EXPECT_GT(check.worst_rms, 0);
+    EXPECT_LT(check.worst_rms, 1e-2);
+    EXPECT_LE(check.rms_sum, 3 * check.worst_rms);
+    EXPECT_TRUE(run->run->warnings().empty());
+}
+
+TEST_F(SceneRunTest, BodiesThatStartInsideSomethingAreDoubted) {
+    const auto run = made("[[body]]\nshape = \"wavy-cube\"\nresolution = 8\nparticles = 200\ndriver = 60\n"
+                          "[[obstacle]]\nshape = \"ground\"\n");
+    ASSERT_TRUE(run->run->advance_to(5, kContext));
+    ASSERT_EQ(run->run->warnings().size(), 1U);
+    EXPECT_NE(run->run->warnings()[0].find("the energy grew by"), std::string::npos);
+}
+
+TEST_F(SceneRunTest, PinsFindTheirParticles) {
+    const auto pinned = [&](const std::string& region) {
+        return set_up(scene(filigree_test::kDrop + "[[pin]]\n" + region + "\n"), kContext);
+    };
+    const Result<ReadyScene> all = pinned("");
+    const std::size_t count = all->bodies[0].body->particle_count();
+    EXPECT_EQ(all->world.pins[0].particles.size(), count);
+    const Result<ReadyScene> near = pinned("vertices = [0, 1]");
+    EXPECT_GE(near->world.pins[0].particles.size(), 1U);
+    EXPECT_LT(near->world.pins[0].particles.size(), count / 4);
+    const Result<ReadyScene> none = pinned("box = { min = [9, 9, 9], max = [10, 10, 10] }");
+    ASSERT_FALSE(none);
+    EXPECT_NE(none.error().message.find("holds no particle of 'cube'"), std::string::npos);
+    EXPECT_NE(pinned("vertices = [123456]").error().message.find("there is no vertex 123456"), std::string::npos);
+}
+
+TEST_F(SceneRunTest, ParticlesNearAPointAreThoseWithinHalfACellAndTheNearest) {
+    const auto run = made();
+    const Body& body = *run->ready.bodies[0].body;
+    const std::vector<Vec3f> there = {body.rest[5]}, far = {Vec3f(100, 0, 0)};
+    const std::vector<Index> near = particles_near(body, there);
+    EXPECT_TRUE(std::binary_search(near.begin(), near.end(), 5U));
+    for (const Index i : near) EXPECT_LE((body.rest[i] - there[0]).norm(), 0.88 * body.spacing());
+    EXPECT_EQ(particles_near(body, far).size(), 1U);
+    EXPECT_TRUE(particles_near(body, {}).empty());
+}
+
+TEST(HoldLost, HoldsWhatIsFarOrNoNumber) {
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    const std::vector<Mat3f> still(4, Mat3f::Identity());
+    const Pose before{{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}}, still, {}};
+    Pose now{{{0.5f, 0, 0}, {100, 0, 0}, {nan, 0, 0}, {3.5f, 0, 0}}, still, {}};
+    now.gradients[3] = 1000 * Mat3f::Identity();
+    EXPECT_EQ(hold_lost(before, now, 10, 100), 3U);
+    EXPECT_EQ(now.positions, (std::vector<Vec3f>{{0.5f, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}}));
+    EXPECT_EQ(now.gradients, still);
+}
+
+} // namespace
+} // namespace filigree
