@@ -1,8 +1,7 @@
 #include "film_export.h"
 
-#include "filigree/render/film.h"
-#include "filigree/render/gl_context.h"
-#include "filigree/render/renderer.h"
+#include "filigree/present/film_frames.h"
+#include "filigree/present/headless_renderer.h"
 
 #include <algorithm>
 
@@ -43,9 +42,7 @@ Result<std::size_t> export_film(const FilmJob& job, const std::string& path, con
     Result<FilmWriter> writer =
         FilmWriter::create(path, job.film.width, job.film.height, turns ? kTurntableRate : job.poses.frames_per_second);
     if (!writer) return writer.error();
-    const Result<HeadlessContext> gl = HeadlessContext::create();
-    if (!gl) return gl.error();
-    Result<Renderer> renderer = Renderer::create();
+    Result<HeadlessRenderer> renderer = HeadlessRenderer::create();
     if (!renderer) return renderer.error();
     RunContext quiet = context; // the progress is that of the frames
     quiet.progress = nullptr;
@@ -82,17 +79,15 @@ Result<std::size_t> export_film(const FilmJob& job, const std::string& path, con
     Camera camera = job.camera;
     camera.up = up_vector(job.view.up);
 
-    for (std::size_t frame = 0; frame < frames; ++frame) {
-        context.report("drawing the film", double(frame) / double(frames));
-        if (context.is_cancelled()) return cancelled_error();
+    const auto draw = [&](std::size_t frame, const RunContext&) -> Result<Picture> {
         if (!turns)
             if (const Status posed = model->set_pose(job.poses.frames[frame], quiet); !posed) return posed.error();
-        const Result<Picture> picture =
-            renderer->picture(scene, turns ? turned(camera, 360.0 * double(frame) / double(frames)) : camera,
-                              {.width = job.film.width, .height = job.film.height, .passes = job.film.passes}, quiet);
-        if (!picture) return picture.error();
-        if (const Status added = writer->add(*picture); !added) return added.error();
-    }
+        return renderer->picture(scene, turns ? turned(camera, 360.0 * double(frame) / double(frames)) : camera,
+                                 {.width = job.film.width, .height = job.film.height, .passes = job.film.passes},
+                                 quiet);
+    };
+    if (const Status drawn = film_frames(frames, draw, std::span(&*writer, 1), "drawing the film", context); !drawn)
+        return drawn.error();
     if (context.is_cancelled()) return cancelled_error();
     if (const Status finished = writer->finish(); !finished) return finished.error();
     return frames;

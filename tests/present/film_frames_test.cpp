@@ -81,7 +81,6 @@ TEST_F(FilmFrames, StopsAtAnErrorAndWhenCancelled) {
 
 TEST(LevelWithin, IsTheFinestThatFits) {
     StripOptions options;
-    options.base = 100;
     options.levels = 3;
     const Model model = strip(make_wavy_cube({.resolution = 24}), options, kContext)->model;
     const auto triangles = [&](unsigned level) {

@@ -93,8 +93,9 @@ TEST_F(SceneRunTest, BodiesThatStartInsideSomethingAreDoubted) {
     const auto run = made("[[body]]\nshape = \"wavy-cube\"\nresolution = 8\nparticles = 200\ndriver = 60\n"
                           "[[obstacle]]\nshape = \"ground\"\n");
     ASSERT_TRUE(run->run->advance_to(5, kContext));
-    ASSERT_EQ(run->run->warnings().size(), 1U);
-    EXPECT_NE(run->run->warnings()[0].find("the energy grew by"), std::string::npos);
+    std::string said;
+    for (const std::string& sentence : run->run->warnings()) said += sentence;
+    EXPECT_NE(said.find("the energy grew by"), std::string::npos) << said;
 }
 
 TEST_F(SceneRunTest, PinsFindTheirParticles) {
