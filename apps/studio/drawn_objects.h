@@ -6,9 +6,8 @@
 #include "shown_model.h"
 #include "workbench.h"
 
-#include "filigree/present/patch_surface.h"
-
 #include "filigree/mesh/defect_edges.h"
+#include "filigree/present/patch_surface.h"
 
 #include <QPalette>
 
