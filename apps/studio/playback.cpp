@@ -173,7 +173,7 @@ private:
                 }
                 if (resets) {
                     if (Status restored = simulation->restore(start); !restored) return restored.error();
-                    simulation->set_hands({}, life);
+                    if (Status let_go = simulation->set_hands({}, life); !let_go) return let_go.error();
                     last = start_of(*made).pose;
                     resets = false;
                     continue;
@@ -186,7 +186,8 @@ private:
                 new_hands = std::exchange(hands, std::nullopt);
             }
             const Clock::time_point begun = Clock::now();
-            if (new_hands) simulation->set_hands(std::move(*new_hands), life);
+            if (new_hands)
+                if (Status seized = simulation->set_hands(std::move(*new_hands), life); !seized) return seized.error();
             Moment moment;
             if (is_frame) {
                 const Result<FrameReport> report = simulation->advance(now);

@@ -32,10 +32,10 @@ TEST(Body, ABoxWeighsWhatItShould) {
         EXPECT_NEAR(sum(body.mass), 800 * 0.06, 1e-5);
         EXPECT_NEAR(sum(body.volume), 0.06, 1e-8);
         EXPECT_FLOAT_EQ(body.mass[0], corners ? 0.1f : 0.8f); // of one cell: an eighth, or all
-        EXPECT_EQ(body.skin.points.size(), 4u * 2 * (5 * 4 + 4 * 3 + 3 * 5));
-        EXPECT_NEAR(sum(body.skin.areas), 0.94, 1e-6);
-        for (std::size_t p = 0; p < body.skin.points.size(); ++p) {
-            const Vec3f out = body.skin.points.rest[p] + 0.01f * body.skin.normals[p];
+        EXPECT_EQ(body.surface.points.size(), 4u * 2 * (5 * 4 + 4 * 3 + 3 * 5));
+        EXPECT_NEAR(sum(body.surface.areas), 0.94, 1e-6);
+        for (std::size_t p = 0; p < body.surface.points.size(); ++p) {
+            const Vec3f out = body.surface.points.rest[p] + 0.01f * body.surface.normals[p];
             EXPECT_TRUE((out.array() < 0).any() || (out.array() > Eigen::Array3f(0.5f, 0.4f, 0.3f)).any());
         }
     }
@@ -51,7 +51,7 @@ TEST(Body, MeshfreeCellsWithoutNeighboursAroundAreSplit) {
     EXPECT_LT((line.rest[0] - Vec3f(0.025f, 0.025f, 0.025f)).norm(), 1e-6f);
 }
 
-TEST(Body, ASphereHasItsMassAndSkin) {
+TEST(Body, ASphereHasItsMassAndSurface) {
     const double pi = 3.14159265358979;
     const Mesh sphere = make_wavy_sphere({.resolution = 40, .amplitude = 0});
     for (const MaterialModel model : {MaterialModel::fem, MaterialModel::meshfree}) {
@@ -61,51 +61,51 @@ TEST(Body, ASphereHasItsMassAndSkin) {
         EXPECT_NEAR(double(body->particle_count()) / 8000, 1, 0.16);
         EXPECT_NEAR(sum(body->mass) / (1000 * pi / 6 * 8), 1, 0.015);
         EXPECT_NEAR(report.mass, sum(body->mass), 1e-3);
-        EXPECT_NEAR(sum(body->skin.areas) / (4 * pi), 1, 0.01);
-        EXPECT_EQ(report.skin_points, body->skin.points.size());
+        EXPECT_NEAR(sum(body->surface.areas) / (4 * pi), 1, 0.01);
+        EXPECT_EQ(report.surface_points, body->surface.points.size());
         const double wanted = 4 * pi / (0.25 * body->spacing() * body->spacing());
-        EXPECT_GT(double(report.skin_points), 0.8 * wanted);
-        EXPECT_LT(double(report.skin_points), 1.8 * wanted);
-        for (std::size_t p = 0; p < report.skin_points; ++p) {
-            const Vec3f& point = body->skin.points.rest[p];
+        EXPECT_GT(double(report.surface_points), 0.8 * wanted);
+        EXPECT_LT(double(report.surface_points), 1.8 * wanted);
+        for (std::size_t p = 0; p < report.surface_points; ++p) {
+            const Vec3f& point = body->surface.points.rest[p];
             EXPECT_NEAR(point.norm(), 1, 2e-3);
-            EXPECT_GT(body->skin.normals[p].dot(point.normalized()), 0.95f);
+            EXPECT_GT(body->surface.normals[p].dot(point.normalized()), 0.95f);
         }
         EXPECT_EQ(report.warning, "");
     }
 }
 
-TEST(Body, TheSkinOfABoxHasItsEdgesAndCorners) {
+TEST(Body, TheSurfaceOfABoxHasItsEdgesAndCorners) {
     const Mesh bar = make_bar({.resolution = 4, .size = 0.2, .length = 2});
     const auto body = make_body(bar, of(MaterialModel::fem), {.cells = {.spacing = 0.05}}, kContext);
     ASSERT_TRUE(body) << body.error().message;
     int corners = 0;
-    for (const Vec3f& point : body->skin.points.rest)
+    for (const Vec3f& point : body->surface.points.rest)
         corners += (point.cwiseAbs() - Vec3f(0.2f, 0.1f, 0.1f)).norm() < 1e-6f;
     EXPECT_EQ(corners, 8);
-    EXPECT_NEAR(sum(body->skin.areas), 2 * 0.04 + 4 * 0.08, 1e-6);
+    EXPECT_NEAR(sum(body->surface.areas), 2 * 0.04 + 4 * 0.08, 1e-6);
 }
 
-TEST(Body, SkinFollowsTheParticles) {
+TEST(Body, SurfacePointsFollowTheParticles) {
     const Mesh cube = make_wavy_cube({.resolution = 24});
     for (const MaterialModel model : {MaterialModel::fem, MaterialModel::meshfree}) {
         const auto body = make_body(cube, of(model), {.cells = {.count = 2000}}, kContext);
         ASSERT_TRUE(body) << body.error().message;
-        const Embedding& skin = body->skin.points;
-        for (std::size_t p = 0; p < skin.size(); ++p) {
+        const Embedding& points = body->surface.points;
+        for (std::size_t p = 0; p < points.size(); ++p) {
             Vec3d at = Vec3d::Zero();
             double weights = 0;
-            for (Index n = skin.offsets[p]; n < skin.offsets[p + 1]; ++n) {
-                at += skin.weights[n] * body->rest[skin.particles[n]].cast<double>();
-                weights += skin.weights[n];
+            for (Index n = points.offsets[p]; n < points.offsets[p + 1]; ++n) {
+                at += points.weights[n] * body->rest[points.particles[n]].cast<double>();
+                weights += points.weights[n];
             }
             ASSERT_NEAR(weights, 1, 1e-6);
-            ASSERT_LT((at - skin.rest[p].cast<double>()).norm(), 1e-6);
+            ASSERT_LT((at - points.rest[p].cast<double>()).norm(), 1e-6);
         }
     }
 }
 
-TEST(Body, KoalaHasItsMassAndSkin) {
+TEST(Body, KoalaHasItsMassAndSurface) {
     const auto path = filigree_test::corpus_folder() / "good/koala_100k.obj";
     if (!std::filesystem::exists(path)) GTEST_SKIP() << "no corpus";
     const Mesh koala = read_mesh(path, kContext)->mesh;
@@ -123,20 +123,20 @@ TEST(Body, KoalaHasItsMassAndSkin) {
     const auto body = make_body(koala, of(MaterialModel::meshfree), {}, kContext);
     ASSERT_TRUE(body) << body.error().message;
     EXPECT_NEAR(sum(body->mass) / (1000 * volume), 1, 0.01);
-    EXPECT_NEAR(sum(body->skin.areas) / area, 1, 0.001);
+    EXPECT_NEAR(sum(body->surface.areas) / area, 1, 0.001);
 
     const ClosestPointTree tree(koala.positions, welded.triangles);
     const double size = bounds(koala.positions).diagonal();
     std::size_t outward = 0;
-    for (std::size_t p = 0; p < body->skin.points.size(); ++p) {
-        const SurfacePoint found = tree.closest(body->skin.points.rest[p]);
+    for (std::size_t p = 0; p < body->surface.points.size(); ++p) {
+        const SurfacePoint found = tree.closest(body->surface.points.rest[p]);
         ASSERT_LT(found.distance, 1e-6 * size);
         const Triangle& t = welded.triangles[found.triangle];
         const Vec3f normal =
             (koala.positions[t[1]] - koala.positions[t[0]]).cross(koala.positions[t[2]] - koala.positions[t[0]]);
-        outward += normal.dot(body->skin.normals[p]) > 0;
+        outward += normal.dot(body->surface.normals[p]) > 0;
     }
-    EXPECT_GT(double(outward), 0.99 * double(body->skin.points.size()));
+    EXPECT_GT(double(outward), 0.99 * double(body->surface.points.size()));
 }
 
 TEST(Body, ThreadsDoNotMatter) {
@@ -147,9 +147,9 @@ TEST(Body, ThreadsDoNotMatter) {
     const Body two = *make_body(cube, of(MaterialModel::meshfree), options, RunContext(2));
     EXPECT_EQ(one.rest.x, two.rest.x);
     EXPECT_EQ(one.mass, two.mass);
-    EXPECT_EQ(one.skin.points.rest, two.skin.points.rest);
-    EXPECT_EQ(one.skin.points.weights, two.skin.points.weights);
-    EXPECT_EQ(one.skin.normals, two.skin.normals);
+    EXPECT_EQ(one.surface.points.rest, two.surface.points.rest);
+    EXPECT_EQ(one.surface.points.weights, two.surface.points.weights);
+    EXPECT_EQ(one.surface.normals, two.surface.normals);
 }
 
 TEST(Body, ThinPartsAreSaid) {

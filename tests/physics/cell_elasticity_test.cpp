@@ -248,7 +248,7 @@ TEST(CellElasticity, PositionsThatAreNotFiniteHaveNoStableStep) {
         x.y[17] = bad;
         ElasticReport report;
         forces_of(body, x, &report);
-        EXPECT_FALSE(std::isfinite(report.rate)) << bad;
+        EXPECT_FALSE(std::isfinite(report.squared_frequency)) << bad;
     }
 }
 
@@ -285,11 +285,11 @@ TEST(CellElasticity, RateBoundsTheLargestEigenvalue) {
                 ElasticReport report;
                 forces_of(body, x, &report);
                 const double exact = largest_rate(body, matrix(x));
-                EXPECT_GE(report.rate, exact) << state.name << ", nu " << poisson_ratio;
+                EXPECT_GE(report.squared_frequency, exact) << state.name << ", nu " << poisson_ratio;
                 // Not so cautious that steps would be wasted; shrunk bodies are soft, and step as if at rest.
                 ElasticReport at_rest;
                 forces_of(body, body.rest, &at_rest);
-                EXPECT_LE(report.rate, std::max<double>(8 * exact, 2 * at_rest.rate))
+                EXPECT_LE(report.squared_frequency, std::max<double>(8 * exact, 2 * at_rest.squared_frequency))
                     << state.name << ", nu " << poisson_ratio;
             }
         }
@@ -298,7 +298,7 @@ TEST(CellElasticity, RateBoundsTheLargestEigenvalue) {
         forces_of(body, body.rest, &report);
         // Transits of a cell by a pressure wave that the longest step allows. Each cell alone could swell, neighbours
         // cannot do it together, so the bound is the more cautious the less the material can be compressed.
-        const double transits = 2 / std::sqrt(report.rate) * pressure_wave_speed(material) / 0.1;
+        const double transits = 2 / std::sqrt(report.squared_frequency) * pressure_wave_speed(material) / 0.1;
         EXPECT_LT(transits, 0.97);
         EXPECT_GT(transits, poisson_ratio > 0.4 ? 0.6 : 0.7);
     }
@@ -313,7 +313,7 @@ TEST(CellElasticity, ExplicitStepsWithinTheBoundAreStable) {
         const double start = elasticity->energy(x, kContext);
         double most = 0, time = 0;
         for (int step = 0; step < 2000 && time < 1; ++step) {
-            const float dt = 1.9f / std::sqrt(elasticity->forces(x, forces, kContext).rate);
+            const float dt = 1.9f / std::sqrt(elasticity->forces(x, forces, kContext).squared_frequency);
             ASSERT_TRUE(std::isfinite(dt) && dt > 0) << state.name;
             double kinetic = 0;
             for (std::size_t i = 0; i < x.size(); ++i) {
@@ -475,7 +475,7 @@ TEST(CellKernel, SameBytesForAnyLanesAndThreads) {
                     EXPECT_EQ(positions.x, expected_positions.x) << state.name << lanes;
                     EXPECT_EQ(positions.y, expected_positions.y) << state.name << lanes;
                     EXPECT_EQ(positions.z, expected_positions.z) << state.name << lanes;
-                    EXPECT_EQ(report.rate, expected.rate) << state.name << lanes;
+                    EXPECT_EQ(report.squared_frequency, expected.squared_frequency) << state.name << lanes;
                     EXPECT_EQ(report.least_volume_ratio, expected.least_volume_ratio) << state.name << lanes;
                     EXPECT_EQ(report.most_stretch, expected.most_stretch) << state.name << lanes;
                 }
@@ -538,7 +538,7 @@ double sag_over_theory(int length, int across, double poisson_ratio) {
     const double frequency = 3.516 * std::sqrt(E * inertia / (density * side * side)) / (L * L);
     float dt = 0;
     const int steps_per_swing = [&] {
-        dt = 1.8f / std::sqrt(elasticity->forces(x, forces, kContext).rate);
+        dt = 1.8f / std::sqrt(elasticity->forces(x, forces, kContext).squared_frequency);
         return static_cast<int>(2 * 3.14159 / (frequency * dt));
     }();
     const float keep = std::exp(-2.0f * float(frequency) * dt);

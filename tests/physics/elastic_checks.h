@@ -144,9 +144,10 @@ inline double expect_rate_is_a_bound(const Body& body, const Make& make) {
                             std::sqrt(double(body.mass[i]) * double(body.mass[j]));
             }
         const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen((K + K.transpose()) / 2, Eigen::EigenvaluesOnly);
-        EXPECT_GT(double(report.rate), eigen.eigenvalues().maxCoeff()) << state.name;
+        EXPECT_GT(double(report.squared_frequency), eigen.eigenvalues().maxCoeff()) << state.name;
         if (state.name == "rest")
-            at_rest = 2 / std::sqrt(double(report.rate)) * pressure_wave_speed(body.material) / body.spacing();
+            at_rest =
+                2 / std::sqrt(double(report.squared_frequency)) * pressure_wave_speed(body.material) / body.spacing();
     }
     return at_rest;
 }
@@ -207,7 +208,7 @@ inline void expect_same_bytes_for_threads(const Body& body, const Make& make) {
         EXPECT_TRUE(same_bytes(forces[0], forces[1])) << state.name;
         EXPECT_TRUE(same_bytes(swept[0], swept[1])) << state.name;
         EXPECT_FALSE(same_bytes(swept[0], state.positions)) << state.name;
-        EXPECT_EQ(reports[0].rate, reports[1].rate);
+        EXPECT_EQ(reports[0].squared_frequency, reports[1].squared_frequency);
         EXPECT_EQ(reports[0].least_volume_ratio, reports[1].least_volume_ratio);
         EXPECT_EQ(reports[0].most_stretch, reports[1].most_stretch);
         EXPECT_EQ(energies[0], energies[1]);

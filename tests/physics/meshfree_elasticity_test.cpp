@@ -45,7 +45,7 @@ struct Motion {
     /// hold(i, x, v) corrects a particle after it moved.
     template <class Hold>
     void step(const RunContext& context, const Vec3f& gravity, float damping, const Hold& hold) {
-        const float rate = elasticity->forces(x, forces, context).rate;
+        const float rate = elasticity->forces(x, forces, context).squared_frequency;
         const float dt = std::min(0.9f * 2 / std::sqrt(rate), 1 / 60.f);
         for (std::size_t i = 0; i < x.size(); ++i) {
             Vec3f v = velocity[i] * std::exp(-damping * dt) + dt * (forces[i] / body.mass[i] + gravity);
@@ -358,7 +358,7 @@ TEST(MeshfreeElasticity, ParticlesWithoutNeighboursAreLeftAlone) {
     elasticity->renew(x, context);
     Vectors forces(27);
     const ElasticReport report = elasticity->forces(x, forces, context);
-    EXPECT_TRUE(std::isfinite(report.rate));
+    EXPECT_TRUE(std::isfinite(report.squared_frequency));
     EXPECT_LT(forces[0].norm(), 1e-6f);
     for (std::size_t i = 0; i < 27; ++i) EXPECT_TRUE(forces[i].allFinite());
     elasticity->finish_substep(x, 1e-3f, context);
@@ -371,7 +371,7 @@ TEST(MeshfreeElasticity, PositionsThatAreNoNumbersAreToldByTheRate) {
     const auto elasticity = make_meshfree_elasticity(body, context);
     Vectors x = body.rest, forces(body.particle_count());
     x.y[13] = std::nanf("");
-    EXPECT_FALSE(std::isfinite(elasticity->forces(x, forces, context).rate));
+    EXPECT_FALSE(std::isfinite(elasticity->forces(x, forces, context).squared_frequency));
     elasticity->finish_substep(x, 1e-3f, context);
     elasticity->renew(x, context); // leaves everything as it is
     EXPECT_TRUE(checks::same_bytes(elasticity->reference(), body.rest));

@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <thread>
 
 namespace filigree {
 namespace {
@@ -296,7 +297,7 @@ TEST(Simulation, BarSwingsAtItsFrequency) {
     Simulation bar = simulation(world, {actor(body)}, {.frames_per_second = 240, .mode = StepMode::explicit_steps});
     Vectors bent = bar.positions(0), swing(bent.size());
     for (std::size_t i = 0; i < bent.size(); ++i) swing.y[i] = 0.05f * bent.x[i] * bent.x[i] * (3 - bent.x[i]) / 2;
-    bar.set_velocities(0, swing);
+    ASSERT_TRUE(bar.set_velocities(0, swing).ok());
     std::size_t tip = 0;
     for (std::size_t i = 0; i < bent.size(); ++i)
         if (bent.x[i] > 0.999f) tip = i;
@@ -474,10 +475,10 @@ TEST(Simulation, AHandPulls) {
     Hand hand;
     hand.point = {0.4f, 0.2f, 0.2f};
     hand.target.constant = Vec3d(1.4, 0.2, 0.2);
-    pulled.set_hands({hand}, RunContext(1));
+    ASSERT_TRUE(pulled.set_hands({hand}, RunContext(1)).ok());
     run(pulled, 300);
     EXPECT_NEAR(centre_of_mass(pulled).x(), 1.2, 0.05);
-    pulled.set_hands({}, RunContext(1));
+    ASSERT_TRUE(pulled.set_hands({}, RunContext(1)).ok());
     run(pulled, 10);
 }
 
@@ -505,7 +506,7 @@ TEST_P(EachMaterial, AttachedPointsFollowAffineMotions) {
     turn.col(0) *= 1.5f;
     Vectors positions = moved.positions(0);
     for (std::size_t i = 0; i < positions.size(); ++i) positions.set(i, turn * positions[i] + Vec3f(1, 2, 3));
-    moved.set_positions(0, positions);
+    ASSERT_TRUE(moved.set_positions(0, positions).ok());
     std::vector<Vec3f> now(points.size());
     std::vector<Mat3f> gradients(points.size());
     moved.attached(attachment, now, gradients, RunContext(1));
@@ -582,7 +583,7 @@ TEST_P(BadStart, ComesBackToRest) {
             p = Vec3f(float(random_unit(7, 3 * i)), float(random_unit(7, 3 * i + 1)), float(random_unit(7, 3 * i + 2)));
         positions.set(i, p);
     }
-    wild.set_positions(0, positions);
+    ASSERT_TRUE(wild.set_positions(0, positions).ok());
     FrameReport report;
     for (int second = 0; second < 40 && (second < 2 || shape_error(wild) > 5e-3); ++second) report = run(wild, 60);
     ASSERT_TRUE(all_finite(wild.positions(0)));
@@ -599,7 +600,7 @@ TEST_P(EachMaterial, NeverNotFinite) {
                 Simulation wild = simulation(with_ground(), {actor(body, {0, 0.2, 0})}, {.frames_per_second = rate});
                 Vectors positions = wild.positions(0);
                 for (std::size_t i = 0; i < positions.size(); ++i) positions.set(i, float(scale) * positions[i]);
-                wild.set_positions(0, positions);
+                ASSERT_TRUE(wild.set_positions(0, positions).ok());
                 const FrameReport first = run(wild, 1);
                 if (scale == 1000) {
                     EXPECT_GT(first.clamped_particles, 0u);
@@ -640,13 +641,126 @@ TEST(Simulation, CancelLeavesTheFrameUndone) {
 TEST(Simulation, RefusesWhatIsNotThere) {
     const auto body = box(2, 2, 2, 0.1, material(MaterialModel::fem));
     const RunContext context(1);
-    EXPECT_FALSE(Simulation::create({}, {}, {}, context).ok());
-    World world;
-    world.pins.push_back({1, {0}, {}});
-    EXPECT_FALSE(Simulation::create(world, {actor(body)}, {}, context).ok());
-    world.pins = {{0, {27}, {}}};
-    EXPECT_FALSE(Simulation::create(world, {actor(body)}, {}, context).ok());
     EXPECT_FALSE(Simulation::create({}, {actor(body)}, {.frames_per_second = 0}, context).ok());
+    EXPECT_FALSE(Simulation::create({}, {actor(body)}, {.descent_substeps = 0}, context).ok());
+
+    Simulation one = simulation(free_space(), {actor(body)});
+    EXPECT_EQ(one.set_positions(1, one.positions(0)).error().code, ErrorCode::usage);
+    EXPECT_EQ(one.set_positions(0, Vectors(26)).error().code, ErrorCode::usage);
+    EXPECT_EQ(one.set_velocities(0, Vectors(28)).error().code, ErrorCode::usage);
+    Hand hand;
+    ASSERT_TRUE(one.set_hands({hand}, context).ok());
+    hand.body = 1;
+    EXPECT_EQ(one.set_hands({hand}, context).error().code, ErrorCode::usage);
+    EXPECT_EQ(one.world().hands.size(), 1u); // the old one stays
+    hand.body = 0;
+    hand.target.times = {1, 0};
+    hand.target.values = {Vec3d::Zero(), Vec3d::Zero()};
+    EXPECT_NE(one.set_hands({hand}, context).error().message.find("hands[0].target.times"), std::string::npos);
+}
+
+// A piston that strikes in the middle of a frame and is back at its end has gone nowhere, and yet it was there.
+TEST(Simulation, ObstaclesThatGoAndReturnWithinAFrameAreFelt) {
+    World world = free_space();
+    Obstacle piston;
+    piston.shape = Cuboid{{-0.5, 0.15, 0.15}, {0.6, 1, 1}}; // 0.2 m from the body
+    piston.motion.move.times = {0, 0.05, 0.1};
+    piston.motion.move.values = {Vec3d::Zero(), Vec3d(0.25, 0, 0), Vec3d::Zero()};
+    world.obstacles.push_back(piston);
+    Simulation struck = simulation(world, {actor(box(3, 3, 3, 0.1, material(MaterialModel::fem)))},
+                                   {.frames_per_second = 10, .mode = StepMode::explicit_steps});
+    run(struck, 1);
+    EXPECT_GT(struck.momentum().linear.x(), 1);
+}
+
+TEST(Simulation, ReportsSayWhyAFrameWasLeftToDescent) {
+    const auto soft = box(2, 2, 2, 0.1, material(MaterialModel::fem));
+    const auto hard = box(2, 2, 2, 0.1, material(MaterialModel::fem, 1e14));
+    const auto first_frame = [](std::shared_ptr<const Body> body, StepMode mode) {
+        Simulation one = simulation(free_space(), {actor(std::move(body))}, {.mode = mode});
+        return run(one, 1);
+    };
+    FrameReport report = first_frame(soft, StepMode::explicit_steps);
+    EXPECT_EQ(report.used, StepMode::explicit_steps);
+    EXPECT_EQ(report.why_descent, DescentCause::none);
+    report = first_frame(hard, StepMode::explicit_steps); // more than 20,000 substeps
+    EXPECT_EQ(report.used, StepMode::descent);
+    EXPECT_EQ(report.why_descent, DescentCause::too_many_substeps);
+    EXPECT_EQ(first_frame(soft, StepMode::descent).why_descent, DescentCause::chosen);
+
+    Simulation broken = simulation(free_space(), {actor(soft)});
+    Vectors velocities = broken.velocities(0);
+    velocities.x[13] = std::numeric_limits<float>::infinity();
+    ASSERT_TRUE(broken.set_velocities(0, velocities).ok());
+    report = run(broken, 1);
+    EXPECT_EQ(report.why_descent, DescentCause::not_finite);
+    EXPECT_GT(report.clamped_particles, 0u);
+    EXPECT_TRUE(all_finite(broken.positions(0)));
+}
+
+// Wax that was thrown and flowed on its way: a hand at its end at rest pulls that end.
+TEST(Simulation, AHandPullsWaxThatHasFlowed) {
+    Material wax = material(MaterialModel::meshfree, 2e5);
+    wax.temperature = 400;
+    wax.melting_from = 300;
+    wax.melting_to = 350;
+    wax.viscosity = 100;
+    Actor bar = actor(box(9, 3, 3, 0.05, wax), {5, 0, 0});
+    bar.velocity = {1, 0, 0};
+    World world = with_ground();
+    const auto start = [&] { return simulation(world, {bar}); };
+    Simulation flowed = start();
+    const std::vector<Vec3f> end = {{0.45f, 0.075f, 0.075f}};
+    const std::size_t before = flowed.attach(0, end, RunContext(1));
+    run(flowed, 30);
+    const std::size_t after = flowed.attach(0, end, RunContext(1));
+    std::vector<Vec3f> one(1), other(1);
+    flowed.attached(before, one, {}, RunContext(1));
+    flowed.attached(after, other, {}, RunContext(1));
+    EXPECT_GT(one[0].x(), 5.2f);
+    EXPECT_LT((one[0] - other[0]).norm(), 0.05f); // a spacing
+
+    const std::string state = flowed.save();
+    Simulation pulled = start();
+    ASSERT_TRUE(pulled.restore(state).ok());
+    EXPECT_TRUE(state.size() > start().save().size()) << "it has not flowed";
+    Hand hand;
+    hand.point = end[0];
+    hand.target.constant = one[0].cast<double>() + Vec3d(0, 1, 0);
+    ASSERT_TRUE(pulled.set_hands({hand}, RunContext(1)).ok());
+    run(flowed, 1);
+    run(pulled, 1);
+    float near_end = 0, far_end = 0; // how much further up the hand had them
+    for (std::size_t i = 0; i < bar.body->particle_count(); ++i) {
+        const float up = pulled.positions(0).y[i] - flowed.positions(0).y[i];
+        float& most = bar.body->rest.x[i] > 0.225f ? near_end : far_end;
+        most = std::max(most, up);
+    }
+    EXPECT_GT(near_end, 1e-4f);
+    EXPECT_GT(near_end, 3 * far_end);
+}
+
+// Const functions share no scratch.
+TEST_P(EachMaterial, ConstFunctionsMayRunAtTheSameTime) {
+    const auto body = box(8, 8, 8, 0.1, material(GetParam()));
+    Simulation one = simulation(with_ground(), {actor(body, {0, 0.02, 0})});
+    const std::size_t attachment = one.attach(0, std::vector<Vec3f>(50, Vec3f(0.3f, 0.3f, 0.3f)), RunContext(1));
+    run(one, 5);
+    const Simulation& still = one;
+    const auto look = [&] {
+        std::vector<Vec3f> points(50);
+        still.attached(attachment, points, {}, RunContext(1));
+        return std::pair(still.energy(RunContext(1)).elastic, points);
+    };
+    const auto expected = look();
+    std::vector<std::thread> threads;
+    std::array<int, 4> wrong = {};
+    for (int& count : wrong)
+        threads.emplace_back([&count, &look, &expected] {
+            for (int k = 0; k < 50; ++k) count += look() != expected;
+        });
+    for (std::thread& thread : threads) thread.join();
+    EXPECT_EQ(wrong, (std::array<int, 4>{}));
 }
 
 } // namespace

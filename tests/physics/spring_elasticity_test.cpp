@@ -111,7 +111,7 @@ TEST(SpringElasticity, BarRingsWithTheWaveSpeed) {
     std::vector<double> crossings;
     double time = 0, before = 0;
     while (time < 6 * length / speed) {
-        const float dt = 0.5f * 2 / std::sqrt(elasticity->forces(x, forces, context).rate);
+        const float dt = 0.5f * 2 / std::sqrt(elasticity->forces(x, forces, context).squared_frequency);
         for (std::size_t i = 0; i < n; ++i) {
             velocity.add(i, forces[i] * (dt / body.mass[i]));
             x.add(i, velocity[i] * dt);
@@ -148,7 +148,7 @@ TEST(SpringElasticity, PositionsThatAreNoNumbersAreToldByTheRate) {
     const auto elasticity = make_spring_elasticity(body, context);
     Vectors x = body.rest, forces(body.particle_count());
     x.y[17] = std::nanf("");
-    EXPECT_FALSE(std::isfinite(elasticity->forces(x, forces, context).rate));
+    EXPECT_FALSE(std::isfinite(elasticity->forces(x, forces, context).squared_frequency));
 }
 
 } // namespace

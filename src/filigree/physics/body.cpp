@@ -94,7 +94,7 @@ std::size_t make_particles(Body& body, const RunContext& context) {
     return split;
 }
 
-Embedding embed_skin(std::span<const Vec3f> points, const Body& body, const RunContext& context) {
+Embedding embed_surface(std::span<const Vec3f> points, const Body& body, const RunContext& context) {
     return body.material.model == MaterialModel::meshfree ? embed(points, body.rest, body.spacing(), context)
                                                           : embed_in_cells(points, body.cells, context);
 }
@@ -136,14 +136,13 @@ Result<Body> make_body(const Mesh& mesh, const Material& material, const BodyOpt
     body.scale = options.scale;
     body.cells = std::move(cells).value();
     found.split_cells = make_particles(body, context);
-    SurfacePoints surface =
-        spread_on_surface(mesh.positions, welded.triangles, options.scale, 0.5 * body.cells.spacing);
-    body.skin.normals = std::move(surface.normals);
-    body.skin.areas = std::move(surface.areas);
-    body.skin.points = embed_skin(surface.positions, body, context);
+    SurfacePoints spread = spread_on_surface(mesh.positions, welded.triangles, options.scale, 0.5 * body.cells.spacing);
+    body.surface.normals = std::move(spread.normals);
+    body.surface.areas = std::move(spread.areas);
+    body.surface.points = embed_surface(spread.positions, body, context);
     if (context.is_cancelled()) return cancelled_error();
 
-    found.skin_points = body.skin.points.size();
+    found.surface_points = body.surface.points.size();
     for (const float mass : body.mass) found.mass += mass;
     found.warning = warning_of(found.cells);
     return body;
@@ -172,11 +171,11 @@ Body make_body(Cells cells, const Material& material) {
                     at[(axis + 1) % 3] += quarter & 1 ? 0.25 : -0.25;
                     at[(axis + 2) % 3] += quarter & 2 ? 0.25 : -0.25;
                     points.push_back((body.cells.origin + h * at).cast<float>());
-                    body.skin.normals.push_back(normal.cast<float>());
-                    body.skin.areas.push_back(float(h * h / 4));
+                    body.surface.normals.push_back(normal.cast<float>());
+                    body.surface.areas.push_back(float(h * h / 4));
                 }
             }
-    body.skin.points = embed_skin(points, body, context);
+    body.surface.points = embed_surface(points, body, context);
     return body;
 }
 

@@ -1,4 +1,4 @@
-// A body: the particles inside a mesh, what they weigh, how they hang together, and the skin that touches others.
+// A body: the particles inside a mesh, what they weigh, how they hang together, and the surface that touches others.
 #pragma once
 
 #include "filigree/physics/cells.h"
@@ -9,7 +9,7 @@
 namespace filigree {
 
 /// Points of the surface that touch obstacles and other bodies and catch wind, about half a spacing apart.
-struct Skin {
+struct BodySurface {
     Embedding points;           ///< on the mesh's surface
     std::vector<Vec3f> normals; ///< unit, outward, at rest
     std::vector<float> areas;   ///< m^2, share of the surface
@@ -26,7 +26,7 @@ struct Body {
     Vectors rest;
     std::vector<float> mass;   ///< kg
     std::vector<float> volume; ///< m^3: occupied, shared out as the mass is
-    Skin skin;
+    BodySurface surface;
 
     double spacing() const { return cells.spacing; }
     std::size_t particle_count() const { return rest.size(); }
@@ -40,7 +40,7 @@ struct BodyOptions {
 struct BodyReport {
     CellReport cells;
     std::size_t split_cells = 0; ///< meshfree: with eight particles
-    std::size_t skin_points = 0;
+    std::size_t surface_points = 0;
     double mass = 0;     ///< kg
     std::string warning; ///< a sentence where parts are fewer than two cells across, or left out; or ""
 };
@@ -49,7 +49,7 @@ struct BodyReport {
 Result<Body> make_body(const Mesh& mesh, const Material& material, const BodyOptions& options,
                        const RunContext& context, BodyReport* report = nullptr);
 
-/// A body of whole cells without a mesh: skin points at the centres of its outer faces, split in four. For tests and
+/// A body of whole cells without a mesh: surface points at the centres of its outer faces, split in four. For tests and
 /// benchmarks.
 Body make_body(Cells cells, const Material& material);
 

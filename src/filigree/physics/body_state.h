@@ -9,17 +9,53 @@ namespace filigree {
 struct BodyState {
     std::shared_ptr<const Body> body;
     std::unique_ptr<Elasticity> elasticity;
-    Vectors positions, velocities;   ///< world, m and m/s
-    Vectors forces;                  ///< N, of the last evaluation
-    std::vector<float> inverse_mass; ///< 0: pinned
-    std::vector<std::uint8_t> fixed; ///< 1: pinned
-    float rest_rate = 0;             ///< ElasticReport::rate at rest
+    Vectors positions, velocities;    ///< world, m and m/s
+    Vectors forces;                   ///< N, of the last evaluation
+    std::vector<float> inverse_mass;  ///< 0: pinned
+    std::vector<std::uint8_t> fixed;  ///< 1: pinned
+    float rest_squared_frequency = 0; ///< ElasticReport::squared_frequency at rest
+    bool is_held = false;             ///< by pins, forces or wind: not left to itself
 
-    // Contact: skin points against obstacles; balls just below the skin against other bodies.
-    Embedding skin, balls;
-    std::vector<float> skin_stiffness; ///< N/m
-    float ball_radius = 0;             ///< m
+    // Contact: points of the surface against obstacles; balls just below them against other bodies.
+    Embedding surface, balls;             ///< in the elasticity's reference
+    std::vector<float> surface_stiffness; ///< N/m
+    float ball_radius = 0;                ///< m
+
+    /// Gradients from the body at rest to the elasticity's reference, one a particle: how matter has flowed until
+    /// neighbourhoods were last renewed. Empty: never; the reference is the body at rest.
+    std::vector<Mat3f> flow;
+    bool has_flowed() const { return !flow.empty(); }
 };
+
+/// Points of the body at rest, where they are in the elasticity's reference.
+struct PlacedPoints {
+    std::vector<Vec3f> places;
+    std::vector<Mat3f> gradients; ///< from rest to there, stretches within 1/4 and 4; empty: the body has not flowed
+};
+
+/// The door for all that is given as a point of the body at rest. A point goes with the particles that were around it
+/// at rest, or where these have come apart with the nearest of them.
+PlacedPoints place_in_reference(const BodyState& state, std::span<const Vec3f> rest_points, const RunContext& context);
+/// The same for the surface's points: their gradients alone, one at a time.
+Mat3f surface_flow(const BodyState& state, std::size_t point);
+
+/// Where points were put that others asked to be carried along.
+struct Attachment {
+    std::size_t body = 0;
+    std::vector<Vec3f> points;    ///< of the body at rest
+    Embedding embedding;          ///< of the points where they are in the elasticity's reference
+    std::vector<Mat3f> gradients; ///< from rest to there; empty: the body had not flowed
+};
+Attachment attach(const BodyState& state, std::size_t body, std::span<const Vec3f> rest_points,
+                  const RunContext& context);
+/// As Simulation::attached.
+void move_attached(const BodyState& state, const Attachment& attachment, std::span<Vec3f> points,
+                   std::span<Mat3f> gradients, const RunContext& context);
+
+/// Renews the elasticity's neighbourhoods where the particles are now; what is embedded in the body stays where it is.
+void renew_neighbourhoods(BodyState& state, std::span<Attachment* const> attachments, const RunContext& context);
+/// The surface's points and balls as they are on a body that has not flowed.
+void embed_surface_at_rest(BodyState& state, bool with_balls, const RunContext& context);
 
 /// Where an embedded point is, by its weights alone.
 inline Vec3f embedded_point(const Embedding& embedding, std::size_t point, const Vectors& values) {

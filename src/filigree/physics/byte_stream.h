@@ -49,13 +49,16 @@ public:
         bytes_.remove_prefix(sizeof value);
         return value;
     }
+    /// A count of things that take so many bytes each at least: never more than can follow.
+    std::size_t count(std::size_t bytes_each) {
+        const std::uint64_t count = value<std::uint64_t>();
+        if (ok_ && count <= bytes_.size() / bytes_each) return std::size_t(count);
+        ok_ = false;
+        return 0;
+    }
     template <class T>
     std::vector<T> array() {
-        const std::uint64_t count = value<std::uint64_t>();
-        if (!ok_ || count > bytes_.size() / sizeof(T)) {
-            ok_ = false;
-            return {};
-        }
+        const std::size_t count = this->count(sizeof(T));
         std::vector<T> values(count);
         if (count > 0) std::memcpy(static_cast<void*>(values.data()), bytes_.data(), count * sizeof(T));
         bytes_.remove_prefix(count * sizeof(T));

@@ -43,7 +43,7 @@ public:
         cell_kernel::sweep(plan_, positions, descent, context);
     }
 
-    double energy(const Vectors& positions, const RunContext& context) override {
+    double energy(const Vectors& positions, const RunContext& context) const override {
         const Cells& cells = body_.cells;
         constexpr std::size_t kPiece = 1024;
         std::vector<double> sums((cells.cells.size() + kPiece - 1) / kPiece); // a piece each, added in order
@@ -63,7 +63,7 @@ public:
 
     const Vectors& reference() const override { return body_.rest; }
 
-    void gradients(const Vectors& positions, std::span<Mat3f> gradients, const RunContext& context) override {
+    void gradients(const Vectors& positions, std::span<Mat3f> gradients, const RunContext& context) const override {
         corner_gradients(body_.cells, positions, gradients, context);
     }
 

@@ -395,7 +395,7 @@ FILIGREE_INLINE void add_slabs(const ForceJob& job, std::size_t begin, std::size
             J = std::min(J, extremes.J[lane]);
             I = std::max(I, extremes.I[lane]);
         }
-        report.rate = rate * factors.rate;
+        report.squared_frequency = rate * factors.rate;
         report.least_volume_ratio = J;
         report.most_stretch = std::sqrt(I / 3);
     }
@@ -733,7 +733,7 @@ ElasticReport forces(const Plan& plan, const Vectors& positions, Vectors& forces
     ElasticReport report;
     if (!reports.empty()) report = reports[0];
     for (const ElasticReport& r : reports) {
-        report.rate = std::max(report.rate, r.rate);
+        report.squared_frequency = std::max(report.squared_frequency, r.squared_frequency);
         report.least_volume_ratio = std::min(report.least_volume_ratio, r.least_volume_ratio);
         report.most_stretch = std::max(report.most_stretch, r.most_stretch);
     }

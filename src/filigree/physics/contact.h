@@ -1,20 +1,21 @@
-// Bodies touching obstacles and each other: penalty forces at skin points, with friction and restitution.
+// Bodies touching obstacles and each other: penalty forces at surface points, with friction and
+// restitution. Private to the layer.
 #pragma once
 
 #include "filigree/physics/body_state.h"
-#include "filigree/physics/world.h"
+#include "filigree/physics/obstacle_motion.h"
 
 #include <functional>
 #include <memory>
 
 namespace filigree {
 
-/// Share of the elastic rate that contact stiffness may add: contacts never shorten explicit steps by more.
-inline constexpr float kContactRate = 1;
+/// Share of the body's squared frequency at rest that contacts may add: they never shorten explicit steps by more.
+inline constexpr float kContactShare = 1;
 
-/// Stiffness of each skin point, N/m: that of a spacing's depth of material under the point's area, bounded so that all
-/// points together add no more than kContactRate times the body's own rate to any particle.
-std::vector<float> skin_stiffness(const Body& body, const Embedding& skin, float rest_rate);
+/// Stiffness of each surface point, N/m: that of a spacing's depth of material under the point's area, bounded so that
+/// all points together add no more than kContactShare times the body's own squared frequency to any particle.
+std::vector<float> surface_stiffness(const Body& body, float rest_squared_frequency);
 
 struct ContactReport {
     std::size_t contacts = 0; ///< points that touch
@@ -25,16 +26,17 @@ struct ContactReport {
 class Contacts {
 public:
     /// bodies: fixed in number from here on.
-    Contacts(const World& world, std::size_t bodies, bool between_bodies);
+    Contacts(const World& world, std::size_t bodies, bool between_bodies)
+        : world_(world), between_bodies_(between_bodies), near_(bodies), touched_(bodies, 0) {}
 
-    /// Finds what might touch before anything has moved by the reaches, unless what was found last still holds: skin
-    /// points near obstacles, and pairs of balls of different bodies. travelled: how far anything may have moved since
-    /// `forget`, m.
-    void look_around(std::span<const BodyState> bodies, double time, float travelled, float obstacle_reach,
-                     float pair_reach, const RunContext& context);
-    /// What was found; anchors and touches stay.
-    void forget() { near_until_ = pairs_until_ = -1; }
-    void forget_touches() { touched_.assign(touched_.size(), 0); }
+    /// Finds what might touch before anything has moved by the reaches, unless what was found last still holds: surface
+    /// points near obstacles, and pairs of balls of different bodies. travelled: bound on how far anything has moved
+    /// since `begin_anew`, obstacles included, m.
+    void search(std::span<const BodyState> bodies, double time, float travelled, float obstacle_reach, float pair_reach,
+                const RunContext& context);
+    /// The next search finds everything again, and ways are counted from here; anchors and touches stay.
+    void begin_anew() { near_until_ = pairs_until_ = -1; }
+    void clear_touches() { touched_.assign(touched_.size(), 0); }
 
     /// Adds the forces of what touches now to the bodies' forces, and lets friction's anchors slide. travelled: as
     /// above. dt: of the substep.
@@ -45,12 +47,12 @@ public:
     /// the penalty can stop. Looks at what the last add_forces or update_anchors found.
     void push_out(std::span<BodyState> bodies, double time);
 
-    /// Contacts of one body as blocks for vertex block descent. Valid until look_around.
+    /// Contacts of one body as blocks for vertex block descent. Valid until the next search.
     class Blocks final : public BlockTerms {
     public:
-        /// Before every sweep: where all points are. During the sweep add sees each move by the asking particle alone,
-        /// so that nothing depends on which thread moves the others when.
-        void look(const Vectors& positions);
+        /// Before every sweep: takes the points' places. During the sweep add sees each move by the asking particle
+        /// alone, so that nothing depends on which thread moves the others when.
+        void update_places(const Vectors& positions);
         void add(Index particle, const Vectors& positions, Vec3f& force, Symmetric3& block) const override;
         /// A further spring that pulls points of an embedding: a hand.
         void add_pull(const Embedding& points, std::size_t point, const Vec3f& target, float stiffness);
@@ -71,12 +73,12 @@ public:
             Index other_point = 0;
             float reach = 0;                                          ///< sum of the balls' radii
             Vec3f target = Vec3f::Zero();                             ///< neither: a pull to here
-            Vec3f place = Vec3f::Zero(), other_place = Vec3f::Zero(); ///< of the points, by look
+            Vec3f place = Vec3f::Zero(), other_place = Vec3f::Zero(); ///< of the points, by update_places
         };
         void link(std::size_t particles);
         std::vector<Entry> entries_;
         std::vector<std::unique_ptr<Eigen::Isometry3d>> motions_; ///< of the obstacles
-        Vectors start_;                                           ///< positions at the last look
+        Vectors start_;                                           ///< positions at the last update_places
         std::vector<std::uint8_t> touched_;
         std::vector<Index> offsets_, entry_of_; ///< entries of each particle
         std::vector<float> weight_of_;
@@ -89,27 +91,34 @@ public:
 
     bool is_touched(std::size_t body) const { return touched_[body]; } ///< by the last add_forces or update_anchors
 
-    /// Where friction holds a skin point on an obstacle, in the obstacle's own axes. All that contacts remember.
+    /// Where friction holds a surface point on an obstacle, in the obstacle's own axes. All that contacts remember.
     struct Anchor {
         Index body, obstacle, point;
         Vec3f place;
     };
     std::vector<Anchor> anchors() const;
-    /// Instead of those there are; ascending by body, obstacle and point. forget comes next.
+    /// Instead of those there are; ascending by body, obstacle and point. begin_anew comes next.
     void set_anchors(std::span<const Anchor> anchors);
 
 private:
+    /// A surface point near an obstacle.
     struct Near {
         Index obstacle, point;
-        float clear_until = 0; ///< way that anything may travel before this can touch
+        float clear_until = 0; ///< `travelled` until which this cannot touch
         float depth = 0;       ///< now
         bool anchored = false;
         Vec3f anchor = Vec3f::Zero();
     };
+    /// Two balls of different bodies near each other.
     struct NearPair {
         Index first_body, first, second_body, second;
         float clear_until; ///< as above; both bodies travel
     };
+    Blocks::Entry block_of(const Near& at, const BodyState& body, const ObstaclePoses& poses, float dt) const;
+    Blocks::Entry block_of(const BodyState& body, Index point, const BodyState& other, Index other_point,
+                           float dt) const;
+    Vec3f obstacle_force(Near& at, const BodyState& body, const ObstaclePoses& poses, float travelled, float dt) const;
+    Vec3f pair_force(NearPair& pair, std::span<const BodyState> bodies, float travelled, float dt) const;
     void find_near(std::span<const BodyState> bodies, double time, float travelled, float reach,
                    const RunContext& context);
     void find_pairs(std::span<const BodyState> bodies, float travelled, float reach, const RunContext& context);
@@ -118,7 +127,7 @@ private:
     bool between_bodies_;
     std::vector<std::vector<Near>> near_; ///< by body, ascending by obstacle and point
     std::vector<NearPair> pairs_;
-    float near_until_ = -1, pairs_until_ = -1; ///< way travelled up to which they hold
+    float near_until_ = -1, pairs_until_ = -1; ///< `travelled` until which they hold
     std::vector<std::uint8_t> touched_;
 };
 

@@ -53,16 +53,16 @@ struct Descent {
 
 /// What one look at all elements found, beside forces.
 struct ElasticReport {
-    /// Bound on the largest eigenvalue of M^-1 K at these positions, 1/s^2: explicit steps up to 2 / sqrt(rate) are
-    /// stable. A maximum over elements, so the same whatever order they are visited in. Infinite or NaN where positions
-    /// are not fit for explicit steps.
-    float rate = 0;
+    /// Bound on the largest eigenvalue of M^-1 K at these positions, 1/s^2: explicit steps up to
+    /// 2 / sqrt(squared_frequency) are stable. A maximum over elements, so the same whatever order they are visited in.
+    /// Infinite or NaN where positions are not fit for explicit steps.
+    float squared_frequency = 0;
     float least_volume_ratio = 1; ///< smallest J; 0 or less: inverted
     float most_stretch = 1;       ///< largest |F| / sqrt(3)
 };
 
 /// Elastic behaviour of one body: the body's arrays in the order its loops want, plus what is stored inside (plastic
-/// strain, temperature). The body must outlive it.
+/// strain, temperature). The body must outlive it. Const functions may run at the same time; others use scratch.
 class Elasticity {
 public:
     virtual ~Elasticity() = default;
@@ -75,12 +75,12 @@ public:
     virtual void sweep(Vectors& positions, const Descent& descent, const RunContext& context) = 0;
 
     /// Elastic energy, J; 0 at rest.
-    virtual double energy(const Vectors& positions, const RunContext& context) = 0;
+    virtual double energy(const Vectors& positions, const RunContext& context) const = 0;
 
     /// Positions that gradients are relative to: the body's rest positions, until neighbourhoods are renewed.
     virtual const Vectors& reference() const = 0;
     /// Deformation gradients at the particles, relative to reference().
-    virtual void gradients(const Vectors& positions, std::span<Mat3f> gradients, const RunContext& context) = 0;
+    virtual void gradients(const Vectors& positions, std::span<Mat3f> gradients, const RunContext& context) const = 0;
 
     /// After each substep: plastic flow, heat. Does nothing for elastic materials.
     virtual void finish_substep(const Vectors& positions, float dt, const RunContext& context);
@@ -88,7 +88,8 @@ public:
     /// stepper can move what is embedded in the body by the old gradients first.
     virtual bool wants_renewal() const;
     /// Neighbours and weights anew: reference() becomes `positions`, gradients the identity; what is stored (elastic
-    /// strain, volume ratio) goes along, so forces stay what they were as nearly as may be.
+    /// strain, volume ratio) goes along, so forces stay what they were as nearly as may be. Positions that are not
+    /// finite leave everything as it is. Only for materials that flow.
     virtual void renew(const Vectors& positions, const RunContext& context);
 
     /// Stored state as bytes, and back; empty for elastic materials. restore_state is false for bytes of another body.

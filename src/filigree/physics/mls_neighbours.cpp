@@ -22,25 +22,25 @@ constexpr float kLeastSpread = 0.03f; // spacings^2: weighted mean square of off
 constexpr float kNoSpread = 0.03f;    // below it there is no gradient in that direction
 constexpr std::size_t kGrain = 256;
 
-/// Particles sorted by the cells of a grid.
+/// Particles sorted by the boxes of a grid.
 class Grid {
 public:
-    Grid(const Vectors& positions, float cell_size) : positions_(positions), inverse_size_(1 / double(cell_size)) {
+    Grid(const Vectors& positions, float box_size) : positions_(positions), inverse_size_(1 / double(box_size)) {
         const std::size_t n = positions.size();
         least_ = Vec3d::Constant(std::numeric_limits<double>::infinity());
         for (std::size_t i = 0; i < n; ++i) least_ = least_.cwiseMin(positions[i].cast<double>());
         sorted_.resize(n);
         for (std::size_t i = 0; i < n; ++i) {
-            const auto at = cell_of(positions[i]);
+            const auto at = box_of(positions[i]);
             sorted_[i] = {key(at[0], at[1], at[2]), Index(i)};
         }
         std::sort(sorted_.begin(), sorted_.end());
     }
 
-    /// Calls visit(index) for all particles in cells within `radius` of a point, and some more.
+    /// Calls visit(index) for all particles in boxes within `radius` of a point, and some more.
     template <class Visit>
     void near(const Vec3f& point, float radius, const Visit& visit) const {
-        const auto low = cell_of(point - Vec3f::Constant(radius)), high = cell_of(point + Vec3f::Constant(radius));
+        const auto low = box_of(point - Vec3f::Constant(radius)), high = box_of(point + Vec3f::Constant(radius));
         for (std::int64_t k = low[2]; k <= high[2]; ++k)
             for (std::int64_t j = low[1]; j <= high[1]; ++j) {
                 const Entry first{key(low[0], j, k), 0};
@@ -52,20 +52,20 @@ public:
     }
 
 private:
-    static constexpr std::int64_t kMostCells = (std::int64_t{1} << 21) - 1;
+    static constexpr std::int64_t kMostBoxes = (std::int64_t{1} << 21) - 1;
     struct Entry {
         std::uint64_t key;
         Index particle;
         auto operator<=>(const Entry&) const = default;
     };
 
-    std::array<std::int64_t, 3> cell_of(const Vec3f& point) const {
-        std::array<std::int64_t, 3> cell;
+    std::array<std::int64_t, 3> box_of(const Vec3f& point) const {
+        std::array<std::int64_t, 3> box;
         for (int a = 0; a < 3; ++a) {
             const double at = std::floor((double(point[a]) - least_[a]) * inverse_size_);
-            cell[std::size_t(a)] = std::int64_t(std::clamp(at, 0.0, double(kMostCells)));
+            box[std::size_t(a)] = std::int64_t(std::clamp(at, 0.0, double(kMostBoxes)));
         }
-        return cell;
+        return box;
     }
     static std::uint64_t key(std::int64_t i, std::int64_t j, std::int64_t k) {
         return (std::uint64_t(k) << 42) | (std::uint64_t(j) << 21) | std::uint64_t(i);
@@ -91,51 +91,119 @@ float full_density() {
     return sum;
 }
 
+/// The particles and what each has around it, before pairs are weighted.
+struct Surroundings {
+    const Vectors& positions;
+    std::span<const float> volume;
+    float spacing;
+    std::vector<std::vector<Index>> found; // of each particle
+    std::vector<float> radius;             // of each particle on its own
+};
+
+/// Neighbours of one particle within `radius`. Whether they are enough and spread in all directions.
+bool look_within(float radius, std::size_t i, const Grid& grid, Surroundings& around) {
+    std::vector<Index>& found = around.found[i];
+    found.clear();
+    Mat3f moment = Mat3f::Zero();
+    float sum = 0;
+    grid.near(around.positions[i], radius, [&](Index j) {
+        const Vec3f d = around.positions[j] - around.positions[i];
+        const float squared = d.squaredNorm();
+        if (j == i || squared >= radius * radius) return;
+        found.push_back(j);
+        const float weight = around.volume[j] * kernel(squared, radius);
+        moment += (weight * d) * d.transpose();
+        sum += weight;
+    });
+    if (found.size() < kEnough || !(sum > 0)) return false;
+    const Eigen::SelfAdjointEigenSolver<Mat3f> eigen(moment / sum, Eigen::EigenvaluesOnly);
+    return eigen.eigenvalues()[0] >= kLeastSpread * around.spacing * around.spacing;
+}
+
+Surroundings find_surroundings(const Vectors& positions, std::span<const float> volume, float spacing,
+                               const RunContext& context) {
+    const std::size_t n = positions.size();
+    Surroundings around{positions, volume, spacing, std::vector<std::vector<Index>>(n), std::vector<float>(n)};
+    const Grid grid(positions, kRadius * spacing);
+    parallel_for(context, n, kGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            float radius = kRadius * spacing;
+            while (!look_within(radius, i, grid, around) && !(radius > kMostRadius * spacing)) radius *= kGrowth;
+            around.radius[i] = radius;
+        }
+    });
+    // A pair has the larger radius of its two.
+    for (std::size_t i = 0; i < n; ++i)
+        for (std::size_t k = 0, count = around.found[i].size(); k < count; ++k) {
+            const Index j = around.found[i][k];
+            if (around.radius[i] > around.radius[j] &&
+                (positions[j] - positions[i]).squaredNorm() >= around.radius[j] * around.radius[j])
+                around.found[j].push_back(Index(i));
+        }
+    parallel_for(context, n, kGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) std::sort(around.found[i].begin(), around.found[i].end());
+    });
+    return around;
+}
+
+/// Sums over the pairs of one particle.
+struct PairSums {
+    Mat3f moment = Mat3f::Zero();
+    Vec3f first = Vec3f::Zero(); // moment
+    float weight = 0, length = 0;
+    float density; // volumes by the kernel of full radius
+};
+
+/// Writes the pairs of particle i.
+PairSums weigh_pairs(std::size_t i, const Surroundings& around, float inverse_cube, MlsNeighbours& result) {
+    PairSums sums{.density = around.volume[i]};
+    for (std::size_t k = 0; k < around.found[i].size(); ++k) {
+        const Index j = around.found[i][k];
+        const Vec3f d = around.positions[j] - around.positions[i];
+        const float r = std::max(around.radius[i], around.radius[j]), squared = d.squaredNorm();
+        const float s = (around.volume[i] * inverse_cube) * (around.volume[j] * inverse_cube) * kernel(squared, r);
+        result.neighbours[result.offsets[i] + k] = j;
+        result.pairs[result.offsets[i] + k] = Float4{s * d.x(), s * d.y(), s * d.z(), s};
+        sums.moment += (s * d) * d.transpose();
+        sums.first += s * d;
+        sums.weight += s;
+        sums.length += s * std::sqrt(squared);
+        sums.density += around.volume[j] * kernel(squared, kRadius * around.spacing);
+    }
+    return sums;
+}
+
+struct InverseMoment {
+    Mat3f inverse = Mat3f::Zero(), missing = Mat3f::Zero(); // the latter: directions without a gradient
+};
+
+InverseMoment invert(const PairSums& sums, float spacing, std::size_t neighbour_count) {
+    const float unit = sums.weight * spacing * spacing; // the mean square: eigenvalues then compare with spreads
+    const Eigen::SelfAdjointEigenSolver<Mat3f> eigen(sums.weight > 0 ? Mat3f(sums.moment / unit) : Mat3f::Zero());
+    InverseMoment result;
+    for (int a = 0; a < 3; ++a) {
+        const Vec3f axis = eigen.eigenvectors().col(a);
+        const float value = eigen.eigenvalues()[a];
+        if (value >= kNoSpread && neighbour_count >= 3)
+            result.inverse += axis * axis.transpose() / (value * sums.weight * spacing * spacing);
+        else
+            result.missing += axis * axis.transpose();
+    }
+    return result;
+}
+
 } // namespace
 
 MlsNeighbours find_mls_neighbours(const Vectors& positions, std::span<const float> volume, double spacing,
                                   const RunContext& context) {
     const std::size_t n = positions.size();
     const auto h = float(spacing);
-    const float inverse_cube = float(1 / (spacing * spacing * spacing));
-    const Grid grid(positions, kRadius * h);
-
-    // The radius of each particle on its own, and the neighbours within.
-    std::vector<std::vector<Index>> found(n);
-    std::vector<float> radius(n);
-    parallel_for(context, n, kGrain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i)
-            for (float r = kRadius * h;; r *= kGrowth) {
-                found[i].clear();
-                Mat3f moment = Mat3f::Zero();
-                float sum = 0;
-                grid.near(positions[i], r, [&](Index j) {
-                    const Vec3f d = positions[j] - positions[i];
-                    const float squared = d.squaredNorm();
-                    if (j == i || squared >= r * r) return;
-                    found[i].push_back(j);
-                    const float weight = volume[j] * kernel(squared, r);
-                    moment += (weight * d) * d.transpose();
-                    sum += weight;
-                });
-                radius[i] = r;
-                if (r > kMostRadius * h) break;
-                if (found[i].size() < kEnough || !(sum > 0)) continue;
-                const Eigen::SelfAdjointEigenSolver<Mat3f> eigen(moment / sum, Eigen::EigenvaluesOnly);
-                if (eigen.eigenvalues()[0] >= kLeastSpread * h * h) break;
-            }
-    });
-    // A pair has the larger radius of its two.
-    for (std::size_t i = 0; i < n; ++i)
-        for (std::size_t k = 0, count = found[i].size(); k < count; ++k) {
-            const Index j = found[i][k];
-            if (radius[i] > radius[j] && (positions[j] - positions[i]).squaredNorm() >= radius[j] * radius[j])
-                found[j].push_back(Index(i));
-        }
+    const float inverse_cube = float(1 / (spacing * spacing * spacing)), full = full_density();
+    const Surroundings around = find_surroundings(positions, volume, h, context);
 
     MlsNeighbours result;
     result.offsets.resize(n + 1);
-    for (std::size_t i = 0; i < n; ++i) result.offsets[i + 1] = Index(result.offsets[i] + found[i].size());
+    for (std::size_t i = 0; i < n; ++i) result.offsets[i + 1] = Index(result.offsets[i] + around.found[i].size());
     result.neighbours.resize(result.offsets[n]);
     result.pairs.resize(result.offsets[n]);
     result.weight_sum.resize(n);
@@ -143,52 +211,25 @@ MlsNeighbours find_mls_neighbours(const Vectors& positions, std::span<const floa
     result.self_gradient.resize(n);
     result.exposure.resize(n);
     result.density.resize(n);
-    std::vector<Mat3f> missing(n, Mat3f::Zero());
-    std::vector<std::uint8_t> is_lonely(n);
-    const float full = full_density();
+    result.missing.resize(n);
     parallel_for(context, n, kGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-            std::sort(found[i].begin(), found[i].end());
-            Mat3f moment = Mat3f::Zero();
-            Vec3f first = Vec3f::Zero();
-            float sum = 0, length = 0, density = volume[i];
-            for (std::size_t k = 0; k < found[i].size(); ++k) {
-                const Index j = found[i][k];
-                const Vec3f d = positions[j] - positions[i];
-                const float r = std::max(radius[i], radius[j]), squared = d.squaredNorm();
-                const float s = (volume[i] * inverse_cube) * (volume[j] * inverse_cube) * kernel(squared, r);
-                result.neighbours[result.offsets[i] + k] = j;
-                result.pairs[result.offsets[i] + k] = Float4{s * d.x(), s * d.y(), s * d.z(), s};
-                moment += (s * d) * d.transpose();
-                first += s * d;
-                sum += s;
-                length += s * std::sqrt(squared);
-                density += volume[j] * kernel(squared, kRadius * h);
-            }
-            result.weight_sum[i] = sum;
-            result.density[i] = density * inverse_cube / full;
-            result.exposure[i] = length > 0 ? std::clamp(first.norm() / length / 0.15f - 1, 0.f, 1.f) : 1.f;
-
-            // In units of the mean square, so that eigenvalues compare with spreads.
-            const Eigen::SelfAdjointEigenSolver<Mat3f> eigen(sum > 0 ? Mat3f(moment / (sum * h * h)) : Mat3f::Zero());
-            Mat3f inverse = Mat3f::Zero();
-            for (int a = 0; a < 3; ++a) {
-                const Vec3f axis = eigen.eigenvectors().col(a);
-                const float value = eigen.eigenvalues()[a];
-                if (value >= kNoSpread && found[i].size() >= 3)
-                    inverse += axis * axis.transpose() / (value * sum * h * h);
-                else {
-                    missing[i] += axis * axis.transpose();
-                    is_lonely[i] = 1;
-                }
-            }
+            const PairSums sums = weigh_pairs(i, around, inverse_cube, result);
+            result.weight_sum[i] = sums.weight;
+            result.density[i] = sums.density * inverse_cube / full;
+            result.exposure[i] =
+                sums.length > 0 ? std::clamp(sums.first.norm() / sums.length / 0.15f - 1, 0.f, 1.f) : 1.f;
+            const InverseMoment moment = invert(sums, h, around.found[i].size());
+            const Mat3f& inverse = moment.inverse;
             result.inverse_moment[i] = {inverse(0, 0), inverse(1, 1), inverse(2, 2),
                                         inverse(0, 1), inverse(0, 2), inverse(1, 2)};
-            result.self_gradient[i] = -result.gradient(i, first);
+            result.self_gradient[i] = -result.gradient(i, sums.first);
+            result.missing[i] = moment.missing;
         }
     });
-    result.lonely_particles = std::size_t(std::count(is_lonely.begin(), is_lonely.end(), 1));
-    if (result.lonely_particles > 0) result.missing = std::move(missing);
+    result.lonely_particles = std::size_t(
+        std::count_if(result.missing.begin(), result.missing.end(), [](const Mat3f& m) { return !m.isZero(0); }));
+    if (result.lonely_particles == 0) result.missing = {};
     return result;
 }
 

@@ -15,9 +15,10 @@ struct Actor {
     Vec3d spin = Vec3d::Zero();                                  ///< rad/s about the centre of mass
 };
 
-/// explicit_steps: velocity Verlet, as many substeps as stability asks for. descent: vertex block descent, a fixed
-/// number of implicit substeps. automatic: the first where it takes no more than most_substeps, else the second; a
-/// frame that was begun in the first way may take up to twice as many.
+/// explicit_steps: velocity Verlet, as many substeps as stability asks for; where that is more than 20,000 a frame, or
+/// what comes of it is not finite, descent takes over for the frame, and the report says why. descent: vertex block
+/// descent, a fixed number of implicit substeps. automatic: the first where it takes no more than most_substeps, else
+/// the second. A frame that was begun in the first way may take up to twice as many.
 enum class StepMode { automatic, explicit_steps, descent };
 
 struct StepOptions {
@@ -28,11 +29,16 @@ struct StepOptions {
     bool contacts_between_bodies = true;
 };
 
+/// Why a frame was made by descent, or finished by it. chosen: the options say so. too_many_substeps: explicit steps
+/// would have been more than the mode allows. not_finite: they did not come to numbers, and the frame was done again.
+enum class DescentCause { none, chosen, too_many_substeps, not_finite };
+
 /// What a frame took and met.
 struct FrameReport {
     StepMode used = StepMode::explicit_steps;
+    DescentCause why_descent = DescentCause::none;
     unsigned substeps = 0;
-    std::size_t contacts = 0;     ///< skin points that touch something, at the frame's end
+    std::size_t contacts = 0;     ///< surface points that touch something, at the frame's end
     double deepest_contact = 0;   ///< m below a surface
     float least_volume_ratio = 1; ///< smallest J; 0 or less: inverted
     float most_stretch = 1;
@@ -49,10 +55,21 @@ struct Momentum {
     Vec3d angular = Vec3d::Zero(); ///< kg m^2/s, about the world's origin
 };
 
-/// Same bytes for any number of threads, and for a run that was saved and restored in between.
+/// Errors: usage, with the place of the first thing that is wrong, as in "world.obstacles[2].friction must be 0 or
+/// more." Everything is checked: that there are bodies with particles, that what is named is there, that numbers are
+/// finite and in their ranges, that keys ascend. Cost O(keys and particles named).
+Status check_world(const World& world, std::span<const Actor> actors);
+/// The same for hands that pull some of so many bodies.
+Status check_hands(std::span<const Hand> hands, std::size_t body_count);
+
+struct SimulationState;
+
+/// Same bytes for any number of threads, and for a run that was saved and restored in between. Const functions may be
+/// called from several threads at a time. `body` and `attachment` are numbers below the count of what there is; only
+/// functions that return a Status check them.
 class Simulation {
 public:
-    /// Errors: usage (no bodies, a pin or hand of a body that is not there, an option out of its range).
+    /// Errors: as check_world; usage (an option out of its range).
     static Result<Simulation> create(World world, std::vector<Actor> actors, const StepOptions& options,
                                      const RunContext& context);
     Simulation(Simulation&&) noexcept;
@@ -69,19 +86,22 @@ public:
     const Body& body(std::size_t body) const;
     const Vectors& positions(std::size_t body) const;  ///< world, m
     const Vectors& velocities(std::size_t body) const; ///< m/s
-    /// For tests, and for whoever starts a body in another shape.
-    void set_positions(std::size_t body, const Vectors& positions);
-    void set_velocities(std::size_t body, const Vectors& velocities);
-    /// Hands may come and go while it runs.
-    void set_hands(std::vector<Hand> hands, const RunContext& context);
+    /// For tests, and for whoever starts a body in another shape. Values may be anything; the next frame repairs what
+    /// no step can take. Errors: usage (no such body, another number of particles).
+    Status set_positions(std::size_t body, const Vectors& positions);
+    Status set_velocities(std::size_t body, const Vectors& velocities);
+    /// Hands may come and go while it runs, and take the place of those there were. Each seizes the particles that were
+    /// around its point at rest, wherever these have flowed. Errors: as check_hands; the old hands then stay.
+    Status set_hands(std::vector<Hand> hands, const RunContext& context);
 
     Energy energy(const RunContext& context) const;
     Momentum momentum() const;
 
-    /// Points that go along with a body: its driver, or all of a mesh. Rest positions in the body's rest space, m.
-    /// Returns a number for attached_*.
+    /// Points that go along with a body: its driver, or all of a mesh. Positions on the body at rest, m, also of a body
+    /// that has flowed since. Returns a number for `attached`. Cost: as embed.
     std::size_t attach(std::size_t body, std::span<const Vec3f> points, const RunContext& context);
-    /// Where they are now (world, m) and the gradients from rest to there. `gradients` may be empty: not wanted.
+    /// Where they are now (world, m) and the gradients from rest to there: as many as were attached. `gradients` may be
+    /// empty: not wanted.
     void attached(std::size_t attachment, std::span<Vec3f> points, std::span<Mat3f> gradients,
                   const RunContext& context) const;
 
@@ -91,9 +111,9 @@ public:
     Status restore(std::string_view bytes);
 
 private:
-    struct Content;
-    explicit Simulation(std::unique_ptr<Content> content);
-    std::unique_ptr<Content> content_;
+    explicit Simulation(std::unique_ptr<SimulationState> state);
+    Status check_vectors(std::size_t body, const Vectors& vectors, const char* what) const;
+    std::unique_ptr<SimulationState> state_;
 };
 
 } // namespace filigree

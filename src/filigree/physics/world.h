@@ -12,7 +12,7 @@ namespace filigree {
 /// A value that changes in time: linear between keys, constant before the first and after the last.
 template <class T>
 struct Keyed {
-    std::vector<double> times; ///< s, ascending; empty: `constant`
+    std::vector<double> times; ///< s, ascending (two equal ones are a jump); empty: `constant`
     std::vector<T> values;     ///< one a time
     T constant{};
 
@@ -35,14 +35,15 @@ struct RigidMotion {
     Keyed<Vec3d> angle{{}, {}, Vec3d::Zero()}; ///< axis times radians
 
     Eigen::Isometry3d at(double time) const;
+    bool moves() const { return !move.times.empty() || !angle.times.empty(); }
 };
 
 struct HalfSpace {
-    Vec3d point = Vec3d::Zero(), normal = {0, 1, 0}; ///< solid below
+    Vec3d point = Vec3d::Zero(), normal = {0, 1, 0}; ///< solid below; any length above 0
 };
 struct Ball {
     Vec3d centre = Vec3d::Zero();
-    double radius = 1;
+    double radius = 1; ///< m, above 0
 };
 struct Cuboid {
     Vec3d centre = Vec3d::Zero(), size = Vec3d::Ones(); ///< along the axes before the obstacle's motion
@@ -56,7 +57,7 @@ struct MeshObstacle {
 struct Obstacle {
     std::variant<HalfSpace, Ball, Cuboid, MeshObstacle> shape;
     RigidMotion motion;
-    double friction = 0.5; ///< Coulomb's coefficient
+    double friction = 0.5; ///< Coulomb's coefficient, 0 or more
     /// 0 .. 1: speed of a hard point after the bounce over that before. A soft body bounces by its own elasticity too.
     double restitution = 0.5;
     double stiffness = 1; ///< above 0, to 1: of the contact; less for ground that is softer than the bodies
@@ -96,8 +97,8 @@ struct World {
     std::vector<Pin> pins;
     std::vector<RegionForce> forces;
     std::vector<Hand> hands;
-    double body_friction = 0.3;    ///< between bodies, Coulomb's
-    double body_restitution = 0.7; ///< between bodies
+    double body_friction = 0.3;    ///< between bodies, Coulomb's; 0 or more
+    double body_restitution = 0.7; ///< between bodies, 0 .. 1
 };
 
 } // namespace filigree

@@ -1,0 +1,183 @@
+// Contacts in descent: blocks of the vertices' systems, and friction's anchors after a substep.
+#include "filigree/physics/contact.h"
+
+#include "filigree/physics/contact_law.h"
+
+#include <algorithm>
+
+namespace filigree {
+
+using namespace contact_law;
+
+void Contacts::Blocks::update_places(const Vectors& positions) {
+    start_ = positions;
+    for (Entry& entry : entries_) {
+        entry.place = embedded_point(*entry.embedding, entry.point, positions);
+        if (entry.other)
+            entry.other_place = embedded_point(entry.other->balls, entry.other_point, entry.other->positions);
+    }
+}
+
+void Contacts::Blocks::add(Index particle, const Vectors& positions, Vec3f& force, Symmetric3& block) const {
+    const Vec3f moved = positions[particle] - start_[particle];
+    for (Index k = offsets_[particle]; k < offsets_[particle + 1]; ++k) {
+        const Entry& entry = entries_[entry_of_[k]];
+        const float weight = weight_of_[k], stiffness = entry.stiffness;
+        const Vec3f place = entry.place + weight * moved;
+        if (entry.other) {
+            const Vec3f between = place - entry.other_place;
+            const float distance = between.norm();
+            if (!(distance < entry.reach && distance > 0)) continue;
+            const Vec3f normal = between / distance;
+            force += weight * stiffness * entry.unloading * (entry.reach - distance) * normal;
+            block.add_outer(normal, weight * weight * stiffness);
+        } else if (entry.obstacle) {
+            const DistanceField::Sample surface = distance_to(*entry.obstacle, *entry.motion, place);
+            if (!(surface.distance < 0)) continue;
+            const float push = stiffness * entry.unloading * -surface.distance;
+            force += weight * push * surface.normal;
+            block.add_outer(surface.normal, weight * weight * stiffness);
+            if (!entry.anchored) continue;
+            const float grip = kTangentialStiffness * stiffness;
+            force +=
+                weight * limited(-grip * along_surface(place - entry.anchor, surface.normal), entry.friction * push);
+            block.add_scaled_identity(weight * weight * grip);
+            block.add_outer(surface.normal, -weight * weight * grip);
+        } else {
+            force += weight * stiffness * (entry.target - place);
+            block.add_scaled_identity(weight * weight * stiffness);
+        }
+    }
+}
+
+void Contacts::Blocks::add_pull(const Embedding& points, std::size_t point, const Vec3f& target, float stiffness) {
+    Entry& entry = entries_.emplace_back();
+    entry.embedding = &points;
+    entry.point = Index(point);
+    entry.stiffness = stiffness;
+    entry.target = target;
+}
+
+void Contacts::Blocks::link(std::size_t particles) {
+    touched_.assign(particles, 0);
+    offsets_.assign(particles + 1, 0);
+    const auto each_weight = [&](const auto& visit) {
+        for (Index e = 0; e < entries_.size(); ++e) {
+            const Embedding& points = *entries_[e].embedding;
+            for (Index k = points.offsets[entries_[e].point]; k < points.offsets[entries_[e].point + 1]; ++k)
+                visit(e, points.particles[k], points.weights[k]);
+        }
+    };
+    each_weight([&](Index, Index particle, float) { ++offsets_[particle + 1]; });
+    for (std::size_t p = 0; p < particles; ++p) {
+        touched_[p] = offsets_[p + 1] != 0;
+        offsets_[p + 1] += offsets_[p];
+    }
+    entry_of_.resize(offsets_.back());
+    weight_of_.resize(offsets_.back());
+    std::vector<Index> next(offsets_.begin(), offsets_.end() - 1);
+    each_weight([&](Index e, Index particle, float weight) {
+        entry_of_[next[particle]] = e;
+        weight_of_[next[particle]++] = weight;
+    });
+}
+
+Contacts::Blocks::Entry Contacts::block_of(const Near& at, const BodyState& body, const ObstaclePoses& poses,
+                                           float dt) const {
+    const Obstacle& obstacle = world_.obstacles[at.obstacle];
+    const Vec3f place = embedded_point(body.surface, at.point, body.positions);
+    const Vec3f normal = distance_to(obstacle, poses.at(at.obstacle), place).normal;
+    const Vec3f velocity = embedded_point(body.surface, at.point, body.velocities) - poses.velocity(at.obstacle, place);
+    Blocks::Entry entry;
+    entry.embedding = &body.surface;
+    entry.point = at.point;
+    entry.stiffness = body.surface_stiffness[at.point] * float(obstacle.stiffness);
+    entry.obstacle = &obstacle;
+    entry.anchored = at.anchored;
+    entry.anchor = poses.to_world(at.obstacle, at.anchor);
+    entry.friction = float(obstacle.friction);
+    entry.unloading = unloading(obstacle.restitution, velocity.dot(normal), smooth_speed(world_, dt));
+    return entry;
+}
+
+/// A ball of `body` against one of another body.
+Contacts::Blocks::Entry Contacts::block_of(const BodyState& body, Index point, const BodyState& other,
+                                           Index other_point, float dt) const {
+    const Vec3f velocity =
+        embedded_point(body.balls, point, body.velocities) - embedded_point(other.balls, other_point, other.velocities);
+    const Vec3f between =
+        embedded_point(body.balls, point, body.positions) - embedded_point(other.balls, other_point, other.positions);
+    Blocks::Entry entry;
+    entry.embedding = &body.balls;
+    entry.point = point;
+    entry.stiffness = pair_stiffness(body, point, other, other_point);
+    entry.other = &other;
+    entry.other_point = other_point;
+    entry.reach = body.ball_radius + other.ball_radius;
+    entry.unloading =
+        unloading(world_.body_restitution, velocity.dot(between.stableNormalized()), smooth_speed(world_, dt));
+    return entry;
+}
+
+Contacts::Blocks Contacts::blocks(std::span<const BodyState> bodies, std::size_t b, double time, float dt,
+                                  const std::function<void(Blocks&)>& pulls) const {
+    const BodyState& body = bodies[b];
+    const ObstaclePoses poses(world_, time);
+    Blocks blocks;
+    for (std::size_t o = 0; o < world_.obstacles.size(); ++o)
+        blocks.motions_.push_back(std::make_unique<Eigen::Isometry3d>(poses.at(o)));
+    for (const Near& at : near_[b]) {
+        blocks.entries_.push_back(block_of(at, body, poses, dt));
+        blocks.entries_.back().motion = blocks.motions_[at.obstacle].get();
+    }
+    for (const NearPair& pair : pairs_) {
+        if (pair.first_body == b)
+            blocks.entries_.push_back(block_of(body, pair.first, bodies[pair.second_body], pair.second, dt));
+        if (pair.second_body == b)
+            blocks.entries_.push_back(block_of(body, pair.second, bodies[pair.first_body], pair.first, dt));
+    }
+    pulls(blocks);
+    blocks.link(body.positions.size());
+    return blocks;
+}
+
+ContactReport Contacts::update_anchors(std::span<const BodyState> bodies, double time) {
+    ContactReport report;
+    const ObstaclePoses poses(world_, time);
+    std::ranges::fill(touched_, std::uint8_t{0});
+    for (std::size_t b = 0; b < bodies.size(); ++b) {
+        const BodyState& body = bodies[b];
+        for (Near& at : near_[b]) {
+            const Obstacle& obstacle = world_.obstacles[at.obstacle];
+            const Vec3f place = embedded_point(body.surface, at.point, body.positions);
+            const DistanceField::Sample surface = distance_to(obstacle, poses.at(at.obstacle), place);
+            at.depth = std::max(0.0f, -surface.distance);
+            if (!(surface.distance < 0)) {
+                at.anchored = false;
+                continue;
+            }
+            touched_[b] = 1;
+            ++report.contacts;
+            report.deepest = std::max(report.deepest, -surface.distance);
+            if (!at.anchored) at.anchor = poses.to_own_axes(at.obstacle, place);
+            at.anchored = true;
+            const float stiffness = body.surface_stiffness[at.point] * float(obstacle.stiffness);
+            const float grip = kTangentialStiffness * stiffness;
+            const float limit = float(obstacle.friction) * stiffness * -surface.distance;
+            const Vec3f offset = along_surface(place - poses.to_world(at.obstacle, at.anchor), surface.normal);
+            if (const float stretch = offset.norm(); grip * stretch > limit)
+                at.anchor = poses.to_own_axes(at.obstacle, place - offset * (limit / (grip * stretch)));
+        }
+    }
+    for (const NearPair& pair : pairs_) {
+        const BodyState &a = bodies[pair.first_body], &b = bodies[pair.second_body];
+        if ((embedded_point(a.balls, pair.first, a.positions) - embedded_point(b.balls, pair.second, b.positions))
+                .norm() < a.ball_radius + b.ball_radius) {
+            touched_[pair.first_body] = touched_[pair.second_body] = 1;
+            ++report.contacts;
+        }
+    }
+    return report;
+}
+
+} // namespace filigree

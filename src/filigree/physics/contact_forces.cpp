@@ -1,0 +1,169 @@
+// Contacts in explicit steps: forces of what touches, and moving out what is too deep.
+#include "filigree/physics/contact.h"
+
+#include "filigree/core/parallel_for.h"
+#include "filigree/physics/contact_law.h"
+
+#include <algorithm>
+
+namespace filigree {
+
+using namespace contact_law;
+
+namespace {
+
+constexpr std::size_t kGrain = 256;
+constexpr double kStiffness = 4; ///< times the stiffness of a spacing of material under the point
+
+} // namespace
+
+std::vector<float> surface_stiffness(const Body& body, float rest_squared_frequency) {
+    const Embedding& points = body.surface.points;
+    const double modulus = body.material.density * std::pow(pressure_wave_speed(body.material), 2);
+    std::vector<float> stiffness(points.size());
+    std::vector<double> sums(body.particle_count(), 0);
+    const auto each_weight = [&](std::size_t point, const auto& visit) {
+        for (Index k = points.offsets[point]; k < points.offsets[point + 1]; ++k)
+            visit(points.particles[k], std::abs(points.weights[k]));
+    };
+    for (std::size_t s = 0; s < points.size(); ++s) {
+        stiffness[s] = float(kStiffness * modulus * double(body.surface.areas[s]) / body.spacing());
+        each_weight(s, [&](Index particle, float weight) { sums[particle] += double(weight * stiffness[s]); });
+    }
+    for (std::size_t s = 0; s < points.size(); ++s) {
+        double part = 1;
+        each_weight(s, [&](Index particle, float weight) {
+            if (weight > 0)
+                part = std::min(part, double(kContactShare) * double(body.mass[particle]) *
+                                          double(rest_squared_frequency) / sums[particle]);
+        });
+        stiffness[s] *= float(part);
+    }
+    return stiffness;
+}
+
+/// The force on a surface point; lets friction's anchor begin, slide and end.
+Vec3f Contacts::obstacle_force(Near& at, const BodyState& body, const ObstaclePoses& poses, float travelled,
+                               float dt) const {
+    at.depth = 0;
+    if (at.clear_until > travelled) {
+        at.anchored = false;
+        return Vec3f::Zero();
+    }
+    const Obstacle& obstacle = world_.obstacles[at.obstacle];
+    const Vec3f place = embedded_point(body.surface, at.point, body.positions);
+    const DistanceField::Sample surface = distance_to(obstacle, poses.at(at.obstacle), place);
+    at.clear_until = travelled + surface.distance;
+    if (!(surface.distance < 0)) {
+        at.anchored = false;
+        return Vec3f::Zero();
+    }
+    at.depth = -surface.distance;
+    const Vec3f velocity = embedded_point(body.surface, at.point, body.velocities) - poses.velocity(at.obstacle, place);
+    const float stiffness = body.surface_stiffness[at.point] * float(obstacle.stiffness);
+    const float away = velocity.dot(surface.normal);
+    const float push = stiffness * -surface.distance * unloading(obstacle.restitution, away, smooth_speed(world_, dt));
+    if (!at.anchored) at.anchor = poses.to_own_axes(at.obstacle, place);
+    at.anchored = true;
+    const float grip = kTangentialStiffness * stiffness;
+    const Vec3f offset = along_surface(place - poses.to_world(at.obstacle, at.anchor), surface.normal);
+    const Vec3f wanted = -grip * (offset + 2 * dt * along_surface(velocity, surface.normal));
+    // A point that sticks may pull up to friction times the full penalty. The unloading does not weaken that limit: a
+    // trembling foot would slip at every rise. A point that slides rubs by the weakened push.
+    const float hold = float(obstacle.friction) * stiffness * -surface.distance;
+    const float stretch = grip * offset.norm();
+    Vec3f held = limited(wanted, hold);
+    if (stretch > hold) {
+        held = limited(wanted, float(obstacle.friction) * push);
+        at.anchor = poses.to_own_axes(at.obstacle, place - offset * (hold / stretch));
+    }
+    return push * surface.normal + held;
+}
+
+/// The force on the pair's first ball; minus it is that on the second.
+Vec3f Contacts::pair_force(NearPair& pair, std::span<const BodyState> bodies, float travelled, float dt) const {
+    if (pair.clear_until > travelled) return Vec3f::Zero();
+    const BodyState &a = bodies[pair.first_body], &b = bodies[pair.second_body];
+    const Vec3f between =
+        embedded_point(a.balls, pair.first, a.positions) - embedded_point(b.balls, pair.second, b.positions);
+    const float distance = between.norm(), depth = a.ball_radius + b.ball_radius - distance;
+    pair.clear_until = travelled - depth / 2;
+    if (!(depth > 0 && distance > 0)) return Vec3f::Zero();
+    const Vec3f normal = between / distance;
+    const Vec3f velocity =
+        embedded_point(a.balls, pair.first, a.velocities) - embedded_point(b.balls, pair.second, b.velocities);
+    const float stiffness = pair_stiffness(a, pair.first, b, pair.second);
+    const float push =
+        stiffness * depth * unloading(world_.body_restitution, velocity.dot(normal), smooth_speed(world_, dt));
+    const Vec3f held =
+        limited(-2 * stiffness * dt * along_surface(velocity, normal), float(world_.body_friction) * push);
+    return push * normal + held;
+}
+
+ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, float travelled, float dt,
+                                   const RunContext& context) {
+    ContactReport report;
+    const ObstaclePoses poses(world_, time);
+    std::vector<Vec3f> forces;
+    std::ranges::fill(touched_, std::uint8_t{0});
+    for (std::size_t b = 0; b < bodies.size(); ++b) {
+        BodyState& body = bodies[b];
+        std::vector<Near>& near = near_[b];
+        forces.assign(near.size(), Vec3f::Zero());
+        parallel_for(context, near.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t k = begin; k < end; ++k) forces[k] = obstacle_force(near[k], body, poses, travelled, dt);
+        });
+        for (std::size_t k = 0; k < near.size(); ++k) {
+            if (!(near[k].depth > 0)) continue;
+            add_to_particles(body.surface, near[k].point, forces[k], body.forces);
+            touched_[b] = 1;
+            ++report.contacts;
+            report.deepest = std::max(report.deepest, near[k].depth);
+        }
+    }
+    forces.assign(pairs_.size(), Vec3f::Zero());
+    parallel_for(context, pairs_.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k) forces[k] = pair_force(pairs_[k], bodies, travelled, dt);
+    });
+    for (std::size_t k = 0; k < pairs_.size(); ++k) {
+        if (forces[k].isZero(0)) continue;
+        const NearPair& pair = pairs_[k];
+        add_to_particles(bodies[pair.first_body].balls, pair.first, forces[k], bodies[pair.first_body].forces);
+        add_to_particles(bodies[pair.second_body].balls, pair.second, -forces[k], bodies[pair.second_body].forces);
+        touched_[pair.first_body] = touched_[pair.second_body] = 1;
+        ++report.contacts;
+    }
+    return report;
+}
+
+void Contacts::push_out(std::span<BodyState> bodies, double time) {
+    const ObstaclePoses poses(world_, time);
+    for (std::size_t b = 0; b < bodies.size(); ++b) {
+        BodyState& body = bodies[b];
+        const float most = kDeepest * float(body.body->spacing());
+        for (const Near& at : near_[b]) {
+            if (!(at.depth > most)) continue;
+            const Vec3f place = embedded_point(body.surface, at.point, body.positions);
+            const DistanceField::Sample surface =
+                distance_to(world_.obstacles[at.obstacle], poses.at(at.obstacle), place);
+            if (!(-surface.distance > most)) continue;
+            // As XPBD projects one constraint of zero compliance: particles move by weight over mass.
+            float yielding = 0;
+            for (Index k = body.surface.offsets[at.point]; k < body.surface.offsets[at.point + 1]; ++k)
+                yielding +=
+                    body.surface.weights[k] * body.surface.weights[k] * body.inverse_mass[body.surface.particles[k]];
+            if (!(yielding > 0)) continue;
+            const float inwards = std::min(
+                0.0f, (embedded_point(body.surface, at.point, body.velocities) - poses.velocity(at.obstacle, place))
+                          .dot(surface.normal));
+            for (Index k = body.surface.offsets[at.point]; k < body.surface.offsets[at.point + 1]; ++k) {
+                const Index particle = body.surface.particles[k];
+                const float share = body.surface.weights[k] * body.inverse_mass[particle] / yielding;
+                body.positions.add(particle, share * (-surface.distance - most) * surface.normal);
+                body.velocities.add(particle, share * -inwards * surface.normal);
+            }
+        }
+    }
+}
+
+} // namespace filigree

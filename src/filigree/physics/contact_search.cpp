@@ -1,0 +1,128 @@
+// Finding what may touch, and what contacts remember.
+#include "filigree/physics/contact.h"
+
+#include "filigree/core/parallel_for.h"
+
+#include <algorithm>
+#include <array>
+
+namespace filigree {
+
+namespace {
+
+constexpr std::size_t kGrain = 256;
+
+} // namespace
+
+void Contacts::search(std::span<const BodyState> bodies, double time, float travelled, float obstacle_reach,
+                      float pair_reach, const RunContext& context) {
+    if (travelled > near_until_ && !world_.obstacles.empty()) {
+        find_near(bodies, time, travelled, obstacle_reach, context);
+        near_until_ = travelled + obstacle_reach;
+    }
+    if (travelled > pairs_until_ && between_bodies_ && bodies.size() > 1) {
+        find_pairs(bodies, travelled, pair_reach, context);
+        pairs_until_ = travelled + pair_reach;
+    }
+}
+
+void Contacts::find_near(std::span<const BodyState> bodies, double time, float travelled, float reach,
+                         const RunContext& context) {
+    const ObstaclePoses poses(world_, time);
+    for (std::size_t b = 0; b < bodies.size(); ++b) {
+        const BodyState& body = bodies[b];
+        const std::size_t points = body.surface.size();
+        std::vector<Vec3f> places(points);
+        parallel_for(context, points, kGrain, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t s = begin; s < end; ++s) places[s] = embedded_point(body.surface, s, body.positions);
+        });
+        std::vector<Near> found;
+        std::vector<float> distances(points);
+        auto old = near_[b].begin();
+        const Box box = bounds(places);
+        for (std::size_t o = 0; o < world_.obstacles.size(); ++o) {
+            const float nearest = distance_to(world_.obstacles[o], poses.at(o), box.centre().cast<float>()).distance -
+                                  float(box.diagonal() / 2);
+            if (nearest > reach) continue;
+            parallel_for(context, points, kGrain, [&](std::size_t begin, std::size_t end) {
+                for (std::size_t s = begin; s < end; ++s)
+                    distances[s] = distance_to(world_.obstacles[o], poses.at(o), places[s]).distance;
+            });
+            for (Index s = 0; s < points; ++s) {
+                if (!(distances[s] < reach)) continue;
+                Near& near = found.emplace_back(Near{Index(o), s});
+                while (old != near_[b].end() && std::pair(old->obstacle, old->point) < std::pair(Index(o), s)) ++old;
+                if (old != near_[b].end() && old->obstacle == o && old->point == s) near = *old;
+                near.clear_until = travelled + distances[s];
+            }
+        }
+        near_[b] = std::move(found);
+    }
+}
+
+void Contacts::find_pairs(std::span<const BodyState> bodies, float travelled, float reach, const RunContext& context) {
+    pairs_.clear();
+    std::vector<Box> boxes(bodies.size());
+    for (std::size_t b = 0; b < bodies.size(); ++b)
+        for (std::size_t i = 0; i < bodies[b].positions.size(); ++i)
+            boxes[b].extend(bodies[b].positions[i].cast<double>());
+    std::vector<std::vector<Vec3f>> balls(bodies.size());
+    const auto find_balls = [&](std::size_t b) {
+        if (!balls[b].empty()) return;
+        balls[b].resize(bodies[b].balls.size());
+        parallel_for(context, balls[b].size(), kGrain, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t s = begin; s < end; ++s)
+                balls[b][s] = embedded_point(bodies[b].balls, s, bodies[b].positions);
+        });
+    };
+    for (std::size_t a = 0; a < bodies.size(); ++a)
+        for (std::size_t b = a + 1; b < bodies.size(); ++b) {
+            const float far = bodies[a].ball_radius + bodies[b].ball_radius + 2 * reach;
+            const Vec3d low = boxes[a].min.cwiseMax(boxes[b].min) - Vec3d::Constant(double(far));
+            const Vec3d high = boxes[a].max.cwiseMin(boxes[b].max) + Vec3d::Constant(double(far));
+            if (!(low.array() <= high.array()).all()) continue;
+            find_balls(a);
+            find_balls(b);
+            const auto is_common = [&](const Vec3f& p) {
+                return (p.cast<double>().array() >= low.array()).all() &&
+                       (p.cast<double>().array() <= high.array()).all();
+            };
+            using Key = std::array<int, 3>;
+            const auto key_of = [&](const Vec3f& p) {
+                const Vec3d q = (p.cast<double>() - low) / double(far);
+                return Key{int(q.x()), int(q.y()), int(q.z())};
+            };
+            std::vector<std::pair<Key, Index>> grid;
+            for (Index t = 0; t < balls[b].size(); ++t)
+                if (is_common(balls[b][t])) grid.emplace_back(key_of(balls[b][t]), t);
+            std::ranges::sort(grid);
+            for (Index s = 0; s < balls[a].size(); ++s) {
+                if (!is_common(balls[a][s])) continue;
+                const Key key = key_of(balls[a][s]);
+                for (int i = key[0] - 1; i <= key[0] + 1; ++i)
+                    for (int j = key[1] - 1; j <= key[1] + 1; ++j) {
+                        auto at = std::ranges::lower_bound(grid, std::pair(Key{i, j, key[2] - 1}, Index{0}));
+                        for (; at != grid.end() && at->first <= Key{i, j, key[2] + 1}; ++at)
+                            if (const float gap = (balls[b][at->second] - balls[a][s]).norm() - far + 2 * reach;
+                                gap < 2 * reach)
+                                pairs_.push_back({Index(a), s, Index(b), at->second, travelled + gap / 2});
+                    }
+            }
+        }
+}
+
+std::vector<Contacts::Anchor> Contacts::anchors() const {
+    std::vector<Anchor> anchors;
+    for (Index b = 0; b < near_.size(); ++b)
+        for (const Near& at : near_[b])
+            if (at.anchored) anchors.push_back({b, at.obstacle, at.point, at.anchor});
+    return anchors;
+}
+
+void Contacts::set_anchors(std::span<const Anchor> anchors) {
+    for (std::vector<Near>& near : near_) near.clear();
+    for (const Anchor& anchor : anchors)
+        near_[anchor.body].push_back({anchor.obstacle, anchor.point, 0, 0, true, anchor.place});
+}
+
+} // namespace filigree

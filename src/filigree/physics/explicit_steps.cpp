@@ -1,0 +1,195 @@
+// Velocity Verlet: kick, drift, kick. The stable step follows from the squared frequencies that are found with the
+// forces.
+#include "filigree/core/parallel_for.h"
+#include "filigree/physics/rigid_state.h"
+#include "filigree/physics/simulation_state.h"
+#include "filigree/physics/stopwatch.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace filigree {
+
+namespace {
+
+constexpr std::size_t kGrain = 2048;
+constexpr double kSafety = 0.9;            ///< part of the stable step that is used: it changes while a step is made
+constexpr double kLeastSubsteps = 2;       ///< a frame; with one, large motions gain energy
+constexpr unsigned kExplicitLimit = 20000; ///< substeps a frame, whatever was asked for
+
+/// Where internal damping has forces computed: f(x + tau v) = f(x) - tau K v, Kelvin-Voigt to first order; of v less
+/// its rigid part.
+Vectors positions_ahead(const BodyState& body, float delay, const RunContext& context) {
+    const RigidState rigid = rigid_state(body);
+    const Vec3f drifting = (rigid.linear / rigid.mass).cast<float>();
+    const Vec3f turning = rigid.angular_velocity_of(rigid.angular).cast<float>(), centre = rigid.centre.cast<float>();
+    Vectors ahead = body.positions;
+    parallel_for(context, ahead.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i)
+            ahead.add(i, delay * (body.velocities[i] - drifting - turning.cross(body.positions[i] - centre)));
+    });
+    return ahead;
+}
+
+/// s, longest that is stable; 0 where no step is. A spring that is also damped along its own motion has
+/// zeta = omega tau / 2.
+double stable_step(double squared_frequency, double internal_damping) {
+    const double omega = std::sqrt(squared_frequency), zeta = 0.5 * omega * internal_damping;
+    const double step = kSafety * 2 / omega * (std::sqrt(1 + zeta * zeta) - zeta);
+    return std::isfinite(squared_frequency) ? step : 0;
+}
+
+class ExplicitSteps {
+public:
+    ExplicitSteps(SimulationState& state, double from, double until, FrameReport& report, const RunContext& context)
+        : state_(state), bodies_(state.bodies), report_(report), context_(context), now_(from), until_(until),
+          meets_anything_(!state.world.obstacles.empty() || state.bodies.size() > 1) {}
+
+    double run() {
+        find_contacts();
+        const float first_dt = float(state_.frame_seconds() / state_.options.most_substeps);
+        find_forces(first_dt);
+        if (repair_start(state_, elastic_, report_, context_)) find_forces(first_dt);
+        while (until_ - now_ > 1e-9 * state_.frame_seconds()) {
+            const double steps = steps_left();
+            if (!(steps <= steps_allowed()) || context_.is_cancelled()) return now_;
+            const float dt = float((until_ - now_) / steps);
+            move(dt, steps <= 1 ? until_ : now_ + double(dt));
+            find_contacts();
+            find_forces(dt);
+            finish(dt);
+        }
+        return until_;
+    }
+
+private:
+    double steps_left() const {
+        const double remaining = until_ - now_;
+        const double fewest = std::ceil(kLeastSubsteps * remaining / state_.frame_seconds() - 1e-6);
+        return stable_step_ > 0 ? std::max(fewest, std::ceil(remaining / stable_step_)) : kExplicitLimit + 1.0;
+    }
+    /// A frame that was begun may take twice as many.
+    double steps_allowed() const {
+        const unsigned limit =
+            state_.options.mode == StepMode::automatic ? state_.options.most_substeps : kExplicitLimit;
+        return report_.substeps == 0 ? limit : 2.0 * limit - report_.substeps;
+    }
+
+    /// The first half of the kick, and the drift.
+    void move(float dt, double until) {
+        const Stopwatch watch(report_.other_seconds);
+        kick(0.5f * dt, false);
+        drift(dt);
+        const double before = std::exchange(now_, until);
+        move_pins(state_, now_, dt);
+        if (meets_anything_)
+            travelled_ += dt * most_particle_speed(bodies_) + float(obstacle_way(state_.world, bodies_, before, now_));
+    }
+
+    void find_contacts() {
+        if (!meets_anything_) return;
+        const Stopwatch watch(report_.contact_seconds);
+        const float speed = most_particle_speed(bodies_) + float(state_.world.gravity.norm() * state_.frame_seconds());
+        const float way = speed * float(until_ - now_) + float(obstacle_way(state_.world, bodies_, now_, until_));
+        const float spacing = least_spacing(bodies_);
+        state_.contacts.search(bodies_, now_, travelled_, std::clamp(2 * way, 0.25f * spacing, 4 * spacing),
+                               0.5f * spacing, context_);
+    }
+
+    /// All forces at the present positions, and the step that is stable there.
+    void find_forces(float dt) {
+        find_elastic_forces();
+        {
+            const Stopwatch watch(report_.contact_seconds);
+            const ContactReport touching = state_.contacts.add_forces(bodies_, now_, travelled_, dt, context_);
+            report_.contacts = touching.contacts;
+            report_.deepest_contact = std::max(report_.deepest_contact, double(touching.deepest));
+        }
+        const Stopwatch watch(report_.other_seconds);
+        state_.external.add_forces(bodies_, now_, context_);
+        stable_step_ = std::numeric_limits<double>::infinity();
+        for (std::size_t b = 0; b < bodies_.size(); ++b) {
+            BodyState& body = bodies_[b];
+            double squared_frequency = double(elastic_[b].squared_frequency);
+            if (state_.contacts.is_touched(b))
+                squared_frequency += double(kContactShare) * double(body.rest_squared_frequency);
+            squared_frequency = state_.external.add_pulls(body, b, now_, squared_frequency);
+            stable_step_ = std::min(stable_step_, stable_step(squared_frequency, body.body->material.internal_damping));
+        }
+    }
+
+    void find_elastic_forces() {
+        const Stopwatch watch(report_.elastic_seconds);
+        elastic_.resize(bodies_.size());
+        for (std::size_t b = 0; b < bodies_.size(); ++b) {
+            BodyState& body = bodies_[b];
+            const float delay = float(body.body->material.internal_damping);
+            elastic_[b] = delay > 0
+                              ? body.elasticity->forces(positions_ahead(body, delay, context_), body.forces, context_)
+                              : body.elasticity->forces(body.positions, body.forces, context_);
+            report_.least_volume_ratio = std::min(report_.least_volume_ratio, elastic_[b].least_volume_ratio);
+            report_.most_stretch = std::max(report_.most_stretch, elastic_[b].most_stretch);
+        }
+    }
+
+    /// The second half of the kick, and what follows a substep.
+    void finish(float dt) {
+        {
+            const Stopwatch watch(report_.contact_seconds);
+            state_.contacts.push_out(bodies_, now_);
+        }
+        const Stopwatch watch(report_.other_seconds);
+        kick(0.5f * dt, true);
+        move_pins(state_, now_, dt);
+        finish_substep(state_, dt, context_);
+        ++report_.substeps;
+    }
+
+    /// Pinned particles too: move_pins sets them right.
+    void kick(float dt, bool damp) {
+        const Vec3f gravity = state_.world.gravity.cast<float>();
+        for (BodyState& body : bodies_) {
+            const float kept = damp ? std::exp(-2 * dt * float(body.body->material.damping)) : 1.0f;
+            parallel_for(context_, body.positions.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+                const float* inverse_mass = body.inverse_mass.data();
+                const auto kick_axis = [&](std::vector<float>& velocities, const std::vector<float>& forces, float g) {
+                    float* v = velocities.data();
+                    const float* f = forces.data();
+                    for (std::size_t i = begin; i < end; ++i) v[i] = (v[i] + dt * (f[i] * inverse_mass[i] + g)) * kept;
+                };
+                kick_axis(body.velocities.x, body.forces.x, gravity.x());
+                kick_axis(body.velocities.y, body.forces.y, gravity.y());
+                kick_axis(body.velocities.z, body.forces.z, gravity.z());
+            });
+        }
+    }
+
+    void drift(float dt) {
+        for (BodyState& body : bodies_)
+            parallel_for(context_, body.positions.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+                for (std::size_t i = begin; i < end; ++i) body.positions.x[i] += dt * body.velocities.x[i];
+                for (std::size_t i = begin; i < end; ++i) body.positions.y[i] += dt * body.velocities.y[i];
+                for (std::size_t i = begin; i < end; ++i) body.positions.z[i] += dt * body.velocities.z[i];
+            });
+    }
+
+    SimulationState& state_;
+    std::vector<BodyState>& bodies_;
+    FrameReport& report_;
+    const RunContext& context_;
+    double now_, until_;        // s
+    float travelled_ = 0;       // m, bound on any way since the frame's start
+    const bool meets_anything_; // obstacles or other bodies
+    std::vector<ElasticReport> elastic_;
+    double stable_step_ = 0; // s
+};
+
+} // namespace
+
+double step_explicitly(SimulationState& state, double from, double until, FrameReport& report,
+                       const RunContext& context) {
+    return ExplicitSteps(state, from, until, report, context).run();
+}
+
+} // namespace filigree

@@ -1,0 +1,175 @@
+#include "filigree/physics/occupied_cells.h"
+
+#include "filigree/core/parallel_for.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdio>
+#include <tuple>
+#include <utility>
+
+namespace filigree::mesh_cells {
+
+namespace {
+
+constexpr double kMostGridCells = 0x1p30; // of the box, one byte each
+constexpr std::size_t kMostAlong = 16383; // times four samples: what scan_inside takes on an axis
+// Samples a cell along each axis: a closed mesh is scanned at a nanosecond each, a winding number takes microseconds.
+constexpr unsigned kSamples = 4, kWindingSamples = 2;
+constexpr double kMostWindings = 0x1p20; // beyond, one sample a cell
+constexpr double kWindingAccuracy = 0.03;
+constexpr std::size_t kSlabBytes = std::size_t{1} << 27;
+constexpr double kWhole = 1e-6; // relative: sides this close to whole numbers of cells are
+
+/// Points at the centres of the n^3 cubes of each cell, layers k_begin .. k_end - 1 of cells. Rounded to few bits, so
+/// that the scan's exact decisions are quick.
+Lattice sample_points(const Grid& grid, unsigned n, std::size_t k_begin, std::size_t k_end) {
+    const double step = grid.spacing / n, bit = std::ldexp(1.0, std::ilogb(step) - 24);
+    Lattice lattice;
+    lattice.spacing = std::nearbyint(step / bit) * bit;
+    for (int axis = 0; axis < 3; ++axis) {
+        const std::size_t begin = axis == 2 ? n * k_begin : 0, end = n * (axis == 2 ? k_end : grid.counts[axis]);
+        const double first = std::nearbyint((grid.origin[axis] + step / 2) / bit) * bit;
+        lattice.coordinates[axis].resize(end - begin);
+        for (std::size_t i = begin; i < end; ++i)
+            lattice.coordinates[axis][i - begin] = first + double(i) * lattice.spacing;
+    }
+    return lattice;
+}
+
+struct Samples {
+    unsigned count = 0;
+    std::array<unsigned, 3> sums = {}; ///< of the samples' places in the cell, counted from 0
+};
+
+/// Adds up to four samples, in the bits of `row`, in row (y, z) of the cell.
+void add_samples(Samples& samples, unsigned row, unsigned y, unsigned z) {
+    const auto count = unsigned(std::popcount(row));
+    samples.count += count;
+    samples.sums[0] += (row >> 1 & 1) + 2 * (row >> 2 & 1) + 3 * (row >> 3 & 1);
+    samples.sums[1] += count * y;
+    samples.sums[2] += count * z;
+}
+
+/// Cells of layers k_begin .. k_end - 1 with some of their n^3 samples inside; n divides 64.
+std::vector<Draft> find_occupied(const Grid& grid, const Occupancy& occupancy, unsigned n, std::size_t k_begin,
+                                 std::size_t k_end, const RunContext& context) {
+    std::vector<std::vector<Draft>> layers(k_end - k_begin);
+    const unsigned cells_a_word = 64 / n;
+    const std::uint64_t mask = (std::uint64_t{1} << n) - 1;
+    parallel_for(context, layers.size(), 1, [&](std::size_t begin, std::size_t end) {
+        std::vector<Samples> row(cells_a_word * occupancy.words_per_row);
+        for (std::size_t layer = begin; layer < end; ++layer)
+            for (std::size_t j = 0; j < grid.counts[1]; ++j) {
+                bool any = false;
+                for (unsigned r = 0; r < n * n; ++r) {
+                    const unsigned y = r % n, z = r / n;
+                    const std::uint64_t* words =
+                        &occupancy.bits[((n * layer + z) * occupancy.counts[1] + n * j + y) * occupancy.words_per_row];
+                    for (std::size_t w = 0; w < occupancy.words_per_row; ++w)
+                        for (std::uint64_t rest = words[w]; rest != 0;) {
+                            const unsigned cell = unsigned(std::countr_zero(rest)) / n;
+                            add_samples(row[cells_a_word * w + cell], unsigned(rest >> n * cell & mask), y, z);
+                            rest &= ~(mask << n * cell);
+                            any = true;
+                        }
+                }
+                if (!any) continue;
+                for (std::size_t i = 0; i < grid.counts[0]; ++i) {
+                    const Samples samples = std::exchange(row[i], {});
+                    if (samples.count == 0) continue;
+                    const std::array<std::size_t, 3> index = {i, j, k_begin + layer};
+                    const float fraction = float(samples.count) / float(n * n * n);
+                    Draft cell{{std::uint16_t(index[0]), std::uint16_t(index[1]), std::uint16_t(index[2])},
+                               std::max(fraction, Cells::kLeastFraction),
+                               {}};
+                    for (int axis = 0; axis < 3; ++axis) {
+                        const double place = (samples.sums[axis] / double(samples.count) + 0.5) / n;
+                        cell.centroid[axis] = float(grid.origin[axis] + grid.spacing * (double(index[axis]) + place));
+                    }
+                    layers[layer].push_back(cell);
+                }
+            }
+    });
+    std::vector<Draft> cells;
+    for (const auto& layer : layers) cells.insert(cells.end(), layer.begin(), layer.end());
+    return cells;
+}
+
+} // namespace
+
+std::string number(double x) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.4g", x);
+    return text;
+}
+
+Result<Grid> make_grid(const Box& box, double spacing, double scale) {
+    Grid grid{.spacing = spacing, .origin = box.centre(), .counts = {}};
+    const double largest = std::max(box.min.cwiseAbs().maxCoeff(), box.max.cwiseAbs().maxCoeff());
+    const double rounding = 4 * std::numeric_limits<float>::epsilon() * largest / spacing;
+    double cells = 1, longest = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+        const double side = box.size()[axis] / spacing;
+        const bool whole = std::abs(side - std::round(side)) <= kWhole * side + rounding;
+        const double count = std::max(whole ? std::round(side) : std::ceil(side), 1.0);
+        cells *= count;
+        longest = std::max(longest, count);
+        grid.origin[axis] -= 0.5 * count * spacing;
+        grid.counts[axis] = std::size_t(std::min(count, 1e9));
+    }
+    if (cells > kMostGridCells || longest > double(kMostAlong)) {
+        const double coarser = std::max(std::cbrt(cells / kMostGridCells), longest / double(kMostAlong));
+        return Error{ErrorCode::unsuitable, "A spacing of " + number(spacing * scale) +
+                                                " m divides the body's box into too many cells; give at least " +
+                                                number(1.05 * spacing * coarser * scale) + " m."};
+    }
+    return grid;
+}
+
+MeshToFill find_mesh_to_fill(const Mesh& mesh, const WeldedTriangles& welded) {
+    MeshToFill found{mesh.positions, welded, std::vector<std::uint8_t>(mesh.vertex_count(), 0), {}};
+    for (const Index vertex : mesh.corners) found.used[vertex] = 1;
+    for (std::size_t v = 0; v < found.used.size(); ++v)
+        if (found.used[v]) found.box.extend(mesh.positions[v].cast<double>());
+    double longest = 0; // squared
+    for (const Triangle& triangle : welded.triangles) {
+        const auto [a, b, c] = found.corners_of(triangle);
+        longest = std::max({longest, (b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()});
+    }
+    found.longest_edge = std::sqrt(longest);
+    return found;
+}
+
+Error too_many_cells(const Grid& grid, double count, double scale) {
+    return {ErrorCode::unsuitable, "A spacing of " + number(grid.spacing * scale) + " m gives about " + number(count) +
+                                       " cells, more than 2^26; give at least " +
+                                       number(1.05 * grid.spacing * std::cbrt(count / kMostCells) * scale) + " m."};
+}
+
+Result<std::vector<Draft>> sample_cells(const MeshToFill& mesh, const Grid& grid, double scale,
+                                        const RunContext& context) {
+    const WeldedTriangles& welded = mesh.welded;
+    const bool scans = welded.closure.is_closed() && welded.closure.is_oriented();
+    const double most = 8 * double(grid.counts[0]) * double(grid.counts[1]) * double(grid.counts[2]);
+    const unsigned n = scans ? kSamples : most <= kMostWindings ? kWindingSamples : 1;
+    const std::size_t bytes_a_layer = n * n * grid.counts[1] * ((n * grid.counts[0] + 63) / 64) * 8;
+    const std::size_t slab = std::clamp<std::size_t>(kSlabBytes / bytes_a_layer, 1, grid.counts[2]);
+    std::vector<Draft> cells;
+    for (std::size_t k = 0; k < grid.counts[2]; k += slab) {
+        const std::size_t end = std::min(k + slab, grid.counts[2]);
+        const Lattice lattice = sample_points(grid, n, k, end);
+        const Result<Occupancy> occupancy =
+            scans ? scan_inside({mesh.positions, welded.triangles}, lattice, Overlap::merged, context)
+                  : winding_inside(mesh.positions, welded.triangles, lattice, kWindingAccuracy, context);
+        if (!occupancy) return occupancy.error();
+        const std::vector<Draft> found = find_occupied(grid, *occupancy, n, k, end, context);
+        cells.insert(cells.end(), found.begin(), found.end());
+        if (double(cells.size()) > kMostCells)
+            return too_many_cells(grid, double(cells.size()) * double(grid.counts[2]) / double(end), scale);
+    }
+    return cells;
+}
+
+} // namespace filigree::mesh_cells

@@ -1,0 +1,30 @@
+#include "filigree/physics/rigid_state.h"
+
+#include <Eigen/Cholesky>
+
+namespace filigree {
+
+Vec3d RigidState::angular_velocity_of(const Vec3d& momentum) const {
+    return (inertia + 1e-12 * inertia.trace() * Mat3d::Identity()).ldlt().solve(momentum);
+}
+
+RigidState rigid_state(const BodyState& body) {
+    RigidState state;
+    const std::vector<float>& mass = body.body->mass;
+    for (std::size_t i = 0; i < mass.size(); ++i) {
+        const double m = double(mass[i]);
+        state.mass += m;
+        state.centre += m * body.positions[i].cast<double>();
+        state.linear += m * body.velocities[i].cast<double>();
+    }
+    state.centre /= state.mass;
+    for (std::size_t i = 0; i < mass.size(); ++i) {
+        const double m = double(mass[i]);
+        const Vec3d r = body.positions[i].cast<double>() - state.centre;
+        state.angular += m * r.cross(body.velocities[i].cast<double>());
+        state.inertia += m * (r.squaredNorm() * Mat3d::Identity() - r * r.transpose());
+    }
+    return state;
+}
+
+} // namespace filigree

@@ -1,0 +1,75 @@
+#include "filigree/physics/saved_state.h"
+
+#include "filigree/physics/byte_stream.h"
+
+namespace filigree {
+
+namespace {
+
+// The name of the format, its version last. 2: with the flow of each particle.
+constexpr std::uint64_t kMagic = 0x32455441'54534c46; // "FLSTATE2"
+static_assert(sizeof(Contacts::Anchor) == 3 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
+
+void write_body(ByteWriter& writer, const SavedBody& body) {
+    writer.value(std::uint64_t(body.positions.size()));
+    writer.vectors(body.positions);
+    writer.vectors(body.velocities);
+    writer.array(std::span(body.elasticity));
+    writer.array(std::span(body.flow));
+    if (body.flow.empty()) return;
+    writer.array(std::span(body.surface));
+    writer.array(std::span(body.balls));
+    writer.value(std::uint64_t(body.attachments.size()));
+    for (const SavedPoints& points : body.attachments) {
+        writer.array(std::span(points.places));
+        writer.array(std::span(points.gradients));
+    }
+}
+
+SavedBody read_body(ByteReader& reader) {
+    SavedBody body;
+    const std::size_t count = reader.count(6 * sizeof(float));
+    body.positions = reader.vectors(count);
+    body.velocities = reader.vectors(count);
+    const std::vector<char> elasticity = reader.array<char>();
+    body.elasticity.assign(elasticity.begin(), elasticity.end());
+    body.flow = reader.array<Mat3f>();
+    if (body.flow.empty()) return body;
+    body.surface = reader.array<Vec3f>();
+    body.balls = reader.array<Vec3f>();
+    body.attachments.resize(reader.count(2 * sizeof(std::uint64_t)));
+    for (SavedPoints& points : body.attachments) {
+        points.places = reader.array<Vec3f>();
+        points.gradients = reader.array<Mat3f>();
+    }
+    return body;
+}
+
+} // namespace
+
+std::string write_saved_state(const SavedState& state) {
+    ByteWriter writer;
+    writer.value(kMagic);
+    writer.value(state.frame);
+    writer.value(std::uint64_t(state.bodies.size()));
+    for (const SavedBody& body : state.bodies) write_body(writer, body);
+    writer.array(std::span(state.anchors));
+    return writer.take();
+}
+
+Result<SavedState> read_saved_state(std::string_view bytes) {
+    ByteReader reader(bytes);
+    if (reader.value<std::uint64_t>() != kMagic)
+        return Error{ErrorCode::bad_file,
+                     "The saved state is damaged or of another version; start the simulation anew."};
+    SavedState state;
+    state.frame = reader.value<std::uint64_t>();
+    state.bodies.resize(reader.count(sizeof(std::uint64_t)));
+    for (SavedBody& body : state.bodies) body = read_body(reader);
+    state.anchors = reader.array<Contacts::Anchor>();
+    if (!reader.ok() || !reader.at_end())
+        return Error{ErrorCode::bad_file, "The saved state is damaged; start the simulation anew."};
+    return state;
+}
+
+} // namespace filigree

@@ -1,0 +1,106 @@
+#include "filigree/physics/simulation_state.h"
+
+#include <algorithm>
+
+namespace filigree {
+
+namespace {
+
+SavedBody save_body(const BodyState& body) {
+    SavedBody saved{.positions = body.positions,
+                    .velocities = body.velocities,
+                    .elasticity = body.elasticity->state(),
+                    .flow = body.flow,
+                    .surface = {},
+                    .balls = {},
+                    .attachments = {}};
+    if (!body.has_flowed()) return saved;
+    saved.surface = body.surface.rest;
+    saved.balls = body.balls.rest;
+    return saved;
+}
+
+/// Embeds points where they were saved. Those that are there already cost nothing. False where they are not as many.
+bool embed_again(Embedding& points, const std::vector<Vec3f>& places, const BodyState& body,
+                 const RunContext& context) {
+    if (places.size() != points.size()) return false;
+    if (places != points.rest) points = embed(places, body.elasticity->reference(), body.body->spacing(), context);
+    return true;
+}
+
+bool restore_attachment(Attachment& attachment, SavedPoints saved, const BodyState& body, const RunContext& context) {
+    if (saved.gradients.size() != saved.places.size()) return false;
+    if (!embed_again(attachment.embedding, saved.places, body, context)) return false;
+    attachment.gradients = std::move(saved.gradients);
+    return true;
+}
+
+/// False where saved points are not those of this body.
+bool restore_points(BodyState& body, SavedBody& saved, std::span<Attachment* const> attachments, bool had_flowed,
+                    const RunContext& context) {
+    if (!body.has_flowed()) {
+        if (!had_flowed) return true;
+        embed_surface_at_rest(body, body.balls.size() != 0, context);
+        for (Attachment* attachment : attachments)
+            *attachment = attach(body, attachment->body, std::vector(attachment->points), context);
+        return true;
+    }
+    if (!embed_again(body.surface, saved.surface, body, context)) return false;
+    if (!embed_again(body.balls, saved.balls, body, context)) return false;
+    for (std::size_t a = 0; a < attachments.size(); ++a) {
+        if (a >= saved.attachments.size()) // attached since
+            *attachments[a] = attach(body, attachments[a]->body, std::vector(attachments[a]->points), context);
+        else if (!restore_attachment(*attachments[a], std::move(saved.attachments[a]), body, context))
+            return false;
+    }
+    return true;
+}
+
+bool are_sound(std::span<const Contacts::Anchor> anchors, const SimulationState& state) {
+    return std::ranges::all_of(anchors, [&](const Contacts::Anchor& anchor) {
+        return anchor.body < state.bodies.size() && anchor.obstacle < state.world.obstacles.size() &&
+               anchor.point < state.bodies[anchor.body].surface.size();
+    });
+}
+
+} // namespace
+
+SavedState save_state(const SimulationState& state) {
+    SavedState saved;
+    saved.frame = state.frame;
+    for (const BodyState& body : state.bodies) saved.bodies.push_back(save_body(body));
+    for (const Attachment& attachment : state.attachments)
+        if (state.bodies[attachment.body].has_flowed())
+            saved.bodies[attachment.body].attachments.push_back({attachment.embedding.rest, attachment.gradients});
+    saved.anchors = state.contacts.anchors();
+    return saved;
+}
+
+Status restore_state(SimulationState& state, SavedState saved) {
+    const Error damaged{ErrorCode::bad_file, "The saved state is damaged; start the simulation anew."};
+    const Error other{ErrorCode::mismatch,
+                      "The saved state is of other bodies; resume it with the scene it was saved from."};
+    if (saved.bodies.size() != state.bodies.size()) return other;
+    const RunContext context(1);
+    for (std::size_t b = 0; b < state.bodies.size(); ++b) {
+        BodyState& body = state.bodies[b];
+        SavedBody& from = saved.bodies[b];
+        const std::size_t count = body.body->particle_count();
+        if (from.positions.size() != count || from.velocities.size() != count) return other;
+        if (!from.flow.empty() && from.flow.size() != count) return other;
+        for (const Mat3f& gradient : from.flow)
+            if (!gradient.allFinite()) return damaged;
+        if (!body.elasticity->restore_state(from.elasticity)) return other;
+        body.positions = std::move(from.positions);
+        body.velocities = std::move(from.velocities);
+        const bool had_flowed = body.has_flowed();
+        body.flow = std::move(from.flow);
+        if (!restore_points(body, from, state.attachments_of(b), had_flowed, context)) return other;
+    }
+    if (!are_sound(saved.anchors, state)) return damaged;
+    state.contacts.set_anchors(saved.anchors);
+    state.frame = saved.frame;
+    return Success{};
+}
+
+} // namespace filigree

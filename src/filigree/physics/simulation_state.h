@@ -1,0 +1,58 @@
+// A world and everything that moves in it, and how a frame of it is made. Private to the layer.
+#pragma once
+
+#include "filigree/physics/contact.h"
+#include "filigree/physics/external_forces.h"
+#include "filigree/physics/saved_state.h"
+#include "filigree/physics/simulation.h"
+
+namespace filigree {
+
+struct SimulationState {
+    SimulationState(World the_world, std::size_t body_count, const StepOptions& the_options)
+        : world(std::move(the_world)), options(the_options),
+          contacts(world, body_count, the_options.contacts_between_bodies), external(world, body_count) {}
+    SimulationState(const SimulationState&) = delete; // contacts and external refer to the world
+    SimulationState& operator=(const SimulationState&) = delete;
+
+    World world;
+    const StepOptions options;
+    std::vector<BodyState> bodies;
+    Contacts contacts;
+    ExternalForces external;
+    std::vector<Attachment> attachments;
+    std::vector<std::vector<Vec3f>> pinned_from; ///< of each pin: where its particles were at the start
+    std::size_t frame = 0;                       ///< frames done
+
+    double frame_seconds() const { return 1 / options.frames_per_second; }
+    double time() const { return double(frame) * frame_seconds(); }
+    std::vector<Attachment*> attachments_of(std::size_t body);
+};
+
+/// Steps by velocity Verlet as far as that goes. Returns the time reached: before `until` when steps became too many
+/// (for descent to go on) or the work was cancelled.
+double step_explicitly(SimulationState& state, double from, double until, FrameReport& report,
+                       const RunContext& context);
+/// Steps by vertex block descent. Breaks off when cancelled.
+void step_by_descent(SimulationState& state, double from, double until, FrameReport& report, const RunContext& context);
+
+// What both do in a substep.
+
+/// m/s, of the fastest particle.
+float most_particle_speed(std::span<const BodyState> bodies);
+float least_spacing(std::span<const BodyState> bodies);
+/// Puts pinned particles where their motion has them at `now`, with its mean velocity over dt.
+void move_pins(SimulationState& state, double now, float dt);
+/// Starts that no step can take: coincident particles are shaken apart, and what is stretched too far is scaled down.
+/// Whether anything was done.
+bool repair_start(SimulationState& state, std::span<const ElasticReport> elastic, FrameReport& report,
+                  const RunContext& context);
+/// Plastic flow and heat; neighbourhoods are renewed where that asks for it.
+void finish_substep(SimulationState& state, float dt, const RunContext& context);
+
+/// Everything that moves, and back. Errors of restore_state: mismatch (of other bodies), bad_file (numbers out of
+/// range); the state is then of no use.
+SavedState save_state(const SimulationState& state);
+Status restore_state(SimulationState& state, SavedState saved);
+
+} // namespace filigree

@@ -1,0 +1,111 @@
+// The parts of a substep that explicit steps and descent share.
+#include "filigree/core/random.h"
+#include "filigree/physics/simulation_state.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace filigree {
+
+namespace {
+
+constexpr float kMostStretch = 10; ///< a body stretched further starts scaled down ...
+constexpr float kStretchAfter = 3; ///< ... to this
+
+void shake(BodyState& body, std::uint64_t seed) {
+    const auto shift = [&](std::size_t number) {
+        return float((random_unit(seed, number) - 0.5) * 2e-3 * body.body->spacing());
+    };
+    for (std::size_t i = 0; i < body.positions.size(); ++i)
+        if (!body.fixed[i]) body.positions.add(i, {shift(3 * i), shift(3 * i + 1), shift(3 * i + 2)});
+}
+
+/// Returns how many particles were moved.
+std::size_t scale_down(BodyState& body, float factor) {
+    const std::size_t count = body.positions.size();
+    Vec3d mean = Vec3d::Zero();
+    for (std::size_t i = 0; i < count; ++i) mean += body.positions[i].cast<double>() / double(count);
+    if (!mean.allFinite()) mean.setZero();
+    std::size_t moved = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        if (body.fixed[i]) continue;
+        const Vec3f from_mean = body.positions[i] - mean.cast<float>();
+        const Vec3f scaled = from_mean.allFinite() ? Vec3f(factor * from_mean) : Vec3f::Zero();
+        body.positions.set(i, mean.cast<float>() + scaled);
+        body.velocities.set(i, Vec3f::Zero());
+        ++moved;
+    }
+    return moved;
+}
+
+} // namespace
+
+std::vector<Attachment*> SimulationState::attachments_of(std::size_t body) {
+    std::vector<Attachment*> found;
+    for (Attachment& attachment : attachments)
+        if (attachment.body == body) found.push_back(&attachment);
+    return found;
+}
+
+float most_particle_speed(std::span<const BodyState> bodies) {
+    float squared = 0;
+    for (const BodyState& body : bodies) {
+        constexpr std::size_t kAtOnce = 16; // so that the compiler uses vectors; what follows the last particle is 0
+        float most[kAtOnce] = {};
+        const Vectors& v = body.velocities;
+        for (std::size_t i = 0; i < v.size(); i += kAtOnce)
+            for (std::size_t k = 0; k < kAtOnce; ++k) {
+                const float here = v.x[i + k] * v.x[i + k] + v.y[i + k] * v.y[i + k] + v.z[i + k] * v.z[i + k];
+                most[k] = here > most[k] ? here : most[k];
+            }
+        squared = std::max(squared, *std::ranges::max_element(most));
+    }
+    return std::sqrt(squared);
+}
+
+float least_spacing(std::span<const BodyState> bodies) {
+    float spacing = std::numeric_limits<float>::max();
+    for (const BodyState& body : bodies) spacing = std::min(spacing, float(body.body->spacing()));
+    return spacing;
+}
+
+void move_pins(SimulationState& state, double now, float dt) {
+    for (std::size_t p = 0; p < state.world.pins.size(); ++p) {
+        const Pin& pin = state.world.pins[p];
+        const Eigen::Isometry3d motion = pin.motion.at(now), before = pin.motion.at(now - double(dt));
+        BodyState& body = state.bodies[pin.body];
+        for (std::size_t k = 0; k < pin.particles.size(); ++k) {
+            const Vec3d from = state.pinned_from[p][k].cast<double>(), place = motion * from;
+            body.positions.set(pin.particles[k], place.cast<float>());
+            body.velocities.set(pin.particles[k],
+                                dt > 0 ? Vec3f(((place - before * from) / double(dt)).cast<float>()) : Vec3f::Zero());
+        }
+    }
+}
+
+bool repair_start(SimulationState& state, std::span<const ElasticReport> elastic, FrameReport& report,
+                  const RunContext& context) {
+    bool repaired = false;
+    for (std::size_t b = 0; b < state.bodies.size(); ++b) {
+        if (std::abs(elastic[b].least_volume_ratio) < 1e-12f) {
+            repaired = true;
+            shake(state.bodies[b], context.seed + b);
+        }
+        if (elastic[b].most_stretch <= kMostStretch) continue;
+        repaired = true;
+        const float factor = std::isfinite(elastic[b].most_stretch) ? kStretchAfter / elastic[b].most_stretch : 0.0f;
+        report.clamped_particles += scale_down(state.bodies[b], factor);
+    }
+    return repaired;
+}
+
+void finish_substep(SimulationState& state, float dt, const RunContext& context) {
+    for (std::size_t b = 0; b < state.bodies.size(); ++b) {
+        BodyState& body = state.bodies[b];
+        body.elasticity->finish_substep(body.positions, dt, context);
+        if (body.elasticity->wants_renewal()) renew_neighbourhoods(body, state.attachments_of(b), context);
+    }
+}
+
+} // namespace filigree
