@@ -1,4 +1,4 @@
-// Saved states: plain values and arrays as bytes, end to end, and back. Private to the layer.
+// Saved states: plain values and arrays as bytes, end to end, and back. For physics and scene.
 #pragma once
 
 #include "filigree/physics/vectors.h"
