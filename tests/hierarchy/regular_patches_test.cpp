@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <ctime>
 #include <filesystem>
 #include <gtest/gtest.h>
 #include <map>
@@ -180,6 +181,22 @@ TEST(RegularPatches, SaysWhatIsInTheWay) {
     touching.add_face(std::array<Index, 4>{0, 1, 2, 3});
     touching.add_face(std::array<Index, 4>{2, 4, 5, 6});
     EXPECT_NE(refusal(touching).find("vertex 2 touch"), std::string::npos);
+}
+
+/// Walking around the middle once for each of its faces would take 3,600 million steps.
+TEST(RegularPatches, AFanTakesNoQuadraticTime) {
+    constexpr Index kFaces = 60'000;
+    Mesh fan;
+    fan.positions.resize(1 + 2 * kFaces, Vec3f::Zero());
+    for (Index i = 0; i < kFaces; ++i)
+        fan.add_face(std::array<Index, 4>{0, 1 + 2 * i, 2 + 2 * i, 1 + 2 * ((i + 1) % kFaces)});
+    const std::clock_t start = std::clock();
+    EXPECT_NE(refusal(fan).find("do not fit"), std::string::npos);
+    EXPECT_LT(double(std::clock() - start) / CLOCKS_PER_SEC, 2);
+
+    fan.positions.resize(1 + 2 * kFaces + 3, Vec3f::Zero()); // and a face that touches the middle alone
+    fan.add_face(std::array<Index, 4>{0, 2 * kFaces + 1, 2 * kFaces + 2, 2 * kFaces + 3});
+    EXPECT_NE(refusal(fan).find("vertex 0 touch there without sharing an edge"), std::string::npos);
 }
 
 TEST(RegularPatches, HolesMustLieOnEveryLevel) {

@@ -6,8 +6,11 @@
 #include "filigree/mesh/topology.h"
 #include "filigree/mesh/triangulate.h"
 
+#include <cmath>
+#include <ctime>
 #include <gtest/gtest.h>
 #include <map>
+#include <numbers>
 #include <set>
 
 namespace filigree {
@@ -137,6 +140,45 @@ TEST(Simplify, FlatAndTinyMeshes) {
     for (const std::size_t target : {0u, 3u})
         EXPECT_EQ(simplify(points, tetrahedron, {.target_vertices = target}, RunContext()).vertex_count, 3u);
     EXPECT_TRUE(simplify({}, {}, {.target_vertices = 3}, RunContext()).triangles.empty());
+}
+
+/// Fans, where every collapse is next to one vertex of all triangles. Quadratic time would show: 10 s and more each.
+enum class Hub { middle, rim, both_ends, shared_edge };
+
+void expect_hub_simplified(Hub hub, Index corners, std::size_t target) {
+    std::vector<Vec3f> points = {{0, 0, 0.5f}, {0, 0, -0.5f}};
+    for (Index i = 0; i < corners; ++i) {
+        const double angle = 2 * std::numbers::pi * i / corners;
+        points.emplace_back(float(0.5 * std::cos(angle)), float(0.5 * std::sin(angle)), 0.0f);
+    }
+    std::vector<Triangle> triangles;
+    for (Index i = 0; i < corners; ++i) {
+        const Index a = 2 + i, b = 2 + (i + 1) % corners;
+        if (hub == Hub::middle || hub == Hub::both_ends) triangles.push_back({0, a, b});
+        if (hub == Hub::both_ends) triangles.push_back({1, b, a});
+        if (hub == Hub::shared_edge) triangles.push_back({0, 1, a});
+        if (hub == Hub::rim && a != 2 && b != 2) triangles.push_back({2, a, b});
+    }
+    const std::clock_t start = std::clock();
+    const Simplified result = simplify(points, triangles, {.target_vertices = target}, kOneThread);
+    EXPECT_LT(double(std::clock() - start) / CLOCKS_PER_SEC, 5) << int(hub);
+    EXPECT_NEAR(double(result.vertex_count), double(target), 0.02 * double(target)) << int(hub);
+    std::set<Triangle> distinct;
+    for (Triangle t : result.triangles) {
+        std::ranges::sort(t);
+        EXPECT_TRUE(t[0] < t[1] && t[1] < t[2] && t[2] < points.size());
+        EXPECT_TRUE(distinct.insert(t).second); // nothing is there twice
+    }
+    if (hub != Hub::both_ends) return;
+    std::map<std::pair<Index, Index>, int> runs; // still closed: every edge one way and the other
+    for (const Triangle& t : result.triangles)
+        for (int k = 0; k < 3; ++k) runs[std::minmax(t[k], t[(k + 1) % 3])] += t[k] < t[(k + 1) % 3] ? 1 : -1;
+    for (const auto& [edge, sum] : runs) EXPECT_EQ(sum, 0) << edge.first << ' ' << edge.second;
+}
+
+TEST(Simplify, FansTakeNoQuadraticTime) {
+    for (const Hub hub : {Hub::middle, Hub::rim, Hub::both_ends}) expect_hub_simplified(hub, 60'000, 500);
+    expect_hub_simplified(Hub::shared_edge, 10'000, 500);
 }
 
 /// A large mesh: still closed and oriented, and threads change nothing.

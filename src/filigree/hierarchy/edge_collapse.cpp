@@ -1,5 +1,11 @@
 // Based on: quadric error metrics [Garland 1997], half-edge form. Where we differ: quadrics are weighted by area, and
 // nothing is forbidden, only priced, so that every mesh can be brought to any count.
+//
+// Hubs, vertices of very many triangles (the middle of a fan), would make it quadratic: every collapse next to one
+// would look at all of them. So removed triangles stay in the lists until these are half empty, what two vertices share
+// is looked for at the one with fewer triangles, and a collapse into a hub prices only what it changed. The hub's other
+// edges are priced again when they come up; a quadric only grows, so until then they stand where they are too early,
+// never too late.
 #include "filigree/hierarchy/edge_collapse.h"
 
 #include <algorithm>
@@ -7,6 +13,7 @@
 #include <cmath>
 #include <queue>
 #include <unordered_map>
+#include <utility>
 
 namespace filigree {
 
@@ -15,7 +22,11 @@ namespace {
 constexpr double kBorderWeight = 1; // of the planes that stand on open edges, so that outlines keep their shape
 constexpr double kLengthWeight =
     0.02; // of (edge length)^2 x area: spreads vertices evenly; 0.001 and 0.1 restore 1.3 to 2 times worse
-constexpr double kMinCosine = 0.2; // a triangle that turns further than this in a collapse counts as turned over
+constexpr double kMinCosine = 0.2;       // a triangle that turns further than this in a collapse counts as turned over
+constexpr std::size_t kHub = 1024;       // triangles at a vertex from which it counts as a hub
+constexpr std::size_t kFewTriangles = 8; // a list this long is no trouble even when all of it is gone
+constexpr double kHubSlack =
+    1.5; // an edge of a hub may have become this much dearer since it was priced: 1.2 in distance
 
 /// Sum of area x (distance to a plane)^2, about the mesh's centre.
 struct Quadric {
@@ -52,6 +63,17 @@ struct Collapse {
     }
 };
 
+/// The triangles at a vertex.
+struct TriangleList {
+    std::vector<Index> all; ///< those that are left in their order, and some that are gone
+    std::size_t left = 0;
+
+    void add(Index triangle) {
+        all.push_back(triangle);
+        ++left;
+    }
+};
+
 class Collapser {
 public:
     Collapser(std::span<const Vec3f> positions, std::span<const Triangle> triangles) {
@@ -70,8 +92,9 @@ public:
         for (const Triangle& t : triangles) triangles_.push_back({local[t[0]], local[t[1]], local[t[2]]});
         around_.resize(points_.size());
         for (Index t = 0; t < triangles_.size(); ++t)
-            for (Index v : triangles_[t]) around_[v].push_back(t);
+            for (Index v : triangles_[t]) around_[v].add(t);
         stamp_.assign(points_.size(), 0);
+        was_hub_.assign(points_.size(), false);
         vertex_count_ = points_.size();
         triangle_count_ = triangles_.size();
         make_quadrics();
@@ -83,13 +106,12 @@ public:
             for (Index w : neighbours) price(v, w);
         }
         while (vertex_count_ > target && !queue_.empty() && !context.is_cancelled()) {
-            const Collapse next = queue_.top();
+            Collapse next = queue_.top();
             queue_.pop();
-            if (next.stamp != stamp_[next.from] + stamp_[next.to]) continue;
+            if (next.stamp != stamp_of(next.from, next.to) && !renew(next)) continue;
             if (shared_triangles(next.from, next.to) == triangle_count_) continue; // something has to be left
             if (!next.forced && !is_clean(next.from, next.to)) {
-                const double lost = loss(next.from, next.to);
-                queue_.push({next.cost + lost, next.error + lost, next.from, next.to, next.stamp, true});
+                queue_.push(forced(next));
                 continue;
             }
             const double area = quadrics_[next.from].area + quadrics_[next.to].area;
@@ -146,90 +168,155 @@ private:
 
     std::vector<Index> neighbours_of(Index v) const {
         std::vector<Index> neighbours;
-        for (Index t : around_[v])
+        for (Index t : around_[v].all)
             for (Index w : triangles_[t])
-                if (w != v) neighbours.push_back(w);
+                if (w != v && is_left(t)) neighbours.push_back(w);
         std::sort(neighbours.begin(), neighbours.end());
         neighbours.erase(std::unique(neighbours.begin(), neighbours.end()), neighbours.end());
         return neighbours;
     }
 
-    void price(Index from, Index to) {
+    bool is_left(Index triangle) const { return triangles_[triangle][0] != kNoIndex; }
+    bool is_hub(Index v) const { return around_[v].left >= kHub; }
+    Index fewer_triangles(Index a, Index b) const { return around_[b].left < around_[a].left ? b : a; }
+    Index stamp_of(Index from, Index to) const { return stamp_[from] + stamp_[to]; }
+
+    Collapse priced(Index from, Index to) const {
         const double along = (points_[to] - points_[from]).squaredNorm();
         const double error = quadrics_[from].at(points_[to]) + quadrics_[to].at(points_[to]);
         const double cost = error + kLengthWeight * along * quadrics_[from].area;
-        queue_.push({cost, error, from, to, stamp_[from] + stamp_[to], false});
+        return {cost, error, from, to, stamp_of(from, to), false};
+    }
+    void price(Index from, Index to) { queue_.push(priced(from, to)); }
+
+    /// An entry with an old stamp is void, for whatever changed its ends has priced the edge again; but not all edges
+    /// of a hub. Whether such an edge's turn is now; if not, it is priced again and waits.
+    bool renew(Collapse& next) {
+        if (!was_hub_[next.from] && !was_hub_[next.to]) return false;
+        if (shared_triangles(next.from, next.to) == 0) return false;
+        Collapse now = priced(next.from, next.to);
+        if (next.forced && !is_clean(next.from, next.to)) now = forced(now);
+        const bool is_due = now.cost <= kHubSlack * next.cost;
+        next = now;
+        if (!is_due) queue_.push(now);
+        return is_due;
     }
 
     /// What a collapse that is not clean is taken to lose: everything around `from`, moved by the edge's length.
-    double loss(Index from, Index to) const {
-        return (points_[to] - points_[from]).squaredNorm() * quadrics_[from].area;
+    Collapse forced(Collapse collapse) const {
+        const double loss =
+            (points_[collapse.to] - points_[collapse.from]).squaredNorm() * quadrics_[collapse.from].area;
+        collapse.cost += loss;
+        collapse.error += loss;
+        collapse.forced = true;
+        return collapse;
     }
 
     static bool has(const Triangle& t, Index v) { return t[0] == v || t[1] == v || t[2] == v; }
 
     std::size_t shared_triangles(Index a, Index b) const {
+        const Index fewer = fewer_triangles(a, b), other = fewer == a ? b : a;
+        const std::vector<Index>& around = around_[fewer].all; // none that is gone has the other
         return static_cast<std::size_t>(
-            std::count_if(around_[a].begin(), around_[a].end(), [&](Index t) { return has(triangles_[t], b); }));
+            std::count_if(around.begin(), around.end(), [&](Index t) { return has(triangles_[t], other); }));
+    }
+
+    std::size_t common_neighbours(Index a, Index b) const {
+        const Index fewer = fewer_triangles(a, b), other = fewer == a ? b : a;
+        std::size_t count = 0;
+        for (Index w : neighbours_of(fewer)) count += w != other && shared_triangles(w, other) > 0;
+        return count;
     }
 
     /// No triangle turns over, and the two ends have no common neighbour but those of the triangles between them.
     bool is_clean(Index from, Index to) const {
         const std::size_t shared = shared_triangles(from, to);
-        if (around_[from].size() == shared) return false; // nothing would be left of it
-        for (Index t : around_[from]) {
+        if (around_[from].left == shared) return false; // nothing would be left of it
+        for (Index t : around_[from].all) {
             Triangle moved = triangles_[t];
-            if (has(moved, to)) continue;
+            if (!is_left(t) || has(moved, to)) continue;
             const Vec3d before = normal(moved);
             std::replace(moved.begin(), moved.end(), from, to);
             const Vec3d after = normal(moved);
             if (after.dot(before) <= kMinCosine * after.norm() * before.norm()) return false;
         }
-        const std::vector<Index> a = neighbours_of(from), b = neighbours_of(to);
-        std::vector<Index> common;
-        std::set_intersection(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(common));
-        return common.size() <= shared;
+        return common_neighbours(from, to) <= shared;
     }
 
     void remove(Index triangle) {
-        for (Index v : triangles_[triangle]) {
-            std::erase(around_[v], triangle);
-            vertex_count_ -= around_[v].empty();
+        const Triangle corners = std::exchange(triangles_[triangle], {kNoIndex, kNoIndex, kNoIndex});
+        for (Index v : corners) {
+            TriangleList& around = around_[v];
+            vertex_count_ -= --around.left == 0;
+            if (around.all.size() > 2 * around.left + kFewTriangles)
+                std::erase_if(around.all, [&](Index t) { return !is_left(t); });
         }
-        triangles_[triangle] = {kNoIndex, kNoIndex, kNoIndex};
         --triangle_count_;
     }
 
     void apply(Index from, Index to) {
-        const std::vector<Index> ring = around_[from];
+        const std::vector<Index> ring = around_[from].all;
         for (Index t : ring)
             if (has(triangles_[t], to)) remove(t);
-        vertex_count_ += around_[to].empty() && !around_[from].empty(); // it had lost its last one, and gets new ones
-        for (Index t : std::vector<Index>(around_[from])) {
+        vertex_count_ += around_[to].left == 0 && around_[from].left > 0; // it had lost its last one, and gets new ones
+        vertex_count_ -= around_[from].left > 0;
+        std::vector<Index> moved;
+        for (Index t : ring)
+            if (is_left(t)) moved.push_back(t);
+        for (Index t : moved) {
             std::replace(triangles_[t].begin(), triangles_[t].end(), from, to);
-            around_[to].push_back(t);
+            around_[to].add(t);
         }
-        vertex_count_ -= !around_[from].empty();
-        around_[from].clear();
+        around_[from] = {};
         quadrics_[to] += quadrics_[from];
-        remove_folded(to);
         ++stamp_[from];
         ++stamp_[to];
-        for (Index w : neighbours_of(to)) {
+        const std::vector<Index> changed = is_hub(to) ? other_corners(moved, to) : std::vector<Index>{};
+        was_hub_[to] = was_hub_[to] || is_hub(to);
+        remove_folded(is_hub(to) ? twins_of(moved, to) : around_[to].all);
+        for (Index w : is_hub(to) ? changed : neighbours_of(to)) {
+            if (is_hub(to) && shared_triangles(to, w) == 0) continue; // it went with what was folded
             price(to, w);
             price(w, to);
         }
     }
 
-    /// Triangles over the same three vertices: one is kept when they face the same way or are all there is, none when
-    /// they are back to back.
-    void remove_folded(Index v) {
+    /// The corners of triangles at v, but for v, ascending.
+    std::vector<Index> other_corners(std::span<const Index> triangles, Index v) const {
+        std::vector<Index> corners;
+        for (Index t : triangles)
+            for (Index w : triangles_[t])
+                if (w != v) corners.push_back(w);
+        std::sort(corners.begin(), corners.end());
+        corners.erase(std::unique(corners.begin(), corners.end()), corners.end());
+        return corners;
+    }
+
+    /// These triangles at v, and all over the same three vertices as one of them.
+    std::vector<Index> twins_of(std::span<const Index> triangles, Index v) const {
+        std::vector<Index> twins(triangles.begin(), triangles.end());
+        for (Index t : triangles) {
+            std::array<Index, 2> others;
+            std::copy_if(triangles_[t].begin(), triangles_[t].end(), others.begin(), [&](Index w) { return w != v; });
+            const Index fewer = fewer_triangles(others[0], others[1]);
+            for (Index s : around_[fewer].all)
+                if (has(triangles_[s], v) && has(triangles_[s], others[0]) && has(triangles_[s], others[1]))
+                    twins.push_back(s);
+        }
+        std::sort(twins.begin(), twins.end());
+        twins.erase(std::unique(twins.begin(), twins.end()), twins.end());
+        return twins;
+    }
+
+    /// Of the ring's triangles over the same three vertices, one is kept when they face the same way or are all there
+    /// is, none when they are back to back.
+    void remove_folded(std::vector<Index> ring) {
         const auto key = [&](Index t) {
             std::array<Index, 3> k = triangles_[t];
             std::sort(k.begin(), k.end());
             return k;
         };
-        std::vector<Index> ring = around_[v];
+        std::erase_if(ring, [&](Index t) { return !is_left(t); });
         std::sort(ring.begin(), ring.end(), [&](Index s, Index t) {
             const auto a = key(s), b = key(t);
             return a != b ? a < b : s < t;
@@ -251,9 +338,10 @@ private:
     std::vector<Vec3d> points_;
     std::vector<Index> source_;
     std::vector<Triangle> triangles_; ///< removed: kNoIndex
-    std::vector<std::vector<Index>> around_;
+    std::vector<TriangleList> around_;
     std::vector<Quadric> quadrics_;
     std::vector<Index> stamp_;
+    std::vector<bool> was_hub_; ///< whether a collapse into it left edges that are not priced again
     std::priority_queue<Collapse, std::vector<Collapse>, std::greater<>> queue_;
     std::size_t vertex_count_ = 0, triangle_count_ = 0, forced_ = 0;
     double error_ = 0;

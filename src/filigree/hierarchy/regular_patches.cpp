@@ -126,9 +126,12 @@ Result<std::vector<VertexKind>> vertex_kinds(const Quads& quads, std::size_t ver
                    : faces[v] == 2 && border[v] == 2 ? VertexKind::border
                                                      : VertexKind::irregular;
     }
+    std::vector<bool> is_walked(vertex_count, false); // once a vertex: its first fan has all faces, or it has several
     for (std::size_t h = 0; h < quads.corners.size(); ++h) {
         const Index v = quads.corners[h];
-        if (kinds[v] == VertexKind::irregular && fan_size(quads, static_cast<Index>(h)) != faces[v])
+        if (kinds[v] != VertexKind::irregular || is_walked[v]) continue;
+        is_walked[v] = true;
+        if (fan_size(quads, static_cast<Index>(h)) != faces[v])
             return unsuitable("The faces at " + name_of("vertex", v) + " touch there without sharing an edge");
     }
     return kinds;

@@ -16,6 +16,8 @@ namespace {
 
 /// Vertices from which our own collapses take over: they are an eighth as fast, so they only get what is left.
 constexpr std::size_t kFinishFrom = 20'000;
+/// Triangles at a vertex from which they do all: meshoptimizer takes quadratic time there, minutes from 100,000 on.
+constexpr std::size_t kLargestBulkFan = 4096;
 
 std::size_t count_vertices(std::span<const Triangle> triangles, std::size_t vertex_count) {
     std::vector<bool> seen(vertex_count, false);
@@ -28,8 +30,16 @@ std::size_t count_vertices(std::span<const Triangle> triangles, std::size_t vert
     return count;
 }
 
+std::size_t largest_fan(std::span<const Triangle> triangles, std::size_t vertex_count) {
+    std::vector<Index> counts(vertex_count, 0);
+    for (const Triangle& t : triangles)
+        for (Index v : t) ++counts[v];
+    return counts.empty() ? 0 : *std::ranges::max_element(counts);
+}
+
 /// One call of meshoptimizer that leaves about `ratio` of the triangles; false when it could not go on.
 bool collapse_bulk(std::span<const Vec3f> positions, double ratio, double max_error, Simplified& current) {
+    if (largest_fan(current.triangles, positions.size()) > kLargestBulkFan) return false;
     const double longest_side = bounds(positions).size().maxCoeff();
     std::vector<Triangle> out(current.triangles.size());
     float relative_error = 0; // to the longest side

@@ -25,9 +25,9 @@ struct Simplified {
 };
 
 /// Quadric edge collapses [Garland 1997]: meshoptimizer down to 20,000 vertices, our own (collapse_edges) from there,
-/// and wherever meshoptimizer cannot go on. triangles must be over welded vertices (one id a position), else seams hold
-/// them back. With both options, error ends it before the count does. Cost O(F log F);
-/// same result for any thread count. When cancelled, what is reached so far.
+/// and wherever meshoptimizer cannot go on or a vertex has thousands of triangles. triangles must be over welded
+/// vertices (one id a position), else seams hold them back. With both options, error ends it before the count does.
+/// Cost O(F log F); same result for any thread count. When cancelled, what is reached so far.
 Simplified simplify(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
                     const SimplifyOptions& options, const RunContext& context);
 
