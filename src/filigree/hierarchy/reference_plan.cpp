@@ -260,7 +260,7 @@ void Plan::fold_level(const Grid& rest, const RunContext& context) {
 void Plan::fold_edges(Level& level, std::span<const Vec3f> records, const Grid& rest, const RunContext& context) const {
     const std::size_t m = std::size_t{1} << (levels_.size() - 1), width = block_width(m), floats = edge_floats(law_);
     level.edges.resize(edges_.halves.size() * m * floats / kLanes + 2);
-    float* code = level.edges.front().floats;
+    float* code = first_float(level.edges);
     parallel_for(
         context, edges_.halves.size(), std::max<std::size_t>(1, kPointsPerTask / m), [&](auto begin, auto end) {
             for (std::size_t edge = begin; edge < end; ++edge)
@@ -280,7 +280,7 @@ void Plan::fold_cells(Level& level, std::span<const Vec3f> records, const Grid& 
     const std::size_t m = std::size_t{1} << (levels_.size() - 1), width = block_width(m);
     const std::size_t floats = cell_floats(references_, law_), rows = patches().patch_count() * m;
     level.cells.resize(rows * m * floats / kLanes + 2);
-    float* code = level.cells.front().floats;
+    float* code = first_float(level.cells);
     const auto fold_cell = [&](std::size_t p, std::size_t i, std::size_t j, float* to) {
         for (const CellPoint kind : {CellPoint::along, CellPoint::upwards, CellPoint::centre}) {
             // Points on the patch's sides are the edges'.
@@ -341,7 +341,7 @@ PlacedDriver Plan::begin(std::span<const Vec3f> driver, bool with_axes, Grid& gr
     const int area_exponent = 2 * (rest_exponent_ - exponent);
     placed.scaling.size = law_ == HeightLaw::volume         ? std::ldexp(1.0f, area_exponent)
                           : law_ == HeightLaw::proportional ? std::min(std::ldexp(1.0f, -area_exponent), kHugeRatio)
-                                                      : placed.scaling.height;
+                                                            : placed.scaling.height;
     grid.resize(patches().patch_count(), 1);
     for (std::size_t slot = 0; slot < driver_slots_.size(); ++slot) {
         const Vec3f p = placed.to_unit * driver[driver_slots_[slot]];
@@ -360,7 +360,7 @@ void Plan::refine_edges(const Level& level, const PlacedDriver& placed, const Gr
     const auto refine_block = [&](std::size_t block) {
         const std::size_t edge = block * width / m, k0 = block * width % m;
         EdgeRun run{
-            {}, edges_.twins[edge] != kNoIndex, level.edges.front().floats + block * width * edge_floats(law_), width};
+            {}, edges_.twins[edge] != kNoIndex, first_float(level.edges) + block * width * edge_floats(law_), width};
         for (std::size_t lane = 0; lane < width; ++lane) {
             const References<float> r = side_references(coarse, edges_, edge, k0 + lane);
             const Point<float> points[6] = {r.ends[0], r.ends[1], r.beyond[0], r.beyond[1], r.behind[0], r.behind[1]};
@@ -409,7 +409,7 @@ void Plan::refine_cells(const Level& level, const PlacedDriver& placed, const Gr
             const Index half = static_cast<Index>(4 * p);
             const float *lower = coarse.row(p, j), *upper = coarse.row(p, j + 1);
             refine_row({j > 0 ? coarse.row(p, j - 1) : lower, lower, upper, coarse.pitch(), m,
-                        level.cells.front().floats + row * row_floats, even, odd, fine_pitch},
+                        first_float(level.cells) + row * row_floats, even, odd, fine_pitch},
                        references_, placed.scaling);
             for (std::size_t c = 0; c < 3; ++c) even[c * fine_pitch + 2 * m] = lower[c * coarse.pitch() + m];
             for (std::size_t k = 0; j == 0 && k < m; ++k) set(even, 2 * k + 1, edge_point(edges, m, half, k));

@@ -34,6 +34,9 @@ struct alignas(64) Line {
 };
 /// Floats from a line's start, with a line to read into after the last.
 using Code = std::vector<Line, LargePages<Line>>;
+/// The lines as floats end to end. (From the array of one line no index may reach into the next.)
+inline float* first_float(Code& code) { return reinterpret_cast<float*>(code.data()); }
+inline const float* first_float(const Code& code) { return reinterpret_cast<const float*>(code.data()); }
 
 /// Positions of one level, patch by patch and row by row; a row is its x, then its y, then its z.
 class Grid {
