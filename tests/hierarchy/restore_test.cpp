@@ -171,9 +171,9 @@ TEST(Restore, ThinShellsKeepTheHeightTheLawSays) {
     const double stretch = 2.25;
     const Deformation f = affine(Vec3d(stretch, 1, 1).asDiagonal(), Vec3d::Zero());
     const std::pair<HeightLaw, double> expected[] = {{HeightLaw::keep, 1},
-                                               {HeightLaw::inverse, 1 / std::sqrt(stretch)},
-                                               {HeightLaw::proportional, std::sqrt(stretch)},
-                                               {HeightLaw::volume, 1 / stretch}};
+                                                     {HeightLaw::inverse, 1 / std::sqrt(stretch)},
+                                                     {HeightLaw::proportional, std::sqrt(stretch)},
+                                                     {HeightLaw::volume, 1 / stretch}};
     for (const auto& [law, factor] : expected)
         for (const bool with_gradients : {false, true}) {
             const Pose pose = with_gradients ? pose_by(f, model) : without_gradients(pose_by(f, model));
@@ -276,4 +276,19 @@ TEST(Restore, PosesOfOtherModelsAreRefused) {
     pose.positions.pop_back();
     EXPECT_EQ(code(pose), ErrorCode::mismatch);
     EXPECT_EQ(Restorer::create(model, {.level = 17}, kOneThread).error().code, ErrorCode::usage);
+
+    Pose few = rest_pose(model);
+    few.positions.pop_back();
+    EXPECT_EQ(restorer_of(model).gradients(few, kOneThread).error().code, ErrorCode::mismatch);
+    few = rest_pose(model);
+    few.ghosts.resize(1, Vec3f::Zero());
+    EXPECT_EQ(restorer_of(model).gradients(few, kOneThread).error().code, ErrorCode::mismatch);
 }
+
+/// A restorer refers to its model, so one that ends with the statement does not compile.
+template <class M>
+concept Restorable = requires(M&& model) {
+    Restorer::create(std::forward<M>(model), {}, kOneThread);
+};
+static_assert(Restorable<const Model&> && Restorable<Model&>);
+static_assert(!Restorable<Model> && !Restorable<const Model>);

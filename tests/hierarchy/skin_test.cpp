@@ -55,7 +55,7 @@ double largest_distance(std::span<const Vec3d> a, std::span<const Vec3f> b) {
     return largest;
 }
 
-Pose rest_pose(const Model& model) {
+Pose rest_with_gradients(const Model& model) {
     Pose pose = rest_pose(model);
     pose.gradients.assign(pose.positions.size(), Mat3f::Identity());
     return pose;
@@ -75,7 +75,7 @@ TEST_P(SkinCase, PlaysWhatWeRestore) {
     const double diagonal = bounds(model.mesh.positions).diagonal();
     const Skin skin = make_skin(model, model.finest_level(), influences, exact).value();
     const Restorer restorer = Restorer::create(model, {}, kContext).value();
-    for (const Pose& pose : {rest_pose(model), make_pose(model, 90, 1.7), make_pose(model, -150, 0.4)}) {
+    for (const Pose& pose : {rest_with_gradients(model), make_pose(model, 90, 1.7), make_pose(model, -150, 0.4)}) {
         const std::vector<Vec3f> restored = restorer.positions(pose, kContext).value();
         EXPECT_LT(largest_distance(play(skin, pose), restored), tolerance * diagonal);
     }
@@ -84,7 +84,7 @@ TEST_P(SkinCase, PlaysWhatWeRestore) {
 TEST_P(SkinCase, IsTheMeshAtRest) {
     const Model& model = wavy_model();
     const Skin skin = make_skin(model, model.finest_level(), GetParam().influences, GetParam().exact).value();
-    EXPECT_LT(largest_distance(play(skin, rest_pose(model)), model.mesh.positions), 3e-7);
+    EXPECT_LT(largest_distance(play(skin, rest_with_gradients(model)), model.mesh.positions), 3e-7);
     if (GetParam().influences == 6) {
         EXPECT_TRUE(skin.positions == model.mesh.positions);
     }

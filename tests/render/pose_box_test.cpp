@@ -32,7 +32,7 @@ Fit fit(const Box& box, std::span<const Vec3f> points) {
 Fit fit_at(const Model& model, const Pose& pose, const RestoreOptions& options = {}) {
     const PoseBox box(model, all_vertices(model));
     const Restorer restorer = restorer_of(model, options);
-    return fit(box.at(pose.positions, restorer.gradients(pose, kOneThread)), restored(model, pose, options));
+    return fit(box.at(pose.positions, restorer.gradients(pose, kOneThread).value()), restored(model, pose, options));
 }
 
 Pose without_gradients(Pose pose) {

@@ -32,6 +32,20 @@ Mat3d tangent_basis(const Vec3d& normal) {
     return basis;
 }
 
+/// For each vertex those that share a face with it, ascending.
+std::vector<std::vector<Index>> neighbour_lists(const Mesh& mesh) {
+    std::vector<std::vector<Index>> neighbours(mesh.vertex_count());
+    for (std::size_t f = 0; f < mesh.face_count(); ++f)
+        for (Index a : mesh.face(f))
+            for (Index b : mesh.face(f))
+                if (a != b) neighbours[a].push_back(b);
+    for (auto& list : neighbours) {
+        std::sort(list.begin(), list.end());
+        list.erase(std::unique(list.begin(), list.end()), list.end());
+    }
+    return neighbours;
+}
+
 } // namespace
 
 GradientFit::GradientFit(const Mesh& driver, const RunContext& context) {
@@ -41,17 +55,14 @@ GradientFit::GradientFit(const Mesh& driver, const RunContext& context) {
     normals_ = vertex_normals(driver_, driver_.positions, context);
     rest_areas_ = ring_areas(driver_.positions);
 
-    // Neighbours share a face; the two-ring is the neighbours' neighbours.
+    find_rings();
+    soft_ = solve(kSoftNormal, context);
+    hard_ = solve(kHardNormal, context);
+}
+
+void GradientFit::find_rings() {
+    const std::vector<std::vector<Index>> neighbours = neighbour_lists(driver_);
     const std::size_t count = driver_.vertex_count();
-    std::vector<std::vector<Index>> neighbours(count);
-    for (std::size_t f = 0; f < driver_.face_count(); ++f)
-        for (Index a : driver_.face(f))
-            for (Index b : driver_.face(f))
-                if (a != b) neighbours[a].push_back(b);
-    for (auto& list : neighbours) {
-        std::sort(list.begin(), list.end());
-        list.erase(std::unique(list.begin(), list.end()), list.end());
-    }
     ring_offsets_ = {0};
     edge_lengths_.assign(count, 0);
     std::vector<Index> seen(count, kNoIndex);
@@ -76,8 +87,6 @@ GradientFit::GradientFit(const Mesh& driver, const RunContext& context) {
                 (driver_.positions[ring_[k]] - driver_.positions[i]).cast<double>().norm() / double(one_ring - begin);
         ring_offsets_.push_back(static_cast<Index>(ring_.size()));
     }
-    soft_ = solve(kSoftNormal, context);
-    hard_ = solve(kHardNormal, context);
 }
 
 GradientFit::Weights GradientFit::solve(double normal_weight, const RunContext& context) const {

@@ -42,6 +42,7 @@ private:
         std::vector<Vec3d> beta;       ///< one a vertex
         std::vector<Mat3d> rest_error; ///< identity minus the fit at rest; not zero only where the ring is degenerate
     };
+    void find_rings();
     Weights solve(double normal_weight, const RunContext& context) const;
     std::vector<Mat3f> apply(const Weights& weights, std::span<const Vec3f> positions, std::span<const Vec3d> columns,
                              const RunContext& context) const;
@@ -50,7 +51,8 @@ private:
     Mesh driver_;
     std::vector<Vec3f> normals_;
     std::vector<double> rest_areas_, edge_lengths_;
-    std::vector<Index> ring_offsets_, ring_; ///< two-ring of each vertex, itself left out
+    /// Two-ring of each vertex (neighbours share a face; they, and theirs), itself left out.
+    std::vector<Index> ring_offsets_, ring_;
     Weights soft_, hard_;
 };
 

@@ -12,7 +12,8 @@ namespace {
 
 using namespace reference;
 
-// Coordinates in a basis beyond this are kept as loose points: those of a sliver fling them about when it opens.
+// Points with larger coordinates in their basis are kept as loose points: the basis is a sliver, and when it opens it
+// would throw them far off.
 constexpr double kMaxCoordinate = 4;
 // So are points that decode worse than this, as a fraction of the power of two above the extent.
 constexpr float kMaxRoundTripError = 2.5e-7f;

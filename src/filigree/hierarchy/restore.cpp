@@ -23,6 +23,7 @@ struct Restorer::Content {
 
     bool has_vertex_normals() const { return !rest.normals.empty() && rest.normals.per_vertex(); }
     void prepare_blend(const RunContext& context);
+    std::vector<Mat3f> gradients(const Pose& pose, const RunContext& context) const;
 };
 
 namespace {
@@ -57,6 +58,17 @@ void Restorer::Content::prepare_blend(const RunContext& context) {
     blend_normals.emplace(detail, positions, driver, items, unit(std::move(normals)));
 }
 
+std::vector<Mat3f> Restorer::Content::gradients(const Pose& pose, const RunContext& context) const {
+    if (!gradient_fit) return {};
+    if (pose.gradients.empty() && pose.ghosts.empty())
+        return gradient_fit->fit(pose.positions, options.thin_shell ? NormalColumn::shell : NormalColumn::fitted, law,
+                                 context);
+    std::vector<Mat3f> given =
+        pose.gradients.empty() ? gradient_fit->fit_to_ghosts(pose.positions, pose.ghosts, context) : pose.gradients;
+    if (options.thin_shell) gradient_fit->make_shell(given, law);
+    return given;
+}
+
 Result<unsigned> restored_level(const Model& model, const RestoreOptions& options) {
     if (options.level && *options.level > model.finest_level())
         return Error{ErrorCode::usage, "The model has levels 0 to " + std::to_string(model.finest_level()) +
@@ -70,7 +82,7 @@ Status check_pose(const Model& model, const Pose& pose) {
         return Error{ErrorCode::mismatch,
                      "The pose has " + std::to_string(count) + " " + what + " and the model's driver " +
                          std::to_string(driver) +
-                         " vertices: export the driver again (filigree level MODEL 0) and move that."};
+                         " vertices; it is of another model, or of a driver whose vertices were changed."};
     };
     if (pose.positions.size() != driver) return wrong(pose.positions.size(), "vertices");
     if (!pose.gradients.empty() && pose.gradients.size() != driver) return wrong(pose.gradients.size(), "gradients");
@@ -109,17 +121,9 @@ std::vector<Vec3f> Restorer::rest_ghosts() const {
     return content_->gradient_fit ? content_->gradient_fit->rest_ghosts() : std::vector<Vec3f>{};
 }
 
-std::vector<Mat3f> Restorer::gradients(const Pose& pose, const RunContext& context) const {
-    const Content& content = *content_;
-    if (!content.gradient_fit) return {};
-    const GradientFit& fit = *content.gradient_fit;
-    if (pose.gradients.empty() && pose.ghosts.empty())
-        return fit.fit(pose.positions, content.options.thin_shell ? NormalColumn::shell : NormalColumn::fitted,
-                       content.law, context);
-    std::vector<Mat3f> gradients =
-        pose.gradients.empty() ? fit.fit_to_ghosts(pose.positions, pose.ghosts, context) : pose.gradients;
-    if (content.options.thin_shell) fit.make_shell(gradients, content.law);
-    return gradients;
+Result<std::vector<Mat3f>> Restorer::gradients(const Pose& pose, const RunContext& context) const {
+    if (Status status = check_pose(*content_->model, pose); !status) return status.error();
+    return content_->gradients(pose, context);
 }
 
 Result<std::vector<Vec3f>> Restorer::positions(const Pose& pose, const RunContext& context) const {
@@ -136,7 +140,7 @@ Status Restorer::positions(const Pose& pose, std::span<Vec3f> out, const RunCont
                                               " positions and the level has " + std::to_string(vertex_count()) + "."};
     if (context.is_cancelled()) return cancelled_error();
     if (content.blend) {
-        content.blend->restore(pose.positions, gradients(pose, context), out, {}, true, context);
+        content.blend->restore(pose.positions, content.gradients(pose, context), out, {}, true, context);
         return Success{};
     }
     if (content.vertices.empty()) { // the finest level: ids and slots are the same
@@ -155,7 +159,7 @@ Result<Mesh> Restorer::mesh(const Pose& pose, const RunContext& context) const {
     if (context.is_cancelled()) return cancelled_error();
     Mesh mesh = content.rest;
     if (content.blend) {
-        const std::vector<Mat3f> a = gradients(pose, context);
+        const std::vector<Mat3f> a = content.gradients(pose, context);
         const bool with_normals = content.has_vertex_normals();
         content.blend->restore(pose.positions, a, mesh.positions,
                                with_normals ? std::span(mesh.normals.values) : std::span<Vec3f>{}, true, context);

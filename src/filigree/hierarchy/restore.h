@@ -28,6 +28,7 @@ class Restorer {
 public:
     /// The model must outlive the restorer. Errors: usage (no such level).
     static Result<Restorer> create(const Model& model, const RestoreOptions& options, const RunContext& context);
+    static Result<Restorer> create(const Model&& model, const RestoreOptions&, const RunContext&) = delete;
     Restorer(Restorer&&) noexcept;
     Restorer& operator=(Restorer&&) noexcept;
     ~Restorer();
@@ -35,8 +36,9 @@ public:
     /// Vertices of the restored level; the finest mesh's own, in its order, when no level was asked for.
     std::size_t vertex_count() const;
 
-    /// The gradients that `pose` is restored with: its own, or estimated from its ghosts or positions (blend code).
-    std::vector<Mat3f> gradients(const Pose& pose, const RunContext& context) const;
+    /// The gradients that `pose` is restored with: its own, or estimated from its ghosts or positions. Blend code; none
+    /// for the reference code, which has no use for them. Errors: as check_pose.
+    Result<std::vector<Mat3f>> gradients(const Pose& pose, const RunContext& context) const;
 
     /// Positions of the level's vertices. Errors: mismatch (the pose has another number of vertices than the driver),
     /// cancelled. Same bytes for any thread count.

@@ -140,7 +140,7 @@ Result<Skin> make_skin(const Model& model, unsigned level, unsigned influences, 
     if (model.code() != DetailCode::blend)
         return Error{ErrorCode::unsuitable,
                      "The model has the reference code, whose levels follow one another, so no skin "
-                     "can play it; strip with --code blend, or export morph targets."};
+                     "can play it; the blend code can be a skin, and both codes can be morph targets."};
     const BlendDetail& detail = std::get<BlendDetail>(model.detail);
     const std::span<const Vec3f> positions = model.mesh.positions;
     std::vector<Vec3d> driver;
@@ -201,7 +201,8 @@ std::vector<NestedRotations> align_rotations(std::span<const Mat3d> matrices) {
     std::vector<Decomposition> parts;
     for (const Mat3d& matrix : matrices) parts.push_back(decompose(matrix * kInnerScale.cwiseInverse().asDiagonal()));
 
-    // Where the axes are clearest the walk begins, so that doubt at a crossing does not spread.
+    // Begin at the key whose stretches differ most, where the axes are sure. From there each key follows its neighbour,
+    // so where two stretches cross and the axes are unsure, only the keys there are affected.
     std::size_t start = 0;
     for (std::size_t k = 1; k < parts.size(); ++k)
         if (smallest_gap(parts[k].s) > smallest_gap(parts[start].s)) start = k;

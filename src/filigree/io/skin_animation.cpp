@@ -203,7 +203,9 @@ Result<SkinAnimation> SkinAnimation::sample(const Skin& skin, const PoseStream& 
         context.report("sampling the driver", double(s) / double(samples));
         const Result<Pose> pose = poses.at(animation.times_[s]);
         if (!pose) return pose.error();
-        const std::vector<Mat3f> gradients = restorer.gradients(*pose, context);
+        const Result<std::vector<Mat3f>> found = restorer.gradients(*pose, context);
+        if (!found) return found.error();
+        const std::vector<Mat3f>& gradients = *found;
         parallel_for(context, joints, 256, [&](std::size_t begin, std::size_t end) {
             for (std::size_t j = begin; j < end; ++j) {
                 const JointTransform joint = joint_transform(skin, j, pose->positions, gradients);

@@ -151,8 +151,9 @@ Status move_vertices(ModelMotion& motion, const Pose& pose, std::size_t count, c
     motion.positions.resize(count);
     motion.normals.resize(count);
     if (!motion.on_cpu) return move_reference(motion, pose, context);
-    motion.on_cpu->restore(pose.positions, motion.restorer->gradients(pose, context), motion.positions, motion.normals,
-                           false, context);
+    const Result<std::vector<Mat3f>> gradients = motion.restorer->gradients(pose, context);
+    if (!gradients) return gradients.error();
+    motion.on_cpu->restore(pose.positions, *gradients, motion.positions, motion.normals, false, context);
     return Success{};
 }
 

@@ -289,7 +289,9 @@ Status Drawable::set_pose(const Pose& pose, const RunContext& context) {
     Box box;
     if (motion.on_gpu) {
         if (Status s = motion.on_gpu->set_pose(pose, context); !s) return s;
-        box = motion.pose_box->at(pose.positions, motion.restorer->gradients(pose, context));
+        const Result<std::vector<Mat3f>> gradients = motion.restorer->gradients(pose, context);
+        if (!gradients) return gradients.error();
+        box = motion.pose_box->at(pose.positions, *gradients);
     } else {
         const std::size_t count = content.vertex.size();
         if (Status s = move_vertices(motion, pose, count, context); !s) return s;

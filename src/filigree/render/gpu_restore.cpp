@@ -94,8 +94,9 @@ struct GpuRestorer::Content {
     PackedRecords packed; ///< until they are uploaded
     std::vector<blend_kernel::VertexTransform> at_rest;
 
+    /// pose: one that fits the model.
     std::vector<blend_kernel::VertexTransform> transforms_of(const Pose& pose, const RunContext& context) const {
-        return poses->transforms(pose.positions, driver->gradients(pose, context), context);
+        return poses->transforms(pose.positions, driver->gradients(pose, context).value(), context);
     }
     Status upload();
 };
