@@ -9,7 +9,7 @@
 #include "filigree/mesh/mesh_distance.h"
 #include "filigree/mesh/shapes.h"
 #include "filigree/render/gl_context.h"
-#include "filigree/sample/sample_inside.h"
+#include "filigree/sample/spacing_for_count.h"
 
 #include "interactive/fidelity.h"
 
@@ -193,7 +193,7 @@ Figure draw_border_rays(FigureRenderer& renderer) {
     constexpr float kRadius = 0.035f;
     const RunContext& context = renderer.context();
     const Mesh cube = make_wavy_cube({.resolution = 4, .amplitude = 0});
-    const std::vector<Triangle> triangles = weld_triangles(cube).triangles;
+    const std::vector<Triangle> triangles = weld_triangles(cube, context).value().triangles;
     Page page = captioned_page(content_height(2, kPanelHeight), "Rays at the border",
                                "Points on rays that meet a cube of quads exactly at a vertex or an edge, told by the "
                                "parity of crossings from an eye on "
@@ -207,7 +207,7 @@ Figure draw_border_rays(FigureRenderer& renderer) {
     for (std::size_t c = 0; c < std::size(cases); ++c) {
         const Case& shown = cases[c];
         const Vec3d eye = shown.through - 4 * shown.direction;
-        const RayParity rays = RayParity::create(cube.positions, triangles, &eye, context).value();
+        const RayParity rays = RayParity::create(cube.positions, triangles, eye, context).value();
         std::vector<Vec3f> inside, outside;
         std::size_t wrong = 0;
         for (int step = -5; step <= 9; ++step) {

@@ -2,7 +2,10 @@
 #include "session.h"
 #include "stage.h"
 
-#include "filigree/sample/sample_inside.h"
+#include "filigree/sample/frustum.h"
+#include "filigree/sample/inside_test.h"
+#include "filigree/sample/spacing_for_count.h"
+#include "filigree/sample/spread_inside.h"
 
 #include <algorithm>
 

@@ -3,7 +3,7 @@
 #include "restored_error.h"
 
 #include "filigree/physics/named_materials.h"
-#include "filigree/sample/sample_inside.h"
+#include "filigree/sample/spacing_for_count.h"
 
 #include <QCoreApplication>
 #include <QEventLoop>

@@ -109,7 +109,7 @@ TEST(Body, KoalaHasItsMassAndSurface) {
     const auto path = filigree_test::corpus_folder() / "good/koala_100k.obj";
     if (!std::filesystem::exists(path)) GTEST_SKIP() << "no corpus";
     const Mesh koala = read_mesh(path, kContext)->mesh;
-    const WeldedTriangles welded = weld_triangles(koala);
+    const WeldedTriangles welded = weld_triangles(koala, kContext).value();
     double volume = 0, area = 0;
     for (const Triangle& t : welded.triangles) {
         const Vec3d a = koala.positions[t[0]].cast<double>(), b = koala.positions[t[1]].cast<double>(),

@@ -4,7 +4,7 @@
 #include "filigree/io/mesh_file.h"
 #include "filigree/mesh/closest_point.h"
 #include "filigree/mesh/shapes.h"
-#include "filigree/sample/sample_inside.h"
+#include "filigree/sample/inside_test.h"
 #include "io/corpus.h"
 #include "threads.h"
 
@@ -86,7 +86,7 @@ TEST(DistanceField, KoalaAgreesWithClosestPointsAndInsideTest) {
     const Mesh koala = read_mesh(path, kContext)->mesh;
     const auto field = DistanceField::create(koala, 1, 0, kContext);
     ASSERT_TRUE(field) << field.error().message;
-    const WeldedTriangles welded = weld_triangles(koala);
+    const WeldedTriangles welded = weld_triangles(koala, kContext).value();
     const ClosestPointTree tree(koala.positions, welded.triangles);
     const InsideTest inside = InsideTest::create(koala, {}, kContext).value();
     const double spacing = bounds(koala.positions).size().maxCoeff() / 64;

@@ -121,7 +121,7 @@ TEST(InsideRays, AgreesWithEveryTriangleInTurn) {
     std::mt19937 random(3);
     for (const Solid& solid : {box({-1, -1, -1}, {1, 1, 1}), octahedron(1), shape("wavy-cube", 12, 2),
                                shape("wavy-sphere", 12, 2), shape("torus", 12, 1), shape("bar", 4, 1)}) {
-        const auto rays = RayParity::create(solid.positions, solid.triangles, nullptr, context);
+        const auto rays = RayParity::create(solid.positions, solid.triangles, {}, context);
         ASSERT_TRUE(rays) << rays.error().message;
         const Box around = bounds(solid.positions);
         std::uniform_real_distribution<double> unit(-0.1, 1.1);
@@ -151,7 +151,7 @@ TEST(InsideRays, IsExactOnMeshesOnTheLatticeFromEveryEye) {
     for (const Solid& solid : solids_on_the_lattice()) {
         const std::vector<bool> expected = brute_force(solid, perturbed);
         exact::Tally tally;
-        const auto compare = [&](const Vec3d* eye) {
+        const auto compare = [&](const std::optional<Vec3d>& eye) {
             const auto rays = RayParity::create(solid.positions, solid.triangles, eye, context);
             if (!rays) {
                 EXPECT_NE(rays.error().message.find("on the surface"), std::string::npos) << rays.error().message;
@@ -166,9 +166,9 @@ TEST(InsideRays, IsExactOnMeshesOnTheLatticeFromEveryEye) {
             tally.expansions += count.tally.expansions;
             return true;
         };
-        EXPECT_TRUE(compare(nullptr));
+        EXPECT_TRUE(compare({}));
         int compared = 0;
-        for (const Vec3d& eye : eyes) compared += compare(&eye);
+        for (const Vec3d& eye : eyes) compared += compare(eye);
         EXPECT_GE(compared, 8) << solid.name;
         EXPECT_GT(tally.integers, 100u) << solid.name;
         EXPECT_GT(tally.expansions, 0u) << solid.name; // the eye at 1e30
@@ -183,7 +183,7 @@ TEST(InsideRays, IsExactForEyesOnLatticePointsThemselves) {
         for (const Vec3d& p : points) expected.push_back(brute_force(solid, moved(p)));
         int accepted = 0;
         for (std::size_t e = 0; e < points.size(); e += 331) {
-            const auto rays = RayParity::create(solid.positions, solid.triangles, &points[e], context);
+            const auto rays = RayParity::create(solid.positions, solid.triangles, points[e], context);
             if (!rays) continue;
             ++accepted;
             int different = 0;
@@ -197,7 +197,7 @@ TEST(InsideRays, IsExactForEyesOnLatticePointsThemselves) {
 TEST(InsideRays, ABoxOnTheLatticeGetsItsVolume) {
     const RunContext context(1);
     const Solid solid = box({0, 0, 0}, {5, 5, 5});
-    const auto rays = RayParity::create(solid.positions, solid.triangles, nullptr, context);
+    const auto rays = RayParity::create(solid.positions, solid.triangles, {}, context);
     ASSERT_TRUE(rays);
     for (const Vec3d& p : lattice_points(-1, 6)) {
         const bool expected = (p.array() >= 0).all() && (p.array() < 5).all();
@@ -213,7 +213,7 @@ TEST(InsideRays, BodiesThatTouchShareNoPointAndMissNone) {
         for (const float y : {-4.f, 0.f})
             for (const float z : {-4.f, 0.f}) {
                 const Solid solid = box({x, y, z}, {x + 4, y + 4, z + 4});
-                const auto rays = RayParity::create(solid.positions, solid.triangles, nullptr, context);
+                const auto rays = RayParity::create(solid.positions, solid.triangles, {}, context);
                 ASSERT_TRUE(rays);
                 for (std::size_t i = 0; i < points.size(); ++i) owners[i] += rays->contains(points[i]);
             }
@@ -224,13 +224,13 @@ TEST(InsideRays, HoldsForLargeSmallAndFarMeshes) {
     const RunContext context(1);
     const Solid unit = snapped(shape("wavy-sphere", 6, 12));
     const std::vector<Vec3d> points = lattice_points(-8, 8);
-    const auto reference = RayParity::create(unit.positions, unit.triangles, nullptr, context);
+    const auto reference = RayParity::create(unit.positions, unit.triangles, {}, context);
     ASSERT_TRUE(reference);
     for (const float scale : {0x1p-100f, 0x1p-20f, 0x1p100f})
         for (const float offset : {0.f, 0x1p16f}) {
             Solid solid = unit;
             for (Vec3f& p : solid.positions) p = scale * (p + Vec3f(offset, -offset, offset)).eval();
-            const auto rays = RayParity::create(solid.positions, solid.triangles, nullptr, context);
+            const auto rays = RayParity::create(solid.positions, solid.triangles, {}, context);
             ASSERT_TRUE(rays);
             int different = 0;
             for (const Vec3d& p : points)
@@ -244,21 +244,21 @@ TEST(InsideRays, RefusesAnEyeOnTheSurfaceAndMeshesWithoutTriangles) {
     const RunContext context(1);
     const Solid solid = box({0, 0, 0}, {4, 4, 4});
     for (const Vec3d& eye : {Vec3d(0, 0, 0), Vec3d(2, 0, 0), Vec3d(1, 2, 4), Vec3d(2, 2, 0), Vec3d(4, 4, 1.7)}) {
-        const auto rays = RayParity::create(solid.positions, solid.triangles, &eye, context);
+        const auto rays = RayParity::create(solid.positions, solid.triangles, eye, context);
         ASSERT_FALSE(rays) << eye.transpose();
         EXPECT_EQ(rays.error().code, ErrorCode::unsuitable);
     }
     const Vec3d beside(2, 2, std::nextafter(4.0, 5.0)), within(2, 2, std::nextafter(4.0, 3.0));
     for (const Vec3d& eye : {beside, within}) {
-        const auto rays = RayParity::create(solid.positions, solid.triangles, &eye, context);
+        const auto rays = RayParity::create(solid.positions, solid.triangles, eye, context);
         ASSERT_TRUE(rays);
         EXPECT_TRUE(rays->contains({1, 1, 1}));
         EXPECT_FALSE(rays->contains({5, 1, 1}));
     }
     const Vec3d nowhere(NAN, 0, 0);
-    EXPECT_EQ(RayParity::create(solid.positions, solid.triangles, &nowhere, context).error().code,
+    EXPECT_EQ(RayParity::create(solid.positions, solid.triangles, nowhere, context).error().code,
               ErrorCode::unsuitable);
-    EXPECT_EQ(RayParity::create(solid.positions, {}, nullptr, context).error().code, ErrorCode::unsuitable);
+    EXPECT_EQ(RayParity::create(solid.positions, {}, {}, context).error().code, ErrorCode::unsuitable);
 }
 
 TEST(InsideRays, ManyPointsAreOnePointManyTimes) {
@@ -268,7 +268,7 @@ TEST(InsideRays, ManyPointsAreOnePointManyTimes) {
     points.push_back(Vec3d(0, INFINITY, 0));
     for (const unsigned threads : {1u, 4u}) {
         const RunContext context(threads);
-        const auto rays = RayParity::create(solid.positions, solid.triangles, nullptr, context);
+        const auto rays = RayParity::create(solid.positions, solid.triangles, {}, context);
         ASSERT_TRUE(rays);
         RayParity::Count together, one_by_one;
         const auto inside = rays->contains(points, context, &together);
@@ -285,9 +285,9 @@ TEST(InsideRays, ManyPointsAreOnePointManyTimes) {
 TEST(InsideRays, CanBeCancelled) {
     const RunContext context(1);
     const Solid solid = shape("wavy-sphere", 10, 2);
-    const auto rays = RayParity::create(solid.positions, solid.triangles, nullptr, context);
+    const auto rays = RayParity::create(solid.positions, solid.triangles, {}, context);
     ASSERT_TRUE(rays);
     context.cancel();
     EXPECT_EQ(rays->contains(lattice_points(-9, 9), context).error().code, ErrorCode::cancelled);
-    EXPECT_EQ(RayParity::create(solid.positions, solid.triangles, nullptr, context).error().code, ErrorCode::cancelled);
+    EXPECT_EQ(RayParity::create(solid.positions, solid.triangles, {}, context).error().code, ErrorCode::cancelled);
 }

@@ -129,5 +129,27 @@ TEST(Occupancy, CountsAndListsItsPoints) {
     EXPECT_EQ(inside.positions[4], Vec3f(5.5f, 0.5f, 1.5f));
 }
 
+TEST(Occupancy, IsEmptyAtFirstAndKeepsToTheMemoryAllowed) {
+    const Lattice lattice = make_lattice(box({0, 0, 0}, {70, 3, 2}), {.spacing = 1}).value();
+    const Occupancy empty = make_occupancy(lattice).value();
+    EXPECT_EQ(empty.counts, lattice.counts());
+    EXPECT_EQ(empty.words_per_row, 2u);
+    EXPECT_EQ(empty.count(), 0u);
+    EXPECT_TRUE(make_occupancy(lattice, 1000, 1096)); // 2 words x 3 x 2 rows are 96 bytes
+    const auto refused = make_occupancy(lattice, 1001, 1096);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::unsuitable);
+    EXPECT_NE(refused.error().message.find("70 x 3 x 2 points"), std::string::npos) << refused.error().message;
+}
+
+TEST(Occupancy, VisitsPointsInsideInOrder) {
+    Occupancy occupancy = make_occupancy(make_lattice(box({0, 0, 0}, {70, 3, 2}), {.spacing = 1}).value()).value();
+    occupancy.bits[1] = 1 | 32;      // i = 64 and 69 of row (0, 0)
+    occupancy.bits[10] = 1ull << 63; // i = 63 of row (2, 1)
+    std::vector<std::array<std::size_t, 3>> visited;
+    for_each_inside(occupancy, [&](std::size_t i, std::size_t j, std::size_t k) { visited.push_back({i, j, k}); });
+    EXPECT_EQ(visited, (std::vector<std::array<std::size_t, 3>>{{64, 0, 0}, {69, 0, 0}, {63, 2, 1}}));
+}
+
 } // namespace
 } // namespace filigree

@@ -126,9 +126,10 @@ Result<Body> make_body(const Mesh& mesh, const Material& material, const BodyOpt
     BodyReport ignored;
     BodyReport& found = report ? *report : ignored;
     found = {};
-    const WeldedTriangles welded = weld_triangles(mesh);
+    const Result<WeldedTriangles> welded = weld_triangles(mesh, context);
+    if (!welded) return welded.error();
     const auto count = [&](const Cells& cells) { return count_particles(cells, material.model, context); };
-    Result<Cells> cells = make_cells(mesh, welded, options.scale, options.cells, count, context, &found.cells);
+    Result<Cells> cells = make_cells(mesh, *welded, options.scale, options.cells, count, context, &found.cells);
     if (!cells) return cells.error();
 
     Body body;

@@ -154,7 +154,9 @@ Result<DistanceField> DistanceField::create(const Mesh& mesh, double scale, doub
     if (!std::isfinite(spacing) || spacing < 0)
         return Error{ErrorCode::usage,
                      "The spacing is " + number(spacing) + "; give metres, above 0 (or 0 to have it chosen)."};
-    const WeldedTriangles welded = weld_triangles(mesh);
+    const Result<WeldedTriangles> welded_triangles = weld_triangles(mesh, context);
+    if (!welded_triangles) return welded_triangles.error();
+    const WeldedTriangles& welded = *welded_triangles;
     if (welded.triangles.empty())
         return Error{ErrorCode::unsuitable, "The mesh has no faces with an area, so nothing has a distance from it."};
     Box box;
@@ -197,8 +199,8 @@ Result<DistanceField> DistanceField::create(const Mesh& mesh, double scale, doub
             lattice.coordinates[axis].push_back(grid.corner[axis] + double(i) * grid.spacing);
     const Result<Occupancy> inside =
         welded.closure.is_closed() && welded.closure.is_oriented()
-            ? scan_inside({mesh.positions, welded.triangles}, lattice, Overlap::merged, context)
-            : winding_inside(mesh.positions, welded.triangles, lattice, InsideOptions().accuracy, context);
+            ? scan_inside({mesh.positions, welded.triangles}, lattice, {.overlap = Overlap::merged}, context)
+            : winding_inside({mesh.positions, welded.triangles}, lattice, {}, context);
     if (!inside) return inside.error();
 
     DistanceField field;

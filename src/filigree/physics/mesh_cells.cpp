@@ -179,9 +179,10 @@ Result<Cells> make_cells(const Mesh& mesh, const WeldedTriangles& welded, double
 
 Result<Cells> make_cells(const Mesh& mesh, double scale, const CellOptions& options, const RunContext& context,
                          CellReport* report) {
+    const Result<WeldedTriangles> welded = weld_triangles(mesh, context);
+    if (!welded) return welded.error();
     return make_cells(
-        mesh, weld_triangles(mesh), scale, options, [](const Cells& cells) { return cells.cells.size(); }, context,
-        report);
+        mesh, *welded, scale, options, [](const Cells& cells) { return cells.cells.size(); }, context, report);
 }
 
 } // namespace filigree

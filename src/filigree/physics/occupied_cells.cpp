@@ -161,8 +161,9 @@ Result<std::vector<Draft>> sample_cells(const MeshToFill& mesh, const Grid& grid
         const std::size_t end = std::min(k + slab, grid.counts[2]);
         const Lattice lattice = sample_points(grid, n, k, end);
         const Result<Occupancy> occupancy =
-            scans ? scan_inside({mesh.positions, welded.triangles}, lattice, Overlap::merged, context)
-                  : winding_inside(mesh.positions, welded.triangles, lattice, kWindingAccuracy, context);
+            scans
+                ? scan_inside({mesh.positions, welded.triangles}, lattice, {.overlap = Overlap::merged}, context)
+                : winding_inside({mesh.positions, welded.triangles}, lattice, {.accuracy = kWindingAccuracy}, context);
         if (!occupancy) return occupancy.error();
         const std::vector<Draft> found = find_occupied(grid, *occupancy, n, k, end, context);
         cells.insert(cells.end(), found.begin(), found.end());

@@ -259,7 +259,7 @@ RayParity& RayParity::operator=(RayParity&&) noexcept = default;
 RayParity::~RayParity() = default;
 
 Result<RayParity> RayParity::create(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
-                                    const Vec3d* eye, const RunContext& context) {
+                                    const std::optional<Vec3d>& eye, const RunContext& context) {
     if (triangles.empty()) return Error{ErrorCode::unsuitable, "The mesh has no triangles, so nothing is inside it."};
     auto content = std::make_unique<Content>();
     Box box;
@@ -317,6 +317,7 @@ Result<RayParity> RayParity::create(std::span<const Vec3f> positions, std::span<
     const auto shape = make_wide_tree(boxes, context);
     if (!shape) return shape.error();
     fill(*content, *shape, positions, triangles, eye_side, context);
+    if (context.is_cancelled()) return cancelled_error();
     return RayParity(std::move(content));
 }
 

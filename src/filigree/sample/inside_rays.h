@@ -6,6 +6,7 @@
 #include "filigree/sample/exact_sign.h"
 
 #include <memory>
+#include <optional>
 
 namespace filigree {
 
@@ -20,7 +21,7 @@ public:
     /// Errors: unsuitable (the eye lies on the surface, or is not within the range of exact_sign.h; no triangles),
     /// cancelled.
     static Result<RayParity> create(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
-                                    const Vec3d* eye, const RunContext& context);
+                                    const std::optional<Vec3d>& eye, const RunContext& context);
     RayParity(RayParity&&) noexcept;
     RayParity& operator=(RayParity&&) noexcept;
     ~RayParity();

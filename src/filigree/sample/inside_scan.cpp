@@ -8,9 +8,9 @@
 #include "filigree/sample/inside_scan_kernel.h"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <mutex>
 #include <string>
 
@@ -29,18 +29,9 @@ constexpr double kHighest = 0x1p300;
 constexpr std::size_t kBatch = std::size_t{1} << 20; // triangles from one look at `cancel` and `progress` to the next
 constexpr std::size_t kLargeBatch = std::size_t{1} << 14;
 constexpr std::size_t kMergedBytes = std::size_t{32} << 20; // of signed crossings at a time, where a layer has fewer
+constexpr std::size_t kCountable = 32'767; // triangles whose crossings, at most one a row each, fit 16 bits
 
 std::size_t words_for(std::size_t points) { return (points + 63) / 64; }
-
-std::string gigabytes(double bytes) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.3g GiB", bytes / double(1 << 30));
-    return text;
-}
-
-std::string sizes(const std::array<std::size_t, 3>& counts) {
-    return std::to_string(counts[0]) + " x " + std::to_string(counts[1]) + " x " + std::to_string(counts[2]);
-}
 
 /// An axis of the lattice for the kernel, or what is wrong with it.
 Result<Axis> make_axis(const std::vector<double>& coordinates, double spacing, char name) {
@@ -108,41 +99,27 @@ public:
 
     const std::array<std::size_t, 3>& counts() const { return counts_; }
 
-    /// Inside or not for layers first_k .. first_k + layers - 1. `signed_crossings` is room that `merged` may use
-    /// again. Returns false when cancelled.
-    bool fill(Overlap overlap, std::size_t first_k, std::size_t layers, std::uint64_t* bits,
-              std::vector<std::int16_t>& signed_crossings) {
+    /// Inside or not for all points. Returns false when cancelled.
+    bool fill(Overlap overlap, std::uint64_t* bits) {
         if (is_empty_) return true;
-        if (overlap == Overlap::parity) {
-            Job job = job_for(first_k, layers);
-            job.bits = bits;
-            job.row_entries = 64 * words_for(counts_[0]);
-            if (!collect(job)) return false;
-            fill_rows(bits, layers);
-            return true;
-        }
-        const std::size_t at_once = merged_layers(counts_), words = words_for(counts_[0]);
-        signed_crossings.resize(counts_[0] * counts_[1] * std::min(at_once, counts_[2]));
-        for (std::size_t k = 0; k < layers; k += at_once) {
-            const std::size_t count = std::min(at_once, layers - k);
-            if (!collect_signed(first_k + k, count, signed_crossings.data())) return false;
-            fill_merged_rows(signed_crossings.data(), count, bits + k * counts_[1] * words);
-        }
+        if (overlap == Overlap::merged) return fill_merged(bits);
+        Job job = job_for(0, counts_[2]);
+        job.bits = bits;
+        job.row_entries = 64 * words_for(counts_[0]);
+        if (!collect(job, 0, triangle_count_)) return false;
+        fill_rows(bits);
         return true;
     }
 
-    /// Winding numbers of a slab into `numbers`, which are 0. Returns false when cancelled.
-    bool wind(std::size_t first_k, std::size_t layers, std::int16_t* numbers) {
-        if (is_empty_) return true;
-        if (!collect_signed(first_k, layers, numbers)) return false;
-        const std::size_t n = counts_[0];
-        parallel_for(context_, counts_[1] * layers, rows_at_once(), [&](std::size_t begin, std::size_t end) {
-            for (std::size_t row = begin; row < end; ++row) {
-                std::int16_t sum = 0;
-                for (std::int16_t& x : std::span(numbers + row * n, n)) x = sum = std::int16_t(sum + x);
-            }
-        });
-        return true;
+    /// Winding numbers of some layers into `numbers`, which are 0.
+    Status wind(std::size_t first_k, std::size_t layers, std::span<std::int16_t> numbers) {
+        if (is_empty_) return Success{};
+        std::vector<std::int32_t> wide;
+        if (!collect_signed(first_k, layers, numbers, wide)) return cancelled_error();
+        const bool fits = wide.empty() ? add_up_rows(numbers.data(), numbers) : add_up_rows(wide.data(), numbers);
+        if (fits) return Success{};
+        return Error{ErrorCode::unsuitable, "More than " + std::to_string(kCountable) +
+                                                " surfaces of the mesh lie one within the other; take some away."};
     }
 
     void report_to(ScanReport* report) const {
@@ -168,15 +145,75 @@ private:
 
     std::size_t rows_at_once() const { return std::max<std::size_t>(1, (std::size_t{1} << 18) / counts_[0]); }
 
-    bool collect_signed(std::size_t first_k, std::size_t layers, std::int16_t* crossings) {
-        Job job = job_for(first_k, layers);
-        job.crossings = crossings;
-        job.row_entries = counts_[0];
-        return collect(job);
+    /// Slab by slab, so that the signed crossings stay small.
+    bool fill_merged(std::uint64_t* bits) {
+        const std::size_t layer_points = counts_[0] * counts_[1], layer_words = words_for(counts_[0]) * counts_[1];
+        const std::size_t slab = std::min(merged_layers(counts_), counts_[2]);
+        std::vector<std::int16_t> crossings(layer_points * slab);
+        std::vector<std::int32_t> wide;
+        for (std::size_t k = 0; k < counts_[2]; k += slab) {
+            const std::size_t layers = std::min(slab, counts_[2] - k);
+            const std::span here = std::span(crossings).first(layer_points * layers);
+            if (!collect_signed(k, layers, here, wide)) return false;
+            if (wide.empty())
+                fill_merged_rows(here.data(), layers, bits + k * layer_words);
+            else
+                fill_merged_rows(wide.data(), layers, bits + k * layer_words);
+        }
+        return true;
     }
 
-    /// All crossings of the job's layers. Pieces may run in any order: toggling and adding commute.
-    bool collect(const Job& job) {
+    /// Signed crossings of some layers, added to `crossings`, which are 0. Where 16 bits are too few, `wide` gets them
+    /// and `crossings` are 0; else `wide` is empty. Returns false when cancelled.
+    bool collect_signed(std::size_t first_k, std::size_t layers, std::span<std::int16_t> crossings,
+                        std::vector<std::int32_t>& wide) {
+        std::atomic<bool> has_wrapped = false;
+        Job job = job_for(first_k, layers);
+        job.crossings = crossings.data();
+        job.has_wrapped = &has_wrapped;
+        job.row_entries = counts_[0];
+        wide.clear();
+        const scan_kernel::Piece before = total_;
+        if (!collect(job, 0, triangle_count_)) return false;
+        if (!has_wrapped) return true;
+        total_ = before; // counted again
+        std::ranges::fill(crossings, std::int16_t{0});
+        wide.resize(crossings.size());
+        for (std::size_t begin = 0; begin < triangle_count_; begin += kCountable) {
+            if (!collect(job, begin, std::min(begin + kCountable, triangle_count_))) return false;
+            parallel_for(context_, wide.size(), std::size_t{1} << 18, [&](std::size_t first, std::size_t last) {
+                for (std::size_t i = first; i < last; ++i) {
+                    wide[i] += crossings[i];
+                    crossings[i] = 0;
+                }
+            });
+        }
+        return true;
+    }
+
+    /// Crossings at each point to those up to it. Returns whether all of them fit.
+    template <class Crossing>
+    bool add_up_rows(const Crossing* crossings, std::span<std::int16_t> numbers) const {
+        const std::size_t n = counts_[0];
+        std::atomic<bool> fits = true;
+        parallel_for(context_, numbers.size() / n, rows_at_once(), [&](std::size_t begin, std::size_t end) {
+            bool all_fit = true;
+            for (std::size_t row = begin; row < end; ++row) {
+                std::int32_t sum = 0;
+                for (std::size_t i = row * n; i < (row + 1) * n; ++i) {
+                    sum += crossings[i];
+                    numbers[i] = std::int16_t(sum);
+                    all_fit &= numbers[i] == sum;
+                }
+            }
+            if (!all_fit) fits = false;
+        });
+        return fits;
+    }
+
+    /// All crossings of triangles begin .. end - 1 with the job's layers. Pieces may run in any order: toggling and
+    /// adding commute.
+    bool collect(const Job& job, std::size_t begin_triangle, std::size_t end_triangle) {
         // with one thread, large pieces fill vectors better; the result is the same
         const std::size_t grain = std::size_t{1} << (job.shared ? 13 : 16);
         std::vector<LargeTriangle> large;
@@ -204,10 +241,10 @@ private:
             }
             return !context_.is_cancelled();
         };
-        if (!in_batches(triangle_count_, kBatch, grain, [&](std::size_t begin, std::size_t end, Piece& piece) {
-                loops_.scan_triangles(job, begin, end, piece);
-            }))
-            return false;
+        const auto scan = [&](std::size_t begin, std::size_t end, Piece& piece) {
+            loops_.scan_triangles(job, begin_triangle + begin, begin_triangle + end, piece);
+        };
+        if (!in_batches(end_triangle - begin_triangle, kBatch, grain, scan)) return false;
         const std::vector<LargeTriangle> tasks = std::move(large);
         large.clear();
         return in_batches(tasks.size(), kLargeBatch, 1, [&](std::size_t begin, std::size_t end, Piece& piece) {
@@ -216,10 +253,10 @@ private:
     }
 
     /// Toggles to inside and outside: each bit becomes the parity of those up to it.
-    void fill_rows(std::uint64_t* bits, std::size_t layers) const {
+    void fill_rows(std::uint64_t* bits) const {
         const std::size_t words = words_for(counts_[0]);
         const std::uint64_t last = ~std::uint64_t{0} >> (64 * words - counts_[0]);
-        parallel_for(context_, counts_[1] * layers, rows_at_once(), [&](std::size_t begin, std::size_t end) {
+        parallel_for(context_, counts_[1] * counts_[2], rows_at_once(), [&](std::size_t begin, std::size_t end) {
             for (std::size_t row = begin; row < end; ++row) {
                 std::uint64_t carry = 0;
                 for (std::uint64_t& word : std::span(bits + row * words, words)) {
@@ -239,23 +276,24 @@ private:
 
     /// Inside is where the sum of crossings is 1 or more. Leaves `crossings` zero, for the next slab. Stretches without
     /// a crossing, nearly all of them, are filled 64 points at a time; that halved the time for the dragon at 512^3.
-    void fill_merged_rows(std::int16_t* crossings, std::size_t layers, std::uint64_t* bits) const {
+    template <class Crossing>
+    void fill_merged_rows(Crossing* crossings, std::size_t layers, std::uint64_t* bits) const {
         const std::size_t n = counts_[0], words = words_for(n);
         parallel_for(context_, counts_[1] * layers, rows_at_once(), [&](std::size_t begin, std::size_t end) {
             for (std::size_t row = begin; row < end; ++row) {
-                std::int16_t sum = 0;
+                std::int32_t sum = 0;
                 for (std::size_t w = 0; w < words; ++w) {
                     const std::span points(crossings + row * n + 64 * w, std::min<std::size_t>(64, n - 64 * w));
                     int any = 0;
-                    for (const std::int16_t x : points) any |= x;
+                    for (const Crossing x : points) any |= x;
                     std::uint64_t word = sum >= 1 ? ~std::uint64_t{0} >> (64 - points.size()) : 0;
                     if (any != 0) {
                         word = 0;
                         for (std::size_t i = 0; i < points.size(); ++i) {
-                            sum = std::int16_t(sum + points[i]);
+                            sum += points[i];
                             word |= std::uint64_t{sum >= 1} << i;
                         }
-                        std::ranges::fill(points, std::int16_t{0});
+                        std::ranges::fill(points, Crossing{0});
                     }
                     bits[row * words + w] = word;
                 }
@@ -274,28 +312,18 @@ private:
     std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
 };
 
-Result<Occupancy> scan_whole(const ScanMesh& mesh, const Lattice& lattice, Overlap overlap, const RunContext& context,
-                             ScanReport* report, std::size_t most_bytes, int lanes) {
+Result<Occupancy> scan_whole(const ScanMesh& mesh, const Lattice& lattice, const ScanOptions& options, int lanes,
+                             const RunContext& context, ScanReport* report) {
     const std::array<std::size_t, 3> counts = lattice.counts();
-    const double rows = double(counts[1]) * double(counts[2]);
-    double bytes = rows * double(words_for(counts[0])) * sizeof(std::uint64_t) +
-                   double(mesh.positions.size()) * sizeof(std::uint32_t);
-    if (overlap == Overlap::merged && rows > 0)
+    double bytes = double(mesh.positions.size()) * sizeof(std::uint32_t);
+    if (options.overlap == Overlap::merged && lattice.point_count() > 0)
         bytes += double(counts[0]) * double(counts[1]) * sizeof(std::int16_t) *
-                 double(std::min(counts[2], Scan::merged_layers({std::max<std::size_t>(counts[0], 1), counts[1], 1})));
-    if (bytes > double(most_bytes))
-        return Error{ErrorCode::unsuitable,
-                     "A lattice of " + sizes(counts) + " points takes " + gigabytes(bytes) + " of memory, and " +
-                         gigabytes(double(most_bytes)) +
-                         " are allowed; take a larger spacing, allow more, or scan it in slabs."};
+                 double(std::min(counts[2], Scan::merged_layers(counts)));
+    auto occupancy = make_occupancy(lattice, bytes, options.most_bytes);
+    if (!occupancy) return occupancy;
     auto scan = Scan::create(mesh, lattice, context, lanes);
     if (!scan) return scan.error();
-    Occupancy occupancy;
-    occupancy.counts = counts;
-    occupancy.words_per_row = words_for(counts[0]);
-    occupancy.bits.resize(occupancy.words_per_row * counts[1] * counts[2]);
-    std::vector<std::int16_t> signed_crossings;
-    if (!scan->fill(overlap, 0, counts[2], occupancy.bits.data(), signed_crossings)) return cancelled_error();
+    if (!scan->fill(options.overlap, occupancy->bits.data())) return cancelled_error();
     scan->report_to(report);
     return occupancy;
 }
@@ -304,34 +332,14 @@ Result<Occupancy> scan_whole(const ScanMesh& mesh, const Lattice& lattice, Overl
 
 std::span<const int> scan_lane_counts() { return scan_kernel::lane_counts(); }
 
-Result<Occupancy> scan_inside(const ScanMesh& mesh, const Lattice& lattice, Overlap overlap, const RunContext& context,
-                              ScanReport* report, std::size_t most_bytes) {
-    return scan_whole(mesh, lattice, overlap, context, report, most_bytes, scan_lane_counts().back());
+Result<Occupancy> scan_inside(const ScanMesh& mesh, const Lattice& lattice, const ScanOptions& options,
+                              const RunContext& context, ScanReport* report) {
+    return scan_whole(mesh, lattice, options, scan_lane_counts().back(), context, report);
 }
 
-Result<Occupancy> scan_inside(const ScanMesh& mesh, const Lattice& lattice, const RunContext& context, int lanes) {
-    return scan_whole(mesh, lattice, Overlap::parity, context, nullptr, std::size_t{4} << 30, lanes);
-}
-
-Status scan_inside_slabs(const ScanMesh& mesh, const Lattice& lattice, Overlap overlap, std::size_t layers,
-                         const std::function<void(std::size_t first_k, const Occupancy&)>& slab,
-                         const RunContext& context, ScanReport* report) {
-    auto scan = Scan::create(mesh, lattice, context, scan_lane_counts().back());
-    if (!scan) return scan.error();
-    const std::array<std::size_t, 3>& counts = scan->counts();
-    Occupancy occupancy;
-    occupancy.words_per_row = words_for(counts[0]);
-    std::vector<std::int16_t> signed_crossings;
-    layers = std::max<std::size_t>(layers, 1);
-    for (std::size_t k = 0; k < counts[2]; k += layers) {
-        occupancy.counts = {counts[0], counts[1], std::min(layers, counts[2] - k)};
-        occupancy.bits.assign(occupancy.words_per_row * counts[1] * occupancy.counts[2], 0);
-        if (!scan->fill(overlap, k, occupancy.counts[2], occupancy.bits.data(), signed_crossings))
-            return cancelled_error();
-        slab(k, occupancy);
-    }
-    scan->report_to(report);
-    return Success{};
+Result<Occupancy> scan_inside_with_lanes(const ScanMesh& mesh, const Lattice& lattice, int lanes,
+                                         const RunContext& context) {
+    return scan_whole(mesh, lattice, {}, lanes, context, nullptr);
 }
 
 Result<std::vector<std::int16_t>> scan_winding(const ScanMesh& mesh, const Lattice& lattice, std::size_t first_k,
@@ -342,7 +350,7 @@ Result<std::vector<std::int16_t>> scan_winding(const ScanMesh& mesh, const Latti
     first_k = std::min(first_k, counts[2]);
     layers = std::min(layers, counts[2] - first_k);
     std::vector<std::int16_t> numbers(counts[0] * counts[1] * layers);
-    if (!scan->wind(first_k, layers, numbers.data())) return cancelled_error();
+    if (Status wound = scan->wind(first_k, layers, numbers); !wound) return wound.error();
     scan->report_to(report);
     return numbers;
 }

@@ -10,8 +10,6 @@
 #include "filigree/sample/exact_sign.h"
 #include "filigree/sample/lattice.h"
 
-#include <functional>
-
 namespace filigree {
 
 /// Where closed parts overlap: parity makes the overlap outside, merged makes it inside (winding number 1 or more).
@@ -30,22 +28,23 @@ struct ScanMesh {
     std::span<const Triangle> triangles;
 };
 
+struct ScanOptions {
+    Overlap overlap = Overlap::parity;
+    std::size_t most_bytes = kMostLatticeBytes; ///< for all that the scan keeps
+};
+
 /// Bits of all lattice points. Does not look whether the mesh is closed: with an open one, rows may be filled to their
 /// end. Memory: a bit a point, 4 bytes a vertex, and for `merged` 32 MiB (or a layer of 2 bytes a point, if that is
-/// more). Uses AVX-512 or AVX2 where the processor has them; the same bits without. Cost O(V + F + crossings + points /
-/// 64). Errors: unsuitable (does not fit into `most_bytes`: says how much it would take; more than 65,534 points on an
+/// more); three times that where more than 32,767 surfaces lie between two points of a row. Uses AVX-512 or AVX2 where
+/// the processor has them; the same bits without. Cost O(V + F + crossings + points / 64).
+/// Errors: unsuitable (does not fit into `most_bytes`: says how much it would take; more than 65,534 points on an
 /// axis), usage (coordinates that are not evenly spaced), cancelled.
-Result<Occupancy> scan_inside(const ScanMesh& mesh, const Lattice& lattice, Overlap overlap, const RunContext& context,
-                              ScanReport* report = nullptr, std::size_t most_bytes = std::size_t{4} << 30);
-
-/// The same slab by slab, for lattices larger than memory: `slab(first_k, occupancy)` gets layers first_k ..
-/// first_k + occupancy.counts[2] - 1, ascending. Every slab looks at all triangles, about 1 ns each.
-Status scan_inside_slabs(const ScanMesh& mesh, const Lattice& lattice, Overlap overlap, std::size_t layers,
-                         const std::function<void(std::size_t first_k, const Occupancy&)>& slab,
-                         const RunContext& context, ScanReport* report = nullptr);
+Result<Occupancy> scan_inside(const ScanMesh& mesh, const Lattice& lattice, const ScanOptions& options,
+                              const RunContext& context, ScanReport* report = nullptr);
 
 /// Net signed crossings before each point (winding numbers for closed, oriented meshes), for the layers first_k ..
 /// first_k + layers - 1 (as far as there are any): one int16 a point, rows along x without padding.
+/// Errors: as scan_inside; unsuitable (a number does not fit: more than 32,767 surfaces, one within the other).
 Result<std::vector<std::int16_t>> scan_winding(const ScanMesh& mesh, const Lattice& lattice, std::size_t first_k,
                                                std::size_t layers, const RunContext& context,
                                                ScanReport* report = nullptr);
@@ -53,6 +52,7 @@ Result<std::vector<std::int16_t>> scan_winding(const ScanMesh& mesh, const Latti
 /// Vector widths this processor has an implementation for (2, 4 or 8 doubles), ascending, so that tests can hold them
 /// against each other; scan_inside takes the last.
 std::span<const int> scan_lane_counts();
-Result<Occupancy> scan_inside(const ScanMesh& mesh, const Lattice& lattice, const RunContext& context, int lanes);
+Result<Occupancy> scan_inside_with_lanes(const ScanMesh& mesh, const Lattice& lattice, int lanes,
+                                         const RunContext& context);
 
 } // namespace filigree

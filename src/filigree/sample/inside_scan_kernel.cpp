@@ -157,10 +157,15 @@ void put(const Job& job, std::size_t entry, bool leaves) {
     } else {
         std::int16_t& sum = job.crossings[entry];
         const std::int16_t change = leaves ? -1 : 1;
+        std::int16_t before;
         if (job.shared)
-            std::atomic_ref(sum).fetch_add(change, std::memory_order_relaxed);
-        else
+            before = std::atomic_ref(sum).fetch_add(change, std::memory_order_relaxed);
+        else {
+            before = sum;
             sum = std::int16_t(sum + change);
+        }
+        if (before == (leaves ? INT16_MIN : INT16_MAX)) [[unlikely]]
+            job.has_wrapped->store(true, std::memory_order_relaxed);
     }
 }
 
@@ -226,7 +231,7 @@ struct Lanes : LaneTypes<N> {
     /// values[i] for whole numbers i.
     static FILIGREE_INLINE Double at(const Axis& axis, Double i) {
         if (axis.computable) return axis.first + i * axis.step;
-        Double result;
+        Double result = {};
         for (int l = 0; l < N; ++l) result[l] = axis.values[std::size_t(i[l])];
         return result;
     }

@@ -5,6 +5,7 @@
 #include "filigree/mesh/mesh.h"
 #include "filigree/sample/exact_sign.h"
 
+#include <atomic>
 #include <span>
 #include <vector>
 
@@ -33,7 +34,8 @@ struct Job {
     std::size_t row_entries = 0; ///< from one row to the next
     std::uint64_t* bits = nullptr;
     std::int16_t* crossings = nullptr;
-    bool shared = false; ///< several threads write
+    std::atomic<bool>* has_wrapped = nullptr; ///< beside `crossings`: set where one of them went past 16 bits
+    bool shared = false;                      ///< several threads write
 };
 
 /// Layers [k_begin, k_end) of a triangle with many rows, left for later so that threads can share it.

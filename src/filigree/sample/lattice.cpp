@@ -23,6 +23,12 @@ std::string number(double x) {
     return text;
 }
 
+std::string gigabytes(double bytes) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.3g GiB", bytes / double(1 << 30));
+    return text;
+}
+
 std::string list(const Vec3d& v, const char* between) {
     return number(v[0]) + between + number(v[1]) + between + number(v[2]);
 }
@@ -92,6 +98,22 @@ Result<Lattice> make_lattice(const Box& box, const LatticeOptions& options) {
     return lattice;
 }
 
+Result<Occupancy> make_occupancy(const Lattice& lattice, double other_bytes, std::size_t most_bytes) {
+    Occupancy occupancy;
+    occupancy.counts = lattice.counts();
+    const auto [nx, ny, nz] = occupancy.counts;
+    occupancy.words_per_row = (nx + 63) / 64;
+    const double words = double(occupancy.words_per_row) * double(ny) * double(nz);
+    const double bytes = words * sizeof(std::uint64_t) + other_bytes;
+    if (bytes > double(most_bytes))
+        return Error{ErrorCode::unsuitable, "A lattice of " + std::to_string(nx) + " x " + std::to_string(ny) + " x " +
+                                                std::to_string(nz) + " points takes " + gigabytes(bytes) +
+                                                " of memory, and " + gigabytes(double(most_bytes)) +
+                                                " are allowed; take a larger spacing."};
+    occupancy.bits.resize(occupancy.words_per_row * ny * nz);
+    return occupancy;
+}
+
 std::size_t Occupancy::count() const {
     std::size_t result = 0;
     for (const std::uint64_t word : bits) result += std::size_t(std::popcount(word));
@@ -103,15 +125,10 @@ LatticePoints points_inside(const Lattice& lattice, const Occupancy& occupancy) 
     LatticePoints points;
     points.indices.reserve(count);
     points.positions.reserve(count);
-    std::size_t word = 0;
-    for (std::size_t k = 0; k < occupancy.counts[2]; ++k)
-        for (std::size_t j = 0; j < occupancy.counts[1]; ++j)
-            for (std::size_t w = 0; w < occupancy.words_per_row; ++w, ++word)
-                for (std::uint64_t rest = occupancy.bits[word]; rest != 0; rest &= rest - 1) {
-                    const std::size_t i = 64 * w + std::size_t(std::countr_zero(rest));
-                    points.indices.push_back({std::uint16_t(i), std::uint16_t(j), std::uint16_t(k)});
-                    points.positions.push_back(lattice.point(i, j, k).cast<float>());
-                }
+    for_each_inside(occupancy, [&](std::size_t i, std::size_t j, std::size_t k) {
+        points.indices.push_back({std::uint16_t(i), std::uint16_t(j), std::uint16_t(k)});
+        points.positions.push_back(lattice.point(i, j, k).cast<float>());
+    });
     return points;
 }
 

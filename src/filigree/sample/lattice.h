@@ -5,6 +5,7 @@
 #include "filigree/mesh/mesh.h"
 
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -52,6 +53,25 @@ struct Occupancy {
     }
     std::size_t count() const; ///< points inside
 };
+
+/// The most memory that deciding about a lattice may take, where a caller does not say.
+inline constexpr std::size_t kMostLatticeBytes = std::size_t{4} << 30;
+
+/// An occupancy with no point inside. other_bytes: what the caller needs beside the bits.
+/// Errors: unsuitable (bits and other bytes are more than most_bytes: says how much).
+Result<Occupancy> make_occupancy(const Lattice& lattice, double other_bytes = 0,
+                                 std::size_t most_bytes = kMostLatticeBytes);
+
+/// Calls visit(i, j, k) for each point inside, in the order of k, j, i.
+template <class Visit>
+void for_each_inside(const Occupancy& occupancy, const Visit& visit) {
+    std::size_t word = 0;
+    for (std::size_t k = 0; k < occupancy.counts[2]; ++k)
+        for (std::size_t j = 0; j < occupancy.counts[1]; ++j)
+            for (std::size_t w = 0; w < occupancy.words_per_row; ++w, ++word)
+                for (std::uint64_t rest = occupancy.bits[word]; rest != 0; rest &= rest - 1)
+                    visit(64 * w + std::size_t(std::countr_zero(rest)), j, k);
+}
 
 /// The points inside, in the order of k, j, i.
 struct LatticePoints {

@@ -1,24 +1,16 @@
 // Based on: [Jacobson 2013], winding numbers of meshes that are not closed; [Barill 2018], a tree of dipoles with the
 // first and second moments; [Van Oosterom 1983], the solid angle of a triangle.
-//
-// On lattices we differ: cones over the edges at which faces do not cancel close the mesh, whose crossings row by row
-// then are whole numbers, exactly. Only what the cones add has to be taken off again, and only they need a tree. It
-// varies slowly away from them, so most blocks of points are decided at their centres.
-#include "filigree/sample/winding.h"
+#include "filigree/sample/winding_tree.h"
 
 #include "filigree/core/parallel_for.h"
-#include "filigree/sample/inside_scan.h"
+#include "filigree/sample/exact_sign.h"
 #include "filigree/sample/wide_tree.h"
 #include "filigree/sample/wide_tree_lanes.h"
 
 #include <algorithm>
-#include <atomic>
 #include <bit>
-#include <chrono>
 #include <cmath>
 #include <numbers>
-#include <numeric>
-#include <string>
 
 namespace filigree {
 
@@ -61,10 +53,7 @@ struct Tree {
     double nearness = 0; ///< what is not opened is at least this share of its centre's distance away
 };
 
-struct Winding {
-    double number;
-    double distance; ///< to the triangles at least, in half sizes
-};
+using Winding = WindingTree::NumberAndDistance;
 
 // Making the tree.
 
@@ -374,16 +363,26 @@ WindingFunction winding_function(bool with_distance) {
 
 struct WindingTree::Content {
     Tree tree;
-    WindingFunction ask;
+    WindingFunction ask = winding_function(false), ask_with_distance = winding_function(true);
 };
 
-WindingTree::WindingTree(std::span<const Vec3f> positions, std::span<const Triangle> triangles, double accuracy,
-                         const RunContext& context)
-    : content_(std::make_unique<Content>(
-          Content{make_tree(positions, triangles, accuracy, context), winding_function(false)})) {}
+WindingTree::WindingTree(std::unique_ptr<Content> content) : content_(std::move(content)) {}
 WindingTree::WindingTree(WindingTree&&) noexcept = default;
 WindingTree& WindingTree::operator=(WindingTree&&) noexcept = default;
 WindingTree::~WindingTree() = default;
+
+Result<WindingTree> WindingTree::create(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
+                                        double accuracy, const RunContext& context) {
+    Tree tree = make_tree(positions, triangles, accuracy, context);
+    if (context.is_cancelled()) return cancelled_error();
+    return WindingTree(std::make_unique<Content>(Content{std::move(tree)}));
+}
+
+double WindingTree::inverse_half_size() const { return content_->tree.inverse_half_size; }
+
+WindingTree::NumberAndDistance WindingTree::winding_and_distance(const Vec3d& point) const {
+    return content_->ask_with_distance(content_->tree, point);
+}
 
 double WindingTree::winding(const Vec3d& point) const { return content_->ask(content_->tree, point).number; }
 
@@ -401,242 +400,6 @@ Result<std::vector<float>> WindingTree::winding(std::span<const Vec3d> points, c
         if (context.is_cancelled()) return cancelled_error();
     }
     return numbers;
-}
-
-namespace {
-
-/// What closes a mesh: for each connected part of the edges at which faces do not cancel, a cone from their middle.
-struct Cones {
-    std::vector<Vec3f> positions;    ///< the mesh's, and the tips
-    std::vector<Triangle> triangles; ///< over these; as many on an edge as are missing there
-    std::size_t open_edges = 0;
-};
-
-Index root_of(std::vector<Index>& parent, Index v) {
-    while (parent[v] != v) v = parent[v] = parent[parent[v]];
-    return v;
-}
-
-Cones make_cones(std::span<const Vec3f> positions, std::span<const Triangle> triangles) {
-    // Edges, at their lower vertex: the other one, and whether they run up (+1) or down (-1).
-    struct End {
-        Index other;
-        int direction;
-    };
-    std::vector<std::size_t> first(positions.size() + 2);
-    const auto for_each_edge = [&](const auto& body) {
-        for (const Triangle& t : triangles)
-            for (std::size_t k = 0; k < 3; ++k) {
-                const Index a = t[k], b = t[(k + 1) % 3];
-                if (a != b) body(std::min(a, b), std::max(a, b), a < b ? 1 : -1);
-            }
-    };
-    for_each_edge([&](Index low, Index, int) { ++first[low + 2]; });
-    std::partial_sum(first.begin(), first.end(), first.begin());
-    std::vector<End> ends(first.back());
-    for_each_edge([&](Index low, Index high, int direction) { ends[first[low + 1]++] = {high, direction}; });
-
-    struct Edge {
-        Index from, to;
-        int missing;
-    };
-    std::vector<Edge> edges;
-    std::vector<Index> parent(positions.size());
-    std::iota(parent.begin(), parent.end(), Index{0});
-    for (Index low = 0; low < positions.size(); ++low) {
-        const auto begin = ends.begin() + static_cast<std::ptrdiff_t>(first[low]);
-        const auto end = ends.begin() + static_cast<std::ptrdiff_t>(first[low + 1]);
-        std::sort(begin, end, [](const End& a, const End& b) { return a.other < b.other; });
-        for (auto e = begin; e != end;) {
-            const Index high = e->other;
-            int sum = 0;
-            for (; e != end && e->other == high; ++e) sum += e->direction;
-            if (sum == 0) continue;
-            edges.push_back(sum > 0 ? Edge{low, high, sum} : Edge{high, low, -sum});
-            parent[root_of(parent, low)] = root_of(parent, high);
-        }
-    }
-
-    Cones cones;
-    cones.open_edges = edges.size();
-    cones.positions.assign(positions.begin(), positions.end());
-    struct Tip {
-        Vec3d sum = Vec3d::Zero();
-        std::size_t count = 0;
-        Index id = kNoIndex;
-    };
-    std::vector<Tip> tips;
-    std::vector<Index> tip_of(edges.empty() ? 0 : positions.size(), kNoIndex); // of each root
-    const auto tip_at = [&](Index v) -> Tip& {
-        Index& tip = tip_of[root_of(parent, v)];
-        if (tip == kNoIndex) {
-            tip = static_cast<Index>(tips.size());
-            tips.push_back({});
-        }
-        return tips[tip];
-    };
-    for (const Edge& e : edges) {
-        Tip& tip = tip_at(e.from);
-        tip.sum += positions[e.from].cast<double>() + positions[e.to].cast<double>();
-        tip.count += 2;
-    }
-    for (Tip& tip : tips) {
-        tip.id = static_cast<Index>(cones.positions.size());
-        cones.positions.push_back((tip.sum / static_cast<double>(tip.count)).cast<float>());
-    }
-    for (const Edge& e : edges)
-        for (int copy = 0; copy < e.missing; ++copy) cones.triangles.push_back({e.to, e.from, tip_at(e.from).id});
-    return cones;
-}
-
-constexpr std::size_t kBlock = 16, kSmallestBlock = 4; // points along a side
-// A block is decided at its centre when the cones are twice its radius away and their part is this far from where the
-// answer changes. Not proven; a bound by the cones' area decides a tenth of the blocks. No point differed in the tests.
-constexpr double kClear = 2, kMargin = 0.2;
-constexpr double kNearHalf = 0.1;
-
-/// Decides the points of some layers of a lattice.
-struct Layers {
-    const Lattice& lattice;
-    const Tree& cones;
-    std::size_t first_k;
-    std::span<const std::int16_t> crossings; ///< of the closed mesh, before each point
-    Occupancy& occupancy;
-    WindingFunction ask = winding_function(false), ask_with_distance = winding_function(true);
-
-    struct Block {
-        std::array<std::size_t, 3> begin, end;
-    };
-
-    /// Returns how many points have a winding number near a half.
-    std::size_t decide(const Block& block, std::size_t side) const {
-        Vec3d low, high;
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-            const auto i = static_cast<Eigen::Index>(axis);
-            low[i] = lattice.coordinates[axis][block.begin[axis]];
-            high[i] = lattice.coordinates[axis][block.end[axis] - 1];
-        }
-        const double radius = 0.5 * (high - low).norm() * cones.inverse_half_size;
-        const Winding w = ask_with_distance(cones, 0.5 * (low + high));
-        if (w.distance >= kClear * radius && from_half(w.number) > kMargin) {
-            for (std::size_t k = block.begin[2]; k < block.end[2]; ++k)
-                for (std::size_t j = block.begin[1]; j < block.end[1]; ++j)
-                    set(block, j, k, [t = threshold(w.number)](std::size_t) { return t; });
-            return 0;
-        }
-        std::size_t near_half = 0;
-        if (side > kSmallestBlock) {
-            for_each_block(block, side / 2, [&](const Block& part) { near_half += decide(part, side / 2); });
-            return near_half;
-        }
-        for (std::size_t k = block.begin[2]; k < block.end[2]; ++k)
-            for (std::size_t j = block.begin[1]; j < block.end[1]; ++j)
-                set(block, j, k, [&](std::size_t i) {
-                    const double number = ask(cones, lattice.point(i, j, k)).number;
-                    near_half += from_half(number) < kNearHalf;
-                    return threshold(number);
-                });
-        return near_half;
-    }
-
-    template <class Body>
-    static void for_each_block(const Block& whole, std::size_t side, const Body& body) {
-        Block part;
-        const auto cut = [&](std::size_t axis, std::size_t begin) {
-            part.begin[axis] = begin;
-            part.end[axis] = std::min(begin + side, whole.end[axis]);
-        };
-        for (std::size_t k = whole.begin[2]; k < whole.end[2]; k += side) {
-            cut(2, k);
-            for (std::size_t j = whole.begin[1]; j < whole.end[1]; j += side) {
-                cut(1, j);
-                for (std::size_t i = whole.begin[0]; i < whole.end[0]; i += side) {
-                    cut(0, i);
-                    body(part);
-                }
-            }
-        }
-    }
-
-private:
-    static double from_half(double number) { return std::abs(number - std::floor(number) - 0.5); }
-    /// Least crossings with which a point is inside: those less what the cones add are 1/2 or more.
-    static int threshold(double number) { return static_cast<int>(std::ceil(number + 0.5)); }
-
-    template <class Threshold>
-    void set(const Block& block, std::size_t j, std::size_t k, const Threshold& threshold_at) const {
-        const std::size_t nx = occupancy.counts[0], ny = occupancy.counts[1];
-        const std::int16_t* row = &crossings[((k - first_k) * ny + j) * nx];
-        std::uint64_t bits = 0;
-        for (std::size_t i = block.begin[0]; i < block.end[0]; ++i)
-            bits |= std::uint64_t{row[i] >= threshold_at(i)} << (i & 63);
-        occupancy.bits[(k * ny + j) * occupancy.words_per_row + (block.begin[0] >> 6)] |= bits;
-    }
-};
-static_assert(64 % kBlock == 0, "a block's row of bits is in one word");
-
-constexpr std::size_t kSlabPoints = std::size_t{1} << 25;   // of crossings at a time
-constexpr double kMostBytes = double(std::size_t{4} << 30); // as scan_inside
-
-} // namespace
-
-Result<Occupancy> winding_inside(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
-                                 const Lattice& lattice, double accuracy, const RunContext& context,
-                                 WindingReport* report) {
-    const auto start = std::chrono::steady_clock::now();
-    WindingReport found;
-    const auto finish = [&] {
-        found.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-        if (report) *report = found;
-    };
-    const Cones cones = make_cones(positions, triangles);
-    found.open_edges = cones.open_edges;
-    if (cones.triangles.empty()) {
-        auto occupancy = scan_inside({positions, triangles}, lattice, Overlap::merged, context);
-        finish();
-        return occupancy;
-    }
-
-    Occupancy occupancy;
-    occupancy.counts = lattice.counts();
-    const auto [nx, ny, nz] = occupancy.counts;
-    occupancy.words_per_row = (nx + 63) / 64;
-    const std::size_t blocks_a_slab =
-        std::max<std::size_t>(1, kSlabPoints / std::max<std::size_t>(1, nx * ny * kBlock));
-    const std::size_t layers = std::min(nz, blocks_a_slab * kBlock);
-    const double bytes = 8.0 * double(occupancy.words_per_row) * double(ny) * double(nz) +
-                         2.0 * double(nx) * double(ny) * double(layers);
-    if (bytes > kMostBytes)
-        return Error{ErrorCode::unsuitable, "The lattice of " + std::to_string(nx) + " x " + std::to_string(ny) +
-                                                " x " + std::to_string(nz) + " points takes " +
-                                                std::to_string(static_cast<std::uint64_t>(bytes / 0x1p30) + 1) +
-                                                " GiB, and " + std::to_string(static_cast<int>(kMostBytes / 0x1p30)) +
-                                                " are the most; give a larger spacing."};
-    occupancy.bits.resize(occupancy.words_per_row * ny * nz);
-
-    const Tree tree = make_tree(cones.positions, cones.triangles, accuracy, context);
-    std::vector<Triangle> closed(triangles.begin(), triangles.end());
-    closed.insert(closed.end(), cones.triangles.begin(), cones.triangles.end());
-    std::atomic<std::size_t> near_half = 0;
-    for (std::size_t first_k = 0; first_k < nz; first_k += layers) {
-        context.report("winding", double(first_k) / double(nz));
-        const auto crossings = scan_winding({cones.positions, closed}, lattice, first_k, layers, context);
-        if (!crossings) return crossings.error();
-        const Layers slab{lattice, tree, first_k, *crossings, occupancy};
-        const std::size_t last_k = std::min(first_k + layers, nz);
-        parallel_for(context, ny, kBlock, [&](std::size_t begin, std::size_t end) {
-            std::size_t near = 0;
-            Layers::for_each_block({{0, begin, first_k}, {nx, end, last_k}}, kBlock, [&](const Layers::Block& block) {
-                if (!context.is_cancelled()) near += slab.decide(block, kBlock);
-            });
-            near_half += near;
-        });
-        if (context.is_cancelled()) return cancelled_error();
-    }
-    const double points = lattice.point_count();
-    found.near_half = points > 0 ? static_cast<double>(near_half) / points : 0;
-    finish();
-    return occupancy;
 }
 
 } // namespace filigree

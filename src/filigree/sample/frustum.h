@@ -1,0 +1,22 @@
+// The report's lattice (2.2): points in a view frustum.
+#pragma once
+
+#include "filigree/core/result.h"
+#include "filigree/core/types.h"
+
+#include <array>
+#include <vector>
+
+namespace filigree {
+
+/// Points in a view frustum, in regular steps across the picture and in depth.
+struct Frustum {
+    Vec3d eye, target, up = {0, 1, 0};
+    double field_of_view_deg = 30, aspect = 1, near = 0, far = 0; ///< near and far: along the view, above 0
+    std::array<std::size_t, 3> counts = {};                       ///< across, up, in depth
+};
+
+/// The points, by depth, row and column. Errors: usage (no extent, near not below far, more than 2^28 points).
+Result<std::vector<Vec3d>> frustum_points(const Frustum& frustum);
+
+} // namespace filigree

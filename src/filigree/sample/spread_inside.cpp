@@ -1,0 +1,157 @@
+#include "filigree/sample/spread_inside.h"
+
+#include "filigree/core/parallel_for.h"
+#include "filigree/core/random.h"
+#include "filigree/sample/inside_test.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace filigree {
+
+namespace {
+
+constexpr int kTries = 8;                // places in a cell; then the lattice point stays where it is, which is inside
+constexpr std::size_t kDarts = 8;        // for each lattice point inside
+constexpr double kDartReach = 1.5;       // spacings: the side of the cube around the point that they fall into
+constexpr double kApart = 0.8;           // spacings between points
+constexpr double kDartsAtOnce = 1 << 21; // about; they take 60 bytes each
+constexpr double kMostPasses = 16;       // over all darts, so that making them again stays cheap
+constexpr std::size_t kBetweenLooks = 1 << 14; // darts from one look at `cancel` to the next
+
+std::vector<Vec3d> lattice_points(const Lattice& lattice, const Occupancy& occupancy) {
+    std::vector<Vec3d> points;
+    points.reserve(occupancy.count());
+    for_each_inside(occupancy,
+                    [&](std::size_t i, std::size_t j, std::size_t k) { points.push_back(lattice.point(i, j, k)); });
+    return points;
+}
+
+Result<std::vector<Vec3d>> jitter(std::vector<Vec3d> points, double spacing, const InsideTest& test,
+                                  const RunContext& context) {
+    parallel_for(context, points.size(), 256, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t p = begin; p < end && !context.is_cancelled(); ++p)
+            for (int attempt = 0; attempt < kTries; ++attempt) {
+                Vec3d moved = points[p];
+                for (int axis = 0; axis < 3; ++axis)
+                    moved[axis] += spacing * (random_unit(context.seed, 3 * (p * kTries + attempt) + axis) - 0.5);
+                if (!test.contains(moved)) continue;
+                points[p] = moved;
+                break;
+            }
+    });
+    if (context.is_cancelled()) return cancelled_error();
+    return points;
+}
+
+/// Points that keep a distance from each other.
+class SpacedPoints {
+public:
+    SpacedPoints(const Vec3d& corner, double distance, std::size_t expected)
+        : corner_(corner), distance_(distance), mask_(std::bit_ceil(std::max<std::size_t>(expected, 16)) - 1),
+          last_(mask_ + 1, kNoIndex) {}
+
+    /// Takes the point unless one is too near. point: nowhere below the corner.
+    void add(const Vec3d& point) {
+        const Cell cell = ((point - corner_) / distance_).cast<std::int64_t>();
+        for (std::int64_t n = 0; n < 27; ++n)
+            if (has_near(cell + Cell(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1), point)) return;
+        Index& last = last_[bucket(cell)];
+        before_.push_back(last);
+        last = static_cast<Index>(points_.size());
+        points_.push_back(point);
+    }
+
+    std::vector<Vec3d> take() { return std::move(points_); }
+
+private:
+    using Cell = Eigen::Matrix<std::int64_t, 3, 1>;
+
+    std::size_t bucket(const Cell& cell) const {
+        std::uint64_t hash = std::uint64_t(cell[0]) * 0x9E3779B97F4A7C15u;
+        hash = (hash ^ (hash >> 29) ^ std::uint64_t(cell[1])) * 0xBF58476D1CE4E5B9u;
+        hash = (hash ^ (hash >> 29) ^ std::uint64_t(cell[2])) * 0x94D049BB133111EBu;
+        return (hash ^ (hash >> 32)) & mask_;
+    }
+    /// Cells that share a bucket do not matter: what is too near is too near from any cell.
+    bool has_near(const Cell& cell, const Vec3d& point) const {
+        for (Index other = last_[bucket(cell)]; other != kNoIndex; other = before_[other])
+            if ((points_[other] - point).squaredNorm() < distance_ * distance_) return true;
+        return false;
+    }
+
+    Vec3d corner_;
+    double distance_;
+    std::size_t mask_;
+    std::vector<Vec3d> points_;
+    std::vector<Index> last_;   ///< of each bucket: its last point
+    std::vector<Index> before_; ///< of each point: the one before it in its bucket
+};
+
+/// Darts around lattice points inside, those whose order is from `low` to below `high`. Cells that merely touch the
+/// surface get none: their neighbours' darts reach them.
+struct Darts {
+    std::vector<Vec3d> places;
+    std::vector<double> orders; ///< 0 to 1: lower ones are thrown first
+};
+
+Darts make_darts(const Lattice& lattice, const Occupancy& occupancy, double low, double high, std::uint64_t seed) {
+    Darts darts;
+    std::uint64_t number = 0;
+    for_each_inside(occupancy, [&](std::size_t i, std::size_t j, std::size_t k) {
+        for (const std::uint64_t end = number + kDarts; number < end; ++number) {
+            const double order = random_unit(seed + 1, number);
+            if (!(low <= order && order < high)) continue;
+            Vec3d place = lattice.point(i, j, k);
+            for (int axis = 0; axis < 3; ++axis)
+                place[axis] += lattice.spacing * (random_unit(seed, 4 * number + axis) - 0.5) * kDartReach;
+            darts.places.push_back(place);
+            darts.orders.push_back(order);
+        }
+    });
+    return darts;
+}
+
+/// Darts in random order, each kept when nothing kept is too near. They are made and thrown in passes, lower orders
+/// first, so that few of them are in memory.
+Result<std::vector<Vec3d>> throw_darts(const Lattice& lattice, const Occupancy& occupancy, const InsideTest& test,
+                                       const RunContext& context) {
+    const std::size_t lattice_points = occupancy.count();
+    if (lattice_points == 0) return std::vector<Vec3d>{};
+    const double passes = std::clamp(std::ceil(double(kDarts * lattice_points) / kDartsAtOnce), 1.0, kMostPasses);
+    const Vec3d corner = lattice.point(0, 0, 0) - Vec3d::Constant(lattice.spacing);
+    SpacedPoints points(corner, kApart * lattice.spacing, lattice_points);
+    for (double pass = 0; pass < passes; ++pass) {
+        context.report("throwing darts", pass / passes);
+        const Darts darts = make_darts(lattice, occupancy, pass / passes, (pass + 1) / passes, context.seed);
+        const Result<std::vector<std::uint8_t>> inside = test.contains(darts.places, context);
+        if (!inside) return inside.error();
+        std::vector<std::pair<double, std::size_t>> thrown;
+        for (std::size_t d = 0; d < darts.places.size(); ++d)
+            if ((*inside)[d]) thrown.emplace_back(darts.orders[d], d);
+        std::ranges::sort(thrown);
+        for (std::size_t t = 0; t < thrown.size(); ++t) {
+            if (t % kBetweenLooks == 0 && context.is_cancelled()) return cancelled_error();
+            points.add(darts.places[thrown[t].second]);
+        }
+    }
+    if (context.is_cancelled()) return cancelled_error();
+    return points.take();
+}
+
+} // namespace
+
+Result<std::vector<Vec3d>> spread_inside(const Mesh& mesh, const Lattice& lattice, Pattern pattern,
+                                         const InsideOptions& options, const RunContext& context,
+                                         InsideReport* report) {
+    const Result<Occupancy> occupancy = sample_inside(mesh, lattice, options, context, report);
+    if (!occupancy) return occupancy.error();
+    if (pattern == Pattern::lattice) return lattice_points(lattice, *occupancy);
+    const Result<InsideTest> test = InsideTest::create(mesh, options, context);
+    if (!test) return test.error();
+    return pattern == Pattern::jitter ? jitter(lattice_points(lattice, *occupancy), lattice.spacing, *test, context)
+                                      : throw_darts(lattice, *occupancy, *test, context);
+}
+
+} // namespace filigree

@@ -1,0 +1,57 @@
+#include "filigree/sample/closure.h"
+
+#include "filigree/mesh/shapes.h"
+#include "filigree/sample/edge_balance.h"
+
+#include <gtest/gtest.h>
+
+namespace filigree {
+namespace {
+
+const RunContext kContext;
+
+TEST(Closure, KnowsOpenEdgesAndTurnedFaces) {
+    Mesh cube = make_wavy_cube({.resolution = 2, .amplitude = 0});
+    EXPECT_TRUE(weld_triangles(cube, kContext)->closure.is_closed());
+    EXPECT_TRUE(weld_triangles(cube, kContext)->closure.is_oriented());
+    std::swap(cube.corners[1], cube.corners[3]); // the first quad, turned round
+    const Closure turned = weld_triangles(cube, kContext)->closure;
+    EXPECT_TRUE(turned.is_closed());
+    EXPECT_EQ(turned.unbalanced, 4u);
+    cube.corners.erase(cube.corners.begin(), cube.corners.begin() + 4);
+    cube.face_offsets.pop_back();
+    const Closure open = weld_triangles(cube, kContext)->closure;
+    EXPECT_EQ(open.open_edges, 4u);
+    EXPECT_EQ(open.unbalanced, 4u);
+    EXPECT_FLOAT_EQ((open.first_open[0] - open.first_open[1]).norm(), bounds(cube.positions).size().x() / 2);
+}
+
+TEST(Closure, VerticesAtOnePlaceAreOne) {
+    Mesh cube = make_wavy_cube({.resolution = 3});
+    Mesh apart;
+    for (std::size_t f = 0; f < cube.face_count(); ++f) {
+        std::vector<Index> face;
+        for (const Index v : cube.face(f)) {
+            face.push_back(Index(apart.positions.size()));
+            apart.positions.push_back(cube.positions[v]);
+        }
+        apart.add_face(face);
+    }
+    EXPECT_TRUE(weld_triangles(apart, kContext)->closure.is_closed());
+    const RunContext cancelled;
+    cancelled.cancel();
+    EXPECT_EQ(weld_triangles(apart, cancelled).error().code, ErrorCode::cancelled);
+}
+
+TEST(EdgeBalance, CountsEachEdgeOnce) {
+    const std::vector<Triangle> triangles = {{2, 0, 1}, {0, 2, 3}, {0, 2, 1}, {3, 3, 1}};
+    std::vector<std::array<int, 4>> edges;
+    for_each_edge(4, triangles, [&](const EdgeBalance& e) {
+        edges.push_back({int(e.low), int(e.high), int(e.triangles), e.net});
+    });
+    EXPECT_EQ(edges, (std::vector<std::array<int, 4>>{
+                         {0, 1, 2, 0}, {0, 2, 3, 1}, {0, 3, 1, -1}, {1, 2, 2, 0}, {1, 3, 2, 0}, {2, 3, 1, 1}}));
+}
+
+} // namespace
+} // namespace filigree
