@@ -32,7 +32,6 @@ struct InputSurface {
     const Mesh& mesh;
     std::vector<Triangle> corners; ///< of each triangle
     std::vector<Index> face_of_corner;
-    std::vector<Index> first_triangle; ///< of each face, and the count of all
     /// Half-edge 3 t + i runs from corner i of triangle t to the next. The next half-edge between the same positions
     /// (the other one, where there are two); kNoIndex on borders.
     std::vector<Index> beyond;
@@ -40,6 +39,7 @@ struct InputSurface {
 
     explicit InputSurface(const Mesh& from) : mesh(from), place(weld_map(from.positions)) {
         cut_faces();
+        sort_by_middle();
         join_edges();
     }
 
@@ -54,31 +54,45 @@ struct InputSurface {
         return (position(corners[t][1]) - a).cross(position(corners[t][2]) - a);
     }
 
-    /// The triangle that has the point, or one of its face.
+    /// The triangle that has the point, or the first of its face.
     Index triangle_of(const CornerPoint& point) const {
-        const Index face = face_of_corner[point.corners[0]];
-        for (Index t = first_triangle[face]; t < first_triangle[face + 1]; ++t)
-            if (std::ranges::is_permutation(corners[t], point.corners)) return t;
-        return first_triangle[face];
+        const Index middle = middle_corner(point.corners);
+        for (Index i = first_at_middle_[middle]; i < first_at_middle_[middle + 1]; ++i)
+            if (std::ranges::is_permutation(corners[at_middle_[i]], point.corners)) return at_middle_[i];
+        return first_triangle_[face_of_corner[point.corners[0]]];
     }
 
 private:
+    static Index middle_corner(const Triangle& t) {
+        return std::max(std::min(t[0], t[1]), std::min(std::max(t[0], t[1]), t[2]));
+    }
+
     void cut_faces() {
         const Triangulation cut = triangulate(mesh);
         face_of_corner.resize(mesh.corner_count());
         for (std::size_t f = 0; f < mesh.face_count(); ++f)
             for (Index c = mesh.face_offsets[f]; c < mesh.face_offsets[f + 1]; ++c) face_of_corner[c] = Index(f);
-        first_triangle.assign(mesh.face_count() + 1, 0);
-        for (const Index face : cut.source_face) ++first_triangle[face + 1];
-        for (std::size_t f = 0; f < mesh.face_count(); ++f) first_triangle[f + 1] += first_triangle[f];
+        first_triangle_.assign(mesh.face_count() + 1, 0);
+        for (const Index face : cut.source_face) ++first_triangle_[face + 1];
+        for (std::size_t f = 0; f < mesh.face_count(); ++f) first_triangle_[f + 1] += first_triangle_[f];
         corners.reserve(cut.triangles.size());
-        for (std::size_t t = 0; t < cut.triangles.size(); ++t) {
-            const std::span<const Index> face = mesh.face(cut.source_face[t]);
-            Triangle& triangle = corners.emplace_back();
-            for (int k = 0; k < 3; ++k)
-                triangle[k] = mesh.face_offsets[cut.source_face[t]] +
-                              Index(std::ranges::find(face, cut.triangles[t][k]) - face.begin());
+        std::vector<Index> corner_of(mesh.vertex_count()); // in the face at hand: the vertex's first corner there
+        for (std::size_t f = 0; f < mesh.face_count(); ++f) {
+            for (Index c = mesh.face_offsets[f + 1]; c-- > mesh.face_offsets[f];) corner_of[mesh.corners[c]] = c;
+            for (Index t = first_triangle_[f]; t < first_triangle_[f + 1]; ++t) {
+                const auto& [a, b, c] = cut.triangles[t];
+                corners.push_back({corner_of[a], corner_of[b], corner_of[c]});
+            }
         }
+    }
+
+    void sort_by_middle() {
+        first_at_middle_.assign(mesh.corner_count() + 1, 0);
+        for (const Triangle& t : corners) ++first_at_middle_[middle_corner(t) + 1];
+        for (std::size_t c = 0; c < mesh.corner_count(); ++c) first_at_middle_[c + 1] += first_at_middle_[c];
+        at_middle_.resize(corners.size());
+        std::vector<Index> next(first_at_middle_.begin(), first_at_middle_.end() - 1);
+        for (Index t = 0; t < corners.size(); ++t) at_middle_[next[middle_corner(corners[t])]++] = t;
     }
 
     void join_edges() {
@@ -100,6 +114,11 @@ private:
                 beyond[edges[i].half_edge] = edges[i + 1 < end ? i + 1 : begin].half_edge;
         }
     }
+
+    std::vector<Index> first_triangle_; ///< of each face, and the count of all
+    /// Triangles by their middle corner, of the three in order: each corner of a face but the first and the last is the
+    /// middle of one triangle. Corner c has at_middle_[first_at_middle_[c]] .. at_middle_[first_at_middle_[c + 1] - 1].
+    std::vector<Index> first_at_middle_, at_middle_;
 };
 
 /// Whether each half-edge is a seam: whether `same(corner, corner)` fails at one of its ends.
@@ -187,7 +206,7 @@ private:
 };
 
 /// `to` on `from`: everything that does not depend on the attribute.
-struct Layout {
+struct Placement {
     const InputSurface& surface;
     const Mesh& to;
     std::span<const CornerPoint> points; ///< of each vertex of `to`
@@ -197,48 +216,48 @@ struct Layout {
     double mean_radius = 0;
 };
 
-Spot find_spot(const Layout& layout, std::span<const Index> face) {
+Spot find_spot(const Placement& placement, std::span<const Index> face) {
     Spot spot;
     double count = 0;
     for (const Index v : face) {
-        if (layout.triangles[v] == kNoIndex) continue;
-        spot.centre += layout.positions[v];
+        if (placement.triangles[v] == kNoIndex) continue;
+        spot.centre += placement.positions[v];
         ++count;
     }
     spot.radius = -1;
     if (count == 0) return spot;
     spot.centre /= count;
     for (std::size_t k = 0; k < face.size(); ++k) {
-        if (layout.triangles[face[k]] == kNoIndex) continue;
-        const Vec3d here = layout.positions[face[k]] - spot.centre;
+        if (placement.triangles[face[k]] == kNoIndex) continue;
+        const Vec3d here = placement.positions[face[k]] - spot.centre;
         spot.radius = std::max(spot.radius, kReach * here.norm());
         const Index next = face[(k + 1) % face.size()];
-        if (layout.triangles[next] != kNoIndex) spot.normal += here.cross(layout.positions[next] - spot.centre);
+        if (placement.triangles[next] != kNoIndex) spot.normal += here.cross(placement.positions[next] - spot.centre);
     }
     spot.normal.normalize(); // stays zero where it is
     return spot;
 }
 
-Layout make_layout(const InputSurface& surface, const Mesh& to, std::span<const CornerPoint> points,
-                   const RunContext& context) {
-    Layout layout{surface, to, points, {}, {}, {}};
-    layout.positions.assign(points.size(), Vec3d::Zero());
-    layout.triangles.assign(points.size(), kNoIndex);
-    layout.spots.resize(to.face_count());
+Placement make_placement(const InputSurface& surface, const Mesh& to, std::span<const CornerPoint> points,
+                         const RunContext& context) {
+    Placement placement{surface, to, points, {}, {}, {}};
+    placement.positions.assign(points.size(), Vec3d::Zero());
+    placement.triangles.assign(points.size(), kNoIndex);
+    placement.spots.resize(to.face_count());
     parallel_for(context, points.size(), kGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t v = begin; v < end; ++v) {
             if (points[v].corners[0] == kNoIndex) continue;
-            layout.triangles[v] = surface.triangle_of(points[v]);
+            placement.triangles[v] = surface.triangle_of(points[v]);
             for (int k = 0; k < 3; ++k)
-                layout.positions[v] += double(points[v].barycentric[k]) * surface.position(points[v].corners[k]);
+                placement.positions[v] += double(points[v].barycentric[k]) * surface.position(points[v].corners[k]);
         }
     });
     parallel_for(context, to.face_count(), kGrain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t f = begin; f < end; ++f) layout.spots[f] = find_spot(layout, to.face(f));
+        for (std::size_t f = begin; f < end; ++f) placement.spots[f] = find_spot(placement, to.face(f));
     });
-    for (const Spot& spot : layout.spots) layout.mean_radius += std::max(0.0, spot.radius);
-    layout.mean_radius /= double(std::max<std::size_t>(1, to.face_count()));
-    return layout;
+    for (const Spot& spot : placement.spots) placement.mean_radius += std::max(0.0, spot.radius);
+    placement.mean_radius /= double(std::max<std::size_t>(1, to.face_count()));
+    return placement;
 }
 
 bool is_under(const InputSurface& surface, Index triangle, const Spot& spot) {
@@ -277,14 +296,14 @@ SurfacePoint closest_of(const InputSurface& surface, std::span<const Index> tria
 }
 
 /// The triangle of `from` under the centre of a face that has a spot.
-Index triangle_under_centre(const Layout& layout, std::size_t face) {
+Index triangle_under_centre(const Placement& placement, std::size_t face) {
     std::vector<Index> seeds;
-    for (const Index v : layout.to.face(face))
-        if (const Index t = layout.triangles[v]; t != kNoIndex && std::ranges::find(seeds, t) == seeds.end())
+    for (const Index v : placement.to.face(face))
+        if (const Index t = placement.triangles[v]; t != kNoIndex && std::ranges::find(seeds, t) == seeds.end())
             seeds.push_back(t);
-    const Spot& spot = layout.spots[face];
-    const std::vector<Index> under = flood(layout.surface, spot, seeds, [](Index) { return true; });
-    return closest_of(layout.surface, under, spot.centre).triangle;
+    const Spot& spot = placement.spots[face];
+    const std::vector<Index> under = flood(placement.surface, spot, seeds, [](Index) { return true; });
+    return closest_of(placement.surface, under, spot.centre).triangle;
 }
 
 /// Values at the corners of `from`.
@@ -378,30 +397,30 @@ auto continue_side(const InputSurface& surface, const CornerValues<T>& values, s
 }
 
 template <class T>
-void cross_seam(const Layout& layout, const CornerValues<T>& values, std::span<const std::uint8_t> seam,
+void cross_seam(const Placement& placement, const CornerValues<T>& values, std::span<const std::uint8_t> seam,
                 std::size_t face, CornerResults<T>& results) {
-    const Spot& spot = layout.spots[face];
-    const Index middle = triangle_under_centre(layout, face);
-    const Index first = layout.to.face_offsets[face];
-    const std::span<const Index> vertices = layout.to.face(face);
-    if (!values.has(layout.surface.corners[middle])) {
+    const Spot& spot = placement.spots[face];
+    const Index middle = triangle_under_centre(placement, face);
+    const Index first = placement.to.face_offsets[face];
+    const std::span<const Index> vertices = placement.to.face(face);
+    if (!values.has(placement.surface.corners[middle])) {
         std::fill_n(results.kinds.begin() + first, vertices.size(), CornerKind::none);
         return;
     }
-    const std::vector<Index> side = flood(layout.surface, spot, {middle}, [&](Index h) {
-        return !seam[h] && values.has(layout.surface.corners[layout.surface.beyond[h] / 3]);
+    const std::vector<Index> side = flood(placement.surface, spot, {middle}, [&](Index h) {
+        return !seam[h] && values.has(placement.surface.corners[placement.surface.beyond[h] / 3]);
     });
     using Value = typename CornerResults<T>::Value;
     Value low = Value::Constant(std::numeric_limits<double>::infinity()), high = -low;
     for (Index c = first; c < first + vertices.size(); ++c) {
-        const Index v = vertices[c - first], triangle = layout.triangles[v];
+        const Index v = vertices[c - first], triangle = placement.triangles[v];
         if (triangle == kNoIndex) continue;
         Value value;
         if (std::ranges::find(side, triangle) != side.end()) {
             if (results.kinds[c] == CornerKind::none) continue; // a polygon with values at some of its corners
-            value = values.at(layout.points[v].corners, layout.points[v].barycentric);
+            value = values.at(placement.points[v].corners, placement.points[v].barycentric);
         } else {
-            value = continue_side(layout.surface, values, side, layout.positions[v], spot.radius);
+            value = continue_side(placement.surface, values, side, placement.positions[v], spot.radius);
             results.kinds[c] = CornerKind::continued;
             results.values[c] = value;
         }
@@ -412,22 +431,24 @@ void cross_seam(const Layout& layout, const CornerValues<T>& values, std::span<c
 }
 
 template <class T>
-CornerResults<T> find_corner_values(const Layout& layout, const CornerValues<T>& values, const RunContext& context) {
-    const std::size_t count = layout.to.corner_count();
+CornerResults<T> find_corner_values(const Placement& placement, const CornerValues<T>& values,
+                                    const RunContext& context) {
+    const std::size_t count = placement.to.corner_count();
     CornerResults<T> results{std::vector<CornerKind>(count, CornerKind::own), {}, {}};
     for (std::size_t c = 0; c < count; ++c) {
-        const CornerPoint& point = layout.points[layout.to.corners[c]];
+        const CornerPoint& point = placement.points[placement.to.corners[c]];
         if (point.corners[0] == kNoIndex || !values.has(point.corners)) results.kinds[c] = CornerKind::none;
     }
     const std::vector<std::uint8_t> seam =
-        find_seams(layout.surface, [&](Index c, Index d) { return values.same(c, d); });
-    const SeamGrid grid(layout.surface, seam, 2 * layout.mean_radius);
+        find_seams(placement.surface, [&](Index c, Index d) { return values.same(c, d); });
+    const SeamGrid grid(placement.surface, seam, 2 * placement.mean_radius);
     if (grid.empty()) return results;
     results.values.resize(count);
     results.extents.resize(count);
-    parallel_for(context, layout.to.face_count(), kGrain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t f = begin; f < end; ++f)
-            if (layout.spots[f].radius >= 0 && grid.near(layout.spots[f])) cross_seam(layout, values, seam, f, results);
+    parallel_for(context, placement.to.face_count(), kGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t f = begin; f < end && !context.is_cancelled(); ++f)
+            if (placement.spots[f].radius >= 0 && grid.near(placement.spots[f]))
+                cross_seam(placement, values, seam, f, results);
     });
     return results;
 }
@@ -476,35 +497,36 @@ void add_continued(const Mesh& to, const CornerResults<T>& results, float tolera
 
 /// One value a vertex where no corner needs another, else corners that share what they can.
 template <class T>
-CornerAttribute<T> assemble(const Layout& layout, const CornerValues<T>& values, const CornerResults<T>& results) {
+CornerAttribute<T> assemble(const Placement& placement, const CornerValues<T>& values,
+                            const CornerResults<T>& results) {
     CornerAttribute<T> attribute;
-    const std::size_t vertices = layout.to.vertex_count();
+    const std::size_t vertices = placement.to.vertex_count();
     std::vector<std::uint8_t> used(vertices);
     for (std::size_t c = 0; c < results.kinds.size(); ++c)
-        if (results.kinds[c] == CornerKind::own) used[layout.to.corners[c]] = 1;
+        if (results.kinds[c] == CornerKind::own) used[placement.to.corners[c]] = 1;
     const bool per_vertex = std::ranges::all_of(results.kinds, [](CornerKind kind) { return kind == CornerKind::own; });
     std::vector<Index> index_of(vertices, kNoIndex);
     for (std::size_t v = 0; v < vertices; ++v) {
         if (!used[v] && !per_vertex) continue;
         index_of[v] = Index(attribute.values.size());
-        const CornerPoint& point = layout.points[v];
+        const CornerPoint& point = placement.points[v];
         attribute.values.push_back(used[v] ? T(values.at(point.corners, point.barycentric).template cast<float>())
                                            : T(T::Zero())); // in no face
     }
     if (per_vertex) return attribute;
     attribute.corners.assign(results.kinds.size(), kNoIndex);
     for (std::size_t c = 0; c < results.kinds.size(); ++c)
-        if (results.kinds[c] == CornerKind::own) attribute.corners[c] = index_of[layout.to.corners[c]];
-    add_continued(layout.to, results, values.tolerance, attribute);
+        if (results.kinds[c] == CornerKind::own) attribute.corners[c] = index_of[placement.to.corners[c]];
+    add_continued(placement.to, results, values.tolerance, attribute);
     return attribute.values.empty() ? CornerAttribute<T>{} : attribute;
 }
 
 template <class T>
-CornerAttribute<T> transfer_corners(const Layout& layout, const CornerAttribute<T>& attribute, float tolerance,
+CornerAttribute<T> transfer_corners(const Placement& placement, const CornerAttribute<T>& attribute, float tolerance,
                                     const RunContext& context) {
     if (attribute.empty()) return {};
-    const CornerValues<T> values{layout.surface.mesh, attribute.values, attribute.corners, tolerance};
-    return assemble(layout, values, find_corner_values(layout, values, context));
+    const CornerValues<T> values{placement.surface.mesh, attribute.values, attribute.corners, tolerance};
+    return assemble(placement, values, find_corner_values(placement, values, context));
 }
 
 /// Unit length, and no value where there is no direction.
@@ -517,41 +539,41 @@ void normalize(CornerAttribute<Vec3f>& normals, const Mesh& mesh) {
         if (is_none(i)) i = kNoIndex;
 }
 
-CornerAttribute<Vec3f> transfer_normals(const Layout& layout, const RunContext& context) {
-    CornerAttribute<Vec3f> normals = layout.surface.mesh.normals;
-    normalize(normals, layout.surface.mesh);
-    normals = transfer_corners(layout, normals, kSameNormal, context);
-    if (!normals.empty()) normalize(normals, layout.to);
+CornerAttribute<Vec3f> transfer_normals(const Placement& placement, const RunContext& context) {
+    CornerAttribute<Vec3f> normals = placement.surface.mesh.normals;
+    normalize(normals, placement.surface.mesh);
+    normals = transfer_corners(placement, normals, kSameNormal, context);
+    if (!normals.empty()) normalize(normals, placement.to);
     return normals;
 }
 
 /// The face of `from` under the centre of each face of `to`.
-std::vector<Index> faces_under(const Layout& layout, const RunContext& context) {
-    const Mesh& from = layout.surface.mesh;
+std::vector<Index> faces_under(const Placement& placement, const RunContext& context) {
+    const Mesh& from = placement.surface.mesh;
     const auto same = [&](Index c, Index d) {
-        const Index f = layout.surface.face_of_corner[c], g = layout.surface.face_of_corner[d];
+        const Index f = placement.surface.face_of_corner[c], g = placement.surface.face_of_corner[d];
         for (const FaceLabels* labels : {&from.objects, &from.groups, &from.materials})
             if (!labels->empty() && labels->of_face[f] != labels->of_face[g]) return false;
         return from.smoothing.empty() || from.smoothing[f] == from.smoothing[g];
     };
-    const SeamGrid grid(layout.surface, find_seams(layout.surface, same), 2 * layout.mean_radius);
-    std::vector<Index> faces(layout.to.face_count(), kNoIndex);
+    const SeamGrid grid(placement.surface, find_seams(placement.surface, same), 2 * placement.mean_radius);
+    std::vector<Index> faces(placement.to.face_count(), kNoIndex);
     parallel_for(context, faces.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t f = begin; f < end; ++f) {
-            if (layout.spots[f].radius < 0) continue;
-            const std::span<const Index> face = layout.to.face(f);
-            const auto known = std::ranges::find_if(face, [&](Index v) { return layout.triangles[v] != kNoIndex; });
-            const Index triangle = !grid.empty() && grid.near(layout.spots[f]) ? triangle_under_centre(layout, f)
-                                                                               : layout.triangles[*known];
-            faces[f] = layout.surface.face_of_corner[layout.surface.corners[triangle][0]];
+        for (std::size_t f = begin; f < end && !context.is_cancelled(); ++f) {
+            if (placement.spots[f].radius < 0) continue;
+            const std::span<const Index> face = placement.to.face(f);
+            const auto known = std::ranges::find_if(face, [&](Index v) { return placement.triangles[v] != kNoIndex; });
+            const Index triangle = !grid.empty() && grid.near(placement.spots[f]) ? triangle_under_centre(placement, f)
+                                                                                  : placement.triangles[*known];
+            faces[f] = placement.surface.face_of_corner[placement.surface.corners[triangle][0]];
         }
     });
     return faces;
 }
 
-void transfer_labels(const Layout& layout, Mesh& to, const RunContext& context) {
-    const Mesh& from = layout.surface.mesh;
-    const std::vector<Index> faces = faces_under(layout, context);
+void transfer_labels(const Placement& placement, Mesh& to, const RunContext& context) {
+    const Mesh& from = placement.surface.mesh;
+    const std::vector<Index> faces = faces_under(placement, context);
     const auto copy = [&](const FaceLabels& source, FaceLabels& target) {
         target.of_face.clear();
         if (source.empty()) return;
@@ -646,13 +668,14 @@ Status transfer_attributes(const Mesh& from, std::span<const CornerPoint> points
     if (!has_face_data(from)) return Success{};
 
     const InputSurface surface(from);
-    const Layout layout = make_layout(surface, to, filled, context);
+    const Placement placement = make_placement(surface, to, filled, context);
     if (context.is_cancelled()) return cancelled_error();
-    to.uvs = transfer_corners(layout, from.uvs, kSameUv, context);
+    to.uvs = transfer_corners(placement, from.uvs, kSameUv, context);
     if (context.is_cancelled()) return cancelled_error();
-    to.normals = transfer_normals(layout, context);
+    to.normals = transfer_normals(placement, context);
     if (context.is_cancelled()) return cancelled_error();
-    transfer_labels(layout, to, context);
+    transfer_labels(placement, to, context);
+    if (context.is_cancelled()) return cancelled_error();
     return Success{};
 }
 
