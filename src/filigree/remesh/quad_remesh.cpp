@@ -7,25 +7,22 @@
 #include "filigree/remesh/base_triangles.h"
 #include "filigree/remesh/feature_curves.h"
 #include "filigree/remesh/half_edges.h"
+#include "filigree/remesh/patch_layout.h"
+#include "filigree/remesh/quad_failure.h"
 #include "filigree/remesh/relax.h"
 #include "filigree/remesh/voxel_wrap.h"
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 
 namespace filigree {
 
 namespace {
 
-constexpr unsigned kMostLevels = 8;
 constexpr std::size_t kFewestQuads = 6, kMostQuads = 100'000'000; // each takes some 200 bytes on the way
-constexpr double kEnoughPatches = 500;          // levels that were not asked for leave about so many, or more
-constexpr double kMostOverdrawn = 1.3;          // quads over those asked for
-constexpr std::size_t kLeastTriangles = 8;      // of the base, for each component
-constexpr std::size_t kMostPatches = 4'000'000; // indices are 32 bits, and a base is refined before it is decimated
-constexpr double kMostRemoved = 0.05;           // of the area, by small parts
+constexpr double kMostOverdrawn = 1.3;                            // quads over those asked for
+constexpr double kMostRemoved = 0.05;                             // of the area, by small parts
 constexpr double kLeastArea = 1e-6;     // of the diagonal squared; a wire a thousand times its thickness has 1e-3
 constexpr double kShortHandle = 2;      // patch sides: loops up to this are closed, when small parts go
 constexpr double kSmallComponent = 0.5; // patch sides, of a component's diagonal
@@ -84,25 +81,8 @@ SurfaceTopology quad_topology(const Mesh& mesh) {
     return surface_topology(surface);
 }
 
-std::string counted(std::size_t quads, unsigned levels) {
-    return std::to_string(quads) + " quads at " + std::to_string(levels) + (levels == 1 ? " level" : " levels");
-}
-
-std::string short_number(double value) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.2g", value);
-    return text;
-}
-
-/// How the quads asked for are laid out.
-struct Layout {
-    std::size_t patches = 0;
-    unsigned levels = 0;
-};
-
-std::size_t patches_for(std::size_t quads, unsigned levels) {
-    return std::max<std::size_t>(1, static_cast<std::size_t>(std::llround(double(quads) / std::pow(4.0, levels))));
-}
+/// What came of a try: an error that no other try can mend, a failure, or neither, and the quads passed the gate.
+using Outcome = Result<std::optional<QuadFailure>>;
 
 class Remesher {
 public:
@@ -110,46 +90,57 @@ public:
         : mesh_(mesh), options_(options), context_(context), watch_(result_.report.seconds) {}
 
     Result<QuadRemeshed> run() {
+        if (Status checked = check_options(); !checked) return checked.error();
         if (Status prepared = prepare(); !prepared) return prepared.error();
-        std::string reason;
-        if (options_.wrap != WrapUse::always) reason = make_room(report().input.components);
-        const bool has_room = reason.empty();
-        if (options_.wrap != WrapUse::always && has_room) reason = try_own_surface();
-        // a wrap joins parts that lie close: not what it takes to keep them
-        const bool may_wrap =
-            options_.wrap == WrapUse::automatic && (has_room || options_.small_parts == SmallParts::remove);
-        if (options_.wrap == WrapUse::always || (may_wrap && worth_another_try(reason))) {
-            if (!reason.empty()) retry(reason);
-            const std::string wrap_reason = try_wrap();
-            if (wrap_reason.empty() || options_.wrap == WrapUse::always)
-                reason = wrap_reason;
-            else
-                reason += " (A wrap around it failed as well: " + wrap_reason + ")";
+        const bool only_wrap = options_.wrap == WrapUse::always;
+        std::optional<QuadFailure> failure;
+        bool has_room = true;
+        if (!only_wrap) {
+            failure = make_room(report().input.components);
+            has_room = !failure;
+            if (has_room) {
+                const Outcome own = try_own_surface();
+                if (!own) return own.error();
+                failure = *own;
+            }
+            if (!failure) return finish();
+            // a wrap joins parts that lie close: not what it takes to keep them
+            const bool may_wrap =
+                options_.wrap == WrapUse::automatic && (has_room || options_.small_parts == SmallParts::remove);
+            if (!may_wrap) return refused(sentence(*failure));
+            note_retry(*failure);
         }
-        if (error_) return *error_;
-        if (!reason.empty()) return Error{ErrorCode::unsuitable, reason};
-        return finish();
+        const Outcome wrap = try_wrap();
+        if (!wrap) return wrap.error();
+        if (!*wrap) return finish();
+        if (only_wrap) return refused(sentence(**wrap));
+        return refused(sentence(*failure) + " (A wrap around it failed as well: " + sentence(**wrap) + ")");
     }
 
 private:
     QuadRemeshReport& report() { return result_.report; }
 
-    bool worth_another_try(const std::string& reason) const { return !error_ && !reason.empty(); }
+    static Error refused(std::string reason) { return {ErrorCode::unsuitable, std::move(reason)}; }
 
-    void retry(const std::string& reason) {
+    void note_retry(const QuadFailure& failure) {
         ++report().tries;
-        report().retried = reason;
+        report().retried = sentence(failure);
     }
 
-    Status prepare() {
+    Status check_options() const {
         const auto fail = [](std::string message) { return Error{ErrorCode::usage, std::move(message)}; };
         if (options_.quads < kFewestQuads || options_.quads > kMostQuads)
             return fail("Ask for 6 to 100,000,000 quads.");
-        if (options_.levels && (*options_.levels < 1 || *options_.levels > kMostLevels))
-            return fail("Levels are 1 to " + std::to_string(kMostLevels) + ".");
+        if (options_.levels && (*options_.levels < 1 || *options_.levels > kMostQuadLevels))
+            return fail("Levels are 1 to " + std::to_string(kMostQuadLevels) + ".");
         if (!(options_.feature_angle_deg >= 0 && options_.feature_angle_deg <= 180))
             return fail("The feature angle is 0 to 180 degrees.");
         if (options_.max_distance && !(*options_.max_distance > 0)) return fail("The largest distance is above 0.");
+        return Success{};
+    }
+
+    /// The cleaned surface, the layout, and the limits.
+    Status prepare() {
         context_.report("cleaning", 0);
         Result<ManifoldSurface> manifold = make_manifold(mesh_, report().clean, context_);
         if (!manifold) return manifold.error();
@@ -158,14 +149,9 @@ private:
 
         const double diagonal = bounds(surface_mesh(surface_, mesh_.origin).positions).diagonal();
         if (!(area_of(surface_) > kLeastArea * diagonal * diagonal))
-            return Error{ErrorCode::unsuitable, "The mesh is all but a line: its area is too small for its length."};
+            return refused("The mesh is all but a line: its area is too small for its length.");
 
-        layout_.levels = options_.levels.value_or(1);
-        if (!options_.levels)
-            while (layout_.levels < kMostLevels &&
-                   double(options_.quads) / std::pow(4.0, layout_.levels + 1) >= kEnoughPatches)
-                ++layout_.levels;
-        layout_.patches = patches_for(options_.quads, layout_.levels);
+        layout_ = plan_patches(options_.quads, options_.levels);
         if (options_.small_parts == SmallParts::remove) {
             context_.report("small parts", 0);
             remove_small_parts();
@@ -175,6 +161,7 @@ private:
                     return closed;
             watch_.end("small parts");
         }
+        if (context_.is_cancelled()) return cancelled_error();
         report().input = surface_topology(surface_);
         cleaned_ = surface_mesh(surface_, mesh_.origin);
         report().diagonal = bounds(cleaned_.positions).diagonal();
@@ -194,176 +181,192 @@ private:
 
     double patch_side() const { return std::sqrt(area_of(surface_) / double(layout_.patches)); }
 
-    /// Many parts need many patches: fewer levels where that is ours to choose, else the reason why it cannot be.
-    std::string make_room(std::size_t parts) {
-        const std::size_t least = kLeastTriangles / 2 * parts;
-        while (layout_.patches < least && !options_.levels && layout_.levels > 1)
-            --layout_.levels, layout_.patches *= 4;
+    /// Many parts need many patches: fewer levels where they were not asked for, else the reason why it cannot be.
+    std::optional<QuadFailure> make_room(std::size_t parts) {
+        const std::size_t least = least_patches(parts);
+        if (!options_.levels) layout_ = with_more_patches(layout_, least);
         if (layout_.patches > kMostPatches)
-            return "Those are " + std::to_string(layout_.patches) + " patches, more than " +
-                   std::to_string(kMostPatches) + "; ask for fewer quads or more levels.";
-        if (layout_.patches >= least) return "";
-        const std::string need = counted(least << (2 * layout_.levels), layout_.levels);
-        if (parts == 1) return "The mesh needs at least " + need + "; ask for more quads.";
-        return "The mesh has " + std::to_string(parts) + " separate parts, which need at least " + need +
-               "; ask for more quads, or for a wrap around them.";
+            return QuadFailure{QuadFailure::Kind::too_many_patches, layout_.patches, kMostPatches};
+        if (layout_.patches >= least) return std::nullopt;
+        QuadFailure failure{QuadFailure::Kind::too_few_quads, least << (2 * layout_.levels)};
+        failure.parts = parts;
+        failure.levels = layout_.levels;
+        return failure;
     }
 
     /// The surface itself, with what may help when it fails: features let go where they need too much, more patches,
     /// both.
-    std::string try_own_surface() {
-        Layout layout = layout_;
+    Outcome try_own_surface() {
+        const std::optional<PatchLayout> finer = options_.levels ? std::nullopt : finer_layout(layout_);
         double angle = options_.feature_angle_deg;
-        for (;;) {
-            const std::string reason = try_surface(surface_, layout, angle);
-            if (!worth_another_try(reason)) return reason;
+        for (bool is_finer = false;;) {
+            const Outcome outcome = try_surface(surface_, is_finer ? *finer : layout_, angle);
+            if (!outcome || !*outcome) return outcome;
             const bool has_features = angle < 180 && report().feature_edges > 0;
-            const bool can_be_finer = !options_.levels && layout_.levels > 1 && layout.levels == layout_.levels;
-            if (has_features && (features_need_more_ || !can_be_finer))
+            const bool can_be_finer = finer && !is_finer;
+            if (has_features && ((*outcome)->by_features || !can_be_finer))
                 angle = 180;
             else if (can_be_finer)
-                layout = {4 * layout_.patches, layout_.levels - 1};
+                is_finer = true;
             else
-                return reason;
-            retry(reason);
+                return outcome;
+            note_retry(**outcome);
         }
     }
 
-    std::string try_wrap() {
+    Outcome try_wrap() {
         const double side = std::sqrt(area_of(surface_) / double(options_.quads));
         WrapOptions wrap;
         const double extent = bounds(cleaned_.positions).size().maxCoeff();
         wrap.resolution = static_cast<unsigned>(std::clamp(kVoxelsPerQuad * extent / side, 48.0, 256.0));
         Result<ManifoldSurface> wrapped = voxel_wrap(surface_.positions, surface_.triangles, wrap, context_);
         watch_.end("wrapping");
-        if (!wrapped) {
-            error_ = wrapped.error();
-            return error_->message;
-        }
+        if (!wrapped) return wrapped.error();
         report().wrapped = true;
         wrapped_ = std::move(*wrapped);
         if (options_.small_parts == SmallParts::remove) {
             CleanReport of_the_wrap; // says nothing about the mesh
             remove_small_components(wrapped_, kSmallComponent * patch_side(), of_the_wrap);
-            if (Status closed = close_handles(wrapped_, kShortHandle * patch_side(), of_the_wrap, context_); !closed) {
-                error_ = closed.error();
-                return error_->message;
-            }
+            if (Status closed = close_handles(wrapped_, kShortHandle * patch_side(), of_the_wrap, context_); !closed)
+                return closed.error();
         }
         watch_.end("small parts");
-        if (const std::string reason = make_room(surface_topology(wrapped_).components); !reason.empty()) return reason;
+        if (const auto failure = make_room(surface_topology(wrapped_).components)) return failure;
         return try_surface(wrapped_, layout_, 180);
     }
 
-    /// From a manifold to quads that pass the gate, or the reason why not.
-    std::string try_surface(const ManifoldSurface& surface, Layout layout, double feature_angle) {
+    /// From a manifold to quads that pass the gate.
+    Outcome try_surface(const ManifoldSurface& surface, PatchLayout layout, double feature_angle) {
         const std::vector<Index> twins = opposite_half_edges(surface.triangles, surface.positions.size());
         const FeatureCurves curves = find_feature_curves(surface, twins, {feature_angle, patch_side()});
         report().feature_edges = curves.edge_count;
         watch_.end("features");
-        const auto corners = static_cast<std::size_t>(std::ranges::count(curves.corners, 1));
-        features_need_more_ = curves.edge_count > 0 && corners > layout.patches;
-        if (features_need_more_)
-            return "The mesh's sharp edges have " + std::to_string(corners) + " corners, too many for " +
-                   std::to_string(layout.patches) + " patches; ask for more quads, or keep fewer features.";
+        if (const auto failure = check_corners(curves, layout)) return failure;
 
         std::optional<SurfaceMap> map;
-        std::optional<BaseQuads> base = make_base(surface, twins, curves, layout, map);
-        if (!base) return error_->message;
-        const std::size_t quads = base->quads.size() << (2 * layout.levels);
-        features_need_more_ = double(quads) > kMostOverdrawn * double(options_.quads) + 24;
-        if (features_need_more_)
-            return "The mesh's features and handles need " + counted(quads, layout.levels) +
-                   "; ask for more quads or fewer levels, or keep fewer features.";
+        const Result<BaseQuads> base = make_base(surface, twins, curves, layout, map);
+        if (!base) return base.error();
+        if (const auto failure = check_quads(base->quads.size(), layout)) return failure;
 
         std::vector<std::uint8_t> features = curves.half_edges;
         for (Index h = 0; h < twins.size(); ++h) features[h] |= twins[h] == kNoIndex;
         std::vector<VertexKind> kinds(surface.positions.size());
         for (Index v = 0; v < kinds.size(); ++v) kinds[v] = map->kind(v);
         const SurfaceWalk walk(surface, twins, features, kinds);
+        Result<PatchGrid> grid = make_grid(map, *base, walk, layout.levels);
+        if (!grid) return grid.error();
+        const Untangled untangled = untangle(*grid, walk, kWantedJacobian, context_);
+        watch_.end("untangling");
+        if (context_.is_cancelled()) return cancelled_error();
+        Outcome outcome = gate(std::move(*grid), surface);
+        // where there are features, they are the likeliest cause of inverted quads
+        if (outcome && *outcome) (*outcome)->by_features = untangled.inverted > 0;
+        return outcome;
+    }
+
+    static std::optional<QuadFailure> check_corners(const FeatureCurves& curves, const PatchLayout& layout) {
+        const auto corners = static_cast<std::size_t>(std::ranges::count(curves.corners, 1));
+        if (curves.edge_count == 0 || corners <= layout.patches) return std::nullopt;
+        QuadFailure failure{QuadFailure::Kind::feature_corners, corners, layout.patches};
+        failure.by_features = true;
+        return failure;
+    }
+
+    std::optional<QuadFailure> check_quads(std::size_t patches, const PatchLayout& layout) const {
+        const std::size_t quads = patches << (2 * layout.levels);
+        if (!(double(quads) > kMostOverdrawn * double(options_.quads) + 24)) return std::nullopt;
+        QuadFailure failure{QuadFailure::Kind::feature_quads, quads};
+        failure.levels = layout.levels;
+        failure.by_features = true;
+        return failure;
+    }
+
+    /// The patches' grids, evened out. The map is not needed any more when the coarse ones are taken from it.
+    Result<PatchGrid> make_grid(std::optional<SurfaceMap>& map, const BaseQuads& base, const SurfaceWalk& walk,
+                                unsigned levels) {
         context_.report("sampling", 0);
-        PatchGrid grid = sample_patches(*map, *base, walk, std::min(layout.levels, kSampledLevels), context_);
+        PatchGrid grid = sample_patches(*map, base, walk, std::min(levels, kSampledLevels), context_);
         map.reset();
         watch_.end("sampling");
+        if (context_.is_cancelled()) return cancelled_error();
         relax(grid, walk, kCoarseSweeps, context_);
-        while (grid.patches.levels < layout.levels) {
+        while (grid.patches.levels < levels) {
             grid = halve_grid(grid, walk, context_);
+            if (context_.is_cancelled()) return cancelled_error();
             relax(grid, walk, kFineSweeps, context_);
         }
         watch_.end("relaxing");
-        const Untangled untangled = untangle(grid, walk, kWantedJacobian, context_);
-        watch_.end("untangling");
-        features_need_more_ = untangled.inverted > 0; // where there are any, they are the likeliest cause
-        return gate(std::move(grid), surface);
+        if (context_.is_cancelled()) return cancelled_error();
+        return grid;
     }
 
-    std::optional<BaseQuads> make_base(const ManifoldSurface& surface, std::span<const Index> twins,
-                                       const FeatureCurves& curves, Layout& layout, std::optional<SurfaceMap>& map) {
+    /// layout: with a level fewer where all sides had to be halved.
+    Result<BaseQuads> make_base(const ManifoldSurface& surface, std::span<const Index> twins,
+                                const FeatureCurves& curves, PatchLayout& layout, std::optional<SurfaceMap>& map) {
         // When a triangle finds no partner all sides are halved: that is one of the levels, or, where their number is
         // fixed, the base begins with a quarter of the patches.
         const bool fixed = options_.levels || layout.levels == 1;
-        for (const bool halve : {false, true}) {
+        for (bool halve = false;; halve = true) {
             map.emplace(surface, twins, curves.half_edges, curves.corners);
             const std::size_t patches = halve ? std::max<std::size_t>(layout.patches / 4, 1) : layout.patches;
-            if (Status made = make_base_triangles(*map, {2 * patches}, context_); !made) {
-                error_ = made.error();
-                return {};
-            }
+            if (Status made = make_base_triangles(*map, {2 * patches}, context_); !made) return made.error();
             watch_.end("decimating");
             Result<BaseQuads> base = make_base_quads(*map, halve, context_);
             watch_.end("pairing");
-            if (!base) {
-                error_ = base.error();
-                return {};
-            }
+            if (!base) return base;
             if (base->halved && !halve && fixed) continue;
             if (base->halved && !halve) --layout.levels;
-            return std::move(*base);
+            return base;
         }
-        return {};
     }
 
-    /// Measures, and says what is wrong.
-    std::string gate(PatchGrid grid, const ManifoldSurface& surface) {
-        if (context_.is_cancelled()) {
-            error_ = cancelled_error();
-            return error_->message;
+    Outcome gate(PatchGrid grid, const ManifoldSurface& surface) {
+        if (Status measured = measure(grid); !measured) return measured.error();
+        source_ = std::move(grid.source);
+        source_surface_ = &surface;
+        result_.patches = std::move(grid.patches);
+        return judge(surface);
+    }
+
+    /// What is wrong with the quads measured.
+    std::optional<QuadFailure> judge(const ManifoldSurface& surface) {
+        if (report().quality.inverted > 0)
+            return QuadFailure{QuadFailure::Kind::inverted, report().quality.inverted, report().quality.quads};
+        const SurfaceTopology in = surface_topology(surface), &out = report().output;
+        if (in.euler != out.euler || in.components != out.components || in.border_loops != out.border_loops) {
+            QuadFailure failure{QuadFailure::Kind::topology};
+            failure.euler = out.euler;
+            failure.expected_euler = in.euler;
+            return failure;
         }
+        const double furthest = std::max(report().to_input.max, report().from_input.max);
+        if (furthest <= report().max_distance) return std::nullopt;
+        QuadFailure failure{QuadFailure::Kind::distance};
+        failure.furthest = furthest;
+        failure.allowed = report().max_distance;
+        return failure;
+    }
+
+    Status measure(const PatchGrid& grid) {
         context_.report("measuring", 0);
         result_.mesh = grid_mesh(grid, mesh_.origin);
         report().patches = grid.patches.patch_count();
         report().levels = grid.patches.levels;
         report().quality = measure_quads(result_.mesh, context_);
         report().output = quad_topology(result_.mesh);
+        if (context_.is_cancelled()) return cancelled_error();
         const Result<MeshDistance> distance = mesh_distance(result_.mesh, cleaned_, kDistanceSamples, context_);
-        if (!distance) {
-            error_ = distance.error();
-            return error_->message;
-        }
+        if (!distance) return distance.error();
         const SurfaceDistance& between = *distance->surfaces;
         report().to_input = {distance->relative(between.rms_a_to_b), distance->relative(between.max_a_to_b)};
         report().from_input = {distance->relative(between.rms_b_to_a), distance->relative(between.max_b_to_a)};
         watch_.end("measuring");
-        source_ = std::move(grid.source);
-        source_surface_ = &surface;
-        result_.patches = std::move(grid.patches);
-
-        if (report().quality.inverted > 0)
-            return std::to_string(report().quality.inverted) + " of " + std::to_string(report().quality.quads) +
-                   " quads came out inverted; ask for more quads, or fewer levels.";
-        const SurfaceTopology in = surface_topology(surface), &out = report().output;
-        if (in.euler != out.euler || in.components != out.components || in.border_loops != out.border_loops)
-            return "The quads' topology is not the mesh's (Euler number " + std::to_string(out.euler) + " instead of " +
-                   std::to_string(in.euler) + "); please report this.";
-        const double furthest = std::max(report().to_input.max, report().from_input.max);
-        if (!(furthest <= report().max_distance))
-            return "The quads are up to " + short_number(furthest) + " of the diagonal from the mesh, more than " +
-                   short_number(report().max_distance) + "; ask for more quads, or allow more.";
-        return "";
+        return Success{};
     }
 
     Result<QuadRemeshed> finish() {
         find_sources();
+        if (context_.is_cancelled()) return cancelled_error();
         if (options_.attributes) {
             context_.report("attributes", 0);
             if (Status moved = transfer_attributes(mesh_, result_.source, result_.mesh, context_); !moved)
@@ -397,7 +400,7 @@ private:
         context_.arena().execute([&] {
             const ClosestPointTree tree(cleaned_.positions, triangles);
             parallel_for(context_, lost.size(), 256, [&](std::size_t begin, std::size_t end) {
-                for (std::size_t i = begin; i < end; ++i) {
+                for (std::size_t i = begin; i < end && !context_.is_cancelled(); ++i) {
                     const SurfacePoint closest = tree.closest(result_.mesh.positions[lost[i]]);
                     result_.source[lost[i]] = {corners[ids[closest.triangle]], closest.barycentric};
                 }
@@ -412,9 +415,7 @@ private:
     Stopwatch watch_;
     ManifoldSurface surface_, wrapped_;
     Mesh cleaned_; ///< surface_ as a mesh: what distances are measured from
-    Layout layout_;
-    bool features_need_more_ = false; ///< what the last try failed by
-    std::optional<Error> error_;      ///< what no other try can mend: cancelled, no memory
+    PatchLayout layout_;
 
     std::vector<TrianglePoint> source_;
     const ManifoldSurface* source_surface_ = nullptr; ///< what source_ lies on
