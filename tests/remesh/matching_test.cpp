@@ -130,5 +130,13 @@ TEST(MatchTriangles, EdgeCases) {
     EXPECT_EQ(match_triangles({3, 5, 4, 0, 2, 1}, {0.5, 0.5, 0.5, 0.5, 0.5, 0.5}), (std::vector<Index>{1, 0}));
 }
 
+TEST(MatchTriangles, StopsWhenItIsCancelled) {
+    const Prepared on(make_wavy_sphere({.resolution = 40}));
+    const Dual dual = with_random_weights(on.twins, 3, 0);
+    int asked = 0;
+    EXPECT_TRUE(match_triangles(dual.opposite, dual.weights, [&] { return ++asked == 2; }).empty());
+    EXPECT_EQ(asked, 2);
+}
+
 } // namespace
 } // namespace filigree

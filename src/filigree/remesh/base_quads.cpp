@@ -34,7 +34,7 @@ public:
         widen_sectors();
         make_regions_even();
         widen_sectors();
-        match();
+        match(context);
         if (context.is_cancelled()) return cancelled_error();
         remove_doublets();
         return collect();
@@ -218,7 +218,7 @@ private:
         return size > wanted ? 0.4 : -0.8;
     }
 
-    void match() {
+    void match(const RunContext& context) {
         std::vector<Index> dense(map_.slot_count(), kNoIndex), slots;
         for (Index s = 0; s < map_.slot_count(); ++s)
             if (!map_.is_removed(s)) {
@@ -240,8 +240,9 @@ private:
                                     map_.position(map_.to(h)), map_.position(map_.from(SurfaceMap::previous(h))));
                 weights[3 * t + k] = std::clamp((jacobian + 0.6 * worth + 4.6) / 6.2, 0.0, 1.0);
             }
-        const std::vector<Index> pairs = match_triangles(opposite, weights);
+        const std::vector<Index> pairs = match_triangles(opposite, weights, [&] { return context.is_cancelled(); });
         partner_.assign(map_.slot_count(), kNoIndex);
+        if (pairs.empty()) return; // cancelled
         for (Index t = 0; t < slots.size(); ++t)
             if (pairs[t] != kNoIndex) partner_[slots[t]] = slots[pairs[t]];
     }

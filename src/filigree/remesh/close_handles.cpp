@@ -30,7 +30,8 @@ std::uint64_t random_bits(std::uint64_t counter) {
 /// passes the vertex: none passes its neighbours either, up to half the difference away. With 2 the searches that cover
 /// a stretch of the surface cost least.
 constexpr double kWalk = 2;
-constexpr int kShorten = 8; ///< times a loop is tried to become shorter, from vertices of its own
+constexpr int kShorten = 8;                 ///< times a loop is tried to become shorter, from vertices of its own
+constexpr std::size_t kBetweenLooks = 1024; ///< vertices of a search, from one look at `cancel` to the next
 
 /// A surface without borders: each border loop has a vertex of its own, joined to all of the loop by triangles that are
 /// not there. They come after the real vertices and triangles.
@@ -206,9 +207,10 @@ struct Loop {
 /// Finds shortest loops that bound nothing, by Dijkstra's algorithm around one vertex after another.
 class LoopSearch {
 public:
-    LoopSearch(const CappedSurface& surface, const Homology& homology, std::span<const Vec3d> positions, double longest)
-        : surface_(surface), signature_(homology.signature), positions_(positions), longest_(longest),
-          nodes_(surface.real_vertices), done_(surface.real_vertices, 0) {}
+    LoopSearch(const CappedSurface& surface, const Homology& homology, std::span<const Vec3d> positions, double longest,
+               const RunContext& context)
+        : context_(context), surface_(surface), signature_(homology.signature), positions_(positions),
+          longest_(longest), nodes_(surface.real_vertices), done_(surface.real_vertices, 0) {}
 
     /// The shortest loop near `vertex`, if there is one no longer than the longest asked for. Not found: none passes
     /// the vertex. Vertices where the answer is known already are passed over.
@@ -239,6 +241,7 @@ private:
             const auto [distance, at] = heap_.back();
             heap_.pop_back();
             if (2 * distance >= limit) break;
+            if (settled_.size() % kBetweenLooks == 0 && context_.is_cancelled()) break;
             if (nodes_[at].settled) continue;
             nodes_[at].settled = true;
             settled_.push_back(at);
@@ -319,6 +322,7 @@ private:
         return loop;
     }
 
+    const RunContext& context_;
     const CappedSurface& surface_;
     std::span<const std::uint64_t> signature_;
     std::span<const Vec3d> positions_;
@@ -420,7 +424,7 @@ std::size_t close_round(ManifoldSurface& surface, const CappedSurface& capped, d
                         CleanReport& report, const RunContext& context) {
     const Index root = static_cast<Index>(random_bits(context.seed + round) % capped.leaving.size());
     const Homology homology = decompose(capped, root);
-    LoopSearch search(capped, homology, surface.positions, longest_loop);
+    LoopSearch search(capped, homology, surface.positions, longest_loop, context);
     std::vector<Loop> loops = disjoint_loops(capped, find_loops(capped, homology, search, context));
     if (context.is_cancelled()) return 0;
     keep_connected(capped, loops);

@@ -18,6 +18,7 @@ constexpr double kCornerReach = 0.25;                       // patch sides, to e
 // is too short in any case, and from where on a curve need not be clearly sharp.
 constexpr double kShortestChain = 1, kLongChain = 3;
 constexpr double kShortestLoop = 0.5, kLongLoop = 3;
+constexpr int kPruningRounds = 4;
 constexpr double kSmallNetwork = 1.5;                         // patch sides, of all its edges together
 constexpr double kClearlySharp = 20 * std::numbers::pi / 180; // beyond the asked angle, on average along the curve
 
@@ -111,7 +112,8 @@ std::vector<Chain> chains_of(const Curves& curves) {
     return chains;
 }
 
-/// Takes short loose ends and tiny loops off, until none is left. Borders never go.
+/// Takes short loose ends and tiny loops off. What goes may leave others with a loose end, so this is done up to
+/// kPruningRounds times. Borders never go.
 void prune(const ManifoldSurface& surface, std::span<const Index> twins, const FeatureOptions& options,
            std::vector<float>& marked) {
     const double clear = options.angle_deg * std::numbers::pi / 180 + kClearlySharp;
@@ -119,7 +121,7 @@ void prune(const ManifoldSurface& surface, std::span<const Index> twins, const F
         const double length = chain.length / options.patch_side;
         return length < shortest || (length < longest && chain.angle < clear);
     };
-    for (int round = 0; round < 4; ++round) {
+    for (int round = 0; round < kPruningRounds; ++round) {
         const Curves curves = collect(surface, twins, marked);
         std::vector<std::uint8_t> gone(surface.positions.size(), 0); // inner vertices of chains that go
         std::vector<std::pair<Index, Index>> single;                 // chains of one edge

@@ -143,7 +143,7 @@ PatchGrid sample_patches(const SurfaceMap& map, const BaseQuads& base, const Sur
 
     const std::vector<std::uint8_t> mine = first_uses(grid.patches, base.kinds.size() + sides.count * inner);
     parallel_for(context, corners.size(), 8, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t p = begin; p < end; ++p)
+        for (std::size_t p = begin; p < end && !context.is_cancelled(); ++p)
             for (std::size_t j = 0; j <= n; ++j)
                 for (std::size_t i = 0; i <= n; ++i) {
                     const std::size_t at = (p * (n + 1) + j) * (n + 1) + i;
@@ -175,7 +175,7 @@ PatchGrid halve_grid(const PatchGrid& coarse, const SurfaceWalk& walk, const Run
     grid.features = coarse.features;
     const std::vector<std::uint8_t> mine = first_uses(grid.patches, corners + sides.count * inner);
     parallel_for(context, coarse.patches.patch_count(), 8, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t p = begin; p < end; ++p)
+        for (std::size_t p = begin; p < end && !context.is_cancelled(); ++p)
             for (std::size_t j = 0; j <= fine; ++j)
                 for (std::size_t i = 0; i <= fine; ++i) {
                     const std::size_t at = (p * (fine + 1) + j) * (fine + 1) + i;

@@ -24,7 +24,7 @@ std::vector<Index> quads_of(const Mesh& mesh) {
 std::vector<double> scaled_jacobians(const Mesh& mesh, std::span<const Index> quads, const RunContext& context) {
     std::vector<double> result(quads.size());
     parallel_for(context, quads.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t q = begin; q < end; ++q) {
+        for (std::size_t q = begin; q < end && !context.is_cancelled(); ++q) {
             const std::span<const Index> face = mesh.face(quads[q]);
             const auto corner = [&](std::size_t k) { return Vec3d(mesh.positions[face[k]].cast<double>()); };
             result[q] = scaled_jacobian(corner(0), corner(1), corner(2), corner(3));
@@ -74,7 +74,7 @@ std::size_t count_irregular_vertices(const Mesh& mesh, std::span<const Index> qu
     std::vector<std::size_t> of_piece((mesh.vertex_count() + kGrain - 1) / kGrain);
     parallel_for(context, mesh.vertex_count(), kGrain, [&](std::size_t begin, std::size_t end) {
         std::vector<Index> neighbours;
-        for (std::size_t v = begin; v < end; ++v) {
+        for (std::size_t v = begin; v < end && !context.is_cancelled(); ++v) {
             const auto around = std::span(at.quads).subspan(at.first[v], at.first[v + 1] - at.first[v]);
             of_piece[begin / kGrain] += is_irregular_inside(mesh, around, static_cast<Index>(v), neighbours);
         }

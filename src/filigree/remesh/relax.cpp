@@ -264,6 +264,7 @@ void relax(PatchGrid& grid, const SurfaceWalk& walk, unsigned sweeps, const RunC
         context.report("relaxing", double(sweep) / sweeps);
         for (const std::vector<Index>& group : near.groups)
             parallel_for(context, group.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+                if (context.is_cancelled()) return;
                 Mover mover(grid, walk, near);
                 for (std::size_t i = begin; i < end; ++i) mover.relax_vertex(group[i]);
             });
@@ -280,6 +281,7 @@ Untangled untangle(PatchGrid& grid, const SurfaceWalk& walk, double least, const
     const auto bad_quads = [&](double limit) {
         std::vector<std::uint8_t> is_bad(near.quads.size(), 0);
         parallel_for(context, near.quads.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+            if (context.is_cancelled()) return;
             for (std::size_t q = begin; q < end; ++q) is_bad[q] = jacobian(static_cast<Index>(q)) < limit;
         });
         std::vector<Index> bad;
@@ -349,7 +351,7 @@ Untangled untangle(PatchGrid& grid, const SurfaceWalk& walk, double least, const
         const std::vector<Index> bad = bad_quads(kOffSurface);
         if (bad.empty()) break;
         for (const Index v : vertices_near(bad, round / 12))
-            if (mover.search(v, kReaches[round % 4], true, round)) off[v] = 1;
+            if (!context.is_cancelled() && mover.search(v, kReaches[round % 4], true, round)) off[v] = 1;
     }
     result.off_surface = static_cast<std::size_t>(std::count(off.begin(), off.end(), 1));
     result.inverted = bad_quads(kInverted).size();

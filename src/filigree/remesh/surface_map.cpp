@@ -230,6 +230,14 @@ std::array<std::uint8_t, 3> SurfaceMap::star_corners(const Star& star, std::size
     return local;
 }
 
+/// Corners of the triangle as points of a record: their places in `points`, else the one after those.
+std::array<std::uint8_t, 3> SurfaceMap::corners_among(const std::array<Index, 4>& points, Index slot) const {
+    std::array<std::uint8_t, 3> local;
+    for (std::size_t k = 0; k < 3; ++k)
+        local[k] = static_cast<std::uint8_t>(std::ranges::find(points, triangles_[slot][k]) - points.begin());
+    return local;
+}
+
 /// The star as it is, centre at zero. One more point is free: the last.
 void SurfaceMap::record_star(const Star& star) {
     begin_record(star.ring.size() + 2);
@@ -398,14 +406,7 @@ void SurfaceMap::flip(Index half_edge) {
     points_[points + 1] = flat.to;
     points_[points + 2] = flat.above;
     points_[points + 3] = flat.below;
-    const auto corners = [&](Index slot) {
-        std::array<std::uint8_t, 3> local;
-        for (int k = 0; k < 3; ++k) {
-            const Index v = triangles_[slot][k];
-            local[k] = static_cast<std::uint8_t>(v == a ? 0 : v == b ? 1 : v == c ? 2 : 3);
-        }
-        return local;
-    };
+    const auto corners = [&](Index slot) { return corners_among({a, b, c, d}, slot); };
     add_old(s, corners(s));
     add_old(t, corners(t));
     const double covered = covered_[s] + covered_[t];
@@ -467,14 +468,7 @@ Index SurfaceMap::split(Index half_edge, double share) {
     points_[points + 2] = flat.above;
     points_[points + 3] = flat.below;
     points_[points + 4] = static_cast<float>(share) * flat.to;
-    const auto corners = [&](Index slot) {
-        std::array<std::uint8_t, 3> local;
-        for (int k = 0; k < 3; ++k) {
-            const Index v = triangles_[slot][k];
-            local[k] = static_cast<std::uint8_t>(v == a ? 0 : v == b ? 1 : v == c ? 2 : v == d ? 3 : 4);
-        }
-        return local;
-    };
+    const auto corners = [&](Index slot) { return corners_among({a, b, c, d}, slot); };
     add_old(half_edge / 3, corners(half_edge / 3));
     if (other != kNoIndex) add_old(other / 3, corners(other / 3));
 

@@ -137,6 +137,7 @@ private:
     void add_new(Index slot, std::array<std::uint8_t, 3> local);
     void record_star(const Star& star);
     std::array<std::uint8_t, 3> star_corners(const Star& star, std::size_t i) const;
+    std::array<std::uint8_t, 3> corners_among(const std::array<Index, 4>& points, Index slot) const;
     void link(Index a, Index b, bool feature);
     void hand_on_area(std::span<const Index> slots, std::span<const double> planar_areas, double total);
 

@@ -5,6 +5,7 @@
 // the separating axes of triangle and voxel would find, at the cost of rows instead of voxels.
 #include "filigree/remesh/voxel_wrap.h"
 
+#include "filigree/core/disjoint_sets.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/mesh/closest_point.h"
 #include "filigree/remesh/voxel_grid.h"
@@ -316,7 +317,7 @@ void smooth_steps(QuadSurface& surface, const RunContext& context) {
     std::vector<Vec3d> moved(corners.size());
     for (int round = 0; round < kSmoothRounds; ++round) {
         parallel_for(context, corners.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t v = begin; v < end; ++v)
+            for (std::size_t v = begin; v < end && !context.is_cancelled(); ++v)
                 moved[v] = mean_of(neighbours.of(v), surface.positions)
                                .cwiseMax(corners[v] - Vec3d::Constant(kFreedom))
                                .cwiseMin(corners[v] + Vec3d::Constant(kFreedom));
@@ -385,7 +386,7 @@ void move_towards(std::span<const Vec3d> targets, std::span<const Triangle> tria
             any = true;
             for (const Index v : triangles[t]) shorten[v] = 1;
         }
-        if (!any) break; // at the latest when nothing around moves
+        if (!any || context.is_cancelled()) break; // at the latest when nothing around moves
         for (std::size_t v = 0; v < step.size(); ++v)
             if (shorten[v]) step[v] = round < kHalvings ? step[v] / 2 : 0.0;
     }
@@ -398,7 +399,7 @@ std::vector<Vec3d> pull_targets(const ClosestPointTree& tree, const VoxelGrid& s
                                 std::span<const Vec3d> normals, const RunContext& context) {
     std::vector<Vec3d> targets(positions.size());
     parallel_for(context, positions.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t v = begin; v < end; ++v) {
+        for (std::size_t v = begin; v < end && !context.is_cancelled(); ++v) {
             const SurfacePoint closest = tree.closest(positions[v].cast<float>());
             targets[v] = closest.position.cast<double>();
             const Vec3d below = targets[v] - kProbe * normals[v];
@@ -439,21 +440,14 @@ void pull_onto_input(const PullTarget& input, const VoxelGrid& solid, std::span<
     }
 }
 
-/// Vertices of one component have one number.
+/// Vertices of one component have one number: its lowest vertex.
 std::vector<Index> find_components(std::span<const Triangle> triangles, std::size_t vertex_count) {
-    std::vector<Index> parent(vertex_count);
-    std::iota(parent.begin(), parent.end(), Index(0));
-    const auto root = [&](Index v) {
-        while (parent[v] != v) v = parent[v] = parent[parent[v]];
-        return v;
-    };
+    DisjointSets components(vertex_count);
     for (const auto& [a, b, c] : triangles)
-        for (const Index v : {b, c}) {
-            const Index p = root(a), q = root(v);
-            parent[std::max(p, q)] = std::min(p, q);
-        }
-    for (Index v = 0; v < vertex_count; ++v) parent[v] = root(v);
-    return parent;
+        for (const Index v : {b, c}) components.join(a, v);
+    std::vector<Index> component(vertex_count);
+    for (Index v = 0; v < vertex_count; ++v) component[v] = components.root(v);
+    return component;
 }
 
 /// Puts components that were pulled inside out, which only those of a few voxels can be, back to where they began.
