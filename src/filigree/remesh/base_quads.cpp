@@ -107,40 +107,32 @@ private:
         return region;
     }
 
-    /// A region with an odd number of triangles cannot be paired. Splitting a feature edge adds one to both its sides,
-    /// so a chain of splits from one odd region to another, or to a border, mends both ends.
-    void make_regions_even() {
-        std::size_t count = 0;
-        const std::vector<Index> region = find_regions(count);
-        const Index outside = static_cast<Index>(count);
-        std::vector<std::uint8_t> odd(count + 1, 0);
-        for (const Index r : region)
-            if (r != kNoIndex) odd[r] ^= 1;
-        if (std::none_of(odd.begin(), odd.end(), [](auto o) { return o != 0; })) return;
-        // for each pair of neighbouring regions, the longest edge between them; by its ends, as a split before may give
-        // it another half-edge
+    static std::uint64_t key(Index a, Index b) { return std::uint64_t{std::min(a, b)} << 32 | std::max(a, b); }
+
+    /// The longest feature edge between each two neighbouring regions, by key. The outside of borders is region
+    /// `outside`.
+    std::unordered_map<std::uint64_t, Index> edges_between(std::span<const Index> region, Index outside) const {
         std::unordered_map<std::uint64_t, Index> between;
         const auto length = [&](Index h) {
             return (map_.position(map_.from(h)) - map_.position(map_.to(h))).squaredNorm();
         };
-        const auto across = [&](Index h) { return map_.is_border(h) ? outside : region[map_.twin(h) / 3]; };
-        const auto key = [](Index a, Index b) { return std::uint64_t{std::min(a, b)} << 32 | std::max(a, b); };
         for_each_half_edge([&](Index h) {
             if (!map_.is_feature(h)) return;
-            const Index a = region[h / 3], b = across(h);
+            const Index a = region[h / 3], b = map_.is_border(h) ? outside : region[map_.twin(h) / 3];
             if (a == b) return;
             const auto [entry, fresh] = between.try_emplace(key(a, b), h);
             if (!fresh && length(h) > length(entry->second)) entry->second = h;
         });
-        std::vector<std::vector<Index>> neighbours(count + 1);
-        for (const auto& [k, h] : between) {
-            neighbours[k >> 32].push_back(static_cast<Index>(k & 0xffffffffu));
-            neighbours[k & 0xffffffffu].push_back(static_cast<Index>(k >> 32));
-        }
-        for (auto& list : neighbours) std::sort(list.begin(), list.end());
+        return between;
+    }
+
+    /// The pairs of regions that chains from each odd region to another, or to the outside, cross. The chains are
+    /// shortest, by breadth-first search.
+    static std::vector<std::pair<Index, Index>> chains_between_odd(std::vector<std::uint8_t> odd, Index outside,
+                                                                   std::span<const std::vector<Index>> neighbours) {
         std::vector<std::pair<Index, Index>> crossed;
-        std::vector<Index> before(count + 1), reached(count + 1, kNoIndex); // from which start a region was reached
-        for (Index start = 0; start < count; ++start) {
+        std::vector<Index> before(outside + 1), reached(outside + 1, kNoIndex); // from which start a region was reached
+        for (Index start = 0; start < outside; ++start) {
             if (!odd[start]) continue;
             std::queue<Index> front;
             front.push(start);
@@ -165,6 +157,28 @@ private:
             if (end != outside) odd[end] = 0;
             for (Index r = end; r != start; r = before[r]) crossed.push_back(std::minmax(r, before[r]));
         }
+        return crossed;
+    }
+
+    /// A region with an odd number of triangles cannot be paired. Splitting a feature edge adds one to both its sides,
+    /// so a chain of splits from one odd region to another, or to a border, mends both ends.
+    void make_regions_even() {
+        std::size_t count = 0;
+        const std::vector<Index> region = find_regions(count);
+        const Index outside = static_cast<Index>(count);
+        std::vector<std::uint8_t> odd(count + 1, 0);
+        for (const Index r : region)
+            if (r != kNoIndex) odd[r] ^= 1;
+        if (std::none_of(odd.begin(), odd.end(), [](auto o) { return o != 0; })) return;
+        const std::unordered_map<std::uint64_t, Index> between = edges_between(region, outside);
+        std::vector<std::vector<Index>> neighbours(count + 1);
+        for (const auto& [k, h] : between) {
+            neighbours[k >> 32].push_back(static_cast<Index>(k & 0xffffffffu));
+            neighbours[k & 0xffffffffu].push_back(static_cast<Index>(k >> 32));
+        }
+        for (auto& list : neighbours) std::sort(list.begin(), list.end());
+        std::vector<std::pair<Index, Index>> crossed = chains_between_odd(std::move(odd), outside, neighbours);
+        // by their ends, as a split before may give an edge another half-edge
         std::unordered_map<std::uint64_t, std::pair<Index, Index>> ends;
         for (const auto& [k, h] : between) ends[k] = {map_.from(h), map_.to(h)};
         // two chains over the same border cancel each other

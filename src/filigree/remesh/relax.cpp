@@ -17,7 +17,7 @@ constexpr double kOverRelaxation = 1.5; // of the way to the mean: half the swee
 constexpr double kStill = 2e-3;         // of the mean edge length at a vertex: shorter moves are not worth their price
 constexpr int kShapeRounds = 6;         // for quads that are poor; the rest for those about to turn over
 constexpr int kOnRounds = 24, kOffRounds = 96; // of untangling; nearly all end after a few
-constexpr int kTutteRings = 4, kTutteSweeps = 30;
+constexpr int kTutteRings = 4, kTutteSweeps = 30, kTutteSearches = 6;
 constexpr std::size_t kMostEvened = 200; // quads whose neighbourhoods are, for each size; more are not worth the time
 constexpr std::array<double, 4> kReaches = {0.5, 0.2, 1.0, 0.07}; // mean edge lengths at the vertex
 constexpr double kInverted = 1e-9;                                // scaled Jacobian of quads that are not above zero
@@ -255,6 +255,117 @@ private:
     const Neighbourhoods& near_;
 };
 
+/// Mends quads that are poor or turned over, in three ways, each for what the one before has left.
+class Untangler {
+public:
+    Untangler(PatchGrid& grid, const SurfaceWalk& walk, const RunContext& context)
+        : grid_(grid), near_(grid), mover_(grid, walk, near_), context_(context) {}
+
+    std::size_t quad_count() const { return near_.quads.size(); }
+
+    std::vector<Index> quads_below(double limit) const {
+        std::vector<std::uint8_t> is_bad(near_.quads.size(), 0);
+        parallel_for(context_, near_.quads.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+            if (context_.is_cancelled()) return;
+            for (std::size_t q = begin; q < end; ++q) is_bad[q] = jacobian(static_cast<Index>(q)) < limit;
+        });
+        std::vector<Index> bad;
+        for (Index q = 0; q < is_bad.size(); ++q)
+            if (is_bad[q]) bad.push_back(q);
+        return bad;
+    }
+
+    /// Single vertices, over the surface.
+    void search_on_surface(double least) {
+        for (int round = 0; round < kOnRounds && !context_.is_cancelled(); ++round) {
+            context_.report("untangling", double(round) / kOnRounds);
+            const std::vector<Index> bad = quads_below(round < kShapeRounds ? least : 0.5 * least);
+            if (bad.empty()) break;
+            bool moved = false;
+            const std::vector<Index> vertices = vertices_near(bad, round % 4 == 3 ? 2 : round % 2);
+            for (const Index v : vertices) {
+                if (context_.is_cancelled()) return;
+                moved |= mover_.search(v, round % 3 == 0 ? 0.6 : 0.25, false, round);
+            }
+            if (!moved && round % 4 == 3) break;
+        }
+    }
+
+    /// What single moves cannot undo: whole neighbourhoods evened out, as in a Tutte embedding, where that helps.
+    void even_out_neighbourhoods() {
+        for (int rings = 1; rings <= kTutteRings; ++rings) {
+            const std::vector<Index> bad = quads_below(kOffSurface);
+            for (const Index q : std::span(bad).first(std::min(bad.size(), kMostEvened))) {
+                if (context_.is_cancelled()) return;
+                even_out(vertices_near({q}, rings));
+            }
+        }
+    }
+
+    /// Single vertices, off the surface where nothing else helps. Returns how many moved.
+    std::size_t search_off_surface() {
+        std::vector<std::uint8_t> off(grid_.positions.size(), 0);
+        for (int round = 0; round < kOffRounds && !context_.is_cancelled(); ++round) {
+            const std::vector<Index> bad = quads_below(kOffSurface);
+            if (bad.empty()) break;
+            for (const Index v : vertices_near(bad, round / 12))
+                if (!context_.is_cancelled() && mover_.search(v, kReaches[round % 4], true, round)) off[v] = 1;
+        }
+        return static_cast<std::size_t>(std::count(off.begin(), off.end(), 1));
+    }
+
+private:
+    double jacobian(Index q) const {
+        const auto& [a, b, c, d] = near_.quads[q];
+        return scaled_jacobian(grid_.positions[a], grid_.positions[b], grid_.positions[c], grid_.positions[d]);
+    }
+
+    /// The vertices of the quads, and of `rings` rings of quads around them, ascending.
+    std::vector<Index> vertices_near(const std::vector<Index>& bad, int rings) const {
+        std::vector<Index> vertices;
+        for (const Index q : bad) vertices.insert(vertices.end(), near_.quads[q].begin(), near_.quads[q].end());
+        const auto sort_once_each = [&] {
+            std::sort(vertices.begin(), vertices.end());
+            vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+        };
+        sort_once_each();
+        for (int ring = 0; ring < rings; ++ring) {
+            for (std::size_t i = 0, end = vertices.size(); i < end; ++i)
+                for (const Index q : near_.around(vertices[i]))
+                    vertices.insert(vertices.end(), near_.quads[q].begin(), near_.quads[q].end());
+            sort_once_each();
+        }
+        return vertices;
+    }
+
+    double badness(std::span<const Index> vertices) const {
+        double sum = 0;
+        for (const Index v : vertices) sum += mover_.badness(v, grid_.positions[v]);
+        return sum;
+    }
+
+    /// Puts everything back where it does not help.
+    void even_out(const std::vector<Index>& vertices) {
+        std::vector<SurfaceWalk::Place> before;
+        for (const Index v : vertices) before.push_back({grid_.source[v], grid_.positions[v]});
+        const double bad_before = badness(vertices);
+        for (int sweep = 0; sweep < kTutteSweeps; ++sweep)
+            for (const Index v : vertices) mover_.centre(v);
+        for (int round = 0; round < kTutteSearches; ++round)
+            for (const Index v : vertices) mover_.search(v, 0.25, false, round);
+        if (badness(vertices) < bad_before) return;
+        for (std::size_t i = 0; i < vertices.size(); ++i) {
+            grid_.source[vertices[i]] = before[i].point;
+            grid_.positions[vertices[i]] = before[i].position;
+        }
+    }
+
+    PatchGrid& grid_;
+    const Neighbourhoods near_;
+    Mover mover_;
+    const RunContext& context_;
+};
+
 } // namespace
 
 void relax(PatchGrid& grid, const SurfaceWalk& walk, unsigned sweeps, const RunContext& context) {
@@ -272,89 +383,14 @@ void relax(PatchGrid& grid, const SurfaceWalk& walk, unsigned sweeps, const RunC
 }
 
 Untangled untangle(PatchGrid& grid, const SurfaceWalk& walk, double least, const RunContext& context) {
-    const Neighbourhoods near(grid);
-    Mover mover(grid, walk, near);
-    const auto jacobian = [&](Index q) {
-        const auto& [a, b, c, d] = near.quads[q];
-        return scaled_jacobian(grid.positions[a], grid.positions[b], grid.positions[c], grid.positions[d]);
-    };
-    const auto bad_quads = [&](double limit) {
-        std::vector<std::uint8_t> is_bad(near.quads.size(), 0);
-        parallel_for(context, near.quads.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-            if (context.is_cancelled()) return;
-            for (std::size_t q = begin; q < end; ++q) is_bad[q] = jacobian(static_cast<Index>(q)) < limit;
-        });
-        std::vector<Index> bad;
-        for (Index q = 0; q < is_bad.size(); ++q)
-            if (is_bad[q]) bad.push_back(q);
-        return bad;
-    };
-    /// The vertices of the quads, and of `rings` rings of quads around them.
-    const auto vertices_near = [&](const std::vector<Index>& bad, int rings) {
-        std::vector<Index> vertices;
-        for (const Index q : bad) vertices.insert(vertices.end(), near.quads[q].begin(), near.quads[q].end());
-        const auto tidy = [&] {
-            std::sort(vertices.begin(), vertices.end());
-            vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
-        };
-        tidy();
-        for (int ring = 0; ring < rings; ++ring) {
-            for (std::size_t i = 0, end = vertices.size(); i < end; ++i)
-                for (const Index q : near.around(vertices[i]))
-                    vertices.insert(vertices.end(), near.quads[q].begin(), near.quads[q].end());
-            tidy();
-        }
-        return vertices;
-    };
+    Untangler untangler(grid, walk, context);
     Untangled result;
-    result.inverted = bad_quads(kInverted).size();
-    if (double(result.inverted) > kHopeless * double(near.quads.size()) + 8) return result;
-    for (int round = 0; round < kOnRounds && !context.is_cancelled(); ++round) {
-        context.report("untangling", double(round) / kOnRounds);
-        const std::vector<Index> bad = bad_quads(round < kShapeRounds ? least : 0.5 * least);
-        if (bad.empty()) break;
-        bool moved = false;
-        const std::vector<Index> vertices = vertices_near(bad, round % 4 == 3 ? 2 : round % 2);
-        for (const Index v : vertices) {
-            if (context.is_cancelled()) return result;
-            moved |= mover.search(v, round % 3 == 0 ? 0.6 : 0.25, false, round);
-        }
-        if (!moved && round % 4 == 3) break;
-    }
-    // What single moves cannot undo: whole neighbourhoods evened out, as in a Tutte embedding, where that helps.
-    for (int rings = 1; rings <= kTutteRings; ++rings) {
-        const std::vector<Index> bad = bad_quads(kOffSurface);
-        for (const Index q : std::span(bad).first(std::min(bad.size(), kMostEvened))) {
-            if (context.is_cancelled()) return result;
-            const std::vector<Index> vertices = vertices_near({q}, rings);
-            const auto badness = [&] {
-                double sum = 0;
-                for (const Index v : vertices) sum += mover.badness(v, grid.positions[v]);
-                return sum;
-            };
-            std::vector<SurfaceWalk::Place> before;
-            for (const Index v : vertices) before.push_back({grid.source[v], grid.positions[v]});
-            const double bad_before = badness();
-            for (int sweep = 0; sweep < kTutteSweeps; ++sweep)
-                for (const Index v : vertices) mover.centre(v);
-            for (int round = 0; round < 6; ++round)
-                for (const Index v : vertices) mover.search(v, 0.25, false, round);
-            if (badness() < bad_before) continue;
-            for (std::size_t i = 0; i < vertices.size(); ++i) {
-                grid.source[vertices[i]] = before[i].point;
-                grid.positions[vertices[i]] = before[i].position;
-            }
-        }
-    }
-    std::vector<std::uint8_t> off(grid.positions.size(), 0);
-    for (int round = 0; round < kOffRounds && !context.is_cancelled(); ++round) {
-        const std::vector<Index> bad = bad_quads(kOffSurface);
-        if (bad.empty()) break;
-        for (const Index v : vertices_near(bad, round / 12))
-            if (!context.is_cancelled() && mover.search(v, kReaches[round % 4], true, round)) off[v] = 1;
-    }
-    result.off_surface = static_cast<std::size_t>(std::count(off.begin(), off.end(), 1));
-    result.inverted = bad_quads(kInverted).size();
+    result.inverted = untangler.quads_below(kInverted).size();
+    if (double(result.inverted) > kHopeless * double(untangler.quad_count()) + 8) return result;
+    untangler.search_on_surface(least);
+    untangler.even_out_neighbourhoods();
+    result.off_surface = untangler.search_off_surface();
+    result.inverted = untangler.quads_below(kInverted).size();
     return result;
 }
 
