@@ -23,7 +23,7 @@ TEST(Closure, KnowsOpenEdgesAndTurnedFaces) {
     const Closure open = weld_triangles(cube, kContext)->closure;
     EXPECT_EQ(open.open_edges, 4u);
     EXPECT_EQ(open.unbalanced, 4u);
-    EXPECT_FLOAT_EQ((open.first_open[0] - open.first_open[1]).norm(), bounds(cube.positions).size().x() / 2);
+    EXPECT_NEAR((open.first_open[0] - open.first_open[1]).norm(), bounds(cube.positions).size().x() / 2, 1e-6);
 }
 
 TEST(Closure, VerticesAtOnePlaceAreOne) {

@@ -1,7 +1,6 @@
 #include "filigree/sample/closure.h"
 
-#include "filigree/mesh/triangulate.h"
-#include "filigree/mesh/weld.h"
+#include "filigree/mesh/surface.h"
 #include "filigree/sample/edge_balance.h"
 
 namespace filigree {
@@ -21,13 +20,10 @@ Closure closure_of(std::span<const Triangle> triangles, std::span<const Vec3f> p
 } // namespace
 
 Result<WeldedTriangles> weld_triangles(const Mesh& mesh, const RunContext& context) {
+    Result<Surface> surface = make_surface(mesh, context);
+    if (!surface) return surface.error();
     WeldedTriangles welded;
-    const std::vector<Index> representative = weld_map(mesh.positions);
-    for (Triangle t : triangulate(mesh).triangles) {
-        for (Index& v : t) v = representative[v];
-        if (t[0] != t[1] && t[1] != t[2] && t[2] != t[0]) welded.triangles.push_back(t);
-    }
-    if (context.is_cancelled()) return cancelled_error();
+    welded.triangles = std::move(surface->triangles);
     welded.closure = closure_of(welded.triangles, mesh.positions);
     if (context.is_cancelled()) return cancelled_error();
     return welded;

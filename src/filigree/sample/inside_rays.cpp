@@ -31,7 +31,8 @@ constexpr double kUnderflow = 0x1p-1060; // see exact_sign.cpp
 
 constexpr std::uint32_t kLeaf = WideTree::kLeaf;
 constexpr std::size_t kLeafSize = WideTree::kLeafSize, kWidth = WideTree::kWidth;
-constexpr std::size_t kWaiting = 32; // leaves found before they are tested
+constexpr std::size_t kWaiting = 32;      // leaves found before they are tested
+constexpr std::size_t kBetweenLooks = 64; // points from one look at `cancel` to the next: each may take a millisecond
 constexpr std::size_t kStackSize = (kWidth - 1) * WideTree::kDeepest + kWidth;
 
 struct alignas(64) Node {
@@ -348,7 +349,10 @@ Result<std::vector<std::uint8_t>> RayParity::contains(std::span<const Vec3d> poi
         parallel_for(context, pieces, kPiece, [&](std::size_t begin, std::size_t end) {
             if (context.is_cancelled()) return;
             Count own;
-            for (std::size_t i = first + begin; i < first + end; ++i) inside[i] = contains(points[i], &own);
+            for (std::size_t i = first + begin; i < first + end; ++i) {
+                if (i % kBetweenLooks == 0 && context.is_cancelled()) return;
+                inside[i] = contains(points[i], &own);
+            }
             if (!count) return;
             const std::lock_guard lock(adding);
             count->crossings += own.crossings;

@@ -387,15 +387,17 @@ WindingTree::NumberAndDistance WindingTree::winding_and_distance(const Vec3d& po
 double WindingTree::winding(const Vec3d& point) const { return content_->ask(content_->tree, point).number; }
 
 Result<std::vector<float>> WindingTree::winding(std::span<const Vec3d> points, const RunContext& context) const {
-    constexpr std::size_t kPiece = 1024, kBetweenReports = std::size_t{1} << 18;
+    constexpr std::size_t kPiece = 1024, kBetweenLooks = 64, kBetweenReports = std::size_t{1} << 18;
     std::vector<float> numbers(points.size());
     for (std::size_t first = 0; first < points.size(); first += kBetweenReports) {
         context.report("winding", static_cast<double>(first) / static_cast<double>(points.size()));
         const std::size_t count = std::min(kBetweenReports, points.size() - first);
         parallel_for(context, count, kPiece, [&](std::size_t begin, std::size_t end) {
             if (context.is_cancelled()) return;
-            for (std::size_t i = first + begin; i < first + end; ++i)
+            for (std::size_t i = first + begin; i < first + end; ++i) {
+                if (i % kBetweenLooks == 0 && context.is_cancelled()) return;
                 numbers[i] = static_cast<float>(winding(points[i]));
+            }
         });
         if (context.is_cancelled()) return cancelled_error();
     }
