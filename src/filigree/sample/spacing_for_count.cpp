@@ -1,5 +1,7 @@
 #include "filigree/sample/spacing_for_count.h"
 
+#include "filigree/core/text.h"
+
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -29,16 +31,9 @@ double spacing_at(const Vec3d& size, double points) {
     return sides[0] / points;
 }
 
-std::string in_words(double count) {
-    std::string digits = std::to_string(std::llround(count));
-    for (std::ptrdiff_t at = std::ptrdiff_t(digits.size()) - 3; at > 0; at -= 3)
-        digits.insert(static_cast<std::size_t>(at), ",");
-    return digits;
-}
-
 Error hardly_inside(std::size_t inside, const Lattice& lattice) {
-    return {ErrorCode::unsuitable, "Of " + in_words(lattice.point_count()) + " lattice points, " +
-                                       std::to_string(inside) +
+    return {ErrorCode::unsuitable, "Of " + with_commas(static_cast<std::uint64_t>(lattice.point_count())) +
+                                       " lattice points, " + std::to_string(inside) +
                                        " are inside: the mesh is a thin sheet, or too open to have an inside. Close "
                                        "it, or give a spacing instead of a count."};
 }
@@ -80,8 +75,9 @@ Result<double> spacing_for_count(const Mesh& mesh, std::size_t count, const Insi
             spacing = spacing_at(size, points_at(size, spacing) * double(count) / inside);
         spacing = std::min(spacing, largest);
         if (spacing < finest)
-            return Error{ErrorCode::unsuitable, in_words(double(count)) + " points inside take more than " +
-                                                    in_words(kMostAlong) + " along a side; ask for fewer."};
+            return Error{ErrorCode::unsuitable, with_commas(count) + " points inside take more than " +
+                                                    with_commas(static_cast<std::uint64_t>(kMostAlong)) +
+                                                    " along a side; ask for fewer."};
     }
     return spacing;
 }
