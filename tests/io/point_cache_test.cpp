@@ -9,8 +9,10 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
 #include <cstring>
+#include <thread>
 
 #include <sys/stat.h>
 #include <unistd.h>
@@ -438,4 +440,36 @@ TEST_F(PointCache, LongerSequencesFromBeforeAreTold) {
     ASSERT_TRUE(warnings.ok());
     ASSERT_FALSE(warnings->empty());
     EXPECT_NE(warnings->back().find("3 more of n_####.ply"), std::string::npos) << warnings->back();
+}
+
+TEST_F(PointCache, ASequenceHalfInItsPlacesIsNotReadUntilItIsWrittenAgain) {
+    ASSERT_TRUE(write_animation(moving(mesh_, 4), path("n/m_####.ply"), kContext).ok());
+    ASSERT_TRUE(write_animation(moving(mesh_, 4), path("n/other_####.ply"), kContext).ok());
+    const std::string old = *read_file(path("n/m_0003.ply"));
+    // a writer that was killed when frames 3 and 4 were still to come
+    const fs::path batch = path("n/.filigree-0123456789abcdef-placing");
+    fs::create_directories(batch / "new");
+    for (const char* name : {"m_0003.ply", "m_0004.ply"}) ASSERT_TRUE(write_file(batch / "new" / name, "new").ok());
+    const auto half = open_poses(path("n/m_####.ply"), mesh_.vertex_count(), Vec3d::Zero(), {}, kContext);
+    ASSERT_FALSE(half.ok());
+    says(half.error(), ErrorCode::bad_file, {"m_0001.ply", "2 files", "write the sequence again", batch.string()});
+    EXPECT_TRUE(open_poses(path("n/other_####.ply"), mesh_.vertex_count(), Vec3d::Zero(), {}, kContext).ok());
+    EXPECT_EQ(*read_file(path("n/m_0003.ply")), old);
+    ASSERT_TRUE(write_file(batch / "lock", "").ok()); // as the writer made it
+    ASSERT_TRUE(write_animation(moving(mesh_, 4), path("n/m_####.ply"), kContext).ok());
+    EXPECT_TRUE(open_poses(path("n/m_####.ply"), mesh_.vertex_count(), Vec3d::Zero(), {}, kContext).ok());
+    EXPECT_FALSE(fs::exists(batch));
+}
+
+TEST_F(PointCache, SequencesOfManyThreadsDoNotDisturbEachOther) {
+    std::atomic<int> failures = 0;
+    std::vector<std::thread> threads;
+    for (const char* name : {"n/a_####.ply", "n/b_####.ply", "n/c_####.ply", "n/d_####.ply"})
+        threads.emplace_back([&, name] {
+            for (int round = 0; round < 4; ++round)
+                if (!write_animation(moving(mesh_, 6), path(name), kContext).ok()) ++failures;
+        });
+    for (std::thread& thread : threads) thread.join();
+    EXPECT_EQ(failures, 0);
+    EXPECT_EQ(std::distance(fs::directory_iterator(path("n")), fs::directory_iterator()), 24);
 }

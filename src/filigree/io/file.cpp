@@ -1,7 +1,8 @@
 #include "filigree/io/file.h"
+#include "filigree/io/file_error.h"
 #include "filigree/io/large_memory.h"
+#include "filigree/io/temporary_file.h"
 
-#include <atomic>
 #include <cerrno>
 #include <cstring>
 #include <new>
@@ -43,46 +44,6 @@ private:
     int descriptor_;
 };
 
-/// What the system says about `error_number`, the same in every locale.
-std::string cause(int error_number) {
-    switch (error_number) {
-    case ENOENT:
-        return "there is no such file or folder";
-    case ENOTDIR:
-        return "a part of its path is not a folder";
-    case EISDIR:
-        return "it is a folder";
-    case EACCES:
-    case EPERM:
-        return "permission is denied";
-    case EROFS:
-        return "the file system is read-only";
-    case ENOSPC:
-        return "the disk is full; make room or write elsewhere";
-    case EDQUOT:
-        return "the disk quota is used up; make room or write elsewhere";
-    case EFBIG:
-        return "the file is larger than allowed here";
-    case ENAMETOOLONG:
-        return "the name is too long";
-    case ELOOP:
-        return "its symbolic links go round in a circle";
-    case EPIPE:
-        return "the reader has gone away";
-    case EIO:
-        return "the device failed";
-    default:
-        return "the system says error " + std::to_string(error_number);
-    }
-}
-
-Error cannot_read(const fs::path& path, int error_number) {
-    return {ErrorCode::not_found, path.string() + ": cannot be read: " + cause(error_number) + "."};
-}
-Error cannot_write(const fs::path& path, int error_number) {
-    return {ErrorCode::unwritable, path.string() + ": cannot be written: " + cause(error_number) + "."};
-}
-
 Result<std::string> read_descriptor(int descriptor, const fs::path& path) {
     constexpr std::size_t kPipePiece = std::size_t{1} << 16;
     struct stat status {};
@@ -107,6 +68,9 @@ Result<std::string> read_descriptor(int descriptor, const fs::path& path) {
     }
 }
 
+/// Where a descriptor's file can be linked from.
+std::string name_of(int descriptor) { return "/proc/self/fd/" + std::to_string(descriptor); }
+
 /// 0 or the error number.
 int write_piece(int descriptor, std::string_view piece) {
     while (!piece.empty()) {
@@ -118,37 +82,19 @@ int write_piece(int descriptor, std::string_view piece) {
     return 0;
 }
 
-/// Where writing to `path` ends up: symbolic links followed, also one that points to nothing yet.
-fs::path follow_links(fs::path path) {
-    constexpr int kLongestChain = 40; // as the kernel's
-    std::error_code failed;
-    for (int links = 0; links < kLongestChain && fs::is_symlink(path, failed); ++links) {
-        const fs::path target = fs::read_symlink(path, failed);
-        if (failed) break;
-        path = target.is_absolute() ? target : path.parent_path() / target;
-    }
-    return path;
-}
-
-/// Beside the target, so that the rename stays in one file system; of another process and call than any other.
-fs::path temporary_name(const fs::path& target) {
-    static std::atomic<unsigned> next{0};
-    return target.parent_path() / (".filigree-" + std::to_string(::getpid()) + "-" + std::to_string(next++) + ".tmp");
-}
-
-int open_temporary(const fs::path& target, fs::path& temporary) {
-    constexpr int kTries = 100; // leftovers of a killed process with our number
-    for (int i = 0; i < kTries; ++i) {
-        temporary = temporary_name(target);
-        const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-        if (descriptor >= 0 || errno != EEXIST) return descriptor;
-    }
+/// A file without a name in a folder, which goes with its last descriptor, also when the process is killed; -1 where
+/// the file system has none, or one could not be given a name later.
+int open_unnamed(const fs::path& folder) {
+    const int descriptor = ::open(folder.empty() ? "." : folder.c_str(), O_WRONLY | O_TMPFILE | O_CLOEXEC, 0666);
+    if (descriptor < 0 || ::access(name_of(descriptor).c_str(), F_OK) == 0) return descriptor;
+    ::close(descriptor);
     return -1;
 }
 
-void sync_folder(const fs::path& folder) {
-    const FileDescriptor descriptor(::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-    if (descriptor.is_open()) ::fsync(descriptor.get()); // best effort: some file systems cannot
+/// A new file under a temporary name.
+int open_temporary(const fs::path& folder, fs::path& temporary) {
+    temporary = temporary_path(folder);
+    return ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
 }
 
 } // namespace
@@ -166,75 +112,92 @@ Result<std::string> read_file(const fs::path& path) {
     }
 }
 
-struct FileWriter::Content {
+struct FileWriter::OpenFile {
     fs::path path;      ///< as the caller named it
     fs::path target;    ///< where that leads
-    fs::path temporary; ///< empty: written in place
+    fs::path temporary; ///< the name it has until then; empty: none, or written in place
+    bool is_unnamed = false;
     FileDescriptor descriptor{-1};
     bool is_standard_output = false;
     std::optional<mode_t> permissions; ///< of the file that is replaced
 
     int get() const { return is_standard_output ? STDOUT_FILENO : descriptor.get(); }
-    ~Content() {
+    ~OpenFile() {
         descriptor.close();
         if (!temporary.empty()) ::unlink(temporary.c_str());
     }
+
+    /// 0 or the error number.
+    int finish() {
+        const bool replaces = is_unnamed || !temporary.empty();
+        if (permissions && ::fchmod(descriptor.get(), *permissions) != 0) return errno;
+        if (replaces && ::fsync(descriptor.get()) != 0) return errno;
+        if (is_unnamed)
+            if (const int failed = give_name()) return failed;
+        if (!descriptor.close()) return errno;
+        if (!replaces) return 0;
+        if (::rename(temporary.c_str(), target.c_str()) != 0) return errno;
+        temporary.clear();
+        sync_folder(target.parent_path());
+        return 0;
+    }
+
+private:
+    int give_name() {
+        const fs::path name = temporary_path(target.parent_path());
+        if (::linkat(AT_FDCWD, name_of(descriptor.get()).c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW) != 0)
+            return errno;
+        temporary = name;
+        return 0;
+    }
 };
 
-FileWriter::FileWriter(std::unique_ptr<Content> content) : content_(std::move(content)) {}
+FileWriter::FileWriter(std::unique_ptr<OpenFile> file) : file_(std::move(file)) {}
 FileWriter::FileWriter(FileWriter&&) noexcept = default;
 FileWriter& FileWriter::operator=(FileWriter&&) noexcept = default;
 FileWriter::~FileWriter() = default;
 
 Result<FileWriter> FileWriter::create(const fs::path& path) {
-    auto content = std::make_unique<Content>();
-    content->path = path;
+    auto file = std::make_unique<OpenFile>();
+    file->path = path;
     if (path == "-") {
-        content->path = "standard output";
-        content->is_standard_output = true;
-        return FileWriter(std::move(content));
+        file->path = "standard output";
+        file->is_standard_output = true;
+        return FileWriter(std::move(file));
     }
-    const fs::path target = content->target = follow_links(path);
+    const fs::path target = file->target = follow_links(path);
     std::error_code ignored;
     if (fs::is_symlink(target, ignored)) return cannot_write(path, ELOOP);
     struct stat existing {};
     const bool exists = ::stat(target.c_str(), &existing) == 0;
     if (exists && S_ISDIR(existing.st_mode)) return cannot_write(path, EISDIR);
     if (exists && !S_ISREG(existing.st_mode)) { // a device or pipe stays what it is
-        content->descriptor.reset(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
+        file->descriptor.reset(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
     } else {
         if (exists && ::access(target.c_str(), W_OK) != 0) return cannot_write(path, errno); // read-only: hands off
         if (!target.has_filename()) return cannot_write(path, ENOENT);
-        if (exists) content->permissions = existing.st_mode & 07777;
+        if (exists) file->permissions = existing.st_mode & 07777;
+        const fs::path folder = target.parent_path();
+        file->descriptor.reset(open_unnamed(folder));
+        file->is_unnamed = file->descriptor.is_open();
         fs::path temporary;
-        content->descriptor.reset(open_temporary(target, temporary));
-        if (content->descriptor.is_open()) content->temporary = temporary;
+        if (!file->is_unnamed) file->descriptor.reset(open_temporary(folder, temporary));
+        if (!file->is_unnamed && file->descriptor.is_open()) file->temporary = temporary;
     }
-    if (!content->descriptor.is_open()) return cannot_write(path, errno);
-    return FileWriter(std::move(content));
+    if (!file->descriptor.is_open()) return cannot_write(path, errno);
+    return FileWriter(std::move(file));
 }
 
 Status FileWriter::write(std::string_view bytes) {
-    if (const int failed = write_piece(content_->get(), bytes)) return cannot_write(content_->path, failed);
+    if (const int failed = write_piece(file_->get(), bytes)) return cannot_write(file_->path, failed);
     return Success{};
 }
 
 Status FileWriter::finish() {
-    Content& content = *content_;
-    if (content.is_standard_output) return Success{};
-    const int descriptor = content.descriptor.get();
-    int failed = 0;
-    if (content.permissions && ::fchmod(descriptor, *content.permissions) != 0) failed = errno;
-    if (!failed && !content.temporary.empty() && ::fsync(descriptor) != 0) failed = errno;
-    if (!content.descriptor.close() && !failed) failed = errno;
-    if (!failed && !content.temporary.empty()) {
-        if (::rename(content.temporary.c_str(), content.target.c_str()) != 0)
-            failed = errno;
-        else
-            content.temporary.clear();
-    }
-    if (failed) return cannot_write(content.path, failed);
-    if (!content.target.empty()) sync_folder(content.target.parent_path());
+    OpenFile& file = *file_;
+    if (file.is_standard_output) return Success{};
+    const int failed = file.finish();
+    if (failed) return cannot_write(file.path, failed);
     return Success{};
 }
 

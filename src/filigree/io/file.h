@@ -18,6 +18,8 @@ Result<std::string> read_file(const std::filesystem::path& path);
 /// renamed. On any error, or when the process dies, `path` is as it was. "-" is standard output. Only a device or pipe
 /// is written in place: it cannot be replaced, and keeps what it got before an error. Symbolic links are followed, and
 /// the permissions of an existing file are kept. Errors: unwritable.
+/// The temporary file has no name until it is whole, so a process that is killed leaves nothing. On file systems
+/// without such files (NFS, FAT) it leaves ".filigree-X.tmp", X random: it hinders nobody and may be deleted.
 Status write_file(const std::filesystem::path& path, std::span<const std::string_view> pieces);
 /// The same of one piece.
 Status write_file(const std::filesystem::path& path, std::string_view bytes);
@@ -37,9 +39,9 @@ public:
     Status finish();
 
 private:
-    struct Content;
-    explicit FileWriter(std::unique_ptr<Content> content);
-    std::unique_ptr<Content> content_;
+    struct OpenFile;
+    explicit FileWriter(std::unique_ptr<OpenFile> file);
+    std::unique_ptr<OpenFile> file_;
 };
 
 } // namespace filigree

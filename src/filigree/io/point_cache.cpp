@@ -1,8 +1,9 @@
 #include "filigree/io/point_cache.h"
-#include "filigree/io/file.h"
-#include "filigree/io/gltf_export.h"
+#include "filigree/io/extension.h"
+#include "filigree/io/gltf_morph_export.h"
 #include "filigree/io/mesh_file.h"
 #include "filigree/io/model_file.h"
+#include "filigree/io/numbered_name.h"
 #include "filigree/io/point_cache_formats.h"
 #include "filigree/io/usd.h"
 #include "filigree/mesh/normals.h"
@@ -39,7 +40,7 @@ Result<PoseStream> open_own_poses(const fs::path& path, std::size_t points, cons
     if (!poses) return poses.error();
     if (poses->empty())
         return Error{ErrorCode::unsuitable,
-                     path.string() + ": has no poses of its own; 'filigree simulate' writes models that have."};
+                     path.string() + ": has no poses of its own; a simulation writes models that have some."};
     if (poses->frames[0].positions.size() != points)
         return Error{ErrorCode::mismatch,
                      path.string() + ": its poses have " + std::to_string(poses->frames[0].positions.size()) +
@@ -60,12 +61,12 @@ MeshAnimation animation_of(PoseStream stream, const Mesh& rest) {
             }};
 }
 
-bool is_cache(const std::string& ending) { return ending == ".pc2" || ending == ".mdd"; }
+bool is_cache(const std::string& extension) { return extension == ".pc2" || extension == ".mdd"; }
 
-Result<PointSource> open_cache(const fs::path& path, const std::string& ending, std::size_t points,
+Result<PointSource> open_cache(const fs::path& path, const std::string& extension, std::size_t points,
                                const PoseFileOptions& options) {
-    return ending == ".pc2" ? open_pc2(path, points, options.frames_per_second)
-                            : open_mdd(path, points, options.frames_per_second);
+    return extension == ".pc2" ? open_pc2(path, points, options.frames_per_second)
+                               : open_mdd(path, points, options.frames_per_second);
 }
 
 Status check_rate(const PoseFileOptions& options) {
@@ -122,25 +123,18 @@ Result<Mesh> mesh_at(const MeshAnimation& animation, std::size_t frame, const Ru
 
 } // namespace
 
-std::string lower_ending(const fs::path& path) {
-    std::string ending = path.extension().string();
-    for (char& c : ending)
-        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-    return ending;
-}
-
 Result<AnimationFormat> animation_format(const fs::path& path) {
     std::error_code ignored;
-    const std::string ending = lower_ending(path);
+    const std::string extension = lower_extension(path);
     if ((!path.empty() && !path.has_filename()) || fs::is_directory(path, ignored) || numbered_name(path)) {
         if (!numbered_name(path)) return AnimationFormat::numbered;
         if (const Result<MeshFormat> format = mesh_format(path); !format) return format.error();
         return AnimationFormat::numbered;
     }
-    if (ending == ".pc2") return AnimationFormat::pc2;
-    if (ending == ".mdd") return AnimationFormat::mdd;
-    if (ending == ".usda") return AnimationFormat::usda;
-    if (ending == ".glb") return AnimationFormat::glb;
+    if (extension == ".pc2") return AnimationFormat::pc2;
+    if (extension == ".mdd") return AnimationFormat::mdd;
+    if (extension == ".usda") return AnimationFormat::usda;
+    if (extension == ".glb") return AnimationFormat::glb;
     return Error{ErrorCode::unsupported,
                  path.string() + ": is no name for an animation; " + std::string(kKnownFormats) + "."};
 }
@@ -169,9 +163,9 @@ void add_gradients(Mesh& mesh, const Pose& pose) {
 Result<PoseStream> open_poses(const fs::path& path, std::size_t points, const Vec3d& origin,
                               const PoseFileOptions& options, const RunContext& context) {
     if (Status sound = check_rate(options); !sound) return sound.error();
-    const std::string ending = lower_ending(path);
-    if (is_cache(ending)) {
-        Result<PointSource> source = open_cache(path, ending, points, options);
+    const std::string extension = lower_extension(path);
+    if (is_cache(extension)) {
+        Result<PointSource> source = open_cache(path, extension, points, options);
         if (!source) return source.error();
         return PoseStream{
             source->frames, source->frames_per_second,
@@ -183,10 +177,10 @@ Result<PoseStream> open_poses(const fs::path& path, std::size_t points, const Ve
                 return pose;
             }};
     }
-    if (ending == ".fil") return open_own_poses(path, points, options, context);
-    if (ending == ".glb" || ending == ".gltf") {
+    if (extension == ".fil") return open_own_poses(path, points, options, context);
+    if (extension == ".glb" || extension == ".gltf") {
         if (!numbered_name(path)) return open_gltf_poses(path, points, origin, options, context);
-    } else if (ending == ".usda") {
+    } else if (extension == ".usda") {
         return Error{ErrorCode::unsupported, path.string() + ": USD is written, not read; export a .pc2 there."};
     }
     if (const Result<AnimationFormat> format = animation_format(path); !format) return format.error();
@@ -196,9 +190,9 @@ Result<PoseStream> open_poses(const fs::path& path, std::size_t points, const Ve
 Result<MeshAnimation> open_animation(const fs::path& path, const Mesh& rest, const PoseFileOptions& options,
                                      const RunContext& context) {
     if (Status sound = check_rate(options); !sound) return sound.error();
-    const std::string ending = lower_ending(path);
-    if (is_cache(ending)) {
-        Result<PointSource> source = open_cache(path, ending, rest.vertex_count(), options);
+    const std::string extension = lower_extension(path);
+    if (is_cache(extension)) {
+        Result<PointSource> source = open_cache(path, extension, rest.vertex_count(), options);
         if (!source) return source.error();
         return MeshAnimation{
             &rest, source->frames, source->frames_per_second,

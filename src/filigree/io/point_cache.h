@@ -22,8 +22,8 @@ enum class AnimationFormat {
     glb,      ///< .glb, morph targets
 };
 
-/// The format that an output's or input's name stands for: its ending, a folder (ends in '/' or is there), or #### or
-/// %04d before a mesh's ending. Errors: unsupported, with the list.
+/// The format that an output's or input's name stands for: its extension, a folder (ends in '/' or is there), or ####
+/// or %04d before a mesh's extension. Errors: unsupported, with the list.
 Result<AnimationFormat> animation_format(const std::filesystem::path& path);
 
 /// The files that are there under such a name: itself, those of a numbered sequence, or all in a folder.
@@ -53,8 +53,8 @@ Result<MeshAnimation> open_animation(const std::filesystem::path& path, const Me
 /// Writes every frame, one in memory at a time, whole or not at all. World coordinates (the origin is added) in 32-bit
 /// floats; a warning says when that loses digits. Numbered meshes are PLY in a folder (under its name), or what the
 /// #### name ends in, counted from 1; they have the rest's attributes, and where it has normals, normals of their own.
-/// They replace files, whose permissions they keep, but no symbolic links. When one cannot be replaced, those before it
-/// are put back.
+/// They replace files, whose permissions they keep, but no symbolic links: all or none, also when the process is killed
+/// (io/file_batch.h). A sequence whose placing was interrupted is not read until it is written again.
 /// Same errors as write_mesh, unsuitable (a position that is not finite; no frames), and cancelled. Cost: writing;
 /// memory one frame.
 Result<std::vector<std::string>> write_animation(const MeshAnimation& animation, const std::filesystem::path& path,

@@ -34,20 +34,6 @@ Status write_pc2(const MeshAnimation& animation, const WorldPositions& positions
 Status write_mdd(const MeshAnimation& animation, const WorldPositions& positions, const std::filesystem::path& path,
                  const RunContext& context);
 
-/// A name with a place for a number: "moved_####.ply", "moved_%04d.ply".
-struct NumberedName {
-    std::filesystem::path folder;
-    std::string before, after; ///< around the number
-    std::size_t digits = 4;    ///< at least
-
-    std::filesystem::path file(std::size_t number) const;
-};
-/// None where the name has no such place.
-std::optional<NumberedName> numbered_name(const std::filesystem::path& path);
-
-/// A file name's ending in lower case, with the dot.
-std::string lower_ending(const std::filesystem::path& path);
-
 /// The rate where nothing says another, frames a second.
 inline constexpr double kUnsaidRate = 60;
 

@@ -1,14 +1,14 @@
 // Numbered meshes: NAME_0001.ply, NAME_0002.ply and so on, a mesh a frame.
+#include "filigree/io/file_batch.h"
+#include "filigree/io/file_error.h"
 #include "filigree/io/mesh_file.h"
 #include "filigree/io/new_folders.h"
+#include "filigree/io/numbered_name.h"
 #include "filigree/io/point_cache_formats.h"
+#include "filigree/io/text_scanner.h"
 
 #include <algorithm>
-#include <charconv>
 #include <map>
-
-#include <sys/stat.h>
-#include <unistd.h>
 
 namespace filigree {
 
@@ -16,23 +16,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
-
 /// Files by number; those of one NumberedName.
 using Numbers = std::map<std::uint64_t, fs::path>;
-
-/// The number in a file's name, if it is of that name.
-std::optional<std::uint64_t> number_of(const std::string& file, const NumberedName& name) {
-    if (file.size() <= name.before.size() + name.after.size() || !file.starts_with(name.before) ||
-        !file.ends_with(name.after))
-        return {};
-    const char* const first = file.data() + name.before.size();
-    const char* const last = file.data() + file.size() - name.after.size();
-    std::uint64_t number = 0;
-    const auto [end, error] = std::from_chars(first, last, number);
-    if (error != std::errc() || end != last) return {};
-    return number;
-}
 
 Error cannot_list(const fs::path& folder) {
     return {ErrorCode::not_found, folder.string() + ": cannot be read: there is no such folder, or it is closed."};
@@ -44,9 +29,10 @@ Result<std::vector<std::string>> names_in(const fs::path& folder) {
     std::error_code failed;
     fs::directory_iterator entry(folder.empty() ? "." : folder, failed);
     if (failed) return cannot_list(folder);
-    for (; entry != fs::directory_iterator(); entry.increment(failed)) {
-        if (failed) return cannot_list(folder);
+    while (entry != fs::directory_iterator()) {
         names.push_back(entry->path().filename().string());
+        entry.increment(failed); // which makes it the end when it fails
+        if (failed) return cannot_list(folder);
     }
     std::sort(names.begin(), names.end());
     return names;
@@ -77,7 +63,7 @@ Result<NumberedName> only_name_in(const fs::path& folder, const std::vector<std:
 Result<std::vector<fs::path>> numbered_files(const NumberedName& name, const std::vector<std::string>& names) {
     Numbers files;
     for (const std::string& file : names) {
-        const auto number = number_of(file, name);
+        const auto number = name.number_of(file);
         if (!number) continue;
         const auto [known, is_new] = files.emplace(*number, name.folder / file);
         if (!is_new)
@@ -118,89 +104,19 @@ Result<Pose> read_pose(const fs::path& file, std::size_t points, const Vec3d& or
     return pose;
 }
 
-/// A folder beside files to come, which goes with all that is left in it.
-class TemporaryFolder {
-public:
-    explicit TemporaryFolder(const fs::path& in)
-        : path_(in / (".filigree-" + std::to_string(::getpid()) + "-frames.tmp")) {
-        std::error_code ignored;
-        fs::remove_all(path_, ignored); // left by a killed process with our number
-        is_there_ = fs::create_directory(path_, ignored);
-    }
-    ~TemporaryFolder() {
-        std::error_code ignored;
-        if (is_there_) fs::remove_all(path_, ignored);
-    }
-    TemporaryFolder(const TemporaryFolder&) = delete;
-    TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-
-    bool is_there() const { return is_there_; }
-    const fs::path& path() const { return path_; }
-
-private:
-    fs::path path_;
-    bool is_there_ = false;
-};
-
-Error cannot_write(const fs::path& path, const std::string& cause) {
-    return {ErrorCode::unwritable, path.string() + ": cannot be written: " + cause + "."};
+/// Refuses a sequence of which a killed process has put only some files into their places.
+Status check_placed(const NumberedName& name) {
+    std::size_t waiting = 0;
+    fs::path aside;
+    for (const fs::path& file : unplaced_files(name.folder))
+        if (name.number_of(file.filename().string())) ++waiting, aside = file.parent_path();
+    if (waiting == 0) return Success{};
+    return Error{ErrorCode::bad_file, name.file(1).string() + ": an interrupted program has not put " +
+                                          std::to_string(waiting) +
+                                          " files of its sequence into their places; write the sequence again, or "
+                                          "move them there from " +
+                                          aside.string() + "."};
 }
-
-/// Whether a file can be put there. What a link leads to would not be replaced, so links are refused.
-Status check_target(const fs::path& target) {
-    struct stat status {};
-    if (::lstat(target.c_str(), &status) != 0) return Success{};
-    if (S_ISDIR(status.st_mode)) return cannot_write(target, "it is a folder");
-    if (S_ISLNK(status.st_mode))
-        return cannot_write(target, "it is a symbolic link; remove it, or choose another name");
-    if (!S_ISREG(status.st_mode)) return cannot_write(target, "it is a pipe or a device");
-    if (::access(target.c_str(), W_OK) != 0) return cannot_write(target, "permission is denied");
-    return Success{};
-}
-
-/// Puts files in the places of others, all or none.
-class Replacement {
-public:
-    /// aside: a folder for what was there before.
-    explicit Replacement(fs::path aside) : aside_(std::move(aside)) {}
-    ~Replacement() {
-        std::error_code ignored;
-        for (auto place = replaced_.rbegin(); place != replaced_.rend() && !is_kept_; ++place)
-            if (place->before.empty())
-                fs::remove(place->target, ignored);
-            else
-                fs::rename(place->before, place->target, ignored);
-    }
-    Replacement(const Replacement&) = delete;
-    Replacement& operator=(const Replacement&) = delete;
-
-    Status replace(const fs::path& file, const fs::path& target) {
-        if (Status free = check_target(target); !free) return free;
-        std::error_code failed;
-        Place place{target, {}};
-        struct stat status {};
-        if (::stat(target.c_str(), &status) == 0) {
-            ::chmod(file.c_str(), status.st_mode & 07777); // best effort, as for some mounts
-            place.before = aside_ / ("before-" + std::to_string(replaced_.size()));
-            fs::create_hard_link(target, place.before, failed); // the target is never away
-            if (failed) fs::rename(target, place.before, failed);
-            if (failed) return cannot_write(target, "it cannot be replaced");
-        }
-        replaced_.push_back(std::move(place));
-        fs::rename(file, target, failed);
-        if (failed) return cannot_write(target, "it cannot be replaced");
-        return Success{};
-    }
-    void keep() { is_kept_ = true; }
-
-private:
-    struct Place {
-        fs::path target, before; ///< before: empty where nothing was
-    };
-    fs::path aside_;
-    std::vector<Place> replaced_;
-    bool is_kept_ = false;
-};
 
 void add_new(std::vector<std::string>& warnings, const std::vector<std::string>& more) {
     for (const std::string& warning : more)
@@ -212,7 +128,7 @@ void warn_of_leftovers(const NumberedName& name, std::size_t frames, std::vector
     const Result<std::vector<std::string>> names = names_in(name.folder);
     if (!names) return;
     const auto others = std::count_if(names->begin(), names->end(), [&](const std::string& file) {
-        const auto number = number_of(file, name);
+        const auto number = name.number_of(file);
         return number && (*number == 0 || *number > frames);
     });
     if (others > 0)
@@ -222,34 +138,6 @@ void warn_of_leftovers(const NumberedName& name, std::size_t frames, std::vector
 
 } // namespace
 
-fs::path NumberedName::file(std::size_t number) const {
-    std::string text = std::to_string(number);
-    if (text.size() < digits) text.insert(0, digits - text.size(), '0');
-    return folder / (before + text + after);
-}
-
-std::optional<NumberedName> numbered_name(const fs::path& path) {
-    const std::string name = path.filename().string();
-    const auto around = [&](std::size_t begin, std::size_t end, std::size_t digits) {
-        return NumberedName{path.parent_path(), name.substr(0, begin), name.substr(end), digits};
-    };
-    if (const std::size_t last = name.rfind('#'); last != std::string::npos) {
-        const std::size_t before = name.find_last_not_of('#', last);
-        const std::size_t begin = before == std::string::npos ? 0 : before + 1;
-        return around(begin, last + 1, last + 1 - begin);
-    }
-    const std::size_t percent = name.find('%');
-    if (percent == std::string::npos) return {};
-    std::size_t end = percent + 1;
-    while (end < name.size() && is_digit(name[end])) ++end;
-    if (end == name.size() || name[end] != 'd') return {};
-    unsigned digits = 1; // "%d"
-    constexpr unsigned kMostDigits = 20;
-    std::from_chars(name.data() + percent + 1, name.data() + end, digits);
-    if (digits > kMostDigits) return {};
-    return around(percent, end + 1, digits);
-}
-
 std::vector<fs::path> animation_files(const fs::path& path) {
     std::error_code ignored;
     const std::optional<NumberedName> name = numbered_name(path);
@@ -258,7 +146,7 @@ std::vector<fs::path> animation_files(const fs::path& path) {
     std::vector<fs::path> files;
     const Result<std::vector<std::string>> names = names_in(folder);
     for (const std::string& file : names ? *names : std::vector<std::string>{})
-        if (!name || number_of(file, *name)) files.push_back(folder / file);
+        if (!name || name->number_of(file)) files.push_back(folder / file);
     return files;
 }
 
@@ -272,6 +160,7 @@ Result<PoseStream> open_numbered(const fs::path& path, std::size_t points, const
         if (!only) return only.error();
         name = std::move(*only);
     }
+    if (Status placed = check_placed(*name); !placed) return placed.error();
     Result<std::vector<fs::path>> files = numbered_files(*name, *names);
     if (!files) return files.error();
     RunContext silent = context; // whoever fetches tells of frames
@@ -285,6 +174,61 @@ Result<PoseStream> open_numbered(const fs::path& path, std::size_t points, const
          silent](std::size_t frame) { return read_pose(files[frame], points, origin, has_gradients, silent); }};
 }
 
+namespace {
+
+/// What write_numbered_meshes does in a folder that is there.
+class NumberedWriter {
+public:
+    NumberedWriter(NumberedName name, const RunContext& context)
+        : name_(std::move(name)), context_(context), silent_(context) {
+        silent_.progress = nullptr; // the bar tells of frames
+        const Result<MeshFormat> format = mesh_format(name_.file(1));
+        is_obj_ = format && *format == MeshFormat::obj;
+    }
+
+    Status write(std::size_t frames, const std::function<Result<Mesh>(std::size_t frame)>& mesh) {
+        Result<FileBatch> files = FileBatch::create(name_.folder);
+        if (!files) return files.error();
+        for (std::size_t frame = 0; frame < frames; ++frame) {
+            context_.report("writing", double(frame) / double(frames));
+            if (context_.is_cancelled()) return cancelled_error();
+            const fs::path target = name_.file(frame + 1);
+            if (Status free = files->check_place(target.filename().string()); !free) return free;
+            Result<Mesh> moved = mesh(frame);
+            if (!moved) return moved.error();
+            if (Status written = write_frame(*moved, files->path(target.filename().string()), target); !written)
+                return written;
+        }
+        if (context_.is_cancelled()) return cancelled_error();
+        return files->finish();
+    }
+    std::vector<std::string>& warnings() { return warnings_; }
+
+private:
+    NumberedName name_;
+    const RunContext& context_;
+    RunContext silent_;
+    bool is_obj_;
+    std::vector<std::string> warnings_;
+
+    Status write_frame(Mesh& mesh, const fs::path& file, const fs::path& target) {
+        if (is_obj_ && !mesh.embedded_materials.empty()) { // a library and its pictures for every frame, else
+            mesh.embedded_materials.clear();
+            add_new(warnings_, {"OBJ files of a sequence do not have embedded materials; left out."});
+        }
+        if (const std::string wrong = check_mesh(mesh); !wrong.empty())
+            return Error{ErrorCode::unsuitable, target.string() +
+                                                    ": not written: it is beyond what numbers can hold (" + wrong +
+                                                    "); deform less."};
+        const auto written = write_mesh(mesh, file, {}, silent_);
+        if (!written) return renamed(written.error(), file, target);
+        add_new(warnings_, *written);
+        return Success{};
+    }
+};
+
+} // namespace
+
 Result<std::vector<std::string>> write_numbered_meshes(std::size_t frames,
                                                        const std::function<Result<Mesh>(std::size_t frame)>& mesh,
                                                        const fs::path& path, const RunContext& context) {
@@ -296,50 +240,14 @@ Result<std::vector<std::string>> write_numbered_meshes(std::size_t frames,
     const fs::path folder = name->folder.empty() ? fs::path(".") : name->folder;
     const NewFolders folders(folder);
     if (!folders.are_there()) return cannot_write(folder, "the folder cannot be made");
-    std::vector<std::string> warnings;
-    RunContext silent = context; // the bar tells of frames
-    silent.progress = nullptr;
-    const Result<MeshFormat> format = mesh_format(name->file(1));
-    const bool is_obj = format && *format == MeshFormat::obj;
-    const auto write_all = [&]() -> Status {
-        const TemporaryFolder temporary(folder);
-        if (!temporary.is_there()) return cannot_write(folder, "nothing can be made in the folder");
-        const auto temporary_file = [&](std::size_t number) {
-            return temporary.path() / (std::to_string(number) + name->after);
-        };
-        for (std::size_t frame = 0; frame < frames; ++frame) {
-            context.report("writing", double(frame) / double(frames));
-            if (context.is_cancelled()) return cancelled_error();
-            if (Status free = check_target(name->file(frame + 1)); !free) return free;
-            Result<Mesh> moved = mesh(frame);
-            if (!moved) return moved.error();
-            if (is_obj && !moved->embedded_materials.empty()) { // a library and its pictures for every frame, else
-                moved->embedded_materials.clear();
-                add_new(warnings, {"OBJ files of a sequence do not have embedded materials; left out."});
-            }
-            if (const std::string wrong = check_mesh(*moved); !wrong.empty())
-                return Error{ErrorCode::unsuitable, name->file(frame + 1).string() +
-                                                        ": not written: it is beyond what numbers can hold (" + wrong +
-                                                        "); deform less."};
-            const auto written = write_mesh(*moved, temporary_file(frame + 1), {}, silent);
-            if (!written) return written.error();
-            add_new(warnings, *written);
-        }
-        if (context.is_cancelled()) return cancelled_error();
-        Replacement replacement(temporary.path());
-        for (std::size_t number = 1; number <= frames; ++number)
-            if (Status done = replacement.replace(temporary_file(number), name->file(number)); !done) return done;
-        replacement.keep();
-        return Success{};
-    };
-    const Status written = write_all();
-    if (!written) {
+    NumberedWriter writer(*name, context);
+    if (Status written = writer.write(frames, mesh); !written) {
         folders.remove();
         return written.error();
     }
     context.report("writing", 1);
-    warn_of_leftovers(*name, frames, warnings);
-    return warnings;
+    warn_of_leftovers(*name, frames, writer.warnings());
+    return writer.warnings();
 }
 
 } // namespace filigree

@@ -1,9 +1,13 @@
 #include "filigree/render/film.h"
 
+#include "filigree/io/extension.h"
 #include "filigree/io/file.h"
+#include "filigree/io/file_batch.h"
+#include "filigree/io/file_error.h"
+#include "filigree/io/numbered_name.h"
+#include "filigree/io/temporary_file.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cerrno>
 #include <charconv>
 #include <csignal>
@@ -26,41 +30,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The letters around a number pattern, "%d" or "%04d", and how many digits it asks for.
-struct NumberPattern {
-    std::string before, after;
-    unsigned digits = 1;
-
-    std::string name(unsigned number) const {
-        const std::string text = std::to_string(number);
-        return before + std::string(digits - std::min<std::size_t>(digits, text.size()), '0') + text + after;
-    }
-};
-
-/// The one pattern in a file's name; none when there is none, or more than one '%'.
-std::optional<NumberPattern> number_pattern(const std::string& name) {
-    const std::size_t start = name.find('%');
-    if (start == std::string::npos || name.find('%', start + 1) != std::string::npos) return std::nullopt;
-    std::size_t at = start + 1;
-    NumberPattern pattern{name.substr(0, start), "", 1};
-    if (at + 1 < name.size() && name[at] == '0' && name[at + 1] >= '1' && name[at + 1] <= '9') {
-        pattern.digits = static_cast<unsigned>(name[at + 1] - '0');
-        at += 2;
-    }
-    if (at >= name.size() || name[at] != 'd') return std::nullopt;
-    pattern.after = name.substr(at + 1);
-    return pattern;
-}
-
 enum class FilmKind { none, mp4, gif, numbered };
 
 FilmKind film_kind(const fs::path& path) {
-    std::string ending = path.extension().string();
-    for (char& c : ending)
-        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-    if (ending == ".mp4") return FilmKind::mp4;
-    if (ending == ".gif") return FilmKind::gif;
-    return ending == ".png" && number_pattern(path.filename().string()) ? FilmKind::numbered : FilmKind::none;
+    const std::string extension = lower_extension(path);
+    if (extension == ".mp4") return FilmKind::mp4;
+    if (extension == ".gif") return FilmKind::gif;
+    return extension == ".png" && printf_numbered_name(path) ? FilmKind::numbered : FilmKind::none;
 }
 
 /// The shortest text that stands for the number, in every locale.
@@ -69,31 +45,25 @@ std::string number_text(double number) {
     return std::string(text, std::to_chars(text, text + sizeof text, number).ptr);
 }
 
-Error cannot_write(const fs::path& path, const std::string& cause) {
-    return {ErrorCode::unwritable, path.string() + ": cannot be written: " + cause + "."};
-}
-
-/// Files beside a target that are gone at the end, unless they are put in place.
+/// The bytes of ffmpeg's film beside its place: gone at the end, unless it is put there.
 class TemporaryFile {
 public:
-    /// Written with `bytes`. Messages name `target`.
-    static Result<TemporaryFile> create(const fs::path& target, std::string_view bytes) {
-        static std::atomic<unsigned> next{0};
-        fs::path path;
+    /// Empty. Messages name `target`, which may be a link: the film replaces what it leads to.
+    static Result<TemporaryFile> create(const fs::path& target) {
+        fs::path real = follow_links(target);
         std::error_code ignored;
-        do { // leftovers of a killed process with our number stay
-            path = target.parent_path() /
-                   (".filigree-" + std::to_string(::getpid()) + "-film" + std::to_string(next++) + ".tmp");
-        } while (fs::exists(fs::symlink_status(path, ignored)));
-        const Status status = write_file(path, bytes);
-        if (status) return TemporaryFile(std::move(path));
-        Error error = status.error();
-        error.message.replace(0, path.string().size(), target.string());
-        return error;
+        if (fs::is_symlink(real, ignored)) return cannot_write(target, ELOOP);
+        fs::path path = temporary_path(real.parent_path());
+        const int descriptor = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+        if (descriptor < 0) return cannot_write(target, errno);
+        ::close(descriptor);
+        return TemporaryFile(std::move(path), std::move(real));
     }
-    TemporaryFile(TemporaryFile&& other) noexcept : path_(std::exchange(other.path_, {})) {}
+    TemporaryFile(TemporaryFile&& other) noexcept
+        : path_(std::exchange(other.path_, {})), real_target_(std::move(other.real_target_)) {}
     TemporaryFile& operator=(TemporaryFile&& other) noexcept {
         std::swap(path_, other.path_);
+        std::swap(real_target_, other.real_target_);
         return *this;
     }
     ~TemporaryFile() {
@@ -102,21 +72,20 @@ public:
 
     const fs::path& path() const { return path_; }
 
-    Status put_in_place(const fs::path& target) {
+    /// 0 or the error number.
+    int put_in_place() {
         std::error_code failed;
-        const fs::file_status existing = fs::status(target, failed);
-        if (fs::is_directory(existing)) return cannot_write(target, "it is a folder");
+        const fs::file_status existing = fs::status(real_target_, failed);
         if (fs::is_regular_file(existing)) fs::permissions(path_, existing.permissions(), failed); // best effort
-        const fs::path real = fs::is_symlink(target, failed) ? fs::weakly_canonical(target, failed) : target;
-        if (::rename(path_.c_str(), real.c_str()) != 0)
-            return cannot_write(target, "its folder does not let us (error " + std::to_string(errno) + ")");
+        if (::rename(path_.c_str(), real_target_.c_str()) != 0) return errno;
         path_.clear();
-        return Success{};
+        sync_folder(real_target_.parent_path());
+        return 0;
     }
 
 private:
-    explicit TemporaryFile(fs::path path) : path_(std::move(path)) {}
-    fs::path path_;
+    TemporaryFile(fs::path path, fs::path real_target) : path_(std::move(path)), real_target_(std::move(real_target)) {}
+    fs::path path_, real_target_;
 };
 
 /// Closes what it holds.
@@ -296,35 +265,21 @@ public:
 
 class NumberedPictures : public FrameSink {
 public:
-    explicit NumberedPictures(const fs::path& target)
-        : folder_(target.parent_path()), pattern_(*number_pattern(target.filename().string())) {}
+    NumberedPictures(NumberedName name, FileBatch files) : name_(std::move(name)), files_(std::move(files)) {}
 
     Status add(const Picture& frame) override {
-        Result<TemporaryFile> file = TemporaryFile::create(picture_path(files_.size()), encode_png(frame));
-        if (!file) return file.error();
-        files_.push_back(std::move(file).value());
-        return Success{};
+        const fs::path target = name_.file(++count_), file = files_.path(target.filename().string());
+        if (Status free = files_.check_place(target.filename().string()); !free) return free;
+        const Status written = write_file(file, encode_png(frame));
+        return written ? written : renamed(written.error(), file, target);
     }
 
-    Status finish() override {
-        std::error_code ignored;
-        for (std::size_t i = 0; i < files_.size(); ++i)
-            if (fs::is_directory(picture_path(i), ignored)) return cannot_write(picture_path(i), "it is a folder");
-        for (std::size_t i = 0; i < files_.size(); ++i) {
-            const Status status = files_[i].put_in_place(picture_path(i));
-            if (status) continue;
-            for (std::size_t placed = 0; placed < i; ++placed) fs::remove(picture_path(placed), ignored);
-            return status;
-        }
-        return Success{};
-    }
+    Status finish() override { return files_.finish(); }
 
 private:
-    fs::path picture_path(std::size_t index) const { return folder_ / pattern_.name(static_cast<unsigned>(index + 1)); }
-
-    fs::path folder_;
-    NumberPattern pattern_;
-    std::vector<TemporaryFile> files_;
+    NumberedName name_;
+    FileBatch files_;
+    std::size_t count_ = 0;
 };
 
 class EncodedFilm : public FrameSink {
@@ -356,7 +311,8 @@ public:
         if (!ffmpeg_.finish()) return failure();
         const Descriptor film(::open(file_.path().c_str(), O_RDONLY | O_CLOEXEC));
         if (!film.is_open() || ::fsync(film.get()) != 0) return cannot_write(target_, "the disk failed");
-        return file_.put_in_place(target_);
+        if (const int failed = file_.put_in_place()) return cannot_write(target_, failed);
+        return Success{};
     }
 
 private:
@@ -414,12 +370,15 @@ Result<FilmWriter> FilmWriter::create(const fs::path& path, unsigned width, unsi
     if (fs::exists(path, ignored) && ::access(path.c_str(), W_OK) != 0)
         return cannot_write(path, "permission is denied");
 
-    Result<TemporaryFile> file = TemporaryFile::create(path, {}); // tells at once whether the folder takes files
-    if (!file) return file.error();
+    // Whether the folder takes files is told at once.
     auto content = std::make_unique<Content>(Content{path.string(), width, height, nullptr});
     if (kind == FilmKind::numbered) {
-        content->sink = std::make_unique<NumberedPictures>(path);
+        Result<FileBatch> files = FileBatch::create(path.parent_path());
+        if (!files) return renamed(files.error(), path.parent_path().empty() ? "." : path.parent_path(), path);
+        content->sink = std::make_unique<NumberedPictures>(*printf_numbered_name(path), std::move(*files));
     } else {
+        Result<TemporaryFile> file = TemporaryFile::create(path);
+        if (!file) return file.error();
         auto film = std::make_unique<EncodedFilm>(path, std::move(file).value());
         if (const Status started = film->start(kind, width, height, frames_per_second); !started)
             return started.error();

@@ -14,7 +14,9 @@ bool is_film_path(const std::filesystem::path& path);
 
 /// Writes a film frame by frame. Nothing stands at `path` until finish(); a writer that goes away before takes its
 /// unfinished files (temporary ones beside the target) and the ffmpeg that it started with it, also when it was
-/// cancelled. Numbers of pictures count from 1. Transparent parts of .mp4 and .gif become white.
+/// cancelled. Numbers of pictures count from 1. Transparent parts of .mp4 and .gif become white. A symbolic link to a
+/// film is followed; numbered pictures replace files, but no links (io/file_batch.h says what holds when the process is
+/// killed). A killed process leaves `.filigree-X.tmp` of an .mp4 or .gif, which may be deleted.
 class FilmWriter {
 public:
     /// .mp4 (H.264, yuv420p; odd sizes are padded by a row or column of the last pixel) and .gif (a palette of its own)
@@ -29,7 +31,7 @@ public:
 
     /// Errors: mismatch (another size), unwritable (disk full, ffmpeg failed: with its last words).
     Status add(const Picture& frame);
-    /// Puts the film in place. Errors: unsuitable (no frames), unwritable.
+    /// Puts the film in place: all numbered pictures or none. Errors: unsuitable (no frames), unwritable.
     Status finish();
 
     unsigned frame_count() const;
