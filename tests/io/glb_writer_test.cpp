@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include <chrono>
+#include <cmath>
 #include <cstring>
 #include <fstream>
 
@@ -313,4 +315,57 @@ TEST(GlbWriter, GltfWithFilesBesideItIsNotWritten) {
     ASSERT_FALSE(result.ok());
     EXPECT_EQ(result.error().code, ErrorCode::unsupported);
     EXPECT_NE(result.error().message.find("write .glb"), std::string::npos);
+}
+
+TEST(GlbWriter, LargeFacesAndHubsWithSeamsTakeLinearTime) {
+    constexpr Index kCorners = 50'000; // squared, these would take half a minute
+    const auto circle = [](Index v) {
+        const double angle = 2 * M_PI * double(v) / kCorners;
+        return Vec3f(float(std::cos(angle)), float(std::sin(angle)), 0);
+    };
+    Mesh polygon, fan;
+    std::vector<Index> corners;
+    for (Index v = 0; v < kCorners; ++v) {
+        polygon.positions.push_back(circle(v)), fan.positions.push_back(circle(v));
+        corners.push_back(v);
+    }
+    polygon.add_face(corners);
+    polygon.add_face(Triangle{0, 2, 1}); // other UVs at these: a seam
+    fan.positions.emplace_back(0.0f, 0.0f, 1.0f);
+    for (Index v = 0; v < kCorners; ++v) fan.add_face(Triangle{v, (v + 1) % kCorners, kCorners});
+    for (Mesh* mesh : {&polygon, &fan})
+        for (Index c = 0; c < mesh->corner_count(); ++c) { // a UV each
+            mesh->uvs.values.emplace_back(float(c) / float(mesh->corner_count()), 0.5f);
+            mesh->uvs.corners.push_back(c);
+        }
+    for (const Mesh* mesh : {&polygon, &fan}) {
+        const auto start = std::chrono::steady_clock::now();
+        std::string bytes;
+        ASSERT_TRUE(write_mesh(*mesh, MeshFormat::gltf, bytes, {}, RunContext(1)).ok());
+        EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(5));
+        const Result<MeshFile> back = read_mesh(bytes, "x.glb", RunContext(1));
+        ASSERT_TRUE(back.ok());
+        EXPECT_EQ(back->mesh.positions, mesh->positions);
+        for (std::size_t c = 0; mesh == &fan && c < mesh->corner_count(); ++c)
+            ASSERT_NEAR(back->mesh.uvs.values[back->mesh.uvs.corners[c]].x(), mesh->uvs.values[c].x(), 1e-6f);
+    }
+}
+
+TEST(GlbWriter, ACancelledContextStopsIt) {
+    const RunContext context(1);
+    context.cancel();
+    std::string bytes;
+    EXPECT_EQ(write_mesh(square(), MeshFormat::gltf, bytes, {}, context).error().code, ErrorCode::cancelled);
+}
+
+TEST(GlbWriter, NamesWithAZeroByteAreReadByEverybody) {
+    Mesh mesh = square();
+    mesh.scalars = {{std::string("a\0b", 3), {1, 2, 3, 4}}};
+    std::string bytes;
+    ASSERT_TRUE(write_mesh(mesh, MeshFormat::gltf, bytes, {}, RunContext(1)).ok());
+    const Result<MeshFile> back = read_mesh(bytes, "x.glb", RunContext(1));
+    ASSERT_TRUE(back.ok()) << back.error().message;
+    ASSERT_EQ(back->mesh.scalars.size(), 1u);
+    EXPECT_EQ(back->mesh.scalars[0].name, "a_b");
+    EXPECT_EQ(back->mesh.scalars[0].values, mesh.scalars[0].values);
 }

@@ -275,6 +275,30 @@ TEST(GltfRefusal, SkinsAndMorphTargets) {
         "meshes[0]: has 1 morph targets and 2 weights");
 }
 
+TEST(GltfRefusal, MatricesOfJointsThatMoveNothingMayBeDamaged) {
+    const std::vector<float> damaged = {0, 0, 0, 0, 1e20f, 2, 0, 7, 0, 0, NAN, 0, 0, 0, 0, 2};
+    const std::vector<float> identity = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+    const auto skinned = [&](const std::vector<float>& first, const std::vector<float>& second) {
+        std::vector<float> matrices = first;
+        matrices.insert(matrices.end(), second.begin(), second.end());
+        GltfText file = triangle();
+        file.add<std::uint8_t>({1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}, 5121, "VEC4"); // all by joint 1
+        file.add({1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}, "VEC4");
+        file.add(matrices, "MAT4");
+        return file.text(R"("nodes":[{"mesh":0,"skin":0},{},{}],"skins":[{"joints":[1,2],"inverseBindMatrices":3}],
+                          "meshes":[{"primitives":[{"attributes":{"POSITION":0,"JOINTS_0":1,"WEIGHTS_0":2}}]}])");
+    };
+    const auto file = read_mesh(skinned(damaged, identity), "a.gltf", RunContext(1));
+    ASSERT_TRUE(file.ok()) << file.error().message;
+    ASSERT_EQ(file->warnings.size(), 1u);
+    EXPECT_EQ(file->warnings[0],
+              "skins[0].inverseBindMatrices: 1 matrix is damaged, of a joint that moves no vertex; left out.");
+    const auto plain = read_mesh(skinned(identity, identity), "a.gltf", RunContext(1));
+    EXPECT_TRUE(plain->warnings.empty());
+    EXPECT_EQ(file->mesh.positions, plain->mesh.positions);
+    expect_refused(skinned(identity, damaged), "matrix 1 is not finite or has a last row");
+}
+
 TEST(GltfRefusal, Animations) {
     const auto animated = [](const std::vector<float>& times, const std::vector<float>& values, const std::string& type,
                              const std::string& path, const std::string& node = "") {

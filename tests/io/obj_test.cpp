@@ -72,7 +72,7 @@ TEST(Obj, ErrorsNameTheLine) {
         {kTriangle + "f 1 2 -4\n", ":4:"},
         {kTriangle + "\n\nf 1 2 18446744073709551617\n", ":6:"},
         {kTriangle + "f 1 2 3.5\n", ":4:"},
-        {kTriangle + "f 1/1 2/1 3/1\n", "UV 1"},
+        {kTriangle + "vt 0 0\nf 1/1 2/1 3/2\n", "UV 2"},
         {kTriangle + "f 1 \\\n2 \\\n9\n", ":6:"},
         {kTriangle + "\x01\x02 3\n", ":4:"},
     };
@@ -90,4 +90,40 @@ TEST(Obj, WeightsOfVerticesAreLeftOutWithAWarning) {
     EXPECT_EQ(file->mesh.positions[1], Vec3f(1, 0, 0));
     ASSERT_EQ(file->warnings.size(), 1u);
     EXPECT_EQ(file->warnings[0].substr(0, 2), "2 ");
+}
+
+TEST(Obj, NormalsAndUvsThatTheFileLacksAreLeftOut) {
+    for (const std::string face : {"f 1//1 2//2 3//3\n", "f 1//7 2//7 3//7\n", "f -3//-3 -2//-2 -1//-1\n"}) {
+        const auto file = read(kTriangle + face);
+        ASSERT_TRUE(file.ok()) << file.error().message;
+        EXPECT_TRUE(file->mesh.normals.empty());
+        EXPECT_EQ(file->mesh.corners, (std::vector<Index>{0, 1, 2}));
+        ASSERT_EQ(file->warnings.size(), 1u);
+        EXPECT_EQ(file->warnings[0], "The faces refer to normals, but the file has none; left out.");
+    }
+    const auto uvs = read(kTriangle + "vn 0 0 1\nf 1/1/1 2/2/1 3/3/1\n");
+    ASSERT_TRUE(uvs.ok());
+    EXPECT_TRUE(uvs->mesh.uvs.empty());
+    EXPECT_EQ(uvs->mesh.normals.values.size(), 1u);
+    ASSERT_EQ(uvs->warnings.size(), 1u);
+    EXPECT_EQ(uvs->warnings[0], "The faces refer to UVs, but the file has none; left out.");
+    // where it has some, one that is not there is damage
+    EXPECT_NE(read(kTriangle + "vn 0 0 1\nf 1//1 2//2 3//1\n").error().message.find("normal 2"), std::string::npos);
+    const auto early = read(kTriangle + "f 1//-1 2//-1 3//-1\nvn 0 0 1\n");
+    ASSERT_FALSE(early.ok());
+    EXPECT_NE(early.error().message.find("cow.obj:4: a corner refers to an element before the first"),
+              std::string::npos)
+        << early.error().message;
+}
+
+TEST(Obj, ACtrlZAtTheEndIsLeftOut) {
+    for (const std::string end : {"\x1a", "\n\x1a", "\r\n\x1a\r\n", "\n\x1a\x1a\n"}) {
+        const auto file = read(kTriangle + "f 1 2 3" + end);
+        ASSERT_TRUE(file.ok()) << file.error().message;
+        EXPECT_EQ(file->mesh.face_count(), 1u);
+        ASSERT_EQ(file->warnings.size(), 1u);
+        EXPECT_NE(file->warnings[0].find("Ctrl-Z"), std::string::npos);
+    }
+    EXPECT_FALSE(read(kTriangle + "\x1a\nf 1 2 3\n").ok()); // in the middle it is damage
+    EXPECT_TRUE(read(kTriangle + "f 1 2 3\n\n \n")->warnings.empty());
 }

@@ -132,3 +132,52 @@ TEST(Ply, ScalarsWhoseNamesAreTakenGetOthers) {
     for (const VertexScalar& scalar : back->mesh.scalars) names.push_back(scalar.name);
     EXPECT_EQ(names, (std::vector<std::string>{"x_2", "a_b", "a_b_2"}));
 }
+
+TEST(Ply, TriangleStripsAreRead) {
+    const std::string vertices = "element vertex 5\nproperty float x\nproperty float y\nproperty float z\n";
+    const std::string body = "0 0 0 1 0 0 0 1 0 1 1 0 0 2 0\n";
+    for (const char* type : {"int int", "uint uchar", "uchar short"}) {
+        const std::string strips = "element tristrips 1\nproperty list " + std::string(type) + " vertex_indices\n";
+        if (std::string(type) == "uint uchar") { // no -1 in it
+            const auto file = read(ascii(vertices + strips, body + "4 0 1 2 3\n"));
+            EXPECT_EQ(file->mesh.corners, (std::vector<Index>{0, 1, 2, 1, 3, 2}));
+            continue;
+        }
+        const auto file = read(ascii(vertices + strips, body + "11 0 1 2 3 -1 2 3 4 4 -1 0\n"));
+        ASSERT_TRUE(file.ok()) << file.error().message;
+        // every second one is turned over; the one with a repeated vertex is none
+        EXPECT_EQ(file->mesh.corners, (std::vector<Index>{0, 1, 2, 1, 3, 2, 2, 3, 4}));
+        EXPECT_EQ(file->mesh.face_count(), 3u);
+        EXPECT_TRUE(file->warnings.empty());
+        EXPECT_EQ(check_mesh(file->mesh), "");
+        const auto out = read(ascii(vertices + strips, body + "4 0 1 2 5\n"));
+        ASSERT_FALSE(out.ok());
+        EXPECT_NE(out.error().message.find("tristrips 0"), std::string::npos) << out.error().message;
+        EXPECT_NE(out.error().message.find("vertex 5"), std::string::npos) << out.error().message;
+    }
+    // beside faces they are the same faces again
+    const std::string both = vertices + kFaces + "element tristrips 1\nproperty list int int vertex_indices\n";
+    const auto faces = read(ascii(both, body + "3 0 1 2\n4 0 1 2 3\n"));
+    EXPECT_EQ(faces->mesh.face_count(), 1u);
+    EXPECT_EQ(faces->warnings.size(), 1u);
+}
+
+TEST(Ply, BinaryTriangleStripsAreRead) {
+    std::string text = "ply\nformat binary_big_endian 1.0\n" + kVertices +
+                       "element tristrips 1\nproperty list int int vertex_indices\nend_header\n";
+    text += std::string(36, '\0') + std::string("\0\0\0\x04\0\0\0\0\0\0\0\x01\0\0\0\x02\xff\xff\xff\xff", 20);
+    const auto file = read(text);
+    ASSERT_TRUE(file.ok()) << file.error().message;
+    EXPECT_EQ(file->mesh.corners, (std::vector<Index>{0, 1, 2}));
+}
+
+TEST(Ply, AZeroByteInANameDoesNotReachOtherFiles) {
+    std::string vertices = kVertices + "property float a_b\n";
+    vertices.replace(vertices.size() - 3, 1, 1, '\0');
+    const auto file = read(ascii(vertices + kFaces, "0 0 0 1 1 0 0 2 0 1 0 3 3 0 1 2\n"));
+    ASSERT_TRUE(file.ok()) << file.error().message;
+    ASSERT_EQ(file->mesh.scalars.size(), 1u);
+    EXPECT_EQ(file->mesh.scalars[0].name, "a_b");
+    ASSERT_EQ(file->warnings.size(), 1u);
+    EXPECT_NE(file->warnings[0].find("zero byte"), std::string::npos);
+}

@@ -111,6 +111,15 @@ TEST(TextWriter, FarCoordinatesAreShortAndReadBack) {
     EXPECT_EQ(text, "524288.5 524288 524388");
 }
 
+TEST(TextWriter, TheSmallestOffsetsFromAnOriginAreWritten) {
+    for (const float offset : {1e-45f, -1e-45f, 1.1e-38f, 3e-39f}) {
+        std::string text;
+        TextWriter(text).coordinate(1000, offset).text(" ").coordinate(1e-40, offset);
+        EXPECT_EQ(text.substr(0, text.find(' ')), "1000");
+        EXPECT_EQ(parse(text.substr(text.find(' ') + 1)), 1e-40 + static_cast<double>(offset));
+    }
+}
+
 TEST(TextScanner, CountsLinesOfEveryKind) {
     TextScanner text("a\nb\r\nc\rd");
     for (std::size_t line = 1; line <= 4; ++line) {

@@ -258,7 +258,8 @@ std::string as_utf8(const std::string& name) {
 
 /// A name that no other attribute has.
 std::string attribute_name(const std::string& scalar, const Json& attributes) {
-    const std::string name = "_" + as_utf8(scalar);
+    std::string name = "_" + as_utf8(scalar);
+    std::replace(name.begin(), name.end(), '\0', '_'); // where other programs' names end
     std::string free_name = name;
     for (int number = 2; attributes.contains(free_name); ++number) free_name = name + "_" + std::to_string(number);
     return free_name;
@@ -310,8 +311,8 @@ public:
 
 private:
     std::optional<std::size_t> add(const std::string& bytes, const std::string& name) {
-        const std::string_view ending = picture_ending(bytes);
-        if (ending.empty()) {
+        const std::string_view extension = picture_extension(bytes);
+        if (extension.empty()) {
             warnings_.push_back("The texture " + name + " is neither PNG nor JPEG and was left out.");
             return std::nullopt;
         }
@@ -319,8 +320,8 @@ private:
         if (!json.contains("samplers")) // smooth, repeated
             json["samplers"] =
                 Json::array({{{"magFilter", 9729}, {"minFilter", 9987}, {"wrapS", 10497}, {"wrapT", 10497}}});
-        Json image = {{"bufferView", builder_.add_view(ending == ".png" ? plain_png(bytes) : bytes)},
-                      {"mimeType", ending == ".png" ? "image/png" : "image/jpeg"}};
+        Json image = {{"bufferView", builder_.add_view(extension == ".png" ? plain_png(bytes) : bytes)},
+                      {"mimeType", extension == ".png" ? "image/png" : "image/jpeg"}};
         if (!name.empty()) image["name"] = name;
         json["images"].push_back(std::move(image));
         json["textures"].push_back({{"sampler", 0}, {"source", json["images"].size() - 1}});

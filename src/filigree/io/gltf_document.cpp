@@ -113,7 +113,7 @@ void Value::fail(const std::string& why, ErrorCode code) const {
     throw Damage{path_.empty() ? why : path_ + ": " + why, code};
 }
 
-Value Value::operator[](const char* member) const {
+Value Value::operator[](const std::string& member) const {
     std::string path = path_.empty() ? member : path_ + "." + member;
     if (!json_) return {nullptr, std::move(path)};
     if (!json_->is_object()) fail("is not an object.");

@@ -4,6 +4,7 @@
 #include "filigree/core/result.h"
 #include "filigree/core/run_context.h"
 #include "filigree/core/types.h"
+#include "filigree/io/gltf_component.h"
 
 #include <cstdint>
 #include <filesystem>
@@ -39,7 +40,8 @@ public:
     [[noreturn]] void fail(const std::string& why, ErrorCode code = ErrorCode::bad_file) const;
 
     /// A member of an object; does not exist where either of them does not.
-    Value operator[](const char* member) const;
+    Value operator[](const std::string& member) const;
+    Value operator[](const char* member) const { return (*this)[std::string(member)]; }
     /// Elements of an array, 0 where there is none.
     std::size_t size() const;
     Value operator[](std::size_t element) const;
@@ -62,7 +64,7 @@ private:
     std::string path_;
 };
 
-enum class Component { int8 = 5120, uint8 = 5121, int16 = 5122, uint16 = 5123, uint32 = 5125, float32 = 5126 };
+using Component = GltfComponent;
 std::size_t size_of(Component component);
 
 /// Checked elements of numbers in a buffer. Views the document's bytes.

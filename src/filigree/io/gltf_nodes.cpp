@@ -241,9 +241,12 @@ void read_skins(Scene& scene) {
             matrices.read(j, columns);
             const bool finite =
                 std::all_of(columns, columns + kMatrixNumbers, [](double x) { return std::isfinite(x); });
-            if (!finite || !is_affine(columns))
-                binds.fail("matrix " + std::to_string(j) + " is not finite or has a last row that is not 0 0 0 1.");
-            skin.inverse_binds[j] = affine_of(columns);
+            if (finite && is_affine(columns)) {
+                skin.inverse_binds[j] = affine_of(columns);
+            } else { // harmless where no vertex has a weight for the joint, which the meshes tell
+                skin.damaged.resize(skin.joints.size(), false);
+                skin.damaged[j] = true;
+            }
         }
     }
 }

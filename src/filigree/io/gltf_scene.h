@@ -6,6 +6,7 @@
 
 #include <functional>
 #include <memory>
+#include <set>
 #include <span>
 
 namespace filigree::gltf {
@@ -35,6 +36,7 @@ struct Node {
 struct Skin {
     std::vector<std::size_t> joints;
     std::vector<Affine> inverse_binds; ///< one a joint
+    std::vector<bool> damaged;         ///< joints whose matrix is none; empty: no joint
 };
 
 /// What moves a vertex: influences first[v] .. first[v + 1] - 1, those of weight 0 left out.
@@ -102,7 +104,7 @@ struct Animation {
 
 struct Scene {
     std::string name;  ///< the file's, for messages
-    std::string owned; ///< its bytes
+    std::string owned; ///< its bytes, unless they are kept elsewhere
     std::unique_ptr<Document> document;
     std::vector<Node> nodes;
     std::vector<std::size_t> order; ///< all nodes, parents first
@@ -120,6 +122,9 @@ struct Scene {
 void read_nodes(Scene& scene);
 void read_skins(Scene& scene);
 void read_animations(Scene& scene);
+/// A primitive's attributes and morph targets. left_out: gets the names of attributes that are not read.
+Geometry read_geometry(Document& document, const Value& primitive, std::vector<std::string>& warnings,
+                       std::set<std::string>& left_out);
 /// Geometries, blocks, and the mesh's faces and attributes.
 void read_meshes(Scene& scene, const RunContext& context);
 /// The document's materials, and for each its number in the mesh; kNoIndex for our own stand-in for none.

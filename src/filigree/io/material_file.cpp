@@ -1,5 +1,6 @@
 // Wavefront MTL, as far as we keep it: Kd, map_Kd, d, Tr, and Pm and Pr, which many programs have added.
 #include "filigree/io/material_file.h"
+#include "filigree/io/extension.h"
 #include "filigree/io/file.h"
 #include "filigree/io/text_scanner.h"
 #include "filigree/io/text_writer.h"
@@ -37,13 +38,6 @@ std::string_view take_word(std::string_view& text) {
 std::string_view without_quotes(std::string_view name) {
     const bool quoted = name.size() > 1 && name.front() == '"' && name.back() == '"';
     return quoted ? name.substr(1, name.size() - 2) : name;
-}
-
-std::string lower_case(std::string_view text) {
-    std::string lower(text);
-    for (char& c : lower)
-        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-    return lower;
 }
 
 bool is_number(std::string_view word, double& value) {
@@ -313,10 +307,10 @@ private:
 
     /// The name, with a number where another file has it.
     template <class MayReplace>
-    std::string free_name(const std::string& stem, std::string_view ending, const MayReplace& may_replace) {
-        std::string name = stem + std::string(ending);
+    std::string free_name(const std::string& stem, std::string_view extension, const MayReplace& may_replace) {
+        std::string name = stem + std::string(extension);
         for (int number = 2; taken_.contains(name) || (exists(name) && !may_replace(name)); ++number)
-            name = stem + "_" + std::to_string(number) + std::string(ending);
+            name = stem + "_" + std::to_string(number) + std::string(extension);
         taken_.insert(name);
         return name;
     }
@@ -345,13 +339,13 @@ private:
     std::string picture_name(const MeshMaterial& material, const std::string& name) {
         const auto [entry, is_new] = pictures_.try_emplace(material.picture_bytes.get());
         if (!is_new) return entry->second;
-        const std::string_view ending = picture_ending(*material.picture_bytes);
-        if (ending.empty()) {
+        const std::string_view extension = picture_extension(*material.picture_bytes);
+        if (extension.empty()) {
             library_.warnings.push_back("The texture of the material " + in_quotes(name) +
                                         " is neither PNG nor JPEG and was left out.");
             return "";
         }
-        entry->second = free_name(stem_ + "_" + as_file_name(name), ending,
+        entry->second = free_name(stem_ + "_" + as_file_name(name), extension,
                                   [&](const std::string& taken) { return our_pictures_.contains(taken); });
         library_.files.push_back({entry->second, material.picture_bytes});
         return entry->second;
@@ -390,7 +384,7 @@ MaterialLibrary make_material_library(const Mesh& mesh, const fs::path& obj_path
     return LibraryMaker(mesh, obj_path).make();
 }
 
-std::string_view picture_ending(std::string_view bytes) {
+std::string_view picture_extension(std::string_view bytes) {
     if (bytes.starts_with("\x89PNG\r\n\x1a\n")) return ".png";
     return bytes.starts_with("\xff\xd8\xff") ? ".jpg" : "";
 }

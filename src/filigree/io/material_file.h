@@ -39,6 +39,6 @@ struct MaterialLibrary {
 MaterialLibrary make_material_library(const Mesh& mesh, const std::filesystem::path& obj_path);
 
 /// How a picture's file begins: ".png", ".jpg", or "" for what is neither.
-std::string_view picture_ending(std::string_view bytes);
+std::string_view picture_extension(std::string_view bytes);
 
 } // namespace filigree

@@ -1,4 +1,5 @@
 #include "filigree/io/mesh_file.h"
+#include "filigree/io/extension.h"
 #include "filigree/io/file.h"
 #include "filigree/io/gltf.h"
 #include "filigree/io/material_file.h"
@@ -14,12 +15,6 @@ namespace filigree {
 namespace {
 
 constexpr std::string_view kKnownFormats = "use .obj, .ply, .stl, .off or .glb";
-
-std::string lower_case(std::string text) {
-    for (char& c : text)
-        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-    return text;
-}
 
 /// Content that is recognised, and what to say about it.
 struct Foreign {
@@ -71,7 +66,8 @@ Result<MeshFormat> decide_format(std::string_view bytes, const std::string& name
     const Result<MeshFormat> by_name = mesh_format(name);
     if (by_name.ok()) return by_name;
     if (is_obj(bytes)) return MeshFormat::obj;
-    return Error{ErrorCode::unsupported, name + ": neither its content nor its ending is of a mesh format we read; " +
+    return Error{ErrorCode::unsupported, name +
+                                             ": neither its content nor its extension is of a mesh format we read; " +
                                              std::string(kKnownFormats) + "."};
 }
 
@@ -91,35 +87,35 @@ Result<MeshFile> parse(const MeshSource& source, MeshFormat format) {
     return source.unsupported("this format is not read.");
 }
 
-/// Sets what is not a finite number to zero and counts it.
-template <class Vector>
-std::size_t mend(std::vector<Vector>& values) {
-    std::size_t mended = 0;
-    for (Vector& value : values) {
-        if (value.allFinite()) continue;
-        value.setZero();
-        ++mended;
-    }
-    return mended;
-}
-
-std::size_t mend(std::vector<float>& values) {
-    const auto is_bad = [](float x) { return !fits_float(static_cast<double>(x)); };
-    const auto mended = std::count_if(values.begin(), values.end(), is_bad);
-    if (mended > 0) std::replace_if(values.begin(), values.end(), is_bad, 0.0f);
-    return static_cast<std::size_t>(mended);
-}
-
 void mend_attributes(MeshFile& file) {
     const auto warn = [&](std::size_t mended, const std::string& what) {
         if (mended > 0)
             file.warnings.push_back(std::to_string(mended) + " " + what + " were not finite and became zero.");
     };
-    warn(mend(file.mesh.uvs.values), "UVs");
-    warn(mend(file.mesh.normals.values), "normals");
-    warn(mend(file.mesh.colors), "colours");
+    warn(zero_not_finite(file.mesh.uvs.values), "UVs");
+    warn(zero_not_finite(file.mesh.normals.values), "normals");
+    warn(zero_not_finite(file.mesh.colors), "colours");
     for (VertexScalar& scalar : file.mesh.scalars)
-        warn(mend(scalar.values), "values of the scalar '" + scalar.name + "'");
+        warn(zero_not_finite(scalar.values), "values of the scalar '" + scalar.name + "'");
+}
+
+/// Names are without zero bytes, which end a name in other programs and in our own models.
+void mend_names(MeshFile& file) {
+    std::size_t mended = 0;
+    const auto mend_name = [&](std::string& name) {
+        if (name.find('\0') == std::string::npos) return;
+        std::replace(name.begin(), name.end(), '\0', '_');
+        ++mended;
+    };
+    Mesh& mesh = file.mesh;
+    for (VertexScalar& scalar : mesh.scalars) mend_name(scalar.name);
+    for (FaceLabels* labels : {&mesh.objects, &mesh.groups, &mesh.materials})
+        for (std::string& name : labels->names) mend_name(name);
+    for (MeshMaterial& material : mesh.embedded_materials) mend_name(material.name);
+    for (std::string& name : mesh.material_files) mend_name(name);
+    if (mended > 0)
+        file.warnings.push_back(std::to_string(mended) + (mended == 1 ? " name has" : " names have") +
+                                " a zero byte inside, which became '_'.");
 }
 
 /// Colours from 0 to 255 as numbers, which some programs write, become 0 to 1.
@@ -148,18 +144,12 @@ Result<MeshFile> read_checked(std::string_view bytes, const std::string& name, c
     if (file->mesh.face_count() == 0)
         file->warnings.push_back("There are no faces: read as " + std::to_string(file->mesh.vertex_count()) +
                                  (file->mesh.vertex_count() == 1 ? " point." : " points."));
+    mend_names(*file);
     mend_attributes(*file);
     scale_colors(*file);
     assert(check_mesh(file->mesh).empty());
     context.report("Reading", 1);
     return file;
-}
-
-std::string join(const std::vector<std::string>& words) {
-    std::string joined;
-    for (std::size_t i = 0; i < words.size(); ++i)
-        joined += (i == 0 ? "" : i + 1 < words.size() ? ", " : " and ") + words[i];
-    return joined;
 }
 
 Error out_of_memory(const std::string& name) {
@@ -168,7 +158,7 @@ Error out_of_memory(const std::string& name) {
 
 std::vector<std::string> with_losses(const std::string& format, const std::vector<std::string>& lost,
                                      std::vector<std::string> warnings) {
-    if (!lost.empty()) warnings.insert(warnings.begin(), format + " cannot hold " + join(lost) + "; left out.");
+    if (!lost.empty()) warnings.insert(warnings.begin(), cannot_hold(format, lost));
     return warnings;
 }
 
@@ -201,13 +191,14 @@ bool is_file_in_folder(const std::filesystem::path& path) {
 } // namespace
 
 Result<MeshFormat> mesh_format(const std::filesystem::path& path) {
-    const std::string ending = lower_case(path.extension().string());
-    if (ending == ".obj") return MeshFormat::obj;
-    if (ending == ".ply") return MeshFormat::ply;
-    if (ending == ".stl") return MeshFormat::stl;
-    if (ending == ".off") return MeshFormat::off;
-    if (ending == ".glb" || ending == ".gltf") return MeshFormat::gltf;
-    return Error{ErrorCode::unsupported, path.string() + ": " + (ending.empty() ? "a name without an ending" : ending) +
+    const std::string extension = lower_extension(path);
+    if (extension == ".obj") return MeshFormat::obj;
+    if (extension == ".ply") return MeshFormat::ply;
+    if (extension == ".stl") return MeshFormat::stl;
+    if (extension == ".off") return MeshFormat::off;
+    if (extension == ".glb" || extension == ".gltf") return MeshFormat::gltf;
+    return Error{ErrorCode::unsupported, path.string() + ": " +
+                                             (extension.empty() ? "a name without an extension" : extension) +
                                              " is not of a mesh format we know; " + std::string(kKnownFormats) + "."};
 }
 
@@ -274,7 +265,7 @@ Result<std::vector<std::string>> write_mesh(const Mesh& mesh, const std::filesys
                                             const WriteMeshOptions& options, const RunContext& context) {
     const Result<MeshFormat> format = options.format ? Result<MeshFormat>(*options.format) : mesh_format(path);
     if (!format.ok()) return format.error();
-    if (*format == MeshFormat::gltf && lower_case(path.extension().string()) == ".gltf")
+    if (*format == MeshFormat::gltf && lower_extension(path) == ".gltf")
         return Error{ErrorCode::unsupported, path.string() + ": glTF is written as one file; write .glb."};
     if (context.is_cancelled()) return cancelled_error();
     if (*format == MeshFormat::obj && !mesh.embedded_materials.empty() && is_file_in_folder(path))

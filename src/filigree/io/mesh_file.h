@@ -21,17 +21,17 @@ struct MeshFile {
     std::vector<std::string> warnings;
 };
 
-/// The format a file name's ending stands for (any case), or `unsupported` with the list of those we know.
+/// The format a file name's extension stands for (any case), or `unsupported` with the list of those we know.
 Result<MeshFormat> mesh_format(const std::filesystem::path& path);
 
 /// Reads a mesh; "-" reads standard input (the format is then found from the content). The format comes from the
-/// content where it can be told, else from the ending. Vertex and face order are the file's. A mesh without faces is
+/// content where it can be told, else from the extension. Vertex and face order are the file's. A mesh without faces is
 /// read (as points) with a warning. What comes back passes check_mesh.
 /// Errors: not_found, bad_file ("cow.obj:214: ..."), unsupported, out_of_memory, cancelled.
 /// Cost: one pass; memory a small multiple of the file.
 Result<MeshFile> read_mesh(const std::filesystem::path& path, const RunContext& context);
 
-/// The same from bytes in memory; `name` stands in messages, and its ending decides where the content cannot.
+/// The same from bytes in memory; `name` stands in messages, and its extension decides where the content cannot.
 Result<MeshFile> read_mesh(std::string_view bytes, const std::string& name, const RunContext& context);
 
 /// Whether a vertex scalar is one of f00 .. f22: a deformation gradient's entry in that row and column, as the file of
@@ -39,7 +39,7 @@ Result<MeshFile> read_mesh(std::string_view bytes, const std::string& name, cons
 bool is_gradient_name(std::string_view scalar);
 
 struct WriteMeshOptions {
-    std::optional<MeshFormat> format = std::nullopt; ///< unset: from the file name's ending
+    std::optional<MeshFormat> format = std::nullopt; ///< unset: from the file name's extension
     bool ascii = false;                              ///< PLY and STL: text instead of binary
     bool big_endian = false;                         ///< PLY: binary, most significant byte first
     /// GLB: the mesh's own path; colours and textures from the material libraries beside it are embedded. Empty: no

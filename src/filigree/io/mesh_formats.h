@@ -1,12 +1,14 @@
 // The readers and writers behind mesh_file.h: a pair for each format, told what the dispatcher knows.
 #pragma once
 
+#include "filigree/io/losses.h"
 #include "filigree/io/mesh_file.h"
 #include "filigree/io/text_scanner.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
-#include <utility>
 
 namespace filigree {
 
@@ -48,7 +50,7 @@ std::vector<std::string> write_off(const Mesh& mesh, std::string& bytes);
 struct GlbNotes {
     std::vector<std::string> lost, warnings;
 };
-/// Errors: unsupported (4 GiB or more), cancelled.
+/// In glb_writer.cpp. Errors: unsupported (4 GiB or more), cancelled.
 Result<GlbNotes> write_glb(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes,
                            const RunContext& context);
 
@@ -63,6 +65,24 @@ bool is_obj(std::string_view bytes);
 
 /// Whether x fits float: finite, and not too large for it.
 inline bool fits_float(double x) { return std::abs(x) <= std::numeric_limits<float>::max(); }
+
+/// Sets vectors that are not finite to zero, and returns how many there were.
+template <class Vector>
+std::size_t zero_not_finite(std::vector<Vector>& values) {
+    std::size_t count = 0;
+    for (Vector& value : values) {
+        if (value.allFinite()) continue;
+        value.setZero();
+        ++count;
+    }
+    return count;
+}
+inline std::size_t zero_not_finite(std::vector<float>& values) {
+    const auto is_bad = [](float x) { return !fits_float(static_cast<double>(x)); };
+    const auto count = std::count_if(values.begin(), values.end(), is_bad);
+    if (count > 0) std::replace_if(values.begin(), values.end(), is_bad, 0.0f);
+    return static_cast<std::size_t>(count);
+}
 
 /// Attributes seen from a format that has one value a vertex: those values, or none when corners of one vertex differ
 /// or have none.
@@ -82,24 +102,6 @@ std::optional<std::vector<T>> values_per_vertex(const CornerAttribute<T>& attrib
     for (std::size_t v = 0; v < values.size(); ++v)
         if (value_of[v] != kUnseen) values[v] = attribute.values[value_of[v]];
     return values;
-}
-
-/// Names what a format without face labels loses.
-inline void add_face_label_losses(const Mesh& mesh, std::vector<std::string>& lost) {
-    if (!mesh.groups.empty()) lost.push_back("groups");
-    if (!mesh.materials.empty() || !mesh.material_files.empty()) lost.push_back("materials");
-    if (!mesh.smoothing.empty()) lost.push_back("smoothing groups");
-}
-
-/// Names what a format without numbers a vertex loses; the nine of a gradient together.
-inline void add_scalar_losses(const Mesh& mesh, std::vector<std::string>& lost) {
-    bool has_gradients = false;
-    for (const VertexScalar& scalar : mesh.scalars) {
-        if (!is_gradient_name(scalar.name))
-            lost.push_back("the scalar " + in_quotes(scalar.name));
-        else if (!std::exchange(has_gradients, true))
-            lost.push_back("deformation gradients (f00 to f22)");
-    }
 }
 
 } // namespace filigree

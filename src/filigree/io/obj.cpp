@@ -84,11 +84,14 @@ struct CornerValues {
 struct HighestIndex {
     std::uint64_t count = 0; // the index itself counts from 1
     std::size_t line = 0;
+    std::size_t line_before_first = 0; // of the first index that counted back from nothing; 0: none
 };
 
 class ObjReader {
 public:
-    explicit ObjReader(const MeshSource& source) : source_(source), text_(source.bytes) {}
+    explicit ObjReader(const MeshSource& source) : source_(source), text_(without_end_mark(source.bytes)) {
+        has_end_mark_ = text_.bytes_left() < source.bytes.size();
+    }
 
     Result<MeshFile> read() {
         reserve();
@@ -109,6 +112,14 @@ private:
     bool fail_at(std::size_t line, const std::string& cause) {
         error_ = source_.error_at_line(line, cause);
         return false;
+    }
+
+    /// Without the Ctrl-Z that old programs end a text with.
+    static std::string_view without_end_mark(std::string_view text) {
+        constexpr std::string_view kBlanks(" \t\r\n\0", 5), kMarkAndBlanks(" \t\r\n\0\x1a", 6);
+        const std::size_t last = text.find_last_not_of(kBlanks);
+        if (last == std::string_view::npos || text[last] != '\x1a') return text;
+        return text.substr(0, text.find_last_not_of(kMarkAndBlanks) + 1);
     }
 
     /// Guesses from the file's size (a scan has 70 bytes a vertex and 35 a face); memory that is not touched is free.
@@ -197,15 +208,30 @@ private:
         std::int64_t n = 0;
         if (!text_.integer(n)) return fail_corner();
         if (n < 0) n += static_cast<std::int64_t>(count_so_far) + 1;
-        if (n <= 0) return fail_index();
+        if (n <= 0) return fail_index(text_.line());
         if (static_cast<std::uint64_t>(n) > highest.count) highest = {static_cast<std::uint64_t>(n), text_.line()};
         index = static_cast<Index>(n - 1); // one too large for 32 bits is found by check_ranges
         return true;
     }
 
     bool fail_corner() { return fail("expected a corner such as 3 or 3/1/2, found " + in_quotes(text_.word()) + "."); }
-    bool fail_index() {
-        return fail("a corner refers to an element before the first; indices count from 1, or back from -1.");
+    bool fail_index(std::size_t line) {
+        return fail_at(line, "a corner refers to an element before the first; indices count from 1, or back from -1.");
+    }
+
+    /// The UV or normal of a corner. A file may have none of what its faces refer to (check_optional).
+    template <class T>
+    bool read_optional_index(CornerValues<T>& attribute, HighestIndex& highest, std::size_t corner) {
+        Index value = 0;
+        if (attribute.values.empty() && text_.peek() == '-') { // counts back from nothing
+            std::int64_t n = 0;
+            if (!text_.integer(n)) return fail_corner();
+            if (highest.line_before_first == 0) highest.line_before_first = text_.line();
+        } else if (!read_index(attribute.values.size(), highest, value)) {
+            return false;
+        }
+        attribute.set(corner, value);
+        return true;
     }
 
     bool has_index() const { return is_digit(text_.peek()) || text_.peek() == '-'; }
@@ -213,21 +239,15 @@ private:
     /// v, v/t, v//n or v/t/n; "v/" and "v//" happen too.
     bool read_corner() {
         const std::size_t corner = mesh_.corners.size();
-        Index vertex = 0, value = 0;
+        Index vertex = 0;
         if (!read_index(world_.size(), highest_vertex_, vertex)) return false;
         mesh_.corners.push_back(vertex);
         if (text_.peek() == '/') {
             text_.advance();
-            if (has_index()) {
-                if (!read_index(uvs_.values.size(), highest_uv_, value)) return false;
-                uvs_.set(corner, value);
-            }
+            if (has_index() && !read_optional_index(uvs_, highest_uv_, corner)) return false;
             if (text_.peek() == '/') {
                 text_.advance();
-                if (has_index()) {
-                    if (!read_index(normals_.values.size(), highest_normal_, value)) return false;
-                    normals_.set(corner, value);
-                }
+                if (has_index() && !read_optional_index(normals_, highest_normal_, corner)) return false;
             }
         }
         return text_.at_word_end() || fail_corner();
@@ -284,10 +304,22 @@ private:
         return fail_at(highest.line, "a corner refers to " + std::string(what) + " " + std::to_string(highest.count) +
                                          ", but the file has " + std::to_string(count) + "; the file may be cut off.");
     }
+    /// Where the file has none at all, as exports of positions alone, what the faces refer to is left out.
+    template <class T>
+    bool check_optional(CornerValues<T>& attribute, const HighestIndex& highest, const char* what, bool& is_missing) {
+        if (attribute.values.empty()) {
+            is_missing = !attribute.corners.empty();
+            attribute.corners.clear();
+            return true;
+        }
+        if (highest.line_before_first != 0) return fail_index(highest.line_before_first);
+        return check_range(highest, attribute.values.size(), what);
+    }
+
     bool check_ranges() {
         return check_range(highest_vertex_, world_.size(), "vertex") &&
-               check_range(highest_uv_, uvs_.values.size(), "UV") &&
-               check_range(highest_normal_, normals_.values.size(), "normal");
+               check_optional(uvs_, highest_uv_, "UV", has_missing_uvs_) &&
+               check_optional(normals_, highest_normal_, "normal", has_missing_normals_);
     }
 
     MeshFile finish() {
@@ -315,6 +347,9 @@ private:
         warn(unknown_statements_, "statements of other kinds were left out (the first: " + first_unknown_ + ").");
         warn(weights_, "vertices have a fourth coordinate, a weight, which was left out.");
         warn(third_uvs_, "UVs have a third number, which was left out.");
+        if (has_missing_uvs_) warnings.emplace_back("The faces refer to UVs, but the file has none; left out.");
+        if (has_missing_normals_) warnings.emplace_back("The faces refer to normals, but the file has none; left out.");
+        if (has_end_mark_) warnings.emplace_back("The file ends in a Ctrl-Z, an old end mark, which was left out.");
         if (colored_vertices_ > 0) warn(world_.size() - colored_vertices_, "vertices have no colour and became white.");
         return warnings;
     }
@@ -332,6 +367,7 @@ private:
     std::size_t lines_read_ = 0, short_faces_ = 0, lines_and_points_ = 0, third_uvs_ = 0, colored_vertices_ = 0;
     std::size_t unknown_statements_ = 0, weights_ = 0;
     std::string first_unknown_;
+    bool has_missing_uvs_ = false, has_missing_normals_ = false, has_end_mark_ = false;
 };
 
 template <class T>

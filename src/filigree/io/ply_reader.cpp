@@ -1,10 +1,8 @@
 // PLY, the Stanford polygon file format: text, and binary of both byte orders.
-#include "filigree/io/ply_header.h"
+#include "filigree/io/ply_body.h"
 
 #include <algorithm>
 #include <array>
-#include <bit>
-#include <cstring>
 
 namespace filigree {
 
@@ -13,118 +11,6 @@ using namespace ply;
 namespace {
 
 constexpr std::size_t kRowsBetweenReports = 1 << 16;
-static_assert(std::endian::native == std::endian::little, "little-endian files are copied as they are");
-
-template <class T>
-T load(const char* p, bool swap) {
-    std::array<char, sizeof(T)> bytes;
-    std::memcpy(bytes.data(), p, sizeof(T));
-    if (swap) std::reverse(bytes.begin(), bytes.end());
-    return std::bit_cast<T>(bytes);
-}
-
-/// Calls f(T{}) with the C++ type of `type`.
-template <class F>
-auto with_type(Type type, const F& f) {
-    switch (type) {
-    case Type::int8:
-        return f(std::int8_t{});
-    case Type::uint8:
-        return f(std::uint8_t{});
-    case Type::int16:
-        return f(std::int16_t{});
-    case Type::uint16:
-        return f(std::uint16_t{});
-    case Type::int32:
-        return f(std::int32_t{});
-    case Type::uint32:
-        return f(std::uint32_t{});
-    case Type::float32:
-        return f(float{});
-    case Type::float64:
-        break;
-    }
-    return f(double{});
-}
-
-/// The numbers of a text body, one after the other.
-class AsciiNumbers {
-public:
-    AsciiNumbers(const MeshSource& source, const TextScanner& text) : source_(source), text_(text) {}
-
-    /// Why the next number cannot be read, or "".
-    std::string read(Type type, double& x) {
-        text_.skip_space();
-        if (text_.at_end()) return "the file ends here; it is cut off";
-        if (!text_.number(x)) return "expected a number, found " + in_quotes(text_.word());
-        if (type != Type::float32 && type != Type::float64) {
-            const bool fits = with_type(type, [&](auto t) {
-                using Limits = std::numeric_limits<decltype(t)>;
-                return x >= static_cast<double>(Limits::lowest()) && x <= static_cast<double>(Limits::max());
-            });
-            if (!fits) return "a number does not fit the type of its property";
-        }
-        return "";
-    }
-    std::size_t bytes_left() const { return text_.bytes_left(); }
-    std::size_t offset() const { return text_.offset(); }
-    Error error(const std::string& row, const std::string& cause) const {
-        return source_.error_at_line(text_.line(), row + ": " + cause + ".");
-    }
-
-private:
-    const MeshSource& source_;
-    TextScanner text_;
-};
-
-/// The numbers of a binary body.
-class BinaryNumbers {
-public:
-    BinaryNumbers(const MeshSource& source, std::size_t offset, bool swap)
-        : source_(source), offset_(offset), swap_(swap) {}
-
-    std::string read(Type type, double& x) {
-        if (bytes_left() < size_of(type)) return "the file ends here; it is cut off";
-        x = with_type(type, [&](auto t) { return static_cast<double>(load<decltype(t)>(data(), swap_)); });
-        offset_ += size_of(type);
-        return "";
-    }
-    std::size_t bytes_left() const { return source_.bytes.size() - offset_; }
-    std::size_t offset() const { return offset_; }
-    const char* data() const { return source_.bytes.data() + offset_; }
-    bool swap() const { return swap_; }
-    void skip(std::size_t bytes) { offset_ += bytes; }
-    Error error(const std::string& row, const std::string& cause) const {
-        return source_.error(row + " at byte " + std::to_string(offset_) + ": " + cause + ".");
-    }
-
-private:
-    const MeshSource& source_;
-    std::size_t offset_;
-    bool swap_;
-};
-
-/// The rows of an element without its lists: numbers at a fixed distance from each other.
-struct Table {
-    struct Column {
-        std::size_t offset;
-        Type type;
-    };
-    const char* data = nullptr;
-    std::size_t rows = 0, row_bytes = 0;
-    bool swap = false;
-    std::vector<Column> columns; ///< of each property; of a list, nothing that counts
-    std::vector<double> numbers; ///< what `data` points to when the file's bytes are not a table
-
-    /// Calls set(row, value) for a column; one switch on the type a column, not a value.
-    template <class F>
-    void for_each(std::size_t column, const F& set) const {
-        with_type(columns[column].type, [&](auto t) {
-            const char* p = data + columns[column].offset;
-            for (std::size_t row = 0; row < rows; ++row, p += row_bytes) set(row, load<decltype(t)>(p, swap));
-        });
-    }
-};
 
 template <class Numbers>
 class BodyReader {
@@ -137,8 +23,8 @@ public:
         if (!vertices || !vertices->has("x") || !vertices->has("y") || !vertices->has("z"))
             return source_.error("has no element 'vertex' with x, y and z.");
         if (vertices->count >= kNoIndex) return source_.unsupported("has more vertices than 32-bit indices can count.");
-        if (header_.find("tristrips") && !header_.find("face"))
-            return source_.unsupported("has triangle strips, which are not read; save it with faces.");
+        const Element* faces = header_.find("face");
+        has_faces_ = faces && faces->count > 0;
         vertex_count_ = vertices->count;
         for (const Element& element : header_.elements)
             if (!read_element(element)) return *error_;
@@ -161,6 +47,7 @@ private:
         source_.context.report("Reading", source_.fraction(numbers_.offset()));
         if (element.name == "vertex") return read_vertices(element);
         if (element.name == "face") return read_faces(element);
+        if (element.name == "tristrips" && !has_faces_) return read_strips(element); // else they are the faces again
         if (element.count > 0) file_.warnings.push_back("The element " + in_quotes(element.name) + " was left out.");
         return skip_rows(element);
     }
@@ -357,14 +244,20 @@ private:
 
     // ---- faces
 
-    bool read_faces(const Element& element) {
+    /// The property that lists a face's or strip's vertices; none, with a warning, where there is no such list.
+    std::optional<std::size_t> find_indices(const Element& element, const char* what) {
         const std::size_t indices =
             element.has("vertex_indices") ? element.find("vertex_indices") : element.find("vertex_index");
-        if (indices == element.properties.size() || !element.properties[indices].list_count) {
-            if (element.count > 0)
-                file_.warnings.emplace_back("The faces have no list 'vertex_indices' and were left out.");
-            return skip_rows(element);
-        }
+        if (indices < element.properties.size() && element.properties[indices].list_count) return indices;
+        if (element.count > 0)
+            file_.warnings.push_back("The " + std::string(what) + " have no list 'vertex_indices' and were left out.");
+        return {};
+    }
+
+    bool read_faces(const Element& element) {
+        const std::optional<std::size_t> found = find_indices(element, "faces");
+        if (!found) return skip_rows(element);
+        const std::size_t indices = *found;
         for (const Property& p : element.properties)
             if (p.name != element.properties[indices].name && !is_texcoord(p))
                 file_.warnings.push_back("The face property " + in_quotes(p.name) + " was left out.");
@@ -417,11 +310,14 @@ private:
                         " vertices, counted from 0");
     }
 
+    bool is_vertex(double index) const { // NaN fails the first comparison
+        return index >= 0 && index < static_cast<double>(vertex_count_) && index == std::floor(index);
+    }
+
     bool add_face(const Element& element, std::size_t row, const std::vector<double>& corners) {
         Mesh& mesh = file_.mesh;
-        for (const double index : corners) // NaN fails the first comparison
-            if (!(index >= 0 && index < static_cast<double>(vertex_count_)) || index != std::floor(index))
-                return fail_index(element, row, index);
+        for (const double index : corners)
+            if (!is_vertex(index)) return fail_index(element, row, index);
         if (corners.size() < 3) return ++short_faces_, true;
         if (mesh.corners.size() + corners.size() >= kNoIndex) return fail_too_many();
         for (const double index : corners) mesh.corners.push_back(static_cast<Index>(index));
@@ -432,6 +328,49 @@ private:
     bool fail_too_many() {
         error_ = source_.unsupported("has more corners than 32-bit indices can count.");
         return false;
+    }
+
+    /// Stanford's early scans have strips of triangles in place of faces.
+    bool read_strips(const Element& element) {
+        const std::optional<std::size_t> indices = find_indices(element, "triangle strips");
+        if (!indices) return skip_rows(element);
+        std::vector<double> strip, list;
+        double x = 0;
+        for (std::size_t row = 0; row < element.count; ++row) {
+            if (!report_progress(row)) return false;
+            for (std::size_t i = 0; i < element.properties.size(); ++i) {
+                const Property& p = element.properties[i];
+                if (p.list_count ? !read_list(element, row, p, i == *indices ? strip : list)
+                                 : !read_number(element, row, p.type, x))
+                    return false;
+            }
+            if (!add_strips(element, row, strip)) return false;
+        }
+        return true;
+    }
+
+    /// Every vertex of a strip makes a triangle with the two before it; every second one is turned over, so that all
+    /// have one orientation. -1 ends a strip and begins the next.
+    bool add_strips(const Element& element, std::size_t row, const std::vector<double>& vertices) {
+        constexpr double kEnd = -1, kUnsignedEnd = 4294967295; // the same bits as uint
+        Mesh& mesh = file_.mesh;
+        Index a = 0, b = 0;
+        std::size_t length = 0;
+        for (const double vertex : vertices) {
+            if (vertex == kEnd || vertex == kUnsignedEnd) {
+                length = 0;
+                continue;
+            }
+            if (!is_vertex(vertex)) return fail_index(element, row, vertex);
+            const auto c = static_cast<Index>(vertex);
+            if (length >= 2 && a != b && b != c && c != a) { // strips are sewn together with repeated vertices
+                if (mesh.corners.size() + 3 >= kNoIndex) return fail_too_many();
+                mesh.add_face(length % 2 == 0 ? Triangle{a, b, c} : Triangle{a, c, b});
+            }
+            a = b, b = c;
+            ++length;
+        }
+        return true;
     }
 
     /// MeshLab's UVs: a list of u, v for each corner of the face just added.
@@ -495,6 +434,7 @@ private:
     std::optional<Error> error_;
     MeshFile file_;
     std::size_t vertex_count_ = 0, short_faces_ = 0;
+    bool has_faces_ = false;
 };
 
 } // namespace

@@ -18,7 +18,10 @@ TextWriter& TextWriter::far_coordinate(double origin, float offset) {
     const double sum = origin + static_cast<double>(offset);
     char digits[kLongestNumber];
     const auto shortest = std::to_chars(digits, digits + sizeof digits, sum);
-    const int guess = offset == 0 ? 0 : static_cast<int>(-std::log10(std::abs(offset) * 0x1p-23f)) - 1;
+    const float last_bit = std::abs(offset) * 0x1p-23f;
+    const bool is_tiny = offset != 0 && last_bit == 0; // no number of decimals is shorter then
+    if (is_tiny) return text({digits, static_cast<std::size_t>(shortest.ptr - digits)});
+    const int guess = offset == 0 ? 0 : static_cast<int>(-std::log10(last_bit)) - 1;
     const int first = std::max(0, guess);
     for (int precision = first; precision < first + kTries; ++precision) {
         char rounded[kLongestNumber];

@@ -1,0 +1,33 @@
+#include "filigree/io/losses.h"
+
+#include "filigree/io/mesh_file.h"
+#include "filigree/io/text_scanner.h"
+
+#include <utility>
+
+namespace filigree {
+
+std::string cannot_hold(const std::string& what, const std::vector<std::string>& lost) {
+    std::string sentence = what + " cannot hold ";
+    for (std::size_t i = 0; i < lost.size(); ++i)
+        sentence += (i == 0 ? "" : i + 1 < lost.size() ? ", " : " and ") + lost[i];
+    return sentence + "; left out.";
+}
+
+void add_face_label_losses(const Mesh& mesh, std::vector<std::string>& lost) {
+    if (!mesh.groups.empty()) lost.emplace_back("groups");
+    if (!mesh.materials.empty() || !mesh.material_files.empty()) lost.emplace_back("materials");
+    if (!mesh.smoothing.empty()) lost.emplace_back("smoothing groups");
+}
+
+void add_scalar_losses(const Mesh& mesh, std::vector<std::string>& lost) {
+    bool has_gradients = false;
+    for (const VertexScalar& scalar : mesh.scalars) {
+        if (!is_gradient_name(scalar.name))
+            lost.push_back("the scalar " + in_quotes(scalar.name));
+        else if (!std::exchange(has_gradients, true))
+            lost.emplace_back("deformation gradients (f00 to f22)");
+    }
+}
+
+} // namespace filigree

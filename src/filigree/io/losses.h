@@ -1,0 +1,19 @@
+// What a format cannot hold, said in one sentence.
+#pragma once
+
+#include "filigree/mesh/mesh.h"
+
+#include <string>
+#include <vector>
+
+namespace filigree {
+
+/// "WHAT cannot hold a, b and c; left out." Each loss is a noun.
+std::string cannot_hold(const std::string& what, const std::vector<std::string>& lost);
+
+/// Names what a format without face labels loses.
+void add_face_label_losses(const Mesh& mesh, std::vector<std::string>& lost);
+/// Names what a format without numbers a vertex loses; the nine of a gradient together.
+void add_scalar_losses(const Mesh& mesh, std::vector<std::string>& lost);
+
+} // namespace filigree
