@@ -119,7 +119,7 @@ std::size_t GlbBuilder::byte_count() const {
     return kHeader + kChunkHeader + json_chunk().size() + (data_bytes_ > 0 ? kChunkHeader + data_bytes_ : 0);
 }
 
-Status GlbBuilder::write_to(const std::function<Status(std::string_view)>& write) {
+Result<std::string> GlbBuilder::head() const {
     const std::string text = json_chunk();
     const std::size_t total = kHeader + kChunkHeader + text.size() + (data_bytes_ > 0 ? kChunkHeader + data_bytes_ : 0);
     if (total > std::numeric_limits<std::uint32_t>::max())
@@ -127,21 +127,30 @@ Status GlbBuilder::write_to(const std::function<Status(std::string_view)>& write
                      "The GLB would have " + std::to_string(total >> 20) +
                          " MiB, and the format ends at 4096; export fewer frames, a coarser level, or a skin."};
     const auto as32 = [](std::size_t n) { return static_cast<std::uint32_t>(n); };
-    if (Status s = write(words({kMagic, 2, as32(total), as32(text.size()), kJsonChunk})); !s) return s;
-    if (Status s = write(text); !s) return s;
-    if (data_bytes_ == 0) return Success{};
-    if (Status s = write(words({as32(data_bytes_), kBinaryChunk})); !s) return s;
-    for (const Part& part : parts_) {
-        std::size_t given = 0;
-        const auto count_and_write = [&](std::string_view piece) {
-            given += piece.size();
-            return write(piece);
-        };
-        if (Status s = part.producer ? part.producer(count_and_write) : count_and_write(part.bytes); !s) return s;
-        assert(given == part.byte_count);
-        constexpr std::string_view kZeros("\0\0\0", 3);
-        if (Status s = write(kZeros.substr(0, padded(given) - given)); !s) return s;
-    }
+    std::string head = words({kMagic, 2, as32(total), as32(text.size()), kJsonChunk}) + text;
+    if (data_bytes_ > 0) head += words({as32(data_bytes_), kBinaryChunk});
+    return head;
+}
+
+Status GlbBuilder::write_part(const Part& part, const Write& write) {
+    std::size_t given = 0;
+    const auto count_and_write = [&](std::string_view piece) {
+        given += piece.size();
+        return write(piece);
+    };
+    if (Status s = part.producer ? part.producer(count_and_write) : count_and_write(part.bytes); !s) return s;
+    assert(given == part.byte_count);
+    constexpr std::string_view kZeros("\0\0\0", 3);
+    return write(kZeros.substr(0, padded(given) - given));
+}
+
+Status GlbBuilder::write_to(const Write& write) const {
+    const Result<std::string> first = head();
+    if (!first) return first.error();
+    if (Status s = write(*first); !s) return s;
+    if (!gathered_.empty()) return write(std::string_view(gathered_).substr(gathered_.size() - data_bytes_));
+    for (const Part& part : parts_)
+        if (Status s = write_part(part, write); !s) return s;
     return Success{};
 }
 
@@ -160,7 +169,7 @@ Status GlbBuilder::write(const std::filesystem::path& path, const RunContext& co
     return file->finish();
 }
 
-Result<std::string> GlbBuilder::bytes() {
+Result<std::string> GlbBuilder::bytes() const {
     std::string all;
     Status written = write_to([&](std::string_view piece) -> Status {
         all += piece;
@@ -168,6 +177,25 @@ Result<std::string> GlbBuilder::bytes() {
     });
     if (!written) return written.error();
     return all;
+}
+
+Result<std::string_view> GlbBuilder::gather() {
+    assert(gathered_.empty());
+    Result<std::string> first = head();
+    if (!first) return first.error();
+    std::string all = *std::move(first);
+    all.reserve(all.size() + data_bytes_);
+    const auto append = [&](std::string_view piece) -> Status {
+        all += piece;
+        return Success{};
+    };
+    for (Part& part : parts_) {
+        const Part taken = std::move(part); // its memory goes at the end of the round
+        if (Status s = write_part(taken, append); !s) return s.error();
+    }
+    parts_.clear();
+    gathered_ = std::move(all);
+    return std::string_view(gathered_);
 }
 
 } // namespace filigree

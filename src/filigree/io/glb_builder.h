@@ -4,6 +4,7 @@
 #include "filigree/core/result.h"
 #include "filigree/core/run_context.h"
 #include "filigree/core/types.h"
+#include "filigree/io/gltf_component.h"
 
 #include <array>
 #include <cstdint>
@@ -17,8 +18,7 @@
 
 namespace filigree {
 
-/// glTF's numbers for what lies in an accessor and what a buffer view is for.
-enum class GltfComponent { int8 = 5120, uint8 = 5121, int16 = 5122, uint16 = 5123, uint32 = 5125, float32 = 5126 };
+/// glTF's numbers for what a buffer view is for.
 enum class GltfTarget { none = 0, vertices = 34962, indices = 34963 };
 
 struct GltfAccessor {
@@ -63,7 +63,10 @@ public:
     /// Writes it, through a temporary file and a rename. Errors: unwritable, unsupported (4 GiB or more), cancelled.
     Status write(const std::filesystem::path& path, const RunContext& context);
     /// The same into memory (not for streamed parts of gigabytes).
-    Result<std::string> bytes();
+    Result<std::string> bytes() const;
+    /// The same, with the parts given up for it one by one, so that they are in memory once. Only the document may
+    /// change afterwards: writing takes the parts from here. The view is valid as long as the builder.
+    Result<std::string_view> gather();
 
 private:
     struct Part {
@@ -73,11 +76,16 @@ private:
     };
     std::vector<Part> parts_;
     std::size_t data_bytes_ = 0;
+    std::string gathered_; ///< the file, and in its last bytes the parts; empty: they are in parts_
 
     std::size_t add_part(Part part, GltfTarget target);
     std::size_t add_accessor(const GltfAccessor& accessor, std::size_t view, std::size_t offset);
+    using Write = std::function<Status(std::string_view)>;
     std::string json_chunk() const;
-    Status write_to(const std::function<Status(std::string_view)>& write);
+    /// What stands before the parts. Errors: unsupported.
+    Result<std::string> head() const;
+    static Status write_part(const Part& part, const Write& write);
+    Status write_to(const Write& write) const;
 };
 
 /// The bytes of plain values.

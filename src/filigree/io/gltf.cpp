@@ -109,9 +109,9 @@ Status read_scene(std::string_view bytes, gltf::Scene& scene, const RunContext& 
 
 } // namespace
 
-struct GltfScene::Content : gltf::Scene {};
+struct GltfScene::Scene : gltf::Scene {};
 
-GltfScene::GltfScene(std::unique_ptr<Content> content) : content_(std::move(content)) {}
+GltfScene::GltfScene(std::unique_ptr<Scene> scene) : scene_(std::move(scene)) {}
 GltfScene::GltfScene(GltfScene&&) noexcept = default;
 GltfScene& GltfScene::operator=(GltfScene&&) noexcept = default;
 GltfScene::~GltfScene() = default;
@@ -119,34 +119,37 @@ GltfScene::~GltfScene() = default;
 Result<GltfScene> GltfScene::read(const std::filesystem::path& path, const RunContext& context) {
     Result<std::string> bytes = read_file(path);
     if (!bytes) return bytes.error();
-    auto content = std::make_unique<Content>();
-    content->name = path == "-" ? "standard input" : path.string();
-    content->owned = *std::move(bytes);
-    if (Status read = read_scene(content->owned, *content, context); !read) return read.error();
-    return GltfScene(std::move(content));
+    return read(*std::move(bytes), path == "-" ? "standard input" : path.string(), context);
 }
 
-Result<GltfScene> GltfScene::read(std::string_view bytes, const std::string& name, const RunContext& context) {
-    auto content = std::make_unique<Content>();
-    content->name = name;
-    content->owned = bytes;
-    if (Status read = read_scene(content->owned, *content, context); !read) return read.error();
-    return GltfScene(std::move(content));
+Result<GltfScene> GltfScene::read(std::string bytes, const std::string& name, const RunContext& context) {
+    auto scene = std::make_unique<Scene>();
+    scene->name = name;
+    scene->owned = std::move(bytes);
+    if (Status read = read_scene(scene->owned, *scene, context); !read) return read.error();
+    return GltfScene(std::move(scene));
 }
 
-const Mesh& GltfScene::mesh() const { return content_->mesh; }
-const std::vector<std::string>& GltfScene::warnings() const { return content_->warnings; }
-const std::vector<GltfAnimation>& GltfScene::animations() const { return content_->summaries; }
-const std::string& GltfScene::export_report() const { return content_->export_report; }
+Result<GltfScene> GltfScene::read_view(std::string_view bytes, const std::string& name, const RunContext& context) {
+    auto scene = std::make_unique<Scene>();
+    scene->name = name;
+    if (Status read = read_scene(bytes, *scene, context); !read) return read.error();
+    return GltfScene(std::move(scene));
+}
+
+const Mesh& GltfScene::mesh() const { return scene_->mesh; }
+const std::vector<std::string>& GltfScene::warnings() const { return scene_->warnings; }
+const std::vector<GltfAnimation>& GltfScene::animations() const { return scene_->summaries; }
+const std::string& GltfScene::export_report() const { return scene_->export_report; }
 
 Status GltfScene::positions(std::size_t animation, double seconds, std::span<Vec3f> out,
                             const RunContext& context) const {
-    assert(animation < content_->animations.size() && out.size() == content_->mesh.vertex_count());
+    assert(animation < scene_->animations.size() && out.size() == scene_->mesh.vertex_count());
     if (context.is_cancelled()) return cancelled_error();
-    const gltf::ScenePose pose = gltf::pose_at(*content_, content_->animations[animation], seconds);
+    const gltf::ScenePose pose = gltf::pose_at(*scene_, scene_->animations[animation], seconds);
     std::atomic<bool> finite = true;
-    const Vec3d origin = content_->mesh.origin;
-    gltf::place_vertices(*content_, pose, context, [&](std::size_t first, std::span<const Vec3d> positions) {
+    const Vec3d origin = scene_->mesh.origin;
+    gltf::place_vertices(*scene_, pose, context, [&](std::size_t first, std::span<const Vec3d> positions) {
         bool all_finite = true;
         for (std::size_t i = 0; i < positions.size(); ++i) {
             out[first + i] = (positions[i] - origin).cast<float>();
@@ -156,17 +159,17 @@ Status GltfScene::positions(std::size_t animation, double seconds, std::span<Vec
     });
     if (context.is_cancelled()) return cancelled_error();
     if (!finite)
-        return Error{ErrorCode::bad_file, content_->name + ": animations[" + std::to_string(animation) +
+        return Error{ErrorCode::bad_file, scene_->name + ": animations[" + std::to_string(animation) +
                                               "]: carries vertices to no place that 32-bit float can hold."};
     return Success{};
 }
 
 Result<Mesh> GltfScene::mesh_at(std::size_t animation, double seconds, const RunContext& context) const {
-    Mesh mesh = content_->mesh;
+    Mesh mesh = scene_->mesh;
     if (Status placed = positions(animation, seconds, mesh.positions, context); !placed) return placed.error();
     if (!mesh.normals.empty())
-        mesh.normals.values = gltf::turned_normals(
-            *content_, gltf::pose_at(*content_, content_->animations[animation], seconds), context);
+        mesh.normals.values =
+            gltf::turned_normals(*scene_, gltf::pose_at(*scene_, scene_->animations[animation], seconds), context);
     if (context.is_cancelled()) return cancelled_error();
     return mesh;
 }

@@ -35,8 +35,11 @@ public:
     /// Errors: not_found, bad_file ("x.gltf: accessors[3].count: ..."), unsupported (a required extension that we do
     /// not know: Draco, meshopt), out_of_memory, cancelled. Cost: one pass; memory a small multiple of the file.
     static Result<GltfScene> read(const std::filesystem::path& path, const RunContext& context);
-    /// From bytes; `name` stands in messages, and its folder is where other files are looked for (none: "" as folder).
-    static Result<GltfScene> read(std::string_view bytes, const std::string& name, const RunContext& context);
+    /// From bytes, which the scene keeps; `name` stands in messages, and its folder is where other files are looked for
+    /// (none: "" as folder).
+    static Result<GltfScene> read(std::string bytes, const std::string& name, const RunContext& context);
+    /// The same from bytes that outlive the scene, and are not copied.
+    static Result<GltfScene> read_view(std::string_view bytes, const std::string& name, const RunContext& context);
     GltfScene(GltfScene&&) noexcept;
     GltfScene& operator=(GltfScene&&) noexcept;
     ~GltfScene();
@@ -57,9 +60,9 @@ public:
     Result<Mesh> mesh_at(std::size_t animation, double seconds, const RunContext& context) const;
 
 private:
-    struct Content;
-    explicit GltfScene(std::unique_ptr<Content> content);
-    std::unique_ptr<Content> content_;
+    struct Scene;
+    explicit GltfScene(std::unique_ptr<Scene> scene);
+    std::unique_ptr<Scene> scene_;
 };
 
 /// Whether bytes are of GLB, or JSON that looks like glTF.

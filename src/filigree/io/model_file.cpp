@@ -509,7 +509,7 @@ auto guarded(std::string_view bytes, const std::string& name, const RunContext& 
     -> Result<decltype(read(bytes))> {
     if (context.is_cancelled()) return cancelled_error();
     if (!is_model_file(bytes))
-        return Error{ErrorCode::bad_file, name + " is not a Filigree model: make one with 'filigree strip'."};
+        return Error{ErrorCode::bad_file, name + " is not a Filigree model: strip a mesh to make one."};
     try {
         return read(bytes);
     } catch (const Damage& damage) {

@@ -131,61 +131,85 @@ std::vector<std::string> losses(const Mesh& mesh) {
 void add_warnings(const MeshAnimation& animation, std::vector<std::string>& warnings) {
     constexpr std::size_t kVectorText = 30; // bytes, as measured
     const Mesh& mesh = *animation.rest;
-    std::string list;
-    for (const std::string& noun : losses(mesh)) list += (list.empty() ? "" : ", ") + noun;
-    if (!list.empty()) warnings.push_back("USD text is written without " + list + ".");
+    if (const std::vector<std::string> lost = losses(mesh); !lost.empty())
+        warnings.push_back(cannot_hold("USD text", lost));
     const std::size_t bytes = animation.frames * mesh.vertex_count() * kVectorText * (mesh.normals.empty() ? 1 : 2);
     if (bytes > kLargeText)
         warnings.push_back("The USD text is about " + std::to_string(bytes / 1'000'000) +
                            " MB, which programs open slowly; a point cache (.pc2) is a third of it.");
 }
 
+/// What moves: points with their boxes, and normals where the mesh has some.
+class TimeSamples {
+public:
+    TimeSamples(const MeshAnimation& animation, const WorldPositions& positions, UsdText& out,
+                const RunContext& context)
+        : animation_(animation), positions_(positions), out_(out), context_(context),
+          has_normals_(!animation.rest->normals.empty()), points_(animation.rest->vertex_count()) {}
+
+    Status write() {
+        if (Status moved = write_points(); !moved) return moved;
+        return has_normals_ ? write_normals() : Status(Success{});
+    }
+
+private:
+    const MeshAnimation& animation_;
+    const WorldPositions& positions_;
+    UsdText& out_;
+    const RunContext& context_;
+    bool has_normals_;
+    std::vector<Vec3f> points_; ///< of the frame at hand
+
+    /// done: the fraction before the first.
+    template <class Write>
+    Status each_frame(double done, const Write& write) {
+        for (std::size_t frame = 0; frame < animation_.frames; ++frame) {
+            context_.report("writing", done + double(frame) / double(animation_.frames) / (has_normals_ ? 2 : 1));
+            if (context_.is_cancelled()) return cancelled_error();
+            if (Status fetched = positions_(frame, points_); !fetched) return fetched;
+            write(frame);
+            if (Status written = out_.finish(); !written) return written;
+        }
+        return Success{};
+    }
+
+    Status write_points() {
+        std::vector<Box> boxes;
+        out_.text("    point3f[] points.timeSamples = {\n");
+        const Status moved = each_frame(0, [&](std::size_t frame) {
+            out_.sample(frame, points_);
+            boxes.push_back(bounds(points_));
+        });
+        if (!moved) return moved;
+        out_.text("    }\n    float3[] extent.timeSamples = {\n");
+        for (std::size_t frame = 0; frame < boxes.size(); ++frame)
+            out_.sample(frame, std::array<Vec3f, 2>{boxes[frame].min.cast<float>(), boxes[frame].max.cast<float>()});
+        out_.text("    }\n");
+        return Success{};
+    }
+
+    Status write_normals() {
+        out_.text("    normal3f[] normals (\n        interpolation = \"vertex\"\n    )\n"
+                  "    normal3f[] normals.timeSamples = {\n");
+        const Status turned = each_frame(
+            0.5, [&](std::size_t frame) { out_.sample(frame, vertex_normals(*animation_.rest, points_, context_)); });
+        if (turned) out_.text("    }\n");
+        return turned;
+    }
+};
+
 } // namespace
 
 Status write_usda(const MeshAnimation& animation, const WorldPositions& positions, const std::filesystem::path& path,
                   std::vector<std::string>& warnings, const RunContext& context) {
-    const Mesh& mesh = *animation.rest;
     Result<FileWriter> file = FileWriter::create(path);
     if (!file) return file.error();
     UsdText out(*file);
     write_header(out, animation);
-    write_faces(out, mesh);
-    write_uvs(out, mesh);
-    write_colors(out, mesh);
-
-    std::vector<Vec3f> points(mesh.vertex_count());
-    std::vector<Box> boxes;
-    const bool has_normals = !mesh.normals.empty();
-    const auto each_frame = [&](const auto& write, double done) -> Status {
-        for (std::size_t frame = 0; frame < animation.frames; ++frame) {
-            context.report("writing", done + double(frame) / double(animation.frames) / (has_normals ? 2 : 1));
-            if (context.is_cancelled()) return cancelled_error();
-            if (Status fetched = positions(frame, points); !fetched) return fetched;
-            write(frame);
-            if (Status written = out.finish(); !written) return written;
-        }
-        return Success{};
-    };
-    out.text("    point3f[] points.timeSamples = {\n");
-    const Status moved = each_frame(
-        [&](std::size_t frame) {
-            out.sample(frame, points);
-            boxes.push_back(bounds(points));
-        },
-        0);
-    if (!moved) return moved;
-    out.text("    }\n    float3[] extent.timeSamples = {\n");
-    for (std::size_t frame = 0; frame < boxes.size(); ++frame)
-        out.sample(frame, std::array<Vec3f, 2>{boxes[frame].min.cast<float>(), boxes[frame].max.cast<float>()});
-    out.text("    }\n");
-    if (has_normals) {
-        out.text("    normal3f[] normals (\n        interpolation = \"vertex\"\n    )\n"
-                 "    normal3f[] normals.timeSamples = {\n");
-        const Status turned =
-            each_frame([&](std::size_t frame) { out.sample(frame, vertex_normals(mesh, points, context)); }, 0.5);
-        if (!turned) return turned;
-        out.text("    }\n");
-    }
+    write_faces(out, *animation.rest);
+    write_uvs(out, *animation.rest);
+    write_colors(out, *animation.rest);
+    if (Status moved = TimeSamples(animation, positions, out, context).write(); !moved) return moved;
     out.text("}\n");
     if (Status written = out.finish(); !written) return written;
     if (context.is_cancelled()) return cancelled_error();

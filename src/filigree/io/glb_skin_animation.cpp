@@ -1,4 +1,4 @@
-#include "filigree/io/skin_animation.h"
+#include "filigree/io/glb_skin_animation.h"
 
 #include "filigree/core/parallel_for.h"
 

@@ -1,4 +1,4 @@
-#include "filigree/io/animation_error.h"
+#include "filigree/io/gltf_export_error.h"
 
 #include <algorithm>
 #include <cmath>
@@ -110,13 +110,6 @@ Status measure_animation(const PositionsAt& played, std::size_t played_count, co
     report.error_between_keys = scale * between.max();
     report.rms_between_keys = scale * between.rms();
     return Success{};
-}
-
-std::string cannot_hold(const std::string& what, const std::vector<std::string>& lost) {
-    std::string sentence = what + " cannot hold ";
-    for (std::size_t i = 0; i < lost.size(); ++i)
-        sentence += (i == 0 ? "" : i + 1 < lost.size() ? ", " : " and ") + lost[i];
-    return sentence + "; left out.";
 }
 
 } // namespace filigree

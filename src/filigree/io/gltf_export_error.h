@@ -1,8 +1,9 @@
 // How far an exported animation is from our own restore, at its keys and between them.
 #pragma once
 
+#include "filigree/core/run_context.h"
 #include "filigree/hierarchy/pose.h"
-#include "filigree/io/gltf_export.h"
+#include "filigree/io/gltf_export_report.h"
 
 #include <functional>
 #include <span>
@@ -39,8 +40,5 @@ using PositionsAt = std::function<Status(double seconds, std::span<Vec3f> out)>;
 Status measure_animation(const PositionsAt& played, std::size_t played_count, const PositionsAt& restored,
                          std::size_t restored_count, std::span<const double> keys, double frames_per_second,
                          ExportReport& report, const RunContext& context);
-
-/// "X cannot hold a, b and c; left out."
-std::string cannot_hold(const std::string& what, const std::vector<std::string>& lost);
 
 } // namespace filigree

@@ -1,12 +1,13 @@
 // Skins: the layout of nodes and why it is like this are in docs/exchange.md.
-#include "filigree/io/gltf_export.h"
+#include "filigree/io/gltf_skin_export.h"
 
 #include "filigree/hierarchy/skin.h"
-#include "filigree/io/animation_error.h"
 #include "filigree/io/glb_levels.h"
 #include "filigree/io/glb_parts.h"
+#include "filigree/io/glb_skin_animation.h"
 #include "filigree/io/gltf.h"
-#include "filigree/io/skin_animation.h"
+#include "filigree/io/gltf_export_error.h"
+#include "filigree/io/losses.h"
 #include "filigree/mesh/normals.h"
 
 #include <algorithm>
@@ -108,8 +109,9 @@ public:
             if (Status added = add_level(k, *made); !added) return added.error();
         }
         if (skin.joints.size() > 65536)
-            return Error{ErrorCode::unsuitable, "The driver would need " + std::to_string(skin.joints.size()) +
-                                                    " joints, and glTF counts to 65536; strip with a smaller --base."};
+            return Error{ErrorCode::unsuitable,
+                         "The driver would need " + std::to_string(skin.joints.size()) +
+                             " joints, and glTF counts to 65536; use a model with a smaller driver."};
         const Result<SkinAnimation> animation =
             SkinAnimation::sample(skin, poses_, poses, *restorer, options_, context_);
         if (!animation) return animation.error();
@@ -143,8 +145,8 @@ private:
     Status check() const {
         if (poses_.frames == 0)
             return Error{ErrorCode::unsuitable,
-                         "There are no poses to export; 'filigree simulate' makes them, and --poses "
-                         "takes another program's."};
+                         "There are no poses to export; give the model some, by a simulation or from another "
+                         "program."};
         if (options_.influences != 3 && options_.influences != 6)
             return Error{ErrorCode::usage,
                          "A vertex of a skin has 3 or 6 influences, not " + std::to_string(options_.influences) + "."};
@@ -231,9 +233,9 @@ private:
 
     /// Reads the file's own bytes and holds them against our restore.
     Status measure(std::span<const double> keys, PoseSampler& poses, const Restorer& restorer) {
-        Result<std::string> bytes = builder_.bytes();
+        const Result<std::string_view> bytes = builder_.gather(); // without a copy, as they may be gigabytes
         if (!bytes) return bytes.error();
-        const Result<GltfScene> scene = GltfScene::read(*bytes, "the exported GLB", context_);
+        const Result<GltfScene> scene = GltfScene::read_view(*bytes, "the exported GLB", context_);
         if (!scene) return scene.error();
         const Vec3d shift = scene->mesh().origin - model_.mesh.origin;
         const bool moves = !scene->animations().empty();

@@ -2,9 +2,9 @@
 #pragma once
 
 #include "filigree/hierarchy/skin.h"
-#include "filigree/io/animation_error.h"
 #include "filigree/io/glb_builder.h"
-#include "filigree/io/gltf_export.h"
+#include "filigree/io/gltf_export_error.h"
+#include "filigree/io/gltf_skin_export.h"
 
 #include <array>
 #include <utility>

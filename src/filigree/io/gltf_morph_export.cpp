@@ -1,7 +1,8 @@
 // Morph targets: every frame a target, and weights that hand over from one to the next.
-#include "filigree/io/animation_error.h"
+#include "filigree/io/gltf_morph_export.h"
+
 #include "filigree/io/glb_parts.h"
-#include "filigree/io/gltf_export.h"
+#include "filigree/io/losses.h"
 #include "filigree/mesh/normals.h"
 
 #include <cmath>
@@ -49,7 +50,7 @@ public:
             return Error{ErrorCode::unsupported,
                          path.string() + ": " + std::to_string(animation_.frames) + " morph targets of " +
                              std::to_string(parts_.vertex_count()) +
-                             " vertices pass the 4 GiB that a GLB can have; write .pc2, fewer frames, or --as skin."};
+                             " vertices pass the 4 GiB that a GLB can have; write a .pc2, fewer frames, or a skin."};
         add_mesh();
         if (Status added = add_targets(); !added) return added.error();
         add_weights();

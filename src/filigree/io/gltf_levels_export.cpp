@@ -1,7 +1,8 @@
 // The levels of a model as GLB: alternatives of one node [MSFT_lod].
-#include "filigree/io/animation_error.h"
+#include "filigree/io/gltf_levels_export.h"
+
 #include "filigree/io/glb_levels.h"
-#include "filigree/io/gltf_export.h"
+#include "filigree/io/losses.h"
 
 #include <new>
 
