@@ -137,7 +137,8 @@ Result<Body> make_body(const Mesh& mesh, const Material& material, const BodyOpt
     body.scale = options.scale;
     body.cells = std::move(cells).value();
     found.split_cells = make_particles(body, context);
-    SurfacePoints spread = spread_on_surface(mesh.positions, welded->triangles, options.scale, 0.5 * body.cells.spacing);
+    SurfacePoints spread =
+        spread_on_surface(mesh.positions, welded->triangles, options.scale, 0.5 * body.cells.spacing);
     body.surface.normals = std::move(spread.normals);
     body.surface.areas = std::move(spread.areas);
     body.surface.points = embed_surface(spread.positions, body, context);
