@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include <oneapi/tbb/info.h>
+#include <oneapi/tbb/task_arena.h>
 
 namespace filigree {
 
@@ -16,8 +17,15 @@ unsigned clamp_threads(unsigned wanted) {
 
 } // namespace
 
+struct RunContext::Arena {
+    explicit Arena(unsigned threads) : arena(static_cast<int>(threads)) {}
+    tbb::task_arena arena;
+};
+
 RunContext::RunContext(unsigned threads)
-    : threads_(clamp_threads(threads)), arena_(std::make_shared<tbb::task_arena>(static_cast<int>(threads_))),
+    : threads_(clamp_threads(threads)), arena_(std::make_shared<Arena>(threads_)),
       cancelled_(std::make_shared<std::atomic<bool>>(false)) {}
+
+void RunContext::execute(const std::function<void()>& work) const { arena_->arena.execute(work); }
 
 } // namespace filigree

@@ -9,8 +9,6 @@
 #include <memory>
 #include <string_view>
 
-#include <oneapi/tbb/task_arena.h>
-
 namespace filigree {
 
 /// Passed by const reference down every long call. Cheap to copy; copies share the cancel flag and the arena.
@@ -27,7 +25,8 @@ public:
     std::uint64_t seed = 1;
 
     unsigned threads() const { return threads_; }
-    tbb::task_arena& arena() const { return *arena_; }
+    /// Calls work() such that oneTBB inside it, and so Embree, takes no more threads than these.
+    void execute(const std::function<void()>& work) const;
 
     /// Asks the work to stop; safe from any thread and from a signal handler.
     void cancel() const { cancelled_->store(true, std::memory_order_relaxed); }
@@ -38,8 +37,9 @@ public:
     }
 
 private:
+    struct Arena; ///< oneTBB's: no header includes it, or every file would compile it
     unsigned threads_;
-    std::shared_ptr<tbb::task_arena> arena_;
+    std::shared_ptr<Arena> arena_;
     std::shared_ptr<std::atomic<bool>> cancelled_;
 };
 

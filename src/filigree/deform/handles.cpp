@@ -15,9 +15,9 @@
 // New solves start from the last solution moved by the best rigid motion of the handles, so a rigid motion is exact.
 #include "filigree/deform/handles.h"
 
+#include "filigree/core/dense_solve.h"
 #include "filigree/core/parallel_for.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/SparseCholesky>
 #include <algorithm>
@@ -76,8 +76,7 @@ Eigen::Quaterniond closed_form_rotation(const Mat3d& A) {
     const Mat3d At = A.transpose();
     const Vec3d axial(At(1, 2) - At(2, 1), At(2, 0) - At(0, 2), At(0, 1) - At(1, 0));
     K << A.trace(), axial.transpose(), axial, A + At - A.trace() * Mat3d::Identity();
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> eigen(K);
-    const Eigen::Vector4d q = eigen.eigenvectors().col(3);
+    const Eigen::Vector4d q = symmetric_eigen(K).vectors.col(3);
     return Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized();
 }
 

@@ -176,8 +176,8 @@ void walk_to_bonds(std::span<const Vec3f> positions, const Surface& surface, std
 void bond_across_gaps(std::span<const Vec3f> positions, std::span<const Vec3f> normals, std::span<const Triangle> cells,
                       std::span<const BondKind> kinds, std::span<Bond> bonds, const RunContext& context) {
     if (std::find(kinds.begin(), kinds.end(), BondKind::gap) == kinds.end()) return;
-    std::optional<ClosestPointTree> built; // in our arena: Embree builds on the threads of the one it is called in
-    context.arena().execute([&] { built.emplace(positions, cells); });
+    std::optional<ClosestPointTree> built; // Embree builds on the threads of the arena it is called in
+    context.execute([&] { built.emplace(positions, cells); });
     const ClosestPointTree& tree = *built;
     parallel_for(context, positions.size(), 1 << 12, [&](std::size_t begin, std::size_t end) {
         if (context.is_cancelled()) return;

@@ -3,10 +3,10 @@
 // leak into the linear ones.
 #include "filigree/hierarchy/gradient_fit.h"
 
+#include "filigree/core/dense_solve.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/mesh/normals.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -122,8 +122,7 @@ GradientFit::Weights GradientFit::solve(double normal_weight, const RunContext& 
             normal_matrix(2, 2) += m * normal_weight;
 
             // The first three rows of the inverse: how the linear terms depend on the right-hand side.
-            const Eigen::Matrix<double, 6, 3> inverse =
-                normal_matrix.ldlt().solve(Eigen::Matrix<double, 6, 3>::Identity());
+            const Eigen::Matrix<double, 6, 3> inverse = inverse_columns(normal_matrix);
             for (std::size_t k = ring_begin; k < ring_end; ++k)
                 weights.alpha[k] = basis * (inverse.transpose() * rows[k - ring_begin]) / size;
             weights.beta[i] = basis * (m * normal_weight * inverse.row(2).transpose());

@@ -1,11 +1,11 @@
 #include "filigree/hierarchy/skin.h"
 
+#include "filigree/core/dense_solve.h"
+
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <numeric>
-
-#include <Eigen/SVD>
 
 namespace filigree {
 
@@ -100,9 +100,9 @@ struct Decomposition {
 };
 
 Decomposition decompose(const Mat3d& matrix) {
-    const Eigen::JacobiSVD<Mat3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    if (svd.info() != Eigen::Success) return {Mat3d::Identity(), Mat3d::Identity(), Vec3d::Zero()}; // not finite
-    Decomposition parts{svd.matrixU(), svd.matrixV(), svd.singularValues()};
+    const SingularValues<double> svd = singular_values(matrix);
+    if (!svd.converged) return {Mat3d::Identity(), Mat3d::Identity(), Vec3d::Zero()}; // not finite
+    Decomposition parts{svd.u, svd.v, svd.s};
     if (parts.u.determinant() < 0) parts.u.col(2) *= -1, parts.s[2] *= -1;
     if (parts.v.determinant() < 0) parts.v.col(2) *= -1, parts.s[2] *= -1;
     return parts;

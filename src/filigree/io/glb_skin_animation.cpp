@@ -1,11 +1,10 @@
 #include "filigree/io/glb_skin_animation.h"
 
+#include "filigree/core/dense_solve.h"
 #include "filigree/core/parallel_for.h"
 
 #include <algorithm>
 #include <cmath>
-
-#include <Eigen/SVD>
 
 namespace filigree {
 
@@ -15,7 +14,7 @@ using Json = GlbBuilder::Json;
 
 /// How far a normal may be off that is turned by the matrix itself: atan r - atan(1/r), r the largest stretch ratio.
 double normal_error(const Mat3d& gradient) {
-    const Vec3d s = Eigen::JacobiSVD<Mat3d>(gradient).singularValues();
+    const Vec3d s = singular_values_only(gradient);
     if (!(s[2] > 0)) return 90;
     const double ratio = s[0] / s[2];
     return (std::atan(ratio) - std::atan(1 / ratio)) * 180 / M_PI;

@@ -127,9 +127,9 @@ void search_in_turn(std::span<const Vec3f> samples, const PlacedTriangles& to, c
 
 /// The distance of every sample to a surface; fewer when cancelled.
 std::vector<double> distances(std::span<const Vec3f> samples, const PlacedTriangles& to, const RunContext& context) {
-    std::optional<ClosestPointTree> built; // in our arena: Embree builds on the threads of the one it is called in
+    std::optional<ClosestPointTree> built; // Embree builds on the threads of the arena it is called in
     const auto leaves = samples.size() < to.triangles.size() ? TreeLeaves::pairs : TreeLeaves::single;
-    context.arena().execute([&] { built.emplace(to.positions, to.triangles, leaves); });
+    context.execute([&] { built.emplace(to.positions, to.triangles, leaves); });
     const ClosestPointTree& tree = *built;
     std::vector<double> result(samples.size());
     for (std::size_t done = 0; done < samples.size(); done += kBatch) {

@@ -1,10 +1,10 @@
 #include "filigree/physics/body.h"
 
+#include "filigree/core/dense_solve.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/physics/mesh_cells.h"
 #include "filigree/physics/surface_points.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 
 namespace filigree {
@@ -46,8 +46,7 @@ bool has_spread(const Cells& cells, std::size_t cell) {
                 ++count;
             }
     if (count < 3) return false;
-    const Eigen::SelfAdjointEigenSolver<Mat3f> eigen(moment / float(count), Eigen::EigenvaluesOnly);
-    return eigen.eigenvalues()[0] >= kLeastSpread;
+    return symmetric_eigenvalues(moment / float(count))[0] >= kLeastSpread;
 }
 
 /// For each cell 1 where its particle will have a gradient.

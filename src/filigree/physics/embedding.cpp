@@ -1,9 +1,10 @@
 #include "filigree/physics/embedding.h"
 
+#include "filigree/core/dense_solve.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/physics/cells.h"
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -141,11 +142,11 @@ struct Fit {
 
 private:
     static Vec3d within_span(const Mat3d& covariance, const Vec3d& b) {
-        const Eigen::SelfAdjointEigenSolver<Mat3d> eigen(covariance);
+        const SymmetricEigen<double, 3> eigen = symmetric_eigen(covariance);
         Vec3d slope = Vec3d::Zero();
         for (int i = 0; i < 3; ++i)
-            if (eigen.eigenvalues()[i] > 1e-2 * eigen.eigenvalues()[2])
-                slope += eigen.eigenvectors().col(i).dot(b) / eigen.eigenvalues()[i] * eigen.eigenvectors().col(i);
+            if (eigen.values[i] > 1e-2 * eigen.values[2])
+                slope += eigen.vectors.col(i).dot(b) / eigen.values[i] * eigen.vectors.col(i);
         return slope;
     }
 };

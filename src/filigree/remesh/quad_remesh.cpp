@@ -397,7 +397,7 @@ private:
                 triangles.push_back(surface_.triangles[t]);
                 ids.push_back(t);
             }
-        context_.arena().execute([&] {
+        context_.execute([&] {
             const ClosestPointTree tree(cleaned_.positions, triangles);
             parallel_for(context_, lost.size(), 256, [&](std::size_t begin, std::size_t end) {
                 for (std::size_t i = begin; i < end && !context_.is_cancelled(); ++i) {

@@ -1,11 +1,11 @@
 #include "filigree/remesh/transfer_attributes.h"
 
+#include "filigree/core/dense_solve.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/mesh/closest_point.h"
 #include "filigree/mesh/triangulate.h"
 #include "filigree/mesh/weld.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -360,11 +360,11 @@ auto gradient_over(const InputSurface& surface, const CornerValues<T>& values, s
         variance += weight * (offset - mean_offset) * (offset - mean_offset).transpose();
         covariance += weight * (value - mean) * (offset - mean_offset).transpose();
     });
-    const Eigen::SelfAdjointEigenSolver<Mat3d> axes(variance);
+    const SymmetricEigen<double, 3> axes = symmetric_eigen(variance);
     Vec3d inverse = Vec3d::Zero();
     for (int k = 0; k < 3; ++k)
-        if (axes.eigenvalues()[k] > kFlatDirection * axes.eigenvalues()[2]) inverse[k] = 1 / axes.eigenvalues()[k];
-    return (covariance * axes.eigenvectors() * inverse.asDiagonal() * axes.eigenvectors().transpose()).eval();
+        if (axes.values[k] > kFlatDirection * axes.values[2]) inverse[k] = 1 / axes.values[k];
+    return (covariance * axes.vectors * inverse.asDiagonal() * axes.vectors.transpose()).eval();
 }
 
 enum class CornerKind : std::uint8_t {

@@ -426,8 +426,8 @@ std::vector<Vec3d> tangential_targets(std::span<const Vec3d> positions, std::spa
 
 void pull_onto_input(const PullTarget& input, const VoxelGrid& solid, std::span<const Triangle> triangles,
                      std::vector<Vec3d>& positions, const RunContext& context) {
-    std::optional<ClosestPointTree> tree; // in our arena: Embree builds on the threads of the one it is called in
-    context.arena().execute([&] { tree.emplace(input.positions, input.triangles); });
+    std::optional<ClosestPointTree> tree; // Embree builds on the threads of the arena it is called in
+    context.execute([&] { tree.emplace(input.positions, input.triangles); });
     const Neighbours neighbours = find_neighbours(triangles, positions.size());
     for (int round = 0; round < kPullRounds && !context.is_cancelled(); ++round) {
         context.report("pulling the wrap onto the surface", double(round) / kPullRounds);

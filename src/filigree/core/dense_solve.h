@@ -1,0 +1,39 @@
+// Decompositions of small matrices. Eigen's are templates that take seconds to compile; here each is compiled once, for
+// the whole library.
+#pragma once
+
+#include "filigree/core/types.h"
+
+namespace filigree {
+
+/// Of a symmetric matrix, of which the lower triangle is read: eigenvalues in ascending order, and unit eigenvectors
+/// as the columns of a rotation or a reflection.
+template <class Scalar, int kSize>
+struct SymmetricEigen {
+    Eigen::Matrix<Scalar, kSize, 1> values;
+    Eigen::Matrix<Scalar, kSize, kSize> vectors;
+};
+SymmetricEigen<float, 3> symmetric_eigen(const Mat3f& matrix);
+SymmetricEigen<double, 3> symmetric_eigen(const Mat3d& matrix);
+SymmetricEigen<double, 4> symmetric_eigen(const Eigen::Matrix4d& matrix);
+/// The eigenvalues alone, which is twice as fast; they may differ from the above in their last bits.
+Vec3f symmetric_eigenvalues(const Mat3f& matrix);
+
+/// matrix = u diag(s) v^T: u and v orthogonal, s descending and not negative.
+template <class Scalar>
+struct SingularValues {
+    Eigen::Matrix<Scalar, 3, 3> u, v;
+    Eigen::Matrix<Scalar, 3, 1> s;
+    bool converged = true; ///< false: the matrix is not finite, and nothing above holds
+};
+SingularValues<float> singular_values(const Mat3f& matrix);
+SingularValues<double> singular_values(const Mat3d& matrix);
+/// s alone; NaN where the matrix is not finite.
+Vec3d singular_values_only(const Mat3d& matrix);
+
+/// x with matrix x = right, for a symmetric positive semi-definite matrix, of which the lower triangle is read.
+Vec3d solve_semidefinite(const Mat3d& matrix, const Vec3d& right);
+/// The inverse's first three columns.
+Eigen::Matrix<double, 6, 3> inverse_columns(const Eigen::Matrix<double, 6, 6>& matrix);
+
+} // namespace filigree
