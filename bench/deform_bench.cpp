@@ -87,8 +87,9 @@ struct HeldSheet {
 
 void factor_handles(benchmark::State& state) {
     const HeldSheet sheet(static_cast<unsigned>(state.range(0)));
+    const RunContext context;
     for ([[maybe_unused]] auto _ : state)
-        benchmark::DoNotOptimize(HandleSolver::create(sheet.positions, sheet.triangles, sheet.handles));
+        benchmark::DoNotOptimize(HandleSolver::create(sheet.positions, sheet.triangles, sheet.handles, context));
     state.counters["vertices"] = static_cast<double>(sheet.positions.size());
 }
 
@@ -96,7 +97,7 @@ void iterate_handles(benchmark::State& state) {
     constexpr unsigned kRounds = 50;
     const HeldSheet sheet(static_cast<unsigned>(state.range(0)));
     const RunContext context(static_cast<unsigned>(state.range(1)));
-    HandleSolver solver = HandleSolver::create(sheet.positions, sheet.triangles, sheet.handles).value();
+    HandleSolver solver = HandleSolver::create(sheet.positions, sheet.triangles, sheet.handles, context).value();
     for ([[maybe_unused]] auto _ : state) {
         solver.reset();
         benchmark::DoNotOptimize(solver.solve(sheet.targets, {.iterations = kRounds, .tolerance = 0}, context));

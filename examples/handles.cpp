@@ -27,7 +27,8 @@ int main() {
         targets.push_back(at_right ? Vec3f(p + lift) : p);
     }
 
-    HandleSolver solver = HandleSolver::create(driver.positions, triangulate(driver).triangles, handles).value();
+    HandleSolver solver =
+        HandleSolver::create(driver.positions, triangulate(driver).triangles, handles, context).value();
     const HandleResult solved = solver.solve(targets, {}, context).value();
     const Restorer restorer = Restorer::create(model, {}, context).value();
     const Mesh restored = restorer.mesh(solved.pose, context).value();

@@ -13,7 +13,7 @@ int main() {
     Mesh bar = make_bar({.resolution = 24, .length = 3});
     const double volume = analyse_topology(bar, context).volume;
 
-    const Box box = bounds(bar.positions);
+    const Box box = world_bounds(bar);
     std::vector<std::unique_ptr<SpaceWarp>> steps;
     steps.push_back(make_squeeze(box, Axis::x, 1.5)); // longer and thinner
     steps.push_back(make_twist(box, Axis::x, 180));

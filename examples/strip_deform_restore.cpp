@@ -17,8 +17,8 @@ Mesh bend_through_driver(const char* input, const char* output) {
     const Model model = strip(mesh, {.base = 1000}, context).value().model;
     const Restorer restorer = Restorer::create(model, {}, context).value();
 
-    const auto bend = make_bend(bounds(mesh.positions), Axis::z, 90);
-    const Pose pose = warp_pose(*bend, driver_positions(model), Vec3d::Zero(), context);
+    const auto bend = make_bend(world_bounds(mesh), Axis::z, 90);
+    const Pose pose = warp_pose(*bend, model, context);
 
     const Mesh restored = restorer.mesh(pose, context).value();
     const auto warnings = write_mesh(restored, output, {}, context).value();
@@ -34,7 +34,7 @@ int main() {
     const Mesh restored = bend_through_driver("sphere.ply", "bent.ply");
 
     // The long way: every vertex. Nobody can tell the difference.
-    warp_mesh(*make_bend(bounds(full.positions), Axis::z, 90), full, context);
+    warp_mesh(*make_bend(world_bounds(full), Axis::z, 90), full, context);
     const MeshDistance distance = mesh_distance(restored, full, 0, context).value();
     std::printf("rms %.1e of the diagonal, 95 %% of normals within %.2f degrees\n",
                 distance.vertices->rms / distance.diagonal, distance.vertices->normal_p95_deg);

@@ -69,8 +69,7 @@ public:
     }
     Pose driver(const Model& model, double fraction, const RunContext& context) const {
         if (handles_) return require(pose_by_handles(model, handles_at(fraction), context));
-        return warp_pose(*warp_at(fraction, world_bounds(model.mesh)), driver_positions(model), model.mesh.origin,
-                         context);
+        return warp_pose(*warp_at(fraction, world_bounds(model.mesh)), model, context);
     }
 
 private:

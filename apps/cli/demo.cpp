@@ -101,7 +101,7 @@ void run_demo(const std::string& input, const std::string& folder, bool pictures
     const Restorer restorer = require(Restorer::create(model, {}, context));
     Pose pose;
     const double driver_seconds =
-        bench::median_seconds([&] { pose = warp_pose(*warp, driver_positions(model), model.mesh.origin, context); });
+        bench::median_seconds([&] { pose = warp_pose(*warp, model, context); });
     std::vector<Vec3f> positions(mesh.vertex_count());
     const double restore_seconds =
         bench::median_seconds([&] { require(restorer.positions(pose, positions, context)); });
@@ -120,7 +120,7 @@ void run_demo(const std::string& input, const std::string& folder, bool pictures
     if (pictures && mesh.face_count() > 0) {
         const DemoScene scene{mesh, model, pose, restored, with_gradients, up};
         const auto pose_at = [&](double part) {
-            return warp_pose(*deformation.warp(part), driver_positions(model), model.mesh.origin, context);
+            return warp_pose(*deformation.warp(part), model, context);
         };
         pictures_made = draw_and_film(scene, pose_at, picture_file, film_file, session);
     }

@@ -112,7 +112,7 @@ Result<Pose> solve(std::span<const Vec3f> positions, std::span<const Triangle> t
         handles.push_back(vertex);
         target_positions.push_back((target - origin).cast<float>());
     }
-    Result<HandleSolver> solver = HandleSolver::create(positions, triangles, handles);
+    Result<HandleSolver> solver = HandleSolver::create(positions, triangles, handles, context);
     if (!solver) return solver.error();
     Result<HandleResult> result = solver->solve(target_positions, {}, context);
     if (!result) return result.error();

@@ -38,10 +38,11 @@ struct PullSolver {
     std::size_t pulled;
 
     static Result<PullSolver> create(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
-                                     std::span<const Index> grip, std::span<const Index> held) {
+                                     std::span<const Index> grip, std::span<const Index> held,
+                                     const RunContext& context) {
         std::vector<Index> handles(grip.begin(), grip.end());
         handles.insert(handles.end(), held.begin(), held.end());
-        Result<HandleSolver> solver = HandleSolver::create(positions, triangles, handles);
+        Result<HandleSolver> solver = HandleSolver::create(positions, triangles, handles, context);
         if (!solver) return solver.error();
         std::vector<Vec3f> targets;
         for (const Index v : handles) targets.push_back(positions[v]);
@@ -111,7 +112,7 @@ Status pull_all(const State& state, const Handle& pull, std::span<const Index> r
         else if (is_held[v] || distance > pull.reach)
             held.push_back(v);
     }
-    Result<PullSolver> solver = PullSolver::create(positions, triangles, grip, held);
+    Result<PullSolver> solver = PullSolver::create(positions, triangles, grip, held, context);
     if (!solver) return solver.error();
     Result<HandleResult> result = solver->solve(pull.move, {}, context);
     if (!result) return result.error();
@@ -266,7 +267,8 @@ struct HandleDrag::Impl {
 
     Status solve() {
         const std::vector<Vec3f> positions = start_positions(*model, start.get());
-        Result<PullSolver> solver = PullSolver::create(positions, driver_triangles(*model), pull.vertices, pull.held);
+        Result<PullSolver> solver =
+            PullSolver::create(positions, driver_triangles(*model), pull.vertices, pull.held, context);
         if (!solver) return solver.error();
         std::optional<GrabbedVertex> vertex;
         const bool is_known = model->code() == DetailCode::blend && (!start || !start->gradients.empty());

@@ -136,14 +136,12 @@ std::vector<FidelityRow> measure_fidelity(const Model& model, const Model* refer
     for (const NamedWarp& warp : fidelity_warps(box)) {
         if (context.is_cancelled()) return rows;
         Comparison comparison(model.mesh, warp, rows, context);
-        const Pose pose = warp_pose(*warp.warp, driver_positions(model), model.mesh.origin, context);
+        const Pose pose = warp_pose(*warp.warp, model, context);
         comparison.add("wrap", wrap_positions(model, pose, context));
         comparison.add("skinning", move_with_cells(model, pose, move_skinning, context));
         if (reference_restorer)
-            comparison.add(
-                "reference",
-                reference_restorer->positions(
-                    warp_pose(*warp.warp, driver_positions(*reference), reference->mesh.origin, context), context));
+            comparison.add("reference",
+                           reference_restorer->positions(warp_pose(*warp.warp, *reference, context), context));
         const Pose positions_only{pose.positions, {}, {}};
         comparison.add("blend_positions", restorer->positions(positions_only, context));
         const Pose with_ghosts{

@@ -127,9 +127,9 @@ public:
             targets.push_back(driver.positions[v]);
             if (at >= 0.95) targets.back()[(axis + 1) % 3] += static_cast<float>(0.2 * box.diagonal());
         }
-        add("handles.setup", median_seconds([&] { HandleSolver::create(driver.positions, triangles, ends).value(); }),
-            "s");
-        HandleSolver solver = HandleSolver::create(driver.positions, triangles, ends).value();
+        add("handles.setup",
+            median_seconds([&] { HandleSolver::create(driver.positions, triangles, ends, context_).value(); }), "s");
+        HandleSolver solver = HandleSolver::create(driver.positions, triangles, ends, context_).value();
         const Restorer restorer = Restorer::create(model, {}, context_).value();
         std::vector<Vec3f> restored(mesh_.vertex_count());
         add("handles.iteration", median_seconds([&] {

@@ -65,7 +65,7 @@ std::function<Vec3f(const Vec3f&)> bent_ends(const Body& body, double degrees) {
 }
 
 HandleSolver make_solver(const Body& body, std::span<const Index> handles) {
-    Result<HandleSolver> solver = HandleSolver::create(body.positions, body.triangles, handles);
+    Result<HandleSolver> solver = HandleSolver::create(body.positions, body.triangles, handles, RunContext(1));
     EXPECT_TRUE(solver.ok());
     return std::move(solver).value();
 }
@@ -398,7 +398,7 @@ TEST(Handles, DegenerateTrianglesAreHarmless) {
 TEST(Handles, WrongInputIsNamed) {
     const Body body = make_body(3);
     const auto code = [&](std::vector<Index> handles) {
-        return HandleSolver::create(body.positions, body.triangles, handles).error().code;
+        return HandleSolver::create(body.positions, body.triangles, handles, RunContext(1)).error().code;
     };
     EXPECT_EQ(code({}), ErrorCode::usage);
     EXPECT_EQ(code({1, 2, 1}), ErrorCode::usage);
@@ -409,6 +409,20 @@ TEST(Handles, WrongInputIsNamed) {
     const std::vector<Vec3f> one = {{0, 0, 0}}, wild = {{0, 0, 0}, {0, std::numeric_limits<float>::quiet_NaN(), 0}};
     EXPECT_EQ(solver.solve(one, {}, RunContext(1)).error().code, ErrorCode::mismatch);
     EXPECT_EQ(solver.solve(wild, {}, RunContext(1)).error().code, ErrorCode::usage);
+}
+
+TEST(Handles, FactoringIsCancelled) {
+    const Body body = make_body(5);
+    RunContext context(1);
+    std::string phase;
+    context.progress = [&](std::string_view name, double) {
+        phase = name;
+        context.cancel();
+    };
+    const auto solver = HandleSolver::create(body.positions, body.triangles, both_ends(body), context);
+    EXPECT_EQ(phase, "factoring");
+    ASSERT_FALSE(solver.ok());
+    EXPECT_EQ(solver.error().code, ErrorCode::cancelled);
 }
 
 TEST(Handles, CancellingKeepsTheLastSolution) {

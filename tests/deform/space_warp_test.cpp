@@ -1,6 +1,7 @@
 #include "filigree/deform/space_warp.h"
 
 #include "filigree/mesh/normals.h"
+#include "filigree/mesh/shapes.h"
 #include "threads.h"
 
 #include <Eigen/Geometry>
@@ -395,6 +396,38 @@ TEST(WarpMesh, PoseAgreesWithPositionsAndBytesWithAnyThreadCount) {
     EXPECT_EQ(one.gradients, two.gradients);
     EXPECT_EQ(one.positions, warp_positions(*warp, mesh.positions, mesh.origin, RunContext(2)));
     EXPECT_TRUE(warp_positions(*warp, {}, Vec3d::Zero(), RunContext(2)).empty());
+}
+
+/// A model whose driver is the whole mesh, as far as poses go.
+Model model_of(Mesh mesh) {
+    Model model;
+    Level driver;
+    for (Index v = 0; v < mesh.vertex_count(); ++v) driver.vertices.push_back(v);
+    model.levels.push_back(std::move(driver));
+    model.mesh = std::move(mesh);
+    return model;
+}
+
+TEST(SpaceWarp, TheSameFarFromTheOrigin) {
+    const RunContext context(1);
+    const Mesh near = make_bar({.resolution = 8, .length = 3});
+    Mesh far = near;
+    far.origin = Vec3d(500'000, -250'000, 1'000'000);
+    const auto bend_of = [](const Mesh& mesh) { return make_bend(world_bounds(mesh), Axis::x, 90); };
+
+    const Pose expected = warp_pose(*bend_of(near), model_of(near), context);
+    const Pose pose = warp_pose(*bend_of(far), model_of(far), context);
+    Mesh bent = far;
+    warp_mesh(*bend_of(far), bent, context);
+    double moved = 0;
+    for (Index v = 0; v < near.vertex_count(); ++v) {
+        moved = std::max(moved, double((pose.positions[v] - far.positions[v]).norm()));
+        ASSERT_LT((pose.positions[v] - expected.positions[v]).norm(), 1e-6f);
+        ASSERT_LT((pose.gradients[v] - expected.gradients[v]).norm(), 1e-6f);
+        ASSERT_EQ(bent.positions[v], pose.positions[v]);
+    }
+    EXPECT_GT(moved, 0.1);
+    EXPECT_LT(moved, 3); // a box relative to the origin would send the bar hundreds of kilometres round an arc
 }
 
 } // namespace

@@ -4,6 +4,8 @@
 
 #include "filigree/core/types.h"
 
+#include <Eigen/Geometry>
+
 namespace filigree {
 
 /// Of a symmetric matrix, of which the lower triangle is read: eigenvalues in ascending order, and unit eigenvectors
@@ -30,6 +32,13 @@ SingularValues<float> singular_values(const Mat3f& matrix);
 SingularValues<double> singular_values(const Mat3d& matrix);
 /// s alone; NaN where the matrix is not finite.
 Vec3d singular_values_only(const Mat3d& matrix);
+
+/// How oriented areas, and so normals, are transformed by a: det(a) a^-T, defined for singular a too.
+inline Mat3d cofactor(const Mat3d& a) {
+    Mat3d result;
+    result << a.col(1).cross(a.col(2)), a.col(2).cross(a.col(0)), a.col(0).cross(a.col(1));
+    return result;
+}
 
 /// x with matrix x = right, for a symmetric positive semi-definite matrix, of which the lower triangle is read.
 Vec3d solve_semidefinite(const Mat3d& matrix, const Vec3d& right);

@@ -380,7 +380,7 @@ HandleSolver& HandleSolver::operator=(HandleSolver&&) noexcept = default;
 HandleSolver::~HandleSolver() = default;
 
 Result<HandleSolver> HandleSolver::create(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
-                                          std::span<const Index> handles) {
+                                          std::span<const Index> handles, const RunContext& context) {
     if (handles.empty()) return Error{ErrorCode::usage, "There is no handle; give at least one vertex a target."};
     if (positions.size() > kMaxVertices)
         return Error{ErrorCode::unsuitable, "Handles move at most " + std::to_string(kMaxVertices) +
@@ -395,9 +395,12 @@ Result<HandleSolver> HandleSolver::create(std::span<const Vec3f> positions, std:
         is_handle[handle] = true;
     }
     try {
+        context.report("factoring", 0);
         auto solver = std::make_unique<Solver>(positions, triangles, handles);
+        if (context.is_cancelled()) return cancelled_error();
         if (!solver->factorise())
             return Error{ErrorCode::out_of_memory, "The handles' system could not be factored; use a smaller driver."};
+        if (context.is_cancelled()) return cancelled_error();
         solver->state = solver->rest_state();
         return HandleSolver(std::move(solver));
     } catch (const std::bad_alloc&) {

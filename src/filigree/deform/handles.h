@@ -33,9 +33,10 @@ public:
     /// positions: V rest points; triangles: over them, any quality (degenerate ones only just hold their vertices
     /// together; a vertex that is connected to no handle stays where it is). handles: distinct vertices whose positions
     /// are given. Errors: usage (a handle out of range, repeated, or none at all), unsuitable (more than
-    /// 20 million vertices), out_of_memory.
+    /// 20 million vertices), out_of_memory, cancelled (asked before and after the
+    /// factorisation, which takes most of the time).
     static Result<HandleSolver> create(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
-                                       std::span<const Index> handles);
+                                       std::span<const Index> handles, const RunContext& context);
     HandleSolver(HandleSolver&&) noexcept;
     HandleSolver& operator=(HandleSolver&&) noexcept;
     ~HandleSolver();

@@ -6,6 +6,7 @@
 //   a plane or a line need no special case.
 #include "filigree/deform/space_warp.h"
 
+#include "filigree/core/dense_solve.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/mesh/normals.h"
 
@@ -199,13 +200,6 @@ Warped RbfWarp::evaluate(const Vec3d& point) const {
     return result;
 }
 
-/// How oriented areas, and so normals, transform: det(A) A^-T, defined for singular A too.
-Mat3d cofactor(const Mat3d& A) {
-    Mat3d result;
-    result << A.col(1).cross(A.col(2)), A.col(2).cross(A.col(0)), A.col(0).cross(A.col(1));
-    return result;
-}
-
 void warp_normals(const SpaceWarp& warp, Mesh& mesh, const RunContext& context) {
     const std::vector<Index> vertex_of = split_shared_normals(mesh);
     parallel_for(context, vertex_of.size(), kGrain, [&](std::size_t begin, std::size_t end) {
@@ -361,6 +355,10 @@ Pose warp_pose(const SpaceWarp& warp, std::span<const Vec3f> positions, const Ve
         }
     });
     return pose;
+}
+
+Pose warp_pose(const SpaceWarp& warp, const Model& model, const RunContext& context) {
+    return warp_pose(warp, driver_positions(model), model.mesh.origin, context);
 }
 
 void warp_mesh(const SpaceWarp& warp, Mesh& mesh, const RunContext& context) {

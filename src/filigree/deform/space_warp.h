@@ -1,8 +1,12 @@
 // Deformations of space with their exact gradients: stretch, squeeze, bend, twist, taper, smooth random, and chains.
+//
+// Space is the world: points, boxes, centres and displacements are world coordinates. The box of a mesh is
+// world_bounds(mesh), and warp_pose and warp_mesh add the mesh's origin before they ask a warp. So one warp serves a
+// mesh, its model and everything beside them, however far from the world's origin they lie.
 #pragma once
 
 #include "filigree/core/run_context.h"
-#include "filigree/hierarchy/pose.h"
+#include "filigree/hierarchy/model.h"
 #include "filigree/mesh/mesh.h"
 
 #include <cstdint>
@@ -18,7 +22,8 @@ struct Warped {
     Mat3d gradient;
 };
 
-/// A deformation of space. Implementations are pure functions: safe from many threads.
+/// A deformation of space, from world points to world points. Implementations are pure functions: safe from many
+/// threads.
 class SpaceWarp {
 public:
     virtual ~SpaceWarp() = default;
@@ -59,10 +64,13 @@ std::unique_ptr<SpaceWarp> make_rbf(std::span<const Vec3d> centres, std::span<co
 /// The warps one after the other; the gradient by the chain rule. None at all: the identity.
 std::unique_ptr<SpaceWarp> make_chain(std::vector<std::unique_ptr<SpaceWarp>> warps);
 
-/// Warps world positions: out[i] = warp(mesh.origin + positions[i]) - mesh.origin, on all threads.
+/// The pose that the warp gives a model's driver, with its gradients.
+Pose warp_pose(const SpaceWarp& warp, const Model& model, const RunContext& context);
+/// Positions relative to `origin` (of the mesh that they belong to), warped: out[i] = warp(mesh.origin + positions[i])
+/// - mesh.origin, on all threads.
 std::vector<Vec3f> warp_positions(const SpaceWarp& warp, std::span<const Vec3f> positions, const Vec3d& origin,
                                   const RunContext& context);
-/// The same with gradients: the pose that a driver with these rest positions takes.
+/// The same with gradients: the pose of a driver that starts from these positions instead of its model's.
 Pose warp_pose(const SpaceWarp& warp, std::span<const Vec3f> positions, const Vec3d& origin, const RunContext& context);
 /// Deforms every vertex of a mesh, and its normals by the cofactor of the gradient, to unit vectors. A normal that
 /// several vertices share becomes one value for each of them, the further ones at the end of normals.values.

@@ -1,4 +1,5 @@
 // Where a glTF scene's vertices are: keys, nodes, morph targets and skins, in double.
+#include "filigree/core/dense_solve.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/io/gltf_scene.h"
 
@@ -126,12 +127,6 @@ void finish_pose(const Scene& scene, ScenePose& pose) {
         for (std::size_t j = 0; j < skin.joints.size(); ++j)
             joints.push_back(pose.world[skin.joints[j]] * skin.inverse_binds[j]);
     }
-}
-
-Mat3d cofactor(const Mat3d& a) {
-    Mat3d columns;
-    columns << a.col(1).cross(a.col(2)), a.col(2).cross(a.col(0)), a.col(0).cross(a.col(1));
-    return columns;
 }
 
 /// What a block needs of a pose.

@@ -5,6 +5,7 @@
 // the exclusive or of those along a loop is zero where the loop bounds a piece of the surface. So, unlike in [Guskov
 // 2001], a short walk around each of these edges finds the handle's shortest loop, and no region is grown everywhere.
 #include "filigree/core/disjoint_sets.h"
+#include "filigree/core/random.h"
 #include "filigree/remesh/half_edges.h"
 #include "filigree/remesh/manifold_surface.h"
 
@@ -17,14 +18,6 @@
 
 namespace filigree {
 namespace {
-
-/// 64 random bits for each counter: [Steele 2014], SplitMix64.
-std::uint64_t random_bits(std::uint64_t counter) {
-    std::uint64_t x = (counter + 1) * 0x9E3779B97F4A7C15u;
-    x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;
-    x = (x ^ (x >> 27)) * 0x94D049BB133111EBu;
-    return x ^ (x >> 31);
-}
 
 /// Closed walks up to this many times the longest loop are looked for. What is not found says more than that no loop
 /// passes the vertex: none passes its neighbours either, up to half the difference away. With 2 the searches that cover
@@ -159,7 +152,7 @@ std::vector<std::uint64_t> sign_edges(const CappedSurface& surface, std::span<co
     std::vector<std::uint64_t> signature(role.size(), 0), subtree(surface.triangles.size(), 0);
     for (const Index h : generators) {
         const Index back = surface.opposite[h];
-        signature[h] = signature[back] = random_bits(h);
+        signature[h] = signature[back] = random_bits(0, h);
         subtree[h / 3] ^= signature[h];
         subtree[back / 3] ^= signature[h];
     }
@@ -422,7 +415,7 @@ std::vector<Loop> find_loops(const CappedSurface& surface, const Homology& homol
 /// One round with new trees. Returns how many handles it closed.
 std::size_t close_round(ManifoldSurface& surface, const CappedSurface& capped, double longest_loop, std::uint64_t round,
                         CleanReport& report, const RunContext& context) {
-    const Index root = static_cast<Index>(random_bits(context.seed + round) % capped.leaving.size());
+    const Index root = static_cast<Index>(random_bits(0, context.seed + round) % capped.leaving.size());
     const Homology homology = decompose(capped, root);
     LoopSearch search(capped, homology, surface.positions, longest_loop, context);
     std::vector<Loop> loops = disjoint_loops(capped, find_loops(capped, homology, search, context));
