@@ -20,24 +20,8 @@ namespace filigree::blend_kernel {
 namespace {
 
 template <int N>
-struct Lanes : LaneTypes<N> {
+struct PointLanes : Lanes<N> {
     using typename LaneTypes<N>::Float;
-    using typename LaneTypes<N>::Loose;
-    using typename LaneTypes<N>::Int;
-    typedef std::int16_t Short __attribute__((vector_size(N * 2), aligned(2), may_alias));
-
-    static FILIGREE_INLINE Float load(const float* p) { return *reinterpret_cast<const Loose*>(p); }
-    static FILIGREE_INLINE Float load(const std::int16_t* p) {
-        return __builtin_convertvector(*reinterpret_cast<const Short*>(p), Float);
-    }
-    static FILIGREE_INLINE void store(float* p, Float x) { *reinterpret_cast<Loose*>(p) = x; }
-
-    /// 1 / sqrt(x) for x > 0 to float precision: a first guess from the exponent and three Newton steps.
-    static FILIGREE_INLINE Float inverse_sqrt(Float x) {
-        Float y = (Float)(0x5f3759df - ((Int)x >> 1));
-        for (int step = 0; step < 3; ++step) y = y * (1.5f - 0.5f * x * y * y);
-        return y;
-    }
 
     /// Stores x0 y0 z0 x1 y1 z1 ...: each third of the output takes its x and y in one shuffle and its z in a second.
     static FILIGREE_INLINE void store_interleaved(float* p, Float x, Float y, Float z) {
@@ -50,8 +34,8 @@ private:
     template <int Third, int... I>
     static FILIGREE_INLINE void interleave(float* p, Float x, Float y, Float z, std::integer_sequence<int, I...>) {
         const Float xy = __builtin_shufflevector(x, y, ((Third * N + I) % 3 == 1 ? N : 0) + (Third * N + I) / 3 ...);
-        store(p + Third * N,
-              __builtin_shufflevector(xy, z, ((Third * N + I) % 3 == 2 ? N + (Third * N + I) / 3 : I)...));
+        Lanes<N>::store(p + Third * N,
+                        __builtin_shufflevector(xy, z, ((Third * N + I) % 3 == 2 ? N + (Third * N + I) / 3 : I)...));
     }
 };
 
@@ -92,7 +76,7 @@ FILIGREE_INLINE void prefetch(const Records& records, std::size_t r) {
 template <int N, bool Int16, bool Positions, bool Normals>
 FILIGREE_INLINE void restore_run(const Records& records, const Run& run, const CellTransform& cell, float* positions,
                                  float* normals) {
-    using L = Lanes<N>;
+    using L = PointLanes<N>;
     using Float = typename L::Float;
     for (Index k = 0; k < run.count; k += N) {
         const std::size_t r = std::size_t{run.first} + k;
@@ -134,7 +118,7 @@ FILIGREE_INLINE void restore_run(const Records& records, const Run& run, const C
             }
             const Float squared = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
             const Float tiny = Float{} + 1e-30f; // a zero normal stays zero
-            const Float length = L::inverse_sqrt(squared > tiny ? squared : tiny);
+            const Float length = inverse_sqrt<Float>(squared > tiny ? squared : tiny);
             L::store_interleaved(normals + 3 * k, n[0] * length, n[1] * length, n[2] * length);
         }
     }
@@ -212,19 +196,18 @@ FILIGREE_INLINE void restore_width(const Job& job, std::size_t begin, std::size_
 
 using RestoreFunction = void (*)(const Job&, std::size_t, std::size_t);
 
-#if defined(__x86_64__)
-__attribute__((target("avx512f,avx512vl,avx512dq,avx512bw"))) void restore_avx512(const Job& job, std::size_t begin,
-                                                                                  std::size_t end) {
+#if defined(FILIGREE_HAS_WIDTHS)
+FILIGREE_AVX512 void restore_avx512(const Job& job, std::size_t begin, std::size_t end) {
     restore_width<16>(job, begin, end);
 }
-__attribute__((target("avx2"))) void restore_avx2(const Job& job, std::size_t begin, std::size_t end) {
+FILIGREE_AVX2 void restore_avx2(const Job& job, std::size_t begin, std::size_t end) {
     restore_width<8>(job, begin, end);
 }
 #endif
 void restore_plain(const Job& job, std::size_t begin, std::size_t end) { restore_width<4>(job, begin, end); }
 
 RestoreFunction restore_function(int lanes) {
-#if defined(__x86_64__)
+#if defined(FILIGREE_HAS_WIDTHS)
     if (lanes == 16) return restore_avx512;
     if (lanes == 8) return restore_avx2;
 #endif

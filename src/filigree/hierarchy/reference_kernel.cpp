@@ -10,16 +10,9 @@
 namespace filigree::reference {
 
 // Vectors as wide as the processor's: wider ones would be taken apart in memory, five times slower.
-#define FILIGREE_LANES(N)                                                                                              \
-    typedef float Lanes##N __attribute__((vector_size(4 * N)));                                                        \
-    typedef std::int32_t IntLanes##N __attribute__((vector_size(4 * N)));                                              \
-    template <>                                                                                                        \
-    struct IntOf<Lanes##N> {                                                                                           \
-        using type = IntLanes##N;                                                                                      \
-    };
-FILIGREE_LANES(4)
-FILIGREE_LANES(8)
-FILIGREE_LANES(16)
+using Lanes4 = LaneTypes<4>::Float;
+using Lanes8 = LaneTypes<8>::Float;
+using Lanes16 = LaneTypes<16>::Float;
 
 namespace {
 
@@ -133,29 +126,26 @@ FILIGREE_INLINE void interleave_of(const float* row, std::size_t pitch, std::siz
     }
 }
 
-#if defined(__x86_64__) && !defined(__clang__) // Clang 14 refuses vectors as arguments here, inlined or not
-#define FILIGREE_FOR_AVX512 __attribute__((target("avx512f")))
-#define FILIGREE_FOR_AVX2 __attribute__((target("avx2")))
-FILIGREE_FOR_AVX512 void refine_row_16(const CellRow& row, int references, const Scaling& scaling) {
+#if defined(FILIGREE_HAS_WIDTHS) && !defined(__clang__) // Clang 14 refuses vectors as arguments here, inlined or not
+FILIGREE_AVX512 void refine_row_16(const CellRow& row, int references, const Scaling& scaling) {
     refine_row_of<Lanes16>(row, references, scaling);
 }
-FILIGREE_FOR_AVX2 void refine_row_8(const CellRow& row, int references, const Scaling& scaling) {
+FILIGREE_AVX2 void refine_row_8(const CellRow& row, int references, const Scaling& scaling) {
     refine_row_of<Lanes8>(row, references, scaling);
 }
-FILIGREE_FOR_AVX512 void interleave_16(const float* row, std::size_t pitch, std::size_t count, float unit, float* out) {
+FILIGREE_AVX512 void interleave_16(const float* row, std::size_t pitch, std::size_t count, float unit, float* out) {
     interleave_of<Lanes16>(row, pitch, count, unit, out);
 }
-FILIGREE_FOR_AVX2 void interleave_8(const float* row, std::size_t pitch, std::size_t count, float unit, float* out) {
+FILIGREE_AVX2 void interleave_8(const float* row, std::size_t pitch, std::size_t count, float unit, float* out) {
     interleave_of<Lanes8>(row, pitch, count, unit, out);
 }
-FILIGREE_FOR_AVX512 void stream_lines_16(const float* from, std::size_t lines, float* to) {
+FILIGREE_AVX512 void stream_lines_16(const float* from, std::size_t lines, float* to) {
     for (std::size_t line = 0; line < lines; ++line)
         _mm512_stream_ps(to + kLanes * line, _mm512_loadu_ps(from + kLanes * line));
 }
-const bool kHasAvx512 = __builtin_cpu_supports("avx512f"), kHasAvx2 = __builtin_cpu_supports("avx2");
 #define FILIGREE_WIDEST(with_16, with_8)                                                                               \
-    if (kHasAvx512) return with_16;                                                                                    \
-    if (kHasAvx2) return with_8
+    if (widest_vectors() == VectorWidth::bytes64) return with_16;                                                      \
+    if (widest_vectors() == VectorWidth::bytes32) return with_8
 #else
 #define FILIGREE_WIDEST(with_16, with_8)
 #endif
@@ -193,7 +183,7 @@ void interleave(const float* row, std::size_t pitch, std::size_t count, float un
 void stream_lines(const float* from, std::size_t lines, float* to) {
 #if defined(__x86_64__)
 #if !defined(__clang__)
-    if (kHasAvx512) return stream_lines_16(from, lines, to);
+    if (widest_vectors() == VectorWidth::bytes64) return stream_lines_16(from, lines, to);
 #endif
     for (std::size_t quarter = 0; quarter < 4 * lines; ++quarter)
         _mm_stream_ps(to + 4 * quarter, _mm_loadu_ps(from + 4 * quarter));

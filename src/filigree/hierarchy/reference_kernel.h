@@ -17,12 +17,6 @@ namespace filigree::reference {
 
 inline constexpr std::size_t kLanes = 16;
 
-/// The integer type of the same shape as F, one float or a vector of them.
-template <class F>
-struct IntOf {
-    using type = std::int32_t;
-};
-
 // Inlined into every clone of the loops, and so compiled for each processor.
 template <class F>
 struct Point {
@@ -67,9 +61,9 @@ FILIGREE_INLINE F at_most(F a, float high) {
 }
 
 /// 1 / sqrt(max(a, kTinySquare)) to float's precision: a guess from the bits, 3.5 % off at most, then a cubic and a
-/// quadratic step. Plain arithmetic instead of an instruction, since those are not the same everywhere.
+/// quadratic step: one step less than inverse_sqrt of lanes.h, for the same precision.
 template <class F>
-FILIGREE_INLINE F inverse_sqrt(F a) {
+FILIGREE_INLINE F bounded_inverse_sqrt(F a) {
     using Int = typename IntOf<F>::type;
     a = at_least(a, kTinySquare);
     F y = std::bit_cast<F>(0x5f375a86 - (std::bit_cast<Int>(a) >> 1));
@@ -129,9 +123,9 @@ template <class F>
 FILIGREE_INLINE F rest_size(const Basis<F>& basis, HeightLaw law) {
     const Point<F> normal = cross(basis.across, basis.up);
     const F width2 = dot(basis.across, basis.across), area2 = dot(normal, normal);
-    if (law == HeightLaw::inverse) return width2 * inverse_sqrt(width2);
-    if (law == HeightLaw::proportional) return inverse_sqrt(area2);
-    return area2 * inverse_sqrt(area2);
+    if (law == HeightLaw::inverse) return width2 * bounded_inverse_sqrt(width2);
+    if (law == HeightLaw::proportional) return bounded_inverse_sqrt(area2);
+    return area2 * bounded_inverse_sqrt(area2);
 }
 
 /// Eq. 2.7 and 2.14: origin + v across + w up + s h n, with s from the law.
@@ -139,15 +133,15 @@ template <class F>
 FILIGREE_INLINE Point<F> place(const Basis<F>& basis, const Point<F>& record, F size, const Scaling& scaling) {
     const Point<F> normal = cross(basis.across, basis.up);
     const F area2 = dot(normal, normal);
-    const F inverse_area = inverse_sqrt(area2);
+    const F inverse_area = bounded_inverse_sqrt(area2);
     F height = scaling.height * record.z;
     if (scaling.law != HeightLaw::keep) {
         F s = scaling.size * size;
         if (scaling.law == HeightLaw::inverse) {
-            s = s * inverse_sqrt(dot(basis.across, basis.across));
+            s = s * bounded_inverse_sqrt(dot(basis.across, basis.across));
         } else if (scaling.law == HeightLaw::proportional) {
             s = at_most(s * (area2 * inverse_area), kHugeRatio);
-            s = s * inverse_sqrt(s); // grows with its surroundings alone: no bound needed
+            s = s * bounded_inverse_sqrt(s); // grows with its surroundings alone: no bound needed
         } else {
             s = s * inverse_area;
         }
@@ -182,7 +176,9 @@ struct EdgeRun {
 
 inline std::size_t block_width(std::size_t cells) { return std::min(cells, kLanes); }
 /// Kinds of basis with a size of their own in a cell: with six references the centre's is none of the edges'.
-inline std::size_t cell_sizes(int references, HeightLaw law) { return law == HeightLaw::keep ? 0 : references == 6 ? 3 : 2; }
+inline std::size_t cell_sizes(int references, HeightLaw law) {
+    return law == HeightLaw::keep ? 0 : references == 6 ? 3 : 2;
+}
 /// A block of cells in blocks of up to kLanes: v, w, h of the edge points along the row, of those across it and of the
 /// centres, then the sizes.
 inline std::size_t cell_floats(int references, HeightLaw law) { return 9 + cell_sizes(references, law); }

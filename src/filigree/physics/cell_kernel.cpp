@@ -21,14 +21,11 @@ namespace filigree::cell_kernel {
 namespace {
 
 template <int N>
-struct Lanes : LaneTypes<N> {
+struct CellLanes : Lanes<N> {
     using typename LaneTypes<N>::Float;
-    using typename LaneTypes<N>::Loose;
     using typename LaneTypes<N>::Int;
 
-    static FILIGREE_INLINE Float load(const float* p) { return *reinterpret_cast<const Loose*>(p); }
-    static FILIGREE_INLINE void store(float* p, Float x) { *reinterpret_cast<Loose*>(p) = x; }
-    static FILIGREE_INLINE void add(float* p, Float x) { store(p, load(p) + x); }
+    static FILIGREE_INLINE void add(float* p, Float x) { Lanes<N>::store(p, Lanes<N>::load(p) + x); }
 
     /// -1 in the first `count` lanes, 0 in the others.
     static FILIGREE_INLINE Int first(Index count) {
@@ -242,10 +239,10 @@ FILIGREE_INLINE typename LaneTypes<N>::Float stiffness_bound(const Factors& f, c
     const Float norm2 = ((aI * aI + c2 * c2) + 2.0f * q * q * shape.I_linear) +
                         (a * shape.J * (18.0f * shape.J + 12.0f * q) + 4.0f * q * shape.J * shape.I_linear);
     const Float spread = (2.0f / 3.0f) * (norm2 - trace * trace * (1.0f / 3.0f));
-    const Float along = trace * (1.0f / 3.0f) + Lanes<N>::square_root(spread > 0.0f ? spread : Float{});
-    const Float across = Lanes<N>::magnitude(q) * ((shape.I_linear + 3.0f) * 0.28867513f); // s_1 <= sqrt(I)
+    const Float along = trace * (1.0f / 3.0f) + CellLanes<N>::square_root(spread > 0.0f ? spread : Float{});
+    const Float across = CellLanes<N>::magnitude(q) * ((shape.I_linear + 3.0f) * 0.28867513f); // s_1 <= sqrt(I)
     const Float bent = a * (0.05f * shape.I_linear + 4.0f * shape.I_bent);
-    return (f.shear_ratio * I * inverse_I1 + Lanes<N>::most(along, across)) + bent;
+    return (f.shear_ratio * I * inverse_I1 + CellLanes<N>::most(along, across)) + bent;
 }
 
 /// What the cells on the left of a block's first corners add to them: sums over x of the right corners' forces, for
@@ -260,7 +257,7 @@ struct Carry {
 template <int N, bool Tail>
 FILIGREE_INLINE void add_forces(const Factors& f, const Vectors& positions, const Cells::Run& run, Index i, Index count,
                                 const float* fraction, float* const* sums, Carry<N>& carry, Extremes<N>& extremes) {
-    using L = Lanes<N>;
+    using L = CellLanes<N>;
     using Float = typename L::Float;
     using Int = typename L::Int;
     CellSums<N> s;
@@ -342,7 +339,7 @@ FILIGREE_INLINE void add_run(const Factors& f, const Vectors& positions, const C
     if (rest == 0) return add_last_corner<N>(run, sums, carry);
     if constexpr (N > 4)
         if (rest <= N / 2) {
-            using L = Lanes<N>;
+            using L = CellLanes<N>;
             Carry<N / 2> half_carry;
             for (int u = 0; u < 4; ++u)
                 half_carry.right[u] = {L::last_half(carry.right[u].x), L::last_half(carry.right[u].y),
@@ -417,7 +414,7 @@ template <int N, bool Tail>
 FILIGREE_INLINE void add_systems(const Factors& f, const Vectors& positions, const Cells::Run& run, Index i,
                                  Index count, const float* fraction, int side, bool left_first, float* systems,
                                  std::size_t stride) {
-    using L = Lanes<N>;
+    using L = CellLanes<N>;
     using Float = typename L::Float;
     using Int = typename L::Int;
     CellSums<N> sums;
@@ -485,7 +482,7 @@ FILIGREE_INLINE void add_run_systems(const Factors& f, const Vectors& positions,
 template <int N>
 FILIGREE_INLINE void solve_vertices(const SweepJob& job, const Row& row, Index v, const float* systems,
                                     std::size_t stride) {
-    using L = Lanes<N>;
+    using L = CellLanes<N>;
     using Float = typename L::Float;
     using Int = typename L::Int;
     const Descent& descent = job.descent;
@@ -559,9 +556,7 @@ using SweepFunction = void (*)(const SweepJob&, std::size_t, std::size_t);
 // That is all the thread sanitizer would find.
 #define FILIGREE_READS_AHEAD __attribute__((no_sanitize("thread")))
 
-#if defined(__x86_64__)
-#define FILIGREE_AVX512 __attribute__((target("avx512f,avx512vl,avx512dq,avx512bw")))
-#define FILIGREE_AVX2 __attribute__((target("avx2")))
+#if defined(FILIGREE_HAS_WIDTHS)
 FILIGREE_AVX512 void add_slabs_avx512(const ForceJob& job, std::size_t begin, std::size_t end) {
     add_slabs<16>(job, begin, end);
 }
@@ -581,7 +576,7 @@ FILIGREE_READS_AHEAD void sweep_rows_plain(const SweepJob& job, std::size_t begi
 }
 
 ForceFunction force_function(int lanes) {
-#if defined(__x86_64__)
+#if defined(FILIGREE_HAS_WIDTHS)
     if (lanes == 16) return add_slabs_avx512;
     if (lanes == 8) return add_slabs_avx2;
 #endif
@@ -589,7 +584,7 @@ ForceFunction force_function(int lanes) {
     return add_slabs_plain;
 }
 SweepFunction sweep_function(int lanes) {
-#if defined(__x86_64__)
+#if defined(FILIGREE_HAS_WIDTHS)
     if (lanes == 16) return sweep_rows_avx512;
     if (lanes == 8) return sweep_rows_avx2;
 #endif

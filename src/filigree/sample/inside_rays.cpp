@@ -206,9 +206,8 @@ FILIGREE_INLINE void count_crossings(const Tree& tree, const Vec3d& point, RayPa
     }
 }
 
-#if defined(__x86_64__)
-__attribute__((target("avx2"))) void count_crossings_avx2(const Tree& tree, const Vec3d& point,
-                                                          RayParity::Count& count) {
+#if defined(FILIGREE_HAS_WIDTHS)
+FILIGREE_AVX2 void count_crossings_avx2(const Tree& tree, const Vec3d& point, RayParity::Count& count) {
     count_crossings<true>(tree, point, count);
 }
 #endif
@@ -217,8 +216,8 @@ void count_crossings_plain(const Tree& tree, const Vec3d& point, RayParity::Coun
 }
 
 auto counting_function() {
-#if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx2")) return count_crossings_avx2;
+#if defined(FILIGREE_HAS_WIDTHS)
+    if (widest_vectors() >= VectorWidth::bytes32) return count_crossings_avx2;
 #endif
     return count_crossings_plain;
 }

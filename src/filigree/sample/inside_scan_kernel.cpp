@@ -198,33 +198,10 @@ std::size_t row_entry(const Job& job, std::size_t j, std::size_t k) {
 
 // ---- N values at a time
 
-/// Types for N doubles in a register; Loose and Float are for reading anywhere.
 template <int N>
-struct LaneTypes;
-#define FILIGREE_LANE_TYPES(N)                                                                                         \
-    template <>                                                                                                        \
-    struct LaneTypes<N> {                                                                                              \
-        typedef double Double __attribute__((vector_size(N * 8)));                                                     \
-        typedef double Loose __attribute__((vector_size(N * 8), aligned(8), may_alias));                               \
-        typedef float Float __attribute__((vector_size(N * 4), aligned(4), may_alias));                                \
-        typedef std::int64_t Mask __attribute__((vector_size(N * 8)));                                                 \
-        typedef std::int32_t Int __attribute__((vector_size(N * 4)));                                                  \
-    };
-FILIGREE_LANE_TYPES(2)
-FILIGREE_LANE_TYPES(4)
-FILIGREE_LANE_TYPES(8)
-#undef FILIGREE_LANE_TYPES
+struct ScanLanes : DoubleLanes<N> {
+    using typename DoubleLaneTypes<N>::Double;
 
-template <int N>
-struct Lanes : LaneTypes<N> {
-    using typename LaneTypes<N>::Double;
-    using typename LaneTypes<N>::Loose;
-    using typename LaneTypes<N>::Float;
-
-    static FILIGREE_INLINE Double load(const double* p) { return *reinterpret_cast<const Loose*>(p); }
-    static FILIGREE_INLINE Double load(const float* p) {
-        return __builtin_convertvector(*reinterpret_cast<const Float*>(p), Double);
-    }
     static FILIGREE_INLINE Double all(double x) { return Double{} + x; }
     static FILIGREE_INLINE Double abs(Double x) { return x < 0 ? -x : x; }
 
@@ -249,7 +226,7 @@ struct Lanes : LaneTypes<N> {
 
     /// Coordinate `axis` of N positions end to end.
     static FILIGREE_INLINE Double coordinate(const float* positions, int axis) {
-        Double result;
+        Double result = {};
         for (int l = 0; l < N; ++l) result[l] = double(positions[3 * l + axis]);
         return result;
     }
@@ -257,7 +234,7 @@ struct Lanes : LaneTypes<N> {
 
 template <int N>
 FILIGREE_INLINE void encode_lanes(const Job& job, std::uint32_t* codes, std::size_t begin, std::size_t end) {
-    using L = Lanes<N>;
+    using L = ScanLanes<N>;
     std::size_t v = begin;
     for (; v + N <= end; v += N) {
         const float* const p = job.positions[v].data();
@@ -280,8 +257,8 @@ struct Entries {
     std::size_t count = 0;
 
     template <int N, bool Signed>
-    FILIGREE_INLINE void append(typename Lanes<N>::Double e, typename Lanes<N>::Double side,
-                                typename Lanes<N>::Mask wanted) {
+    FILIGREE_INLINE void append(typename ScanLanes<N>::Double e, typename ScanLanes<N>::Double side,
+                                typename ScanLanes<N>::Mask wanted) {
         alignas(64) double all_e[N], all_side[N];
         alignas(64) std::int64_t all_wanted[N];
         std::memcpy(all_e, &e, sizeof e);
@@ -309,7 +286,7 @@ struct SmallTriangles {
 };
 
 template <int N>
-FILIGREE_INLINE bool any(typename Lanes<N>::Mask mask) {
+FILIGREE_INLINE bool any(typename ScanLanes<N>::Mask mask) {
     std::int64_t result = 0;
     for (int l = 0; l < N; ++l) result |= mask[l];
     return result != 0;
@@ -319,7 +296,7 @@ FILIGREE_INLINE bool any(typename Lanes<N>::Mask mask) {
 template <int N, bool Signed>
 FILIGREE_INLINE void scan_small(const Job& job, SmallTriangles& small, std::uint32_t width_j, std::uint32_t width_k,
                                 Piece& piece) {
-    using L = Lanes<N>;
+    using L = ScanLanes<N>;
     using Double = typename L::Double;
     using Mask = typename L::Mask;
     constexpr std::size_t kRoom = SmallTriangles::kRoom;
@@ -416,7 +393,7 @@ FILIGREE_INLINE void scan_small(const Job& job, SmallTriangles& small, std::uint
 template <int N, bool Signed>
 FILIGREE_INLINE void scan_layers(const Job& job, Index triangle, std::uint32_t k_begin, std::uint32_t k_end,
                                  Piece& piece) {
-    using L = Lanes<N>;
+    using L = ScanLanes<N>;
     using Double = typename L::Double;
     using Mask = typename L::Mask;
     const Corners corners(job, triangle);
@@ -578,9 +555,9 @@ FILIGREE_INLINE void scan_large_any(const Job& job, std::span<const LargeTriangl
     }                                                                                                                  \
     constexpr Loops k_##NAME = {encode_##NAME, scan_triangles_##NAME, scan_large_##NAME};
 
-#if defined(__x86_64__)
-FILIGREE_LOOPS(avx512, 8, __attribute__((target("avx512f,avx512vl,avx512dq,avx512bw"))))
-FILIGREE_LOOPS(avx2, 4, __attribute__((target("avx2"))))
+#if defined(FILIGREE_HAS_WIDTHS)
+FILIGREE_LOOPS(avx512, 8, FILIGREE_AVX512)
+FILIGREE_LOOPS(avx2, 4, FILIGREE_AVX2)
 #endif
 FILIGREE_LOOPS(plain, 2, )
 
@@ -592,7 +569,7 @@ std::span<const int> lane_counts() {
 }
 
 Loops loops(int lanes) {
-#if defined(__x86_64__)
+#if defined(FILIGREE_HAS_WIDTHS)
     if (lanes == 8) return k_avx512;
     if (lanes == 4) return k_avx2;
 #endif

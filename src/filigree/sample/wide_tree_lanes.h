@@ -5,11 +5,11 @@
 
 namespace filigree {
 
-typedef float Float8 __attribute__((vector_size(32)));
-typedef std::int32_t Int8 __attribute__((vector_size(32)));
-typedef float Float4 __attribute__((vector_size(16)));
-typedef double Double4 __attribute__((vector_size(32)));
-typedef std::int64_t Long4 __attribute__((vector_size(32)));
+using Float8 = LaneTypes<8>::Float;
+using Int8 = LaneTypes<8>::Int;
+using Float4 = LaneTypes<4>::Float;
+using Double4 = DoubleLaneTypes<4>::Double;
+using Long4 = DoubleLaneTypes<4>::Mask;
 
 FILIGREE_INLINE Float8 load8(const float* p) { return *reinterpret_cast<const Float8*>(p); }
 FILIGREE_INLINE Double4 load4(const float* p) {

@@ -199,12 +199,7 @@ Tree make_tree(std::span<const Vec3f> positions, std::span<const Triangle> trian
 
 // Asking it.
 
-// 1 / sqrt(x): a first guess from the exponent and Newton steps, each of which doubles the digits.
-FILIGREE_INLINE Float8 inverse_sqrt(Float8 x) {
-    Float8 y = (Float8)(0x5f3759df - ((Int8)x >> 1));
-    for (int step = 0; step < 3; ++step) y = y * (1.5f - 0.5f * x * y * y);
-    return y;
-}
+/// By Newton steps, each of which doubles the digits.
 FILIGREE_INLINE Double4 square_root(Double4 x) {
     Double4 y = (Double4)(0x5fe6eb50c7b537a9 - ((Long4)x >> 1));
     for (int step = 0; step < 4; ++step) y = y * (1.5 - 0.5 * x * y * y);
@@ -338,11 +333,11 @@ FILIGREE_INLINE Winding winding_of(const Tree& tree, const Vec3d& point) {
 
 using WindingFunction = Winding (*)(const Tree&, const Vec3d&);
 
-#if defined(__x86_64__)
-__attribute__((target("avx2"))) Winding winding_avx2(const Tree& tree, const Vec3d& point) {
+#if defined(FILIGREE_HAS_WIDTHS)
+FILIGREE_AVX2 Winding winding_avx2(const Tree& tree, const Vec3d& point) {
     return winding_of<true, false>(tree, point);
 }
-__attribute__((target("avx2"))) Winding winding_and_distance_avx2(const Tree& tree, const Vec3d& point) {
+FILIGREE_AVX2 Winding winding_and_distance_avx2(const Tree& tree, const Vec3d& point) {
     return winding_of<true, true>(tree, point);
 }
 #endif
@@ -353,8 +348,8 @@ Winding winding_and_distance_plain(const Tree& tree, const Vec3d& point) {
 
 /// The tree's answer, with the distance or without.
 WindingFunction winding_function(bool with_distance) {
-#if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx2")) return with_distance ? winding_and_distance_avx2 : winding_avx2;
+#if defined(FILIGREE_HAS_WIDTHS)
+    if (widest_vectors() >= VectorWidth::bytes32) return with_distance ? winding_and_distance_avx2 : winding_avx2;
 #endif
     return with_distance ? winding_and_distance_plain : winding_plain;
 }
