@@ -7,8 +7,7 @@
 
 namespace filigree {
 
-/// A loop's body, called through one pointer: oneTBB's templates are then compiled once and not in every loop, which
-/// was a fifth of the library's compile time.
+/// A loop's body, called through one pointer: oneTBB's templates are then compiled once and not in every loop.
 class LoopBody {
 public:
     template <class Body>
