@@ -76,7 +76,7 @@ protected:
     void choose_scalars(Subject& subject, const std::string& path);
     void upload(Subject& subject);
     Pose read_pose(const Subject& subject, const std::string& path) const {
-        return pose_from_mesh(session_.read_mesh(path), *subject.model);
+        return pose_of_mesh(session_.read_mesh(path), subject.model->mesh.origin);
     }
     /// Poses a model; its vertices' places are left in subject.mesh.
     void set_pose(Subject& subject, const Pose& pose, bool on_screen);

@@ -29,8 +29,6 @@ OptionList restore_options(RestoreOptions& options) {
             Option("--thin-shell", options.thin_shell, "Bumps keep their shape, as on cloth and skin")};
 }
 
-Pose pose_from_mesh(const Mesh& mesh, const Model& model) { return pose_of_mesh(mesh, model.mesh.origin); }
-
 const Pose& own_pose(const PoseSequence& poses, std::size_t frame, const std::string& path) {
     if (poses.empty())
         throw Failure{{ErrorCode::unsuitable,
@@ -39,20 +37,6 @@ const Pose& own_pose(const PoseSequence& poses, std::size_t frame, const std::st
         throw Failure{{ErrorCode::usage,
                        fmt::format("{}: has frames 1 to {}; there is no frame {}.", path, poses.frames.size(), frame)}};
     return poses.frames[frame - 1];
-}
-
-Mesh driver_mesh(const Model& model) {
-    Mesh driver = level_mesh(model, 0);
-    std::erase_if(driver.scalars, [](const VertexScalar& scalar) { return is_gradient_name(scalar.name); });
-    return driver;
-}
-
-Mesh posed_driver(const Model& model, const Pose& pose) {
-    Mesh driver = driver_mesh(model);
-    driver.positions = pose.positions;
-    driver.normals = {};
-    add_gradients(driver, pose);
-    return driver;
 }
 
 namespace {
@@ -105,7 +89,7 @@ void restore_one(const Options& options, Session& session) {
     PoseSequence own;
     const Model model = session.read_model(options.model, options.frame ? &own : nullptr);
     Pose pose = options.frame ? own_pose(own, options.frame, options.model)
-                              : pose_from_mesh(session.read_mesh(options.pose), model);
+                              : pose_of_mesh(session.read_mesh(options.pose), model.mesh.origin);
     if (!options.ghosts.empty()) pose.ghosts = positions_for(session.read_mesh(options.ghosts), model);
     const Restorer restorer = require(Restorer::create(model, options.restore, session.context()));
     const double start = now_seconds();

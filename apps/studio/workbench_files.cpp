@@ -5,6 +5,7 @@
 #include "pins.h"
 #include "words.h"
 
+#include "filigree/hierarchy/pose_mesh.h"
 #include "filigree/io/file.h"
 #include "filigree/io/mesh_file.h"
 #include "filigree/io/model_file.h"
@@ -93,21 +94,6 @@ Result<Mesh> posed_mesh(const State& state, const Pose& pose, const RunContext& 
     const Result<Restorer> restorer = Restorer::create(*state.model, state.restore, context);
     if (!restorer) return restorer.error();
     return restorer->mesh(pose, context);
-}
-
-/// The driver as `filigree restore` reads it: with the gradients in the scalars f00 .. f22, row by row.
-Mesh posed_driver(const Model& model, const Pose& pose) {
-    Mesh driver = level_mesh(model, 0);
-    std::erase_if(driver.scalars, [](const VertexScalar& scalar) { return is_gradient_name(scalar.name); });
-    if (pose.positions.empty()) return driver;
-    driver.positions = pose.positions;
-    driver.normals = {}; // of the driver at rest
-    for (int k = 0; k < 9 && !pose.gradients.empty(); ++k) {
-        VertexScalar& scalar = driver.scalars.emplace_back();
-        scalar.name = {'f', char('0' + k / 3), char('0' + k % 3)};
-        for (const Mat3f& gradient : pose.gradients) scalar.values.push_back(gradient(k / 3, k % 3));
-    }
-    return driver;
 }
 
 bool is_deformed(const State& state) { return !state.warps.none() || state.handle_pose; }
@@ -300,7 +286,7 @@ void Workbench::save_mesh(const std::string& path) {
 
 void Workbench::save_driver(const std::string& path) {
     save("Saving " + file_name(path), path, [path, model = state().model, pose = pose_](const RunContext& context) {
-        return write_checked(posed_driver(*model, pose), path, context);
+        return write_checked(pose.positions.empty() ? driver_mesh(*model) : posed_driver(*model, pose), path, context);
     });
 }
 

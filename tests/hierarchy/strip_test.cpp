@@ -197,6 +197,32 @@ TEST(Strip, DuplicatesStayTogether) {
             ASSERT_TRUE(mesh.positions[a] != mesh.positions[b] || moved[a] == moved[b]) << a << ' ' << b;
 }
 
+/// Flat-shaded: as many vertices as corners, and a quarter as many places.
+TEST(Strip, LevelsCountPlacesNotVertices) {
+    const Mesh shared = make_wavy_sphere({.resolution = 24});
+    const Mesh flat = soup(shared);
+    ASSERT_GT(flat.vertex_count(), 3 * shared.vertex_count());
+    for (const StripOptions& options : {StripOptions{}, StripOptions{.levels = 2}, StripOptions{.base = 60}}) {
+        const Model one = stripped(shared, options).model, other = stripped(flat, options).model;
+        ASSERT_EQ(one.levels.size(), other.levels.size());
+        for (std::size_t k = 0; k < one.levels.size(); ++k)
+            EXPECT_NEAR(double(one.levels[k].vertices.size()), double(other.levels[k].vertices.size()), 2) << k;
+        EXPECT_LT(other.levels.back().vertices.size(), shared.vertex_count()); // the first level loses some
+    }
+    const Model quarter = stripped(flat, {.levels = 1}).model;
+    EXPECT_NEAR(double(quarter.driver().vertices.size()), double(shared.vertex_count()) / 4,
+                0.02 * double(shared.vertex_count()));
+}
+
+TEST(Strip, ALevelThatRemovesNothingIsNotKept) {
+    Mesh mesh = make_wavy_plane({.resolution = 8}); // 81 vertices
+    mesh.uvs = {};
+    for (int i = 0; i < 2000; ++i) mesh.positions.emplace_back(float(i), 5.0f, 5.0f); // loose ones: in no level
+    const Model model = stripped(mesh, {.base = 40}).model;                           // 40, 160 and 640 of 2,081
+    ASSERT_EQ(model.levels.size(), 1u);
+    EXPECT_LE(model.driver().vertices.size(), 41u);
+}
+
 TEST(Strip, SameBytesForAnyThreads) {
     FILIGREE_NEEDS_TWO_THREADS();
     for (const Precision precision : kPrecisions) {

@@ -1,5 +1,6 @@
 #include "filigree/io/losses.h"
 
+#include "filigree/hierarchy/pose_mesh.h"
 #include "filigree/io/mesh_file.h"
 #include "filigree/io/text_scanner.h"
 

@@ -202,11 +202,6 @@ Result<MeshFormat> mesh_format(const std::filesystem::path& path) {
                                              " is not of a mesh format we know; " + std::string(kKnownFormats) + "."};
 }
 
-bool is_gradient_name(std::string_view scalar) {
-    const auto is_index = [](char c) { return c >= '0' && c <= '2'; };
-    return scalar.size() == 3 && scalar[0] == 'f' && is_index(scalar[1]) && is_index(scalar[2]);
-}
-
 Result<MeshFile> read_mesh(std::string_view bytes, const std::string& name, const RunContext& context) {
     try {
         return read_checked(bytes, name, context);

@@ -34,10 +34,6 @@ Result<MeshFile> read_mesh(const std::filesystem::path& path, const RunContext& 
 /// The same from bytes in memory; `name` stands in messages, and its extension decides where the content cannot.
 Result<MeshFile> read_mesh(std::string_view bytes, const std::string& name, const RunContext& context);
 
-/// Whether a vertex scalar is one of f00 .. f22: a deformation gradient's entry in that row and column, as the file of
-/// a moved driver holds it.
-bool is_gradient_name(std::string_view scalar);
-
 struct WriteMeshOptions {
     std::optional<MeshFormat> format = std::nullopt; ///< unset: from the file name's extension
     bool ascii = false;                              ///< PLY and STL: text instead of binary

@@ -21,14 +21,6 @@ namespace fs = std::filesystem;
 constexpr const char* kKnownFormats =
     "use .pc2, .mdd, .usda, .glb, a folder (NAME/), or NAME_####.ply for numbered meshes";
 
-std::string gradient_name(int k) { return {'f', static_cast<char>('0' + k / 3), static_cast<char>('0' + k % 3)}; }
-
-const std::vector<float>* find_scalar(const Mesh& mesh, const std::string& name) {
-    for (const VertexScalar& scalar : mesh.scalars)
-        if (scalar.name == name) return &scalar.values;
-    return nullptr;
-}
-
 void take_origin_off(std::span<Vec3f> positions, const Vec3d& origin) {
     if (origin.isZero()) return;
     for (Vec3f& p : positions) p = (p.cast<double>() - origin).cast<float>();
@@ -137,27 +129,6 @@ Result<AnimationFormat> animation_format(const fs::path& path) {
     if (extension == ".glb") return AnimationFormat::glb;
     return Error{ErrorCode::unsupported,
                  path.string() + ": is no name for an animation; " + std::string(kKnownFormats) + "."};
-}
-
-Pose pose_of_mesh(const Mesh& moved, const Vec3d& origin) {
-    Pose pose;
-    pose.positions.resize(moved.vertex_count());
-    for (std::size_t v = 0; v < pose.positions.size(); ++v)
-        pose.positions[v] = (moved.world_position(v) - origin).cast<float>();
-    std::array<const std::vector<float>*, 9> entries;
-    for (int k = 0; k < 9; ++k)
-        if (!(entries[std::size_t(k)] = find_scalar(moved, gradient_name(k)))) return pose;
-    pose.gradients.resize(pose.positions.size());
-    for (std::size_t v = 0; v < pose.gradients.size(); ++v)
-        for (int k = 0; k < 9; ++k) pose.gradients[v](k / 3, k % 3) = (*entries[std::size_t(k)])[v];
-    return pose;
-}
-
-void add_gradients(Mesh& mesh, const Pose& pose) {
-    for (int k = 0; k < 9 && !pose.gradients.empty(); ++k) {
-        VertexScalar& scalar = mesh.scalars.emplace_back(VertexScalar{gradient_name(k), {}});
-        for (const Mat3f& gradient : pose.gradients) scalar.values.push_back(gradient(k / 3, k % 3));
-    }
 }
 
 Result<PoseStream> open_poses(const fs::path& path, std::size_t points, const Vec3d& origin,

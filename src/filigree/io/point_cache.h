@@ -65,10 +65,4 @@ Result<std::vector<std::string>> write_numbered_meshes(std::size_t frames,
                                                        const std::function<Result<Mesh>(std::size_t frame)>& mesh,
                                                        const std::filesystem::path& path, const RunContext& context);
 
-/// The pose that a moved driver has in a mesh's file: its positions, and the gradients in its vertex scalars f00 .. f22
-/// where all nine are there. origin: the model's.
-Pose pose_of_mesh(const Mesh& moved, const Vec3d& origin);
-/// Puts a pose's gradients, where it has any, into a mesh of its vertices as those nine scalars.
-void add_gradients(Mesh& mesh, const Pose& pose);
-
 } // namespace filigree

@@ -1,4 +1,5 @@
 // Numbered meshes: NAME_0001.ply, NAME_0002.ply and so on, a mesh a frame.
+#include "filigree/hierarchy/pose_mesh.h"
 #include "filigree/io/file_batch.h"
 #include "filigree/io/file_error.h"
 #include "filigree/io/mesh_file.h"

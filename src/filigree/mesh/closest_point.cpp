@@ -190,7 +190,8 @@ struct ClosestPointTree::Tree {
         return leaf.pieces == 1 ? box : piece_box(triangles[leaf.first], box, leaf);
     }
 
-    /// The box of what of a triangle lies between two planes: its edges have all corners of that.
+    /// The box of the part of a triangle that lies between the leaf's two planes. Every corner of that part lies on an
+    /// edge of the triangle, so the edges, cut at the planes, are enough.
     Box piece_box(const Triangle& triangle, const Box& whole, const Leaf& leaf) const {
         int axis = 0;
         const double length = whole.size().maxCoeff(&axis);
