@@ -46,6 +46,41 @@ TEST(MeshDistance, OfParallelSquaresInAnyScale) {
     }
 }
 
+TEST(VertexDistance, IsThatOfTheWholeComparison) {
+    const Mesh a = make_wavy_sphere({.resolution = 8});
+    Mesh b = a;
+    for (Vec3f& p : b.positions) p.x() *= 1.5f;
+    const RunContext context(1);
+    const VertexDistance expected = *distance(a, b).vertices;
+    for (const VertexDistance& d :
+         {vertex_distance(a, b, context).value(), vertex_distance(a, a.positions, b.positions, context)}) {
+        EXPECT_EQ(d.rms, expected.rms);
+        EXPECT_EQ(d.max, expected.max);
+        EXPECT_EQ(d.max_vertex, expected.max_vertex);
+        EXPECT_EQ(d.normal_p95_deg, expected.normal_p95_deg);
+        EXPECT_EQ(d.per_vertex, expected.per_vertex);
+    }
+    EXPECT_GT(expected.rms, 0.01);
+    b.origin.y() += 2; // the shapes alone know no origin
+    EXPECT_GT(vertex_distance(a, b, context)->rms, 1.9);
+}
+
+TEST(VertexDistance, NeedsAsManyVertices) {
+    const Result<VertexDistance> d =
+        vertex_distance(make_wavy_plane({.resolution = 4}), make_wavy_plane({.resolution = 5}), RunContext(1));
+    ASSERT_FALSE(d.ok());
+    EXPECT_EQ(d.error().code, ErrorCode::mismatch);
+    EXPECT_NE(d.error().message.find("25 and 36"), std::string::npos) << d.error().message;
+}
+
+TEST(MeshDistance, SaysOnlyWhatItLookedAt) {
+    Mesh points; // as many vertices as the other mesh, and no faces
+    points.positions = make_wavy_plane({.resolution = 4}).positions;
+    const auto d = distances_to_surface(make_wavy_plane({.resolution = 4}), points, RunContext(1));
+    EXPECT_EQ(d.error().code, ErrorCode::unsuitable);
+    EXPECT_EQ(d.error().message.find("same number"), std::string::npos) << d.error().message;
+}
+
 TEST(MeshDistance, IsNotTheSameBothWays) {
     const MeshDistance d = distance(square(1, 0), square(3, 0)); // the small one lies in the large one
     EXPECT_LT(d.surfaces->max_a_to_b, 1e-7);

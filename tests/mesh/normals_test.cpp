@@ -18,6 +18,13 @@ TEST(VertexNormals, OfAUnitSquareInAnyScale) {
     }
 }
 
+TEST(DoubledAreaVector, IsRightForFacesFarOutAndNotConvex) {
+    const float far = 1 << 20; // a float's step is 1/8 there
+    const std::vector<Vec3f> arrow = {{far, far, 0}, {far + 4, far + 4, 0}, {far, far + 8, 0}, {far + 1, far + 4, 0}};
+    EXPECT_EQ(doubled_area_vector(arrow, std::vector<Index>{0, 1, 2, 3}), Vec3d(0, 0, 2 * (16 - 4)));
+    EXPECT_EQ(doubled_area_vector(arrow, std::vector<Index>{3, 2, 1, 0}), Vec3d(0, 0, -2 * (16 - 4)));
+}
+
 TEST(VertexNormals, AreWeightedByArea) {
     Mesh mesh; // around vertex 0: area 3/2 facing z and 4/2 facing x
     mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 3, 0}, {0, 0, -4}, {0, 1, 0}};

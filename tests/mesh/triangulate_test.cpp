@@ -172,5 +172,13 @@ TEST(Triangulate, HugeFacesAreQuick) {
     EXPECT_EQ(triangulate(star(50000, 0.5)).triangles.size(), 49998u);
 }
 
+TEST(Triangulate, CanBeCancelled) {
+    const RunContext context(1);
+    const Mesh pentagon = one_face({{0, 0, 0}, {2, 0, 0}, {3, 1, 0}, {2, 2, 0}, {0, 2, 0}});
+    EXPECT_EQ(triangulate(pentagon, context)->triangles, triangulate(pentagon).triangles);
+    context.cancel();
+    EXPECT_EQ(triangulate(pentagon, context).error().code, ErrorCode::cancelled);
+}
+
 } // namespace
 } // namespace filigree
