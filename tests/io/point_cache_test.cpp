@@ -1,5 +1,6 @@
 #include "filigree/io/point_cache.h"
 
+#include "filigree/hierarchy/pose_mesh.h"
 #include "filigree/hierarchy/strip.h"
 #include "filigree/io/file.h"
 #include "filigree/io/mesh_file.h"
