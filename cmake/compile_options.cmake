@@ -1,12 +1,15 @@
 # What every target of ours is compiled with. One place, so that the same input gives the same bytes everywhere.
 add_library(filigree_options INTERFACE)
 target_compile_options(filigree_options INTERFACE
-  -Wall -Wextra -Wno-restrict -Wno-array-bounds -Wno-stringop-overflow -Wno-stringop-overread  # false alarms about std::string, GCC 12
+  -Wall -Wextra -Wno-restrict -Wno-array-bounds -Wno-stringop-overflow -Wno-stringop-overread -Wno-free-nonheap-object  # false alarms about std::string and std::vector, GCC 12
   -Wshadow -Wconversion -Wno-sign-conversion -Wno-psabi
   -ffp-contract=off      # no fused multiply-add: the same bytes whatever the processor has
   $<$<BOOL:${FILIGREE_STRICT}>:-Werror>
   # GCC looks for memory to reuse from 128 MB on, which the precompiled headers alone take: up to a fifth of its time.
   $<$<CXX_COMPILER_ID:GNU>:--param=ggc-min-heapsize=600000>)
+if(CMAKE_UNITY_BUILD) # sources look like headers then
+  target_compile_options(filigree_options INTERFACE -Wno-subobject-linkage)
+endif()
 if(BUILD_SHARED_LIBS) # calls of our own stay direct, as in a static library
   target_compile_options(filigree_options INTERFACE -fno-semantic-interposition)
   target_link_options(filigree_options INTERFACE -Wl,-Bsymbolic-functions)

@@ -19,6 +19,9 @@ using Json = nlohmann::ordered_json;
 
 inline constexpr double kFigureWidth = 720; ///< of every figure, page units
 
+/// A point as JSON has it.
+inline std::vector<double> listed(const Vec3d& p) { return {p.x(), p.y(), p.z()}; }
+
 struct Panel;
 
 /// A figure, and the numbers in it.

@@ -16,8 +16,6 @@ namespace filigree::report {
 
 namespace {
 
-std::vector<double> listed(const Vec3d& p) { return {p.x(), p.y(), p.z()}; }
-
 // --- figure 1.1 ---
 
 /// A line P1 P2 with a detail over it: the foot's place along the line, and the height.

@@ -116,8 +116,6 @@ private:
     std::vector<StoredPoint> stored_;
 };
 
-std::vector<double> listed(const Vec3d& p) { return {p.x(), p.y(), p.z()}; }
-
 Json numbers_of(const StoredPoint& s, const Reconstruction& r) {
     return {
         {"column", s.place[0]},    {"row", s.place[1]}, {"level", s.level}, {"c1", listed(r.c1)}, {"c2", listed(r.c2)},

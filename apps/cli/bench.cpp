@@ -13,7 +13,7 @@ namespace {
 
 constexpr unsigned kBenchResolution = 256; // of the wavy cube, unless there is a mesh
 
-struct Options {
+struct BenchArguments {
     std::string mesh;
     bench::MeasureOptions measure;
 };
@@ -43,7 +43,7 @@ void report_fidelity(const std::vector<bench::FidelityRow>& rows, Report& report
     report.set("fidelity", values);
 }
 
-void run(const Options& options, Session& session) {
+void run(const BenchArguments& options, Session& session) {
     Mesh mesh =
         options.mesh.empty() ? make_wavy_cube({.resolution = kBenchResolution}) : session.read_mesh(options.mesh);
     const RunContext silent = session.silent_context(); // a bar would cost time that is measured
@@ -62,7 +62,7 @@ void run(const Options& options, Session& session) {
 } // namespace
 
 Command bench_command() {
-    const auto options = std::make_shared<Options>();
+    const auto options = std::make_shared<BenchArguments>();
     return {.name = "bench",
             .text = "Measure this machine: speeds with their rivals, and fidelity",
             .options =

@@ -11,7 +11,7 @@ namespace filigree::cli {
 
 namespace {
 
-struct Options {
+struct CompareArguments {
     std::string a, b, picture;
     UpAxis up = UpAxis::y;
     std::size_t samples = 100'000;
@@ -78,7 +78,7 @@ void report_distances(const MeshDistance& distance, Report& report) {
     }
 }
 
-void run(const Options& options, Session& session) {
+void run(const CompareArguments& options, Session& session) {
     if (!options.picture.empty()) check_picture_path(options.picture);
     const Mesh a = session.read_mesh(options.a), b = session.read_mesh(options.b);
     const MeshDistance distance = require(mesh_distance(a, b, options.samples, session.context()));
@@ -101,7 +101,7 @@ void run(const Options& options, Session& session) {
 } // namespace
 
 Command compare_command() {
-    const auto options = std::make_shared<Options>();
+    const auto options = std::make_shared<CompareArguments>();
     return {.name = "compare",
             .text = "Say how far one mesh is from another",
             .options =

@@ -42,7 +42,7 @@ std::unique_ptr<SpaceWarp> chain_steps(const std::vector<WarpStep>& steps, const
     return make_chain(std::move(warps));
 }
 
-struct Options {
+struct DeformArguments {
     std::string input, output, handles, pose_output;
     std::vector<WarpStep> steps;
     std::optional<Axis> axis = {};
@@ -58,7 +58,7 @@ struct Options {
 /// What is done to the file, wholly or a part of the way there.
 class Deformation {
 public:
-    explicit Deformation(const Options& options) : options_(options) {
+    explicit Deformation(const DeformArguments& options) : options_(options) {
         if (!options.handles.empty()) handles_ = require(read_handles(options.handles));
     }
 
@@ -87,18 +87,18 @@ private:
         return part;
     }
 
-    const Options& options_;
+    const DeformArguments& options_;
     std::optional<HandlesFile> handles_;
 };
 
-Mesh restore_pose(const Model& model, const Pose& pose, const Options& options, const RunContext& context) {
+Mesh restore_pose(const Model& model, const Pose& pose, const DeformArguments& options, const RunContext& context) {
     const Restorer restorer = require(Restorer::create(model, options.restore, context));
     return require(restorer.mesh(pose, context));
 }
 
 bool is_model_path(const std::string& path) { return lower_ending(path) == ".fil"; }
 
-void check(const Options& options, const Session& session) {
+void check(const DeformArguments& options, const Session& session) {
     const auto refuse = [](const std::string& sentence) { throw Failure{{ErrorCode::usage, sentence}}; };
     check_second_output("--pose", options.pose_output, options.output);
     if (options.steps.empty() == options.handles.empty())
@@ -142,7 +142,7 @@ void write_posed_model(const Model& model, const PoseStream& poses, const std::s
                                     poses.frames_per_second));
 }
 
-void animate_model(const Model& model, const Options& options, Session& session, Report& report) {
+void animate_model(const Model& model, const DeformArguments& options, Session& session, Report& report) {
     const Deformation deformation(options);
     const RunContext silent = session.silent_context(); // the bar tells of frames
     const PoseStream poses{options.frames, options.frames_per_second, [&](std::size_t frame) -> Result<Pose> {
@@ -153,7 +153,7 @@ void animate_model(const Model& model, const Options& options, Session& session,
                            report);
 }
 
-void animate_mesh(const Mesh& rest, const Options& options, Session& session, Report& report) {
+void animate_mesh(const Mesh& rest, const DeformArguments& options, Session& session, Report& report) {
     if (is_model_path(options.output))
         throw Failure{{ErrorCode::usage, options.output + ": a model with poses comes from a model, and " +
                                              options.input + " is a mesh; 'filigree strip' makes one of it."}};
@@ -168,7 +168,7 @@ void animate_mesh(const Mesh& rest, const Options& options, Session& session, Re
     write_animation_output(animation, options.animation, options.output, options.input, session, report);
 }
 
-void deform_animation(const Options& options, const Session::Content& content, Session& session) {
+void deform_animation(const DeformArguments& options, const Session::Content& content, Session& session) {
     Report report;
     const double start = now_seconds();
     const auto* model = std::get_if<Model>(&content.value);
@@ -184,7 +184,7 @@ void deform_animation(const Options& options, const Session::Content& content, S
     session.print(report);
 }
 
-void deform_once(const Options& options, const Session::Content& content, Session& session) {
+void deform_once(const DeformArguments& options, const Session::Content& content, Session& session) {
     const Deformation deformation(options);
     const double start = now_seconds();
     const auto* model = std::get_if<Model>(&content.value);
@@ -225,7 +225,7 @@ OptionList warp_options(std::vector<WarpStep>& steps) {
 } // namespace
 
 Command deform_command() {
-    const auto options = std::make_shared<Options>();
+    const auto options = std::make_shared<DeformArguments>();
     return {.name = "deform",
             .text = "Deform a mesh (every vertex) or a model (its driver, then restore); options apply in the order "
                     "given",

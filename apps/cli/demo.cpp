@@ -23,13 +23,13 @@ namespace {
 constexpr unsigned kDemoResolution = 264; // of the wavy cube, as large as the report's
 
 /// What the demo does to a mesh: a twist and a bend along one axis, as far as the mesh is slim enough not to fold.
-struct Deformation {
+struct DemoWarp {
     Box box;
     Axis axis;
     double twist_deg, bend_deg;
 
     /// What stands leans over, and its base stays on the ground; what lies is bent along its longest side.
-    Deformation(const Box& of, UpAxis up) : box(of), axis(static_cast<Axis>(up)) {
+    DemoWarp(const Box& of, UpAxis up) : box(of), axis(static_cast<Axis>(up)) {
         constexpr double kLying = 1.5; // longest side over height
         if (box.size().maxCoeff() > kLying * box.size()[int(axis)]) axis = longest_axis(box);
         const int a = int(axis);
@@ -89,7 +89,7 @@ void run_demo(const std::string& input, const std::string& folder, bool pictures
 
     // The long way: every vertex, and every normal where the mesh has them.
     const UpAxis up = asked_up.value_or(find_up_axis(mesh, usual_up_axis(input)));
-    const Deformation deformation(world_bounds(mesh), up);
+    const DemoWarp deformation(world_bounds(mesh), up);
     const auto warp = deformation.warp();
     Mesh full = mesh;
     const double full_seconds =
@@ -100,8 +100,7 @@ void run_demo(const std::string& input, const std::string& folder, bool pictures
     // Ours: the driver with its gradients, then all detail back.
     const Restorer restorer = require(Restorer::create(model, {}, context));
     Pose pose;
-    const double driver_seconds =
-        bench::median_seconds([&] { pose = warp_pose(*warp, model, context); });
+    const double driver_seconds = bench::median_seconds([&] { pose = warp_pose(*warp, model, context); });
     std::vector<Vec3f> positions(mesh.vertex_count());
     const double restore_seconds =
         bench::median_seconds([&] { require(restorer.positions(pose, positions, context)); });
@@ -119,9 +118,7 @@ void run_demo(const std::string& input, const std::string& folder, bool pictures
     std::vector<std::string> pictures_made;
     if (pictures && mesh.face_count() > 0) {
         const DemoScene scene{mesh, model, pose, restored, with_gradients, up};
-        const auto pose_at = [&](double part) {
-            return warp_pose(*deformation.warp(part), model, context);
-        };
+        const auto pose_at = [&](double part) { return warp_pose(*deformation.warp(part), model, context); };
         pictures_made = draw_and_film(scene, pose_at, picture_file, film_file, session);
     }
     files.keep();
@@ -167,7 +164,7 @@ void run_demo(const std::string& input, const std::string& folder, bool pictures
                                  {"positions_only_normal_p95_deg", p.normal_p95_deg}});
 }
 
-struct Options {
+struct DemoArguments {
     std::string input, output = "filigree-demo";
     bool no_pictures = false;
     std::optional<UpAxis> up;
@@ -176,7 +173,7 @@ struct Options {
 } // namespace
 
 Command demo_command() {
-    const auto options = std::make_shared<Options>();
+    const auto options = std::make_shared<DemoArguments>();
     return {.name = "demo",
             .text = "The main job, start to end: strip, bend and twist the driver, restore, compare",
             .options = {Option("mesh", options->input,

@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct ExportArguments {
     std::string input, output, poses;
     PoseFileOptions pose_file;
     bool at_rest = false, web = false;
@@ -24,10 +24,8 @@ struct Options {
     AnimationOutput animation;
 };
 
-[[noreturn]] void refuse(ErrorCode code, const std::string& sentence) { throw Failure{{code, sentence}}; }
-
 /// Levels at rest, one beside the other.
-void export_levels(const Model& model, const Options& options, Session& session, Report& report) {
+void export_levels(const Model& model, const ExportArguments& options, Session& session, Report& report) {
     if (const AnimationFormat format = require(animation_format(options.output)); format != AnimationFormat::glb)
         refuse(ErrorCode::unsuitable,
                options.input + (options.at_rest ? ": a" : ": has no poses, and a") +
@@ -37,8 +35,8 @@ void export_levels(const Model& model, const Options& options, Session& session,
                                                    "--full-precision", "--no-normals", "--morph-normals", "--law",
                                                    "--level", "--thin-shell", "--frame-rate", "--animation"});
     if (!given.empty())
-        refuse(ErrorCode::usage, given + " belongs to a model that moves, and " + options.input +
-                                     " is exported at rest; 'filigree level' writes one level of it.");
+        refuse(given + " belongs to a model that moves, and " + options.input +
+               " is exported at rest; 'filigree level' writes one level of it.");
     session.begin_writing(options.output);
     for (const std::string& warning :
          require(write_levels_glb(model, options.output, options.input, session.context())))
@@ -50,7 +48,7 @@ void export_levels(const Model& model, const Options& options, Session& session,
 }
 
 /// A moving file of another program, frame by frame, as another format.
-void convert_animation(const Mesh& rest, const Options& options, Session& session, Report& report) {
+void convert_animation(const Mesh& rest, const ExportArguments& options, Session& session, Report& report) {
     const bool may_move =
         !options.poses.empty() || lower_ending(options.input) == ".glb" || lower_ending(options.input) == ".gltf";
     if (!may_move)
@@ -62,7 +60,7 @@ void convert_animation(const Mesh& rest, const Options& options, Session& sessio
     write_animation_output(animation, options.animation, options.output, options.input, session, report);
 }
 
-void export_model(const Model& model, const PoseSequence& own, const Options& options, Session& session,
+void export_model(const Model& model, const PoseSequence& own, const ExportArguments& options, Session& session,
                   Report& report) {
     const bool moves = !options.at_rest && (!options.poses.empty() || !own.empty());
     if (!moves) return export_levels(model, options, session, report);
@@ -73,7 +71,8 @@ void export_model(const Model& model, const PoseSequence& own, const Options& op
 }
 
 /// A folder with a page that shows the model.
-void export_page(const Model& model, const PoseSequence& own, Options options, Session& session, Report& report) {
+void export_page(const Model& model, const PoseSequence& own, ExportArguments options, Session& session,
+                 Report& report) {
     const std::string folder_name = options.output;
     OutputFolder folder(folder_name, options.input);
     folder.protect(animation_files(options.poses));
@@ -89,9 +88,8 @@ void export_page(const Model& model, const PoseSequence& own, Options options, S
     report.add("page", index, "page", index);
 }
 
-void run(const Options& options, Session& session) {
-    if (options.at_rest && !options.poses.empty())
-        refuse(ErrorCode::usage, "--rest leaves the poses out that --poses names.");
+void run(const ExportArguments& options, Session& session) {
+    if (options.at_rest && !options.poses.empty()) refuse("--rest leaves the poses out that --poses names.");
     if (!options.web) {
         check_animation_path(options.output);
         check_not_input(options.output, {options.input, options.poses});
@@ -118,7 +116,7 @@ void run(const Options& options, Session& session) {
 } // namespace
 
 Command export_command() {
-    const auto options = std::make_shared<Options>();
+    const auto options = std::make_shared<ExportArguments>();
     return {
         .name = "export",
         .text = "Write a model, moving or at rest, for other programs",

@@ -36,7 +36,7 @@ std::vector<FigureEntry> chosen_figures(const std::vector<std::string>& only) {
     return chosen;
 }
 
-struct Options {
+struct FiguresArguments {
     std::string output = "filigree-figures", format = "png";
     std::vector<std::string> only;
     unsigned width = 1440, passes = 0;
@@ -45,7 +45,7 @@ struct Options {
 };
 
 /// The scan as figures have it: z up, and without attributes that would take the colours' place.
-std::optional<Mesh> read_scan(const Options& options, Session& session) {
+std::optional<Mesh> read_scan(const FiguresArguments& options, Session& session) {
     if (options.scan.empty()) return {};
     const Mesh mesh = session.read_mesh(options.scan);
     if (mesh.face_count() == 0)
@@ -60,7 +60,7 @@ std::optional<Mesh> read_scan(const Options& options, Session& session) {
     return scan;
 }
 
-void run_figures(const Options& options, Session& session) {
+void run_figures(const FiguresArguments& options, Session& session) {
     const RunContext& context = session.context();
     const std::vector<FigureEntry> chosen = chosen_figures(options.only);
     OutputFolder folder(options.output);
@@ -95,7 +95,7 @@ void run_figures(const Options& options, Session& session) {
 } // namespace
 
 Command figures_command() {
-    const auto options = std::make_shared<Options>();
+    const auto options = std::make_shared<FiguresArguments>();
     return {.name = "figures",
             .text = "The report's figures, drawn from what the program computes",
             .options =

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kShownSeconds = 0.005; // phases that would be written as 0.00 are left out
 
-struct Options {
+struct RemeshArguments {
     std::string input, output, base, picture;
     QuadRemeshOptions remesh;
     View view = View::iso;
@@ -158,7 +158,7 @@ void report_remesh(const QuadRemeshed& result, const RunSeconds& run, Report& re
     report_seconds(remesh, run, report);
 }
 
-void draw_patches(const QuadRemeshed& result, const Options& options, Session& session) {
+void draw_patches(const QuadRemeshed& result, const RemeshArguments& options, Session& session) {
     const RunContext& context = session.context();
     Stage stage(session);
     const PatchDrawing drawing = require(PatchDrawing::create(result.mesh, result.patches, 0.8f, context));
@@ -173,7 +173,7 @@ void draw_patches(const QuadRemeshed& result, const Options& options, Session& s
 }
 
 /// Before any work: what cannot be written.
-void check_outputs(const Options& options) {
+void check_outputs(const RemeshArguments& options) {
     if (options.output != "-") require(mesh_format(options.output));
     check_second_output("--base", options.base, options.output);
     if (options.picture.empty()) return;
@@ -190,7 +190,7 @@ void warn_of_triangles(const std::string& path, Session& session) {
         session.warn(path + ": holds triangles only, so each quad is split in two; write .ply or .obj to keep quads.");
 }
 
-void run(const Options& options, Session& session) {
+void run(const RemeshArguments& options, Session& session) {
     check_outputs(options);
     const double start = now_seconds();
     const Mesh mesh = session.read_mesh(options.input);
@@ -237,7 +237,7 @@ OptionList remesh_options(QuadRemeshOptions& remesh) {
 } // namespace
 
 Command remesh_command() {
-    const auto options = std::make_shared<Options>();
+    const auto options = std::make_shared<RemeshArguments>();
     return {
         .name = "remesh",
         .text = "Turn any mesh into quads: patches of a regular grid",

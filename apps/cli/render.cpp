@@ -11,8 +11,6 @@ namespace filigree::cli {
 
 namespace {
 
-[[noreturn]] void refuse(const std::string& sentence) { throw Failure{{ErrorCode::usage, sentence}}; }
-
 PictureSize parse_size(const std::string& text) {
     PictureSize size;
     const char* end = text.data() + text.size();

@@ -9,8 +9,6 @@ namespace filigree::cli {
 
 namespace {
 
-[[noreturn]] void refuse(const std::string& sentence) { throw Failure{{ErrorCode::usage, sentence}}; }
-
 class RenderedFilm : public Rendering {
 public:
     RenderedFilm(const RenderOptions& options, Session& session)

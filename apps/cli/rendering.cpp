@@ -10,8 +10,6 @@ namespace filigree::cli {
 
 namespace {
 
-[[noreturn]] void refuse(const std::string& sentence) { throw Failure{{ErrorCode::usage, sentence}}; }
-
 Background parse_background(const std::string& text) {
     Background background;
     if (text.empty()) return background;

@@ -41,7 +41,7 @@ const Pose& own_pose(const PoseSequence& poses, std::size_t frame, const std::st
 
 namespace {
 
-struct Options {
+struct RestoreArguments {
     std::string model, pose, poses, ghosts, output;
     std::size_t frame = 0; ///< of the model's own, from 1; 0: none
     bool all_frames = false;
@@ -58,7 +58,7 @@ std::string animation_place(const std::string& output) {
     return is_plain ? output + "/" : output;
 }
 
-void check(const Options& options, const Session& session) {
+void check(const RestoreArguments& options, const Session& session) {
     const auto refuse = [](const std::string& sentence) { throw Failure{{ErrorCode::usage, sentence}}; };
     if (!options.pose.empty() + !options.poses.empty() + (options.frame > 0) + options.all_frames != 1)
         refuse("Say what moved the driver: --pose FILE for a mesh, --poses FILE for an animation, or for a model that "
@@ -85,7 +85,7 @@ const char* source_of(const Model& model, const Pose& pose) {
     return pose.ghosts.empty() ? "positions" : "positions and ghost points";
 }
 
-void restore_one(const Options& options, Session& session) {
+void restore_one(const RestoreArguments& options, Session& session) {
     PoseSequence own;
     const Model model = session.read_model(options.model, options.frame ? &own : nullptr);
     Pose pose = options.frame ? own_pose(own, options.frame, options.model)
@@ -107,7 +107,7 @@ void restore_one(const Options& options, Session& session) {
     session.print(report);
 }
 
-void restore_all(const Options& options, Session& session) {
+void restore_all(const RestoreArguments& options, Session& session) {
     PoseSequence own;
     const Model model = session.read_model(options.model, options.all_frames ? &own : nullptr);
     const PoseStream poses = poses_of(options.poses, options.poses_file, model, own, options.model, session);
@@ -128,7 +128,7 @@ void restore_all(const Options& options, Session& session) {
 } // namespace
 
 Command restore_command() {
-    const auto options = std::make_shared<Options>();
+    const auto options = std::make_shared<RestoreArguments>();
     return {.name = "restore",
             .text = "Put the detail back onto a moved driver",
             .options =

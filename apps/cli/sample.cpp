@@ -15,7 +15,7 @@ namespace filigree::cli {
 
 namespace {
 
-struct Options {
+struct SampleArguments {
     std::string input, output, picture;
     double spacing = 0;
     std::size_t count = 0;
@@ -43,7 +43,7 @@ const char* method_name(InsideMethod method) {
 }
 
 /// The report's points: in the view from the eye, in regular steps across the picture and in depth.
-std::vector<Vec3d> points_in_view(const Mesh& mesh, const Options& options, const RunContext& context,
+std::vector<Vec3d> points_in_view(const Mesh& mesh, const SampleArguments& options, const RunContext& context,
                                   InsideReport& report, std::size_t& tested) {
     const Box box = bounds(mesh.positions);
     InsideOptions inside = options.inside;
@@ -110,14 +110,14 @@ struct Found {
     std::array<double, 3> origin = {};
 };
 
-Found find_in_view(const Mesh& mesh, const Options& options, const RunContext& context) {
+Found find_in_view(const Mesh& mesh, const SampleArguments& options, const RunContext& context) {
     Found found;
     found.points = points_in_view(mesh, options, context, found.inside, found.tested);
     found.spacing = bounds(mesh.positions).diagonal() / double(options.frustum[2]);
     return found;
 }
 
-Found find_on_lattice(const Mesh& mesh, const Options& options, const RunContext& context) {
+Found find_on_lattice(const Mesh& mesh, const SampleArguments& options, const RunContext& context) {
     Found found;
     LatticeOptions lattice_options{.spacing = options.spacing};
     if (options.count)
@@ -173,7 +173,7 @@ Report make_report(const Found& found, const std::string& output) {
     return report;
 }
 
-void check(const Options& options) {
+void check(const SampleArguments& options) {
     if (!(options.spacing > 0) && !options.count && options.frustum.empty())
         throw Failure{{ErrorCode::usage, "Say how many points: --spacing S, --count N, or --frustum NX NY NZ."}};
     if (!options.frustum.empty() && options.pattern != Pattern::lattice)
@@ -182,7 +182,7 @@ void check(const Options& options) {
         throw Failure{{ErrorCode::unsupported, options.picture + ": the picture is a PNG; let its name end in .png."}};
 }
 
-void run(Options options, Session& session) {
+void run(SampleArguments options, Session& session) {
     check(options);
     RunContext context = session.context();
     context.seed = options.seed;
@@ -201,7 +201,7 @@ void run(Options options, Session& session) {
     session.print(make_report(found, options.output));
 }
 
-OptionList point_options(Options& options) {
+OptionList point_options(SampleArguments& options) {
     return {
         Option("--spacing", options.spacing, "Between lattice points, model units").above_zero(),
         Option("--count", options.count, "Choose the spacing so that about as many are inside")
@@ -213,7 +213,7 @@ OptionList point_options(Options& options) {
             .excludes({"--spacing", "--count"})};
 }
 
-OptionList inside_options(Options& options) {
+OptionList inside_options(SampleArguments& options) {
     return {choice<InsideMethod>("--method", options.inside.method,
                                  {{"auto", InsideMethod::automatic},
                                   {"scan", InsideMethod::scan},
@@ -243,7 +243,7 @@ OptionList inside_options(Options& options) {
 } // namespace
 
 Command sample_command() {
-    const auto options = std::make_shared<Options>();
+    const auto options = std::make_shared<SampleArguments>();
     return {.name = "sample",
             .text = "Fill a mesh with points: those of a regular lattice that are inside",
             .options = OptionList{Option("mesh", options->input, "Mesh").is_read().required(),

@@ -24,6 +24,9 @@ namespace filigree::cli {
 struct Failure {
     Error error;
 };
+[[noreturn]] inline void refuse(ErrorCode code, const std::string& sentence) { throw Failure{{code, sentence}}; }
+/// What the arguments ask for makes no sense.
+[[noreturn]] inline void refuse(const std::string& sentence) { refuse(ErrorCode::usage, sentence); }
 
 /// The value, or a Failure.
 template <class T>

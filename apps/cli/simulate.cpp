@@ -19,15 +19,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct SimulateArguments {
     std::string scene, save, resume;
     std::vector<std::string> outputs;
     std::size_t frames = 0, stop_at = 0; ///< 0: as the scene says; not before the end
     bool check = false, keys = false;
     AnimationOutput animation;
 };
-
-[[noreturn]] void refuse(const std::string& sentence) { throw Failure{{ErrorCode::usage, sentence}}; }
 
 /// Where a run's results go, sorted by kind, and everything that can be refused before the work.
 struct Outputs {
@@ -88,7 +86,7 @@ bool is_numbered(const fs::path& file, const fs::path& folder, const std::string
 }
 
 /// Refuses outputs that would go over what the run reads, or over each other.
-void check_places(const Options& options, const SceneFile& scene, const Outputs& outputs) {
+void check_places(const SimulateArguments& options, const SceneFile& scene, const Outputs& outputs) {
     std::vector<std::pair<fs::path, std::string>> taken = {{options.scene, "the scene"}};
     const auto add_mesh = [&](const std::string& mesh) {
         if (!mesh.empty()) taken.emplace_back(mesh, "a mesh of the scene");
@@ -133,7 +131,7 @@ void check_places(const Options& options, const SceneFile& scene, const Outputs&
 
 class Run {
 public:
-    Run(const Options& options, Session& session)
+    Run(const SimulateArguments& options, Session& session)
         : options_(options), session_(session), scene_(require(read_scene(options.scene))), outputs_(options.outputs) {
         check_places(options, scene_, outputs_);
         if (options.frames) scene_.frames = options.frames;
@@ -239,7 +237,7 @@ private:
         }
     }
 
-    const Options& options_;
+    const SimulateArguments& options_;
     Session& session_;
     SceneFile scene_;
     Outputs outputs_;
@@ -370,7 +368,7 @@ void Run::report() const {
     session_.print(table.text() + animation_rows_.text(), json);
 }
 
-void check(const Options& options, const Session& session) {
+void check(const SimulateArguments& options, const Session& session) {
     std::error_code ignored;
     const fs::path folder = fs::path(options.save).parent_path();
     if (fs::is_directory(options.save, ignored) || (!folder.empty() && !fs::is_directory(folder, ignored)))
@@ -385,7 +383,7 @@ void check(const Options& options, const Session& session) {
         refuse("--stop-at stops a run that goes on later; say where with --save.");
 }
 
-void run(const Options& options, Session& session) {
+void run(const SimulateArguments& options, Session& session) {
     if (options.keys) return session.print(scene_manual(), {{"manual", scene_manual()}});
     check(options, session);
     Run run(options, session);
@@ -397,7 +395,7 @@ void run(const Options& options, Session& session) {
 } // namespace
 
 Command simulate_command() {
-    const auto options = std::make_shared<Options>();
+    const auto options = std::make_shared<SimulateArguments>();
     return {.name = "simulate",
             .text = "Let the bodies of a scene move: a film, a model with poses, or meshes",
             .options =

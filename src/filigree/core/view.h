@@ -3,6 +3,8 @@
 
 #include "filigree/core/types.h"
 
+#include <numbers>
+
 namespace filigree {
 
 /// The usual directions. With y up: front looks along -z, side along -x (from the right), top along -y, iso from the
@@ -11,6 +13,8 @@ enum class View { front, side, top, iso };
 enum class UpAxis { x, y, z };
 
 Vec3d up_vector(UpAxis up);
+inline double radians(double degrees) { return degrees * std::numbers::pi / 180; }
+
 /// Unit, from the object to the viewer.
 Vec3d view_direction(View view, UpAxis up);
 

@@ -29,7 +29,7 @@
 namespace filigree {
 namespace {
 
-constexpr std::size_t kGrain = 512;
+constexpr std::size_t kHandlesGrain = 512;
 constexpr std::size_t kMaxVertices = 20'000'000; // the sparse matrices count their entries in int
 
 // Cotangents have no unit, so these hold for any mesh. The floor ties vertices together that only degenerate or obtuse
@@ -121,7 +121,7 @@ Eigen::Quaterniond ahead(const Eigen::Quaterniond& before, const Eigen::Quaterni
 }
 
 void to_matrices(std::span<const Eigen::Quaterniond> rotations, std::span<Mat3d> matrices, const RunContext& context) {
-    parallel_for(context, rotations.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, rotations.size(), kHandlesGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) matrices[i] = rotations[i].toRotationMatrix();
     });
 }
@@ -277,7 +277,7 @@ void HandleSolver::Solver::follow_handles(State& s, std::span<const Vec3f> targe
 void HandleSolver::Solver::local_step(State& s, std::vector<Mat3d>& rotations, double smoothness,
                                       const RunContext& context) const {
     const double k = smoothness * diagonal, k2 = k * k;
-    parallel_for(context, rest.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, rest.size(), kHandlesGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             if (role[i] == Role::loose) continue;
             Mat3d covariance = Mat3d::Zero(), around = Mat3d::Zero();
@@ -297,7 +297,7 @@ void HandleSolver::Solver::local_step(State& s, std::vector<Mat3d>& rotations, d
 /// The best positions for the rotations as they are. x: room for the right-hand sides.
 void HandleSolver::Solver::global_step(State& s, std::span<const Mat3d> rotations, Rows3& x,
                                        const RunContext& context) const {
-    parallel_for(context, free.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, free.size(), kHandlesGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t r = begin; r < end; ++r) {
             const Index i = free[r];
             Vec3d turned = Vec3d::Zero(), edges = Vec3d::Zero(), known = Vec3d::Zero();
@@ -352,8 +352,8 @@ void HandleSolver::Solver::substitute(Rows3& x) const {
 double HandleSolver::Solver::energy(const State& s, std::span<const Mat3d> rotations, double smoothness,
                                     const RunContext& context) const {
     const double k = smoothness * diagonal, k2 = 0.5 * k * k;
-    std::vector<double> sums(rest.size() / kGrain + 1);
-    parallel_for(context, rest.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    std::vector<double> sums(rest.size() / kHandlesGrain + 1);
+    parallel_for(context, rest.size(), kHandlesGrain, [&](std::size_t begin, std::size_t end) {
         double sum = 0;
         for (std::size_t i = begin; i < end; ++i) {
             if (role[i] == Role::loose) continue;
@@ -363,7 +363,7 @@ double HandleSolver::Solver::energy(const State& s, std::span<const Mat3d> rotat
                 sum += edge.value() * (strain.squaredNorm() + k2 * (rotations[i] - rotations[j]).squaredNorm());
             }
         }
-        sums[begin / kGrain] = sum;
+        sums[begin / kHandlesGrain] = sum;
     });
     return std::accumulate(sums.begin(), sums.end(), 0.0);
 }

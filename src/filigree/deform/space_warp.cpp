@@ -21,11 +21,11 @@
 namespace filigree {
 namespace {
 
-constexpr std::size_t kGrain = 4096;    // points a piece: long enough to hide the cost of a task
-constexpr double kThin = 1e-9;          // of the diagonal; a box shorter than this has no length to bend along
-constexpr double kBumpDeviation = 0.35; // of the diagonal
+constexpr std::size_t kSpaceWarpGrain = 4096; // points a piece: long enough to hide the cost of a task
+constexpr double kThin = 1e-9;                // of the diagonal; a box shorter than this has no length to bend along
+constexpr double kBumpDeviation = 0.35;       // of the diagonal
 
-double radians(double degrees) { return degrees * (std::numbers::pi / 180); }
+double in_radians(double degrees) { return degrees * (std::numbers::pi / 180); }
 
 /// A warp from one formula for position and gradient. Where only the position is asked for, the compiler drops the
 /// rest.
@@ -202,7 +202,7 @@ Warped RbfWarp::evaluate(const Vec3d& point) const {
 
 void warp_normals(const SpaceWarp& warp, Mesh& mesh, const RunContext& context) {
     const std::vector<Index> vertex_of = split_shared_normals(mesh);
-    parallel_for(context, vertex_of.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, vertex_of.size(), kSpaceWarpGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             if (vertex_of[i] == kNoIndex) continue;
             Vec3f& normal = mesh.normals.values[i];
@@ -229,7 +229,7 @@ std::unique_ptr<SpaceWarp> make_squeeze(const Box& box, Axis axis, double factor
 std::unique_ptr<SpaceWarp> make_bend(const Box& box, Axis axis, double degrees) {
     const AxisBasis f(box, axis);
     if (f.thin) return make_identity();
-    return make_warp([f, curvature = radians(degrees) / f.length](const Vec3d& p) {
+    return make_warp([f, curvature = in_radians(degrees) / f.length](const Vec3d& p) {
         const double x = f.clamp(p[f.along]) - f.centre[f.along], beyond = p[f.along] - f.centre[f.along] - x;
         const double y = p[f.across] - f.centre[f.across];
         // An arc of length x that turns by 2 h has a chord of length x sin(h) / h in the direction h.
@@ -252,7 +252,7 @@ std::unique_ptr<SpaceWarp> make_bend(const Box& box, Axis axis, double degrees) 
 std::unique_ptr<SpaceWarp> make_twist(const Box& box, Axis axis, double degrees) {
     const AxisBasis f(box, axis);
     if (f.thin) return make_identity();
-    return make_warp([f, rate = radians(degrees) / f.length](const Vec3d& p) {
+    return make_warp([f, rate = in_radians(degrees) / f.length](const Vec3d& p) {
         const double angle = rate * (f.clamp(p[f.along]) - f.centre[f.along]);
         const double sine = std::sin(angle), cosine = std::cos(angle);
         const double y = p[f.across] - f.centre[f.across], z = p[f.across2] - f.centre[f.across2];
@@ -335,7 +335,7 @@ std::unique_ptr<SpaceWarp> make_chain(std::vector<std::unique_ptr<SpaceWarp>> wa
 std::vector<Vec3f> warp_positions(const SpaceWarp& warp, std::span<const Vec3f> positions, const Vec3d& origin,
                                   const RunContext& context) {
     std::vector<Vec3f> warped(positions.size());
-    parallel_for(context, positions.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, positions.size(), kSpaceWarpGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i)
             warped[i] = (warp.position(origin + positions[i].cast<double>()) - origin).cast<float>();
     });
@@ -347,7 +347,7 @@ Pose warp_pose(const SpaceWarp& warp, std::span<const Vec3f> positions, const Ve
     Pose pose;
     pose.positions.resize(positions.size());
     pose.gradients.resize(positions.size());
-    parallel_for(context, positions.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, positions.size(), kSpaceWarpGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             const Warped warped = warp.warp(origin + positions[i].cast<double>());
             pose.positions[i] = (warped.position - origin).cast<float>();

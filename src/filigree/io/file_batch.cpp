@@ -93,7 +93,7 @@ Stamp stamp_of(const struct stat& status) {
 /// everything else.
 using Stamps = std::map<std::string, Stamp>;
 
-std::string bytes_of(const Stamps& stamps) {
+std::string stamp_bytes(const Stamps& stamps) {
     std::string bytes;
     for (const auto& [name, stamp] : stamps)
         bytes += std::to_string(stamp.seconds) + " " + std::to_string(stamp.nanoseconds) + " " +
@@ -237,7 +237,7 @@ private:
             if (Status free = check_target(target_ / name); !free) return free;
             if (const auto status = status_of(target_ / name)) before[name] = stamp_of(*status);
         }
-        if (Status written = write_file(path_ / kBefore, bytes_of(before)); !written) return written;
+        if (Status written = write_file(path_ / kBefore, stamp_bytes(before)); !written) return written;
         sync_folder(path_ / kNew);
         return rename_to(kPlacing);
     }

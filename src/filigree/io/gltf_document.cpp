@@ -285,7 +285,7 @@ std::uint32_t Accessor::integer(std::size_t i) const {
 }
 
 void Accessor::add_to(std::span<Vec3d> sums, std::size_t begin, std::size_t end, double weight) const {
-    Vec3d value;
+    Vec3d value = Vec3d::Zero();
     if (base_)
         for (std::size_t i = begin; i < end; ++i) {
             read_from(base_ + i * stride_, value.data(), 3);
@@ -293,7 +293,7 @@ void Accessor::add_to(std::span<Vec3d> sums, std::size_t begin, std::size_t end,
         }
     for (std::size_t s = first_sparse(begin); s < sparse_count_ && sparse_index(s) < end; ++s) {
         const std::size_t i = sparse_index(s);
-        Vec3d base;
+        Vec3d base = Vec3d::Zero();
         read_from(base_ ? base_ + i * stride_ : nullptr, base.data(), 3);
         read_from(sparse_values_ + s * width * size_of(component), value.data(), 3);
         sums[i - begin] += weight * (value - base);

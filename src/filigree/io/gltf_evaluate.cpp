@@ -10,7 +10,7 @@ namespace filigree::gltf {
 
 namespace {
 
-constexpr std::size_t kGrain = 2048;
+constexpr std::size_t kGltfEvaluateGrain = 2048;
 
 /// Where a time lies between keys.
 struct Moment {
@@ -247,8 +247,8 @@ void place_vertices(const Scene& scene, const ScenePose& pose, const RunContext&
     for (const Block& block : scene.blocks) {
         if (context.is_cancelled()) break;
         const PosedBlock posed(scene, block, pose);
-        parallel_for(context, posed.geometry().kept, kGrain, [&](std::size_t begin, std::size_t end) {
-            std::array<Vec3d, kGrain> positions;
+        parallel_for(context, posed.geometry().kept, kGltfEvaluateGrain, [&](std::size_t begin, std::size_t end) {
+            std::array<Vec3d, kGltfEvaluateGrain> positions;
             posed.positions(begin, end, positions);
             take(block.first_vertex + begin, std::span(positions).first(end - begin));
         });
@@ -260,9 +260,10 @@ std::vector<Vec3f> turned_normals(const Scene& scene, const ScenePose& pose, con
     for (const Block& block : scene.blocks) {
         if (context.is_cancelled()) break;
         const PosedBlock posed(scene, block, pose);
-        parallel_for(context, posed.geometry().normals.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-            posed.normals(begin, end, std::span(normals).subspan(block.first_normal + begin, end - begin));
-        });
+        parallel_for(context, posed.geometry().normals.size(), kGltfEvaluateGrain,
+                     [&](std::size_t begin, std::size_t end) {
+                         posed.normals(begin, end, std::span(normals).subspan(block.first_normal + begin, end - begin));
+                     });
     }
     return normals;
 }

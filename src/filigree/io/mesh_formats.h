@@ -31,6 +31,9 @@ struct MeshSource {
     }
 };
 
+/// Readers of rows look at cancel and report progress every so many.
+inline constexpr std::size_t kRowsBetweenReports = 1 << 16;
+
 /// Readers leave to the dispatcher: attributes that are not finite, and meshes without vertices or faces.
 /// Positions are finite and every index is in range.
 Result<MeshFile> read_obj(const MeshSource& source);

@@ -24,13 +24,13 @@ namespace {
 constexpr char kMagic[8] = {'F', 'I', 'L', 'I', 'G', 'R', 'E', 'E'};
 constexpr std::uint32_t kVersion = 1;
 
-struct Header {
+struct ModelHeader {
     char magic[8];
     std::uint32_t version, section_count;
     std::uint64_t file_size;
     std::uint64_t table_hash; ///< XXH3-64 of the table
 };
-static_assert(sizeof(Header) == 32);
+static_assert(sizeof(ModelHeader) == 32);
 
 struct Section {
     char name[8];            ///< padded with zeros
@@ -66,12 +66,12 @@ public:
 
     std::string finish() {
         const std::size_t table_bytes = sections_.size() * sizeof(Section);
-        for (Section& section : sections_) section.offset += sizeof(Header) + table_bytes;
-        Header header{};
+        for (Section& section : sections_) section.offset += sizeof(ModelHeader) + table_bytes;
+        ModelHeader header{};
         std::memcpy(header.magic, kMagic, sizeof kMagic);
         header.version = kVersion;
         header.section_count = static_cast<std::uint32_t>(sections_.size());
-        header.file_size = sizeof(Header) + table_bytes + content_.size();
+        header.file_size = sizeof(ModelHeader) + table_bytes + content_.size();
         header.table_hash = XXH3_64bits(sections_.data(), table_bytes);
         std::string file;
         file.reserve(header.file_size);
@@ -254,7 +254,7 @@ struct Damage {
 class SectionReader {
 public:
     explicit SectionReader(std::string_view bytes) : bytes_(bytes) {
-        Header header;
+        ModelHeader header;
         if (bytes.size() < sizeof header) throw Damage{"is cut off in its header"};
         std::memcpy(&header, bytes.data(), sizeof header);
         if (header.version != kVersion)

@@ -7,16 +7,14 @@ namespace filigree {
 
 namespace {
 
-constexpr std::size_t kRowsBetweenReports = 1 << 16;
-
 /// What the first word says: [ST][C][N][4][n]OFF.
-struct Header {
+struct OffHeader {
     bool uvs = false, colors = false, normals = false, four_dimensions = false, n_dimensions = false;
 };
 
 /// Takes the keyword off the front of `word`: the counts may follow without a blank ("OFF8 6 12").
-std::optional<Header> take_header(std::string_view& word) {
-    Header header;
+std::optional<OffHeader> take_header(std::string_view& word) {
+    OffHeader header;
     std::string_view rest = word;
     const auto take = [&](std::string_view prefix) {
         if (!rest.starts_with(prefix)) return false;
@@ -62,7 +60,7 @@ private:
         TextScanner after = text_;
         std::string_view word = after.word();
         const std::size_t length = word.size();
-        const std::optional<Header> header = take_header(word);
+        const std::optional<OffHeader> header = take_header(word);
         if (!header) {
             const bool bare = is_digit(text_.peek()); // the keyword may be missing
             return bare || fail("expected 'OFF', found " + in_quotes(word) + ".");
@@ -226,7 +224,7 @@ private:
     const MeshSource& source_;
     TextScanner text_;
     std::optional<Error> error_;
-    Header header_;
+    OffHeader header_;
     MeshFile file_;
     std::vector<Vec3d> world_;
     std::size_t vertex_count_ = 0, face_count_ = 0, faces_read_ = 0;

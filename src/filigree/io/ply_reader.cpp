@@ -1,4 +1,5 @@
 // PLY, the Stanford polygon file format: text, and binary of both byte orders.
+#include "filigree/io/mesh_formats.h"
 #include "filigree/io/ply_body.h"
 
 #include <algorithm>
@@ -9,8 +10,6 @@ namespace filigree {
 using namespace ply;
 
 namespace {
-
-constexpr std::size_t kRowsBetweenReports = 1 << 16;
 
 template <class Numbers>
 class BodyReader {

@@ -17,8 +17,8 @@
 namespace filigree {
 namespace {
 
-constexpr std::size_t kGrain = 1024;   // queries a piece
-constexpr std::size_t kBatch = 131072; // queries between looks at the cancel flag
+constexpr std::size_t kMeshDistanceGrain = 1024; // queries a piece
+constexpr std::size_t kBatch = 131072;           // queries between looks at the cancel flag
 constexpr double kPercentile = 0.95;
 
 /// Smallest value that at least `fraction` of all are not above; values is reordered and not empty.
@@ -135,10 +135,11 @@ std::vector<double> distances(std::span<const Vec3f> samples, const PlacedTriang
     for (std::size_t done = 0; done < samples.size(); done += kBatch) {
         if (context.is_cancelled()) return {};
         context.report("measuring distances", double(done) / double(samples.size()));
-        parallel_for(context, std::min(kBatch, samples.size() - done), kGrain, [&](std::size_t begin, std::size_t end) {
-            search_in_turn(samples.subspan(done + begin, end - begin), to, tree,
-                           std::span(result).subspan(done + begin, end - begin));
-        });
+        parallel_for(context, std::min(kBatch, samples.size() - done), kMeshDistanceGrain,
+                     [&](std::size_t begin, std::size_t end) {
+                         search_in_turn(samples.subspan(done + begin, end - begin), to, tree,
+                                        std::span(result).subspan(done + begin, end - begin));
+                     });
     }
     return result;
 }

@@ -9,7 +9,7 @@
 namespace filigree {
 namespace {
 
-constexpr std::size_t kGrain = 16384;
+constexpr std::size_t kNormalsGrain = 16384;
 
 /// Adds twice the area vector of a face to the sums of its vertices.
 void add_face(std::span<const Index> face, std::span<const Vec3f> positions, std::vector<Vec3d>& sums) {
@@ -19,7 +19,7 @@ void add_face(std::span<const Index> face, std::span<const Vec3f> positions, std
 
 std::vector<Vec3f> normalised(const std::vector<Vec3d>& sums, const RunContext& context) {
     std::vector<Vec3f> normals(sums.size());
-    parallel_for(context, sums.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, sums.size(), kNormalsGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t v = begin; v < end; ++v) {
             const double length = sums[v].norm();
             normals[v] = length > 0 ? Vec3f((sums[v] / length).cast<float>()) : Vec3f::Zero();

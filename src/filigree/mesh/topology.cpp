@@ -14,8 +14,8 @@
 namespace filigree {
 namespace {
 
-constexpr double kDegenerateArea = 1e-14; // of the diagonal squared: float's rounding of the positions, squared
-constexpr std::size_t kGrain = 8192;      // vertices or faces a piece
+constexpr double kDegenerateArea = 1e-14;    // of the diagonal squared: float's rounding of the positions, squared
+constexpr std::size_t kTopologyGrain = 8192; // vertices or faces a piece
 
 void add(Finding& finding, std::initializer_list<Index> place) {
     if (finding.count++ < Finding::kPlaces) finding.places.emplace_back(place);
@@ -63,7 +63,7 @@ Incidence gather_incidence(const Mesh& mesh, const RunContext& context) {
     in.vertex_set_hash.resize(faces);
     in.collapsed.resize(faces);
     in.degenerate.resize(faces);
-    parallel_for(context, faces, kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, faces, kTopologyGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t f = begin; f < end; ++f) {
             std::uint64_t hash = 0;
             for (const Index vertex : mesh.face(f)) hash += mix(vertex + 1);
@@ -208,10 +208,10 @@ private:
 
 void analyse_vertices(const Mesh& mesh, Incidence& incidence, const RunContext& context, TopologyReport& report) {
     DisjointSets components(mesh.face_count());
-    std::vector<VertexFindings> pieces((mesh.vertex_count() + kGrain - 1) / kGrain);
-    parallel_for(context, mesh.vertex_count(), kGrain, [&](std::size_t begin, std::size_t end) {
+    std::vector<VertexFindings> pieces((mesh.vertex_count() + kTopologyGrain - 1) / kTopologyGrain);
+    parallel_for(context, mesh.vertex_count(), kTopologyGrain, [&](std::size_t begin, std::size_t end) {
         VertexVisitor visitor(mesh, incidence, components);
-        for (std::size_t v = begin; v < end; ++v) visitor.visit(static_cast<Index>(v), pieces[begin / kGrain]);
+        for (std::size_t v = begin; v < end; ++v) visitor.visit(static_cast<Index>(v), pieces[begin / kTopologyGrain]);
     });
 
     std::size_t used_vertices = 0, live_faces = 0;
@@ -243,9 +243,9 @@ void measure_faces(const Mesh& mesh, Incidence& incidence, const RunContext& con
         double area = 0, volume = 0; // volume: of tetrahedra over the box's centre, which keeps the digits
         Vec3d doubled_area = Vec3d::Zero();
     };
-    std::vector<Sums> pieces((mesh.face_count() + kGrain - 1) / kGrain);
-    parallel_for(context, mesh.face_count(), kGrain, [&](std::size_t begin, std::size_t end) {
-        Sums& sums = pieces[begin / kGrain];
+    std::vector<Sums> pieces((mesh.face_count() + kTopologyGrain - 1) / kTopologyGrain);
+    parallel_for(context, mesh.face_count(), kTopologyGrain, [&](std::size_t begin, std::size_t end) {
+        Sums& sums = pieces[begin / kTopologyGrain];
         for (std::size_t f = begin; f < end; ++f) {
             const std::span<const Index> face = mesh.face(f);
             const Vec3d doubled_area = doubled_area_vector(mesh.positions, face);

@@ -11,7 +11,7 @@ namespace filigree {
 
 namespace {
 
-constexpr std::size_t kGrain = 2048;
+constexpr std::size_t kBodyStateGrain = 2048;
 constexpr float kMostFlow = 4; ///< stretch, and 1 over it: what flows is sheared without end, its detail is not
 constexpr float kTogether = 1; ///< spacings between two ways of placing a point; further, its particles came apart
 
@@ -29,7 +29,7 @@ Mat3f bounded_stretch(const Mat3f& gradient) {
 }
 
 void bound_stretches(std::span<Mat3f> gradients, const RunContext& context) {
-    parallel_for(context, gradients.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, gradients.size(), kBodyStateGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) gradients[i] = bounded_stretch(gradients[i]);
     });
 }
@@ -60,7 +60,7 @@ PlacedPoints place_in_reference(const BodyState& state, std::span<const Vec3f> r
     placed.gradients.resize(rest_points.size());
     move_embedded(at_rest, rest, reference, state.flow, placed.places, placed.gradients, context);
     const float together = kTogether * float(state.body->spacing());
-    parallel_for(context, rest_points.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, rest_points.size(), kBodyStateGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t p = begin; p < end; ++p) {
             const Index nearest = nearest_particle(at_rest, p, rest);
             const Vec3f alone = reference[nearest] + state.flow[nearest] * (rest_points[p] - rest[nearest]);

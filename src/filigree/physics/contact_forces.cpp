@@ -12,7 +12,7 @@ using namespace contact_law;
 
 namespace {
 
-constexpr std::size_t kGrain = 256;
+constexpr std::size_t kContactForcesGrain = 256;
 constexpr double kStiffness = 4; ///< times the stiffness of a spacing of material under the point
 
 } // namespace
@@ -110,7 +110,7 @@ ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, flo
         BodyState& body = bodies[b];
         std::vector<Near>& near = near_[b];
         forces.assign(near.size(), Vec3f::Zero());
-        parallel_for(context, near.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        parallel_for(context, near.size(), kContactForcesGrain, [&](std::size_t begin, std::size_t end) {
             for (std::size_t k = begin; k < end; ++k) forces[k] = obstacle_force(near[k], body, poses, travelled, dt);
         });
         for (std::size_t k = 0; k < near.size(); ++k) {
@@ -122,7 +122,7 @@ ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, flo
         }
     }
     forces.assign(pairs_.size(), Vec3f::Zero());
-    parallel_for(context, pairs_.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, pairs_.size(), kContactForcesGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k) forces[k] = pair_force(pairs_[k], bodies, travelled, dt);
     });
     for (std::size_t k = 0; k < pairs_.size(); ++k) {

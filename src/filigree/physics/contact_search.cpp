@@ -10,7 +10,7 @@ namespace filigree {
 
 namespace {
 
-constexpr std::size_t kGrain = 256;
+constexpr std::size_t kContactSearchGrain = 256;
 
 } // namespace
 
@@ -33,7 +33,7 @@ void Contacts::find_near(std::span<const BodyState> bodies, double time, float t
         const BodyState& body = bodies[b];
         const std::size_t points = body.surface.size();
         std::vector<Vec3f> places(points);
-        parallel_for(context, points, kGrain, [&](std::size_t begin, std::size_t end) {
+        parallel_for(context, points, kContactSearchGrain, [&](std::size_t begin, std::size_t end) {
             for (std::size_t s = begin; s < end; ++s) places[s] = embedded_point(body.surface, s, body.positions);
         });
         std::vector<Near> found;
@@ -44,7 +44,7 @@ void Contacts::find_near(std::span<const BodyState> bodies, double time, float t
             const float nearest = distance_to(world_.obstacles[o], poses.at(o), box.centre().cast<float>()).distance -
                                   float(box.diagonal() / 2);
             if (nearest > reach) continue;
-            parallel_for(context, points, kGrain, [&](std::size_t begin, std::size_t end) {
+            parallel_for(context, points, kContactSearchGrain, [&](std::size_t begin, std::size_t end) {
                 for (std::size_t s = begin; s < end; ++s)
                     distances[s] = distance_to(world_.obstacles[o], poses.at(o), places[s]).distance;
             });
@@ -70,7 +70,7 @@ void Contacts::find_pairs(std::span<const BodyState> bodies, float travelled, fl
     const auto find_balls = [&](std::size_t b) {
         if (!balls[b].empty()) return;
         balls[b].resize(bodies[b].balls.size());
-        parallel_for(context, balls[b].size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        parallel_for(context, balls[b].size(), kContactSearchGrain, [&](std::size_t begin, std::size_t end) {
             for (std::size_t s = begin; s < end; ++s)
                 balls[b][s] = embedded_point(bodies[b].balls, s, bodies[b].positions);
         });

@@ -14,7 +14,7 @@ namespace filigree {
 
 namespace {
 
-constexpr std::size_t kGrain = 2048;   // points in a piece of parallel work
+constexpr std::size_t kEmbeddingGrain = 2048; // points in a piece of parallel work
 constexpr double kRadius = 1.75;       // spacings; smaller is sharper, and 1.75 always holds a cell's eight corners
 constexpr double kRadiusGrowth = 1.25; // where the particles in it do not do
 constexpr int kAttempts = 6;
@@ -218,9 +218,9 @@ Embedding embed(std::span<const Vec3f> points, const Vectors& rest, double spaci
     if (points.empty() || rest.size() == 0) return embedding;
 
     const ParticleGrid grid(rest, spacing);
-    std::vector<Piece> pieces((points.size() + kGrain - 1) / kGrain);
-    parallel_for(context, points.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-        Piece& piece = pieces[begin / kGrain];
+    std::vector<Piece> pieces((points.size() + kEmbeddingGrain - 1) / kEmbeddingGrain);
+    parallel_for(context, points.size(), kEmbeddingGrain, [&](std::size_t begin, std::size_t end) {
+        Piece& piece = pieces[begin / kEmbeddingGrain];
         Fit fit;
         for (std::size_t p = begin; p < end; ++p) embed_point(points[p].cast<double>(), grid, spacing, fit, piece);
     });
@@ -282,7 +282,7 @@ Embedding embed_in_cells(std::span<const Vec3f> points, const Cells& cells, cons
     for (std::size_t p = 0; p <= points.size(); ++p) embedding.offsets[p] = Index(8 * p);
     embedding.particles.resize(8 * points.size());
     embedding.weights.resize(8 * points.size());
-    parallel_for(context, points.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, points.size(), kEmbeddingGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t p = begin; p < end; ++p) {
             Vec3d at = (points[p].cast<double>() - cells.origin) / cells.spacing;
             if (!at.allFinite())
@@ -323,7 +323,7 @@ void move_embedded(const Embedding& embedding, const Vectors& rest, const Vector
                    std::span<const Mat3f> particle_gradients, std::span<Vec3f> points, std::span<Mat3f> gradients,
                    const RunContext& context) {
     assert(points.size() == embedding.size() && (gradients.empty() || gradients.size() == points.size()));
-    parallel_for(context, points.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, points.size(), kEmbeddingGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t p = begin; p < end; ++p) {
             const Index first = embedding.offsets[p], last = embedding.offsets[p + 1];
             const Vec3f c = embedding.rest[p];

@@ -13,7 +13,7 @@ namespace filigree {
 
 namespace {
 
-constexpr std::size_t kGrain = 2048;
+constexpr std::size_t kExplicitStepsGrain = 2048;
 constexpr double kSafety = 0.9;            ///< part of the stable step that is used: it changes while a step is made
 constexpr double kLeastSubsteps = 2;       ///< a frame; with one, large motions gain energy
 constexpr unsigned kExplicitLimit = 20000; ///< substeps a frame, whatever was asked for
@@ -25,7 +25,7 @@ Vectors positions_ahead(const BodyState& body, float delay, const RunContext& co
     const Vec3f drifting = (rigid.linear / rigid.mass).cast<float>();
     const Vec3f turning = rigid.angular_velocity_of(rigid.angular).cast<float>(), centre = rigid.centre.cast<float>();
     Vectors ahead = body.positions;
-    parallel_for(context, ahead.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, ahead.size(), kExplicitStepsGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i)
             ahead.add(i, delay * (body.velocities[i] - drifting - turning.cross(body.positions[i] - centre)));
     });
@@ -151,7 +151,7 @@ private:
         const Vec3f gravity = state_.world.gravity.cast<float>();
         for (BodyState& body : bodies_) {
             const float kept = damp ? std::exp(-2 * dt * float(body.body->material.damping)) : 1.0f;
-            parallel_for(context_, body.positions.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+            parallel_for(context_, body.positions.size(), kExplicitStepsGrain, [&](std::size_t begin, std::size_t end) {
                 const float* inverse_mass = body.inverse_mass.data();
                 const auto kick_axis = [&](std::vector<float>& velocities, const std::vector<float>& forces, float g) {
                     float* v = velocities.data();
@@ -167,7 +167,7 @@ private:
 
     void drift(float dt) {
         for (BodyState& body : bodies_)
-            parallel_for(context_, body.positions.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+            parallel_for(context_, body.positions.size(), kExplicitStepsGrain, [&](std::size_t begin, std::size_t end) {
                 for (std::size_t i = begin; i < end; ++i) body.positions.x[i] += dt * body.velocities.x[i];
                 for (std::size_t i = begin; i < end; ++i) body.positions.y[i] += dt * body.velocities.y[i];
                 for (std::size_t i = begin; i < end; ++i) body.positions.z[i] += dt * body.velocities.z[i];

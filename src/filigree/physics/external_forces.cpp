@@ -9,7 +9,7 @@ namespace filigree {
 
 namespace {
 
-constexpr std::size_t kGrain = 2048;
+constexpr std::size_t kExternalForcesGrain = 2048;
 constexpr float kHandShare = 0.25f; // of the body's squared frequency at rest: a hand may add that much
 constexpr double kHandReach = 4;    // spacings
 
@@ -115,7 +115,7 @@ void ExternalForces::add_forces(std::span<BodyState> bodies, double time, const 
     }
     if (!has_wind()) return;
     for (std::size_t b = 0; b < bodies.size(); ++b)
-        parallel_for(context, bodies[b].forces.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        parallel_for(context, bodies[b].forces.size(), kExternalForcesGrain, [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i) bodies[b].forces.add(i, wind_[b][i]);
         });
 }

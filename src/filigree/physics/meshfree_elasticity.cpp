@@ -34,7 +34,7 @@ using namespace meshfree;
 
 namespace {
 
-constexpr std::size_t kGrain = 256;
+constexpr std::size_t kMeshfreeElasticityGrain = 256;
 constexpr double kHourglass = 0.05; // of mu V / h^2
 // Of the power iteration for the squared frequency. It comes from below: hence the margin, which also covers what a
 // state changes beyond its largest stiffness. Tests compare with dense eigenvalues.
@@ -88,10 +88,11 @@ public:
     ElasticReport forces(const Vectors& positions, Vectors& forces, const RunContext& context) override {
         const std::size_t n = body_.particle_count();
         gather(positions, position_, context);
-        std::vector<BlockResult> found((n + kGrain - 1) / kGrain);
-        parallel_for(context, n, kGrain,
-                     [&](std::size_t begin, std::size_t end) { found[begin / kGrain] = find_stresses(begin, end); });
-        parallel_for(context, n, kGrain, [&](std::size_t begin, std::size_t end) {
+        std::vector<BlockResult> found((n + kMeshfreeElasticityGrain - 1) / kMeshfreeElasticityGrain);
+        parallel_for(context, n, kMeshfreeElasticityGrain, [&](std::size_t begin, std::size_t end) {
+            found[begin / kMeshfreeElasticityGrain] = find_stresses(begin, end);
+        });
+        parallel_for(context, n, kMeshfreeElasticityGrain, [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i)
                 forces.set(i, to_vector(gather_force(neighbours_, packing_, position_.data(), columns_.data(), i)));
         });
@@ -101,11 +102,13 @@ public:
     void sweep(Vectors& positions, const Descent& descent, const RunContext& context) override {
         if (colors_.empty()) find_colors();
         gather(positions, position_, context);
-        parallel_for(context, body_.particle_count(), kGrain, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t i = begin; i < end; ++i) columns_[i] = gather_gradient(neighbours_, position_.data(), i);
-        });
+        parallel_for(context, body_.particle_count(), kMeshfreeElasticityGrain,
+                     [&](std::size_t begin, std::size_t end) {
+                         for (std::size_t i = begin; i < end; ++i)
+                             columns_[i] = gather_gradient(neighbours_, position_.data(), i);
+                     });
         for (const std::vector<Index>& color : colors_)
-            parallel_for(context, color.size(), kGrain / 16, [&](std::size_t begin, std::size_t end) {
+            parallel_for(context, color.size(), kMeshfreeElasticityGrain / 16, [&](std::size_t begin, std::size_t end) {
                 for (std::size_t k = begin; k < end; ++k) move_particle(positions, descent, color[k]);
             });
     }
@@ -114,11 +117,11 @@ public:
         const std::size_t n = body_.particle_count();
         std::vector<Float4> position(n);
         gather(positions, position, context);
-        std::vector<double> pieces((n + kGrain - 1) / kGrain);
-        parallel_for(context, n, kGrain, [&](std::size_t begin, std::size_t end) {
+        std::vector<double> pieces((n + kMeshfreeElasticityGrain - 1) / kMeshfreeElasticityGrain);
+        parallel_for(context, n, kMeshfreeElasticityGrain, [&](std::size_t begin, std::size_t end) {
             double sum = 0;
             for (std::size_t i = begin; i < end; ++i) sum += particle_energy(position.data(), i);
-            pieces[begin / kGrain] = sum;
+            pieces[begin / kMeshfreeElasticityGrain] = sum;
         });
         double sum = 0;
         for (const double piece : pieces) sum += piece;
@@ -130,7 +133,7 @@ public:
     void gradients(const Vectors& positions, std::span<Mat3f> gradients, const RunContext& context) const override {
         std::vector<Float4> position(body_.particle_count());
         gather(positions, position, context);
-        parallel_for(context, position.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        parallel_for(context, position.size(), kMeshfreeElasticityGrain, [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i)
                 gradients[i] = to_matrix(gather_gradient(neighbours_, position.data(), i));
         });
@@ -196,7 +199,7 @@ public:
 
 private:
     static void gather(const Vectors& positions, std::vector<Float4>& position, const RunContext& context) {
-        parallel_for(context, position.size(), 4 * kGrain, [&](std::size_t begin, std::size_t end) {
+        parallel_for(context, position.size(), 4 * kMeshfreeElasticityGrain, [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i) position[i] = load3(positions, i);
         });
     }

@@ -13,7 +13,7 @@ namespace filigree::meshfree {
 
 namespace {
 
-constexpr std::size_t kGrain = 256;
+constexpr std::size_t kMeshfreeFlowGrain = 256;
 constexpr float kFlowToRenew = 0.5f;       // |G|^2 - 3 of the flow G since the last renewal: a stretch by 1.45
 constexpr float kMostFlow = 2.5f;          // ... of any single particle
 constexpr float kSlipToRenew = 0.5f;       // spacings: of a neighbour from where F says
@@ -70,7 +70,7 @@ void Flow::move_heat(const MlsNeighbours& neighbours, float dt, const RunContext
         const double steps = std::min(std::ceil(double(dt) / limit), kMostHeatSteps);
         const float step = float(std::min(double(dt) / steps, limit) * material.conductivity);
         for (int s = 0; s < int(steps); ++s) {
-            parallel_for(context, n, kGrain, [&](std::size_t begin, std::size_t end) {
+            parallel_for(context, n, kMeshfreeFlowGrain, [&](std::size_t begin, std::size_t end) {
                 for (std::size_t i = begin; i < end; ++i) {
                     double gain = 0;
                     for (std::size_t k = neighbours.offsets[i]; k < neighbours.offsets[i + 1]; ++k) {
@@ -89,15 +89,15 @@ void Flow::move_heat(const MlsNeighbours& neighbours, float dt, const RunContext
 
 bool Flow::move_matter(const MlsNeighbours& neighbours, const Float4* position, float dt, const RunContext& context) {
     const std::size_t n = body_.particle_count();
-    std::vector<std::array<std::size_t, 2>> distorted((n + kGrain - 1) / kGrain);
-    parallel_for(context, n, kGrain, [&](std::size_t begin, std::size_t end) {
+    std::vector<std::array<std::size_t, 2>> distorted((n + kMeshfreeFlowGrain - 1) / kMeshfreeFlowGrain);
+    parallel_for(context, n, kMeshfreeFlowGrain, [&](std::size_t begin, std::size_t end) {
         std::array<std::size_t, 2> counts = {0, 0};
         for (std::size_t i = begin; i < end; ++i) {
             const float amount = flow_particle(neighbours, position, i, dt);
             counts[0] += amount > kFlowToRenew;
             counts[1] += amount > kMostFlow;
         }
-        distorted[begin / kGrain] = counts;
+        distorted[begin / kMeshfreeFlowGrain] = counts;
     });
     std::array<std::size_t, 2> total = {0, 0};
     for (const auto& counts : distorted)
@@ -139,7 +139,7 @@ float Flow::flow_particle(const MlsNeighbours& neighbours, const Float4* positio
 }
 
 void Flow::take_gradients(const MlsNeighbours& neighbours, const Float4* position, const RunContext& context) {
-    parallel_for(context, stored_.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, stored_.size(), kMeshfreeFlowGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i)
             stored_[i] = to_matrix(gather_gradient(neighbours, position, i)) * stored_[i];
     });
@@ -154,7 +154,7 @@ void Flow::begin_anew(const MlsNeighbours& neighbours, const RunContext& context
 /// denser than at the start, the kernel's sum tells how far. At its surface a melt bears no tension (drops come apart),
 /// and a neighbourhood that was turned inside out is a round one from now on.
 void Flow::correct_volume(const MlsNeighbours& neighbours, const RunContext& context) {
-    parallel_for(context, body_.particle_count(), kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, body_.particle_count(), kMeshfreeFlowGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             const float part = melted(i);
             if (!(part > 0)) continue;

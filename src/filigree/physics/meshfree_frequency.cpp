@@ -10,7 +10,7 @@ namespace filigree::meshfree {
 
 namespace {
 
-constexpr std::size_t kGrain = 256;
+constexpr std::size_t kMeshfreeFrequencyGrain = 256;
 
 } // namespace
 
@@ -38,10 +38,10 @@ float squared_frequency_over_stiffness(const Body& body, const MlsNeighbours& ne
     };
     double most = 0;
     for (int iteration = 0; iteration < iterations; ++iteration) {
-        parallel_for(context, n, kGrain, [&](std::size_t begin, std::size_t end) {
+        parallel_for(context, n, kMeshfreeFrequencyGrain, [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i) stress[i] = linear_stress(i);
         });
-        parallel_for(context, n, kGrain, [&](std::size_t begin, std::size_t end) {
+        parallel_for(context, n, kMeshfreeFrequencyGrain, [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i)
                 next[i] = gather_force(neighbours, packing, motion.data(), stress.data(), i);
         });

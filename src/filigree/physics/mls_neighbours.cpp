@@ -20,7 +20,7 @@ constexpr float kGrowth = 1.2f;       // of the radius, a try
 constexpr std::size_t kEnough = 8;    // neighbours
 constexpr float kLeastSpread = 0.03f; // spacings^2: weighted mean square of offsets in the direction of the least
 constexpr float kNoSpread = 0.03f;    // below it there is no gradient in that direction
-constexpr std::size_t kGrain = 256;
+constexpr std::size_t kMlsNeighboursGrain = 256;
 
 /// Particles sorted by the boxes of a grid.
 class Grid {
@@ -125,7 +125,7 @@ Surroundings find_surroundings(const Vectors& positions, std::span<const float> 
     const std::size_t n = positions.size();
     Surroundings around{positions, volume, spacing, std::vector<std::vector<Index>>(n), std::vector<float>(n)};
     const Grid grid(positions, kRadius * spacing);
-    parallel_for(context, n, kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, n, kMlsNeighboursGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             float radius = kRadius * spacing;
             while (!look_within(radius, i, grid, around) && !(radius > kMostRadius * spacing)) radius *= kGrowth;
@@ -140,7 +140,7 @@ Surroundings find_surroundings(const Vectors& positions, std::span<const float> 
                 (positions[j] - positions[i]).squaredNorm() >= around.radius[j] * around.radius[j])
                 around.found[j].push_back(Index(i));
         }
-    parallel_for(context, n, kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, n, kMlsNeighboursGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) std::sort(around.found[i].begin(), around.found[i].end());
     });
     return around;
@@ -212,7 +212,7 @@ MlsNeighbours find_mls_neighbours(const Vectors& positions, std::span<const floa
     result.exposure.resize(n);
     result.density.resize(n);
     result.missing.resize(n);
-    parallel_for(context, n, kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, n, kMlsNeighboursGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             const PairSums sums = weigh_pairs(i, around, inverse_cube, result);
             result.weight_sum[i] = sums.weight;

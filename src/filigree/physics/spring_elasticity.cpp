@@ -36,10 +36,10 @@ constexpr float kVolumeFrom = 0.3f, kVolumeStiffness = 1.5f;
 constexpr float kVolumeNear =
     0.6f; // a sweep looks at cells below this at its start: one sweep will not take others there
 // Growing out of a collapse by leaps leaves particles on the wrong side of each other.
-constexpr float kCollapsed = 0.5f;     // squared lengths over those at rest
-constexpr float kCollapsedStep = 0.1f; // spacings a sweep
-constexpr float kLargest = 1e15f;      // m: positions beyond are not fit for explicit steps
-constexpr std::size_t kGrain = 256;    // particles
+constexpr float kCollapsed = 0.5f;                  // squared lengths over those at rest
+constexpr float kCollapsedStep = 0.1f;              // spacings a sweep
+constexpr float kLargest = 1e15f;                   // m: positions beyond are not fit for explicit steps
+constexpr std::size_t kSpringElasticityGrain = 256; // particles
 constexpr std::size_t kRunGrain = 2;
 
 /// The tetrahedron of a cell's corner and the three corners beside it.
@@ -114,7 +114,7 @@ public:
     void sweep(Vectors& positions, const Descent& descent, const RunContext& context) override {
         find_pressed_cells(positions, volumes_, context);
         for (const std::vector<Index>& color : colors_)
-            parallel_for(context, color.size(), kGrain / 4, [&](std::size_t begin, std::size_t end) {
+            parallel_for(context, color.size(), kSpringElasticityGrain / 4, [&](std::size_t begin, std::size_t end) {
                 for (std::size_t k = begin; k < end; ++k) move_particle(positions, descent, color[k]);
             });
     }
@@ -123,11 +123,11 @@ public:
         CellVolumes volumes = volumes_of_cells();
         find_pressed_cells(positions, volumes, context);
         const std::size_t n = body_.particle_count();
-        std::vector<double> pieces((n + kGrain - 1) / kGrain);
-        parallel_for(context, n, kGrain, [&](std::size_t begin, std::size_t end) {
+        std::vector<double> pieces((n + kSpringElasticityGrain - 1) / kSpringElasticityGrain);
+        parallel_for(context, n, kSpringElasticityGrain, [&](std::size_t begin, std::size_t end) {
             double sum = 0;
             for (std::size_t i = begin; i < end; ++i) sum += star_energy(positions, volumes, i);
-            pieces[begin / kGrain] = sum;
+            pieces[begin / kSpringElasticityGrain] = sum;
         });
         double sum = 0;
         for (const double piece : pieces) sum += piece;
@@ -185,8 +185,8 @@ private:
     /// Returns what the pressed cells add to the bound on the squared frequency.
     float add_volume_forces(const Vectors& positions, Vectors& forces, const RunContext& context) const {
         const std::size_t n = body_.particle_count();
-        std::vector<float> bounds((n + kGrain - 1) / kGrain);
-        parallel_for(context, n, kGrain, [&](std::size_t begin, std::size_t end) {
+        std::vector<float> bounds((n + kSpringElasticityGrain - 1) / kSpringElasticityGrain);
+        parallel_for(context, n, kSpringElasticityGrain, [&](std::size_t begin, std::size_t end) {
             float most = 0;
             for (std::size_t i = begin; i < end; ++i) {
                 float bound = 0;
@@ -207,7 +207,7 @@ private:
                                     });
                 most = std::max(most, bound * inverse_mass_[i]);
             }
-            bounds[begin / kGrain] = most;
+            bounds[begin / kSpringElasticityGrain] = most;
         });
         float most = 0;
         for (const float bound : bounds) most = std::max(most, bound);

@@ -33,7 +33,7 @@ struct SurfaceDeleter {
 struct DrawingDeleter {
     void operator()(cairo_t* drawing) const { cairo_destroy(drawing); }
 };
-using Surface = std::unique_ptr<cairo_surface_t, SurfaceDeleter>;
+using CairoSurface = std::unique_ptr<cairo_surface_t, SurfaceDeleter>;
 using Drawing = std::unique_ptr<cairo_t, DrawingDeleter>;
 
 /// A drawing whose letters are as wide on every kind of surface.
@@ -150,7 +150,7 @@ double script_shift(Script script, double size) {
 
 /// What measures text: a drawing on nothing.
 Drawing measuring_drawing() {
-    const Surface surface(cairo_image_surface_create(CAIRO_FORMAT_A8, 1, 1));
+    const CairoSurface surface(cairo_image_surface_create(CAIRO_FORMAT_A8, 1, 1));
     return begin_drawing(surface.get());
 }
 
@@ -268,8 +268,8 @@ void paint_path(cairo_t* drawing, const Ink& fill, const Stroke& stroke) {
 // --- pictures ---
 
 /// A picture as cairo holds it: native words with the colours multiplied by alpha.
-Surface image_surface(const Picture& picture) {
-    Surface surface(cairo_image_surface_create(CAIRO_FORMAT_ARGB32, int(picture.width), int(picture.height)));
+CairoSurface image_surface(const Picture& picture) {
+    CairoSurface surface(cairo_image_surface_create(CAIRO_FORMAT_ARGB32, int(picture.width), int(picture.height)));
     if (cairo_surface_status(surface.get()) != CAIRO_STATUS_SUCCESS) return surface;
     unsigned char* data = cairo_image_surface_get_data(surface.get());
     const std::size_t stride = std::size_t(cairo_image_surface_get_stride(surface.get()));
@@ -365,9 +365,9 @@ struct Page::Content {
     Result<std::string> streamed(bool as_pdf) const {
         std::string bytes;
         {
-            const Surface surface(as_pdf
-                                      ? cairo_pdf_surface_create_for_stream(append, &bytes, 0.75 * width, 0.75 * height)
-                                      : cairo_svg_surface_create_for_stream(append, &bytes, width, height));
+            const CairoSurface surface(
+                as_pdf ? cairo_pdf_surface_create_for_stream(append, &bytes, 0.75 * width, 0.75 * height)
+                       : cairo_svg_surface_create_for_stream(append, &bytes, width, height));
             if (as_pdf) // else the time of writing stands there
                 cairo_pdf_surface_set_metadata(surface.get(), CAIRO_PDF_METADATA_CREATE_DATE, "2000-01-01T00:00:00Z");
             else
@@ -546,8 +546,8 @@ void Page::legend(ColorMap map, const ValueRange& range, const std::string& titl
 }
 
 Picture Page::pixels(double scale) const {
-    const Surface surface(cairo_image_surface_create(CAIRO_FORMAT_ARGB32, int(std::lround(scale * width())),
-                                                     int(std::lround(scale * height()))));
+    const CairoSurface surface(cairo_image_surface_create(CAIRO_FORMAT_ARGB32, int(std::lround(scale * width())),
+                                                          int(std::lround(scale * height()))));
     if (cairo_surface_status(surface.get()) != CAIRO_STATUS_SUCCESS) return {};
     const Drawing drawing = begin_drawing(surface.get());
     cairo_scale(drawing.get(), scale, scale);

@@ -65,8 +65,8 @@ struct Quadric {
     }
 };
 
-double cross(const Vec2f& a, const Vec2f& b) { return double(a.x()) * b.y() - double(a.y()) * b.x(); }
-double doubled_area(const Vec2f& a, const Vec2f& b, const Vec2f& c) { return cross(b - a, c - a); }
+double cross_in_plane(const Vec2f& a, const Vec2f& b) { return double(a.x()) * b.y() - double(a.y()) * b.x(); }
+double doubled_area(const Vec2f& a, const Vec2f& b, const Vec2f& c) { return cross_in_plane(b - a, c - a); }
 
 /// 1 for an equilateral triangle, 0 without an area.
 double shape(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
@@ -442,7 +442,7 @@ private:
             Vec2d weighted = Vec2d::Zero();
             for (std::size_t i = 0; i < star_.triangle_count(); ++i) {
                 const Vec2f &a = star_.flat[i], &b = star_.flat[star_.next(i)];
-                const double area = cross(a, b);
+                const double area = cross_in_plane(a, b);
                 weighted += area * (a + b).cast<double>() / 3;
                 sum += area;
             }

@@ -18,9 +18,9 @@
 namespace filigree {
 namespace {
 
-constexpr double kNoArea = 1e-14;      // of the diagonal squared: float's rounding of the positions, squared
-constexpr double kTinyArea = 1e-7;     // of the whole surface's: of a component that is nothing but needles
-constexpr std::size_t kGrain = 32'768; // triangles a piece
+constexpr double kNoArea = 1e-14;  // of the diagonal squared: float's rounding of the positions, squared
+constexpr double kTinyArea = 1e-7; // of the whole surface's: of a component that is nothing but needles
+constexpr std::size_t kManifoldSurfaceGrain = 32'768; // triangles a piece
 
 /// Triangles over welded vertices, and the mesh corners and faces they come from.
 struct Soup {
@@ -392,7 +392,7 @@ ManifoldSurface split_into_fans(Soup soup, std::span<const Vec3d> positions, con
 std::vector<double> double_areas(std::span<const Vec3d> positions, std::span<const Triangle> triangles,
                                  const RunContext& context) {
     std::vector<double> areas(triangles.size());
-    parallel_for(context, triangles.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, triangles.size(), kManifoldSurfaceGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t t = begin; t < end; ++t) areas[t] = double_area(positions, triangles[t]);
     });
     return areas;

@@ -9,7 +9,7 @@ namespace filigree {
 
 namespace {
 
-constexpr std::size_t kGrain = 1024;
+constexpr std::size_t kPatchGridGrain = 1024;
 
 /// Which side of which patch is which; sides have one direction, that of the patch that came first.
 struct Sides {

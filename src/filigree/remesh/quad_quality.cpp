@@ -10,7 +10,7 @@
 namespace filigree {
 namespace {
 
-constexpr std::size_t kGrain = 4096;
+constexpr std::size_t kQuadQualityGrain = 4096;
 constexpr double kLowFraction = 0.01; // what the low scaled Jacobian is the percentile of
 
 std::vector<Index> quads_of(const Mesh& mesh) {
@@ -23,7 +23,7 @@ std::vector<Index> quads_of(const Mesh& mesh) {
 
 std::vector<double> scaled_jacobians(const Mesh& mesh, std::span<const Index> quads, const RunContext& context) {
     std::vector<double> result(quads.size());
-    parallel_for(context, quads.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, quads.size(), kQuadQualityGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t q = begin; q < end && !context.is_cancelled(); ++q) {
             const std::span<const Index> face = mesh.face(quads[q]);
             const auto corner = [&](std::size_t k) { return Vec3d(mesh.positions[face[k]].cast<double>()); };
@@ -71,12 +71,12 @@ bool is_irregular_inside(const Mesh& mesh, std::span<const Index> quads, Index v
 
 std::size_t count_irregular_vertices(const Mesh& mesh, std::span<const Index> quads, const RunContext& context) {
     const QuadsAtVertices at = quads_at_vertices(mesh, quads);
-    std::vector<std::size_t> of_piece((mesh.vertex_count() + kGrain - 1) / kGrain);
-    parallel_for(context, mesh.vertex_count(), kGrain, [&](std::size_t begin, std::size_t end) {
+    std::vector<std::size_t> of_piece((mesh.vertex_count() + kQuadQualityGrain - 1) / kQuadQualityGrain);
+    parallel_for(context, mesh.vertex_count(), kQuadQualityGrain, [&](std::size_t begin, std::size_t end) {
         std::vector<Index> neighbours;
         for (std::size_t v = begin; v < end && !context.is_cancelled(); ++v) {
             const auto around = std::span(at.quads).subspan(at.first[v], at.first[v + 1] - at.first[v]);
-            of_piece[begin / kGrain] += is_irregular_inside(mesh, around, static_cast<Index>(v), neighbours);
+            of_piece[begin / kQuadQualityGrain] += is_irregular_inside(mesh, around, static_cast<Index>(v), neighbours);
         }
     });
     std::size_t count = 0;

@@ -11,7 +11,7 @@ namespace filigree {
 
 namespace {
 
-constexpr std::size_t kGrain = 512;
+constexpr std::size_t kRelaxGrain = 512;
 constexpr double kGoodEnough = 0.5;     // scaled Jacobian: a move that leaves quads above this is always welcome
 constexpr double kOverRelaxation = 1.5; // of the way to the mean: half the sweeps do
 constexpr double kStill = 2e-3;         // of the mean edge length at a vertex: shorter moves are not worth their price
@@ -265,7 +265,7 @@ public:
 
     std::vector<Index> quads_below(double limit) const {
         std::vector<std::uint8_t> is_bad(near_.quads.size(), 0);
-        parallel_for(context_, near_.quads.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        parallel_for(context_, near_.quads.size(), kRelaxGrain, [&](std::size_t begin, std::size_t end) {
             if (context_.is_cancelled()) return;
             for (std::size_t q = begin; q < end; ++q) is_bad[q] = jacobian(static_cast<Index>(q)) < limit;
         });
@@ -374,7 +374,7 @@ void relax(PatchGrid& grid, const SurfaceWalk& walk, unsigned sweeps, const RunC
     for (unsigned sweep = 0; sweep < sweeps && !context.is_cancelled(); ++sweep) {
         context.report("relaxing", double(sweep) / sweeps);
         for (const std::vector<Index>& group : near.groups)
-            parallel_for(context, group.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+            parallel_for(context, group.size(), kRelaxGrain, [&](std::size_t begin, std::size_t end) {
                 if (context.is_cancelled()) return;
                 Mover mover(grid, walk, near);
                 for (std::size_t i = begin; i < end; ++i) mover.relax_vertex(group[i]);

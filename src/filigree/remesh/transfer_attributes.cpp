@@ -14,7 +14,7 @@
 namespace filigree {
 namespace {
 
-constexpr std::size_t kGrain = 1024;
+constexpr std::size_t kTransferAttributesGrain = 1024;
 constexpr float kSameUv = 1e-5f;         // a sixth of a pixel of 16,384
 constexpr float kSameNormal = 1e-2f;     // half a degree: as files of few digits round
 constexpr double kReach = 1.25;          // of the distance from a face's centre to its corners: what is searched
@@ -244,7 +244,7 @@ Placement make_placement(const InputSurface& surface, const Mesh& to, std::span<
     placement.positions.assign(points.size(), Vec3d::Zero());
     placement.triangles.assign(points.size(), kNoIndex);
     placement.spots.resize(to.face_count());
-    parallel_for(context, points.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, points.size(), kTransferAttributesGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t v = begin; v < end; ++v) {
             if (points[v].corners[0] == kNoIndex) continue;
             placement.triangles[v] = surface.triangle_of(points[v]);
@@ -252,7 +252,7 @@ Placement make_placement(const InputSurface& surface, const Mesh& to, std::span<
                 placement.positions[v] += double(points[v].barycentric[k]) * surface.position(points[v].corners[k]);
         }
     });
-    parallel_for(context, to.face_count(), kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, to.face_count(), kTransferAttributesGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t f = begin; f < end; ++f) placement.spots[f] = find_spot(placement, to.face(f));
     });
     for (const Spot& spot : placement.spots) placement.mean_radius += std::max(0.0, spot.radius);
@@ -445,7 +445,7 @@ CornerResults<T> find_corner_values(const Placement& placement, const CornerValu
     if (grid.empty()) return results;
     results.values.resize(count);
     results.extents.resize(count);
-    parallel_for(context, placement.to.face_count(), kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, placement.to.face_count(), kTransferAttributesGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t f = begin; f < end && !context.is_cancelled(); ++f)
             if (placement.spots[f].radius >= 0 && grid.near(placement.spots[f]))
                 cross_seam(placement, values, seam, f, results);
@@ -558,7 +558,7 @@ std::vector<Index> faces_under(const Placement& placement, const RunContext& con
     };
     const SeamGrid grid(placement.surface, find_seams(placement.surface, same), 2 * placement.mean_radius);
     std::vector<Index> faces(placement.to.face_count(), kNoIndex);
-    parallel_for(context, faces.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, faces.size(), kTransferAttributesGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t f = begin; f < end && !context.is_cancelled(); ++f) {
             if (placement.spots[f].radius < 0) continue;
             const std::span<const Index> face = placement.to.face(f);
@@ -622,7 +622,7 @@ void interpolate_vertex_data(const Mesh& from, std::span<const CornerPoint> poin
     to.scalars.clear();
     for (const VertexScalar& scalar : from.scalars)
         to.scalars.push_back({scalar.name, std::vector<float>(points.size())});
-    parallel_for(context, points.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, points.size(), kTransferAttributesGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t v = begin; v < end; ++v) {
             if (points[v].corners[0] == kNoIndex) continue;
             Eigen::Vector4d color = Eigen::Vector4d::Zero();

@@ -23,7 +23,7 @@ namespace {
 constexpr std::uint8_t kMostCrossings = 16;
 constexpr double kNeedleLength = 8, kNeedleWidth = 0.5; // voxels: longer and thinner, a triangle is a needle
 constexpr std::size_t kSlab = 8;                        // layers of voxels a piece; even, as blocks must not be shared
-constexpr std::size_t kGrain = 2048;                    // vertices or triangles a piece
+constexpr std::size_t kVoxelWrapGrain = 2048;           // vertices or triangles a piece
 constexpr double kTouch = 1e-9;                         // voxels: what is closer than this touches
 constexpr int kSmoothRounds = 6;
 constexpr double kFreedom = 0.45; // voxels that smoothing moves a vertex along each axis: sides never meet
@@ -316,7 +316,7 @@ void smooth_steps(QuadSurface& surface, const RunContext& context) {
         find_neighbours(std::span<const std::array<Index, 4>>(surface.quads), surface.positions.size());
     std::vector<Vec3d> moved(corners.size());
     for (int round = 0; round < kSmoothRounds; ++round) {
-        parallel_for(context, corners.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        parallel_for(context, corners.size(), kVoxelWrapGrain, [&](std::size_t begin, std::size_t end) {
             for (std::size_t v = begin; v < end && !context.is_cancelled(); ++v)
                 moved[v] = mean_of(neighbours.of(v), surface.positions)
                                .cwiseMax(corners[v] - Vec3d::Constant(kFreedom))
@@ -369,10 +369,10 @@ void move_towards(std::span<const Vec3d> targets, std::span<const Triangle> tria
     std::vector<Vec3d> moved(positions.size());
     std::vector<std::uint8_t> bad(triangles.size());
     for (int round = 0;; ++round) {
-        parallel_for(context, positions.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        parallel_for(context, positions.size(), kVoxelWrapGrain, [&](std::size_t begin, std::size_t end) {
             for (std::size_t v = begin; v < end; ++v) moved[v] = positions[v] + step[v] * (targets[v] - positions[v]);
         });
-        parallel_for(context, triangles.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        parallel_for(context, triangles.size(), kVoxelWrapGrain, [&](std::size_t begin, std::size_t end) {
             for (std::size_t t = begin; t < end; ++t) {
                 const auto& [a, b, c] = triangles[t];
                 bad[t] = (step[a] > 0 || step[b] > 0 || step[c] > 0) &&
@@ -398,7 +398,7 @@ void move_towards(std::span<const Vec3d> targets, std::span<const Triangle> tria
 std::vector<Vec3d> pull_targets(const ClosestPointTree& tree, const VoxelGrid& solid, std::span<const Vec3d> positions,
                                 std::span<const Vec3d> normals, const RunContext& context) {
     std::vector<Vec3d> targets(positions.size());
-    parallel_for(context, positions.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, positions.size(), kVoxelWrapGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t v = begin; v < end && !context.is_cancelled(); ++v) {
             const SurfacePoint closest = tree.closest(positions[v].cast<float>());
             targets[v] = closest.position.cast<double>();
@@ -415,7 +415,7 @@ std::vector<Vec3d> pull_targets(const ClosestPointTree& tree, const VoxelGrid& s
 std::vector<Vec3d> tangential_targets(std::span<const Vec3d> positions, std::span<const Vec3d> normals,
                                       const Neighbours& neighbours, const RunContext& context) {
     std::vector<Vec3d> targets(positions.size());
-    parallel_for(context, positions.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, positions.size(), kVoxelWrapGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t v = begin; v < end; ++v) {
             const Vec3d offset = mean_of(neighbours.of(v), positions) - positions[v];
             targets[v] = positions[v] + 0.5 * (offset - offset.dot(normals[v]) * normals[v]);

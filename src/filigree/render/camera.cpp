@@ -9,8 +9,6 @@ namespace filigree {
 
 namespace {
 
-double radians(double degrees) { return degrees * std::numbers::pi / 180; }
-
 /// Columns right, up and back. Back is `back`, or z when that has no direction.
 Mat3d basis_of(const Vec3d& back, const Vec3d& up) {
     constexpr double kParallel = 1e-6; // sine of the angle between view and up

@@ -8,8 +8,6 @@ namespace filigree {
 
 namespace {
 
-double radians(double degrees) { return degrees * std::numbers::pi / 180; }
-
 /// Model units from the bottom to the top of the picture, at a distance along the view.
 double visible_height(const Camera& camera, double distance) {
     if (!(camera.field_of_view_deg > 0)) return camera.height;

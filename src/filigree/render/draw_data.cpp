@@ -12,7 +12,7 @@ namespace filigree {
 
 namespace {
 
-constexpr std::size_t kGrain = 1 << 14; // draw vertices
+constexpr std::size_t kDrawDataGrain = 1 << 14; // draw vertices
 
 Error nothing_to_draw() { return {ErrorCode::unsuitable, "There is no face to draw; draw the vertices as points."}; }
 
@@ -35,7 +35,7 @@ float to_unit(float value, const ValueRange& range) {
 template <class T, class Value>
 std::vector<T> values_of(std::size_t count, const RunContext& context, const Value& value) {
     std::vector<T> values(count);
-    parallel_for(context, count, kGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, count, kDrawDataGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) values[i] = value(i);
     });
     return values;
@@ -64,7 +64,7 @@ void fill(DrawData::Content& content, const Mesh& mesh, const SurfaceOptions& op
     if (!drawn_at.empty()) {
         source.resize(drawn_at.size());
         for (Index d = 0; d < source.size(); ++d) source[drawn_at[d]] = d;
-        parallel_for(context, draw.triangles.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+        parallel_for(context, draw.triangles.size(), kDrawDataGrain, [&](std::size_t begin, std::size_t end) {
             for (std::size_t t = begin; t < end; ++t)
                 for (Index& v : draw.triangles[t]) v = drawn_at[v];
         });
@@ -159,10 +159,10 @@ Status move_vertices(ModelMotion& motion, const Pose& pose, std::size_t count, c
 
 Box write_moved(const ModelMotion& motion, std::span<Vec3f> positions, std::span<std::uint32_t> normals,
                 const RunContext& context) {
-    std::vector<Box> boxes((positions.size() + kGrain - 1) / kGrain);
-    parallel_for(context, positions.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    std::vector<Box> boxes((positions.size() + kDrawDataGrain - 1) / kDrawDataGrain);
+    parallel_for(context, positions.size(), kDrawDataGrain, [&](std::size_t begin, std::size_t end) {
         const std::span piece = std::span(motion.positions).subspan(begin, end - begin);
-        boxes[begin / kGrain] = bounds(piece);
+        boxes[begin / kDrawDataGrain] = bounds(piece);
         std::copy(piece.begin(), piece.end(), positions.begin() + begin);
         for (std::size_t d = begin; d < end; ++d) normals[d] = octahedral(motion.normals[d]);
     });

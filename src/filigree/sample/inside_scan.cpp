@@ -23,8 +23,7 @@ using scan_kernel::Job;
 using scan_kernel::LargeTriangle;
 using scan_kernel::Piece;
 
-constexpr std::size_t kMaxCount = 65534; // a lower bound, 0 to count, has 16 bits
-constexpr double kLowest = 0x1p-300;     // what exact signs need of coordinates that are not 0
+constexpr double kLowest = 0x1p-300; // what exact signs need of coordinates that are not 0
 constexpr double kHighest = 0x1p300;
 constexpr std::size_t kBatch = std::size_t{1} << 20; // triangles from one look at `cancel` and `progress` to the next
 constexpr std::size_t kLargeBatch = std::size_t{1} << 14;
@@ -36,9 +35,9 @@ std::size_t words_for(std::size_t points) { return (points + 63) / 64; }
 /// An axis of the lattice for the kernel, or what is wrong with it.
 Result<Axis> make_axis(const std::vector<double>& coordinates, double spacing, char name) {
     const std::string where = std::string("The lattice's coordinates along ") + name;
-    if (coordinates.size() > kMaxCount)
+    if (coordinates.size() > kMostLowerBounds)
         return Error{ErrorCode::unsuitable, where + " are " + std::to_string(coordinates.size()) + "; the most are " +
-                                                std::to_string(kMaxCount) + ": take a larger spacing."};
+                                                std::to_string(kMostLowerBounds) + ": take a larger spacing."};
     for (const double x : coordinates)
         if (!(std::abs(x) <= kHighest) || (x != 0 && std::abs(x) < kLowest))
             return Error{ErrorCode::usage, where + " hold a value that is not a number, or too large or small to be "

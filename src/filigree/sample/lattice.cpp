@@ -10,8 +10,7 @@ namespace filigree {
 
 namespace {
 
-constexpr std::size_t kMaxCount = 65534; // lower bounds on an axis, 0 to count, then fit 16 bits
-constexpr int kSpacingBits = 25;         // of the spacing; 2^-25 of it is the grid's step
+constexpr int kSpacingBits = 25; // of the spacing; 2^-25 of it is the grid's step
 /// A spacing has to be this many times the rounding of float at the largest coordinate: closer points would tell apart
 /// what the mesh cannot.
 constexpr double kResolution = 0x1p-22;
@@ -86,11 +85,12 @@ Result<Lattice> make_lattice(const Box& box, const LatticeOptions& options) {
                                                     "xyz"[axis] + " (" + number(low) + " to " + number(high) +
                                                     "); give a smaller spacing or another origin."};
         const double count = last - first + 1;
-        if (count > double(kMaxCount))
+        if (count > double(kMostLowerBounds))
             return Error{ErrorCode::unsuitable,
                          "A lattice spacing of " + number(h) + " gives " + number(count) + " points along " +
-                             "xyz"[axis] + "; the most are " + std::to_string(kMaxCount) + ", so give at least " +
-                             number(1.0001 * box.size().maxCoeff() / double(kMaxCount - 1)) + "."};
+                             "xyz"[axis] + "; the most are " + std::to_string(kMostLowerBounds) +
+                             ", so give at least " +
+                             number(1.0001 * box.size().maxCoeff() / double(kMostLowerBounds - 1)) + "."};
         auto& coordinates = lattice.coordinates[axis];
         coordinates.resize(std::size_t(count));
         for (std::size_t i = 0; i < coordinates.size(); ++i) coordinates[i] = origin + (first + double(i)) * h;

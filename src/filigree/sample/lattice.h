@@ -12,6 +12,9 @@
 
 namespace filigree {
 
+/// Points along an axis at most, so that lower bounds on them, 0 to count, fit 16 bits.
+inline constexpr std::size_t kMostLowerBounds = 65534;
+
 /// Points (x[i], y[j], z[k]), relative to the mesh's origin. The stored doubles are the points: every decision is made
 /// about them, exactly.
 struct Lattice {

@@ -20,8 +20,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kDegree = std::numbers::pi / 180;
-
 /// A name that can be part of a file's name.
 std::string plain_name(const std::string& text) {
     std::string name;

@@ -15,8 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kDegree = std::numbers::pi / 180;
-
 unsigned line_of(const toml::node& node) { return node.source().begin.line; }
 
 /// "; did you mean 'this'?" or where to look.

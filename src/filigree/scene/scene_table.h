@@ -6,10 +6,13 @@
 #include "filigree/scene/scene_keys.h"
 
 #include <array>
+#include <numbers>
 
 #include <toml++/toml.h>
 
 namespace filigree {
+
+inline constexpr double kDegree = std::numbers::pi / 180; // radians
 
 /// "path:line: what", with one full stop or question mark at its end.
 Error error_at(const std::string& path, unsigned line, ErrorCode code, const std::string& what);
