@@ -1,5 +1,7 @@
 #include "playback.h"
 
+#include "studio/materials.h"
+
 #include "filigree/physics/named_materials.h"
 
 #include <QSignalSpy>
@@ -11,10 +13,6 @@
 
 namespace filigree::studio {
 namespace {
-
-Material material_named(std::string_view name) {
-    return std::ranges::find(named_materials(), name, &NamedMaterial::name)->material;
-}
 
 State ball_state(const BodySettings& body = {}) {
     State state;

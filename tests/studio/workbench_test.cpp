@@ -2,6 +2,8 @@
 
 #include "io/corpus.h"
 
+#include "studio/materials.h"
+
 #include "filigree/io/file.h"
 #include "filigree/io/mesh_file.h"
 #include "filigree/io/model_file.h"
@@ -21,10 +23,6 @@ namespace filigree::studio {
 namespace {
 
 namespace fs = std::filesystem;
-
-Material material_named(std::string_view name) {
-    return std::ranges::find(named_materials(), name, &NamedMaterial::name)->material;
-}
 
 /// A workbench with what it told, and a folder for files.
 class WorkbenchTest : public testing::Test {
