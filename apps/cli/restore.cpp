@@ -93,7 +93,8 @@ void restore_one(const RestoreArguments& options, Session& session) {
     if (!options.ghosts.empty()) pose.ghosts = positions_for(session.read_mesh(options.ghosts), model);
     const Restorer restorer = require(Restorer::create(model, options.restore, session.context()));
     const double start = now_seconds();
-    const Mesh mesh = require(restorer.mesh(pose, session.context()));
+    const Mesh mesh = require(with_hint(restorer.mesh(pose, session.context()), ErrorCode::mismatch,
+                                        "'filigree level MODEL 0' writes the driver as it is."));
     const double seconds = now_seconds() - start;
     session.write_mesh(mesh, options.output, options.model);
     const char* from = source_of(model, pose);

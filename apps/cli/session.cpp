@@ -146,6 +146,9 @@ Mesh Session::read_mesh(const std::string& path) {
 
 Model Session::read_model(const std::string& path, PoseSequence* poses) {
     const std::string bytes = read_bytes(path);
+    if (!is_model_file(bytes))
+        refuse(ErrorCode::bad_file,
+               shown_name(path) + " is not a Filigree model: make one of a mesh with 'filigree strip'.");
     if (poses) *poses = require(read_poses(bytes, shown_name(path), context()));
     return require(filigree::read_model(bytes, shown_name(path), context()));
 }

@@ -28,6 +28,13 @@ struct Failure {
 /// What the arguments ask for makes no sense.
 [[noreturn]] inline void refuse(const std::string& sentence) { refuse(ErrorCode::usage, sentence); }
 
+/// The result; an error of that kind gets a sentence more, of what the command line has against it.
+template <class T>
+Result<T> with_hint(Result<T> result, ErrorCode code, const std::string& hint) {
+    if (!result && result.error().code == code) return Error{code, result.error().message + " " + hint};
+    return result;
+}
+
 /// The value, or a Failure.
 template <class T>
 T require(Result<T> result) {

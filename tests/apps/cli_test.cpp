@@ -215,7 +215,8 @@ TEST_F(Cli, UsageIsTwo) {
         fails(2, {"strip", "cube.obj", "-o", "x.fil", "--error", error}, {"--error"});
     fails(2, {"strip", "cube.obj", "-o", "x.fil", "--base", "50", "--levels", "2"}, {"--base", "--levels"});
     fails(2, {"strip", "cube.obj", "-o", "x.fil", "--code", "magic"}, {"blend", "reference"});
-    fails(2, {"strip", "cube.obj", "-o", "cube.obj"}, {"cube.obj", "cube.fil"});
+    fails(2, {"strip", "cube.obj", "-o", "cube.obj"}, {"cube.obj", "overwritten"});
+    fails(2, {"strip", "cube.obj", "-o", "other.obj"}, {"other.obj", "other.fil"});
     fails(2, {"deform", "cube.obj", "-o", "x.ply"}, {"--bend"});
     fails(2, {"deform", "cube.obj", "-o", "x.ply", "--bend", "nan"}, {"--bend"});
     fails(2, {"deform", "cube.obj", "-o", "x.ply", "--taper", "0"}, {"--taper"});

@@ -74,6 +74,10 @@ TEST(UpAxisTest, WithoutAClearBaseItIsTheUsualOne) {
         Mesh upside_down = dome(true);
         for (Vec3f& p : upside_down.positions) p = Vec3f(p.x(), -p.y(), -p.z());
         EXPECT_EQ(find_up_axis(upside_down, usual), usual);
+        Mesh sheet;
+        sheet.positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+        sheet.add_face(std::array<Index, 4>{0, 1, 2, 3});
+        EXPECT_EQ(find_up_axis(sheet, usual), usual);
         Mesh points;
         points.positions = {{0, 0, 0}, {1, 0, 0}, {0, 0, 1}};
         EXPECT_EQ(find_up_axis(points, usual), usual);

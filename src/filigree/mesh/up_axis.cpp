@@ -52,6 +52,7 @@ UpAxis find_up_axis(const Mesh& mesh, UpAxis usual) {
     if (box.empty()) return usual;
     std::array<double, 3> base = {}, box_side = {};
     for (std::size_t axis = 0; axis < 3; ++axis) {
+        if (box.size()[int(axis)] == 0) return usual; // a sheet without thickness: a picture, more often than a floor
         base[axis] = flat_area(mesh, box, int(axis), 1);
         box_side[axis] = box.size()[int(axis + 1) % 3] * box.size()[int(axis + 2) % 3];
     }
