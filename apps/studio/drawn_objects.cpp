@@ -257,9 +257,9 @@ void DrawnObjects::follow_inside_points() {
     with_opengl_([this] {
         inside_pose_ = pose_stamp_;
         const std::span<const Vec3f> rest = workbench_.inside_points();
-        const Status is_there = pose_stamp_ == 0
-                                  ? inside_->set_positions(rest)
-                                  : inside_->set_positions(carried_points(rest, shown_->rest_pose().positions, pose_));
+        const Status is_there =
+            pose_stamp_ == 0 ? inside_->set_positions(rest)
+                             : inside_->set_positions(carried_points(rest, shown_->rest_pose().positions, pose_));
         if (!is_there) inside_.reset(); // of a mesh not shown yet
     });
     Q_EMIT changed(false);

@@ -68,7 +68,8 @@ TEST(GradientFit, RigidMotionsAndProportionalScaleAreExact) {
         const auto moved =
             mapped(mesh.positions, [&](const Vec3d& p) { return Vec3d(scale * turn * (p + Vec3d(1, 2, 3))); });
         for (const NormalColumn column : {NormalColumn::fitted, NormalColumn::shell})
-            EXPECT_LT(largest_error(fit.fit(moved, column, HeightLaw::proportional, kOneThread), scale * turn), 1e-4 * scale);
+            EXPECT_LT(largest_error(fit.fit(moved, column, HeightLaw::proportional, kOneThread), scale * turn),
+                      1e-4 * scale);
     }
 }
 
@@ -145,7 +146,8 @@ TEST(GradientFit, NoThreadChangesAByte) {
     const Mesh mesh = make_wavy_sphere({.resolution = 32});
     const auto moved =
         mapped(mesh.positions, [](const Vec3d& p) { return Vec3d(p.x() * p.y(), p.y(), p.z() + p.x()); });
-    const auto one = GradientFit(mesh, kOneThread).fit(moved, NormalColumn::fitted, HeightLaw::proportional, kOneThread);
+    const auto one =
+        GradientFit(mesh, kOneThread).fit(moved, NormalColumn::fitted, HeightLaw::proportional, kOneThread);
     const RunContext two(2);
     EXPECT_EQ(GradientFit(mesh, two).fit(moved, NormalColumn::fitted, HeightLaw::proportional, two), one);
 }

@@ -87,12 +87,15 @@ TEST(ReferenceCode, LawsOnAStretchedQuad) {
     const Mesh mesh = one_level(4, {0, 0, 0.125f});
     const ReferenceDetail detail = encoded(mesh);
     const auto driver = mapped(detail.rest_driver, [](const Vec3f& p) { return Vec3f(2 * p.x(), p.y(), p.z()); });
-    const std::pair<HeightLaw, float> expected[] = {
-        {HeightLaw::keep, 1.0f}, {HeightLaw::inverse, 0.5f}, {HeightLaw::proportional, std::sqrt(2.0f)}, {HeightLaw::volume, 0.5f}};
+    const std::pair<HeightLaw, float> expected[] = {{HeightLaw::keep, 1.0f},
+                                                    {HeightLaw::inverse, 0.5f},
+                                                    {HeightLaw::proportional, std::sqrt(2.0f)},
+                                                    {HeightLaw::volume, 0.5f}};
     for (const auto& [law, factor] : expected)
         for (const unsigned references : {3u, 4u, 6u}) {
             const auto positions = restored(encoded(mesh, references), law, driver);
-            EXPECT_LT((positions[4] - Vec3f(1, 0.5f, factor * 0.125f)).norm(), 1e-6f) << height_law_name(law) << references;
+            EXPECT_LT((positions[4] - Vec3f(1, 0.5f, factor * 0.125f)).norm(), 1e-6f)
+                << height_law_name(law) << references;
         }
 }
 
@@ -117,7 +120,8 @@ TEST(ReferenceCode, RoundTrip) {
                            make_torus({.resolution = 32}),       make_wavy_plane({.resolution = 2})};
     for (std::size_t m = 0; m < std::size(meshes); ++m)
         for (const unsigned references : {3u, 4u, 6u})
-            for (const HeightLaw law : {HeightLaw::keep, HeightLaw::inverse, HeightLaw::proportional, HeightLaw::volume}) {
+            for (const HeightLaw law :
+                 {HeightLaw::keep, HeightLaw::inverse, HeightLaw::proportional, HeightLaw::volume}) {
                 const ReferenceDetail detail = encoded(meshes[m], references);
                 EXPECT_EQ(detail.records.size() + detail.rest_driver.size(), meshes[m].vertex_count());
                 EXPECT_LE(distance(restored(detail, law, detail.rest_driver), meshes[m].positions), 2e-7)
@@ -158,7 +162,8 @@ TEST(ReferenceCode, RigidMotionIsExact) {
     const auto move = [&](const Vec3f& p) { return Vec3f(turn * p + Vec3f(0.3f, -0.2f, 0.5f)); };
     for (const Mesh& mesh : {make_wavy_cube({.resolution = 64}), rough_cube(32, 0.05f)})
         for (const unsigned references : {3u, 4u, 6u})
-            for (const HeightLaw law : {HeightLaw::keep, HeightLaw::inverse, HeightLaw::proportional, HeightLaw::volume}) {
+            for (const HeightLaw law :
+                 {HeightLaw::keep, HeightLaw::inverse, HeightLaw::proportional, HeightLaw::volume}) {
                 const ReferenceDetail detail = encoded(mesh, references);
                 EXPECT_LE(
                     distance(restored(detail, law, mapped(detail.rest_driver, move)), mapped(mesh.positions, move)),
@@ -312,8 +317,8 @@ TEST(ReferenceCode, SameBytesForAnyThreadCount) {
     ASSERT_TRUE(three_detail.ok());
     EXPECT_TRUE(same_bytes(one_detail.records, three_detail->records));
     const auto driver = mapped(one_detail.rest_driver, [](const Vec3f& p) { return Vec3f(2 * p.x(), p.y(), p.z()); });
-    EXPECT_TRUE(
-        same_bytes(restored(one_detail, HeightLaw::inverse, driver), restored(one_detail, HeightLaw::inverse, driver, three)));
+    EXPECT_TRUE(same_bytes(restored(one_detail, HeightLaw::inverse, driver),
+                           restored(one_detail, HeightLaw::inverse, driver, three)));
 }
 
 TEST(ReferenceCode, RefusesWhatItCannotDo) {

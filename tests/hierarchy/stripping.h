@@ -61,7 +61,6 @@ inline Pose pose_by(const Deformation& f, const Model& model) {
     return pose;
 }
 
-
 /// Largest distance and root mean square, as fractions of b's diagonal (model units when that is zero); NaN stays NaN.
 struct Distance {
     double max = 0, rms = 0;

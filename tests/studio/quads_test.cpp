@@ -1,8 +1,8 @@
 // "Make quads": the mesh becomes quads in patches, is told of, and can be undone.
 #include "quads.h"
 
-#include "one_window.h"
 #include "filigree/present/patch_colors.h"
+#include "one_window.h"
 #include "script.h"
 #include "words.h"
 

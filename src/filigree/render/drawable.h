@@ -46,8 +46,8 @@ struct PointOptions {
 /// positions and normals are uploaded with each pose; for software renderers, which would restore again in each pass.
 enum class RestoreOn { gpu, cpu };
 
-/// The processor's half of a drawable: all that needs no OpenGL, and so can be made in any thread while a window goes on
-/// drawing. Errors of both: unsuitable (nothing to draw), usage (no such level), cancelled.
+/// The processor's half of a drawable: all that needs no OpenGL, and so can be made in any thread while a window goes
+/// on drawing. Errors of both: unsuitable (nothing to draw), usage (no such level), cancelled.
 class DrawData {
 public:
     static Result<DrawData> surface(const Mesh& mesh, const SurfaceOptions& options, const RunContext& context);

@@ -81,8 +81,8 @@ public:
     bool add_pass();
     /// x, y: where the picture's lower left corner goes, pixels; what lies around it stays.
     void show(unsigned framebuffer, int x = 0, int y = 0) const;
-    /// One pass that stands for all, for what moves: no shadow maps, the sky's light by the normal alone, a soft contact
-    /// shadow on the ground left out. As bright as the whole picture. Errors as of begin. show() then shows it.
+    /// One pass that stands for all, for what moves: no shadow maps, the sky's light by the normal alone, a soft
+    /// contact shadow on the ground left out. As bright as the whole picture. Errors as of begin. show() then shows it.
     Status preview(const Scene& scene, const Camera& camera, unsigned width, unsigned height);
 
 private:
