@@ -99,6 +99,10 @@ Command strip_command() {
                         Option("--error", strip.error,
                                "How far the driver may leave the mesh (rms), fraction of the diagonal")
                             .above_zero(),
+                        Option("--max-edge", strip.max_edge,
+                               "Longest edge that simplifying may leave, fraction of the diagonal: flat parts keep "
+                               "vertices")
+                            .above_zero(),
                         choice<DetailCode>("--code", strip.code,
                                            {{"blend", DetailCode::blend}, {"reference", DetailCode::reference}},
                                            "blend: any mesh (default); reference: the report's, for regular quads"),

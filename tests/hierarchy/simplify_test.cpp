@@ -124,6 +124,40 @@ TEST(Simplify, TheErrorIsABound) {
     }
 }
 
+double longest_edge(const Mesh& mesh, const Simplified& simplified) {
+    float longest = 0; // squared
+    for (const Triangle& t : simplified.triangles)
+        for (int k = 0; k < 3; ++k)
+            longest = std::max(longest, (mesh.positions[t[k]] - mesh.positions[t[(k + 1) % 3]]).squaredNorm());
+    return std::sqrt(double(longest));
+}
+
+// Flat sides are worth nothing to the quadric error: without a bound their triangles get as long as they are wide.
+TEST(Simplify, FlatPartsKeepVerticesForTheSakeOfTheLongestEdge) {
+    constexpr double kMost = 0.06;                 // of the diagonal
+    for (const unsigned resolution : {24u, 40u}) { // the latter goes through both stages
+        const Mesh mesh = *make_shape("bar", {.resolution = resolution});
+        const double diagonal = bounds(mesh.positions).diagonal();
+        const Simplified free = simplified(mesh, {.target_vertices = 100});
+        const Simplified held = simplified(mesh, {.target_vertices = 100, .max_edge = kMost});
+        EXPECT_GT(longest_edge(mesh, free), 2 * kMost * diagonal);
+        EXPECT_LE(longest_edge(mesh, held), kMost * diagonal);
+        EXPECT_GT(held.vertex_count, 100u);
+        EXPECT_LT(held.vertex_count, 2000u);
+        // A count that the bound leaves room for is met as without one.
+        expect_near_target(simplified(mesh, {.target_vertices = 1000, .max_edge = kMost}).vertex_count, 1000);
+    }
+}
+
+TEST(Simplify, EdgesOfTheMeshMayBeLonger) {
+    Mesh mesh = *make_shape("bar", {.resolution = 12});
+    mesh.add_face(Triangle{0, 1, static_cast<Index>(mesh.positions.size())}); // a far point
+    mesh.positions.emplace_back(20.0f, 0.0f, 0.0f);
+    const Simplified held = simplified(mesh, {.target_vertices = 20, .max_edge = 0.02});
+    EXPECT_GT(held.triangles.size(), 100u);
+    EXPECT_LE(longest_edge(mesh, held), longest_edge(mesh, simplified(mesh, {})));
+}
+
 TEST(Simplify, FlatAndTinyMeshes) {
     const Mesh flat = make_wavy_plane({.resolution = 16, .amplitude = 0});
     const Simplified corners = simplified(flat, {.target_vertices = 4});

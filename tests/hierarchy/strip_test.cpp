@@ -251,6 +251,9 @@ TEST(Strip, OptionsThatMakeNoSenseAreRefused) {
     EXPECT_EQ(code(mesh, {.levels = 17}), ErrorCode::usage);
     EXPECT_EQ(code(mesh, {.error = 0}), ErrorCode::usage);
     EXPECT_EQ(code(mesh, {.error = NAN}), ErrorCode::usage);
+    EXPECT_EQ(code(mesh, {.max_edge = 0}), ErrorCode::usage);
+    EXPECT_EQ(code(mesh, {.max_edge = NAN}), ErrorCode::usage);
+    EXPECT_EQ(code(mesh, {.code = DetailCode::reference, .max_edge = 0.1}), ErrorCode::usage);
     EXPECT_EQ(code(mesh, {.code = DetailCode::reference, .error = 0.1}), ErrorCode::usage);
     EXPECT_EQ(code(mesh, {.code = DetailCode::reference, .references = 5}), ErrorCode::usage);
     EXPECT_EQ(code(Mesh{}, {}), ErrorCode::unsuitable);

@@ -100,23 +100,24 @@ public:
         make_quadrics();
     }
 
-    void run(std::size_t target, std::optional<double> max_error, const RunContext& context) {
+    void run(const EdgeCollapseOptions& options, const RunContext& context) {
         for (Index v = 0; v < points_.size(); ++v) {
             const std::vector<Index> neighbours = neighbours_of(v);
             for (Index w : neighbours) price(v, w);
         }
-        while (vertex_count_ > target && !queue_.empty() && !context.is_cancelled()) {
+        while (vertex_count_ > options.target_vertices && !queue_.empty() && !context.is_cancelled()) {
             Collapse next = queue_.top();
             queue_.pop();
             if (next.stamp != stamp_of(next.from, next.to) && !renew(next)) continue;
             if (shared_triangles(next.from, next.to) == triangle_count_) continue; // something has to be left
+            if (options.max_edge && stretches(next.from, next.to, *options.max_edge)) continue;
             if (!next.forced && !is_clean(next.from, next.to)) {
                 queue_.push(forced(next));
                 continue;
             }
             const double area = quadrics_[next.from].area + quadrics_[next.to].area;
             const double distance = area > 0 ? std::sqrt(next.error / area) : 0;
-            if (max_error && distance > *max_error) break;
+            if (options.max_error && distance > *options.max_error) break;
             error_ = std::max(error_, distance);
             forced_ += next.forced;
             apply(next.from, next.to);
@@ -226,6 +227,20 @@ private:
         std::size_t count = 0;
         for (Index w : neighbours_of(fewer)) count += w != other && shared_triangles(w, other) > 0;
         return count;
+    }
+
+    /// Whether an edge becomes longer than `limit` and than it was. The collapse is then dropped; it comes back when
+    /// one of its ends is priced again.
+    bool stretches(Index from, Index to, double limit) const {
+        for (const Index t : around_[from].all) {
+            if (!is_left(t) || has(triangles_[t], to)) continue;
+            for (const Index w : triangles_[t]) {
+                const double after = (points_[to] - points_[w]).squaredNorm();
+                if (w != from && after > limit * limit && after > (points_[from] - points_[w]).squaredNorm())
+                    return true;
+            }
+        }
+        return false;
     }
 
     /// No triangle turns over, and the two ends have no common neighbour but those of the triangles between them.
@@ -350,10 +365,9 @@ private:
 } // namespace
 
 EdgeCollapseResult collapse_edges(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
-                                  std::size_t target_vertices, std::optional<double> max_error,
-                                  const RunContext& context) {
+                                  const EdgeCollapseOptions& options, const RunContext& context) {
     Collapser collapser(positions, triangles);
-    collapser.run(target_vertices, max_error, context);
+    collapser.run(options, context);
     return collapser.result();
 }
 

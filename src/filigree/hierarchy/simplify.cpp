@@ -7,6 +7,8 @@
 #include "filigree/hierarchy/edge_collapse.h"
 
 #include <algorithm>
+#include <utility>
+#include <vector>
 
 #include <meshoptimizer.h>
 
@@ -35,6 +37,20 @@ std::size_t largest_fan(std::span<const Triangle> triangles, std::size_t vertex_
     for (const Triangle& t : triangles)
         for (Index v : t) ++counts[v];
     return counts.empty() ? 0 : *std::ranges::max_element(counts);
+}
+
+/// Edges longer than `limit`, ascending: the smaller end first.
+std::vector<std::pair<Index, Index>> long_edges(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
+                                                double limit) {
+    std::vector<std::pair<Index, Index>> edges;
+    for (const Triangle& t : triangles)
+        for (int k = 0; k < 3; ++k) {
+            const auto [a, b] = std::minmax(t[k], t[(k + 1) % 3]);
+            if (double((positions[a] - positions[b]).squaredNorm()) > limit * limit) edges.emplace_back(a, b);
+        }
+    std::sort(edges.begin(), edges.end());
+    edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+    return edges;
 }
 
 /// One call of meshoptimizer that leaves about `ratio` of the triangles; false when it could not go on.
@@ -69,11 +85,19 @@ Simplified simplify(std::span<const Vec3f> positions, std::span<const Triangle> 
     const double max_error = options.max_error.value_or(1e6) * diagonal;
     const std::size_t target = std::max<std::size_t>(options.target_vertices.value_or(3), 3);
     const std::size_t bulk_target = std::max(target, kFinishFrom);
+    EdgeCollapseOptions collapse{.target_vertices = target};
+    if (options.max_error) collapse.max_error = max_error;
+    if (options.max_edge) collapse.max_edge = *options.max_edge * diagonal;
     for (int round = 0; round < 6 && current.vertex_count * 50 > bulk_target * 51 && !context.is_cancelled(); ++round)
         if (!collapse_bulk(positions, double(bulk_target) / double(current.vertex_count), max_error, current)) break;
+    if (collapse.max_edge && !std::ranges::includes(long_edges(positions, triangles, *collapse.max_edge),
+                                                    long_edges(positions, current.triangles, *collapse.max_edge))) {
+        current = {};
+        current.triangles.assign(triangles.begin(), triangles.end());
+        current.vertex_count = count_vertices(triangles, positions.size());
+    }
     if (current.vertex_count * 50 > target * 51) {
-        EdgeCollapseResult finished = collapse_edges(
-            positions, current.triangles, target, options.max_error ? std::optional(max_error) : std::nullopt, context);
+        EdgeCollapseResult finished = collapse_edges(positions, current.triangles, collapse, context);
         current.triangles = std::move(finished.triangles);
         current.vertex_count = finished.vertex_count;
         current.error = std::max(current.error, finished.error);

@@ -14,6 +14,9 @@ struct SimplifyOptions {
     /// Stop before a collapse whose quadric error is worse: a root mean square distance, fraction of the diagonal.
     /// Single points may be a few times further away.
     std::optional<double> max_error = {};
+    /// No edge becomes longer than this, fraction of the diagonal, unless it was in the input: flat parts keep vertices
+    /// too. Where this holds collapses back, more than target_vertices are left. On its own it removes nothing.
+    std::optional<double> max_edge = {};
 };
 
 /// What is left: triangles over the input's own vertex ids.
@@ -27,6 +30,7 @@ struct Simplified {
 /// Quadric edge collapses [Garland 1997]: meshoptimizer down to 20,000 vertices, our own (collapse_edges) from there,
 /// and wherever meshoptimizer cannot go on or a vertex has thousands of triangles. triangles must be over welded
 /// vertices (one id a position), else seams hold them back. With both options, error ends it before the count does.
+/// Where meshoptimizer leaves an edge longer than max_edge, all is done by our own.
 /// Cost O(F log F); same result for any thread count. When cancelled, what is reached so far.
 Simplified simplify(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
                     const SimplifyOptions& options, const RunContext& context);

@@ -110,7 +110,7 @@ std::vector<Level> simplify_levels(const WorkingMesh& work, const StripOptions& 
     std::vector<Triangle> current = work.surface.triangles;
     for (std::size_t k = targets.size(); k-- > 0 && !context.is_cancelled();) {
         context.report("simplify", 1 - double(k + 1) / double(targets.size()));
-        SimplifyOptions simplify_options{.target_vertices = targets[k]};
+        SimplifyOptions simplify_options{.target_vertices = targets[k], .max_edge = options.max_edge};
         if (options.error) {
             simplify_options.max_error = *options.error - report.simplify_error;
             if (*simplify_options.max_error <= 0 && !levels.empty()) break;
@@ -216,6 +216,10 @@ std::optional<Error> check_options(const Mesh& mesh, const StripOptions& options
         return Error{ErrorCode::usage, "error must be above 0 and at most 1: it is a fraction of the diagonal."};
     if (options.code == DetailCode::reference && options.error)
         return Error{ErrorCode::usage, "The reference code removes whole levels: give base or levels, not error."};
+    if (options.max_edge && !(*options.max_edge > 0 && *options.max_edge <= 1))
+        return Error{ErrorCode::usage, "max_edge must be above 0 and at most 1: it is a fraction of the diagonal."};
+    if (options.code == DetailCode::reference && options.max_edge)
+        return Error{ErrorCode::usage, "The reference code removes whole levels: max_edge is for the blend code."};
     if (mesh.vertex_count() == 0) return Error{ErrorCode::unsuitable, "The mesh has no vertices: nothing to strip."};
     return std::nullopt;
 }

@@ -15,6 +15,9 @@ struct StripOptions {
     std::optional<std::size_t> base = {}; ///< driver vertices, about; 3 or more
     std::optional<unsigned> levels = {};  ///< levels below the finest, each with a quarter of the vertices of the next
     std::optional<double> error = {};     ///< how far the driver may leave the mesh, fraction of the diagonal (rms)
+    /// Longest edge that simplification may leave, fraction of the diagonal; edges of the mesh itself may be longer.
+    /// Flat parts then keep vertices, and there may be more than asked for above. Blend code only.
+    std::optional<double> max_edge = {};
     Precision precision = Precision::float32; ///< blend code only
     unsigned references = 3;                  ///< reference code only: 3, 4 or 6
     bool operator==(const StripOptions&) const = default;
