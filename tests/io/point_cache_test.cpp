@@ -298,6 +298,25 @@ TEST_F(PointCache, NumberedPlyGivesGradients) {
     says(poses->pose(2).error(), ErrorCode::mismatch, {"g_0003.ply", "no gradients"});
 }
 
+TEST_F(PointCache, NumberedMeshesOfOneFolderComeTogetherOrNotAtAll) {
+    const Mesh mesh = make_wavy_plane({.resolution = 3});
+    std::size_t broken = kNoIndex;
+    const auto frame_of = [&](std::size_t frame) {
+        Mesh moved = mesh;
+        moved.positions[0].x() = frame == broken ? std::nanf("") : float(frame);
+        return Result<Mesh>(moved);
+    };
+    const std::vector<NumberedMeshes> parts = {{{path("both"), "a#1_", ".ply"}, frame_of},
+                                               {{path("both"), "b_", ".ply"}, frame_of}};
+    ASSERT_TRUE(write_numbered_meshes(3, parts, kContext).ok());
+    EXPECT_TRUE(fs::exists(path("both/a#1_0003.ply"))); // the name is known: no '#' stands for a number
+    EXPECT_TRUE(fs::exists(path("both/b_0003.ply")));
+    const std::string before = read_file(path("both/a#1_0002.ply")).value();
+    broken = 2;
+    says(write_numbered_meshes(3, parts, kContext).error(), ErrorCode::unsuitable, {"a#1_0003.ply"});
+    EXPECT_EQ(read_file(path("both/a#1_0002.ply")).value(), before);
+}
+
 TEST_F(PointCache, NumberedMeshesKeepAttributes) {
     const Mesh rest = filigree_test::make_corner_attribute_mesh();
     ASSERT_TRUE(write_animation(moving(rest, 2), path("n_####.obj"), kContext).ok());

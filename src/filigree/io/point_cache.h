@@ -4,6 +4,7 @@
 #include "filigree/core/result.h"
 #include "filigree/core/run_context.h"
 #include "filigree/hierarchy/pose.h"
+#include "filigree/io/numbered_name.h"
 #include "filigree/mesh/mesh_animation.h"
 
 #include <filesystem>
@@ -64,5 +65,13 @@ Result<std::vector<std::string>> write_animation(const MeshAnimation& animation,
 Result<std::vector<std::string>> write_numbered_meshes(std::size_t frames,
                                                        const std::function<Result<Mesh>(std::size_t frame)>& mesh,
                                                        const std::filesystem::path& path, const RunContext& context);
+/// Meshes that are numbered under one name.
+struct NumberedMeshes {
+    NumberedName name;
+    std::function<Result<Mesh>(std::size_t frame)> mesh; ///< of a frame, 0 .. frames - 1
+};
+/// Several of them side by side in one folder, all or none. parts: one or more, all with the first one's folder.
+Result<std::vector<std::string>> write_numbered_meshes(std::size_t frames, std::span<const NumberedMeshes> parts,
+                                                       const RunContext& context);
 
 } // namespace filigree

@@ -180,25 +180,19 @@ namespace {
 /// What write_numbered_meshes does in a folder that is there.
 class NumberedWriter {
 public:
-    NumberedWriter(NumberedName name, const RunContext& context)
-        : name_(std::move(name)), context_(context), silent_(context) {
+    explicit NumberedWriter(const RunContext& context) : context_(context), silent_(context) {
         silent_.progress = nullptr; // the bar tells of frames
-        const Result<MeshFormat> format = mesh_format(name_.file(1));
-        is_obj_ = format && *format == MeshFormat::obj;
     }
 
-    Status write(std::size_t frames, const std::function<Result<Mesh>(std::size_t frame)>& mesh) {
-        Result<FileBatch> files = FileBatch::create(name_.folder);
+    Status write(std::size_t frames, std::span<const NumberedMeshes> parts, const fs::path& folder) {
+        Result<FileBatch> files = FileBatch::create(folder);
         if (!files) return files.error();
         for (std::size_t frame = 0; frame < frames; ++frame) {
             context_.report("writing", double(frame) / double(frames));
-            if (context_.is_cancelled()) return cancelled_error();
-            const fs::path target = name_.file(frame + 1);
-            if (Status free = files->check_place(target.filename().string()); !free) return free;
-            Result<Mesh> moved = mesh(frame);
-            if (!moved) return moved.error();
-            if (Status written = write_frame(*moved, files->path(target.filename().string()), target); !written)
-                return written;
+            for (const NumberedMeshes& part : parts) {
+                if (context_.is_cancelled()) return cancelled_error();
+                if (Status written = write_frame(part, frame, *files); !written) return written;
+            }
         }
         if (context_.is_cancelled()) return cancelled_error();
         return files->finish();
@@ -206,22 +200,26 @@ public:
     std::vector<std::string>& warnings() { return warnings_; }
 
 private:
-    NumberedName name_;
     const RunContext& context_;
     RunContext silent_;
-    bool is_obj_;
     std::vector<std::string> warnings_;
 
-    Status write_frame(Mesh& mesh, const fs::path& file, const fs::path& target) {
-        if (is_obj_ && !mesh.embedded_materials.empty()) { // a library and its pictures for every frame, else
-            mesh.embedded_materials.clear();
+    Status write_frame(const NumberedMeshes& part, std::size_t frame, const FileBatch& files) {
+        const fs::path target = part.name.file(frame + 1), file = files.path(target.filename().string());
+        if (Status free = files.check_place(target.filename().string()); !free) return free;
+        Result<Mesh> mesh = part.mesh(frame);
+        if (!mesh) return mesh.error();
+        const Result<MeshFormat> format = mesh_format(target);
+        const bool is_obj = format && *format == MeshFormat::obj;
+        if (is_obj && !mesh->embedded_materials.empty()) { // a library and its pictures for every frame, else
+            mesh->embedded_materials.clear();
             add_new(warnings_, {"OBJ files of a sequence do not have embedded materials; left out."});
         }
-        if (const std::string wrong = check_mesh(mesh); !wrong.empty())
+        if (const std::string wrong = check_mesh(*mesh); !wrong.empty())
             return Error{ErrorCode::unsuitable, target.string() +
                                                     ": not written: it is beyond what numbers can hold (" + wrong +
                                                     "); deform less."};
-        const auto written = write_mesh(mesh, file, {}, silent_);
+        const auto written = write_mesh(*mesh, file, {}, silent_);
         if (!written) return renamed(written.error(), file, target);
         add_new(warnings_, *written);
         return Success{};
@@ -238,16 +236,23 @@ Result<std::vector<std::string>> write_numbered_meshes(std::size_t frames,
         const fs::path folder = path.has_filename() ? path : path.parent_path();
         name = NumberedName{folder, folder.filename().string() + "_", ".ply"};
     }
-    const fs::path folder = name->folder.empty() ? fs::path(".") : name->folder;
+    const NumberedMeshes only{*name, mesh};
+    return write_numbered_meshes(frames, std::span(&only, 1), context);
+}
+
+Result<std::vector<std::string>> write_numbered_meshes(std::size_t frames, std::span<const NumberedMeshes> parts,
+                                                       const RunContext& context) {
+    const fs::path& named = parts.front().name.folder;
+    const fs::path folder = named.empty() ? fs::path(".") : named;
     const NewFolders folders(folder);
     if (!folders.are_there()) return cannot_write(folder, "the folder cannot be made");
-    NumberedWriter writer(*name, context);
-    if (Status written = writer.write(frames, mesh); !written) {
+    NumberedWriter writer(context);
+    if (Status written = writer.write(frames, parts, folder); !written) {
         folders.remove();
         return written.error();
     }
     context.report("writing", 1);
-    warn_of_leftovers(*name, frames, writer.warnings());
+    for (const NumberedMeshes& part : parts) warn_of_leftovers(part.name, frames, writer.warnings());
     return writer.warnings();
 }
 

@@ -1,5 +1,7 @@
 #include "filigree/present/film_frames.h"
 
+#include "filigree/present/level_shape.h"
+
 namespace filigree {
 
 Status film_frames(std::size_t frames,
@@ -21,11 +23,7 @@ Status film_frames(std::size_t frames,
 
 unsigned level_within(const Model& model, std::size_t most_triangles) {
     unsigned level = model.finest_level();
-    const auto triangles = [&](unsigned k) {
-        return k == model.finest_level() ? model.mesh.corner_count() - 2 * model.mesh.face_count()
-                                         : model.levels[k].corners.size() - 2 * model.levels[k].face_count();
-    };
-    while (level > 0 && triangles(level) > most_triangles) --level;
+    while (level > 0 && level_facts(model, level).triangles > most_triangles) --level;
     return level;
 }
 

@@ -24,6 +24,22 @@ void RunTimes::add(const FrameReport& report) {
     other += report.other_seconds;
 }
 
+void DescentCauses::add(const FrameReport& report) {
+    switch (report.why_descent) {
+    case DescentCause::none:
+        break;
+    case DescentCause::chosen:
+        ++chosen;
+        break;
+    case DescentCause::too_many_substeps:
+        ++too_many_substeps;
+        break;
+    case DescentCause::not_finite:
+        ++not_finite;
+        break;
+    }
+}
+
 std::size_t hold_lost(const Pose& before, Pose& now, float far, float most_gradient) {
     std::size_t held = 0;
     for (std::size_t v = 0; v < now.positions.size(); ++v) {

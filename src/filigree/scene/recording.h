@@ -38,6 +38,13 @@ struct RunTimes {
     void add(const FrameReport& report);
 };
 
+/// Frames of this run that descent made or finished, by cause; those before it was resumed are not in it.
+struct DescentCauses {
+    std::uint64_t chosen = 0, too_many_substeps = 0, not_finite = 0;
+
+    void add(const FrameReport& report);
+};
+
 struct Recording {
     std::vector<PoseSequence> poses;                        ///< one a body; the first is the start
     std::vector<std::vector<std::vector<Vec3f>>> particles; ///< of each body and frame, where they are drawn

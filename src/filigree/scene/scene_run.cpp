@@ -109,6 +109,7 @@ Status SceneRun::advance_to(std::uint64_t last, const RunContext& context) {
         if (!report) return report.error();
         recording_.totals.add(*report);
         times_.add(*report);
+        descent_causes_.add(*report);
         last_volume_ratio_ = report->least_volume_ratio;
         for (std::size_t b = 0; b < followers_.size(); ++b)
             if (const Status recorded = record_body(b); !recorded) return recorded;

@@ -30,6 +30,7 @@ public:
     std::uint64_t frame() const { return recording_.totals.frames; }
     const Recording& recording() const { return recording_; }
     const RunTimes& times() const { return times_; }
+    const DescentCauses& descent_causes() const { return descent_causes_; }
     Energy energy() const { return simulation_.energy(always_); }
     /// The body's mesh in one of the recorded poses, at the scene's origin. Errors: as of Restorer::mesh.
     Result<Mesh> mesh(std::size_t body, std::size_t frame, const RunContext& context) const;
@@ -62,6 +63,7 @@ private:
     std::vector<Follower> followers_;
     Recording recording_;
     RunTimes times_;
+    DescentCauses descent_causes_;
     float last_volume_ratio_ = 1;
 };
 

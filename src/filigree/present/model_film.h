@@ -1,0 +1,36 @@
+// A film of one model: its motion, or once around it.
+#pragma once
+
+#include "filigree/hierarchy/pose.h"
+#include "filigree/hierarchy/restore.h"
+#include "filigree/render/camera.h"
+#include "filigree/render/drawable.h"
+#include "filigree/render/renderer.h"
+#include "filigree/scene/dropped_body.h"
+
+#include <memory>
+#include <optional>
+#include <string>
+
+namespace filigree {
+
+/// All that a film needs, so that it can be made in another thread.
+struct ModelFilm {
+    std::shared_ptr<const Model> model;
+    RestoreOptions restore;
+    SurfaceOptions surface;
+    Appearance look;
+    PoseSequence poses;                       ///< no frames: a turntable of `pose`, 90 pictures, 30 a second
+    Pose pose;                                ///< no positions: at rest
+    std::optional<Surroundings> surroundings; ///< drawn, and their ground; unset: the ground is below all
+    Camera camera;                            ///< its `up` is taken from below
+    UpAxis up = UpAxis::y;
+    bool ground = true; ///< where surroundings do not say
+    unsigned width = 960, height = 720, passes = 8;
+};
+
+/// Makes its own OpenGL context. Returns the number of pictures. Progress: "drawing the film". Errors: as of
+/// FilmWriter, HeadlessRenderer, Drawable; cancelled. Nothing stands at `path` then.
+Result<std::size_t> film_model(const ModelFilm& film, const std::string& path, const RunContext& context);
+
+} // namespace filigree

@@ -1,0 +1,55 @@
+// A mesh as a body above the ground, with an obstacle under it if wanted: a scene that needs no file.
+#pragma once
+
+#include "filigree/hierarchy/model.h"
+#include "filigree/physics/body.h"
+#include "filigree/physics/world.h"
+
+#include <memory>
+#include <span>
+#include <vector>
+
+namespace filigree {
+
+enum class ObstacleChoice { none, ball, step, slope };
+
+/// How a body is made of a mesh, and the world it is put in. SI units.
+struct DropOptions {
+    Material material;
+    std::size_t particles = 2000; ///< about; the spacing follows
+    double size = 1;              ///< m, the longest side of the mesh's box
+    double drop = 0.5;            ///< m above the ground or the obstacle at the start
+    bool gravity = true, ground = true;
+    ObstacleChoice obstacle = ObstacleChoice::none;
+    double friction = 0.5, restitution = 0.9;
+    bool operator==(const DropOptions&) const = default;
+};
+
+/// What stands around a body, to be drawn: meshes in model units, relative to the model's origin.
+struct Surroundings {
+    std::vector<Mesh> obstacles;
+    bool has_ground = false;
+    double ground_level = 0; ///< model units along `up`, relative to the model's origin
+};
+
+/// A body that is ready to move. Shared, and never changes.
+struct DroppedBody {
+    std::shared_ptr<const Model> model;
+    std::shared_ptr<const Body> body;
+    BodyReport report;
+    double scale = 1; ///< metres a model unit
+    World world;      ///< metres, relative to the model's origin times the scale
+    Surroundings surroundings;
+};
+
+/// The body starts where the mesh is, and the ground is put below it, so that nothing jumps when it is made. pinned:
+/// vertices of the model's driver; the particles near them are held fast where they are. up: along an axis. Errors:
+/// unsuitable (a mesh without extent), and as of make_body. Cost: make_body's.
+Result<std::shared_ptr<const DroppedBody>> make_dropped_body(std::shared_ptr<const Model> model,
+                                                             const DropOptions& options, std::span<const Index> pinned,
+                                                             const Vec3d& up, const RunContext& context);
+
+/// Where the body starts, what it falls on and what stands around it, in the world. up: an axis.
+Box room_of(const DroppedBody& dropped, const Vec3d& up);
+
+} // namespace filigree

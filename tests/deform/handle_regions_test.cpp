@@ -1,0 +1,85 @@
+#include "filigree/deform/handle_regions.h"
+
+#include "filigree/hierarchy/strip.h"
+#include "filigree/mesh/shapes.h"
+
+#include <cmath>
+#include <gtest/gtest.h>
+
+namespace filigree {
+namespace {
+
+const RunContext kContext;
+
+/// A bar along x, 4 long, whose ends are taken: one stays, the other goes 1 along y.
+std::vector<HandleRegion> ends(double move) {
+    return {{.name = "foot", .box = Box{Vec3d(-9, -9, -9), Vec3d(-1.9, 9, 9)}},
+            {.name = "head", .box = Box{Vec3d(1.9, -9, -9), Vec3d(9, 9, 9)}, .move = Vec3d(0, move, 0)}};
+}
+
+Error refusal(const Mesh& mesh, const std::vector<HandleRegion>& handles) {
+    return move_by_handles(mesh, handles, kContext).error();
+}
+
+TEST(HandleRegions, EndsGoWhereTheyAreSent) {
+    const Mesh bar = make_bar({.resolution = 4});
+    const Mesh moved = move_by_handles(bar, ends(1), kContext).value();
+    for (Index v = 0; v < bar.vertex_count(); ++v) {
+        const Vec3f way = moved.positions[v] - bar.positions[v];
+        const float x = bar.positions[v].x();
+        EXPECT_TRUE(x >= -1.9f || way.norm() < 1e-5f);
+        EXPECT_TRUE(x <= 1.9f || (way - Vec3f(0, 1, 0)).norm() < 1e-5f);
+        EXPECT_LT(way.norm(), 1.5f);
+    }
+}
+
+TEST(HandleRegions, ARegionTurnsAboutItsMiddleOrTheCentreGiven) {
+    const Mesh bar = make_bar({.resolution = 4});
+    std::vector<HandleRegion> handles = ends(0);
+    handles[1].rotation = Eigen::AngleAxisd(0.5, Vec3d::UnitX());
+    const Mesh turned = move_by_handles(bar, handles, kContext).value();
+    handles[1].centre = Vec3d(0, 1, 0);
+    const Mesh swung = move_by_handles(bar, handles, kContext).value();
+    for (Index v = 0; v < bar.vertex_count(); ++v) {
+        if (bar.positions[v].x() < 1.9f) continue;
+        const Vec3d p = bar.positions[v].cast<double>();
+        EXPECT_LT((handles[1].rotation * p - turned.positions[v].cast<double>()).norm(), 1e-5);
+        const Vec3d about = *handles[1].centre + handles[1].rotation * (p - *handles[1].centre);
+        EXPECT_LT((about - swung.positions[v].cast<double>()).norm(), 1e-5);
+    }
+}
+
+TEST(HandleRegions, TheDriverFollowsTheSameHandles) {
+    const Mesh bar = make_bar({.resolution = 8});
+    const Model model = strip(bar, {.base = 100}, kContext).value().model;
+    const Pose pose = pose_by_handles(model, ends(1), kContext).value();
+    const std::vector<Vec3f> rest = driver_positions(model);
+    ASSERT_EQ(pose.positions.size(), rest.size());
+    for (Index v = 0; v < rest.size(); ++v)
+        EXPECT_TRUE(rest[v].x() <= 1.9f || (pose.positions[v] - rest[v] - Vec3f(0, 1, 0)).norm() < 1e-5f);
+}
+
+TEST(HandleRegions, VerticesAtOnePlaceMoveAsOne) {
+    Mesh seam; // two triangles whose common edge is there twice
+    seam.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+    seam.add_face(std::array<Index, 3>{0, 1, 2});
+    seam.add_face(std::array<Index, 3>{3, 4, 5});
+    const Mesh moved = move_by_handles(seam, {{{.vertices = {1}, .move = Vec3d(0, 0, 1)}}}, kContext).value();
+    EXPECT_EQ(moved.positions[1], moved.positions[3]);
+    const Error apart = refusal(seam, {{.vertices = {1}}, {.vertices = {3}, .move = Vec3d(0, 0, 1)}});
+    EXPECT_EQ(apart.code, ErrorCode::usage);
+    EXPECT_NE(apart.message.find("vertices 1 and 3"), std::string::npos);
+}
+
+TEST(HandleRegions, SayWhichHandleIsWrong) {
+    const Mesh bar = make_bar({.resolution = 4});
+    const Error empty = refusal(bar, {{.sphere = std::pair(Vec3d(9, 9, 9), 1.0)}});
+    EXPECT_TRUE(empty.message.starts_with("handle 1 holds no vertex")) << empty.message;
+    const Error unknown = refusal(bar, {{.name = "head", .vertices = {Index(bar.vertex_count())}}});
+    EXPECT_TRUE(unknown.message.starts_with("handle 'head' names vertex")) << unknown.message;
+    const Error shared = refusal(bar, {{.vertices = {0, 1}}, {.vertices = {1}}});
+    EXPECT_TRUE(shared.message.starts_with("handle 2 shares a vertex")) << shared.message;
+}
+
+} // namespace
+} // namespace filigree

@@ -1,0 +1,45 @@
+#include "filigree/deform/warp_steps.h"
+
+#include <gtest/gtest.h>
+
+namespace filigree {
+namespace {
+
+const Box kBox{Vec3d(-1, -2, -1), Vec3d(1, 2, 1)};
+const Vec3d kPoint(0.4, 1.3, -0.7);
+
+TEST(WarpSteps, AreDoneOneAfterTheOtherOverOneBox) {
+    const std::vector<WarpStep> steps = {{WarpKind::bend, 60}, {WarpKind::stretch, 1.5}, {WarpKind::random, 0.1}};
+    const Vec3d bent = make_bend(kBox, Axis::y, 60)->position(kPoint);
+    const Vec3d stretched = make_stretch(kBox, Axis::y, 1.5)->position(bent);
+    const Vec3d all = make_smooth_random(kBox, 0.1, 7)->position(stretched);
+    EXPECT_EQ(make_warp(steps, kBox, Axis::y, 7)->position(kPoint), all);
+    EXPECT_EQ(make_warp(std::vector<WarpStep>(), kBox, Axis::y)->position(kPoint), kPoint);
+}
+
+TEST(WarpSteps, PartsGoFromNothingToAll) {
+    for (const WarpKind kind :
+         {WarpKind::stretch, WarpKind::squeeze, WarpKind::bend, WarpKind::twist, WarpKind::taper, WarpKind::random}) {
+        const WarpStep step{kind, 0.7};
+        const WarpStep nothing = step.part(0);
+        EXPECT_LT((make_warp(std::span(&nothing, 1), kBox, Axis::x)->position(kPoint) - kPoint).norm(), 1e-12);
+        EXPECT_EQ(step.part(1).amount, 0.7);
+    }
+    EXPECT_EQ((WarpStep{WarpKind::bend, 90}).part(0.5).amount, 45);
+    EXPECT_EQ((WarpStep{WarpKind::taper, 3}).part(0.5).amount, 2);
+}
+
+TEST(Warps, AreStepsInAFixedOrder) {
+    EXPECT_EQ(make_warp(Warps(), kBox), nullptr);
+    EXPECT_EQ(make_warp(Warps{.bend = 30}, Box()), nullptr);
+    const Warps warps{.axis = Axis::z, .stretch = 1.2, .squeeze = 0.9, .bend = 30, .twist = 20, .taper = 0.8};
+    const std::vector<WarpStep> steps = {{WarpKind::stretch, 1.2},
+                                         {WarpKind::squeeze, 0.9},
+                                         {WarpKind::bend, 30},
+                                         {WarpKind::twist, 20},
+                                         {WarpKind::taper, 0.8}};
+    EXPECT_EQ(make_warp(warps, kBox)->position(kPoint), make_warp(steps, kBox, Axis::z)->position(kPoint));
+}
+
+} // namespace
+} // namespace filigree

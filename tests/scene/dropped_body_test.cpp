@@ -1,0 +1,68 @@
+#include "scene/dropped_ball.h"
+
+#include <gtest/gtest.h>
+
+using namespace filigree_test;
+
+namespace {
+
+const RunContext kContext;
+const Vec3d kUp = Vec3d::UnitY();
+
+TEST(DroppedBody, StandsWhereTheMeshIsAboveTheGround) {
+    DropOptions options = jelly();
+    options.size = 0.5; // m
+    options.drop = 0.25;
+    const auto body = dropped(options);
+    EXPECT_NEAR(body->scale, 0.25, 1e-3);
+    EXPECT_TRUE(body->surroundings.has_ground);
+    EXPECT_NEAR(body->surroundings.ground_level, -2, 0.02); // its lowest point is at -1, and 1 unit above the ground
+    EXPECT_EQ(body->world.obstacles.size(), 1u);
+    EXPECT_LT(body->world.gravity.y(), -9);
+    const Box room = room_of(*body, kUp);
+    EXPECT_NEAR(room.min.y(), -2, 0.02);
+    EXPECT_NEAR(room.max.y(), 1, 0.02);
+}
+
+TEST(DroppedBody, EveryObstacleIsBelowAndDrawn) {
+    for (const ObstacleChoice choice : {ObstacleChoice::ball, ObstacleChoice::step, ObstacleChoice::slope})
+        for (const Vec3d& up : {Vec3d(Vec3d::UnitX()), Vec3d(Vec3d::UnitY()), Vec3d(Vec3d::UnitZ())}) {
+            DropOptions options = jelly();
+            options.obstacle = choice;
+            options.drop = 0.1;
+            const auto body = dropped(options, up);
+            ASSERT_EQ(body->surroundings.obstacles.size(), 1u);
+            EXPECT_EQ(check_mesh(body->surroundings.obstacles[0]), "");
+            double highest = -1e9, below = 1e9;
+            for (const Vec3f& p : body->surroundings.obstacles[0].positions) {
+                highest = std::max(highest, p.cast<double>().dot(up));
+                below = std::min(below, p.cast<double>().dot(up));
+            }
+            if (choice != ObstacleChoice::slope) {
+                EXPECT_NEAR(highest, -1.2, 0.02); // 0.1 m is 0.2 units
+            }
+            EXPECT_NEAR(below, body->surroundings.ground_level, 0.02);
+            const Vectors& rest = body->body->rest;
+            for (std::size_t i = 0; i < rest.size(); ++i)
+                for (const Obstacle& obstacle : body->world.obstacles)
+                    EXPECT_GT(distance_to(obstacle, obstacle.motion.at(0), rest[i]).distance, -0.01);
+        }
+}
+
+TEST(DroppedBody, HoldsParticlesNearPinnedVertices) {
+    const auto model = ball_model();
+    const auto body = make_dropped_body(model, jelly(), std::vector<Index>{0, 5}, kUp, kContext).value();
+    ASSERT_EQ(body->world.pins.size(), 1u);
+    EXPECT_GE(body->world.pins[0].particles.size(), 2u);
+    EXPECT_TRUE(dropped(jelly())->world.pins.empty());
+}
+
+TEST(DroppedBody, RefusesWhatHasNoVolumeInWords) {
+    Model flat = *ball_model();
+    for (Vec3f& p : flat.mesh.positions) p.setZero();
+    const auto body = make_dropped_body(std::make_shared<const Model>(flat), jelly(), {}, kUp, kContext);
+    ASSERT_FALSE(body.ok());
+    EXPECT_EQ(body.error().code, ErrorCode::unsuitable);
+}
+
+} // namespace
