@@ -4,12 +4,9 @@
 #include "jobs.h"
 #include "pins.h"
 
-#include "filigree/mesh/triangulate.h"
-#include "filigree/mesh/weld.h"
+#include "filigree/deform/pull.h"
 
-#include <Eigen/LU>
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
@@ -17,128 +14,13 @@
 
 namespace filigree::studio {
 
-namespace {
-
-std::vector<Vec3f> start_positions(const Model& model, const Pose* start) {
-    return start ? start->positions : driver_positions(model);
-}
-
-std::vector<Triangle> driver_triangles(const Model& model) {
-    Mesh mesh; // the faces alone: triangulating looks at the positions at rest
-    mesh.positions = driver_positions(model);
-    mesh.face_offsets = model.driver().face_offsets;
-    mesh.corners = model.driver().corners;
-    return triangulate(mesh).triangles;
-}
-
-/// Those of a pull and those it holds, in the order that the solver is told their places.
-struct PullSolver {
-    HandleSolver solver;
-    std::vector<Vec3f> targets; ///< of the pulled ones, then of those held: where they start
-    std::size_t pulled;
-
-    static Result<PullSolver> create(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
-                                     std::span<const Index> grip, std::span<const Index> held,
-                                     const RunContext& context) {
-        std::vector<Index> handles(grip.begin(), grip.end());
-        handles.insert(handles.end(), held.begin(), held.end());
-        Result<HandleSolver> solver = HandleSolver::create(positions, triangles, handles, context);
-        if (!solver) return solver.error();
-        std::vector<Vec3f> targets;
-        for (const Index v : handles) targets.push_back(positions[v]);
-        return PullSolver{std::move(*solver), std::move(targets), grip.size()};
-    }
-    Result<HandleResult> solve(const Vec3f& way, const HandleOptions& options, const RunContext& context) {
-        std::vector<Vec3f> places = targets;
-        for (std::size_t i = 0; i < pulled; ++i) places[i] += way;
-        return solver.solve(places, options, context);
-    }
-};
-
-/// One vertex of the finest mesh, restored from pose after pose.
-class GrabbedVertex {
-public:
-    GrabbedVertex(const Model& model, Index vertex, const Pose* start)
-        : restorer_(std::get<BlendDetail>(model.detail), model.mesh.positions, model.driver().vertices,
-                    std::array{BlendRestorer::Item{vertex, 0}}),
-          start_(model.mesh.positions[vertex]) {
-        if (start) start_ = place(*start);
-    }
-    /// From where it started.
-    Vec3f way(const Pose& pose) const { return place(pose) - start_; }
-
-private:
-    Vec3f place(const Pose& pose) const {
-        Vec3f place;
-        restorer_.restore(pose.positions, pose.gradients, std::span(&place, 1), {}, true, RunContext());
-        return place;
-    }
-    BlendRestorer restorer_;
-    Vec3f start_;
-};
-
-/// The driver vertices that carry a vertex of the finest mesh, ascending; none for the reference code.
-std::vector<Index> carriers(const Model& model, Index vertex) {
-    const auto* detail = std::get_if<BlendDetail>(&model.detail);
-    if (!detail) return {};
-    const auto record = std::find(detail->order.begin(), detail->order.end(), vertex) - detail->order.begin();
-    const auto next = std::upper_bound(detail->cell_offsets.begin(), detail->cell_offsets.end(), record);
-    const auto cell = static_cast<std::size_t>(next - detail->cell_offsets.begin() - 1);
-    if (cell >= detail->cells.size()) return {};
-    std::vector<Index> result(detail->cells[cell].begin(), detail->cells[cell].end());
-    std::sort(result.begin(), result.end());
-    return result;
-}
-
-/// The rotations of a pull that began at `start` (null: at rest) follow the gradients there.
-void follow_start(Pose& pose, const Pose* start) {
-    if (!start || start->gradients.empty()) return;
-    for (std::size_t v = 0; v < pose.gradients.size(); ++v) pose.gradients[v] *= start->gradients[v];
-}
-
-/// One pull of the driver done again, over every vertex of the mesh. Vertices at one place move as one.
-Status pull_all(const State& state, const Handle& pull, std::span<const Index> representative,
-                std::span<const Triangle> triangles, std::vector<Vec3f>& positions, const RunContext& context) {
-    const std::vector<Vec3f>& rest = state.model->mesh.positions;
-    std::vector<char> is_held(rest.size());
-    for (const Index v : pull.held) is_held[representative[state.model->driver().vertices[v]]] = 1;
-    std::vector<Index> grip, held;
-    for (const Index v : pull.vertices) is_held[representative[state.model->driver().vertices[v]]] = 2;
-    for (Index v = 0; v < rest.size(); ++v) {
-        if (representative[v] != v) continue;
-        const double distance = (rest[v] - pull.centre).norm();
-        if (is_held[v] == 2 || (!is_held[v] && distance <= pull.grip))
-            grip.push_back(v);
-        else if (is_held[v] || distance > pull.reach)
-            held.push_back(v);
-    }
-    Result<PullSolver> solver = PullSolver::create(positions, triangles, grip, held, context);
-    if (!solver) return solver.error();
-    Result<HandleResult> result = solver->solve(pull.move, {}, context);
-    if (!result) return result.error();
-    positions = std::move(result->pose.positions);
-    return Success{};
-}
-
-} // namespace
-
-std::unique_ptr<SpaceWarp> make_warp(const Warps& warps, const Box& rest_box) {
-    if (warps.none() || rest_box.empty()) return nullptr;
-    std::vector<std::unique_ptr<SpaceWarp>> steps;
-    if (warps.stretch != 1) steps.push_back(make_stretch(rest_box, warps.axis, warps.stretch));
-    if (warps.squeeze != 1) steps.push_back(make_squeeze(rest_box, warps.axis, warps.squeeze));
-    if (warps.bend != 0) steps.push_back(make_bend(rest_box, warps.axis, warps.bend));
-    if (warps.twist != 0) steps.push_back(make_twist(rest_box, warps.axis, warps.twist));
-    if (warps.taper != 1) steps.push_back(make_taper(rest_box, warps.axis, warps.taper));
-    return make_chain(std::move(steps));
-}
-
 Pose deformed_pose(const State& state, const RunContext& context) {
     if (!state.model) return {};
     const Mesh& mesh = state.model->mesh;
     const auto warp = make_warp(state.warps, world_bounds(mesh));
     if (!warp) return state.handle_pose ? *state.handle_pose : Pose{};
-    Pose pose = warp_pose(*warp, start_positions(*state.model, state.handle_pose.get()), mesh.origin, context);
+    const std::vector<Vec3f> start = state.handle_pose ? state.handle_pose->positions : driver_positions(*state.model);
+    Pose pose = warp_pose(*warp, start, mesh.origin, context);
     follow_start(pose, state.handle_pose.get());
     return pose;
 }
@@ -147,74 +29,21 @@ Result<std::vector<Vec3f>> full_deformation(const State& state, const RunContext
     if (state.pose_from_file)
         return Error{ErrorCode::unsuitable, "The shape began with a pose from a file, and where that would take every "
                                             "vertex is not known; reset the deformation to measure what you do."};
-    const Mesh& mesh = state.model->mesh;
-    std::vector<Vec3f> positions = mesh.positions;
-    const auto is_pull = [](const Handle& handle) { return !handle.pinned; };
-    const auto pulls = std::count_if(state.handles.begin(), state.handles.end(), is_pull);
-    if (pulls > 0) {
-        const std::vector<Index> representative = weld_map(mesh.positions);
-        std::vector<Triangle> triangles = triangulate(mesh).triangles;
-        for (Triangle& triangle : triangles)
-            for (Index& vertex : triangle) vertex = representative[vertex];
-        std::ptrdiff_t done = 0;
-        for (const Handle& handle : state.handles) {
-            if (!is_pull(handle)) continue;
-            context.report("pulling every vertex", double(done++) / double(pulls));
-            if (context.is_cancelled()) return cancelled_error();
-            const Status status = pull_all(state, handle, representative, triangles, positions, context);
-            if (!status) return status.error();
-        }
-        for (Index v = 0; v < positions.size(); ++v) positions[v] = positions[representative[v]];
-    }
+    std::vector<Pull> pulls;
+    for (const Handle& handle : state.handles)
+        if (!handle.pinned)
+            pulls.push_back({{handle.vertices, handle.held}, handle.centre, handle.grip, handle.reach, handle.move});
+    Result<std::vector<Vec3f>> pulled = pull_every_vertex(*state.model, pulls, context);
+    if (!pulled) return pulled.error();
     if (context.is_cancelled()) return cancelled_error();
+    const Mesh& mesh = state.model->mesh;
     const auto warp = make_warp(state.warps, world_bounds(mesh));
-    return warp ? warp_positions(*warp, positions, mesh.origin, context) : positions;
+    return warp ? warp_positions(*warp, *pulled, mesh.origin, context) : std::move(*pulled);
 }
 
 PullRegion pull_region(const State& state, const Vec3f& rest_point, double grip, double reach,
                        std::optional<Index> vertex) {
-    const std::vector<Index> carried_by = vertex ? carriers(*state.model, *vertex) : std::vector<Index>();
-    const std::vector<Vec3f> rest = driver_positions(*state.model);
-    const VertexSet pinned(rest.size(), pinned_vertices(state.handles));
-    PullRegion region;
-    Index nearest = kNoIndex;
-    for (Index v = 0; v < rest.size(); ++v) {
-        if (pinned.contains(v)) continue;
-        const float distance = (rest[v] - rest_point).norm();
-        if (nearest == kNoIndex || distance < (rest[nearest] - rest_point).norm()) nearest = v;
-        if (distance <= grip || std::binary_search(carried_by.begin(), carried_by.end(), v)) region.grip.push_back(v);
-    }
-    if (region.grip.empty() && nearest != kNoIndex) region.grip.push_back(nearest);
-    for (Index v = 0; v < rest.size(); ++v)
-        if (pinned.contains(v) ||
-            ((rest[v] - rest_point).norm() > reach && !std::binary_search(region.grip.begin(), region.grip.end(), v)))
-            region.held.push_back(v);
-    return region;
-}
-
-Vec3d unwarped(const SpaceWarp& warp, const Vec3d& place, const Vec3d& guess) {
-    constexpr int kSteps = 20;
-    Vec3d point = guess;
-    Warped now = warp.warp(point);
-    double distance = (place - now.position).norm();
-    for (int step = 0; step < kSteps; ++step) {
-        const Eigen::FullPivLU<Mat3d> gradient(now.gradient);
-        if (!gradient.isInvertible()) break;
-        Vec3d way = gradient.solve(place - now.position);
-        bool is_nearer = false;
-        for (int halving = 0; halving < 8 && !is_nearer; ++halving, way *= 0.5) {
-            const Warped next = warp.warp(point + way);
-            const double next_distance = (place - next.position).norm();
-            if (!(next_distance < distance)) continue;
-            point += way;
-            now = next;
-            distance = next_distance;
-            is_nearer = true;
-            break;
-        }
-        if (!is_nearer) break;
-    }
-    return point;
+    return pull_region(*state.model, pinned_vertices(state.handles), rest_point, grip, reach, vertex);
 }
 
 struct HandleDrag::Impl {
@@ -242,14 +71,9 @@ struct HandleDrag::Impl {
     std::optional<Error> error;
     bool is_new = false, rests = false, has_ended = false;
 
-    // A few rounds a picture while the mouse moves; the rest while it rests.
-    static constexpr unsigned kRounds = 8;
-    static constexpr double kTolerance = 1e-4, kFinalTolerance = 1e-5;
-    static constexpr unsigned kMostRounds = 400;                    ///< without a move
-    static constexpr double kOffPointer = 3e-4;                     ///< of the diagonal: a fraction of a pixel
-    static constexpr float kMostCorrection = 0.5f;                  ///< of the way: pins may hold what carries it
-    static constexpr std::chrono::milliseconds kLongestEnding{250}; ///< a large driver is let go a little early
-    static constexpr std::chrono::seconds kLongestFinish{3};        ///< preparing included
+    static constexpr double kTolerance = 1e-4, kFinalTolerance = 1e-5; ///< while the mouse moves, once it rests
+    static constexpr std::chrono::milliseconds kLongestEnding{250};    ///< a large driver is let go a little early
+    static constexpr std::chrono::seconds kLongestFinish{3};           ///< preparing included
 
     void work() {
         const Status status = run_guarded("The pull", "Strip to fewer vertices.", [this] { return solve(); });
@@ -265,72 +89,59 @@ struct HandleDrag::Impl {
         bell.ring();
     }
 
+    /// What is asked for next.
+    struct Order {
+        Vec3f way = Vec3f::Zero();
+        double tolerance = kTolerance;
+    };
+
+    /// Waits until there is something to do; none: the drag is over, as asked for.
+    Result<std::optional<Order>> next_order(const PullSolver& solver) {
+        std::unique_lock lock(mutex);
+        const auto has_arrived = [&] { return solver.has_arrived(is_ending ? kFinalTolerance : kTolerance); };
+        const auto has_work = [&] { return stops || is_ending || way_number != solved || !has_arrived(); };
+        if (!has_work()) {
+            rests = true;
+            bell.ring();
+            wake.wait(lock, has_work);
+            rests = false;
+        }
+        if (stops) return cancelled_error();
+        if (is_ending && !ending_since) ending_since = std::chrono::steady_clock::now();
+        const bool is_late = ending_since && std::chrono::steady_clock::now() - *ending_since > kLongestEnding;
+        if (is_ending && way_number == solved && (has_arrived() || is_late)) return std::optional<Order>();
+        solved = way_number;
+        return std::optional(Order{way, is_ending ? kFinalTolerance : kTolerance});
+    }
+
     Status solve() {
-        const std::vector<Vec3f> positions = start_positions(*model, start.get());
         Result<PullSolver> solver =
-            PullSolver::create(positions, driver_triangles(*model), pull.vertices, pull.held, context);
+            PullSolver::create(*model, start.get(), {pull.vertices, pull.held}, grabbed, context);
         if (!solver) return solver.error();
-        std::optional<GrabbedVertex> vertex;
-        const bool is_known = model->code() == DetailCode::blend && (!start || !start->gradients.empty());
-        if (grabbed && is_known) vertex.emplace(*model, *grabbed, start.get());
-        const double off_pointer = kOffPointer * bounds(model->mesh.positions).diagonal();
-        Vec3f correction = Vec3f::Zero();
-        std::uint64_t solved = 0;
-        double last_move = 1, distance = 0; // of the vertex that was grabbed from where it should be
-        unsigned rounds = 0;
-        std::optional<std::chrono::steady_clock::time_point> ending_since;
         for (;;) {
-            Vec3f to;
-            double tolerance = kTolerance;
-            {
-                std::unique_lock lock(mutex);
-                const auto settled = [&] {
-                    return (last_move <= (is_ending ? kFinalTolerance : kTolerance) && distance <= off_pointer) ||
-                           rounds >= kMostRounds;
-                };
-                const auto has_work = [&] { return stops || is_ending || way_number != solved || !settled(); };
-                if (!has_work()) {
-                    rests = true;
-                    bell.ring();
-                    wake.wait(lock, has_work);
-                    rests = false;
-                }
-                if (stops) return cancelled_error();
-                if (is_ending && !ending_since) ending_since = std::chrono::steady_clock::now();
-                const bool is_late = ending_since && std::chrono::steady_clock::now() - *ending_since > kLongestEnding;
-                if (is_ending && way_number == solved && (settled() || is_late)) return Success{};
-                if (way_number != solved) rounds = 0;
-                solved = way_number;
-                to = way;
-                if (is_ending) tolerance = kFinalTolerance;
-            }
+            const Result<std::optional<Order>> order = next_order(*solver);
+            if (!order) return order.error();
+            if (!*order) return Success{};
             const auto begin = std::chrono::steady_clock::now();
-            const Vec3f applying = to + correction;
-            Result<HandleResult> result =
-                solver->solve(applying, {.iterations = kRounds, .tolerance = tolerance}, context);
-            if (!result) return result.error();
-            rounds += std::max(1u, result->iterations);
-            last_move = result->last_move;
-            follow_start(result->pose, start.get());
-            if (vertex) {
-                const Vec3f rest = to - vertex->way(result->pose);
-                distance = double(rest.norm());
-                correction += rest;
-                const float most = kMostCorrection * to.norm();
-                if (correction.norm() > most) correction *= most / correction.norm();
-            }
+            Result<Pose> solution = solver->step((*order)->way, (*order)->tolerance, context);
+            if (!solution) return solution.error();
             const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - begin;
-            auto next = std::make_shared<const Pose>(std::move(result->pose));
+            auto next = std::make_shared<const Pose>(std::move(*solution));
             {
                 const std::scoped_lock lock(mutex);
                 pose = std::move(next);
-                applied = applying;
+                applied = solver->applied();
                 milliseconds = took.count();
                 is_new = true;
             }
             bell.ring();
         }
     }
+
+private:
+    // Of the thread alone.
+    std::uint64_t solved = 0;                                          ///< the last move that was solved for
+    std::optional<std::chrono::steady_clock::time_point> ending_since; ///< asked to end
 };
 
 HandleDrag::HandleDrag(QObject* parent) : QObject(parent), bell_(std::make_unique<Bell>()) {

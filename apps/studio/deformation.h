@@ -3,7 +3,8 @@
 
 #include "document.h"
 
-#include "filigree/deform/handles.h"
+#include "filigree/deform/pull.h"
+#include "filigree/deform/unwarp.h"
 
 #include <QObject>
 
@@ -13,9 +14,6 @@ namespace filigree::studio {
 
 class Bell;
 
-/// Null where there is nothing to do.
-std::unique_ptr<SpaceWarp> make_warp(const Warps& warps, const Box& rest_box);
-
 /// The driver's pose by handles, then warps; no positions at all when the state has neither. Cost O(driver).
 Pose deformed_pose(const State& state, const RunContext& context);
 
@@ -23,18 +21,9 @@ Pose deformed_pose(const State& state, const RunContext& context);
 /// solved over all vertices, which takes seconds for several hundred thousand. Positions relative to the mesh's origin.
 Result<std::vector<Vec3f>> full_deformation(const State& state, const RunContext& context);
 
-/// Which driver vertices a pull at a point takes and which stay: those within `grip` of it, and those beyond `reach`.
-/// Pins are among those that stay. Distances along straight lines at rest, model units. With `vertex` (of the finest
-/// mesh) those that carry it are taken too, so that it comes along.
-struct PullRegion {
-    std::vector<Index> grip, held; ///< of the driver, ascending, disjoint; grip is empty only where all is pinned
-};
+/// As filigree::pull_region, around the pins there are.
 PullRegion pull_region(const State& state, const Vec3f& rest_point, double grip, double reach,
                        std::optional<Index> vertex = {});
-
-/// Where a point goes that the warp takes to `place`: Newton's method from `guess` (both in the world); where it does
-/// not arrive, the best place found.
-Vec3d unwarped(const SpaceWarp& warp, const Vec3d& place, const Vec3d& guess);
 
 /// As-rigid-as-possible solving in a thread of its own: always for the latest move, so that a drag never waits.
 class HandleDrag : public QObject {

@@ -1,14 +1,14 @@
 // What the studio works on: one state after the other, each a value, and the undo stack between them.
 #pragma once
 
-#include "filigree/deform/space_warp.h"
+#include "filigree/deform/warp_steps.h"
 #include "filigree/hierarchy/pose.h"
 #include "filigree/hierarchy/restore.h"
 #include "filigree/hierarchy/strip.h"
 #include "filigree/mesh/shapes.h"
 #include "filigree/mesh/topology.h"
-#include "filigree/physics/material.h"
 #include "filigree/render/surface_materials.h"
+#include "filigree/scene/dropped_body.h"
 
 #include <QObject>
 #include <QUndoStack>
@@ -41,16 +41,6 @@ struct Shape {
     bool operator==(const Shape&) const = default;
 };
 
-/// The five deformations, one after the other in this order, about the mesh's box at rest.
-struct Warps {
-    Axis axis = Axis::y;
-    double stretch = 1, squeeze = 1; ///< factors
-    double bend = 0, twist = 0;      ///< degrees
-    double taper = 1;                ///< factor
-    bool operator==(const Warps&) const = default;
-    bool none() const { return stretch == 1 && squeeze == 1 && bend == 0 && twist == 0 && taper == 1; }
-};
-
 /// A pin, or a pull that was made. Each pull starts from the shape that the ones before it left, so nothing jumps when
 /// the next one begins. Places are in model units, relative to the mesh's origin, before the warps.
 struct Handle {
@@ -65,18 +55,10 @@ struct Handle {
     bool operator==(const Handle&) const = default;
 };
 
-enum class ObstacleChoice { none, ball, step, slope };
-
-/// How a body is made of the mesh, and the world it is put in. SI units.
-struct BodySettings {
-    std::string preset = "soft-rubber"; ///< of named_materials(); "custom" once the material was changed by hand
-    Material material;                  ///< starts as the preset's
-    std::size_t particles = 2000;       ///< about; the spacing follows
-    double size = 1;                    ///< m, the longest side of the mesh's box
-    double drop = 0.5;                  ///< m above the ground at the start
-    bool gravity = true, ground = true;
-    ObstacleChoice obstacle = ObstacleChoice::none;
-    double friction = 0.5, restitution = 0.9;
+/// How a body is made, and the world it is put in.
+struct BodySettings : DropOptions {
+    std::string preset =
+        "soft-rubber"; ///< of named_materials(); "custom" once the material, which starts so, was changed
     bool operator==(const BodySettings&) const = default;
 };
 

@@ -3,7 +3,7 @@
 #include "quads.h"
 #include "theme.h"
 
-#include "filigree/core/parallel_for.h"
+#include "filigree/deform/carried_points.h"
 
 #include <QElapsedTimer>
 
@@ -33,32 +33,6 @@ Mesh moved_mesh(const Mesh& mesh, std::span<const Vec3f> positions) {
 VertexColors error_colors(std::vector<float> distances, double diagonal) {
     HeatMap map = heat_map(std::move(distances), diagonal);
     return {std::move(map.values), ColorMap::sequential, map.range};
-}
-
-/// Where the driver takes points inside the mesh: each goes with all of its vertices (or enough of them, evenly
-/// chosen), by the inverse fourth power of their distances, so above all with the nearest.
-std::vector<Vec3f> carried_points(std::span<const Vec3f> rest, std::span<const Vec3f> driver, const Pose& pose) {
-    std::vector<Vec3f> carried(rest.begin(), rest.end());
-    if (rest.empty()) return carried;
-    constexpr std::size_t kMostPairs = 1'500'000, kLeast = 64; // a few milliseconds
-    const std::size_t most = std::clamp(kMostPairs / rest.size(), kLeast, driver.size() + kLeast);
-    const std::size_t step = (driver.size() + most - 1) / most;
-    const float least = 1e-6f * bounds(driver).size().cast<float>().squaredNorm();
-    parallel_for(RunContext(), rest.size(), 64, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) {
-            Vec3f place = Vec3f::Zero();
-            float sum = 0;
-            for (std::size_t v = 0; v < driver.size(); v += step) {
-                const Vec3f offset = rest[i] - driver[v];
-                const float distance2 = offset.squaredNorm() + least, weight = 1 / (distance2 * distance2);
-                const Vec3f turned = pose.gradients.empty() ? offset : Vec3f(pose.gradients[v] * offset);
-                place += weight * (pose.positions[v] + turned);
-                sum += weight;
-            }
-            carried[i] = place / sum;
-        }
-    });
-    return carried;
 }
 
 } // namespace
@@ -193,7 +167,6 @@ void DrawnObjects::follow_view() {
 bool DrawnObjects::shows_particles() const {
     return settings_.particles && workbench_.mode() == Mode::body && workbench_.playback().has_body();
 }
-bool DrawnObjects::shows_inside_points() const { return workbench_.view().settings().inside_points; }
 
 void DrawnObjects::follow_particles() {
     const Moment* moment = workbench_.playback().moment();
@@ -213,7 +186,7 @@ void DrawnObjects::follow_particles() {
 }
 
 void DrawnObjects::follow_surroundings() {
-    const std::shared_ptr<const MadeBody> made =
+    const std::shared_ptr<const DroppedBody> made =
         workbench_.mode() == Mode::body ? workbench_.playback().made() : nullptr;
     if (made == surroundings_of_) return;
     surroundings_of_ = made;
@@ -258,8 +231,9 @@ void DrawnObjects::follow_inside_points() {
         inside_pose_ = pose_stamp_;
         const std::span<const Vec3f> rest = workbench_.inside_points();
         const Status is_there =
-            pose_stamp_ == 0 ? inside_->set_positions(rest)
-                             : inside_->set_positions(carried_points(rest, shown_->rest_pose().positions, pose_));
+            pose_stamp_ == 0
+                ? inside_->set_positions(rest)
+                : inside_->set_positions(carried_points(rest, shown_->rest_pose().positions, pose_, RunContext()));
         if (!is_there) inside_.reset(); // of a mesh not shown yet
     });
     Q_EMIT changed(false);

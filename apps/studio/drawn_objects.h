@@ -63,7 +63,6 @@ public:
     const VertexColors& colors() const { return colors_; }
     const std::vector<DefectEdge>& defects() const { return defects_; }
     bool shows_particles() const;
-    bool shows_inside_points() const;
 
 Q_SIGNALS:
     void changed(bool pose); ///< another picture is due; pose: because things move
@@ -101,7 +100,7 @@ private:
     std::uint64_t pose_stamp_ = 0, last_stamp_ = 0;
 
     std::optional<Drawable> particles_, inside_, full_;
-    std::shared_ptr<const MadeBody> particles_of_, surroundings_of_;
+    std::shared_ptr<const DroppedBody> particles_of_, surroundings_of_;
     std::uint64_t full_asked_ = 0; ///< which pose the full deformation is of, or will be; 0: none
     std::string full_error_;       ///< why it cannot be drawn
     std::vector<Drawable> obstacles_;

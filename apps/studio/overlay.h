@@ -1,8 +1,9 @@
 // What is written and drawn over the picture: hints, captions, legends, handles, and the sentence instead of a picture.
 #pragma once
 
-#include "gizmo.h"
 #include "shown_model.h"
+
+#include "filigree/present/warp_gizmo.h"
 
 #include <QPolygonF>
 #include <QWidget>

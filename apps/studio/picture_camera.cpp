@@ -137,28 +137,10 @@ Box PictureCamera::opened_box() const {
     return box;
 }
 
-/// Where the body starts, what it falls on and what stands around it; empty without a body.
+/// Of the body; empty without one.
 Box PictureCamera::body_room() const {
     const auto made = workbench_.playback().made();
-    Box room;
-    if (!made) return room;
-    const Vec3d origin = made->model->mesh.origin;
-    room = world_bounds(made->model->mesh);
-    const Surroundings& around = made->surroundings;
-    if (around.has_ground) {
-        int axis = 0;
-        up_vector(workbench_.view().settings().up).maxCoeff(&axis);
-        Vec3d low = room.min, high = room.max;
-        low[axis] = high[axis] = origin[axis] + around.ground_level;
-        room.extend(low);
-        room.extend(high);
-    }
-    for (const Mesh& obstacle : around.obstacles) {
-        const Box box = bounds(obstacle.positions);
-        room.extend(origin + box.min);
-        room.extend(origin + box.max);
-    }
-    return room;
+    return made ? room_of(*made, up_vector(workbench_.view().settings().up)) : Box();
 }
 
 bool PictureCamera::is_seen(const Box& box) const {

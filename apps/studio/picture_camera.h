@@ -67,7 +67,7 @@ private:
     std::string fitted_name_;
 
     bool was_split_ = false;
-    std::shared_ptr<const MadeBody> framed_body_; ///< that the view was widened for
+    std::shared_ptr<const DroppedBody> framed_body_; ///< that the view was widened for
 };
 
 } // namespace filigree::studio

@@ -1,8 +1,8 @@
 #include "playback.h"
 
 #include "bell.h"
-
-#include "filigree/scene/recording.h"
+#include "jobs.h"
+#include "pins.h"
 
 #include <QCoreApplication>
 #include <QEventLoop>
@@ -10,7 +10,6 @@
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
-#include <new>
 #include <thread>
 
 namespace filigree::studio {
@@ -25,20 +24,15 @@ std::size_t bytes_of(const Pose& pose) {
     return pose.positions.size() * sizeof(Vec3f) + pose.gradients.size() * sizeof(Mat3f);
 }
 
-/// Before anything has moved.
-Moment start_of(const MadeBody& made) {
-    Moment moment;
-    moment.pose.positions = driver_positions(*made.model);
-    moment.pose.gradients.assign(moment.pose.positions.size(), Mat3f::Identity());
-    const Vectors& rest = made.body->rest;
-    for (std::size_t i = 0; i < rest.size(); ++i) moment.particles.push_back(rest[i] / float(made.scale));
-    return moment;
-}
-
 } // namespace
 
+Result<std::shared_ptr<const DroppedBody>> make_body_of(const State& state, const Vec3d& up,
+                                                        const RunContext& context) {
+    return make_dropped_body(state.model, state.body, pinned_vertices(state.handles), up, context);
+}
+
 struct Playback::Worker {
-    Worker(std::shared_ptr<const MadeBody> of, const Bell& rings) : made(std::move(of)), bell(rings) {
+    Worker(std::shared_ptr<const DroppedBody> of, const Bell& rings) : made(std::move(of)), bell(rings) {
         thread = std::thread([this] { work(); });
     }
     ~Worker() {
@@ -59,7 +53,7 @@ struct Playback::Worker {
         std::optional<Error> error;
     };
 
-    const std::shared_ptr<const MadeBody> made;
+    const std::shared_ptr<const DroppedBody> made;
     const Bell& bell;
     const RunContext life;         ///< of the worker: for what a pause must not break off
     std::size_t steps_awaited = 0; ///< main thread alone: asked for by step() and not delivered yet
@@ -105,24 +99,16 @@ struct Playback::Worker {
     }
 
 private:
-    // The worker's own.
-    std::optional<Simulation> simulation;
-    std::size_t driver = 0;
-    std::optional<std::size_t> all_vertices;
-    std::string start;
-    Pose last;
+    /// What the worker is to do next, as it was asked for when it looked.
+    struct Order {
+        RunContext context = RunContext(); ///< of the frame
+        bool is_frame = false, rewinds = false, with_full = false;
+        std::optional<std::vector<Hand>> hands = {};
+    };
 
     void work() {
-        Status status = Success{};
-        try {
-            status = simulate();
-        } catch (const std::bad_alloc&) {
-            status = Error{ErrorCode::out_of_memory,
-                           "There is not enough memory to simulate this body: choose fewer particles."};
-        } catch (const std::exception& error) {
-            status = Error{ErrorCode::unsuitable, std::string("The simulation was stopped by an error of our own (") +
-                                                      error.what() + "); please report it."};
-        }
+        const Status status =
+            run_guarded("The simulation", "Choose fewer particles.", [this]() -> Status { return simulate(); });
         {
             const std::scoped_lock lock(mutex);
             is_idle = true;
@@ -134,106 +120,77 @@ private:
         bell.ring();
     }
 
-    Status begin() {
-        Actor actor;
-        actor.body = made->body;
-        Result<Simulation> created = Simulation::create(made->world, {actor}, {}, life);
-        if (!created) return created.error();
-        simulation = std::move(*created);
-        std::vector<Vec3f> points = driver_positions(*made->model);
-        last.positions = points;
-        last.gradients.assign(points.size(), Mat3f::Identity());
-        for (Vec3f& p : points) p *= float(made->scale);
-        driver = simulation->attach(0, points, life);
-        start = simulation->save();
-        return Success{};
+    /// Rests while there is nothing to do, and until it is time for the next frame. Errors: cancelled, to quit.
+    Result<Order> next_order() {
+        std::unique_lock lock(mutex);
+        for (;;) {
+            const auto has_work = [&] { return quits || plays || steps > 0 || resets || shows_again; };
+            if (!has_work()) {
+                is_idle = true;
+                parked.notify_all();
+                wake.wait(lock, has_work);
+                next = Clock::now();
+            }
+            is_idle = false;
+            if (quits) return cancelled_error();
+            if (resets) return Order{.rewinds = true};
+            if (plays && steps == 0) {
+                wake.wait_until(lock, next, [&] { return quits || !plays || steps > 0 || resets; });
+                if (quits || !plays || resets) continue;
+            }
+            if (context.is_cancelled()) context = RunContext();
+            shows_again = false;
+            return Order{context, plays || steps > 0, false, wants_full, std::exchange(hands, std::nullopt)};
+        }
     }
 
     Status simulate() {
-        if (Status begun = begin(); !begun) return begun;
-        Clock::time_point next = Clock::now();
+        Result<BodyMotion> motion = BodyMotion::create(made, life);
+        if (!motion) return motion.error();
         for (;;) {
-            RunContext now;
-            bool is_frame = false, with_full = false;
-            std::optional<std::vector<Hand>> new_hands;
-            {
-                std::unique_lock lock(mutex);
-                const auto has_work = [&] { return quits || plays || steps > 0 || resets || shows_again; };
-                if (!has_work()) {
-                    is_idle = true;
-                    parked.notify_all();
-                    wake.wait(lock, has_work);
-                    next = Clock::now();
-                }
-                is_idle = false;
-                if (quits) return cancelled_error();
-                if (plays && steps == 0 && !resets) {
-                    wake.wait_until(lock, next, [&] { return quits || !plays || steps > 0 || resets; });
-                    if (quits || !plays || resets) continue;
-                }
-                if (resets) {
-                    if (Status restored = simulation->restore(start); !restored) return restored.error();
-                    if (Status let_go = simulation->set_hands({}, life); !let_go) return let_go.error();
-                    last = start_of(*made).pose;
-                    resets = false;
-                    continue;
-                }
-                if (context.is_cancelled()) context = RunContext();
-                now = context;
-                is_frame = plays || steps > 0;
-                with_full = wants_full;
-                shows_again = false;
-                new_hands = std::exchange(hands, std::nullopt);
-            }
-            const Clock::time_point begun = Clock::now();
-            if (new_hands)
-                if (Status seized = simulation->set_hands(std::move(*new_hands), life); !seized) return seized.error();
-            Moment moment;
-            if (is_frame) {
-                const Result<FrameReport> report = simulation->advance(now);
-                if (!report && report.error().code == ErrorCode::cancelled) continue;
-                if (!report) return report.error();
-                moment.report = *report;
-            }
-            look(moment, with_full);
-            moment.milliseconds = std::chrono::duration<double, std::milli>(Clock::now() - begun).count();
-            {
-                const std::scoped_lock lock(mutex);
-                if (is_frame) {
-                    outbox.poses.push_back(moment.pose);
-                    if (steps > 0) --steps;
-                }
-                outbox.moment = std::move(moment);
-            }
-            bell.ring();
-            next = std::max(next + std::chrono::microseconds(16'667), Clock::now());
+            Result<Order> order = next_order();
+            if (!order) return order.error();
+            const Status done = order->rewinds ? go_to_start(*motion) : show(*motion, *order);
+            if (!done) return done;
         }
     }
 
-    void look(Moment& moment, bool with_full) {
-        const RunContext always; // a frame that was simulated is delivered
-        const float to_units = float(1 / made->scale);
-        const auto far = static_cast<float>(kFarInAFrame * bounds(made->model->mesh.positions).diagonal());
-        moment.frame = simulation->frame();
-        moment.pose.positions.resize(last.positions.size());
-        moment.pose.gradients.resize(last.positions.size());
-        simulation->attached(driver, moment.pose.positions, moment.pose.gradients, always);
-        for (Vec3f& p : moment.pose.positions) p *= to_units;
-        hold_lost(last, moment.pose, far, float(kFarInAFrame));
-        last = moment.pose;
-        const Vectors& particles = simulation->positions(0);
-        moment.particles.reserve(particles.size());
-        for (std::size_t i = 0; i < particles.size(); ++i) moment.particles.push_back(to_units * particles[i]);
-        if (!with_full) return;
-        if (!all_vertices) {
-            std::vector<Vec3f> points = made->model->mesh.positions;
-            for (Vec3f& p : points) p *= float(made->scale);
-            all_vertices = simulation->attach(0, points, always);
-        }
-        moment.full.resize(made->model->mesh.vertex_count());
-        simulation->attached(*all_vertices, moment.full, {}, always);
-        for (Vec3f& p : moment.full) p *= to_units;
+    Status go_to_start(BodyMotion& motion) {
+        const Status rewound = motion.rewind(life);
+        const std::scoped_lock lock(mutex);
+        resets = false;
+        return rewound;
     }
+
+    /// The next frame, or another look at this one.
+    Status show(BodyMotion& motion, Order& order) {
+        const Clock::time_point begun = Clock::now();
+        if (order.hands)
+            if (Status seized = motion.set_hands(std::move(*order.hands), life); !seized) return seized;
+        FrameReport report;
+        if (order.is_frame) {
+            const Result<FrameReport> advanced = motion.advance(order.context);
+            if (!advanced && advanced.error().code == ErrorCode::cancelled) return Success{};
+            if (!advanced) return advanced.error();
+            report = *advanced;
+        }
+        Moment moment = motion.look(order.with_full);
+        moment.report = report;
+        moment.milliseconds = std::chrono::duration<double, std::milli>(Clock::now() - begun).count();
+        {
+            const std::scoped_lock lock(mutex);
+            if (order.is_frame) {
+                outbox.poses.push_back(moment.pose);
+                if (steps > 0) --steps;
+            }
+            outbox.moment = std::move(moment);
+        }
+        bell.ring();
+        next = std::max(next + std::chrono::microseconds(16'667), Clock::now());
+        return Success{};
+    }
+
+    Clock::time_point next = Clock::now(); ///< when the next frame is due; the worker's own
 };
 
 Playback::Playback(QObject* parent) : QObject(parent), bell_(std::make_unique<Bell>()) {
@@ -242,7 +199,7 @@ Playback::Playback(QObject* parent) : QObject(parent), bell_(std::make_unique<Be
 
 Playback::~Playback() = default;
 
-void Playback::put(std::shared_ptr<const MadeBody> made) {
+void Playback::put(std::shared_ptr<const DroppedBody> made) {
     worker_.reset();
     made_ = std::move(made);
     is_playing_ = is_grabbed_ = false;

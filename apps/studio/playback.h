@@ -3,7 +3,7 @@
 
 #include "document.h"
 
-#include "filigree/physics/simulation.h"
+#include "filigree/scene/body_motion.h"
 
 #include <QObject>
 
@@ -11,34 +11,8 @@ namespace filigree::studio {
 
 class Bell;
 
-/// What stands around a body, to be drawn: meshes in model units, relative to the model's origin.
-struct Surroundings {
-    std::vector<Mesh> obstacles;
-    bool has_ground = false;
-    double ground_level = 0; ///< model units along `up`, relative to the model's origin
-};
-
-/// A body that is ready to move. Shared, and never changes.
-struct MadeBody {
-    std::shared_ptr<const Model> model;
-    std::shared_ptr<const Body> body;
-    BodyReport report;
-    double scale = 1; ///< metres a model unit
-    World world;      ///< metres, relative to the model's origin times the scale
-    Surroundings surroundings;
-};
-/// Errors: as make_body, in words.
-Result<std::shared_ptr<const MadeBody>> make_body_of(const State& state, const Vec3d& up, const RunContext& context);
-
-/// One moment of a body, in model units relative to the model's origin.
-struct Moment {
-    std::size_t frame = 0; ///< frames since the start; 0 is the start
-    Pose pose;             ///< of the driver, with gradients
-    std::vector<Vec3f> particles;
-    std::vector<Vec3f> full; ///< every vertex as the particles carry it; only when asked for
-    FrameReport report;
-    double milliseconds = 0; ///< of the simulation and the driver together
-};
+/// The state's model as a body, its pinned vertices held. Errors: as of make_dropped_body.
+Result<std::shared_ptr<const DroppedBody>> make_body_of(const State& state, const Vec3d& up, const RunContext& context);
 
 /// Lives in the main thread.
 class Playback : public QObject {
@@ -48,10 +22,10 @@ public:
     ~Playback() override; ///< stops, wherever it is
 
     /// A body at its start. Replaces whatever was there.
-    void put(std::shared_ptr<const MadeBody> made);
+    void put(std::shared_ptr<const DroppedBody> made);
     void remove();
     bool has_body() const { return made_ != nullptr; }
-    std::shared_ptr<const MadeBody> made() const { return made_; }
+    std::shared_ptr<const DroppedBody> made() const { return made_; }
 
     void play();  ///< from the last frame simulated, as fast as 60 frames a second
     void pause(); ///< at once, in the middle of a frame too: the frames delivered by then are all there are
@@ -86,7 +60,7 @@ private:
     struct Worker;
     void deliver();
 
-    std::shared_ptr<const MadeBody> made_;
+    std::shared_ptr<const DroppedBody> made_;
     std::unique_ptr<Moment> moment_;
     PoseSequence recording_;
     bool is_playing_ = false, is_grabbed_ = false, wants_full_ = false;

@@ -1,19 +1,15 @@
 // The mouse over the picture: turns and moves the camera, pulls, pins, and drags the knobs of the deformations.
 #pragma once
 
-#include "gizmo.h"
 #include "picture_camera.h"
 #include "pins.h"
+
+#include "filigree/present/level_shape.h"
+#include "filigree/present/warp_gizmo.h"
 
 #include <QMouseEvent>
 
 namespace filigree::studio {
-
-/// A point of the surface under the mouse.
-struct Picked {
-    Vec3d at;     ///< in the world
-    Index vertex; ///< of the finest mesh, the nearest one
-};
 
 class Pointer : public QObject {
     Q_OBJECT

@@ -1,75 +1,15 @@
 #include "shown_model.h"
 
-#include "filigree/mesh/mesh_distance.h"
-#include "filigree/mesh/triangulate.h"
-
 #include <algorithm>
 
 namespace filigree::studio {
-
-namespace {
-
-LevelFacts facts_of(const Model& model, unsigned level) {
-    const bool finest = level == model.finest_level();
-    const std::size_t faces = finest ? model.mesh.face_count() : model.levels[level].face_count();
-    const std::size_t corners = finest ? model.mesh.corner_count() : model.levels[level].corners.size();
-    LevelFacts facts;
-    facts.triangles = corners - 2 * faces;
-    facts.vertices = finest ? model.mesh.vertex_count() : model.levels[level].vertices.size();
-    if (finest) facts.deviation = 0;
-    return facts;
-}
-
-/// Some of the finest mesh's vertices, evenly by index, as a mesh without faces.
-Mesh some_vertices(const Mesh& mesh, std::size_t most) {
-    Mesh some;
-    some.origin = mesh.origin;
-    const std::size_t count = std::min(mesh.vertex_count(), most);
-    for (std::size_t i = 0; i < count; ++i) some.positions.push_back(mesh.positions[i * mesh.vertex_count() / count]);
-    return some;
-}
-
-/// How far nearly all of `points` are from a level.
-std::optional<double> deviation_of(const Mesh& points, const Mesh& level, const RunContext& context) {
-    constexpr double kNearlyAll = 0.97;
-    Result<std::vector<float>> distances = distances_to_surface(points, level, context);
-    if (!distances || distances->empty()) return std::nullopt;
-    const auto at = distances->begin() + static_cast<std::ptrdiff_t>(kNearlyAll * double(distances->size() - 1));
-    std::nth_element(distances->begin(), at, distances->end());
-    return *at;
-}
-
-} // namespace
-
-Result<std::shared_ptr<const LevelShape>> LevelShape::make(std::shared_ptr<const Model> model, RestoreOptions restore,
-                                                           unsigned level, const RunContext& context) {
-    auto shape = std::make_shared<LevelShape>();
-    restore.level = level;
-    Result<Restorer> restorer = Restorer::create(*model, restore, context);
-    if (!restorer) return restorer.error();
-    shape->restorer_ = std::move(restorer).value();
-    shape->vertex_count_ = shape->restorer_->vertex_count();
-    if (level == model->finest_level()) {
-        shape->triangles_ = triangulate(model->mesh).triangles;
-    } else {
-        shape->vertices_ = model->levels[level].vertices;
-        shape->triangles_ = triangulate(level_mesh(*model, level)).triangles;
-    }
-    shape->model_ = std::move(model);
-    return std::shared_ptr<const LevelShape>(std::move(shape));
-}
-
-std::vector<Vec3f> LevelShape::positions(const Pose& pose, const RunContext& context) const {
-    Result<std::vector<Vec3f>> restored = restorer_->positions(pose, context);
-    return restored ? std::move(restored).value() : std::vector<Vec3f>();
-}
 
 ShownModel::ShownModel(const State& state, RestoreOn where)
     : model_(state.model), source_(state.source), restore_(state.restore), where_(where) {
     rest_pose_.positions = driver_positions(*model_);
     levels_.resize(model_->finest_level() + 1);
     asked_.resize(levels_.size());
-    for (unsigned level = 0; level < levels_.size(); ++level) facts_.push_back(facts_of(*model_, level));
+    for (unsigned level = 0; level < levels_.size(); ++level) facts_.push_back(level_facts(*model_, level));
 }
 
 bool ShownModel::is_of(const State& state) const {
@@ -135,15 +75,7 @@ void ShownModel::measure(Jobs& background, std::function<void()> ready) {
     using Deviations = std::vector<std::optional<double>>;
     background.start<Deviations>(
         "The picture", "deviations",
-        [model = model_](const RunContext& context) -> Result<Deviations> {
-            constexpr std::size_t kProbes = 20'000; // vertices: enough for a percentile
-            const Mesh points = some_vertices(model->mesh, kProbes);
-            Deviations deviations;
-            for (unsigned level = 0; level < model->finest_level(); ++level)
-                deviations.push_back(deviation_of(points, level_mesh(*model, level), context));
-            if (context.is_cancelled()) return cancelled_error();
-            return deviations;
-        },
+        [model = model_](const RunContext& context) { return level_deviations(*model, context); },
         [this, life = std::weak_ptr(life_), ready = std::move(ready)](const Deviations& deviations) {
             if (life.expired()) return;
             for (std::size_t level = 0; level < deviations.size(); ++level) facts_[level].deviation = deviations[level];

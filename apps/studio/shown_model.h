@@ -3,33 +3,12 @@
 #pragma once
 
 #include "document.h"
-#include "filigree/render/level_choice.h"
 #include "jobs.h"
 
+#include "filigree/present/level_shape.h"
 #include "filigree/render/drawable.h"
 
 namespace filigree::studio {
-
-/// A level in the processor's memory, for picking. Never changes once made.
-class LevelShape {
-public:
-    /// Errors: as Restorer::create.
-    static Result<std::shared_ptr<const LevelShape>> make(std::shared_ptr<const Model> model, RestoreOptions restore,
-                                                          unsigned level, const RunContext& context);
-
-    const std::vector<Triangle>& triangles() const { return triangles_; }
-    std::size_t vertex_count() const { return vertex_count_; }
-    Index finest_vertex(Index vertex) const { return vertices_.empty() ? vertex : vertices_[vertex]; }
-    /// As posed, relative to the mesh's origin. Empty: the pose does not belong to the model.
-    std::vector<Vec3f> positions(const Pose& pose, const RunContext& context) const;
-
-private:
-    std::shared_ptr<const Model> model_;
-    std::optional<Restorer> restorer_;
-    std::vector<Index> vertices_; ///< in the finest mesh; empty: it is the finest
-    std::vector<Triangle> triangles_;
-    std::size_t vertex_count_ = 0;
-};
 
 /// Numbers of the finest mesh's vertices to be shown as colours, with the legend's title.
 struct VertexColors {

@@ -3,8 +3,6 @@
 #include "drawn_objects.h"
 #include "viewport_overlay.h"
 
-#include "filigree/mesh/ray_hit.h"
-
 #include <QElapsedTimer>
 #include <QOpenGLContext>
 #include <QOpenGLFunctions>
@@ -449,28 +447,10 @@ std::optional<Picked> Viewport::Impl::pick(const QPointF& point) {
     if (shown->shared_model() != workbench.state().model) return std::nullopt; // its vertices are others
     const std::optional<unsigned> level = shown->nearest_ready(drawn_level);
     if (!level) return std::nullopt;
-    const LevelShape& shape = *shown->level(*level)->shape;
-    const std::span<const Vec3f> positions = drawn.positions(*level);
-    if (positions.empty()) return std::nullopt;
     const QPointF at = camera.in_tile(point);
     const PictureSize size = camera.tile_size();
-    Camera::Ray ray = camera.camera().ray(at.x(), at.y(), size.width, size.height);
-    const std::optional<ClipPlane> clip = drawn.clip();
-    constexpr int kMostLayers = 8; // of what is clipped away in front of what is not
-    for (int layer = 0; layer < kMostLayers; ++layer) {
-        const std::optional<RayHit> hit =
-            first_hit(positions, shape.triangles(), ray.origin - drawn.origin(), ray.direction, RunContext());
-        if (!hit) return std::nullopt;
-        const Vec3d place = ray.origin + hit->distance * ray.direction;
-        if (clip && clip->normal.dot(place) > clip->offset) {
-            ray.origin = place + 1e-9 * std::max(1.0, hit->distance) * ray.direction;
-            continue;
-        }
-        Eigen::Index corner = 0;
-        hit->barycentric.maxCoeff(&corner);
-        return Picked{place, shape.finest_vertex(shape.triangles()[hit->triangle][static_cast<std::size_t>(corner)])};
-    }
-    return std::nullopt;
+    return shown->level(*level)->shape->pick(
+        drawn.positions(*level), camera.camera().ray(at.x(), at.y(), size.width, size.height), drawn.clip());
 }
 
 void Viewport::Impl::fade_hint() {

@@ -10,6 +10,24 @@ namespace {
 
 constexpr std::size_t kMostDefects = 5'000; // edges drawn
 
+/// "Bend 35°".
+QString gizmo_label(GizmoPart part, const Warps& warps) {
+    const auto factor = [](double value) { return QString::fromUtf8("× %1").arg(value, 0, 'f', 2); };
+    const auto degrees = [](double value) { return QString::fromUtf8("%1°").arg(value, 0, 'f', 0); };
+    switch (part) {
+    case GizmoPart::stretch:
+        return "Stretch " + factor(warps.stretch);
+    case GizmoPart::squeeze:
+        return "Squeeze " + factor(warps.squeeze);
+    case GizmoPart::bend:
+        return "Bend " + degrees(warps.bend);
+    case GizmoPart::twist:
+        return "Twist " + degrees(warps.twist);
+    default:
+        return "Taper " + factor(warps.taper);
+    }
+}
+
 class OverlayWriter {
 public:
     OverlayWriter(const PictureParts& parts, unsigned drawn_level)

@@ -1,6 +1,6 @@
 #include "workbench_impl.h"
 
-#include "restored_error.h"
+#include "filigree/deform/restored_error.h"
 
 #include "filigree/physics/named_materials.h"
 #include "filigree/sample/spacing_for_count.h"
@@ -183,7 +183,7 @@ void Workbench::measure_error() {
                 if (!deformed) return deformed.error();
                 full = std::move(*deformed);
             }
-            Result<VertexDistance> distance = restored_error(state, pose, full, context);
+            Result<VertexDistance> distance = restored_error(*state.model, state.restore, pose, full, context);
             if (!distance) return distance.error();
             return Measured{std::move(*distance), std::move(full)};
         },

@@ -139,7 +139,7 @@ private:
     void take_model(State& now, const State& made) const;
     void change_level(unsigned level, const QString& name, const std::string& merge);
     void make_body_then(After then);
-    void put_body(std::shared_ptr<const MadeBody> made);
+    void put_body(std::shared_ptr<const DroppedBody> made);
     bool is_refused(const std::string& topic, const QString& sentence);
     const Pose& recorded_pose(std::size_t frame) const; ///< the body's, else the document's
     bool is_live_frame() const;                         ///< what is shown is where the body is now

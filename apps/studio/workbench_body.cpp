@@ -34,7 +34,8 @@ void Workbench::make_body() { make_body_then(After::nothing); }
 void Workbench::make_body_then(After then) {
     impl_->then = then;
     const auto up_axis = view_.settings().up;
-    using Made = Result<std::shared_ptr<const MadeBody>>; // an error is delivered too: no body fits the settings then
+    using Made =
+        Result<std::shared_ptr<const DroppedBody>>; // an error is delivered too: no body fits the settings then
     jobs_.start<Made>(
         "Making the body", kBodyTopic,
         [state = state(), up_axis](const RunContext& context) -> Result<Made> {
@@ -58,7 +59,7 @@ void Workbench::make_body_then(After then) {
         });
 }
 
-void Workbench::put_body(std::shared_ptr<const MadeBody> made) {
+void Workbench::put_body(std::shared_ptr<const DroppedBody> made) {
     const After then = std::exchange(impl_->then, After::nothing);
     impl_->replay.stop();
     impl_->keeps_body = true;

@@ -1,7 +1,6 @@
 // Files in and out.
 #include "workbench_impl.h"
 
-#include "film_export.h"
 #include "pins.h"
 #include "words.h"
 
@@ -9,6 +8,9 @@
 #include "filigree/io/file.h"
 #include "filigree/io/mesh_file.h"
 #include "filigree/io/model_file.h"
+#include "filigree/io/numbered_name.h"
+#include "filigree/io/point_cache.h"
+#include "filigree/present/model_film.h"
 
 #include <algorithm>
 #include <filesystem>
@@ -122,59 +124,20 @@ Result<QString> write_checked(const Mesh& mesh, const std::string& path, const R
     return text;
 }
 
-/// "frame_%04d.obj" cut at its number. Folders may have a '%' in their names.
-struct NumberedPath {
-    std::string before, after;
-    std::size_t digits = 1;
-
-    static Result<NumberedPath> parse(const std::string& pattern) {
-        const Error no_number{ErrorCode::usage, pattern + ": needs one place for the frame's number, such as %04d in "
-                                                          "frame_%04d.obj."};
-        const std::size_t slash = pattern.rfind('/'), name = slash == std::string::npos ? 0 : slash + 1;
-        const std::size_t from = pattern.find('%', name);
-        if (from == std::string::npos || pattern.find('%', from + 1) != std::string::npos) return no_number;
-        const std::size_t until = pattern.find_first_not_of("0123456789", from + 1);
-        if (until == std::string::npos || pattern[until] != 'd' || until - from > 3) return no_number;
-        NumberedPath path{pattern.substr(0, from), pattern.substr(until + 1), 1};
-        if (until > from + 1) path.digits = std::stoul(pattern.substr(from + 1, until - from - 1));
-        return path;
-    }
-    std::string at(std::size_t number) const {
-        std::string text = std::to_string(number);
-        if (text.size() < digits) text.insert(0, digits - text.size(), '0');
-        return before + text + after;
-    }
-};
-
-/// All or none: what was written is taken back when a later one fails, unless it took the place of a file.
-Result<QString> write_frames(const State& state, const Recording& poses, const NumberedPath& path,
+/// All or none.
+Result<QString> write_frames(const State& state, const Recording& poses, const NumberedName& name,
                              const RunContext& context) {
     const Result<Restorer> restorer = Restorer::create(*state.model, state.restore, context);
     if (!restorer) return restorer.error();
     RunContext quiet = context; // the progress is that of the frames
     quiet.progress = nullptr;
-    std::vector<std::string> written;
-    const auto write_all = [&]() -> Status {
-        for (std::size_t frame = 0; frame < poses.frames.size(); ++frame) {
-            context.report("writing meshes", double(frame) / double(poses.frames.size()));
-            if (context.is_cancelled()) return cancelled_error();
-            const Result<Mesh> mesh = restorer->mesh(*poses.frames[frame], quiet);
-            if (!mesh) return mesh.error();
-            const std::string name = path.at(frame + 1);
-            std::error_code ignored;
-            const bool is_new = !fs::exists(name, ignored);
-            const Result<QString> saved = write_checked(*mesh, name, quiet);
-            if (!saved) return saved.error();
-            if (is_new) written.push_back(name);
-        }
-        return Success{};
-    };
-    if (const Status status = write_all(); !status) {
-        std::error_code ignored;
-        for (const std::string& name : written) fs::remove(name, ignored);
-        return status.error();
-    }
-    return QString("Saved %1 to %2.").arg(counted(poses.frames.size(), "mesh", "meshes"), file_name(path.at(1)));
+    const NumberedMeshes meshes{name, [&](std::size_t frame) { return restorer->mesh(*poses.frames[frame], quiet); }};
+    const auto warnings = write_numbered_meshes(poses.frames.size(), std::span(&meshes, 1), context);
+    if (!warnings) return warnings.error();
+    QString text = QString("Saved %1 to %2.")
+                       .arg(counted(poses.frames.size(), "mesh", "meshes"), file_name(name.file(1).string()));
+    for (const std::string& warning : *warnings) text += ' ' + QString::fromStdString(warning);
+    return text;
 }
 
 } // namespace
@@ -185,9 +148,9 @@ std::vector<std::string> existing_outputs(const std::string& pattern, std::size_
         std::error_code ignored;
         if (fs::exists(path, ignored)) result.push_back(path);
     };
-    const Result<NumberedPath> numbered = NumberedPath::parse(pattern);
+    const std::optional<NumberedName> numbered = printf_numbered_name(pattern);
     if (!numbered) add(pattern);
-    for (std::size_t frame = 1; numbered && frame <= frames; ++frame) add(numbered->at(frame));
+    for (std::size_t frame = 1; numbered && frame <= frames; ++frame) add(numbered->file(frame).string());
     return result;
 }
 
@@ -291,9 +254,11 @@ void Workbench::save_driver(const std::string& path) {
 }
 
 void Workbench::export_meshes(const std::string& pattern) {
-    const Result<NumberedPath> path = NumberedPath::parse(pattern);
-    if (!path) {
-        Q_EMIT told(QString::fromStdString(path.error().message), true);
+    const std::optional<NumberedName> name = printf_numbered_name(pattern);
+    if (!name) {
+        Q_EMIT told(QString::fromStdString(pattern) + ": needs one place for the frame's number, such as %04d in "
+                                                      "frame_%04d.obj.",
+                    true);
         return;
     }
     commit_recording();
@@ -301,36 +266,41 @@ void Workbench::export_meshes(const std::string& pattern) {
         Q_EMIT told("There is nothing recorded yet: press Play first.", true);
         return;
     }
-    save("Exporting meshes", pattern, [state = state(), path = *path](const RunContext& context) {
-        return write_frames(state, *state.recording, path, context);
+    save("Exporting meshes", pattern, [state = state(), name = *name](const RunContext& context) {
+        return write_frames(state, *state.recording, name, context);
     });
 }
 
 void Workbench::export_film(const std::string& path, const FilmSettings& settings) {
     commit_recording();
-    auto job = std::make_shared<FilmJob>();
-    job->state = state();
-    job->pose = pose_;
-    if (state().recording) job->poses = state().recording->poses();
-    if (playback_.has_body()) {
-        job->surroundings = playback_.made()->surroundings;
-        job->has_surroundings = true;
-    }
-    job->camera = view_.camera();
-    job->view = view_.settings();
-    job->film = settings;
-    save("Exporting " + file_name(path), path, [path, job](const RunContext& context) -> Result<QString> {
-        const Result<std::size_t> frames = studio::export_film(*job, path, context);
+    const ViewSettings& view = view_.settings();
+    auto film = std::make_shared<ModelFilm>();
+    film->model = state().model;
+    film->restore = state().restore;
+    film->surface.materials = state().source->materials.materials;
+    film->look.edges = view.style != SurfaceStyle::shaded;
+    film->look.surface = view.style != SurfaceStyle::wireframe;
+    if (state().recording) film->poses = state().recording->poses();
+    film->pose = pose_;
+    if (playback_.has_body()) film->surroundings = playback_.made()->surroundings;
+    film->camera = view_.camera();
+    film->up = view.up;
+    film->ground = view.ground;
+    film->width = settings.width;
+    film->height = settings.height;
+    film->passes = settings.passes;
+    const auto draw = [path, film, view, source = state().source](const RunContext& context) -> Result<QString> {
+        const Result<std::size_t> frames = film_model(*film, path, context);
         if (!frames) return frames.error();
         QString text = QString("Saved %1: %2.").arg(file_name(path), counted(*frames, "picture", "pictures"));
-        const ViewSettings& view = job->view;
         std::vector<QString> left_out;
         if (view.coloring != Coloring::own) left_out.push_back("colouring");
         if (view.clip) left_out.push_back("the clip plane");
         if (view.split) left_out.push_back("the split view");
         if (view.particles || view.inside_points) left_out.push_back("points");
         return left_out.empty() ? text : text + " Films are without " + listed(left_out) + '.';
-    });
+    };
+    save("Exporting " + file_name(path), path, draw);
 }
 
 } // namespace filigree::studio

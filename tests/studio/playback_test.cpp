@@ -31,7 +31,7 @@ State ball_state(const BodySettings& body = {}) {
     return state;
 }
 
-std::shared_ptr<const MadeBody> made_of(const State& state) {
+std::shared_ptr<const DroppedBody> made_of(const State& state) {
     return make_body_of(state, Vec3d::UnitY(), RunContext()).value();
 }
 
@@ -39,53 +39,6 @@ float lowest(const Pose& pose) {
     float y = 1e9f;
     for (const Vec3f& p : pose.positions) y = std::min(y, p.y());
     return y;
-}
-
-TEST(MakeBodyOf, StandsWhereTheMeshIsAboveTheGround) {
-    BodySettings settings;
-    settings.size = 0.5; // m
-    settings.drop = 0.25;
-    const auto made = made_of(ball_state(settings));
-    EXPECT_NEAR(made->scale, 0.25, 1e-3);
-    EXPECT_TRUE(made->surroundings.has_ground);
-    EXPECT_NEAR(made->surroundings.ground_level, -2, 0.02); // its lowest point is at -1, and 1 unit above the ground
-    EXPECT_EQ(made->world.obstacles.size(), 1u);
-    EXPECT_LT(made->world.gravity.y(), -9);
-}
-
-TEST(MakeBodyOf, EveryObstacleIsBelowAndDrawn) {
-    for (const ObstacleChoice choice : {ObstacleChoice::ball, ObstacleChoice::step, ObstacleChoice::slope})
-        for (const Vec3d& up : {Vec3d(Vec3d::UnitX()), Vec3d(Vec3d::UnitY()), Vec3d(Vec3d::UnitZ())}) {
-            BodySettings settings;
-            settings.obstacle = choice;
-            settings.drop = 0.1;
-            const auto made = make_body_of(ball_state(settings), up, RunContext()).value();
-            ASSERT_EQ(made->surroundings.obstacles.size(), 1u);
-            EXPECT_EQ(check_mesh(made->surroundings.obstacles[0]), "");
-            double highest = -1e9, below = 1e9;
-            for (const Vec3f& p : made->surroundings.obstacles[0].positions) {
-                highest = std::max(highest, p.cast<double>().dot(up));
-                below = std::min(below, p.cast<double>().dot(up));
-            }
-            if (choice != ObstacleChoice::slope) {
-                EXPECT_NEAR(highest, -1.2, 0.02);
-            } // 0.1 m is 0.2 units
-            EXPECT_NEAR(below, made->surroundings.ground_level, 0.02);
-            const Vectors& rest = made->body->rest;
-            for (std::size_t i = 0; i < rest.size(); ++i)
-                for (const Obstacle& obstacle : made->world.obstacles)
-                    EXPECT_GT(distance_to(obstacle, obstacle.motion.at(0), rest[i]).distance, -0.01);
-        }
-}
-
-TEST(MakeBodyOf, RefusesWhatHasNoVolumeInWords) {
-    State state = ball_state();
-    Model flat = *state.model;
-    for (Vec3f& p : flat.mesh.positions) p.setZero();
-    state.model = std::make_shared<const Model>(flat);
-    const auto made = make_body_of(state, Vec3d::UnitY(), RunContext());
-    ASSERT_FALSE(made.ok());
-    EXPECT_FALSE(made.error().message.empty());
 }
 
 TEST(Playback, StartsAtRestWithARecordingOfTheStart) {
@@ -211,7 +164,7 @@ TEST(Playback, PinnedVerticesHoldTheBody) {
 }
 
 TEST(Playback, ABodyThatCannotBeSimulatedIsToldAndRemoved) {
-    auto made = std::make_shared<MadeBody>(*made_of(ball_state()));
+    auto made = std::make_shared<DroppedBody>(*made_of(ball_state()));
     made->world.obstacles[0].stiffness = 2; // refused
     for (const bool resets : {false, true}) {
         Playback playback;

@@ -25,6 +25,11 @@ Field<Body> material_field(double Material::*member, double offset = 0) {
             [=](Body& body, double number) { body.material.*member = number + offset; }};
 }
 
+template <class Value>
+Field<Body> drop_field(Value DropOptions::*member) {
+    return field(static_cast<Value Body::*>(member));
+}
+
 /// The preset as an index of named_materials(), one beyond them for a material changed by hand.
 const Field<Body> kPreset = {[](const Body& body) {
                                  const auto materials = named_materials();
@@ -107,7 +112,7 @@ void BodyPanel::add_material() {
            {.least = 10, .most = 20000, .decimals = 0, .unit = "kg/m³", .logarithmic = true});
     number(rows,
            settings.setting("body.particles", "Particles", "About so many particles move; more are finer and slower",
-                            field(&Body::particles)),
+                            drop_field(&Body::particles)),
            {.least = kLeastParticles, .most = kMostParticles, .decimals = 0, .logarithmic = true});
     const Field<Body> spacing = {
         [this](const Body& body) { return 1000 * std::cbrt(volume(body) / double(body.particles)); },
@@ -121,7 +126,7 @@ void BodyPanel::add_material() {
                          "How far apart the particles are, about, millimetres: another way to say how many there are",
                          spacing, [this](const Body& body) { return volume(body) > 0; }),
         {.least = 0.1, .most = 1000, .decimals = 1, .unit = "mm", .logarithmic = true});
-    number(rows, settings.setting("body.size", "Size", "The longest side of the mesh, metres", field(&Body::size)),
+    number(rows, settings.setting("body.size", "Size", "The longest side of the mesh, metres", drop_field(&Body::size)),
            {.least = 0.01, .most = 100, .decimals = 2, .unit = "m", .logarithmic = true});
 }
 
@@ -147,22 +152,22 @@ void BodyPanel::add_motion(const Actions& actions) {
 void BodyPanel::add_world() {
     QGridLayout* rows = section("World");
     const auto settings = body();
-    check(rows, settings.setting("body.ground", "Ground", "A floor to fall on", field(&Body::ground)));
-    check(rows, settings.setting("body.gravity", "Gravity", "9.81 m/s² downwards", field(&Body::gravity)));
+    check(rows, settings.setting("body.ground", "Ground", "A floor to fall on", drop_field(&Body::ground)));
+    check(rows, settings.setting("body.gravity", "Gravity", "9.81 m/s² downwards", drop_field(&Body::gravity)));
     number(rows,
-           settings.setting("body.drop_height", "Drop", "Metres above the ground at the start", field(&Body::drop), {},
-                            [](const Body& body) { return body.ground; }),
+           settings.setting("body.drop_height", "Drop", "Metres above the ground at the start", drop_field(&Body::drop),
+                            {}, [](const Body& body) { return body.ground; }),
            {.least = 0, .most = 5, .step = 0.05, .decimals = 2, .unit = "m"});
-    choice(rows, settings.setting("body.obstacle", "Obstacle", "Something to fall on", field(&Body::obstacle)),
+    choice(rows, settings.setting("body.obstacle", "Obstacle", "Something to fall on", drop_field(&Body::obstacle)),
            {"None", "Ball", "Step", "Slope"});
     number(rows,
            settings.setting("body.friction", "Friction", "Coulomb's coefficient: 0 slides for ever",
-                            field(&Body::friction)),
+                            drop_field(&Body::friction)),
            {.least = 0, .most = 2, .step = 0.05, .decimals = 2});
     number(rows,
            settings.setting("body.restitution", "Bounce",
                             "Restitution of the ground: speed after a bounce over that before, for hard points",
-                            field(&Body::restitution)),
+                            drop_field(&Body::restitution)),
            {.least = 0, .most = 1, .step = 0.05, .decimals = 2});
 }
 

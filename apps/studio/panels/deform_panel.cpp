@@ -2,7 +2,6 @@
 
 #include "actions.h"
 #include "pins.h"
-#include "warp_ranges.h"
 
 namespace filigree::studio {
 
@@ -40,8 +39,8 @@ DeformPanel::DeformPanel(Workbench& workbench, const Actions& actions, QWidget* 
         [this](const Warps& to, const std::string& merge) { this->workbench().set_warps(to, merge); }};
     choice(rows, warps.setting("deform.axis", "Axis", "The axis that all five go along", field(&Warps::axis)),
            {"x", "y", "z"});
-    const NumberSpec factor = {.least = kLeastFactor,
-                               .most = kMostFactor,
+    const NumberSpec factor = {.least = Warps::kLeastFactor,
+                               .most = Warps::kMostFactor,
                                .decimals = 2,
                                .unit = "×",
                                .logarithmic = true,
@@ -57,8 +56,9 @@ DeformPanel::DeformPanel(Workbench& workbench, const Actions& actions, QWidget* 
     add("deform.stretch", "Stretch", &Warps::stretch, factor, "Longer along the axis; a factor");
     add("deform.squeeze", "Squeeze", &Warps::squeeze, factor,
         "Longer along the axis and thinner across, the volume stays; a factor");
-    add("deform.bend", "Bend", &Warps::bend, angle(kMostBend, 1), "Into an arc from end to end, degrees");
-    add("deform.twist", "Twist", &Warps::twist, angle(kMostTwist, 5), "Turned about the axis from end to end, degrees");
+    add("deform.bend", "Bend", &Warps::bend, angle(Warps::kMostBend, 1), "Into an arc from end to end, degrees");
+    add("deform.twist", "Twist", &Warps::twist, angle(Warps::kMostTwist, 5),
+        "Turned about the axis from end to end, degrees");
     add("deform.taper", "Taper", &Warps::taper, factor, "Size of the far end, as a factor of the near end's");
     beside(rows, {button("deform.reset", "edit.reset_deformation", "Reset all")});
     refresh();
