@@ -1,5 +1,5 @@
 #include "commands.h"
-#include "stage.h"
+#include "pictures.h"
 
 #include "filigree/present/page.h"
 
@@ -13,7 +13,7 @@ namespace {
 
 struct CompareArguments {
     std::string a, b, picture;
-    UpAxis up = UpAxis::y;
+    std::optional<UpAxis> up;
     std::size_t samples = 100'000;
 };
 
@@ -24,19 +24,17 @@ void draw_errors(const Mesh& a, const Mesh& b, const std::string& names, const M
     const HeatMap errors =
         heat_map(distance.vertices ? distance.vertices->per_vertex : require(distances_to_surface(a, b, context)),
                  distance.diagonal);
-    Stage stage(session);
+    HeadlessRenderer renderer = require(HeadlessRenderer::create());
     const ScalarColors scalars{errors.values, ColorMap::sequential, errors.range};
     const Drawable drawable = a.face_count()
                                   ? require(Drawable::surface(a, {.scalars = scalars}, context))
                                   : require(Drawable::points(a.positions, a.origin, {.scalars = scalars}, context));
     constexpr unsigned kWidth = 1120, kHeight = 840;
-    const CameraPoints points{a.positions, a.origin, drawable.point_radius()};
-    const Camera camera =
-        fit_camera(std::span(&points, 1), view_direction(View::iso, up), up_vector(up), double(kWidth) / kHeight);
+    const Camera camera = camera_for(a, View::iso, up, double(kWidth) / kHeight, drawable.point_radius());
     Scene scene;
     scene.objects.push_back({&drawable, {.gloss = 0.15f}});
     scene.up = up;
-    const Picture picture = stage.take(scene, camera, {.width = kWidth, .height = kHeight});
+    const Picture picture = require(renderer.picture(scene, camera, {.width = kWidth, .height = kHeight}, context));
     Page page(kWidth + 130, kHeight + 40);
     page.picture(picture, {0, 0}, kWidth, kHeight);
     page.legend(ColorMap::sequential, errors.range, "distance / diagonal", {kWidth + 14, 24}, 420);
@@ -92,7 +90,7 @@ void run(const CompareArguments& options, Session& session) {
     report_distances(distance, report);
     if (!options.picture.empty()) {
         draw_errors(a, b, Page::plain(file_name(options.a)) + " against " + Page::plain(file_name(options.b)), distance,
-                    options.up, options.picture, session);
+                    up_of(options.up, a, options.a), options.picture, session);
         report.add("picture", options.picture, "picture", options.picture);
     }
     session.print(report);
@@ -113,7 +111,7 @@ Command compare_command() {
                  Option("--picture", options->picture,
                         "Also draw the first mesh coloured by its distance from the second (.png, .svg, .pdf)")
                      .is_written(),
-                 up_option(options->up, "Which axis is up in the picture (unset: y)")},
+                 found_up_option(options->up)},
             .examples = "  filigree compare restored.ply full.ply\n"
                         "  filigree compare restored.ply full.ply --picture heat.png\n"
                         "  filigree compare driver.ply scan.ply --json",

@@ -1,10 +1,10 @@
 #include "animation_output.h"
 #include "commands.h"
-#include "handles_file.h"
+#include "pictures.h"
 #include "restore_options.h"
-#include "stage.h"
 
-#include "filigree/deform/space_warp.h"
+#include "filigree/deform/warp_steps.h"
+#include "filigree/io/handles_file.h"
 
 #include <fmt/format.h>
 
@@ -12,39 +12,9 @@ namespace filigree::cli {
 
 namespace {
 
-/// One warp option, kept in the order it was given in.
-struct WarpStep {
-    std::string kind;
-    double amount;
-
-    /// On the way from nothing (0) to all of it (1).
-    WarpStep part(double fraction) const {
-        const bool is_factor = kind == "stretch" || kind == "squeeze" || kind == "taper";
-        const double nothing = is_factor ? 1 : 0;
-        return {kind, nothing + fraction * (amount - nothing)};
-    }
-};
-
-std::unique_ptr<SpaceWarp> make_warp(const WarpStep& step, const Box& box, Axis axis, std::uint64_t seed) {
-    if (step.kind == "stretch") return make_stretch(box, axis, step.amount);
-    if (step.kind == "squeeze") return make_squeeze(box, axis, step.amount);
-    if (step.kind == "bend") return make_bend(box, axis, step.amount);
-    if (step.kind == "twist") return make_twist(box, axis, step.amount);
-    if (step.kind == "taper") return make_taper(box, axis, step.amount);
-    return make_smooth_random(box, step.amount, seed);
-}
-
-/// The warps one after the other, all over the box of the undeformed mesh.
-std::unique_ptr<SpaceWarp> chain_steps(const std::vector<WarpStep>& steps, const Box& box, std::optional<Axis> axis,
-                                       std::uint64_t seed) {
-    std::vector<std::unique_ptr<SpaceWarp>> warps;
-    for (const WarpStep& step : steps) warps.push_back(make_warp(step, box, axis.value_or(longest_axis(box)), seed));
-    return make_chain(std::move(warps));
-}
-
 struct DeformArguments {
     std::string input, output, handles, pose_output;
-    std::vector<WarpStep> steps;
+    std::vector<WarpStep> steps; ///< in the order in which they were given
     std::optional<Axis> axis = {};
     std::uint64_t seed = 1;
     RestoreOptions restore;
@@ -63,32 +33,40 @@ public:
     }
 
     Mesh mesh(Mesh mesh, double fraction, const RunContext& context) const {
-        if (handles_) return require(move_mesh_by_handles(std::move(mesh), handles_at(fraction), context));
+        if (!handles_.empty()) return moved(move_by_handles(std::move(mesh), handles_at(fraction), context));
         warp_mesh(*warp_at(fraction, world_bounds(mesh)), mesh, context);
         return mesh;
     }
     Pose driver(const Model& model, double fraction, const RunContext& context) const {
-        if (handles_) return require(pose_by_handles(model, handles_at(fraction), context));
+        if (!handles_.empty()) return moved(pose_by_handles(model, handles_at(fraction), context));
         return warp_pose(*warp_at(fraction, world_bounds(model.mesh)), model, context);
     }
 
 private:
+    /// All over the box of the undeformed mesh.
     std::unique_ptr<SpaceWarp> warp_at(double fraction, const Box& box) const {
         std::vector<WarpStep> steps;
-        for (const WarpStep& step : options_.steps) steps.push_back(fraction == 1 ? step : step.part(fraction));
-        return chain_steps(steps, box, options_.axis, options_.seed);
+        for (const WarpStep& step : options_.steps) steps.push_back(step.part(fraction));
+        return make_warp(steps, box, options_.axis.value_or(longest_axis(box)), options_.seed);
     }
-    HandlesFile handles_at(double fraction) const {
-        HandlesFile part = *handles_;
-        for (HandleEntry& entry : part.handles) {
-            entry.move *= fraction;
-            entry.rotation.angle() *= fraction;
+    std::vector<HandleRegion> handles_at(double fraction) const {
+        std::vector<HandleRegion> part = handles_;
+        for (HandleRegion& handle : part) {
+            handle.move *= fraction;
+            handle.rotation.angle() *= fraction;
         }
         return part;
     }
+    /// What a handle has against its place is said of the file.
+    template <class T>
+    T moved(Result<T> result) const {
+        if (!result && result.error().code == ErrorCode::usage)
+            refuse(options_.handles + ": " + result.error().message);
+        return require(std::move(result));
+    }
 
     const DeformArguments& options_;
-    std::optional<HandlesFile> handles_;
+    std::vector<HandleRegion> handles_; ///< of the file; none: warps
 };
 
 Mesh restore_pose(const Model& model, const Pose& pose, const DeformArguments& options, const RunContext& context) {
@@ -96,7 +74,7 @@ Mesh restore_pose(const Model& model, const Pose& pose, const DeformArguments& o
     return require(restorer.mesh(pose, context));
 }
 
-bool is_model_path(const std::string& path) { return lower_ending(path) == ".fil"; }
+bool is_model_path(const std::string& path) { return lower_extension(path) == ".fil"; }
 
 void check(const DeformArguments& options, const Session& session) {
     const auto refuse = [](const std::string& sentence) { throw Failure{{ErrorCode::usage, sentence}}; };
@@ -208,18 +186,22 @@ void deform_once(const DeformArguments& options, const Session::Content& content
 
 /// A warp of its own each time that it is given, in the order of the command line.
 OptionList warp_options(std::vector<WarpStep>& steps) {
-    const auto step = [&steps](const std::string& kind, const std::string& text) {
-        return Option("--" + kind, Option::EachNumber([&steps, kind](double amount) {
+    const auto step = [&steps](const std::string& name, WarpKind kind, const std::string& text) {
+        return Option("--" + name, Option::EachNumber([&steps, kind](double amount) {
                           steps.push_back({kind, amount});
                       }),
                       text);
     };
-    return {step("stretch", "Scale along the axis by this factor").above_zero(),
-            step("squeeze", "Scale along the axis by this factor and across it so that the volume stays").above_zero(),
-            step("bend", "Bend the axis into an arc of this many degrees").finite(),
-            step("twist", "Turn the far end about the axis by this many degrees against the near end").finite(),
-            step("taper", "Scale cross-sections, from 1 at the near end to this factor at the far end").above_zero(),
-            step("random", "Smooth random displacement of up to this fraction of the diagonal").finite()};
+    return {
+        step("stretch", WarpKind::stretch, "Scale along the axis by this factor").above_zero(),
+        step("squeeze", WarpKind::squeeze, "Scale along the axis by this factor and across it so that the volume stays")
+            .above_zero(),
+        step("bend", WarpKind::bend, "Bend the axis into an arc of this many degrees").finite(),
+        step("twist", WarpKind::twist, "Turn the far end about the axis by this many degrees against the near end")
+            .finite(),
+        step("taper", WarpKind::taper, "Scale cross-sections, from 1 at the near end to this factor at the far end")
+            .above_zero(),
+        step("random", WarpKind::random, "Smooth random displacement of up to this fraction of the diagonal").finite()};
 }
 
 } // namespace

@@ -7,7 +7,6 @@
 #include "filigree/hierarchy/strip.h"
 #include "filigree/mesh/mesh_distance.h"
 #include "filigree/mesh/shapes.h"
-#include "filigree/mesh/up_axis.h"
 
 #include <algorithm>
 #include <cmath>
@@ -59,10 +58,10 @@ std::vector<std::string> draw_and_film(const DemoScene& scene, const std::functi
                                        const std::string& picture, const std::string& film, Session& session) {
     std::vector<std::string> made;
     try {
-        Stage stage(session);
-        draw_demo(scene, stage, picture, session);
+        HeadlessRenderer renderer = require(HeadlessRenderer::create());
+        draw_demo(scene, renderer, picture, session);
         made.push_back(picture);
-        film_demo(scene, pose_at, stage, film, session);
+        film_demo(scene, pose_at, renderer, film, session);
         made.push_back(film);
     } catch (const Failure& failure) {
         if (failure.error.code == ErrorCode::cancelled) throw;
@@ -88,7 +87,7 @@ void run_demo(const std::string& input, const std::string& folder, bool pictures
     const double strip_seconds = now_seconds() - read;
 
     // The long way: every vertex, and every normal where the mesh has them.
-    const UpAxis up = asked_up.value_or(find_up_axis(mesh, usual_up_axis(input)));
+    const UpAxis up = up_of(asked_up, mesh, input);
     const DemoWarp deformation(world_bounds(mesh), up);
     const auto warp = deformation.warp();
     Mesh full = mesh;

@@ -26,7 +26,7 @@ Camera camera_for(std::span<const CameraPoints> points, UpAxis up, double aspect
 
 } // namespace
 
-void draw_demo(const DemoScene& scene, Stage& stage, const std::string& path, Session& session) {
+void draw_demo(const DemoScene& scene, HeadlessRenderer& renderer, const std::string& path, Session& session) {
     const RunContext& context = session.context();
     const double aspect = double(kPanelWidth) / kPanelHeight;
     const CameraPoints before{scene.mesh.positions, scene.mesh.origin},
@@ -44,7 +44,8 @@ void draw_demo(const DemoScene& scene, Stage& stage, const std::string& path, Se
         Appearance look;
         look.edges = edges;
         shown.objects.push_back({&drawable, look});
-        const Picture picture = stage.take(shown, camera, {.width = kPanelWidth, .height = kPanelHeight, .passes = 16});
+        const Picture picture = require(
+            renderer.picture(shown, camera, {.width = kPanelWidth, .height = kPanelHeight, .passes = 16}, context));
         const Point corner(panel++ * (kPanelWidth + kGap), 0);
         page.picture(picture, corner, kPanelWidth, kPanelHeight);
         page.text(caption, corner + Point(kPanelWidth / 2.0, kPanelHeight + 26), {.size = 16, .align = Align::centre});
@@ -74,7 +75,7 @@ void draw_demo(const DemoScene& scene, Stage& stage, const std::string& path, Se
     require(page.write(path, 1));
 }
 
-void film_demo(const DemoScene& scene, const std::function<Pose(double)>& pose_at, Stage& stage,
+void film_demo(const DemoScene& scene, const std::function<Pose(double)>& pose_at, HeadlessRenderer& renderer,
                const std::string& path, Session& session) {
     const RunContext& context = session.context();
     RunContext without_bar = context; // the bar tells of frames
@@ -102,7 +103,7 @@ void film_demo(const DemoScene& scene, const std::function<Pose(double)>& pose_a
         shown.objects.push_back({&drawable, {}});
         shown.fixed_ground = true;
         shown.ground_level = extent.ground_level(scene.up);
-        frames.push_back(require(stage.renderer().picture(
+        frames.push_back(require(renderer.picture(
             shown, camera, {.width = kFilmWidth, .height = kFilmHeight, .passes = kFilmPasses}, without_bar)));
     }
     for (const Picture& frame : frames) require(writer.add(frame));

@@ -1,7 +1,7 @@
 #include "animation_output.h"
 #include "commands.h"
+#include "pictures.h"
 #include "restore_options.h"
-#include "stage.h"
 #include "web_page.h"
 
 #include "filigree/io/gltf_export.h"
@@ -50,7 +50,7 @@ void export_levels(const Model& model, const ExportArguments& options, Session& 
 /// A moving file of another program, frame by frame, as another format.
 void convert_animation(const Mesh& rest, const ExportArguments& options, Session& session, Report& report) {
     const bool may_move =
-        !options.poses.empty() || lower_ending(options.input) == ".glb" || lower_ending(options.input) == ".gltf";
+        !options.poses.empty() || lower_extension(options.input) == ".glb" || lower_extension(options.input) == ".gltf";
     if (!may_move)
         refuse(ErrorCode::unsuitable, options.input + ": is a mesh that does not move; --poses FILE moves it, and "
                                                       "'filigree strip' makes a model of it.");

@@ -1,7 +1,7 @@
 #include "commands.h"
 
 #include "output_folder.h"
-#include "stage.h"
+#include "pictures.h"
 
 #include "report/figures.h"
 

@@ -1,6 +1,6 @@
 #include "commands.h"
+#include "pictures.h"
 #include "session.h"
-#include "stage.h"
 
 #include "filigree/present/patch_drawing.h"
 #include "filigree/remesh/quad_remesh.h"
@@ -19,7 +19,7 @@ struct RemeshArguments {
     std::string input, output, base, picture;
     QuadRemeshOptions remesh;
     View view = View::iso;
-    UpAxis up = UpAxis::y;
+    std::optional<UpAxis> up;
 };
 
 /// A count of a report: its key in JSON, and what it counts, said after the number.
@@ -158,28 +158,22 @@ void report_remesh(const QuadRemeshed& result, const RunSeconds& run, Report& re
     report_seconds(remesh, run, report);
 }
 
-void draw_patches(const QuadRemeshed& result, const RemeshArguments& options, Session& session) {
+void draw_patches(const QuadRemeshed& result, UpAxis up, const RemeshArguments& options, Session& session) {
     const RunContext& context = session.context();
-    Stage stage(session);
+    HeadlessRenderer renderer = require(HeadlessRenderer::create());
     const PatchDrawing drawing = require(PatchDrawing::create(result.mesh, result.patches, 0.8f, context));
     Scene scene;
     drawing.add_to(scene);
-    scene.up = options.up;
-    const CameraPoints all{result.mesh.positions, result.mesh.origin};
-    const Camera camera =
-        fit_camera(std::span(&all, 1), view_direction(options.view, options.up), up_vector(options.up), 4.0 / 3);
-    session.begin_writing(options.picture);
-    write_picture(stage.take(scene, camera, {.width = 1600, .height = 1200}), options.picture, session);
+    scene.up = up;
+    write_picture_of(scene, camera_for(result.mesh, options.view, up, 4.0 / 3), {.width = 1600, .height = 1200},
+                     options.picture, renderer, session);
 }
 
 /// Before any work: what cannot be written.
 void check_outputs(const RemeshArguments& options) {
     if (options.output != "-") require(mesh_format(options.output));
     check_second_output("--base", options.base, options.output);
-    if (options.picture.empty()) return;
-    if (lower_ending(options.picture) != ".png")
-        throw Failure{{ErrorCode::unsupported, options.picture + ": the picture is a PNG; let its name end in .png."}};
-    check_picture_path(options.picture);
+    if (!options.picture.empty()) check_png_path(options.picture);
 }
 
 /// Formats that hold triangles only lose what the command is for.
@@ -201,7 +195,7 @@ void run(const RemeshArguments& options, Session& session) {
     session.write_mesh(result.mesh, options.output, options.input);
     if (!options.base.empty()) session.write_mesh(base_mesh(result), options.base);
     const double written = now_seconds();
-    if (!options.picture.empty()) draw_patches(result, options, session);
+    if (!options.picture.empty()) draw_patches(result, up_of(options.up, mesh, options.input), options, session);
 
     Report report;
     report.set("output", options.output);
@@ -250,7 +244,7 @@ Command remesh_command() {
                 Option("--picture", options->picture, "Also draw the quads, their patches in colour (.png)")
                     .is_written(),
                 view_option(options->view, "Where to look from in the picture (unset: iso)"),
-                up_option(options->up, "Which axis is up in the picture (unset: y)")},
+                found_up_option(options->up)},
         .examples = "  filigree remesh scan.ply -o quads.ply\n"
                     "  filigree remesh scan.ply -o quads.obj --quads 20000 --picture quads.png\n"
                     "  filigree remesh part.stl -o quads.ply --feature-angle 30 --levels 3\n"

@@ -58,7 +58,7 @@ void check(const RenderOptions& options, bool is_film) {
         refuse("A film reads its files twice, and standard input can be read once; give file names.");
     const bool has_page = is_film ? !options.scalar.empty()
                                   : !options.scalar.empty() || !options.captions.empty() || options.files.size() > 1 ||
-                                        lower_ending(options.output) != ".png";
+                                        lower_extension(options.output) != ".png";
     if (options.background == "transparent" && has_page)
         refuse("--background transparent is for one picture in a .png without captions and legend; a page is white.");
     if (options.turntable && !is_film)

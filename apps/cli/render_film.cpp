@@ -110,7 +110,7 @@ private:
         const Camera seen = options_.turntable ? turned(camera_, 360.0 * double(frame) / double(frames_)) : camera_;
         PictureOptions picture = picture_options(size_.width - legend_width(), size_.height);
         if (!picture.passes) picture.passes = 12;
-        Result<Picture> drawn = stage_.renderer().picture(scene, seen, picture, quiet);
+        Result<Picture> drawn = renderer_.picture(scene, seen, picture, quiet);
         if (!drawn || !has_scalars()) return drawn;
         Page page(size_.width, size_.height);
         page.picture(*drawn, {0, 0}, picture.width, picture.height);
@@ -123,7 +123,7 @@ private:
         Json json = summary(size_, frames_);
         json["seconds"] = seconds;
         session_.print(fmt::format("{}: {} frames of {} by {} pixels in {} ({})\n", options_.output, frames_,
-                                   size_.width, size_.height, seconds_text(seconds), stage_.renderer_name()),
+                                   size_.width, size_.height, seconds_text(seconds), renderer_.name()),
                        json);
     }
 

@@ -90,10 +90,11 @@ private:
         if (options_.frame > 0) set_pose(subject, subject.poses.frames[options_.frame - 1], true);
         const CameraPoints points{subject.mesh.positions, subject.mesh.origin, subject.drawable->point_radius()};
         const Camera camera = shared_ ? *shared_ : camera_for(std::span(&points, 1), aspect());
-        Picture picture = stage_.take(scene_of(subject), camera, picture_options(layout_.width, layout_.height));
+        Picture picture = require(
+            renderer_.picture(scene_of(subject), camera, picture_options(layout_.width, layout_.height), context()));
         title_ = subject.scalar_title;
         subjects_[i].reset();
-        if (count_ == 1 && !has_captions_ && !has_scalars() && lower_ending(options_.output) == ".png") {
+        if (count_ == 1 && !has_captions_ && !has_scalars() && lower_extension(options_.output) == ".png") {
             alone_ = std::move(picture);
             return;
         }
@@ -109,7 +110,7 @@ private:
         Json json = summary(alone_.width ? PictureSize{alone_.width, alone_.height} : layout_.page, 1);
         json["seconds"] = seconds;
         session_.print(fmt::format("{}: {} by {} pixels in {} ({})\n", options_.output, layout_.page.width,
-                                   layout_.page.height, seconds_text(seconds), stage_.renderer_name()),
+                                   layout_.page.height, seconds_text(seconds), renderer_.name()),
                        json);
     }
 

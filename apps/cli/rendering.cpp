@@ -1,7 +1,5 @@
 #include "rendering.h"
 
-#include "filigree/mesh/up_axis.h"
-
 #include <utility>
 
 #include <fmt/format.h>
@@ -46,7 +44,7 @@ std::unique_ptr<Subject> Rendering::read(const std::string& path) {
     subject->materials = load_materials(subject->mesh, path, session_);
     if (subject->mesh.vertex_count() == 0)
         throw Failure{{ErrorCode::unsuitable, path + ": has no vertices, so there is nothing to draw."}};
-    if (!std::exchange(up_known_, true)) up_ = options_.up.value_or(find_up_axis(subject->mesh, usual_up_axis(path)));
+    if (!std::exchange(up_known_, true)) up_ = up_of(options_.up, subject->mesh, path);
     choose_scalars(*subject, path);
     return subject;
 }
@@ -165,13 +163,8 @@ Camera Rendering::camera_for(std::span<const CameraPoints> points, double aspect
 }
 
 Json Rendering::summary(const PictureSize& size, std::size_t frames) const {
-    return {{"output", options_.output},
-            {"width", size.width},
-            {"height", size.height},
-            {"frames", frames},
-            {"triangles", triangles_},
-            {"points", points_},
-            {"renderer", stage_.renderer_name()}};
+    return {{"output", options_.output}, {"width", size.width}, {"height", size.height},       {"frames", frames},
+            {"triangles", triangles_},   {"points", points_},   {"renderer", renderer_.name()}};
 }
 
 } // namespace filigree::cli

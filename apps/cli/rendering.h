@@ -1,8 +1,8 @@
 // Meshes and models as `filigree render` draws them: read, coloured, posed, put into a scene.
 #pragma once
 
+#include "pictures.h"
 #include "restore_options.h"
-#include "stage.h"
 
 #include "filigree/present/film_extent.h"
 #include "filigree/present/page.h"
@@ -66,7 +66,7 @@ struct Subject {
 /// What stills and films share.
 class Rendering {
 public:
-    Rendering(const RenderOptions& options, Session& session) : options_(options), session_(session), stage_(session) {
+    Rendering(const RenderOptions& options, Session& session) : options_(options), session_(session) {
         if (!options.against.empty()) against_ = session.read_mesh(options.against);
     }
 
@@ -91,7 +91,7 @@ protected:
 
     const RenderOptions& options_;
     Session& session_;
-    Stage stage_;
+    HeadlessRenderer renderer_ = require(HeadlessRenderer::create());
     std::optional<Mesh> against_;
     UpAxis up_ = UpAxis::y; ///< as asked for, else as the first file has it
     bool up_known_ = false;

@@ -1,6 +1,6 @@
 #include "commands.h"
+#include "pictures.h"
 #include "session.h"
-#include "stage.h"
 
 #include "filigree/sample/frustum.h"
 #include "filigree/sample/inside_test.h"
@@ -25,7 +25,7 @@ struct SampleArguments {
     InsideOptions inside;
     Pattern pattern = Pattern::lattice;
     std::uint64_t seed = 1;
-    UpAxis up = UpAxis::y;
+    std::optional<UpAxis> up;
 };
 
 const char* method_name(InsideMethod method) {
@@ -76,7 +76,7 @@ std::vector<Vec3d> points_in_view(const Mesh& mesh, const SampleArguments& optio
 void draw_points(const Mesh& mesh, const std::vector<Vec3f>& points, double spacing, UpAxis up, const std::string& path,
                  Session& session) {
     const RunContext& context = session.context();
-    Stage stage(session);
+    HeadlessRenderer renderer = require(HeadlessRenderer::create());
     const Drawable surface = require(Drawable::surface(mesh, {}, context));
     Scene scene;
     const Vec3d direction = view_direction(View::iso, up), axis = up_vector(up);
@@ -94,10 +94,8 @@ void draw_points(const Mesh& mesh, const std::vector<Vec3f>& points, double spac
         scene.objects.push_back({&*balls, blue});
     }
     scene.up = up;
-    const CameraPoints all{mesh.positions, mesh.origin};
-    const Camera camera = fit_camera(std::span(&all, 1), direction, axis, 4.0 / 3);
-    session.begin_writing(path);
-    write_picture(stage.take(scene, camera, {.width = 1280, .height = 960}), path, session);
+    write_picture_of(scene, camera_for(mesh, View::iso, up, 4.0 / 3), {.width = 1280, .height = 960}, path, renderer,
+                     session);
 }
 
 /// Points inside, and how they were found.
@@ -178,8 +176,7 @@ void check(const SampleArguments& options) {
         throw Failure{{ErrorCode::usage, "Say how many points: --spacing S, --count N, or --frustum NX NY NZ."}};
     if (!options.frustum.empty() && options.pattern != Pattern::lattice)
         throw Failure{{ErrorCode::usage, "--pattern spreads the points of a lattice; leave --frustum out."}};
-    if (!options.picture.empty() && !options.picture.ends_with(".png"))
-        throw Failure{{ErrorCode::unsupported, options.picture + ": the picture is a PNG; let its name end in .png."}};
+    if (!options.picture.empty()) check_png_path(options.picture);
 }
 
 void run(SampleArguments options, Session& session) {
@@ -197,7 +194,8 @@ void run(SampleArguments options, Session& session) {
     for (const Vec3d& p : found.points) cloud.positions.push_back(p.cast<float>());
     session.write_mesh(cloud, options.output);
     if (!options.picture.empty())
-        draw_points(mesh, cloud.positions, found.spacing, options.up, options.picture, session);
+        draw_points(mesh, cloud.positions, found.spacing, up_of(options.up, mesh, options.input), options.picture,
+                    session);
     session.print(make_report(found, options.output));
 }
 
@@ -254,7 +252,7 @@ Command sample_command() {
                        OptionList{Option("--picture", options->picture,
                                          "Also draw the points, and the surface cut open (.png)")
                                       .is_written(),
-                                  up_option(options->up, "Which axis is up in the picture (unset: y)")},
+                                  found_up_option(options->up)},
             .examples = "  filigree sample scan.ply -o points.ply --count 100000\n"
                         "  filigree sample cube.obj -o points.ply --spacing 0.02 --picture points.png\n"
                         "  filigree sample open.obj -o points.ply --count 20000 --pattern poisson",

@@ -1,9 +1,12 @@
 #include "animation_output.h"
 #include "commands.h"
-#include "output_folder.h"
-#include "stage.h"
+#include "pictures.h"
+#include "simulate_report.h"
 
+#include "filigree/io/extension.h"
 #include "filigree/io/file.h"
+#include "filigree/io/numbered_name.h"
+#include "filigree/io/point_cache.h"
 #include "filigree/present/scene_film.h"
 #include "filigree/scene/scene_keys.h"
 #include "filigree/scene/scene_run.h"
@@ -43,7 +46,7 @@ struct Outputs {
                 throw Failure{{ErrorCode::unwritable, path + ": cannot be written: there is no such folder."}};
             if (is_folder)
                 folders.push_back(path);
-            else if (lower_ending(path) == ".fil")
+            else if (lower_extension(path) == ".fil")
                 models.push_back(path);
             else if (is_film_path(path))
                 films.push_back(path);
@@ -74,15 +77,9 @@ bool is_one_file(const fs::path& a, const fs::path& b) {
     return fs::weakly_canonical(fs::absolute(a), failed) == fs::weakly_canonical(fs::absolute(b), failed) && !failed;
 }
 
-/// Whether `file` lies in `folder` and its name is digits between `before` and `after`.
-bool is_numbered(const fs::path& file, const fs::path& folder, const std::string& before, const std::string& after) {
-    const std::string name = file.filename().string();
-    if (name.size() <= before.size() + after.size() || !name.starts_with(before) || !name.ends_with(after))
-        return false;
-    const std::string_view number =
-        std::string_view(name).substr(before.size(), name.size() - before.size() - after.size());
-    return number.find_first_not_of("0123456789") == std::string_view::npos &&
-           is_one_file(file.parent_path() / ".", folder / ".");
+/// "BODY_0001.ply" and so on.
+NumberedName mesh_names(const fs::path& folder, const std::string& body) {
+    return {folder.has_filename() ? folder : folder.parent_path(), body + "_", ".ply"};
 }
 
 /// Refuses outputs that would go over what the run reads, or over each other.
@@ -104,17 +101,14 @@ void check_places(const SimulateArguments& options, const SceneFile& scene, cons
     if (!options.resume.empty()) taken.emplace_back(options.resume, "the state to go on from"); // may be saved over
     for (const std::string& path : outputs.models)
         for (const SceneBody& body : scene.bodies) take(model_path(path, scene.bodies.size(), body.name), "an output");
-    const auto take_numbered = [&](const std::string& path, const fs::path& folder, const std::string& before,
-                                   const std::string& after) {
+    const auto take_numbered = [&](const std::string& path, const NumberedName& name) {
         for (const auto& [file, is] : taken)
-            if (is_numbered(file, folder, before, after))
+            if (name.number_of(file.filename().string()) && is_one_file(file.parent_path() / ".", name.folder / "."))
                 refuse(fmt::format("{}: {} is {} and would be overwritten.", path, file.string(), is));
     };
     for (const std::string& path : outputs.films) {
-        const std::string name = fs::path(path).filename().string();
-        const std::size_t from = name.find('%'), until = name.find('d', std::min(from, name.size()));
-        if (lower_ending(path) == ".png" && until != std::string::npos)
-            take_numbered(path, fs::path(path).parent_path(), name.substr(0, from), name.substr(until + 1));
+        if (const auto name = printf_numbered_name(path); name && lower_extension(path) == ".png")
+            take_numbered(path, *name);
         take(path, "an output");
     }
     for (const std::string& path : outputs.animations)
@@ -124,7 +118,7 @@ void check_places(const SimulateArguments& options, const SceneFile& scene, cons
             take(place, "an output");
         }
     for (const std::string& path : outputs.folders) {
-        for (const SceneBody& body : scene.bodies) take_numbered(path, path, body.name + "_", ".ply");
+        for (const SceneBody& body : scene.bodies) take_numbered(path, mesh_names(path, body.name));
         take(path, "an output");
     }
 }
@@ -178,10 +172,6 @@ public:
     void report() const;
 
 private:
-    void report_bodies(Table& table, Json& json) const;
-    void report_frames(Table& table, Json& json) const;
-    void report_checks(Table& table, Json& json) const;
-
     void write_animations() {
         for (const std::string& path : outputs_.animations)
             for (std::size_t b = 0; b < ready_.bodies.size(); ++b) {
@@ -217,23 +207,18 @@ private:
                                                          run_->frame(), scene_.frames, options_.save)}};
     }
 
-    /// A mesh a frame and body.
+    /// A mesh a frame and body: all of a folder or none.
     void write_meshes() {
+        const RunContext silent = session_.silent_context();
         for (const std::string& path : outputs_.folders) {
-            OutputFolder folder(path, options_.scene);
-            std::vector<std::vector<std::string>> files(ready_.bodies.size());
-            for (std::size_t b = 0; b < files.size(); ++b)
-                for (std::size_t frame = 0; frame < run_->recording().poses[b].frames.size(); ++frame)
-                    files[b].push_back(folder.file(fmt::format("{}_{:04}.ply", ready_.bodies[b].name, frame + 1)));
-            RunContext silent = session_.context();
-            silent.progress = nullptr;
-            for (std::size_t frame = 0; frame < files[0].size(); ++frame) {
-                session_.context().report("writing meshes", double(frame) / double(files[0].size()));
-                for (std::size_t b = 0; b < files.size(); ++b)
-                    session_.write_mesh(require(run_->mesh(b, frame, silent)), files[b][frame]);
-            }
-            session_.context().report("writing meshes", 1);
-            folder.keep();
+            std::vector<NumberedMeshes> parts;
+            for (std::size_t b = 0; b < ready_.bodies.size(); ++b)
+                parts.push_back({mesh_names(path, ready_.bodies[b].name),
+                                 [&, b](std::size_t frame) { return run_->mesh(b, frame, silent); }});
+            session_.begin_writing(path);
+            const std::size_t frames = run_->recording().poses[0].frames.size();
+            for (const std::string& warning : require(write_numbered_meshes(frames, parts, session_.context())))
+                session_.warn(warning);
         }
     }
 
@@ -250,122 +235,19 @@ private:
     double film_seconds_ = 0, write_seconds_ = 0;
 };
 
-Json energy_json(const Energy& energy) {
-    return {{"kinetic", energy.kinetic}, {"elastic", energy.elastic}, {"potential", energy.potential}};
-}
-
-std::string energy_text(const Energy& e) {
-    return fmt::format("{:.4g} J  (kinetic {:.4g}, elastic {:.4g}, potential {:.4g})", e.total(), e.kinetic, e.elastic,
-                       e.potential);
-}
-
-void Run::report_bodies(Table& table, Json& json) const {
-    for (std::size_t b = 0; b < ready_.bodies.size(); ++b) {
-        const ReadyBody& body = ready_.bodies[b];
-        const std::size_t elements = body.body->cells.cells.size(), vertices = body.model.mesh.vertex_count(),
-                          driver = body.model.driver().vertices.size();
-        table.row(body.name,
-                  fmt::format("{} particles, {} cells of {:.3g} m; {:.4g} kg, {:.4g} m^3; {} vertices by a "
-                              "driver of {}",
-                              with_commas(body.body->particle_count()), with_commas(elements), body.body->spacing(),
-                              body.report.mass, body.report.cells.volume, with_commas(vertices), with_commas(driver)));
-        json["bodies"].push_back({{"name", body.name},
-                                  {"particles", body.body->particle_count()},
-                                  {"elements", elements},
-                                  {"spacing_m", body.body->spacing()},
-                                  {"mass_kg", body.report.mass},
-                                  {"volume_m3", body.report.cells.volume},
-                                  {"thin_cells", body.report.cells.thin_cells},
-                                  {"loose_parts", body.report.cells.loose_parts},
-                                  {"vertices", vertices},
-                                  {"driver_vertices", driver}});
-    }
-}
-
-void Run::report_frames(Table& table, Json& json) const {
-    const RunTotals& t = run_->recording().totals;
-    const RunTimes& times = run_->times();
-    const double frames = double(std::max<std::uint64_t>(t.frames, 1));
-    const Energy end = run_->energy();
-    const auto ms = [&](double seconds) { return 1e3 * seconds / double(std::max<std::uint64_t>(times.frames, 1)); };
-    table.row("frames",
-              fmt::format("{} of {}, at {} a second", t.frames, scene_.frames, scene_.step.frames_per_second));
-    const std::uint64_t least = t.frames ? t.least_substeps : 0;
-    table.row("substeps",
-              fmt::format("{} to {} a frame, {:.3g} on average; {} frames explicit, {} by descent", least,
-                          t.most_substeps, double(t.substeps) / frames, t.explicit_frames, t.descent_frames));
-    const double seconds = times.elastic + times.contact + times.other;
-    table.row("time a frame", fmt::format("{:.3g} ms elastic, {:.3g} contacts, {:.3g} other, {:.3g} driver, {:.3g} "
-                                          "restore: {:.3g} in all",
-                                          ms(times.elastic), ms(times.contact), ms(times.other), ms(times.coupling),
-                                          ms(times.restore), ms(seconds + times.coupling + times.restore)));
-    table.row("cells",
-              fmt::format("{:.3g} of their volume at least, stretched {:.3g} times at most{}", t.least_volume_ratio,
-                          t.most_stretch, t.least_volume_ratio <= 0 ? "; some were inside out" : ""));
-    table.row("contacts",
-              fmt::format("{} points at most, {:.3g} m deep at most", with_commas(t.most_contacts), t.deepest_contact));
-    table.row("energy at the start", energy_text(t.start));
-    table.row("and at the end", energy_text(end));
-    if (t.clamped_particles) table.row("clamped", with_commas(t.clamped_particles) + " motions of particles");
-    json["frames"] = t.frames;
-    json["frames_per_second"] = scene_.step.frames_per_second;
-    json["explicit_frames"] = t.explicit_frames;
-    json["descent_frames"] = t.descent_frames;
-    json["substeps"] = {{"min", least}, {"mean", double(t.substeps) / frames}, {"max", t.most_substeps}};
-    json["ms_a_frame"] = {{"elastic", ms(times.elastic)},
-                          {"contacts", ms(times.contact)},
-                          {"other", ms(times.other)},
-                          {"driver", ms(times.coupling)},
-                          {"restore", ms(times.restore)}};
-    json["least_volume_ratio"] = t.least_volume_ratio;
-    json["most_stretch"] = t.most_stretch;
-    json["most_contacts"] = t.most_contacts;
-    json["deepest_contact_m"] = t.deepest_contact;
-    json["clamped_particles"] = t.clamped_particles;
-    json["energy_start"] = energy_json(t.start);
-    json["energy_end"] = energy_json(end);
-}
-
-void Run::report_checks(Table& table, Json& json) const {
-    const RunTimes& times = run_->times();
-    const double frames = double(std::max<std::uint64_t>(run_->frame(), 1));
-    const std::vector<CheckTotals>& checks = run_->recording().checks;
-    for (std::size_t b = 0; b < checks.size(); ++b) {
-        const CheckTotals& check = checks[b];
-        table.row(ready_.bodies[b].name + ", restored",
-                  fmt::format("rms {:.2e} of the diagonal from all attached (worst frame {:.2e}, worst vertex {:.2e}); "
-                              "95 % of normals within {:.3g} degrees (worst frame {:.3g})",
-                              check.rms_sum / frames, check.worst_rms, check.worst_max, check.p95_sum / frames,
-                              check.worst_p95));
-        json["bodies"].at(b)["check"] = {{"rms_mean", check.rms_sum / frames},
-                                         {"rms_worst", check.worst_rms},
-                                         {"max_worst", check.worst_max},
-                                         {"normal_p95_deg_mean", check.p95_sum / frames},
-                                         {"normal_p95_deg_worst", check.worst_p95}};
-    }
-    if (!checks.empty() && times.frames) {
-        const double ratio = times.direct / (times.coupling + times.restore);
-        table.row("attached directly", fmt::format("{:.3g} ms a frame: {:.3g} times the driver and the restore",
-                                                   1e3 * times.direct / double(times.frames), ratio));
-        json["direct_ms_a_frame"] = 1e3 * times.direct / double(times.frames);
-        json["direct_ratio"] = ratio;
-    }
-}
-
 void Run::report() const {
-    Table table;
-    Json json = {{"scene", options_.scene}, {"outputs", options_.outputs}, {"bodies", Json::array()}};
-    table.row("scene", options_.scene);
-    report_bodies(table, json);
-    report_frames(table, json);
-    report_checks(table, json);
+    Report report;
+    report.add("scene", options_.scene, "scene", options_.scene);
+    report.set("outputs", options_.outputs);
+    report_run(scene_, ready_, *run_, report);
     if (!options_.outputs.empty())
-        table.row("written", fmt::format("{} in {}", fmt::join(options_.outputs, ", "), seconds_text(write_seconds_)));
-    if (!options_.save.empty()) table.row("state", options_.save);
-    json["write_seconds"] = write_seconds_;
-    json["film_seconds"] = film_seconds_;
-    if (!animations_.empty()) json["animations"] = animations_;
-    session_.print(table.text() + animation_rows_.text(), json);
+        report.row("written", fmt::format("{} in {}", fmt::join(options_.outputs, ", "), seconds_text(write_seconds_)));
+    if (!options_.save.empty()) report.row("state", options_.save);
+    report.set("write_seconds", write_seconds_);
+    report.set("film_seconds", film_seconds_);
+    if (!animations_.empty()) report.set("animations", animations_);
+    report.say(animation_rows_.text());
+    session_.print(report);
 }
 
 void check(const SimulateArguments& options, const Session& session) {

@@ -50,6 +50,20 @@ const std::string kBody = "[[body]]\nshape = \"bar\"\n"; // two lines
 
 } // namespace
 
+TEST_F(Simulate, SaysWhyFramesWereMadeByDescent) {
+    const auto causes = [&](const std::string& mode) {
+        std::string scene = kDrop;
+        write("causes.toml", scene.insert(scene.find("frames"), mode));
+        const std::string said = run({"simulate", "causes.toml", "--check"}).out;
+        EXPECT_EQ(said.find("frames by descent") != std::string::npos, !mode.empty()) << said;
+        const Json counts = this->json(words("causes.toml", {"--check"})).at("descent_causes");
+        return std::vector<int>{counts.at("chosen"), counts.at("too_many_substeps"), counts.at("not_finite")};
+    };
+    EXPECT_EQ(causes(""), (std::vector<int>{0, 0, 0}));
+    EXPECT_EQ(causes("mode = \"descent\"\n"), (std::vector<int>{6, 0, 0}));
+    EXPECT_EQ(causes("most_substeps = 1\n"), (std::vector<int>{0, 6, 0}));
+}
+
 TEST_F(Simulate, ACubeFallsAndItsPosesPlay) {
     const Json json = this->json(words("drop.toml", {"-o", "drop.fil"}));
     EXPECT_EQ(json["frames"], 6);

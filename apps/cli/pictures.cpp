@@ -1,24 +1,20 @@
-#include "stage.h"
+#include "pictures.h"
 
 #include "filigree/core/color.h"
 #include "filigree/io/file.h"
+#include "filigree/mesh/up_axis.h"
 
-#include <algorithm>
-#include <cctype>
 #include <filesystem>
 
 namespace filigree::cli {
 
-Stage::Stage(Session& session)
-    : session_(session), gl_(require(HeadlessContext::create())), renderer_(require(Renderer::create())) {}
+namespace {
 
-Picture Stage::take(const Scene& scene, const Camera& camera, const PictureOptions& options) {
-    return require(renderer_.picture(scene, camera, options, session_.context()));
-}
+const std::vector<std::pair<std::string, UpAxis>> kUpAxes = {{"x", UpAxis::x}, {"y", UpAxis::y}, {"z", UpAxis::z}};
 
-Option up_option(UpAxis& up, const std::string& text) {
-    return choice<UpAxis>("--up", up, {{"x", UpAxis::x}, {"y", UpAxis::y}, {"z", UpAxis::z}}, text);
-}
+} // namespace
+
+Option up_option(UpAxis& up, const std::string& text) { return choice<UpAxis>("--up", up, kUpAxes, text); }
 
 Option view_option(View& view, const std::string& text) {
     return choice<View>("--view", view,
@@ -37,23 +33,25 @@ Vec3f parse_color(const std::string& text, const std::string& option) {
 }
 
 Option found_up_option(std::optional<UpAxis>& up) {
-    return choice<UpAxis>("--up", up, {{"x", UpAxis::x}, {"y", UpAxis::y}, {"z", UpAxis::z}},
+    return choice<UpAxis>("--up", up, kUpAxes,
                           "Which axis is up (unset: by the mesh's flat base, else z for STL and y for all others)");
+}
+
+UpAxis up_of(const std::optional<UpAxis>& asked, const Mesh& mesh, const std::string& path) {
+    return asked.value_or(find_up_axis(mesh, usual_up_axis(path)));
+}
+
+Camera camera_for(const Mesh& mesh, View view, UpAxis up, double aspect, double point_radius) {
+    const CameraPoints points{mesh.positions, mesh.origin, point_radius};
+    return fit_camera(std::span(&points, 1), view_direction(view, up), up_vector(up), aspect);
 }
 
 std::string file_name(const std::string& path) {
     return path == "-" ? "standard input" : std::filesystem::path(path).filename().string();
 }
 
-std::string lower_ending(const std::string& path) {
-    std::string ending = std::filesystem::path(path).extension().string();
-    std::transform(ending.begin(), ending.end(), ending.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    return ending;
-}
-
 void check_picture_path(const std::string& path) {
-    const std::string ending = lower_ending(path);
+    const std::string ending = lower_extension(path);
     if (ending != ".png" && ending != ".svg" && ending != ".pdf")
         throw Failure{{ErrorCode::unsupported, path + ": is no picture's name; let it end in .png, .svg or .pdf."}};
     std::error_code ignored;
@@ -62,9 +60,22 @@ void check_picture_path(const std::string& path) {
         throw Failure{{ErrorCode::unwritable, path + ": cannot be written: there is no such folder."}};
 }
 
+void check_png_path(const std::string& path) {
+    if (lower_extension(path) != ".png")
+        refuse(ErrorCode::unsupported, path + ": the picture is a PNG; let its name end in .png.");
+    check_picture_path(path);
+}
+
 void write_picture(const Picture& picture, const std::string& path, Session& session) {
     if (session.context().is_cancelled()) throw Failure{cancelled_error()};
     require(write_file(path, encode_png(picture)));
+}
+
+void write_picture_of(const Scene& scene, const Camera& camera, const PictureOptions& options, const std::string& path,
+                      HeadlessRenderer& renderer, Session& session) {
+    const Picture picture = require(renderer.picture(scene, camera, options, session.context()));
+    session.begin_writing(path);
+    write_picture(picture, path, session);
 }
 
 } // namespace filigree::cli

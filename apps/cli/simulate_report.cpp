@@ -1,0 +1,146 @@
+#include "simulate_report.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+namespace filigree::cli {
+
+namespace {
+
+Json energy_json(const Energy& energy) {
+    return {{"kinetic", energy.kinetic}, {"elastic", energy.elastic}, {"potential", energy.potential}};
+}
+
+std::string energy_text(const Energy& e) {
+    return fmt::format("{:.4g} J  (kinetic {:.4g}, elastic {:.4g}, potential {:.4g})", e.total(), e.kinetic, e.elastic,
+                       e.potential);
+}
+
+Json body_json(const ReadyBody& body) {
+    return {{"name", body.name},
+            {"particles", body.body->particle_count()},
+            {"elements", body.body->cells.cells.size()},
+            {"spacing_m", body.body->spacing()},
+            {"mass_kg", body.report.mass},
+            {"volume_m3", body.report.cells.volume},
+            {"thin_cells", body.report.cells.thin_cells},
+            {"loose_parts", body.report.cells.loose_parts},
+            {"vertices", body.model.mesh.vertex_count()},
+            {"driver_vertices", body.model.driver().vertices.size()}};
+}
+
+void report_body(const ReadyBody& body, Report& report) {
+    report.row(body.name,
+               fmt::format("{} particles, {} cells of {:.3g} m; {:.4g} kg, {:.4g} m^3; {} vertices by a driver of {}",
+                           with_commas(body.body->particle_count()), with_commas(body.body->cells.cells.size()),
+                           body.body->spacing(), body.report.mass, body.report.cells.volume,
+                           with_commas(body.model.mesh.vertex_count()),
+                           with_commas(body.model.driver().vertices.size())));
+    report.set("bodies").push_back(body_json(body));
+}
+
+/// Why descent took over, where it did.
+void report_descent(const DescentCauses& causes, Report& report) {
+    std::vector<std::string> reasons;
+    const auto add = [&](std::uint64_t frames, const char* reason) {
+        if (frames > 0) reasons.push_back(fmt::format("{} {}", with_commas(frames), reason));
+    };
+    add(causes.chosen, "because the scene says so");
+    add(causes.too_many_substeps, "that would have taken too many substeps");
+    add(causes.not_finite, "that came to no finite numbers and were done again");
+    if (!reasons.empty()) report.row("frames by descent", fmt::format("{}", fmt::join(reasons, ", ")));
+    report.set("descent_causes", {{"chosen", causes.chosen},
+                                  {"too_many_substeps", causes.too_many_substeps},
+                                  {"not_finite", causes.not_finite}});
+}
+
+/// A frame's milliseconds, on average.
+void report_times(const RunTimes& times, Report& report) {
+    const auto ms = [&](double seconds) { return 1e3 * seconds / double(std::max<std::uint64_t>(times.frames, 1)); };
+    const double all = times.elastic + times.contact + times.other + times.coupling + times.restore;
+    report.add("time a frame",
+               fmt::format("{:.3g} ms elastic, {:.3g} contacts, {:.3g} other, {:.3g} driver, {:.3g} restore: {:.3g} "
+                           "in all",
+                           ms(times.elastic), ms(times.contact), ms(times.other), ms(times.coupling), ms(times.restore),
+                           ms(all)),
+               "ms_a_frame",
+               {{"elastic", ms(times.elastic)},
+                {"contacts", ms(times.contact)},
+                {"other", ms(times.other)},
+                {"driver", ms(times.coupling)},
+                {"restore", ms(times.restore)}});
+}
+
+void report_totals(const RunTotals& t, Report& report) {
+    report.row("cells",
+               fmt::format("{:.3g} of their volume at least, stretched {:.3g} times at most{}", t.least_volume_ratio,
+                           t.most_stretch, t.least_volume_ratio <= 0 ? "; some were inside out" : ""));
+    report.set("least_volume_ratio", t.least_volume_ratio);
+    report.set("most_stretch", t.most_stretch);
+    report.row("contacts", fmt::format("{} points at most, {:.3g} m deep at most", with_commas(t.most_contacts),
+                                       t.deepest_contact));
+    report.set("most_contacts", t.most_contacts);
+    report.set("deepest_contact_m", t.deepest_contact);
+}
+
+void report_frames(const SceneFile& scene, const SceneRun& run, Report& report) {
+    const RunTotals& t = run.recording().totals;
+    const double mean = double(t.substeps) / double(std::max<std::uint64_t>(t.frames, 1));
+    const std::uint64_t least = t.frames ? t.least_substeps : 0;
+    report.add("frames", fmt::format("{} of {}, at {} a second", t.frames, scene.frames, scene.step.frames_per_second),
+               "frames", t.frames);
+    report.set("frames_per_second", scene.step.frames_per_second);
+    report.set("explicit_frames", t.explicit_frames);
+    report.set("descent_frames", t.descent_frames);
+    report.add("substeps",
+               fmt::format("{} to {} a frame, {:.3g} on average; {} frames explicit, {} by descent", least,
+                           t.most_substeps, mean, t.explicit_frames, t.descent_frames),
+               "substeps", {{"min", least}, {"mean", mean}, {"max", t.most_substeps}});
+    report_descent(run.descent_causes(), report);
+    report_times(run.times(), report);
+    report_totals(t, report);
+    const Energy end = run.energy();
+    report.add("energy at the start", energy_text(t.start), "energy_start", energy_json(t.start));
+    report.add("and at the end", energy_text(end), "energy_end", energy_json(end));
+    if (t.clamped_particles) report.row("clamped", with_commas(t.clamped_particles) + " motions of particles");
+    report.set("clamped_particles", t.clamped_particles);
+}
+
+void report_checks(const ReadyScene& ready, const SceneRun& run, Report& report) {
+    const RunTimes& times = run.times();
+    const double frames = double(std::max<std::uint64_t>(run.frame(), 1));
+    const std::vector<CheckTotals>& checks = run.recording().checks;
+    for (std::size_t b = 0; b < checks.size(); ++b) {
+        const CheckTotals& check = checks[b];
+        report.row(
+            ready.bodies[b].name + ", restored",
+            fmt::format("rms {:.2e} of the diagonal from all attached (worst frame {:.2e}, worst vertex {:.2e}); "
+                        "95 % of normals within {:.3g} degrees (worst frame {:.3g})",
+                        check.rms_sum / frames, check.worst_rms, check.worst_max, check.p95_sum / frames,
+                        check.worst_p95));
+        report.set("bodies").at(b)["check"] = {{"rms_mean", check.rms_sum / frames},
+                                               {"rms_worst", check.worst_rms},
+                                               {"max_worst", check.worst_max},
+                                               {"normal_p95_deg_mean", check.p95_sum / frames},
+                                               {"normal_p95_deg_worst", check.worst_p95}};
+    }
+    if (checks.empty() || times.frames == 0) return;
+    const double direct = 1e3 * times.direct / double(times.frames);
+    const double ratio = times.direct / (times.coupling + times.restore);
+    report.add("attached directly",
+               fmt::format("{:.3g} ms a frame: {:.3g} times the driver and the restore", direct, ratio),
+               "direct_ms_a_frame", direct);
+    report.set("direct_ratio", ratio);
+}
+
+} // namespace
+
+void report_run(const SceneFile& scene, const ReadyScene& ready, const SceneRun& run, Report& report) {
+    report.set("bodies", Json::array());
+    for (const ReadyBody& body : ready.bodies) report_body(body, report);
+    report_frames(scene, run, report);
+    report_checks(ready, run, report);
+}
+
+} // namespace filigree::cli
