@@ -145,13 +145,12 @@ std::string given_animation_option(const Session& session) {
 bool is_animation_path(const std::string& path) { return animation_format(path).ok(); }
 
 void check_animation_path(const std::string& path) {
-    if (path == "-")
-        throw Failure{{ErrorCode::usage, "An animation cannot go to standard output; give -o a file or a folder."}};
+    if (path == "-") refuse("An animation cannot go to standard output; give -o a file or a folder.");
     const AnimationFormat format = require(animation_format(path));
     std::error_code ignored;
     const fs::path folder = fs::path(path).parent_path();
     if (format != AnimationFormat::numbered && !folder.empty() && !fs::is_directory(folder, ignored))
-        throw Failure{{ErrorCode::unwritable, path + ": cannot be written: there is no such folder."}};
+        refuse(ErrorCode::unwritable, path + ": cannot be written: there is no such folder.");
 }
 
 void check_animation_options(const std::vector<std::string>& paths, const Session& session) {
@@ -161,7 +160,7 @@ void check_animation_options(const std::vector<std::string>& paths, const Sessio
     };
     const std::string given = given_animation_option(session);
     if (!given.empty() && std::none_of(paths.begin(), paths.end(), is_glb))
-        throw Failure{{ErrorCode::usage, given + " belongs to an animation that goes to a .glb."}};
+        refuse(given + " belongs to an animation that goes to a .glb.");
 }
 
 void check_not_input(const std::string& output, const std::vector<std::string>& inputs) {
@@ -177,8 +176,7 @@ void check_not_input(const std::string& output, const std::vector<std::string>& 
     for (const fs::path& path : animation_files(numbered_path(output, inputs.front()))) {
         const auto file = file_of(path);
         if (file && taken.contains(*file))
-            throw Failure{{ErrorCode::usage,
-                           path.string() + ": is the input and would be overwritten; choose another place with -o."}};
+            refuse(path.string() + ": is the input and would be overwritten; choose another place with -o.");
     }
 }
 
@@ -194,7 +192,7 @@ PoseStream poses_of(const std::string& poses, const PoseFileOptions& options, co
     if (!poses.empty())
         return require(
             open_poses(poses, model.driver().vertices.size(), model.mesh.origin, options, session.context()));
-    if (!options.animation.empty()) throw Failure{{ErrorCode::usage, "--animation belongs to --poses."}};
+    if (!options.animation.empty()) refuse("--animation belongs to --poses.");
     own_pose(own, 1, model_path);
     PoseStream stream = stream_of(own);
     stream.frames_per_second = options.frames_per_second.value_or(own.frames_per_second);
@@ -239,8 +237,8 @@ void write_animation_output(const MeshAnimation& animation, const AnimationOutpu
     session.begin_writing(path);
     if (format == AnimationFormat::glb) {
         if (output.glb == GlbMotion::skin)
-            throw Failure{{ErrorCode::unsuitable, path + ": a skin needs a model ('filigree strip' makes one); leave "
-                                                         "out --as skin for morph targets."}};
+            refuse(ErrorCode::unsuitable, path + ": a skin needs a model ('filigree strip' makes one); leave "
+                                                 "out --as skin for morph targets.");
         MorphOptions options = output.morph;
         if (output.no_normals) options.normals = ExportNormals::leave;
         options.materials_beside = materials_beside;

@@ -89,9 +89,11 @@ void run(const CompareArguments& options, Session& session) {
     report.set("diagonal_units", distance.diagonal);
     report_distances(distance, report);
     if (!options.picture.empty()) {
+        const UpAxis up = up_of(options.up, a, options.a);
         draw_errors(a, b, Page::plain(file_name(options.a)) + " against " + Page::plain(file_name(options.b)), distance,
-                    up_of(options.up, a, options.a), options.picture, session);
-        report.add("picture", options.picture, "picture", options.picture);
+                    up, options.picture, session);
+        report.row("picture", options.picture);
+        report_picture(options.picture, up, report);
     }
     session.print(report);
 }

@@ -77,7 +77,6 @@ Mesh restore_pose(const Model& model, const Pose& pose, const DeformArguments& o
 bool is_model_path(const std::string& path) { return lower_extension(path) == ".fil"; }
 
 void check(const DeformArguments& options, const Session& session) {
-    const auto refuse = [](const std::string& sentence) { throw Failure{{ErrorCode::usage, sentence}}; };
     check_second_output("--pose", options.pose_output, options.output);
     if (options.steps.empty() == options.handles.empty())
         refuse("Say how to deform: one or more of --stretch, --squeeze, --bend, --twist, --taper and --random, or "
@@ -98,11 +97,10 @@ void check_poses_fit(std::size_t frames, std::size_t driver_vertices, const std:
     constexpr std::size_t kVertexBytes = sizeof(Vec3f) + sizeof(Mat3f), kMost = std::size_t{4} << 30;
     const double bytes = double(frames) * double(driver_vertices * kVertexBytes);
     if (bytes > double(kMost))
-        throw Failure{
-            {ErrorCode::usage,
-             fmt::format("{}: {} poses of {} vertices are {:.3g} GB, and a model's poses may be {:.3g}; ask "
-                         "for fewer --frames, or write a .pc2.",
-                         output, with_commas(frames), with_commas(driver_vertices), bytes / 1e9, double(kMost) / 1e9)}};
+        refuse(fmt::format("{}: {} poses of {} vertices are {:.3g} GB, and a model's poses may be {:.3g}; ask "
+                           "for fewer --frames, or write a .pc2.",
+                           output, with_commas(frames), with_commas(driver_vertices), bytes / 1e9,
+                           double(kMost) / 1e9));
 }
 
 /// The model itself, with the poses.
@@ -133,8 +131,8 @@ void animate_model(const Model& model, const DeformArguments& options, Session& 
 
 void animate_mesh(const Mesh& rest, const DeformArguments& options, Session& session, Report& report) {
     if (is_model_path(options.output))
-        throw Failure{{ErrorCode::usage, options.output + ": a model with poses comes from a model, and " +
-                                             options.input + " is a mesh; 'filigree strip' makes one of it."}};
+        refuse(options.output + ": a model with poses comes from a model, and " + options.input +
+               " is a mesh; 'filigree strip' makes one of it.");
     const Deformation deformation(options);
     const RunContext silent = session.silent_context();
     const MeshAnimation animation{&rest, options.frames, options.frames_per_second,
@@ -167,7 +165,7 @@ void deform_once(const DeformArguments& options, const Session::Content& content
     const double start = now_seconds();
     const auto* model = std::get_if<Model>(&content.value);
     if (!model && !options.pose_output.empty())
-        throw Failure{{ErrorCode::usage, "--pose writes a model's driver, and " + options.input + " is a mesh."}};
+        refuse("--pose writes a model's driver, and " + options.input + " is a mesh.");
     const Pose pose = model ? deformation.driver(*model, 1, session.context()) : Pose{};
     const Mesh mesh = model ? restore_pose(*model, pose, options, session.context())
                             : deformation.mesh(std::get<Mesh>(content.value), 1, session.context());

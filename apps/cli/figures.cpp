@@ -29,7 +29,7 @@ std::vector<FigureEntry> chosen_figures(const std::vector<std::string>& only) {
     for (const FigureEntry& figure : all) known += std::string(known.empty() ? "" : ", ") + figure.name;
     for (const std::string& name : only)
         if (std::none_of(all.begin(), all.end(), [&](const auto& f) { return f.name == name; }))
-            throw Failure{{ErrorCode::usage, fmt::format("There is no figure '{}'; --only takes {}.", name, known)}};
+            refuse(fmt::format("There is no figure '{}'; --only takes {}.", name, known));
     std::vector<FigureEntry> chosen;
     for (const FigureEntry& figure : all)
         if (std::find(only.begin(), only.end(), figure.name) != only.end()) chosen.push_back(figure);
@@ -49,7 +49,7 @@ std::optional<Mesh> read_scan(const FiguresArguments& options, Session& session)
     if (options.scan.empty()) return {};
     const Mesh mesh = session.read_mesh(options.scan);
     if (mesh.face_count() == 0)
-        throw Failure{{ErrorCode::unsuitable, options.scan + ": has no faces; give a scan with a surface."}};
+        refuse(ErrorCode::unsuitable, options.scan + ": has no faces; give a scan with a surface.");
     Mesh scan;
     scan.face_offsets = mesh.face_offsets;
     scan.corners = mesh.corners;

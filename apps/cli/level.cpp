@@ -16,7 +16,7 @@ Mesh ghost_points(const Model& model, const RunContext& context) {
     Mesh ghosts = driver_mesh(model);
     ghosts.positions = require(Restorer::create(model, {}, context)).rest_ghosts();
     if (ghosts.positions.empty())
-        throw Failure{{ErrorCode::unsuitable, "A reference model has no ghost points; strip with --code blend."}};
+        refuse(ErrorCode::unsuitable, "A reference model has no ghost points; strip with --code blend.");
     return ghosts;
 }
 
@@ -24,8 +24,8 @@ void run(const LevelOptions& options, Session& session) {
     check_second_output("--ghosts", options.ghosts, options.output);
     const Model model = session.read_model(options.model);
     if (options.level > model.finest_level())
-        throw Failure{{ErrorCode::usage, fmt::format("{} has levels 0 to {}; there is no level {}.", options.model,
-                                                     model.finest_level(), options.level)}};
+        refuse(fmt::format("{} has levels 0 to {}; there is no level {}.", options.model, model.finest_level(),
+                           options.level));
     const Mesh mesh = options.level == 0 ? driver_mesh(model) : level_mesh(model, options.level);
     const Mesh ghosts = options.ghosts.empty() ? Mesh() : ghost_points(model, session.context());
     session.write_mesh(mesh, options.output, options.model);

@@ -32,10 +32,10 @@ void refuse_to_overwrite_inputs(const OptionList& options) {
             for (const std::string& read : paths_of(input))
                 for (const std::string& written : paths_of(output))
                     if (input.file == Option::File::read && is_one_file(read, written))
-                        throw Failure{{ErrorCode::usage, written +
-                                                             ": is the input and would be overwritten; choose "
-                                                             "another place with " +
-                                                             name + "."}};
+                        refuse(written +
+                               ": is the input and would be overwritten; choose "
+                               "another place with " +
+                               name + ".");
     }
 }
 

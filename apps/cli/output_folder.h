@@ -20,8 +20,7 @@ public:
     explicit OutputFolder(std::filesystem::path path, const std::filesystem::path& input = {})
         : path_(std::move(path)), inputs_{input}, folders_(path_) {
         if (!folders_.are_there())
-            throw Failure{
-                {ErrorCode::unwritable, path_.string() + ": the folder cannot be made; choose another with -o."}};
+            refuse(ErrorCode::unwritable, path_.string() + ": the folder cannot be made; choose another with -o.");
     }
     ~OutputFolder() {
         std::error_code ignored;
@@ -44,8 +43,8 @@ public:
             return !input.empty() && std::filesystem::equivalent(file, input, failed) && !failed;
         };
         if (std::any_of(inputs_.begin(), inputs_.end(), is_one))
-            throw Failure{{ErrorCode::usage, file.string() + ": is the input and would be overwritten; choose another "
-                                                             "folder with -o."}};
+            refuse(file.string() + ": is the input and would be overwritten; choose another "
+                                   "folder with -o.");
         if (!std::filesystem::exists(file, failed)) new_files_.push_back(file);
         return file.string();
     }

@@ -29,7 +29,7 @@ SurfaceMaterials load_materials(const Mesh& mesh, const std::string& path, Sessi
 
 Vec3f parse_color(const std::string& text, const std::string& option) {
     if (const std::optional<Vec3f> color = filigree::parse_color(text)) return *color;
-    throw Failure{{ErrorCode::usage, option + ": '" + text + "' is no colour; write it as #rrggbb, such as #d04030."}};
+    refuse(option + ": '" + text + "' is no colour; write it as #rrggbb, such as #d04030.");
 }
 
 Option found_up_option(std::optional<UpAxis>& up) {
@@ -39,6 +39,11 @@ Option found_up_option(std::optional<UpAxis>& up) {
 
 UpAxis up_of(const std::optional<UpAxis>& asked, const Mesh& mesh, const std::string& path) {
     return asked.value_or(find_up_axis(mesh, usual_up_axis(path)));
+}
+
+void report_picture(const std::string& path, UpAxis up, Report& report) {
+    report.set("picture", path);
+    report.set("up", kUpAxes[std::size_t(up)].first);
 }
 
 Camera camera_for(const Mesh& mesh, View view, UpAxis up, double aspect, double point_radius) {
@@ -53,11 +58,11 @@ std::string file_name(const std::string& path) {
 void check_picture_path(const std::string& path) {
     const std::string ending = lower_extension(path);
     if (ending != ".png" && ending != ".svg" && ending != ".pdf")
-        throw Failure{{ErrorCode::unsupported, path + ": is no picture's name; let it end in .png, .svg or .pdf."}};
+        refuse(ErrorCode::unsupported, path + ": is no picture's name; let it end in .png, .svg or .pdf.");
     std::error_code ignored;
     const std::filesystem::path folder = std::filesystem::path(path).parent_path();
     if (!folder.empty() && !std::filesystem::is_directory(folder, ignored))
-        throw Failure{{ErrorCode::unwritable, path + ": cannot be written: there is no such folder."}};
+        refuse(ErrorCode::unwritable, path + ": cannot be written: there is no such folder.");
 }
 
 void check_png_path(const std::string& path) {

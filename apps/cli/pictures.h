@@ -19,6 +19,9 @@ Option found_up_option(std::optional<UpAxis>& up);
 /// As asked for, else as the mesh's flat base or the file's format has it.
 UpAxis up_of(const std::optional<UpAxis>& asked, const Mesh& mesh, const std::string& path);
 
+/// The picture that a command drew beside its work, and what is up in it.
+void report_picture(const std::string& path, UpAxis up, Report& report);
+
 /// Shows all of a mesh.
 Camera camera_for(const Mesh& mesh, View view, UpAxis up, double aspect, double point_radius = 0);
 

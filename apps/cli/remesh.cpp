@@ -195,12 +195,13 @@ void run(const RemeshArguments& options, Session& session) {
     session.write_mesh(result.mesh, options.output, options.input);
     if (!options.base.empty()) session.write_mesh(base_mesh(result), options.base);
     const double written = now_seconds();
-    if (!options.picture.empty()) draw_patches(result, up_of(options.up, mesh, options.input), options, session);
+    const UpAxis up = up_of(options.up, mesh, options.input);
+    if (!options.picture.empty()) draw_patches(result, up, options, session);
 
     Report report;
     report.set("output", options.output);
     if (!options.base.empty()) report.set("base", options.base);
-    if (!options.picture.empty()) report.set("picture", options.picture);
+    if (!options.picture.empty()) report_picture(options.picture, up, report);
     report_remesh(result, {read - start, remeshed - read, written - remeshed}, report);
     session.print(report);
 }

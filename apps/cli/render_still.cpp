@@ -28,10 +28,8 @@ struct PanelLayout {
         const double w = (page.width - legend - kGap * (columns - 1)) / columns;
         const double h = double(page.height) / rows - caption;
         if (w < 16 || h < 16)
-            throw Failure{
-                {ErrorCode::usage,
-                 fmt::format("--size: {} pictures with their captions do not fit into {}x{} pixels; make it larger.",
-                             count, page.width, page.height)}};
+            refuse(fmt::format("--size: {} pictures with their captions do not fit into {}x{} pixels; make it larger.",
+                               count, page.width, page.height));
         width = static_cast<unsigned>(w);
         height = static_cast<unsigned>(h);
     }

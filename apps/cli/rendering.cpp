@@ -43,7 +43,7 @@ std::unique_ptr<Subject> Rendering::read(const std::string& path) {
     }
     subject->materials = load_materials(subject->mesh, path, session_);
     if (subject->mesh.vertex_count() == 0)
-        throw Failure{{ErrorCode::unsuitable, path + ": has no vertices, so there is nothing to draw."}};
+        refuse(ErrorCode::unsuitable, path + ": has no vertices, so there is nothing to draw.");
     if (!std::exchange(up_known_, true)) up_ = up_of(options_.up, subject->mesh, path);
     choose_scalars(*subject, path);
     return subject;
@@ -76,8 +76,8 @@ void Rendering::choose_scalars(Subject& subject, const std::string& path) {
         if (subject.scalars.empty()) {
             std::string names = "error, strain, level";
             for (const VertexScalar& scalar : subject.mesh.scalars) names += ", " + scalar.name;
-            throw Failure{{ErrorCode::unsuitable,
-                           fmt::format("{}: has no vertex scalar '{}'; there are: {}.", path, name, names)}};
+            refuse(ErrorCode::unsuitable,
+                   fmt::format("{}: has no vertex scalar '{}'; there are: {}.", path, name, names));
         }
     }
 }

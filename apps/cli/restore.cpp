@@ -31,11 +31,10 @@ OptionList restore_options(RestoreOptions& options) {
 
 const Pose& own_pose(const PoseSequence& poses, std::size_t frame, const std::string& path) {
     if (poses.empty())
-        throw Failure{{ErrorCode::unsuitable,
-                       path + ": has no poses of its own; 'filigree simulate' makes them, --pose FILE names another."}};
+        refuse(ErrorCode::unsuitable,
+               path + ": has no poses of its own; 'filigree simulate' makes them, --pose FILE names another.");
     if (frame < 1 || frame > poses.frames.size())
-        throw Failure{{ErrorCode::usage,
-                       fmt::format("{}: has frames 1 to {}; there is no frame {}.", path, poses.frames.size(), frame)}};
+        refuse(fmt::format("{}: has frames 1 to {}; there is no frame {}.", path, poses.frames.size(), frame));
     return poses.frames[frame - 1];
 }
 
@@ -59,7 +58,6 @@ std::string animation_place(const std::string& output) {
 }
 
 void check(const RestoreArguments& options, const Session& session) {
-    const auto refuse = [](const std::string& sentence) { throw Failure{{ErrorCode::usage, sentence}}; };
     if (!options.pose.empty() + !options.poses.empty() + (options.frame > 0) + options.all_frames != 1)
         refuse("Say what moved the driver: --pose FILE for a mesh, --poses FILE for an animation, or for a model that "
                "holds poses --frame N or --frames.");

@@ -173,9 +173,9 @@ Report make_report(const Found& found, const std::string& output) {
 
 void check(const SampleArguments& options) {
     if (!(options.spacing > 0) && !options.count && options.frustum.empty())
-        throw Failure{{ErrorCode::usage, "Say how many points: --spacing S, --count N, or --frustum NX NY NZ."}};
+        refuse("Say how many points: --spacing S, --count N, or --frustum NX NY NZ.");
     if (!options.frustum.empty() && options.pattern != Pattern::lattice)
-        throw Failure{{ErrorCode::usage, "--pattern spreads the points of a lattice; leave --frustum out."}};
+        refuse("--pattern spreads the points of a lattice; leave --frustum out.");
     if (!options.picture.empty()) check_png_path(options.picture);
 }
 
@@ -193,10 +193,13 @@ void run(SampleArguments options, Session& session) {
     cloud.positions.reserve(found.points.size());
     for (const Vec3d& p : found.points) cloud.positions.push_back(p.cast<float>());
     session.write_mesh(cloud, options.output);
-    if (!options.picture.empty())
-        draw_points(mesh, cloud.positions, found.spacing, up_of(options.up, mesh, options.input), options.picture,
-                    session);
-    session.print(make_report(found, options.output));
+    Report report = make_report(found, options.output);
+    if (!options.picture.empty()) {
+        const UpAxis up = up_of(options.up, mesh, options.input);
+        draw_points(mesh, cloud.positions, found.spacing, up, options.picture, session);
+        report_picture(options.picture, up, report);
+    }
+    session.print(report);
 }
 
 OptionList point_options(SampleArguments& options) {

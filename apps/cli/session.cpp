@@ -139,8 +139,8 @@ Mesh Session::parse_mesh(const std::string& bytes, const std::string& path) {
 Mesh Session::read_mesh(const std::string& path) {
     const std::string bytes = read_bytes(path);
     if (is_model_file(bytes))
-        throw Failure{{ErrorCode::bad_file, shown_name(path) + ": is a model where a mesh belongs; "
-                                                               "'filigree level MODEL 0 -o MESH' writes its driver."}};
+        refuse(ErrorCode::bad_file, shown_name(path) + ": is a model where a mesh belongs; "
+                                                       "'filigree level MODEL 0 -o MESH' writes its driver.");
     return parse_mesh(bytes, path);
 }
 
@@ -175,8 +175,8 @@ void Session::begin_writing(const std::string& path) {
 
 void Session::write_mesh(const Mesh& mesh, const std::string& path, const std::string& source) {
     if (const std::string wrong = check_mesh(mesh); !wrong.empty())
-        throw Failure{{ErrorCode::unsuitable, path + ": not written: the result is beyond what numbers can hold (" +
-                                                  wrong + "); deform less."}};
+        refuse(ErrorCode::unsuitable,
+               path + ": not written: the result is beyond what numbers can hold (" + wrong + "); deform less.");
     begin_writing(path);
     WriteMeshOptions options;
     if (source != "-") options.materials_beside = source;
@@ -196,15 +196,15 @@ void Session::print(const std::string& text, Json object) {
     const std::string shown = json ? object.text() + "\n" : text;
     if (standard_output_taken_) return write_text(shown);
     if (std::fputs(shown.c_str(), stdout) == EOF || std::fflush(stdout) == EOF)
-        throw Failure{{ErrorCode::unwritable,
-                       "standard output: cannot be written: the reader has gone away, or the disk is full."}};
+        refuse(ErrorCode::unwritable,
+               "standard output: cannot be written: the reader has gone away, or the disk is full.");
 }
 
 void check_second_output(const std::string& option, const std::string& path, const std::string& first) {
     if (path.empty()) return;
     if (path == first)
-        throw Failure{{ErrorCode::usage, option + " and -o both write to " + (path == "-" ? "standard output" : path) +
-                                             "; give each a place of its own."}};
+        refuse(option + " and -o both write to " + (path == "-" ? "standard output" : path) +
+               "; give each a place of its own.");
     if (path != "-") require(mesh_format(path));
 }
 

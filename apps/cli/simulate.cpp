@@ -43,7 +43,7 @@ struct Outputs {
             const fs::path folder = fs::path(path).parent_path();
             const bool is_folder = path.ends_with('/') || fs::is_directory(path, ignored);
             if (!is_folder && !folder.empty() && !fs::is_directory(folder, ignored))
-                throw Failure{{ErrorCode::unwritable, path + ": cannot be written: there is no such folder."}};
+                refuse(ErrorCode::unwritable, path + ": cannot be written: there is no such folder.");
             if (is_folder)
                 folders.push_back(path);
             else if (lower_extension(path) == ".fil")
@@ -53,11 +53,10 @@ struct Outputs {
             else if (is_animation_path(path))
                 animations.push_back(path);
             else
-                throw Failure{{ErrorCode::unsupported,
-                               path +
-                                   ": is no name for a simulation's output; end it in .fil (a model with its poses), "
-                                   ".mp4, .gif or _%04d.png (a film), .glb, .pc2, .mdd or .usda (the detailed mesh "
-                                   "moving), or / (a folder of meshes)."}};
+                refuse(ErrorCode::unsupported,
+                       path + ": is no name for a simulation's output; end it in .fil (a model with its poses), "
+                              ".mp4, .gif or _%04d.png (a film), .glb, .pc2, .mdd or .usda (the detailed mesh "
+                              "moving), or / (a folder of meshes).");
         }
     }
 };
@@ -203,8 +202,8 @@ private:
     [[noreturn]] void cancelled() {
         if (options_.save.empty()) throw Failure{cancelled_error()};
         save();
-        throw Failure{{ErrorCode::cancelled, fmt::format("Cancelled after frame {} of {}; go on with --resume {}.",
-                                                         run_->frame(), scene_.frames, options_.save)}};
+        refuse(ErrorCode::cancelled, fmt::format("Cancelled after frame {} of {}; go on with --resume {}.",
+                                                 run_->frame(), scene_.frames, options_.save));
     }
 
     /// A mesh a frame and body: all of a folder or none.
@@ -254,7 +253,7 @@ void check(const SimulateArguments& options, const Session& session) {
     std::error_code ignored;
     const fs::path folder = fs::path(options.save).parent_path();
     if (fs::is_directory(options.save, ignored) || (!folder.empty() && !fs::is_directory(folder, ignored)))
-        throw Failure{{ErrorCode::unwritable, options.save + ": cannot be written: it is a folder, or in none."}};
+        refuse(ErrorCode::unwritable, options.save + ": cannot be written: it is a folder, or in none.");
     if (options.scene.empty()) refuse("Give a scene: filigree simulate SCENE.toml -o OUT.");
     if (options.outputs.empty() && options.save.empty() && !options.check)
         refuse("Say where the motion goes: -o OUT.fil, -o OUT.glb, -o OUT.pc2, -o FILM.mp4 or -o FOLDER/; or give "

@@ -23,8 +23,8 @@ struct StripSeconds {
 /// A model under a mesh's name is a slip, and could be the end of the mesh.
 void refuse_mesh_name(const std::string& path) {
     if (path != "-" && mesh_format(path).ok())
-        throw Failure{{ErrorCode::usage, path + ": is the name of a mesh; give the model another, such as " +
-                                             std::filesystem::path(path).stem().string() + ".fil."}};
+        refuse(path + ": is the name of a mesh; give the model another, such as " +
+               std::filesystem::path(path).stem().string() + ".fil.");
 }
 
 /// Counts of what did not go as hoped: a row where there is any.

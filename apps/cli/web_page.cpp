@@ -26,10 +26,10 @@ fs::path find_parts() {
     else
         folder = fs::read_symlink("/proc/self/exe", failed).parent_path() / FILIGREE_WEB_FROM_PROGRAM;
     if (fs::exists(folder / "filigree.js", failed)) return folder;
-    throw Failure{{ErrorCode::unsupported,
-                   folder.lexically_normal().string() +
-                       ": the parts of the web page are not there, as they are made with node and npm's packages; run "
-                       "scripts/setup and build again, or say with FILIGREE_WEB where they are."}};
+    refuse(ErrorCode::unsupported,
+           folder.lexically_normal().string() +
+               ": the parts of the web page are not there, as they are made with node and npm's packages; run "
+               "scripts/setup and build again, or say with FILIGREE_WEB where they are.");
 }
 
 std::string html_text(const std::string& text) {
@@ -94,7 +94,7 @@ void WebPage::write_model_script(Session& session) const {
         const std::string_view read(piece.data(), std::size_t(model.gcount()));
         require_written(script.write("filigree_part(\"" + base64(read) + "\");\n"));
     }
-    if (!model.eof()) throw Failure{{ErrorCode::not_found, model_ + ": cannot be read again; try once more."}};
+    if (!model.eof()) refuse(ErrorCode::not_found, model_ + ": cannot be read again; try once more.");
     require_written(script.finish());
 }
 

@@ -41,6 +41,15 @@ TEST_F(Sample, AnOpenMeshIsTakenByWindingNumbers) {
     fails(7, {"sample", "open.obj", "-o", "x.ply", "--spacing", "0.1", "--method", "scan"}, {"open edges", "winding"});
 }
 
+TEST_F(Sample, ThePictureStandsAsTheFileDoes) {
+    ok({"make", "wavy-cube", "-o", "cube.stl", "--resolution", "8", "--quiet"}); // says nothing; STL has z up
+    const Ran ran = run({"sample", "cube.stl", "-o", "points.ply", "--count", "50", "--picture", "p.png", "--json"});
+    if (ran.code == 5) GTEST_SKIP() << "no OpenGL";
+    ASSERT_EQ(ran.code, 0) << ran.err;
+    EXPECT_EQ(Json::parse(ran.out).at("up"), "z");
+    EXPECT_TRUE(bytes_of(path("p.png")).starts_with("\x89PNG"));
+}
+
 TEST_F(Sample, PatternsAreSeeded) {
     make_cube();
     for (const char* pattern : {"jitter", "poisson"}) {
