@@ -72,14 +72,41 @@ bool collapse_bulk(std::span<const Vec3f> positions, double ratio, double max_er
     return true;
 }
 
+Simplified not_simplified(std::span<const Vec3f> positions, std::span<const Triangle> triangles) {
+    Simplified whole;
+    whole.triangles.assign(triangles.begin(), triangles.end());
+    whole.vertex_count = count_vertices(triangles, positions.size());
+    return whole;
+}
+
+/// meshoptimizer's part: down to about `target` vertices, or as far as it goes.
+Simplified simplify_bulk(std::span<const Vec3f> positions, std::span<const Triangle> triangles, std::size_t target,
+                         double max_error, const RunContext& context) {
+    Simplified current = not_simplified(positions, triangles);
+    for (int round = 0; round < 6 && current.vertex_count * 50 > target * 51 && !context.is_cancelled(); ++round)
+        if (!collapse_bulk(positions, double(target) / double(current.vertex_count), max_error, current)) break;
+    return current;
+}
+
+/// As far as it goes without an edge that is longer than max_edge (model units) and not in the input: half as far until
+/// there is none.
+Simplified simplify_bulk(std::span<const Vec3f> positions, std::span<const Triangle> triangles, std::size_t target,
+                         double max_error, double max_edge, const RunContext& context) {
+    const std::size_t whole = count_vertices(triangles, positions.size());
+    const auto may_be_long = long_edges(positions, triangles, max_edge);
+    for (; target < whole && !context.is_cancelled(); target *= 2) {
+        Simplified bulk = simplify_bulk(positions, triangles, target, max_error, context);
+        if (std::ranges::includes(may_be_long, long_edges(positions, bulk.triangles, max_edge))) return bulk;
+    }
+    return not_simplified(positions, triangles);
+}
+
 } // namespace
 
 Simplified simplify(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
                     const SimplifyOptions& options, const RunContext& context) {
-    Simplified current;
-    current.triangles.assign(triangles.begin(), triangles.end());
-    current.vertex_count = count_vertices(triangles, positions.size());
-    if (triangles.empty() || (!options.target_vertices && !options.max_error)) return current;
+    if (triangles.empty() || (!options.target_vertices && !options.max_error))
+        return not_simplified(positions, triangles);
 
     const double diagonal = bounds(positions).diagonal();
     const double max_error = options.max_error.value_or(1e6) * diagonal;
@@ -88,14 +115,9 @@ Simplified simplify(std::span<const Vec3f> positions, std::span<const Triangle> 
     EdgeCollapseOptions collapse{.target_vertices = target};
     if (options.max_error) collapse.max_error = max_error;
     if (options.max_edge) collapse.max_edge = *options.max_edge * diagonal;
-    for (int round = 0; round < 6 && current.vertex_count * 50 > bulk_target * 51 && !context.is_cancelled(); ++round)
-        if (!collapse_bulk(positions, double(bulk_target) / double(current.vertex_count), max_error, current)) break;
-    if (collapse.max_edge && !std::ranges::includes(long_edges(positions, triangles, *collapse.max_edge),
-                                                    long_edges(positions, current.triangles, *collapse.max_edge))) {
-        current = {};
-        current.triangles.assign(triangles.begin(), triangles.end());
-        current.vertex_count = count_vertices(triangles, positions.size());
-    }
+    Simplified current = collapse.max_edge
+                             ? simplify_bulk(positions, triangles, bulk_target, max_error, *collapse.max_edge, context)
+                             : simplify_bulk(positions, triangles, bulk_target, max_error, context);
     if (current.vertex_count * 50 > target * 51) {
         EdgeCollapseResult finished = collapse_edges(positions, current.triangles, collapse, context);
         current.triangles = std::move(finished.triangles);

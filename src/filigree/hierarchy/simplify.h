@@ -30,7 +30,7 @@ struct Simplified {
 /// Quadric edge collapses [Garland 1997]: meshoptimizer down to 20,000 vertices, our own (collapse_edges) from there,
 /// and wherever meshoptimizer cannot go on or a vertex has thousands of triangles. triangles must be over welded
 /// vertices (one id a position), else seams hold them back. With both options, error ends it before the count does.
-/// Where meshoptimizer leaves an edge longer than max_edge, all is done by our own.
+/// With max_edge meshoptimizer goes only as far as it leaves no longer edge, and our own do the rest.
 /// Cost O(F log F); same result for any thread count. When cancelled, what is reached so far.
 Simplified simplify(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
                     const SimplifyOptions& options, const RunContext& context);
