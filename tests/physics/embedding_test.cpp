@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -103,11 +104,69 @@ TEST(Embedding, AffineMotionIsFollowedToRounding) {
         const Body body = block(model, 12, Vec3d(-0.5, -0.5, -0.5));
         const auto points = random_points(Vec3f::Constant(-0.5f), Vec3f::Constant(0.5f), 0.03f, 2000);
         std::vector<Embedding> embeddings = {embed(points, body.rest, body.spacing(), kContext)};
-        if (model == MaterialModel::fem) embeddings.push_back(embed_in_cells(points, body.cells, kContext));
+        embeddings.push_back(embed_to_follow(points, body.rest, body.spacing(), nullptr, kContext));
+        if (model == MaterialModel::fem) {
+            embeddings.push_back(embed_in_cells(points, body.cells, kContext));
+            embeddings.push_back(embed_to_follow(points, body.rest, body.spacing(), &body.cells, kContext));
+        }
         for (const Embedding& embedding : embeddings)
             for (const Mat3f& matrix : {turn, Mat3f(3 * turn), Mat3f(turn * shear), Mat3f(turn * stretch * shear)})
                 EXPECT_LT(affine_error(embedding, body, matrix, Vec3f(0.2f, -0.4f, 0.1f)), 2e-7);
     }
+}
+
+/// Where embedded points go, less where they are, when each particle is moved by its own number from -reach to reach.
+std::vector<Vec3f> shaken(const Embedding& embedding, const Vectors& rest, float reach) {
+    Vectors positions = rest;
+    for (std::size_t i = 0; i < rest.size(); ++i) {
+        Vec3f move;
+        for (int axis = 0; axis < 3; ++axis) move[axis] = reach * (2 * float(random_unit(std::uint64_t(axis), i)) - 1);
+        positions.set(i, rest[i] + move);
+    }
+    const std::vector<Mat3f> gradients(rest.size(), Mat3f::Identity());
+    std::vector<Vec3f> points(embedding.size());
+    move_embedded(embedding, rest, positions, gradients, points, {}, kContext);
+    for (std::size_t p = 0; p < points.size(); ++p) points[p] -= embedding.rest[p];
+    return points;
+}
+
+float largest_jump(const std::vector<Vec3f>& values) {
+    float most = 0;
+    for (std::size_t i = 0; i + 1 < values.size(); ++i) most = std::max(most, (values[i + 1] - values[i]).norm());
+    return most;
+}
+
+// Half a spacing beyond a meshfree body's outermost particles is its surface. There linear weights overshoot, and
+// where they overshoot too far the next point suddenly has other particles.
+TEST(Embedding, WhatFollowsDoesNotJumpOrOvershoot) {
+    const Body body = block(MaterialModel::meshfree, 10);
+    const auto spacing = float(body.spacing());
+    std::vector<Vec3f> points; // along a path that leaves the body near one of its edges
+    for (int i = 0; i <= 4000; ++i)
+        points.push_back(Vec3f(0.48f, 0.9f, 0.93f) + float(i) / 4000 * Vec3f(0.02f, 0.15f, 0.1f));
+    const Embedding following = embed_to_follow(points, body.rest, body.spacing(), nullptr, kContext);
+    for (const float weight : following.weights) ASSERT_GE(weight, -0.05f - 1e-6f);
+    const float reach = 0.1f * spacing;
+    const auto ours = shaken(following, body.rest, reach),
+               linear = shaken(embed(points, body.rest, body.spacing(), kContext), body.rest, reach);
+    EXPECT_LT(largest_jump(ours), 2e-3f * reach);
+    EXPECT_GT(largest_jump(linear), 5e-2f * reach);
+    for (const Vec3f& move : ours) ASSERT_LT(move.norm(), std::numbers::sqrt3_v<float> * reach);
+}
+
+// Two plates, two cells thick, with an empty layer of cells between them.
+TEST(Embedding, WhatFollowsIsNotCarriedAcrossAGap) {
+    std::vector<Cells::LatticeIndex> indices;
+    for (std::uint16_t k = 0; k < 5; ++k)
+        for (std::uint16_t j = 0; j < 8 && k != 2; ++j)
+            for (std::uint16_t i = 0; i < 8; ++i) indices.push_back({i, j, k});
+    const Body body = make_body(lattice_cells(std::move(indices), 0.1, Vec3d::Zero()), Material());
+    const auto points = random_points(Vec3f::Zero(), Vec3f(0.8f, 0.8f, 0.2f), 0, 1000);
+    const auto carried_by_upper = [&](const Embedding& embedding) {
+        return std::ranges::count_if(embedding.particles, [&](Index i) { return body.rest[i].z() > 0.25f; });
+    };
+    EXPECT_GT(carried_by_upper(embed(points, body.rest, body.spacing(), kContext)), 1000);
+    EXPECT_EQ(carried_by_upper(embed_to_follow(points, body.rest, body.spacing(), &body.cells, kContext)), 0);
 }
 
 TEST(Embedding, FarPointsGoAlongWithTheNearestParticles) {

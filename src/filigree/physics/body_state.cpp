@@ -50,6 +50,11 @@ std::vector<Vec3f> places_of(const Embedding& points, const Vectors& positions) 
     return places;
 }
 
+/// The cells whose corners are the particles; null for meshfree bodies.
+const Cells* corners_of(const Body& body) {
+    return body.material.model == MaterialModel::meshfree ? nullptr : &body.cells;
+}
+
 } // namespace
 
 PlacedPoints place_in_reference(const BodyState& state, std::span<const Vec3f> rest_points, const RunContext& context) {
@@ -87,7 +92,8 @@ Attachment attach(const BodyState& state, std::size_t body, std::span<const Vec3
     PlacedPoints placed = place_in_reference(state, rest_points, context);
     return {body,
             {rest_points.begin(), rest_points.end()},
-            embed(placed.places, state.elasticity->reference(), state.body->spacing(), context),
+            embed_to_follow(placed.places, state.elasticity->reference(), state.body->spacing(),
+                            corners_of(*state.body), context),
             std::move(placed.gradients)};
 }
 
@@ -127,7 +133,7 @@ void renew_neighbourhoods(BodyState& state, std::span<Attachment* const> attachm
     state.surface = embed(surface, state.positions, spacing, context);
     if (!balls.empty()) state.balls = embed(balls, state.positions, spacing, context);
     for (std::size_t a = 0; a < attachments.size(); ++a)
-        attachments[a]->embedding = embed(carried[a], state.positions, spacing, context);
+        attachments[a]->embedding = embed_to_follow(carried[a], state.positions, spacing, nullptr, context);
 }
 
 void embed_surface_at_rest(BodyState& state, bool with_balls, const RunContext& context) {

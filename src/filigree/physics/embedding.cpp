@@ -19,6 +19,9 @@ constexpr double kRadius = 1.75;       // spacings; smaller is sharper, and 1.75
 constexpr double kRadiusGrowth = 1.25; // where the particles in it do not do
 constexpr int kAttempts = 6;
 constexpr double kLeastWeight = -0.5; // beyond, a weight makes more of the noise of its particle than of its motion
+/// Least weight of what only follows: -0.05 to -0.3 are the nearest to a body of eight times the particles, and half
+/// as far from what a driver restores as without a bound (docs/bodies.md).
+constexpr double kFollowingWeight = -0.05;
 /// 27 det / trace^3 of the particles' covariance, 1 for a round cloud: below, they count as lying in a plane.
 constexpr double kSpanning = 2e-3;
 
@@ -96,8 +99,40 @@ private:
     std::vector<Vec3d> positions_;
 };
 
+/// What lies across a gap is near a point, but does not move with it.
+class ReachedCorners {
+public:
+    explicit ReachedCorners(const Cells* cells) : cells_(cells) {}
+
+    /// Leaves the corners of the point's own cell and of the 26 around it; everything where it is in no cell.
+    void keep(const Vec3d& point, std::vector<ParticleGrid::Near>& near) const {
+        if (!cells_) return;
+        const Vec3d at = ((point - cells_->origin) / cells_->spacing).array().floor();
+        if ((at.array() < 0).any() || (at.array() > 65535).any()) return;
+        const std::array<int, 3> low = {int(at[0]) - 1, int(at[1]) - 1, int(at[2]) - 1};
+        std::array<bool, 64> reached = {}; // corners low .. low + 3 along each axis
+        if (cells_->find_cell(low[0] + 1, low[1] + 1, low[2] + 1) == kNoIndex) return;
+        for (int cell = 0; cell < 27; ++cell) {
+            const int i = cell % 3, j = cell / 3 % 3, k = cell / 9;
+            if (cells_->find_cell(low[0] + i, low[1] + j, low[2] + k) == kNoIndex) continue;
+            for (int c = 0; c < 8; ++c) reached[number(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2))] = true;
+        }
+        std::erase_if(near, [&](const ParticleGrid::Near& particle) {
+            const Cells::LatticeIndex& corner = cells_->corners[particle.particle];
+            const int i = corner[0] - low[0], j = corner[1] - low[1], k = corner[2] - low[2];
+            return std::min({i, j, k}) < 0 || std::max({i, j, k}) > 3 || !reached[number(i, j, k)];
+        });
+    }
+
+private:
+    static std::size_t number(int i, int j, int k) { return std::size_t(i + 4 * j + 16 * k); }
+
+    const Cells* cells_;
+};
+
 /// What the weights of one point are made of.
 struct Fit {
+    double floor = -std::numeric_limits<double>::infinity(); ///< linear only as far as no weight falls below
     std::vector<ParticleGrid::Near> near;
     std::vector<double> weights;
     double least = 0; ///< weight
@@ -132,6 +167,7 @@ struct Fit {
             slope = within_span(covariance, -mean);
         else
             return false;
+        slope *= part_above_floor(slope, point + mean, sum);
         least = 0;
         for (std::size_t n = 0; n < near.size(); ++n) {
             weights[n] *= 1 / sum + slope.dot(near[n].position - point - mean);
@@ -141,6 +177,17 @@ struct Fit {
     }
 
 private:
+    /// The largest part of the slope, 0 to 1, with which no weight falls below the floor. It changes with the point
+    /// without a jump.
+    double part_above_floor(const Vec3d& slope, const Vec3d& middle, double sum) const {
+        double part = 1;
+        for (std::size_t n = 0; n < near.size(); ++n) {
+            const double plain = weights[n] / sum, change = weights[n] * slope.dot(near[n].position - middle);
+            if (plain + change < floor) part = std::min(part, (plain - floor) / -change);
+        }
+        return part;
+    }
+
     static Vec3d within_span(const Mat3d& covariance, const Vec3d& b) {
         const SymmetricEigen<double, 3> eigen = symmetric_eigen(covariance);
         Vec3d slope = Vec3d::Zero();
@@ -158,7 +205,12 @@ struct Piece {
     EmbeddingReport report;
 };
 
-void embed_point(const Vec3d& point, const ParticleGrid& grid, double spacing, Fit& fit, Piece& piece) {
+void embed_point(const Vec3d& point, const ParticleGrid& grid, const ReachedCorners& reached, double spacing, Fit& fit,
+                 Piece& piece) {
+    const auto find = [&](double radius) {
+        grid.find(point, radius, fit.near);
+        reached.keep(point, fit.near);
+    };
     const auto accept = [&] {
         piece.counts.push_back(Index(fit.near.size()));
         for (std::size_t n = 0; n < fit.near.size(); ++n) {
@@ -176,9 +228,8 @@ void embed_point(const Vec3d& point, const ParticleGrid& grid, double spacing, F
     }
     // Far points reach one spacing further than their nearest particle.
     double growth = 1;
-    grid.find(point, kRadius * spacing, fit.near);
-    for (double radius = kRadius * spacing; fit.near.empty(); grid.find(point, radius, fit.near))
-        radius *= kRadiusGrowth;
+    find(kRadius * spacing);
+    for (double radius = kRadius * spacing; fit.near.empty(); find(radius)) radius *= kRadiusGrowth;
     double nearest = std::numeric_limits<double>::infinity();
     for (const auto& near : fit.near) nearest = std::min(nearest, std::sqrt(near.squared_distance));
     const bool far = nearest > kRadius * spacing;
@@ -186,14 +237,14 @@ void embed_point(const Vec3d& point, const ParticleGrid& grid, double spacing, F
     const auto reach = [&] { return std::max(kRadius * spacing * growth, nearest + spacing * growth); };
     for (int attempt = 0; attempt < kAttempts; ++attempt, growth *= kRadiusGrowth) {
         const double radius = reach();
-        if (attempt > 0 || radius > kRadius * spacing) grid.find(point, radius, fit.near);
+        if (attempt > 0 || radius > kRadius * spacing) find(radius);
         if (fit.solve(point, radius, false) && fit.least >= kLeastWeight) return accept();
     }
     // Not to be had: what can be had from those around the nearest particle, and no slope where that shoots too far.
     piece.report.far_points += !far;
     growth = 1;
     const double radius = reach();
-    grid.find(point, radius, fit.near);
+    find(radius);
     fit.solve(point, radius, true);
     if (fit.least < kLeastWeight) {
         double sum = 0;
@@ -207,10 +258,9 @@ void embed_point(const Vec3d& point, const ParticleGrid& grid, double spacing, F
     accept();
 }
 
-} // namespace
-
-Embedding embed(std::span<const Vec3f> points, const Vectors& rest, double spacing, const RunContext& context,
-                EmbeddingReport* report) {
+Embedding embed_points(std::span<const Vec3f> points, const Vectors& rest, double spacing,
+                       const ReachedCorners& reached, double floor, const RunContext& context,
+                       EmbeddingReport* report) {
     Embedding embedding;
     embedding.rest.assign(points.begin(), points.end());
     embedding.offsets.assign(points.size() + 1, 0);
@@ -222,7 +272,9 @@ Embedding embed(std::span<const Vec3f> points, const Vectors& rest, double spaci
     parallel_for(context, points.size(), kEmbeddingGrain, [&](std::size_t begin, std::size_t end) {
         Piece& piece = pieces[begin / kEmbeddingGrain];
         Fit fit;
-        for (std::size_t p = begin; p < end; ++p) embed_point(points[p].cast<double>(), grid, spacing, fit, piece);
+        fit.floor = floor;
+        for (std::size_t p = begin; p < end; ++p)
+            embed_point(points[p].cast<double>(), grid, reached, spacing, fit, piece);
     });
 
     std::size_t total = 0;
@@ -244,6 +296,19 @@ Embedding embed(std::span<const Vec3f> points, const Vectors& rest, double spaci
         piece = {};
     }
     return embedding;
+}
+
+} // namespace
+
+Embedding embed(std::span<const Vec3f> points, const Vectors& rest, double spacing, const RunContext& context,
+                EmbeddingReport* report) {
+    return embed_points(points, rest, spacing, ReachedCorners(nullptr), -std::numeric_limits<double>::infinity(),
+                        context, report);
+}
+
+Embedding embed_to_follow(std::span<const Vec3f> points, const Vectors& rest, double spacing, const Cells* cells,
+                          const RunContext& context) {
+    return embed_points(points, rest, spacing, ReachedCorners(cells), kFollowingWeight, context, nullptr);
 }
 
 namespace {

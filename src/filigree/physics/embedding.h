@@ -31,6 +31,14 @@ struct EmbeddingReport {
 Embedding embed(std::span<const Vec3f> points, const Vectors& rest, double spacing, const RunContext& context,
                 EmbeddingReport* report = nullptr);
 
+/// Weights for move_embedded, whose Hermite form follows affine motion by any weights that sum to 1. They are as linear
+/// as they can be with none below -0.05: weights that shoot out of the body make more of what single particles do than
+/// of the motion, and differ from point to point. They change without a jump where those of `embed` reach further.
+/// cells: whose corners the particles are, or null. Then only corners of a point's own cell and of the cells around it
+/// carry it, not what lies across a gap.
+Embedding embed_to_follow(std::span<const Vec3f> points, const Vectors& rest, double spacing, const Cells* cells,
+                          const RunContext& context);
+
 /// Trilinear weights in the cell that holds each point (or the nearest cell): positive inside, eight a point. For the
 /// corners of cells.
 Embedding embed_in_cells(std::span<const Vec3f> points, const Cells& cells, const RunContext& context);
