@@ -8,6 +8,7 @@
 #include "filigree/io/numbered_name.h"
 #include "filigree/io/point_cache.h"
 #include "filigree/present/scene_film.h"
+#include "filigree/scene/finer_check.h"
 #include "filigree/scene/scene_keys.h"
 #include "filigree/scene/scene_run.h"
 
@@ -22,11 +23,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::size_t kFinerMoments = 20; // of a run that are compared with that of eight times the particles
+
 struct SimulateArguments {
     std::string scene, save, resume;
     std::vector<std::string> outputs;
     std::size_t frames = 0, stop_at = 0; ///< 0: as the scene says; not before the end
-    bool check = false, keys = false;
+    bool check = false, finer = false, keys = false;
     AnimationOutput animation;
 };
 
@@ -144,6 +147,8 @@ public:
         for (const std::string& warning : run_->warnings()) session_.warn(warning);
         if (!status && status.error().code == ErrorCode::cancelled) cancelled();
         require(status);
+        if (options_.finer)
+            finer_ = require(check_against_finer(scene_, ready_, run_->frame(), kFinerMoments, session_.context()));
     }
 
     void write() {
@@ -229,6 +234,7 @@ private:
     std::vector<FilmWriter> films_;
     ReadyScene ready_;
     std::optional<SceneRun> run_;
+    std::vector<FinerCheck> finer_; ///< one a body where that was asked for
     Table animation_rows_;
     Json animations_ = Json::array();
     double film_seconds_ = 0, write_seconds_ = 0;
@@ -239,6 +245,7 @@ void Run::report() const {
     report.add("scene", options_.scene, "scene", options_.scene);
     report.set("outputs", options_.outputs);
     report_run(scene_, ready_, *run_, report);
+    report_finer(ready_, finer_, report);
     if (!options_.outputs.empty())
         report.row("written", fmt::format("{} in {}", fmt::join(options_.outputs, ", "), seconds_text(write_seconds_)));
     if (!options_.save.empty()) report.row("state", options_.save);
@@ -255,10 +262,9 @@ void check(const SimulateArguments& options, const Session& session) {
     if (fs::is_directory(options.save, ignored) || (!folder.empty() && !fs::is_directory(folder, ignored)))
         refuse(ErrorCode::unwritable, options.save + ": cannot be written: it is a folder, or in none.");
     if (options.scene.empty()) refuse("Give a scene: filigree simulate SCENE.toml -o OUT.");
-    if (options.outputs.empty() && options.save.empty() && !options.check)
+    if (options.outputs.empty() && options.save.empty() && !options.check && !options.finer)
         refuse("Say where the motion goes: -o OUT.fil, -o OUT.glb, -o OUT.pc2, -o FILM.mp4 or -o FOLDER/; or give "
-               "--save or "
-               "--check.");
+               "--save, --check or --finer.");
     check_animation_options(options.outputs, session);
     if (options.stop_at && options.save.empty())
         refuse("--stop-at stops a run that goes on later; say where with --save.");
@@ -289,6 +295,8 @@ Command simulate_command() {
                     Option("--frames", options->frames, "Frames to compute (unset: as the scene says)").whole_from(1),
                     Option("--check", options->check,
                            "Also carry every vertex by the particles, and say how far the restored mesh is from that"),
+                    Option("--finer", options->finer,
+                           "Also simulate eight times the particles, and say how far our meshes are from theirs"),
                     Option("--stop-at", options->stop_at, "Stop after this frame, to go on later; with --save")
                         .whole_from(1),
                     Option("--save", options->save, "Write the state at the end, or when cancelled, to go on from"),

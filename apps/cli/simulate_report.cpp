@@ -40,6 +40,20 @@ void report_body(const ReadyBody& body, Report& report) {
     report.set("bodies").push_back(body_json(body));
 }
 
+/// How fine the driver is, and the errors that follow; those of a body that melts follow from no rule.
+void report_driver(const ReadyBody& body, const PoseSequence& poses, Json& json, Report& report) {
+    const DriverEdges& edges = body.driver;
+    std::string text = fmt::format("edges {:.2g} spacings on average, {:.2g} at most", edges.mean, edges.longest);
+    json = {{"mean_edge", edges.mean}, {"longest_edge", edges.longest}, {"on_long_edges", edges.on_long_edges}};
+    if (!body.body->material.melts()) {
+        const ExpectedError error = expected_error(poses, edges, body.model, *body.body);
+        text += fmt::format("; expect {:.1e} of the diagonal from the spacing, {:.1e} from the driver", error.spacing,
+                            error.driver);
+        json["expected"] = {{"spacing", error.spacing}, {"driver", error.driver}};
+    }
+    report.row(body.name + ", driver", text);
+}
+
 /// Why descent took over, where it did.
 void report_descent(const DescentCauses& causes, Report& report) {
     std::vector<std::string> reasons;
@@ -139,8 +153,28 @@ void report_checks(const ReadyScene& ready, const SceneRun& run, Report& report)
 void report_run(const SceneFile& scene, const ReadyScene& ready, const SceneRun& run, Report& report) {
     report.set("bodies", Json::array());
     for (const ReadyBody& body : ready.bodies) report_body(body, report);
+    for (std::size_t b = 0; b < ready.bodies.size(); ++b)
+        report_driver(ready.bodies[b], run.recording().poses[b], report.set("bodies").at(b)["driver"], report);
     report_frames(scene, run, report);
     report_checks(ready, run, report);
+}
+
+void report_finer(const ReadyScene& ready, std::span<const FinerCheck> checks, Report& report) {
+    const auto error_json = [](const TruthError& error) -> Json {
+        return {{"rms_mean", error.rms}, {"max_worst", error.worst}};
+    };
+    for (std::size_t b = 0; b < checks.size(); ++b) {
+        const FinerCheck& check = checks[b];
+        const double ratio = check.attached.rms > 0 ? check.restored.rms / check.attached.rms : 1;
+        report.row(ready.bodies[b].name + ", finer",
+                   fmt::format("{} particles: all attached are {:.2e} of the diagonal from theirs (worst vertex "
+                               "{:.2e}), restored {:.2e}, {:.3g} times that (worst vertex {:.2e})",
+                               with_commas(check.particles), check.attached.rms, check.attached.worst,
+                               check.restored.rms, ratio, check.restored.worst));
+        report.set("bodies").at(b)["finer"] = {{"particles", check.particles},
+                                               {"attached", error_json(check.attached)},
+                                               {"restored", error_json(check.restored)}};
+    }
 }
 
 } // namespace filigree::cli

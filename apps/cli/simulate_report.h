@@ -3,11 +3,16 @@
 
 #include "report.h"
 
+#include "filigree/scene/finer_check.h"
 #include "filigree/scene/scene_run.h"
+
+#include <span>
 
 namespace filigree::cli {
 
 /// The bodies, the frames, what they took and met, and what was checked.
 void report_run(const SceneFile& scene, const ReadyScene& ready, const SceneRun& run, Report& report);
+/// How far its meshes are from those of eight times the particles: one a body, or none where that was not asked for.
+void report_finer(const ReadyScene& ready, std::span<const FinerCheck> checks, Report& report);
 
 } // namespace filigree::cli

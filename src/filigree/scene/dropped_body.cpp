@@ -1,6 +1,7 @@
 #include "filigree/scene/dropped_body.h"
 
 #include "filigree/mesh/shapes.h"
+#include "filigree/scene/body_driver.h"
 #include "filigree/scene/particles_near.h"
 
 #include <algorithm>
@@ -143,6 +144,10 @@ Result<std::shared_ptr<const DroppedBody>> make_dropped_body(std::shared_ptr<con
     Result<Body> body = make_body(dropped->model->mesh, options.material, body_options, context, &dropped->report);
     if (!body) return body.error();
     dropped->body = std::make_shared<const Body>(std::move(*body));
+    if (const std::string coarse =
+            driver_warning(measure_driver(*dropped->model, *dropped->body), *dropped->model, *dropped->body);
+        !coarse.empty())
+        dropped->report.warning += (dropped->report.warning.empty() ? "" : " ") + coarse;
     DropBuilder(options, up, box, dropped->scale).build(*dropped);
     hold_pinned(pinned, *dropped);
     return std::shared_ptr<const DroppedBody>(std::move(dropped));

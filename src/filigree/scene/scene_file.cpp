@@ -136,7 +136,7 @@ private:
         in.set("size", body.shape_options.size);
         in.set("length", body.shape_options.length);
         in.set("thickness", body.shape_options.thickness);
-        in.set_whole("driver", body.driver);
+        if (in.has("driver")) in.set_whole("driver", body.driver.emplace());
         in.set("scale", body.body.scale);
         if (in.has("particles") && in.has("spacing")) in.fail("spacing", "give one of particles and spacing");
         in.set_whole("particles", body.body.cells.count);

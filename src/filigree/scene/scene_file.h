@@ -32,8 +32,8 @@ struct SceneBody {
     std::string mesh; ///< file, as found from here; or
     std::string shape;
     ShapeOptions shape_options;
-    std::size_t driver = 1000; ///< vertices
-    BodyOptions body;          ///< with the scale, metres a model unit
+    std::optional<std::size_t> driver = {}; ///< vertices; unset: as fine as the particles, see body_driver_options
+    BodyOptions body;                       ///< with the scale, metres a model unit
     Material material;
     std::optional<Vec3d> centre = {}; ///< m; unset: where the mesh's own coordinates say
     Eigen::AngleAxisd rotation = Eigen::AngleAxisd::Identity();

@@ -19,11 +19,6 @@ double now_seconds() {
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-std::vector<Vec3f> in_metres(std::vector<Vec3f> points, double scale) {
-    for (Vec3f& p : points) p *= float(scale);
-    return points;
-}
-
 double percentile_95(std::vector<float>& values) {
     if (values.empty()) return 0;
     const auto place = values.begin() + std::ptrdiff_t(0.95 * double(values.size() - 1));
@@ -78,7 +73,7 @@ Status SceneRun::follow(bool checks) {
     for (std::size_t b = 0; b < ready_->bodies.size(); ++b) {
         const ReadyBody& body = ready_->bodies[b];
         const auto attach = [&](std::vector<Vec3f> points) {
-            return simulation_.attach(b, in_metres(std::move(points), body.scale), always_);
+            return simulation_.attach(b, body.in_metres(std::move(points)), always_);
         };
         const std::size_t driver = attach(driver_positions(body.model));
         Result<Restorer> restorer = Restorer::create(body.model, {}, always_);

@@ -1,6 +1,5 @@
 #include "filigree/scene/world_setup.h"
 
-#include "filigree/hierarchy/strip.h"
 #include "filigree/io/file.h"
 #include "filigree/io/mesh_file.h"
 #include "filigree/io/model_file.h"
@@ -88,17 +87,25 @@ private:
         return std::move(file.mesh);
     }
 
+    /// A model, or one without levels where there is only a mesh.
     Model model_of(const SceneBody& body) {
-        Mesh mesh;
+        Model model;
         if (body.mesh.empty()) {
-            mesh = make_shape(body.shape, body.shape_options).value();
-        } else {
-            const std::string bytes = read_file(body.mesh).value();
-            if (is_model_file(bytes)) return read_model(bytes, body.mesh, context_).value();
-            mesh = mesh_of(bytes, body.mesh);
+            model.mesh = make_shape(body.shape, body.shape_options).value();
+            return model;
         }
+        const std::string bytes = read_file(body.mesh).value();
+        if (is_model_file(bytes)) return read_model(bytes, body.mesh, context_).value();
+        model.mesh = mesh_of(bytes, body.mesh);
+        return model;
+    }
+
+    Model stripped(Mesh mesh, const SceneBody& from, const Body& body) const {
         StripOptions options;
-        options.base = std::min(body.driver, std::max<std::size_t>(mesh.vertex_count(), 3));
+        if (from.driver)
+            options.base = std::min(*from.driver, std::max<std::size_t>(mesh.vertex_count(), 3));
+        else
+            options = body_driver_options(mesh, body);
         return strip(std::move(mesh), options, context_).value().model;
     }
 
@@ -124,6 +131,13 @@ private:
                 make_body(mesh, from.material, from.body, context_, &body.report).value());
         });
         if (!body.report.warning.empty()) warn("body '" + body.name + "': " + body.report.warning);
+        const bool has_own_driver = !body.model.levels.empty();
+        if (!has_own_driver)
+            body.model = at_line(scene_, from.line, [&] { return stripped(std::move(mesh), from, *body.body); });
+        hash_.add(body.model.driver().vertices);
+        body.driver = measure_driver(body.model, *body.body);
+        const std::string coarse = driver_warning(body.driver, body.model, *body.body);
+        if (has_own_driver && !coarse.empty()) warn("body '" + body.name + "': " + coarse);
         body.color = from.color.value_or(kBodyColors[result_.bodies.size() % std::size(kBodyColors)]);
         body.has_own_color = !from.color;
 
@@ -318,6 +332,11 @@ private:
 };
 
 } // namespace
+
+std::vector<Vec3f> ReadyBody::in_metres(std::vector<Vec3f> points) const {
+    for (Vec3f& p : points) p *= float(scale);
+    return points;
+}
 
 Result<ReadyScene> set_up(const SceneFile& scene, const RunContext& context) {
     try {

@@ -1,7 +1,7 @@
 // From a scene's words to bodies, a world and what is drawn of it.
 #pragma once
 
-#include "filigree/hierarchy/model.h"
+#include "filigree/scene/body_driver.h"
 #include "filigree/scene/scene_file.h"
 
 namespace filigree {
@@ -13,8 +13,11 @@ struct ReadyBody {
     double scale = 1;      ///< metres a model unit
     std::shared_ptr<const Body> body;
     BodyReport report;
+    DriverEdges driver;
     Vec3f color = Vec3f::Zero();
     bool has_own_color = false; ///< of the mesh's own, if it has some
+
+    std::vector<Vec3f> in_metres(std::vector<Vec3f> points) const; ///< from model units
 };
 
 /// An obstacle as it is drawn, before its motion.
