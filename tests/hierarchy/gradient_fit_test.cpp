@@ -1,5 +1,6 @@
 #include "filigree/hierarchy/gradient_fit.h"
 
+#include "filigree/core/random.h"
 #include "filigree/mesh/normals.h"
 #include "filigree/mesh/shapes.h"
 #include "threads.h"
@@ -10,6 +11,7 @@ namespace filigree {
 namespace {
 
 const RunContext kOneThread(1);
+constexpr NormalColumn kColumns[] = {NormalColumn::fitted, NormalColumn::shell};
 constexpr HeightLaw kLaws[] = {HeightLaw::keep, HeightLaw::inverse, HeightLaw::proportional, HeightLaw::volume};
 
 template <class Map>
@@ -50,37 +52,39 @@ TEST(GradientFit, IsTheIdentityAtRest) {
     const std::vector<Mesh> meshes = meshes_with_bad_rings();
     for (std::size_t m = 0; m < meshes.size(); ++m) {
         const Mesh& mesh = meshes[m];
-        const GradientFit fit(mesh, kOneThread);
-        for (const HeightLaw law : kLaws)
-            for (const NormalColumn column : {NormalColumn::fitted, NormalColumn::shell})
-                EXPECT_LT(largest_error(fit.fit(mesh.positions, column, law, kOneThread), Mat3d::Identity()), 1e-6)
+        for (const NormalColumn column : kColumns) {
+            const GradientFit fit(mesh, column, kOneThread);
+            for (const HeightLaw law : kLaws)
+                EXPECT_LT(largest_error(fit.fit(mesh.positions, law, kOneThread), Mat3d::Identity()), 1e-6)
                     << m << ' ' << height_law_name(law);
-        const auto ghosts = fit.rest_ghosts(); // of float length: a tenth of an edge has a digit less
-        EXPECT_LT(largest_error(fit.fit_to_ghosts(mesh.positions, ghosts, kOneThread), Mat3d::Identity()), 1e-5) << m;
+            const auto ghosts = fit.rest_ghosts(); // of float length: a tenth of an edge has a digit less
+            EXPECT_LT(largest_error(fit.fit_to_ghosts(mesh.positions, ghosts, kOneThread), Mat3d::Identity()), 1e-5)
+                << m;
+        }
     }
 }
 
 TEST(GradientFit, RigidMotionsAndProportionalScaleAreExact) {
     const Mat3d turn = Eigen::AngleAxisd(2, Vec3d(1, -1, 0.5).normalized()).toRotationMatrix();
     const Mesh mesh = make_wavy_sphere({.resolution = 16});
-    const GradientFit fit(mesh, kOneThread);
     for (const double scale : {0.1, 1.0, 50.0}) {
         const auto moved =
             mapped(mesh.positions, [&](const Vec3d& p) { return Vec3d(scale * turn * (p + Vec3d(1, 2, 3))); });
-        for (const NormalColumn column : {NormalColumn::fitted, NormalColumn::shell})
-            EXPECT_LT(largest_error(fit.fit(moved, column, HeightLaw::proportional, kOneThread), scale * turn),
-                      1e-4 * scale);
+        for (const NormalColumn column : kColumns) {
+            const GradientFit fit(mesh, column, kOneThread);
+            EXPECT_LT(largest_error(fit.fit(moved, HeightLaw::proportional, kOneThread), scale * turn), 1e-4 * scale);
+        }
     }
 }
 
 TEST(GradientFit, ShellsHaveTheLawsNormalColumn) {
     const Mesh mesh = make_wavy_plane({.resolution = 8, .amplitude = 0});
-    const GradientFit fit(mesh, kOneThread);
+    const GradientFit fit(mesh, NormalColumn::shell, kOneThread);
     const auto moved = mapped(mesh.positions, [](const Vec3d& p) { return Vec3d(2 * p.x(), p.y(), p.z()); });
     const double expected[] = {1, 1 / std::sqrt(2.0), std::sqrt(2.0), 0.5};
     for (const HeightLaw law : kLaws) {
         const Mat3d a = Vec3d(2, 1, expected[static_cast<int>(law)]).asDiagonal();
-        EXPECT_LT(largest_error(fit.fit(moved, NormalColumn::shell, law, kOneThread), a), 1e-3) << height_law_name(law);
+        EXPECT_LT(largest_error(fit.fit(moved, law, kOneThread), a), 1e-3) << height_law_name(law);
         // Given gradients keep their plane part, and get the same column.
         std::vector<Mat3f> given(mesh.vertex_count(), Mat3f(Vec3f(2, 1, 7).asDiagonal()));
         fit.make_shell(given, law);
@@ -93,10 +97,10 @@ TEST(GradientFit, QuadraticsToFirstOrder) {
     const auto f = [](const Vec3d& p) { return Vec3d(p + Vec3d(p.x() * p.y(), p.x() * p.x() / 2, p.x() * p.y())); };
     const auto error_at = [&](unsigned resolution) {
         const Mesh mesh = make_wavy_sphere({.resolution = resolution, .amplitude = 0});
-        const GradientFit fit(mesh, kOneThread);
+        const GradientFit fit(mesh, NormalColumn::fitted, kOneThread);
         const auto moved = mapped(mesh.positions, f);
         const std::vector<Vec3f> rest_normals = vertex_normals(mesh, mesh.positions, kOneThread);
-        const auto a = fit.fit(moved, NormalColumn::fitted, HeightLaw::proportional, kOneThread);
+        const auto a = fit.fit(moved, HeightLaw::proportional, kOneThread);
         const auto with_ghosts = fit.fit_to_ghosts(moved, mapped(fit.rest_ghosts(), f), kOneThread);
         double in_plane = 0, whole = 0;
         for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
@@ -130,14 +134,15 @@ TEST(GradientFit, LawsAreBoundedWhereTheyHaveToBe) {
 
 TEST(GradientFit, CollapsedDriversGiveFiniteGradients) {
     const Mesh mesh = make_wavy_cube({.resolution = 8});
-    const GradientFit fit(mesh, kOneThread);
-    for (const float squash : {0.0f, 1e-20f}) {
-        const auto moved =
-            mapped(mesh.positions, [&](const Vec3d& p) { return Vec3d(squash * p.x(), squash * p.y(), 0); });
-        for (const HeightLaw law : kLaws)
-            for (const NormalColumn column : {NormalColumn::fitted, NormalColumn::shell})
-                for (const Mat3f& a : fit.fit(moved, column, law, kOneThread))
+    for (const NormalColumn column : kColumns) {
+        const GradientFit fit(mesh, column, kOneThread);
+        for (const float squash : {0.0f, 1e-20f}) {
+            const auto moved =
+                mapped(mesh.positions, [&](const Vec3d& p) { return Vec3d(squash * p.x(), squash * p.y(), 0); });
+            for (const HeightLaw law : kLaws)
+                for (const Mat3f& a : fit.fit(moved, law, kOneThread))
                     ASSERT_TRUE(a.allFinite()) << height_law_name(law);
+        }
     }
 }
 
@@ -146,10 +151,137 @@ TEST(GradientFit, NoThreadChangesAByte) {
     const Mesh mesh = make_wavy_sphere({.resolution = 32});
     const auto moved =
         mapped(mesh.positions, [](const Vec3d& p) { return Vec3d(p.x() * p.y(), p.y(), p.z() + p.x()); });
-    const auto one =
-        GradientFit(mesh, kOneThread).fit(moved, NormalColumn::fitted, HeightLaw::proportional, kOneThread);
+    const auto one = GradientFit(mesh, NormalColumn::fitted, kOneThread).fit(moved, HeightLaw::keep, kOneThread);
     const RunContext two(2);
-    EXPECT_EQ(GradientFit(mesh, two).fit(moved, NormalColumn::fitted, HeightLaw::proportional, two), one);
+    EXPECT_EQ(GradientFit(mesh, NormalColumn::fitted, two).fit(moved, HeightLaw::keep, two), one);
+}
+
+const Mat3d kTurn = Eigen::AngleAxisd(1.1, Vec3d(0.3, 1, -0.4).normalized()).toRotationMatrix();
+
+/// Stretched, sheared and turned.
+const Mat3d kAffine = (Mat3d() << 1.4, 0.3, -0.2, 0.1, 0.7, 0.4, -0.5, 0.2, 1.1).finished();
+
+Vec3d affinely(const Vec3d& p) { return kAffine * p + Vec3d(1, -2, 3); }
+
+/// Largest difference from an affine map's gradient over all vertices, from positions alone.
+double affine_error(const Mesh& mesh) {
+    const GradientFit fit(mesh, NormalColumn::fitted, kOneThread);
+    return largest_error(fit.fit(mapped(mesh.positions, affinely), HeightLaw::keep, kOneThread), kAffine);
+}
+
+TEST(GradientFit, AffineMapsAreExactWhereNeighboursSpread) {
+    EXPECT_LT(affine_error(make_wavy_sphere({.resolution = 16})), 1e-4);
+    EXPECT_LT(affine_error(make_bar({.resolution = 4})), 1e-4);
+    // Its sides are flat and seven edges wide at least: one neighbour in four is of a sparser set, which sees past
+    // them.
+    EXPECT_LT(affine_error(make_wavy_cube({.resolution = 8, .amplitude = 0})), 1e-4);
+}
+
+TEST(GradientFit, APlateAnEighthOfAnEdgeThickIsSolid) {
+    Mesh plate = make_wavy_cube({.resolution = 8, .amplitude = 0});
+    for (Vec3f& p : plate.positions) p.z() /= 64;
+    EXPECT_LT(affine_error(plate), 2e-3);
+}
+
+TEST(GradientFit, ASheetTurnsWithItsPlaneAndKeepsTheLaw) {
+    const Mesh sheet = make_wavy_plane({.resolution = 10, .amplitude = 0});
+    const GradientFit fit(sheet, NormalColumn::fitted, kOneThread);
+    const auto turned = mapped(sheet.positions, [](const Vec3d& p) { return Vec3d(kTurn * p); });
+    const auto twice = mapped(sheet.positions, [](const Vec3d& p) { return Vec3d(2 * kTurn * p); });
+    const double heights[] = {1, 0.5, 2, 0.25}; // keep, inverse, proportional, volume
+    for (const HeightLaw law : kLaws) {
+        EXPECT_LT(largest_error(fit.fit(turned, law, kOneThread), kTurn), 1e-5);
+        const Mat3d expected = kTurn * Vec3d(2, 2, heights[static_cast<int>(law)]).asDiagonal();
+        EXPECT_LT(largest_error(fit.fit(twice, law, kOneThread), expected), 1e-4) << height_law_name(law);
+    }
+}
+
+/// From a sheet to a plate, in steps of thickness: no gradient may jump from one step to the next.
+TEST(GradientFit, TheLawTakesOverContinuously) {
+    const Mesh cube = make_wavy_cube({.resolution = 8, .amplitude = 0});
+    std::vector<Mat3f> previous;
+    for (double thickness = 1e-5; thickness < 1e-2; thickness *= 1.05) {
+        Mesh plate = cube;
+        for (Vec3f& p : plate.positions) p.z() *= float(thickness);
+        const GradientFit fit(plate, NormalColumn::fitted, kOneThread);
+        const auto moved = mapped(plate.positions, [](const Vec3d& p) { return Vec3d(p.x(), p.y(), 2 * p.z()); });
+        const std::vector<Mat3f> now = fit.fit(moved, HeightLaw::keep, kOneThread);
+        for (std::size_t v = 0; v < previous.size(); ++v)
+            ASSERT_LT((now[v] - previous[v]).norm(), 0.1) << thickness << ' ' << v;
+        previous = now;
+    }
+}
+
+/// Points of two meshes, one after the other.
+Mesh side_by_side(const Mesh& a, const Mesh& b) {
+    Mesh both = a;
+    both.positions.insert(both.positions.end(), b.positions.begin(), b.positions.end());
+    for (std::size_t f = 0; f < b.face_count(); ++f) {
+        std::vector<Index> face;
+        for (Index v : b.face(f)) face.push_back(v + static_cast<Index>(a.vertex_count()));
+        both.add_face(face);
+    }
+    return both;
+}
+
+TEST(GradientFit, PartsThatTouchSlideOnEachOther) {
+    const Mesh lower = make_wavy_cube({.resolution = 8, .amplitude = 0});
+    Mesh upper = lower;
+    for (Vec3f& p : upper.positions) p += Vec3f(0.03f, 0.05f, 1); // on top of the lower
+    const Mesh both = side_by_side(lower, upper);
+    std::vector<Vec3f> moved = both.positions;
+    for (std::size_t v = lower.vertex_count(); v < moved.size(); ++v)
+        moved[v] = (kTurn * moved[v].cast<double>() + Vec3d(0.4, 0, 0)).cast<float>();
+    const std::vector<Mat3f> a =
+        GradientFit(both, NormalColumn::fitted, kOneThread).fit(moved, HeightLaw::keep, kOneThread);
+    EXPECT_LT(largest_error(std::span(a).first(lower.vertex_count()), Mat3d::Identity()), 1e-4);
+    EXPECT_LT(largest_error(std::span(a).subspan(lower.vertex_count()), kTurn), 1e-4);
+}
+
+TEST(GradientFit, DoubledVerticesCountOnce) {
+    const Mesh mesh = make_wavy_sphere({.resolution = 12});
+    Mesh doubled; // every face with vertices of its own
+    for (std::size_t f = 0; f < mesh.face_count(); ++f) {
+        std::vector<Index> face;
+        for (Index v : mesh.face(f)) {
+            face.push_back(static_cast<Index>(doubled.positions.size()));
+            doubled.positions.push_back(mesh.positions[v]);
+        }
+        doubled.add_face(face);
+    }
+    EXPECT_LT(affine_error(doubled), 1e-4);
+    Mesh almost = side_by_side(mesh, mesh); // twice, and not quite at the same places
+    for (std::size_t v = mesh.vertex_count(); v < almost.positions.size(); ++v) almost.positions[v] *= 1.000001f;
+    EXPECT_LT(affine_error(almost), 1e-3);
+}
+
+TEST(GradientFit, NoiseIsNotAmplified) {
+    const Mesh mesh = make_wavy_sphere({.resolution = 32});
+    const GradientFit fit(mesh, NormalColumn::fitted, kOneThread);
+    const double edge = (mesh.positions[mesh.face(0)[0]] - mesh.positions[mesh.face(0)[1]]).norm();
+    std::vector<Vec3f> moved = mesh.positions;
+    std::uint64_t counter = 0;
+    for (Vec3f& p : moved)
+        for (int k = 0; k < 3; ++k) p[k] += float(1e-3 * edge * (2 * random_unit(7, counter++) - 1));
+    double squared = 0;
+    const std::vector<Mat3f> a = fit.fit(moved, HeightLaw::keep, kOneThread);
+    for (const Mat3f& gradient : a) squared += (gradient - Mat3f::Identity()).squaredNorm();
+    EXPECT_LT(std::sqrt(squared / double(a.size())), 1e-2); // about seven thousandths, of one
+}
+
+TEST(GradientFit, PointsWithoutFacesHaveGradientsToo) {
+    Mesh points;
+    points.positions = make_wavy_sphere({.resolution = 12}).positions;
+    EXPECT_LT(affine_error(points), 1e-4);
+    Mesh line;
+    for (int k = 0; k < 20; ++k) line.positions.emplace_back(0.1f * float(k), 0.05f * float(k), 0.0f);
+    const GradientFit fit(line, NormalColumn::fitted, kOneThread);
+    const auto moved = mapped(line.positions, [](const Vec3d& p) { return Vec3d(2 * kTurn * p); });
+    const Vec3d along = (line.positions[1] - line.positions[0]).cast<double>().normalized();
+    for (const Mat3f& a : fit.fit(moved, HeightLaw::proportional, kOneThread)) {
+        EXPECT_LT((a.cast<double>() * along - 2 * kTurn * along).norm(), 1e-4);
+        EXPECT_LT((a.transpose() * a - 4 * Mat3f::Identity()).norm(), 1e-3); // turned and scaled, in every direction
+    }
 }
 
 } // namespace

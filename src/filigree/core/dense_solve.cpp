@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <Eigen/SVD>
 
 namespace filigree {
@@ -43,8 +44,8 @@ Vec3d singular_values_only(const Mat3d& matrix) {
 
 Vec3d solve_semidefinite(const Mat3d& matrix, const Vec3d& right) { return matrix.ldlt().solve(right); }
 
-Eigen::Matrix<double, 6, 3> inverse_columns(const Eigen::Matrix<double, 6, 6>& matrix) {
-    return matrix.ldlt().solve(Eigen::Matrix<double, 6, 3>::Identity());
+Eigen::MatrixXd solve_general(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& right) {
+    return matrix.partialPivLu().solve(right);
 }
 
 } // namespace filigree

@@ -42,7 +42,7 @@ inline Mat3d cofactor(const Mat3d& a) {
 
 /// x with matrix x = right, for a symmetric positive semi-definite matrix, of which the lower triangle is read.
 Vec3d solve_semidefinite(const Mat3d& matrix, const Vec3d& right);
-/// The inverse's first three columns.
-Eigen::Matrix<double, 6, 3> inverse_columns(const Eigen::Matrix<double, 6, 6>& matrix);
+/// x with matrix x = right, for any square matrix that is not singular.
+Eigen::MatrixXd solve_general(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& right);
 
 } // namespace filigree

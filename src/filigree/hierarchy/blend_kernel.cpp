@@ -46,14 +46,14 @@ struct alignas(64) CellTransform {
 
 constexpr int kA = 3, kHalfRest = 12; // offsets in a VertexTransform
 
+template <int N>
 FILIGREE_INLINE void set_cell(CellTransform& cell, const Triangle& corners, const VertexTransform* transforms) {
-    const float* t0 = transforms[corners[0]].t;
-    const float* t1 = transforms[corners[1]].t;
-    const float* t2 = transforms[corners[2]].t;
-    for (int k = 0; k < 16; ++k) {
-        cell.base[k] = t0[k];
-        cell.du[k] = t1[k] - t0[k];
-        cell.dv[k] = t2[k] - t0[k];
+    using L = Lanes<N>;
+    for (int k = 0; k < 16; k += N) {
+        const typename L::Float t0 = L::load(transforms[corners[0]].t + k);
+        L::store(cell.base + k, t0);
+        L::store(cell.du + k, L::load(transforms[corners[1]].t + k) - t0);
+        L::store(cell.dv + k, L::load(transforms[corners[2]].t + k) - t0);
     }
 }
 
@@ -173,7 +173,7 @@ FILIGREE_INLINE void restore_runs(const Job& job, std::size_t run_begin, std::si
             if (r == run_end) return;
         }
         const Run& run = job.records.runs[r];
-        set_cell(cell, job.records.cells[run.cell], job.transforms);
+        set_cell<N>(cell, job.records.cells[run.cell], job.transforms);
         restore_run<N, Int16, Positions, Normals>(job.records, run, cell, positions + 3 * filled, normals + 3 * filled);
         filled += run.count;
     }

@@ -1,10 +1,8 @@
-// The plane part of the gradient comes from how the ring's vertices moved, the normal part from the ring's own relief
-// where it has some (the z column) and else from the normal. The quadratic terms take up curvature, so that it does not
-// leak into the linear ones.
 #include "filigree/hierarchy/gradient_fit.h"
 
 #include "filigree/core/dense_solve.h"
 #include "filigree/core/parallel_for.h"
+#include "filigree/hierarchy/space_neighbours.h"
 #include "filigree/mesh/normals.h"
 
 #include <algorithm>
@@ -14,192 +12,207 @@ namespace filigree {
 
 namespace {
 
-constexpr double kQuadraticRidge = 1e-4; // times the neighbour count, in units of the ring's own size
-constexpr double kLinearRidge = 1e-9;    // the same; keeps degenerate rings solvable
-constexpr double kSoftNormal = 0.003;    // the same; pull of the z column towards s n'
-constexpr double kHardNormal = 1e4;      // the same; z column as good as given
-constexpr double kGhostLength = 0.1;     // of a ghost point from its vertex, in mean edge lengths
-constexpr std::size_t kMaxRing = 48;     // neighbours a fit uses at most: more add cost, no accuracy
+constexpr double kQuadratics = 10; // how cheap quadratic terms are beside the kernel; between 1 and 100 little changes
+constexpr double kRidge =
+    3e-8; // on the kernel, in units of the set's size: keeps vertices almost at one place solvable
+constexpr double kFlat = 6e-4, kSolid = 6e-3; // thickness in widths: below the first the law, above the second the sum
+constexpr double kNoSpread = 1e-4;            // thickness in widths below which a direction has no linear term
+constexpr double kGhostLength = 0.1;          // of a ghost point from its vertex, in mean edge lengths
 
-using Row6 = Eigen::Matrix<double, 6, 1>;
-
-/// Columns: two unit tangents and the normal.
-Mat3d tangent_basis(const Vec3d& normal) {
-    Mat3d basis;
-    basis.col(0) = normal.unitOrthogonal();
-    basis.col(1) = normal.cross(basis.col(0));
-    basis.col(2) = normal;
-    return basis;
+double smooth_step(double from, double to, double x) {
+    const double t = std::clamp((x - from) / (to - from), 0.0, 1.0);
+    return t * t * (3 - 2 * t);
 }
 
-/// For each vertex those that share a face with it, ascending.
-std::vector<std::vector<Index>> neighbour_lists(const Mesh& mesh) {
-    std::vector<std::vector<Index>> neighbours(mesh.vertex_count());
-    for (std::size_t f = 0; f < mesh.face_count(); ++f)
-        for (Index a : mesh.face(f))
-            for (Index b : mesh.face(f))
-                if (a != b) neighbours[a].push_back(b);
-    for (auto& list : neighbours) {
-        std::sort(list.begin(), list.end());
-        list.erase(std::unique(list.begin(), list.end()), list.end());
+/// a with what it does to the unit vector n replaced by s n', n' and s from what it does to the plane across n.
+Mat3d with_law(const Mat3d& a, const Vec3d& n, HeightLaw law) {
+    const Vec3d t = n.unitOrthogonal();
+    const Vec3d across = (a * t).cross(a * n.cross(t)); // the deformed normal; its length is the area ratio
+    const double area = across.norm();
+    const Vec3d column = area > 0 ? Vec3d(height_law_scale(law, 1, area) * across / area) : Vec3d(Vec3d::Zero());
+    return a + (column - a * n) * n.transpose();
+}
+
+/// a with what it does across the unit vector t replaced by the least rotation that takes t to a t, scaled like a t.
+Mat3d turned_with_line(const Mat3d& a, const Vec3d& t) {
+    const Vec3d moved = a * t;
+    const double stretch = moved.norm();
+    if (!(stretch > 0)) return moved * t.transpose();
+    const Mat3d turn = Eigen::Quaterniond::FromTwoVectors(t, moved).toRotationMatrix();
+    return moved * t.transpose() + stretch * turn * (Mat3d::Identity() - t * t.transpose());
+}
+
+/// The mean length of the edges at each vertex, each counted once for each face it is of.
+std::vector<double> mean_edge_lengths(const Mesh& mesh) {
+    std::vector<double> sums(mesh.vertex_count(), 0), edges(mesh.vertex_count(), 0);
+    for (std::size_t f = 0; f < mesh.face_count(); ++f) {
+        const std::span<const Index> face = mesh.face(f);
+        for (std::size_t k = 0; k < face.size(); ++k) {
+            const Index ends[] = {face[k], face[(k + 1) % face.size()]};
+            const double length = (mesh.positions[ends[0]] - mesh.positions[ends[1]]).cast<double>().norm();
+            for (Index v : ends) sums[v] += length, ++edges[v];
+        }
     }
-    return neighbours;
+    for (std::size_t v = 0; v < sums.size(); ++v) sums[v] /= std::max(edges[v], 1.0);
+    return sums;
+}
+
+/// A set of points in axes of its own: along which it spreads most first, about the vertex, in units of its size.
+struct LocalSet {
+    double size = 0;           ///< root of the mean squared distance from the mean
+    Mat3d axes;                ///< columns
+    Vec3d spread;              ///< root of the mean square along each axis, in sizes
+    std::vector<Vec3d> points; ///< the vertex itself first
+
+    LocalSet(std::span<const Vec3f> positions, Index vertex, std::span<const Index> neighbours) {
+        const Vec3d centre = positions[vertex].cast<double>();
+        points.push_back(Vec3d::Zero());
+        for (Index j : neighbours) points.push_back(positions[j].cast<double>() - centre);
+        Vec3d mean = Vec3d::Zero();
+        for (const Vec3d& p : points) mean += p / double(points.size());
+        Mat3d covariance = Mat3d::Zero();
+        for (const Vec3d& p : points) covariance += (p - mean) * (p - mean).transpose() / double(points.size());
+        size = std::sqrt(covariance.trace());
+        if (!(size > 0)) return;
+
+        const SymmetricEigen<double, 3> eigen = symmetric_eigen(Mat3d(covariance / (size * size)));
+        axes = eigen.vectors.rowwise().reverse();
+        spread = eigen.values.reverse().cwiseMax(0).cwiseSqrt();
+        for (Vec3d& p : points) p = axes.transpose() * p / size;
+    }
+
+    /// Directions with a linear term.
+    int rank() const { return spread[1] < kNoSpread * spread[0] ? 1 : spread[2] < kNoSpread * spread[1] ? 2 : 3; }
+};
+
+/// The gradient at the first point of the interpolant, as a weight for each point's value: rows of three.
+Eigen::MatrixXd gradient_weights(const LocalSet& set) {
+    const Eigen::Index n = static_cast<Eigen::Index>(set.points.size()), rank = set.rank();
+    Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(n + 1 + rank, n + 1 + rank);
+    Eigen::MatrixXd right = Eigen::MatrixXd::Zero(n + 1 + rank, 3);
+    for (Eigen::Index a = 0; a < n; ++a) {
+        const Vec3d& p = set.points[static_cast<std::size_t>(a)];
+        for (Eigen::Index b = 0; b <= a; ++b) {
+            const Vec3d& q = set.points[static_cast<std::size_t>(b)];
+            const double squared = (p - q).squaredNorm(), dot = p.dot(q);
+            matrix(a, b) = matrix(b, a) = squared * std::sqrt(squared) + kQuadratics * dot * dot;
+        }
+        matrix(a, a) += kRidge;
+        matrix(a, n) = matrix(n, a) = 1;
+        matrix.row(a).tail(rank) = p.head(rank).transpose();
+        matrix.col(a).tail(rank) = p.head(rank);
+        right.row(a) = -3 * p.norm() * p.transpose();
+    }
+    for (Eigen::Index k = 0; k < rank; ++k) right(n + 1 + k, k) = 1;
+    return solve_general(matrix, right).topRows(n);
 }
 
 } // namespace
 
-GradientFit::GradientFit(const Mesh& driver, const RunContext& context) {
-    driver_.positions = driver.positions;
-    driver_.face_offsets = driver.face_offsets;
-    driver_.corners = driver.corners;
-    normals_ = vertex_normals(driver_, driver_.positions, context);
-    rest_areas_ = ring_areas(driver_.positions);
-
-    find_rings();
-    soft_ = solve(kSoftNormal, context);
-    hard_ = solve(kHardNormal, context);
-}
-
-void GradientFit::find_rings() {
-    const std::vector<std::vector<Index>> neighbours = neighbour_lists(driver_);
-    const std::size_t count = driver_.vertex_count();
-    ring_offsets_ = {0};
-    edge_lengths_.assign(count, 0);
-    std::vector<Index> seen(count, kNoIndex);
-    for (Index i = 0; i < count; ++i) {
-        const std::size_t begin = ring_.size();
-        seen[i] = i;
-        const auto take = [&](Index j) {
-            if (seen[j] == i || ring_.size() - begin >= kMaxRing) return;
-            seen[j] = i;
-            ring_.push_back(j);
-        };
-        const std::size_t step = neighbours[i].size() / kMaxRing + 1; // spread over a fan larger than the cap
-        for (std::size_t k = 0; k < neighbours[i].size(); k += step) take(neighbours[i][k]);
-        const std::size_t one_ring = ring_.size();
-        for (std::size_t k = begin; k < one_ring && ring_.size() - begin < kMaxRing; ++k)
-            for (Index j : neighbours[ring_[k]]) {
-                if (ring_.size() - begin >= kMaxRing) break; // a fan may have any number
-                take(j);
-            }
-        for (std::size_t k = begin; k < one_ring; ++k)
-            edge_lengths_[i] +=
-                (driver_.positions[ring_[k]] - driver_.positions[i]).cast<double>().norm() / double(one_ring - begin);
-        ring_offsets_.push_back(static_cast<Index>(ring_.size()));
-    }
-}
-
-GradientFit::Weights GradientFit::solve(double normal_weight, const RunContext& context) const {
-    Weights weights;
-    const std::size_t count = driver_.vertex_count();
-    weights.alpha.assign(ring_.size(), Vec3d::Zero());
-    weights.beta.assign(count, Vec3d::Zero());
-    parallel_for(context, count, 256, [&](std::size_t begin, std::size_t end) {
-        std::vector<Row6> rows;
-        for (std::size_t i = begin; i < end; ++i) {
-            const std::size_t ring_begin = ring_offsets_[i], ring_end = ring_offsets_[i + 1];
-            const Vec3d normal = normals_[i].cast<double>();
-            if (ring_begin == ring_end || normal.squaredNorm() == 0) continue;
-            const Mat3d basis = tangent_basis(normal.normalized());
-            const Vec3d centre = driver_.positions[i].cast<double>();
-            double size = 0;
-            for (std::size_t k = ring_begin; k < ring_end; ++k)
-                size += (driver_.positions[ring_[k]].cast<double>() - centre).squaredNorm();
-            const double m = double(ring_end - ring_begin);
-            size = std::sqrt(size / m);
-            if (!(size > 0)) continue;
-
-            rows.clear();
-            Eigen::Matrix<double, 6, 6> normal_matrix = Eigen::Matrix<double, 6, 6>::Zero();
-            for (std::size_t k = ring_begin; k < ring_end; ++k) {
-                const Vec3d x = basis.transpose() * (driver_.positions[ring_[k]].cast<double>() - centre) / size;
-                Row6 row;
-                row << x[0], x[1], x[2], x[0] * x[0], x[0] * x[1], x[1] * x[1];
-                normal_matrix += row * row.transpose();
-                rows.push_back(row);
-            }
-            for (int d = 0; d < 6; ++d) normal_matrix(d, d) += m * (d < 3 ? kLinearRidge : kQuadraticRidge);
-            normal_matrix(2, 2) += m * normal_weight;
-
-            // The first three rows of the inverse: how the linear terms depend on the right-hand side.
-            const Eigen::Matrix<double, 6, 3> inverse = inverse_columns(normal_matrix);
-            for (std::size_t k = ring_begin; k < ring_end; ++k)
-                weights.alpha[k] = basis * (inverse.transpose() * rows[k - ring_begin]) / size;
-            weights.beta[i] = basis * (m * normal_weight * inverse.row(2).transpose());
-        }
+GradientFit::GradientFit(const Mesh& driver, NormalColumn normal_column, const RunContext& context)
+    : rest_(driver.positions), normals_(vertex_normals(driver, driver.positions, context)),
+      normal_column_(normal_column) {
+    SpaceNeighbourOptions options;
+    options.along_surface = normal_column == NormalColumn::shell;
+    const IndexLists neighbours = space_neighbours(driver, normals_, options, context);
+    const std::size_t count = rest_.size();
+    if (const double diagonal = bounds(rest_).diagonal(); diagonal > 0) scale_ = 1 / diagonal;
+    for (double length : mean_edge_lengths(driver)) ghost_lengths_.push_back(float(kGhostLength * length));
+    term_offsets_ = neighbours.offsets;
+    terms_.assign(neighbours.items.size(), {});
+    flatness_.assign(count, {});
+    rest_error_.assign(count, Mat3f::Identity());
+    parallel_for(context, count, 64, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) solve(static_cast<Index>(i), neighbours);
     });
-    std::vector<Vec3d> columns(count);
-    for (std::size_t i = 0; i < count; ++i) columns[i] = normals_[i].cast<double>().normalized();
-    weights.rest_error.assign(count, Mat3d::Zero());
-    const std::vector<Mat3f> at_rest = apply(weights, driver_.positions, columns, context);
-    for (std::size_t i = 0; i < count; ++i) weights.rest_error[i] = Mat3d::Identity() - at_rest[i].cast<double>();
-    return weights;
+    const std::vector<Mat3f> at_rest = sum(rest_, context);
+    for (std::size_t i = 0; i < count; ++i) rest_error_[i] += -at_rest[i];
 }
 
-std::vector<Mat3f> GradientFit::apply(const Weights& weights, std::span<const Vec3f> positions,
-                                      std::span<const Vec3d> columns, const RunContext& context) const {
-    std::vector<Mat3f> gradients(driver_.vertex_count());
-    parallel_for(context, gradients.size(), 1024, [&](std::size_t begin, std::size_t end) {
+void GradientFit::solve(Index vertex, const IndexLists& neighbours) {
+    const LocalSet set(rest_, vertex, neighbours[vertex]);
+    if (!(set.size > 0)) return;
+    const Eigen::MatrixXd weights = gradient_weights(set);
+    for (std::size_t k = 0; k < neighbours[vertex].size(); ++k) {
+        const Vec3d weight = set.axes * weights.row(static_cast<Eigen::Index>(k) + 1).transpose() / (set.size * scale_);
+        terms_[term_offsets_[vertex] + k] = {neighbours[vertex][k], weight.cast<float>()};
+    }
+    const int rank = set.rank();
+    const auto share_of_law = [&](int axis) {
+        return rank < axis + 1 ? 1 : float(1 - smooth_step(kFlat, kSolid, set.spread[axis] / set.spread[axis - 1]));
+    };
+    flatness_[vertex] = {set.axes.col(0).cast<float>(), set.axes.col(2).cast<float>(), share_of_law(1),
+                         share_of_law(2)};
+    rest_error_[vertex] = (set.axes.leftCols(rank) * set.axes.leftCols(rank).transpose()).cast<float>();
+}
+
+std::vector<Mat3f> GradientFit::sum(std::span<const Vec3f> positions, const RunContext& context) const {
+    std::vector<Eigen::Vector4f> padded(positions.size()); // a position is one load, and a column one register
+    for (std::size_t i = 0; i < padded.size(); ++i)
+        padded[i] << (scale_ * positions[i].cast<double>()).cast<float>(), 0;
+    std::vector<Mat3f> gradients(rest_.size());
+    parallel_for(context, gradients.size(), 256, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-            Mat3d a = weights.rest_error[i] + columns[i] * weights.beta[i].transpose();
-            const Vec3d centre = positions[i].cast<double>();
-            for (std::size_t k = ring_offsets_[i]; k < ring_offsets_[i + 1]; ++k)
-                a += (positions[ring_[k]].cast<double>() - centre) * weights.alpha[k].transpose();
-            gradients[i] = a.cast<float>();
+            Eigen::Vector4f x = Eigen::Vector4f::Zero(), y = x, z = x;
+            for (std::size_t k = term_offsets_[i]; k < term_offsets_[i + 1]; ++k) {
+                const Eigen::Vector4f way = padded[terms_[k].vertex] - padded[i];
+                x += way * terms_[k].weight[0];
+                y += way * terms_[k].weight[1];
+                z += way * terms_[k].weight[2];
+            }
+            gradients[i] << x.head<3>(), y.head<3>(), z.head<3>();
         }
     });
     return gradients;
 }
 
-std::vector<double> GradientFit::ring_areas(std::span<const Vec3f> positions) const {
-    std::vector<double> areas(positions.size(), 0);
-    for (std::size_t f = 0; f < driver_.face_count(); ++f) {
-        const std::span<const Index> face = driver_.face(f);
-        const double doubled_area = doubled_area_vector(positions, face).norm();
-        for (Index v : face) areas[v] += doubled_area;
-    }
-    return areas;
+Mat3f GradientFit::complete(const Mat3f& gradient, const Flatness& flatness, HeightLaw law) const {
+    if (flatness.off_plane == 0) return gradient;
+    Mat3d a = gradient.cast<double>();
+    if (flatness.beside_line > 0) a += flatness.beside_line * (turned_with_line(a, flatness.line.cast<double>()) - a);
+    a += flatness.off_plane * (with_law(a, flatness.normal.cast<double>(), law) - a);
+    return a.cast<float>();
 }
 
-std::vector<Mat3f> GradientFit::fit(std::span<const Vec3f> positions, NormalColumn normal_column, HeightLaw law,
-                                    const RunContext& context) const {
-    const std::vector<Vec3f> normals = vertex_normals(driver_, positions, context);
-    const std::vector<double> areas = law == HeightLaw::keep ? rest_areas_ : ring_areas(positions);
-    std::vector<Vec3d> columns(positions.size());
-    for (std::size_t i = 0; i < columns.size(); ++i)
-        columns[i] = height_law_scale(law, rest_areas_[i], areas[i]) * normals[i].cast<double>().normalized();
-    return apply(normal_column == NormalColumn::shell ? hard_ : soft_, positions, columns, context);
+std::vector<Mat3f> GradientFit::fit_space(std::span<const Vec3f> positions, HeightLaw law,
+                                          const RunContext& context) const {
+    std::vector<Mat3f> gradients = sum(positions, context);
+    for (std::size_t i = 0; i < gradients.size(); ++i)
+        gradients[i] = complete(gradients[i] + rest_error_[i], flatness_[i], law);
+    return gradients;
+}
+
+std::vector<Mat3f> GradientFit::fit(std::span<const Vec3f> positions, HeightLaw law, const RunContext& context) const {
+    std::vector<Mat3f> gradients = fit_space(positions, law, context);
+    if (normal_column_ == NormalColumn::shell) make_shell(gradients, law);
+    return gradients;
 }
 
 std::vector<Mat3f> GradientFit::fit_to_ghosts(std::span<const Vec3f> positions, std::span<const Vec3f> ghosts,
                                               const RunContext& context) const {
     const std::vector<Vec3f> rest = rest_ghosts();
-    std::vector<Vec3d> columns(positions.size(), Vec3d::Zero());
-    for (std::size_t i = 0; i < columns.size(); ++i) {
-        const double length = (rest[i] - driver_.positions[i]).cast<double>().norm();
-        if (length > 0) columns[i] = (ghosts[i] - positions[i]).cast<double>() / length;
+    std::vector<Mat3f> gradients = fit_space(positions, HeightLaw::proportional, context);
+    for (std::size_t i = 0; i < gradients.size(); ++i) {
+        const Vec3d normal = normals_[i].cast<double>().normalized();
+        const double length = (rest[i] - rest_[i]).cast<double>().norm(); // as rounded
+        if (!(length > 0)) continue;
+        const Vec3d column = (ghosts[i] - positions[i]).cast<double>() / length;
+        const Mat3d a = gradients[i].cast<double>();
+        gradients[i] = (a + (column - a * normal) * normal.transpose()).cast<float>();
     }
-    return apply(hard_, positions, columns, context);
+    return gradients;
 }
 
 void GradientFit::make_shell(std::span<Mat3f> gradients, HeightLaw law) const {
     for (std::size_t i = 0; i < gradients.size(); ++i) {
-        const Vec3d n = normals_[i].cast<double>().normalized();
-        if (n.squaredNorm() == 0) continue;
-        const Mat3d a = gradients[i].cast<double>();
-        const Mat3d basis = tangent_basis(n);
-        const Vec3d across =
-            (a * basis.col(0)).cross(a * basis.col(1)); // the deformed normal; its length is the area ratio
-        const double area = across.norm();
-        const Vec3d column = area > 0 ? Vec3d(height_law_scale(law, 1, area) * across / area) : Vec3d(Vec3d::Zero());
-        gradients[i] = (a + (column - a * n) * n.transpose()).cast<float>();
+        const Vec3d normal = normals_[i].cast<double>().normalized();
+        if (!normal.isZero(0)) gradients[i] = with_law(gradients[i].cast<double>(), normal, law).cast<float>();
     }
 }
 
 std::vector<Vec3f> GradientFit::rest_ghosts() const {
-    std::vector<Vec3f> ghosts = driver_.positions;
-    for (std::size_t i = 0; i < ghosts.size(); ++i)
-        ghosts[i] += (kGhostLength * edge_lengths_[i] * normals_[i].cast<double>().normalized()).cast<float>();
+    std::vector<Vec3f> ghosts = rest_;
+    for (std::size_t i = 0; i < ghosts.size(); ++i) ghosts[i] += ghost_lengths_[i] * normals_[i];
     return ghosts;
 }
 

@@ -3,30 +3,35 @@
 
 #include "filigree/core/run_context.h"
 #include "filigree/hierarchy/height_law.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh/incidence.h"
 
 namespace filigree {
 
-/// How the gradient's normal column is found when only the surface is known.
+/// How the gradient's normal column is found when only positions are known.
 enum class NormalColumn {
-    fitted, ///< from the surface's curvature, pulled gently to s n': solid matter, bumps stretch with the body
+    fitted, ///< from the vertices around in space: solid matter, bumps stretch with the body
     shell,  ///< s n' exactly: bumps keep their shape, for cloth and skin
 };
 
-/// Precomputed least-squares fits over the two-ring of every driver vertex. In rest coordinates (u, v, z) about the
-/// vertex, z along its normal, positions are fitted by [u v z u^2 uv v^2] with a ridge on the quadratic terms; what is
-/// left at run time is A_i = sum_j (c_j' - c_i') alpha_ij^T + s n_i' beta_i^T. Exact at rest, for rigid motions, and
-/// with HeightLaw::proportional for uniform scale. A vertex without faces has the identity.
+/// The gradient at each driver vertex of the smoothest deformation that takes the vertices around it to where they are
+/// now: of the triharmonic interpolant (kernel r^3, affine part free, quadratic part nearly so; Duchon 1977) of its
+/// neighbours in space (space_neighbours.h). The interpolant is linear in the positions, so each gradient is a sum of
+/// (c_j' - c_i') g_ij^T with weights g_ij that are solved for once. Exact at rest and for affine maps.
+///
+/// Where the neighbours lie in one plane, nothing says what happens off it: the normal column is s n' with s by the
+/// law. Sets up to six thousandths as thick as wide go over into that gradually. Where they lie on one line,
+/// the other two columns turn with it. A vertex without neighbours has the identity. With NormalColumn::shell the
+/// normal column at every vertex with a face is s n', whatever lies around.
 class GradientFit {
 public:
-    /// driver: the driver at rest. Cost O(V) fits of six unknowns.
-    explicit GradientFit(const Mesh& driver, const RunContext& context);
+    /// driver: the driver at rest. Cost O(V) solves of 36 unknowns: about 10 us each on one core, twice that with
+    /// their neighbours.
+    GradientFit(const Mesh& driver, NormalColumn normal_column, const RunContext& context);
 
-    /// One gradient a vertex of the driver, whose vertices are now at `positions`; s by the law, from the areas of the
-    /// one-rings. Cost O(V); same bytes for any thread count.
-    std::vector<Mat3f> fit(std::span<const Vec3f> positions, NormalColumn normal_column, HeightLaw law,
-                           const RunContext& context) const;
-    /// The same, with the normal column given: ghosts[i] is where rest_ghosts()[i] went.
+    /// One gradient a vertex of the driver, whose vertices are now at `positions`. Cost O(V); same bytes for any thread
+    /// count.
+    std::vector<Mat3f> fit(std::span<const Vec3f> positions, HeightLaw law, const RunContext& context) const;
+    /// The same with the normal column given: ghosts[i] is where rest_ghosts()[i] went.
     std::vector<Mat3f> fit_to_ghosts(std::span<const Vec3f> positions, std::span<const Vec3f> ghosts,
                                      const RunContext& context) const;
     /// Replaces the normal column of given gradients by s n', n' and s from the gradients themselves.
@@ -37,23 +42,30 @@ public:
     std::vector<Vec3f> rest_ghosts() const;
 
 private:
-    struct Weights {
-        std::vector<Vec3d> alpha;      ///< one a neighbour
-        std::vector<Vec3d> beta;       ///< one a vertex
-        std::vector<Mat3d> rest_error; ///< identity minus the fit at rest; not zero only where the ring is degenerate
+    /// One term of a vertex's sum.
+    struct Term {
+        Index vertex;
+        Vec3f weight;
     };
-    void find_rings();
-    Weights solve(double normal_weight, const RunContext& context) const;
-    std::vector<Mat3f> apply(const Weights& weights, std::span<const Vec3f> positions, std::span<const Vec3d> columns,
-                             const RunContext& context) const;
-    std::vector<double> ring_areas(std::span<const Vec3f> positions) const;
+    /// Directions in which a vertex's neighbours do not spread, and how far the law decides there, 0 to 1.
+    struct Flatness {
+        Vec3f line, normal; ///< along which they spread most, and least
+        float beside_line = 0, off_plane = 0;
+    };
+    void solve(Index vertex, const IndexLists& neighbours);
+    Mat3f complete(const Mat3f& gradient, const Flatness& flatness, HeightLaw law) const;
+    std::vector<Mat3f> sum(std::span<const Vec3f> positions, const RunContext& context) const;
+    std::vector<Mat3f> fit_space(std::span<const Vec3f> positions, HeightLaw law, const RunContext& context) const;
 
-    Mesh driver_;
-    std::vector<Vec3f> normals_;
-    std::vector<double> rest_areas_, edge_lengths_;
-    /// Two-ring of each vertex (neighbours share a face; they, and theirs), itself left out.
-    std::vector<Index> ring_offsets_, ring_;
-    Weights soft_, hard_;
+    std::vector<Vec3f> rest_, normals_;
+    std::vector<float> ghost_lengths_; ///< from each vertex to its ghost point
+    NormalColumn normal_column_;
+    double scale_ = 1; ///< one over the driver's diagonal, so that no size is too small or too large for a float
+    std::vector<Index> term_offsets_;
+    std::vector<Term> terms_;
+    std::vector<Flatness> flatness_;
+    /// What the sum misses at rest: rounding, and everything where there are no neighbours.
+    std::vector<Mat3f> rest_error_;
 };
 
 } // namespace filigree

@@ -2,6 +2,8 @@
 
 #include "filigree/mesh/normals.h"
 
+#include <mutex>
+
 namespace filigree {
 
 struct Restorer::Content {
@@ -14,15 +16,17 @@ struct Restorer::Content {
     std::vector<Index> vertex_of_normal; ///< of rest.normals.values, in the level's own ids
 
     // blend code
-    std::optional<GradientFit> gradient_fit;
-    std::optional<BlendRestorer> blend;         ///< positions, and normals where there is one a vertex
-    std::optional<BlendRestorer> blend_normals; ///< normals alone, where corners have their own
+    mutable std::once_flag gradient_fit_made;
+    mutable std::optional<GradientFit> gradient_fit; ///< made for the first pose without gradients
+    std::optional<BlendRestorer> blend;              ///< positions, and normals where there is one a vertex
+    std::optional<BlendRestorer> blend_normals;      ///< normals alone, where corners have their own
 
     // reference code
     std::optional<ReferenceRestorer> reference;
 
     bool has_vertex_normals() const { return !rest.normals.empty() && rest.normals.per_vertex(); }
-    void prepare_blend(const RunContext& context);
+    void prepare_blend();
+    const GradientFit& fit(unsigned threads) const;
     std::vector<Mat3f> gradients(const Pose& pose, const RunContext& context) const;
 };
 
@@ -35,9 +39,17 @@ std::vector<Vec3f> unit(std::vector<Vec3f> normals) {
 
 } // namespace
 
-void Restorer::Content::prepare_blend(const RunContext& context) {
+/// Not for a pose's own context: cancelled half way, it would stay half made.
+const GradientFit& Restorer::Content::fit(unsigned threads) const {
+    std::call_once(gradient_fit_made, [&] {
+        gradient_fit.emplace(level_mesh(*model, 0), options.thin_shell ? NormalColumn::shell : NormalColumn::fitted,
+                             RunContext(threads));
+    });
+    return *gradient_fit;
+}
+
+void Restorer::Content::prepare_blend() {
     const BlendDetail& detail = std::get<BlendDetail>(model->detail);
-    gradient_fit.emplace(level_mesh(*model, 0), context);
     const std::span<const Vec3f> positions = model->mesh.positions;
     const std::span<const Index> driver = model->driver().vertices;
 
@@ -59,13 +71,12 @@ void Restorer::Content::prepare_blend(const RunContext& context) {
 }
 
 std::vector<Mat3f> Restorer::Content::gradients(const Pose& pose, const RunContext& context) const {
-    if (!gradient_fit) return {};
-    if (pose.gradients.empty() && pose.ghosts.empty())
-        return gradient_fit->fit(pose.positions, options.thin_shell ? NormalColumn::shell : NormalColumn::fitted, law,
-                                 context);
-    std::vector<Mat3f> given =
-        pose.gradients.empty() ? gradient_fit->fit_to_ghosts(pose.positions, pose.ghosts, context) : pose.gradients;
-    if (options.thin_shell) gradient_fit->make_shell(given, law);
+    if (!blend) return {};
+    if (pose.gradients.empty() && pose.ghosts.empty()) return fit(context.threads()).fit(pose.positions, law, context);
+    std::vector<Mat3f> given = pose.gradients.empty()
+                                   ? fit(context.threads()).fit_to_ghosts(pose.positions, pose.ghosts, context)
+                                   : pose.gradients;
+    if (options.thin_shell) fit(context.threads()).make_shell(given, law);
     return given;
 }
 
@@ -107,7 +118,7 @@ Result<Restorer> Restorer::create(const Model& model, const RestoreOptions& opti
     content->vertex_of_normal = split_shared_normals(content->rest);
     if (model.code() == DetailCode::blend) {
         content->law = options.law.value_or(HeightLaw::proportional);
-        content->prepare_blend(context);
+        content->prepare_blend();
     } else {
         content->law = options.law.value_or(HeightLaw::inverse);
         content->reference.emplace(std::get<ReferenceDetail>(model.detail), content->law, context);
@@ -118,7 +129,7 @@ Result<Restorer> Restorer::create(const Model& model, const RestoreOptions& opti
 std::size_t Restorer::vertex_count() const { return content_->rest.vertex_count(); }
 
 std::vector<Vec3f> Restorer::rest_ghosts() const {
-    return content_->gradient_fit ? content_->gradient_fit->rest_ghosts() : std::vector<Vec3f>{};
+    return content_->blend ? content_->fit(0).rest_ghosts() : std::vector<Vec3f>{};
 }
 
 Result<std::vector<Mat3f>> Restorer::gradients(const Pose& pose, const RunContext& context) const {

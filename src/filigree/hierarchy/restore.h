@@ -11,7 +11,7 @@ namespace filigree {
 
 struct RestoreOptions {
     /// Unset: proportional for the blend code (uniform scale is exact), inverse for the reference code (the report).
-    /// With the blend code a law matters where gradients are estimated, and for thin shells.
+    /// With the blend code a law matters where gradients are estimated in flat places, and for thin shells.
     std::optional<HeightLaw> law = {};
     bool thin_shell = false; ///< blend code: bumps keep their shape (cloth, skin) instead of stretching with the body
     std::optional<unsigned> level = {}; ///< restore up to this level; unset: the finest

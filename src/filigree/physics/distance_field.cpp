@@ -12,17 +12,17 @@ namespace filigree {
 
 namespace {
 
-constexpr int kMargin = 3; // spacings around the box, and as far from the surface distances are exact
+constexpr int kBandMargin = 3; // spacings around the box, and as far from the surface distances are exact
 constexpr double kMostPoints = 0x1p27;
 
-std::string number(double x) {
+std::string sample_number(double x) {
     char text[32];
     std::snprintf(text, sizeof text, "%.4g", x);
     return text;
 }
 
 /// The points of a regular grid, x fastest.
-struct Grid {
+struct DistanceGrid {
     Vec3d corner = Vec3d::Zero();
     double spacing = 0;
     std::array<std::size_t, 3> counts = {};
@@ -34,8 +34,8 @@ struct Grid {
     }
 };
 
-/// 1 for points within kMargin steps, along each axis, of the box of grid cubes around some part of a triangle.
-std::vector<std::uint8_t> find_band(const Grid& grid, std::span<const Vec3f> positions,
+/// 1 for points within kBandMargin steps, along each axis, of the box of grid cubes around some part of a triangle.
+std::vector<std::uint8_t> find_band(const DistanceGrid& grid, std::span<const Vec3f> positions,
                                     std::span<const Triangle> triangles) {
     std::vector<std::uint8_t> band(grid.size(), 0);
     const auto place = [&](double x, int axis) {
@@ -72,7 +72,7 @@ std::vector<std::uint8_t> find_band(const Grid& grid, std::span<const Vec3f> pos
                         band[grid.index(i, j, k)] = 1;
         }
     }
-    // A mark is a cube's lowest corner: spread it from kMargin - 1 below to kMargin above, axis by axis.
+    // A mark is a cube's lowest corner: spread it from kBandMargin - 1 below to kBandMargin above, axis by axis.
     const std::array<std::size_t, 3> strides = {1, grid.counts[0], grid.counts[0] * grid.counts[1]};
     for (int axis = 0; axis < 3; ++axis) {
         const std::vector<std::uint8_t> before = band;
@@ -80,8 +80,8 @@ std::vector<std::uint8_t> find_band(const Grid& grid, std::span<const Vec3f> pos
         for (std::size_t p = 0; p < band.size(); ++p) {
             if (!before[p]) continue;
             const std::size_t at = p / stride % grid.counts[axis];
-            const std::size_t down = std::min<std::size_t>(at, kMargin - 1);
-            const std::size_t up = std::min<std::size_t>(grid.counts[axis] - 1 - at, kMargin);
+            const std::size_t down = std::min<std::size_t>(at, kBandMargin - 1);
+            const std::size_t up = std::min<std::size_t>(grid.counts[axis] - 1 - at, kBandMargin);
             for (std::size_t n = p - down * stride; n <= p + up * stride; n += stride) band[n] = 1;
         }
     }
@@ -92,7 +92,7 @@ std::vector<std::uint8_t> find_band(const Grid& grid, std::span<const Vec3f> pos
 /// eight directions [Danielsson 1980]: distances to points of the surface, so never too small, and hardly too large.
 class Spreader {
 public:
-    Spreader(const Grid& grid, std::vector<Vec3f>& closest, std::vector<float>& distances)
+    Spreader(const DistanceGrid& grid, std::vector<Vec3f>& closest, std::vector<float>& distances)
         : grid_(grid), closest_(closest), distances_(distances) {}
 
     void sweep(bool down_x, bool down_y, bool down_z) {
@@ -120,18 +120,18 @@ private:
         closest_[to] = closest_[from];
     }
 
-    const Grid& grid_;
+    const DistanceGrid& grid_;
     std::vector<Vec3f>& closest_;
     std::vector<float>& distances_;
 };
 
 /// The grid around a box, all in model units.
-Result<Grid> make_grid(const Box& box, double spacing, double scale) {
-    Grid grid;
+Result<DistanceGrid> make_distance_grid(const Box& box, double spacing, double scale) {
+    DistanceGrid grid;
     grid.spacing = spacing;
     double points = 1;
     for (int axis = 0; axis < 3; ++axis) {
-        const double cubes = std::ceil(box.size()[axis] / spacing) + 2 * kMargin;
+        const double cubes = std::ceil(box.size()[axis] / spacing) + 2 * kBandMargin;
         points *= cubes + 1;
         grid.counts[axis] = std::size_t(std::min(cubes + 1, 1e9));
         grid.corner[axis] = box.centre()[axis] - 0.5 * cubes * spacing;
@@ -139,9 +139,9 @@ Result<Grid> make_grid(const Box& box, double spacing, double scale) {
     const std::size_t most = *std::max_element(grid.counts.begin(), grid.counts.end());
     if (points > kMostPoints || most > 65534) {
         const double coarser = std::max(std::cbrt(points / kMostPoints), double(most) / 65534);
-        return Error{ErrorCode::unsuitable, "A distance field with a spacing of " + number(spacing * scale) +
+        return Error{ErrorCode::unsuitable, "A distance field with a spacing of " + sample_number(spacing * scale) +
                                                 " m has more than 2^27 points; give at least " +
-                                                number(1.05 * coarser * spacing * scale) + " m."};
+                                                sample_number(1.05 * coarser * spacing * scale) + " m."};
     }
     return grid;
 }
@@ -150,10 +150,10 @@ Result<Grid> make_grid(const Box& box, double spacing, double scale) {
 
 Result<DistanceField> DistanceField::create(const Mesh& mesh, double scale, double spacing, const RunContext& context) {
     if (!std::isfinite(scale) || scale <= 0)
-        return Error{ErrorCode::usage, "The scale is " + number(scale) + "; give metres a model unit, above 0."};
+        return Error{ErrorCode::usage, "The scale is " + sample_number(scale) + "; give metres a model unit, above 0."};
     if (!std::isfinite(spacing) || spacing < 0)
         return Error{ErrorCode::usage,
-                     "The spacing is " + number(spacing) + "; give metres, above 0 (or 0 to have it chosen)."};
+                     "The spacing is " + sample_number(spacing) + "; give metres, above 0 (or 0 to have it chosen)."};
     const Result<WeldedTriangles> welded_triangles = weld_triangles(mesh, context);
     if (!welded_triangles) return welded_triangles.error();
     const WeldedTriangles& welded = *welded_triangles;
@@ -164,11 +164,12 @@ Result<DistanceField> DistanceField::create(const Mesh& mesh, double scale, doub
         for (const Index v : triangle) box.extend(mesh.positions[v].cast<double>());
     const double longest = box.size().maxCoeff();
     if (!(longest * scale > 1e-9) || longest * scale > 1e9)
-        return Error{ErrorCode::usage, "With a scale of " + number(scale) + " the mesh is " + number(longest * scale) +
+        return Error{ErrorCode::usage, "With a scale of " + sample_number(scale) + " the mesh is " +
+                                           sample_number(longest * scale) +
                                            " m long; give a scale that makes it 1e-9 to 1e9 m."};
-    const Result<Grid> made = make_grid(box, spacing > 0 ? spacing / scale : longest / 64, scale);
+    const Result<DistanceGrid> made = make_distance_grid(box, spacing > 0 ? spacing / scale : longest / 64, scale);
     if (!made) return made.error();
-    const Grid& grid = *made;
+    const DistanceGrid& grid = *made;
 
     const std::vector<std::uint8_t> band = find_band(grid, mesh.positions, welded.triangles);
     std::vector<float> distances(grid.size(), std::numeric_limits<float>::infinity());

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kMeshfreeFlowGrain = 256;
 constexpr float kFlowToRenew = 0.5f;       // |G|^2 - 3 of the flow G since the last renewal: a stretch by 1.45
-constexpr float kMostFlow = 2.5f;          // ... of any single particle
+constexpr float kMostFlowMeasured = 2.5f;  // ... of any single particle
 constexpr float kSlipToRenew = 0.5f;       // spacings: of a neighbour from where F says
 constexpr std::size_t kShareToRenew = 100; // renew when one particle of this many is distorted
 constexpr double kMostHeatSteps = 16;
@@ -95,7 +95,7 @@ bool Flow::move_matter(const MlsNeighbours& neighbours, const Float4* position, 
         for (std::size_t i = begin; i < end; ++i) {
             const float amount = flow_particle(neighbours, position, i, dt);
             counts[0] += amount > kFlowToRenew;
-            counts[1] += amount > kMostFlow;
+            counts[1] += amount > kMostFlowMeasured;
         }
         distorted[begin / kMeshfreeFlowGrain] = counts;
     });

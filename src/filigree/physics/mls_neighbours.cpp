@@ -14,18 +14,19 @@
 namespace filigree {
 namespace {
 
-constexpr float kRadius = 1.74f;      // spacings
-constexpr float kMostRadius = 3.6f;   // spacings: neighbours are not looked for farther away
-constexpr float kGrowth = 1.2f;       // of the radius, a try
-constexpr std::size_t kEnough = 8;    // neighbours
-constexpr float kLeastSpread = 0.03f; // spacings^2: weighted mean square of offsets in the direction of the least
-constexpr float kNoSpread = 0.03f;    // below it there is no gradient in that direction
+constexpr float kSupportRadius = 1.74f;     // spacings
+constexpr float kMostRadius = 3.6f;         // spacings: neighbours are not looked for farther away
+constexpr float kGrowth = 1.2f;             // of the radius, a try
+constexpr std::size_t kEnough = 8;          // neighbours
+constexpr float kLeastMomentSpread = 0.03f; // spacings^2: weighted mean square of offsets in the direction of the least
+constexpr float kNoSpread = 0.03f;          // below it there is no gradient in that direction
 constexpr std::size_t kMlsNeighboursGrain = 256;
 
 /// Particles sorted by the boxes of a grid.
-class Grid {
+class NeighbourGrid {
 public:
-    Grid(const Vectors& positions, float box_size) : positions_(positions), inverse_size_(1 / double(box_size)) {
+    NeighbourGrid(const Vectors& positions, float box_size)
+        : positions_(positions), inverse_size_(1 / double(box_size)) {
         const std::size_t n = positions.size();
         least_ = Vec3d::Constant(std::numeric_limits<double>::infinity());
         for (std::size_t i = 0; i < n; ++i) least_ = least_.cwiseMin(positions[i].cast<double>());
@@ -87,7 +88,7 @@ float full_density() {
     float sum = 0;
     for (int k = -1; k <= 1; ++k)
         for (int j = -1; j <= 1; ++j)
-            for (int i = -1; i <= 1; ++i) sum += kernel(float(i * i + j * j + k * k), kRadius);
+            for (int i = -1; i <= 1; ++i) sum += kernel(float(i * i + j * j + k * k), kSupportRadius);
     return sum;
 }
 
@@ -101,7 +102,7 @@ struct Surroundings {
 };
 
 /// Neighbours of one particle within `radius`. Whether they are enough and spread in all directions.
-bool look_within(float radius, std::size_t i, const Grid& grid, Surroundings& around) {
+bool look_within(float radius, std::size_t i, const NeighbourGrid& grid, Surroundings& around) {
     std::vector<Index>& found = around.found[i];
     found.clear();
     Mat3f moment = Mat3f::Zero();
@@ -117,17 +118,17 @@ bool look_within(float radius, std::size_t i, const Grid& grid, Surroundings& ar
     });
     if (found.size() < kEnough || !(sum > 0)) return false;
     const Eigen::SelfAdjointEigenSolver<Mat3f> eigen(moment / sum, Eigen::EigenvaluesOnly);
-    return eigen.eigenvalues()[0] >= kLeastSpread * around.spacing * around.spacing;
+    return eigen.eigenvalues()[0] >= kLeastMomentSpread * around.spacing * around.spacing;
 }
 
 Surroundings find_surroundings(const Vectors& positions, std::span<const float> volume, float spacing,
                                const RunContext& context) {
     const std::size_t n = positions.size();
     Surroundings around{positions, volume, spacing, std::vector<std::vector<Index>>(n), std::vector<float>(n)};
-    const Grid grid(positions, kRadius * spacing);
+    const NeighbourGrid grid(positions, kSupportRadius * spacing);
     parallel_for(context, n, kMlsNeighboursGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-            float radius = kRadius * spacing;
+            float radius = kSupportRadius * spacing;
             while (!look_within(radius, i, grid, around) && !(radius > kMostRadius * spacing)) radius *= kGrowth;
             around.radius[i] = radius;
         }
@@ -168,7 +169,7 @@ PairSums weigh_pairs(std::size_t i, const Surroundings& around, float inverse_cu
         sums.first += s * d;
         sums.weight += s;
         sums.length += s * std::sqrt(squared);
-        sums.density += around.volume[j] * kernel(squared, kRadius * around.spacing);
+        sums.density += around.volume[j] * kernel(squared, kSupportRadius * around.spacing);
     }
     return sums;
 }

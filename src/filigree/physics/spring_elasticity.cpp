@@ -36,9 +36,9 @@ constexpr float kVolumeFrom = 0.3f, kVolumeStiffness = 1.5f;
 constexpr float kVolumeNear =
     0.6f; // a sweep looks at cells below this at its start: one sweep will not take others there
 // Growing out of a collapse by leaps leaves particles on the wrong side of each other.
-constexpr float kCollapsed = 0.5f;                  // squared lengths over those at rest
-constexpr float kCollapsedStep = 0.1f;              // spacings a sweep
-constexpr float kLargest = 1e15f;                   // m: positions beyond are not fit for explicit steps
+constexpr float kCollapsedSpring = 0.5f;            // squared lengths over those at rest
+constexpr float kCollapsedSpringStep = 0.1f;        // spacings a sweep
+constexpr float kLargestSpring = 1e15f;             // m: positions beyond are not fit for explicit steps
 constexpr std::size_t kSpringElasticityGrain = 256; // particles
 constexpr std::size_t kRunGrain = 2;
 
@@ -107,7 +107,7 @@ public:
         ElasticReport report = find_pressed_cells(positions, volumes_, context);
         for (const float bound : bounds_) report.squared_frequency = std::max(report.squared_frequency, bound);
         if (volumes_.any_pressed) report.squared_frequency += add_volume_forces(positions, forces, context);
-        if (!(report.most_stretch < kLargest)) report.squared_frequency = std::numeric_limits<float>::infinity();
+        if (!(report.most_stretch < kLargestSpring)) report.squared_frequency = std::numeric_limits<float>::infinity();
         return report;
     }
 
@@ -247,8 +247,8 @@ private:
                             });
         if (descent.touched[i] && descent.external) descent.external->add(i, positions, force, block);
         Vec3f step = block.solve(force);
-        const float most = kCollapsedStep * float(body_.spacing()), length = step.norm();
-        if (length > most && lengths < kCollapsed * rests) step *= most / length;
+        const float most = kCollapsedSpringStep * float(body_.spacing()), length = step.norm();
+        if (length > most && lengths < kCollapsedSpring * rests) step *= most / length;
         positions.add(i, step);
     }
 

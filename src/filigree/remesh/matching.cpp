@@ -10,9 +10,9 @@ namespace filigree {
 
 namespace {
 
-constexpr std::uint32_t kNone = 0xffffffff; // kNoIndex
-constexpr std::int64_t kUnit = 4096;        // of a weight's 0 to 1: whole numbers keep the algorithm exact
-constexpr unsigned kBetweenLooks = 1 << 16; // weights read from one look at is_cancelled to the next
+constexpr std::uint32_t kNone = 0xffffffff;      // kNoIndex
+constexpr std::int64_t kUnit = 4096;             // of a weight's 0 to 1: whole numbers keep the algorithm exact
+constexpr unsigned kReadsBetweenLooks = 1 << 16; // weights read from one look at is_cancelled to the next
 
 struct Cancelled {};
 
@@ -27,7 +27,7 @@ public:
         : weights_(graph), is_cancelled_(is_cancelled) {}
     void set(Key edge, Value weight) { weights_[edge] = weight; }
     Value operator[](Key edge) const {
-        if (++reads_ % kBetweenLooks == 0 && is_cancelled_()) throw Cancelled();
+        if (++reads_ % kReadsBetweenLooks == 0 && is_cancelled_()) throw Cancelled();
         return weights_[edge];
     }
 

@@ -9,7 +9,7 @@ namespace filigree {
 
 namespace {
 
-constexpr int kMostSteps = 512;
+constexpr int kMostWalkSteps = 512;
 constexpr int kMostAround = 64; // triangles tried around a vertex, to each side
 
 struct Closest {
@@ -68,7 +68,7 @@ SurfaceWalk::Place SurfaceWalk::walk(const TrianglePoint& start, const Vec3d& ta
     };
     Index triangle = start.triangle;
     Closest best = closest(triangle);
-    for (int step = 0; step < kMostSteps; ++step) {
+    for (int step = 0; step < kMostWalkSteps; ++step) {
         const Index here = triangle;
         const auto try_triangle = [&](Index t) {
             const Closest other = closest(t);
@@ -161,14 +161,14 @@ SurfaceWalk::Place SurfaceWalk::slide(const TrianglePoint& start, const Vec3d& t
     const double t = project(first);
     if (t > 1) {
         Index h = first;
-        for (int i = 0; i < kMostSteps; ++i) {
+        for (int i = 0; i < kMostWalkSteps; ++i) {
             h = onward(h);
             if (h == kNoIndex || h == first || project(h) <= 1) break;
         }
     } else if (t < 0) {
         // backwards: along the twin, or, on a border, by the previous border edge
         Index h = first;
-        for (int i = 0; i < kMostSteps; ++i) {
+        for (int i = 0; i < kMostWalkSteps; ++i) {
             const Index vertex = from(h);
             if (kinds_[vertex] != VertexKind::curve) break;
             Index g = SurfaceMap::previous(h);

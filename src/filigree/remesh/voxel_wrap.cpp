@@ -28,11 +28,11 @@ constexpr double kTouch = 1e-9;                         // voxels: what is close
 constexpr int kSmoothRounds = 6;
 constexpr double kFreedom = 0.45; // voxels that smoothing moves a vertex along each axis: sides never meet
 constexpr int kPullRounds = 3;
-constexpr double kProbe = 1.5;      // voxels below the surface that are looked at to see whether a part is thin
-constexpr double kShell = 0.2;      // voxels between a sheet and each side of the shell around it
-constexpr int kHalvings = 5;        // of a step that turns a triangle over, before it is not made at all
-constexpr double kMostTurn = 0.3;   // cosine: further than this no triangle turns in a step
-constexpr double kLeastArea = 1e-4; // voxels squared, twice the area: smaller, a triangle only grows
+constexpr double kProbe = 1.5;          // voxels below the surface that are looked at to see whether a part is thin
+constexpr double kShell = 0.2;          // voxels between a sheet and each side of the shell around it
+constexpr int kHalvings = 5;            // of a step that turns a triangle over, before it is not made at all
+constexpr double kMostTurn = 0.3;       // cosine: further than this no triangle turns in a step
+constexpr double kLeastWrapArea = 1e-4; // voxels squared, twice the area: smaller, a triangle only grows
 
 // ---- Touched voxels
 
@@ -359,7 +359,7 @@ std::vector<Vec3d> unit_normals(std::span<const Vec3d> positions, std::span<cons
 /// Whether a triangle may go from one shape to another: it neither turns far nor vanishes.
 bool may_become(const Vec3d& from, const Vec3d& to) {
     const double before = from.norm(), after = to.norm();
-    return after > std::min(before, kLeastArea) && from.dot(to) >= kMostTurn * before * after;
+    return after > std::min(before, kLeastWrapArea) && from.dot(to) >= kMostTurn * before * after;
 }
 
 /// Moves vertices towards their targets, in smaller steps, or not at all, where a triangle would turn over.

@@ -27,22 +27,23 @@ constexpr double kLeastStep = 0x1p-40; // of a direction's component: moves a ra
 
 // Each side test is the sum of six products of three differences with a relative error below 8 * 2^-53.
 constexpr double kSideError = 6e-15;
-constexpr double kUnderflow = 0x1p-1060; // see exact_sign.cpp
+constexpr double kRayUnderflow = 0x1p-1060; // see exact_sign.cpp
 
-constexpr std::uint32_t kLeaf = WideTree::kLeaf;
-constexpr std::size_t kLeafSize = WideTree::kLeafSize, kWidth = WideTree::kWidth;
-constexpr std::size_t kWaiting = 32;      // leaves found before they are tested
-constexpr std::size_t kBetweenLooks = 64; // points from one look at `cancel` to the next: each may take a millisecond
-constexpr std::size_t kStackSize = (kWidth - 1) * WideTree::kDeepest + kWidth;
+constexpr std::uint32_t kRayLeaf = WideTree::kLeaf;
+constexpr std::size_t kRayLeafSize = WideTree::kLeafSize, kRayWidth = WideTree::kWidth;
+constexpr std::size_t kWaiting = 32; // leaves found before they are tested
+constexpr std::size_t kRaysBetweenLooks =
+    64; // points from one look at `cancel` to the next: each may take a millisecond
+constexpr std::size_t kRayStackSize = (kRayWidth - 1) * WideTree::kDeepest + kRayWidth;
 
 struct alignas(64) Node {
-    float lo[3][kWidth], hi[3][kWidth];
-    std::uint32_t child[kWidth]; ///< of nodes; with kLeaf, of leaves
+    float lo[3][kRayWidth], hi[3][kRayWidth];
+    std::uint32_t child[kRayWidth]; ///< of nodes; with kRayLeaf, of leaves
 };
 
 struct alignas(64) Leaf {
-    float corner[3][3][kLeafSize]; ///< [corner][axis][triangle]
-    float eye_side[kLeafSize];     ///< orient3d(a, b, c, eye); 0 also where there is no triangle
+    float corner[3][3][kRayLeafSize]; ///< [corner][axis][triangle]
+    float eye_side[kRayLeafSize];     ///< orient3d(a, b, c, eye); 0 also where there is no triangle
     std::uint32_t count;
 
     Vec3d vertex(int k, int triangle) const {
@@ -50,18 +51,18 @@ struct alignas(64) Leaf {
     }
 };
 
-struct Tree {
+struct RayTree {
     std::vector<Node> nodes; ///< the first is the root
     std::vector<Leaf> leaves;
     Vec3d eye;
     bool eye_inside = false;
     Vec3d lowest, highest, centre;
     double inverse_half_size = 1;
-    void (*count_crossings)(const Tree&, const Vec3d&, RayParity::Count&) = nullptr;
+    void (*count_crossings)(const RayTree&, const Vec3d&, RayParity::Count&) = nullptr;
 };
 
 /// Nodes and leaves as queries read them.
-void fill(Tree& tree, const WideTree& shape, std::span<const Vec3f> positions, std::span<const Triangle> triangles,
+void fill(RayTree& tree, const WideTree& shape, std::span<const Vec3f> positions, std::span<const Triangle> triangles,
           std::span<const std::int8_t> eye_side, const RunContext& context) {
     tree.nodes.resize(shape.nodes.size());
     tree.leaves.resize(shape.leaf_count);
@@ -78,15 +79,15 @@ void fill(Tree& tree, const WideTree& shape, std::span<const Vec3f> positions, s
     };
     parallel_for(context, shape.nodes.size(), 256, [&](std::size_t begin, std::size_t end) {
         for (std::size_t n = begin; n < end; ++n)
-            for (std::size_t c = 0; c < kWidth; ++c) {
+            for (std::size_t c = 0; c < kRayWidth; ++c) {
                 const WideTree::Child& child = shape.nodes[n].children[c]; // an empty box is never entered
                 for (std::size_t axis = 0; axis < 3; ++axis) {
                     tree.nodes[n].lo[axis][c] = child.box.lo[axis];
                     tree.nodes[n].hi[axis][c] = child.box.hi[axis];
                 }
                 tree.nodes[n].child[c] = child.id;
-                if (child.id & kLeaf)
-                    fill_leaf(tree.leaves[child.id & ~kLeaf],
+                if (child.id & kRayLeaf)
+                    fill_leaf(tree.leaves[child.id & ~kRayLeaf],
                               std::span(shape.order).subspan(child.begin, child.end - child.begin));
             }
     });
@@ -98,7 +99,7 @@ struct Ray {
     int near[3], far[3];
 };
 
-Ray make_ray(const Tree& tree, const Vec3d& point) {
+Ray make_ray(const RayTree& tree, const Vec3d& point) {
     const Vec3d from = (point - tree.centre) * tree.inverse_half_size;
     Vec3d step = (tree.eye - point) * tree.inverse_half_size;
     const double length = step.cwiseAbs().maxCoeff();
@@ -117,7 +118,7 @@ Ray make_ray(const Tree& tree, const Vec3d& point) {
 /// A bit for each child whose box the ray meets.
 template <bool Avx2>
 FILIGREE_INLINE unsigned children_met(const Node& node, const Ray& ray) {
-    const float(*rows)[kWidth] = node.lo; // hi follows
+    const float(*rows)[kRayWidth] = node.lo; // hi follows
     Float8 enter = {}, leave = Float8{} + 1;
     for (int i = 0; i < 3; ++i) {
         const Float8 to_near = (load8(rows[ray.near[i]]) - ray.origin[i]) * ray.inverse[i];
@@ -146,7 +147,7 @@ FILIGREE_INLINE void count_leaf(const Leaf& leaf, const Vec3d& eye, const Vec3d&
         c[i] = load4(leaf.corner[2][i]) - point[i];
         size = larger(size, larger(absolute(a[i]), larger(absolute(b[i]), absolute(c[i]))));
     }
-    const Double4 bound = kSideError * longest_step * size * size + kUnderflow;
+    const Double4 bound = kSideError * longest_step * size * size + kRayUnderflow;
     // Sides of the planes through the ray's ends and each edge: to_eye . (a x b), (b x c), (c x a).
     const Double4 eye_a[3] = {to_eye[1] * a[2] - to_eye[2] * a[1], to_eye[2] * a[0] - to_eye[0] * a[2],
                               to_eye[0] * a[1] - to_eye[1] * a[0]};
@@ -166,7 +167,7 @@ FILIGREE_INLINE void count_leaf(const Leaf& leaf, const Vec3d& eye, const Vec3d&
     const Long4 all_right = (ab < -bound) & (bc < -bound) & (ca < -bound);
     const Double4 across = eye_side * (a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
                                        a[2] * (b[0] * c[1] - b[1] * c[0]));
-    const Double4 across_bound = kSideError * size * size * size + kUnderflow;
+    const Double4 across_bound = kSideError * size * size * size + kRayUnderflow;
     const Long4 beyond = across > across_bound, before = across < -across_bound;
     const Long4 crossed = possible & (all_left | all_right) & beyond;
     const Long4 open = possible & ~((all_left | all_right) & beyond) & ~before;
@@ -176,21 +177,21 @@ FILIGREE_INLINE void count_leaf(const Leaf& leaf, const Vec3d& eye, const Vec3d&
 }
 
 template <bool Avx2>
-FILIGREE_INLINE void count_crossings(const Tree& tree, const Vec3d& point, RayParity::Count& count) {
+FILIGREE_INLINE void count_crossings(const RayTree& tree, const Vec3d& point, RayParity::Count& count) {
     const Ray ray = make_ray(tree, point);
     const Vec3d to_eye = tree.eye - point;
     const double longest_step = to_eye.cwiseAbs().maxCoeff();
     // Leaves wait until the memory they were asked from has answered: that, not arithmetic, is what a query waits for.
-    std::uint32_t stack[kStackSize], leaves[kWaiting + kWidth];
+    std::uint32_t stack[kRayStackSize], leaves[kWaiting + kRayWidth];
     std::size_t top = 0, waiting = 0;
     stack[top++] = 0;
     while (top > 0) {
         const Node& node = tree.nodes[stack[--top]];
         for (unsigned met = children_met<Avx2>(node, ray); met != 0; met &= met - 1) {
             const std::uint32_t child = node.child[std::countr_zero(met)];
-            if (child & kLeaf) {
-                prefetch(tree.leaves[child & ~kLeaf]);
-                leaves[waiting++] = child & ~kLeaf;
+            if (child & kRayLeaf) {
+                prefetch(tree.leaves[child & ~kRayLeaf]);
+                leaves[waiting++] = child & ~kRayLeaf;
             } else {
                 prefetch(tree.nodes[child]);
                 stack[top++] = child;
@@ -207,11 +208,11 @@ FILIGREE_INLINE void count_crossings(const Tree& tree, const Vec3d& point, RayPa
 }
 
 #if defined(FILIGREE_HAS_WIDTHS)
-FILIGREE_AVX2 void count_crossings_avx2(const Tree& tree, const Vec3d& point, RayParity::Count& count) {
+FILIGREE_AVX2 void count_crossings_avx2(const RayTree& tree, const Vec3d& point, RayParity::Count& count) {
     count_crossings<true>(tree, point, count);
 }
 #endif
-void count_crossings_plain(const Tree& tree, const Vec3d& point, RayParity::Count& count) {
+void count_crossings_plain(const RayTree& tree, const Vec3d& point, RayParity::Count& count) {
     count_crossings<false>(tree, point, count);
 }
 
@@ -251,7 +252,7 @@ bool crosses_along_x(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d
 
 } // namespace
 
-struct RayParity::Content : Tree {};
+struct RayParity::Content : RayTree {};
 
 RayParity::RayParity(std::unique_ptr<Content> content) : content_(std::move(content)) {}
 RayParity::RayParity(RayParity&&) noexcept = default;
@@ -349,7 +350,7 @@ Result<std::vector<std::uint8_t>> RayParity::contains(std::span<const Vec3d> poi
             if (context.is_cancelled()) return;
             Count own;
             for (std::size_t i = first + begin; i < first + end; ++i) {
-                if (i % kBetweenLooks == 0 && context.is_cancelled()) return;
+                if (i % kRaysBetweenLooks == 0 && context.is_cancelled()) return;
                 inside[i] = contains(points[i], &own);
             }
             if (!count) return;
