@@ -19,6 +19,7 @@ void expect_grid(const PatchGrid& grid, const Prepared& on, unsigned levels) {
     ASSERT_EQ(grid.positions.size(), grid.source.size());
     ASSERT_EQ(grid.positions.size(), grid.kinds.size());
     ASSERT_EQ(grid.positions.size(), grid.along.size());
+    ASSERT_EQ(grid.positions.size(), grid.held.size());
     ASSERT_EQ(grid.quads().size(), grid.patches.patch_count() * n * n);
     const Mesh mesh = grid_mesh(grid, Vec3d(1, 2, 3));
     ASSERT_EQ(check_mesh(mesh), "");

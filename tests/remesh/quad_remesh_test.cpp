@@ -77,13 +77,14 @@ void expect_promises(const QuadRemeshed& quads, const Mesh& input, const QuadRem
     EXPECT_EQ(check_mesh(base), "");
     EXPECT_EQ(base.face_count(), report.patches);
 
-    EXPECT_LE(std::max(report.to_input.max, report.from_input.max), report.max_distance);
+    EXPECT_LE(report.to_input.max, report.max_distance);
+    EXPECT_LE(report.from_input.max, report.max_distance_from_input);
     const auto distance = mesh_distance(quads.mesh, input, 20'000, kSingle);
     ASSERT_TRUE(distance.ok());
     // input->quads only where no part of the input was taken away; the samples are others than the gate's
     EXPECT_LE(distance->relative(distance->surfaces->max_a_to_b), 1.1 * report.max_distance + 1e-6);
     if (!report.wrapped && report.clean.removed_components == 0 && report.clean.closed_handles == 0) {
-        EXPECT_LE(distance->relative(distance->surfaces->max_b_to_a), 1.1 * report.max_distance + 1e-6);
+        EXPECT_LE(distance->relative(distance->surfaces->max_b_to_a), 1.1 * report.max_distance_from_input + 1e-6);
     }
     EXPECT_EQ(quads.mesh.origin, input.origin);
     if (!report.wrapped) {
@@ -184,6 +185,69 @@ TEST(QuadRemesh, KeepsItsPromisesOnTheGoodCorpus) {
         }
     }
     EXPECT_GT(remeshed_files, 5u);
+}
+
+/// A ball with thin spikes, the way claws stand on a paw.
+Mesh ball_with_spikes() {
+    Mesh mesh = make_wavy_sphere({.resolution = 96, .amplitude = 0});
+    const std::array<Vec3f, 6> spikes = {{{1, 0.3f, 0.2f},
+                                          {-0.4f, 1, 0.1f},
+                                          {0.2f, -0.5f, 1},
+                                          {-0.6f, -0.6f, -0.5f},
+                                          {0.55f, -0.2f, 0.8f},
+                                          {-0.1f, 0.7f, -0.7f}}};
+    for (Vec3f& p : mesh.positions) {
+        float height = 1;
+        for (const Vec3f& spike : spikes) {
+            const float angle = std::acos(std::clamp(p.normalized().dot(spike.normalized()), -1.0f, 1.0f));
+            height += 0.7f * std::exp(-(angle / 0.06f) * (angle / 0.06f));
+        }
+        p *= height;
+    }
+    return mesh;
+}
+
+TEST(QuadRemesh, KeepsThinSpikes) {
+    for (const std::size_t quads : {20'000, 50'000}) {
+        const QuadRemeshed result = remeshed(ball_with_spikes(), {.quads = quads});
+        EXPECT_LE(result.report.from_input.max, 6e-3) << quads << " quads";
+        EXPECT_EQ(result.report.tries, 1u);
+    }
+}
+
+TEST(QuadRemesh, KeepsWhatSticksOutOfScans) {
+    const std::vector<CorpusRow> rows = read_corpus();
+    if (rows.empty()) GTEST_SKIP() << "no corpus";
+    std::size_t scans = 0;
+    for (const CorpusRow& row : rows) {
+        if (row.file != "good/fish.obj" && row.file != "good/koala_100k.obj" && row.file != "good/penguin.obj")
+            continue;
+        SCOPED_TRACE(row.file);
+        const auto input = read_mesh(row.path, kSingle);
+        ASSERT_TRUE(input.ok());
+        const QuadRemeshed result = remeshed(input->mesh, {.quads = 20'000});
+        EXPECT_LE(result.report.from_input.max, 4e-3); // the fish lost 6.1e-3 of its fins
+        ++scans;
+    }
+    EXPECT_EQ(scans, 3u);
+}
+
+TEST(QuadRemesh, TheDistanceFromTheInputHasALimitOfItsOwn) {
+    const Mesh ball = make_wavy_sphere({.resolution = 24, .amplitude = 0});
+    const auto limits = [&](const QuadRemeshOptions& options) {
+        const QuadRemeshReport report = remeshed(ball, options).report;
+        return std::pair(report.max_distance, report.max_distance_from_input);
+    };
+    const auto [both, from_input] = limits({.quads = 20'000});
+    EXPECT_EQ(from_input, 6e-3);
+    EXPECT_GT(both, from_input);
+    EXPECT_EQ(limits({.quads = 20'000, .max_distance = 0.02}), std::pair(0.02, 0.02)) << "as asked";
+    for (const QuadRemeshOptions& options : {QuadRemeshOptions{.quads = 19'999},
+                                             {.quads = 20'000, .levels = 4},
+                                             {.quads = 20'000, .wrap = WrapUse::always}}) {
+        const auto [all, second] = limits(options);
+        EXPECT_EQ(all, second);
+    }
 }
 
 TEST(QuadRemesh, MeetsTheCountOfSmoothSurfaces) {

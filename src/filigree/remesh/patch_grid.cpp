@@ -140,6 +140,7 @@ PatchGrid sample_patches(const SurfaceMap& map, const BaseQuads& base, const Sur
     grid.positions.resize(count);
     grid.source.resize(count);
     grid.kinds.assign(count, VertexKind::inside);
+    grid.held.assign(count, 0);
 
     const std::vector<std::uint8_t> mine = first_uses(grid.patches, base.kinds.size() + sides.count * inner);
     parallel_for(context, corners.size(), 8, [&](std::size_t begin, std::size_t end) {
@@ -172,6 +173,7 @@ PatchGrid halve_grid(const PatchGrid& coarse, const SurfaceWalk& walk, const Run
     grid.positions.resize(count);
     grid.source.resize(count);
     grid.kinds.assign(count, VertexKind::inside);
+    grid.held.assign(count, 0);
     grid.features = coarse.features;
     const std::vector<std::uint8_t> mine = first_uses(grid.patches, corners + sides.count * inner);
     parallel_for(context, coarse.patches.patch_count(), 8, [&](std::size_t begin, std::size_t end) {
@@ -189,6 +191,7 @@ PatchGrid halve_grid(const PatchGrid& coarse, const SurfaceWalk& walk, const Run
                         grid.positions[v] = coarse.positions[a];
                         grid.source[v] = coarse.source[a];
                         grid.kinds[v] = coarse.kinds[a];
+                        grid.held[v] = coarse.held[a];
                         continue;
                     }
                     const Vec3d middle =

@@ -15,6 +15,9 @@ struct PatchGrid {
     std::vector<Vec3d> positions;
     std::vector<TrianglePoint> source; ///< on the original surface; kept in step with positions while points stay on it
     std::vector<VertexKind> kinds;
+    /// Above 0 for vertices that stay at a tip: how far untangling may take them from there, model units; see
+    /// hold_tips.
+    std::vector<float> held;
     /// The two neighbours along the curve of each curve vertex, else kNoIndex.
     std::vector<std::array<Index, 2>> along;
 

@@ -10,6 +10,7 @@
 #include "filigree/remesh/patch_layout.h"
 #include "filigree/remesh/quad_failure.h"
 #include "filigree/remesh/relax.h"
+#include "filigree/remesh/tips.h"
 #include "filigree/remesh/voxel_wrap.h"
 
 #include <algorithm>
@@ -28,7 +29,10 @@ constexpr double kShortHandle = 2;      // patch sides: loops up to this are clo
 constexpr double kSmallComponent = 0.5; // patch sides, of a component's diagonal
 constexpr unsigned kSampledLevels = 3;  // taken from the map; finer ones are halved from there
 constexpr unsigned kCoarseSweeps = 20, kFineSweeps = 4;
-constexpr double kWantedJacobian = 0.2; // below it, places are searched
+constexpr std::size_t kManyQuads = 20'000; // from here on the input is no further from the quads than
+constexpr double kMostLost = 6e-3;         // of the diagonal, unless the options say something else
+constexpr int kTipRounds = 6;              // of holding tips; the last ones find next to none
+constexpr double kWantedJacobian = 0.2;    // below it, places are searched
 constexpr std::size_t kDistanceSamples = 100'000;
 constexpr double kVoxelsPerQuad = 0.7; // along a quad's side, of the wrap
 
@@ -166,6 +170,11 @@ private:
         cleaned_ = surface_mesh(surface_, mesh_.origin);
         report().diagonal = bounds(cleaned_.positions).diagonal();
         report().max_distance = options_.max_distance.value_or(patch_side() / report().diagonal);
+        report().max_distance_from_input = report().max_distance;
+        // a wrap that was asked for closes cavities; few large patches were asked for as well
+        if (!options_.max_distance && !options_.levels && options_.wrap != WrapUse::always &&
+            options_.quads >= kManyQuads)
+            report().max_distance_from_input = std::min(report().max_distance, kMostLost);
         return Success{};
     }
 
@@ -253,14 +262,13 @@ private:
         std::vector<VertexKind> kinds(surface.positions.size());
         for (Index v = 0; v < kinds.size(); ++v) kinds[v] = map->kind(v);
         const SurfaceWalk walk(surface, twins, features, kinds);
-        Result<PatchGrid> grid = make_grid(map, *base, walk, layout.levels);
+        std::size_t inverted = 0;
+        Result<PatchGrid> grid = make_grid(surface, twins, kinds, map, *base, walk, layout.levels, inverted);
         if (!grid) return grid.error();
-        const Untangled untangled = untangle(*grid, walk, kWantedJacobian, context_);
-        watch_.end("untangling");
         if (context_.is_cancelled()) return cancelled_error();
         Outcome outcome = gate(std::move(*grid), surface);
         // where there are features, they are the likeliest cause of inverted quads
-        if (outcome && *outcome) (*outcome)->by_features = untangled.inverted > 0;
+        if (outcome && *outcome) (*outcome)->by_features = inverted > 0;
         return outcome;
     }
 
@@ -281,15 +289,63 @@ private:
         return failure;
     }
 
-    /// The patches' grids, evened out. The map is not needed any more when the coarse ones are taken from it.
-    Result<PatchGrid> make_grid(std::optional<SurfaceMap>& map, const BaseQuads& base, const SurfaceWalk& walk,
-                                unsigned levels) {
+    /// The patches' grids, evened out, with the tips held that would be lost; without where that turns quads over.
+    /// The map is not needed any more when the coarse grids are taken from it.
+    Result<PatchGrid> make_grid(const ManifoldSurface& surface, std::span<const Index> twins,
+                                std::span<const VertexKind> kinds, std::optional<SurfaceMap>& map,
+                                const BaseQuads& base, const SurfaceWalk& walk, unsigned levels,
+                                std::size_t& inverted) {
         context_.report("sampling", 0);
-        PatchGrid grid = sample_patches(*map, base, walk, std::min(levels, kSampledLevels), context_);
+        PatchGrid sampled = sample_patches(*map, base, walk, std::min(levels, kSampledLevels), context_);
         map.reset();
         watch_.end("sampling");
         if (context_.is_cancelled()) return cancelled_error();
-        relax(grid, walk, kCoarseSweeps, context_);
+        PatchGrid plain = sampled;
+        relax(plain, walk, kCoarseSweeps, context_);
+        std::optional<PatchGrid> with_tips;
+        if (Status held = hold_what_sticks_out(surface, twins, kinds, walk, plain, std::move(sampled), with_tips);
+            !held)
+            return held.error();
+        watch_.end("relaxing");
+        if (with_tips) {
+            if (Status finished = finish_grid(*with_tips, walk, levels, inverted); !finished) return finished.error();
+            if (inverted == 0) return std::move(*with_tips);
+        }
+        if (Status finished = finish_grid(plain, walk, levels, inverted); !finished) return finished.error();
+        return plain;
+    }
+
+    /// with_tips: the grid relaxed with tips held, if the surface sticks out of the one relaxed without.
+    Status hold_what_sticks_out(const ManifoldSurface& surface, std::span<const Index> twins,
+                                std::span<const VertexKind> kinds, const SurfaceWalk& walk, const PatchGrid& plain,
+                                PatchGrid sampled, std::optional<PatchGrid>& with_tips) {
+        if (context_.is_cancelled()) return cancelled_error();
+        if (is_hopeless(plain)) return Success{};
+        const Mesh target = surface_mesh(surface, mesh_.origin);
+        const double bound = tip_bound(plain);
+        for (int round = 0; round < kTipRounds; ++round) {
+            const Mesh quads = grid_mesh(with_tips ? *with_tips : plain, mesh_.origin);
+            const Result<std::vector<float>> distances = distances_to_surface(target, quads, context_);
+            if (!distances) return distances.error();
+            const std::vector<Index> tips = find_tips(surface, twins, kinds, *distances, bound);
+            if (tips.empty() || hold_tips(surface, twins, tips, bound, sampled) == 0) return Success{};
+            with_tips = sampled;
+            relax(*with_tips, walk, kCoarseSweeps, context_);
+            if (context_.is_cancelled()) return cancelled_error();
+        }
+        return Success{};
+    }
+
+    /// How far the surface may stick out of a grid before a tip is held there, model units: half of what the gate
+    /// allows, but no more than a quad's side, and no less than half of it, which is what bent quads are off by.
+    double tip_bound(const PatchGrid& grid) {
+        const std::size_t quads = grid.patches.patch_count() << (2 * grid.patches.levels);
+        const double side = std::sqrt(area_of(surface_) / double(quads));
+        return std::clamp(0.5 * report().max_distance_from_input * report().diagonal, 0.5 * side, side);
+    }
+
+    /// Down to the finest level, and untangled.
+    Status finish_grid(PatchGrid& grid, const SurfaceWalk& walk, unsigned levels, std::size_t& inverted) {
         while (grid.patches.levels < levels) {
             grid = halve_grid(grid, walk, context_);
             if (context_.is_cancelled()) return cancelled_error();
@@ -297,7 +353,10 @@ private:
         }
         watch_.end("relaxing");
         if (context_.is_cancelled()) return cancelled_error();
-        return grid;
+        inverted = untangle(grid, walk, kWantedJacobian, context_).inverted;
+        watch_.end("untangling");
+        if (context_.is_cancelled()) return cancelled_error();
+        return Success{};
     }
 
     /// layout: with a level fewer where all sides had to be halved.
@@ -339,11 +398,11 @@ private:
             failure.expected_euler = in.euler;
             return failure;
         }
-        const double furthest = std::max(report().to_input.max, report().from_input.max);
-        if (furthest <= report().max_distance) return std::nullopt;
+        const bool strays = report().to_input.max > report().max_distance;
+        if (!strays && report().from_input.max <= report().max_distance_from_input) return std::nullopt;
         QuadFailure failure{QuadFailure::Kind::distance};
-        failure.furthest = furthest;
-        failure.allowed = report().max_distance;
+        failure.furthest = strays ? report().to_input.max : report().from_input.max;
+        failure.allowed = strays ? report().max_distance : report().max_distance_from_input;
         return failure;
     }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 namespace filigree {
 
@@ -18,6 +19,7 @@ constexpr double kStill = 2e-3;         // of the mean edge length at a vertex: 
 constexpr int kShapeRounds = 6;         // for quads that are poor; the rest for those about to turn over
 constexpr int kOnRounds = 24, kOffRounds = 96; // of untangling; nearly all end after a few
 constexpr int kTutteRings = 4, kTutteSweeps = 30, kTutteSearches = 6;
+constexpr int kReleaseRings = 2;         // around a quad that stays inverted: tips there may move
 constexpr std::size_t kMostEvened = 200; // quads whose neighbourhoods are, for each size; more are not worth the time
 constexpr std::array<double, 4> kReaches = {0.5, 0.2, 1.0, 0.07}; // mean edge lengths at the vertex
 constexpr double kInverted = 1e-9;                                // scaled Jacobian of quads that are not above zero
@@ -94,7 +96,7 @@ public:
         : grid_(grid), walk_(walk), near_(near) {}
 
     void relax_vertex(Index v) {
-        if (grid_.kinds[v] == VertexKind::corner) return;
+        if (stays(v)) return;
         const Vec3d here = grid_.positions[v];
         double edge = 0;
         const Vec3d target = mean_target(v, edge);
@@ -109,10 +111,12 @@ public:
         }
     }
 
+    /// From here on tips move as far as they may from where they are now.
+    void loosen_tips() { anchors_ = grid_.positions; }
+
     /// Tries places around the vertex for better quads. Returns whether it moved.
     bool search(Index v, double reach, bool off_surface, int round) {
-        const VertexKind kind = grid_.kinds[v];
-        if (kind == VertexKind::corner) return false;
+        if (stays(v)) return false;
         const Vec3d here = grid_.positions[v];
         double edge = 0;
         const Vec3d target = mean_target(v, edge);
@@ -125,7 +129,8 @@ public:
                 off_surface ? SurfaceWalk::Place{grid_.source[v], rounded(towards)} : move(v, towards);
             if (off_surface) place.point = walk_.walk(grid_.source[v], towards).point;
             const double value = badness(v, place.position);
-            if (value >= best - 1e-9 || (was_good && is_turned(v, place.position))) return;
+            if (value >= best - 1e-9 || !is_on_leash(v, place.position) || (was_good && is_turned(v, place.position)))
+                return;
             best = value;
             found = place;
             moved = true;
@@ -154,7 +159,7 @@ public:
 
     /// Puts the vertex between its neighbours, whatever that does to its quads.
     void centre(Index v) {
-        if (grid_.kinds[v] != VertexKind::inside) return;
+        if (grid_.kinds[v] != VertexKind::inside || grid_.held[v] > 0) return;
         Vec3d sum = Vec3d::Zero();
         for (const Index q : near_.around(v)) {
             const auto& quad = near_.quads[q];
@@ -186,6 +191,15 @@ public:
     }
 
 private:
+    bool stays(Index v) const {
+        return grid_.kinds[v] == VertexKind::corner || (grid_.held[v] > 0 && anchors_.empty());
+    }
+
+    /// Whether the vertex is at no tip, or near enough to its own.
+    bool is_on_leash(Index v, const Vec3d& place) const {
+        return !(grid_.held[v] > 0) || (place - anchors_[v]).norm() <= grid_.held[v];
+    }
+
     /// The quad's corners, with v put at `place`.
     std::array<Vec3d, 4> corners(const std::array<Index, 4>& quad, Index v, const Vec3d& place) const {
         std::array<Vec3d, 4> points;
@@ -253,6 +267,7 @@ private:
     PatchGrid& grid_;
     const SurfaceWalk& walk_;
     const Neighbourhoods& near_;
+    std::vector<Vec3d> anchors_; ///< of every vertex once tips are loose
 };
 
 /// Mends quads that are poor or turned over, in three ways, each for what the one before has left.
@@ -260,8 +275,6 @@ class Untangler {
 public:
     Untangler(PatchGrid& grid, const SurfaceWalk& walk, const RunContext& context)
         : grid_(grid), near_(grid), mover_(grid, walk, near_), context_(context) {}
-
-    std::size_t quad_count() const { return near_.quads.size(); }
 
     std::vector<Index> quads_below(double limit) const {
         std::vector<std::uint8_t> is_bad(near_.quads.size(), 0);
@@ -300,6 +313,16 @@ public:
                 even_out(vertices_near({q}, rings));
             }
         }
+    }
+
+    void loosen_tips() { mover_.loosen_tips(); }
+
+    /// Lets go of the tips near quads that are turned over. Returns whether there were any.
+    bool release_tips() {
+        bool released = false;
+        for (const Index v : vertices_near(quads_below(kInverted), kReleaseRings))
+            released |= std::exchange(grid_.held[v], 0.0f) > 0;
+        return released;
     }
 
     /// Single vertices, off the surface where nothing else helps. Returns how many moved.
@@ -368,6 +391,15 @@ private:
 
 } // namespace
 
+bool is_hopeless(const PatchGrid& grid) {
+    const std::vector<std::array<Index, 4>> quads = grid.quads();
+    const auto inverted = std::ranges::count_if(quads, [&](const std::array<Index, 4>& quad) {
+        const auto& [a, b, c, d] = quad;
+        return scaled_jacobian(grid.positions[a], grid.positions[b], grid.positions[c], grid.positions[d]) < kInverted;
+    });
+    return double(inverted) > kHopeless * double(quads.size()) + 8;
+}
+
 void relax(PatchGrid& grid, const SurfaceWalk& walk, unsigned sweeps, const RunContext& context) {
     const Neighbourhoods near(grid);
     for (Vec3d& p : grid.positions) p = rounded(p);
@@ -386,10 +418,19 @@ Untangled untangle(PatchGrid& grid, const SurfaceWalk& walk, double least, const
     Untangler untangler(grid, walk, context);
     Untangled result;
     result.inverted = untangler.quads_below(kInverted).size();
-    if (double(result.inverted) > kHopeless * double(untangler.quad_count()) + 8) return result;
-    untangler.search_on_surface(least);
-    untangler.even_out_neighbourhoods();
-    result.off_surface = untangler.search_off_surface();
+    if (is_hopeless(grid)) return result;
+    const auto mend_on_surface = [&] {
+        untangler.search_on_surface(least);
+        untangler.even_out_neighbourhoods();
+    };
+    mend_on_surface();
+    if (std::ranges::any_of(grid.held, [](float leash) { return leash > 0; })) {
+        untangler.loosen_tips();
+        mend_on_surface();
+        result.off_surface = untangler.search_off_surface();
+        if (untangler.release_tips()) mend_on_surface();
+    }
+    result.off_surface += untangler.search_off_surface();
     result.inverted = untangler.quads_below(kInverted).size();
     return result;
 }
