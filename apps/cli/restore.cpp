@@ -2,6 +2,8 @@
 #include "commands.h"
 #include "restore_options.h"
 
+#include "filigree/hierarchy/pose_error.h"
+
 #include <filesystem>
 
 #include <fmt/format.h>
@@ -83,6 +85,25 @@ const char* source_of(const Model& model, const Pose& pose) {
     return pose.ghosts.empty() ? "positions" : "positions and ghost points";
 }
 
+constexpr double kErrorToWarnOf = 1e-3; ///< of the diagonal
+
+/// What the driver is too coarse for: seen in the pose alone.
+void report_expected_error(const Model& model, const Pose& pose, const Restorer& restorer, Session& session,
+                           Report& report) {
+    if (model.code() != DetailCode::blend) return;
+    const std::vector<Mat3f> gradients = require(restorer.gradients(pose, session.context()));
+    const double diagonal = bounds(pose.positions).diagonal();
+    if (!(diagonal > 0)) return;
+    const double error = PoseError(model).estimate(pose, gradients).rms / diagonal;
+    report.say(fmt::format("Expected error: {:.2g} of the diagonal (rms).\n", error));
+    report.set("expected_error", error);
+    if (error > kErrorToWarnOf)
+        session.warn(
+            fmt::format("The pose is more curved than the driver can follow: the mesh is off by about {:.2g} of "
+                        "the diagonal. Strip with a finer driver (--base, or --fidelity).",
+                        error));
+}
+
 void restore_one(const RestoreArguments& options, Session& session) {
     PoseSequence own;
     const Model model = session.read_model(options.model, options.frame ? &own : nullptr);
@@ -103,6 +124,7 @@ void restore_one(const RestoreArguments& options, Session& session) {
     report.set("vertices", mesh.vertex_count());
     report.set("from", from);
     report.set("seconds", seconds);
+    report_expected_error(model, pose, restorer, session, report);
     session.print(report);
 }
 

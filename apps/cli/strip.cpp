@@ -1,7 +1,7 @@
 #include "commands.h"
 #include "session.h"
 
-#include "filigree/hierarchy/strip.h"
+#include "filigree/deform/fidelity.h"
 
 #include <filesystem>
 
@@ -14,6 +14,8 @@ namespace {
 struct StripCommandOptions {
     std::string input, output;
     StripOptions strip;
+    std::optional<double> fidelity;
+    PoseSource fidelity_from = PoseSource::positions;
 };
 
 struct StripSeconds {
@@ -70,15 +72,30 @@ Report make_report(const Stripped& stripped, const std::string& output, const St
     return report;
 }
 
+void report_fidelity(const StrippedToFidelity& result, const StripCommandOptions& options, Report& report) {
+    const char* from = options.fidelity_from == PoseSource::positions ? "positions" : "gradients";
+    report.add(
+        "fidelity", fmt::format("{:.2g} of the diagonal from {} ({} drivers tried)", result.error, from, result.tried),
+        "fidelity", {{"error", result.error}, {"asked", *options.fidelity}, {"from", from}, {"tried", result.tried}});
+}
+
 void run(const StripCommandOptions& options, Session& session) {
     refuse_mesh_name(options.output);
+    if (!options.fidelity && !session.first_given({"--fidelity-from"}).empty()) refuse("--fidelity-from belongs to --fidelity.");
     const double start = now_seconds();
     Mesh mesh = session.read_mesh(options.input);
     const double read = now_seconds();
-    const Stripped stripped = require(strip(std::move(mesh), options.strip, session.context()));
+    StrippedToFidelity result;
+    if (options.fidelity)
+        result = require(
+            strip_to_fidelity(mesh, options.strip, {*options.fidelity, options.fidelity_from}, session.context()));
+    else
+        result.stripped = require(strip(std::move(mesh), options.strip, session.context()));
     const double done = now_seconds();
-    session.write_model(stripped.model, options.output);
-    session.print(make_report(stripped, options.output, {read - start, done - read, now_seconds() - done}));
+    session.write_model(result.stripped.model, options.output);
+    Report report = make_report(result.stripped, options.output, {read - start, done - read, now_seconds() - done});
+    if (options.fidelity) report_fidelity(result, options, report);
+    session.print(report);
 }
 
 } // namespace
@@ -88,33 +105,41 @@ Command strip_command() {
     StripOptions& strip = options->strip;
     return {.name = "strip",
             .text = "Take the detail off a mesh: make a model with a light driver",
-            .options = {Option("mesh", options->input, "Mesh to strip").is_read().required(),
-                        Option("-o,--output", options->output, "Model file to write (.fil)").is_written().required(),
-                        Option("--base", strip.base, "Vertices of the driver (unset: 1,000, fewer for small meshes)")
-                            .whole_from(3)
-                            .excludes({"--levels", "--error"}),
-                        Option("--levels", strip.levels, "Levels to remove, each leaves a quarter of the vertices")
-                            .whole_from(1)
-                            .excludes({"--error"}),
-                        Option("--error", strip.error,
-                               "How far the driver may leave the mesh (rms), fraction of the diagonal")
-                            .above_zero(),
-                        Option("--max-edge", strip.max_edge,
-                               "Longest edge that simplifying may leave, fraction of the diagonal: flat parts keep "
-                               "vertices")
-                            .above_zero(),
-                        choice<DetailCode>("--code", strip.code,
-                                           {{"blend", DetailCode::blend}, {"reference", DetailCode::reference}},
-                                           "blend: any mesh (default); reference: the report's, for regular quads"),
-                        choice<Precision>("--precision", strip.precision,
-                                          {{"float", Precision::float32}, {"int16", Precision::int16}},
-                                          "Of the blend code: float, 20 bytes a vertex (default), or int16, 10 bytes"),
-                        Option("--references", strip.references,
-                               "Of the reference code: coarse points that a point refers to")
-                            .one_of({3, 4, 6})
-                            .with_default()},
+            .options =
+                {Option("mesh", options->input, "Mesh to strip").is_read().required(),
+                 Option("-o,--output", options->output, "Model file to write (.fil)").is_written().required(),
+                 Option("--base", strip.base, "Vertices of the driver (unset: 1,000, fewer for small meshes)")
+                     .whole_from(3)
+                     .excludes({"--levels", "--error", "--fidelity"}),
+                 Option("--levels", strip.levels, "Levels to remove, each leaves a quarter of the vertices")
+                     .whole_from(1)
+                     .excludes({"--error", "--fidelity"}),
+                 Option("--error", strip.error, "How far the driver may leave the mesh (rms), fraction of the diagonal")
+                     .above_zero()
+                     .excludes({"--fidelity"}),
+                 Option("--fidelity", options->fidelity,
+                        "Smallest driver that restores bends, twists, tapers and random warps to this rms error, "
+                        "fraction of the diagonal")
+                     .above_zero(),
+                 choice<PoseSource>("--fidelity-from", options->fidelity_from,
+                                    {{"positions", PoseSource::positions}, {"gradients", PoseSource::gradients}},
+                                    "What poses will come with: positions (default) or gradients too"),
+                 Option("--max-edge", strip.max_edge,
+                        "Longest edge that simplifying may leave, fraction of the diagonal: flat parts keep "
+                        "vertices")
+                     .above_zero(),
+                 choice<DetailCode>("--code", strip.code,
+                                    {{"blend", DetailCode::blend}, {"reference", DetailCode::reference}},
+                                    "blend: any mesh (default); reference: the report's, for regular quads"),
+                 choice<Precision>("--precision", strip.precision,
+                                   {{"float", Precision::float32}, {"int16", Precision::int16}},
+                                   "Of the blend code: float, 20 bytes a vertex (default), or int16, 10 bytes"),
+                 Option("--references", strip.references, "Of the reference code: coarse points that a point refers to")
+                     .one_of({3, 4, 6})
+                     .with_default()},
             .examples = "  filigree strip scan.ply -o scan.fil\n"
                         "  filigree strip scan.ply -o scan.fil --base 5000 --precision int16\n"
+                        "  filigree strip scan.ply -o scan.fil --fidelity 1e-5\n"
                         "  filigree strip cube.obj -o cube.fil --code reference",
             .run = [options](Session& session) { run(*options, session); }};
 }

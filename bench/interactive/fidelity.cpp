@@ -1,7 +1,7 @@
 #include "fidelity.h"
 
 #include "filigree/core/parallel_for.h"
-#include "filigree/deform/space_warp.h"
+#include "filigree/deform/fidelity.h"
 #include "filigree/hierarchy/restore.h"
 #include "filigree/mesh/mesh_distance.h"
 
@@ -11,27 +11,6 @@
 namespace filigree::bench {
 
 namespace {
-
-struct NamedWarp {
-    std::string name;
-    bool affine;
-    std::unique_ptr<SpaceWarp> warp;
-};
-
-std::vector<NamedWarp> fidelity_warps(const Box& box) {
-    const Axis axis = longest_axis(box);
-    std::vector<NamedWarp> warps;
-    warps.push_back({"stretch 2", true, make_stretch(box, axis, 2)});
-    warps.push_back({"stretch 0.5", true, make_stretch(box, axis, 0.5)});
-    warps.push_back({"squeeze 2", true, make_squeeze(box, axis, 2)});
-    warps.push_back({"bend 90", false, make_bend(box, axis, 90)});
-    warps.push_back({"bend 180", false, make_bend(box, axis, 180)});
-    warps.push_back({"twist 180", false, make_twist(box, axis, 180)});
-    warps.push_back({"taper 0.5", false, make_taper(box, axis, 0.5)});
-    warps.push_back({"random 10 %", false, make_smooth_random(box, 0.10, 1)});
-    warps.push_back({"random 25 %", false, make_smooth_random(box, 0.25, 1)});
-    return warps;
-}
 
 /// Orthonormal frame of a triangle: along its first edge, across, and its normal.
 Mat3d triangle_frame(const Vec3d& a, const Vec3d& b, const Vec3d& c) {

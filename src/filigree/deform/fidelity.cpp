@@ -1,0 +1,127 @@
+#include "filigree/deform/fidelity.h"
+
+#include "filigree/hierarchy/restore.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace filigree {
+
+namespace {
+
+constexpr std::size_t kFirstDriver = 1000, kSmallestDriver = 12;
+constexpr double kOrder = 1.3;        // the error falls about as fast as this power of the driver's vertices grows
+constexpr double kCloseEnough = 1.15; // ratio of the smallest driver that passed to the largest that did not
+
+/// The next size to try: where a power law through both drivers, or of the usual order through one, meets the goal.
+class DriverSearch {
+public:
+    DriverSearch(std::size_t most, double goal) : most_(double(most)), goal_(goal) {}
+
+    std::size_t first() const { return static_cast<std::size_t>(std::min(double(kFirstDriver), most_)); }
+    void add(std::size_t size, double error) {
+        Tried& side = error <= goal_ ? passed_ : failed_;
+        side = {double(size), std::max(error, 1e-12)};
+    }
+    bool is_done() const {
+        return passed_.size > 0 &&
+               (passed_.size <= double(kSmallestDriver) || passed_.size / failed_.size < kCloseEnough);
+    }
+    std::size_t next() const {
+        double size;
+        if (passed_.size > 0 && failed_.size > 0) {
+            const double slope = std::log(passed_.error / failed_.error) / std::log(passed_.size / failed_.size);
+            size = failed_.size * std::pow(0.9 * goal_ / failed_.error, 1 / std::min(slope, -0.1));
+            size = std::clamp(size, failed_.size * 1.07, passed_.size / 1.07);
+        } else {
+            const Tried& one = passed_.size > 0 ? passed_ : failed_;
+            size = one.size * std::clamp(std::pow(one.error / (0.8 * goal_), 1 / kOrder), 0.1, 10.0);
+            if (passed_.size > 0)
+                size = std::min(size, passed_.size / 1.3);
+            else
+                size = std::max(size, failed_.size * 1.3);
+        }
+        return static_cast<std::size_t>(std::clamp(std::round(size), double(kSmallestDriver), most_));
+    }
+
+private:
+    struct Tried {
+        double size = 0, error = 0;
+    };
+    Tried passed_, failed_;
+    double most_, goal_;
+};
+
+Status check(const StripOptions& options, const FidelityGoal& goal) {
+    if (!(goal.error > 0) || !std::isfinite(goal.error))
+        return Error{ErrorCode::usage, "A fidelity has to be above 0, a fraction of the diagonal."};
+    if (options.code != DetailCode::blend)
+        return Error{ErrorCode::usage,
+                     "Fidelity belongs to the blend code; the reference code's driver follows from the mesh."};
+    if (options.base || options.levels || options.error)
+        return Error{ErrorCode::usage, "Fidelity says how fine the driver is; say no base, levels or error beside it."};
+    return Success{};
+}
+
+} // namespace
+
+std::vector<NamedWarp> fidelity_warps(const Box& box) {
+    const Axis axis = longest_axis(box);
+    std::vector<NamedWarp> warps;
+    warps.push_back({"stretch 2", true, make_stretch(box, axis, 2)});
+    warps.push_back({"stretch 0.5", true, make_stretch(box, axis, 0.5)});
+    warps.push_back({"squeeze 2", true, make_squeeze(box, axis, 2)});
+    warps.push_back({"bend 90", false, make_bend(box, axis, 90)});
+    warps.push_back({"bend 180", false, make_bend(box, axis, 180)});
+    warps.push_back({"twist 180", false, make_twist(box, axis, 180)});
+    warps.push_back({"taper 0.5", false, make_taper(box, axis, 0.5)});
+    warps.push_back({"random 10 %", false, make_smooth_random(box, 0.10, 1)});
+    warps.push_back({"random 25 %", false, make_smooth_random(box, 0.25, 1)});
+    return warps;
+}
+
+Result<double> fidelity(const Model& model, PoseSource source, const RunContext& context) {
+    const Result<Restorer> restorer = Restorer::create(model, {}, context);
+    if (!restorer) return restorer.error();
+    double largest = 0;
+    for (const NamedWarp& named : fidelity_warps(world_bounds(model.mesh))) {
+        if (named.affine) continue;
+        Pose pose = warp_pose(*named.warp, model, context);
+        if (source == PoseSource::positions) pose.gradients.clear();
+        const Result<std::vector<Vec3f>> restored = restorer->positions(pose, context);
+        if (!restored) return restored.error();
+        const std::vector<Vec3f> truth = warp_positions(*named.warp, model.mesh.positions, model.mesh.origin, context);
+        if (context.is_cancelled()) return cancelled_error();
+        double squared = 0;
+        for (std::size_t v = 0; v < truth.size(); ++v)
+            squared += ((*restored)[v] - truth[v]).cast<double>().squaredNorm();
+        const double diagonal = bounds(truth).diagonal();
+        if (diagonal > 0) largest = std::max(largest, std::sqrt(squared / double(truth.size())) / diagonal);
+    }
+    return largest;
+}
+
+Result<StrippedToFidelity> strip_to_fidelity(const Mesh& mesh, const StripOptions& options, const FidelityGoal& goal,
+                                             const RunContext& context) {
+    if (Status status = check(options, goal); !status) return status.error();
+    DriverSearch search(std::max<std::size_t>(mesh.vertex_count(), 3), goal.error);
+    StrippedToFidelity best;
+    unsigned tried = 0;
+    for (std::size_t size = search.first();; size = search.next()) {
+        StripOptions trial = options;
+        trial.base = std::max<std::size_t>(size, 3);
+        Result<Stripped> stripped = strip(mesh, trial, context);
+        if (!stripped) return stripped.error();
+        const Result<double> error = fidelity(stripped->model, goal.source, context);
+        if (!error) return error.error();
+        ++tried;
+        search.add(size, *error);
+        const bool is_whole = size >= mesh.vertex_count();
+        if (*error <= goal.error || is_whole) best = {*std::move(stripped), *error, tried};
+        if (search.is_done() || is_whole) break;
+    }
+    best.tried = tried;
+    return best;
+}
+
+} // namespace filigree

@@ -1,0 +1,101 @@
+#include "filigree/hierarchy/pose_error.h"
+
+#include "filigree/core/random.h"
+#include "filigree/deform/restored_error.h"
+#include "filigree/deform/space_warp.h"
+#include "filigree/hierarchy/strip.h"
+#include "filigree/mesh/shapes.h"
+
+#include <gtest/gtest.h>
+
+namespace filigree {
+namespace {
+
+const RunContext kOneThread(1);
+
+Model stripped(Mesh mesh, std::size_t base) {
+    StripOptions options;
+    options.base = base;
+    return strip(std::move(mesh), options, kOneThread).value().model;
+}
+
+double estimated(const Model& model, const Pose& pose) {
+    const Restorer restorer = Restorer::create(model, {}, kOneThread).value();
+    return PoseError(model).estimate(pose, restorer.gradients(pose, kOneThread).value()).rms;
+}
+
+std::unique_ptr<SpaceWarp> random_warp(const Box& box, std::uint64_t seed) {
+    const auto between = [&](double low, double high) { return low + (high - low) * random_unit(seed, 0); };
+    const Axis axis = static_cast<Axis>(random_bits(seed, 1) % 3);
+    switch (random_bits(seed, 2) % 4) {
+    case 0:
+        return make_bend(box, axis, between(20, 180));
+    case 1:
+        return make_twist(box, axis, between(20, 270));
+    case 2:
+        return make_taper(box, axis, between(0.3, 0.9));
+    default:
+        return make_smooth_random(box, between(0.03, 0.3), seed);
+    }
+}
+
+/// Share of random poses of several models whose estimate is within a factor of 2 of the error.
+double share_within_two(bool with_gradients, std::uint64_t poses_a_model) {
+    const Model models[] = {
+        stripped(make_wavy_cube({.resolution = 48}), 1000), stripped(make_wavy_sphere({.resolution = 64}), 600),
+        stripped(make_torus({.resolution = 64}), 500), stripped(make_bar({.resolution = 24}), 300),
+        stripped(make_wavy_plane({.resolution = 100}), 500)};
+    double within = 0, count = 0;
+    std::uint64_t seed = 100;
+    for (const Model& model : models) {
+        const Box box = world_bounds(model.mesh);
+        for (std::uint64_t k = 0; k < poses_a_model; ++k) {
+            const std::unique_ptr<SpaceWarp> warp = random_warp(box, ++seed);
+            Pose pose = warp_pose(*warp, model, kOneThread);
+            if (!with_gradients) pose.gradients.clear();
+            const std::vector<Vec3f> truth = warp_positions(*warp, model.mesh.positions, model.mesh.origin, kOneThread);
+            const double error = restored_error(model, {}, pose, truth, kOneThread).value().rms;
+            const double ratio = estimated(model, pose) / error;
+            within += ratio > 0.5 && ratio < 2;
+            ++count;
+        }
+    }
+    return within / count;
+}
+
+TEST(PoseError, IsWithinAFactorOfTwo) {
+    EXPECT_GT(share_within_two(false, 40), 0.85);
+    EXPECT_GT(share_within_two(true, 40), 0.8);
+}
+
+TEST(PoseError, IsNothingAtRestAndForAffineMaps) {
+    const Model model = stripped(make_wavy_sphere({.resolution = 48}), 400);
+    const double diagonal = world_bounds(model.mesh).diagonal();
+    EXPECT_LT(estimated(model, rest_pose(model)), 1e-7 * diagonal);
+    Pose turned = rest_pose(model);
+    for (Vec3f& p : turned.positions) p = Vec3f(2 * p.y() + p.z(), -p.x(), 0.5f * p.z());
+    EXPECT_LT(estimated(model, turned), 1e-6 * diagonal);
+}
+
+TEST(PoseError, IsLargestWhereThePoseIsCurved) {
+    const Model model = stripped(make_bar({.resolution = 24}), 400);
+    Pose pose = rest_pose(model);
+    const Box box = bounds(pose.positions);
+    for (Vec3f& p : pose.positions) { // half of it stays
+        const double x = std::max(0.0, double(p.x()) - box.centre().x()) / box.size().x();
+        p.z() += float(0.5 * box.size().x() * (1 - std::cos(6 * x)));
+    }
+    const Restorer restorer = Restorer::create(model, {}, kOneThread).value();
+    const PoseError::Estimate estimate = PoseError(model).estimate(pose, restorer.gradients(pose, kOneThread).value());
+    double still = 0, moved = 0;
+    const std::vector<Vec3f> rest = driver_positions(model);
+    for (std::size_t v = 0; v < rest.size(); ++v) {
+        const double x = (double(rest[v].x()) - box.min.x()) / box.size().x();
+        double& side = x < 0.3 ? still : moved;
+        side = std::max(side, double(estimate.local[v]));
+    }
+    EXPECT_LT(10 * still, moved);
+}
+
+} // namespace
+} // namespace filigree
