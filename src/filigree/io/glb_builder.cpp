@@ -17,7 +17,7 @@ std::string words(std::initializer_list<std::uint32_t> values) {
     return {reinterpret_cast<const char*>(values.begin()), 4 * values.size()};
 }
 
-constexpr std::uint32_t kMagic = 0x46546c67, kJsonChunk = 0x4e4f534a, kBinaryChunk = 0x004e4942;
+constexpr std::uint32_t kGlbMagic = 0x46546c67, kJsonChunk = 0x4e4f534a, kBinaryChunk = 0x004e4942;
 
 } // namespace
 
@@ -127,7 +127,7 @@ Result<std::string> GlbBuilder::head() const {
                      "The GLB would have " + std::to_string(total >> 20) +
                          " MiB, and the format ends at 4096; export fewer frames, a coarser level, or a skin."};
     const auto as32 = [](std::size_t n) { return static_cast<std::uint32_t>(n); };
-    std::string head = words({kMagic, 2, as32(total), as32(text.size()), kJsonChunk}) + text;
+    std::string head = words({kGlbMagic, 2, as32(total), as32(text.size()), kJsonChunk}) + text;
     if (data_bytes_ > 0) head += words({as32(data_bytes_), kBinaryChunk});
     return head;
 }

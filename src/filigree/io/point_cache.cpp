@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kKnownFormats =
+constexpr const char* kKnownCacheFormats =
     "use .pc2, .mdd, .usda, .glb, a folder (NAME/), or NAME_####.ply for numbered meshes";
 
 void take_origin_off(std::span<Vec3f> positions, const Vec3d& origin) {
@@ -128,7 +128,7 @@ Result<AnimationFormat> animation_format(const fs::path& path) {
     if (extension == ".usda") return AnimationFormat::usda;
     if (extension == ".glb") return AnimationFormat::glb;
     return Error{ErrorCode::unsupported,
-                 path.string() + ": is no name for an animation; " + std::string(kKnownFormats) + "."};
+                 path.string() + ": is no name for an animation; " + std::string(kKnownCacheFormats) + "."};
 }
 
 Result<PoseStream> open_poses(const fs::path& path, std::size_t points, const Vec3d& origin,

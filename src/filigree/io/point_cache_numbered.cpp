@@ -25,7 +25,7 @@ Error cannot_list(const fs::path& folder) {
 }
 
 /// Names of the files in a folder, sorted.
-Result<std::vector<std::string>> names_in(const fs::path& folder) {
+Result<std::vector<std::string>> file_names_in(const fs::path& folder) {
     std::vector<std::string> names;
     std::error_code failed;
     fs::directory_iterator entry(folder.empty() ? "." : folder, failed);
@@ -126,7 +126,7 @@ void add_new(std::vector<std::string>& warnings, const std::vector<std::string>&
 
 /// Says that a longer sequence of this name was there before, whose end would be read as this one's.
 void warn_of_leftovers(const NumberedName& name, std::size_t frames, std::vector<std::string>& warnings) {
-    const Result<std::vector<std::string>> names = names_in(name.folder);
+    const Result<std::vector<std::string>> names = file_names_in(name.folder);
     if (!names) return;
     const auto others = std::count_if(names->begin(), names->end(), [&](const std::string& file) {
         const auto number = name.number_of(file);
@@ -145,7 +145,7 @@ std::vector<fs::path> animation_files(const fs::path& path) {
     if (!name && !fs::is_directory(path, ignored)) return {path};
     const fs::path folder = name ? name->folder : path;
     std::vector<fs::path> files;
-    const Result<std::vector<std::string>> names = names_in(folder);
+    const Result<std::vector<std::string>> names = file_names_in(folder);
     for (const std::string& file : names ? *names : std::vector<std::string>{})
         if (!name || name->number_of(file)) files.push_back(folder / file);
     return files;
@@ -154,7 +154,7 @@ std::vector<fs::path> animation_files(const fs::path& path) {
 Result<PoseStream> open_numbered(const fs::path& path, std::size_t points, const Vec3d& origin,
                                  const PoseFileOptions& options, const RunContext& context) {
     std::optional<NumberedName> name = numbered_name(path);
-    const Result<std::vector<std::string>> names = names_in(name ? name->folder : path);
+    const Result<std::vector<std::string>> names = file_names_in(name ? name->folder : path);
     if (!names) return names.error();
     if (!name) {
         Result<NumberedName> only = only_name_in(path, *names);

@@ -15,7 +15,7 @@ namespace {
 constexpr int kBandMargin = 3; // spacings around the box, and as far from the surface distances are exact
 constexpr double kMostPoints = 0x1p27;
 
-std::string sample_number(double x) {
+std::string short_number(double x) {
     char text[32];
     std::snprintf(text, sizeof text, "%.4g", x);
     return text;
@@ -139,9 +139,9 @@ Result<DistanceGrid> make_distance_grid(const Box& box, double spacing, double s
     const std::size_t most = *std::max_element(grid.counts.begin(), grid.counts.end());
     if (points > kMostPoints || most > 65534) {
         const double coarser = std::max(std::cbrt(points / kMostPoints), double(most) / 65534);
-        return Error{ErrorCode::unsuitable, "A distance field with a spacing of " + sample_number(spacing * scale) +
+        return Error{ErrorCode::unsuitable, "A distance field with a spacing of " + short_number(spacing * scale) +
                                                 " m has more than 2^27 points; give at least " +
-                                                sample_number(1.05 * coarser * spacing * scale) + " m."};
+                                                short_number(1.05 * coarser * spacing * scale) + " m."};
     }
     return grid;
 }
@@ -150,10 +150,10 @@ Result<DistanceGrid> make_distance_grid(const Box& box, double spacing, double s
 
 Result<DistanceField> DistanceField::create(const Mesh& mesh, double scale, double spacing, const RunContext& context) {
     if (!std::isfinite(scale) || scale <= 0)
-        return Error{ErrorCode::usage, "The scale is " + sample_number(scale) + "; give metres a model unit, above 0."};
+        return Error{ErrorCode::usage, "The scale is " + short_number(scale) + "; give metres a model unit, above 0."};
     if (!std::isfinite(spacing) || spacing < 0)
         return Error{ErrorCode::usage,
-                     "The spacing is " + sample_number(spacing) + "; give metres, above 0 (or 0 to have it chosen)."};
+                     "The spacing is " + short_number(spacing) + "; give metres, above 0 (or 0 to have it chosen)."};
     const Result<WeldedTriangles> welded_triangles = weld_triangles(mesh, context);
     if (!welded_triangles) return welded_triangles.error();
     const WeldedTriangles& welded = *welded_triangles;
@@ -164,8 +164,8 @@ Result<DistanceField> DistanceField::create(const Mesh& mesh, double scale, doub
         for (const Index v : triangle) box.extend(mesh.positions[v].cast<double>());
     const double longest = box.size().maxCoeff();
     if (!(longest * scale > 1e-9) || longest * scale > 1e9)
-        return Error{ErrorCode::usage, "With a scale of " + sample_number(scale) + " the mesh is " +
-                                           sample_number(longest * scale) +
+        return Error{ErrorCode::usage, "With a scale of " + short_number(scale) + " the mesh is " +
+                                           short_number(longest * scale) +
                                            " m long; give a scale that makes it 1e-9 to 1e9 m."};
     const Result<DistanceGrid> made = make_distance_grid(box, spacing > 0 ? spacing / scale : longest / 64, scale);
     if (!made) return made.error();

@@ -66,7 +66,7 @@ struct Quadric {
 };
 
 double cross_in_plane(const Vec2f& a, const Vec2f& b) { return double(a.x()) * b.y() - double(a.y()) * b.x(); }
-double doubled_area(const Vec2f& a, const Vec2f& b, const Vec2f& c) { return cross_in_plane(b - a, c - a); }
+double doubled_flat_area(const Vec2f& a, const Vec2f& b, const Vec2f& c) { return cross_in_plane(b - a, c - a); }
 
 /// 1 for an equilateral triangle, 0 without an area.
 double shape(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
@@ -278,7 +278,7 @@ private:
         for (std::size_t i = 0; i < star_.triangle_count(); ++i) {
             if (i == target || star_.next(i) == target) continue;
             const std::size_t j = star_.next(i);
-            if (doubled_area(star_.flat[target], star_.flat[i], star_.flat[j]) < kPositive) return false;
+            if (doubled_flat_area(star_.flat[target], star_.flat[i], star_.flat[j]) < kPositive) return false;
             const Vec3d &a = map_.position(star_.ring[i]), &b = map_.position(star_.ring[j]);
             const Vec3d normal = (a - p).cross(b - p);
             area += 0.5 * normal.norm();
@@ -396,8 +396,8 @@ private:
         }
         const SurfaceMap::Unfolded flat = map_.unfold(h);
         const double size = flat.to.squaredNorm();
-        if (doubled_area(flat.above, Vec2f::Zero(), flat.below) < 1e-3 * size ||
-            doubled_area(flat.below, flat.to, flat.above) < 1e-3 * size)
+        if (doubled_flat_area(flat.above, Vec2f::Zero(), flat.below) < 1e-3 * size ||
+            doubled_flat_area(flat.below, flat.to, flat.above) < 1e-3 * size)
             return false;
         const Vec3d &pa = map_.position(a), &pb = map_.position(b), &pc = map_.position(c), &pd = map_.position(d);
         const Vec3d n = (pa - pc).cross(pd - pc), m = (pb - pd).cross(pc - pd);
@@ -460,7 +460,7 @@ private:
 
     bool may_relocate(const Vec2f& place, double old_area) const {
         for (std::size_t i = 0; i < star_.triangle_count(); ++i)
-            if (doubled_area(place, star_.flat[i], star_.flat[star_.next(i)]) < 1e-3) return false;
+            if (doubled_flat_area(place, star_.flat[i], star_.flat[star_.next(i)]) < 1e-3) return false;
         const Vec3d p = map_.original_position(map_.locate(star_, place));
         if (quadrics_[star_.centre].at(p) > kRelocationBound * old_area * old_area) return false;
         const bool curve = map_.kind(star_.centre) == VertexKind::curve;

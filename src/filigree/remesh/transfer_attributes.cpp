@@ -17,7 +17,7 @@ namespace {
 constexpr std::size_t kTransferAttributesGrain = 1024;
 constexpr float kSameUv = 1e-5f;         // a sixth of a pixel of 16,384
 constexpr float kSameNormal = 1e-2f;     // half a degree: as files of few digits round
-constexpr double kReach = 1.25;          // of the distance from a face's centre to its corners: what is searched
+constexpr double kTransferReach = 1.25;  // of the distance from a face's centre to its corners: what is searched
 constexpr double kEdgeOn = 0.1;          // cosine, below which a triangle is not under a face but beside it
 constexpr std::size_t kMostUnder = 4096; // triangles looked at under one face
 constexpr double kMostSeamCells = 1e5;   // that seams are long: the grid grows coarser instead
@@ -230,7 +230,7 @@ Spot find_spot(const Placement& placement, std::span<const Index> face) {
     for (std::size_t k = 0; k < face.size(); ++k) {
         if (placement.triangles[face[k]] == kNoIndex) continue;
         const Vec3d here = placement.positions[face[k]] - spot.centre;
-        spot.radius = std::max(spot.radius, kReach * here.norm());
+        spot.radius = std::max(spot.radius, kTransferReach * here.norm());
         const Index next = face[(k + 1) % face.size()];
         if (placement.triangles[next] != kNoIndex) spot.normal += here.cross(placement.positions[next] - spot.centre);
     }

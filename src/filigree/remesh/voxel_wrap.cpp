@@ -281,7 +281,7 @@ QuadSurface extract_border(const VoxelGrid& solid) {
 }
 
 /// The neighbours of each vertex along edges: vertex v has ends[first[v]] .. ends[first[v + 1] - 1].
-struct Neighbours {
+struct VoxelNeighbours {
     std::vector<Index> first, ends;
     std::span<const Index> of(std::size_t v) const {
         return std::span(ends).subspan(first[v], first[v + 1] - first[v]);
@@ -290,8 +290,8 @@ struct Neighbours {
 
 /// Each edge of a closed surface is left once from each end.
 template <class Face>
-Neighbours find_neighbours(std::span<const Face> faces, std::size_t vertex_count) {
-    Neighbours neighbours;
+VoxelNeighbours find_neighbours(std::span<const Face> faces, std::size_t vertex_count) {
+    VoxelNeighbours neighbours;
     neighbours.first.assign(vertex_count + 1, 0);
     for (const Face& face : faces)
         for (const Index v : face) ++neighbours.first[v + 1];
@@ -312,7 +312,7 @@ Vec3d mean_of(std::span<const Index> vertices, std::span<const Vec3d> positions)
 /// Takes the steps off, each vertex within its own box.
 void smooth_steps(QuadSurface& surface, const RunContext& context) {
     const std::vector<Vec3d> corners = surface.positions;
-    const Neighbours neighbours =
+    const VoxelNeighbours neighbours =
         find_neighbours(std::span<const std::array<Index, 4>>(surface.quads), surface.positions.size());
     std::vector<Vec3d> moved(corners.size());
     for (int round = 0; round < kSmoothRounds; ++round) {
@@ -413,7 +413,7 @@ std::vector<Vec3d> pull_targets(const ClosestPointTree& tree, const VoxelGrid& s
 
 /// Each vertex to the middle of its neighbours, along the surface.
 std::vector<Vec3d> tangential_targets(std::span<const Vec3d> positions, std::span<const Vec3d> normals,
-                                      const Neighbours& neighbours, const RunContext& context) {
+                                      const VoxelNeighbours& neighbours, const RunContext& context) {
     std::vector<Vec3d> targets(positions.size());
     parallel_for(context, positions.size(), kVoxelWrapGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t v = begin; v < end; ++v) {
@@ -428,7 +428,7 @@ void pull_onto_input(const PullTarget& input, const VoxelGrid& solid, std::span<
                      std::vector<Vec3d>& positions, const RunContext& context) {
     std::optional<ClosestPointTree> tree; // Embree builds on the threads of the arena it is called in
     context.execute([&] { tree.emplace(input.positions, input.triangles); });
-    const Neighbours neighbours = find_neighbours(triangles, positions.size());
+    const VoxelNeighbours neighbours = find_neighbours(triangles, positions.size());
     for (int round = 0; round < kPullRounds && !context.is_cancelled(); ++round) {
         context.report("pulling the wrap onto the surface", double(round) / kPullRounds);
         std::vector<Vec3d> normals = unit_normals(positions, triangles);

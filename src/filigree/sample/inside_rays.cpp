@@ -36,12 +36,12 @@ constexpr std::size_t kRaysBetweenLooks =
     64; // points from one look at `cancel` to the next: each may take a millisecond
 constexpr std::size_t kRayStackSize = (kRayWidth - 1) * WideTree::kDeepest + kRayWidth;
 
-struct alignas(64) Node {
+struct alignas(64) RayNode {
     float lo[3][kRayWidth], hi[3][kRayWidth];
     std::uint32_t child[kRayWidth]; ///< of nodes; with kRayLeaf, of leaves
 };
 
-struct alignas(64) Leaf {
+struct alignas(64) RayLeaf {
     float corner[3][3][kRayLeafSize]; ///< [corner][axis][triangle]
     float eye_side[kRayLeafSize];     ///< orient3d(a, b, c, eye); 0 also where there is no triangle
     std::uint32_t count;
@@ -52,8 +52,8 @@ struct alignas(64) Leaf {
 };
 
 struct RayTree {
-    std::vector<Node> nodes; ///< the first is the root
-    std::vector<Leaf> leaves;
+    std::vector<RayNode> nodes; ///< the first is the root
+    std::vector<RayLeaf> leaves;
     Vec3d eye;
     bool eye_inside = false;
     Vec3d lowest, highest, centre;
@@ -66,7 +66,7 @@ void fill(RayTree& tree, const WideTree& shape, std::span<const Vec3f> positions
           std::span<const std::int8_t> eye_side, const RunContext& context) {
     tree.nodes.resize(shape.nodes.size());
     tree.leaves.resize(shape.leaf_count);
-    const auto fill_leaf = [&](Leaf& leaf, std::span<const Index> of_leaf) {
+    const auto fill_leaf = [&](RayLeaf& leaf, std::span<const Index> of_leaf) {
         leaf = {};
         leaf.count = static_cast<std::uint32_t>(of_leaf.size());
         for (std::size_t lane = 0; lane < of_leaf.size(); ++lane) {
@@ -93,7 +93,8 @@ void fill(RayTree& tree, const WideTree& shape, std::span<const Vec3f> positions
     });
 }
 
-/// The segment from the point towards the eye as the boxes are tested with it: near and far are rows of Node::lo, hi.
+/// The segment from the point towards the eye as the boxes are tested with it: near and far are rows of RayNode::lo,
+/// hi.
 struct Ray {
     float origin[3], inverse[3];
     int near[3], far[3];
@@ -117,7 +118,7 @@ Ray make_ray(const RayTree& tree, const Vec3d& point) {
 
 /// A bit for each child whose box the ray meets.
 template <bool Avx2>
-FILIGREE_INLINE unsigned children_met(const Node& node, const Ray& ray) {
+FILIGREE_INLINE unsigned children_met(const RayNode& node, const Ray& ray) {
     const float(*rows)[kRayWidth] = node.lo; // hi follows
     Float8 enter = {}, leave = Float8{} + 1;
     for (int i = 0; i < 3; ++i) {
@@ -129,7 +130,7 @@ FILIGREE_INLINE unsigned children_met(const Node& node, const Ray& ray) {
     return lane_bits<Avx2>(enter <= leave);
 }
 
-bool crosses_exactly(const Leaf& leaf, int triangle, const Vec3d& eye, const Vec3d& point, exact::Tally& tally) {
+bool crosses_exactly(const RayLeaf& leaf, int triangle, const Vec3d& eye, const Vec3d& point, exact::Tally& tally) {
     const Vec3d a = leaf.vertex(0, triangle), b = leaf.vertex(1, triangle), c = leaf.vertex(2, triangle);
     const int side = exact::orient3d_perturbed(eye, a, b, point, &tally);
     return exact::orient3d_perturbed(eye, b, c, point, &tally) == side &&
@@ -138,7 +139,7 @@ bool crosses_exactly(const Leaf& leaf, int triangle, const Vec3d& eye, const Vec
 }
 
 template <bool Avx2>
-FILIGREE_INLINE void count_leaf(const Leaf& leaf, const Vec3d& eye, const Vec3d& point, const Vec3d& to_eye,
+FILIGREE_INLINE void count_leaf(const RayLeaf& leaf, const Vec3d& eye, const Vec3d& point, const Vec3d& to_eye,
                                 double longest_step, RayParity::Count& count) {
     Double4 a[3], b[3], c[3], size = {};
     for (int i = 0; i < 3; ++i) {
@@ -186,7 +187,7 @@ FILIGREE_INLINE void count_crossings(const RayTree& tree, const Vec3d& point, Ra
     std::size_t top = 0, waiting = 0;
     stack[top++] = 0;
     while (top > 0) {
-        const Node& node = tree.nodes[stack[--top]];
+        const RayNode& node = tree.nodes[stack[--top]];
         for (unsigned met = children_met<Avx2>(node, ray); met != 0; met &= met - 1) {
             const std::uint32_t child = node.child[std::countr_zero(met)];
             if (child & kRayLeaf) {
@@ -199,7 +200,7 @@ FILIGREE_INLINE void count_crossings(const RayTree& tree, const Vec3d& point, Ra
         }
         if (waiting < kWaiting && top > 0) continue;
         for (std::size_t i = 0; i < waiting; ++i) {
-            const Leaf& leaf = tree.leaves[leaves[i]];
+            const RayLeaf& leaf = tree.leaves[leaves[i]];
             count.triangles_tested += leaf.count;
             count_leaf<Avx2>(leaf, tree.eye, point, to_eye, longest_step, count);
         }
