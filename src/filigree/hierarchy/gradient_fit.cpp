@@ -149,7 +149,7 @@ void GradientFit::solve(Index vertex, const IndexLists& neighbours) {
 std::vector<Mat3f> GradientFit::sum(std::span<const Vec3f> positions, const RunContext& context) const {
     std::vector<Eigen::Vector4f> padded(positions.size()); // a position is one load, and a column one register
     for (std::size_t i = 0; i < padded.size(); ++i)
-        padded[i] << (scale_ * positions[i].cast<double>()).cast<float>(), 0;
+        padded[i] << (scale_ * (positions[i].cast<double>() - positions[0].cast<double>())).cast<float>(), 0;
     std::vector<Mat3f> gradients(rest_.size());
     parallel_for(context, gradients.size(), 256, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
