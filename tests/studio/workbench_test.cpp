@@ -844,11 +844,12 @@ TEST_F(WorkbenchTest, WhatABodyDoesNotTakeIsTold) {
     bench.set_warps(warps);
     bench.make_body();
     bench.wait_until_idle();
-    ASSERT_EQ(notes.size(), 1u);
-    EXPECT_EQ(notes[0], "A body is made of the shape at rest, without its deformation.");
-    bench.pin(std::vector<Index>{3});
     ASSERT_EQ(notes.size(), 2u);
-    EXPECT_EQ(notes[1], "Make the body again for new pins to hold it.");
+    EXPECT_NE(notes[0].find("cannot follow the particles"), std::string::npos) << notes[0]; // the driver is coarse
+    EXPECT_EQ(notes[1], "A body is made of the shape at rest, without its deformation.");
+    bench.pin(std::vector<Index>{3});
+    ASSERT_EQ(notes.size(), 3u);
+    EXPECT_EQ(notes[2], "Make the body again for new pins to hold it.");
 }
 
 TEST_F(WorkbenchTest, NumbersAreLookedForInTheFileNameAlone) {
