@@ -81,7 +81,8 @@ void report_fidelity(const StrippedToFidelity& result, const StripCommandOptions
 
 void run(const StripCommandOptions& options, Session& session) {
     refuse_mesh_name(options.output);
-    if (!options.fidelity && !session.first_given({"--fidelity-from"}).empty()) refuse("--fidelity-from belongs to --fidelity.");
+    if (!options.fidelity && !session.first_given({"--fidelity-from"}).empty())
+        refuse("--fidelity-from belongs to --fidelity.");
     const double start = now_seconds();
     Mesh mesh = session.read_mesh(options.input);
     const double read = now_seconds();

@@ -11,8 +11,8 @@ namespace {
 const RunContext kOneThread(1);
 
 TEST(Fidelity, FallsWithEveryFinerDriver) {
-    for (const Mesh& mesh : {make_wavy_sphere({.resolution = 80}), make_torus({.resolution = 80}),
-                             make_wavy_plane({.resolution = 120})})
+    for (const Mesh& mesh :
+         {make_wavy_sphere({.resolution = 80}), make_torus({.resolution = 80}), make_wavy_plane({.resolution = 120})})
         for (const PoseSource source : {PoseSource::positions, PoseSource::gradients}) {
             double coarser = 1;
             for (const std::size_t base : {250, 1000, 4000}) {
