@@ -14,20 +14,6 @@ namespace {
 
 constexpr Precision kPrecisions[] = {Precision::float32, Precision::int16};
 
-/// Every triangle with vertices of its own.
-Mesh soup(const Mesh& mesh) {
-    Mesh out;
-    for (std::size_t f = 0; f < mesh.face_count(); ++f) {
-        std::vector<Index> face;
-        for (Index v : mesh.face(f)) {
-            face.push_back(static_cast<Index>(out.positions.size()));
-            out.positions.push_back(mesh.positions[v]);
-        }
-        out.add_face(face);
-    }
-    return out;
-}
-
 Mesh points_only(std::size_t count) {
     Mesh mesh;
     std::mt19937 random(1);

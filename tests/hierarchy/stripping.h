@@ -61,6 +61,20 @@ inline Pose pose_by(const Deformation& f, const Model& model) {
     return pose;
 }
 
+/// Every face with vertices of its own.
+inline Mesh soup(const Mesh& mesh) {
+    Mesh out;
+    for (std::size_t f = 0; f < mesh.face_count(); ++f) {
+        std::vector<Index> face;
+        for (Index v : mesh.face(f)) {
+            face.push_back(static_cast<Index>(out.positions.size()));
+            out.positions.push_back(mesh.positions[v]);
+        }
+        out.add_face(face);
+    }
+    return out;
+}
+
 /// Largest distance and root mean square, as fractions of b's diagonal (model units when that is zero); NaN stays NaN.
 struct Distance {
     double max = 0, rms = 0;

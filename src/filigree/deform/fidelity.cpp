@@ -1,6 +1,7 @@
 #include "filigree/deform/fidelity.h"
 
 #include "filigree/hierarchy/restore.h"
+#include "filigree/mesh/mesh_distance.h"
 
 #include <algorithm>
 #include <cmath>
@@ -92,11 +93,9 @@ Result<double> fidelity(const Model& model, PoseSource source, const RunContext&
         if (!restored) return restored.error();
         const std::vector<Vec3f> truth = warp_positions(*named.warp, model.mesh.positions, model.mesh.origin, context);
         if (context.is_cancelled()) return cancelled_error();
-        double squared = 0;
-        for (std::size_t v = 0; v < truth.size(); ++v)
-            squared += ((*restored)[v] - truth[v]).cast<double>().squaredNorm();
         const double diagonal = bounds(truth).diagonal();
-        if (diagonal > 0) largest = std::max(largest, std::sqrt(squared / double(truth.size())) / diagonal);
+        if (diagonal > 0)
+            largest = std::max(largest, vertex_distance(model.mesh, *restored, truth, context).rms / diagonal);
     }
     return largest;
 }

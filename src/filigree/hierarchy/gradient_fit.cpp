@@ -2,6 +2,7 @@
 
 #include "filigree/core/dense_solve.h"
 #include "filigree/core/parallel_for.h"
+#include "filigree/core/smoothstep.h"
 #include "filigree/hierarchy/space_neighbours.h"
 #include "filigree/mesh/normals.h"
 
@@ -18,11 +19,6 @@ constexpr double kRidge =
 constexpr double kFlat = 6e-4, kSolid = 6e-3; // thickness in widths: below the first the law, above the second the sum
 constexpr double kNoSpread = 1e-4;            // thickness in widths below which a direction has no linear term
 constexpr double kGhostLength = 0.1;          // of a ghost point from its vertex, in mean edge lengths
-
-double smooth_step(double from, double to, double x) {
-    const double t = std::clamp((x - from) / (to - from), 0.0, 1.0);
-    return t * t * (3 - 2 * t);
-}
 
 /// a with what it does to the unit vector n replaced by s n', n' and s from what it does to the plane across n.
 Mat3d with_law(const Mat3d& a, const Vec3d& n, HeightLaw law) {
@@ -112,11 +108,10 @@ Eigen::MatrixXd gradient_weights(const LocalSet& set) {
 GradientFit::GradientFit(const Mesh& driver, NormalColumn normal_column, const RunContext& context)
     : rest_(driver.positions), normals_(vertex_normals(driver, driver.positions, context)),
       normal_column_(normal_column) {
-    SpaceNeighbourOptions options;
-    options.along_surface = normal_column == NormalColumn::shell;
-    const IndexLists neighbours = space_neighbours(driver, normals_, options, context);
+    const IndexLists neighbours = space_neighbours(
+        driver, normals_, normal_column == NormalColumn::shell ? NeighbourKind::along_surface : NeighbourKind::in_space,
+        context);
     const std::size_t count = rest_.size();
-    if (const double diagonal = bounds(rest_).diagonal(); diagonal > 0) scale_ = 1 / diagonal;
     for (double length : mean_edge_lengths(driver)) ghost_lengths_.push_back(float(kGhostLength * length));
     term_offsets_ = neighbours.offsets;
     terms_.assign(neighbours.items.size(), {});
@@ -134,12 +129,12 @@ void GradientFit::solve(Index vertex, const IndexLists& neighbours) {
     if (!(set.size > 0)) return;
     const Eigen::MatrixXd weights = gradient_weights(set);
     for (std::size_t k = 0; k < neighbours[vertex].size(); ++k) {
-        const Vec3d weight = set.axes * weights.row(static_cast<Eigen::Index>(k) + 1).transpose() / (set.size * scale_);
-        terms_[term_offsets_[vertex] + k] = {neighbours[vertex][k], weight.cast<float>()};
+        const Vec3d weight = set.axes * weights.row(static_cast<Eigen::Index>(k) + 1).transpose() / set.size;
+        terms_[term_offsets_[vertex] + k] = {neighbours[vertex][k], weight};
     }
     const int rank = set.rank();
     const auto share_of_law = [&](int axis) {
-        return rank < axis + 1 ? 1 : float(1 - smooth_step(kFlat, kSolid, set.spread[axis] / set.spread[axis - 1]));
+        return rank < axis + 1 ? 1 : float(1 - smoothstep(kFlat, kSolid, set.spread[axis] / set.spread[axis - 1]));
     };
     flatness_[vertex] = {set.axes.col(0).cast<float>(), set.axes.col(2).cast<float>(), share_of_law(1),
                          share_of_law(2)};
@@ -147,20 +142,14 @@ void GradientFit::solve(Index vertex, const IndexLists& neighbours) {
 }
 
 std::vector<Mat3f> GradientFit::sum(std::span<const Vec3f> positions, const RunContext& context) const {
-    std::vector<Eigen::Vector4f> padded(positions.size()); // a position is one load, and a column one register
-    for (std::size_t i = 0; i < padded.size(); ++i)
-        padded[i] << (scale_ * (positions[i].cast<double>() - positions[0].cast<double>())).cast<float>(), 0;
     std::vector<Mat3f> gradients(rest_.size());
     parallel_for(context, gradients.size(), 256, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-            Eigen::Vector4f x = Eigen::Vector4f::Zero(), y = x, z = x;
-            for (std::size_t k = term_offsets_[i]; k < term_offsets_[i + 1]; ++k) {
-                const Eigen::Vector4f way = padded[terms_[k].vertex] - padded[i];
-                x += way * terms_[k].weight[0];
-                y += way * terms_[k].weight[1];
-                z += way * terms_[k].weight[2];
-            }
-            gradients[i] << x.head<3>(), y.head<3>(), z.head<3>();
+            const Vec3d centre = positions[i].cast<double>();
+            Mat3d a = Mat3d::Zero();
+            for (std::size_t k = term_offsets_[i]; k < term_offsets_[i + 1]; ++k)
+                a += (positions[terms_[k].vertex].cast<double>() - centre) * terms_[k].weight.transpose();
+            gradients[i] = a.cast<float>();
         }
     });
     return gradients;

@@ -24,8 +24,7 @@ enum class NormalColumn {
 /// normal column at every vertex with a face is s n', whatever lies around.
 class GradientFit {
 public:
-    /// driver: the driver at rest. Cost O(V) solves of 36 unknowns: about 10 us each on one core, twice that with
-    /// their neighbours.
+    /// driver: the driver at rest. Cost O(V) solves of 36 unknowns, and O(V log V) for the neighbours.
     GradientFit(const Mesh& driver, NormalColumn normal_column, const RunContext& context);
 
     /// One gradient a vertex of the driver, whose vertices are now at `positions`. Cost O(V); same bytes for any thread
@@ -45,7 +44,7 @@ private:
     /// One term of a vertex's sum.
     struct Term {
         Index vertex;
-        Vec3f weight;
+        Vec3d weight;
     };
     /// Directions in which a vertex's neighbours do not spread, and how far the law decides there, 0 to 1.
     struct Flatness {
@@ -60,7 +59,6 @@ private:
     std::vector<Vec3f> rest_, normals_;
     std::vector<float> ghost_lengths_; ///< from each vertex to its ghost point
     NormalColumn normal_column_;
-    double scale_ = 1; ///< one over the driver's diagonal, so that no size is too small or too large for a float
     std::vector<Index> term_offsets_;
     std::vector<Term> terms_;
     std::vector<Flatness> flatness_;

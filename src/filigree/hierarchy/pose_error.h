@@ -11,8 +11,8 @@ namespace filigree {
 /// rule misses the other end), or the gradients differ, the deformation is more curved than the driver can follow;
 /// between the ends the mesh is off by a share of the one, and of the other times the detail's height. The two shares
 /// are calibrated over bends, twists, tapers and smooth random displacements of meshes and drivers of many kinds: the
-/// estimate was within a factor of 2 of the error for nine poses in ten, also on meshes that were not used to calibrate
-/// (test PoseError.IsWithinAFactorOfTwo). It does not see that a solver would have moved the whole mesh differently.
+/// estimate is within a factor of 2 of the error for nine poses in ten (test PoseError.IsWithinAFactorOfTwo). It does
+/// not see that a solver would have moved the whole mesh differently.
 class PoseError {
 public:
     /// Of a blend model; for others every estimate is 0. Cost O(V).

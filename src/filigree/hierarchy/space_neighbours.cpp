@@ -12,10 +12,11 @@ namespace filigree {
 
 namespace {
 
-constexpr std::size_t kThinning = 8;      // one in so many vertices is in the sparse tree
-constexpr std::size_t kTried = 3;         // candidates for each neighbour wanted
-constexpr float kAcross = 0.2f;           // cosine from which a vertex is in front of the surface
-constexpr std::size_t kSmallestPart = 32; // places; smaller parts see all others
+constexpr std::size_t kNear = 24, kFar = 8; // neighbours among all vertices, and among some
+constexpr std::size_t kThinning = 8;        // one in so many vertices is in the sparse tree
+constexpr std::size_t kTried = 3;           // candidates for each neighbour wanted
+constexpr float kAcross = 0.2f;             // cosine from which a vertex is in front of the surface
+constexpr std::size_t kSmallestPart = 32;   // places; smaller parts see all others
 
 /// Some of a mesh's vertices, as nanoflann sees them.
 class PointTree {
@@ -86,8 +87,8 @@ struct Part {
 
 class Search {
 public:
-    Search(const Mesh& mesh, std::span<const Vec3f> normals, const SpaceNeighbourOptions& options)
-        : mesh_(mesh), normals_(normals), options_(options), place_(weld_map(mesh.positions)) {
+    Search(const Mesh& mesh, std::span<const Vec3f> normals, NeighbourKind kind)
+        : mesh_(mesh), normals_(normals), kind_(kind), place_(weld_map(mesh.positions)) {
         link_places();
         split_into_parts();
     }
@@ -104,19 +105,19 @@ public:
         found.clear();
         const Index own = place_[vertex];
         const Part& part = *parts_[part_of_[own]];
-        part.all.nearest(mesh_.positions[own], kTried * options_.near, scratch.candidates);
+        part.all.nearest(mesh_.positions[own], kTried * kNear, scratch.candidates);
         reach(own, scratch);
         const auto is_reached = [&](Index v) { return scratch.mark[v] == 2 * scratch.round + 1; };
         for (const auto& [distance, v] : scratch.candidates) {
-            if (found.size() == options_.near) break;
-            if (v != own && (is_reached(v) || (!options_.along_surface && has_matter_between(own, v))))
+            if (found.size() == kNear) break;
+            if (v != own && (is_reached(v) || (kind_ == NeighbourKind::in_space && has_matter_between(own, v))))
                 found.push_back(v);
         }
-        if (options_.along_surface) return;
+        if (kind_ == NeighbourKind::along_surface) return;
         const std::size_t near_count = found.size();
-        part.some.nearest(mesh_.positions[own], kTried * options_.far + options_.near, scratch.candidates);
+        part.some.nearest(mesh_.positions[own], kTried * kFar + kNear, scratch.candidates);
         for (const auto& [distance, v] : scratch.candidates) {
-            if (found.size() == near_count + options_.far) break;
+            if (found.size() == near_count + kFar) break;
             const auto near_end = found.begin() + static_cast<std::ptrdiff_t>(near_count);
             if (v != own && std::find(found.begin(), near_end, v) == near_end &&
                 (is_reached(v) || has_matter_between(own, v)))
@@ -193,7 +194,7 @@ private:
 
     const Mesh& mesh_;
     std::span<const Vec3f> normals_;
-    SpaceNeighbourOptions options_;
+    NeighbourKind kind_;
     std::vector<Index> place_; ///< of each vertex: the lowest vertex there
     IndexLists links_;         ///< the edges at each place
     std::vector<Index> part_of_;
@@ -202,9 +203,9 @@ private:
 
 } // namespace
 
-IndexLists space_neighbours(const Mesh& mesh, std::span<const Vec3f> normals, const SpaceNeighbourOptions& options,
+IndexLists space_neighbours(const Mesh& mesh, std::span<const Vec3f> normals, NeighbourKind kind,
                             const RunContext& context) {
-    const Search search(mesh, normals, options);
+    const Search search(mesh, normals, kind);
     std::vector<std::vector<Index>> lists(search.vertex_count());
     const std::size_t grain = std::max<std::size_t>(256, lists.size() / 64); // each piece marks all vertices once
     parallel_for(context, lists.size(), grain, [&](std::size_t begin, std::size_t end) {

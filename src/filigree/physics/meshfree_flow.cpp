@@ -1,6 +1,7 @@
 #include "filigree/physics/meshfree_flow.h"
 
 #include "filigree/core/parallel_for.h"
+#include "filigree/core/smoothstep.h"
 #include "filigree/physics/plasticity.h"
 
 #include <Eigen/LU>
@@ -21,13 +22,6 @@ constexpr std::size_t kShareToRenew = 100; // renew when one particle of this ma
 constexpr double kMostHeatSteps = 16;
 constexpr float kLeastMelt = 0.8f;       // volume ratio: below it a renewed melt forgets its shape
 constexpr float kMostCorrection = 0.02f; // of a volume ratio, a renewal
-
-float smoothstep(double from, double to, double x) {
-    if (x >= to) return 1;
-    if (x <= from) return 0;
-    const double t = (x - from) / (to - from);
-    return float(t * t * (3 - 2 * t));
-}
 
 /// Of a pair, m: V / sum of weights over the mean square of offsets is the Laplacian's scale; both ends' mean.
 float conductance(const Body& body, const MlsNeighbours& neighbours, std::size_t i, std::size_t k) {
@@ -54,7 +48,8 @@ Flow::Flow(const Body& body) : body_(body) {
 
 float Flow::melted(std::size_t i) const {
     const Material& material = body_.material;
-    return material.melts() ? smoothstep(material.melting_from, material.melting_to, double(temperature_[i])) : 0;
+    return material.melts() ? float(smoothstep(material.melting_from, material.melting_to, double(temperature_[i])))
+                            : 0;
 }
 
 float Flow::shear_modulus(std::size_t i) const { return is_active() ? shear_modulus_of(melted(i)) : shear_; }
