@@ -163,8 +163,8 @@ void PrintTo(const TrueCase&, std::ostream*) {} // else its bytes, which are oth
 INSTANTIATE_TEST_SUITE_P(Scenes, BodyTruth,
                          testing::Values(TrueCase{kFalls, 4e-4, 3, 8e-3, 1.1}, TrueCase{kSags, 4e-4, 3, 8e-3, 1.4},
                                          TrueCase{kPressed, 1e-3, 5, 2e-2, 1.1}),
-                         [](const auto& info) {
-                             return std::string(std::array{"Falls", "Sags", "Pressed"}[info.index]);
+                         [](const auto& test) {
+                             return std::string(std::array{"Falls", "Sags", "Pressed"}[test.index]);
                          });
 
 } // namespace
