@@ -126,12 +126,10 @@ void describe_mesh(const Mesh& mesh, Session& session, Report& report) {
 void describe_levels(const Model& model, Report& report) {
     Json levels = Json::array();
     for (unsigned k = 0; k <= model.finest_level(); ++k) {
-        const bool finest = k == model.finest_level();
-        const std::size_t vertices = finest ? model.mesh.vertex_count() : model.levels[k].vertices.size();
-        const std::size_t faces = finest ? model.mesh.face_count() : model.levels[k].face_count();
-        report.row(fmt::format("level {}", k), fmt::format("{} vertices, {} faces{}", with_commas(vertices),
-                                                           with_commas(faces), k == 0 ? "  (driver)" : ""));
-        levels.push_back({{"vertices", vertices}, {"faces", faces}});
+        const LevelCounts counts = level_counts(model, k);
+        report.row(fmt::format("level {}", k), fmt::format("{} vertices, {} faces{}", with_commas(counts.vertices),
+                                                           with_commas(counts.faces), k == 0 ? "  (driver)" : ""));
+        levels.push_back({{"vertices", counts.vertices}, {"faces", counts.faces}});
     }
     report.set("levels", levels);
 }

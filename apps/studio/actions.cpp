@@ -365,7 +365,7 @@ void Actions::Impl::name_step(const char* name, const QString& verb, const QStri
 bool Actions::Impl::can_remove_detail() const {
     const State& state = workbench.state();
     return state.model && state.level() > 0 &&
-           level_vertices(*state.model, state.level() - 1) < level_vertices(*state.model, state.level());
+           level_counts(*state.model, state.level() - 1).vertices < level_counts(*state.model, state.level()).vertices;
 }
 
 // Files

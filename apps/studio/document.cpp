@@ -16,13 +16,6 @@ PoseSequence Recording::poses() const {
     return result;
 }
 
-std::size_t level_vertices(const Model& model, unsigned level) {
-    return level < model.levels.size() ? model.levels[level].vertices.size() : model.mesh.vertex_count();
-}
-std::size_t level_faces(const Model& model, unsigned level) {
-    return level < model.levels.size() ? model.levels[level].face_count() : model.mesh.face_count();
-}
-
 /// Holds the state before and after, so undo and redo bring back the very same one.
 class StateChange : public QUndoCommand {
 public:

@@ -93,9 +93,6 @@ struct State {
     bool operator==(const State&) const = default;
 };
 
-std::size_t level_vertices(const Model& model, unsigned level);
-std::size_t level_faces(const Model& model, unsigned level);
-
 /// The state and its history. Lives in the main thread.
 class Document : public QObject {
     Q_OBJECT

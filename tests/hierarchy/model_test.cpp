@@ -2,6 +2,7 @@
 #include "filigree/hierarchy/model.h"
 
 #include "filigree/mesh/shapes.h"
+#include "filigree/mesh/triangulate.h"
 #include "hierarchy/stripping.h"
 
 using namespace filigree_test;
@@ -25,6 +26,18 @@ ReferenceDetail& reference(Model& model) { return std::get<ReferenceDetail>(mode
 const Mesh kPlane = make_wavy_plane({.resolution = 8});
 
 } // namespace
+
+TEST(Model, CountsWhatItsLevelsHave) {
+    const Model model = stripped(kPlane, {.levels = 2}).model;
+    for (unsigned level = 0; level <= model.finest_level(); ++level) {
+        const Mesh mesh = level_mesh(model, level);
+        const LevelCounts counts = level_counts(model, level);
+        EXPECT_EQ(counts.vertices, mesh.vertex_count()) << level;
+        EXPECT_EQ(counts.faces, mesh.face_count()) << level;
+        EXPECT_EQ(counts.corners, mesh.corner_count()) << level;
+        EXPECT_EQ(counts.triangles(), triangulate(mesh).triangles.size()) << level;
+    }
+}
 
 TEST(Model, DamageOfMeshAndLevelsIsSeen) {
     expect_all_seen(stripped(kPlane, {.levels = 2}).model,

@@ -124,8 +124,9 @@ QString DetailPanel::levels() const {
             return QStringLiteral("<td align='%1'>%2</td>")
                 .arg(QLatin1String(align), shown ? "<b>" + content + "</b>" : content);
         };
-        table += "<tr>" + cell(name, "left") + cell(with_commas(level_vertices(model, level)) + " vertices", "right") +
-                 cell(with_commas(level_faces(model, level)) + " faces", "right") + "</tr>";
+        const LevelCounts counts = level_counts(model, level);
+        table += "<tr>" + cell(name, "left") + cell(with_commas(counts.vertices) + " vertices", "right") +
+                 cell(with_commas(counts.faces) + " faces", "right") + "</tr>";
     }
     return table + "</table>";
 }

@@ -39,11 +39,12 @@ Overview::Overview(Workbench& workbench, const Actions& actions, QWidget* parent
 void Overview::refresh() {
     zoom_->set_value(workbench_.view().zoom());
     const State& state = workbench_.state();
-    level_->setText(state.model ? QStringLiteral("level %1 of %2 – %3")
-                                      .arg(state.level())
-                                      .arg(state.model->finest_level())
-                                      .arg(counted(level_vertices(*state.model, state.level()), "vertex", "vertices"))
-                                : QStringLiteral("no mesh"));
+    level_->setText(state.model
+                        ? QStringLiteral("level %1 of %2 – %3")
+                              .arg(state.level())
+                              .arg(state.model->finest_level())
+                              .arg(counted(level_counts(*state.model, state.level()).vertices, "vertex", "vertices"))
+                        : QStringLiteral("no mesh"));
 }
 
 } // namespace filigree::studio

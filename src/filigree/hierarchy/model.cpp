@@ -28,6 +28,13 @@ Mesh level_mesh(const Model& model, unsigned level) {
     return mesh;
 }
 
+LevelCounts level_counts(const Model& model, unsigned level) {
+    if (level >= model.finest_level())
+        return {model.mesh.vertex_count(), model.mesh.face_count(), model.mesh.corner_count()};
+    const Level& counted = model.levels[level];
+    return {counted.vertices.size(), counted.face_count(), counted.corners.size()};
+}
+
 std::vector<float> vertex_levels(const Model& model, unsigned level) {
     std::vector<float> levels(model.mesh.vertex_count(), static_cast<float>(model.finest_level()));
     for (unsigned k = model.finest_level(); k-- > 0;)

@@ -38,6 +38,15 @@ struct Model {
 /// faces only at the finest level (the caller can see which are empty). Cost O(size of the mesh).
 Mesh level_mesh(const Model& model, unsigned level);
 
+/// What a level has, as its level_mesh() would.
+struct LevelCounts {
+    std::size_t vertices = 0, faces = 0, corners = 0;
+    /// Once its faces are cut into triangles.
+    std::size_t triangles() const { return corners - 2 * faces; }
+};
+/// Of level k, 0 <= k <= finest_level().
+LevelCounts level_counts(const Model& model, unsigned level);
+
 /// The coarsest level that each vertex of level k is in, as numbers for colours. Cost O(size of the levels).
 std::vector<float> vertex_levels(const Model& model, unsigned level);
 

@@ -60,9 +60,7 @@ const GlbMaterials& GlbLevels::add_materials(GlbBuilder& builder, const GlbParts
 }
 
 std::vector<double> GlbLevels::screen_coverages(unsigned top, std::size_t count) const {
-    const auto faces = [&](unsigned level) {
-        return level == model_.finest_level() ? model_.mesh.face_count() : model_.levels[level].face_count();
-    };
+    const auto faces = [&](unsigned level) { return level_counts(model_, level).faces; };
     std::vector<double> coverages;
     for (unsigned k = 1; k < count; ++k)
         coverages.push_back(static_cast<double>(faces(top - k)) /

@@ -75,13 +75,11 @@ std::optional<Picked> LevelShape::pick(std::span<const Vec3f> positions, Camera:
 }
 
 LevelFacts level_facts(const Model& model, unsigned level) {
-    const bool finest = level == model.finest_level();
-    const std::size_t faces = finest ? model.mesh.face_count() : model.levels[level].face_count();
-    const std::size_t corners = finest ? model.mesh.corner_count() : model.levels[level].corners.size();
+    const LevelCounts counts = level_counts(model, level);
     LevelFacts facts;
-    facts.triangles = corners - 2 * faces;
-    facts.vertices = finest ? model.mesh.vertex_count() : model.levels[level].vertices.size();
-    if (finest) facts.deviation = 0;
+    facts.triangles = counts.triangles();
+    facts.vertices = counts.vertices;
+    if (level == model.finest_level()) facts.deviation = 0;
     return facts;
 }
 
