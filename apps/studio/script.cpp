@@ -37,6 +37,7 @@ constexpr double kPatience = 600; // seconds that a command may take
 
 /// The window as it is at this moment.
 Status grab_window(const std::filesystem::path& path, MainWindow& window) {
+    for (int k = 0; k < 3; ++k) QCoreApplication::sendPostedEvents(); // a text that grew, its layout, what that moves
     QPixmap picture = window.grab();
     for (QDialog* const dialog : window.findChildren<QDialog*>()) // what stands over the window belongs to it
         if (dialog->isVisible()) {
