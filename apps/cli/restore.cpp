@@ -85,19 +85,17 @@ const char* source_of(const Model& model, const Pose& pose) {
     return pose.ghosts.empty() ? "positions" : "positions and ghost points";
 }
 
-constexpr double kErrorToWarnOf = 1e-3; ///< of the diagonal
-
 /// What the driver is too coarse for: seen in the pose alone.
 void report_expected_error(const Model& model, const Pose& pose, const Restorer& restorer, Session& session,
                            Report& report) {
     if (model.code() != DetailCode::blend) return;
     const std::vector<Mat3f> gradients = require(restorer.gradients(pose, session.context()));
-    const double diagonal = bounds(pose.positions).diagonal();
-    if (!(diagonal > 0)) return;
-    const double error = PoseError(model).estimate(pose, gradients).rms / diagonal;
+    const PoseError::Estimate estimate = PoseError(model).estimate(pose, gradients);
+    if (!(estimate.diagonal > 0)) return;
+    const double error = estimate.share();
     report.say(fmt::format("Expected error: {:.2g} of the diagonal (rms).\n", error));
     report.set("expected_error", error);
-    if (error > kErrorToWarnOf)
+    if (estimate.is_too_curved())
         session.warn(
             fmt::format("The pose is more curved than the driver can follow: the mesh is off by about {:.2g} of "
                         "the diagonal. Strip with a finer driver (--base, or --fidelity).",

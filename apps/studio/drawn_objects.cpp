@@ -30,11 +30,6 @@ Mesh moved_mesh(const Mesh& mesh, std::span<const Vec3f> positions) {
     return moved;
 }
 
-VertexColors error_colors(std::vector<float> distances, double diagonal) {
-    HeatMap map = heat_map(std::move(distances), diagonal);
-    return {std::move(map.values), ColorMap::sequential, map.range};
-}
-
 } // namespace
 
 DrawnObjects::DrawnObjects(Workbench& workbench, WithOpenGl with_opengl)
@@ -59,6 +54,9 @@ DrawnObjects::DrawnObjects(Workbench& workbench, WithOpenGl with_opengl)
     connect(&workbench, &Workbench::mode_changed, this, [this] { follow_view(); });
     connect(&workbench.playback(), &Playback::state_changed, this, [this] { follow_view(); });
     connect(&workbench.playback(), &Playback::moved, this, [this] { follow_particles(); });
+    connect(&workbench.expected_error(), &ExpectedError::changed, this, [this] {
+        if (settings_.coloring == Coloring::expected_error) follow_colors();
+    });
     connect(&workbench.view(), &ViewState::changed, this, [this] { follow_view(); });
 }
 
@@ -152,6 +150,7 @@ void DrawnObjects::follow_view() {
     settings_ = workbench_.view().settings();
     const bool wants_full = settings_.split || settings_.coloring == Coloring::error;
     workbench_.want_full(wants_full);
+    workbench_.expected_error().want_colors(settings_.coloring == Coloring::expected_error);
     follow_surroundings();
     follow_particles();
     follow_inside_points();
@@ -336,61 +335,6 @@ std::string DrawnObjects::patches_problem() const {
 
 PatchSurface* DrawnObjects::patches_at(unsigned level) {
     return patches_ && shown_ && level == shown_->finest_level() ? &*patches_ : nullptr;
-}
-
-void DrawnObjects::follow_colors() {
-    if (!shown_) return;
-    const auto put = [this](Coloring coloring, VertexColors colors) {
-        colors_ = std::move(colors);
-        colors_are_ = coloring;
-        color_stamp_ = ++last_stamp_;
-        Q_EMIT changed(false);
-    };
-    const auto put_none = [&] {
-        if (color_stamp_ != 0) put(Coloring::own, {});
-        color_stamp_ = 0;
-    };
-    const std::size_t count = shown_->model().mesh.vertex_count();
-    switch (settings_.coloring) {
-    case Coloring::own:
-    case Coloring::patches: // as another surface
-        return put_none();
-    case Coloring::levels:
-        if (colors_are_ == Coloring::levels && color_stamp_ != 0) return;
-        return put(
-            Coloring::levels,
-            {shown_->arrival(), ColorMap::sequential, {0, static_cast<float>(std::max(1u, shown_->finest_level()))}});
-    case Coloring::error:
-        break;
-    }
-    const double diagonal = bounds(shown_->model().mesh.positions).diagonal();
-    const std::optional<VertexDistance>& error = workbench_.error();
-    if (pose_stamp_ == 0) return put(Coloring::error, {std::vector<float>(count), ColorMap::sequential, {0, 0.01f}});
-    if (!has_full_vertices()) {
-        if (!error || error->per_vertex.size() != count) return put_none();
-        return put(Coloring::error, error_colors(error->per_vertex, diagonal));
-    }
-    if (colors_are_ != Coloring::error) put_none();
-    background_.start<VertexColors>(
-        "The picture", "error colors",
-        [diagonal, pose = pose_, model = shown_->shared_model(), restore = workbench_.state().restore,
-         full = std::vector(workbench_.full().begin(), workbench_.full().end())](
-            const RunContext& context) mutable -> Result<VertexColors> {
-            restore.level.reset();
-            const Result<Restorer> restorer = Restorer::create(*model, restore, context);
-            if (!restorer) return restorer.error();
-            const Result<std::vector<Vec3f>> restored = restorer->positions(pose, context);
-            if (!restored) return restored.error();
-            std::vector<float> distances(full.size());
-            for (std::size_t v = 0; v < full.size(); ++v) distances[v] = ((*restored)[v] - full[v]).norm();
-            return error_colors(std::move(distances), diagonal);
-        },
-        [this, put, stamp = pose_stamp_, model = shown_->shared_model()](VertexColors colors) {
-            if (shown_ && shown_->shared_model() == model && stamp == pose_stamp_ &&
-                settings_.coloring == Coloring::error)
-                put(Coloring::error, std::move(colors));
-        },
-        {.failed = [](const Error&) {}}); // the mesh is grey then: the error is not known
 }
 
 void DrawnObjects::follow_defects() {

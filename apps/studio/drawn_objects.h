@@ -80,6 +80,10 @@ private:
     void follow_patches();
     PatchSurface* patches_at(unsigned level); ///< what is drawn in its place; null: itself
     void follow_colors();
+    void put_colors(Coloring coloring, VertexColors colors);
+    void drop_colors();
+    void follow_error();
+    void follow_expected_error();
     void follow_defects();
     void ask_for(unsigned level, bool is_urgent);
     void adopt();
@@ -110,6 +114,7 @@ private:
     VertexColors colors_;
     std::uint64_t color_stamp_ = 0;
     Coloring colors_are_ = Coloring::own;
+    std::uint64_t expected_number_ = 0; ///< of the expected error that the colours are
     std::vector<DefectEdge> defects_;
     std::shared_ptr<const Model> defects_of_;
     bool inside_points_stale_ = false;               ///< other points have come than are drawn

@@ -16,8 +16,10 @@ namespace {
 constexpr double kMargin = 14; // from the widget's borders
 constexpr double kTriad = 70;  // the axes take, from the margins in the corner
 
-const QColor kPin(226, 74, 51), kOpen(235, 94, 40), kNonManifold(190, 50, 200), kOpposed(20, 110, 220),
-    kFlat(150, 110, 0);
+constexpr double kWarningWidth = 340; // wider is hard to read over a picture
+
+const QColor kWarning(217, 138, 20), kPin(226, 74, 51), kOpen(235, 94, 40), kNonManifold(190, 50, 200),
+    kOpposed(20, 110, 220), kFlat(150, 110, 0);
 const std::array<QColor, 3> kAxes = {QColor(214, 69, 65), QColor(76, 160, 72), QColor(62, 116, 214)};
 
 QColor gizmo_color(GizmoPart part) {
@@ -69,6 +71,19 @@ public:
         painter_.drawText(plate.adjusted(8, 4, -8, -4), Qt::AlignCenter, text);
         painter_.setOpacity(1);
         return plate;
+    }
+
+    /// A sentence in an amber frame above the axes, in as many lines as it needs.
+    void warning(const QString& text) {
+        const double width = std::min(kWarningWidth, area_.width() - 2 * kMargin) - 16;
+        const QRectF taken = painter_.boundingRect(QRectF(0, 0, width, 4000), Qt::AlignLeft | Qt::TextWordWrap, text);
+        QRectF plate(0, 0, std::ceil(taken.width()) + 16, std::ceil(taken.height()) + 8);
+        plate.moveBottomLeft({area_.left() + kMargin, area_.bottom() - kMargin - kTriad - 6});
+        painter_.setPen(QPen(kWarning, 1.5));
+        painter_.setBrush(plate_);
+        painter_.drawRoundedRect(plate, 5, 5);
+        painter_.setPen(text_);
+        painter_.drawText(plate.adjusted(8, 4, -8, -4), Qt::AlignLeft | Qt::TextWordWrap, text);
     }
 
     void captions(const std::vector<OverlayContent::Caption>& captions) {
@@ -303,7 +318,10 @@ void Overlay::paintEvent(QPaintEvent*) {
         if (!text.isEmpty()) top = sheet.label(QPointF(kMargin, top), text, Qt::AlignLeft).bottom() + 6;
     if (c.shows_triad) sheet.triad(c);
     const QRectF legend = c.legend ? sheet.legend(*c.legend) : QRectF();
-    if (c.hint_strength > 0 && !c.hint.isEmpty()) sheet.hint(c.hint, c.hint_strength, legend);
+    if (!c.warning.isEmpty())
+        sheet.warning(c.warning);
+    else if (c.hint_strength > 0 && !c.hint.isEmpty())
+        sheet.hint(c.hint, c.hint_strength, legend);
 }
 
 } // namespace filigree::studio

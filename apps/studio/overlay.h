@@ -17,7 +17,8 @@ struct OverlayContent {
     std::string trouble; ///< not empty: there is no picture, and this is written instead
     QString hint;        ///< at the bottom, as visible as `hint_strength` (0 to 1)
     double hint_strength = 0;
-    QString note; ///< in the upper left corner: the level by distance, what is being prepared
+    QString note;    ///< in the upper left corner: the level by distance, what is being prepared
+    QString warning; ///< above the axes, in place of the hint: what is wrong with the shape as it is shown
     struct Caption {
         QString title, detail;
         QRectF tile;

@@ -10,7 +10,7 @@
 namespace filigree::studio {
 
 enum class SurfaceStyle { shaded, edges, wireframe };
-enum class Coloring { own, error, levels, patches };
+enum class Coloring { own, error, levels, patches, expected_error };
 enum class Tool { pull, pin, turn };
 
 struct ViewSettings {

@@ -104,6 +104,7 @@ Viewport::Viewport(Workbench& workbench, QWidget* parent)
     connect(&c.drawn, &DrawnObjects::changed, this, [&c](bool pose) { c.touch(pose); });
     connect(&workbench.view(), &ViewState::camera_changed, this, [&c] { c.touch(false); });
     connect(&workbench.view(), &ViewState::changed, this, [&c] { c.touch(false); });
+    connect(&workbench.expected_error(), &ExpectedError::changed, this, [&c] { c.update_overlay(); });
     connect(&c.pointer, &Pointer::changed, this, [&c] { c.update_overlay(); });
     connect(&c.pointer, &Pointer::has_begun, this, [&c] { c.fade_hint(); });
 }

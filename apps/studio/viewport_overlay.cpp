@@ -47,6 +47,7 @@ public:
             if (settings_.defects) add_defects();
         }
         add_note();
+        if (drawn_.shown()) content.warning = workbench_.expected_error().warning();
     }
 
 private:
@@ -81,15 +82,14 @@ private:
 
     void add_legend() {
         const VertexColors& colors = drawn_.colors();
-        const bool is_error = settings_.coloring == Coloring::error;
-        if (colors.values.empty() || (!is_error && settings_.coloring != Coloring::levels)) return;
-        content.legend =
-            OverlayContent::Legend{is_error ? "Distance from the full deformation" : "Level at which a vertex comes in",
-                                   is_error ? "% of the diagonal" : "",
-                                   colors.map,
-                                   colors.range,
-                                   is_error ? 100.0 : 1.0,
-                                   !is_error};
+        if (colors.values.empty()) return;
+        const bool is_levels = settings_.coloring == Coloring::levels;
+        const char* const title = is_levels ? "Level at which a vertex comes in"
+                                  : settings_.coloring == Coloring::expected_error
+                                      ? "Expected error"
+                                      : "Distance from the full deformation";
+        content.legend = OverlayContent::Legend{
+            title, is_levels ? "" : "% of the diagonal", colors.map, colors.range, is_levels ? 1.0 : 100.0, is_levels};
     }
 
     void add_pins() {
@@ -169,6 +169,8 @@ private:
                 .arg(with_commas(facts().vertices));
         if (shown && settings_.coloring == Coloring::patches && !drawn_.patches_problem().empty())
             return QString::fromStdString(drawn_.patches_problem());
+        if (shown && settings_.coloring == Coloring::expected_error && state.model->code() != DetailCode::blend)
+            return "The expected error is known for the blend code alone.";
         if (!state.source) return {};
         if (!(pointer_.rest_box().diagonal() > 0))
             return "All vertices are in one place, so there is no shape to show.";

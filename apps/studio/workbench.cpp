@@ -220,7 +220,8 @@ void Workbench::sample_inside_points(std::size_t count) {
 
 void Workbench::wait_until_idle() {
     jobs_.wait_until_idle();
-    while (impl_->measures_next || jobs_.is_busy() || drag_.is_busy())
+    const auto is_judging = [&] { return expected_error_.is_pending() && !is_playing(); };
+    while (impl_->measures_next || jobs_.is_busy() || drag_.is_busy() || is_judging())
         QCoreApplication::processEvents(QEventLoop::WaitForMoreEvents);
 }
 

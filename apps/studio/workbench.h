@@ -3,6 +3,7 @@
 
 #include "deformation.h"
 #include "document.h"
+#include "expected_error.h"
 #include "jobs.h"
 #include "playback.h"
 #include "view.h"
@@ -96,6 +97,10 @@ public:
     void measure_error();
     const std::optional<VertexDistance>& error() const { return error_; } ///< of the pose shown, if it was measured
 
+    /// What the pose shown is expected to be off by, without measuring.
+    ExpectedError& expected_error() { return expected_error_; }
+    const ExpectedError& expected_error() const { return expected_error_; }
+
     /// The driver's pose as shown; null: at rest. It stays until the next pose_changed().
     const Pose* pose() const { return pose_.positions.empty() ? nullptr : &pose_; }
     /// All vertices of the finest mesh as fully deformed, if known for the pose shown; empty else. The split view and
@@ -108,7 +113,8 @@ public:
     void sample_inside_points(std::size_t count);
     std::span<const Vec3f> inside_points() const { return inside_points_; }
 
-    void wait_until_idle(); ///< no job, and a pull has arrived where it was pulled to: for tests and scripts
+    /// No job, a pull has arrived where it was pulled to, and what stands still is judged: for tests and scripts.
+    void wait_until_idle();
 
 Q_SIGNALS:
     void pose_changed();
@@ -162,6 +168,7 @@ private:
     bool is_pulling_ = false, wants_full_ = false;
     std::size_t frame_ = 0;
     std::unique_ptr<Impl> impl_;
+    ExpectedError expected_error_{*this};
 };
 
 } // namespace filigree::studio

@@ -97,6 +97,27 @@ TEST(PoseError, IsLargestWhereThePoseIsCurved) {
         side = std::max(side, double(estimate.local[v]));
     }
     EXPECT_LT(10 * still, moved);
+
+    // The mesh's vertices, for colours, likewise; a driver's vertex has its own.
+    const std::vector<float> errors = vertex_errors(model, estimate.local);
+    ASSERT_EQ(errors.size(), model.mesh.vertex_count());
+    for (std::size_t v = 0; v < rest.size(); ++v)
+        EXPECT_NEAR(errors[model.driver().vertices[v]], estimate.local[v], 1e-6 * moved) << v;
+    for (std::size_t v = 0; v < errors.size(); ++v) {
+        const double x = (double(model.mesh.positions[v].x()) - box.min.x()) / box.size().x();
+        EXPECT_LE(errors[v], (x < 0.25 ? still : moved) * (1 + 1e-6)) << v;
+        EXPECT_GE(errors[v], -1e-6 * moved) << v; // weights are rounded
+    }
+}
+
+TEST(PoseError, WarnsFromOneThousandthOfTheDiagonal) {
+    PoseError::Estimate estimate{.rms = 0.019, .diagonal = 20, .local = {}};
+    EXPECT_FALSE(estimate.is_too_curved());
+    estimate.rms = 0.021;
+    EXPECT_TRUE(estimate.is_too_curved());
+    EXPECT_DOUBLE_EQ(estimate.share(), 0.00105);
+    estimate.diagonal = 0; // a single point
+    EXPECT_FALSE(estimate.is_too_curved());
 }
 
 } // namespace

@@ -184,4 +184,40 @@ TEST_F(DrawnObjectsTest, ColorsAreOfWhatTheLegendSays) {
     EXPECT_TRUE(drawn->colors().values.empty());
 }
 
+/// Without knowing the full deformation: that would take every vertex through the same pulls.
+TEST_F(DrawnObjectsTest, TheExpectedErrorIsColouredForEveryPose) {
+    set([](ViewSettings& s) { s.coloring = Coloring::expected_error; });
+    const std::size_t count = workbench.state().model->mesh.vertex_count();
+    const auto most = [&] { return *std::ranges::max_element(drawn->colors().values); };
+    settle();
+    ASSERT_EQ(drawn->colors().values.size(), count);
+    EXPECT_EQ(most(), 0) << "at rest";
+    bend(140);
+    EXPECT_EQ(drawn->colors().values.size(), count) << "grey for a moment, while it moves";
+    settle();
+    const float bent = most();
+    EXPECT_GT(bent, 1e-5f);
+    EXPECT_LT(bent, 0.2f) << "fractions of the diagonal";
+    EXPECT_TRUE(workbench.full().empty());
+    EXPECT_GE(drawn->colors().range.most, 1e-4f);
+    const unsigned level = workbench.state().level();
+    const Scene scene = drawn->scene(TileShows::restored, level, {}, 1, QPalette());
+    ASSERT_FALSE(scene.objects.empty());
+    EXPECT_TRUE(scene.objects[0].appearance.own_colors);
+
+    simulate();
+    workbench.go_to_frame(1);
+    settle();
+    ASSERT_EQ(drawn->colors().values.size(), count) << "a recorded moment has one as well";
+    EXPECT_LT(most(), bent) << "it has only begun to fall";
+
+    workbench.set_mode(Mode::deform);
+    workbench.set_strip({.code = DetailCode::reference});
+    settle();
+    ASSERT_EQ(workbench.state().model->code(), DetailCode::reference);
+    EXPECT_TRUE(drawn->colors().values.empty());
+    set([](ViewSettings& s) { s.coloring = Coloring::own; });
+    EXPECT_TRUE(drawn->colors().values.empty());
+}
+
 } // namespace

@@ -192,6 +192,9 @@ TEST_F(Panels, ChoicesAndSwitchesReachTheWorkbench) {
     EXPECT_EQ(workbench().view().settings().style, SurfaceStyle::wireframe);
     choose("view.coloring", 2);
     EXPECT_EQ(workbench().view().settings().coloring, Coloring::levels);
+    choose("view.coloring", 4);
+    EXPECT_EQ(workbench().view().settings().coloring, Coloring::expected_error);
+    EXPECT_TRUE(get<QLabel>("view.error").isVisibleTo(get<QScrollArea>("view").widget()));
     choose("view.up", 2);
     EXPECT_EQ(workbench().view().settings().up, UpAxis::z);
     choose("view.clip_axis", 0);

@@ -616,6 +616,44 @@ TEST(Viewport, AModelThatWasPosedIsSeenWhole) {
     }
 }
 
+TEST(Viewport, APoseTooCurvedForTheDriverIsSaidInThePicture) {
+    Stand stand;
+    ASSERT_TRUE(stand.is_ready());
+    stand.workbench.set_strip({.base = 60});
+    stand.workbench.wait_until_idle();
+    const auto* overlay = static_cast<const Overlay*>(stand.viewport->findChild<QWidget*>("viewport.overlay"));
+    EXPECT_EQ(overlay->content().warning, "");
+    Warps warps;
+    warps.bend = 170;
+    stand.workbench.set_warps(warps);
+    stand.workbench.wait_until_idle();
+    ASSERT_TRUE(stand.is_drawn());
+    EXPECT_EQ(overlay->content().warning, stand.workbench.expected_error().warning());
+    EXPECT_NE(overlay->content().warning, "");
+    EXPECT_FALSE(overlay->content().legend);
+
+    const QRect corner(14, stand.viewport->height() - 150, 200, 60);
+    const QImage with = stand.window.grab().toImage();
+    stand.set([](ViewSettings& s) { s.coloring = Coloring::expected_error; });
+    stand.workbench.wait_until_idle();
+    ASSERT_TRUE(stand.is_drawn());
+    ASSERT_TRUE(overlay->content().legend);
+    EXPECT_EQ(overlay->content().legend->title, "Expected error");
+    EXPECT_EQ(overlay->content().legend->unit, "% of the diagonal");
+    EXPECT_EQ(overlay->content().legend->per_value, 100);
+    stand.workbench.reset_deformation();
+    EXPECT_EQ(overlay->content().warning, "") << "at once: the shape is at rest";
+    stand.workbench.wait_until_idle();
+    ASSERT_TRUE(stand.is_drawn());
+    EXPECT_GT(difference(with, stand.window.grab().toImage(), corner), 2) << "it is not painted";
+
+    stand.workbench.set_strip({.code = DetailCode::reference});
+    stand.workbench.wait_until_idle();
+    ASSERT_TRUE(stand.is_drawn());
+    EXPECT_FALSE(overlay->content().legend);
+    EXPECT_TRUE(overlay->content().note.contains("blend code")) << overlay->content().note.toStdString();
+}
+
 TEST(Viewport, MeshesWithoutFacesOrExtentAreSeenAndSaidSo) {
     Stand stand("wavy-cube", 8);
     ASSERT_TRUE(stand.is_ready());

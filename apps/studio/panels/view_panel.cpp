@@ -5,7 +5,21 @@
 
 namespace filigree::studio {
 
+namespace {
+
 using Settings = ViewSettings;
+
+QString expected_error_text(const Workbench& workbench) {
+    const State& state = workbench.state();
+    if (state.model && state.model->code() != DetailCode::blend)
+        return QStringLiteral("What the reference code is off by can only be measured.");
+    const PoseError::Estimate* estimate = workbench.expected_error().estimate();
+    if (!estimate) return QStringLiteral("Not judged yet.");
+    return QStringLiteral("Expected from the pose alone: %1 of the diagonal (root mean square).")
+        .arg(number_text(estimate->share(), 2));
+}
+
+} // namespace
 
 ViewPanel::ViewPanel(Workbench& workbench, Viewport& viewport, MainWindow& window, QWidget* parent)
     : Panel("view", workbench, parent), viewport_(viewport) {
@@ -50,6 +64,7 @@ ViewPanel::ViewPanel(Workbench& workbench, Viewport& viewport, MainWindow& windo
 
     connect(&workbench, &Workbench::error_measured, this, &ViewPanel::show_error);
     connect(&workbench, &Workbench::pose_changed, this, &ViewPanel::show_error);
+    connect(&workbench.expected_error(), &ExpectedError::changed, this, &ViewPanel::show_error);
     connect(&window, &MainWindow::theme_changed, this, &ViewPanel::refresh);
     connect(&viewport_, &Viewport::timings_changed, this, &ViewPanel::show_drawn);
     refresh();
@@ -63,9 +78,9 @@ void ViewPanel::add_surface(MainWindow& window) {
     choice(rows,
            view.setting("view.coloring", "Colours",
                         "The mesh's own; how far it is from the full deformation; at which level a vertex is added; "
-                        "patches of regular quads",
+                        "patches of regular quads; how far it is expected to be from the full deformation",
                         field(&Settings::coloring)),
-           {"Its own", "Error", "Levels", "Patches"});
+           {"Its own", "Error", "Levels", "Patches", "Expected error"});
     error_ = text(rows, "view.error", Tone::quiet);
     measure_ = new ActionButton("view.measure", window.actions().find("view.measure_error"), {}, page());
     beside(rows, {measure_});
@@ -82,11 +97,12 @@ void ViewPanel::refresh() {
 }
 
 void ViewPanel::show_error() {
-    const bool shown = workbench().view().settings().coloring == Coloring::error;
-    const QString text = error_text(workbench(), true);
+    const Coloring coloring = workbench().view().settings().coloring;
+    const bool is_measured = coloring == Coloring::error;
+    const QString text = is_measured ? error_text(workbench(), true) : expected_error_text(workbench());
     error_->setText(text.isEmpty() ? QStringLiteral("Not measured for what is shown.") : text);
-    error_->setVisible(shown);
-    measure_->setVisible(shown);
+    error_->setVisible(is_measured || coloring == Coloring::expected_error);
+    measure_->setVisible(is_measured);
 }
 
 void ViewPanel::show_drawn() {

@@ -61,10 +61,25 @@ PoseError::Estimate PoseError::estimate(const Pose& pose, std::span<const Mat3f>
         count += loads_[c].count;
     }
     Estimate result;
+    result.diagonal = bounds(pose.positions).diagonal();
     result.rms = std::sqrt(sum / std::max(count, 1.0));
     for (std::size_t i = 0; i < rest_.size(); ++i)
         result.local.push_back(float(std::sqrt(squared[i] / std::max(counts[i], 1.0))));
     return result;
+}
+
+std::vector<float> vertex_errors(const Model& model, std::span<const float> local) {
+    const auto* detail = std::get_if<BlendDetail>(&model.detail);
+    if (!detail) return {};
+    std::vector<float> errors(model.mesh.vertex_count());
+    for (std::size_t c = 0; c < detail->cells.size(); ++c) {
+        const auto& [i, j, k] = detail->cells[c];
+        for (Index r = detail->cell_offsets[c]; r < detail->cell_offsets[c + 1]; ++r) {
+            const float u = detail->u[r], v = detail->v[r];
+            errors[detail->order[r]] = (1 - u - v) * local[i] + u * local[j] + v * local[k];
+        }
+    }
+    return errors;
 }
 
 } // namespace filigree

@@ -20,7 +20,13 @@ public:
 
     struct Estimate {
         double rms = 0;           ///< over the mesh's vertices, model units
+        double diagonal = 0;      ///< of the posed driver, model units
         std::vector<float> local; ///< rms over what hangs around each driver vertex, model units
+
+        /// As a share of the diagonal; 0 for a driver without size.
+        double share() const { return diagonal > 0 ? rms / diagonal : 0; }
+        /// Whether one sees it: a pixel of a picture that the shape fills.
+        bool is_too_curved() const { return share() > 1e-3; }
     };
     /// gradients: those that the pose is restored with (Restorer::gradients), one a driver vertex. Cost O(driver).
     Estimate estimate(const Pose& pose, std::span<const Mat3f> gradients) const;
@@ -36,5 +42,9 @@ private:
     std::vector<Triangle> cells_;
     std::vector<Load> loads_;
 };
+
+/// The local estimates at the vertices of the finest mesh, for colours: blended over each cell as positions are. Empty
+/// for other than blend models. Cost O(V).
+std::vector<float> vertex_errors(const Model& model, std::span<const float> local);
 
 } // namespace filigree

@@ -1,0 +1,89 @@
+// Numbers of the mesh's vertices as colours: levels, errors measured, errors expected.
+#include "drawn_objects.h"
+
+#include <algorithm>
+
+namespace filigree::studio {
+
+namespace {
+
+VertexColors error_colors(std::vector<float> distances, double diagonal) {
+    HeatMap map = heat_map(std::move(distances), diagonal);
+    return {std::move(map.values), ColorMap::sequential, map.range};
+}
+
+} // namespace
+
+void DrawnObjects::put_colors(Coloring coloring, VertexColors colors) {
+    colors_ = std::move(colors);
+    colors_are_ = coloring;
+    color_stamp_ = ++last_stamp_;
+    Q_EMIT changed(false);
+}
+
+void DrawnObjects::drop_colors() {
+    if (color_stamp_ != 0) put_colors(Coloring::own, {});
+    color_stamp_ = 0;
+}
+
+void DrawnObjects::follow_colors() {
+    if (!shown_) return;
+    switch (settings_.coloring) {
+    case Coloring::own:
+    case Coloring::patches: // as another surface
+        return drop_colors();
+    case Coloring::levels:
+        if (colors_are_ == Coloring::levels && color_stamp_ != 0) return;
+        return put_colors(
+            Coloring::levels,
+            {shown_->arrival(), ColorMap::sequential, {0, static_cast<float>(std::max(1u, shown_->finest_level()))}});
+    case Coloring::error:
+        return follow_error();
+    case Coloring::expected_error:
+        return follow_expected_error();
+    }
+}
+
+/// While things move, the colours stay those of a pose just before.
+void DrawnObjects::follow_expected_error() {
+    const ExpectedError& expected = workbench_.expected_error();
+    if (expected.colors().values.size() != shown_->model().mesh.vertex_count()) return drop_colors();
+    if (colors_are_ == Coloring::expected_error && color_stamp_ != 0 && expected_number_ == expected.number()) return;
+    expected_number_ = expected.number();
+    put_colors(Coloring::expected_error, {expected.colors().values, ColorMap::sequential, expected.colors().range});
+}
+
+void DrawnObjects::follow_error() {
+    const std::size_t count = shown_->model().mesh.vertex_count();
+    const double diagonal = bounds(shown_->model().mesh.positions).diagonal();
+    const std::optional<VertexDistance>& error = workbench_.error();
+    if (pose_stamp_ == 0)
+        return put_colors(Coloring::error, {std::vector<float>(count), ColorMap::sequential, {0, 0.01f}});
+    if (!has_full_vertices()) {
+        if (!error || error->per_vertex.size() != count) return drop_colors();
+        return put_colors(Coloring::error, error_colors(error->per_vertex, diagonal));
+    }
+    if (colors_are_ != Coloring::error) drop_colors();
+    background_.start<VertexColors>(
+        "The picture", "error colors",
+        [diagonal, pose = pose_, model = shown_->shared_model(), restore = workbench_.state().restore,
+         full = std::vector(workbench_.full().begin(), workbench_.full().end())](
+            const RunContext& context) mutable -> Result<VertexColors> {
+            restore.level.reset();
+            const Result<Restorer> restorer = Restorer::create(*model, restore, context);
+            if (!restorer) return restorer.error();
+            const Result<std::vector<Vec3f>> restored = restorer->positions(pose, context);
+            if (!restored) return restored.error();
+            std::vector<float> distances(full.size());
+            for (std::size_t v = 0; v < full.size(); ++v) distances[v] = ((*restored)[v] - full[v]).norm();
+            return error_colors(std::move(distances), diagonal);
+        },
+        [this, stamp = pose_stamp_, model = shown_->shared_model()](VertexColors colors) {
+            if (shown_ && shown_->shared_model() == model && stamp == pose_stamp_ &&
+                settings_.coloring == Coloring::error)
+                put_colors(Coloring::error, std::move(colors));
+        },
+        {.failed = [](const Error&) {}}); // the mesh is grey then: the error is not known
+}
+
+} // namespace filigree::studio

@@ -1,0 +1,135 @@
+#include "expected_error.h"
+
+#include "words.h"
+#include "workbench.h"
+
+#include <algorithm>
+
+namespace filigree::studio {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+const std::string kTopic = "expected error";
+constexpr std::chrono::milliseconds kLeastPause(150); // between two looks: as fast as one reads numbers
+constexpr int kPauses = 4;                            // so many times as long as a look took
+constexpr float kLeastRange = 1e-4f;                  // of the diagonal: less is not to be seen, and rounding at rest
+
+HeatMap colors_of(std::vector<float> errors, double diagonal) {
+    HeatMap map = heat_map(std::move(errors), diagonal);
+    if (!(map.range.most >= kLeastRange) || map.values.empty()) map.range = {0, kLeastRange};
+    return map;
+}
+
+bool is_judged(const State& state) { return state.model && state.model->code() == DetailCode::blend; }
+
+} // namespace
+
+/// What every pose of a model is judged with. Of one job at a time.
+struct ExpectedError::Judge {
+    std::shared_ptr<const Model> model;
+    RestoreOptions restore;
+    Restorer restorer;
+    PoseError error;
+
+    bool is_for(const Model& other, const RestoreOptions& options) const {
+        return model.get() == &other && restore == options;
+    }
+};
+
+struct ExpectedError::Judgement {
+    std::shared_ptr<Judge> judge;
+    PoseError::Estimate estimate;
+    HeatMap colors;
+    Clock::duration took;
+};
+
+ExpectedError::ExpectedError(Workbench& workbench) : workbench_(workbench) {
+    pause_.setSingleShot(true);
+    connect(&pause_, &QTimer::timeout, this, &ExpectedError::look_soon);
+    connect(&jobs_, &Jobs::finished, this, &ExpectedError::look_soon);
+    connect(&workbench, &Workbench::pose_changed, this, &ExpectedError::follow);
+}
+
+QString ExpectedError::warning() const {
+    if (!estimate_ || !estimate_->is_too_curved()) return {};
+    return QStringLiteral("The pose is more curved than the driver can follow: the mesh is off by about %1 % of the "
+                          "diagonal. Choose a larger driver (Detail, Size).")
+        .arg(number_text(100 * estimate_->share(), 2));
+}
+
+void ExpectedError::want_colors(bool wanted) {
+    if (wants_colors_ == wanted) return;
+    wants_colors_ = wanted;
+    if (wanted) follow();
+}
+
+void ExpectedError::follow() {
+    const State& state = workbench_.state();
+    const bool is_at_rest = !workbench_.pose();
+    ++wanted_;
+    if (state.model != model_ || is_at_rest || !is_judged(state)) {
+        jobs_.drop(kTopic);
+        model_ = state.model;
+        if (is_at_rest && is_judged(state))
+            put(PoseError::Estimate(),
+                colors_of(std::vector<float>(wants_colors_ ? model_->mesh.vertex_count() : 0), 0));
+        else
+            put({}, {});
+    }
+    if (is_at_rest || !is_judged(state)) judged_ = wanted_;
+    look_soon();
+}
+
+void ExpectedError::put(std::optional<PoseError::Estimate> estimate, HeatMap colors) {
+    if (!estimate && !estimate_ && colors_.values.empty()) return;
+    estimate_ = std::move(estimate);
+    colors_ = std::move(colors);
+    ++number_;
+    Q_EMIT changed();
+}
+
+void ExpectedError::look_soon() {
+    if (!is_pending() || jobs_.is_busy() || pause_.isActive()) return;
+    const auto wait = std::chrono::ceil<std::chrono::milliseconds>(next_look_ - Clock::now());
+    if (wait.count() > 0) return pause_.start(wait);
+    look();
+}
+
+void ExpectedError::look() {
+    RestoreOptions options = workbench_.state().restore;
+    options.level = 0; // gradients are the driver's alone
+    jobs_.start<Judgement>(
+        "The expected error", kTopic,
+        [judge = judge_, model = model_, options, pose = *workbench_.pose(),
+         with_colors = wants_colors_](const RunContext& cancels) mutable -> Result<Judgement> {
+            const auto begin = Clock::now();
+            const RunContext context(1); // the others are for what moves
+            if (!judge || !judge->is_for(*model, options)) {
+                Result<Restorer> restorer = Restorer::create(*model, options, context);
+                if (!restorer) return restorer.error();
+                judge.reset(new Judge{model, options, std::move(*restorer), PoseError(*model)});
+            }
+            if (cancels.is_cancelled()) return cancelled_error();
+            const Result<std::vector<Mat3f>> gradients = judge->restorer.gradients(pose, context);
+            if (!gradients) return gradients.error();
+            Judgement made{judge, judge->error.estimate(pose, *gradients), {}, {}};
+            if (with_colors)
+                made.colors = colors_of(vertex_errors(*model, made.estimate.local), made.estimate.diagonal);
+            made.took = Clock::now() - begin;
+            return made;
+        },
+        [this, number = wanted_](Judgement made) {
+            judge_ = std::move(made.judge);
+            judged_ = number;
+            next_look_ = Clock::now() + std::max<Clock::duration>(kLeastPause, kPauses * made.took);
+            put(std::move(made.estimate), std::move(made.colors));
+        },
+        {.failed = [this, number = wanted_](const Error&) { // the shape is not there then either, and that is told
+            judged_ = number;
+            put({}, {});
+        }});
+}
+
+} // namespace filigree::studio
