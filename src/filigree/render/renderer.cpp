@@ -1,304 +1,33 @@
-#include "filigree/render/renderer.h"
-
-#include "filigree/render/color_map.h"
-#include "filigree/render/drawable_content.h"
+#include "filigree/render/gl_visit.h"
+#include "filigree/render/renderer_content.h"
 #include "filigree/render/shaders.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
-#include <numbers>
+#include <limits>
 
 namespace filigree {
 
 namespace {
 
-using Mat4f = Eigen::Matrix4f;
 using Mat4d = Eigen::Matrix4d;
 using gl::Framebuffer;
 using gl::Program;
 using gl::Texture;
+using gl::Visit;
 
 constexpr int kLeastShadowSize = 512, kMostShadowSize = 2048;
-constexpr double kKeyReach = 0.16;      // of the key light: tangent of half the angle it is seen under
-constexpr double kGroundSide = 2.5;     // half, in diagonals of the scene
 constexpr double kGroundDarkness = 0.6; // of a shadow that no light reaches
-constexpr double kFinePixels = 150;     // of the picture for each triangle: no more, and vertices are lit, not pixels
-constexpr GLuint kUnits = 5;            // of textures, that the shaders read
 constexpr unsigned kFewPasses = 4;      // below, the hardware's multisampling does the antialiasing
 // Light that a white surface gets where it faces the source, over all passes. The sky is seen by half on average.
 constexpr double kKeyLight = 0.92, kSkyLight = 2 * 0.46, kFillLight = 0.11, kBounceLight = 0.09;
 
-/// A sequence that fills the unit square evenly whatever its length [Roberts 2018].
-std::array<double, 2> evenly(unsigned i, double shift) {
-    const double g = 1.32471795724474602596;
-    const auto part = [](double x) { return x - std::floor(x); };
-    return {part(shift + (i + 1) / g), part(shift + (i + 1) / (g * g))};
-}
-
-/// Two directions that make a right-handed basis with the unit vector n.
-std::array<Vec3d, 2> tangents(const Vec3d& n) {
-    const Vec3d other = std::abs(n.x()) < 0.7 ? Vec3d::UnitX() : Vec3d::UnitY();
-    const Vec3d t = other.cross(n).normalized();
-    return {t, n.cross(t)};
-}
-
-/// Where light comes from, as the viewer sees it: key from the upper left, sky from above and behind the viewer. All of
-/// it turns with the camera, so that the frames of a turntable are lit alike.
-class Lights {
-public:
-    Lights(const Vec3d& back, const Vec3d& camera_right, const Vec3d& up) {
-        const Vec3d level = up.cross(back);
-        right_ = level.norm() > 1e-3 ? level.normalized() : camera_right;
-        const Vec3d front = right_.cross(up);
-        key_ = (-0.72 * right_ + 0.72 * up + 0.42 * front).normalized();
-        sky_ = (up + 0.55 * front).normalized();
-        fill_ = (0.80 * right_ + 0.05 * up + 0.45 * front).normalized();
-        // Looking down (or up) along the axis, front is no longer towards the viewer: turn all that way.
-        const double along = back.dot(up);
-        if (std::abs(along) > 0.85)
-            for (Vec3d* d : {&key_, &sky_, &fill_}) *d = (*d + 0.6 * along * up).normalized();
-    }
-    const Vec3d& fill() const { return fill_; }
-    const Vec3d& key() const { return key_; } ///< the middle
-    const Vec3d& sky() const { return sky_; }
-    /// The i-th point of the key light.
-    Vec3d key(unsigned i) const {
-        const auto [u, v] = evenly(i, 0.5);
-        const double r = kKeyReach * std::sqrt(u);
-        return around(key_, 1, r, 2 * std::numbers::pi * v).normalized();
-    }
-    /// The i-th direction, evenly over the hemisphere around the sky's middle.
-    Vec3d sky(unsigned i) const {
-        const auto [u, v] = evenly(i, 0.25);
-        const double z = 1 - u, r = std::sqrt(std::max(0.0, 1 - z * z));
-        return around(sky_, z, r, 2 * std::numbers::pi * v);
-    }
-
-private:
-    Vec3d around(const Vec3d& axis, double along, double across, double angle) const {
-        const Vec3d a = (right_ - axis * axis.dot(right_)).normalized(), b = axis.cross(a);
-        return along * axis + across * (std::cos(angle) * a + std::sin(angle) * b);
-    }
-
-    Vec3d right_, key_, sky_, fill_;
-};
-
-/// The block that shaders/frame.glsl declares.
-struct FrameBlock {
-    float view_projection[16], key_matrix[16], sky_matrix[16];
-    float eye[4], key_direction[4], sky_direction[4], fill_direction[4], up[4], viewport[4], strength[4], ground[4];
-};
-
-void put(float (&to)[16], const Mat4d& m) { Eigen::Map<Mat4f>{to} = m.cast<float>(); }
+void put(float (&to)[16], const Mat4d& m) { Eigen::Map<Eigen::Matrix4f>{to} = m.cast<float>(); }
 void put(float (&to)[4], const Vec3d& v, double w) {
     for (int k = 0; k < 3; ++k) to[k] = static_cast<float>(v[k]);
     to[3] = static_cast<float>(w);
 }
-
-std::array<Vec3d, 8> corners_of(const Box& box) {
-    std::array<Vec3d, 8> corners;
-    for (int k = 0; k < 8; ++k)
-        corners[k] = Vec3d((k & 1) ? box.max.x() : box.min.x(), (k & 2) ? box.max.y() : box.min.y(),
-                           (k & 4) ? box.max.z() : box.min.z());
-    return corners;
-}
-
-/// Parallel light from a direction over a box: to clip space, and the size of a texel.
-struct LightView {
-    Mat4d matrix;
-    double texel;
-
-    LightView(const Vec3d& direction, const Box& box, int size) {
-        const auto [a, b] = tangents(direction);
-        Vec3d lo = Vec3d::Constant(std::numeric_limits<double>::infinity()), hi = -lo;
-        for (const Vec3d& c : corners_of(box)) {
-            const Vec3d p(a.dot(c), b.dot(c), direction.dot(c));
-            lo = lo.cwiseMin(p);
-            hi = hi.cwiseMax(p);
-        }
-        const double margin = 4.0 / size; // so that the outermost texels stay empty
-        const Vec3d extent = (hi - lo).cwiseMax(1e-6) * (1 + 2 * margin);
-        const Vec3d centre = 0.5 * (lo + hi);
-        const double near = hi.z() + 0.02, far = lo.z() - 4 * kGroundSide; // the ground far behind is lit too
-        matrix = Mat4d::Zero();
-        matrix.row(0) << 2 / extent.x() * a.transpose(), -2 / extent.x() * centre.x();
-        matrix.row(1) << 2 / extent.y() * b.transpose(), -2 / extent.y() * centre.y();
-        matrix.row(2) << -2 / (near - far) * direction.transpose(), (near + far) / (near - far);
-        matrix(3, 3) = 1;
-        texel = std::max(extent.x(), extent.y()) / size;
-    }
-    Mat4d to_texture() const {
-        Mat4d half = Mat4d::Identity();
-        half.diagonal() << 0.5, 0.5, 0.5, 1;
-        half.col(3) << 0.5, 0.5, 0.5, 1;
-        return half * matrix;
-    }
-};
-
-void set_color(const Program& program, const char* name, const Vec3f& srgb) {
-    glUniform3fv(program.uniform(name), 1, srgb_to_linear(srgb).eval().data());
-}
-
-Texture make_texture(GLenum format, GLsizei width, GLsizei height) {
-    Texture texture = Texture::make();
-    glBindTexture(GL_TEXTURE_2D, texture.name());
-    glTexStorage2D(GL_TEXTURE_2D, 1, format, width, height);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-    return texture;
-}
-
-Framebuffer make_framebuffer(const Texture* color, const Texture* depth) {
-    Framebuffer framebuffer = Framebuffer::make();
-    glBindFramebuffer(GL_FRAMEBUFFER, framebuffer.name());
-    if (color) glFramebufferTexture(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, color->name(), 0);
-    if (depth) glFramebufferTexture(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, depth->name(), 0);
-    if (!color) glDrawBuffer(GL_NONE);
-    return framebuffer;
-}
-
-/// A depth map that light is compared with.
-struct ShadowMap {
-    Texture depth;
-    Framebuffer framebuffer;
-    int size = 0;
-
-    explicit ShadowMap(int side) : depth(make_texture(GL_DEPTH_COMPONENT32F, side, side)), size(side) {
-        glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
-        glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
-        glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
-        glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
-        glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_COMPARE_MODE, GL_COMPARE_REF_TO_TEXTURE);
-        framebuffer = make_framebuffer(nullptr, &depth);
-    }
-};
-
-const std::string kVersion = "#version 430 core\n";
-
-/// Everything that drawing depends on and that others who draw in this context (Qt's painter) may have left otherwise.
-void set_state() {
-    for (const GLenum ability : {GL_BLEND, GL_CULL_FACE, GL_SCISSOR_TEST, GL_STENCIL_TEST, GL_COLOR_LOGIC_OP,
-                                 GL_POLYGON_OFFSET_FILL, GL_SAMPLE_ALPHA_TO_COVERAGE, GL_SAMPLE_COVERAGE,
-                                 GL_PRIMITIVE_RESTART, GL_RASTERIZER_DISCARD, GL_FRAMEBUFFER_SRGB, GL_DEPTH_CLAMP})
-        glDisable(ability);
-    glEnable(GL_DEPTH_TEST);
-    glEnable(GL_MULTISAMPLE);
-    glDepthFunc(GL_LESS);
-    glDepthMask(GL_TRUE);
-    glDepthRange(0, 1);
-    glClearDepth(1);
-    glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
-    glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
-    glBlendEquation(GL_FUNC_ADD);
-    for (GLuint unit = 0; unit < kUnits; ++unit) glBindSampler(unit, 0);
-}
-
-/// Leaves nothing of ours behind that others trip over: no program, arrays, textures or tests; and the framebuffer that
-/// was bound before.
-class Visit {
-public:
-    Visit() : Visit(bound_framebuffer()) {}
-    explicit Visit(GLuint leave_bound) : framebuffer_(leave_bound) { set_state(); }
-    Visit(const Visit&) = delete;
-    ~Visit() {
-        glDisable(GL_DEPTH_TEST);
-        glDisable(GL_BLEND);
-        glUseProgram(0);
-        glBindVertexArray(0);
-        for (const GLenum target : {GL_ARRAY_BUFFER, GL_UNIFORM_BUFFER, GL_SHADER_STORAGE_BUFFER})
-            glBindBuffer(target, 0);
-        for (GLuint unit = kUnits; unit-- > 0;) {
-            glActiveTexture(GL_TEXTURE0 + unit);
-            for (const GLenum target : {GL_TEXTURE_1D, GL_TEXTURE_2D, GL_TEXTURE_BUFFER}) glBindTexture(target, 0);
-        }
-        glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_);
-    }
-
-private:
-    static GLuint bound_framebuffer() {
-        GLint name = 0;
-        glGetIntegerv(GL_DRAW_FRAMEBUFFER_BINDING, &name);
-        return static_cast<GLuint>(name);
-    }
-    GLuint framebuffer_ = 0;
-};
-
-/// A colour and a depth of several samples a pixel.
-struct Multisampled {
-    gl::Renderbuffer color, depth;
-    Framebuffer framebuffer;
-
-    Multisampled() = default;
-    Multisampled(int samples, GLenum color_format, GLenum depth_format, GLsizei width, GLsizei height)
-        : color(gl::Renderbuffer::make()), depth(gl::Renderbuffer::make()), framebuffer(Framebuffer::make()) {
-        glBindFramebuffer(GL_FRAMEBUFFER, framebuffer.name());
-        const auto attach = [&](const gl::Renderbuffer& buffer, GLenum format, GLenum attachment) {
-            glBindRenderbuffer(GL_RENDERBUFFER, buffer.name());
-            glRenderbufferStorageMultisample(GL_RENDERBUFFER, samples, format, width, height);
-            glFramebufferRenderbuffer(GL_FRAMEBUFFER, attachment, GL_RENDERBUFFER, buffer.name());
-        };
-        attach(color, color_format, GL_COLOR_ATTACHMENT0);
-        attach(depth, depth_format, GL_DEPTH_ATTACHMENT);
-        glBindRenderbuffer(GL_RENDERBUFFER, 0);
-    }
-    void resolve_to(const Framebuffer& to, GLsizei width, GLsizei height) const {
-        glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer.name());
-        glBindFramebuffer(GL_DRAW_FRAMEBUFFER, to.name());
-        glBlitFramebuffer(0, 0, width, height, 0, 0, width, height, GL_COLOR_BUFFER_BIT, GL_NEAREST);
-    }
-};
-
-bool is_complete() { return glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE; }
-
-/// Where passes are drawn and added up.
-struct Targets {
-    Texture color, depth, sum;
-    Framebuffer pass, total;
-    Multisampled multisampled;
-    unsigned width = 0, height = 0;
-    int samples = 0;
-
-    /// Whether there was room.
-    bool make(unsigned w, unsigned h, int samples_a_pixel) {
-        const auto x = static_cast<GLsizei>(w), y = static_cast<GLsizei>(h);
-        color = make_texture(GL_RGBA16F, x, y);
-        depth = make_texture(GL_DEPTH_COMPONENT32F, x, y);
-        sum = make_texture(GL_RGBA32F, x, y);
-        pass = make_framebuffer(&color, &depth);
-        total = make_framebuffer(&sum, nullptr);
-        bool complete = is_complete();
-        multisampled = samples_a_pixel > 1 ? Multisampled(samples_a_pixel, GL_RGBA16F, GL_DEPTH_COMPONENT32F, x, y)
-                                           : Multisampled();
-        complete = complete && (samples_a_pixel <= 1 || is_complete());
-        width = w;
-        height = h;
-        samples = samples_a_pixel;
-        return complete;
-    }
-};
-
-/// Where a preview is drawn: sRGB, as it is shown.
-struct PreviewTargets {
-    Texture color, depth;
-    Framebuffer framebuffer;
-    Multisampled multisampled;
-    unsigned width = 0, height = 0;
-
-    bool make(unsigned w, unsigned h, int samples) {
-        const auto x = static_cast<GLsizei>(w), y = static_cast<GLsizei>(h);
-        color = make_texture(GL_RGBA8, x, y);
-        depth = samples > 1 ? Texture() : make_texture(GL_DEPTH_COMPONENT24, x, y);
-        framebuffer = make_framebuffer(&color, samples > 1 ? nullptr : &depth);
-        bool complete = is_complete();
-        multisampled = samples > 1 ? Multisampled(samples, GL_RGBA8, GL_DEPTH_COMPONENT24, x, y) : Multisampled();
-        complete = complete && (samples <= 1 || is_complete());
-        width = w;
-        height = h;
-        return complete;
-    }
-};
 
 /// Whether the processor draws, for which several samples a pixel are several times the work.
 bool is_software_renderer() {
@@ -328,100 +57,6 @@ Box Scene::box() const {
     return all;
 }
 
-struct Renderer::Content {
-    enum class Source { given, float_records, int16_records };
-    enum class Target { light, preview, depth };
-    /// What a surface's program is made for: nothing is computed that is not needed.
-    struct Kind {
-        Target target = Target::light;
-        Source source = Source::given;
-        bool plain = true; ///< no colours, numbers and pictures of its own
-        bool edges = false, clipped = false, covered = false;
-        bool by_vertex = false; ///< light; previews only
-        auto operator<=>(const Kind&) const = default;
-    };
-
-    // Made once.
-    std::map<Kind, Program> surface_programs;
-    Program points, points_in_preview, ground, add, show, copy, preview_background;
-    gl::Buffer frame_buffer;
-    gl::VertexArray nothing; ///< for shaders that need no input
-    std::optional<ShadowMap> key_map, sky_map;
-    GLint largest = 0, most_samples = 0;
-    bool is_software = false;
-
-    // One picture.
-    Scene scene;
-    Camera camera;
-    unsigned width = 0, height = 0, passes = 0, done = 0;
-    bool is_preview = false; ///< what was drawn last
-    Targets targets;
-    PreviewTargets preview_targets;
-    Vec3d centre = Vec3d::Zero();
-    double scale = 1;
-    Box box; ///< of the scene, in scene space
-    bool shows_ground = false;
-    double ground_level = 0, ground_light = 1;
-    std::optional<Lights> lights;
-
-    static std::string vertex_source(const Kind& kind) {
-        std::string source;
-        if (kind.source != Source::given)
-            source = "#define RESTORED\n" + GpuRestorer::shader_source(kind.source == Source::float_records
-                                                                           ? Precision::float32
-                                                                           : Precision::int16);
-        source += shaders::frame;
-        if (kind.by_vertex) source += std::string(shaders::preview_lighting) + shaders::light_vertex;
-        return source + shaders::surface_vertex;
-    }
-    const Program& surface_program(const Kind& kind) {
-        Program& program = surface_programs[kind];
-        if (program) return program;
-        std::string head = kVersion;
-        for (const auto& [is_so, name] :
-             {std::pair(kind.plain, "PLAIN"), std::pair(kind.edges, "EDGES"), std::pair(kind.clipped, "CLIPPED"),
-              std::pair(kind.covered, "COVERED"), std::pair(kind.by_vertex, "BY_VERTEX")})
-            if (is_so) head += std::string("#define ") + name + "\n";
-        const std::string before = head + shaders::frame + (kind.covered ? shaders::coverage : "");
-        std::vector<Program::Stage> stages = {{GL_VERTEX_SHADER, head + vertex_source(kind)}};
-        if (kind.target == Target::depth) {
-            stages.push_back(
-                {GL_FRAGMENT_SHADER,
-                 before + (kind.covered ? "void main() { if (!is_covered()) discard; }\n" : "void main() {}\n")});
-            return program = Program::link(stages);
-        }
-        if (kind.by_vertex) {
-            stages.push_back({GL_FRAGMENT_SHADER, before + shaders::light_fragment});
-            return program = Program::link(stages);
-        }
-        if (kind.edges) stages.push_back({GL_GEOMETRY_SHADER, head + shaders::frame + shaders::edges_geometry});
-        stages.push_back(
-            {GL_FRAGMENT_SHADER, before + lighting_source(kind.target == Target::preview) + shaders::surface_fragment});
-        return program = Program::link(stages);
-    }
-    static const char* lighting_source(bool preview) { return preview ? shaders::preview_lighting : shaders::lighting; }
-    static Source source_of(const Drawable::Content& drawable) {
-        if (!drawable.restorer()) return Source::given;
-        return drawable.restorer()->precision() == Precision::int16 ? Source::int16_records : Source::float_records;
-    }
-
-    Status start(const Scene& new_scene, const Camera& new_camera, unsigned w, unsigned h);
-    Status make_targets(int samples);
-    Status make_preview_targets();
-    Error no_room() const;
-    FrameBlock view_of(const Eigen::Vector2d& shift) const;
-    FrameBlock frame(unsigned number) const;
-    FrameBlock preview_frame() const;
-    void use(const FrameBlock& block) const;
-    void draw_depth(FrameBlock block, const LightView& view, const ShadowMap& map);
-    void draw_objects(Target target);
-    void draw_surface(const SceneObject& object, Target target);
-    void draw_points(const SceneObject& object, Target target);
-    void set_place(const Program& program, const SceneObject& object) const;
-    void draw_ground();
-    void draw_preview_background();
-};
-
 Renderer::Renderer(std::unique_ptr<Content> content) : content_(std::move(content)) {}
 Renderer::Renderer(Renderer&&) noexcept = default;
 Renderer& Renderer::operator=(Renderer&&) noexcept = default;
@@ -436,7 +71,7 @@ Result<Renderer> Renderer::create() {
     auto content = std::make_unique<Content>();
     const auto link = [](const std::string& vertex, const std::string& fragment) {
         const std::array<Program::Stage, 2> stages = {
-            {{GL_VERTEX_SHADER, kVersion + vertex}, {GL_FRAGMENT_SHADER, kVersion + fragment}}};
+            {{GL_VERTEX_SHADER, kGlslVersion + vertex}, {GL_FRAGMENT_SHADER, kGlslVersion + fragment}}};
         return Program::link(stages);
     };
     const std::string frame = shaders::frame, lighting = shaders::lighting;
@@ -634,7 +269,7 @@ void Renderer::Content::use(const FrameBlock& block) const {
     glBindBufferBase(GL_UNIFORM_BUFFER, 0, frame_buffer.name());
 }
 
-void Renderer::Content::draw_depth(FrameBlock block, const LightView& view, const ShadowMap& map) {
+void Renderer::Content::draw_depth(FrameBlock block, const LightView& view, const gl::ShadowMap& map) {
     glBindFramebuffer(GL_FRAMEBUFFER, map.framebuffer.name());
     glViewport(0, 0, map.size, map.size);
     glClear(GL_DEPTH_BUFFER_BIT);
@@ -644,119 +279,6 @@ void Renderer::Content::draw_depth(FrameBlock block, const LightView& view, cons
     block.viewport[3] = 1;
     use(block);
     draw_objects(Target::depth);
-}
-
-void Renderer::Content::set_place(const Program& program, const SceneObject& object) const {
-    const Drawable::Content& drawable = object.drawable->content();
-    const Vec3f offset = (drawable.origin - centre).cast<float>();
-    glUniform3f(program.uniform("offset"), offset.x(), offset.y(), offset.z());
-    glUniform1f(program.uniform("scale"), static_cast<float>(scale));
-    const std::optional<ClipPlane>& clip = object.appearance.clip;
-    glUniform1i(program.uniform("is_clipped"), clip.has_value());
-    glUniform1f(program.uniform("coverage"), object.appearance.coverage);
-    if (clip) {
-        const Vec3d n = clip->normal.normalized();
-        const double d = scale * (clip->offset / clip->normal.norm() - n.dot(centre));
-        glUniform4f(program.uniform("clip"), float(n.x()), float(n.y()), float(n.z()), static_cast<float>(d));
-    }
-}
-
-void Renderer::Content::draw_objects(Target target) {
-    for (const SceneObject& object : scene.objects) {
-        if (object.appearance.coverage == 0) continue;
-        if (object.drawable->content().point_count)
-            draw_points(object, target);
-        else if (target != Target::depth || object.appearance.surface)
-            draw_surface(object, target);
-    }
-}
-
-void Renderer::Content::draw_surface(const SceneObject& object, Target target) {
-    const Drawable::Content& drawable = object.drawable->content();
-    const Appearance& look = object.appearance;
-    const bool only_depth = target == Target::depth;
-    const bool with_edges = !only_depth && (look.edges || !look.surface);
-    const bool has_pictures = std::any_of(drawable.parts.begin(), drawable.parts.end(),
-                                          [](const Drawable::Content::Part& part) { return bool(part.picture); });
-    Kind kind;
-    kind.target = target;
-    kind.source = source_of(drawable);
-    kind.plain = only_depth || !look.own_colors || !(drawable.has_colors || drawable.has_scalars || has_pictures);
-    kind.edges = with_edges;
-    kind.clipped = look.clip.has_value();
-    kind.covered = look.coverage != 1;
-    kind.by_vertex = target == Target::preview && !with_edges && !look.clip && !(look.own_colors && has_pictures) &&
-                     double(drawable.triangle_count) * kFinePixels > double(width) * height;
-    const Program& program = surface_program(kind);
-    glUseProgram(program.name());
-    set_place(program, object);
-    if (look.clip) glEnable(GL_CLIP_DISTANCE0);
-    glBindVertexArray(drawable.arrays.name());
-    if (drawable.restorer()) drawable.restorer()->bind();
-    if (only_depth) {
-        glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(3 * drawable.triangle_count), GL_UNSIGNED_INT, nullptr);
-    } else {
-        const bool own = look.own_colors;
-        glUniform1f(program.uniform("gloss"), look.gloss);
-        glUniform1i(program.uniform("has_colors"), own && drawable.has_colors);
-        glUniform1i(program.uniform("has_scalars"), own && drawable.has_scalars);
-        if (drawable.has_scalars) {
-            glActiveTexture(GL_TEXTURE3);
-            glBindTexture(GL_TEXTURE_1D, drawable.scalar_colors.name());
-        }
-        if (with_edges) {
-            set_color(program, "edge_color", look.edge_color);
-            glUniform1f(program.uniform("edge_width"), look.edge_width);
-            glUniform1i(program.uniform("has_surface"), look.surface);
-            glUniform1i(program.uniform("edge_flags"), 4);
-            glActiveTexture(GL_TEXTURE4);
-            glBindTexture(GL_TEXTURE_BUFFER, drawable.edge_texture.name());
-        }
-        for (const Drawable::Content::Part& part : drawable.parts) {
-            const Vec3f& color = own && part.has_color ? part.color : look.color;
-            set_color(program, "base_color", color);
-            glUniform1i(program.uniform("has_picture"), own && part.picture);
-            if (part.picture) {
-                glActiveTexture(GL_TEXTURE2);
-                glBindTexture(GL_TEXTURE_2D, part.picture.name());
-            }
-            glUniform1i(program.uniform("first_triangle"), static_cast<GLint>(part.first));
-            glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(3 * part.count), GL_UNSIGNED_INT,
-                           reinterpret_cast<const void*>(std::size_t{12} * part.first));
-        }
-    }
-    glDisable(GL_CLIP_DISTANCE0);
-}
-
-void Renderer::Content::draw_points(const SceneObject& object, Target target) {
-    const Drawable::Content& drawable = object.drawable->content();
-    const Appearance& look = object.appearance;
-    const Program& program = target == Target::preview ? points_in_preview : points;
-    glUseProgram(program.name());
-    set_place(program, object);
-    glUniform1f(program.uniform("radius"), static_cast<float>(drawable.radius * scale));
-    glUniform1f(program.uniform("gloss"), look.gloss);
-    set_color(program, "base_color", look.color);
-    glUniform1i(program.uniform("has_colors"), look.own_colors && drawable.has_colors);
-    glUniform1i(program.uniform("has_scalars"), look.own_colors && drawable.has_scalars);
-    if (drawable.has_scalars) {
-        glActiveTexture(GL_TEXTURE3);
-        glBindTexture(GL_TEXTURE_1D, drawable.scalar_colors.name());
-    }
-    glBindVertexArray(drawable.arrays.name());
-    glDrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, static_cast<GLsizei>(drawable.point_count));
-}
-
-void Renderer::Content::draw_ground() {
-    const auto [right, forward] = tangents(up_vector(scene.up));
-    const Vec3f a = (kGroundSide * right).cast<float>(), b = (kGroundSide * forward).cast<float>();
-    glUseProgram(ground.name());
-    glUniform3fv(ground.uniform("ground_right"), 1, a.data());
-    glUniform3fv(ground.uniform("ground_forward"), 1, b.data());
-    glBindVertexArray(nothing.name());
-    glDisable(GL_DEPTH_TEST);
-    glDrawArrays(GL_TRIANGLE_STRIP, 0, 4);
-    glEnable(GL_DEPTH_TEST);
 }
 
 void Renderer::Content::draw_preview_background() {
@@ -778,7 +300,7 @@ bool Renderer::add_pass() {
     c.draw_depth(block, LightView(c.lights->key(c.done), c.box, c.key_map->size), *c.key_map);
     c.draw_depth(block, LightView(c.lights->sky(c.done), c.box, c.sky_map->size), *c.sky_map);
 
-    const Targets& targets = c.targets;
+    const gl::Targets& targets = c.targets;
     const Framebuffer& target = targets.samples > 1 ? targets.multisampled.framebuffer : targets.pass;
     const auto w = static_cast<GLsizei>(c.width), h = static_cast<GLsizei>(c.height);
     glBindFramebuffer(GL_FRAMEBUFFER, target.name());
@@ -874,8 +396,8 @@ Result<Picture> Renderer::picture(const Scene& scene, const Camera& camera, cons
     }
     c.scene.objects.clear(); // they need not outlive this call
     const auto w = static_cast<GLsizei>(c.width), h = static_cast<GLsizei>(c.height);
-    const Texture color = make_texture(GL_RGBA8, w, h);
-    const Framebuffer framebuffer = make_framebuffer(&color, nullptr);
+    const Texture color = gl::make_texture(GL_RGBA8, w, h);
+    const Framebuffer framebuffer = gl::make_framebuffer(&color, nullptr);
     show(framebuffer.name());
     Picture picture(c.width, c.height), flipped(c.width, c.height);
     glPixelStorei(GL_PACK_ALIGNMENT, 1);
