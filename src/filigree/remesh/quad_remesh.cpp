@@ -263,7 +263,7 @@ private:
         for (Index v = 0; v < kinds.size(); ++v) kinds[v] = map->kind(v);
         const SurfaceWalk walk(surface, twins, features, kinds);
         std::size_t inverted = 0;
-        Result<PatchGrid> grid = make_grid(surface, twins, kinds, map, *base, walk, layout.levels, inverted);
+        Result<PatchGrid> grid = make_grid(walk, map, *base, layout.levels, inverted);
         if (!grid) return grid.error();
         if (context_.is_cancelled()) return cancelled_error();
         Outcome outcome = gate(std::move(*grid), surface);
@@ -291,10 +291,8 @@ private:
 
     /// The patches' grids, evened out, with the tips held that would be lost; without where that turns quads over.
     /// The map is not needed any more when the coarse grids are taken from it.
-    Result<PatchGrid> make_grid(const ManifoldSurface& surface, std::span<const Index> twins,
-                                std::span<const VertexKind> kinds, std::optional<SurfaceMap>& map,
-                                const BaseQuads& base, const SurfaceWalk& walk, unsigned levels,
-                                std::size_t& inverted) {
+    Result<PatchGrid> make_grid(const SurfaceWalk& walk, std::optional<SurfaceMap>& map, const BaseQuads& base,
+                                unsigned levels, std::size_t& inverted) {
         context_.report("sampling", 0);
         PatchGrid sampled = sample_patches(*map, base, walk, std::min(levels, kSampledLevels), context_);
         map.reset();
@@ -303,9 +301,7 @@ private:
         PatchGrid plain = sampled;
         relax(plain, walk, kCoarseSweeps, context_);
         std::optional<PatchGrid> with_tips;
-        if (Status held = hold_what_sticks_out(surface, twins, kinds, walk, plain, std::move(sampled), with_tips);
-            !held)
-            return held.error();
+        if (Status held = hold_what_sticks_out(walk, plain, std::move(sampled), with_tips); !held) return held.error();
         watch_.end("relaxing");
         if (with_tips) {
             if (Status finished = finish_grid(*with_tips, walk, levels, inverted); !finished) return finished.error();
@@ -316,19 +312,19 @@ private:
     }
 
     /// with_tips: the grid relaxed with tips held, if the surface sticks out of the one relaxed without.
-    Status hold_what_sticks_out(const ManifoldSurface& surface, std::span<const Index> twins,
-                                std::span<const VertexKind> kinds, const SurfaceWalk& walk, const PatchGrid& plain,
-                                PatchGrid sampled, std::optional<PatchGrid>& with_tips) {
+    Status hold_what_sticks_out(const SurfaceWalk& walk, const PatchGrid& plain, PatchGrid sampled,
+                                std::optional<PatchGrid>& with_tips) {
         if (context_.is_cancelled()) return cancelled_error();
         if (is_hopeless(plain)) return Success{};
+        const ManifoldSurface& surface = walk.surface();
         const Mesh target = surface_mesh(surface, mesh_.origin);
         const double bound = tip_bound(plain);
         for (int round = 0; round < kTipRounds; ++round) {
             const Mesh quads = grid_mesh(with_tips ? *with_tips : plain, mesh_.origin);
             const Result<std::vector<float>> distances = distances_to_surface(target, quads, context_);
             if (!distances) return distances.error();
-            const std::vector<Index> tips = find_tips(surface, twins, kinds, *distances, bound);
-            if (tips.empty() || hold_tips(surface, twins, tips, bound, sampled) == 0) return Success{};
+            const std::vector<Index> tips = find_tips(surface, walk.twins(), walk.kinds(), *distances, bound);
+            if (tips.empty() || hold_tips(surface, walk.twins(), tips, bound, sampled) == 0) return Success{};
             with_tips = sampled;
             relax(*with_tips, walk, kCoarseSweeps, context_);
             if (context_.is_cancelled()) return cancelled_error();

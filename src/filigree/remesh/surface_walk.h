@@ -14,6 +14,10 @@ public:
                 std::span<const VertexKind> kinds)
         : surface_(surface), twins_(twins), features_(features), kinds_(kinds) {}
 
+    const ManifoldSurface& surface() const { return surface_; }
+    std::span<const Index> twins() const { return twins_; }
+    std::span<const VertexKind> kinds() const { return kinds_; }
+
     struct Place {
         TrianglePoint point;
         Vec3d position = Vec3d::Zero();
