@@ -59,7 +59,7 @@ std::string error_text(const ExportReport& exported, bool is_skin) {
 
 void warn_of_export(const ExportReport& exported, bool has_normals, const std::string& path, Session& session) {
     constexpr double kSeen = 10; // degrees
-    for (const std::string& warning : exported.warnings) session.warn(warning);
+    session.warn(exported.warnings);
     if (has_normals && exported.normal_error_degrees > kSeen)
         session.warn(fmt::format("{}: normals are up to {:.0f} degrees off in viewers that do not correct them "
                                  "(three.js): --no-normals makes them flat and right; see docs/exchange.md.",
@@ -111,9 +111,7 @@ void write_numbered(const Restorer& restorer, const PoseStream& poses, const std
         if (!pose) return pose.error();
         return restorer.mesh(*pose, silent);
     };
-    for (const std::string& warning :
-         require(write_numbered_meshes(poses.frames, mesh, numbered_path(path, input), session.context())))
-        session.warn(warning);
+    session.warn(require(write_numbered_meshes(poses.frames, mesh, numbered_path(path, input), session.context())));
 }
 
 } // namespace
@@ -146,11 +144,7 @@ bool is_animation_path(const std::string& path) { return animation_format(path).
 
 void check_animation_path(const std::string& path) {
     if (path == "-") refuse("An animation cannot go to standard output; give -o a file or a folder.");
-    const AnimationFormat format = require(animation_format(path));
-    std::error_code ignored;
-    const fs::path folder = fs::path(path).parent_path();
-    if (format != AnimationFormat::numbered && !folder.empty() && !fs::is_directory(folder, ignored))
-        refuse(ErrorCode::unwritable, path + ": cannot be written: there is no such folder.");
+    if (require(animation_format(path)) != AnimationFormat::numbered) check_folder_of(path);
 }
 
 void check_animation_options(const std::vector<std::string>& paths, const Session& session) {
@@ -249,8 +243,7 @@ void write_animation_output(const MeshAnimation& animation, const AnimationOutpu
         return;
     }
     const std::string place = format == AnimationFormat::numbered ? numbered_path(path, materials_beside) : path;
-    for (const std::string& warning : require(write_animation(animation, place, session.context())))
-        session.warn(warning);
+    session.warn(require(write_animation(animation, place, session.context())));
     if (format == AnimationFormat::numbered)
         report.set("output", path);
     else

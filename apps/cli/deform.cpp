@@ -50,12 +50,9 @@ private:
         return make_warp(steps, box, options_.axis.value_or(longest_axis(box)), options_.seed);
     }
     std::vector<HandleRegion> handles_at(double fraction) const {
-        std::vector<HandleRegion> part = handles_;
-        for (HandleRegion& handle : part) {
-            handle.move *= fraction;
-            handle.rotation.angle() *= fraction;
-        }
-        return part;
+        std::vector<HandleRegion> handles;
+        for (const HandleRegion& handle : handles_) handles.push_back(handle.part(fraction));
+        return handles;
     }
     /// What a handle has against its place is said of the file.
     template <class T>

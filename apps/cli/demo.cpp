@@ -70,8 +70,14 @@ std::vector<std::string> draw_and_film(const DemoScene& scene, const std::functi
     return made;
 }
 
-void run_demo(const std::string& input, const std::string& folder, bool pictures, std::optional<UpAxis> asked_up,
-              Session& session) {
+struct DemoArguments {
+    std::string input, output = "filigree-demo";
+    bool no_pictures = false;
+    std::optional<UpAxis> up;
+};
+
+void run_demo(const DemoArguments& options, Session& session) {
+    const auto& [input, folder, no_pictures, asked_up] = options;
     const RunContext& context = session.context();
     OutputFolder files(folder, input);
     const std::string model_file = files.file("model.fil"), mesh_file = files.file("mesh.ply"),
@@ -115,7 +121,7 @@ void run_demo(const std::string& input, const std::string& folder, bool pictures
     session.write_mesh(full, full_file);
     session.write_mesh(restored, restored_file);
     std::vector<std::string> pictures_made;
-    if (pictures && mesh.face_count() > 0) {
+    if (!no_pictures && mesh.face_count() > 0) {
         const DemoScene scene{mesh, model, pose, restored, with_gradients, up};
         const auto pose_at = [&](double part) { return warp_pose(*deformation.warp(part), model, context); };
         pictures_made = draw_and_film(scene, pose_at, picture_file, film_file, session);
@@ -163,12 +169,6 @@ void run_demo(const std::string& input, const std::string& folder, bool pictures
                                  {"positions_only_normal_p95_deg", p.normal_p95_deg}});
 }
 
-struct DemoArguments {
-    std::string input, output = "filigree-demo";
-    bool no_pictures = false;
-    std::optional<UpAxis> up;
-};
-
 } // namespace
 
 Command demo_command() {
@@ -183,9 +183,7 @@ Command demo_command() {
                         Option("--no-pictures", options->no_pictures, "Draw no picture and no film"),
                         found_up_option(options->up)},
             .examples = "  filigree demo\n  filigree demo scan.ply -o out",
-            .run = [options](Session& session) {
-                run_demo(options->input, options->output, !options->no_pictures, options->up, session);
-            }};
+            .run = [options](Session& session) { run_demo(*options, session); }};
 }
 
 } // namespace filigree::cli

@@ -78,8 +78,6 @@ void draw_demo(const DemoScene& scene, HeadlessRenderer& renderer, const std::st
 void film_demo(const DemoScene& scene, const std::function<Pose(double)>& pose_at, HeadlessRenderer& renderer,
                const std::string& path, Session& session) {
     const RunContext& context = session.context();
-    RunContext without_bar = context; // the bar tells of frames
-    without_bar.progress = nullptr;
     FilmWriter writer = require(FilmWriter::create(path, kFilmWidth, kFilmHeight, 30));
     RestoreOptions restore;
     restore.level = level_within(scene.model, kMostFilmTriangles);
@@ -92,11 +90,11 @@ void film_demo(const DemoScene& scene, const std::function<Pose(double)>& pose_a
     const CameraPoints points = extent.points();
     const Camera camera = camera_for(std::span(&points, 1), scene.up, double(kFilmWidth) / kFilmHeight);
 
-    std::vector<Picture> frames;
-    for (unsigned f = 0; f < kFilmFrames; ++f) {
-        if (context.is_cancelled()) throw Failure{cancelled_error()};
-        context.report("filming", double(f) / kFilmFrames);
-        const double t = 0.5 - 0.5 * std::cos(std::numbers::pi * f / (kFilmFrames - 1)); // starts and ends slowly
+    std::vector<Picture> frames; // the way there; back it is the same
+    const auto draw = [&](std::size_t f, const RunContext& quiet) -> Result<Picture> {
+        if (f >= kFilmFrames) return frames[2 * (kFilmFrames - 1) - f];
+        const double t =
+            0.5 - 0.5 * std::cos(std::numbers::pi * double(f) / (kFilmFrames - 1)); // starts and ends slowly
         require(drawable.set_pose(pose_at(t), context));
         Scene shown;
         shown.up = scene.up;
@@ -104,10 +102,10 @@ void film_demo(const DemoScene& scene, const std::function<Pose(double)>& pose_a
         shown.fixed_ground = true;
         shown.ground_level = extent.ground_level(scene.up);
         frames.push_back(require(renderer.picture(
-            shown, camera, {.width = kFilmWidth, .height = kFilmHeight, .passes = kFilmPasses}, without_bar)));
-    }
-    for (const Picture& frame : frames) require(writer.add(frame));
-    for (unsigned f = kFilmFrames - 1; f-- > 1;) require(writer.add(frames[f]));
+            shown, camera, {.width = kFilmWidth, .height = kFilmHeight, .passes = kFilmPasses}, quiet)));
+        return frames.back();
+    };
+    require(film_frames(2 * (kFilmFrames - 1), draw, std::span(&writer, 1), "filming", context));
     require(writer.finish());
 }
 

@@ -38,9 +38,7 @@ void export_levels(const Model& model, const ExportArguments& options, Session& 
         refuse(given + " belongs to a model that moves, and " + options.input +
                " is exported at rest; 'filigree level' writes one level of it.");
     session.begin_writing(options.output);
-    for (const std::string& warning :
-         require(write_levels_glb(model, options.output, options.input, session.context())))
-        session.warn(warning);
+    session.warn(require(write_levels_glb(model, options.output, options.input, session.context())));
     const auto bytes = fs::file_size(options.output);
     report.set("vertices", model.mesh.vertex_count());
     report.add("levels", fmt::format("{}, as MSFT_lod", model.finest_level() + 1), "levels", model.finest_level() + 1);

@@ -11,8 +11,6 @@ namespace filigree::cli {
 
 namespace {
 
-Json vec_json(const Vec3d& v) { return {v[0], v[1], v[2]}; }
-
 struct NamedFinding {
     const char* key;
     const char* title;
@@ -99,7 +97,7 @@ void describe_size(const TopologyReport& topology, Report& report) {
                    fmt::format("{:.6g} x {:.6g} x {:.6g}, diagonal {:.6g}, from ({:.9g}, {:.9g}, {:.9g})",
                                box.size()[0], box.size()[1], box.size()[2], box.diagonal(), box.min[0], box.min[1],
                                box.min[2]),
-                   "box", {{"min", vec_json(box.min)}, {"max", vec_json(box.max)}});
+                   "box", {{"min", box.min}, {"max", box.max}});
         report.set("diagonal_units", box.diagonal());
     }
     report.add("area", fmt::format("{:.6g}", topology.area), "area", topology.area);

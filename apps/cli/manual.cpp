@@ -103,13 +103,9 @@ void print_option(const Option& option, std::string& page) {
     if (option.is_positional()) {
         page += italic(option.name);
     } else {
-        std::string names = option.name[0] == '!' ? option.name.substr(1) : option.name, shown;
-        for (std::size_t from = 0; from < names.size();) {
-            const std::size_t comma = std::min(names.find(',', from), names.size());
-            shown += (shown.empty() ? "" : ", ") + bold(names.substr(from, comma - from));
-            from = comma + 1;
-        }
-        page += shown;
+        if (const std::size_t comma = option.name.find(','); comma != std::string::npos)
+            page += bold(option.name.substr(0, comma)) + ", ";
+        page += bold(option.long_name());
         if (const std::string values = values_text(option); !values.empty()) page += " " + italic(values);
     }
     page += "\n" + escaped(description(option)) + "\n";

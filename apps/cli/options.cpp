@@ -2,7 +2,7 @@
 
 #include "session.h"
 
-#include <sys/stat.h>
+#include <filesystem>
 
 namespace filigree::cli {
 
@@ -15,11 +15,9 @@ std::vector<std::string> paths_of(const Option& option) {
 }
 
 /// Whether both are names of one file; a terminal or a pipe may be read and written.
-bool is_one_file(const std::string& a, const std::string& b) {
-    struct stat first {
-    }, second{};
-    return ::stat(a.c_str(), &first) == 0 && ::stat(b.c_str(), &second) == 0 && S_ISREG(first.st_mode) &&
-           first.st_dev == second.st_dev && first.st_ino == second.st_ino;
+bool is_one_file(const std::filesystem::path& a, const std::filesystem::path& b) {
+    std::error_code failed;
+    return std::filesystem::is_regular_file(a, failed) && std::filesystem::equivalent(a, b, failed) && !failed;
 }
 
 } // namespace

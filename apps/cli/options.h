@@ -15,8 +15,8 @@ namespace filigree::cli {
 
 class Session;
 
-/// One option ("-o,--output"), flag ("--json"; "!--no-x" clears its bool) or positional argument ("mesh"). It says
-/// where the value goes, so the target has to live until the command has run.
+/// One option ("-o,--output"), flag ("--json") or positional argument ("mesh"). It says where the value goes, so the
+/// target has to live until the command has run.
 struct Option {
     using EachText = std::function<void(const std::string&)>;
     using EachNumber = std::function<void(double)>; ///< called at once, in the order of the command line
@@ -68,9 +68,9 @@ struct Option {
     Option(std::string names, EachNumber set, std::string purpose)
         : name(std::move(names)), target(std::move(set)), text(std::move(purpose)) {}
 
-    bool is_positional() const { return name[0] != '-' && name[0] != '!'; }
+    bool is_positional() const { return name[0] != '-'; }
     /// "--output" of "-o,--output".
-    std::string long_name() const { return name.substr(name.find_last_of(",!") + 1); }
+    std::string long_name() const { return name.substr(name.find(',') + 1); }
 
     Option required() const { return with(&Option::is_required, true); }
     /// Help shows the value that the target has at the start.

@@ -21,12 +21,6 @@ Option view_option(View& view, const std::string& text) {
                         {{"front", View::front}, {"side", View::side}, {"top", View::top}, {"iso", View::iso}}, text);
 }
 
-SurfaceMaterials load_materials(const Mesh& mesh, const std::string& path, Session& session) {
-    SurfaceMaterials loaded = load_surface_materials(mesh, path);
-    for (const std::string& warning : loaded.warnings) session.warn(warning);
-    return loaded;
-}
-
 Vec3f parse_color(const std::string& text, const std::string& option) {
     if (const std::optional<Vec3f> color = filigree::parse_color(text)) return *color;
     refuse(option + ": '" + text + "' is no colour; write it as #rrggbb, such as #d04030.");
@@ -59,10 +53,7 @@ void check_picture_path(const std::string& path) {
     const std::string ending = lower_extension(path);
     if (ending != ".png" && ending != ".svg" && ending != ".pdf")
         refuse(ErrorCode::unsupported, path + ": is no picture's name; let it end in .png, .svg or .pdf.");
-    std::error_code ignored;
-    const std::filesystem::path folder = std::filesystem::path(path).parent_path();
-    if (!folder.empty() && !std::filesystem::is_directory(folder, ignored))
-        refuse(ErrorCode::unwritable, path + ": cannot be written: there is no such folder.");
+    check_folder_of(path);
 }
 
 void check_png_path(const std::string& path) {

@@ -25,9 +25,6 @@ void report_picture(const std::string& path, UpAxis up, Report& report);
 /// Shows all of a mesh.
 Camera camera_for(const Mesh& mesh, View view, UpAxis up, double aspect, double point_radius = 0);
 
-/// As load_surface_materials; its warnings are said.
-SurfaceMaterials load_materials(const Mesh& mesh, const std::string& path, Session& session);
-
 /// "#d04030", sRGB; otherwise a Failure that names the option.
 Vec3f parse_color(const std::string& text, const std::string& option);
 

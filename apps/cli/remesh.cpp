@@ -18,6 +18,7 @@ constexpr double kShownSeconds = 0.005; // phases that would be written as 0.00 
 struct RemeshArguments {
     std::string input, output, base, picture;
     QuadRemeshOptions remesh;
+    bool no_attributes = false;
     View view = View::iso;
     std::optional<UpAxis> up;
 };
@@ -185,11 +186,12 @@ void warn_of_triangles(const std::string& path, Session& session) {
         session.warn(path + ": holds triangles only, so each quad is split in two; write .ply or .obj to keep quads.");
 }
 
-void run(const RemeshArguments& options, Session& session) {
+void run(RemeshArguments options, Session& session) {
     check_outputs(options);
     const double start = now_seconds();
     const Mesh mesh = session.read_mesh(options.input);
     const double read = now_seconds();
+    options.remesh.attributes = !options.no_attributes;
     const QuadRemeshed result = require(quad_remesh(mesh, options.remesh, session.context()));
     const double remeshed = now_seconds();
     warn_of_triangles(options.output, session);
@@ -228,8 +230,7 @@ OptionList remesh_options(QuadRemeshOptions& remesh) {
                    "What both distances may reach, fraction of the diagonal (unset: a patch's side; from the mesh to "
                    "the quads "
                    "6e-3 for 20,000 quads and more)")
-                .above_zero(),
-            Option("!--no-attributes", remesh.attributes, "Leave UVs, colours, normals and labels behind")};
+                .above_zero()};
 }
 
 } // namespace
@@ -244,6 +245,7 @@ Command remesh_command() {
                        Option("-o,--output", options->output, "Quads to write").is_written().required()} +
             remesh_options(options->remesh) +
             OptionList{
+                Option("--no-attributes", options->no_attributes, "Leave UVs, colours, normals and labels behind"),
                 Option("--base", options->base, "Also write the patches' corners as a mesh, a quad each").is_written(),
                 Option("--picture", options->picture, "Also draw the quads, their patches in colour (.png)")
                     .is_written(),

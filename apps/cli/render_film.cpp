@@ -45,7 +45,7 @@ public:
             std::span(&writer, 1), "filming", context()));
         session_.begin_writing(options_.output);
         require(writer.finish());
-        report(now_seconds() - start);
+        report(fmt::format("{} frames of ", frames_), size_, frames_, now_seconds() - start);
     }
 
 private:
@@ -117,14 +117,6 @@ private:
         page.legend(options_.map, range_, Page::plain(subject_->scalar_title), {size_.width - kLegendWidth + 14, 24},
                     std::min(420.0, size_.height - 60.0));
         return page.pixels(1);
-    }
-
-    void report(double seconds) const {
-        Json json = summary(size_, frames_);
-        json["seconds"] = seconds;
-        session_.print(fmt::format("{}: {} frames of {} by {} pixels in {} ({})\n", options_.output, frames_,
-                                   size_.width, size_.height, seconds_text(seconds), renderer_.name()),
-                       json);
     }
 
     bool by_file_, is_own_ = false, by_pose_ = false;

@@ -58,7 +58,7 @@ public:
             write_picture(alone_, options_.output, session_);
         else
             require(page_.write(options_.output, 1));
-        report(now_seconds() - start);
+        report("", layout_.page, 1, now_seconds() - start);
     }
 
 private:
@@ -102,14 +102,6 @@ private:
             page_.text(i < options_.captions.size() ? options_.captions[i] : Page::plain(file_name(options_.files[i])),
                        {corner.x() + 0.5 * layout_.width, corner.y() + layout_.height + 22},
                        {.size = 15, .align = Align::centre});
-    }
-
-    void report(double seconds) const {
-        Json json = summary(alone_.width ? PictureSize{alone_.width, alone_.height} : layout_.page, 1);
-        json["seconds"] = seconds;
-        session_.print(fmt::format("{}: {} by {} pixels in {} ({})\n", options_.output, layout_.page.width,
-                                   layout_.page.height, seconds_text(seconds), renderer_.name()),
-                       json);
     }
 
     std::size_t count_;

@@ -41,7 +41,8 @@ std::unique_ptr<Subject> Rendering::read(const std::string& path) {
             refuse(path + ": is a mesh, and --poses and --frame move a model; 'filigree strip' makes one of it.");
         subject->mesh = std::move(std::get<Mesh>(content.value));
     }
-    subject->materials = load_materials(subject->mesh, path, session_);
+    subject->materials = load_surface_materials(subject->mesh, path);
+    session_.warn(subject->materials.warnings);
     if (subject->mesh.vertex_count() == 0)
         refuse(ErrorCode::unsuitable, path + ": has no vertices, so there is nothing to draw.");
     if (!std::exchange(up_known_, true)) up_ = up_of(options_.up, subject->mesh, path);
@@ -162,9 +163,18 @@ Camera Rendering::camera_for(std::span<const CameraPoints> points, double aspect
     return camera;
 }
 
-Json Rendering::summary(const PictureSize& size, std::size_t frames) const {
-    return {{"output", options_.output}, {"width", size.width}, {"height", size.height},       {"frames", frames},
-            {"triangles", triangles_},   {"points", points_},   {"renderer", renderer_.name()}};
+void Rendering::report(const std::string& frames, const PictureSize& size, std::size_t frame_count,
+                       double seconds) const {
+    session_.print(fmt::format("{}: {}{} by {} pixels in {} ({})\n", options_.output, frames, size.width, size.height,
+                               seconds_text(seconds), renderer_.name()),
+                   {{"output", options_.output},
+                    {"width", size.width},
+                    {"height", size.height},
+                    {"frames", frame_count},
+                    {"triangles", triangles_},
+                    {"points", points_},
+                    {"renderer", renderer_.name()},
+                    {"seconds", seconds}});
 }
 
 } // namespace filigree::cli

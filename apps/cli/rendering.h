@@ -87,7 +87,8 @@ protected:
     }
     bool has_scalars() const { return !options_.scalar.empty(); }
     ValueRange range_of(std::span<const float> values) const;
-    Json summary(const PictureSize& size, std::size_t frames) const;
+    /// frames: empty, or what the text says of them before the size.
+    void report(const std::string& frames, const PictureSize& size, std::size_t frame_count, double seconds) const;
 
     const RenderOptions& options_;
     Session& session_;

@@ -10,17 +10,6 @@
 
 namespace filigree::cli {
 
-namespace {
-
-std::vector<Vec3f> positions_for(const Mesh& mesh, const Model& model) {
-    std::vector<Vec3f> positions(mesh.vertex_count());
-    for (std::size_t v = 0; v < positions.size(); ++v)
-        positions[v] = (mesh.world_position(v) - model.mesh.origin).cast<float>();
-    return positions;
-}
-
-} // namespace
-
 OptionList restore_options(RestoreOptions& options) {
     std::vector<std::pair<std::string, HeightLaw>> laws;
     for (std::string_view name : kHeightLawNames) laws.emplace_back(name, *height_law_from_name(name));
@@ -107,7 +96,8 @@ void restore_one(const RestoreArguments& options, Session& session) {
     const Model model = session.read_model(options.model, options.frame ? &own : nullptr);
     Pose pose = options.frame ? own_pose(own, options.frame, options.model)
                               : pose_of_mesh(session.read_mesh(options.pose), model.mesh.origin);
-    if (!options.ghosts.empty()) pose.ghosts = positions_for(session.read_mesh(options.ghosts), model);
+    if (!options.ghosts.empty())
+        pose.ghosts = pose_of_mesh(session.read_mesh(options.ghosts), model.mesh.origin).positions;
     const Restorer restorer = require(Restorer::create(model, options.restore, session.context()));
     const double start = now_seconds();
     const Mesh mesh = require(with_hint(restorer.mesh(pose, session.context()), ErrorCode::mismatch,
@@ -137,8 +127,6 @@ void restore_all(const RestoreArguments& options, Session& session) {
                            options.model, session, report);
     const double seconds = now_seconds() - start;
     report.set("output", options.output);
-    report.set("frames", poses.frames);
-    report.set("frames_per_second", poses.frames_per_second);
     report.add("restored from", fmt::format("{} in {}", from, seconds_text(seconds)), "from", from);
     report.set("seconds", seconds);
     session.print(report);

@@ -21,56 +21,16 @@ struct SampleArguments {
     std::size_t count = 0;
     std::vector<double> origin, eye;
     std::vector<std::size_t> frustum;
-    double field_of_view = 30;
     InsideOptions inside;
     Pattern pattern = Pattern::lattice;
     std::uint64_t seed = 1;
     std::optional<UpAxis> up;
 };
 
-const char* method_name(InsideMethod method) {
-    switch (method) {
-    case InsideMethod::scan:
-        return "scan";
-    case InsideMethod::rays:
-        return "rays";
-    case InsideMethod::winding:
-        return "winding";
-    case InsideMethod::automatic:
-        break;
-    }
-    return "auto";
-}
-
-/// The report's points: in the view from the eye, in regular steps across the picture and in depth.
-std::vector<Vec3d> points_in_view(const Mesh& mesh, const SampleArguments& options, const RunContext& context,
-                                  InsideReport& report, std::size_t& tested) {
-    const Box box = bounds(mesh.positions);
-    InsideOptions inside = options.inside;
-    if (inside.method == InsideMethod::automatic) inside.method = InsideMethod::rays;
-    Frustum frustum;
-    frustum.target = box.centre();
-    frustum.eye = inside.eye.value_or(Vec3d(box.centre() + 2.2 * box.diagonal() * Vec3d(0.25, 0.2, 1).normalized()));
-    inside.eye = frustum.eye;
-    frustum.field_of_view_deg = options.field_of_view;
-    const double distance = (frustum.eye - frustum.target).norm(), reach = 0.5 * box.diagonal();
-    frustum.near = std::max(distance - reach, 1e-3 * distance);
-    frustum.far = distance + reach;
-    std::copy_n(options.frustum.begin(), 3, frustum.counts.begin());
-    const std::vector<Vec3d> points = require(frustum_points(frustum));
-    tested = points.size();
-    const double begin = now_seconds();
-    const InsideTest test = require(InsideTest::create(mesh, inside, context));
-    const double start = now_seconds();
-    report.setup_seconds = start - begin;
-    const std::vector<std::uint8_t> answers = require(test.contains(points, context));
-    report.used = test.used();
-    report.seconds = now_seconds() - start;
-    std::vector<Vec3d> chosen;
-    for (std::size_t i = 0; i < points.size(); ++i)
-        if (answers[i]) chosen.push_back(points[i]);
-    return chosen;
-}
+const std::vector<std::pair<std::string, InsideMethod>> kMethods = {{"auto", InsideMethod::automatic},
+                                                                    {"scan", InsideMethod::scan},
+                                                                    {"rays", InsideMethod::rays},
+                                                                    {"winding", InsideMethod::winding}};
 
 /// Points blue, surface red, the half of the surface towards the viewer cut away.
 void draw_points(const Mesh& mesh, const std::vector<Vec3f>& points, double spacing, UpAxis up, const std::string& path,
@@ -108,10 +68,18 @@ struct Found {
     std::array<double, 3> origin = {};
 };
 
+/// The report's points: in the view from the eye, in regular steps across the picture and in depth.
 Found find_in_view(const Mesh& mesh, const SampleArguments& options, const RunContext& context) {
+    const Box box = bounds(mesh.positions);
+    InsideOptions inside = options.inside;
+    Frustum frustum = frustum_around(box, inside.eye);
+    inside.eye = frustum.eye;
+    std::copy_n(options.frustum.begin(), 3, frustum.counts.begin());
+    const std::vector<Vec3d> points = require(frustum_points(frustum));
     Found found;
-    found.points = points_in_view(mesh, options, context, found.inside, found.tested);
-    found.spacing = bounds(mesh.positions).diagonal() / double(options.frustum[2]);
+    found.points = require(points_inside(mesh, points, inside, context, &found.inside));
+    found.tested = points.size();
+    found.spacing = box.diagonal() / double(options.frustum[2]);
     return found;
 }
 
@@ -145,6 +113,7 @@ void warn_of_doubts(const Found& found, const std::string& input, Session& sessi
 Report make_report(const Found& found, const std::string& output) {
     const InsideReport& inside = found.inside;
     const ScanReport& scan = inside.scan;
+    const std::string& method = kMethods[std::size_t(inside.used)].first;
     Report report;
     report.set("output", output);
     report.row("points inside", fmt::format("{} of {}", with_commas(found.points.size()), with_commas(found.tested)));
@@ -153,10 +122,10 @@ Report make_report(const Found& found, const std::string& output) {
     report.set("lattice", found.counts);
     report.set("lattice_origin", found.origin);
     report.add("spacing", fmt::format("{:.6g} units", found.spacing), "spacing_units", found.spacing);
-    report.add("method",
-               fmt::format("{} in {}, set up in {}", method_name(inside.used), seconds_text(inside.seconds),
-                           seconds_text(inside.setup_seconds)),
-               "method", method_name(inside.used));
+    report.add(
+        "method",
+        fmt::format("{} in {}, set up in {}", method, seconds_text(inside.seconds), seconds_text(inside.setup_seconds)),
+        "method", method);
     if (inside.used == InsideMethod::scan)
         report.row("crossings",
                    fmt::format("{} ({} decided in integers, {} in expansions)", with_commas(scan.crossings),
@@ -215,11 +184,7 @@ OptionList point_options(SampleArguments& options) {
 }
 
 OptionList inside_options(SampleArguments& options) {
-    return {choice<InsideMethod>("--method", options.inside.method,
-                                 {{"auto", InsideMethod::automatic},
-                                  {"scan", InsideMethod::scan},
-                                  {"rays", InsideMethod::rays},
-                                  {"winding", InsideMethod::winding}},
+    return {choice<InsideMethod>("--method", options.inside.method, kMethods,
                                  "How to tell (unset: scan where the mesh is closed, else winding)"),
             choice<Pattern>("--pattern", options.pattern,
                             {{"lattice", Pattern::lattice}, {"jitter", Pattern::jitter}, {"poisson", Pattern::poisson}},

@@ -122,6 +122,10 @@ void Session::warn(const std::string& sentence) {
     warnings_.push_back(sentence);
 }
 
+void Session::warn(const std::vector<std::string>& sentences) {
+    for (const std::string& sentence : sentences) warn(sentence);
+}
+
 std::string Session::read_bytes(const std::string& path) const {
     std::error_code ignored;
     is_waiting_for_input = path == "-" || !std::filesystem::is_regular_file(path, ignored); // a pipe, a terminal
@@ -132,7 +136,7 @@ std::string Session::read_bytes(const std::string& path) const {
 
 Mesh Session::parse_mesh(const std::string& bytes, const std::string& path) {
     MeshFile file = require(filigree::read_mesh(bytes, shown_name(path), context()));
-    for (const std::string& warning : file.warnings) warn(warning);
+    warn(file.warnings);
     return std::move(file.mesh);
 }
 
@@ -157,7 +161,7 @@ Session::Content Session::read_any(const std::string& path, bool keep_scene) {
     const std::string bytes = read_bytes(path);
     if (keep_scene && is_gltf(bytes)) {
         GltfScene scene = require(GltfScene::read(bytes, shown_name(path), context()));
-        for (const std::string& warning : scene.warnings()) warn(warning);
+        warn(scene.warnings());
         return {scene.mesh(), bytes.size(), {}, std::move(scene)};
     }
     if (!is_model_file(bytes)) return {parse_mesh(bytes, path), bytes.size(), {}, {}};
@@ -174,14 +178,11 @@ void Session::begin_writing(const std::string& path) {
 }
 
 void Session::write_mesh(const Mesh& mesh, const std::string& path, const std::string& source) {
-    if (const std::string wrong = check_mesh(mesh); !wrong.empty())
-        refuse(ErrorCode::unsuitable,
-               path + ": not written: the result is beyond what numbers can hold (" + wrong + "); deform less.");
     begin_writing(path);
     WriteMeshOptions options;
     if (source != "-") options.materials_beside = source;
     if (path == "-") options.format = MeshFormat::ply; // no name to tell the format by: PLY holds the most
-    for (const std::string& warning : require(filigree::write_mesh(mesh, path, options, context()))) warn(warning);
+    warn(require(filigree::write_mesh(mesh, path, options, context())));
 }
 
 void Session::write_model(const Model& model, const std::string& path, const PoseSequence& poses) {
@@ -198,6 +199,13 @@ void Session::print(const std::string& text, Json object) {
     if (std::fputs(shown.c_str(), stdout) == EOF || std::fflush(stdout) == EOF)
         refuse(ErrorCode::unwritable,
                "standard output: cannot be written: the reader has gone away, or the disk is full.");
+}
+
+void check_folder_of(const std::string& path) {
+    std::error_code ignored;
+    const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+    if (!folder.empty() && !std::filesystem::is_directory(folder, ignored))
+        refuse(ErrorCode::unwritable, path + ": cannot be written: there is no such folder.");
 }
 
 void check_second_output(const std::string& option, const std::string& path, const std::string& first) {

@@ -82,6 +82,7 @@ public:
 
     /// Goes to stderr at once, unless quiet, and into the JSON; a sentence that was said is not said again.
     void warn(const std::string& sentence);
+    void warn(const std::vector<std::string>& sentences);
 
     /// The result: the table for people, or with --json the values with the warnings added. Standard output, unless a
     /// mesh or a model went there. With --quiet a table that only tells of a file written is left out.
@@ -97,6 +98,9 @@ private:
     bool wrote_file_ = false;
     bool standard_output_taken_ = false; ///< by a mesh or a model
 };
+
+/// Refuses, before any work, an output that lies in no folder.
+void check_folder_of(const std::string& path);
 
 /// Refuses, before any work, a second output (`option`; empty: none) that goes where the first goes, or has no format
 /// that we know.

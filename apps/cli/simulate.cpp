@@ -43,10 +43,8 @@ struct Outputs {
             if (std::find(paths.begin(), paths.begin() + std::ptrdiff_t(i), path) != paths.begin() + std::ptrdiff_t(i))
                 refuse(path + ": two outputs cannot go to one place.");
             std::error_code ignored;
-            const fs::path folder = fs::path(path).parent_path();
             const bool is_folder = path.ends_with('/') || fs::is_directory(path, ignored);
-            if (!is_folder && !folder.empty() && !fs::is_directory(folder, ignored))
-                refuse(ErrorCode::unwritable, path + ": cannot be written: there is no such folder.");
+            if (!is_folder) check_folder_of(path);
             if (is_folder)
                 folders.push_back(path);
             else if (lower_extension(path) == ".fil")
@@ -133,7 +131,7 @@ public:
         if (options.frames) scene_.frames = options.frames;
         open_outputs();
         ready_ = require(set_up(scene_, session.context()));
-        for (const std::string& warning : ready_.warnings) session.warn(warning);
+        session.warn(ready_.warnings);
         run_.emplace(require(SceneRun::create(scene_, ready_, options.check, session.context())));
         if (!options.resume.empty()) require(run_->resume(require(read_file(options.resume)), options.resume));
     }
@@ -144,7 +142,7 @@ public:
             refuse(
                 fmt::format("{}: is at frame {} already, and {} is the last.", options_.resume, run_->frame(), last));
         const Status status = run_->advance_to(last, session_.context());
-        for (const std::string& warning : run_->warnings()) session_.warn(warning);
+        session_.warn(run_->warnings());
         if (!status && status.error().code == ErrorCode::cancelled) cancelled();
         require(status);
         if (options_.finer)
@@ -190,9 +188,7 @@ private:
     }
     void film() {
         const double start = now_seconds();
-        for (const std::string& warning :
-             require(film_scene(scene_, ready_, run_->recording(), *renderer_, films_, session_.context())))
-            session_.warn(warning);
+        session_.warn(require(film_scene(scene_, ready_, run_->recording(), *renderer_, films_, session_.context())));
         film_seconds_ = now_seconds() - start;
     }
     void open_outputs() {
@@ -221,8 +217,7 @@ private:
                                  [&, b](std::size_t frame) { return run_->mesh(b, frame, silent); }});
             session_.begin_writing(path);
             const std::size_t frames = run_->recording().poses[0].frames.size();
-            for (const std::string& warning : require(write_numbered_meshes(frames, parts, session_.context())))
-                session_.warn(warning);
+            session_.warn(require(write_numbered_meshes(frames, parts, session_.context())));
         }
     }
 
@@ -258,9 +253,9 @@ void Run::report() const {
 
 void check(const SimulateArguments& options, const Session& session) {
     std::error_code ignored;
-    const fs::path folder = fs::path(options.save).parent_path();
-    if (fs::is_directory(options.save, ignored) || (!folder.empty() && !fs::is_directory(folder, ignored)))
-        refuse(ErrorCode::unwritable, options.save + ": cannot be written: it is a folder, or in none.");
+    if (fs::is_directory(options.save, ignored))
+        refuse(ErrorCode::unwritable, options.save + ": cannot be written: it is a folder.");
+    check_folder_of(options.save);
     if (options.scene.empty()) refuse("Give a scene: filigree simulate SCENE.toml -o OUT.");
     if (options.outputs.empty() && options.save.empty() && !options.check && !options.finer)
         refuse("Say where the motion goes: -o OUT.fil, -o OUT.glb, -o OUT.pc2, -o FILM.mp4 or -o FOLDER/; or give "

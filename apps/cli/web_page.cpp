@@ -13,10 +13,6 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kPieceBytes = 3 * (std::size_t{1} << 18); // browsers limit a string, and base64 takes threes
 
-void require_written(const Status& status) {
-    if (!status) throw Failure{status.error()};
-}
-
 /// FILIGREE_WEB, or where the build and the installation put them, seen from the program.
 fs::path find_parts() {
     std::error_code failed;
@@ -32,25 +28,14 @@ fs::path find_parts() {
                "scripts/setup and build again, or say with FILIGREE_WEB where they are.");
 }
 
-std::string html_text(const std::string& text) {
-    std::string escaped;
-    for (const char c : text) {
-        if (c == '&')
-            escaped += "&amp;";
-        else if (c == '<')
-            escaped += "&lt;";
-        else if (c == '>')
-            escaped += "&gt;";
-        else
-            escaped += c;
-    }
-    return escaped;
-}
-
 std::string replaced(std::string text, std::string_view what, const std::string& by) {
     for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + by.size()))
         text.replace(at, what.size(), by);
     return text;
+}
+
+std::string html_text(const std::string& text) {
+    return replaced(replaced(replaced(text, "&", "&amp;"), "<", "&lt;"), ">", "&gt;");
 }
 
 std::string base64(std::string_view bytes) {
@@ -67,8 +52,6 @@ std::string base64(std::string_view bytes) {
     return text;
 }
 
-void write_text(const std::string& path, const std::string& text) { require_written(write_file(path, text)); }
-
 } // namespace
 
 WebPage::WebPage(OutputFolder& folder, std::string title)
@@ -79,9 +62,9 @@ WebPage::WebPage(OutputFolder& folder, std::string title)
 
 void WebPage::write(Session& session) {
     const std::string index = require(read_file(parts_ / "index.html"));
-    write_text(index_, replaced(index, "{{title}}", html_text(title_)));
+    require(write_file(index_, replaced(index, "{{title}}", html_text(title_))));
     for (const std::string& file : {script_, style_, license_})
-        write_text(file, require(read_file(parts_ / fs::path(file).filename())));
+        require(write_file(file, require(read_file(parts_ / fs::path(file).filename()))));
     write_model_script(session);
 }
 
@@ -92,10 +75,10 @@ void WebPage::write_model_script(Session& session) const {
     while (model.read(piece.data(), std::streamsize(piece.size())), model.gcount() > 0) {
         if (session.context().is_cancelled()) throw Failure{cancelled_error()};
         const std::string_view read(piece.data(), std::size_t(model.gcount()));
-        require_written(script.write("filigree_part(\"" + base64(read) + "\");\n"));
+        require(script.write("filigree_part(\"" + base64(read) + "\");\n"));
     }
     if (!model.eof()) refuse(ErrorCode::not_found, model_ + ": cannot be read again; try once more.");
-    require_written(script.finish());
+    require(script.finish());
 }
 
 } // namespace filigree::cli

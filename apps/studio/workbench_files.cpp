@@ -110,11 +110,8 @@ std::vector<QString> lost_with_model(const State& state) {
 }
 
 /// Returns what to tell. source: the file that the mesh came from; "" for none.
-Result<QString> write_checked(const Mesh& mesh, const std::string& path, const RunContext& context,
-                              const std::string& source = {}) {
-    if (const std::string wrong = check_mesh(mesh); !wrong.empty())
-        return Error{ErrorCode::unsuitable,
-                     path + ": not written: the result is beyond what numbers can hold (" + wrong + "); deform less."};
+Result<QString> write_told(const Mesh& mesh, const std::string& path, const RunContext& context,
+                           const std::string& source = {}) {
     const Result<std::vector<std::string>> warnings = write_mesh(mesh, path, {.materials_beside = source}, context);
     if (!warnings) return warnings.error();
     QString text = QString("Saved %1: %2, %3.")
@@ -243,13 +240,13 @@ void Workbench::save_mesh(const std::string& path) {
          [path, state = state(), pose = pose_](const RunContext& context) -> Result<QString> {
              const Result<Mesh> mesh = posed_mesh(state, pose, context);
              if (!mesh) return mesh.error();
-             return write_checked(*mesh, path, context, state.source ? state.source->path : "");
+             return write_told(*mesh, path, context, state.source ? state.source->path : "");
          });
 }
 
 void Workbench::save_driver(const std::string& path) {
     save("Saving " + file_name(path), path, [path, model = state().model, pose = pose_](const RunContext& context) {
-        return write_checked(pose.positions.empty() ? driver_mesh(*model) : posed_driver(*model, pose), path, context);
+        return write_told(pose.positions.empty() ? driver_mesh(*model) : posed_driver(*model, pose), path, context);
     });
 }
 

@@ -139,6 +139,7 @@ TEST_F(Cli, EveryCommandHasHelpWithExamples) {
         for (const char* option : {"--json", "--threads", "--quiet"})
             EXPECT_NE(help.find(option), std::string::npos) << command;
         EXPECT_NE(ok({"--help"}).out.find("\n  " + command), std::string::npos) << command;
+        EXPECT_EQ(help.find("{false}"), std::string::npos) << command;
     }
 }
 

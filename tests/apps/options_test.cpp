@@ -61,7 +61,7 @@ TEST_F(OptionTables, ManualPagesNameEveryOption) {
             const std::size_t at = option.find("--");
             if (!option.starts_with("  -") || at == std::string::npos || option.find("--help") != std::string::npos)
                 continue;
-            std::string name = option.substr(at, option.find_first_of(" {", at) - at), escaped;
+            std::string name = option.substr(at, option.find(' ', at) - at), escaped;
             for (const char c : name) escaped += c == '-' ? "\\-" : std::string(1, c);
             EXPECT_NE(of_command.find("\\fB" + escaped + "\\fR"), std::string::npos) << name;
         }

@@ -33,6 +33,18 @@ TEST(HandleRegions, EndsGoWhereTheyAreSent) {
     }
 }
 
+TEST(HandleRegions, APartOfAHandleGoesAPartOfTheWay) {
+    HandleRegion handle = ends(3)[1];
+    handle.rotation = Eigen::AngleAxisd(0.6, Vec3d::UnitX());
+    const HandleRegion half = handle.part(0.5), none = handle.part(0);
+    EXPECT_EQ(half.move, Vec3d(0, 1.5, 0));
+    EXPECT_EQ(half.rotation.angle(), 0.3);
+    EXPECT_EQ(half.rotation.axis(), Vec3d::UnitX());
+    EXPECT_EQ(half.name, handle.name);
+    EXPECT_TRUE(none.move.isZero(0) && none.rotation.angle() == 0);
+    EXPECT_EQ(handle.part(1).move, handle.move);
+}
+
 TEST(HandleRegions, ARegionTurnsAboutItsMiddleOrTheCentreGiven) {
     const Mesh bar = make_bar({.resolution = 4});
     std::vector<HandleRegion> handles = ends(0);

@@ -61,6 +61,20 @@ const std::vector<std::pair<const char*, WriteMeshOptions>> kPlyKinds = {
 
 } // namespace
 
+TEST(MeshFile, WhatNumbersCannotHoldIsNotWritten) {
+    Mesh mesh = make_plain_mesh();
+    mesh.positions[0].x() = std::numeric_limits<float>::infinity();
+    const std::filesystem::path path = std::filesystem::temp_directory_path() / "filigree_too_far.ply";
+    std::filesystem::remove(path);
+    const auto written = write_mesh(mesh, path, {}, kContext);
+    ASSERT_FALSE(written);
+    EXPECT_EQ(written.error().code, ErrorCode::unsuitable);
+    EXPECT_EQ(
+        written.error().message.find(path.string() + ": not written: the result is beyond what numbers can hold ("),
+        0u);
+    EXPECT_FALSE(std::filesystem::exists(path));
+}
+
 TEST(MeshFile, SurfacesComeBackBitByBit) {
     for (const Mesh& mesh : {make_plain_mesh(), make_far_mesh()}) {
         expect_same_surface(from_bytes(to_bytes(mesh, MeshFormat::obj), "a.obj").mesh, mesh);

@@ -25,5 +25,33 @@ TEST(Frustum, PointsInsideAreThoseThatRaysFind) {
     EXPECT_EQ(frustum_points(frustum).error().code, ErrorCode::usage);
 }
 
+/// How far the box reaches along the view, from the eye.
+std::pair<double, double> depths(const Frustum& frustum, const Box& box) {
+    const Vec3d forward = (frustum.target - frustum.eye).normalized();
+    double least = 1e300, most = -1e300;
+    for (int k = 0; k < 8; ++k) {
+        const Vec3d corner(k & 1 ? box.max.x() : box.min.x(), k & 2 ? box.max.y() : box.min.y(),
+                           k & 4 ? box.max.z() : box.min.z());
+        const double depth = forward.dot(corner - frustum.eye);
+        least = std::min(least, depth);
+        most = std::max(most, depth);
+    }
+    return {least, most};
+}
+
+TEST(Frustum, AroundABoxReachesFromBeforeToBehindIt) {
+    const Box box{Vec3d(1, 2, 3), Vec3d(3, 3, 4)};
+    for (const std::optional<Vec3d>& eye : {std::optional<Vec3d>(), std::optional(Vec3d(-9, 4, 2))}) {
+        const Frustum frustum = frustum_around(box, eye);
+        const auto [least, most] = depths(frustum, box);
+        EXPECT_EQ(frustum.target, box.centre());
+        if (eye) EXPECT_EQ(frustum.eye, *eye);
+        EXPECT_LE(frustum.near, least);
+        EXPECT_GE(frustum.far, most);
+        EXPECT_LT(frustum.far - frustum.near, 1.001 * box.diagonal());
+    }
+    EXPECT_GT(frustum_around(box, Vec3d(1.5, 2.5, 3.5)).near, 0); // from within
+}
+
 } // namespace
 } // namespace filigree

@@ -30,6 +30,25 @@ TEST(InsideTest, SinglePointsGetTheLatticesAnswers) {
     }
 }
 
+TEST(InsideTest, PointsInsideAreThoseThatItContains) {
+    const Mesh mesh = make_wavy_sphere({.resolution = 10});
+    const Lattice lattice = lattice_over(mesh, 0.13);
+    const auto [nx, ny, nz] = lattice.counts();
+    std::vector<Vec3d> points, expected;
+    const InsideTest test = InsideTest::create(mesh, by(InsideMethod::rays), kContext).value();
+    for (std::size_t i = 0; i < nx * ny * nz; ++i) {
+        points.push_back(lattice.point(i % nx, i / nx % ny, i / nx / ny));
+        if (test.contains(points.back())) expected.push_back(points.back());
+    }
+    InsideReport report;
+    EXPECT_EQ(points_inside(mesh, points, {}, kContext, &report).value(), expected);
+    EXPECT_EQ(report.used, InsideMethod::rays);
+    EXPECT_EQ(points_inside(mesh, points, by(InsideMethod::winding), kContext, &report).value().size(),
+              expected.size());
+    EXPECT_EQ(report.used, InsideMethod::winding);
+    EXPECT_EQ(points_inside(without_faces(mesh, 3), points, {}, kContext).error().code, ErrorCode::unsuitable);
+}
+
 TEST(InsideTest, CancelledIsNoAnswer) {
     const Mesh mesh = make_wavy_sphere({.resolution = 10});
     for (const InsideMethod method : {InsideMethod::rays, InsideMethod::winding}) {

@@ -104,6 +104,13 @@ Result<Targets> welded_targets(const Targets& targets, std::span<const Index> re
 
 } // namespace
 
+HandleRegion HandleRegion::part(double fraction) const {
+    HandleRegion part = *this;
+    part.move *= fraction;
+    part.rotation.angle() *= fraction;
+    return part;
+}
+
 Result<Mesh> move_by_handles(Mesh mesh, std::span<const HandleRegion> handles, const RunContext& context) {
     const std::vector<Index> representative = weld_map(mesh.positions);
     const Result<Targets> targets =

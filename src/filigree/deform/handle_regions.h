@@ -25,6 +25,9 @@ struct HandleRegion {
     Vec3d move = Vec3d::Zero();                          ///< model units
     Eigen::AngleAxisd rotation = Eigen::AngleAxisd::Identity();
     std::optional<Vec3d> centre = {}; ///< world coordinates; unset: the middle of the region's vertices
+
+    /// On the way from rest (0) to where it goes (1).
+    HandleRegion part(double fraction) const;
 };
 
 /// Every vertex of the mesh, by one solve over all of them; normals turn along. Vertices at one place move together.

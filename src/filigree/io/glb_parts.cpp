@@ -2,6 +2,7 @@
 
 #include "filigree/core/srgb.h"
 #include "filigree/io/file.h"
+#include "filigree/io/losses.h"
 #include "filigree/mesh/normals.h"
 #include "filigree/mesh/triangulate.h"
 
@@ -227,7 +228,7 @@ std::vector<std::string> what_is_lost(const Mesh& mesh, bool by_object) {
     std::vector<std::string> lost;
     bool polygons = false;
     for (std::size_t f = 0; f < mesh.face_count() && !polygons; ++f) polygons = mesh.face_size(f) > 3;
-    if (polygons) lost.emplace_back("faces of more than three corners (cut into triangles)");
+    if (polygons) lost.emplace_back(kPolygonLoss);
     if (!by_object && !mesh.objects.empty()) lost.emplace_back("objects");
     if (!mesh.groups.empty()) lost.emplace_back("groups");
     if (!mesh.smoothing.empty()) lost.emplace_back("smoothing groups");

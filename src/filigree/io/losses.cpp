@@ -8,11 +8,14 @@
 
 namespace filigree {
 
-std::string cannot_hold(const std::string& what, const std::vector<std::string>& lost) {
+std::string cannot_hold(const std::string& what, std::vector<std::string> lost) {
+    const bool has_polygons = std::erase(lost, kPolygonLoss) > 0;
     std::string sentence = what + " cannot hold ";
+    if (lost.empty()) return sentence + kPolygonLoss + "; cut into triangles.";
     for (std::size_t i = 0; i < lost.size(); ++i)
         sentence += (i == 0 ? "" : i + 1 < lost.size() ? ", " : " and ") + lost[i];
-    return sentence + "; left out.";
+    sentence += "; left out.";
+    return has_polygons ? sentence + " Faces of more than three corners are cut into triangles." : sentence;
 }
 
 void add_face_label_losses(const Mesh& mesh, std::vector<std::string>& lost) {

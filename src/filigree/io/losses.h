@@ -8,8 +8,11 @@
 
 namespace filigree {
 
-/// "WHAT cannot hold a, b and c; left out." Each loss is a noun.
-std::string cannot_hold(const std::string& what, const std::vector<std::string>& lost);
+/// The loss of formats that hold triangles alone: not left out like others, but cut.
+inline constexpr const char* kPolygonLoss = "faces of more than three corners";
+
+/// "WHAT cannot hold a, b and c; left out.", and of polygons that they are cut. Each loss is a noun.
+std::string cannot_hold(const std::string& what, std::vector<std::string> lost);
 
 /// Names what a format without face labels loses.
 void add_face_label_losses(const Mesh& mesh, std::vector<std::string>& lost);

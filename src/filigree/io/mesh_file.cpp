@@ -258,6 +258,10 @@ Result<std::vector<std::string>> write_mesh(const Mesh& mesh, MeshFormat format,
 
 Result<std::vector<std::string>> write_mesh(const Mesh& mesh, const std::filesystem::path& path,
                                             const WriteMeshOptions& options, const RunContext& context) {
+    if (const std::string wrong = check_mesh(mesh); !wrong.empty())
+        return Error{ErrorCode::unsuitable, path.string() +
+                                                ": not written: the result is beyond what numbers can hold (" + wrong +
+                                                "); deform less."};
     const Result<MeshFormat> format = options.format ? Result<MeshFormat>(*options.format) : mesh_format(path);
     if (!format.ok()) return format.error();
     if (*format == MeshFormat::gltf && lower_extension(path) == ".gltf")

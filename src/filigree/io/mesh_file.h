@@ -47,11 +47,12 @@ struct WriteMeshOptions {
 /// "-" writes standard output and needs `options.format`. Embedded materials go beside an OBJ x.obj as x.mtl and
 /// x_NAME.png or .jpg; other files that have these names already are not replaced (x_2.mtl). Returns the warnings: one
 /// sentence that lists what the format cannot hold, and one for each texture that is missing.
-/// Errors: unsupported, unwritable, out_of_memory, cancelled.
+/// Errors: unsuitable (check_mesh refuses the mesh, whose numbers a deformation may have taken too far), unsupported,
+/// unwritable, out_of_memory, cancelled.
 Result<std::vector<std::string>> write_mesh(const Mesh& mesh, const std::filesystem::path& path,
                                             const WriteMeshOptions& options, const RunContext& context);
-/// The bytes of a file of that format into `bytes` (options.format does not count here). Same warnings; errors:
-/// unsupported, out_of_memory, cancelled.
+/// The bytes of a file of that format into `bytes` (options.format does not count here). mesh: passes check_mesh. Same
+/// warnings; errors: unsupported, out_of_memory, cancelled.
 Result<std::vector<std::string>> write_mesh(const Mesh& mesh, MeshFormat format, std::string& bytes,
                                             const WriteMeshOptions& options, const RunContext& context);
 

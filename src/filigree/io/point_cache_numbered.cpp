@@ -215,10 +215,6 @@ private:
             mesh->embedded_materials.clear();
             add_new(warnings_, {"OBJ files of a sequence do not have embedded materials; left out."});
         }
-        if (const std::string wrong = check_mesh(*mesh); !wrong.empty())
-            return Error{ErrorCode::unsuitable, target.string() +
-                                                    ": not written: it is beyond what numbers can hold (" + wrong +
-                                                    "); deform less."};
         const auto written = write_mesh(*mesh, file, {}, silent_);
         if (!written) return renamed(written.error(), file, target);
         add_new(warnings_, *written);

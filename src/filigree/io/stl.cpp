@@ -293,8 +293,7 @@ std::vector<std::string> write_stl(const Mesh& mesh, const WriteMeshOptions& opt
     else
         write_binary(mesh, faces.triangles, bytes);
     std::vector<std::string> lost;
-    if (faces.triangles.size() != mesh.face_count())
-        lost.emplace_back("faces of more than three corners (cut into triangles)");
+    if (faces.triangles.size() != mesh.face_count()) lost.emplace_back(kPolygonLoss);
     if (!options.ascii && !mesh.origin.isZero(0)) lost.emplace_back("all digits of positions this far from zero");
     if (!mesh.uvs.empty()) lost.emplace_back("UVs");
     if (!mesh.normals.empty()) lost.emplace_back("vertex normals");

@@ -1,9 +1,20 @@
 #include "filigree/sample/frustum.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
 namespace filigree {
+
+Frustum frustum_around(const Box& box, const std::optional<Vec3d>& eye) {
+    Frustum frustum;
+    frustum.target = box.centre();
+    frustum.eye = eye.value_or(Vec3d(box.centre() + 2.2 * box.diagonal() * Vec3d(0.25, 0.2, 1).normalized()));
+    const double distance = (frustum.eye - frustum.target).norm(), reach = 0.5 * box.diagonal();
+    frustum.near = std::max(distance - reach, 1e-3 * distance);
+    frustum.far = distance + reach;
+    return frustum;
+}
 
 Result<std::vector<Vec3d>> frustum_points(const Frustum& frustum) {
     const double count = double(frustum.counts[0]) * double(frustum.counts[1]) * double(frustum.counts[2]);

@@ -1,5 +1,7 @@
 #include "filigree/sample/inside_test.h"
 
+#include <chrono>
+
 namespace filigree {
 
 namespace {
@@ -36,6 +38,27 @@ Result<std::vector<std::uint8_t>> InsideTest::contains(std::span<const Vec3d> po
     std::vector<std::uint8_t> inside(points.size());
     for (std::size_t i = 0; i < inside.size(); ++i) inside[i] = (*windings)[i] >= float(kInside);
     return inside;
+}
+
+Result<std::vector<Vec3d>> points_inside(const Mesh& mesh, std::span<const Vec3d> points, InsideOptions options,
+                                         const RunContext& context, InsideReport* report) {
+    using Clock = std::chrono::steady_clock;
+    if (options.method == InsideMethod::automatic) options.method = InsideMethod::rays;
+    const Clock::time_point begin = Clock::now();
+    const Result<InsideTest> test = InsideTest::create(mesh, options, context);
+    if (!test) return test.error();
+    const Clock::time_point prepared = Clock::now();
+    const Result<std::vector<std::uint8_t>> inside = test->contains(points, context);
+    if (!inside) return inside.error();
+    if (report) {
+        report->used = test->used();
+        report->setup_seconds = std::chrono::duration<double>(prepared - begin).count();
+        report->seconds = std::chrono::duration<double>(Clock::now() - prepared).count();
+    }
+    std::vector<Vec3d> chosen;
+    for (std::size_t i = 0; i < points.size(); ++i)
+        if ((*inside)[i]) chosen.push_back(points[i]);
+    return chosen;
 }
 
 } // namespace filigree

@@ -25,4 +25,8 @@ private:
     std::optional<WindingTree> winding_;
 };
 
+/// Those of the points that are inside, by rays unless the options say how. Errors: as InsideTest.
+Result<std::vector<Vec3d>> points_inside(const Mesh& mesh, std::span<const Vec3d> points, InsideOptions options,
+                                         const RunContext& context, InsideReport* report = nullptr);
+
 } // namespace filigree
