@@ -131,42 +131,42 @@ void run_demo(const DemoArguments& options, Session& session) {
     const double ours = driver_seconds + restore_seconds;
     const VertexDistance& d = *with_gradients.vertices;
     const VertexDistance& p = *positions_only.vertices;
-    Table table;
-    table.row("mesh", fmt::format("{} vertices, {} faces  ({})", with_commas(mesh.vertex_count()),
-                                  with_commas(mesh.face_count()), input.empty() ? "the report's wavy cube" : input));
-    table.row("driver", fmt::format("{} vertices, stripped in {}", with_commas(model.driver().vertices.size()),
-                                    seconds_text(strip_seconds)));
-    table.row("deform every vertex", seconds_text(full_seconds));
-    table.row("deform driver, restore", fmt::format("{}  ({} + {})", seconds_text(ours), seconds_text(driver_seconds),
-                                                    seconds_text(restore_seconds)));
-    table.row("speed ratio", fmt::format("{:.1f} times", full_seconds / ours));
-    table.row("difference, rms", distance_text(with_gradients, d.rms));
-    table.row("normals off by",
-              fmt::format("{:.2g} degrees (95 % of them by less than {:.2g})", d.normal_mean_deg, d.normal_p95_deg));
-    table.row("without gradients", fmt::format("rms {:.2e} of the diagonal, 95 % of normals within {:.2g} degrees",
-                                               positions_only.relative(p.rms), p.normal_p95_deg));
-    table.row("files", folder + "/: mesh, driver, driver_bent, restored, full_deformation (.ply), model.fil");
-    if (!pictures_made.empty()) table.row("to look at", fmt::format("{}", fmt::join(pictures_made, ", ")));
-    session.print(table.text(), {{"mesh", input.empty() ? "wavy-cube" : input},
-                                 {"output", folder},
-                                 {"pictures", pictures_made},
-                                 {"vertices", mesh.vertex_count()},
-                                 {"driver_vertices", model.driver().vertices.size()},
-                                 {"read_seconds", read - start},
-                                 {"strip_seconds", strip_seconds},
-                                 {"full_seconds", full_seconds},
-                                 {"driver_seconds", driver_seconds},
-                                 {"restore_seconds", restore_seconds},
-                                 {"speed_ratio", full_seconds / ours},
-                                 {"rms", with_gradients.relative(d.rms)},
-                                 {"rms_units", d.rms},
-                                 {"max", with_gradients.relative(d.max)},
-                                 {"max_units", d.max},
-                                 {"normal_mean_deg", d.normal_mean_deg},
-                                 {"normal_p95_deg", d.normal_p95_deg},
-                                 {"positions_only_rms", positions_only.relative(p.rms)},
-                                 {"positions_only_rms_units", p.rms},
-                                 {"positions_only_normal_p95_deg", p.normal_p95_deg}});
+    Report report;
+    report.row("mesh", fmt::format("{} vertices, {} faces  ({})", with_commas(mesh.vertex_count()),
+                                   with_commas(mesh.face_count()), input.empty() ? "the report's wavy cube" : input));
+    report.row("driver", fmt::format("{} vertices, stripped in {}", with_commas(model.driver().vertices.size()),
+                                     seconds_text(strip_seconds)));
+    report.row("deform every vertex", seconds_text(full_seconds));
+    report.row("deform driver, restore", fmt::format("{}  ({} + {})", seconds_text(ours), seconds_text(driver_seconds),
+                                                     seconds_text(restore_seconds)));
+    report.row("speed ratio", fmt::format("{:.1f} times", full_seconds / ours));
+    report.row("difference, rms", distance_text(with_gradients, d.rms));
+    report.row("normals off by",
+               fmt::format("{:.2g} degrees (95 % of them by less than {:.2g})", d.normal_mean_deg, d.normal_p95_deg));
+    report.row("without gradients", fmt::format("rms {:.2e} of the diagonal, 95 % of normals within {:.2g} degrees",
+                                                positions_only.relative(p.rms), p.normal_p95_deg));
+    report.row("files", folder + "/: mesh, driver, driver_bent, restored, full_deformation (.ply), model.fil");
+    if (!pictures_made.empty()) report.row("to look at", fmt::format("{}", fmt::join(pictures_made, ", ")));
+    session.print(report.text(), {{"mesh", input.empty() ? "wavy-cube" : input},
+                                  {"output", folder},
+                                  {"pictures", pictures_made},
+                                  {"vertices", mesh.vertex_count()},
+                                  {"driver_vertices", model.driver().vertices.size()},
+                                  {"read_seconds", read - start},
+                                  {"strip_seconds", strip_seconds},
+                                  {"full_seconds", full_seconds},
+                                  {"driver_seconds", driver_seconds},
+                                  {"restore_seconds", restore_seconds},
+                                  {"speed_ratio", full_seconds / ours},
+                                  {"rms", with_gradients.relative(d.rms)},
+                                  {"rms_units", d.rms},
+                                  {"max", with_gradients.relative(d.max)},
+                                  {"max_units", d.max},
+                                  {"normal_mean_deg", d.normal_mean_deg},
+                                  {"normal_p95_deg", d.normal_p95_deg},
+                                  {"positions_only_rms", positions_only.relative(p.rms)},
+                                  {"positions_only_rms_units", p.rms},
+                                  {"positions_only_normal_p95_deg", p.normal_p95_deg}});
 }
 
 } // namespace

@@ -127,11 +127,6 @@ void Json::push_back(Json value) {
     std::get<std::vector<Json>>(value_->plain).push_back(std::move(value));
 }
 
-void Json::update(const Json& object) {
-    const auto& members = std::get<Object>(object.value_->plain);
-    for (std::size_t k = 0; k < members.keys.size(); ++k) (*this)[members.keys[k]] = members.values[k];
-}
-
 bool Json::is_object() const { return get_if<Object>(); }
 
 bool Json::empty() const {

@@ -47,8 +47,6 @@ public:
     Json& at(std::size_t place);
     /// A null becomes a list.
     void push_back(Json value);
-    /// Adds an object's keys, or replaces their values.
-    void update(const Json& object);
 
     bool is_object() const;
     /// Of a list or an object: whether nothing is in it.

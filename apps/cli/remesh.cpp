@@ -5,8 +5,6 @@
 #include "filigree/present/patch_drawing.h"
 #include "filigree/remesh/quad_remesh.h"
 
-#include <filesystem>
-
 #include <fmt/format.h>
 
 namespace filigree::cli {
@@ -178,14 +176,6 @@ void check_outputs(const RemeshArguments& options) {
     if (!options.picture.empty()) check_png_path(options.picture);
 }
 
-/// Formats that hold triangles only lose what the command is for.
-void warn_of_triangles(const std::string& path, Session& session) {
-    if (path == "-") return;
-    const MeshFormat format = require(mesh_format(path));
-    if (format == MeshFormat::stl || format == MeshFormat::gltf)
-        session.warn(path + ": holds triangles only, so each quad is split in two; write .ply or .obj to keep quads.");
-}
-
 void run(RemeshArguments options, Session& session) {
     check_outputs(options);
     const double start = now_seconds();
@@ -194,7 +184,6 @@ void run(RemeshArguments options, Session& session) {
     options.remesh.attributes = !options.no_attributes;
     const QuadRemeshed result = require(quad_remesh(mesh, options.remesh, session.context()));
     const double remeshed = now_seconds();
-    warn_of_triangles(options.output, session);
     session.write_mesh(result.mesh, options.output, options.input);
     if (!options.base.empty()) session.write_mesh(base_mesh(result), options.base);
     const double written = now_seconds();

@@ -15,12 +15,12 @@ void Report::count(std::string title, const std::string& key, std::size_t count)
     add(std::move(title), with_commas(count), key, count);
 }
 
-std::string Table::text() const {
+std::string Report::text() const {
     std::size_t width = 0;
     for (const auto& [title, value] : rows_) width = std::max(width, title.size());
     std::string text;
     for (const auto& [title, value] : rows_) text += fmt::format("{:<{}}  {}\n", title, width, value);
-    return text;
+    return text + lines_;
 }
 
 std::string seconds_text(double seconds) {

@@ -11,17 +11,6 @@
 
 namespace filigree::cli {
 
-/// Lines "title   text" with the texts in one column.
-class Table {
-public:
-    void row(std::string title, std::string text) { rows_.emplace_back(std::move(title), std::move(text)); }
-    void append(const Table& other) { rows_.insert(rows_.end(), other.rows_.begin(), other.rows_.end()); }
-    std::string text() const;
-
-private:
-    std::vector<std::pair<std::string, std::string>> rows_;
-};
-
 /// Facts in the order in which they are said. A fact is a line "title   text" of the table, and a value under a key of
 /// the JSON; some are only one of the two.
 class Report {
@@ -31,19 +20,21 @@ public:
     /// A count for both, "1,234,567" for people.
     void count(std::string title, const std::string& key, std::size_t count);
     /// A line for people.
-    void row(std::string title, std::string text) { table_.row(std::move(title), std::move(text)); }
+    void row(std::string title, std::string text) { rows_.emplace_back(std::move(title), std::move(text)); }
+    /// The other's lines of the table.
+    void add_rows(const Report& other) { rows_.insert(rows_.end(), other.rows_.begin(), other.rows_.end()); }
     /// A value for programs; `set(key)` to fill it in.
     Json& set(const std::string& key) { return values_[key]; }
     void set(const std::string& key, Json value) { values_[key] = std::move(value); }
     /// Text for people below the table; whole lines.
     void say(const std::string& lines) { lines_ += lines; }
 
-    std::string text() const { return table_.text() + lines_; }
-    const Table& table() const { return table_; }
+    /// The table, with its texts in one column, and what is below.
+    std::string text() const;
     const Json& json() const { return values_; }
 
 private:
-    Table table_;
+    std::vector<std::pair<std::string, std::string>> rows_; ///< title and text
     std::string lines_;
     Json values_ = Json::object();
 };

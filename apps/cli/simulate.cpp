@@ -182,7 +182,7 @@ private:
                                        options_.animation,
                                        model_path(path, ready_.bodies.size(), ready_.bodies[b].name),
                                        scene_.bodies[b].mesh, session_, report);
-                animation_rows_.append(report.table());
+                animation_rows_.add_rows(report);
                 animations_.push_back(report.json());
             }
     }
@@ -230,7 +230,7 @@ private:
     ReadyScene ready_;
     std::optional<SceneRun> run_;
     std::vector<FinerCheck> finer_; ///< one a body where that was asked for
-    Table animation_rows_;
+    Report animation_rows_;
     Json animations_ = Json::array();
     double film_seconds_ = 0, write_seconds_ = 0;
 };

@@ -118,7 +118,8 @@ TEST(GlbWriter, OneValueAVertexLeavesVerticesAsTheyAre) {
     EXPECT_FALSE(glb.json["meshes"][0].contains("extras")); // nothing to be undone
     EXPECT_EQ(glb.indices().size(), 3 * (1 + 2 + 3 + 1));
     ASSERT_EQ(warnings.size(), 1u);
-    EXPECT_EQ(warnings[0], "GLB cannot hold faces of more than three corners; cut into triangles.");
+    EXPECT_EQ(warnings[0],
+              "GLB cannot hold faces of more than three corners; cut into triangles. PLY and OBJ keep them.");
 }
 
 TEST(GlbWriter, CornersThatDifferGetCopiesBehindTheMeshsVertices) {

@@ -11,11 +11,12 @@ namespace filigree {
 std::string cannot_hold(const std::string& what, std::vector<std::string> lost) {
     const bool has_polygons = std::erase(lost, kPolygonLoss) > 0;
     std::string sentence = what + " cannot hold ";
-    if (lost.empty()) return sentence + kPolygonLoss + "; cut into triangles.";
+    if (lost.empty()) return sentence + kPolygonLoss + "; cut into triangles. PLY and OBJ keep them.";
     for (std::size_t i = 0; i < lost.size(); ++i)
         sentence += (i == 0 ? "" : i + 1 < lost.size() ? ", " : " and ") + lost[i];
     sentence += "; left out.";
-    return has_polygons ? sentence + " Faces of more than three corners are cut into triangles." : sentence;
+    return has_polygons ? sentence + " Faces of more than three corners are cut into triangles; PLY and OBJ keep them."
+                        : sentence;
 }
 
 void add_face_label_losses(const Mesh& mesh, std::vector<std::string>& lost) {
