@@ -9,7 +9,6 @@
 #include "filigree/hierarchy/height_law.h"
 
 #include <algorithm>
-#include <bit>
 #include <cstddef>
 #include <cstdint>
 
@@ -66,7 +65,8 @@ template <class F>
 FILIGREE_INLINE F bounded_inverse_sqrt(F a) {
     using Int = typename IntOf<F>::type;
     a = at_least(a, kTinySquare);
-    F y = std::bit_cast<F>(0x5f375a86 - (std::bit_cast<Int>(a) >> 1));
+    // No std::bit_cast: where it is not inlined (-Og), it is a call with other registers than its caller's widths have.
+    F y = __builtin_bit_cast(F, 0x5f375a86 - (__builtin_bit_cast(Int, a) >> 1));
     F t = a * y * y;
     y = y * (1.875f - t * (1.25f - 0.375f * t));
     t = a * y * y;
