@@ -45,7 +45,7 @@ TEST(Frustum, AroundABoxReachesFromBeforeToBehindIt) {
         const Frustum frustum = frustum_around(box, eye);
         const auto [least, most] = depths(frustum, box);
         EXPECT_EQ(frustum.target, box.centre());
-        if (eye) EXPECT_EQ(frustum.eye, *eye);
+        EXPECT_EQ(frustum.eye, eye.value_or(frustum.eye));
         EXPECT_LE(frustum.near, least);
         EXPECT_GE(frustum.far, most);
         EXPECT_LT(frustum.far - frustum.near, 1.001 * box.diagonal());
