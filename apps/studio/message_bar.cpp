@@ -66,6 +66,12 @@ void MessageBar::place() {
               (icon_->isHidden() ? 0 : icon_->sizeHint().width()));
     const int height = std::max(layout()->totalHeightForWidth(width), layout()->totalMinimumSize().height());
     setGeometry((parentWidget()->width() - width) / 2, margin, width, height);
+    if (isVisible()) Q_EMIT covers(margin + height);
+}
+
+void MessageBar::hideEvent(QHideEvent* event) {
+    QFrame::hideEvent(event);
+    if (isHidden()) Q_EMIT covers(0); // not when the window alone is hidden
 }
 
 void MessageBar::show_text(int width) {

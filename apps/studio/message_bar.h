@@ -17,7 +17,11 @@ public:
     void show_message(const QString& sentence, bool is_error);
     QString message() const; ///< "" when it is hidden
 
+Q_SIGNALS:
+    void covers(int height); ///< so much of the parent's top, pixels; 0: none, it is hidden
+
 protected:
+    void hideEvent(QHideEvent* event) override;
     bool eventFilter(QObject* object, QEvent* event) override;
     void paintEvent(QPaintEvent* event) override;
     void changeEvent(QEvent* event) override;

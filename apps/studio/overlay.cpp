@@ -96,7 +96,7 @@ public:
                 const double x = std::round(tile.left()) + 0.5;
                 painter_.drawLine(QPointF(x, tile.top()), QPointF(x, tile.bottom()));
             }
-            label(QPointF(tile.center().x(), tile.top() + kMargin),
+            label(QPointF(tile.center().x(), area_.top() + kMargin),
                   detail.isEmpty() ? title : title + "\n" + wrapped(detail, tile.width() - 2 * kMargin - 16),
                   Qt::AlignHCenter);
         }
@@ -298,9 +298,14 @@ void Overlay::set(OverlayContent content) {
     update();
 }
 
+void Overlay::set_covered(int height) {
+    covered_ = height;
+    update();
+}
+
 void Overlay::paintEvent(QPaintEvent*) {
     QPainter painter(this);
-    Sheet sheet(painter, palette(), rect());
+    Sheet sheet(painter, palette(), rect().adjusted(0, covered_, 0, 0));
     const OverlayContent& c = content_;
     if (!c.trouble.empty()) {
         painter.fillRect(rect(), palette().window());
@@ -313,7 +318,7 @@ void Overlay::paintEvent(QPaintEvent*) {
     if (c.pull) sheet.pull(*c.pull);
     if (c.hover) sheet.hover(*c.hover, c.hover_radius);
     sheet.captions(c.captions);
-    double top = c.captions.empty() ? kMargin : kMargin + 52; // below the captions
+    double top = covered_ + (c.captions.empty() ? kMargin : kMargin + 52); // below the captions
     for (const QString& text : {c.note, c.defect_summary})
         if (!text.isEmpty()) top = sheet.label(QPointF(kMargin, top), text, Qt::AlignLeft).bottom() + 6;
     if (c.shows_triad) sheet.triad(c);

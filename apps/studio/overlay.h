@@ -74,6 +74,7 @@ class Overlay : public QWidget {
 public:
     explicit Overlay(QWidget* parent);
     void set(OverlayContent content);
+    void set_covered(int height); ///< by something else over the top: what stands there begins below
     const OverlayContent& content() const { return content_; }
 
 protected:
@@ -81,6 +82,7 @@ protected:
 
 private:
     OverlayContent content_;
+    int covered_ = 0;
 };
 
 } // namespace filigree::studio

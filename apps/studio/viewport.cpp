@@ -117,6 +117,7 @@ Viewport::~Viewport() {
 const Timings& Viewport::timings() const { return impl_->timings; }
 const std::string& Viewport::trouble() const { return impl_->trouble; }
 void Viewport::set_animated(bool animated) { impl_->camera.set_animated(animated); }
+void Viewport::set_covered(int height) { impl_->overlay->set_covered(height); }
 void Viewport::look_from(View view) { impl_->camera.show_all_from(view_direction(view, impl_->settings().up)); }
 void Viewport::show_all() { impl_->camera.show_all(); }
 QPointF Viewport::place_of(const Vec3d& world) const { return impl_->camera.place_of(world); }

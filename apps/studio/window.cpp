@@ -188,6 +188,7 @@ QWidget* MainWindow::Impl::make_middle(MainWindow& window) {
     over->setContentsMargins(0, 0, 0, 0);
     over->addWidget(viewport);
     messages = new MessageBar(picture);
+    connect(messages, &MessageBar::covers, viewport, &Viewport::set_covered);
     auto* column = new QVBoxLayout(middle);
     column->setContentsMargins(0, 0, 0, 0);
     column->setSpacing(0);

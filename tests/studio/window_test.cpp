@@ -1,4 +1,5 @@
 #include "one_window.h"
+#include "overlay.h"
 #include "panel.h"
 
 #include <QApplication>
@@ -114,6 +115,37 @@ TEST_F(Window, ErrorsAreToldWithTheFilesName) {
     EXPECT_EQ(window->message(), "");
     window->show_message("All is well.", false);
     EXPECT_EQ(window->message(), "All is well.");
+}
+
+TEST_F(Window, AMessageHidesNothingThatIsWrittenInThePicture) {
+    window->show();
+    ASSERT_TRUE(QTest::qWaitForWindowExposed(window));
+    workbench().view().edit([](ViewSettings& settings) { settings.level_by_distance = settings.split = true; });
+    auto* overlay = static_cast<Overlay*>(window->findChild<QWidget*>("viewport.overlay"));
+    const auto is_written = [&] {
+        return overlay->content().captions.size() == 3 && overlay->content().note.contains("Level");
+    };
+    ASSERT_TRUE(QTest::qWaitFor(is_written, 20'000));
+    /// The first row with something written in it.
+    const auto top = [&] {
+        QImage image(overlay->size(), QImage::Format_ARGB32_Premultiplied);
+        image.fill(Qt::transparent);
+        overlay->render(&image, {}, {}, {});
+        const int separator = image.width() / 3; // goes all the way up
+        for (int y = 0; y < image.height(); ++y)
+            for (int x = 0; x < separator - 5; ++x)
+                if (qAlpha(image.pixel(x, y)) > 0) return y;
+        return image.height();
+    };
+    window->show_message("", false);
+    const int before = top();
+    EXPECT_LT(before, 20);
+    window->show_message("A sentence.", true);
+    auto* bar = window->findChild<QWidget*>("message");
+    EXPECT_GT(top(), bar->geometry().bottom());
+    window->findChild<QToolButton*>("message.close")->click();
+    EXPECT_EQ(top(), before);
+    workbench().view().edit([](ViewSettings& settings) { settings.level_by_distance = settings.split = false; });
 }
 
 TEST_F(Window, UnsavedChangesAreAskedFor) {
