@@ -288,6 +288,8 @@ std::vector<Command> Actions::Impl::body_menu() {
     return {
         {"body.make", "&Make body", "Fills the mesh with particles and drops it on the ground", "Ctrl+B",
          [this] { workbench.make_body(); }, has_model},
+        {"body.fit_driver", "&Fit driver", "Takes a driver as fine as the body's particles, and makes the body again",
+         "", [this] { workbench.fit_driver(); }, [this] { return workbench.playback().has_body(); }},
         {"body.animate", "A&nimate", "Drops the mesh on the ground as a soft body and plays", "A",
          [this] {
              workbench.animate();

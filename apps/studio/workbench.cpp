@@ -45,9 +45,13 @@ Workbench::Workbench(QObject* parent) : QObject(parent), impl_(std::make_unique<
         commit_recording(); // what there was before
     });
     connect(&jobs_, &Jobs::failed, this, tell);
-    connect(&jobs_, &Jobs::failed, this, [this] { impl_->then = After::nothing; });
-    connect(&jobs_, &Jobs::cancelled, this, [this](const QString& title) {
+    const auto forget_plans = [this] {
         impl_->then = After::nothing;
+        impl_->fits_driver = false;
+    };
+    connect(&jobs_, &Jobs::failed, this, forget_plans);
+    connect(&jobs_, &Jobs::cancelled, this, [this, forget_plans](const QString& title) {
+        forget_plans();
         Q_EMIT told(title + ": cancelled.", false);
     });
     connect(&drag_, &HandleDrag::solved, this, &Workbench::show_drag);
@@ -92,6 +96,7 @@ void Workbench::follow_document(const State& before) {
                                (mode_ == Mode::deform || now.recording == before.recording || impl_->keeps_body);
     if (!is_same_shape || now.restore != before.restore) show_pose();
     if (!is_same_motion) Q_EMIT timeline_changed();
+    if (now.model != before.model && std::exchange(impl_->fits_driver, false)) make_body();
     if (impl_->is_opening || (now.source != before.source && impl_->is_another_shape)) Q_EMIT opened();
 }
 

@@ -81,6 +81,10 @@ public:
     // Body
     void set_body(const BodySettings& settings, const std::string& merge = {}); ///< a body that was made is made again
     void make_body();
+    /// Strips to a driver as fine as the body's particles, and makes the body again. Needs a body.
+    void fit_driver();
+    /// What is wrong with the body there is; "" when nothing is.
+    QString body_warning() const;
     void play(); ///< replays from the frame shown, then goes on simulating; makes the body where there is none
     void pause();
     void step();

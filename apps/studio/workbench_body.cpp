@@ -5,10 +5,30 @@
 #include "pins.h"
 #include "words.h"
 
+#include "filigree/scene/body_driver.h"
+
 #include <algorithm>
 #include <cmath>
 
 namespace filigree::studio {
+
+namespace {
+
+/// The library's words name options of the command line; here there is a command for them.
+QString warning_of(const DroppedBody& made) {
+    const DriverEdges edges = measure_driver(*made.model, *made.body);
+    const std::string coarse = driver_warning(edges, *made.model, *made.body);
+    QString text = QString::fromStdString(made.report.warning);
+    if (coarse.empty()) return text;
+    return text.replace(
+        QString::fromStdString(coarse),
+        QStringLiteral("%1 % of the mesh hangs on driver triangles that are too long to follow the particles: "
+                       "Fit driver takes one of about %2 vertices.")
+            .arg(100 * edges.on_long_edges, 0, 'f', 0)
+            .arg(with_commas(*body_driver_options(made.model->mesh, *made.body).base)));
+}
+
+} // namespace
 
 void Workbench::set_body(const BodySettings& settings, const std::string& merge) {
     if (settings == state().body) return;
@@ -30,6 +50,15 @@ void Workbench::set_body(const BodySettings& settings, const std::string& merge)
 }
 
 void Workbench::make_body() { make_body_then(After::nothing); }
+
+void Workbench::fit_driver() {
+    if (!playback_.has_body()) return;
+    pause();
+    impl_->fits_driver = true;
+    set_strip(body_driver_options(state().model->mesh, *playback_.made()->body));
+}
+
+QString Workbench::body_warning() const { return playback_.has_body() ? impl_->body_warning : QString(); }
 
 void Workbench::make_body_then(After then) {
     impl_->then = then;
@@ -64,13 +93,14 @@ void Workbench::put_body(std::shared_ptr<const DroppedBody> made) {
     impl_->replay.stop();
     impl_->keeps_body = true;
     document_.edit("Make a body", [](State& next) { next.recording = nullptr; });
+    impl_->body_warning = warning_of(*made);
     playback_.put(made);
     impl_->keeps_body = false;
     frame_ = 0;
     set_mode(Mode::body);
     show_pose();
     Q_EMIT timeline_changed();
-    if (!made->report.warning.empty()) Q_EMIT told(QString::fromStdString(made->report.warning), false);
+    if (!body_warning().isEmpty()) Q_EMIT told(body_warning(), false);
     const bool is_deformed = !state().warps.none() || state().handle_pose;
     if (is_deformed && !std::exchange(impl_->told_of_rest, true))
         Q_EMIT told("A body is made of the shape at rest, without its deformation.", false);

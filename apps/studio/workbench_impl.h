@@ -38,9 +38,11 @@ struct Workbench::Impl {
     After then = After::nothing; ///< once the body is made
     std::size_t looked_at = 0;   ///< frame of the last moment of the body, shown or not
     bool told_of_rest = false;   ///< that a body is made of the shape at rest
-    bool keeps_body = false;     ///< a step of our own, after which the body still fits
-    bool commits_steps = false;  ///< once they are delivered
-    bool measures_next = false;  ///< the error, once every vertex is delivered
+    QString body_warning;
+    bool fits_driver = false;   ///< with the next model a body is to be made
+    bool keeps_body = false;    ///< a step of our own, after which the body still fits
+    bool commits_steps = false; ///< once they are delivered
+    bool measures_next = false; ///< the error, once every vertex is delivered
     bool is_opening = false, is_another_shape = false;
 };
 

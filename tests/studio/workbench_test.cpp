@@ -577,6 +577,31 @@ TEST_F(WorkbenchTest, BodySettingsMakeTheBodyAgain) {
     EXPECT_FALSE(bench.playback().has_body());
 }
 
+TEST_F(WorkbenchTest, ADriverTooCoarseForTheBodyIsToldAndFitted) {
+    make_small_shape();
+    bench.set_strip({.base = 20});
+    bench.wait_until_idle();
+    EXPECT_EQ(bench.body_warning(), "") << "there is no body";
+    notes.clear();
+    bench.make_body();
+    bench.wait_until_idle();
+    const std::string warning = bench.body_warning().toStdString();
+    EXPECT_NE(warning.find("Fit driver"), std::string::npos) << warning;
+    EXPECT_EQ(warning.find("--"), std::string::npos) << "that is for the command line: " << warning;
+    EXPECT_EQ(notes, std::vector{warning});
+
+    bench.fit_driver();
+    bench.wait_until_idle();
+    EXPECT_TRUE(bench.playback().has_body());
+    EXPECT_EQ(bench.mode(), Mode::body);
+    EXPECT_EQ(bench.body_warning(), "");
+    EXPECT_GT(state().model->driver().vertices.size(), 20u);
+    bench.set_strip({.base = 20}); // no body is made of its own accord
+    bench.wait_until_idle();
+    EXPECT_FALSE(bench.playback().has_body());
+    EXPECT_TRUE(errors.empty());
+}
+
 TEST_F(WorkbenchTest, WhatCannotBeABodyIsTold) {
     ASSERT_TRUE(write_file(path("point.obj"), "v 1 2 3\n").ok());
     bench.open(path("point.obj"));

@@ -147,6 +147,8 @@ void BodyPanel::add_motion(const Actions& actions) {
                                       [this](const ViewSettings&) { return workbench().playback().has_body(); })));
     rows->addLayout(buttons, rows->rowCount(), 0, 1, 3);
     report_ = text(rows, "body.report", Tone::quiet);
+    fit_driver_ = new ActionButton("body.fit", actions.find("body.fit_driver"), {}, page());
+    beside(rows, {fit_driver_});
 }
 
 void BodyPanel::add_world() {
@@ -236,6 +238,7 @@ void BodyPanel::refresh() {
     Panel::refresh();
     sentence_->setText(sentence());
     if (const QString text = report(); report_->text() != text) report_->setText(text);
+    fit_driver_->setVisible(!workbench().body_warning().isEmpty());
 }
 
 QString BodyPanel::sentence() const {
@@ -251,8 +254,8 @@ QString BodyPanel::report() const {
     QString text = QStringLiteral("%1, %2 mm apart, %3 kg.")
                        .arg(counted(made->body->particle_count(), "particle", "particles"),
                             number_text(1000 * made->body->spacing()), number_text(made->report.mass));
-    if (!made->report.warning.empty()) text += '\n' + QString::fromStdString(made->report.warning);
-    return text;
+    const QString warning = workbench().body_warning();
+    return warning.isEmpty() ? text : text + '\n' + warning;
 }
 
 } // namespace filigree::studio
