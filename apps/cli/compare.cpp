@@ -1,6 +1,7 @@
 #include "commands.h"
 #include "pictures.h"
 
+#include "filigree/present/error_picture.h"
 #include "filigree/present/page.h"
 
 #include <cmath>
@@ -24,20 +25,6 @@ void draw_errors(const Mesh& a, const Mesh& b, const std::string& names, const M
     const HeatMap errors =
         heat_map(distance.vertices ? distance.vertices->per_vertex : require(distances_to_surface(a, b, context)),
                  distance.diagonal);
-    HeadlessRenderer renderer = require(HeadlessRenderer::create());
-    const ScalarColors scalars{errors.values, ColorMap::sequential, errors.range};
-    const Drawable drawable = a.face_count()
-                                  ? require(Drawable::surface(a, {.scalars = scalars}, context))
-                                  : require(Drawable::points(a.positions, a.origin, {.scalars = scalars}, context));
-    constexpr unsigned kWidth = 1120, kHeight = 840;
-    const Camera camera = camera_for(a, View::iso, up, double(kWidth) / kHeight, drawable.point_radius());
-    Scene scene;
-    scene.objects.push_back({&drawable, {.gloss = 0.15f}});
-    scene.up = up;
-    const Picture picture = require(renderer.picture(scene, camera, {.width = kWidth, .height = kHeight}, context));
-    Page page(kWidth + 130, kHeight + 40);
-    page.picture(picture, {0, 0}, kWidth, kHeight);
-    page.legend(ColorMap::sequential, errors.range, "distance / diagonal", {kWidth + 14, 24}, 420);
     double sum = 0, most = 0;
     for (float value : errors.values) {
         sum += double(value) * value;
@@ -45,9 +32,7 @@ void draw_errors(const Mesh& a, const Mesh& b, const std::string& names, const M
     }
     const std::string caption = fmt::format("{}: rms {:.2e}, max {:.2e} of the diagonal", names,
                                             std::sqrt(sum / std::max<double>(1, double(errors.values.size()))), most);
-    page.text(caption, {kWidth / 2.0, kHeight + 26}, {.size = 15, .align = Align::centre});
-    if (context.is_cancelled()) throw Failure{cancelled_error()};
-    require(page.write(path, 1));
+    require(write_error_picture(a, errors, "distance / diagonal", caption, up, path, context));
 }
 
 /// The distances: fractions of the diagonal under a key, model units under the key with "_units".

@@ -1,8 +1,10 @@
 #include "animation_output.h"
 #include "commands.h"
+#include "pictures.h"
 #include "restore_options.h"
 
-#include "filigree/hierarchy/pose_error.h"
+#include "filigree/present/error_picture.h"
+#include "filigree/present/page.h"
 
 #include <filesystem>
 
@@ -32,7 +34,8 @@ const Pose& own_pose(const PoseSequence& poses, std::size_t frame, const std::st
 namespace {
 
 struct RestoreArguments {
-    std::string model, pose, poses, ghosts, output;
+    std::string model, pose, poses, ghosts, output, picture;
+    std::optional<UpAxis> up;
     std::size_t frame = 0; ///< of the model's own, from 1; 0: none
     bool all_frames = false;
     PoseFileOptions poses_file;
@@ -56,6 +59,10 @@ void check(const RestoreArguments& options, const Session& session) {
     if (options.poses.empty() && !options.poses_file.animation.empty()) refuse("--animation belongs to --poses.");
     if (!options.is_animation() && options.poses_file.frames_per_second)
         refuse("--frame-rate belongs to --poses or --frames.");
+    if (options.is_animation() && !options.picture.empty()) refuse("--picture belongs to --pose or --frame.");
+    if (!options.picture.empty() && options.restore.level)
+        refuse("--picture draws the finest level; leave out --level.");
+    if (!options.picture.empty()) check_picture_path(options.picture);
     const std::string given = given_animation_option(session);
     if (!options.is_animation() && !given.empty()) refuse(given + " belongs to --poses or --frames.");
     if (!options.is_animation()) return;
@@ -74,9 +81,21 @@ const char* source_of(const Model& model, const Pose& pose) {
     return pose.ghosts.empty() ? "positions" : "positions and ghost points";
 }
 
+/// The restored mesh, coloured by where it is expected to be off.
+void draw_expected_error(const Model& model, const PoseError::Estimate& estimate, const Mesh& mesh,
+                         const RestoreArguments& options, Session& session, Report& report) {
+    const UpAxis up = up_of(options.up, model.mesh, options.model);
+    const std::string caption = fmt::format("{}: expected error {:.2e} of the diagonal (rms)",
+                                            Page::plain(file_name(options.output)), estimate.share());
+    require(write_error_picture(mesh, expected_error_map(model, estimate), "expected / diagonal", caption, up,
+                                options.picture, session.context()));
+    report.say(fmt::format("{}: where it is expected\n", options.picture));
+    report_picture(options.picture, up, report);
+}
+
 /// What the driver is too coarse for: seen in the pose alone.
-void report_expected_error(const Model& model, const Pose& pose, const Restorer& restorer, Session& session,
-                           Report& report) {
+void report_expected_error(const Model& model, const Pose& pose, const Restorer& restorer, const Mesh& mesh,
+                           const RestoreArguments& options, Session& session, Report& report) {
     if (model.code() != DetailCode::blend) return;
     const std::vector<Mat3f> gradients = require(restorer.gradients(pose, session.context()));
     const PoseError::Estimate estimate = PoseError(model).estimate(pose, gradients);
@@ -89,6 +108,7 @@ void report_expected_error(const Model& model, const Pose& pose, const Restorer&
             fmt::format("The pose is more curved than the driver can follow: the mesh is off by about {:.2g} of "
                         "the diagonal. Strip with a finer driver (--base, or --fidelity).",
                         error));
+    if (!options.picture.empty()) draw_expected_error(model, estimate, mesh, options, session, report);
 }
 
 void restore_one(const RestoreArguments& options, Session& session) {
@@ -98,6 +118,9 @@ void restore_one(const RestoreArguments& options, Session& session) {
                               : pose_of_mesh(session.read_mesh(options.pose), model.mesh.origin);
     if (!options.ghosts.empty())
         pose.ghosts = pose_of_mesh(session.read_mesh(options.ghosts), model.mesh.origin).positions;
+    if (!options.picture.empty() && model.code() != DetailCode::blend)
+        refuse(ErrorCode::unsuitable, options.model + ": has the reference code, whose error can only be measured: "
+                                                      "'filigree compare' does, with --picture.");
     const Restorer restorer = require(Restorer::create(model, options.restore, session.context()));
     const double start = now_seconds();
     const Mesh mesh = require(with_hint(restorer.mesh(pose, session.context()), ErrorCode::mismatch,
@@ -112,7 +135,7 @@ void restore_one(const RestoreArguments& options, Session& session) {
     report.set("vertices", mesh.vertex_count());
     report.set("from", from);
     report.set("seconds", seconds);
-    report_expected_error(model, pose, restorer, session, report);
+    report_expected_error(model, pose, restorer, mesh, options, session, report);
     session.print(report);
 }
 
@@ -157,9 +180,14 @@ Command restore_command() {
                                   "and so on, or NAME_####.obj")
                                .is_written()
                                .required()} +
+                OptionList{Option("--picture", options->picture,
+                                  "Also draw the mesh coloured by the error to expect (.png, .svg, .pdf)")
+                               .is_written(),
+                           found_up_option(options->up)} +
                 restore_options(options->restore) + animation_options(options->animation),
             .examples = "  filigree restore scan.fil --pose moved.obj -o restored.ply\n"
                         "  filigree restore scan.fil --pose moved.obj -o skin.ply --thin-shell --law keep\n"
+                        "  filigree restore scan.fil --pose moved.obj -o restored.ply --picture errors.png\n"
                         "  filigree restore bounce.fil --frame 30 -o half_a_second.ply\n"
                         "  filigree restore bounce.fil --frames -o frames/\n"
                         "  filigree restore scan.fil --poses cloth.pc2 --frame-rate 24 -o detailed.pc2",

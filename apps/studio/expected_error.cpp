@@ -3,6 +3,8 @@
 #include "words.h"
 #include "workbench.h"
 
+#include "filigree/present/error_picture.h"
+
 #include <algorithm>
 
 namespace filigree::studio {
@@ -14,13 +16,6 @@ using Clock = std::chrono::steady_clock;
 const std::string kTopic = "expected error";
 constexpr std::chrono::milliseconds kLeastPause(150); // between two looks: as fast as one reads numbers
 constexpr int kPauses = 4;                            // so many times as long as a look took
-constexpr float kLeastRange = 1e-4f;                  // of the diagonal: less is not to be seen, and rounding at rest
-
-HeatMap colors_of(std::vector<float> errors, double diagonal) {
-    HeatMap map = heat_map(std::move(errors), diagonal);
-    if (!(map.range.most >= kLeastRange) || map.values.empty()) map.range = {0, kLeastRange};
-    return map;
-}
 
 bool is_judged(const State& state) { return state.model && state.model->code() == DetailCode::blend; }
 
@@ -72,11 +67,13 @@ void ExpectedError::follow() {
     if (state.model != model_ || is_at_rest || !is_judged(state)) {
         jobs_.drop(kTopic);
         model_ = state.model;
-        if (is_at_rest && is_judged(state))
-            put(PoseError::Estimate(),
-                colors_of(std::vector<float>(wants_colors_ ? model_->mesh.vertex_count() : 0), 0));
-        else
+        if (is_at_rest && is_judged(state)) {
+            PoseError::Estimate none;
+            none.local.resize(model_->driver().vertices.size());
+            put(none, wants_colors_ ? expected_error_map(*model_, none) : HeatMap());
+        } else {
             put({}, {});
+        }
     }
     if (is_at_rest || !is_judged(state)) judged_ = wanted_;
     look_soon();
@@ -115,8 +112,7 @@ void ExpectedError::look() {
             const Result<std::vector<Mat3f>> gradients = judge->restorer.gradients(pose, context);
             if (!gradients) return gradients.error();
             Judgement made{judge, judge->error.estimate(pose, *gradients), {}, {}};
-            if (with_colors)
-                made.colors = colors_of(vertex_errors(*model, made.estimate.local), made.estimate.diagonal);
+            if (with_colors) made.colors = expected_error_map(*model, made.estimate);
             made.took = Clock::now() - begin;
             return made;
         },

@@ -20,12 +20,11 @@ QString warning_of(const DroppedBody& made) {
     const std::string coarse = driver_warning(edges, *made.model, *made.body);
     QString text = QString::fromStdString(made.report.warning);
     if (coarse.empty()) return text;
-    return text.replace(
-        QString::fromStdString(coarse),
-        QStringLiteral("%1 % of the mesh hangs on driver triangles that are too long to follow the particles: "
-                       "Fit driver takes one of about %2 vertices.")
-            .arg(100 * edges.on_long_edges, 0, 'f', 0)
-            .arg(with_commas(*body_driver_options(made.model->mesh, *made.body).base)));
+    return text.replace(QString::fromStdString(coarse),
+                        QStringLiteral("%1 % of the mesh hangs on driver triangles that cannot follow the particles: "
+                                       "Fit driver takes one of about %2 vertices.")
+                            .arg(100 * edges.on_long_edges, 0, 'f', 0)
+                            .arg(with_commas(*body_driver_options(made.model->mesh, *made.body).base)));
 }
 
 } // namespace

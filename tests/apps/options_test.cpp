@@ -30,6 +30,7 @@ TEST_F(OptionTables, NoCommandWritesOverItsInput) {
         {"deform", "cube.ply", "-o", "pull.json", "--handles", "pull.json"},
         {"restore", "cube.fil", "--pose", "driver.ply", "-o", "driver.ply"},
         {"restore", "cube.fil", "--pose", "driver.ply", "--ghosts", "ghosts.ply", "-o", "ghosts.ply"},
+        {"restore", "cube.fil", "--pose", "driver.ply", "-o", "x.ply", "--picture", "driver.ply"},
         {"compare", "cube.ply", "driver.ply", "--picture", "driver.ply"},
         {"sample", "cube.ply", "-o", "cube.ply", "--count", "100"},
         {"sample", "cube.ply", "-o", "x.ply", "--count", "100", "--picture", "cube.ply"},

@@ -404,3 +404,31 @@ TEST_F(Render, ComparesInAPicture) {
     EXPECT_NE(none.err.find("no faces"), std::string::npos) << none.err;
     EXPECT_FALSE(std::filesystem::exists(path("x.png")));
 }
+
+TEST_F(Render, RestoreDrawsTheErrorToExpect) {
+    ok({"make", "wavy-sphere", "-o", "sphere.ply", "--resolution", "32"});
+    ok({"strip", "sphere.ply", "-o", "sphere.fil", "--base", "40"});
+    ok({"deform", "sphere.fil", "-o", "bent.ply", "--bend", "150", "--pose", "pose.ply"});
+    const Json restored = json({"restore", "sphere.fil", "--pose", "pose.ply", "-o", "r.ply", "--picture", "heat.png"});
+    EXPECT_EQ(restored["picture"], "heat.png");
+    EXPECT_EQ(restored["up"], "y");
+    const Picture heat = picture("heat.png");
+    EXPECT_GT(heat.width, 1000u);
+    ok({"restore", "sphere.fil", "--pose", "pose.ply", "-o", "again.ply"});
+    EXPECT_EQ(bytes_of(path("again.ply")), bytes_of(path("r.ply"))) << "the mesh is the same";
+
+    const std::vector<std::string> one = {"restore", "sphere.fil", "--pose", "pose.ply", "-o", "x.ply", "--picture"};
+    const auto with = [&](std::vector<std::string> more) {
+        more.insert(more.begin(), one.begin(), one.end());
+        return more;
+    };
+    refused(5, with({"heat.jpg"}), {"heat.jpg", ".png"});
+    refused(2, with({"x.png", "--level", "0"}), {"finest"});
+    refused(2, {"restore", "sphere.fil", "--frames", "-o", "x.pc2", "--picture", "x.png"}, {"--picture"});
+    ok({"make", "wavy-plane", "-o", "plane.ply", "--resolution", "16"});
+    ok({"strip", "plane.ply", "-o", "plane.fil", "--code", "reference"});
+    ok({"level", "plane.fil", "0", "-o", "driver.ply"});
+    refused(7, {"restore", "plane.fil", "--pose", "driver.ply", "-o", "x.ply", "--picture", "x.png"}, {"reference"});
+    EXPECT_FALSE(std::filesystem::exists(path("x.png")));
+    EXPECT_FALSE(std::filesystem::exists(path("x.ply")));
+}
