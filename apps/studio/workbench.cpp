@@ -47,7 +47,7 @@ Workbench::Workbench(QObject* parent) : QObject(parent), impl_(std::make_unique<
     connect(&jobs_, &Jobs::failed, this, tell);
     const auto forget_plans = [this] {
         impl_->then = After::nothing;
-        impl_->fits_driver = false;
+        impl_->fits_driver.reset();
     };
     connect(&jobs_, &Jobs::failed, this, forget_plans);
     connect(&jobs_, &Jobs::cancelled, this, [this, forget_plans](const QString& title) {
@@ -96,7 +96,7 @@ void Workbench::follow_document(const State& before) {
                                (mode_ == Mode::deform || now.recording == before.recording || impl_->keeps_body);
     if (!is_same_shape || now.restore != before.restore) show_pose();
     if (!is_same_motion) Q_EMIT timeline_changed();
-    if (now.model != before.model && std::exchange(impl_->fits_driver, false)) make_body();
+    if (now.model != before.model && std::exchange(impl_->fits_driver, std::nullopt) == now.strip) make_body();
     if (impl_->is_opening || (now.source != before.source && impl_->is_another_shape)) Q_EMIT opened();
 }
 

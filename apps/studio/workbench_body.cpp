@@ -53,8 +53,8 @@ void Workbench::make_body() { make_body_then(After::nothing); }
 void Workbench::fit_driver() {
     if (!playback_.has_body()) return;
     pause();
-    impl_->fits_driver = true;
-    set_strip(body_driver_options(state().model->mesh, *playback_.made()->body));
+    impl_->fits_driver = body_driver_options(state().model->mesh, *playback_.made()->body);
+    set_strip(*impl_->fits_driver);
 }
 
 QString Workbench::body_warning() const { return playback_.has_body() ? impl_->body_warning : QString(); }

@@ -39,10 +39,10 @@ struct Workbench::Impl {
     std::size_t looked_at = 0;   ///< frame of the last moment of the body, shown or not
     bool told_of_rest = false;   ///< that a body is made of the shape at rest
     QString body_warning;
-    bool fits_driver = false;   ///< with the next model a body is to be made
-    bool keeps_body = false;    ///< a step of our own, after which the body still fits
-    bool commits_steps = false; ///< once they are delivered
-    bool measures_next = false; ///< the error, once every vertex is delivered
+    std::optional<StripOptions> fits_driver; ///< once a model is made with these, a body is
+    bool keeps_body = false;                 ///< a step of our own, after which the body still fits
+    bool commits_steps = false;              ///< once they are delivered
+    bool measures_next = false;              ///< the error, once every vertex is delivered
     bool is_opening = false, is_another_shape = false;
 };
 
