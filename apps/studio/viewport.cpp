@@ -376,7 +376,10 @@ void Viewport::Impl::draw_preview() {
     if (restore > 0 && had_pose_moves && levels.size() == 1 && is_on_cpu) cost.learn_restoring(restore, facts.vertices);
     timings.part = melts ? change.part() : 1;
     timings.driver = workbench.driver_milliseconds();
-    if (restore > 0.02) timings.restore = is_on_cpu ? restore : 0;
+    if (!workbench.pose())
+        timings.restore = 0; // what the shape before took is no longer true
+    else if (restore > 0.02)
+        timings.restore = is_on_cpu ? restore : 0;
     note_frame_rate();
     note_level();
     if (change.from()) touch(false);
