@@ -5,9 +5,9 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include <chrono>
 #include <cmath>
 #include <cstring>
+#include <ctime>
 #include <fstream>
 
 #include <unistd.h>
@@ -340,10 +340,10 @@ TEST(GlbWriter, LargeFacesAndHubsWithSeamsTakeLinearTime) {
             mesh->uvs.corners.push_back(c);
         }
     for (const Mesh* mesh : {&polygon, &fan}) {
-        const auto start = std::chrono::steady_clock::now();
+        const std::clock_t start = std::clock(); // of the processor, which others may use as well
         std::string bytes;
         ASSERT_TRUE(write_mesh(*mesh, MeshFormat::gltf, bytes, {}, RunContext(1)).ok());
-        EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(5));
+        EXPECT_LT(double(std::clock() - start) / CLOCKS_PER_SEC, 5);
         const Result<MeshFile> back = read_mesh(bytes, "x.glb", RunContext(1));
         ASSERT_TRUE(back.ok());
         EXPECT_EQ(back->mesh.positions, mesh->positions);
