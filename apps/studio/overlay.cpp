@@ -73,12 +73,14 @@ public:
         return plate;
     }
 
-    /// A sentence in an amber frame above the axes, in as many lines as it needs.
-    void warning(const QString& text) {
+    /// A sentence in an amber frame above the axes (and the legend, where that is in its way), in as many lines as it
+    /// needs.
+    void warning(const QString& text, const QRectF& legend) {
         const double width = std::min(kWarningWidth, area_.width() - 2 * kMargin) - 16;
         const QRectF taken = painter_.boundingRect(QRectF(0, 0, width, 4000), Qt::AlignLeft | Qt::TextWordWrap, text);
         QRectF plate(0, 0, std::ceil(taken.width()) + 16, std::ceil(taken.height()) + 8);
         plate.moveBottomLeft({area_.left() + kMargin, area_.bottom() - kMargin - kTriad - 6});
+        if (plate.intersects(legend)) plate.moveBottom(legend.top() - 6);
         painter_.setPen(QPen(kWarning, 1.5));
         painter_.setBrush(plate_);
         painter_.drawRoundedRect(plate, 5, 5);
@@ -124,18 +126,24 @@ public:
     QRectF legend(const OverlayContent::Legend& legend) {
         constexpr double kWidth = 200, kHeight = 10;
         const QFontMetricsF metrics(painter_.font());
-        const QString title = legend.unit.isEmpty() ? legend.title : legend.title + ", " + legend.unit;
-        const double width = std::max(kWidth, metrics.horizontalAdvance(title)) + 32;
-        const double height = 2 * metrics.height() + kHeight + 22;
-        const QRectF plate(std::round(area_.right() - kMargin - width), std::round(area_.bottom() - kMargin - height),
-                           width, height);
+        QStringList title = {legend.unit.isEmpty() ? legend.title : legend.title + ", " + legend.unit};
+        if (metrics.horizontalAdvance(title[0]) + 32 > area_.width() - 2 * kMargin) title = {legend.title, legend.unit};
+        double width = kWidth;
+        for (const QString& line : title) width = std::max(width, metrics.horizontalAdvance(line));
+        width += 32;
+        const double title_height = double(title.size()) * metrics.height();
+        const double height = title_height + metrics.height() + kHeight + 22;
+        const double left = std::round(area_.right() - kMargin - width);
+        const double over_axes =
+            left < area_.left() + kMargin + kTriad ? kTriad : 0; // there is no room for both side by side
+        const QRectF plate(left, std::round(area_.bottom() - kMargin - over_axes - height), width, height);
         painter_.setPen(Qt::NoPen);
         painter_.setBrush(plate_);
         painter_.drawRoundedRect(plate, 5, 5);
         painter_.setPen(text_);
-        painter_.drawText(plate.adjusted(16, 6, -16, 0), Qt::AlignLeft | Qt::AlignTop, title);
+        painter_.drawText(plate.adjusted(16, 6, -16, 0), Qt::AlignLeft | Qt::AlignTop, title.join('\n'));
 
-        const QRectF bar(plate.left() + 16, plate.top() + 10 + metrics.height(), plate.width() - 32, kHeight);
+        const QRectF bar(plate.left() + 16, plate.top() + 10 + title_height, plate.width() - 32, kHeight);
         QLinearGradient gradient(bar.topLeft(), bar.topRight());
         for (int i = 0; i <= 16; ++i) {
             const Vec3f c = color_at(legend.map, static_cast<float>(i) / 16);
@@ -324,7 +332,7 @@ void Overlay::paintEvent(QPaintEvent*) {
     if (c.shows_triad) sheet.triad(c);
     const QRectF legend = c.legend ? sheet.legend(*c.legend) : QRectF();
     if (!c.warning.isEmpty())
-        sheet.warning(c.warning);
+        sheet.warning(c.warning, legend);
     else if (c.hint_strength > 0 && !c.hint.isEmpty())
         sheet.hint(c.hint, c.hint_strength, legend);
 }

@@ -157,6 +157,7 @@ TEST_F(ExpectedErrorTest, ColorsAreMadeWhereTheyAreWanted) {
     bend(0);
     ASSERT_EQ(expected.colors().values.size(), errors.size());
     EXPECT_EQ(*std::ranges::max_element(expected.colors().values), 0);
+    EXPECT_EQ(expected.colors().range.most, 1e-4f) << "the legend would go to 100 %";
     bend(0.01); // of which rounding is a part
     bench.wait_until_idle();
     EXPECT_EQ(expected.colors().range.most, 1e-4f);

@@ -3,12 +3,15 @@
 #include "filigree/present/headless_renderer.h"
 #include "filigree/present/page.h"
 
+#include <algorithm>
+
 namespace filigree {
 
 HeatMap expected_error_map(const Model& model, const PoseError::Estimate& estimate) {
     constexpr float kLeastRange = 1e-4f;
     HeatMap map = heat_map(vertex_errors(model, estimate.local), estimate.diagonal);
-    if (!(map.range.most >= kLeastRange)) map.range = {0, kLeastRange};
+    const bool is_nothing = std::ranges::all_of(map.values, [](float value) { return value == 0; });
+    if (is_nothing || !(map.range.most >= kLeastRange)) map.range = {0, kLeastRange};
     return map;
 }
 
