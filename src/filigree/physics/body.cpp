@@ -6,6 +6,7 @@
 #include "filigree/physics/surface_points.h"
 
 #include <algorithm>
+#include <cassert>
 
 namespace filigree {
 
@@ -14,6 +15,9 @@ namespace {
 /// Below this mean square of its neighbours' offsets along some direction, in spacings, a cell's particle has no
 /// gradient in that direction.
 constexpr float kLeastSpread = 0.01f;
+
+constexpr double kFieldSpacing = 0.5; ///< spacings between the points of the distance field
+constexpr float kSheetDepth = 0.25f, kSheetRadius = 0.4f; ///< spacings
 
 /// Particles at the corners: each cell gives an eighth of its mass to each of its corners.
 void use_corners(Body& body) {
@@ -105,6 +109,41 @@ std::size_t count_particles(const Cells& cells, MaterialModel model, const RunCo
     return cells.cells.size() + 7 * std::size_t(std::count(spread.begin(), spread.end(), 0));
 }
 
+/// The outer faces of whole cells.
+Mesh outer_faces(const Cells& cells) {
+    Mesh mesh;
+    for (const auto& corner : cells.corners)
+        mesh.positions.push_back(
+            (cells.origin + cells.spacing * Vec3d(corner[0], corner[1], corner[2])).cast<float>());
+    for (std::size_t c = 0; c < cells.cells.size(); ++c)
+        for (int axis = 0; axis < 3; ++axis)
+            for (int side = 0; side < 2; ++side) {
+                std::array<int, 3> next = {cells.cells[c][0], cells.cells[c][1], cells.cells[c][2]};
+                next[axis] += side ? 1 : -1;
+                if (cells.find_cell(next[0], next[1], next[2]) != kNoIndex) continue;
+                const int u = 1 << (axis + 1) % 3, v = 1 << (axis + 2) % 3, base = side << axis;
+                const auto& corner = cells.cell_corners[c];
+                std::array<Index, 4> face = {corner[base], corner[base + u], corner[base + u + v], corner[base + v]};
+                if (!side) std::swap(face[1], face[3]);
+                mesh.add_face(face);
+            }
+    return mesh;
+}
+
+/// The distance from the surface at rest. A mesh whose inside is thinner than cells can see counts as a sheet.
+Status add_field(Body& body, const Mesh& mesh, const RunContext& context) {
+    if (body.material.model == MaterialModel::meshfree) return Success{};
+    RunContext quiet = context;
+    quiet.progress = nullptr;
+    Result<DistanceField> field = DistanceField::create(mesh, body.scale, kFieldSpacing * body.spacing(), quiet);
+    if (!field) return field.error();
+    float deepest = 0;
+    for (const Vec3f& centroid : body.cells.centroid) deepest = std::max(deepest, -field->at(centroid).distance);
+    if (deepest < kSheetDepth * float(body.spacing())) body.field_radius = kSheetRadius * float(body.spacing());
+    body.field = std::make_shared<const DistanceField>(std::move(field).value());
+    return Success{};
+}
+
 std::string warning_of(const CellReport& cells) {
     std::string warning;
     if (cells.thin_cells > 0)
@@ -141,6 +180,7 @@ Result<Body> make_body(const Mesh& mesh, const Material& material, const BodyOpt
     body.surface.normals = std::move(spread.normals);
     body.surface.areas = std::move(spread.areas);
     body.surface.points = embed_surface(spread.positions, body, context);
+    if (Status added = add_field(body, mesh, context); !added) return added.error();
     if (context.is_cancelled()) return cancelled_error();
 
     found.surface_points = body.surface.points.size();
@@ -177,6 +217,8 @@ Body make_body(Cells cells, const Material& material) {
                 }
             }
     body.surface.points = embed_surface(points, body, context);
+    [[maybe_unused]] const Status added = add_field(body, outer_faces(body.cells), context);
+    assert(added.ok());
     return body;
 }
 

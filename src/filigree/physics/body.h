@@ -2,9 +2,12 @@
 #pragma once
 
 #include "filigree/physics/cells.h"
+#include "filigree/physics/distance_field.h"
 #include "filigree/physics/embedding.h"
 #include "filigree/physics/material.h"
 #include "filigree/physics/vectors.h"
+
+#include <memory>
 
 namespace filigree {
 
@@ -27,6 +30,10 @@ struct Body {
     std::vector<float> mass;   ///< kg
     std::vector<float> volume; ///< m^3: occupied, shared out as the mass is
     BodySurface surface;
+    /// Distance from the surface at rest, m, on a grid of half a spacing: how deep what touches the body lies in it. Null
+    /// for meshfree bodies.
+    std::shared_ptr<const DistanceField> field;
+    float field_radius = 0; ///< m: a sheet without thickness is everything closer to it than this
 
     double spacing() const { return cells.spacing; }
     std::size_t particle_count() const { return rest.size(); }

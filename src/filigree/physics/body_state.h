@@ -16,10 +16,11 @@ struct BodyState {
     float rest_squared_frequency = 0; ///< ElasticReport::squared_frequency at rest
     bool is_held = false;             ///< by pins, forces or wind: not left to itself
 
-    // Contact: points of the surface against obstacles; balls just below them against other bodies.
+    // Contact: points of the surface; meshfree bodies touch each other by balls just below them.
     Embedding surface, balls;             ///< in the elasticity's reference
     std::vector<float> surface_stiffness; ///< N/m
     float ball_radius = 0;                ///< m
+    bool has_balls() const { return balls.size() != 0; }
 
     /// Gradients from the body at rest to the elasticity's reference, one a particle: how matter has flowed until
     /// neighbourhoods were last renewed. Empty: never; the reference is the body at rest.

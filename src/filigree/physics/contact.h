@@ -3,6 +3,7 @@
 #pragma once
 
 #include "filigree/physics/body_state.h"
+#include "filigree/physics/matter_contact.h"
 #include "filigree/physics/obstacle_motion.h"
 
 #include <functional>
@@ -17,25 +18,40 @@ inline constexpr float kContactShare = 1;
 /// all points together add no more than kContactShare times the body's own squared frequency to any particle.
 std::vector<float> surface_stiffness(const Body& body, float rest_squared_frequency);
 
-struct ContactReport {
-    std::size_t contacts = 0; ///< points that touch
-    float deepest = 0;        ///< m
-};
-
 /// All contacts of a scene. Finding what is near is separate from forces, and rare.
 class Contacts {
 public:
     /// bodies: fixed in number from here on.
-    Contacts(const World& world, std::size_t bodies, bool between_bodies)
-        : world_(world), between_bodies_(between_bodies), near_(bodies), touched_(bodies, 0) {}
+    Contacts(const World& world, std::size_t bodies, bool between_bodies, bool within_bodies)
+        : world_(world), between_bodies_(between_bodies), near_(bodies), touched_(bodies, 0),
+          on_obstacle_(bodies, 0), matter_(world, between_bodies, within_bodies) {}
+    /// Once, when all bodies are there.
+    void begin(std::span<const BodyState> bodies) { matter_.begin(bodies); }
 
     /// Finds what might touch before anything has moved by the reaches, unless what was found last still holds: surface
-    /// points near obstacles, and pairs of balls of different bodies. travelled: bound on how far anything has moved
-    /// since `begin_anew`, obstacles included, m.
-    void search(std::span<const BodyState> bodies, double time, float travelled, float obstacle_reach, float pair_reach,
-                const RunContext& context);
+    /// points near obstacles and near cells of other bodies or far parts of their own, and pairs of balls of meshfree
+    /// bodies.
+    struct Search {
+        double time;                      ///< s
+        float travelled;                  ///< m, bound on how far anything has moved since `begin_anew`, with obstacles
+        float obstacle_reach, pair_reach; ///< m
+        double left, frame;               ///< s, of the frame
+    };
+    void search(std::span<const BodyState> bodies, const Search& search, const RunContext& context);
+    /// Before positions change by dt times velocities.
+    void travel(std::span<const BodyState> bodies, float dt) { matter_.travel(bodies, dt); }
+    /// s: in longer steps something could pass through something.
+    double longest_step() const { return matter_.longest_step(); }
+    /// The same before anything was searched for; begin_anew comes next.
+    double longest_step_from(std::span<const BodyState> bodies, double left) {
+        matter_.find_approaching(bodies, left);
+        return matter_.longest_step();
+    }
     /// The next search finds everything again, and ways are counted from here; anchors and touches stay.
-    void begin_anew() { near_until_ = pairs_until_ = -1; }
+    void begin_anew() {
+        near_until_ = pairs_until_ = -1;
+        matter_.begin_anew();
+    }
     void clear_touches() { touched_.assign(touched_.size(), 0); }
 
     /// Adds the forces of what touches now to the bodies' forces, and lets friction's anchors slide. travelled: as
@@ -52,7 +68,8 @@ public:
     public:
         /// Before every sweep: takes the points' places. During the sweep add sees each move by the asking particle
         /// alone, so that nothing depends on which thread moves the others when.
-        void update_places(const Vectors& positions);
+        /// swept: what `add` will be asked with; it moves `scale` times as far as the particles' positions.
+        void update_places(std::span<const BodyState> bodies, const Vectors& swept, float scale);
         void add(Index particle, const Vectors& positions, Vec3f& force, Symmetric3& block) const override;
         /// A further spring that pulls points of an embedding: a hand.
         void add_pull(const Embedding& points, std::size_t point, const Vec3f& target, float stiffness);
@@ -69,36 +86,55 @@ public:
             bool anchored = false;
             Vec3f anchor = Vec3f::Zero(); ///< world
             float friction = 0, unloading = 1;
-            const BodyState* other = nullptr; ///< or a ball of another body
+            const MatterContacts::Frame* frame = nullptr; ///< or a point and the matter around it; `place` is its way
+            const BodyState* other = nullptr;             ///< or a ball of another body
             Index other_point = 0;
             float reach = 0;                                          ///< sum of the balls' radii
             Vec3f target = Vec3f::Zero();                             ///< neither: a pull to here
             Vec3f place = Vec3f::Zero(), other_place = Vec3f::Zero(); ///< of the points, by update_places
         };
+        template <class Visit>
+        void each_weight(const Entry& entry, const Visit& visit) const;
         void link(std::size_t particles);
+        std::size_t body_ = 0;
+        const MatterContacts* matter_ = nullptr;
         std::vector<Entry> entries_;
         std::vector<std::unique_ptr<Eigen::Isometry3d>> motions_; ///< of the obstacles
-        Vectors start_;                                           ///< positions at the last update_places
+        Vectors start_;                                           ///< what is swept, at the last update_places
+        float scale_ = 1;
         std::vector<std::uint8_t> touched_;
         std::vector<Index> offsets_, entry_of_; ///< entries of each particle
         std::vector<float> weight_of_;
     };
     /// `pulls` adds hands before the particles are linked. time, dt: of the substep's end, and its length.
+    /// frames: of the substep, by matter_frames.
     Blocks blocks(std::span<const BodyState> bodies, std::size_t body, double time, float dt,
-                  const std::function<void(Blocks&)>& pulls) const;
+                  std::span<const MatterContacts::Frame> frames, const std::function<void(Blocks&)>& pulls) const;
+    std::vector<MatterContacts::Frame> matter_frames(std::span<const BodyState> bodies, float dt) const {
+        return matter_.frames(bodies, dt);
+    }
     /// After a descent substep: anchors begin, slide and end as positions say.
     ContactReport update_anchors(std::span<const BodyState> bodies, double time);
 
     bool is_touched(std::size_t body) const { return touched_[body]; } ///< by the last add_forces or update_anchors
+    /// Bodies that touch each other, and nothing else, as numbers of groups, one a body: such a group keeps its momentum.
+    /// kNoIndex: of bodies that touch an obstacle, or others that do.
+    std::vector<Index> free_groups() const;
 
-    /// Where friction holds a surface point on an obstacle, in the obstacle's own axes. All that contacts remember.
+    /// Where friction holds a surface point on an obstacle, in the obstacle's own axes.
     struct Anchor {
-        Index body, obstacle, point;
+        Index body, obstacle, point, slides;
         Vec3f place;
     };
-    std::vector<Anchor> anchors() const;
-    /// Instead of those there are; ascending by body, obstacle and point. begin_anew comes next.
-    void set_anchors(std::span<const Anchor> anchors);
+    /// All that contacts remember.
+    struct Memory {
+        std::vector<Anchor> anchors;                ///< ascending by body, obstacle and point
+        std::vector<MatterContacts::Memory> matter; ///< ascending by bodies and point
+        std::vector<std::uint8_t> recovering;       ///< one a body
+    };
+    Memory memory() const;
+    /// Instead of what there is; begin_anew comes next. False, and nothing changed, where it is not of these bodies.
+    bool set_memory(const Memory& memory, std::span<const BodyState> bodies);
 
 private:
     /// A surface point near an obstacle.
@@ -106,7 +142,7 @@ private:
         Index obstacle, point;
         float clear_until = 0; ///< `travelled` until which this cannot touch
         float depth = 0;       ///< now
-        bool anchored = false;
+        contact_law::Grasp grasp;
         Vec3f anchor = Vec3f::Zero();
     };
     /// Two balls of different bodies near each other.
@@ -128,7 +164,8 @@ private:
     std::vector<std::vector<Near>> near_; ///< by body, ascending by obstacle and point
     std::vector<NearPair> pairs_;
     float near_until_ = -1, pairs_until_ = -1; ///< `travelled` until which they hold
-    std::vector<std::uint8_t> touched_;
+    std::vector<std::uint8_t> touched_, on_obstacle_;
+    MatterContacts matter_;
 };
 
 } // namespace filigree

@@ -4,14 +4,38 @@
 #include "filigree/physics/contact_law.h"
 
 #include <algorithm>
+#include <numeric>
 
 namespace filigree {
 
 using namespace contact_law;
 
-void Contacts::Blocks::update_places(const Vectors& positions) {
-    start_ = positions;
+/// Calls visit(particle, weight) for the particles of this body that move an entry's place.
+template <class Visit>
+void Contacts::Blocks::each_weight(const Entry& entry, const Visit& visit) const {
+    if (!entry.frame || entry.frame->body == body_) {
+        const Embedding& points = *entry.embedding;
+        for (Index k = points.offsets[entry.point]; k < points.offsets[entry.point + 1]; ++k)
+            visit(points.particles[k], points.weights[k]);
+    }
+    if (entry.frame && entry.frame->other == body_) {
+        const Matter::Weights weights = Matter::weights(entry.frame->place.local);
+        const auto& corners = matter_->matter(entry.frame->other).corners(entry.frame->place.cell);
+        for (int c = 0; c < 8; ++c) visit(corners[c], -weights[c]);
+    }
+}
+
+void Contacts::Blocks::update_places(std::span<const BodyState> bodies, const Vectors& swept, float scale) {
+    start_ = swept;
+    scale_ = scale;
+    const Vectors& positions = bodies[body_].positions;
     for (Entry& entry : entries_) {
+        if (entry.frame) {
+            const MatterContacts::Frame& frame = *entry.frame;
+            entry.place = embedded_point(bodies[frame.body].surface, frame.point, bodies[frame.body].positions) -
+                          matter_->matter(frame.other).mean(frame.place, bodies[frame.other].positions) + frame.start;
+            continue;
+        }
         entry.place = embedded_point(*entry.embedding, entry.point, positions);
         if (entry.other)
             entry.other_place = embedded_point(entry.other->balls, entry.other_point, entry.other->positions);
@@ -19,33 +43,46 @@ void Contacts::Blocks::update_places(const Vectors& positions) {
 }
 
 void Contacts::Blocks::add(Index particle, const Vectors& positions, Vec3f& force, Symmetric3& block) const {
-    const Vec3f moved = positions[particle] - start_[particle];
+    const Vec3f moved = scale_ * (positions[particle] - start_[particle]);
     for (Index k = offsets_[particle]; k < offsets_[particle + 1]; ++k) {
         const Entry& entry = entries_[entry_of_[k]];
-        const float weight = weight_of_[k], stiffness = entry.stiffness;
+        const float weight = weight_of_[k], stiffness = entry.stiffness, squared = scale_ * weight * weight;
         const Vec3f place = entry.place + weight * moved;
-        if (entry.other) {
+        if (entry.frame) {
+            const MatterContacts::Frame& frame = *entry.frame;
+            const float depth = frame.depth - place.dot(frame.normal);
+            if (!(depth > 0)) continue;
+            const float push = stiffness * frame.unloading * depth;
+            force += weight * push * frame.normal;
+            block.add_outer(frame.normal, squared * stiffness);
+            if (!frame.holds) continue;
+            const float grip = kTangentialStiffness * stiffness;
+            const Vec3f offset = frame.offset + along_surface(place, frame.normal);
+            force += weight * limited(-grip * offset, frame.friction * push);
+            block.add_scaled_identity(squared * grip);
+            block.add_outer(frame.normal, -squared * grip);
+        } else if (entry.other) {
             const Vec3f between = place - entry.other_place;
             const float distance = between.norm();
             if (!(distance < entry.reach && distance > 0)) continue;
             const Vec3f normal = between / distance;
             force += weight * stiffness * entry.unloading * (entry.reach - distance) * normal;
-            block.add_outer(normal, weight * weight * stiffness);
+            block.add_outer(normal, squared * stiffness);
         } else if (entry.obstacle) {
             const DistanceField::Sample surface = distance_to(*entry.obstacle, *entry.motion, place);
             if (!(surface.distance < 0)) continue;
             const float push = stiffness * entry.unloading * -surface.distance;
             force += weight * push * surface.normal;
-            block.add_outer(surface.normal, weight * weight * stiffness);
+            block.add_outer(surface.normal, squared * stiffness);
             if (!entry.anchored) continue;
             const float grip = kTangentialStiffness * stiffness;
             force +=
                 weight * limited(-grip * along_surface(place - entry.anchor, surface.normal), entry.friction * push);
-            block.add_scaled_identity(weight * weight * grip);
-            block.add_outer(surface.normal, -weight * weight * grip);
+            block.add_scaled_identity(squared * grip);
+            block.add_outer(surface.normal, -squared * grip);
         } else {
             force += weight * stiffness * (entry.target - place);
-            block.add_scaled_identity(weight * weight * stiffness);
+            block.add_scaled_identity(squared * stiffness);
         }
     }
 }
@@ -61,14 +98,11 @@ void Contacts::Blocks::add_pull(const Embedding& points, std::size_t point, cons
 void Contacts::Blocks::link(std::size_t particles) {
     touched_.assign(particles, 0);
     offsets_.assign(particles + 1, 0);
-    const auto each_weight = [&](const auto& visit) {
-        for (Index e = 0; e < entries_.size(); ++e) {
-            const Embedding& points = *entries_[e].embedding;
-            for (Index k = points.offsets[entries_[e].point]; k < points.offsets[entries_[e].point + 1]; ++k)
-                visit(e, points.particles[k], points.weights[k]);
-        }
+    const auto each = [&](const auto& visit) {
+        for (Index e = 0; e < entries_.size(); ++e)
+            each_weight(entries_[e], [&](Index particle, float weight) { visit(e, particle, weight); });
     };
-    each_weight([&](Index, Index particle, float) { ++offsets_[particle + 1]; });
+    each([&](Index, Index particle, float) { ++offsets_[particle + 1]; });
     for (std::size_t p = 0; p < particles; ++p) {
         touched_[p] = offsets_[p + 1] != 0;
         offsets_[p + 1] += offsets_[p];
@@ -76,7 +110,7 @@ void Contacts::Blocks::link(std::size_t particles) {
     entry_of_.resize(offsets_.back());
     weight_of_.resize(offsets_.back());
     std::vector<Index> next(offsets_.begin(), offsets_.end() - 1);
-    each_weight([&](Index e, Index particle, float weight) {
+    each([&](Index e, Index particle, float weight) {
         entry_of_[next[particle]] = e;
         weight_of_[next[particle]++] = weight;
     });
@@ -93,7 +127,7 @@ Contacts::Blocks::Entry Contacts::block_of(const Near& at, const BodyState& body
     entry.point = at.point;
     entry.stiffness = body.surface_stiffness[at.point] * float(obstacle.stiffness);
     entry.obstacle = &obstacle;
-    entry.anchored = at.anchored;
+    entry.anchored = at.grasp.holds;
     entry.anchor = poses.to_world(at.obstacle, at.anchor);
     entry.friction = float(obstacle.friction);
     entry.unloading = unloading(obstacle.restitution, velocity.dot(normal), smooth_speed(world_, dt));
@@ -120,10 +154,13 @@ Contacts::Blocks::Entry Contacts::block_of(const BodyState& body, Index point, c
 }
 
 Contacts::Blocks Contacts::blocks(std::span<const BodyState> bodies, std::size_t b, double time, float dt,
+                                  std::span<const MatterContacts::Frame> frames,
                                   const std::function<void(Blocks&)>& pulls) const {
     const BodyState& body = bodies[b];
     const ObstaclePoses poses(world_, time);
     Blocks blocks;
+    blocks.body_ = b;
+    blocks.matter_ = &matter_;
     for (std::size_t o = 0; o < world_.obstacles.size(); ++o)
         blocks.motions_.push_back(std::make_unique<Eigen::Isometry3d>(poses.at(o)));
     for (const Near& at : near_[b]) {
@@ -136,6 +173,14 @@ Contacts::Blocks Contacts::blocks(std::span<const BodyState> bodies, std::size_t
         if (pair.second_body == b)
             blocks.entries_.push_back(block_of(body, pair.second, bodies[pair.first_body], pair.first, dt));
     }
+    for (const MatterContacts::Frame& frame : frames) {
+        if (frame.body != b && frame.other != b) continue;
+        Blocks::Entry& entry = blocks.entries_.emplace_back();
+        entry.frame = &frame;
+        entry.embedding = &bodies[frame.body].surface;
+        entry.point = frame.point;
+        entry.stiffness = frame.stiffness;
+    }
     pulls(blocks);
     blocks.link(body.positions.size());
     return blocks;
@@ -145,6 +190,7 @@ ContactReport Contacts::update_anchors(std::span<const BodyState> bodies, double
     ContactReport report;
     const ObstaclePoses poses(world_, time);
     std::ranges::fill(touched_, std::uint8_t{0});
+    std::ranges::fill(on_obstacle_, std::uint8_t{0});
     for (std::size_t b = 0; b < bodies.size(); ++b) {
         const BodyState& body = bodies[b];
         for (Near& at : near_[b]) {
@@ -153,14 +199,14 @@ ContactReport Contacts::update_anchors(std::span<const BodyState> bodies, double
             const DistanceField::Sample surface = distance_to(obstacle, poses.at(at.obstacle), place);
             at.depth = std::max(0.0f, -surface.distance);
             if (!(surface.distance < 0)) {
-                at.anchored = false;
+                at.grasp = {};
                 continue;
             }
-            touched_[b] = 1;
+            touched_[b] = on_obstacle_[b] = 1;
             ++report.contacts;
             report.deepest = std::max(report.deepest, -surface.distance);
-            if (!at.anchored) at.anchor = poses.to_own_axes(at.obstacle, place);
-            at.anchored = true;
+            if (!at.grasp.holds) at.anchor = poses.to_own_axes(at.obstacle, place);
+            at.grasp = {true, false};
             const float stiffness = body.surface_stiffness[at.point] * float(obstacle.stiffness);
             const float grip = kTangentialStiffness * stiffness;
             const float limit = float(obstacle.friction) * stiffness * -surface.distance;
@@ -177,7 +223,25 @@ ContactReport Contacts::update_anchors(std::span<const BodyState> bodies, double
             ++report.contacts;
         }
     }
+    const ContactReport inside = matter_.update_anchors(bodies, touched_);
+    report.contacts += inside.contacts;
+    report.deepest_in_matter = inside.deepest_in_matter;
     return report;
+}
+
+std::vector<Index> Contacts::free_groups() const {
+    std::vector<Index> group(touched_.size());
+    std::iota(group.begin(), group.end(), Index{0});
+    const auto join = [&](Index a, Index b) {
+        const Index from = std::max(group[a], group[b]), to = std::min(group[a], group[b]);
+        std::ranges::replace(group, from, to);
+    };
+    matter_.each_touching(join);
+    for (const NearPair& pair : pairs_)
+        if (touched_[pair.first_body] && touched_[pair.second_body]) join(pair.first_body, pair.second_body);
+    for (std::size_t b = 0; b < group.size(); ++b)
+        if (on_obstacle_[b]) std::ranges::replace(group, Index(group[b]), kNoIndex);
+    return group;
 }
 
 } // namespace filigree

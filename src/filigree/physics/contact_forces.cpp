@@ -47,7 +47,7 @@ Vec3f Contacts::obstacle_force(Near& at, const BodyState& body, const ObstaclePo
                                float dt) const {
     at.depth = 0;
     if (at.clear_until > travelled) {
-        at.anchored = false;
+        at.grasp = {};
         return Vec3f::Zero();
     }
     const Obstacle& obstacle = world_.obstacles[at.obstacle];
@@ -55,29 +55,22 @@ Vec3f Contacts::obstacle_force(Near& at, const BodyState& body, const ObstaclePo
     const DistanceField::Sample surface = distance_to(obstacle, poses.at(at.obstacle), place);
     at.clear_until = travelled + surface.distance;
     if (!(surface.distance < 0)) {
-        at.anchored = false;
+        at.grasp = {};
         return Vec3f::Zero();
     }
     at.depth = -surface.distance;
-    const Vec3f velocity = embedded_point(body.surface, at.point, body.velocities) - poses.velocity(at.obstacle, place);
-    const float stiffness = body.surface_stiffness[at.point] * float(obstacle.stiffness);
-    const float away = velocity.dot(surface.normal);
-    const float push = stiffness * -surface.distance * unloading(obstacle.restitution, away, smooth_speed(world_, dt));
-    if (!at.anchored) at.anchor = poses.to_own_axes(at.obstacle, place);
-    at.anchored = true;
-    const float grip = kTangentialStiffness * stiffness;
-    const Vec3f offset = along_surface(place - poses.to_world(at.obstacle, at.anchor), surface.normal);
-    const Vec3f wanted = -grip * (offset + 2 * dt * along_surface(velocity, surface.normal));
-    // A point that sticks may pull up to friction times the full penalty. The unloading does not weaken that limit: a
-    // trembling foot would slip at every rise. A point that slides rubs by the weakened push.
-    const float hold = float(obstacle.friction) * stiffness * -surface.distance;
-    const float stretch = grip * offset.norm();
-    Vec3f held = limited(wanted, hold);
-    if (stretch > hold) {
-        held = limited(wanted, float(obstacle.friction) * push);
-        at.anchor = poses.to_own_axes(at.obstacle, place - offset * (hold / stretch));
-    }
-    return push * surface.normal + held;
+    const Touch touch{surface.normal,
+                      embedded_point(body.surface, at.point, body.velocities) - poses.velocity(at.obstacle, place),
+                      at.depth,
+                      body.surface_stiffness[at.point] * float(obstacle.stiffness),
+                      float(obstacle.friction),
+                      float(obstacle.restitution)};
+    Vec3f offset = Vec3f::Zero();
+    if (at.grasp.holds) offset = along_surface(place - poses.to_world(at.obstacle, at.anchor), surface.normal);
+    const bool landed = !at.grasp.holds;
+    const Vec3f force = touch_force(touch, offset, at.grasp, dt, smooth_speed(world_, dt));
+    if (landed || at.grasp.slides) at.anchor = poses.to_own_axes(at.obstacle, place - offset);
+    return force;
 }
 
 /// The force on the pair's first ball; minus it is that on the second.
@@ -133,6 +126,9 @@ ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, flo
         touched_[pair.first_body] = touched_[pair.second_body] = 1;
         ++report.contacts;
     }
+    const ContactReport inside = matter_.add_forces(bodies, dt, touched_, context);
+    report.contacts += inside.contacts;
+    report.deepest_in_matter = inside.deepest_in_matter;
     return report;
 }
 
@@ -164,6 +160,7 @@ void Contacts::push_out(std::span<BodyState> bodies, double time) {
             }
         }
     }
+    matter_.push_out(bodies);
 }
 
 } // namespace filigree

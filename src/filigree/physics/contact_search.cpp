@@ -14,16 +14,16 @@ constexpr std::size_t kContactSearchGrain = 256;
 
 } // namespace
 
-void Contacts::search(std::span<const BodyState> bodies, double time, float travelled, float obstacle_reach,
-                      float pair_reach, const RunContext& context) {
-    if (travelled > near_until_ && !world_.obstacles.empty()) {
-        find_near(bodies, time, travelled, obstacle_reach, context);
-        near_until_ = travelled + obstacle_reach;
+void Contacts::search(std::span<const BodyState> bodies, const Search& search, const RunContext& context) {
+    if (search.travelled > near_until_ && !world_.obstacles.empty()) {
+        find_near(bodies, search.time, search.travelled, search.obstacle_reach, context);
+        near_until_ = search.travelled + search.obstacle_reach;
     }
-    if (travelled > pairs_until_ && between_bodies_ && bodies.size() > 1) {
-        find_pairs(bodies, travelled, pair_reach, context);
-        pairs_until_ = travelled + pair_reach;
+    if (search.travelled > pairs_until_ && between_bodies_ && bodies.size() > 1) {
+        find_pairs(bodies, search.travelled, search.pair_reach, context);
+        pairs_until_ = search.travelled + search.pair_reach;
     }
+    matter_.search(bodies, search.left, search.frame, context);
 }
 
 void Contacts::find_near(std::span<const BodyState> bodies, double time, float travelled, float reach,
@@ -50,7 +50,7 @@ void Contacts::find_near(std::span<const BodyState> bodies, double time, float t
             });
             for (Index s = 0; s < points; ++s) {
                 if (!(distances[s] < reach)) continue;
-                Near& near = found.emplace_back(Near{Index(o), s});
+                Near& near = found.emplace_back(Near{.obstacle = Index(o), .point = s, .grasp = {}});
                 while (old != near_[b].end() && std::pair(old->obstacle, old->point) < std::pair(Index(o), s)) ++old;
                 if (old != near_[b].end() && old->obstacle == o && old->point == s) near = *old;
                 near.clear_until = travelled + distances[s];
@@ -62,6 +62,7 @@ void Contacts::find_near(std::span<const BodyState> bodies, double time, float t
 
 void Contacts::find_pairs(std::span<const BodyState> bodies, float travelled, float reach, const RunContext& context) {
     pairs_.clear();
+    if (std::ranges::none_of(bodies, &BodyState::has_balls)) return;
     std::vector<Box> boxes(bodies.size());
     for (std::size_t b = 0; b < bodies.size(); ++b)
         for (std::size_t i = 0; i < bodies[b].positions.size(); ++i)
@@ -77,6 +78,7 @@ void Contacts::find_pairs(std::span<const BodyState> bodies, float travelled, fl
     };
     for (std::size_t a = 0; a < bodies.size(); ++a)
         for (std::size_t b = a + 1; b < bodies.size(); ++b) {
+            if (!bodies[a].has_balls() || !bodies[b].has_balls()) continue;
             const float far = bodies[a].ball_radius + bodies[b].ball_radius + 2 * reach;
             const Vec3d low = boxes[a].min.cwiseMax(boxes[b].min) - Vec3d::Constant(double(far));
             const Vec3d high = boxes[a].max.cwiseMin(boxes[b].max) + Vec3d::Constant(double(far));
@@ -111,18 +113,31 @@ void Contacts::find_pairs(std::span<const BodyState> bodies, float travelled, fl
         }
 }
 
-std::vector<Contacts::Anchor> Contacts::anchors() const {
-    std::vector<Anchor> anchors;
+Contacts::Memory Contacts::memory() const {
+    Memory memory{{}, matter_.memories(), matter_.recovering()};
     for (Index b = 0; b < near_.size(); ++b)
         for (const Near& at : near_[b])
-            if (at.anchored) anchors.push_back({b, at.obstacle, at.point, at.anchor});
-    return anchors;
+            if (at.grasp.holds)
+                memory.anchors.push_back({b, at.obstacle, at.point, Index(at.grasp.slides), at.anchor});
+    return memory;
 }
 
-void Contacts::set_anchors(std::span<const Anchor> anchors) {
+bool Contacts::set_memory(const Memory& memory, std::span<const BodyState> bodies) {
+    const bool sound =
+        memory.recovering.size() == bodies.size() &&
+        std::ranges::all_of(memory.anchors,
+                            [&](const Anchor& anchor) {
+                                return anchor.body < bodies.size() && anchor.obstacle < world_.obstacles.size() &&
+                                       anchor.point < bodies[anchor.body].surface.size();
+                            }) &&
+        std::ranges::all_of(memory.matter, [&](const auto& pair) { return matter_.is_sound(pair, bodies); });
+    if (!sound) return false;
     for (std::vector<Near>& near : near_) near.clear();
-    for (const Anchor& anchor : anchors)
-        near_[anchor.body].push_back({anchor.obstacle, anchor.point, 0, 0, true, anchor.place});
+    for (const Anchor& anchor : memory.anchors)
+        near_[anchor.body].push_back(
+            {anchor.obstacle, anchor.point, 0, 0, {true, anchor.slides != 0}, anchor.place});
+    matter_.set_memories(memory.matter, memory.recovering);
+    return true;
 }
 
 } // namespace filigree

@@ -11,24 +11,22 @@ namespace filigree {
 
 namespace {
 
+constexpr double kMostParts = 16; ///< of a usual substep, where bodies meet fast
 constexpr float kWildStretch = 3; ///< a body stretched further is not predicted: sweeps begin where it is
 
-/// Implicit Euler takes angular momentum away however well it is solved; a body that nothing touches gets it back.
-void restore_momentum(BodyState& body, const RigidState& before, const Vec3d& gravity, float dt) {
-    const RigidState after = rigid_state(body);
-    const double t = double(dt), kept = std::exp(-t * body.body->material.damping);
-    const Vec3d linear = (before.linear + t * before.mass * gravity) * kept;
-    const Vec3d centre = before.centre + t / before.mass * before.linear + 0.5 * t * t * gravity;
-    const Vec3d shift = (linear - after.linear) / after.mass;
-    const Vec3d turn = after.angular_velocity_of(before.angular * kept - after.angular);
-    const double size = std::sqrt(after.inertia.trace() / after.mass);
-    const double rounding = 1e-7 * std::max(centre.norm(), size);
-    if ((centre - after.centre).norm() + t * (shift.norm() + size * turn.norm()) < rounding) return;
-    for (std::size_t i = 0; i < body.positions.size(); ++i) {
-        const Vec3d arm = body.positions[i].cast<double>() - after.centre;
-        body.velocities.add(i, (shift + turn.cross(arm)).cast<float>());
-        body.positions.add(i, (centre - after.centre).cast<float>());
-    }
+/// How a body at rest in itself would have moved in dt: the rotation about its centre.
+struct Turn {
+    Vec3d centre = Vec3d::Zero();
+    Mat3d rotation = Mat3d::Identity();
+    Vec3f of(const Vec3f& point) const { return (centre + rotation * (point.cast<double>() - centre)).cast<float>(); }
+};
+
+Turn turn_in(const RigidState& state, double dt) {
+    const Vec3d angle = dt * state.angular_velocity_of(state.angular);
+    Turn turn{state.centre, Mat3d::Identity()};
+    if (const double length = angle.norm(); length > 0)
+        turn.rotation = Eigen::AngleAxisd(length, angle / length).toRotationMatrix();
+    return turn;
 }
 
 /// One substep, from `now` less dt to `now`.
@@ -54,10 +52,17 @@ private:
         const float obstacles = float(obstacle_way(state_.world, bodies_, now_ - double(dt_), now_));
         const float way = 1.5f * speed * dt_ + 1.5f * obstacles, spacing = least_spacing(bodies_);
         state_.contacts.begin_anew();
-        state_.contacts.search(bodies_, now_, 0, std::clamp(way, 0.25f * spacing, 8 * spacing),
-                               std::clamp(way, 0.25f * spacing, 0.75f * spacing), context_);
+        state_.contacts.search(bodies_,
+                               {.time = now_,
+                                .travelled = 0,
+                                .obstacle_reach = std::clamp(way, 0.25f * spacing, 8 * spacing),
+                                .pair_reach = std::clamp(way, 0.25f * spacing, 0.75f * spacing),
+                                .left = double(dt_),
+                                .frame = double(dt_)},
+                               context_);
+        frames_ = state_.contacts.matter_frames(bodies_, dt_);
         for (std::size_t b = 0; b < bodies_.size(); ++b)
-            blocks_.push_back(state_.contacts.blocks(bodies_, b, now_, dt_, [&](Contacts::Blocks& blocks) {
+            blocks_.push_back(state_.contacts.blocks(bodies_, b, now_, dt_, frames_, [&](Contacts::Blocks& blocks) {
                 for (const Grip& grip : state_.external.grips())
                     if (grip.pulls(b, now_)) blocks.add_pull(grip.region, 0, grip.target(now_), grip.stiffness);
             }));
@@ -81,6 +86,7 @@ private:
             BodyState& body = bodies_[b];
             const std::size_t count = body.positions.size();
             before_.push_back(rigid_state(body));
+            turn_.push_back(turn_in(before_.back(), double(dt_)));
             start_.push_back(body.positions);
             Vectors& target = target_.emplace_back(count);
             std::vector<float>& inertia = inertia_.emplace_back(count);
@@ -102,14 +108,39 @@ private:
         for (unsigned iteration = 0; iteration < state_.options.descent_iterations; ++iteration) {
             if (context_.is_cancelled()) return false;
             const Stopwatch watch(report_.elastic_seconds);
-            for (std::size_t b = 0; b < bodies_.size(); ++b) {
-                BodyState& body = bodies_[b];
-                blocks_[b].update_places(body.positions);
-                body.elasticity->sweep(
-                    body.positions, {target_[b], inertia_[b], body.fixed, blocks_[b].touched(), &blocks_[b]}, context_);
-            }
+            for (std::size_t b = 0; b < bodies_.size(); ++b) sweep(b);
         }
         return true;
+    }
+
+    /// Internal damping has elastic forces as they are at y = x + tau v, v less the turning (Kelvin-Voigt to first
+    /// order, as in explicit steps). With x0 where the particles would be without other motion, s = tau / dt and so
+    /// x = (y + s x0) / (1 + s), a sweep moves y instead, towards (1 + s) target - s x0 by inertia / (1 + s).
+    void sweep(std::size_t b) {
+        BodyState& body = bodies_[b];
+        const float s = float(body.body->material.internal_damping) / dt_;
+        const auto terms = [&](const Vectors& target, std::span<const float> inertia) {
+            return Descent{target, inertia, body.fixed, blocks_[b].touched(), &blocks_[b]};
+        };
+        if (!(s > 0)) {
+            blocks_[b].update_places(bodies_, body.positions, 1);
+            body.elasticity->sweep(body.positions, terms(target_[b], inertia_[b]), context_);
+            return;
+        }
+        const std::size_t count = body.positions.size();
+        Vectors ahead(count), target(count);
+        std::vector<float> inertia(count);
+        for (std::size_t i = 0; i < count; ++i) {
+            const Vec3f from = turn_[b].of(start_[b][i]);
+            ahead.set(i, (1 + s) * body.positions[i] - s * from);
+            target.set(i, (1 + s) * target_[b][i] - s * from);
+            inertia[i] = inertia_[b][i] / (1 + s);
+        }
+        blocks_[b].update_places(bodies_, ahead, 1 / (1 + s));
+        body.elasticity->sweep(ahead, terms(target, inertia), context_);
+        for (std::size_t i = 0; i < count; ++i)
+            if (!body.fixed[i])
+                body.positions.set(i, (ahead[i] + s * turn_[b].of(start_[b][i])) / (1 + s));
     }
 
     void finish() {
@@ -118,9 +149,11 @@ private:
             const ContactReport touching = state_.contacts.update_anchors(bodies_, now_);
             report_.contacts = touching.contacts;
             report_.deepest_contact = std::max(report_.deepest_contact, double(touching.deepest));
+            report_.deepest_in_matter = std::max(report_.deepest_in_matter, double(touching.deepest_in_matter));
         }
         const Stopwatch watch(report_.other_seconds);
         for (std::size_t b = 0; b < bodies_.size(); ++b) update_velocities(b);
+        restore_momentum();
         state_.contacts.push_out(bodies_, now_);
         finish_substep(state_, dt_, context_);
         ++report_.substeps;
@@ -131,10 +164,53 @@ private:
         const float kept = std::exp(-dt_ * float(body.body->material.damping));
         for (std::size_t i = 0; i < body.positions.size(); ++i)
             if (!body.fixed[i]) body.velocities.set(i, (body.positions[i] - start_[b][i]) / dt_ * kept);
-        if (!body.is_held && !state_.contacts.is_touched(b) && !state_.external.pull(b, now_))
-            restore_momentum(body, before_[b], state_.world.gravity, dt_);
         report_.least_volume_ratio = std::min(report_.least_volume_ratio, elastic_[b].least_volume_ratio);
         report_.most_stretch = std::max(report_.most_stretch, elastic_[b].most_stretch);
+    }
+
+    /// Implicit Euler takes angular momentum away however well it is solved, and sweeps that are not solved let two
+    /// bodies push each other unequally. Bodies that touch nothing but each other get it back, as if they were one.
+    void restore_momentum() {
+        std::vector<Index> groups = state_.contacts.free_groups();
+        for (std::size_t b = 0; b < bodies_.size(); ++b)
+            if (bodies_[b].is_held || state_.external.pull(b, now_))
+                std::ranges::replace(groups, Index(groups[b]), kNoIndex);
+        for (Index group = 0; group < bodies_.size(); ++group) {
+            if (std::ranges::find(groups, group) == groups.end()) continue;
+            RigidState before, after, kept;
+            for (std::size_t b = 0; b < bodies_.size(); ++b) {
+                if (groups[b] != group) continue;
+                RigidState state = before_[b];
+                before = together(before, state);
+                const double part = std::exp(-double(dt_) * bodies_[b].body->material.damping);
+                state.linear = (state.linear + double(dt_) * state.mass * state_.world.gravity) * part;
+                state.angular *= part;
+                kept = together(kept, state);
+                after = together(after, rigid_state(bodies_[b]));
+            }
+            give_back(group, groups, before, kept, after);
+        }
+    }
+
+    void give_back(Index group, std::span<const Index> groups, const RigidState& before, const RigidState& kept,
+                   const RigidState& after) {
+        const double t = double(dt_);
+        const Vec3d& gravity = state_.world.gravity;
+        const Vec3d centre = before.centre + t / before.mass * before.linear + 0.5 * t * t * gravity;
+        const Vec3d shift = (kept.linear - after.linear) / after.mass;
+        const Vec3d turn = after.angular_velocity_of(kept.angular - after.angular);
+        const double size = std::sqrt(after.inertia.trace() / after.mass);
+        const double rounding = 1e-7 * std::max(centre.norm(), size);
+        if ((centre - after.centre).norm() + t * (shift.norm() + size * turn.norm()) < rounding) return;
+        for (std::size_t b = 0; b < bodies_.size(); ++b) {
+            if (groups[b] != group) continue;
+            BodyState& body = bodies_[b];
+            for (std::size_t i = 0; i < body.positions.size(); ++i) {
+                const Vec3d arm = body.positions[i].cast<double>() - after.centre;
+                body.velocities.add(i, (shift + turn.cross(arm)).cast<float>());
+                body.positions.add(i, (centre - after.centre).cast<float>());
+            }
+        }
     }
 
     SimulationState& state_;
@@ -144,10 +220,13 @@ private:
     const double now_; // s
     const float dt_;
 
+    std::vector<MatterContacts::Frame> frames_;
+
     // Of each body.
     std::vector<Contacts::Blocks> blocks_;
     std::vector<ElasticReport> elastic_;
     std::vector<RigidState> before_;
+    std::vector<Turn> turn_;
     std::vector<Vectors> start_, target_;
     std::vector<std::vector<float>> inertia_; ///< m / dt^2
 };
@@ -156,12 +235,14 @@ private:
 
 void step_by_descent(SimulationState& state, double from, double until, FrameReport& report,
                      const RunContext& context) {
-    const unsigned steps =
-        std::max(1u, unsigned(std::lround(state.options.descent_substeps * (until - from) / state.frame_seconds())));
-    const double step = (until - from) / steps;
-    for (unsigned s = 0; s < steps && !context.is_cancelled(); ++s) {
-        const double now = s + 1 == steps ? until : from + (s + 1) * step;
-        if (!DescentStep(state, now, float(step), report, context).run()) return;
+    const double usual = state.frame_seconds() / state.options.descent_substeps;
+    for (double now = from; now < until && !context.is_cancelled();) {
+        const double longest =
+            std::clamp(state.contacts.longest_step_from(state.bodies, until - now), usual / kMostParts, usual);
+        const double steps = std::max(1.0, std::ceil((until - now) / longest - 1e-6));
+        const double next = steps == 1 ? until : now + (until - now) / steps;
+        if (!DescentStep(state, next, float(next - now), report, context).run()) return;
+        now = next;
     }
 }
 

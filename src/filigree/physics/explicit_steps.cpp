@@ -44,7 +44,8 @@ class ExplicitSteps {
 public:
     ExplicitSteps(SimulationState& state, double from, double until, FrameReport& report, const RunContext& context)
         : state_(state), bodies_(state.bodies), report_(report), context_(context), now_(from), until_(until),
-          meets_anything_(!state.world.obstacles.empty() || state.bodies.size() > 1) {}
+          meets_anything_(!state.world.obstacles.empty() || state.options.contacts_within_bodies ||
+                          (state.options.contacts_between_bodies && state.bodies.size() > 1)) {}
 
     double run() {
         find_contacts();
@@ -80,6 +81,7 @@ private:
     void move(float dt, double until) {
         const Stopwatch watch(report_.other_seconds);
         kick(0.5f * dt, false);
+        if (meets_anything_) state_.contacts.travel(bodies_, dt);
         drift(dt);
         const double before = std::exchange(now_, until);
         move_pins(state_, now_, dt);
@@ -93,8 +95,14 @@ private:
         const float speed = most_particle_speed(bodies_) + float(state_.world.gravity.norm() * state_.frame_seconds());
         const float way = speed * float(until_ - now_) + float(obstacle_way(state_.world, bodies_, now_, until_));
         const float spacing = least_spacing(bodies_);
-        state_.contacts.search(bodies_, now_, travelled_, std::clamp(2 * way, 0.25f * spacing, 4 * spacing),
-                               0.5f * spacing, context_);
+        state_.contacts.search(bodies_,
+                               {.time = now_,
+                                .travelled = travelled_,
+                                .obstacle_reach = std::clamp(2 * way, 0.25f * spacing, 4 * spacing),
+                                .pair_reach = 0.5f * spacing,
+                                .left = until_ - now_,
+                                .frame = state_.frame_seconds()},
+                               context_);
     }
 
     /// All forces at the present positions, and the step that is stable there.
@@ -105,10 +113,11 @@ private:
             const ContactReport touching = state_.contacts.add_forces(bodies_, now_, travelled_, dt, context_);
             report_.contacts = touching.contacts;
             report_.deepest_contact = std::max(report_.deepest_contact, double(touching.deepest));
+            report_.deepest_in_matter = std::max(report_.deepest_in_matter, double(touching.deepest_in_matter));
         }
         const Stopwatch watch(report_.other_seconds);
         state_.external.add_forces(bodies_, now_, context_);
-        stable_step_ = std::numeric_limits<double>::infinity();
+        stable_step_ = state_.contacts.longest_step();
         for (std::size_t b = 0; b < bodies_.size(); ++b) {
             BodyState& body = bodies_[b];
             double squared_frequency = double(elastic_[b].squared_frequency);
@@ -180,7 +189,7 @@ private:
     const RunContext& context_;
     double now_, until_;        // s
     float travelled_ = 0;       // m, bound on any way since the frame's start
-    const bool meets_anything_; // obstacles or other bodies
+    const bool meets_anything_; // obstacles, other bodies or parts of the same
     std::vector<ElasticReport> elastic_;
     double stable_step_ = 0; // s
 };

@@ -27,4 +27,18 @@ RigidState rigid_state(const BodyState& body) {
     return state;
 }
 
+RigidState together(const RigidState& a, const RigidState& b) {
+    RigidState both;
+    both.mass = a.mass + b.mass;
+    if (!(both.mass > 0)) return both;
+    both.centre = (a.mass * a.centre + b.mass * b.centre) / both.mass;
+    both.linear = a.linear + b.linear;
+    for (const RigidState& part : {a, b}) {
+        const Vec3d arm = part.centre - both.centre;
+        both.angular += part.angular + arm.cross(part.linear);
+        both.inertia += part.inertia + part.mass * (arm.squaredNorm() * Mat3d::Identity() - arm * arm.transpose());
+    }
+    return both;
+}
+
 } // namespace filigree

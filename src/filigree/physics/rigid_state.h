@@ -15,5 +15,7 @@ struct RigidState {
 };
 
 RigidState rigid_state(const BodyState& body);
+/// Of both as one body.
+RigidState together(const RigidState& a, const RigidState& b);
 
 } // namespace filigree

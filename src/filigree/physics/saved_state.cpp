@@ -6,9 +6,10 @@ namespace filigree {
 
 namespace {
 
-// The name of the format, its version last. 2: with the flow of each particle.
-constexpr std::uint64_t kMagic = 0x32455441'54534c46; // "FLSTATE2"
-static_assert(sizeof(Contacts::Anchor) == 3 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
+// The name of the format, its version last. 3: with what touches bodies.
+constexpr std::uint64_t kMagic = 0x33455441'54534c46; // "FLSTATE3"
+static_assert(sizeof(Contacts::Anchor) == 4 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
+static_assert(sizeof(MatterContacts::Memory) == 6 * sizeof(Index) + 3 * sizeof(Vec3f), "padding would be saved");
 
 void write_body(ByteWriter& writer, const SavedBody& body) {
     writer.value(std::uint64_t(body.positions.size()));
@@ -53,7 +54,9 @@ std::string write_saved_state(const SavedState& state) {
     writer.value(state.frame);
     writer.value(std::uint64_t(state.bodies.size()));
     for (const SavedBody& body : state.bodies) write_body(writer, body);
-    writer.array(std::span(state.anchors));
+    writer.array(std::span(state.contacts.anchors));
+    writer.array(std::span(state.contacts.matter));
+    writer.array(std::span(state.contacts.recovering));
     return writer.take();
 }
 
@@ -66,7 +69,9 @@ Result<SavedState> read_saved_state(std::string_view bytes) {
     state.frame = reader.value<std::uint64_t>();
     state.bodies.resize(reader.count(sizeof(std::uint64_t)));
     for (SavedBody& body : state.bodies) body = read_body(reader);
-    state.anchors = reader.array<Contacts::Anchor>();
+    state.contacts.anchors = reader.array<Contacts::Anchor>();
+    state.contacts.matter = reader.array<MatterContacts::Memory>();
+    state.contacts.recovering = reader.array<std::uint8_t>();
     if (!reader.ok() || !reader.at_end())
         return Error{ErrorCode::bad_file, "The saved state is damaged; start the simulation anew."};
     return state;

@@ -27,7 +27,7 @@ struct SavedBody {
 struct SavedState {
     std::uint64_t frame = 0;
     std::vector<SavedBody> bodies;
-    std::vector<Contacts::Anchor> anchors;
+    Contacts::Memory contacts;
 };
 
 /// Values and arrays end to end after the version's name; no padding, so that equal states are equal bytes.

@@ -44,7 +44,7 @@ BodyState begin_body(const Actor& actor, bool meets_bodies, const RunContext& co
 
     state.surface_stiffness = surface_stiffness(body, state.rest_squared_frequency);
     state.ball_radius = kBallRadius * float(body.spacing());
-    embed_surface_at_rest(state, meets_bodies, context);
+    embed_surface_at_rest(state, meets_bodies && body.material.model == MaterialModel::meshfree, context);
     return state;
 }
 
@@ -144,6 +144,7 @@ Result<Simulation> Simulation::create(World world, std::vector<Actor> actors, co
         for (BodyState& body : state->bodies) body.is_held = true;
     state->external.set_grips(make_grips(state->world.hands, *state, context));
     begin_pins(*state);
+    state->contacts.begin(state->bodies);
     return Simulation(std::move(state));
 }
 

@@ -26,7 +26,7 @@ struct StepOptions {
     StepMode mode = StepMode::automatic;
     unsigned most_substeps = 256; ///< a descent frame costs as much as some 120 explicit substeps
     unsigned descent_substeps = 4, descent_iterations = 8;
-    bool contacts_between_bodies = true;
+    bool contacts_between_bodies = true, contacts_within_bodies = true;
 };
 
 /// Why a frame was made by descent, or finished by it. chosen: the options say so. too_many_substeps: explicit steps
@@ -39,7 +39,8 @@ struct FrameReport {
     DescentCause why_descent = DescentCause::none;
     unsigned substeps = 0;
     std::size_t contacts = 0;     ///< surface points that touch something, at the frame's end
-    double deepest_contact = 0;   ///< m below a surface
+    double deepest_contact = 0;   ///< m below an obstacle's surface
+    double deepest_in_matter = 0; ///< m that a point of a surface lay inside another body, or its own
     float least_volume_ratio = 1; ///< smallest J; 0 or less: inverted
     float most_stretch = 1;
     double elastic_seconds = 0, contact_seconds = 0, other_seconds = 0;

@@ -40,7 +40,7 @@ bool restore_points(BodyState& body, SavedBody& saved, std::span<Attachment* con
                     const RunContext& context) {
     if (!body.has_flowed()) {
         if (!had_flowed) return true;
-        embed_surface_at_rest(body, body.balls.size() != 0, context);
+        embed_surface_at_rest(body, body.has_balls(), context);
         for (Attachment* attachment : attachments)
             *attachment = attach(body, attachment->body, std::vector(attachment->points), context);
         return true;
@@ -56,13 +56,6 @@ bool restore_points(BodyState& body, SavedBody& saved, std::span<Attachment* con
     return true;
 }
 
-bool are_sound(std::span<const Contacts::Anchor> anchors, const SimulationState& state) {
-    return std::ranges::all_of(anchors, [&](const Contacts::Anchor& anchor) {
-        return anchor.body < state.bodies.size() && anchor.obstacle < state.world.obstacles.size() &&
-               anchor.point < state.bodies[anchor.body].surface.size();
-    });
-}
-
 } // namespace
 
 SavedState save_state(const SimulationState& state) {
@@ -72,7 +65,7 @@ SavedState save_state(const SimulationState& state) {
     for (const Attachment& attachment : state.attachments)
         if (state.bodies[attachment.body].has_flowed())
             saved.bodies[attachment.body].attachments.push_back({attachment.embedding.rest, attachment.gradients});
-    saved.anchors = state.contacts.anchors();
+    saved.contacts = state.contacts.memory();
     return saved;
 }
 
@@ -97,8 +90,7 @@ Status restore_state(SimulationState& state, SavedState saved) {
         body.flow = std::move(from.flow);
         if (!restore_points(body, from, state.attachments_of(b), had_flowed, context)) return other;
     }
-    if (!are_sound(saved.anchors, state)) return damaged;
-    state.contacts.set_anchors(saved.anchors);
+    if (!state.contacts.set_memory(saved.contacts, state.bodies)) return damaged;
     state.frame = saved.frame;
     return Success{};
 }

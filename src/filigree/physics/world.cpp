@@ -52,4 +52,11 @@ DistanceField::Sample distance_to(const Obstacle& obstacle, const Eigen::Isometr
     return sample;
 }
 
+PairContact World::contact_of(std::size_t body, std::size_t other) const {
+    for (const BodyPair& pair : body_pairs)
+        if ((pair.first == body && pair.second == other) || (pair.first == other && pair.second == body))
+            return pair.contact;
+    return {body_friction, body_restitution};
+}
+
 } // namespace filigree

@@ -89,6 +89,18 @@ struct Hand {
     double from = 0, until = std::numeric_limits<double>::infinity(); ///< s
 };
 
+/// How two bodies touch.
+struct PairContact {
+    double friction = 0.3;    ///< Coulomb's coefficient, 0 or more
+    double restitution = 0.7; ///< 0 .. 1, as an obstacle's
+};
+
+/// How these two bodies touch, where that differs from others.
+struct BodyPair {
+    std::size_t first = 0, second = 0; ///< in any order; equal: parts of one body
+    PairContact contact;
+};
+
 struct World {
     Vec3d gravity = {0, -9.81, 0};            ///< m/s^2
     Keyed<Vec3d> wind{{}, {}, Vec3d::Zero()}; ///< m/s
@@ -97,8 +109,11 @@ struct World {
     std::vector<Pin> pins;
     std::vector<RegionForce> forces;
     std::vector<Hand> hands;
-    double body_friction = 0.3;    ///< between bodies, Coulomb's; 0 or more
-    double body_restitution = 0.7; ///< between bodies, 0 .. 1
+    double body_friction = PairContact{}.friction; ///< between bodies, and between parts of one
+    double body_restitution = PairContact{}.restitution;
+    std::vector<BodyPair> body_pairs; ///< those that touch otherwise
+
+    PairContact contact_of(std::size_t body, std::size_t other) const;
 };
 
 } // namespace filigree

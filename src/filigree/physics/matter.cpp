@@ -1,0 +1,204 @@
+#include "filigree/physics/matter.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace filigree {
+
+namespace {
+
+constexpr float kLeastVolume = 1e-3f;             ///< of a cell at rest: flatter ones have no inside
+constexpr float kMostDepthStretch = 3;                 ///< of depth, and 1 over it [Drake #21317]
+constexpr float kConverged = 1e-3f, kFar = 0.5f;  ///< cells
+constexpr int kNewtonSteps = 4, kLongestWalk = 6;   ///< that a walk may go
+constexpr float kTurned = -0.2f;                  ///< cosine between the entry and a normal that is not its side's
+constexpr int kTraceSteps = 12;
+
+/// Position in a cell and its derivative by local coordinates.
+struct CellMap {
+    Vec3f point;
+    Mat3f slope;
+};
+
+CellMap map_cell(const Vectors& x, const std::array<Index, 8>& corners, const Vec3f& t) {
+    std::array<Vec3f, 8> p;
+    for (int c = 0; c < 8; ++c) p[c] = x[corners[c]];
+    const Vec3f d00 = p[1] - p[0], d10 = p[3] - p[2], d01 = p[5] - p[4], d11 = p[7] - p[6]; // along x
+    const Vec3f a00 = p[0] + t[0] * d00, a10 = p[2] + t[0] * d10, a01 = p[4] + t[0] * d01, a11 = p[6] + t[0] * d11;
+    const Vec3f b0 = a00 + t[1] * (a10 - a00), b1 = a01 + t[1] * (a11 - a01);
+    CellMap map;
+    map.point = b0 + t[2] * (b1 - b0);
+    map.slope.col(0) = (1 - t[2]) * (d00 + t[1] * (d10 - d00)) + t[2] * (d01 + t[1] * (d11 - d01));
+    map.slope.col(1) = a10 - a00 + t[2] * (a11 - a01 - a10 + a00);
+    map.slope.col(2) = b1 - b0;
+    return map;
+}
+
+} // namespace
+
+Matter::Matter(const Body& body) : body_(body) {
+    const Cells& cells = body.cells;
+    for (const auto& cell : cells.cells)
+        for (int axis = 0; axis < 3; ++axis) counts_[axis] = std::max(counts_[axis], int(cell[axis]) + 1);
+    grid_.assign(std::size_t(counts_[0]) * counts_[1] * counts_[2], kNoIndex);
+    for (Index c = 0; c < cells.cells.size(); ++c) {
+        const auto& at = cells.cells[c];
+        grid_[(std::size_t(at[2]) * counts_[1] + at[1]) * counts_[0] + at[0]] = c;
+    }
+    find_together();
+    find_cells_of_points();
+}
+
+Index Matter::cell_at(int i, int j, int k) const {
+    if (i < 0 || j < 0 || k < 0 || i >= counts_[0] || j >= counts_[1] || k >= counts_[2]) return kNoIndex;
+    return grid_[(std::size_t(k) * counts_[1] + j) * counts_[0] + i];
+}
+
+void Matter::find_together() {
+    const Cells& cells = body_.cells;
+    together_.resize(cells.cells.size());
+    whole_around_.resize(cells.cells.size());
+    for (Index c = 0; c < cells.cells.size(); ++c) {
+        const auto& at = cells.cells[c];
+        std::array<bool, 125> exists, reached = {};
+        for (int n = 0; n < 125; ++n)
+            exists[n] = cell_at(at[0] + n % 5 - 2, at[1] + n / 5 % 5 - 2, at[2] + n / 25 - 2) != kNoIndex;
+        const auto spread = [&](int n) { // to all neighbours
+            const int i = n % 5, j = n / 5 % 5, k = n / 25;
+            for (int z = std::max(0, k - 1); z <= std::min(4, k + 1); ++z)
+                for (int y = std::max(0, j - 1); y <= std::min(4, j + 1); ++y)
+                    for (int x = std::max(0, i - 1); x <= std::min(4, i + 1); ++x)
+                        reached[x + 5 * y + 25 * z] |= exists[x + 5 * y + 25 * z];
+        };
+        spread(62);
+        const std::array<bool, 125> near = reached;
+        for (int n = 0; n < 125; ++n)
+            if (near[n]) spread(n);
+        for (int n = 0; n < 125; ++n)
+            if (reached[n]) together_[c][n / 64] |= std::uint64_t(1) << (n % 64);
+        whole_around_[c] = reached == exists;
+    }
+}
+
+void Matter::find_cells_of_points() {
+    const Cells& cells = body_.cells;
+    const std::vector<Vec3f>& points = body_.surface.points.rest;
+    cell_of_point_.assign(points.size(), 0);
+    for (std::size_t s = 0; s < points.size(); ++s) {
+        const Vec3d at = (points[s].cast<double>() - cells.origin) / cells.spacing;
+        const Vec3d low = at.array().floor();
+        double least = std::numeric_limits<double>::infinity();
+        for (int n = 0; n < 27; ++n) {
+            const Vec3d index = low + Vec3d(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+            const Index cell = cell_at(int(index[0]), int(index[1]), int(index[2]));
+            const double away = (at - index - Vec3d::Constant(0.5)).cwiseAbs().maxCoeff();
+            if (cell == kNoIndex || away >= least) continue;
+            least = away;
+            cell_of_point_[s] = cell;
+        }
+    }
+}
+
+bool Matter::are_together(Index a, Index b) const {
+    const auto &from = body_.cells.cells[a], &to = body_.cells.cells[b];
+    const int i = int(to[0]) - from[0] + 2, j = int(to[1]) - from[1] + 2, k = int(to[2]) - from[2] + 2;
+    if (std::min({i, j, k}) < 0 || std::max({i, j, k}) > 4) return false;
+    const int n = i + 5 * j + 25 * k;
+    return together_[a][n / 64] >> (n % 64) & 1;
+}
+
+Matter::Weights Matter::weights(const Vec3f& t) {
+    Weights w;
+    for (int c = 0; c < 8; ++c)
+        w[c] = (c & 1 ? t[0] : 1 - t[0]) * (c & 2 ? t[1] : 1 - t[1]) * (c & 4 ? t[2] : 1 - t[2]);
+    return w;
+}
+
+Vec3f Matter::mean(const Place& place, const Vectors& values) const {
+    const Weights w = weights(place.local);
+    const std::array<Index, 8>& corner = corners(place.cell);
+    Vec3f sum = Vec3f::Zero();
+    for (int c = 0; c < 8; ++c) sum += w[c] * values[corner[c]];
+    return sum;
+}
+
+/// The cell beyond the side that `local` is furthest outside of and that has a neighbour; local coordinates become that
+/// cell's.
+std::optional<Index> Matter::neighbour(Index cell, Vec3f& local) const {
+    const auto& at = body_.cells.cells[cell];
+    std::array<int, 3> order = {0, 1, 2};
+    const auto outside = [&](int axis) { return std::max(-local[axis], local[axis] - 1); };
+    std::ranges::sort(order, std::greater{}, outside);
+    for (const int axis : order) {
+        if (!(outside(axis) > 0)) break;
+        std::array<int, 3> next = {at[0], at[1], at[2]};
+        const int side = local[axis] < 0 ? -1 : 1;
+        next[axis] += side;
+        if (const Index found = cell_at(next[0], next[1], next[2]); found != kNoIndex) {
+            local[axis] -= float(side);
+            return found;
+        }
+    }
+    return std::nullopt;
+}
+
+bool Matter::locate(const Vectors& positions, const Vec3f& point, Place& place, Mat3f& inverse) const {
+    const auto spacing = float(body_.spacing());
+    const float least = kLeastVolume * spacing * spacing * spacing;
+    for (int walked = 0; walked < kLongestWalk; ++walked) {
+        bool converged = false;
+        for (int step = 0; step < kNewtonSteps && !converged; ++step) {
+            const Vec3f from = place.local.cwiseMax(-kFar).cwiseMin(1 + kFar);
+            const CellMap map = map_cell(positions, corners(place.cell), from);
+            if (!(map.slope.determinant() > least)) return false;
+            inverse = map.slope.inverse();
+            const Vec3f next = from + inverse * (point - map.point);
+            converged = (next - place.local).cwiseAbs().maxCoeff() < kConverged;
+            place.local = next;
+            if (!(next.cwiseAbs().maxCoeff() < 4)) break; // the cells on the way come closer
+        }
+        const std::optional<Index> next = neighbour(place.cell, place.local);
+        if (!next) return converged && place.local.allFinite();
+        place.cell = *next;
+    }
+    return false;
+}
+
+Mat3f Matter::inverse_derivative(const Vectors& positions, const Place& place) const {
+    return map_cell(positions, corners(place.cell), place.local).slope.inverse();
+}
+
+float Matter::volume_ratio(const Vectors& positions, Index cell) const {
+    const auto spacing = float(body_.spacing());
+    return map_cell(positions, corners(cell), Vec3f::Constant(0.5f)).slope.determinant() / (spacing * spacing * spacing);
+}
+
+Vec3f Matter::rest_position(const Place& place) const {
+    const auto& at = body_.cells.cells[place.cell];
+    const Vec3d lattice = Vec3d(at[0], at[1], at[2]) + place.local.cast<double>();
+    return (body_.cells.origin + body_.spacing() * lattice).cast<float>();
+}
+
+std::optional<Matter::Depth> Matter::depth(const Place& place, const Mat3f& inverse, const Vec3f& entry) const {
+    const Vec3f rest = rest_position(place);
+    DistanceField::Sample surface = body_.field->at(rest);
+    surface.distance -= body_.field_radius;
+    if (surface.distance < 0 && surface.normal.dot(entry) < kTurned) {
+        float way = 0;
+        for (int step = 0; step < kTraceSteps; ++step) {
+            const float left = -(body_.field->at(rest + way * entry).distance - body_.field_radius);
+            if (!(left > 1e-3f * float(body_.spacing()))) break;
+            way += left;
+        }
+        surface = {-way, entry};
+    }
+    const Vec3f slope = inverse.transpose() * surface.normal * float(body_.spacing()); // F^-T n: of the distance
+    const float length = slope.norm();
+    if (!(length > 1e-6f) || !std::isfinite(length)) return std::nullopt;
+    return Depth{-surface.distance / std::clamp(length, 1 / kMostDepthStretch, kMostDepthStretch), slope / length,
+                 surface.normal};
+}
+
+} // namespace filigree

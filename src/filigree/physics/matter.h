@@ -1,0 +1,71 @@
+// A body's cells as matter that points may be inside of: which cell holds a point now, where that was at rest, and how
+// deep below the surface. Private to the layer.
+#pragma once
+
+#include "filigree/physics/body.h"
+
+#include <array>
+#include <optional>
+
+namespace filigree {
+
+/// Maps points of the world into a deformed body's rest space, where its distance field says depth and direction
+/// [Fisher & Lin 2001, McAdams 2011].
+class Matter {
+public:
+    /// body: of material fem or springs, so that its particles are the corners of its cells; outlives this.
+    explicit Matter(const Body& body);
+
+    /// A point in a cell: local coordinates are 0 .. 1 inside, and go on linearly outside.
+    struct Place {
+        Index cell = kNoIndex;
+        Vec3f local = Vec3f::Constant(0.5f);
+    };
+    using Weights = std::array<float, 8>;
+    /// Trilinear; they sum to 1.
+    static Weights weights(const Vec3f& local);
+    const std::array<Index, 8>& corners(Index cell) const { return body_.cells.cell_corners[cell]; }
+    Vec3f mean(const Place& place, const Vectors& values) const; ///< of the corners' values, by their weights
+
+    /// The place of a point, by Newton's method from `place` on, from cell to neighbouring cell. `inverse`: of the
+    /// derivative by local coordinates, 1/m. False where cells are inverted or flat, or the walk does not end.
+    bool locate(const Vectors& positions, const Vec3f& point, Place& place, Mat3f& inverse) const;
+
+    /// Derivative of local coordinates by position, 1/m.
+    Mat3f inverse_derivative(const Vectors& positions, const Place& place) const;
+
+    float volume_ratio(const Vectors& positions, Index cell) const; ///< of the cell's middle, now to rest
+
+    /// Where a place lies beside the surface.
+    struct Depth {
+        float depth;  ///< m, along the normal; below 0 outside
+        Vec3f normal; ///< unit, outward, in the world
+        Vec3f rest;   ///< the normal at rest
+    };
+    /// entry: unit, at rest; the normal where the point came in, or zero. A point that is past the middle of a thin
+    /// part goes back the way it came.
+    std::optional<Depth> depth(const Place& place, const Mat3f& inverse, const Vec3f& entry) const;
+
+    Vec3f rest_position(const Place& place) const; ///< m
+    /// Whether two cells are the same piece of matter: one is reached from the other in two steps between neighbours.
+    bool are_together(Index a, Index b) const;
+    /// Whether all cells within two steps along each axis are together with this one.
+    bool is_whole_around(Index cell) const { return whole_around_[cell]; }
+    Index cell_of_point(std::size_t surface_point) const { return cell_of_point_[surface_point]; }
+    const Body& body() const { return body_; }
+
+private:
+    Index cell_at(int i, int j, int k) const;
+    std::optional<Index> neighbour(Index cell, Vec3f& local) const;
+    void find_together();
+    void find_cells_of_points();
+
+    const Body& body_;
+    std::array<int, 3> counts_{0, 0, 0};
+    std::vector<Index> grid_;                            ///< cell at each lattice index, kNoIndex where there is none
+    std::vector<std::array<std::uint64_t, 2>> together_; ///< of each cell: bits of the 5^3 cells around it
+    std::vector<std::uint8_t> whole_around_;
+    std::vector<Index> cell_of_point_;
+};
+
+} // namespace filigree

@@ -1,0 +1,531 @@
+#include "filigree/physics/matter_contact.h"
+
+#include "filigree/core/parallel_for.h"
+#include "filigree/physics/matter_search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <tuple>
+
+namespace filigree {
+
+using namespace contact_law;
+
+namespace {
+
+constexpr std::size_t kMatterContactGrain = 128;
+constexpr float kLeastReach = 0.1f, kMostReach = 0.5f; ///< spacings that anything may go between two searches
+constexpr float kOwnReach = 0.3f;                      ///< the same of a body beside itself ...
+constexpr double kOwnSearches = 3;                     ///< ... which is searched no more often than this in a frame
+constexpr float kOutside = 0.25f;                      ///< cells that a point may lie outside of the last one
+constexpr float kLongestWay = 0.3f;                    ///< spacings a substep that one body may go towards another
+constexpr float kClearer = 0.8f;                       ///< part of a distance that is safe to go
+constexpr float kSlowest = 0.2f;                       ///< of a side's speed: what its pairs may gain unasked
+constexpr float kCrushed = 0.05f;                      ///< volume ratio below which a cell counts as crushed
+constexpr float kTooManyCrushed = 0.05f;               ///< part of a body's cells
+constexpr Index kAskedCells = 7;                       ///< one of so many is asked
+constexpr float kLittle = 0.05f;                       ///< spacings until a point that is nowhere is asked again
+
+Box box_of(const Vectors& positions) {
+    Vec3f low = positions[0], high = low;
+    for (std::size_t i = 1; i < positions.size(); ++i) {
+        low = low.cwiseMin(positions[i]);
+        high = high.cwiseMax(positions[i]);
+    }
+    Box box;
+    box.extend(low.cast<double>());
+    box.extend(high.cast<double>());
+    return box;
+}
+
+bool are_near(const Box& a, const Box& b, double distance) {
+    return (a.min.array() - distance <= b.max.array()).all() && (b.min.array() - distance <= a.max.array()).all();
+}
+
+/// N/m^3 in each cell: what the body's own surface has there, per area.
+std::vector<float> stiffness_per_area(const BodyState& state) {
+    const Embedding& points = state.body->surface.points;
+    const Cells& cells = state.body->cells;
+    double stiffness = 0, area = 0;
+    for (std::size_t s = 0; s < points.size(); ++s) {
+        stiffness += double(state.surface_stiffness[s]);
+        area += double(state.body->surface.areas[s]);
+    }
+    std::vector<float> at_corner(state.positions.size(), area > 0 ? float(stiffness / area) : 0);
+    for (std::size_t s = 0; s < points.size(); ++s)
+        for (Index k = points.offsets[s]; k < points.offsets[s + 1]; ++k) {
+            float& corner = at_corner[points.particles[k]];
+            corner = std::min(corner, state.surface_stiffness[s] / state.body->surface.areas[s]);
+        }
+    std::vector<float> in_cell(cells.cells.size(), std::numeric_limits<float>::max());
+    for (std::size_t c = 0; c < in_cell.size(); ++c)
+        for (const Index corner : cells.cell_corners[c]) in_cell[c] = std::min(in_cell[c], at_corner[corner]);
+    return in_cell;
+}
+
+/// Where particles will be in so many seconds.
+Vectors positions_in(const BodyState& body, float seconds) {
+    Vectors positions = body.positions;
+    const auto move = [&](std::vector<float>& x, const std::vector<float>& v) {
+        for (std::size_t i = 0; i < x.size(); ++i) x[i] += seconds * v[i];
+    };
+    move(positions.x, body.velocities.x);
+    move(positions.y, body.velocities.y);
+    move(positions.z, body.velocities.z);
+    return positions;
+}
+
+} // namespace
+
+void MatterContacts::begin(std::span<const BodyState> bodies) {
+    std::map<const Body*, std::shared_ptr<const Matter>> known; // pieces of one kind share theirs
+    for (const BodyState& state : bodies) {
+        std::shared_ptr<const Matter>& matter = known[state.body.get()];
+        if (!matter && state.body->field) matter = std::make_shared<Matter>(*state.body);
+        matter_.push_back(matter);
+        per_area_.push_back(matter ? stiffness_per_area(state) : std::vector<float>());
+    }
+    speeds_.resize(bodies.size());
+    recovers_.assign(bodies.size(), 0);
+}
+
+void MatterContacts::begin_anew() {
+    sides_until_ = -1;
+    way_ = 0;
+    for (Side& side : sides_) {
+        side.way = 0;
+        side.until = -1;
+        side.looked_at = std::numeric_limits<double>::infinity();
+        for (Pair& pair : side.pairs) pair.clear_until = 0;
+    }
+}
+
+/// Bound on how fast particles of two bodies, or of one, move beside each other.
+float MatterContacts::relative_speed(Index a, Index b) const {
+    const Speeds &one = speeds_[a], &other = speeds_[b];
+    return (one.most - other.least).cwiseMax(other.most - one.least).norm();
+}
+
+void MatterContacts::travel(std::span<const BodyState> bodies, float dt) {
+    Speeds all;
+    for (std::size_t b = 0; b < bodies.size(); ++b) {
+        const Vectors& v = bodies[b].velocities;
+        const auto range = [&](const std::vector<float>& values, int axis) {
+            constexpr std::size_t kAtOnce = 16; // so that the compiler uses vectors
+            const std::size_t count = v.size(), whole = count - count % kAtOnce;
+            float least[kAtOnce], most[kAtOnce];
+            std::ranges::fill(least, values[0]);
+            std::ranges::fill(most, values[0]);
+            const auto take = [&](std::size_t i, std::size_t k) {
+                least[k] = values[i] < least[k] ? values[i] : least[k];
+                most[k] = values[i] > most[k] ? values[i] : most[k];
+            };
+            for (std::size_t i = 0; i < whole; i += kAtOnce)
+                for (std::size_t k = 0; k < kAtOnce; ++k) take(i + k, k);
+            for (std::size_t i = whole; i < count; ++i) take(i, 0);
+            speeds_[b].least[axis] = *std::ranges::min_element(least);
+            speeds_[b].most[axis] = *std::ranges::max_element(most);
+        };
+        range(v.x, 0);
+        range(v.y, 1);
+        range(v.z, 2);
+        if (b == 0) all = speeds_[b];
+        all.least = all.least.cwiseMin(speeds_[b].least);
+        all.most = all.most.cwiseMax(speeds_[b].most);
+    }
+    way_ += dt * (all.most - all.least).norm();
+    for (Side& side : sides_) {
+        side.speed = relative_speed(side.body, side.other);
+        side.way += dt * side.speed;
+    }
+}
+
+/// Which bodies are near each other: boxes swept along x.
+void MatterContacts::find_sides(std::span<const BodyState> bodies, double left) {
+    std::vector<Box> boxes(bodies.size());
+    float spacing = 0, speed = 0;
+    std::vector<Index> order;
+    for (Index b = 0; b < bodies.size(); ++b) {
+        boxes[b] = box_of(bodies[b].positions);
+        if (!boxes[b].size().allFinite()) continue;
+        order.push_back(b);
+        spacing = std::max(spacing, float(bodies[b].body->spacing()));
+        speed = std::max(speed, relative_speed(b, order.front()));
+    }
+    const float reach = std::max(spacing, std::min(speed * float(left), 4 * spacing));
+    sides_until_ = way_ + reach;
+    const double far = double(reach + spacing);
+    std::ranges::sort(order, {}, [&](Index b) { return std::pair(boxes[b].min.x(), b); });
+    std::vector<std::pair<Index, Index>> found;
+    for (auto a = order.begin(); a != order.end(); ++a) {
+        if (within_bodies_ && matter_[*a]) found.emplace_back(*a, *a);
+        if (!between_bodies_) continue;
+        for (auto b = a + 1; b != order.end() && boxes[*b].min.x() - far <= boxes[*a].max.x(); ++b) {
+            if (!are_near(boxes[*a], boxes[*b], far)) continue;
+            if (matter_[*b]) found.emplace_back(*a, *b);
+            if (matter_[*a]) found.emplace_back(*b, *a);
+        }
+    }
+    std::ranges::sort(found);
+    std::vector<Side> sides;
+    auto old = sides_.begin();
+    for (const auto& [body, other] : found) {
+        while (old != sides_.end() && std::pair(old->body, old->other) < std::pair(body, other)) ++old;
+        if (old != sides_.end() && old->body == body && old->other == other)
+            sides.push_back(std::move(*old));
+        else
+            sides.push_back({.body = body, .other = other, .pairs = {}});
+        sides.back().speed = relative_speed(body, other);
+        sides.back().spacing = float(std::min(bodies[body].body->spacing(), bodies[other].body->spacing()));
+    }
+    sides_ = std::move(sides);
+}
+
+void MatterContacts::find_approaching(std::span<const BodyState> bodies, double left) {
+    begin_anew();
+    travel(bodies, 0);
+    find_sides(bodies, left);
+}
+
+/// Pairs of a side anew; those that touch stay.
+void MatterContacts::find_pairs(Side& side, const Embedding& points, const Vectors& positions, const CellBoxes& cells,
+                                const RunContext& context) const {
+    const bool own = side.body == side.other;
+    const Matter& matter = *matter_[side.other];
+    std::vector<Index> found(points.size());
+    parallel_for(context, points.size(), 4 * kMatterContactGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t s = begin; s < end; ++s)
+            found[s] = cells.find(embedded_point(points, s, positions), own ? matter.cell_of_point(s) : kNoIndex);
+    });
+    std::vector<Pair> pairs;
+    auto old = side.pairs.begin();
+    for (Index s = 0; s < points.size(); ++s) {
+        while (old != side.pairs.end() && old->point < s) ++old;
+        if (old != side.pairs.end() && old->point == s && (old->grasp.holds || old->tangled))
+            pairs.push_back(*old);
+        else if (found[s] != kNoIndex)
+            pairs.push_back(
+                {.point = s, .place = {found[s]}, .clear_until = side.way, .grasp = {}, .anchor = {}});
+    }
+    side.pairs = std::move(pairs);
+}
+
+void MatterContacts::search(std::span<const BodyState> bodies, double left, double frame, const RunContext& context) {
+    if (sides_until_ < 0) travel(bodies, 0);
+    const bool anew = sides_until_ < 0;
+    if (way_ > sides_until_) find_sides(bodies, left);
+    if (anew) find_recovering(bodies);
+    std::vector<Side*> stale;
+    for (Side& side : sides_) {
+        const bool own = side.body == side.other;
+        if (side.way > side.until && (!own || !(side.looked_at - left < frame / kOwnSearches))) stale.push_back(&side);
+    }
+    std::map<Index, CellBoxes> boxes; // of bodies that others ask for
+    for (Side* side : stale) {
+        side->looked_at = left;
+        if (side->body == side->other) {
+            // Looked for where everything will be halfway to the next search.
+            const BodyState& body = bodies[side->body];
+            const auto ahead = float(0.5 * std::min(left, frame / kOwnSearches));
+            const float reach = kOwnReach * side->spacing;
+            side->until = side->way + reach;
+            const Vectors positions = positions_in(body, ahead);
+            find_pairs(*side, body.surface, positions, CellBoxes(*matter_[side->other], positions, reach), context);
+            continue;
+        }
+        const float spacing = side->spacing;
+        const float reach =
+            std::clamp(side->speed * float(left), kLeastReach * spacing, kMostReach * spacing);
+        side->until = side->way + reach;
+        const BodyState& other = bodies[side->other];
+        auto cells = boxes.find(side->other);
+        if (cells == boxes.end())
+            cells = boxes
+                        .try_emplace(side->other, *matter_[side->other], other.positions,
+                                     kMostReach * float(other.body->spacing()))
+                        .first;
+        find_pairs(*side, bodies[side->body].surface, bodies[side->body].positions, cells->second, context);
+    }
+    work_.clear();
+    for (Index i = 0; i < sides_.size(); ++i)
+        for (Index p = 0; p < sides_[i].pairs.size(); ++p) work_.emplace_back(i, p);
+}
+
+double MatterContacts::longest_step() const {
+    double longest = std::numeric_limits<double>::infinity();
+    for (const Side& side : sides_) {
+        if (side.body == side.other || !(side.speed > 0)) continue;
+        longest = std::min(longest, double(kLongestWay * side.spacing / side.speed));
+    }
+    return longest;
+}
+
+void MatterContacts::leave(Pair& pair, const Side& side, float clearance) const {
+    pair.depth = 0;
+    pair.grasp = {};
+    pair.tangled = false;
+    pair.entry = Vec3f::Zero();
+    pair.clear_until = side.way + clearance;
+}
+
+/// Part of the body's cells that are crushed or inside out, of some.
+float MatterContacts::crushed_part(const BodyState& body, const Matter& matter) const {
+    const std::size_t cells = body.body->cells.cells.size();
+    std::size_t crushed = 0, asked = 0;
+    for (Index c = 0; c < cells; c += kAskedCells, ++asked)
+        crushed += !(matter.volume_ratio(body.positions, c) > kCrushed);
+    return float(crushed) / float(asked);
+}
+
+/// A body that starts crushed or inside out would hold itself in that shape. It does not meet itself until all of it is
+/// out of itself.
+void MatterContacts::find_recovering(std::span<const BodyState> bodies) {
+    for (Side& side : sides_) {
+        if (side.body != side.other) continue;
+        const float crushed = crushed_part(bodies[side.body], *matter_[side.body]);
+        const bool tangled = std::ranges::any_of(side.pairs, &Pair::tangled);
+        std::uint8_t& recovers = recovers_[side.body];
+        recovers = crushed > kTooManyCrushed || (recovers && (tangled || crushed > 0));
+    }
+}
+
+/// Where a point lies in the other's matter; a pair that does not touch is left until it might.
+std::optional<MatterContacts::Entered> MatterContacts::enter(Pair& pair, const Side& side,
+                                                             std::span<const BodyState> bodies) const {
+    const BodyState &body = bodies[side.body], &other = bodies[side.other];
+    const Matter& matter = *matter_[side.other];
+    const float little = kLittle * side.spacing;
+    Mat3f inverse;
+    if (!matter.locate(other.positions, embedded_point(body.surface, pair.point, body.positions), pair.place,
+                       inverse)) {
+        pair.place.local.setConstant(0.5f);
+        leave(pair, side, little);
+        return std::nullopt;
+    }
+    if (side.body == side.other && matter.are_together(matter.cell_of_point(pair.point), pair.place.cell)) {
+        leave(pair, side, little);
+        return std::nullopt;
+    }
+    const std::optional<Matter::Depth> found = matter.depth(pair.place, inverse, pair.entry);
+    const Vec3f& local = pair.place.local;
+    const float outside = std::max(-local.minCoeff(), local.maxCoeff() - 1);
+    if (!found || !(found->depth > 0) || outside > kOutside) {
+        float clear = little;
+        if (found && found->depth < 0) { // neighbours move alike: no need to ask again as soon as the side's speed says
+            const Vec3f velocity = embedded_point(body.surface, pair.point, body.velocities) -
+                                   matter.mean(pair.place, other.velocities);
+            clear = -kClearer * found->depth * side.speed / (velocity.norm() + kSlowest * side.speed);
+        }
+        leave(pair, side, clear);
+        return std::nullopt;
+    }
+    if (pair.entry.isZero(0)) {
+        pair.entry = found->rest;
+        pair.tangled = side.body == side.other && (recovers_[side.body] || found->depth > kDeepest * side.spacing);
+    }
+    if (pair.tangled) {
+        pair.depth = 0;
+        return std::nullopt;
+    }
+    pair.depth = found->depth;
+    return Entered{found->normal, found->depth};
+}
+
+/// N/m; half where the other body's points push as well.
+float MatterContacts::stiffness(const Side& side, const Pair& pair, std::span<const BodyState> bodies) const {
+    const BodyState& body = bodies[side.body];
+    return (matter_[side.body] ? 0.5f : 1.0f) *
+           std::min(body.surface_stiffness[pair.point],
+                           body.body->surface.areas[pair.point] * per_area_[side.other][pair.place.cell]);
+}
+
+/// The force on the point; minus it is that on the matter. Lets friction's anchor begin, slide and end.
+Vec3f MatterContacts::force(Pair& pair, const Side& side, std::span<const BodyState> bodies, float dt) const {
+    if (pair.clear_until > side.way) return Vec3f::Zero();
+    const std::optional<Entered> entered = enter(pair, side, bodies);
+    if (!entered) return Vec3f::Zero();
+    const BodyState &body = bodies[side.body], &other = bodies[side.other];
+    const Matter& matter = *matter_[side.other];
+    const PairContact law = world_.contact_of(side.body, side.other);
+    const Touch touch{entered->normal,
+                      embedded_point(body.surface, pair.point, body.velocities) -
+                          matter.mean(pair.place, other.velocities),
+                      pair.depth,
+                      stiffness(side, pair, bodies),
+                      float(law.friction),
+                      float(law.restitution)};
+    const Vec3f place = matter.mean(pair.place, other.positions);
+    Vec3f offset = Vec3f::Zero();
+    if (pair.grasp.holds) offset = along_surface(place - matter.mean(pair.anchor, other.positions), touch.normal);
+    const bool landed = !pair.grasp.holds;
+    const Vec3f force = touch_force(touch, offset, pair.grasp, dt, smooth_speed(world_, dt));
+    if (landed || pair.grasp.slides) anchor_at(pair, side, other, offset);
+    return force;
+}
+
+/// Puts the anchor so far behind the point.
+void MatterContacts::anchor_at(Pair& pair, const Side& side, const BodyState& other, const Vec3f& offset) const {
+    pair.anchor = pair.place;
+    if (!offset.isZero(0))
+        pair.anchor.local -= matter_[side.other]->inverse_derivative(other.positions, pair.place) * offset;
+}
+
+ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, std::span<std::uint8_t> touched,
+                                         const RunContext& context) {
+    ContactReport report;
+    forces_.assign(work_.size(), Vec3f::Zero());
+    parallel_for(context, work_.size(), kMatterContactGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k) {
+            Side& side = sides_[work_[k].first];
+            forces_[k] = force(side.pairs[work_[k].second], side, bodies, dt);
+        }
+    });
+    for (std::size_t k = 0; k < work_.size(); ++k) {
+        const Side& side = sides_[work_[k].first];
+        const Pair& pair = side.pairs[work_[k].second];
+        if (!(pair.depth > 0)) continue;
+        add_to_particles(bodies[side.body].surface, pair.point, forces_[k], bodies[side.body].forces);
+        const Matter::Weights weights = Matter::weights(pair.place.local);
+        const auto& corners = matter_[side.other]->corners(pair.place.cell);
+        for (int c = 0; c < 8; ++c) bodies[side.other].forces.add(corners[c], -weights[c] * forces_[k]);
+        touched[side.body] = touched[side.other] = 1;
+        ++report.contacts;
+        report.deepest_in_matter = std::max(report.deepest_in_matter, pair.depth);
+    }
+    return report;
+}
+
+void MatterContacts::push_out(std::span<BodyState> bodies) {
+    for (Side& side : sides_) {
+        const float most = kDeepest * side.spacing;
+        for (Pair& pair : side.pairs)
+            if (pair.depth > most) push_out(pair, side, bodies);
+    }
+}
+
+/// As XPBD projects one constraint of zero compliance: particles of both sides move by weight over mass.
+void MatterContacts::push_out(Pair& pair, const Side& side, std::span<BodyState> bodies) const {
+    const float most = kDeepest * side.spacing;
+    const std::optional<Entered> entered = enter(pair, side, bodies); // others have moved it since
+    if (!entered || !(entered->depth > most)) return;
+    BodyState &body = bodies[side.body], &other = bodies[side.other];
+    const Matter::Weights weights = Matter::weights(pair.place.local);
+    const auto& corners = matter_[side.other]->corners(pair.place.cell);
+    const Embedding& points = body.surface;
+    float yielding = 0;
+    for (Index k = points.offsets[pair.point]; k < points.offsets[pair.point + 1]; ++k)
+        yielding += points.weights[k] * points.weights[k] * body.inverse_mass[points.particles[k]];
+    for (int c = 0; c < 8; ++c) yielding += weights[c] * weights[c] * other.inverse_mass[corners[c]];
+    if (!(yielding > 0)) return;
+    const Vec3f velocity = embedded_point(points, pair.point, body.velocities) -
+                           matter_[side.other]->mean(pair.place, other.velocities);
+    const Vec3f way = (entered->depth - most) / yielding * entered->normal;
+    const Vec3f push = std::max(0.0f, -velocity.dot(entered->normal)) / yielding * entered->normal;
+    const auto move = [&](BodyState& state, Index particle, float weight) {
+        const float share = weight * state.inverse_mass[particle];
+        state.positions.add(particle, share * way);
+        state.velocities.add(particle, share * push);
+    };
+    for (Index k = points.offsets[pair.point]; k < points.offsets[pair.point + 1]; ++k)
+        move(body, points.particles[k], points.weights[k]);
+    for (int c = 0; c < 8; ++c) move(other, corners[c], -weights[c]);
+}
+
+std::vector<MatterContacts::Frame> MatterContacts::frames(std::span<const BodyState> bodies, float dt) const {
+    std::vector<Frame> frames;
+    for (const Side& side : sides_)
+        for (Pair pair : side.pairs) {
+            const BodyState &body = bodies[side.body], &other = bodies[side.other];
+            const Matter& matter = *matter_[side.other];
+            const bool touches = enter(pair, side, bodies).has_value();
+            if (!touches && pair.clear_until > side.way + kMostReach * side.spacing) continue;
+            const Mat3f inverse = matter.inverse_derivative(other.positions, pair.place);
+            const std::optional<Matter::Depth> found = matter.depth(pair.place, inverse, pair.entry);
+            if (!found || !found->normal.allFinite()) continue;
+            const Vec3f velocity = embedded_point(body.surface, pair.point, body.velocities) -
+                                   matter.mean(pair.place, other.velocities);
+            Frame& frame = frames.emplace_back();
+            frame.body = side.body;
+            frame.other = side.other;
+            frame.point = pair.point;
+            frame.place = pair.place;
+            frame.normal = found->normal;
+            frame.start = matter.mean(pair.place, other.positions) -
+                          embedded_point(body.surface, pair.point, body.positions);
+            frame.depth = found->depth;
+            frame.stiffness = stiffness(side, pair, bodies);
+            const PairContact law = world_.contact_of(side.body, side.other);
+            frame.unloading =
+                unloading(law.restitution, velocity.dot(found->normal), smooth_speed(world_, dt));
+            frame.friction = float(law.friction);
+            frame.holds = pair.grasp.holds;
+            if (frame.holds)
+                frame.offset = along_surface(matter.mean(pair.place, other.positions) -
+                                                 matter.mean(pair.anchor, other.positions),
+                                             frame.normal);
+        }
+    return frames;
+}
+
+ContactReport MatterContacts::update_anchors(std::span<const BodyState> bodies, std::span<std::uint8_t> touched) {
+    ContactReport report;
+    for (Side& side : sides_)
+        for (Pair& pair : side.pairs) {
+            if (!enter(pair, side, bodies)) continue;
+            const BodyState& other = bodies[side.other];
+            const Matter& matter = *matter_[side.other];
+            touched[side.body] = touched[side.other] = 1;
+            ++report.contacts;
+            report.deepest_in_matter = std::max(report.deepest_in_matter, pair.depth);
+            Vec3f offset = Vec3f::Zero();
+            const bool landed = !pair.grasp.holds;
+            if (!landed) {
+                const Mat3f inverse = matter.inverse_derivative(other.positions, pair.place);
+                const std::optional<Matter::Depth> found = matter.depth(pair.place, inverse, pair.entry);
+                offset = matter.mean(pair.place, other.positions) - matter.mean(pair.anchor, other.positions);
+                if (found) offset = along_surface(offset, found->normal);
+            }
+            const float limit = float(world_.contact_of(side.body, side.other).friction) * pair.depth;
+            const float stretch = kTangentialStiffness * offset.norm();
+            pair.grasp = {true, stretch > limit};
+            if (stretch > limit) offset *= limit / stretch;
+            if (landed || pair.grasp.slides) anchor_at(pair, side, other, offset);
+        }
+    return report;
+}
+
+std::vector<MatterContacts::Memory> MatterContacts::memories() const {
+    std::vector<Memory> memories;
+    for (const Side& side : sides_)
+        for (const Pair& pair : side.pairs)
+            if (pair.grasp.holds || pair.tangled)
+                memories.push_back({side.body, side.other, pair.point, pair.place.cell, pair.anchor.cell,
+                                    Index(pair.grasp.slides) + 2 * Index(pair.tangled), pair.place.local, pair.anchor.local, pair.entry});
+    return memories;
+}
+
+bool MatterContacts::is_sound(const Memory& memory, std::span<const BodyState> bodies) const {
+    if (memory.body >= bodies.size() || memory.other >= bodies.size() || !matter_[memory.other]) return false;
+    const std::size_t cells = bodies[memory.other].body->cells.cells.size();
+    return memory.point < bodies[memory.body].surface.size() && memory.cell < cells && memory.anchor_cell < cells;
+}
+
+void MatterContacts::set_memories(std::span<const Memory> memories, std::vector<std::uint8_t> recovering) {
+    recovers_ = std::move(recovering);
+    sides_.clear();
+    for (const Memory& memory : memories) {
+        if (sides_.empty() || sides_.back().body != memory.body || sides_.back().other != memory.other)
+            sides_.push_back({.body = memory.body, .other = memory.other, .pairs = {}});
+        sides_.back().pairs.push_back({.point = memory.point,
+                                       .place = {memory.cell, memory.local},
+                                       .grasp = {!(memory.flags & 2), (memory.flags & 1) != 0},
+                                       .anchor = {memory.anchor_cell, memory.anchor_local},
+                                       .entry = memory.entry,
+                                       .tangled = (memory.flags & 2) != 0});
+    }
+    begin_anew();
+}
+
+} // namespace filigree

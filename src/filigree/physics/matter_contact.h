@@ -1,0 +1,139 @@
+// Surface points in the matter of other bodies, and of their own. Private to the layer.
+#pragma once
+
+#include "filigree/physics/body_state.h"
+#include "filigree/physics/contact_law.h"
+#include "filigree/physics/matter.h"
+
+#include <algorithm>
+#include <memory>
+
+namespace filigree {
+
+struct ContactReport {
+    std::size_t contacts = 0; ///< points that touch
+    float deepest = 0;        ///< m, in an obstacle
+    float deepest_in_matter = 0;
+};
+
+class CellBoxes;
+
+/// Each surface point that lies in a cell of another body, or of a far part of its own, is pushed out along the normal
+/// of that matter's surface, and held by friction to the place in that matter where it landed. What pushes the point
+/// pushes the cell's corners back at the same place, so that momentum and angular momentum stay what they were.
+class MatterContacts {
+public:
+    MatterContacts(const World& world, bool between_bodies, bool within_bodies)
+        : world_(world), between_bodies_(between_bodies), within_bodies_(within_bodies) {}
+
+    /// Once, when all bodies are there. Meshfree bodies have no cells that move, and take no part.
+    void begin(std::span<const BodyState> bodies);
+
+    /// The next search finds everything again; what touches is remembered.
+    void begin_anew();
+    /// Before positions change by dt times velocities. Cost O(particles).
+    void travel(std::span<const BodyState> bodies, float dt);
+    /// Finds which points might touch which cells, as far as what was found last does not hold any more.
+    /// left: s of the frame.
+    void search(std::span<const BodyState> bodies, double left, double frame, const RunContext& context);
+    /// Only which bodies are near each other, for longest_step.
+    void find_approaching(std::span<const BodyState> bodies, double left);
+    /// Calls visit(body, other) for each two different bodies of which points touched at the last look.
+    template <class Visit>
+    void each_touching(const Visit& visit) const {
+        for (const Side& side : sides_)
+            if (side.body != side.other &&
+                std::ranges::any_of(side.pairs, [](const Pair& pair) { return pair.depth > 0; }))
+                visit(side.body, side.other);
+    }
+    /// s: in longer steps something could pass through something.
+    double longest_step() const;
+
+    /// As Contacts::add_forces. touched: of each body, 1 where it touches; added to.
+    ContactReport add_forces(std::span<BodyState> bodies, float dt, std::span<std::uint8_t> touched,
+                             const RunContext& context);
+    /// As Contacts::push_out.
+    void push_out(std::span<BodyState> bodies);
+
+    /// A surface point in or near a cell of `other`.
+    struct Pair {
+        Index point = 0;
+        Matter::Place place;
+        float clear_until = 0; ///< way of the side until which this cannot touch
+        float depth = 0;       ///< now
+        contact_law::Grasp grasp;
+        Matter::Place anchor;
+        Vec3f entry = Vec3f::Zero(); ///< normal at rest where the point came in; zero while it is outside
+        bool tangled = false;        ///< it did not come in from outside, and is left alone until it is out
+    };
+    /// All that friction remembers: pairs that touch. In the order of sides and points.
+    struct Memory {
+        Index body, other, point, cell, anchor_cell;
+        std::uint32_t flags; ///< 1: slides, 2: tangled
+        Vec3f local, anchor_local, entry;
+    };
+    std::vector<Memory> memories() const;
+    const std::vector<std::uint8_t>& recovering() const { return recovers_; }
+    void set_memories(std::span<const Memory> memories, std::vector<std::uint8_t> recovering);
+    bool is_sound(const Memory& memory, std::span<const BodyState> bodies) const;
+
+    /// A pair as descent sees it in a substep: the matter's frame stands still.
+    struct Frame {
+        Index body, other, point;
+        Matter::Place place;
+        Vec3f normal = Vec3f::Zero();
+        Vec3f start = Vec3f::Zero(); ///< from the point to the matter at its place, before anything moves
+        float depth = 0;             ///< then; below 0 outside
+        float stiffness = 0, unloading = 1, friction = 0;
+        bool holds = false;
+        Vec3f offset = Vec3f::Zero(); ///< from the anchor, along the surface, then
+    };
+    std::vector<Frame> frames(std::span<const BodyState> bodies, float dt) const;
+    const Matter& matter(std::size_t body) const { return *matter_[body]; }
+    /// After a descent substep: what touches, and friction's anchors, as positions say.
+    ContactReport update_anchors(std::span<const BodyState> bodies, std::span<std::uint8_t> touched);
+
+private:
+    /// Points of one body against the matter of another, or of its own.
+    struct Side {
+        Index body, other;
+        float way = 0;         ///< m, bound on what either has gone beside the other
+        float until = -1;      ///< way until which the pairs hold
+        double looked_at = 0;  ///< s left of the frame at the last look
+        float speed = 0;       ///< m/s, the same bound's
+        float spacing = 0;     ///< m, the smaller of both
+        std::vector<Pair> pairs;
+    };
+    struct Speeds { ///< of a body's particles along each axis
+        Vec3f least = Vec3f::Zero(), most = Vec3f::Zero();
+    };
+    struct Entered {
+        Vec3f normal;
+        float depth;
+    };
+    float relative_speed(Index a, Index b) const;
+    void find_pairs(Side& side, const Embedding& points, const Vectors& positions, const CellBoxes& cells,
+                    const RunContext& context) const;
+    void find_sides(std::span<const BodyState> bodies, double left);
+    std::optional<Entered> enter(Pair& pair, const Side& side, std::span<const BodyState> bodies) const;
+    float crushed_part(const BodyState& body, const Matter& matter) const;
+    void find_recovering(std::span<const BodyState> bodies);
+    void leave(Pair& pair, const Side& side, float clearance) const;
+    float stiffness(const Side& side, const Pair& pair, std::span<const BodyState> bodies) const;
+    void anchor_at(Pair& pair, const Side& side, const BodyState& other, const Vec3f& offset) const;
+    Vec3f force(Pair& pair, const Side& side, std::span<const BodyState> bodies, float dt) const;
+    void push_out(Pair& pair, const Side& side, std::span<BodyState> bodies) const;
+
+    const World& world_;
+    bool between_bodies_, within_bodies_;
+    std::vector<std::shared_ptr<const Matter>> matter_; ///< null: of meshfree bodies
+    std::vector<std::vector<float>> per_area_;          ///< N/m^3 in each cell of each body
+    std::vector<std::uint8_t> recovers_;                ///< of each body: 1 while it does not meet itself
+    std::vector<Speeds> speeds_;
+    std::vector<Side> sides_; ///< ascending by bodies
+    float way_ = 0, sides_until_ = -1;
+    std::vector<std::pair<Index, Index>> work_; ///< side and pair of each force
+    std::vector<Vec3f> forces_;
+};
+
+} // namespace filigree

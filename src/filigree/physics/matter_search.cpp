@@ -1,0 +1,110 @@
+#include "filigree/physics/matter_search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace filigree {
+
+namespace {
+
+constexpr float kBoxSize = 1.25f;         ///< spacings
+constexpr double kMostBoxes = 8, kFewBoxes = 4096; ///< a cell, and whatever their number
+
+} // namespace
+
+CellBoxes::CellBoxes(const Matter& matter, const Vectors& positions, float reach) : matter_(matter) {
+    const Cells& cells = matter.body().cells;
+    extents_.resize(cells.cells.size());
+    Vec3f high = Vec3f::Constant(-std::numeric_limits<float>::max());
+    low_ = -high;
+    for (std::size_t c = 0; c < extents_.size(); ++c) {
+        Extent& extent = extents_[c];
+        const auto& corners = cells.cell_corners[c];
+        extent.low = extent.high = extent.centre = positions[corners[0]];
+        for (int k = 1; k < 8; ++k) {
+            const Vec3f p = positions[corners[k]];
+            extent.low = extent.low.cwiseMin(p);
+            extent.high = extent.high.cwiseMax(p);
+            extent.centre += p;
+        }
+        extent.centre /= 8;
+        extent.low.array() -= reach;
+        extent.high.array() += reach;
+        low_ = low_.cwiseMin(extent.low);
+        high = high.cwiseMax(extent.high);
+    }
+    if (!(high - low_).allFinite()) {
+        extents_.clear(); // the frame is done again
+        return;
+    }
+    step_ = kBoxSize * float(matter.body().spacing());
+    const auto boxes = [&] { return ((high - low_) / step_).array().floor().cast<double>() + 1; };
+    while (boxes().prod() > kMostBoxes * double(extents_.size()) + kFewBoxes) step_ *= 1.25f;
+    for (int axis = 0; axis < 3; ++axis) counts_[axis] = int(boxes()[axis]);
+
+    const auto each_box = [&](const Extent& extent, const auto& visit) {
+        std::array<int, 3> from, to;
+        for (int axis = 0; axis < 3; ++axis) {
+            from[axis] = int((extent.low[axis] - low_[axis]) / step_);
+            to[axis] = std::min(int((extent.high[axis] - low_[axis]) / step_), counts_[axis] - 1);
+        }
+        for (int k = from[2]; k <= to[2]; ++k)
+            for (int j = from[1]; j <= to[1]; ++j)
+                for (int i = from[0]; i <= to[0]; ++i) visit((std::size_t(k) * counts_[1] + j) * counts_[0] + i);
+    };
+    offsets_.assign(std::size_t(counts_[0]) * counts_[1] * counts_[2] + 1, 0);
+    for (const Extent& extent : extents_) each_box(extent, [&](std::size_t box) { ++offsets_[box + 1]; });
+    for (std::size_t box = 1; box < offsets_.size(); ++box) offsets_[box] += offsets_[box - 1];
+    entries_.resize(offsets_.back());
+    ranges_.resize(offsets_.size() - 1);
+    std::vector<Index> next(offsets_.begin(), offsets_.end() - 1);
+    for (Index c = 0; c < extents_.size(); ++c)
+        each_box(extents_[c], [&](std::size_t box) {
+            entries_[next[box]++] = {c, cells.cells[c]};
+            Range& range = ranges_[box];
+            for (int axis = 0; axis < 3; ++axis) {
+                range.least[axis] = std::min(range.least[axis], cells.cells[c][axis]);
+                range.most[axis] = std::max(range.most[axis], cells.cells[c][axis]);
+            }
+        });
+}
+
+Index CellBoxes::find(const Vec3f& point, Index apart_from) const {
+    std::size_t box = 0;
+    for (int axis = 2; axis >= 0; --axis) {
+        const float at = (point[axis] - low_[axis]) / step_;
+        if (!(at >= 0) || !(at < float(counts_[axis]))) return kNoIndex;
+        box = box * counts_[axis] + std::size_t(at);
+    }
+    if (apart_from == kNoIndex) return nearest(box, point, [](const Entry&) { return true; });
+    const Cells::LatticeIndex& own = matter_.body().cells.cells[apart_from];
+    const bool whole = matter_.is_whole_around(apart_from);
+    const auto is_close = [&](const Cells::LatticeIndex& at) {
+        return std::abs(int(at[0]) - own[0]) <= 2 && std::abs(int(at[1]) - own[1]) <= 2 &&
+               std::abs(int(at[2]) - own[2]) <= 2;
+    };
+    if (whole && is_close(ranges_[box].least) && is_close(ranges_[box].most)) return kNoIndex;
+    return nearest(box, point, [&](const Entry& entry) {
+        return !is_close(entry.at) || (!whole && !matter_.are_together(apart_from, entry.cell));
+    });
+}
+
+/// The cell of the box nearest to the point, of those that reach it and count.
+template <class Counts>
+Index CellBoxes::nearest(std::size_t box, const Vec3f& point, const Counts& counts) const {
+    Index found = kNoIndex;
+    float least = std::numeric_limits<float>::infinity();
+    for (Index k = offsets_[box]; k < offsets_[box + 1]; ++k) {
+        if (!counts(entries_[k])) continue;
+        const Extent& extent = extents_[entries_[k].cell];
+        if ((point.array() < extent.low.array()).any() || (point.array() > extent.high.array()).any()) continue;
+        const float away = (extent.centre - point).squaredNorm();
+        if (away >= least) continue;
+        least = away;
+        found = entries_[k].cell;
+    }
+    return found;
+}
+
+} // namespace filigree

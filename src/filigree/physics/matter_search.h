@@ -1,0 +1,43 @@
+// Finding which cells of a body points might lie in. Private to the layer.
+#pragma once
+
+#include "filigree/physics/matter.h"
+
+namespace filigree {
+
+/// The cells of a body where they are now, sorted into the boxes of a grid.
+class CellBoxes {
+public:
+    /// reach: m, that points may still move before they are looked for again.
+    CellBoxes(const Matter& matter, const Vectors& positions, float reach);
+
+    /// The cell that holds the point, or the nearest within reach; kNoIndex where there is none. apart_from: a cell of
+    /// the same body; what is one piece of matter with it does not count. kNoIndex: everything counts.
+    Index find(const Vec3f& point, Index apart_from) const;
+
+private:
+    struct Entry;
+    template <class Counts>
+    Index nearest(std::size_t box, const Vec3f& point, const Counts& counts) const;
+
+    const Matter& matter_;
+    Vec3f low_ = Vec3f::Zero();
+    float step_ = 1;
+    std::array<int, 3> counts_{0, 0, 0};
+    struct Entry {
+        Index cell;
+        Cells::LatticeIndex at;
+    };
+    struct Range {
+        Cells::LatticeIndex least = {65535, 65535, 65535}, most = {0, 0, 0};
+    };
+    struct Extent {
+        Vec3f low, high, centre;
+    };
+    std::vector<Index> offsets_;
+    std::vector<Entry> entries_;  ///< of each box: cells that reach into it
+    std::vector<Range> ranges_;   ///< of their lattice indices
+    std::vector<Extent> extents_; ///< of each cell, `reach` wider than it is
+};
+
+} // namespace filigree
