@@ -92,10 +92,11 @@ void report_totals(const RunTotals& t, Report& report) {
                            t.most_stretch, t.least_volume_ratio <= 0 ? "; some were inside out" : ""));
     report.set("least_volume_ratio", t.least_volume_ratio);
     report.set("most_stretch", t.most_stretch);
-    report.row("contacts", fmt::format("{} points at most, {:.3g} m deep at most", with_commas(t.most_contacts),
-                                       t.deepest_contact));
+    report.row("contacts", fmt::format("{} points at most, {:.3g} m deep at most, {:.3g} m in bodies",
+                                       with_commas(t.most_contacts), t.deepest_contact, t.deepest_in_matter));
     report.set("most_contacts", t.most_contacts);
     report.set("deepest_contact_m", t.deepest_contact);
+    report.set("deepest_in_matter_m", t.deepest_in_matter);
 }
 
 void report_frames(const SceneFile& scene, const SceneRun& run, Report& report) {

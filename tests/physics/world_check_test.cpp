@@ -55,6 +55,14 @@ TEST(CheckWorld, SaysWhichThingAndWhichField) {
          }},
         {"world.body_friction", [](World& w) { w.body_friction = -0.1; }},
         {"world.body_restitution", [](World& w) { w.body_restitution = 1.1; }},
+        {"world.body_pairs[0]",
+         [](World& w) {
+             w.body_pairs.push_back({0, 99, {}});
+         }},
+        {"world.body_pairs[0].contact.friction",
+         [](World& w) {
+             w.body_pairs.push_back({0, 0, {.friction = -1}});
+         }},
         {"world.obstacles[0].shape.normal",
          [](World& w) {
              w.obstacles[0].shape = HalfSpace{{0, 0, 0}, {0, 0, 0}};

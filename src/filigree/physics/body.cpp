@@ -16,7 +16,7 @@ namespace {
 /// gradient in that direction.
 constexpr float kLeastSpread = 0.01f;
 
-constexpr double kFieldSpacing = 0.5; ///< spacings between the points of the distance field
+constexpr double kFieldSpacing = 0.5;                     ///< spacings between the points of the distance field
 constexpr float kSheetDepth = 0.25f, kSheetRadius = 0.4f; ///< spacings
 
 /// Particles at the corners: each cell gives an eighth of its mass to each of its corners.
@@ -113,8 +113,7 @@ std::size_t count_particles(const Cells& cells, MaterialModel model, const RunCo
 Mesh outer_faces(const Cells& cells) {
     Mesh mesh;
     for (const auto& corner : cells.corners)
-        mesh.positions.push_back(
-            (cells.origin + cells.spacing * Vec3d(corner[0], corner[1], corner[2])).cast<float>());
+        mesh.positions.push_back((cells.origin + cells.spacing * Vec3d(corner[0], corner[1], corner[2])).cast<float>());
     for (std::size_t c = 0; c < cells.cells.size(); ++c)
         for (int axis = 0; axis < 3; ++axis)
             for (int side = 0; side < 2; ++side) {

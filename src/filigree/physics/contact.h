@@ -24,7 +24,7 @@ public:
     /// bodies: fixed in number from here on.
     Contacts(const World& world, std::size_t bodies, bool between_bodies, bool within_bodies)
         : world_(world), between_bodies_(between_bodies), near_(bodies), touched_(bodies, 0),
-          on_obstacle_(bodies, 0), matter_(world, between_bodies, within_bodies) {}
+          matter_(world, between_bodies, within_bodies) {}
     /// Once, when all bodies are there.
     void begin(std::span<const BodyState> bodies) { matter_.begin(bodies); }
 
@@ -117,8 +117,14 @@ public:
     ContactReport update_anchors(std::span<const BodyState> bodies, double time);
 
     bool is_touched(std::size_t body) const { return touched_[body]; } ///< by the last add_forces or update_anchors
-    /// Bodies that touch each other, and nothing else, as numbers of groups, one a body: such a group keeps its momentum.
-    /// kNoIndex: of bodies that touch an obstacle, or others that do.
+    /// What the last add_forces may have added to the squared frequency of a body, in parts of that at rest. Two bodies
+    /// that push each other swing by the sum of what each feels.
+    double added_frequency(std::size_t body) const {
+        return double(kContactShare) *
+               ((touched_[body] & kOnObstacle ? 1.0 : 0.0) + (touched_[body] & kInMatter ? 2.0 : 0.0));
+    }
+    /// Bodies that touch each other, and nothing else, as numbers of groups, one a body: such a group keeps its
+    /// momentum. kNoIndex: of bodies that touch an obstacle, or others that do.
     std::vector<Index> free_groups() const;
 
     /// Where friction holds a surface point on an obstacle, in the obstacle's own axes.
@@ -164,7 +170,8 @@ private:
     std::vector<std::vector<Near>> near_; ///< by body, ascending by obstacle and point
     std::vector<NearPair> pairs_;
     float near_until_ = -1, pairs_until_ = -1; ///< `travelled` until which they hold
-    std::vector<std::uint8_t> touched_, on_obstacle_;
+    static constexpr std::uint8_t kOnObstacle = 1, kInMatter = MatterContacts::kTouched;
+    std::vector<std::uint8_t> touched_; ///< of each body
     MatterContacts matter_;
 };
 

@@ -190,7 +190,6 @@ ContactReport Contacts::update_anchors(std::span<const BodyState> bodies, double
     ContactReport report;
     const ObstaclePoses poses(world_, time);
     std::ranges::fill(touched_, std::uint8_t{0});
-    std::ranges::fill(on_obstacle_, std::uint8_t{0});
     for (std::size_t b = 0; b < bodies.size(); ++b) {
         const BodyState& body = bodies[b];
         for (Near& at : near_[b]) {
@@ -202,7 +201,7 @@ ContactReport Contacts::update_anchors(std::span<const BodyState> bodies, double
                 at.grasp = {};
                 continue;
             }
-            touched_[b] = on_obstacle_[b] = 1;
+            touched_[b] |= kOnObstacle;
             ++report.contacts;
             report.deepest = std::max(report.deepest, -surface.distance);
             if (!at.grasp.holds) at.anchor = poses.to_own_axes(at.obstacle, place);
@@ -219,7 +218,8 @@ ContactReport Contacts::update_anchors(std::span<const BodyState> bodies, double
         const BodyState &a = bodies[pair.first_body], &b = bodies[pair.second_body];
         if ((embedded_point(a.balls, pair.first, a.positions) - embedded_point(b.balls, pair.second, b.positions))
                 .norm() < a.ball_radius + b.ball_radius) {
-            touched_[pair.first_body] = touched_[pair.second_body] = 1;
+            touched_[pair.first_body] |= kInMatter;
+            touched_[pair.second_body] |= kInMatter;
             ++report.contacts;
         }
     }
@@ -240,7 +240,7 @@ std::vector<Index> Contacts::free_groups() const {
     for (const NearPair& pair : pairs_)
         if (touched_[pair.first_body] && touched_[pair.second_body]) join(pair.first_body, pair.second_body);
     for (std::size_t b = 0; b < group.size(); ++b)
-        if (on_obstacle_[b]) std::ranges::replace(group, Index(group[b]), kNoIndex);
+        if (touched_[b] & kOnObstacle) std::ranges::replace(group, Index(group[b]), kNoIndex);
     return group;
 }
 

@@ -64,7 +64,8 @@ Vec3f Contacts::obstacle_force(Near& at, const BodyState& body, const ObstaclePo
                       at.depth,
                       body.surface_stiffness[at.point] * float(obstacle.stiffness),
                       float(obstacle.friction),
-                      float(obstacle.restitution)};
+                      float(obstacle.restitution),
+                      body.rest_squared_frequency * float(obstacle.stiffness)};
     Vec3f offset = Vec3f::Zero();
     if (at.grasp.holds) offset = along_surface(place - poses.to_world(at.obstacle, at.anchor), surface.normal);
     const bool landed = !at.grasp.holds;
@@ -109,7 +110,7 @@ ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, flo
         for (std::size_t k = 0; k < near.size(); ++k) {
             if (!(near[k].depth > 0)) continue;
             add_to_particles(body.surface, near[k].point, forces[k], body.forces);
-            touched_[b] = 1;
+            touched_[b] |= kOnObstacle;
             ++report.contacts;
             report.deepest = std::max(report.deepest, near[k].depth);
         }
@@ -123,7 +124,8 @@ ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, flo
         const NearPair& pair = pairs_[k];
         add_to_particles(bodies[pair.first_body].balls, pair.first, forces[k], bodies[pair.first_body].forces);
         add_to_particles(bodies[pair.second_body].balls, pair.second, -forces[k], bodies[pair.second_body].forces);
-        touched_[pair.first_body] = touched_[pair.second_body] = 1;
+        touched_[pair.first_body] |= kInMatter;
+        touched_[pair.second_body] |= kInMatter;
         ++report.contacts;
     }
     const ContactReport inside = matter_.add_forces(bodies, dt, touched_, context);

@@ -117,8 +117,7 @@ Contacts::Memory Contacts::memory() const {
     Memory memory{{}, matter_.memories(), matter_.recovering()};
     for (Index b = 0; b < near_.size(); ++b)
         for (const Near& at : near_[b])
-            if (at.grasp.holds)
-                memory.anchors.push_back({b, at.obstacle, at.point, Index(at.grasp.slides), at.anchor});
+            if (at.grasp.holds) memory.anchors.push_back({b, at.obstacle, at.point, Index(at.grasp.slides), at.anchor});
     return memory;
 }
 
@@ -134,8 +133,7 @@ bool Contacts::set_memory(const Memory& memory, std::span<const BodyState> bodie
     if (!sound) return false;
     for (std::vector<Near>& near : near_) near.clear();
     for (const Anchor& anchor : memory.anchors)
-        near_[anchor.body].push_back(
-            {anchor.obstacle, anchor.point, 0, 0, {true, anchor.slides != 0}, anchor.place});
+        near_[anchor.body].push_back({anchor.obstacle, anchor.point, 0, 0, {true, anchor.slides != 0}, anchor.place});
     matter_.set_memories(memory.matter, memory.recovering);
     return true;
 }

@@ -139,8 +139,7 @@ private:
         blocks_[b].update_places(bodies_, ahead, 1 / (1 + s));
         body.elasticity->sweep(ahead, terms(target, inertia), context_);
         for (std::size_t i = 0; i < count; ++i)
-            if (!body.fixed[i])
-                body.positions.set(i, (ahead[i] + s * turn_[b].of(start_[b][i])) / (1 + s));
+            if (!body.fixed[i]) body.positions.set(i, (ahead[i] + s * turn_[b].of(start_[b][i])) / (1 + s));
     }
 
     void finish() {

@@ -121,8 +121,7 @@ private:
         for (std::size_t b = 0; b < bodies_.size(); ++b) {
             BodyState& body = bodies_[b];
             double squared_frequency = double(elastic_[b].squared_frequency);
-            if (state_.contacts.is_touched(b))
-                squared_frequency += double(kContactShare) * double(body.rest_squared_frequency);
+            squared_frequency += state_.contacts.added_frequency(b) * double(body.rest_squared_frequency);
             squared_frequency = state_.external.add_pulls(body, b, now_, squared_frequency);
             stable_step_ = std::min(stable_step_, stable_step(squared_frequency, body.body->material.internal_damping));
         }

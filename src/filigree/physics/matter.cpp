@@ -10,9 +10,9 @@ namespace filigree {
 namespace {
 
 constexpr float kLeastVolume = 1e-3f;             ///< of a cell at rest: flatter ones have no inside
-constexpr float kMostDepthStretch = 3;                 ///< of depth, and 1 over it [Drake #21317]
+constexpr float kMostDepthStretch = 3;            ///< of depth, and 1 over it [Drake #21317]
 constexpr float kConverged = 1e-3f, kFar = 0.5f;  ///< cells
-constexpr int kNewtonSteps = 4, kLongestWalk = 6;   ///< that a walk may go
+constexpr int kNewtonSteps = 4, kLongestWalk = 6; ///< that a walk may go
 constexpr float kTurned = -0.2f;                  ///< cosine between the entry and a normal that is not its side's
 constexpr int kTraceSteps = 12;
 
@@ -172,7 +172,8 @@ Mat3f Matter::inverse_derivative(const Vectors& positions, const Place& place) c
 
 float Matter::volume_ratio(const Vectors& positions, Index cell) const {
     const auto spacing = float(body_.spacing());
-    return map_cell(positions, corners(cell), Vec3f::Constant(0.5f)).slope.determinant() / (spacing * spacing * spacing);
+    return map_cell(positions, corners(cell), Vec3f::Constant(0.5f)).slope.determinant() /
+           (spacing * spacing * spacing);
 }
 
 Vec3f Matter::rest_position(const Place& place) const {

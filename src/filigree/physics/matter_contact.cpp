@@ -206,8 +206,7 @@ void MatterContacts::find_pairs(Side& side, const Embedding& points, const Vecto
         if (old != side.pairs.end() && old->point == s && (old->grasp.holds || old->tangled))
             pairs.push_back(*old);
         else if (found[s] != kNoIndex)
-            pairs.push_back(
-                {.point = s, .place = {found[s]}, .clear_until = side.way, .grasp = {}, .anchor = {}});
+            pairs.push_back({.point = s, .place = {found[s]}, .clear_until = side.way, .grasp = {}, .anchor = {}});
     }
     side.pairs = std::move(pairs);
 }
@@ -236,8 +235,7 @@ void MatterContacts::search(std::span<const BodyState> bodies, double left, doub
             continue;
         }
         const float spacing = side->spacing;
-        const float reach =
-            std::clamp(side->speed * float(left), kLeastReach * spacing, kMostReach * spacing);
+        const float reach = std::clamp(side->speed * float(left), kLeastReach * spacing, kMostReach * spacing);
         side->until = side->way + reach;
         const BodyState& other = bodies[side->other];
         auto cells = boxes.find(side->other);
@@ -313,9 +311,12 @@ std::optional<MatterContacts::Entered> MatterContacts::enter(Pair& pair, const S
     const float outside = std::max(-local.minCoeff(), local.maxCoeff() - 1);
     if (!found || !(found->depth > 0) || outside > kOutside) {
         float clear = little;
-        if (found && found->depth < 0) { // neighbours move alike: no need to ask again as soon as the side's speed says
-            const Vec3f velocity = embedded_point(body.surface, pair.point, body.velocities) -
-                                   matter.mean(pair.place, other.velocities);
+        if (found && found->depth < 0 && found->depth > -little)
+            clear = 0;
+        else if (found &&
+                 found->depth < 0) { // neighbours move alike: no need to ask again as soon as the side's speed says
+            const Vec3f velocity =
+                embedded_point(body.surface, pair.point, body.velocities) - matter.mean(pair.place, other.velocities);
             clear = -kClearer * found->depth * side.speed / (velocity.norm() + kSlowest * side.speed);
         }
         leave(pair, side, clear);
@@ -338,7 +339,7 @@ float MatterContacts::stiffness(const Side& side, const Pair& pair, std::span<co
     const BodyState& body = bodies[side.body];
     return (matter_[side.body] ? 0.5f : 1.0f) *
            std::min(body.surface_stiffness[pair.point],
-                           body.body->surface.areas[pair.point] * per_area_[side.other][pair.place.cell]);
+                    body.body->surface.areas[pair.point] * per_area_[side.other][pair.place.cell]);
 }
 
 /// The force on the point; minus it is that on the matter. Lets friction's anchor begin, slide and end.
@@ -355,7 +356,8 @@ Vec3f MatterContacts::force(Pair& pair, const Side& side, std::span<const BodySt
                       pair.depth,
                       stiffness(side, pair, bodies),
                       float(law.friction),
-                      float(law.restitution)};
+                      float(law.restitution),
+                      std::max(body.rest_squared_frequency, other.rest_squared_frequency)};
     const Vec3f place = matter.mean(pair.place, other.positions);
     Vec3f offset = Vec3f::Zero();
     if (pair.grasp.holds) offset = along_surface(place - matter.mean(pair.anchor, other.positions), touch.normal);
@@ -390,7 +392,8 @@ ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, 
         const Matter::Weights weights = Matter::weights(pair.place.local);
         const auto& corners = matter_[side.other]->corners(pair.place.cell);
         for (int c = 0; c < 8; ++c) bodies[side.other].forces.add(corners[c], -weights[c] * forces_[k]);
-        touched[side.body] = touched[side.other] = 1;
+        touched[side.body] |= kTouched;
+        touched[side.other] |= kTouched;
         ++report.contacts;
         report.deepest_in_matter = std::max(report.deepest_in_matter, pair.depth);
     }
@@ -419,8 +422,8 @@ void MatterContacts::push_out(Pair& pair, const Side& side, std::span<BodyState>
         yielding += points.weights[k] * points.weights[k] * body.inverse_mass[points.particles[k]];
     for (int c = 0; c < 8; ++c) yielding += weights[c] * weights[c] * other.inverse_mass[corners[c]];
     if (!(yielding > 0)) return;
-    const Vec3f velocity = embedded_point(points, pair.point, body.velocities) -
-                           matter_[side.other]->mean(pair.place, other.velocities);
+    const Vec3f velocity =
+        embedded_point(points, pair.point, body.velocities) - matter_[side.other]->mean(pair.place, other.velocities);
     const Vec3f way = (entered->depth - most) / yielding * entered->normal;
     const Vec3f push = std::max(0.0f, -velocity.dot(entered->normal)) / yielding * entered->normal;
     const auto move = [&](BodyState& state, Index particle, float weight) {
@@ -444,27 +447,25 @@ std::vector<MatterContacts::Frame> MatterContacts::frames(std::span<const BodySt
             const Mat3f inverse = matter.inverse_derivative(other.positions, pair.place);
             const std::optional<Matter::Depth> found = matter.depth(pair.place, inverse, pair.entry);
             if (!found || !found->normal.allFinite()) continue;
-            const Vec3f velocity = embedded_point(body.surface, pair.point, body.velocities) -
-                                   matter.mean(pair.place, other.velocities);
+            const Vec3f velocity =
+                embedded_point(body.surface, pair.point, body.velocities) - matter.mean(pair.place, other.velocities);
             Frame& frame = frames.emplace_back();
             frame.body = side.body;
             frame.other = side.other;
             frame.point = pair.point;
             frame.place = pair.place;
             frame.normal = found->normal;
-            frame.start = matter.mean(pair.place, other.positions) -
-                          embedded_point(body.surface, pair.point, body.positions);
+            frame.start =
+                matter.mean(pair.place, other.positions) - embedded_point(body.surface, pair.point, body.positions);
             frame.depth = found->depth;
             frame.stiffness = stiffness(side, pair, bodies);
             const PairContact law = world_.contact_of(side.body, side.other);
-            frame.unloading =
-                unloading(law.restitution, velocity.dot(found->normal), smooth_speed(world_, dt));
+            frame.unloading = unloading(law.restitution, velocity.dot(found->normal), smooth_speed(world_, dt));
             frame.friction = float(law.friction);
             frame.holds = pair.grasp.holds;
             if (frame.holds)
-                frame.offset = along_surface(matter.mean(pair.place, other.positions) -
-                                                 matter.mean(pair.anchor, other.positions),
-                                             frame.normal);
+                frame.offset = along_surface(
+                    matter.mean(pair.place, other.positions) - matter.mean(pair.anchor, other.positions), frame.normal);
         }
     return frames;
 }
@@ -476,7 +477,8 @@ ContactReport MatterContacts::update_anchors(std::span<const BodyState> bodies, 
             if (!enter(pair, side, bodies)) continue;
             const BodyState& other = bodies[side.other];
             const Matter& matter = *matter_[side.other];
-            touched[side.body] = touched[side.other] = 1;
+            touched[side.body] |= kTouched;
+            touched[side.other] |= kTouched;
             ++report.contacts;
             report.deepest_in_matter = std::max(report.deepest_in_matter, pair.depth);
             Vec3f offset = Vec3f::Zero();
@@ -502,7 +504,8 @@ std::vector<MatterContacts::Memory> MatterContacts::memories() const {
         for (const Pair& pair : side.pairs)
             if (pair.grasp.holds || pair.tangled)
                 memories.push_back({side.body, side.other, pair.point, pair.place.cell, pair.anchor.cell,
-                                    Index(pair.grasp.slides) + 2 * Index(pair.tangled), pair.place.local, pair.anchor.local, pair.entry});
+                                    Index(pair.grasp.slides) + 2 * Index(pair.tangled), pair.place.local,
+                                    pair.anchor.local, pair.entry});
     return memories;
 }
 

@@ -49,7 +49,8 @@ public:
     /// s: in longer steps something could pass through something.
     double longest_step() const;
 
-    /// As Contacts::add_forces. touched: of each body, 1 where it touches; added to.
+    static constexpr std::uint8_t kTouched = 2;
+    /// As Contacts::add_forces. touched: of each body; kTouched is set where it touches.
     ContactReport add_forces(std::span<BodyState> bodies, float dt, std::span<std::uint8_t> touched,
                              const RunContext& context);
     /// As Contacts::push_out.
@@ -97,11 +98,11 @@ private:
     /// Points of one body against the matter of another, or of its own.
     struct Side {
         Index body, other;
-        float way = 0;         ///< m, bound on what either has gone beside the other
-        float until = -1;      ///< way until which the pairs hold
-        double looked_at = 0;  ///< s left of the frame at the last look
-        float speed = 0;       ///< m/s, the same bound's
-        float spacing = 0;     ///< m, the smaller of both
+        float way = 0;        ///< m, bound on what either has gone beside the other
+        float until = -1;     ///< way until which the pairs hold
+        double looked_at = 0; ///< s left of the frame at the last look
+        float speed = 0;      ///< m/s, the same bound's
+        float spacing = 0;    ///< m, the smaller of both
         std::vector<Pair> pairs;
     };
     struct Speeds { ///< of a body's particles along each axis

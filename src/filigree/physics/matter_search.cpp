@@ -8,7 +8,7 @@ namespace filigree {
 
 namespace {
 
-constexpr float kBoxSize = 1.25f;         ///< spacings
+constexpr float kBoxSize = 1.25f;                  ///< spacings
 constexpr double kMostBoxes = 8, kFewBoxes = 4096; ///< a cell, and whatever their number
 
 } // namespace

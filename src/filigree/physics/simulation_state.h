@@ -11,8 +11,7 @@ namespace filigree {
 struct SimulationState {
     SimulationState(World the_world, std::size_t body_count, const StepOptions& the_options)
         : world(std::move(the_world)), options(the_options),
-          contacts(world, body_count, the_options.contacts_between_bodies,
-                   the_options.contacts_within_bodies),
+          contacts(world, body_count, the_options.contacts_between_bodies, the_options.contacts_within_bodies),
           external(world, body_count) {}
     SimulationState(const SimulationState&) = delete; // contacts and external refer to the world
     SimulationState& operator=(const SimulationState&) = delete;

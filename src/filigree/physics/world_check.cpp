@@ -113,6 +113,15 @@ Status check_world(const World& world, std::span<const Actor> actors) {
     check.at_least(world.body_friction, 0, "world.body_friction", "must be 0 or more");
     check.require(world.body_restitution >= 0 && world.body_restitution <= 1, "world.body_restitution",
                   "must be from 0 to 1");
+    for (std::size_t p = 0; p < world.body_pairs.size(); ++p) {
+        const BodyPair& pair = world.body_pairs[p];
+        const std::string place = numbered("world.body_pairs", p);
+        check.require(pair.first < actors.size() && pair.second < actors.size(), place,
+                      "must name bodies that are there");
+        check.at_least(pair.contact.friction, 0, place + ".contact.friction", "must be 0 or more");
+        check.require(pair.contact.restitution >= 0 && pair.contact.restitution <= 1, place + ".contact.restitution",
+                      "must be from 0 to 1");
+    }
     for (std::size_t o = 0; o < world.obstacles.size(); ++o)
         check.obstacle(world.obstacles[o], numbered("world.obstacles", o));
     for (std::size_t p = 0; p < world.pins.size(); ++p) {

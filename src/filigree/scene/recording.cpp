@@ -13,6 +13,7 @@ void RunTotals::add(const FrameReport& report) {
     clamped_particles += report.clamped_particles;
     most_contacts = std::max<std::uint64_t>(most_contacts, report.contacts);
     deepest_contact = std::max(deepest_contact, report.deepest_contact);
+    deepest_in_matter = std::max(deepest_in_matter, report.deepest_in_matter);
     least_volume_ratio = std::min(least_volume_ratio, report.least_volume_ratio);
     most_stretch = std::max(most_stretch, report.most_stretch);
 }

@@ -20,7 +20,7 @@ struct RunTotals {
     std::uint64_t frames = 0, explicit_frames = 0, descent_frames = 0;
     std::uint64_t substeps = 0, least_substeps = ~std::uint64_t{0}, most_substeps = 0, clamped_particles = 0,
                   most_contacts = 0;
-    double deepest_contact = 0; ///< m
+    double deepest_contact = 0, deepest_in_matter = 0; ///< m
     float least_volume_ratio = 1, most_stretch = 1;
     Energy start; ///< before the first frame
 

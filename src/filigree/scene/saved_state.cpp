@@ -11,13 +11,14 @@ namespace filigree {
 
 namespace {
 
-constexpr std::string_view kFormat = "FILSTAT", kMagic = "FILSTAT3"; // ends in the version
+constexpr std::string_view kFormat = "FILSTAT", kMagic = "FILSTAT4"; // ends in the version
 
 void write_totals(ByteWriter& out, const RunTotals& t) {
     for (const std::uint64_t count : {t.frames, t.explicit_frames, t.descent_frames, t.substeps, t.least_substeps,
                                       t.most_substeps, t.clamped_particles, t.most_contacts})
         out.value(count);
     out.value(t.deepest_contact);
+    out.value(t.deepest_in_matter);
     out.value(t.least_volume_ratio);
     out.value(t.most_stretch);
     for (const double joules : {t.start.kinetic, t.start.elastic, t.start.potential}) out.value(joules);
@@ -29,6 +30,7 @@ RunTotals read_totals(ByteReader& in) {
                                  &t.most_substeps, &t.clamped_particles, &t.most_contacts})
         *count = in.value<std::uint64_t>();
     t.deepest_contact = in.value<double>();
+    t.deepest_in_matter = in.value<double>();
     t.least_volume_ratio = in.value<float>();
     t.most_stretch = in.value<float>();
     for (double* joules : {&t.start.kinetic, &t.start.elastic, &t.start.potential}) *joules = in.value<double>();

@@ -57,6 +57,7 @@ public:
         each("force", [&](const SceneTable& section) {
             scene_.forces.push_back({section.line(), body_of(section), section.region(), section.keyed("newtons")});
         });
+        each("pair", [&](const SceneTable& section) { read_pair(section); });
         each("hand", [&](const SceneTable& section) { read_hand(section); });
         scene_.content = spelled();
         return std::move(scene_);
@@ -111,6 +112,7 @@ private:
         in.set_whole("descent_substeps", step.descent_substeps);
         in.set_whole("descent_iterations", step.descent_iterations);
         step.contacts_between_bodies = in.flag("contacts_between_bodies", true);
+        step.contacts_within_bodies = in.flag("contacts_within_bodies", true);
     }
 
     void read_world(const SceneTable& in) {
@@ -141,7 +143,7 @@ private:
         if (in.has("particles") && in.has("spacing")) in.fail("spacing", "give one of particles and spacing");
         in.set_whole("particles", body.body.cells.count);
         in.set("spacing", body.body.cells.spacing);
-        read_material(in, body.material);
+        body.material_name = read_material(in, body.material);
         in.set("centre", body.centre);
         body.rotation = in.rotation("rotate");
         in.set("velocity", body.velocity);
@@ -185,7 +187,8 @@ private:
         if (model == MaterialModel::springs) refuse("poisson_ratio", "\"fem\" or \"meshfree\"");
     }
 
-    static void read_material(const SceneTable& in, Material& material) {
+    /// Returns the name of the one it began as.
+    static std::string read_material(const SceneTable& in, Material& material) {
         std::vector<std::string_view> names;
         for (const NamedMaterial& named : named_materials()) names.push_back(named.name);
         const std::string name = in.has("material") ? in.text("material") : std::string(names[0]);
@@ -218,6 +221,7 @@ private:
             while (wrong.back() == '.') wrong.pop_back();
             in.fail(in.line(), wrong);
         }
+        return name;
     }
 
     void read_obstacle(const SceneTable& in) {
@@ -264,6 +268,28 @@ private:
         if (found == names.end())
             in.fail("body", fmt::format("there is no body '{}'; there are {}", name, fmt::join(names, ", ")));
         return std::size_t(found - names.begin());
+    }
+
+    /// Numbers of the bodies of this name, or of this material.
+    std::vector<std::size_t> bodies_called(const SceneTable& in, std::string_view key) const {
+        if (!in.has(key)) in.fail(in.line(), "[[pair]] needs first and second: names of bodies or materials");
+        const std::string name = in.text(key);
+        std::vector<std::size_t> found;
+        for (std::size_t b = 0; b < scene_.bodies.size(); ++b)
+            if (scene_.bodies[b].name == name) return {b};
+        for (std::size_t b = 0; b < scene_.bodies.size(); ++b)
+            if (scene_.bodies[b].material_name == name) found.push_back(b);
+        if (found.empty()) in.fail(key, "no body is called '" + name + "', nor made of it");
+        return found;
+    }
+
+    void read_pair(const SceneTable& in) {
+        PairContact contact{scene_.body_friction, scene_.body_restitution};
+        in.set("friction", contact.friction);
+        in.set("restitution", contact.restitution);
+        for (const std::size_t first : bodies_called(in, "first"))
+            for (const std::size_t second : bodies_called(in, "second"))
+                scene_.pairs.push_back({first, second, contact});
     }
 
     void read_hand(const SceneTable& in) {

@@ -35,6 +35,7 @@ struct SceneBody {
     std::optional<std::size_t> driver = {}; ///< vertices; unset: as fine as the particles, see body_driver_options
     BodyOptions body;                       ///< with the scale, metres a model unit
     Material material;
+    std::string material_name;        ///< that it began as
     std::optional<Vec3d> centre = {}; ///< m; unset: where the mesh's own coordinates say
     Eigen::AngleAxisd rotation = Eigen::AngleAxisd::Identity();
     Vec3d velocity = Vec3d::Zero(), spin = Vec3d::Zero(); ///< m/s, rad/s
@@ -100,6 +101,7 @@ struct SceneFile {
     double air_density = 0, body_friction = 0.3, body_restitution = 0.7;
     std::vector<SceneBody> bodies;
     std::vector<SceneObstacle> obstacles;
+    std::vector<BodyPair> pairs;
     std::vector<ScenePin> pins;
     std::vector<SceneForce> forces;
     std::vector<SceneHand> hands;

@@ -47,6 +47,7 @@ constexpr KeyRule kKeys[] = {
     from(1, 1000, "simulation", "descent_substeps", whole, "", "4", "a frame, descent"),
     from(1, 1000, "simulation", "descent_iterations", whole, "", "8", "a substep, descent"),
     plain("simulation", "contacts_between_bodies", flag, "", "true", "whether bodies touch each other"),
+    plain("simulation", "contacts_within_bodies", flag, "", "true", "whether a body touches itself"),
 
     plain("world", "gravity", vector, "m/s^2", "[0, -9.81, 0]", "acceleration of everything"),
     plain("world", "wind", keyed, "m/s", "[0, 0, 0]", "velocity of the air"),
@@ -118,6 +119,11 @@ constexpr KeyRule kKeys[] = {
     plain("obstacle", "pivot", vector, "m", "its centre", "what it turns about"),
     plain("obstacle", "color", color, "", "grey", "in pictures"),
     plain("obstacle", "visible", flag, "", "true", "in pictures"),
+
+    plain("pair", "first", text, "", "", "name of a body, or of a material: all bodies of it; must be there"),
+    plain("pair", "second", text, "", "", "the same of what it touches; of one body with itself, its name again"),
+    from(0, 100, "pair", "friction", number, "", "the world's", "Coulomb's coefficient where these touch"),
+    from(0, 1, "pair", "restitution", number, "", "the world's", "where these touch"),
 
     plain("pin", "body", text, "", "the only one", "name of the body whose particles are held"),
     plain("pin", "box", box, "m", "", "those in a box at the start: `{ min = [x, y, z], max = [x, y, z] }`; or"),

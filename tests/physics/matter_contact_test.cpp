@@ -1,0 +1,388 @@
+// Bodies that touch each other and themselves.
+#include "filigree/core/random.h"
+#include "filigree/physics/matter_search.h"
+#include "filigree/physics/simulation.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+namespace filigree {
+namespace {
+
+const RunContext kOneThread(1);
+
+Material rubber(double young_modulus = 1e6, double damping = 0) {
+    Material material;
+    material.young_modulus = young_modulus;
+    material.damping = damping;
+    return material;
+}
+
+/// About the origin.
+std::shared_ptr<const Body> block(std::size_t nx, std::size_t ny, std::size_t nz, double spacing,
+                                  const Material& material) {
+    const Vec3d half = 0.5 * spacing * Vec3d(double(nx), double(ny), double(nz));
+    return std::make_shared<Body>(make_body(box_cells(nx, ny, nz, spacing, -half), material));
+}
+
+Actor put(std::shared_ptr<const Body> body, const Vec3d& at, double degrees = 0, const Vec3d& velocity = Vec3d::Zero()) {
+    Actor actor{.body = std::move(body), .velocity = velocity};
+    actor.placement = Eigen::Translation3d(at) * Eigen::AngleAxisd(degrees * std::numbers::pi / 180, Vec3d::UnitZ());
+    return actor;
+}
+
+Simulation begin(World world, std::vector<Actor> actors, StepMode mode = StepMode::explicit_steps) {
+    return Simulation::create(std::move(world), std::move(actors), {.mode = mode}, kOneThread).value();
+}
+
+Vec3d centre_of(const Simulation& simulation, std::size_t body) {
+    Vec3d sum = Vec3d::Zero();
+    double mass = 0;
+    for (std::size_t i = 0; i < simulation.body(body).particle_count(); ++i) {
+        const double m = double(simulation.body(body).mass[i]);
+        sum += m * simulation.positions(body)[i].cast<double>();
+        mass += m;
+    }
+    return sum / mass;
+}
+
+/// Something at rest on a slope, or sliding down it. `on_body`: the slope is a body that is held fast.
+struct Slope {
+    double degrees;
+    bool on_body;
+    World world;
+    std::vector<Actor> actors;
+    Vec3d normal, down;
+
+    Slope(double the_degrees, bool is_body, double friction) : degrees(the_degrees), on_body(is_body) {
+        const double angle = degrees * std::numbers::pi / 180;
+        normal = Vec3d(-std::sin(angle), std::cos(angle), 0);
+        down = Vec3d(-std::cos(angle), -std::sin(angle), 0);
+        world.body_friction = friction;
+        if (on_body) {
+            actors.push_back(put(block(60, 3, 8, 0.05, rubber()), -0.075 * normal, degrees));
+            Pin pin;
+            for (Index i = 0; i < actors[0].body->particle_count(); ++i) pin.particles.push_back(i);
+            world.pins.push_back(pin);
+        } else {
+            Obstacle plane;
+            plane.shape = HalfSpace{Vec3d::Zero(), normal};
+            plane.friction = friction;
+            world.obstacles.push_back(plane);
+        }
+    }
+    /// Metres up the slope from its middle.
+    std::size_t add(std::shared_ptr<const Body> body, double height, double up, double speed) {
+        Actor actor = put(std::move(body), height * normal - up * down, degrees, speed * down);
+        actors.push_back(actor);
+        return actors.size() - 1;
+    }
+};
+
+class EachStepMode : public testing::TestWithParam<StepMode> {};
+INSTANTIATE_TEST_SUITE_P(MatterContact, EachStepMode, testing::Values(StepMode::explicit_steps, StepMode::descent),
+                         [](const testing::TestParamInfo<StepMode>& mode) {
+                             return mode.param == StepMode::descent ? "descent" : "explicit_steps";
+                         });
+
+// Descent is slow and comes to rest sooner.
+TEST_P(EachStepMode, ASquareStackStands) {
+    const bool descent = GetParam() == StepMode::descent;
+    const std::size_t bodies = descent ? 3 : 5;
+    const int seconds = descent ? 12 : 60;
+    World world;
+    world.obstacles.emplace_back().shape = HalfSpace{};
+    std::vector<Actor> actors;
+    const auto cube = block(3, 3, 3, 0.4 / 3, rubber(1e6, 0.5));
+    for (std::size_t i = 0; i < bodies; ++i) actors.push_back(put(cube, Vec3d(0, 0.2 + 0.4 * double(i), 0)));
+    Simulation stack = begin(world, actors, GetParam());
+    std::vector<Vec3d> before;
+    for (int frame = 0; frame < 60 * seconds; ++frame) {
+        ASSERT_TRUE(stack.advance(kOneThread).ok());
+        if (frame + 1 != 60 * (seconds - 4)) continue;
+        for (std::size_t b = 0; b < bodies; ++b) before.push_back(centre_of(stack, b));
+    }
+    for (std::size_t b = 0; b < bodies; ++b) {
+        EXPECT_LT((centre_of(stack, b) - before[b]).norm() / 4, 1e-5) << "m/s, of body " << b;
+        EXPECT_NEAR(centre_of(stack, b).y(), 0.2 + 0.4 * double(b), 0.03);
+        EXPECT_LT(std::hypot(centre_of(stack, b).x(), centre_of(stack, b).z()), 2e-3);
+    }
+}
+
+// Flat plates: a tower of five cubes would tip over.
+TEST_P(EachStepMode, AStackHoldsOnASlopeOfTwentyDegrees) {
+    const bool descent = GetParam() == StepMode::descent;
+    const std::size_t bodies = descent ? 3 : 5;
+    Slope slope(20, false, 0.5);
+    const std::size_t across = descent ? 3 : 6, high = descent ? 1 : 2;
+    const double spacing = 0.4 / double(across);
+    const auto plate = block(across, high, across, spacing, rubber(1e6, 0.5));
+    for (std::size_t i = 0; i < bodies; ++i) slope.add(plate, (0.5 + double(i)) * double(high) * spacing, 0, 0);
+    Simulation stack = begin(slope.world, slope.actors, GetParam());
+    std::vector<Vec3d> before;
+    for (int frame = 0; frame < 900; ++frame) {
+        ASSERT_TRUE(stack.advance(kOneThread).ok());
+        if (frame + 1 != 600) continue;
+        for (std::size_t b = 0; b < bodies; ++b) before.push_back(centre_of(stack, b));
+    }
+    for (std::size_t b = 0; b < bodies; ++b)
+        EXPECT_LT((centre_of(stack, b) - before[b]).norm() / 5, 1e-5) << "m/s, of body " << b;
+}
+
+TEST(MatterContact, SlidingFollowsCoulombOnObstaclesAndOnBodies) {
+    for (const bool on_body : {false, true})
+        for (const double degrees : {26.0, 30.0, 40.0}) {
+            Slope slope(degrees, on_body, 0.5);
+            const std::size_t body = slope.add(block(4, 4, 4, 0.05, rubber()), 0.1002, 1.2, 1);
+            Simulation sliding = begin(slope.world, slope.actors);
+            std::vector<double> way;
+            for (int frame = 0; frame < 33; ++frame) {
+                ASSERT_TRUE(sliding.advance(kOneThread).ok());
+                way.push_back(centre_of(sliding, body).dot(slope.down));
+            }
+            const double first = (way[7] - way[2]) * 12, last = (way[32] - way[27]) * 12; // m/s
+            const double angle = degrees * std::numbers::pi / 180, acceleration = (last - first) / (25.0 / 60);
+            const double friction = (9.81 * std::sin(angle) - acceleration) / (9.81 * std::cos(angle));
+            EXPECT_NEAR(friction, 0.5, 0.01) << degrees << (on_body ? " degrees, on a body" : " degrees");
+        }
+}
+
+TEST(MatterContact, ABlockHoldsOnABodyAndSlidesBeyondItsAngle) {
+    for (const double degrees : {10.0, 20.0, 24.0, 30.0}) {
+        Slope slope(degrees, true, 0.5);
+        const std::size_t body = slope.add(block(4, 4, 4, 0.05, rubber(1e6, 0.5)), 0.1002, 0.3, 0);
+        Simulation resting = begin(slope.world, slope.actors);
+        for (int frame = 0; frame < 120; ++frame) ASSERT_TRUE(resting.advance(kOneThread).ok());
+        const Vec3d before = centre_of(resting, body);
+        for (int frame = 0; frame < 60; ++frame) ASSERT_TRUE(resting.advance(kOneThread).ok());
+        const double speed = (centre_of(resting, body) - before).norm();
+        if (degrees < 26)
+            EXPECT_LT(speed, 1e-4) << degrees;
+        else
+            EXPECT_GT(speed, 0.1) << degrees;
+    }
+}
+
+TEST_P(EachStepMode, BodiesMeetWithoutPassingAndKeepMomentumAndEnergy) {
+    const bool descent = GetParam() == StepMode::descent;
+    const auto cube = block(6, 6, 6, 0.4 / 6, rubber());
+    const double wave_speed = pressure_wave_speed(rubber()); // 36.7 m/s
+    for (const double speed : {1.0, 5.0, wave_speed / 2}) {
+        World world;
+        world.gravity.setZero();
+        Simulation meeting = begin(world,
+                                   {put(cube, {-0.3, 0, 0}, 0, {speed / 2, 0, 0}),
+                                    put(cube, {0.3, 0.05, 0.03}, 0, {-speed / 2, 0, 0})},
+                                   GetParam());
+        const double energy = meeting.energy(kOneThread).total();
+        const Momentum momentum = meeting.momentum();
+        double nearest = 1;
+        for (int frame = 0; frame < 45; ++frame) {
+            ASSERT_TRUE(meeting.advance(kOneThread).ok());
+            nearest = std::min(nearest, centre_of(meeting, 1).x() - centre_of(meeting, 0).x());
+            EXPECT_LT(meeting.energy(kOneThread).total(), 1.01 * energy) << speed;
+        }
+        EXPECT_LT(nearest, 0.42);
+        EXPECT_GT(nearest, 0.2);
+        EXPECT_GT(centre_of(meeting, 1).x() - centre_of(meeting, 0).x(), nearest + 0.02) << "they part again";
+        const Momentum after = meeting.momentum();
+        EXPECT_LT((after.angular - momentum.angular).norm(), (descent ? 1e-3 : 1e-5) * momentum.angular.norm()) << speed;
+        EXPECT_LT((after.linear - momentum.linear).norm(), 1e-5 * 64 * speed) << speed;
+    }
+}
+
+/// Two arms, one spacing apart, on a foot.
+Cells fork() {
+    std::vector<Cells::LatticeIndex> cells;
+    for (std::uint16_t k = 0; k < 3; ++k)
+        for (std::uint16_t j = 0; j < 14; ++j)
+            for (std::uint16_t i = 0; i < 7; ++i)
+                if (j < 3 || i < 3 || i > 3) cells.push_back({i, j, k});
+    return lattice_cells(std::move(cells), 0.1, Vec3d(-0.35, 0, -0.15));
+}
+
+/// The arms pressed together by a palm on each side. Returns how far one side's matter went past the other's, m.
+double press(bool touches_itself, FrameReport& worst) {
+    World world;
+    world.gravity.setZero();
+    for (const int side : {-1, 1}) {
+        Obstacle palm;
+        palm.shape = Cuboid{Vec3d(side * 0.5, 1.2, 0), Vec3d(0.2, 0.3, 1)};
+        palm.motion.move = {{0, 1}, {Vec3d::Zero(), Vec3d(-side * 0.16, 0, 0)}, Vec3d::Zero()};
+        palm.friction = 0;
+        world.obstacles.push_back(palm);
+    }
+    const auto body = std::make_shared<Body>(make_body(fork(), rubber(1e5, 2)));
+    Simulation pressed = Simulation::create(world, {put(body, Vec3d::Zero())},
+                                            {.mode = StepMode::explicit_steps, .contacts_within_bodies = touches_itself},
+                                            kOneThread)
+                             .value();
+    for (int frame = 0; frame < 90; ++frame) {
+        const FrameReport report = pressed.advance(kOneThread).value();
+        worst.deepest_in_matter = std::max(worst.deepest_in_matter, report.deepest_in_matter);
+        worst.least_volume_ratio = std::min(worst.least_volume_ratio, report.least_volume_ratio);
+    }
+    double left = -1, right = 1; // of the inner faces' middles
+    for (std::size_t i = 0; i < body->particle_count(); ++i) {
+        const Vec3f rest = body->rest[i];
+        if (std::abs(rest.y() - 1.2f) > 0.06f) continue;
+        if (std::abs(rest.x() + 0.05f) < 0.01f) left = std::max(left, double(pressed.positions(0).x[i]));
+        if (std::abs(rest.x() - 0.05f) < 0.01f) right = std::min(right, double(pressed.positions(0).x[i]));
+    }
+    return left - right;
+}
+
+TEST(MatterContact, ABodyMeetsItself) {
+    FrameReport with, without;
+    EXPECT_LT(press(true, with), 0.03);
+    EXPECT_GT(press(false, without), 0.06) << "the scene asks nothing of contact";
+    EXPECT_LT(with.deepest_in_matter, 0.3 * 0.1);
+    EXPECT_GT(with.deepest_in_matter, 0);
+    EXPECT_EQ(without.deepest_in_matter, 0);
+}
+
+TEST(MatterContact, FrictionMayDifferFromPairToPair) {
+    Slope slope(20, true, 0.5);
+    const std::size_t rough = slope.add(block(2, 2, 2, 0.1, rubber(1e6, 0.5)), 0.1002, 0.3, 0);
+    const std::size_t smooth = slope.add(block(2, 2, 2, 0.1, rubber(1e6, 0.5)), 0.1002, -0.3, 0);
+    slope.world.body_pairs.push_back({smooth, 0, {.friction = 0.05}});
+    Simulation both = begin(slope.world, slope.actors);
+    for (int frame = 0; frame < 60; ++frame) ASSERT_TRUE(both.advance(kOneThread).ok());
+    EXPECT_LT(centre_of(both, rough).dot(slope.down), -0.28);
+    EXPECT_GT(centre_of(both, smooth).dot(slope.down), 0.8);
+}
+
+TEST_P(EachStepMode, SavedWhileTouchingItGoesOnTheSameForAnyThreads) {
+    World world;
+    world.obstacles.emplace_back().shape = HalfSpace{};
+    const auto cube = block(4, 4, 4, 0.1, rubber(1e5, 0.5));
+    const std::vector<Actor> actors = {put(cube, {0, 0.2, 0}), put(cube, {0.1, 0.62, 0.05}, 10),
+                                       put(std::make_shared<Body>(make_body(fork(), rubber(5e4))), {0, 0.9, 0})};
+    Simulation one = begin(world, actors, GetParam());
+    for (int frame = 0; frame < 40; ++frame) ASSERT_TRUE(one.advance(kOneThread).ok());
+    Simulation other = begin(world, actors, GetParam());
+    ASSERT_TRUE(other.restore(one.save()).ok());
+    EXPECT_EQ(one.save(), other.save());
+    const RunContext two_threads(2);
+    for (int frame = 0; frame < 20; ++frame) {
+        ASSERT_TRUE(one.advance(kOneThread).ok());
+        ASSERT_TRUE(other.advance(two_threads).ok());
+    }
+    EXPECT_EQ(one.save(), other.save());
+}
+
+// Descent's damping is that of explicit steps: a bar that swings loses as much.
+TEST(MatterContact, DescentHasInternalDamping) {
+    Material material = rubber(1e5);
+    material.internal_damping = 0.01;
+    std::array<double, 2> kept;
+    for (const StepMode mode : {StepMode::explicit_steps, StepMode::descent}) {
+        World world;
+        world.gravity.setZero();
+        Simulation ringing = Simulation::create(world, {put(block(8, 2, 2, 0.1, material), Vec3d::Zero())},
+                                                {.mode = mode, .most_substeps = 4000, .descent_substeps = 100}, kOneThread)
+                                 .value();
+        Vectors stretched = ringing.positions(0);
+        for (std::size_t i = 0; i < stretched.size(); ++i) stretched.x[i] *= 1.05f;
+        ASSERT_TRUE(ringing.set_positions(0, stretched).ok());
+        const double before = ringing.energy(kOneThread).total();
+        for (int frame = 0; frame < 6; ++frame) ASSERT_TRUE(ringing.advance(kOneThread).ok());
+        kept[mode == StepMode::descent] = ringing.energy(kOneThread).total() / before;
+    }
+    EXPECT_LT(kept[0], 0.6);
+    EXPECT_GT(kept[0], 0.01);
+    EXPECT_NEAR(kept[1] / kept[0], 1, 0.25) << kept[0];
+}
+
+Vectors bent(const Body& body) {
+    Vectors positions = body.rest;
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+        const Vec3f p = positions[i];
+        positions.set(i, {p.x() + 0.3f * p.y() * p.y(), 0.9f * p.y() - 0.2f * p.x(), p.z() * (1 + 0.3f * p.y())});
+    }
+    return positions;
+}
+
+TEST(Matter, FindsThePlaceOfAPoint) {
+    const Body body = make_body(box_cells(6, 5, 4, 0.1), rubber());
+    const Matter matter(body);
+    const Vectors positions = bent(body);
+    for (std::uint64_t n = 0; n < 500; ++n) {
+        const Matter::Place truth{Index(random_unit(1, 4 * n) * double(body.cells.cells.size())),
+                                  {float(random_unit(1, 4 * n + 1)), float(random_unit(1, 4 * n + 2)),
+                                   float(random_unit(1, 4 * n + 3))}};
+        const Vec3f point = matter.mean(truth, positions);
+        const CellBoxes boxes(matter, positions, 0.01f);
+        Matter::Place found{boxes.find(point, kNoIndex)};
+        ASSERT_NE(found.cell, kNoIndex);
+        Mat3f inverse;
+        ASSERT_TRUE(matter.locate(positions, point, found, inverse));
+        EXPECT_LT((matter.rest_position(found) - matter.rest_position(truth)).norm(), 1e-4f);
+    }
+}
+
+TEST(Matter, KnowsDepthAndDirectionInABodyThatTurnedAndStretched) {
+    const Body body = make_body(box_cells(6, 6, 6, 0.1, Vec3d::Constant(-0.3)), rubber());
+    const Matter matter(body);
+    const Eigen::AngleAxisf turn(0.7f, Vec3f(1, 2, 3).normalized());
+    Vectors positions = body.rest;
+    for (std::size_t i = 0; i < positions.size(); ++i)
+        positions.set(i, turn * Vec3f(1.5f * positions.x[i], positions.y[i], positions.z[i]));
+    const Vec3f point = turn * Vec3f(0.4f, 0, 0);
+    Matter::Place place{CellBoxes(matter, positions, 0).find(point, kNoIndex)};
+    Mat3f inverse;
+    ASSERT_TRUE(matter.locate(positions, point, place, inverse));
+    const auto depth = matter.depth(place, inverse, Vec3f::Zero());
+    ASSERT_TRUE(depth);
+    EXPECT_NEAR(depth->depth, 0.05f, 2e-3f);
+    EXPECT_LT((depth->normal - turn * Vec3f::UnitX()).norm(), 0.02f);
+}
+
+TEST(Matter, CellsAcrossAGapAreNotTogether) {
+    const Body body = make_body(fork(), rubber());
+    const Matter matter(body);
+    const auto cell = [&](int i, int j) { return body.cells.find_cell(i, j, 1); };
+    EXPECT_TRUE(matter.are_together(cell(0, 10), cell(2, 9)));
+    EXPECT_FALSE(matter.are_together(cell(2, 10), cell(4, 10)));
+    EXPECT_TRUE(matter.are_together(cell(2, 3), cell(4, 3))) << "over the foot";
+    EXPECT_FALSE(matter.are_together(cell(0, 10), cell(0, 7)));
+}
+
+TEST(CellBoxes, FindsWhatBruteForceFinds) {
+    const Body body = make_body(fork(), rubber());
+    const Matter matter(body);
+    const Vectors positions = bent(body);
+    const float reach = 0.03f;
+    const CellBoxes boxes(matter, positions, reach);
+    std::size_t hits = 0;
+    for (std::uint64_t n = 0; n < 2000; ++n) {
+        const Vec3f point(float(1.6 * random_unit(2, 4 * n) - 0.6), float(1.6 * random_unit(2, 4 * n + 1) - 0.2),
+                          float(0.8 * random_unit(2, 4 * n + 2) - 0.4));
+        const bool own = n % 2;
+        const Index apart = own ? Index(random_unit(2, 4 * n + 3) * double(body.cells.cells.size())) : kNoIndex;
+        Index best = kNoIndex;
+        float least = 1e9f;
+        for (Index c = 0; c < body.cells.cells.size(); ++c) {
+            Vec3f low = Vec3f::Constant(1e9f), high = -low, middle = Vec3f::Zero();
+            for (const Index corner : body.cells.cell_corners[c]) {
+                low = low.cwiseMin(positions[corner]);
+                high = high.cwiseMax(positions[corner]);
+                middle += positions[corner] / 8;
+            }
+            if (own && matter.are_together(apart, c)) continue;
+            if (((point - low).array() < -reach).any() || ((point - high).array() > reach).any()) continue;
+            if (const float away = (middle - point).squaredNorm(); away < least) {
+                least = away;
+                best = c;
+            }
+        }
+        EXPECT_EQ(boxes.find(point, apart), best) << n;
+        hits += best != kNoIndex;
+    }
+    EXPECT_GT(hits, 200u);
+}
+
+} // namespace
+} // namespace filigree
