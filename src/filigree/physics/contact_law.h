@@ -47,8 +47,8 @@ struct Touch {
     float squared_frequency; ///< bound on stiffness by the mass it moves, 1/s^2
 };
 
-/// How friction holds a touching point: by a spring to the place where it landed, up to Coulomb's limit [Cundall &
-/// Strack 1979]. Where the anchor lies is kept in the axes of what is touched.
+/// How friction holds a touching point: by a spring to the place where it landed, up to Coulomb's limit [Cundall
+/// 1979]. Where the anchor lies is kept in the axes of what is touched.
 struct Grasp {
     bool holds = false;  ///< there is an anchor
     bool slides = false; ///< the spring is at its limit, also while the load grows

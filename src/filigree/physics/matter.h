@@ -10,7 +10,7 @@
 namespace filigree {
 
 /// Maps points of the world into a deformed body's rest space, where its distance field says depth and direction
-/// [Fisher & Lin 2001, McAdams 2011].
+/// [Fisher 2001, McAdams 2011].
 class Matter {
 public:
     /// body: of material fem or springs, so that its particles are the corners of its cells; outlives this.
