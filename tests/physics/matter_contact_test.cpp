@@ -27,7 +27,8 @@ std::shared_ptr<const Body> block(std::size_t nx, std::size_t ny, std::size_t nz
     return std::make_shared<Body>(make_body(box_cells(nx, ny, nz, spacing, -half), material));
 }
 
-Actor put(std::shared_ptr<const Body> body, const Vec3d& at, double degrees = 0, const Vec3d& velocity = Vec3d::Zero()) {
+Actor put(std::shared_ptr<const Body> body, const Vec3d& at, double degrees = 0,
+          const Vec3d& velocity = Vec3d::Zero()) {
     Actor actor{.body = std::move(body), .velocity = velocity};
     actor.placement = Eigen::Translation3d(at) * Eigen::AngleAxisd(degrees * std::numbers::pi / 180, Vec3d::UnitZ());
     return actor;
@@ -172,10 +173,9 @@ TEST_P(EachStepMode, BodiesMeetWithoutPassingAndKeepMomentumAndEnergy) {
     for (const double speed : {1.0, 5.0, wave_speed / 2}) {
         World world;
         world.gravity.setZero();
-        Simulation meeting = begin(world,
-                                   {put(cube, {-0.3, 0, 0}, 0, {speed / 2, 0, 0}),
-                                    put(cube, {0.3, 0.05, 0.03}, 0, {-speed / 2, 0, 0})},
-                                   GetParam());
+        Simulation meeting = begin(
+            world, {put(cube, {-0.3, 0, 0}, 0, {speed / 2, 0, 0}), put(cube, {0.3, 0.05, 0.03}, 0, {-speed / 2, 0, 0})},
+            GetParam());
         const double energy = meeting.energy(kOneThread).total();
         const Momentum momentum = meeting.momentum();
         double nearest = 1;
@@ -188,7 +188,8 @@ TEST_P(EachStepMode, BodiesMeetWithoutPassingAndKeepMomentumAndEnergy) {
         EXPECT_GT(nearest, 0.2);
         EXPECT_GT(centre_of(meeting, 1).x() - centre_of(meeting, 0).x(), nearest + 0.02) << "they part again";
         const Momentum after = meeting.momentum();
-        EXPECT_LT((after.angular - momentum.angular).norm(), (descent ? 1e-3 : 1e-5) * momentum.angular.norm()) << speed;
+        EXPECT_LT((after.angular - momentum.angular).norm(), (descent ? 1e-3 : 1e-5) * momentum.angular.norm())
+            << speed;
         EXPECT_LT((after.linear - momentum.linear).norm(), 1e-5 * 64 * speed) << speed;
     }
 }
@@ -215,10 +216,10 @@ double press(bool touches_itself, FrameReport& worst) {
         world.obstacles.push_back(palm);
     }
     const auto body = std::make_shared<Body>(make_body(fork(), rubber(1e5, 2)));
-    Simulation pressed = Simulation::create(world, {put(body, Vec3d::Zero())},
-                                            {.mode = StepMode::explicit_steps, .contacts_within_bodies = touches_itself},
-                                            kOneThread)
-                             .value();
+    Simulation pressed =
+        Simulation::create(world, {put(body, Vec3d::Zero())},
+                           {.mode = StepMode::explicit_steps, .contacts_within_bodies = touches_itself}, kOneThread)
+            .value();
     for (int frame = 0; frame < 90; ++frame) {
         const FrameReport report = pressed.advance(kOneThread).value();
         worst.deepest_in_matter = std::max(worst.deepest_in_matter, report.deepest_in_matter);
@@ -281,9 +282,10 @@ TEST(MatterContact, DescentHasInternalDamping) {
     for (const StepMode mode : {StepMode::explicit_steps, StepMode::descent}) {
         World world;
         world.gravity.setZero();
-        Simulation ringing = Simulation::create(world, {put(block(8, 2, 2, 0.1, material), Vec3d::Zero())},
-                                                {.mode = mode, .most_substeps = 4000, .descent_substeps = 100}, kOneThread)
-                                 .value();
+        Simulation ringing =
+            Simulation::create(world, {put(block(8, 2, 2, 0.1, material), Vec3d::Zero())},
+                               {.mode = mode, .most_substeps = 4000, .descent_substeps = 100}, kOneThread)
+                .value();
         Vectors stretched = ringing.positions(0);
         for (std::size_t i = 0; i < stretched.size(); ++i) stretched.x[i] *= 1.05f;
         ASSERT_TRUE(ringing.set_positions(0, stretched).ok());
@@ -310,9 +312,9 @@ TEST(Matter, FindsThePlaceOfAPoint) {
     const Matter matter(body);
     const Vectors positions = bent(body);
     for (std::uint64_t n = 0; n < 500; ++n) {
-        const Matter::Place truth{Index(random_unit(1, 4 * n) * double(body.cells.cells.size())),
-                                  {float(random_unit(1, 4 * n + 1)), float(random_unit(1, 4 * n + 2)),
-                                   float(random_unit(1, 4 * n + 3))}};
+        const Matter::Place truth{
+            Index(random_unit(1, 4 * n) * double(body.cells.cells.size())),
+            {float(random_unit(1, 4 * n + 1)), float(random_unit(1, 4 * n + 2)), float(random_unit(1, 4 * n + 3))}};
         const Vec3f point = matter.mean(truth, positions);
         const CellBoxes boxes(matter, positions, 0.01f);
         Matter::Place found{boxes.find(point, kNoIndex)};
