@@ -1,6 +1,7 @@
 #include "commands.h"
 #include "session.h"
 
+#include "filigree/deform/fidelity.h"
 #include "filigree/io/gltf.h"
 #include "filigree/mesh/topology.h"
 #include "filigree/remesh/quad_quality.h"
@@ -155,6 +156,28 @@ void describe_code(const Model& model, Report& report) {
     }
 }
 
+constexpr std::size_t kQuickDriver = 20000;      ///< vertices, of a driver that is judged in a second or so
+constexpr std::size_t kQuickReference = 2000000; ///< vertices, of a mesh restored six times in a few seconds
+
+bool is_judged_quickly(const Model& model) {
+    return model.code() == DetailCode::blend ? model.driver().vertices.size() <= kQuickDriver
+                                             : model.mesh.vertex_count() <= kQuickReference;
+}
+
+/// What the driver is good for.
+void describe_fidelity(const Model& model, Session& session, Report& report) {
+    const DriverFidelity fidelity = require(driver_fidelity(model, session.context()));
+    if (model.code() == DetailCode::reference) {
+        report.add("fidelity", fmt::format("{:.2g} of the diagonal", fidelity.positions), "fidelity",
+                   {{"positions", fidelity.positions}});
+        return;
+    }
+    report.add("fidelity",
+               fmt::format("{:.2g} of the diagonal from positions, {:.2g} with gradients", fidelity.positions,
+                           fidelity.gradients),
+               "fidelity", {{"positions", fidelity.positions}, {"gradients", fidelity.gradients}});
+}
+
 void describe_model(const Model& model, const PoseSequence& poses, std::size_t bytes, Report& report) {
     const char* code = model.code() == DetailCode::blend ? "blend" : "reference";
     report.add("code", code, "code", code);
@@ -206,7 +229,13 @@ void describe_scene(const GltfScene& scene, Report& report) {
     if (measured && measured->is_object()) describe_export(*measured, report);
 }
 
-void run(const std::string& path, Session& session) {
+struct InfoArguments {
+    std::string path;
+    bool fidelity = false; ///< also where it takes long
+};
+
+void run(const InfoArguments& options, Session& session) {
+    const std::string& path = options.path;
     const Session::Content content = session.read_any(path, true);
     Report report;
     report.add("file", path, "file", path);
@@ -214,9 +243,12 @@ void run(const std::string& path, Session& session) {
         report.set("kind", "mesh");
         describe_mesh(*mesh, session, report);
         if (content.scene) describe_scene(*content.scene, report);
+        if (options.fidelity) refuse(path + ": is a mesh, and --fidelity belongs to models.");
     } else {
         report.set("kind", "model");
-        describe_model(std::get<Model>(content.value), content.poses, content.bytes, report);
+        const Model& model = std::get<Model>(content.value);
+        describe_model(model, content.poses, content.bytes, report);
+        if (options.fidelity || is_judged_quickly(model)) describe_fidelity(model, session, report);
     }
     session.print(report);
 }
@@ -224,14 +256,18 @@ void run(const std::string& path, Session& session) {
 } // namespace
 
 Command info_command() {
-    const auto path = std::make_shared<std::string>();
+    const auto options = std::make_shared<InfoArguments>();
     return {.name = "info",
             .text = "Say what a mesh or a model is, and what is wrong with it",
-            .options = {Option("file", *path, "Mesh or model").required()},
+            .options = {Option("file", options->path, "Mesh or model").required(),
+                        Option("--fidelity", options->fidelity,
+                               fmt::format("Measure what a model's driver is good for, also where it takes long (a "
+                                           "driver of more than {} vertices)",
+                                           with_commas(kQuickDriver)))},
             .examples = "  filigree info scan.ply\n"
                         "  filigree info scan.ply --json | jq .defects\n"
                         "  filigree info scan.fil",
-            .run = [path](Session& session) { run(*path, session); }};
+            .run = [options](Session& session) { run(*options, session); }};
 }
 
 } // namespace filigree::cli

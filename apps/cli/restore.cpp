@@ -94,11 +94,8 @@ void draw_expected_error(const Model& model, const PoseError::Estimate& estimate
 }
 
 /// What the driver is too coarse for: seen in the pose alone.
-void report_expected_error(const Model& model, const Pose& pose, const Restorer& restorer, const Mesh& mesh,
+void report_expected_error(const Model& model, const PoseError::Estimate& estimate, const Mesh& mesh,
                            const RestoreArguments& options, Session& session, Report& report) {
-    if (model.code() != DetailCode::blend) return;
-    const std::vector<Mat3f> gradients = require(restorer.gradients(pose, session.context()));
-    const PoseError::Estimate estimate = PoseError(model).estimate(pose, gradients);
     if (!(estimate.diagonal > 0)) return;
     const double error = estimate.share();
     report.say(fmt::format("Expected error: {:.2g} of the diagonal (rms).\n", error));
@@ -123,8 +120,10 @@ void restore_one(const RestoreArguments& options, Session& session) {
                                                       "'filigree compare' does, with --picture.");
     const Restorer restorer = require(Restorer::create(model, options.restore, session.context()));
     const double start = now_seconds();
-    const Mesh mesh = require(with_hint(restorer.mesh(pose, session.context()), ErrorCode::mismatch,
-                                        "'filigree level MODEL 0' writes the driver as it is."));
+    const std::vector<Mat3f> gradients =
+        require(with_hint(restorer.gradients(pose, session.context()), ErrorCode::mismatch,
+                          "'filigree level MODEL 0' writes the driver as it is."));
+    const Mesh mesh = require(restorer.mesh(pose, gradients, session.context()));
     const double seconds = now_seconds() - start;
     session.write_mesh(mesh, options.output, options.model);
     const char* from = source_of(model, pose);
@@ -135,7 +134,10 @@ void restore_one(const RestoreArguments& options, Session& session) {
     report.set("vertices", mesh.vertex_count());
     report.set("from", from);
     report.set("seconds", seconds);
-    report_expected_error(model, pose, restorer, mesh, options, session, report);
+    if (model.code() == DetailCode::blend) {
+        const PoseError judge(model, session.context().threads());
+        report_expected_error(model, judge.estimate(pose, gradients), mesh, options, session, report);
+    }
     session.print(report);
 }
 

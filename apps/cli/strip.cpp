@@ -96,6 +96,11 @@ void run(const StripCommandOptions& options, Session& session) {
     session.write_model(result.stripped.model, options.output);
     Report report = make_report(result.stripped, options.output, {read - start, done - read, now_seconds() - done});
     if (options.fidelity) report_fidelity(result, options, report);
+    if (options.fidelity && result.error > *options.fidelity)
+        session.warn(
+            fmt::format("No driver restores to {:.2g} of the diagonal: with every vertex in it the error is {:.2g}, "
+                        "the rounding of 32-bit numbers.",
+                        *options.fidelity, result.error));
     session.print(report);
 }
 

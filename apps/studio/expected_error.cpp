@@ -106,7 +106,7 @@ void ExpectedError::look() {
             if (!judge || !judge->is_for(*model, options)) {
                 Result<Restorer> restorer = Restorer::create(*model, options, context);
                 if (!restorer) return restorer.error();
-                judge.reset(new Judge{model, options, std::move(*restorer), PoseError(*model)});
+                judge.reset(new Judge{model, options, std::move(*restorer), PoseError(*model, context.threads())});
             }
             if (cancels.is_cancelled()) return cancelled_error();
             const Result<std::vector<Mat3f>> gradients = judge->restorer.gradients(pose, context);

@@ -2,6 +2,9 @@
 // Google Benchmark programs in bench/ go through more sizes; scripts/bench-peers sets this beside other programs.
 #include "measure.h"
 
+#include "drivers.h"
+#include "estimate.h"
+#include "fidelity.h"
 #include "simulate.h"
 #include "timing.h"
 #include "triad.h"
@@ -144,8 +147,13 @@ public:
         Mesh copy = mesh_;
         const Result<Stripped> reference =
             strip(std::move(copy), {.code = DetailCode::reference, .base = model.driver().vertices.size()}, context_);
-        measured_.fidelity = measure_fidelity(model, reference ? &reference->model : nullptr, context_);
-        for (const FidelitySummary& summary : summarise(measured_.fidelity)) {
+        const std::vector<FidelityRow> rows =
+            measure_fidelity(model, reference ? &reference->model : nullptr, context_);
+        Table table{"fidelity", {"method", "warp", "rms", "max", "normal_p95_deg"}, {}};
+        for (const FidelityRow& row : rows)
+            table.rows.push_back({row.method, row.warp, row.rms, row.max, row.normal_p95_deg});
+        measured_.tables.push_back(std::move(table));
+        for (const FidelitySummary& summary : summarise(rows)) {
             const std::string name = "fidelity." + summary.method;
             add(name + ".affine_rms", summary.affine_rms, "diagonals");
             add(name + ".curved_rms", summary.curved_rms, "diagonals");
@@ -240,13 +248,18 @@ private:
 } // namespace
 
 const std::vector<std::string>& measure_names() {
-    static const std::vector<std::string> names = {"all",    "restore", "strip",    "files",
-                                                   "deform", "handles", "fidelity", "simulate"};
+    static const std::vector<std::string> names = {"all",      "restore",  "strip",    "files",   "deform", "handles",
+                                                   "fidelity", "simulate", "estimate", "drivers", "goals"};
     return names;
 }
 
-Measured measure(Mesh mesh, const MeasureOptions& options, const RunContext& context) {
-    Bench bench(std::move(mesh), options.base, context);
+bool takes_many_meshes(const std::string& name) { return name == "estimate" || name == "drivers" || name == "goals"; }
+
+Measured measure(std::vector<NamedMesh> meshes, const MeasureOptions& options, const RunContext& context) {
+    if (options.name == "estimate") return measure_estimate(meshes, options.poses, context);
+    if (options.name == "drivers") return measure_drivers(meshes, context);
+    if (options.name == "goals") return measure_goals(meshes, context);
+    Bench bench(std::move(meshes.front().mesh), options.base, context);
     const auto wants = [&](const char* name) { return options.name == "all" || options.name == name; };
     if (wants("restore")) bench.restore();
     if (wants("strip")) bench.strip_phases();

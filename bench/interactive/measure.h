@@ -1,11 +1,10 @@
 // The benchmark that a user runs: this machine's speeds beside their rivals, and how close restored detail comes.
 #pragma once
 
-#include "fidelity.h"
 #include "measurement.h"
+#include "named_mesh.h"
 
 #include "filigree/core/run_context.h"
-#include "filigree/mesh/mesh.h"
 
 #include <optional>
 #include <string>
@@ -17,17 +16,16 @@ struct MeasureOptions {
     std::string name = "all";             ///< one of measure_names()
     std::optional<std::size_t> base = {}; ///< driver vertices; unset: as strip chooses
     std::size_t particles = 0;            ///< of every body; 0: the sizes of docs/benchmarks.md
+    std::size_t poses = 1000;             ///< of estimate
 };
 
-struct Measured {
-    std::vector<Measurement> results;
-    std::vector<FidelityRow> fidelity; ///< empty unless it was asked for
-};
-
+/// Suites, and all: those that take one mesh.
 const std::vector<std::string>& measure_names();
+/// Whether a suite goes through many meshes; built-in ones where none are given.
+bool takes_many_meshes(const std::string& name);
 
-/// Takes a minute or so for all. When cancelled, what was measured so far. Throws BadResultAccess where the mesh cannot
-/// be stripped or simulated.
-Measured measure(Mesh mesh, const MeasureOptions& options, const RunContext& context);
+/// Takes a minute or so for all. meshes: one, or some for the suites that take many. When cancelled, what was measured
+/// so far. Throws BadResultAccess where a mesh cannot be stripped or simulated.
+Measured measure(std::vector<NamedMesh> meshes, const MeasureOptions& options, const RunContext& context);
 
 } // namespace filigree::bench

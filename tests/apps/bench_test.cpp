@@ -33,6 +33,46 @@ TEST_F(Bench, SimulateMeasuresBodies) {
     EXPECT_NEAR(figures.at("simulate.fall.rate"), 1000 / figures.at("simulate.fall.frame"), 1);
 }
 
+TEST_F(Bench, EstimateJudgesRandomPoses) {
+    ok({"make", "wavy-sphere", "-o", "sphere.ply", "--resolution", "24", "--quiet"});
+    const Json said = json({"bench", "estimate", "--mesh", "sphere.ply", "--poses", "60"});
+    EXPECT_EQ(said.at("meshes").size(), 1u);
+    std::map<std::string, double> figures;
+    for (const Json& figure : said.at("results")) figures[figure.at("name")] = figure.at("value");
+    for (const char* source : {"estimate.positions", "estimate.gradients"}) {
+        EXPECT_EQ(figures.at(std::string(source) + ".poses"), 60);
+        EXPECT_GE(figures.at(std::string(source) + ".within_2"), 90);
+    }
+    double poses = 0;
+    for (const Json& row : said.at("estimate_by_kind")) poses += row.at("poses").get<double>();
+    EXPECT_EQ(poses, 120);
+    EXPECT_EQ(said.at("estimate_worst").size(), 16u);
+    const Json again = json({"bench", "estimate", "--mesh", "sphere.ply", "--poses", "60", "--threads", "2"});
+    EXPECT_EQ(said.at("results"), again.at("results")); // seeded
+}
+
+TEST_F(Bench, DriversGoThroughAFolder) {
+    std::filesystem::create_directories(path("meshes/more"));
+    ok({"make", "wavy-sphere", "-o", "meshes/sphere.ply", "--resolution", "24", "--quiet"});
+    ok({"make", "torus", "-o", "meshes/more/torus.obj", "--resolution", "20", "--quiet"});
+    write("meshes/broken.obj", "v 1 2\n");
+    write("meshes/notes.txt", "no mesh");
+    const Json said = json({"bench", "drivers", "--mesh", "meshes"});
+    EXPECT_EQ(said.at("meshes").size(), 2u);
+    EXPECT_NE(said.at("warnings").dump().find("broken.obj"), std::string::npos);
+    EXPECT_EQ(said.at("drivers").size(), 3u); // 250 and 1,000; 250
+    for (const Json& row : said.at("drivers")) EXPECT_EQ(row.at("rises"), "");
+    std::filesystem::create_directories(path("empty"));
+    fails(2, {"bench", "drivers", "--mesh", "empty"}, {"no meshes"});
+}
+
+TEST_F(Bench, GoalsAreReached) {
+    ok({"make", "torus", "-o", "torus.ply", "--resolution", "16", "--quiet"});
+    const Json said = json({"bench", "goals", "--mesh", "torus.ply"});
+    EXPECT_EQ(said.at("goals").size(), 4u);
+    for (const Json& row : said.at("goals")) EXPECT_EQ(row.at("reached"), "yes") << row.dump();
+}
+
 TEST_F(Bench, RefusesWhatItCannotMeasure) {
     fails(2, {"bench", "simulate", "--particles", "1"}, {"--particles"});
     fails(2, {"bench", "swim"}, {"simulate"});

@@ -163,6 +163,34 @@ TEST_F(Cli, InfoSaysWhatIsWrongAndWhere) {
     EXPECT_EQ(model.at("levels").back().at("vertices"), 1538);
 }
 
+TEST_F(Cli, StripSaysWhereAFidelityIsBelowRounding) {
+    ok({"make", "bar", "-o", "bar.ply", "--resolution", "4", "--quiet"});
+    const Json said = json({"strip", "bar.ply", "-o", "bar.fil", "--fidelity", "1e-10"});
+    EXPECT_GT(said.at("fidelity").at("error").get<double>(), 1e-10);
+    EXPECT_NE(said.at("warnings").dump().find("rounding"), std::string::npos);
+}
+
+TEST_F(Cli, InfoSaysWhatADriverIsGoodFor) {
+    ok({"make", "wavy-sphere", "-o", "sphere.ply", "--resolution", "32", "--quiet"});
+    double coarser = 1;
+    for (const char* base : {"100", "400"}) {
+        ok({"strip", "sphere.ply", "-o", "sphere.fil", "--base", base, "--quiet"});
+        const Json fidelity = json({"info", "sphere.fil"}).at("fidelity");
+        EXPECT_LT(fidelity.at("positions").get<double>(), coarser);
+        EXPECT_GT(fidelity.at("positions").get<double>(), fidelity.at("gradients").get<double>());
+        EXPECT_GT(fidelity.at("gradients").get<double>(), 1e-7);
+        coarser = fidelity.at("positions");
+    }
+    EXPECT_NE(ok({"info", "sphere.fil"}).out.find("from positions"), std::string::npos);
+    fails(2, {"info", "sphere.ply", "--fidelity"}, {"--fidelity", "models"});
+
+    ok({"make", "wavy-cube", "-o", "cube.obj", "--resolution", "16", "--quiet"});
+    ok({"strip", "cube.obj", "-o", "reference.fil", "--code", "reference", "--quiet"});
+    const Json reference = json({"info", "reference.fil"}).at("fidelity");
+    EXPECT_GT(reference.at("positions").get<double>(), 0);
+    EXPECT_FALSE(reference.contains("gradients"));
+}
+
 TEST_F(Cli, JsonKeysAreWordsInSnakeCase) {
     make_model();
     const std::function<void(const Json&)> check = [&](const Json& value) {

@@ -20,10 +20,19 @@ Model stripped(Mesh mesh, std::size_t base) {
     return strip(std::move(mesh), options, kOneThread).value().model;
 }
 
-double estimated(const Model& model, const Pose& pose) {
-    const Restorer restorer = Restorer::create(model, {}, kOneThread).value();
-    return PoseError(model).estimate(pose, restorer.gradients(pose, kOneThread).value()).rms;
-}
+/// Estimates of one model's poses.
+class Judge {
+public:
+    explicit Judge(const Model& model)
+        : restorer_(Restorer::create(model, {}, kOneThread).value()), error_(model, kOneThread.threads()) {}
+    double rms(const Pose& pose) const {
+        return error_.estimate(pose, restorer_.gradients(pose, kOneThread).value()).rms;
+    }
+
+private:
+    Restorer restorer_;
+    PoseError error_;
+};
 
 std::unique_ptr<SpaceWarp> random_warp(const Box& box, std::uint64_t seed) {
     const auto between = [&](double low, double high) { return low + (high - low) * random_unit(seed, 0); };
@@ -50,6 +59,7 @@ double share_within_two(bool with_gradients, std::uint64_t poses_a_model) {
     std::uint64_t seed = 100;
     for (const Model& model : models) {
         const Box box = world_bounds(model.mesh);
+        const Judge judge(model);
         for (std::uint64_t k = 0; k < poses_a_model; ++k) {
             const std::unique_ptr<SpaceWarp> warp = random_warp(box, ++seed);
             Pose pose = warp_pose(*warp, model, kOneThread);
@@ -57,7 +67,7 @@ double share_within_two(bool with_gradients, std::uint64_t poses_a_model) {
             const std::vector<Vec3f> truth = warp_positions(*warp, model.mesh.positions, model.mesh.origin, kOneThread);
             const double error = restored_error(model, {}, pose, truth, kOneThread).value().rms;
             const double rounding = 2e-7 * box.diagonal(); // below it both are nothing
-            const double ratio = std::max(estimated(model, pose), rounding) / std::max(error, rounding);
+            const double ratio = std::max(judge.rms(pose), rounding) / std::max(error, rounding);
             within += ratio >= 0.5 && ratio <= 2;
             ++count;
         }
@@ -70,13 +80,30 @@ TEST(PoseError, IsWithinAFactorOfTwo) {
     EXPECT_GE(share_within_two(true, 40), 0.9);
 }
 
+TEST(PoseError, SameBytesForAnyThreadsAndAfterAMove) {
+    const Model model = stripped(make_wavy_sphere({.resolution = 48}), 400);
+    const Box box = world_bounds(model.mesh);
+    Pose pose = warp_pose(*make_bend(box, Axis::x, 100), model, kOneThread);
+    for (const bool with_gradients : {true, false}) {
+        const std::vector<Mat3f> gradients = pose.gradients;
+        if (!with_gradients) pose.gradients.clear();
+        PoseError one(model, 1), two(model, 2);
+        const PoseError::Estimate first = one.estimate(pose, gradients), second = two.estimate(pose, gradients);
+        const PoseError moved = std::move(one);
+        const PoseError::Estimate third = moved.estimate(pose, gradients);
+        EXPECT_EQ(first.rms, second.rms);
+        EXPECT_EQ(first.rms, third.rms);
+        EXPECT_EQ(first.local, second.local);
+    }
+}
+
 TEST(PoseError, IsNothingAtRestAndForAffineMaps) {
     const Model model = stripped(make_wavy_sphere({.resolution = 48}), 400);
     const double diagonal = world_bounds(model.mesh).diagonal();
-    EXPECT_LT(estimated(model, rest_pose(model)), 1e-7 * diagonal);
+    EXPECT_LT(Judge(model).rms(rest_pose(model)), 1e-7 * diagonal);
     Pose turned = rest_pose(model);
     for (Vec3f& p : turned.positions) p = Vec3f(2 * p.y() + p.z(), -p.x(), 0.5f * p.z());
-    EXPECT_LT(estimated(model, turned), 1e-6 * diagonal);
+    EXPECT_LT(Judge(model).rms(turned), 1e-6 * diagonal);
 }
 
 TEST(PoseError, IsLargestWhereThePoseIsCurved) {

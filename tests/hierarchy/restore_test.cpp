@@ -258,6 +258,25 @@ TEST(Restore, SameBytesForAnyThreads) {
     EXPECT_TRUE(same_bytes(one.positions, *restorer.positions(pose, RunContext(2))));
 }
 
+TEST(Restore, GradientsAtHandGiveTheSameBytes) {
+    Mesh mesh = make_wavy_cube({.resolution = 32});
+    mesh.normals.values = vertex_normals(mesh, mesh.positions, kOneThread);
+    const Model model = stripped(mesh).model;
+    const Pose pose = without_gradients(pose_by(bend(120), model));
+    for (const bool thin_shell : {false, true}) {
+        RestoreOptions options;
+        options.thin_shell = thin_shell;
+        const Restorer restorer = Restorer::create(model, options, kOneThread).value();
+        const std::vector<Mat3f> gradients = restorer.gradients(pose, kOneThread).value();
+        const Mesh anew = restorer.mesh(pose, kOneThread).value();
+        const Mesh at_hand = restorer.mesh(pose, gradients, kOneThread).value();
+        EXPECT_TRUE(same_bytes(anew.positions, at_hand.positions));
+        EXPECT_TRUE(same_bytes(anew.normals.values, at_hand.normals.values));
+        const std::span<const Mat3f> too_few(gradients.data(), 3);
+        EXPECT_EQ(restorer.mesh(pose, too_few, kOneThread).error().code, ErrorCode::mismatch);
+    }
+}
+
 TEST(Restore, PosesOfOtherModelsAreRefused) {
     const Model model = stripped(make_wavy_plane({.resolution = 16})).model;
     const Restorer restorer = restorer_of(model);

@@ -1,6 +1,8 @@
 #include "filigree/deform/fidelity.h"
 
+#include "filigree/hierarchy/gradient_fit.h"
 #include "filigree/hierarchy/restore.h"
+#include "filigree/hierarchy/sampled_restorer.h"
 #include "filigree/mesh/mesh_distance.h"
 
 #include <algorithm>
@@ -10,8 +12,10 @@ namespace filigree {
 
 namespace {
 
+constexpr std::size_t kMostMeasured = 65536; // vertices, where a few per cent do
 constexpr std::size_t kFirstDriver = 1000, kSmallestDriver = 12;
 constexpr double kOrder = 1.3;        // the error falls about as fast as this power of the driver's vertices grows
+constexpr double kMargin = 1.4;       // warps that are no more curved than the family's err by up to so much more
 constexpr double kCloseEnough = 1.15; // ratio of the smallest driver that passed to the largest that did not
 
 /// The next size to try: where a power law through both drivers, or of the usual order through one, meets the goal.
@@ -30,17 +34,15 @@ public:
     }
     std::size_t next() const {
         double size;
-        if (passed_.size > 0 && failed_.size > 0) {
+        if (passed_.size > 0 && passed_.size < most_ && failed_.size > 0) {
             const double slope = std::log(passed_.error / failed_.error) / std::log(passed_.size / failed_.size);
             size = failed_.size * std::pow(0.9 * goal_ / failed_.error, 1 / std::min(slope, -0.1));
             size = std::clamp(size, failed_.size * 1.07, passed_.size / 1.07);
-        } else {
-            const Tried& one = passed_.size > 0 ? passed_ : failed_;
+        } else { // the whole mesh has no error that a power law could go through
+            const Tried& one = failed_.size > 0 ? failed_ : passed_;
             size = one.size * std::clamp(std::pow(one.error / (0.8 * goal_), 1 / kOrder), 0.1, 10.0);
-            if (passed_.size > 0)
-                size = std::min(size, passed_.size / 1.3);
-            else
-                size = std::max(size, failed_.size * 1.3);
+            if (failed_.size > 0) size = std::max(size, failed_.size * 1.3);
+            if (passed_.size > 0) size = std::min(size, passed_.size / (failed_.size > 0 ? 1.07 : 1.3));
         }
         return static_cast<std::size_t>(std::clamp(std::round(size), double(kSmallestDriver), most_));
     }
@@ -100,10 +102,37 @@ Result<double> fidelity(const Model& model, PoseSource source, const RunContext&
     return largest;
 }
 
+Result<DriverFidelity> driver_fidelity(const Model& model, const RunContext& context) {
+    if (model.code() != DetailCode::blend) {
+        const Result<double> error = fidelity(model, PoseSource::positions, context);
+        if (!error) return error.error();
+        return DriverFidelity{*error, *error};
+    }
+    const SampledRestorer restorer(model, kMostMeasured);
+    const GradientFit fit(level_mesh(model, 0), NormalColumn::fitted, context);
+    DriverFidelity largest;
+    for (const NamedWarp& named : fidelity_warps(world_bounds(model.mesh))) {
+        if (named.affine) continue;
+        const Pose pose = warp_pose(*named.warp, model, context);
+        const std::vector<Vec3f> truth = warp_positions(*named.warp, restorer.rest(), model.mesh.origin, context);
+        const std::vector<Mat3f> fitted = fit.fit(pose.positions, HeightLaw::proportional, context);
+        if (context.is_cancelled()) return cancelled_error();
+        const double diagonal = bounds(truth).diagonal();
+        if (!(diagonal > 0)) continue;
+        const auto error = [&](std::span<const Mat3f> gradients) {
+            return restorer.rms_distance(pose.positions, gradients, truth, context) / diagonal;
+        };
+        largest.positions = std::max(largest.positions, error(fitted));
+        largest.gradients = std::max(largest.gradients, error(pose.gradients));
+    }
+    return largest;
+}
+
 Result<StrippedToFidelity> strip_to_fidelity(const Mesh& mesh, const StripOptions& options, const FidelityGoal& goal,
                                              const RunContext& context) {
     if (Status status = check(options, goal); !status) return status.error();
-    DriverSearch search(std::max<std::size_t>(mesh.vertex_count(), 3), goal.error);
+    const double aim = goal.error / kMargin;
+    DriverSearch search(std::max<std::size_t>(mesh.vertex_count(), 3), aim);
     StrippedToFidelity best;
     unsigned tried = 0;
     for (std::size_t size = search.first();; size = search.next()) {
@@ -115,9 +144,9 @@ Result<StrippedToFidelity> strip_to_fidelity(const Mesh& mesh, const StripOption
         if (!error) return error.error();
         ++tried;
         search.add(size, *error);
-        const bool is_whole = size >= mesh.vertex_count();
-        if (*error <= goal.error || is_whole) best = {*std::move(stripped), *error, tried};
-        if (search.is_done() || is_whole) break;
+        const bool passed = *error <= aim, is_whole = size >= mesh.vertex_count();
+        if (passed || is_whole) best = {*std::move(stripped), *error, tried};
+        if (search.is_done() || (is_whole && !passed)) break;
     }
     best.tried = tried;
     return best;

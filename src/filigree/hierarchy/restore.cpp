@@ -165,17 +165,25 @@ Status Restorer::positions(const Pose& pose, std::span<Vec3f> out, const RunCont
 }
 
 Result<Mesh> Restorer::mesh(const Pose& pose, const RunContext& context) const {
+    if (Status status = check_pose(*content_->model, pose); !status) return status.error();
+    if (context.is_cancelled()) return cancelled_error();
+    return mesh(pose, content_->gradients(pose, context), context);
+}
+
+Result<Mesh> Restorer::mesh(const Pose& pose, std::span<const Mat3f> gradients, const RunContext& context) const {
     const Content& content = *content_;
     if (Status status = check_pose(*content.model, pose); !status) return status.error();
+    if (content.blend && gradients.size() != pose.positions.size())
+        return Error{ErrorCode::mismatch, "There are " + std::to_string(gradients.size()) + " gradients for " +
+                                              std::to_string(pose.positions.size()) + " driver vertices."};
     if (context.is_cancelled()) return cancelled_error();
     Mesh mesh = content.rest;
     if (content.blend) {
-        const std::vector<Mat3f> a = content.gradients(pose, context);
         const bool with_normals = content.has_vertex_normals();
-        content.blend->restore(pose.positions, a, mesh.positions,
+        content.blend->restore(pose.positions, gradients, mesh.positions,
                                with_normals ? std::span(mesh.normals.values) : std::span<Vec3f>{}, true, context);
         if (content.blend_normals)
-            content.blend_normals->restore(pose.positions, a, {}, mesh.normals.values, true, context);
+            content.blend_normals->restore(pose.positions, gradients, {}, mesh.normals.values, true, context);
         return mesh;
     }
     Result<std::vector<Vec3f>> restored = positions(pose, context);

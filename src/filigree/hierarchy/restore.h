@@ -49,6 +49,9 @@ public:
     /// The level as a mesh: positions, and the normals where the mesh came with normals (by the cofactor of the blended
     /// gradient; computed anew from the faces for the reference code); every other attribute as it came.
     Result<Mesh> mesh(const Pose& pose, const RunContext& context) const;
+    /// The same bytes with what gradients(pose) gave, for who asks for both: the work is done once. Errors: also
+    /// mismatch (another number of gradients than driver vertices, blend code).
+    Result<Mesh> mesh(const Pose& pose, std::span<const Mat3f> gradients, const RunContext& context) const;
 
     /// Where the driver's ghost points are at rest (blend code; empty else).
     std::vector<Vec3f> rest_ghosts() const;
