@@ -4,7 +4,22 @@
 #include "filigree/physics/body.h"
 #include "filigree/physics/elasticity.h"
 
+#include <Eigen/Geometry>
+#include <optional>
+
 namespace filigree {
+
+/// Where a rigid body is and how it moves.
+struct RigidPose {
+    double mass = 0;                                          ///< kg
+    Mat3d inverse_inertia = Mat3d::Zero();                    ///< 1/(kg m^2), of the body at rest
+    Vec3d rest_centre = Vec3d::Zero();                        ///< of mass, m
+    Vec3d centre = Vec3d::Zero(), velocity = Vec3d::Zero();   ///< world, m and m/s
+    Eigen::Quaterniond turn = Eigen::Quaterniond::Identity(); ///< from the body at rest
+    Vec3d angular = Vec3d::Zero();                            ///< angular momentum about the centre, kg m^2/s
+    double quiet_seconds = 0;                                 ///< that it has hardly moved
+    bool sleeps = false;                                      ///< it rests, and nothing is computed for it
+};
 
 struct BodyState {
     std::shared_ptr<const Body> body;
@@ -15,6 +30,9 @@ struct BodyState {
     std::vector<std::uint8_t> fixed;  ///< 1: pinned
     float rest_squared_frequency = 0; ///< ElasticReport::squared_frequency at rest
     bool is_held = false;             ///< by pins, forces or wind: not left to itself
+    std::optional<RigidPose> rigid;   ///< of a rigid body
+    bool was_pushed = false;          ///< particles were moved one by one, and a rigid body's pose has to follow
+    bool sleeps() const { return rigid && rigid->sleeps; }
 
     // Contact: points of the surface; meshfree bodies touch each other by balls just below them.
     Embedding surface, balls;             ///< in the elasticity's reference

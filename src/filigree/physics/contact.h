@@ -37,7 +37,7 @@ public:
         float obstacle_reach, pair_reach; ///< m
         double left, frame;               ///< s, of the frame
     };
-    void search(std::span<const BodyState> bodies, const Search& search, const RunContext& context);
+    void search(std::span<BodyState> bodies, const Search& search, const RunContext& context);
     /// Before positions change by dt times velocities.
     void travel(std::span<const BodyState> bodies, float dt) { matter_.travel(bodies, dt); }
     /// s: in longer steps something could pass through something.

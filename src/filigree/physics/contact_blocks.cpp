@@ -19,8 +19,9 @@ void Contacts::Blocks::each_weight(const Entry& entry, const Visit& visit) const
             visit(points.particles[k], points.weights[k]);
     }
     if (entry.frame && entry.frame->other == body_) {
-        const Matter::Weights weights = Matter::weights(entry.frame->place.local);
-        const auto& corners = matter_->matter(entry.frame->other).corners(entry.frame->place.cell);
+        const Matter& matter = matter_->matter(entry.frame->other);
+        const Matter::Weights weights = matter.weights(entry.frame->place);
+        const auto& corners = matter.corners(entry.frame->place.cell);
         for (int c = 0; c < 8; ++c) visit(corners[c], -weights[c]);
     }
 }

@@ -103,6 +103,7 @@ ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, flo
     for (std::size_t b = 0; b < bodies.size(); ++b) {
         BodyState& body = bodies[b];
         std::vector<Near>& near = near_[b];
+        if (body.sleeps()) continue;
         forces.assign(near.size(), Vec3f::Zero());
         parallel_for(context, near.size(), kContactForcesGrain, [&](std::size_t begin, std::size_t end) {
             for (std::size_t k = begin; k < end; ++k) forces[k] = obstacle_force(near[k], body, poses, travelled, dt);
@@ -140,7 +141,7 @@ void Contacts::push_out(std::span<BodyState> bodies, double time) {
         BodyState& body = bodies[b];
         const float most = kDeepest * float(body.body->spacing());
         for (const Near& at : near_[b]) {
-            if (!(at.depth > most)) continue;
+            if (!(at.depth > most) || body.sleeps()) continue;
             const Vec3f place = embedded_point(body.surface, at.point, body.positions);
             const DistanceField::Sample surface =
                 distance_to(world_.obstacles[at.obstacle], poses.at(at.obstacle), place);
@@ -160,6 +161,7 @@ void Contacts::push_out(std::span<BodyState> bodies, double time) {
                 body.positions.add(particle, share * (-surface.distance - most) * surface.normal);
                 body.velocities.add(particle, share * -inwards * surface.normal);
             }
+            body.was_pushed = true;
         }
     }
     matter_.push_out(bodies);

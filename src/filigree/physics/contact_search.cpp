@@ -14,7 +14,8 @@ constexpr std::size_t kContactSearchGrain = 256;
 
 } // namespace
 
-void Contacts::search(std::span<const BodyState> bodies, const Search& search, const RunContext& context) {
+void Contacts::search(std::span<BodyState> bodies, const Search& search, const RunContext& context) {
+    if (matter_.search(bodies, search.left, search.frame, context)) near_until_ = -1; // what woke has nothing near yet
     if (search.travelled > near_until_ && !world_.obstacles.empty()) {
         find_near(bodies, search.time, search.travelled, search.obstacle_reach, context);
         near_until_ = search.travelled + search.obstacle_reach;
@@ -23,7 +24,6 @@ void Contacts::search(std::span<const BodyState> bodies, const Search& search, c
         find_pairs(bodies, search.travelled, search.pair_reach, context);
         pairs_until_ = search.travelled + search.pair_reach;
     }
-    matter_.search(bodies, search.left, search.frame, context);
 }
 
 void Contacts::find_near(std::span<const BodyState> bodies, double time, float travelled, float reach,
@@ -31,6 +31,7 @@ void Contacts::find_near(std::span<const BodyState> bodies, double time, float t
     const ObstaclePoses poses(world_, time);
     for (std::size_t b = 0; b < bodies.size(); ++b) {
         const BodyState& body = bodies[b];
+        if (body.sleeps()) continue;
         const std::size_t points = body.surface.size();
         std::vector<Vec3f> places(points);
         parallel_for(context, points, kContactSearchGrain, [&](std::size_t begin, std::size_t end) {

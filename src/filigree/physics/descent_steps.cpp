@@ -1,5 +1,6 @@
 // Implicit Euler, solved by vertex block descent [Chen 2024]. Contacts are found where a substep begins: the blocks of
 // its sweeps follow the particles from there.
+#include "filigree/physics/rigid_body.h"
 #include "filigree/physics/rigid_state.h"
 #include "filigree/physics/simulation_state.h"
 #include "filigree/physics/stopwatch.h"
@@ -37,6 +38,8 @@ public:
 
     /// False when cancelled.
     bool run() {
+        for (BodyState& body : bodies_)
+            if (body.rigid) wake(body);
         find_contacts();
         find_elastic_state();
         predict();
@@ -118,7 +121,7 @@ private:
     /// x = (y + s x0) / (1 + s), a sweep moves y instead, towards (1 + s) target - s x0 by inertia / (1 + s).
     void sweep(std::size_t b) {
         BodyState& body = bodies_[b];
-        const float s = float(body.body->material.internal_damping) / dt_;
+        const float s = body.rigid ? 0.0f : float(body.body->material.internal_damping) / dt_;
         const auto terms = [&](const Vectors& target, std::span<const float> inertia) {
             return Descent{target, inertia, body.fixed, blocks_[b].touched(), &blocks_[b]};
         };
@@ -153,7 +156,11 @@ private:
         const Stopwatch watch(report_.other_seconds);
         for (std::size_t b = 0; b < bodies_.size(); ++b) update_velocities(b);
         restore_momentum();
+        for (BodyState& body : bodies_)
+            if (body.rigid) fit_pose(body);
         state_.contacts.push_out(bodies_, now_);
+        for (BodyState& body : bodies_)
+            if (std::exchange(body.was_pushed, false) && body.rigid) fit_pose(body);
         finish_substep(state_, dt_, context_);
         ++report_.substeps;
     }

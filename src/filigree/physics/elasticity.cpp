@@ -2,6 +2,7 @@
 #include "filigree/physics/elasticity.h"
 
 #include "filigree/physics/body.h"
+#include "filigree/physics/rigid_body.h"
 
 namespace filigree {
 
@@ -15,6 +16,7 @@ std::unique_ptr<Elasticity> make_elasticity(const Body& body, const RunContext& 
     const MaterialModel model = body.material.model;
     if (model == MaterialModel::springs) return make_spring_elasticity(body, context);
     if (model == MaterialModel::meshfree) return make_meshfree_elasticity(body, context);
+    if (model == MaterialModel::rigid) return make_rigid_elasticity(body);
     return make_cell_elasticity(body, context);
 }
 

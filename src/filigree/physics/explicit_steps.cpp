@@ -1,6 +1,7 @@
 // Velocity Verlet: kick, drift, kick. The stable step follows from the squared frequencies that are found with the
 // forces.
 #include "filigree/core/parallel_for.h"
+#include "filigree/physics/rigid_body.h"
 #include "filigree/physics/rigid_state.h"
 #include "filigree/physics/simulation_state.h"
 #include "filigree/physics/stopwatch.h"
@@ -81,6 +82,8 @@ private:
     void move(float dt, double until) {
         const Stopwatch watch(report_.other_seconds);
         kick(0.5f * dt, false);
+        for (BodyState& body : bodies_)
+            if (body.rigid && !body.sleeps()) place_particles(body);
         if (meets_anything_) state_.contacts.travel(bodies_, dt);
         drift(dt);
         const double before = std::exchange(now_, until);
@@ -120,10 +123,13 @@ private:
         stable_step_ = state_.contacts.longest_step();
         for (std::size_t b = 0; b < bodies_.size(); ++b) {
             BodyState& body = bodies_[b];
+            if (body.sleeps()) continue;
             double squared_frequency = double(elastic_[b].squared_frequency);
-            squared_frequency += state_.contacts.added_frequency(b) * double(body.rest_squared_frequency);
+            if (!body.rigid)
+                squared_frequency += state_.contacts.added_frequency(b) * double(body.rest_squared_frequency);
             squared_frequency = state_.external.add_pulls(body, b, now_, squared_frequency);
-            stable_step_ = std::min(stable_step_, stable_step(squared_frequency, body.body->material.internal_damping));
+            stable_step_ = std::min(
+                stable_step_, stable_step(squared_frequency, body.rigid ? 0 : body.body->material.internal_damping));
         }
     }
 
@@ -132,7 +138,7 @@ private:
         elastic_.resize(bodies_.size());
         for (std::size_t b = 0; b < bodies_.size(); ++b) {
             BodyState& body = bodies_[b];
-            const float delay = float(body.body->material.internal_damping);
+            const float delay = body.rigid ? 0.0f : float(body.body->material.internal_damping);
             elastic_[b] = delay > 0
                               ? body.elasticity->forces(positions_ahead(body, delay, context_), body.forces, context_)
                               : body.elasticity->forces(body.positions, body.forces, context_);
@@ -146,9 +152,13 @@ private:
         {
             const Stopwatch watch(report_.contact_seconds);
             state_.contacts.push_out(bodies_, now_);
+            for (BodyState& body : bodies_)
+                if (std::exchange(body.was_pushed, false) && body.rigid) fit_pose(body);
         }
         const Stopwatch watch(report_.other_seconds);
         kick(0.5f * dt, true);
+        for (BodyState& body : bodies_)
+            if (body.rigid && !body.sleeps()) place_particles(body);
         move_pins(state_, now_, dt);
         finish_substep(state_, dt, context_);
         ++report_.substeps;
@@ -158,6 +168,12 @@ private:
     void kick(float dt, bool damp) {
         const Vec3f gravity = state_.world.gravity.cast<float>();
         for (BodyState& body : bodies_) {
+            if (body.sleeps()) continue;
+            if (body.rigid) {
+                kick_rigid(body, state_.world.gravity, double(dt),
+                           damp ? std::exp(-2 * double(dt) * body.body->material.damping) : 1);
+                continue;
+            }
             const float kept = damp ? std::exp(-2 * dt * float(body.body->material.damping)) : 1.0f;
             parallel_for(context_, body.positions.size(), kExplicitStepsGrain, [&](std::size_t begin, std::size_t end) {
                 const float* inverse_mass = body.inverse_mass.data();
@@ -174,12 +190,17 @@ private:
     }
 
     void drift(float dt) {
-        for (BodyState& body : bodies_)
+        for (BodyState& body : bodies_) {
+            if (body.rigid) {
+                if (!body.sleeps()) drift_rigid(body, double(dt));
+                continue;
+            }
             parallel_for(context_, body.positions.size(), kExplicitStepsGrain, [&](std::size_t begin, std::size_t end) {
                 for (std::size_t i = begin; i < end; ++i) body.positions.x[i] += dt * body.velocities.x[i];
                 for (std::size_t i = begin; i < end; ++i) body.positions.y[i] += dt * body.velocities.y[i];
                 for (std::size_t i = begin; i < end; ++i) body.positions.z[i] += dt * body.velocities.z[i];
             });
+        }
     }
 
     SimulationState& state_;

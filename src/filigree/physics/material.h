@@ -7,8 +7,9 @@
 namespace filigree {
 
 /// How a body's elasticity is computed. fem: neo-Hookean on lattice cells. springs: a lattice of springs, Poisson's
-/// ratio 1/4 by construction. meshfree: moving least squares over neighbours [Mueller 2004]; the one that flows.
-enum class MaterialModel { fem, springs, meshfree };
+/// ratio 1/4 by construction. meshfree: moving least squares over neighbours [Mueller 2004]; the one that flows. rigid:
+/// does not deform; for what is too stiff or too small to be stepped as elastic.
+enum class MaterialModel { fem, springs, meshfree, rigid };
 
 struct Material {
     MaterialModel model = MaterialModel::fem;

@@ -109,7 +109,9 @@ bool Matter::are_together(Index a, Index b) const {
     return together_[a][n / 64] >> (n % 64) & 1;
 }
 
-Matter::Weights Matter::weights(const Vec3f& t) {
+Matter::Weights Matter::weights(const Place& place) const {
+    const Vec3f& t = place.local;
+    if (is_rigid()) return {1 - t.sum(), t[0], t[1], 0, t[2], 0, 0, 0};
     Weights w;
     for (int c = 0; c < 8; ++c)
         w[c] = (c & 1 ? t[0] : 1 - t[0]) * (c & 2 ? t[1] : 1 - t[1]) * (c & 4 ? t[2] : 1 - t[2]);
@@ -117,7 +119,7 @@ Matter::Weights Matter::weights(const Vec3f& t) {
 }
 
 Vec3f Matter::mean(const Place& place, const Vectors& values) const {
-    const Weights w = weights(place.local);
+    const Weights w = weights(place);
     const std::array<Index, 8>& corner = corners(place.cell);
     Vec3f sum = Vec3f::Zero();
     for (int c = 0; c < 8; ++c) sum += w[c] * values[corner[c]];
@@ -145,6 +147,13 @@ std::optional<Index> Matter::neighbour(Index cell, Vec3f& local) const {
 }
 
 bool Matter::locate(const Vectors& positions, const Vec3f& point, Place& place, Mat3f& inverse) const {
+    if (is_rigid()) {
+        place.cell = 0;
+        place.local.setZero();
+        inverse = inverse_derivative(positions, place);
+        place.local = inverse * (point - positions[corners(0)[0]]);
+        return place.local.allFinite();
+    }
     const auto spacing = float(body_.spacing());
     const float least = kLeastVolume * spacing * spacing * spacing;
     for (int walked = 0; walked < kLongestWalk; ++walked) {
@@ -167,6 +176,7 @@ bool Matter::locate(const Vectors& positions, const Vec3f& point, Place& place, 
 }
 
 Mat3f Matter::inverse_derivative(const Vectors& positions, const Place& place) const {
+    if (is_rigid()) return map_cell(positions, corners(0), Vec3f::Zero()).slope.inverse();
     return map_cell(positions, corners(place.cell), place.local).slope.inverse();
 }
 

@@ -13,8 +13,10 @@ namespace filigree {
 /// [Fisher 2001, McAdams 2011].
 class Matter {
 public:
-    /// body: of material fem or springs, so that its particles are the corners of its cells; outlives this.
+    /// body: not meshfree, so that its particles are the corners of its cells; outlives this.
     explicit Matter(const Body& body);
+    /// A rigid body is one cell that goes on as far as one likes.
+    bool is_rigid() const { return body_.material.model == MaterialModel::rigid; }
 
     /// A point in a cell: local coordinates are 0 .. 1 inside, and go on linearly outside.
     struct Place {
@@ -22,8 +24,8 @@ public:
         Vec3f local = Vec3f::Constant(0.5f);
     };
     using Weights = std::array<float, 8>;
-    /// Trilinear; they sum to 1.
-    static Weights weights(const Vec3f& local);
+    /// Trilinear, of a rigid body linear; they sum to 1.
+    Weights weights(const Place& place) const;
     const std::array<Index, 8>& corners(Index cell) const { return body_.cells.cell_corners[cell]; }
     Vec3f mean(const Place& place, const Vectors& values) const; ///< of the corners' values, by their weights
 

@@ -2,6 +2,7 @@
 
 #include "filigree/core/parallel_for.h"
 #include "filigree/physics/matter_search.h"
+#include "filigree/physics/rigid_body.h"
 
 #include <algorithm>
 #include <cmath>
@@ -26,6 +27,7 @@ constexpr float kSlowest = 0.2f;                       ///< of a side's speed: w
 constexpr float kCrushed = 0.05f;                      ///< volume ratio below which a cell counts as crushed
 constexpr float kTooManyCrushed = 0.05f;               ///< part of a body's cells
 constexpr Index kAskedCells = 7;                       ///< one of so many is asked
+constexpr float kWaking = 0.02f;                       ///< m/s of what touches a sleeper
 constexpr float kLittle = 0.05f;                       ///< spacings until a point that is nowhere is asked again
 
 Box box_of(const Vectors& positions) {
@@ -75,6 +77,14 @@ Vectors positions_in(const BodyState& body, float seconds) {
     move(positions.y, body.velocities.y);
     move(positions.z, body.velocities.z);
     return positions;
+}
+
+std::vector<Vec3f> surface_places(const Embedding& points, const Vectors& positions, const RunContext& context) {
+    std::vector<Vec3f> places(points.size());
+    parallel_for(context, places.size(), 4 * kMatterContactGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t s = begin; s < end; ++s) places[s] = embedded_point(points, s, positions);
+    });
+    return places;
 }
 
 } // namespace
@@ -160,7 +170,7 @@ void MatterContacts::find_sides(std::span<const BodyState> bodies, double left) 
     std::ranges::sort(order, {}, [&](Index b) { return std::pair(boxes[b].min.x(), b); });
     std::vector<std::pair<Index, Index>> found;
     for (auto a = order.begin(); a != order.end(); ++a) {
-        if (within_bodies_ && matter_[*a]) found.emplace_back(*a, *a);
+        if (within_bodies_ && matter_[*a] && !bodies[*a].rigid) found.emplace_back(*a, *a);
         if (!between_bodies_) continue;
         for (auto b = a + 1; b != order.end() && boxes[*b].min.x() - far <= boxes[*a].max.x(); ++b) {
             if (!are_near(boxes[*a], boxes[*b], far)) continue;
@@ -190,14 +200,18 @@ void MatterContacts::find_approaching(std::span<const BodyState> bodies, double 
 }
 
 /// Pairs of a side anew; those that touch stay.
-void MatterContacts::find_pairs(Side& side, const Embedding& points, const Vectors& positions, const CellBoxes& cells,
+void MatterContacts::find_pairs(Side& side, std::span<const Vec3f> points, const Box& near, const CellBoxes& cells,
                                 const RunContext& context) const {
     const bool own = side.body == side.other;
     const Matter& matter = *matter_[side.other];
     std::vector<Index> found(points.size());
+    const Vec3f low = near.min.cast<float>(), high = near.max.cast<float>();
     parallel_for(context, points.size(), 4 * kMatterContactGrain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t s = begin; s < end; ++s)
-            found[s] = cells.find(embedded_point(points, s, positions), own ? matter.cell_of_point(s) : kNoIndex);
+        for (std::size_t s = begin; s < end; ++s) {
+            const Vec3f& p = points[s];
+            const bool is_near = own || ((p.array() >= low.array()) && (p.array() <= high.array())).all();
+            found[s] = is_near ? cells.find(p, own ? matter.cell_of_point(s) : kNoIndex) : kNoIndex;
+        }
     });
     std::vector<Pair> pairs;
     auto old = side.pairs.begin();
@@ -211,17 +225,40 @@ void MatterContacts::find_pairs(Side& side, const Embedding& points, const Vecto
     side.pairs = std::move(pairs);
 }
 
-void MatterContacts::search(std::span<const BodyState> bodies, double left, double frame, const RunContext& context) {
+/// A body that sleeps wakes when one that touches it moves.
+bool MatterContacts::wake_touched(std::span<BodyState> bodies) const {
+    bool woke = false;
+    for (const Side& side : sides_)
+        for (const auto& [sleeper, other] : {std::pair(side.body, side.other), std::pair(side.other, side.body)}) {
+            if (!bodies[sleeper].sleeps() || bodies[other].sleeps()) continue;
+            const Speeds& speeds = speeds_[other];
+            if (!(speeds.least.cwiseAbs().cwiseMax(speeds.most.cwiseAbs()).norm() > kWaking)) continue;
+            if (std::ranges::none_of(side.pairs, [](const Pair& pair) { return pair.grasp.holds; })) continue;
+            wake(bodies[sleeper]);
+            woke = true;
+        }
+    return woke;
+}
+
+bool MatterContacts::search(std::span<BodyState> bodies, double left, double frame, const RunContext& context) {
     if (sides_until_ < 0) travel(bodies, 0);
     const bool anew = sides_until_ < 0;
     if (way_ > sides_until_) find_sides(bodies, left);
     if (anew) find_recovering(bodies);
     std::vector<Side*> stale;
+    const bool woke = wake_touched(bodies);
     for (Side& side : sides_) {
         const bool own = side.body == side.other;
+        if (bodies[side.body].sleeps() && bodies[side.other].sleeps()) continue;
         if (side.way > side.until && (!own || !(side.looked_at - left < frame / kOwnSearches))) stale.push_back(&side);
     }
     std::map<Index, CellBoxes> boxes; // of bodies that others ask for
+    std::vector<Box> extents(bodies.size());
+    std::vector<std::vector<Vec3f>> places(bodies.size()); // of surface points
+    const auto extent_of = [&](Index b) -> const Box& {
+        if (extents[b].empty()) extents[b] = box_of(bodies[b].positions);
+        return extents[b];
+    };
     for (Side* side : stale) {
         side->looked_at = left;
         if (side->body == side->other) {
@@ -231,12 +268,17 @@ void MatterContacts::search(std::span<const BodyState> bodies, double left, doub
             const float reach = kOwnReach * side->spacing;
             side->until = side->way + reach;
             const Vectors positions = positions_in(body, ahead);
-            find_pairs(*side, body.surface, positions, CellBoxes(*matter_[side->other], positions, reach), context);
+            find_pairs(*side, surface_places(body.surface, positions, context), {},
+                       CellBoxes(*matter_[side->other], positions, reach), context);
             continue;
         }
         const float spacing = side->spacing;
         const float reach = std::clamp(side->speed * float(left), kLeastReach * spacing, kMostReach * spacing);
         side->until = side->way + reach;
+        if (!are_near(extent_of(side->body), extent_of(side->other), double(reach + kOutside * spacing))) {
+            side->pairs.clear();
+            continue;
+        }
         const BodyState& other = bodies[side->other];
         auto cells = boxes.find(side->other);
         if (cells == boxes.end())
@@ -244,11 +286,19 @@ void MatterContacts::search(std::span<const BodyState> bodies, double left, doub
                         .try_emplace(side->other, *matter_[side->other], other.positions,
                                      kMostReach * float(other.body->spacing()))
                         .first;
-        find_pairs(*side, bodies[side->body].surface, bodies[side->body].positions, cells->second, context);
+        std::vector<Vec3f>& points = places[side->body];
+        if (points.empty()) points = surface_places(bodies[side->body].surface, bodies[side->body].positions, context);
+        Box near = extent_of(side->other);
+        near.min.array() -= double(reach + kOutside * spacing);
+        near.max.array() += double(reach + kOutside * spacing);
+        find_pairs(*side, points, near, cells->second, context);
     }
     work_.clear();
-    for (Index i = 0; i < sides_.size(); ++i)
+    for (Index i = 0; i < sides_.size(); ++i) {
+        if (bodies[sides_[i].body].sleeps() && bodies[sides_[i].other].sleeps()) continue;
         for (Index p = 0; p < sides_[i].pairs.size(); ++p) work_.emplace_back(i, p);
+    }
+    return woke;
 }
 
 double MatterContacts::longest_step() const {
@@ -309,7 +359,7 @@ std::optional<MatterContacts::Entered> MatterContacts::enter(Pair& pair, const S
     const std::optional<Matter::Depth> found = matter.depth(pair.place, inverse, pair.entry);
     const Vec3f& local = pair.place.local;
     const float outside = std::max(-local.minCoeff(), local.maxCoeff() - 1);
-    if (!found || !(found->depth > 0) || outside > kOutside) {
+    if (!found || !(found->depth > 0) || (outside > kOutside && !matter.is_rigid())) {
         float clear = little;
         if (found && found->depth < 0 && found->depth > -little)
             clear = 0;
@@ -389,7 +439,7 @@ ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, 
         const Pair& pair = side.pairs[work_[k].second];
         if (!(pair.depth > 0)) continue;
         add_to_particles(bodies[side.body].surface, pair.point, forces_[k], bodies[side.body].forces);
-        const Matter::Weights weights = Matter::weights(pair.place.local);
+        const Matter::Weights weights = matter_[side.other]->weights(pair.place);
         const auto& corners = matter_[side.other]->corners(pair.place.cell);
         for (int c = 0; c < 8; ++c) bodies[side.other].forces.add(corners[c], -weights[c] * forces_[k]);
         touched[side.body] |= kTouched;
@@ -403,6 +453,7 @@ ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, 
 void MatterContacts::push_out(std::span<BodyState> bodies) {
     for (Side& side : sides_) {
         const float most = kDeepest * side.spacing;
+        if (bodies[side.body].sleeps() && bodies[side.other].sleeps()) continue;
         for (Pair& pair : side.pairs)
             if (pair.depth > most) push_out(pair, side, bodies);
     }
@@ -414,7 +465,7 @@ void MatterContacts::push_out(Pair& pair, const Side& side, std::span<BodyState>
     const std::optional<Entered> entered = enter(pair, side, bodies); // others have moved it since
     if (!entered || !(entered->depth > most)) return;
     BodyState &body = bodies[side.body], &other = bodies[side.other];
-    const Matter::Weights weights = Matter::weights(pair.place.local);
+    const Matter::Weights weights = matter_[side.other]->weights(pair.place);
     const auto& corners = matter_[side.other]->corners(pair.place.cell);
     const Embedding& points = body.surface;
     float yielding = 0;
@@ -434,6 +485,7 @@ void MatterContacts::push_out(Pair& pair, const Side& side, std::span<BodyState>
     for (Index k = points.offsets[pair.point]; k < points.offsets[pair.point + 1]; ++k)
         move(body, points.particles[k], points.weights[k]);
     for (int c = 0; c < 8; ++c) move(other, corners[c], -weights[c]);
+    body.was_pushed = other.was_pushed = true;
 }
 
 std::vector<MatterContacts::Frame> MatterContacts::frames(std::span<const BodyState> bodies, float dt) const {

@@ -33,9 +33,9 @@ public:
     void begin_anew();
     /// Before positions change by dt times velocities. Cost O(particles).
     void travel(std::span<const BodyState> bodies, float dt);
-    /// Finds which points might touch which cells, as far as what was found last does not hold any more.
-    /// left: s of the frame.
-    void search(std::span<const BodyState> bodies, double left, double frame, const RunContext& context);
+    /// Finds which points might touch which cells, as far as what was found last does not hold any more. Sleeping
+    /// bodies that something touches wake; returns whether any did. left: s of the frame.
+    bool search(std::span<BodyState> bodies, double left, double frame, const RunContext& context);
     /// Only which bodies are near each other, for longest_step.
     void find_approaching(std::span<const BodyState> bodies, double left);
     /// Calls visit(body, other) for each two different bodies of which points touched at the last look.
@@ -113,8 +113,9 @@ private:
         float depth;
     };
     float relative_speed(Index a, Index b) const;
-    void find_pairs(Side& side, const Embedding& points, const Vectors& positions, const CellBoxes& cells,
+    void find_pairs(Side& side, std::span<const Vec3f> points, const Box& near, const CellBoxes& cells,
                     const RunContext& context) const;
+    bool wake_touched(std::span<BodyState> bodies) const;
     void find_sides(std::span<const BodyState> bodies, double left);
     std::optional<Entered> enter(Pair& pair, const Side& side, std::span<const BodyState> bodies) const;
     float crushed_part(const BodyState& body, const Matter& matter) const;

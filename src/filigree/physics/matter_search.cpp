@@ -15,6 +15,20 @@ constexpr double kMostBoxes = 8, kFewBoxes = 4096; ///< a cell, and whatever the
 
 CellBoxes::CellBoxes(const Matter& matter, const Vectors& positions, float reach) : matter_(matter) {
     const Cells& cells = matter.body().cells;
+    if (matter.is_rigid()) {
+        inverse_ = matter.inverse_derivative(positions, {0, Vec3f::Zero()});
+        corner_ = positions[matter.corners(0)[0]];
+        reach_ = reach;
+        for (int axis = 0; axis < 3; ++axis)
+            for (const auto& cell : cells.cells) counts_[axis] = std::max(counts_[axis], cell[axis] + 1);
+        const auto around = float(reach / matter.body().spacing());
+        const auto& first = cells.cells[0]; // local coordinates are counted from it
+        for (int axis = 0; axis < 3; ++axis) {
+            low_[axis] = -around - float(first[axis]);
+            high_[axis] = around + float(counts_[axis] - first[axis]);
+        }
+        return;
+    }
     extents_.resize(cells.cells.size());
     Vec3f high = Vec3f::Constant(-std::numeric_limits<float>::max());
     low_ = -high;
@@ -70,7 +84,15 @@ CellBoxes::CellBoxes(const Matter& matter, const Vectors& positions, float reach
         });
 }
 
+Index CellBoxes::find_rigid(const Vec3f& point) const {
+    const Vec3f local = inverse_ * (point - corner_);
+    if ((local.array() < low_.array()).any() || (local.array() > high_.array()).any()) return kNoIndex;
+    const Vec3f rest = matter_.rest_position({0, local});
+    return matter_.body().field->at(rest).distance - matter_.body().field_radius < reach_ ? 0 : kNoIndex;
+}
+
 Index CellBoxes::find(const Vec3f& point, Index apart_from) const {
+    if (matter_.is_rigid()) return find_rigid(point);
     std::size_t box = 0;
     for (int axis = 2; axis >= 0; --axis) {
         const float at = (point[axis] - low_[axis]) / step_;

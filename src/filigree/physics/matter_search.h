@@ -17,10 +17,15 @@ public:
 
 private:
     struct Entry;
+    Index find_rigid(const Vec3f& point) const;
     template <class Counts>
     Index nearest(std::size_t box, const Vec3f& point, const Counts& counts) const;
 
     const Matter& matter_;
+    Mat3f inverse_ = Mat3f::Zero(); ///< of a rigid body: from the world to its cell 0
+    Vec3f corner_ = Vec3f::Zero();
+    Vec3f high_ = Vec3f::Zero(); ///< with low_ the box of its cells in those coordinates
+    float reach_ = 0;
     Vec3f low_ = Vec3f::Zero();
     float step_ = 1;
     std::array<int, 3> counts_{0, 0, 0};

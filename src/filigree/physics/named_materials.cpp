@@ -29,6 +29,11 @@ std::span<const NamedMaterial> named_materials() {
         made("wood", "stiff; a tenth of real wood's", 600, 1e9, 0.3, [](Material&) {}),
         made("metal", "heavy and stiff; a hundredth of steel's", 7800, 2e9, 0.3, [](Material&) {}),
         made("lattice", "springs", 1000, 1e5, 0.25, [](Material& m) { m.model = MaterialModel::springs; }),
+        made("stone", "does not deform; any size and number of pieces", 2600, 1e9, 0.2,
+             [](Material& m) {
+                 m.model = MaterialModel::rigid;
+                 m.damping = 0.1;
+             }),
         made("clay", "keeps the shape it is pressed into", 1700, 2e5, 0.35,
              [](Material& m) {
                  m.model = MaterialModel::meshfree;

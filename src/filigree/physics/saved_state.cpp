@@ -11,11 +11,33 @@ constexpr std::uint64_t kMagic = 0x33455441'54534c46; // "FLSTATE3"
 static_assert(sizeof(Contacts::Anchor) == 4 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
 static_assert(sizeof(MatterContacts::Memory) == 6 * sizeof(Index) + 3 * sizeof(Vec3f), "padding would be saved");
 
+void write_pose(ByteWriter& writer, const std::optional<RigidPose>& pose) {
+    writer.value(std::uint64_t(pose.has_value()));
+    if (!pose) return;
+    for (const Vec3d& v : {pose->centre, pose->velocity, pose->angular})
+        for (int axis = 0; axis < 3; ++axis) writer.value(v[axis]);
+    for (int k = 0; k < 4; ++k) writer.value(pose->turn.coeffs()[k]);
+    writer.value(pose->quiet_seconds);
+    writer.value(std::uint64_t(pose->sleeps));
+}
+
+std::optional<RigidPose> read_pose(ByteReader& reader) {
+    if (reader.value<std::uint64_t>() == 0) return std::nullopt;
+    RigidPose pose;
+    for (Vec3d* v : {&pose.centre, &pose.velocity, &pose.angular})
+        for (int axis = 0; axis < 3; ++axis) (*v)[axis] = reader.value<double>();
+    for (int k = 0; k < 4; ++k) pose.turn.coeffs()[k] = reader.value<double>();
+    pose.quiet_seconds = reader.value<double>();
+    pose.sleeps = reader.value<std::uint64_t>() != 0;
+    return pose;
+}
+
 void write_body(ByteWriter& writer, const SavedBody& body) {
     writer.value(std::uint64_t(body.positions.size()));
     writer.vectors(body.positions);
     writer.vectors(body.velocities);
     writer.array(std::span(body.elasticity));
+    write_pose(writer, body.rigid);
     writer.array(std::span(body.flow));
     if (body.flow.empty()) return;
     writer.array(std::span(body.surface));
@@ -34,6 +56,7 @@ SavedBody read_body(ByteReader& reader) {
     body.velocities = reader.vectors(count);
     const std::vector<char> elasticity = reader.array<char>();
     body.elasticity.assign(elasticity.begin(), elasticity.end());
+    body.rigid = read_pose(reader);
     body.flow = reader.array<Mat3f>();
     if (body.flow.empty()) return body;
     body.surface = reader.array<Vec3f>();

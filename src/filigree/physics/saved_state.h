@@ -18,6 +18,7 @@ struct SavedPoints {
 struct SavedBody {
     Vectors positions, velocities;
     std::string elasticity; ///< Elasticity::state
+    std::optional<RigidPose> rigid;
     // Of bodies that have flowed; empty for others, whose points are embedded as they were at the start.
     std::vector<Mat3f> flow; ///< BodyState::flow
     std::vector<Vec3f> surface, balls;

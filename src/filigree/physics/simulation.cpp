@@ -1,5 +1,6 @@
 #include "filigree/physics/simulation.h"
 
+#include "filigree/physics/rigid_body.h"
 #include "filigree/physics/rigid_state.h"
 #include "filigree/physics/simulation_state.h"
 
@@ -42,7 +43,13 @@ BodyState begin_body(const Actor& actor, bool meets_bodies, const RunContext& co
     state.inverse_mass.resize(count);
     for (std::size_t i = 0; i < count; ++i) state.inverse_mass[i] = 1 / body.mass[i];
 
-    state.surface_stiffness = surface_stiffness(body, state.rest_squared_frequency);
+    if (body.material.model == MaterialModel::rigid) {
+        fit_pose(state);
+        state.rest_squared_frequency = kRigidSquaredFrequency;
+        state.surface_stiffness = rigid_surface_stiffness(state);
+    } else {
+        state.surface_stiffness = surface_stiffness(body, state.rest_squared_frequency);
+    }
     state.ball_radius = kBallRadius * float(body.spacing());
     embed_surface_at_rest(state, meets_bodies && body.material.model == MaterialModel::meshfree, context);
     return state;
@@ -92,6 +99,19 @@ std::size_t hold_lost_particles(SimulationState& state) {
     return held;
 }
 
+/// Rigid bodies that have hardly moved for a while sleep, and wake when anything moves them.
+void let_rest(SimulationState& state, double from, double until) {
+    const bool disturbed = state.external.has_wind() || obstacle_way(state.world, state.bodies, from, until) > 0;
+    for (std::size_t b = 0; b < state.bodies.size(); ++b) {
+        BodyState& body = state.bodies[b];
+        if (!body.rigid) continue;
+        if (disturbed || body.is_held || state.external.pull(b, until))
+            wake(body);
+        else if (!body.rigid->sleeps)
+            tire(body, state.frame_seconds());
+    }
+}
+
 /// One frame, whatever way it takes. Cancelled work leaves the state half done.
 Result<FrameReport> step_frame(SimulationState& state, const SavedState& start, const RunContext& context) {
     const double from = state.time(), until = double(state.frame + 1) * state.frame_seconds();
@@ -122,6 +142,7 @@ Result<FrameReport> step_frame(SimulationState& state, const SavedState& start, 
     }
     if (context.is_cancelled()) return cancelled_error();
     report.clamped_particles += hold_lost_particles(state);
+    let_rest(state, from, until);
     ++state.frame;
     return report;
 }
@@ -178,11 +199,13 @@ const Vectors& Simulation::velocities(std::size_t body) const {
 Status Simulation::set_positions(std::size_t body, const Vectors& positions) {
     if (Status checked = check_vectors(body, positions, "positions"); !checked) return checked;
     state_->bodies[body].positions = positions;
+    if (state_->bodies[body].rigid) fit_pose(state_->bodies[body]);
     return Success{};
 }
 Status Simulation::set_velocities(std::size_t body, const Vectors& velocities) {
     if (Status checked = check_vectors(body, velocities, "velocities"); !checked) return checked;
     state_->bodies[body].velocities = velocities;
+    if (state_->bodies[body].rigid) fit_pose(state_->bodies[body]);
     return Success{};
 }
 Status Simulation::check_vectors(std::size_t body, const Vectors& vectors, const char* what) const {

@@ -10,6 +10,7 @@ SavedBody save_body(const BodyState& body) {
     SavedBody saved{.positions = body.positions,
                     .velocities = body.velocities,
                     .elasticity = body.elasticity->state(),
+                    .rigid = body.rigid,
                     .flow = body.flow,
                     .surface = {},
                     .balls = {},
@@ -56,6 +57,16 @@ bool restore_points(BodyState& body, SavedBody& saved, std::span<Attachment* con
     return true;
 }
 
+/// What moves; the rest is the body's.
+void restore_pose(RigidPose& pose, const RigidPose& saved) {
+    pose.centre = saved.centre;
+    pose.velocity = saved.velocity;
+    pose.turn = saved.turn;
+    pose.angular = saved.angular;
+    pose.quiet_seconds = saved.quiet_seconds;
+    pose.sleeps = saved.sleeps;
+}
+
 } // namespace
 
 SavedState save_state(const SimulationState& state) {
@@ -84,6 +95,8 @@ Status restore_state(SimulationState& state, SavedState saved) {
         for (const Mat3f& gradient : from.flow)
             if (!gradient.allFinite()) return damaged;
         if (!body.elasticity->restore_state(from.elasticity)) return other;
+        if (from.rigid.has_value() != body.rigid.has_value()) return other;
+        if (body.rigid) restore_pose(*body.rigid, *from.rigid);
         body.positions = std::move(from.positions);
         body.velocities = std::move(from.velocities);
         const bool had_flowed = body.has_flowed();

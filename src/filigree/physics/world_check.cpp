@@ -129,6 +129,8 @@ Status check_world(const World& world, std::span<const Actor> actors) {
         const std::string place = numbered("world.pins", p);
         check.body(pin.body, place);
         check.particles(pin.body, pin.particles, place);
+        check.require(pin.body >= actors.size() || actors[pin.body].body->material.model != MaterialModel::rigid, place,
+                      "holds a rigid body, which has no part that could be held; make it an obstacle");
         check.motion(pin.motion, place + ".motion");
     }
     for (std::size_t f = 0; f < world.forces.size(); ++f) {

@@ -173,7 +173,7 @@ private:
 
     /// Refuses keys that do nothing for the body's model.
     static void refuse_other_models(const SceneTable& in, MaterialModel model) {
-        constexpr std::array kNames = {"fem", "springs", "meshfree"};
+        constexpr std::array kNames = {"fem", "springs", "meshfree", "rigid"};
         const auto refuse = [&](std::string_view key, const char* models) {
             if (in.has(key))
                 in.fail(key, fmt::format("'{}' in [[body]] is for model = {}, and this body's is \"{}\"", key, models,

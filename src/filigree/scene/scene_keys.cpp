@@ -72,8 +72,8 @@ constexpr KeyRule kKeys[] = {
     from(8, 1e8, "body", "particles", whole, "", "8000", "about so many"),
     above(0, 1e6, "body", "spacing", number, "m", "", "instead of `particles`: from one to the next"),
     plain("body", "material", text, "", "rubber", "one of the materials below; the keys from `model` on change it"),
-    one_of("fem springs meshfree", "body", "model", "by the material",
-           "finite elements, springs, or mesh-free; only the last flows"),
+    one_of("fem springs meshfree rigid", "body", "model", "by the material",
+           "finite elements, springs, or mesh-free, which alone flows; rigid does not deform"),
     above(0, 1e6, "body", "density", number, "kg/m^3", "by the material", "mass by volume"),
     above(0, 1e12, "body", "young_modulus", number, "Pa", "by the material", "stiffness"),
     from(0, 0.49, "body", "poisson_ratio", number, "", "by the material",
@@ -288,7 +288,7 @@ std::string scene_manual() {
         "\n### Materials\n\n| name | model | density | young_modulus | poisson_ratio | damping | internal_damping | "
         "yield_stress | creep_time | melting_from, melting_to | viscosity | |\n"
         "|---|---|---|---|---|---|---|---|---|---|---|---|\n";
-    constexpr std::array<std::string_view, 3> kModels = {"fem", "springs", "meshfree"};
+    constexpr std::array<std::string_view, 4> kModels = {"fem", "springs", "meshfree", "rigid"};
     for (const NamedMaterial& named : named_materials()) {
         const Material& m = named.material;
         manual +=

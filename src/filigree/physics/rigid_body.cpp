@@ -1,0 +1,226 @@
+#include "filigree/physics/rigid_body.h"
+
+#include "filigree/physics/rigid_state.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+
+namespace filigree {
+
+namespace {
+
+constexpr double kMostTouching = 6; ///< points that carry a body at one time, or a sixth of all
+constexpr double kSlow = 5e-3;      ///< m/s of the fastest point, below which a body tires ...
+constexpr double kTired = 0.5;      ///< ... and sleeps after so many seconds
+
+/// Turns what is given as of the body at rest into the world's axes.
+Mat3d turned(const RigidPose& pose, const Mat3d& at_rest) {
+    const Mat3d r = pose.turn.toRotationMatrix();
+    return r * at_rest * r.transpose();
+}
+
+/// Rotation nearest to the moment of places times places at rest [Kabsch 1976].
+Mat3d nearest_rotation(const Mat3d& moment) {
+    const Eigen::JacobiSVD<Mat3d> svd(moment, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    Vec3d sign = Vec3d::Ones();
+    sign[2] = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
+    return svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
+}
+
+class RigidElasticity final : public Elasticity {
+public:
+    explicit RigidElasticity(const Body& body) : body_(body) {
+        double mass = 0;
+        for (std::size_t i = 0; i < body.mass.size(); ++i) {
+            mass += double(body.mass[i]);
+            centre_ += double(body.mass[i]) * body.rest[i].cast<double>();
+        }
+        centre_ /= mass;
+    }
+
+    ElasticReport forces(const Vectors&, Vectors& forces, const RunContext&) override {
+        std::ranges::fill(forces.x, 0.0f);
+        std::ranges::fill(forces.y, 0.0f);
+        std::ranges::fill(forces.z, 0.0f);
+        ElasticReport report;
+        report.squared_frequency = 3 * kRigidSquaredFrequency; // on an obstacle and between bodies, also just before
+        return report;
+    }
+
+    /// One Newton step of the six ways a rigid body moves [Giles 2025].
+    void sweep(Vectors& positions, const Descent& descent, const RunContext&) override {
+        using Vec6d = Eigen::Matrix<double, 6, 1>;
+        using Mat6d = Eigen::Matrix<double, 6, 6>;
+        const Vec3d centre = centre_of(positions);
+        Vec6d force = Vec6d::Zero();
+        Mat6d stiffness = Mat6d::Zero();
+        for (std::size_t i = 0; i < positions.size(); ++i) {
+            const Vec3f place = positions[i];
+            Vec3f pull = descent.inertia[i] * (descent.target[i] - place);
+            Symmetric3 block;
+            block.add_scaled_identity(descent.inertia[i]);
+            if (descent.touched[i]) descent.external->add(Index(i), positions, pull, block);
+            const Vec3d arm = place.cast<double>() - centre;
+            Mat3d b, cross;
+            b << block.xx, block.xy, block.xz, block.xy, block.yy, block.yz, block.xz, block.yz, block.zz;
+            cross << 0, arm.z(), -arm.y(), -arm.z(), 0, arm.x(), arm.y(), -arm.x(), 0; // turn x arm = cross turn
+            force.head<3>() += pull.cast<double>();
+            force.tail<3>() += arm.cross(pull.cast<double>());
+            stiffness.topLeftCorner<3, 3>() += b;
+            stiffness.topRightCorner<3, 3>() += b * cross;
+            stiffness.bottomLeftCorner<3, 3>() += cross.transpose() * b;
+            stiffness.bottomRightCorner<3, 3>() += cross.transpose() * b * cross;
+        }
+        const Vec6d step = stiffness.ldlt().solve(force);
+        if (!step.allFinite()) return;
+        const double angle = step.tail<3>().norm();
+        const Mat3d turn =
+            angle > 0 ? Eigen::AngleAxisd(angle, step.tail<3>() / angle).toRotationMatrix() : Mat3d(Mat3d::Identity());
+        for (std::size_t i = 0; i < positions.size(); ++i)
+            positions.set(i, (centre + step.head<3>() + turn * (positions[i].cast<double>() - centre)).cast<float>());
+    }
+
+    double energy(const Vectors&, const RunContext&) const override { return 0; }
+    const Vectors& reference() const override { return body_.rest; }
+    void gradients(const Vectors& positions, std::span<Mat3f> gradients, const RunContext&) const override {
+        std::ranges::fill(gradients, rotation_of(positions).cast<float>());
+    }
+
+    Vec3d centre_of(const Vectors& positions) const {
+        Vec3d sum = Vec3d::Zero();
+        double mass = 0;
+        for (std::size_t i = 0; i < positions.size(); ++i) {
+            sum += double(body_.mass[i]) * positions[i].cast<double>();
+            mass += double(body_.mass[i]);
+        }
+        return sum / mass;
+    }
+    Mat3d rotation_of(const Vectors& positions) const {
+        const Vec3d centre = centre_of(positions);
+        Mat3d moment = Mat3d::Zero();
+        for (std::size_t i = 0; i < positions.size(); ++i)
+            moment += double(body_.mass[i]) * (positions[i].cast<double>() - centre) *
+                      (body_.rest[i].cast<double>() - centre_).transpose();
+        return nearest_rotation(moment);
+    }
+    const Vec3d& rest_centre() const { return centre_; }
+
+private:
+    const Body& body_;
+    Vec3d centre_ = Vec3d::Zero(); ///< of mass, at rest
+};
+
+const RigidElasticity& rigid(const BodyState& body) { return static_cast<const RigidElasticity&>(*body.elasticity); }
+
+} // namespace
+
+std::unique_ptr<Elasticity> make_rigid_elasticity(const Body& body) { return std::make_unique<RigidElasticity>(body); }
+
+RigidPose rigid_pose(const BodyState& body) {
+    const RigidState state = rigid_state(body);
+    RigidPose pose;
+    pose.mass = state.mass;
+    pose.centre = state.centre;
+    pose.velocity = state.linear / state.mass;
+    pose.angular = state.angular;
+    pose.turn = Eigen::Quaterniond(rigid(body).rotation_of(body.positions));
+    const Mat3d r = pose.turn.toRotationMatrix();
+    pose.inverse_inertia = (r.transpose() * state.inertia * r).inverse();
+    pose.rest_centre = rigid(body).rest_centre();
+    return pose;
+}
+
+void place_particles(BodyState& body) {
+    const RigidPose& pose = *body.rigid;
+    const Mat3f r = pose.turn.toRotationMatrix().cast<float>();
+    const Vec3f spin = (turned(pose, pose.inverse_inertia) * pose.angular).cast<float>();
+    const Vec3f centre = pose.centre.cast<float>(), velocity = pose.velocity.cast<float>();
+    const Vec3f from = pose.rest_centre.cast<float>();
+    for (std::size_t i = 0; i < body.positions.size(); ++i) {
+        const Vec3f arm = r * (body.body->rest[i] - from);
+        body.positions.set(i, centre + arm);
+        body.velocities.set(i, velocity + spin.cross(arm));
+    }
+}
+
+void fit_pose(BodyState& body) {
+    RigidPose pose = rigid_pose(body);
+    if (body.rigid) { // what does not change stays as it was, to the last digit
+        pose.mass = body.rigid->mass;
+        pose.inverse_inertia = body.rigid->inverse_inertia;
+        pose.quiet_seconds = body.rigid->quiet_seconds;
+    }
+    body.rigid = pose;
+    place_particles(body);
+}
+
+void kick_rigid(BodyState& body, const Vec3d& gravity, double dt, double kept) {
+    RigidPose& pose = *body.rigid;
+    Vec3d force = Vec3d::Zero(), torque = Vec3d::Zero();
+    for (std::size_t i = 0; i < body.forces.size(); ++i) {
+        const Vec3f f = body.forces[i];
+        if (f.isZero(0)) continue;
+        force += f.cast<double>();
+        torque += (body.positions[i].cast<double>() - pose.centre).cross(f.cast<double>());
+    }
+    pose.velocity = (pose.velocity + dt * (force / pose.mass + gravity)) * kept;
+    pose.angular = (pose.angular + dt * torque) * kept;
+}
+
+void drift_rigid(BodyState& body, double dt) {
+    RigidPose& pose = *body.rigid;
+    pose.centre += dt * pose.velocity;
+    // The spin where the turn will be halfway: a body without torque then keeps its energy to second order.
+    Eigen::Quaterniond half = pose.turn;
+    const auto turn_by = [&](const Eigen::Quaterniond& from, const Eigen::Quaterniond& spin_at, double seconds) {
+        const Mat3d r = spin_at.toRotationMatrix();
+        const Vec3d angle = seconds * (r * pose.inverse_inertia * r.transpose() * pose.angular);
+        const double length = angle.norm();
+        if (!(length > 0)) return from;
+        return Eigen::Quaterniond(Eigen::AngleAxisd(length, angle / length)) * from;
+    };
+    half = turn_by(pose.turn, pose.turn, dt / 2);
+    pose.turn = turn_by(pose.turn, half, dt).normalized();
+    place_particles(body);
+}
+
+std::vector<float> rigid_surface_stiffness(const BodyState& body) {
+    const RigidState state = rigid_state(body);
+    const Mat3d inverse_inertia = state.inertia.inverse();
+    const Mat3d r = rigid(body).rotation_of(body.positions);
+    const BodySurface& surface = body.body->surface;
+    const double share = std::max(kMostTouching, double(surface.points.size()) / 6);
+    std::vector<float> stiffness(surface.points.size());
+    for (std::size_t s = 0; s < stiffness.size(); ++s) {
+        const Vec3d arm = embedded_point(surface.points, s, body.positions).cast<double>() - state.centre;
+        const Vec3d turn = arm.cross(r * surface.normals[s].cast<double>());
+        const double mass = 1 / (1 / state.mass + turn.dot(inverse_inertia * turn));
+        stiffness[s] = float(double(kRigidSquaredFrequency) * mass / share);
+    }
+    return stiffness;
+}
+
+void tire(BodyState& body, double frame_seconds) {
+    RigidPose& pose = *body.rigid;
+    float most = 0;
+    for (std::size_t i = 0; i < body.velocities.size(); ++i) most = std::max(most, body.velocities[i].squaredNorm());
+    if (double(most) > kSlow * kSlow) {
+        pose.quiet_seconds = 0;
+        return;
+    }
+    pose.quiet_seconds += frame_seconds;
+    if (pose.quiet_seconds < kTired) return;
+    pose.sleeps = true;
+    pose.velocity = pose.angular = Vec3d::Zero();
+    place_particles(body);
+}
+
+void wake(BodyState& body) {
+    body.rigid->sleeps = false;
+    body.rigid->quiet_seconds = 0;
+}
+
+} // namespace filigree

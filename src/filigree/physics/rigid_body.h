@@ -1,0 +1,34 @@
+// A body that does not deform: its particles keep their places beside each other. Private to the layer.
+#pragma once
+
+#include "filigree/physics/body_state.h"
+
+namespace filigree {
+
+/// Squared frequency that contacts give a rigid body, 1/s^2: stiff enough that it sinks in by 10 micrometres of its own
+/// weight on a face, soft enough for some 17 substeps a frame at 60 frames a second.
+inline constexpr float kRigidSquaredFrequency = 1e6f;
+
+/// m, m/s and so on of the body as it is moved by its particles' forces.
+RigidPose rigid_pose(const BodyState& body);
+/// The particles where the pose has them, with its velocities.
+void place_particles(BodyState& body);
+/// The pose that fits the particles best, after something moved them one by one.
+void fit_pose(BodyState& body);
+
+/// m/s of the forces on the particles and gravity, for dt; then what damping leaves, a factor.
+void kick_rigid(BodyState& body, const Vec3d& gravity, double dt, double kept);
+/// Moves by the velocities for dt, and places the particles.
+void drift_rigid(BodyState& body, double dt);
+
+/// N/m of each surface point, so that those that touch at one time add no more than kRigidSquaredFrequency.
+std::vector<float> rigid_surface_stiffness(const BodyState& body);
+
+/// Elastic forces of a body that has none.
+std::unique_ptr<Elasticity> make_rigid_elasticity(const Body& body);
+
+/// Counts frames in which a body hardly moves; after half a second it sleeps.
+void tire(BodyState& body, double frame_seconds);
+void wake(BodyState& body);
+
+} // namespace filigree

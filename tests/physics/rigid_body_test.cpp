@@ -1,0 +1,198 @@
+#include "filigree/physics/rigid_body.h"
+
+#include "filigree/physics/simulation.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+namespace filigree {
+namespace {
+
+const RunContext kOneThread(1);
+
+Material stone(double damping = 0) {
+    Material material;
+    material.model = MaterialModel::rigid;
+    material.density = 2600;
+    material.damping = damping;
+    return material;
+}
+
+std::shared_ptr<const Body> block(std::size_t nx, std::size_t ny, std::size_t nz, double spacing,
+                                  const Material& material) {
+    const Vec3d half = 0.5 * spacing * Vec3d(double(nx), double(ny), double(nz));
+    return std::make_shared<Body>(make_body(box_cells(nx, ny, nz, spacing, -half), material));
+}
+
+Actor put(std::shared_ptr<const Body> body, const Vec3d& at) {
+    Actor actor{.body = std::move(body)};
+    actor.placement.translation() = at;
+    return actor;
+}
+
+Simulation begin(World world, std::vector<Actor> actors, StepMode mode = StepMode::automatic) {
+    return Simulation::create(std::move(world), std::move(actors), {.mode = mode}, kOneThread).value();
+}
+
+Vec3d centre_of(const Simulation& simulation, std::size_t body) {
+    Vec3d sum = Vec3d::Zero();
+    for (std::size_t i = 0; i < simulation.positions(body).size(); ++i)
+        sum += simulation.positions(body)[i].cast<double>() * double(simulation.body(body).mass[i]);
+    double mass = 0;
+    for (const float m : simulation.body(body).mass) mass += double(m);
+    return sum / mass;
+}
+
+double most_stretch(const Simulation& simulation, std::size_t body) {
+    const Vectors &rest = simulation.body(body).rest, &now = simulation.positions(body);
+    double most = 0;
+    for (std::size_t i = 1; i < rest.size(); ++i) {
+        const double before = double((rest[i] - rest[0]).norm());
+        most = std::max(most, std::abs(double((now[i] - now[0]).norm()) / before - 1));
+    }
+    return most;
+}
+
+// Euler: about the middle axis a body tumbles, and keeps its energy and angular momentum all the while.
+TEST(RigidBody, TumblesAndKeepsEnergyAndMomentum) {
+    World world;
+    world.gravity.setZero();
+    Actor actor = put(block(6, 4, 2, 0.05, stone()), Vec3d::Zero());
+    actor.spin = Vec3d(0.01, 6, 0.01);
+    Simulation tumbling = begin(world, {actor});
+    const double energy = tumbling.energy(kOneThread).total();
+    const Vec3d angular = tumbling.momentum().angular;
+    double most_turned = 0;
+    for (int frame = 0; frame < 600; ++frame) {
+        ASSERT_TRUE(tumbling.advance(kOneThread).ok());
+        const Vec3f axis = tumbling.positions(0)[tumbling.positions(0).size() - 1] - tumbling.positions(0)[0];
+        most_turned = std::max(most_turned, -double(axis.normalized().y()));
+    }
+    EXPECT_NEAR(tumbling.energy(kOneThread).total() / energy, 1, 5e-3);
+    EXPECT_LT((tumbling.momentum().angular - angular).norm() / angular.norm(), 1e-4);
+    EXPECT_LT(most_stretch(tumbling, 0), 1e-5);
+    EXPECT_GT(most_turned, 0.3) << "it turns over";
+}
+
+TEST(RigidBody, FallsFreely) {
+    Simulation falling = begin({}, {put(block(2, 2, 2, 0.1, stone()), Vec3d(0, 1, 0))});
+    for (int frame = 0; frame < 30; ++frame) ASSERT_TRUE(falling.advance(kOneThread).ok());
+    EXPECT_NEAR(centre_of(falling, 0).y(), 1 - 0.5 * 9.81 * 0.25, 2e-5);
+}
+
+TEST(RigidBody, SlidesByCoulombAndHoldsBelowItsAngle) {
+    for (const double degrees : {20.0, 26.0, 30.0, 40.0}) {
+        const double angle = degrees * std::numbers::pi / 180;
+        const Vec3d normal(-std::sin(angle), std::cos(angle), 0), down(-std::cos(angle), -std::sin(angle), 0);
+        World world;
+        world.obstacles.emplace_back().shape = HalfSpace{Vec3d::Zero(), normal};
+        Actor actor = put(block(4, 4, 4, 0.05, stone()), 0.1001 * normal);
+        actor.placement.rotate(Eigen::AngleAxisd(angle, Vec3d::UnitZ()));
+        actor.velocity = degrees > 20 ? Vec3d(2 * down) : Vec3d::Zero();
+        Simulation sliding = begin(world, {actor});
+        std::vector<double> way;
+        for (int frame = 0; frame < 60; ++frame) {
+            ASSERT_TRUE(sliding.advance(kOneThread).ok());
+            way.push_back(centre_of(sliding, 0).dot(down));
+        }
+        if (degrees < 26) {
+            EXPECT_LT(std::abs(way[59] - way[29]), 5e-6);
+            continue;
+        }
+        const double acceleration = ((way[35] - way[30]) - (way[9] - way[4])) * 12 / (26.0 / 60);
+        EXPECT_NEAR((9.81 * std::sin(angle) - acceleration) / (9.81 * std::cos(angle)), 0.5, 0.01) << degrees;
+    }
+}
+
+TEST(RigidBody, AStackOfFiveSleepsAndWakesWhenItIsHit) {
+    World world;
+    world.obstacles.emplace_back().shape = HalfSpace{};
+    const auto cube = block(3, 3, 3, 0.1, stone(0.1));
+    std::vector<Actor> actors;
+    for (int i = 0; i < 5; ++i) actors.push_back(put(cube, Vec3d(0, 0.15 + 0.3 * i, 0)));
+    actors.push_back(put(block(3, 3, 3, 0.1, stone()), Vec3d(-12, 1.4, 0))); // arrives after 2 s
+    actors.back().velocity = Vec3d(6, 9.81, 0);
+    Simulation stack = begin(world, actors);
+    for (int frame = 0; frame < 90; ++frame) ASSERT_TRUE(stack.advance(kOneThread).ok());
+    const Vec3d before = centre_of(stack, 4);
+    EXPECT_NEAR(before.y(), 1.35, 2e-3);
+    for (int frame = 0; frame < 15; ++frame) ASSERT_TRUE(stack.advance(kOneThread).ok());
+    EXPECT_EQ((centre_of(stack, 4) - before).norm(), 0) << "it sleeps";
+    for (int frame = 0; frame < 60; ++frame) ASSERT_TRUE(stack.advance(kOneThread).ok());
+    EXPECT_GT((centre_of(stack, 4) - before).norm(), 0.05) << "it is hit";
+}
+
+TEST(RigidBody, SoftAndRigidBodiesMeet) {
+    Material soft;
+    soft.young_modulus = 2e5;
+    soft.damping = 0;
+    for (const StepMode mode : {StepMode::explicit_steps, StepMode::descent}) {
+        World world;
+        world.gravity.setZero();
+        std::vector<Actor> actors = {put(block(4, 4, 4, 0.1, soft), Vec3d(-0.4, 0, 0)),
+                                     put(block(3, 3, 3, 0.1, stone()), Vec3d(0.4, 0.1, 0))};
+        actors[1].velocity = Vec3d(-3, 0, 0);
+        Simulation meeting = begin(world, actors, mode);
+        const Momentum momentum = meeting.momentum();
+        const double energy = meeting.energy(kOneThread).total();
+        double nearest = 1;
+        for (int frame = 0; frame < 40; ++frame) {
+            ASSERT_TRUE(meeting.advance(kOneThread).ok());
+            nearest = std::min(nearest, centre_of(meeting, 1).x() - centre_of(meeting, 0).x());
+            EXPECT_LT(meeting.energy(kOneThread).total(), 1.01 * energy);
+        }
+        const bool descent = mode == StepMode::descent;
+        EXPECT_GT(nearest, 0.1);
+        EXPECT_LT((meeting.momentum().linear - momentum.linear).norm(),
+                  (descent ? 1e-3 : 1e-5) * momentum.linear.norm());
+        EXPECT_LT((meeting.momentum().angular - momentum.angular).norm(),
+                  (descent ? 1e-2 : 1e-4) * momentum.angular.norm());
+        EXPECT_LT(most_stretch(meeting, 1), 1e-5);
+    }
+}
+
+TEST(RigidBody, AHeapComesToRestAndGoesOnTheSameAfterARestore) {
+    World world;
+    world.body_friction = 0.5;
+    world.body_restitution = 0.3;
+    world.obstacles.emplace_back().shape = HalfSpace{};
+    const std::array kinds = {block(3, 3, 3, 0.025, stone(0.1)), block(5, 2, 3, 0.025, stone(0.1))};
+    std::vector<Actor> actors;
+    for (int i = 0; i < 24; ++i) {
+        actors.push_back(put(kinds[std::size_t(i % 2)], Vec3d(0.1 * (i % 2) + 0.01 * (i % 5), 0.1 + 0.12 * (i / 4),
+                                                              0.1 * (i / 2 % 2) + 0.01 * (i % 3))));
+        actors.back().placement.rotate(Eigen::AngleAxisd(0.4 * i, Vec3d(1, i % 3, i % 5).normalized()));
+    }
+    Simulation heap = begin(world, actors);
+    for (int frame = 0; frame < 60; ++frame) {
+        const FrameReport report = heap.advance(kOneThread).value();
+        EXPECT_LT(report.deepest_contact, 0.02);
+    }
+    Simulation other = begin(world, actors);
+    ASSERT_TRUE(other.restore(heap.save()).ok());
+    const RunContext two_threads(2);
+    for (int frame = 0; frame < 240; ++frame) {
+        ASSERT_TRUE(heap.advance(kOneThread).ok());
+        if (frame < 60) {
+            ASSERT_TRUE(other.advance(two_threads).ok());
+        }
+        if (frame == 59) {
+            EXPECT_TRUE(heap.save() == other.save());
+        }
+    }
+    EXPECT_LT(heap.energy(kOneThread).kinetic, 1e-4);
+    for (std::size_t b = 0; b < actors.size(); ++b) EXPECT_GT(centre_of(heap, b).y(), 0.02) << b;
+}
+
+TEST(RigidBody, CannotBePinned) {
+    World world;
+    world.pins.push_back({.body = 0, .particles = {0}, .motion = {}});
+    const auto made = Simulation::create(world, {put(block(2, 2, 2, 0.1, stone()), Vec3d::Zero())}, {}, kOneThread);
+    ASSERT_FALSE(made.ok());
+    EXPECT_NE(made.error().message.find("rigid"), std::string::npos);
+}
+
+} // namespace
+} // namespace filigree
