@@ -446,7 +446,7 @@ TEST_F(Simulate, TheManualsDefaultsAreTheLibrarys) {
 }
 
 TEST_F(Simulate, TheExamplesRun) {
-    for (const char* const name : {"bounce", "bar_sag", "press", "melt", "collide"}) {
+    for (const char* const name : {"bounce", "bar_sag", "press", "melt", "collide", "wall", "slope", "fold", "heap"}) {
         SCOPED_TRACE(name);
         const std::string scene = FILIGREE_ROOT "/examples/scenes/" + std::string(name) + ".toml";
         const Json json = this->json({"simulate", scene, "--frames", "2", "-o", "out.fil"});
@@ -455,7 +455,7 @@ TEST_F(Simulate, TheExamplesRun) {
         EXPECT_GT(json["least_volume_ratio"], 0.5);
         EXPECT_EQ(json["warnings"], Json::array());
     }
-    for (const char* const name : {"koala_drop", "dragon_pull"}) { // meshes that a user has to bring
+    for (const char* const name : {"koala_drop", "koala_sit", "dragon_pull"}) { // meshes that a user has to bring
         const std::string scene = FILIGREE_ROOT "/examples/scenes/" + std::string(name) + ".toml";
         const Ran ran = run({"simulate", scene, "--frames", "1", "-o", "out.fil"});
         EXPECT_TRUE(ran.code == 0 || ran.code == 3) << ran.err;

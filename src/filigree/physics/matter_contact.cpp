@@ -240,64 +240,83 @@ bool MatterContacts::wake_touched(std::span<BodyState> bodies) const {
     return woke;
 }
 
+/// What several sides of one search ask of bodies, worked out once.
+class MatterContacts::Surroundings {
+public:
+    Surroundings(const MatterContacts& contacts, std::span<const BodyState> bodies, const RunContext& context)
+        : contacts_(contacts), bodies_(bodies), context_(context), extents_(bodies.size()), points_(bodies.size()) {}
+
+    const Box& extent(Index body) {
+        if (extents_[body].empty()) extents_[body] = box_of(bodies_[body].positions);
+        return extents_[body];
+    }
+    std::span<const Vec3f> surface_points(Index body) {
+        std::vector<Vec3f>& points = points_[body];
+        if (points.empty()) points = surface_places(bodies_[body].surface, bodies_[body].positions, context_);
+        return points;
+    }
+    const CellBoxes& cells(Index body) {
+        const auto found = cells_.find(body);
+        if (found != cells_.end()) return found->second;
+        const float reach = kMostReach * float(bodies_[body].body->spacing());
+        return cells_.try_emplace(body, *contacts_.matter_[body], bodies_[body].positions, reach).first->second;
+    }
+
+private:
+    const MatterContacts& contacts_;
+    std::span<const BodyState> bodies_;
+    const RunContext& context_;
+    std::vector<Box> extents_;
+    std::vector<std::vector<Vec3f>> points_;
+    std::map<Index, CellBoxes> cells_;
+};
+
+/// Of a body and itself: where everything will be halfway to the next search.
+void MatterContacts::find_own_pairs(Side& side, const BodyState& body, float ahead, const RunContext& context) const {
+    const float reach = kOwnReach * side.spacing;
+    side.until = side.way + reach;
+    const Vectors positions = positions_in(body, ahead);
+    find_pairs(side, surface_places(body.surface, positions, context), {},
+               CellBoxes(*matter_[side.other], positions, reach), context);
+}
+
+void MatterContacts::find_other_pairs(Side& side, Surroundings& around, double left, const RunContext& context) const {
+    const float reach = std::clamp(side.speed * float(left), kLeastReach * side.spacing, kMostReach * side.spacing);
+    side.until = side.way + reach;
+    const double far = double(reach + kOutside * side.spacing);
+    Box near = around.extent(side.other);
+    if (!are_near(around.extent(side.body), near, far)) {
+        side.pairs.clear();
+        return;
+    }
+    near.min.array() -= far;
+    near.max.array() += far;
+    find_pairs(side, around.surface_points(side.body), near, around.cells(side.other), context);
+}
+
 bool MatterContacts::search(std::span<BodyState> bodies, double left, double frame, const RunContext& context) {
-    if (sides_until_ < 0) travel(bodies, 0);
     const bool anew = sides_until_ < 0;
-    if (way_ > sides_until_) find_sides(bodies, left);
+    if (anew) travel(bodies, 0);
+    bool changed = way_ > sides_until_;
+    if (changed) find_sides(bodies, left);
     if (anew) find_recovering(bodies);
-    std::vector<Side*> stale;
     const bool woke = wake_touched(bodies);
+    Surroundings around(*this, bodies, context);
     for (Side& side : sides_) {
+        if (!(side.way > side.until) || both_sleep(side, bodies)) continue;
         const bool own = side.body == side.other;
-        if (bodies[side.body].sleeps() && bodies[side.other].sleeps()) continue;
-        if (side.way > side.until && (!own || !(side.looked_at - left < frame / kOwnSearches))) stale.push_back(&side);
+        if (own && side.looked_at - left < frame / kOwnSearches) continue;
+        side.looked_at = left;
+        changed = true;
+        if (own)
+            find_own_pairs(side, bodies[side.body], float(0.5 * std::min(left, frame / kOwnSearches)), context);
+        else
+            find_other_pairs(side, around, left, context);
     }
-    std::map<Index, CellBoxes> boxes; // of bodies that others ask for
-    std::vector<Box> extents(bodies.size());
-    std::vector<std::vector<Vec3f>> places(bodies.size()); // of surface points
-    const auto extent_of = [&](Index b) -> const Box& {
-        if (extents[b].empty()) extents[b] = box_of(bodies[b].positions);
-        return extents[b];
-    };
-    for (Side* side : stale) {
-        side->looked_at = left;
-        if (side->body == side->other) {
-            // Looked for where everything will be halfway to the next search.
-            const BodyState& body = bodies[side->body];
-            const auto ahead = float(0.5 * std::min(left, frame / kOwnSearches));
-            const float reach = kOwnReach * side->spacing;
-            side->until = side->way + reach;
-            const Vectors positions = positions_in(body, ahead);
-            find_pairs(*side, surface_places(body.surface, positions, context), {},
-                       CellBoxes(*matter_[side->other], positions, reach), context);
-            continue;
-        }
-        const float spacing = side->spacing;
-        const float reach = std::clamp(side->speed * float(left), kLeastReach * spacing, kMostReach * spacing);
-        side->until = side->way + reach;
-        if (!are_near(extent_of(side->body), extent_of(side->other), double(reach + kOutside * spacing))) {
-            side->pairs.clear();
-            continue;
-        }
-        const BodyState& other = bodies[side->other];
-        auto cells = boxes.find(side->other);
-        if (cells == boxes.end())
-            cells = boxes
-                        .try_emplace(side->other, *matter_[side->other], other.positions,
-                                     kMostReach * float(other.body->spacing()))
-                        .first;
-        std::vector<Vec3f>& points = places[side->body];
-        if (points.empty()) points = surface_places(bodies[side->body].surface, bodies[side->body].positions, context);
-        Box near = extent_of(side->other);
-        near.min.array() -= double(reach + kOutside * spacing);
-        near.max.array() += double(reach + kOutside * spacing);
-        find_pairs(*side, points, near, cells->second, context);
-    }
+    if (!changed && !woke) return false;
     work_.clear();
-    for (Index i = 0; i < sides_.size(); ++i) {
-        if (bodies[sides_[i].body].sleeps() && bodies[sides_[i].other].sleeps()) continue;
-        for (Index p = 0; p < sides_[i].pairs.size(); ++p) work_.emplace_back(i, p);
-    }
+    for (Index i = 0; i < sides_.size(); ++i)
+        for (Index p = 0; p < sides_[i].pairs.size() && !both_sleep(sides_[i], bodies); ++p) work_.emplace_back(i, p);
     return woke;
 }
 
@@ -453,7 +472,7 @@ ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, 
 void MatterContacts::push_out(std::span<BodyState> bodies) {
     for (Side& side : sides_) {
         const float most = kDeepest * side.spacing;
-        if (bodies[side.body].sleeps() && bodies[side.other].sleeps()) continue;
+        if (both_sleep(side, bodies)) continue;
         for (Pair& pair : side.pairs)
             if (pair.depth > most) push_out(pair, side, bodies);
     }

@@ -115,6 +115,12 @@ private:
     float relative_speed(Index a, Index b) const;
     void find_pairs(Side& side, std::span<const Vec3f> points, const Box& near, const CellBoxes& cells,
                     const RunContext& context) const;
+    class Surroundings;
+    static bool both_sleep(const Side& side, std::span<const BodyState> bodies) {
+        return bodies[side.body].sleeps() && bodies[side.other].sleeps();
+    }
+    void find_own_pairs(Side& side, const BodyState& body, float ahead, const RunContext& context) const;
+    void find_other_pairs(Side& side, Surroundings& around, double left, const RunContext& context) const;
     bool wake_touched(std::span<BodyState> bodies) const;
     void find_sides(std::span<const BodyState> bodies, double left);
     std::optional<Entered> enter(Pair& pair, const Side& side, std::span<const BodyState> bodies) const;
