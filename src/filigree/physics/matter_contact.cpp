@@ -391,10 +391,9 @@ std::optional<MatterContacts::Entered> MatterContacts::enter(Pair& pair, const S
         leave(pair, side, clear);
         return std::nullopt;
     }
-    if (pair.entry.isZero(0)) {
-        pair.entry = found->rest;
+    if (pair.entry.isZero(0))
         pair.tangled = side.body == side.other && (recovers_[side.body] || found->depth > kDeepest * side.spacing);
-    }
+    pair.entry = found->rest; // follows a point that slides round an edge; a thin part's far side turns it at once
     if (pair.tangled) {
         pair.depth = 0;
         return std::nullopt;

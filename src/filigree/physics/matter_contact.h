@@ -64,7 +64,7 @@ public:
         float depth = 0;       ///< now
         contact_law::Grasp grasp;
         Matter::Place anchor;
-        Vec3f entry = Vec3f::Zero(); ///< normal at rest where the point came in; zero while it is outside
+        Vec3f entry = Vec3f::Zero(); ///< normal at rest on the side where the point came in; zero outside
         bool tangled = false;        ///< it did not come in from outside, and is left alone until it is out
     };
     /// All that friction remembers: pairs that touch. In the order of sides and points.
