@@ -109,23 +109,79 @@ std::size_t count_particles(const Cells& cells, MaterialModel model, const RunCo
     return cells.cells.size() + 7 * std::size_t(std::count(spread.begin(), spread.end(), 0));
 }
 
-/// The outer faces of whole cells.
-Mesh outer_faces(const Cells& cells) {
-    Mesh mesh;
-    for (const auto& corner : cells.corners)
-        mesh.positions.push_back((cells.origin + cells.spacing * Vec3d(corner[0], corner[1], corner[2])).cast<float>());
+/// Spacings between points of the surface. A rigid body has no dents that few points would miss.
+double point_spacing(const Material& material) { return material.model == MaterialModel::rigid ? 1 : 0.5; }
+
+/// Calls visit(cell, axis, side) for the outer faces of whole cells; side: 0 towards lower coordinates, or 1.
+template <class Visit>
+void each_outer_face(const Cells& cells, const Visit& visit) {
     for (std::size_t c = 0; c < cells.cells.size(); ++c)
         for (int axis = 0; axis < 3; ++axis)
             for (int side = 0; side < 2; ++side) {
                 std::array<int, 3> next = {cells.cells[c][0], cells.cells[c][1], cells.cells[c][2]};
                 next[axis] += side ? 1 : -1;
-                if (cells.find_cell(next[0], next[1], next[2]) != kNoIndex) continue;
-                const int u = 1 << (axis + 1) % 3, v = 1 << (axis + 2) % 3, base = side << axis;
-                const auto& corner = cells.cell_corners[c];
-                std::array<Index, 4> face = {corner[base], corner[base + u], corner[base + u + v], corner[base + v]};
-                if (!side) std::swap(face[1], face[3]);
-                mesh.add_face(face);
+                if (cells.find_cell(next[0], next[1], next[2]) == kNoIndex) visit(c, axis, side);
             }
+}
+
+/// The corners of a face of a cell, counter-clockwise from outside.
+std::array<Index, 4> face_corners(const Cells& cells, std::size_t cell, int axis, int side) {
+    const int u = 1 << (axis + 1) % 3, v = 1 << (axis + 2) % 3, base = side << axis;
+    const auto& corner = cells.cell_corners[cell];
+    std::array<Index, 4> face = {corner[base], corner[base + u], corner[base + u + v], corner[base + v]};
+    if (!side) std::swap(face[1], face[3]);
+    return face;
+}
+
+/// Surface points at the middles of the quarters of outer faces; their normals and areas go into the body.
+std::vector<Vec3f> points_on_faces(Body& body) {
+    std::vector<Vec3f> points;
+    const double h = body.spacing();
+    each_outer_face(body.cells, [&](std::size_t c, int axis, int side) {
+        const auto& cell = body.cells.cells[c];
+        Vec3d normal = Vec3d::Zero();
+        normal[axis] = side ? 1 : -1;
+        const Vec3d centre = Vec3d(cell[0], cell[1], cell[2]) + Vec3d::Constant(0.5) + 0.5 * normal;
+        for (int quarter = 0; quarter < 4; ++quarter) {
+            Vec3d at = centre;
+            at[(axis + 1) % 3] += quarter & 1 ? 0.25 : -0.25;
+            at[(axis + 2) % 3] += quarter & 2 ? 0.25 : -0.25;
+            points.push_back((body.cells.origin + h * at).cast<float>());
+            body.surface.normals.push_back(normal.cast<float>());
+            body.surface.areas.push_back(float(h * h / 4));
+        }
+    });
+    return points;
+}
+
+/// The same at the corners of outer faces, one where several meet.
+std::vector<Vec3f> points_at_corners(Body& body) {
+    const auto quarter = float(body.spacing() * body.spacing() / 4);
+    std::vector<Vec3f> normals(body.rest.size(), Vec3f::Zero());
+    std::vector<float> areas(body.rest.size(), 0);
+    each_outer_face(body.cells, [&](std::size_t c, int axis, int side) {
+        for (const Index corner : face_corners(body.cells, c, axis, side)) {
+            normals[corner][axis] += side ? 1.0f : -1.0f;
+            areas[corner] += quarter;
+        }
+    });
+    std::vector<Vec3f> points;
+    for (std::size_t corner = 0; corner < body.rest.size(); ++corner) {
+        if (!(areas[corner] > 0)) continue;
+        points.push_back(body.rest[corner]);
+        body.surface.normals.push_back(normals[corner].stableNormalized());
+        body.surface.areas.push_back(areas[corner]);
+    }
+    return points;
+}
+
+/// The outer faces of whole cells.
+Mesh outer_faces(const Cells& cells) {
+    Mesh mesh;
+    for (const auto& corner : cells.corners)
+        mesh.positions.push_back((cells.origin + cells.spacing * Vec3d(corner[0], corner[1], corner[2])).cast<float>());
+    each_outer_face(cells,
+                    [&](std::size_t c, int axis, int side) { mesh.add_face(face_corners(cells, c, axis, side)); });
     return mesh;
 }
 
@@ -175,7 +231,7 @@ Result<Body> make_body(const Mesh& mesh, const Material& material, const BodyOpt
     body.cells = std::move(cells).value();
     found.split_cells = make_particles(body, context);
     SurfacePoints spread =
-        spread_on_surface(mesh.positions, welded->triangles, options.scale, 0.5 * body.cells.spacing);
+        spread_on_surface(mesh.positions, welded->triangles, options.scale, point_spacing(material) * body.spacing());
     body.surface.normals = std::move(spread.normals);
     body.surface.areas = std::move(spread.areas);
     body.surface.points = embed_surface(spread.positions, body, context);
@@ -195,26 +251,8 @@ Body make_body(Cells cells, const Material& material) {
     body.cells = std::move(cells);
     make_particles(body, context);
 
-    std::vector<Vec3f> points;
-    const double h = body.spacing();
-    for (const auto& cell : body.cells.cells)
-        for (int axis = 0; axis < 3; ++axis)
-            for (int side = -1; side <= 1; side += 2) {
-                std::array<int, 3> next = {cell[0], cell[1], cell[2]};
-                next[axis] += side;
-                if (body.cells.find_cell(next[0], next[1], next[2]) != kNoIndex) continue;
-                Vec3d normal = Vec3d::Zero();
-                normal[axis] = side;
-                const Vec3d centre = Vec3d(cell[0], cell[1], cell[2]) + Vec3d::Constant(0.5) + 0.5 * normal;
-                for (int quarter = 0; quarter < 4; ++quarter) {
-                    Vec3d at = centre;
-                    at[(axis + 1) % 3] += quarter & 1 ? 0.25 : -0.25;
-                    at[(axis + 2) % 3] += quarter & 2 ? 0.25 : -0.25;
-                    points.push_back((body.cells.origin + h * at).cast<float>());
-                    body.surface.normals.push_back(normal.cast<float>());
-                    body.surface.areas.push_back(float(h * h / 4));
-                }
-            }
+    const bool is_rigid = material.model == MaterialModel::rigid;
+    const std::vector<Vec3f> points = is_rigid ? points_at_corners(body) : points_on_faces(body);
     body.surface.points = embed_surface(points, body, context);
     [[maybe_unused]] const Status added = add_field(body, outer_faces(body.cells), context);
     assert(added.ok());

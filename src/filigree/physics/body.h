@@ -11,7 +11,8 @@
 
 namespace filigree {
 
-/// Points of the surface that touch obstacles and other bodies and catch wind, about half a spacing apart.
+/// Points of the surface that touch obstacles and other bodies and catch wind, about half a spacing apart; of rigid bodies
+/// a spacing.
 struct BodySurface {
     Embedding points;           ///< on the mesh's surface
     std::vector<Vec3f> normals; ///< unit, outward, at rest
@@ -56,8 +57,8 @@ struct BodyReport {
 Result<Body> make_body(const Mesh& mesh, const Material& material, const BodyOptions& options,
                        const RunContext& context, BodyReport* report = nullptr);
 
-/// A body of whole cells without a mesh: surface points at the centres of its outer faces, split in four. For tests and
-/// benchmarks.
+/// A body of whole cells without a mesh: surface points at the centres of its outer faces, split in four, or at their
+/// corners if it is rigid. For tests and benchmarks.
 Body make_body(Cells cells, const Material& material);
 
 } // namespace filigree

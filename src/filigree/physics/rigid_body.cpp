@@ -1,5 +1,6 @@
 #include "filigree/physics/rigid_body.h"
 
+#include "filigree/core/dense_solve.h"
 #include "filigree/physics/rigid_state.h"
 
 #include <Eigen/Geometry>
@@ -189,15 +190,13 @@ void drift_rigid(BodyState& body, double dt) {
 
 std::vector<float> rigid_surface_stiffness(const BodyState& body) {
     const RigidState state = rigid_state(body);
-    const Mat3d inverse_inertia = state.inertia.inverse();
-    const Mat3d r = rigid(body).rotation_of(body.positions);
+    const double easiest = 1 / symmetric_eigen(state.inertia).values[0]; // of the turns about any axis
     const BodySurface& surface = body.body->surface;
     const double share = std::max(kMostTouching, double(surface.points.size()) / 6);
     std::vector<float> stiffness(surface.points.size());
     for (std::size_t s = 0; s < stiffness.size(); ++s) {
         const Vec3d arm = embedded_point(surface.points, s, body.positions).cast<double>() - state.centre;
-        const Vec3d turn = arm.cross(r * surface.normals[s].cast<double>());
-        const double mass = 1 / (1 / state.mass + turn.dot(inverse_inertia * turn));
+        const double mass = 1 / (1 / state.mass + easiest * arm.squaredNorm()); // that a push there moves, at least
         stiffness[s] = float(double(kRigidSquaredFrequency) * mass / share);
     }
     return stiffness;
