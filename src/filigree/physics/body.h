@@ -11,8 +11,8 @@
 
 namespace filigree {
 
-/// Points of the surface that touch obstacles and other bodies and catch wind, about half a spacing apart; of rigid bodies
-/// a spacing.
+/// Points of the surface that touch obstacles and other bodies and catch wind, about half a spacing apart; of rigid
+/// bodies a spacing.
 struct BodySurface {
     Embedding points;           ///< on the mesh's surface
     std::vector<Vec3f> normals; ///< unit, outward, at rest
