@@ -1,7 +1,8 @@
 // Bodies that touch each other and themselves.
+
 #include "filigree/core/random.h"
 #include "filigree/physics/matter_search.h"
-#include "filigree/physics/simulation.h"
+#include "physics/test_bodies.h"
 
 #include <gtest/gtest.h>
 
@@ -20,13 +21,6 @@ Material rubber(double young_modulus = 1e6, double damping = 0) {
     return material;
 }
 
-/// About the origin.
-std::shared_ptr<const Body> block(std::size_t nx, std::size_t ny, std::size_t nz, double spacing,
-                                  const Material& material) {
-    const Vec3d half = 0.5 * spacing * Vec3d(double(nx), double(ny), double(nz));
-    return std::make_shared<Body>(make_body(box_cells(nx, ny, nz, spacing, -half), material));
-}
-
 Actor put(std::shared_ptr<const Body> body, const Vec3d& at, double degrees = 0,
           const Vec3d& velocity = Vec3d::Zero()) {
     Actor actor{.body = std::move(body), .velocity = velocity};
@@ -36,17 +30,6 @@ Actor put(std::shared_ptr<const Body> body, const Vec3d& at, double degrees = 0,
 
 Simulation begin(World world, std::vector<Actor> actors, StepMode mode = StepMode::explicit_steps) {
     return Simulation::create(std::move(world), std::move(actors), {.mode = mode}, kOneThread).value();
-}
-
-Vec3d centre_of(const Simulation& simulation, std::size_t body) {
-    Vec3d sum = Vec3d::Zero();
-    double mass = 0;
-    for (std::size_t i = 0; i < simulation.body(body).particle_count(); ++i) {
-        const double m = double(simulation.body(body).mass[i]);
-        sum += m * simulation.positions(body)[i].cast<double>();
-        mass += m;
-    }
-    return sum / mass;
 }
 
 /// Something at rest on a slope, or sliding down it. `on_body`: the slope is a body that is held fast.
@@ -103,12 +86,12 @@ TEST_P(EachStepMode, ASquareStackStands) {
     for (int frame = 0; frame < 60 * seconds; ++frame) {
         ASSERT_TRUE(stack.advance(kOneThread).ok());
         if (frame + 1 != 60 * (seconds - 4)) continue;
-        for (std::size_t b = 0; b < bodies; ++b) before.push_back(centre_of(stack, b));
+        for (std::size_t b = 0; b < bodies; ++b) before.push_back(centre_of_mass(stack, b));
     }
     for (std::size_t b = 0; b < bodies; ++b) {
-        EXPECT_LT((centre_of(stack, b) - before[b]).norm() / 4, 1e-5) << "m/s, of body " << b;
-        EXPECT_NEAR(centre_of(stack, b).y(), 0.2 + 0.4 * double(b), 0.03);
-        EXPECT_LT(std::hypot(centre_of(stack, b).x(), centre_of(stack, b).z()), 2e-3);
+        EXPECT_LT((centre_of_mass(stack, b) - before[b]).norm() / 4, 1e-5) << "m/s, of body " << b;
+        EXPECT_NEAR(centre_of_mass(stack, b).y(), 0.2 + 0.4 * double(b), 0.03);
+        EXPECT_LT(std::hypot(centre_of_mass(stack, b).x(), centre_of_mass(stack, b).z()), 2e-3);
     }
 }
 
@@ -126,10 +109,10 @@ TEST_P(EachStepMode, AStackHoldsOnASlopeOfTwentyDegrees) {
     for (int frame = 0; frame < 900; ++frame) {
         ASSERT_TRUE(stack.advance(kOneThread).ok());
         if (frame + 1 != 600) continue;
-        for (std::size_t b = 0; b < bodies; ++b) before.push_back(centre_of(stack, b));
+        for (std::size_t b = 0; b < bodies; ++b) before.push_back(centre_of_mass(stack, b));
     }
     for (std::size_t b = 0; b < bodies; ++b)
-        EXPECT_LT((centre_of(stack, b) - before[b]).norm() / 5, 1e-5) << "m/s, of body " << b;
+        EXPECT_LT((centre_of_mass(stack, b) - before[b]).norm() / 5, 1e-5) << "m/s, of body " << b;
 }
 
 TEST(MatterContact, SlidingFollowsCoulombOnObstaclesAndOnBodies) {
@@ -141,7 +124,7 @@ TEST(MatterContact, SlidingFollowsCoulombOnObstaclesAndOnBodies) {
             std::vector<double> way;
             for (int frame = 0; frame < 33; ++frame) {
                 ASSERT_TRUE(sliding.advance(kOneThread).ok());
-                way.push_back(centre_of(sliding, body).dot(slope.down));
+                way.push_back(centre_of_mass(sliding, body).dot(slope.down));
             }
             const double first = (way[7] - way[2]) * 12, last = (way[32] - way[27]) * 12; // m/s
             const double angle = degrees * std::numbers::pi / 180, acceleration = (last - first) / (25.0 / 60);
@@ -156,9 +139,9 @@ TEST(MatterContact, ABlockHoldsOnABodyAndSlidesBeyondItsAngle) {
         const std::size_t body = slope.add(block(4, 4, 4, 0.05, rubber(1e6, 0.5)), 0.1002, 0.3, 0);
         Simulation resting = begin(slope.world, slope.actors);
         for (int frame = 0; frame < 120; ++frame) ASSERT_TRUE(resting.advance(kOneThread).ok());
-        const Vec3d before = centre_of(resting, body);
+        const Vec3d before = centre_of_mass(resting, body);
         for (int frame = 0; frame < 60; ++frame) ASSERT_TRUE(resting.advance(kOneThread).ok());
-        const double speed = (centre_of(resting, body) - before).norm();
+        const double speed = (centre_of_mass(resting, body) - before).norm();
         if (degrees < 26)
             EXPECT_LT(speed, 1e-4) << degrees;
         else
@@ -181,12 +164,12 @@ TEST_P(EachStepMode, BodiesMeetWithoutPassingAndKeepMomentumAndEnergy) {
         double nearest = 1;
         for (int frame = 0; frame < 45; ++frame) {
             ASSERT_TRUE(meeting.advance(kOneThread).ok());
-            nearest = std::min(nearest, centre_of(meeting, 1).x() - centre_of(meeting, 0).x());
+            nearest = std::min(nearest, centre_of_mass(meeting, 1).x() - centre_of_mass(meeting, 0).x());
             EXPECT_LT(meeting.energy(kOneThread).total(), 1.01 * energy) << speed;
         }
         EXPECT_LT(nearest, 0.42);
         EXPECT_GT(nearest, 0.2);
-        EXPECT_GT(centre_of(meeting, 1).x() - centre_of(meeting, 0).x(), nearest + 0.02) << "they part again";
+        EXPECT_GT(centre_of_mass(meeting, 1).x() - centre_of_mass(meeting, 0).x(), nearest + 0.02) << "they part again";
         const Momentum after = meeting.momentum();
         EXPECT_LT((after.angular - momentum.angular).norm(), (descent ? 1e-3 : 1e-5) * momentum.angular.norm())
             << speed;
@@ -251,8 +234,8 @@ TEST(MatterContact, FrictionMayDifferFromPairToPair) {
     slope.world.body_pairs.push_back({smooth, 0, {.friction = 0.05}});
     Simulation both = begin(slope.world, slope.actors);
     for (int frame = 0; frame < 60; ++frame) ASSERT_TRUE(both.advance(kOneThread).ok());
-    EXPECT_LT(centre_of(both, rough).dot(slope.down), -0.28);
-    EXPECT_GT(centre_of(both, smooth).dot(slope.down), 0.8);
+    EXPECT_LT(centre_of_mass(both, rough).dot(slope.down), -0.28);
+    EXPECT_GT(centre_of_mass(both, smooth).dot(slope.down), 0.8);
 }
 
 TEST_P(EachStepMode, SavedWhileTouchingItGoesOnTheSameForAnyThreads) {

@@ -1,6 +1,5 @@
 #include "filigree/physics/rigid_body.h"
-
-#include "filigree/physics/simulation.h"
+#include "physics/test_bodies.h"
 
 #include <gtest/gtest.h>
 
@@ -20,12 +19,6 @@ Material stone(double damping = 0) {
     return material;
 }
 
-std::shared_ptr<const Body> block(std::size_t nx, std::size_t ny, std::size_t nz, double spacing,
-                                  const Material& material) {
-    const Vec3d half = 0.5 * spacing * Vec3d(double(nx), double(ny), double(nz));
-    return std::make_shared<Body>(make_body(box_cells(nx, ny, nz, spacing, -half), material));
-}
-
 Actor put(std::shared_ptr<const Body> body, const Vec3d& at) {
     Actor actor{.body = std::move(body)};
     actor.placement.translation() = at;
@@ -34,15 +27,6 @@ Actor put(std::shared_ptr<const Body> body, const Vec3d& at) {
 
 Simulation begin(World world, std::vector<Actor> actors, StepMode mode = StepMode::automatic) {
     return Simulation::create(std::move(world), std::move(actors), {.mode = mode}, kOneThread).value();
-}
-
-Vec3d centre_of(const Simulation& simulation, std::size_t body) {
-    Vec3d sum = Vec3d::Zero();
-    for (std::size_t i = 0; i < simulation.positions(body).size(); ++i)
-        sum += simulation.positions(body)[i].cast<double>() * double(simulation.body(body).mass[i]);
-    double mass = 0;
-    for (const float m : simulation.body(body).mass) mass += double(m);
-    return sum / mass;
 }
 
 double most_stretch(const Simulation& simulation, std::size_t body) {
@@ -79,7 +63,7 @@ TEST(RigidBody, TumblesAndKeepsEnergyAndMomentum) {
 TEST(RigidBody, FallsFreely) {
     Simulation falling = begin({}, {put(block(2, 2, 2, 0.1, stone()), Vec3d(0, 1, 0))});
     for (int frame = 0; frame < 30; ++frame) ASSERT_TRUE(falling.advance(kOneThread).ok());
-    EXPECT_NEAR(centre_of(falling, 0).y(), 1 - 0.5 * 9.81 * 0.25, 2e-5);
+    EXPECT_NEAR(centre_of_mass(falling, 0).y(), 1 - 0.5 * 9.81 * 0.25, 2e-5);
 }
 
 TEST(RigidBody, SlidesByCoulombAndHoldsBelowItsAngle) {
@@ -95,7 +79,7 @@ TEST(RigidBody, SlidesByCoulombAndHoldsBelowItsAngle) {
         std::vector<double> way;
         for (int frame = 0; frame < 60; ++frame) {
             ASSERT_TRUE(sliding.advance(kOneThread).ok());
-            way.push_back(centre_of(sliding, 0).dot(down));
+            way.push_back(centre_of_mass(sliding, 0).dot(down));
         }
         if (degrees < 26) {
             EXPECT_LT(std::abs(way[59] - way[29]), 5e-6);
@@ -116,12 +100,12 @@ TEST(RigidBody, AStackOfFiveSleepsAndWakesWhenItIsHit) {
     actors.back().velocity = Vec3d(6, 9.81, 0);
     Simulation stack = begin(world, actors);
     for (int frame = 0; frame < 90; ++frame) ASSERT_TRUE(stack.advance(kOneThread).ok());
-    const Vec3d before = centre_of(stack, 4);
+    const Vec3d before = centre_of_mass(stack, 4);
     EXPECT_NEAR(before.y(), 1.35, 2e-3);
     for (int frame = 0; frame < 15; ++frame) ASSERT_TRUE(stack.advance(kOneThread).ok());
-    EXPECT_EQ((centre_of(stack, 4) - before).norm(), 0) << "it sleeps";
+    EXPECT_EQ((centre_of_mass(stack, 4) - before).norm(), 0) << "it sleeps";
     for (int frame = 0; frame < 60; ++frame) ASSERT_TRUE(stack.advance(kOneThread).ok());
-    EXPECT_GT((centre_of(stack, 4) - before).norm(), 0.05) << "it is hit";
+    EXPECT_GT((centre_of_mass(stack, 4) - before).norm(), 0.05) << "it is hit";
 }
 
 TEST(RigidBody, SoftAndRigidBodiesMeet) {
@@ -140,7 +124,7 @@ TEST(RigidBody, SoftAndRigidBodiesMeet) {
         double nearest = 1;
         for (int frame = 0; frame < 40; ++frame) {
             ASSERT_TRUE(meeting.advance(kOneThread).ok());
-            nearest = std::min(nearest, centre_of(meeting, 1).x() - centre_of(meeting, 0).x());
+            nearest = std::min(nearest, centre_of_mass(meeting, 1).x() - centre_of_mass(meeting, 0).x());
             EXPECT_LT(meeting.energy(kOneThread).total(), 1.01 * energy);
         }
         const bool descent = mode == StepMode::descent;
@@ -183,7 +167,7 @@ TEST(RigidBody, AHeapComesToRestAndGoesOnTheSameAfterARestore) {
         }
     }
     EXPECT_LT(heap.energy(kOneThread).kinetic, 1e-4);
-    for (std::size_t b = 0; b < actors.size(); ++b) EXPECT_GT(centre_of(heap, b).y(), 0.02) << b;
+    for (std::size_t b = 0; b < actors.size(); ++b) EXPECT_GT(centre_of_mass(heap, b).y(), 0.02) << b;
 }
 
 TEST(RigidBody, CannotBePinned) {

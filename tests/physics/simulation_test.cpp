@@ -1,6 +1,7 @@
 #include "filigree/physics/simulation.h"
 
 #include "filigree/core/random.h"
+#include "physics/test_bodies.h"
 
 #include <gtest/gtest.h>
 
@@ -66,17 +67,6 @@ bool all_finite(const Vectors& values) {
     for (std::size_t i = 0; i < values.size(); ++i)
         if (!values[i].allFinite()) return false;
     return true;
-}
-
-Vec3d centre_of_mass(const Simulation& simulation, std::size_t body = 0) {
-    Vec3d sum = Vec3d::Zero();
-    double mass = 0;
-    for (std::size_t i = 0; i < simulation.body(body).particle_count(); ++i) {
-        const double m = double(simulation.body(body).mass[i]);
-        sum += m * simulation.positions(body)[i].cast<double>();
-        mass += m;
-    }
-    return sum / mass;
 }
 
 /// Largest distance of a particle from the rigid motion that fits the body's start best.

@@ -1,0 +1,26 @@
+// Bodies that several tests put into worlds, and where they are.
+#pragma once
+
+#include "filigree/physics/simulation.h"
+
+namespace filigree {
+
+/// Of whole cells, about the origin.
+inline std::shared_ptr<const Body> block(std::size_t nx, std::size_t ny, std::size_t nz, double spacing,
+                                         const Material& material) {
+    const Vec3d half = 0.5 * spacing * Vec3d(double(nx), double(ny), double(nz));
+    return std::make_shared<Body>(make_body(box_cells(nx, ny, nz, spacing, -half), material));
+}
+
+inline Vec3d centre_of_mass(const Simulation& simulation, std::size_t body = 0) {
+    Vec3d sum = Vec3d::Zero();
+    double mass = 0;
+    for (std::size_t i = 0; i < simulation.body(body).particle_count(); ++i) {
+        const double m = double(simulation.body(body).mass[i]);
+        sum += m * simulation.positions(body)[i].cast<double>();
+        mass += m;
+    }
+    return sum / mass;
+}
+
+} // namespace filigree
