@@ -78,7 +78,7 @@ void heap(benchmark::State& state) {
 /// A mesh of 1 m, FILIGREE_SCAN, that falls 0.3 m; 0 or 1: whether it meets itself.
 void scan(benchmark::State& state) {
     const char* path = std::getenv("FILIGREE_SCAN");
-    if (!path) {
+    if (!path || !*path) {
         state.SkipWithError("FILIGREE_SCAN names no mesh");
         return;
     }

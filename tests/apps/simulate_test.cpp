@@ -380,6 +380,10 @@ TEST_F(Simulate, WrongTypesAndRangesAreNamed) {
     refused(kBody + "[[pin]]\nbody = \"baa\"\n", {"bad.toml:4:", "'baa'", "bar"});
     refused(kBody + "[[pin]]\nbox = { min = [9, 9, 9], max = [10, 10, 10] }\n", {"bad.toml:3:", "no particle"});
     refused(kBody + "[[pin]]\nvertices = [1000000]\n", {"bad.toml:3:", "1000000"});
+    refused(kBody + "material = \"stone\"\n[[pin]]\n", {"bad.toml:4:", "rigid", "obstacle"});
+    refused(kBody + "[[pair]]\nfirst = \"bar\"\n", {"bad.toml:3:", "second"});
+    refused(kBody + "[[pair]]\nfirst = \"bar\"\nsecond = \"wax\"\n", {"bad.toml:5:", "'wax'"});
+    refused(kBody + "[[pair]]\nfirst = \"bar\"\nsecond = \"bar\"\nfriction = -1\n", {"bad.toml:6:", "friction"});
     refused(kBody + "[[hand]]\ntarget = [0, 0, 0]\n", {"bad.toml:3:", "point and vertex"});
     refused(kBody + "[simulation]\nframes = 1\nduration = 2\n", {"bad.toml:5:", "frames and duration"});
     refused(kBody + "[simulation]\nmode = \"fast\"\n", {"bad.toml:4:", "automatic, explicit, descent"});
@@ -417,6 +421,8 @@ TEST_F(Simulate, KeysThatDoNothingForAModelAreRefused) {
     refused(kBody + "material = \"clay\"\nbending = 0.1\n", {"bad.toml:4:", "'bending'", "\"meshfree\""});
     refused(kBody + "material = \"lattice\"\npoisson_ratio = 0.25\n",
             {"bad.toml:4:", "'poisson_ratio'", "\"fem\" or \"meshfree\"", "is \"springs\""});
+    for (const std::string key : {"young_modulus", "poisson_ratio", "internal_damping"})
+        refused(kBody + "material = \"stone\"\n" + key + " = 0.1\n", {"bad.toml:4:", "'" + key + "'", "is \"rigid\""});
     // What a material brings along is left out without a word.
     write("fem.toml", kBody + "resolution = 4\nparticles = 100\nmaterial = \"wax\"\nmodel = \"fem\"\n");
     ok(words("fem.toml", {"--frames", "1", "--check"}));

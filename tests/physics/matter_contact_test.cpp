@@ -1,7 +1,7 @@
 // Bodies that touch each other and themselves.
 
 #include "filigree/core/random.h"
-#include "filigree/physics/matter_search.h"
+#include "filigree/physics/cell_boxes.h"
 #include "physics/test_bodies.h"
 
 #include <gtest/gtest.h>
@@ -236,6 +236,24 @@ TEST(MatterContact, FrictionMayDifferFromPairToPair) {
     for (int frame = 0; frame < 60; ++frame) ASSERT_TRUE(both.advance(kOneThread).ok());
     EXPECT_LT(centre_of_mass(both, rough).dot(slope.down), -0.28);
     EXPECT_GT(centre_of_mass(both, smooth).dot(slope.down), 0.8);
+}
+
+// Meshfree bodies touch by balls; their pairs count as those of others do.
+TEST(MatterContact, APairOfMeshfreeBodiesHasItsOwnRestitution) {
+    Material clay = rubber(1e5);
+    clay.model = MaterialModel::meshfree;
+    const auto cube = block(3, 3, 3, 0.1, clay);
+    std::array<double, 2> parting;
+    for (const bool hard : {false, true}) {
+        World world;
+        world.gravity.setZero();
+        world.body_pairs.push_back({1, 0, {.friction = 0, .restitution = hard ? 1.0 : 0.0}});
+        Simulation meeting =
+            begin(world, {put(cube, {-0.2, 0, 0}, 0, {0.5, 0, 0}), put(cube, {0.2, 0, 0}, 0, {-0.5, 0, 0})});
+        for (int frame = 0; frame < 40; ++frame) ASSERT_TRUE(meeting.advance(kOneThread).ok());
+        parting[hard] = centre_of_mass(meeting, 1).x() - centre_of_mass(meeting, 0).x();
+    }
+    EXPECT_GT(parting[1], parting[0] + 0.02);
 }
 
 TEST_P(EachStepMode, SavedWhileTouchingItGoesOnTheSameForAnyThreads) {

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 
 namespace filigree {
 
@@ -16,7 +17,8 @@ namespace {
 /// gradient in that direction.
 constexpr float kLeastSpread = 0.01f;
 
-constexpr double kFieldSpacing = 0.5;                     ///< spacings between the points of the distance field
+constexpr double kFieldSpacing = 0.5; ///< spacings between the points of the distance field
+constexpr double kMostFieldPoints = 0x1p25;
 constexpr float kSheetDepth = 0.25f, kSheetRadius = 0.4f; ///< spacings
 
 /// Particles at the corners: each cell gives an eighth of its mass to each of its corners.
@@ -185,12 +187,20 @@ Mesh outer_faces(const Cells& cells) {
     return mesh;
 }
 
+/// m between points of the distance field: wider for very many cells, so that memory stays bounded.
+double field_spacing(const Body& body) {
+    Box box;
+    for (const auto& corner : body.cells.corners) box.extend(Vec3d(corner[0], corner[1], corner[2]));
+    const double points = (box.size().array() / kFieldSpacing + 1).prod();
+    return kFieldSpacing * body.spacing() * std::max(1.0, std::cbrt(points / kMostFieldPoints));
+}
+
 /// The distance from the surface at rest. A mesh whose inside is thinner than cells can see counts as a sheet.
 Status add_field(Body& body, const Mesh& mesh, const RunContext& context) {
     if (body.material.model == MaterialModel::meshfree) return Success{};
     RunContext quiet = context;
     quiet.progress = nullptr;
-    Result<DistanceField> field = DistanceField::create(mesh, body.scale, kFieldSpacing * body.spacing(), quiet);
+    Result<DistanceField> field = DistanceField::create(mesh, body.scale, field_spacing(body), quiet);
     if (!field) return field.error();
     float deepest = 0;
     for (const Vec3f& centroid : body.cells.centroid) deepest = std::max(deepest, -field->at(centroid).distance);

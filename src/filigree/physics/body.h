@@ -31,7 +31,8 @@ struct Body {
     std::vector<float> mass;   ///< kg
     std::vector<float> volume; ///< m^3: occupied, shared out as the mass is
     BodySurface surface;
-    /// Distance from the surface at rest, m, on a grid of half a spacing: how deep what touches the body lies in it.
+    /// Distance from the surface at rest, m, on a grid of half a spacing (wider for
+    /// millions of cells): how deep what touches the body lies in it.
     /// Null for meshfree bodies.
     std::shared_ptr<const DistanceField> field;
     float field_radius = 0; ///< m: a sheet without thickness is everything closer to it than this

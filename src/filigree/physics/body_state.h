@@ -89,4 +89,20 @@ inline void add_to_particles(const Embedding& embedding, std::size_t point, cons
         values.add(embedding.particles[k], embedding.weights[k] * value);
 }
 
+/// How far a point gives way to an impulse of 1 along any direction, 1/kg: sum w^2 / m.
+inline float yielding(const Embedding& embedding, std::size_t point, const std::vector<float>& inverse_mass) {
+    float sum = 0;
+    for (Index k = embedding.offsets[point]; k < embedding.offsets[point + 1]; ++k)
+        sum += embedding.weights[k] * embedding.weights[k] * inverse_mass[embedding.particles[k]];
+    return sum;
+}
+
+/// Moves a particle by its weight over its mass, as XPBD projects a constraint of zero compliance.
+inline void push_particle(BodyState& body, Index particle, float weight, const Vec3f& way, const Vec3f& velocity) {
+    const float share = weight * body.inverse_mass[particle];
+    body.positions.add(particle, share * way);
+    body.velocities.add(particle, share * velocity);
+    body.was_pushed = true;
+}
+
 } // namespace filigree

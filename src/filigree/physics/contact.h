@@ -38,7 +38,7 @@ public:
         double left, frame;               ///< s, of the frame
     };
     void search(std::span<BodyState> bodies, const Search& search, const RunContext& context);
-    /// Before positions change by dt times velocities.
+    /// Positions have changed by dt times velocities.
     void travel(std::span<const BodyState> bodies, float dt) { matter_.travel(bodies, dt); }
     /// s: in longer steps something could pass through something.
     double longest_step() const { return matter_.longest_step(); }
@@ -155,10 +155,11 @@ private:
     struct NearPair {
         Index first_body, first, second_body, second;
         float clear_until; ///< as above; both bodies travel
+        PairContact law;
     };
     Blocks::Entry block_of(const Near& at, const BodyState& body, const ObstaclePoses& poses, float dt) const;
     Blocks::Entry block_of(const BodyState& body, Index point, const BodyState& other, Index other_point,
-                           float dt) const;
+                           const PairContact& law, float dt) const;
     Vec3f obstacle_force(Near& at, const BodyState& body, const ObstaclePoses& poses, float travelled, float dt) const;
     Vec3f pair_force(NearPair& pair, std::span<const BodyState> bodies, float travelled, float dt) const;
     void find_near(std::span<const BodyState> bodies, double time, float travelled, float reach,

@@ -137,7 +137,7 @@ Contacts::Blocks::Entry Contacts::block_of(const Near& at, const BodyState& body
 
 /// A ball of `body` against one of another body.
 Contacts::Blocks::Entry Contacts::block_of(const BodyState& body, Index point, const BodyState& other,
-                                           Index other_point, float dt) const {
+                                           Index other_point, const PairContact& law, float dt) const {
     const Vec3f velocity =
         embedded_point(body.balls, point, body.velocities) - embedded_point(other.balls, other_point, other.velocities);
     const Vec3f between =
@@ -149,8 +149,7 @@ Contacts::Blocks::Entry Contacts::block_of(const BodyState& body, Index point, c
     entry.other = &other;
     entry.other_point = other_point;
     entry.reach = body.ball_radius + other.ball_radius;
-    entry.unloading =
-        unloading(world_.body_restitution, velocity.dot(between.stableNormalized()), smooth_speed(world_, dt));
+    entry.unloading = unloading(law.restitution, velocity.dot(between.stableNormalized()), smooth_speed(world_, dt));
     return entry;
 }
 
@@ -170,9 +169,9 @@ Contacts::Blocks Contacts::blocks(std::span<const BodyState> bodies, std::size_t
     }
     for (const NearPair& pair : pairs_) {
         if (pair.first_body == b)
-            blocks.entries_.push_back(block_of(body, pair.first, bodies[pair.second_body], pair.second, dt));
+            blocks.entries_.push_back(block_of(body, pair.first, bodies[pair.second_body], pair.second, pair.law, dt));
         if (pair.second_body == b)
-            blocks.entries_.push_back(block_of(body, pair.second, bodies[pair.first_body], pair.first, dt));
+            blocks.entries_.push_back(block_of(body, pair.second, bodies[pair.first_body], pair.first, pair.law, dt));
     }
     for (const MatterContacts::Frame& frame : frames) {
         if (frame.body != b && frame.other != b) continue;

@@ -88,9 +88,8 @@ Vec3f Contacts::pair_force(NearPair& pair, std::span<const BodyState> bodies, fl
         embedded_point(a.balls, pair.first, a.velocities) - embedded_point(b.balls, pair.second, b.velocities);
     const float stiffness = pair_stiffness(a, pair.first, b, pair.second);
     const float push =
-        stiffness * depth * unloading(world_.body_restitution, velocity.dot(normal), smooth_speed(world_, dt));
-    const Vec3f held =
-        limited(-2 * stiffness * dt * along_surface(velocity, normal), float(world_.body_friction) * push);
+        stiffness * depth * unloading(pair.law.restitution, velocity.dot(normal), smooth_speed(world_, dt));
+    const Vec3f held = limited(-2 * stiffness * dt * along_surface(velocity, normal), float(pair.law.friction) * push);
     return push * normal + held;
 }
 
@@ -146,22 +145,15 @@ void Contacts::push_out(std::span<BodyState> bodies, double time) {
             const DistanceField::Sample surface =
                 distance_to(world_.obstacles[at.obstacle], poses.at(at.obstacle), place);
             if (!(-surface.distance > most)) continue;
-            // As XPBD projects one constraint of zero compliance: particles move by weight over mass.
-            float yielding = 0;
-            for (Index k = body.surface.offsets[at.point]; k < body.surface.offsets[at.point + 1]; ++k)
-                yielding +=
-                    body.surface.weights[k] * body.surface.weights[k] * body.inverse_mass[body.surface.particles[k]];
-            if (!(yielding > 0)) continue;
+            const float gives = yielding(body.surface, at.point, body.inverse_mass);
+            if (!(gives > 0)) continue;
             const float inwards = std::min(
                 0.0f, (embedded_point(body.surface, at.point, body.velocities) - poses.velocity(at.obstacle, place))
                           .dot(surface.normal));
-            for (Index k = body.surface.offsets[at.point]; k < body.surface.offsets[at.point + 1]; ++k) {
-                const Index particle = body.surface.particles[k];
-                const float share = body.surface.weights[k] * body.inverse_mass[particle] / yielding;
-                body.positions.add(particle, share * (-surface.distance - most) * surface.normal);
-                body.velocities.add(particle, share * -inwards * surface.normal);
-            }
-            body.was_pushed = true;
+            const Vec3f way = (-surface.distance - most) / gives * surface.normal;
+            const Vec3f push = -inwards / gives * surface.normal;
+            for (Index k = body.surface.offsets[at.point]; k < body.surface.offsets[at.point + 1]; ++k)
+                push_particle(body, body.surface.particles[k], body.surface.weights[k], way, push);
         }
     }
     matter_.push_out(bodies);

@@ -80,6 +80,7 @@ void Contacts::find_pairs(std::span<const BodyState> bodies, float travelled, fl
     for (std::size_t a = 0; a < bodies.size(); ++a)
         for (std::size_t b = a + 1; b < bodies.size(); ++b) {
             if (!bodies[a].has_balls() || !bodies[b].has_balls()) continue;
+            const PairContact law = world_.contact_of(a, b);
             const float far = bodies[a].ball_radius + bodies[b].ball_radius + 2 * reach;
             const Vec3d low = boxes[a].min.cwiseMax(boxes[b].min) - Vec3d::Constant(double(far));
             const Vec3d high = boxes[a].max.cwiseMin(boxes[b].max) + Vec3d::Constant(double(far));
@@ -108,7 +109,7 @@ void Contacts::find_pairs(std::span<const BodyState> bodies, float travelled, fl
                         for (; at != grid.end() && at->first <= Key{i, j, key[2] + 1}; ++at)
                             if (const float gap = (balls[b][at->second] - balls[a][s]).norm() - far + 2 * reach;
                                 gap < 2 * reach)
-                                pairs_.push_back({Index(a), s, Index(b), at->second, travelled + gap / 2});
+                                pairs_.push_back({Index(a), s, Index(b), at->second, travelled + gap / 2, law});
                     }
             }
         }

@@ -82,10 +82,8 @@ private:
     void move(float dt, double until) {
         const Stopwatch watch(report_.other_seconds);
         kick(0.5f * dt, false);
-        for (BodyState& body : bodies_)
-            if (body.rigid && !body.sleeps()) place_particles(body);
-        if (meets_anything_) state_.contacts.travel(bodies_, dt);
         drift(dt);
+        if (meets_anything_) state_.contacts.travel(bodies_, dt);
         const double before = std::exchange(now_, until);
         move_pins(state_, now_, dt);
         if (meets_anything_)

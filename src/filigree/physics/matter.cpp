@@ -10,7 +10,7 @@ namespace filigree {
 namespace {
 
 constexpr float kLeastVolume = 1e-3f;             ///< of a cell at rest: flatter ones have no inside
-constexpr float kMostDepthStretch = 3;            ///< of depth, and 1 over it [Drake #21317]
+constexpr float kMostDepthStretch = 3;            ///< of depth, and 1 over it: more is the noise of a crushed cell
 constexpr float kConverged = 1e-3f, kFar = 0.5f;  ///< cells
 constexpr int kNewtonSteps = 4, kLongestWalk = 6; ///< that a walk may go
 constexpr float kTurned = -0.2f;                  ///< cosine between the entry and a normal that is not its side's

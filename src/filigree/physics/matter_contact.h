@@ -23,6 +23,9 @@ class CellBoxes;
 /// pushes the cell's corners back at the same place, so that momentum and angular momentum stay what they were.
 class MatterContacts {
 public:
+    static constexpr float kMostReach = 0.5f; ///< spacings that anything may go between two searches
+    static constexpr float kOutside = 0.25f;  ///< cells that a point may lie outside of the last one and still touch
+
     MatterContacts(const World& world, bool between_bodies, bool within_bodies)
         : world_(world), between_bodies_(between_bodies), within_bodies_(within_bodies) {}
 
@@ -31,14 +34,14 @@ public:
 
     /// The next search finds everything again; what touches is remembered.
     void begin_anew();
-    /// Before positions change by dt times velocities. Cost O(particles).
+    /// Positions have changed by dt times velocities. Cost O(particles).
     void travel(std::span<const BodyState> bodies, float dt);
     /// Finds which points might touch which cells, as far as what was found last does not hold any more. Sleeping
     /// bodies that something touches wake; returns whether any did. left: s of the frame.
     bool search(std::span<BodyState> bodies, double left, double frame, const RunContext& context);
     /// Only which bodies are near each other, for longest_step.
     void find_approaching(std::span<const BodyState> bodies, double left);
-    /// Calls visit(body, other) for each two different bodies of which points touched at the last look.
+    /// Calls visit(body, other) for each two different bodies of which points touched at last.
     template <class Visit>
     void each_touching(const Visit& visit) const {
         for (const Side& side : sides_)
@@ -98,19 +101,16 @@ private:
     /// Points of one body against the matter of another, or of its own.
     struct Side {
         Index body, other;
-        float way = 0;        ///< m, bound on what either has gone beside the other
-        float until = -1;     ///< way until which the pairs hold
-        double looked_at = 0; ///< s left of the frame at the last look
-        float speed = 0;      ///< m/s, the same bound's
-        float spacing = 0;    ///< m, the smaller of both
+        float way = 0;          ///< m, bound on what either has gone beside the other
+        float until = -1;       ///< way until which the pairs hold
+        double searched_at = 0; ///< s left of the frame at the last search
+        float speed = 0;        ///< m/s, the same bound's
+        float spacing = 0;      ///< m, the smaller of both
+        PairContact law;
         std::vector<Pair> pairs;
     };
     struct Speeds { ///< of a body's particles along each axis
         Vec3f least = Vec3f::Zero(), most = Vec3f::Zero();
-    };
-    struct Entered {
-        Vec3f normal;
-        float depth;
     };
     float relative_speed(Index a, Index b) const;
     void find_pairs(Side& side, std::span<const Vec3f> points, const Box& near, const CellBoxes& cells,
@@ -123,9 +123,10 @@ private:
     void find_other_pairs(Side& side, Surroundings& around, double left, const RunContext& context) const;
     bool wake_touched(std::span<BodyState> bodies) const;
     void find_sides(std::span<const BodyState> bodies, double left);
-    std::optional<Entered> enter(Pair& pair, const Side& side, std::span<const BodyState> bodies) const;
+    std::optional<Vec3f> enter(Pair& pair, const Side& side, std::span<const BodyState> bodies) const;
     float crushed_part(const BodyState& body, const Matter& matter) const;
     void find_recovering(std::span<const BodyState> bodies);
+    float clearance(const Pair& pair, const Side& side, float distance, std::span<const BodyState> bodies) const;
     void leave(Pair& pair, const Side& side, float clearance) const;
     float stiffness(const Side& side, const Pair& pair, std::span<const BodyState> bodies) const;
     void anchor_at(Pair& pair, const Side& side, const BodyState& other, const Vec3f& offset) const;

@@ -89,13 +89,16 @@ bool is_finite(const SimulationState& state) {
 /// What cannot be computed stays with its body, at rest. Returns how many particles that are.
 std::size_t hold_lost_particles(SimulationState& state) {
     std::size_t held = 0;
-    for (BodyState& body : state.bodies)
+    for (BodyState& body : state.bodies) {
+        const std::size_t before = held;
         for (std::size_t i = 0; i < body.positions.size(); ++i) {
             if (body.positions[i].allFinite() && body.velocities[i].allFinite()) continue;
             if (!body.positions[i].allFinite()) body.positions.set(i, body.elasticity->reference()[i]);
             body.velocities.set(i, Vec3f::Zero());
             ++held;
         }
+        if (body.rigid && held > before) fit_pose(body);
+    }
     return held;
 }
 

@@ -1,6 +1,7 @@
 #include "filigree/physics/simulation_state.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace filigree {
 
@@ -57,14 +58,18 @@ bool restore_points(BodyState& body, SavedBody& saved, std::span<Attachment* con
     return true;
 }
 
-/// What moves; the rest is the body's.
-void restore_pose(RigidPose& pose, const RigidPose& saved) {
+/// What moves; the rest is the body's. False where it is no pose.
+bool restore_pose(RigidPose& pose, const RigidPose& saved) {
+    if (!saved.centre.allFinite() || !saved.velocity.allFinite() || !saved.angular.allFinite() ||
+        !(std::abs(saved.turn.norm() - 1) < 1e-6) || !(saved.quiet_seconds >= 0))
+        return false;
     pose.centre = saved.centre;
     pose.velocity = saved.velocity;
     pose.turn = saved.turn;
     pose.angular = saved.angular;
     pose.quiet_seconds = saved.quiet_seconds;
     pose.sleeps = saved.sleeps;
+    return true;
 }
 
 } // namespace
@@ -96,7 +101,7 @@ Status restore_state(SimulationState& state, SavedState saved) {
             if (!gradient.allFinite()) return damaged;
         if (!body.elasticity->restore_state(from.elasticity)) return other;
         if (from.rigid.has_value() != body.rigid.has_value()) return other;
-        if (body.rigid) restore_pose(*body.rigid, *from.rigid);
+        if (body.rigid && !restore_pose(*body.rigid, *from.rigid)) return damaged;
         body.positions = std::move(from.positions);
         body.velocities = std::move(from.velocities);
         const bool had_flowed = body.has_flowed();

@@ -53,6 +53,8 @@ public:
         each("obstacle", [&](const SceneTable& section) { read_obstacle(section); });
         each("pin", [&](const SceneTable& section) {
             scene_.pins.push_back({section.line(), body_of(section), section.region(), section.motion()});
+            if (scene_.bodies[scene_.pins.back().body].material.model == MaterialModel::rigid)
+                section.fail(section.line(), "a rigid body has no part that could be held; make it an [[obstacle]]");
         });
         each("force", [&](const SceneTable& section) {
             scene_.forces.push_back({section.line(), body_of(section), section.region(), section.keyed("newtons")});
@@ -185,6 +187,9 @@ private:
                 refuse(key, "\"meshfree\"");
         if (model != MaterialModel::springs) refuse("bending", "\"springs\"");
         if (model == MaterialModel::springs) refuse("poisson_ratio", "\"fem\" or \"meshfree\"");
+        if (model == MaterialModel::rigid)
+            for (const char* key : {"young_modulus", "poisson_ratio", "internal_damping"})
+                refuse(key, "\"fem\", \"springs\" or \"meshfree\"");
     }
 
     /// Returns the name of the one it began as.

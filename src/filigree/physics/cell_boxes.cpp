@@ -1,4 +1,4 @@
-#include "filigree/physics/matter_search.h"
+#include "filigree/physics/cell_boxes.h"
 
 #include <algorithm>
 #include <cmath>

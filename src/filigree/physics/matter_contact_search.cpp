@@ -1,34 +1,26 @@
-#include "filigree/physics/matter_contact.h"
-
+// Finding which points might be in which cells, and what contacts in matter remember.
 #include "filigree/core/parallel_for.h"
-#include "filigree/physics/matter_search.h"
+#include "filigree/physics/cell_boxes.h"
+#include "filigree/physics/matter_contact.h"
 #include "filigree/physics/rigid_body.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <map>
-#include <tuple>
 
 namespace filigree {
 
-using namespace contact_law;
-
 namespace {
 
-constexpr std::size_t kMatterContactGrain = 128;
-constexpr float kLeastReach = 0.1f, kMostReach = 0.5f; ///< spacings that anything may go between two searches
-constexpr float kOwnReach = 0.3f;                      ///< the same of a body beside itself ...
-constexpr double kOwnSearches = 3;                     ///< ... which is searched no more often than this in a frame
-constexpr float kOutside = 0.25f;                      ///< cells that a point may lie outside of the last one
-constexpr float kLongestWay = 0.3f;                    ///< spacings a substep that one body may go towards another
-constexpr float kClearer = 0.8f;                       ///< part of a distance that is safe to go
-constexpr float kSlowest = 0.2f;                       ///< of a side's speed: what its pairs may gain unasked
-constexpr float kCrushed = 0.05f;                      ///< volume ratio below which a cell counts as crushed
-constexpr float kTooManyCrushed = 0.05f;               ///< part of a body's cells
-constexpr Index kAskedCells = 7;                       ///< one of so many is asked
-constexpr float kWaking = 0.02f;                       ///< m/s of what touches a sleeper
-constexpr float kLittle = 0.05f;                       ///< spacings until a point that is nowhere is asked again
+constexpr std::size_t kMatterSearchGrain = 512;
+constexpr float kLeastReach = 0.1f;      ///< spacings that anything may go between two searches; at most kMostReach
+constexpr float kOwnReach = 0.3f;        ///< the same of a body beside itself ...
+constexpr double kOwnSearches = 3;       ///< ... which is searched no more often than this in a frame
+constexpr float kLongestWay = 0.3f;      ///< spacings a substep that one body may go towards another
+constexpr float kCrushed = 0.05f;        ///< volume ratio below which a cell counts as crushed
+constexpr float kTooManyCrushed = 0.05f; ///< part of a body's cells
+constexpr Index kAskedCells = 7;         ///< one of so many is asked
+constexpr float kWaking = 0.02f;         ///< m/s of what touches a sleeper
 
 Box box_of(const Vectors& positions) {
     Vec3f low = positions[0], high = low;
@@ -81,7 +73,7 @@ Vectors positions_in(const BodyState& body, float seconds) {
 
 std::vector<Vec3f> surface_places(const Embedding& points, const Vectors& positions, const RunContext& context) {
     std::vector<Vec3f> places(points.size());
-    parallel_for(context, places.size(), 4 * kMatterContactGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, places.size(), kMatterSearchGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t s = begin; s < end; ++s) places[s] = embedded_point(points, s, positions);
     });
     return places;
@@ -107,7 +99,7 @@ void MatterContacts::begin_anew() {
     for (Side& side : sides_) {
         side.way = 0;
         side.until = -1;
-        side.looked_at = std::numeric_limits<double>::infinity();
+        side.searched_at = std::numeric_limits<double>::infinity();
         for (Pair& pair : side.pairs) pair.clear_until = 0;
     }
 }
@@ -186,8 +178,9 @@ void MatterContacts::find_sides(std::span<const BodyState> bodies, double left) 
         if (old != sides_.end() && old->body == body && old->other == other)
             sides.push_back(std::move(*old));
         else
-            sides.push_back({.body = body, .other = other, .pairs = {}});
+            sides.push_back({.body = body, .other = other, .law = {}, .pairs = {}});
         sides.back().speed = relative_speed(body, other);
+        sides.back().law = world_.contact_of(body, other);
         sides.back().spacing = float(std::min(bodies[body].body->spacing(), bodies[other].body->spacing()));
     }
     sides_ = std::move(sides);
@@ -206,7 +199,7 @@ void MatterContacts::find_pairs(Side& side, std::span<const Vec3f> points, const
     const Matter& matter = *matter_[side.other];
     std::vector<Index> found(points.size());
     const Vec3f low = near.min.cast<float>(), high = near.max.cast<float>();
-    parallel_for(context, points.size(), 4 * kMatterContactGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, points.size(), kMatterSearchGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t s = begin; s < end; ++s) {
             const Vec3f& p = points[s];
             const bool is_near = own || ((p.array() >= low.array()) && (p.array() <= high.array())).all();
@@ -305,8 +298,8 @@ bool MatterContacts::search(std::span<BodyState> bodies, double left, double fra
     for (Side& side : sides_) {
         if (!(side.way > side.until) || both_sleep(side, bodies)) continue;
         const bool own = side.body == side.other;
-        if (own && side.looked_at - left < frame / kOwnSearches) continue;
-        side.looked_at = left;
+        if (own && side.searched_at - left < frame / kOwnSearches) continue;
+        side.searched_at = left;
         changed = true;
         if (own)
             find_own_pairs(side, bodies[side.body], float(0.5 * std::min(left, frame / kOwnSearches)), context);
@@ -327,14 +320,6 @@ double MatterContacts::longest_step() const {
         longest = std::min(longest, double(kLongestWay * side.spacing / side.speed));
     }
     return longest;
-}
-
-void MatterContacts::leave(Pair& pair, const Side& side, float clearance) const {
-    pair.depth = 0;
-    pair.grasp = {};
-    pair.tangled = false;
-    pair.entry = Vec3f::Zero();
-    pair.clear_until = side.way + clearance;
 }
 
 /// Part of the body's cells that are crushed or inside out, of some.
@@ -358,216 +343,6 @@ void MatterContacts::find_recovering(std::span<const BodyState> bodies) {
     }
 }
 
-/// Where a point lies in the other's matter; a pair that does not touch is left until it might.
-std::optional<MatterContacts::Entered> MatterContacts::enter(Pair& pair, const Side& side,
-                                                             std::span<const BodyState> bodies) const {
-    const BodyState &body = bodies[side.body], &other = bodies[side.other];
-    const Matter& matter = *matter_[side.other];
-    const float little = kLittle * side.spacing;
-    Mat3f inverse;
-    if (!matter.locate(other.positions, embedded_point(body.surface, pair.point, body.positions), pair.place,
-                       inverse)) {
-        pair.place.local.setConstant(0.5f);
-        leave(pair, side, little);
-        return std::nullopt;
-    }
-    if (side.body == side.other && matter.are_together(matter.cell_of_point(pair.point), pair.place.cell)) {
-        leave(pair, side, little);
-        return std::nullopt;
-    }
-    const std::optional<Matter::Depth> found = matter.depth(pair.place, inverse, pair.entry);
-    const Vec3f& local = pair.place.local;
-    const float outside = std::max(-local.minCoeff(), local.maxCoeff() - 1);
-    if (!found || !(found->depth > 0) || (outside > kOutside && !matter.is_rigid())) {
-        float clear = little;
-        if (found && found->depth < 0 && found->depth > -little)
-            clear = 0;
-        else if (found &&
-                 found->depth < 0) { // neighbours move alike: no need to ask again as soon as the side's speed says
-            const Vec3f velocity =
-                embedded_point(body.surface, pair.point, body.velocities) - matter.mean(pair.place, other.velocities);
-            clear = -kClearer * found->depth * side.speed / (velocity.norm() + kSlowest * side.speed);
-        }
-        leave(pair, side, clear);
-        return std::nullopt;
-    }
-    if (pair.entry.isZero(0))
-        pair.tangled = side.body == side.other && (recovers_[side.body] || found->depth > kDeepest * side.spacing);
-    pair.entry = found->rest; // follows a point that slides round an edge; a thin part's far side turns it at once
-    if (pair.tangled) {
-        pair.depth = 0;
-        return std::nullopt;
-    }
-    pair.depth = found->depth;
-    return Entered{found->normal, found->depth};
-}
-
-/// N/m; half where the other body's points push as well.
-float MatterContacts::stiffness(const Side& side, const Pair& pair, std::span<const BodyState> bodies) const {
-    const BodyState& body = bodies[side.body];
-    return (matter_[side.body] ? 0.5f : 1.0f) *
-           std::min(body.surface_stiffness[pair.point],
-                    body.body->surface.areas[pair.point] * per_area_[side.other][pair.place.cell]);
-}
-
-/// The force on the point; minus it is that on the matter. Lets friction's anchor begin, slide and end.
-Vec3f MatterContacts::force(Pair& pair, const Side& side, std::span<const BodyState> bodies, float dt) const {
-    if (pair.clear_until > side.way) return Vec3f::Zero();
-    const std::optional<Entered> entered = enter(pair, side, bodies);
-    if (!entered) return Vec3f::Zero();
-    const BodyState &body = bodies[side.body], &other = bodies[side.other];
-    const Matter& matter = *matter_[side.other];
-    const PairContact law = world_.contact_of(side.body, side.other);
-    const Touch touch{entered->normal,
-                      embedded_point(body.surface, pair.point, body.velocities) -
-                          matter.mean(pair.place, other.velocities),
-                      pair.depth,
-                      stiffness(side, pair, bodies),
-                      float(law.friction),
-                      float(law.restitution),
-                      std::max(body.rest_squared_frequency, other.rest_squared_frequency)};
-    const Vec3f place = matter.mean(pair.place, other.positions);
-    Vec3f offset = Vec3f::Zero();
-    if (pair.grasp.holds) offset = along_surface(place - matter.mean(pair.anchor, other.positions), touch.normal);
-    const bool landed = !pair.grasp.holds;
-    const Vec3f force = touch_force(touch, offset, pair.grasp, dt, smooth_speed(world_, dt));
-    if (landed || pair.grasp.slides) anchor_at(pair, side, other, offset);
-    return force;
-}
-
-/// Puts the anchor so far behind the point.
-void MatterContacts::anchor_at(Pair& pair, const Side& side, const BodyState& other, const Vec3f& offset) const {
-    pair.anchor = pair.place;
-    if (!offset.isZero(0))
-        pair.anchor.local -= matter_[side.other]->inverse_derivative(other.positions, pair.place) * offset;
-}
-
-ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, std::span<std::uint8_t> touched,
-                                         const RunContext& context) {
-    ContactReport report;
-    forces_.assign(work_.size(), Vec3f::Zero());
-    parallel_for(context, work_.size(), kMatterContactGrain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t k = begin; k < end; ++k) {
-            Side& side = sides_[work_[k].first];
-            forces_[k] = force(side.pairs[work_[k].second], side, bodies, dt);
-        }
-    });
-    for (std::size_t k = 0; k < work_.size(); ++k) {
-        const Side& side = sides_[work_[k].first];
-        const Pair& pair = side.pairs[work_[k].second];
-        if (!(pair.depth > 0)) continue;
-        add_to_particles(bodies[side.body].surface, pair.point, forces_[k], bodies[side.body].forces);
-        const Matter::Weights weights = matter_[side.other]->weights(pair.place);
-        const auto& corners = matter_[side.other]->corners(pair.place.cell);
-        for (int c = 0; c < 8; ++c) bodies[side.other].forces.add(corners[c], -weights[c] * forces_[k]);
-        touched[side.body] |= kTouched;
-        touched[side.other] |= kTouched;
-        ++report.contacts;
-        report.deepest_in_matter = std::max(report.deepest_in_matter, pair.depth);
-    }
-    return report;
-}
-
-void MatterContacts::push_out(std::span<BodyState> bodies) {
-    for (Side& side : sides_) {
-        const float most = kDeepest * side.spacing;
-        if (both_sleep(side, bodies)) continue;
-        for (Pair& pair : side.pairs)
-            if (pair.depth > most) push_out(pair, side, bodies);
-    }
-}
-
-/// As XPBD projects one constraint of zero compliance: particles of both sides move by weight over mass.
-void MatterContacts::push_out(Pair& pair, const Side& side, std::span<BodyState> bodies) const {
-    const float most = kDeepest * side.spacing;
-    const std::optional<Entered> entered = enter(pair, side, bodies); // others have moved it since
-    if (!entered || !(entered->depth > most)) return;
-    BodyState &body = bodies[side.body], &other = bodies[side.other];
-    const Matter::Weights weights = matter_[side.other]->weights(pair.place);
-    const auto& corners = matter_[side.other]->corners(pair.place.cell);
-    const Embedding& points = body.surface;
-    float yielding = 0;
-    for (Index k = points.offsets[pair.point]; k < points.offsets[pair.point + 1]; ++k)
-        yielding += points.weights[k] * points.weights[k] * body.inverse_mass[points.particles[k]];
-    for (int c = 0; c < 8; ++c) yielding += weights[c] * weights[c] * other.inverse_mass[corners[c]];
-    if (!(yielding > 0)) return;
-    const Vec3f velocity =
-        embedded_point(points, pair.point, body.velocities) - matter_[side.other]->mean(pair.place, other.velocities);
-    const Vec3f way = (entered->depth - most) / yielding * entered->normal;
-    const Vec3f push = std::max(0.0f, -velocity.dot(entered->normal)) / yielding * entered->normal;
-    const auto move = [&](BodyState& state, Index particle, float weight) {
-        const float share = weight * state.inverse_mass[particle];
-        state.positions.add(particle, share * way);
-        state.velocities.add(particle, share * push);
-    };
-    for (Index k = points.offsets[pair.point]; k < points.offsets[pair.point + 1]; ++k)
-        move(body, points.particles[k], points.weights[k]);
-    for (int c = 0; c < 8; ++c) move(other, corners[c], -weights[c]);
-    body.was_pushed = other.was_pushed = true;
-}
-
-std::vector<MatterContacts::Frame> MatterContacts::frames(std::span<const BodyState> bodies, float dt) const {
-    std::vector<Frame> frames;
-    for (const Side& side : sides_)
-        for (Pair pair : side.pairs) {
-            const BodyState &body = bodies[side.body], &other = bodies[side.other];
-            const Matter& matter = *matter_[side.other];
-            const bool touches = enter(pair, side, bodies).has_value();
-            if (!touches && pair.clear_until > side.way + kMostReach * side.spacing) continue;
-            const Mat3f inverse = matter.inverse_derivative(other.positions, pair.place);
-            const std::optional<Matter::Depth> found = matter.depth(pair.place, inverse, pair.entry);
-            if (!found || !found->normal.allFinite()) continue;
-            const Vec3f velocity =
-                embedded_point(body.surface, pair.point, body.velocities) - matter.mean(pair.place, other.velocities);
-            Frame& frame = frames.emplace_back();
-            frame.body = side.body;
-            frame.other = side.other;
-            frame.point = pair.point;
-            frame.place = pair.place;
-            frame.normal = found->normal;
-            frame.start =
-                matter.mean(pair.place, other.positions) - embedded_point(body.surface, pair.point, body.positions);
-            frame.depth = found->depth;
-            frame.stiffness = stiffness(side, pair, bodies);
-            const PairContact law = world_.contact_of(side.body, side.other);
-            frame.unloading = unloading(law.restitution, velocity.dot(found->normal), smooth_speed(world_, dt));
-            frame.friction = float(law.friction);
-            frame.holds = pair.grasp.holds;
-            if (frame.holds)
-                frame.offset = along_surface(
-                    matter.mean(pair.place, other.positions) - matter.mean(pair.anchor, other.positions), frame.normal);
-        }
-    return frames;
-}
-
-ContactReport MatterContacts::update_anchors(std::span<const BodyState> bodies, std::span<std::uint8_t> touched) {
-    ContactReport report;
-    for (Side& side : sides_)
-        for (Pair& pair : side.pairs) {
-            if (!enter(pair, side, bodies)) continue;
-            const BodyState& other = bodies[side.other];
-            const Matter& matter = *matter_[side.other];
-            touched[side.body] |= kTouched;
-            touched[side.other] |= kTouched;
-            ++report.contacts;
-            report.deepest_in_matter = std::max(report.deepest_in_matter, pair.depth);
-            Vec3f offset = Vec3f::Zero();
-            const bool landed = !pair.grasp.holds;
-            if (!landed) {
-                const Mat3f inverse = matter.inverse_derivative(other.positions, pair.place);
-                const std::optional<Matter::Depth> found = matter.depth(pair.place, inverse, pair.entry);
-                offset = matter.mean(pair.place, other.positions) - matter.mean(pair.anchor, other.positions);
-                if (found) offset = along_surface(offset, found->normal);
-            }
-            const float limit = float(world_.contact_of(side.body, side.other).friction) * pair.depth;
-            const float stretch = kTangentialStiffness * offset.norm();
-            pair.grasp = {true, stretch > limit};
-            if (stretch > limit) offset *= limit / stretch;
-            if (landed || pair.grasp.slides) anchor_at(pair, side, other, offset);
-        }
-    return report;
-}
-
 std::vector<MatterContacts::Memory> MatterContacts::memories() const {
     std::vector<Memory> memories;
     for (const Side& side : sides_)
@@ -581,6 +356,7 @@ std::vector<MatterContacts::Memory> MatterContacts::memories() const {
 
 bool MatterContacts::is_sound(const Memory& memory, std::span<const BodyState> bodies) const {
     if (memory.body >= bodies.size() || memory.other >= bodies.size() || !matter_[memory.other]) return false;
+    if (!memory.local.allFinite() || !memory.anchor_local.allFinite() || !memory.entry.allFinite()) return false;
     const std::size_t cells = bodies[memory.other].body->cells.cells.size();
     return memory.point < bodies[memory.body].surface.size() && memory.cell < cells && memory.anchor_cell < cells;
 }
@@ -590,7 +366,7 @@ void MatterContacts::set_memories(std::span<const Memory> memories, std::vector<
     sides_.clear();
     for (const Memory& memory : memories) {
         if (sides_.empty() || sides_.back().body != memory.body || sides_.back().other != memory.other)
-            sides_.push_back({.body = memory.body, .other = memory.other, .pairs = {}});
+            sides_.push_back({.body = memory.body, .other = memory.other, .law = {}, .pairs = {}});
         sides_.back().pairs.push_back({.point = memory.point,
                                        .place = {memory.cell, memory.local},
                                        .grasp = {!(memory.flags & 2), (memory.flags & 1) != 0},
