@@ -50,6 +50,17 @@ const std::string kBody = "[[body]]\nshape = \"bar\"\n"; // two lines
 
 } // namespace
 
+TEST_F(Simulate, WarnsOfCrushedBodiesAndSaysWhatIsMovedAsRigid) {
+    write("crush.toml",
+          "[simulation]\nframes = 30\n[[obstacle]]\nshape = \"ground\"\n"
+          "[[body]]\nname = \"jelly\"\nshape = \"wavy-cube\"\nsize = 0.3\nparticles = 64\n"
+          "young_modulus = 2e3\ncentre = [0, 0.3, 0]\nvelocity = [0, -12, 0]\n"
+          "[[body]]\nname = \"crumb\"\nshape = \"wavy-cube\"\nsize = 0.3\nparticles = 8\ncentre = [1, 0.3, 0]\n");
+    const std::string said = run({"simulate", "crush.toml", "-o", "crush.fil"}).err;
+    EXPECT_NE(said.find("body 'jelly': cells were crushed to "), std::string::npos) << said;
+    EXPECT_NE(said.find("body 'crumb' is moved as a rigid body: it has only 1 cell"), std::string::npos) << said;
+}
+
 TEST_F(Simulate, SaysWhyFramesWereMadeByDescent) {
     const auto causes = [&](const std::string& mode) {
         std::string scene = kDrop;

@@ -162,6 +162,11 @@ TEST(Body, ThinPartsAreSaid) {
     EXPECT_NE(report.warning.find("fewer than two cells across"), std::string::npos) << report.warning;
 }
 
+TEST(Body, PartsOneCellThickAreNoSheets) {
+    for (int k = 1; k < 40; ++k)
+        EXPECT_EQ(make_body(box_cells(3, 2, 1, 0.013 * k), of(MaterialModel::fem)).field_radius, 0) << k;
+}
+
 TEST(Body, BadMaterialsAndScalesAreRefused) {
     const Mesh cube = make_wavy_cube({.resolution = 4});
     EXPECT_EQ(make_body(cube, of(MaterialModel::fem, -1), {}, kContext).error().code, ErrorCode::usage);

@@ -1,6 +1,6 @@
 // Random bodies thrown at each other over a ground: nothing becomes anything but numbers, nothing falls through, no
 // energy comes from nowhere. FILIGREE_SCENES and FILIGREE_SECONDS ask for more of them (a hundred of ten seconds:
-// scripts/soak-contact).
+// scripts/soak-contact), FILIGREE_FIRST for others.
 #include "filigree/core/random.h"
 #include "filigree/physics/simulation.h"
 
@@ -69,7 +69,8 @@ double from_environment(const char* name, double unset) {
 TEST(RandomScenes, StaySound) {
     const auto scenes = std::size_t(from_environment("FILIGREE_SCENES", 8));
     const auto frames = std::size_t(60 * from_environment("FILIGREE_SECONDS", 2));
-    for (std::uint64_t seed = 1; seed <= scenes; ++seed) {
+    const auto first = std::uint64_t(from_environment("FILIGREE_FIRST", 1));
+    for (std::uint64_t seed = first; seed < first + scenes; ++seed) {
         SCOPED_TRACE("seed " + std::to_string(seed));
         const Scene scene = random_scene(seed);
         Simulation simulation = Simulation::create(scene.world, scene.actors, scene.options, kOneThread).value();

@@ -194,5 +194,58 @@ TEST(RigidBody, CannotBePinned) {
     EXPECT_NE(made.error().message.find("rigid"), std::string::npos);
 }
 
+Material rubber(double young_modulus = 1e5) {
+    Material material;
+    material.young_modulus = young_modulus;
+    return material;
+}
+
+Simulation begin_with(const std::vector<Actor>& actors, const StepOptions& options, World world = {}) {
+    return Simulation::create(std::move(world), actors, options, kOneThread).value();
+}
+
+TEST(AutomaticRigid, FewCellsAreRigid) {
+    const auto crumb = block(3, 1, 2, 0.05, rubber()), cube = block(2, 2, 2, 0.05, rubber());
+    World world;
+    world.obstacles.emplace_back().shape = HalfSpace{};
+    world.obstacles[0].restitution = world.body_restitution = 0;
+    const std::vector<Actor> actors = {put(crumb, {0, 0.03, 0}), put(cube, {0.3, 0.1, 0}), put(crumb, {0, 0.09, 0})};
+    Simulation falling = begin_with(actors, {}, world);
+    EXPECT_EQ(falling.why_rigid(0), "it has only 6 cells");
+    EXPECT_EQ(falling.why_rigid(1), "");
+    EXPECT_EQ(&falling.body(0), &falling.body(2)) << "those of one kind share theirs";
+    for (int frame = 0; frame < 120; ++frame) ASSERT_TRUE(falling.advance(kOneThread).ok());
+    EXPECT_LT(most_stretch(falling, 0), 1e-5);
+    EXPECT_GT(most_stretch(falling, 1), 1e-4);
+    EXPECT_NEAR(centre_of_mass(falling, 0).y(), 0.025, 2e-3);
+    EXPECT_NEAR(centre_of_mass(falling, 2).y(), 0.075, 4e-3) << "one lies on the other";
+}
+
+TEST(AutomaticRigid, IsSwitchedOffAndSparesWhatIsPinnedOrFlows) {
+    const auto crumb = block(3, 2, 1, 0.05, rubber());
+    EXPECT_EQ(begin_with({put(crumb, {0, 0, 0})}, {.automatic_rigid = false}).why_rigid(0), "");
+    World world;
+    world.pins.emplace_back().particles = {0};
+    EXPECT_EQ(begin_with({put(crumb, {0, 0, 0})}, {}, world).why_rigid(0), "");
+    Material clay = rubber();
+    clay.model = MaterialModel::meshfree;
+    EXPECT_EQ(begin_with({put(block(2, 2, 1, 0.05, clay), {0, 0, 0})}, {}).why_rigid(0), "");
+}
+
+TEST(AutomaticRigid, WhatIsFarTooStiffIsRigidAndTheRestStaysExplicit) {
+    const std::vector<Actor> actors = {put(block(4, 4, 4, 0.02, rubber(1e11)), {0, 0.06, 0}),
+                                       put(block(4, 4, 4, 0.02, rubber(1e5)), {0, 0.16, 0})};
+    World world;
+    world.obstacles.emplace_back().shape = HalfSpace{};
+    for (const bool automatic : {true, false}) {
+        Simulation falling = begin_with(actors, {.automatic_rigid = automatic}, world);
+        EXPECT_EQ(falling.why_rigid(0).starts_with("elastic, it would need "), automatic);
+        EXPECT_EQ(falling.why_rigid(1), "");
+        const FrameReport report = falling.advance(kOneThread).value();
+        EXPECT_EQ(report.used, automatic ? StepMode::explicit_steps : StepMode::descent);
+    }
+    EXPECT_EQ(begin_with(actors, {.mode = StepMode::descent}, world).why_rigid(0), "") << "descent steps it as it is";
+}
+
 } // namespace
 } // namespace filigree

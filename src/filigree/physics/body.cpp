@@ -19,7 +19,8 @@ constexpr float kLeastSpread = 0.01f;
 
 constexpr double kFieldSpacing = 0.5; ///< spacings between the points of the distance field
 constexpr double kMostFieldPoints = 0x1p25;
-constexpr float kSheetDepth = 0.25f, kSheetRadius = 0.4f; ///< spacings
+/// Spacings. Between points of its grid the field sees as little as a quarter of a spacing in a part that is one thick.
+constexpr float kSheetDepth = 0.2f, kSheetRadius = 0.4f;
 
 /// Particles at the corners: each cell gives an eighth of its mass to each of its corners.
 void use_corners(Body& body) {

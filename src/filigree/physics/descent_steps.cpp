@@ -170,8 +170,7 @@ private:
         const float kept = std::exp(-dt_ * float(body.body->material.damping));
         for (std::size_t i = 0; i < body.positions.size(); ++i)
             if (!body.fixed[i]) body.velocities.set(i, (body.positions[i] - start_[b][i]) / dt_ * kept);
-        report_.least_volume_ratio = std::min(report_.least_volume_ratio, elastic_[b].least_volume_ratio);
-        report_.most_stretch = std::max(report_.most_stretch, elastic_[b].most_stretch);
+        note_deformation(report_, b, elastic_[b]);
     }
 
     /// Implicit Euler takes angular momentum away however well it is solved, and sweeps that are not solved let two

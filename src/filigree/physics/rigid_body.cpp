@@ -120,6 +120,12 @@ const RigidElasticity& rigid(const BodyState& body) { return static_cast<const R
 
 std::unique_ptr<Elasticity> make_rigid_elasticity(const Body& body) { return std::make_unique<RigidElasticity>(body); }
 
+Body as_rigid(const Body& body) {
+    Body rigid = body;
+    rigid.material.model = MaterialModel::rigid;
+    return rigid;
+}
+
 RigidPose rigid_pose(const BodyState& body) {
     const RigidState state = rigid_state(body);
     RigidPose pose;

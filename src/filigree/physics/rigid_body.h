@@ -9,6 +9,9 @@ namespace filigree {
 /// less than a millimetre in all, soft enough for some 17 substeps a frame at 60 frames a second.
 inline constexpr float kRigidSquaredFrequency = 1e6f;
 
+/// The same particles and surface, of a material that does not deform. body: of fem or springs.
+Body as_rigid(const Body& body);
+
 /// m, m/s and so on of the body as it is moved by its particles' forces.
 RigidPose rigid_pose(const BodyState& body);
 /// The particles where the pose has them, with its velocities.

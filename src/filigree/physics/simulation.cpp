@@ -1,5 +1,6 @@
 #include "filigree/physics/simulation.h"
 
+#include "filigree/core/text.h"
 #include "filigree/physics/rigid_body.h"
 #include "filigree/physics/rigid_state.h"
 #include "filigree/physics/simulation_state.h"
@@ -7,6 +8,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <map>
 
 namespace filigree {
 
@@ -53,6 +55,55 @@ BodyState begin_body(const Actor& actor, bool meets_bodies, const RunContext& co
     state.ball_radius = kBallRadius * float(body.spacing());
     embed_surface_at_rest(state, meets_bodies && body.material.model == MaterialModel::meshfree, context);
     return state;
+}
+
+/// Bodies that are too small or too stiff for explicit steps are made rigid; those of one kind go on sharing theirs.
+class AutomaticRigid {
+public:
+    AutomaticRigid(const World& world, const StepOptions& options, std::size_t bodies)
+        : options_(options), may_be_rigid_(bodies, options.automatic_rigid ? 1 : 0) {
+        for (const Pin& pin : world.pins) may_be_rigid_[pin.body] = 0;
+    }
+
+    /// "": it stays as it is.
+    std::string reason(std::size_t number, const BodyState& state) const {
+        const Body& body = *state.body;
+        const MaterialModel model = body.material.model;
+        if (!may_be_rigid_[number] || (model != MaterialModel::fem && model != MaterialModel::springs)) return "";
+        if (const std::size_t cells = body.cells.cells.size(); cells < kFewestElasticCells)
+            return "it has only " + std::to_string(cells) + (cells == 1 ? " cell" : " cells");
+        const double substeps = substeps_at_rest(state);
+        if (options_.mode != StepMode::automatic || substeps <= kMostElasticSubsteps * options_.most_substeps)
+            return "";
+        return "elastic, it would need " + with_commas(std::uint64_t(substeps)) + " explicit substeps a frame";
+    }
+    std::shared_ptr<const Body> rigid(const std::shared_ptr<const Body>& body) {
+        std::shared_ptr<const Body>& found = made_[body];
+        if (!found) found = std::make_shared<const Body>(as_rigid(*body));
+        return found;
+    }
+
+private:
+    double substeps_at_rest(const BodyState& state) const {
+        return std::sqrt(double(state.rest_squared_frequency)) / (2 * options_.frames_per_second);
+    }
+
+    const StepOptions& options_;
+    std::vector<std::uint8_t> may_be_rigid_;
+    std::map<std::shared_ptr<const Body>, std::shared_ptr<const Body>> made_;
+};
+
+void begin_bodies(SimulationState& state, std::vector<Actor>& actors, const RunContext& context) {
+    AutomaticRigid automatic(state.world, state.options, actors.size());
+    for (Actor& actor : actors) {
+        BodyState body = begin_body(actor, actors.size() > 1, context);
+        state.why_rigid.push_back(automatic.reason(state.bodies.size(), body));
+        if (!state.why_rigid.back().empty()) {
+            actor.body = automatic.rigid(actor.body);
+            body = begin_body(actor, actors.size() > 1, context);
+        }
+        state.bodies.push_back(std::move(body));
+    }
 }
 
 void begin_pins(SimulationState& state) {
@@ -162,7 +213,7 @@ Result<Simulation> Simulation::create(World world, std::vector<Actor> actors, co
     if (Status checked = check_options(options); !checked) return checked.error();
     if (Status checked = check_world(world, actors); !checked) return checked.error();
     auto state = std::make_unique<SimulationState>(std::move(world), actors.size(), options);
-    for (const Actor& actor : actors) state->bodies.push_back(begin_body(actor, actors.size() > 1, context));
+    begin_bodies(*state, actors, context);
     for (const RegionForce& force : state->world.forces) state->bodies[force.body].is_held = true;
     if (state->external.has_wind())
         for (BodyState& body : state->bodies) body.is_held = true;
@@ -189,6 +240,10 @@ std::size_t Simulation::body_count() const { return state_->bodies.size(); }
 const Body& Simulation::body(std::size_t body) const {
     assert(body < body_count());
     return *state_->bodies[body].body;
+}
+const std::string& Simulation::why_rigid(std::size_t body) const {
+    assert(body < body_count());
+    return state_->why_rigid[body];
 }
 const Vectors& Simulation::positions(std::size_t body) const {
     assert(body < body_count());

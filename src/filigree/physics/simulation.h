@@ -27,7 +27,12 @@ struct StepOptions {
     unsigned most_substeps = 256; ///< a descent frame costs as much as some 120 explicit substeps
     unsigned descent_substeps = 4, descent_iterations = 8;
     bool contacts_between_bodies = true, contacts_within_bodies = true;
+    /// Whether bodies of fem and springs become rigid that have fewer than kFewestElasticCells cells, or for which
+    /// `automatic` would need more than kMostElasticSubsteps times most_substeps. Those that are pinned stay elastic.
+    bool automatic_rigid = true;
 };
+inline constexpr std::size_t kFewestElasticCells = 8;
+inline constexpr double kMostElasticSubsteps = 4;
 
 /// Why a frame was made by descent, or finished by it. chosen: the options say so. too_many_substeps: explicit steps
 /// would have been more than the mode allows. not_finite: they did not come to numbers, and the frame was done again.
@@ -41,7 +46,8 @@ struct FrameReport {
     std::size_t contacts = 0;     ///< surface points that touch something, at the frame's end
     double deepest_contact = 0;   ///< m below an obstacle's surface
     double deepest_in_matter = 0; ///< m that a point of a surface lay inside another body, or its own
-    float least_volume_ratio = 1; ///< smallest J; 0 or less: inverted
+    float least_volume_ratio = 1; ///< smallest J of all cells; 0 or less: inverted
+    std::size_t most_crushed = 0; ///< the body that has it; below 0.1 explicit steps damp it a little
     float most_stretch = 1;
     double elastic_seconds = 0, contact_seconds = 0, other_seconds = 0;
     std::size_t clamped_particles = 0; ///< whose motion was not finite, or whose start was scaled down
@@ -84,7 +90,9 @@ public:
     double time() const;       ///< s
     const World& world() const;
     std::size_t body_count() const;
-    const Body& body(std::size_t body) const;
+    const Body& body(std::size_t body) const; ///< as it is moved: rigid where automatic_rigid made it so
+    /// Why automatic_rigid made a body rigid, as in "it has only 5 cells"; "" where it did not.
+    const std::string& why_rigid(std::size_t body) const;
     const Vectors& positions(std::size_t body) const;  ///< world, m
     const Vectors& velocities(std::size_t body) const; ///< m/s
     /// For tests, and for whoever starts a body in another shape. Values may be anything; the next frame repairs what

@@ -19,6 +19,7 @@ struct SimulationState {
     World world;
     const StepOptions options;
     std::vector<BodyState> bodies;
+    std::vector<std::string> why_rigid; ///< of each body: Simulation::why_rigid
     Contacts contacts;
     ExternalForces external;
     std::vector<Attachment> attachments;
@@ -38,6 +39,9 @@ double step_explicitly(SimulationState& state, double from, double until, FrameR
 void step_by_descent(SimulationState& state, double from, double until, FrameReport& report, const RunContext& context);
 
 // What both do in a substep.
+
+/// What a body's elasticity met, into the frame's report.
+void note_deformation(FrameReport& report, std::size_t body, const ElasticReport& met);
 
 /// m/s, of the fastest particle.
 float most_particle_speed(std::span<const BodyState> bodies);

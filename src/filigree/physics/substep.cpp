@@ -48,6 +48,13 @@ std::vector<Attachment*> SimulationState::attachments_of(std::size_t body) {
     return found;
 }
 
+void note_deformation(FrameReport& report, std::size_t body, const ElasticReport& met) {
+    report.most_stretch = std::max(report.most_stretch, met.most_stretch);
+    if (!(met.least_volume_ratio < report.least_volume_ratio)) return;
+    report.least_volume_ratio = met.least_volume_ratio;
+    report.most_crushed = body;
+}
+
 float most_particle_speed(std::span<const BodyState> bodies) {
     float squared = 0;
     for (const BodyState& body : bodies) {

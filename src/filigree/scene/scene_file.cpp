@@ -115,6 +115,7 @@ private:
         in.set_whole("descent_iterations", step.descent_iterations);
         step.contacts_between_bodies = in.flag("contacts_between_bodies", true);
         step.contacts_within_bodies = in.flag("contacts_within_bodies", true);
+        step.automatic_rigid = in.flag("automatic_rigid", true);
     }
 
     void read_world(const SceneTable& in) {

@@ -48,6 +48,8 @@ constexpr KeyRule kKeys[] = {
     from(1, 1000, "simulation", "descent_iterations", whole, "", "8", "a substep, descent"),
     plain("simulation", "contacts_between_bodies", flag, "", "true", "whether bodies touch each other"),
     plain("simulation", "contacts_within_bodies", flag, "", "true", "whether a body touches itself"),
+    plain("simulation", "automatic_rigid", flag, "", "true",
+          "whether bodies of fewer than 8 cells, or too stiff for explicit steps by far, are moved as rigid"),
 
     plain("world", "gravity", vector, "m/s^2", "[0, -9.81, 0]", "acceleration of everything"),
     plain("world", "wind", keyed, "m/s", "[0, 0, 0]", "velocity of the air"),

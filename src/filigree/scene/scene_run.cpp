@@ -15,6 +15,8 @@ namespace filigree {
 
 namespace {
 
+constexpr float kCrushed = 0.1f; ///< of a cell's volume, below which the user is told
+
 double now_seconds() {
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
@@ -25,6 +27,9 @@ double percentile_95(std::vector<float>& values) {
     std::nth_element(values.begin(), place, values.end());
     return *place;
 }
+
+/// A part of a volume in words; below 0: inside out.
+std::string volume_text(float ratio) { return ratio > 0 ? fmt::format("{:.2g} %", 100 * ratio) : "less than none"; }
 
 /// A frame's distances of the restored mesh from the one that the particles carry; diagonal: of the body, m.
 void add_frame(CheckTotals& check, const Mesh& mesh, std::span<const Vec3f> restored, std::span<const Vec3f> direct,
@@ -106,6 +111,7 @@ Status SceneRun::advance_to(std::uint64_t last, const RunContext& context) {
         times_.add(*report);
         descent_causes_.add(*report);
         last_volume_ratio_ = report->least_volume_ratio;
+        note_crush(*report);
         for (std::size_t b = 0; b < followers_.size(); ++b)
             if (const Status recorded = record_body(b); !recorded) return recorded;
     }
@@ -146,6 +152,15 @@ void SceneRun::hold_lost_of(std::size_t b) {
     if (held > 0 && !followers_[b].first_lost) followers_[b].first_lost = frame();
 }
 
+void SceneRun::note_crush(const FrameReport& report) {
+    if (!(report.least_volume_ratio < kCrushed)) return;
+    std::optional<Crush>& crush = followers_[report.most_crushed].crush;
+    if (!crush) crush = Crush{.first = frame()};
+    if (!(report.least_volume_ratio < crush->least)) return;
+    crush->least = report.least_volume_ratio;
+    crush->worst = frame();
+}
+
 void SceneRun::check_body(std::size_t b) {
     const ReadyBody& body = ready_->bodies[b];
     const Follower& follower = followers_[b];
@@ -174,6 +189,17 @@ std::vector<std::string> SceneRun::warnings() const {
         sentences.push_back(fmt::format("{} motions of particles were not finite or had to be limited: the motion is "
                                         "not to be trusted",
                                         with_commas(clamped)));
+    for (std::size_t b = 0; b < followers_.size(); ++b) {
+        const std::string& name = ready_->bodies[b].name;
+        if (const std::string& reason = simulation_.why_rigid(b); !reason.empty())
+            sentences.push_back(fmt::format("body '{}' is moved as a rigid body: {}; automatic_rigid = false keeps it "
+                                            "elastic",
+                                            name, reason));
+        if (const std::optional<Crush>& crush = followers_[b].crush)
+            sentences.push_back(fmt::format("body '{}': cells were crushed to {} of their volume in frame {}, first "
+                                            "below a tenth in frame {}: what follows may be wrong",
+                                            name, volume_text(crush->least), crush->worst, crush->first));
+    }
     if (last_volume_ratio_ <= 0)
         sentences.push_back("some cells are inside out at the end: the bodies were pressed or pulled too hard");
     if (const std::optional<std::string> energy = energy_warning()) sentences.push_back(*energy);

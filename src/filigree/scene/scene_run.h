@@ -38,6 +38,11 @@ public:
     std::vector<std::string> warnings() const;
 
 private:
+    /// How far a body was crushed in this run.
+    struct Crush {
+        std::uint64_t first = 0, worst = 0; ///< frames: first below kCrushed, and of the least volume
+        float least = 1;                    ///< volume of a cell, of that at rest
+    };
     /// What goes along with a body.
     struct Follower {
         std::size_t driver = 0;            ///< attachment
@@ -45,6 +50,7 @@ private:
         Restorer restorer;
         std::vector<Vec3f> restored;             ///< the latest frame
         std::optional<std::uint64_t> first_lost; ///< the first frame in which hold_lost held some
+        std::optional<Crush> crush = {};
     };
 
     SceneRun(const SceneFile& scene, const ReadyScene& ready, Simulation simulation, unsigned threads);
@@ -52,6 +58,7 @@ private:
     Status record_body(std::size_t body);
     void hold_lost_of(std::size_t body);
     void check_body(std::size_t body);
+    void note_crush(const FrameReport& report);
     bool is_left_alone() const;
     std::optional<std::string> energy_warning() const;
     std::optional<std::string> descent_warning() const;
