@@ -255,13 +255,17 @@ Result<Body> make_body(const Mesh& mesh, const Material& material, const BodyOpt
     return body;
 }
 
-Body make_body(Cells cells, const Material& material) {
-    const RunContext context;
+Body bare_body(Cells cells, const Material& material) {
     Body body;
     body.material = material;
     body.cells = std::move(cells);
-    make_particles(body, context);
+    make_particles(body, RunContext());
+    return body;
+}
 
+Body make_body(Cells cells, const Material& material) {
+    const RunContext context;
+    Body body = bare_body(std::move(cells), material);
     const bool is_rigid = material.model == MaterialModel::rigid;
     const std::vector<Vec3f> points = is_rigid ? points_at_corners(body) : points_on_faces(body);
     body.surface.points = embed_surface(points, body, context);

@@ -61,5 +61,7 @@ Result<Body> make_body(const Mesh& mesh, const Material& material, const BodyOpt
 /// A body of whole cells without a mesh: surface points at the centres of its outer faces, split in four, or at their
 /// corners if it is rigid. For tests and benchmarks.
 Body make_body(Cells cells, const Material& material);
+/// The same with particles alone: no surface, no field.
+Body bare_body(Cells cells, const Material& material);
 
 } // namespace filigree

@@ -1,7 +1,7 @@
 // A body on its way: what the stepper and contacts change. Private to the layer.
 #pragma once
 
-#include "filigree/physics/body.h"
+#include "filigree/physics/broken_body.h"
 #include "filigree/physics/elasticity.h"
 
 #include <Eigen/Geometry>
@@ -23,6 +23,10 @@ struct RigidPose {
 
 struct BodyState {
     std::shared_ptr<const Body> body;
+    std::size_t actor = 0;                    ///< that it belongs to: a piece, to the one that broke
+    bool is_absent = false;                   ///< a body that has broken, or a piece of one that has not
+    std::shared_ptr<const BrokenBody> broken; ///< of a body that breaks: its pieces ...
+    std::size_t first_piece = 0;              ///< ... and the first of their numbers
     std::unique_ptr<Elasticity> elasticity;
     Vectors positions, velocities;    ///< world, m and m/s
     Vectors forces;                   ///< N, of the last evaluation
@@ -32,19 +36,30 @@ struct BodyState {
     bool is_held = false;             ///< by pins, forces or wind: not left to itself
     std::optional<RigidPose> rigid;   ///< of a rigid body
     bool was_pushed = false;          ///< particles were moved one by one, and a rigid body's pose has to follow
-    bool sleeps() const { return rigid && rigid->sleeps; }
+    bool sleeps() const { return is_absent || (rigid && rigid->sleeps); }
 
     // Contact: points of the surface; meshfree bodies touch each other by balls just below them.
     Embedding surface, balls;             ///< in the elasticity's reference
     std::vector<float> surface_stiffness; ///< N/m
     float ball_radius = 0;                ///< m
     bool has_balls() const { return balls.size() != 0; }
+    std::vector<std::uint8_t> hidden; ///< 1: a surface point on a crack that has not opened; empty: none
+    bool is_hidden(std::size_t point) const { return !hidden.empty() && hidden[point]; }
 
     /// Gradients from the body at rest to the elasticity's reference, one a particle: how matter has flowed until
     /// neighbourhoods were last renewed. Empty: never; the reference is the body at rest.
     std::vector<Mat3f> flow;
     bool has_flowed() const { return !flow.empty(); }
 };
+
+/// Calls visit(body, number, particle) for a particle of a body, or of one that has broken for each of its copies.
+template <class State, class Visit>
+void each_copy(std::span<State> bodies, std::size_t body, Index particle, const Visit& visit) {
+    const BodyState& whole = bodies[body];
+    if (!whole.is_absent) return visit(bodies[body], body, particle);
+    for (const CornerCopy& copy : whole.broken->copies_of(particle))
+        visit(bodies[whole.first_piece + copy.piece], whole.first_piece + copy.piece, copy.corner);
+}
 
 /// Points of the body at rest, where they are in the elasticity's reference.
 struct PlacedPoints {

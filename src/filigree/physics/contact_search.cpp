@@ -50,7 +50,7 @@ void Contacts::find_near(std::span<const BodyState> bodies, double time, float t
                     distances[s] = distance_to(world_.obstacles[o], poses.at(o), places[s]).distance;
             });
             for (Index s = 0; s < points; ++s) {
-                if (!(distances[s] < reach)) continue;
+                if (!(distances[s] < reach) || body.is_hidden(s)) continue;
                 Near& near = found.emplace_back(Near{.obstacle = Index(o), .point = s, .grasp = {}});
                 while (old != near_[b].end() && std::pair(old->obstacle, old->point) < std::pair(Index(o), s)) ++old;
                 if (old != near_[b].end() && old->obstacle == o && old->point == s) near = *old;
@@ -80,7 +80,7 @@ void Contacts::find_pairs(std::span<const BodyState> bodies, float travelled, fl
     for (std::size_t a = 0; a < bodies.size(); ++a)
         for (std::size_t b = a + 1; b < bodies.size(); ++b) {
             if (!bodies[a].has_balls() || !bodies[b].has_balls()) continue;
-            const PairContact law = world_.contact_of(a, b);
+            const PairContact law = world_.contact_of(bodies[a].actor, bodies[b].actor);
             const float far = bodies[a].ball_radius + bodies[b].ball_radius + 2 * reach;
             const Vec3d low = boxes[a].min.cwiseMax(boxes[b].min) - Vec3d::Constant(double(far));
             const Vec3d high = boxes[a].max.cwiseMin(boxes[b].max) + Vec3d::Constant(double(far));

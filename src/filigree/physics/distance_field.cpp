@@ -221,6 +221,16 @@ Result<DistanceField> DistanceField::create(const Mesh& mesh, double scale, doub
     return field;
 }
 
+void DistanceField::cut(const DistanceField& other, float radius) {
+    std::size_t at = 0;
+    for (std::size_t k = 0; k < counts_[2]; ++k)
+        for (std::size_t j = 0; j < counts_[1]; ++j)
+            for (std::size_t i = 0; i < counts_[0]; ++i, ++at) {
+                const Vec3f point = corner_ + spacing_ * Vec3f(float(i), float(j), float(k));
+                distances_[at] = std::max(distances_[at], other.at(point).distance - radius);
+            }
+}
+
 DistanceField::Sample DistanceField::at(const Vec3f& point) const {
     const Vec3f up = Vec3f::UnitY();
     if (!point.allFinite()) return {std::numeric_limits<float>::infinity(), up};

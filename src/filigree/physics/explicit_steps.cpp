@@ -15,8 +15,9 @@ namespace filigree {
 namespace {
 
 constexpr std::size_t kExplicitStepsGrain = 2048;
-constexpr double kSafety = 0.9;      ///< part of the stable step that is used: it changes while a step is made
-constexpr double kLeastSubsteps = 2; ///< a frame; with one, large motions gain energy
+constexpr double kSafety = 0.9;           ///< part of the stable step that is used: it changes while a step is made
+constexpr double kLeastSubsteps = 2;      ///< a frame; with one, large motions gain energy
+constexpr double kShortestOpening = 0.25; ///< of the stable step: cracks that open faster are followed less well
 /// Where forces change as fast as in a crushed cell, steps of changing length give a body energy: 40 % in four seconds
 /// (Simulation.ACrushedBodyGainsNoEnergy). So little internal damping takes it away again.
 constexpr float kCrushedVolume = 0.1f;     ///< of a cell, of its volume at rest
@@ -65,6 +66,10 @@ public:
             find_contacts();
             find_forces(dt);
             finish(dt);
+            if (!break_bodies(state_, now_, context_)) continue;
+            travelled_ = 0;
+            find_contacts();
+            find_forces(dt);
         }
         return until_;
     }
@@ -123,15 +128,27 @@ private:
         const Stopwatch watch(report_.other_seconds);
         state_.external.add_forces(bodies_, now_, context_);
         stable_step_ = state_.contacts.longest_step();
+        std::vector<double> frequencies(bodies_.size()); // squared
         for (std::size_t b = 0; b < bodies_.size(); ++b) {
             BodyState& body = bodies_[b];
             if (body.sleeps()) continue;
-            double squared_frequency = double(elastic_[b].squared_frequency);
+            double& squared_frequency = frequencies[b];
+            squared_frequency = double(elastic_[b].squared_frequency);
             if (!body.rigid)
                 squared_frequency += state_.contacts.added_frequency(b) * double(body.rest_squared_frequency);
             squared_frequency = state_.external.add_pulls(body, b, now_, squared_frequency);
-            stable_step_ = std::min(stable_step_, stable_step(squared_frequency, double(delay_of(b, dt))));
         }
+        double opening_step = std::numeric_limits<double>::infinity();
+        for (const Cracks& cracks : state_.cracks) {
+            const Cracks::Pace pace = cracks.add_forces(bodies_, context_);
+            for (std::size_t piece = 0; piece < cracks.body().pieces.size(); ++piece)
+                frequencies[cracks.first_piece() + piece] += double(pace.squared_frequency);
+            opening_step = std::min(opening_step, double(pace.opening_step));
+        }
+        for (std::size_t b = 0; b < bodies_.size(); ++b)
+            if (!bodies_[b].sleeps())
+                stable_step_ = std::min(stable_step_, stable_step(frequencies[b], double(delay_of(b, dt))));
+        stable_step_ = std::min(stable_step_, std::max(opening_step, kShortestOpening * stable_step_));
     }
 
     /// s of internal damping.
@@ -147,6 +164,7 @@ private:
         elastic_.resize(bodies_.size());
         for (std::size_t b = 0; b < bodies_.size(); ++b) {
             BodyState& body = bodies_[b];
+            if (body.is_absent) continue;
             const float delay = delay_of(b, dt);
             elastic_[b] = delay > 0
                               ? body.elasticity->forces(positions_ahead(body, delay, context_), body.forces, context_)
@@ -159,9 +177,7 @@ private:
     void finish(float dt) {
         {
             const Stopwatch watch(report_.contact_seconds);
-            state_.contacts.push_out(bodies_, now_);
-            for (BodyState& body : bodies_)
-                if (std::exchange(body.was_pushed, false) && body.rigid) fit_pose(body);
+            push_out(state_, now_);
         }
         const Stopwatch watch(report_.other_seconds);
         kick(0.5f * dt, true);
@@ -199,8 +215,9 @@ private:
 
     void drift(float dt) {
         for (BodyState& body : bodies_) {
+            if (body.sleeps()) continue;
             if (body.rigid) {
-                if (!body.sleeps()) drift_rigid(body, double(dt));
+                drift_rigid(body, double(dt));
                 continue;
             }
             parallel_for(context_, body.positions.size(), kExplicitStepsGrain, [&](std::size_t begin, std::size_t end) {

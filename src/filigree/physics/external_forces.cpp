@@ -91,6 +91,7 @@ void ExternalForces::find_wind(std::span<const BodyState> bodies, double time, d
     const Vec3f wind = world_.wind.at(time).cast<float>();
     for (std::size_t b = 0; b < bodies.size(); ++b) {
         const BodyState& body = bodies[b];
+        if (body.is_absent) continue;
         std::vector<Mat3f> particle_gradients(body.positions.size()), gradients(body.surface.size());
         std::vector<Vec3f> points(body.surface.size());
         body.elasticity->gradients(body.positions, particle_gradients, context);
@@ -98,6 +99,7 @@ void ExternalForces::find_wind(std::span<const BodyState> bodies, double time, d
                       context);
         Vectors forces(body.positions.size());
         for (std::size_t s = 0; s < body.surface.size(); ++s) {
+            if (body.is_hidden(s)) continue;
             const Mat3f from_rest = body.has_flowed() ? Mat3f(gradients[s] * surface_flow(body, s)) : gradients[s];
             const Vec3f push = push_of_wind(body, s, from_rest, wind, world_.air_density, frames_per_second);
             if (!push.isZero(0)) add_to_particles(body.surface, s, push, forces);
@@ -108,16 +110,19 @@ void ExternalForces::find_wind(std::span<const BodyState> bodies, double time, d
 
 void ExternalForces::add_forces(std::span<BodyState> bodies, double time, const RunContext& context) const {
     for (const RegionForce& force : world_.forces) {
-        BodyState& body = bodies[force.body];
-        const Vec3f acceleration = region_acceleration(force, *body.body, time);
+        const Vec3f acceleration = region_acceleration(force, *bodies[force.body].body, time);
         for (const Index particle : force.particles)
-            body.forces.add(particle, body.body->mass[particle] * acceleration);
+            each_copy(bodies, force.body, particle, [&](BodyState& body, std::size_t, Index copy) {
+                body.forces.add(copy, body.body->mass[copy] * acceleration);
+            });
     }
     if (!has_wind()) return;
-    for (std::size_t b = 0; b < bodies.size(); ++b)
+    for (std::size_t b = 0; b < bodies.size(); ++b) {
+        if (bodies[b].is_absent) continue;
         parallel_for(context, bodies[b].forces.size(), kExternalForcesGrain, [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i) bodies[b].forces.add(i, wind_[b][i]);
         });
+    }
 }
 
 double ExternalForces::add_pulls(BodyState& body, std::size_t index, double time, double squared_frequency) const {
@@ -136,7 +141,10 @@ std::vector<Vectors> ExternalForces::region_accelerations(std::span<const BodySt
     for (std::size_t b = 0; b < bodies.size(); ++b) accelerations[b] = Vectors(bodies[b].positions.size());
     for (const RegionForce& force : world_.forces) {
         const Vec3f acceleration = region_acceleration(force, *bodies[force.body].body, time);
-        for (const Index particle : force.particles) accelerations[force.body].add(particle, acceleration);
+        for (const Index particle : force.particles)
+            each_copy(bodies, force.body, particle, [&](const BodyState&, std::size_t body, Index copy) {
+                accelerations[body].add(copy, acceleration);
+            });
     }
     return accelerations;
 }

@@ -113,8 +113,8 @@ private:
         Vec3f least = Vec3f::Zero(), most = Vec3f::Zero();
     };
     float relative_speed(Index a, Index b) const;
-    void find_pairs(Side& side, std::span<const Vec3f> points, const Box& near, const CellBoxes& cells,
-                    const RunContext& context) const;
+    void find_pairs(Side& side, std::span<const Vec3f> points, std::span<const std::uint8_t> hidden, const Box& near,
+                    const CellBoxes& cells, const RunContext& context) const;
     class Surroundings;
     static bool both_sleep(const Side& side, std::span<const BodyState> bodies) {
         return bodies[side.body].sleeps() && bodies[side.other].sleeps();

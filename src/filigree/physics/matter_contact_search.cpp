@@ -112,7 +112,9 @@ float MatterContacts::relative_speed(Index a, Index b) const {
 
 void MatterContacts::travel(std::span<const BodyState> bodies, float dt) {
     Speeds all;
+    bool is_first = true;
     for (std::size_t b = 0; b < bodies.size(); ++b) {
+        if (bodies[b].is_absent) continue;
         const Vectors& v = bodies[b].velocities;
         const auto range = [&](const std::vector<float>& values, int axis) {
             constexpr std::size_t kAtOnce = 16; // so that the compiler uses vectors
@@ -133,7 +135,7 @@ void MatterContacts::travel(std::span<const BodyState> bodies, float dt) {
         range(v.x, 0);
         range(v.y, 1);
         range(v.z, 2);
-        if (b == 0) all = speeds_[b];
+        if (std::exchange(is_first, false)) all = speeds_[b];
         all.least = all.least.cwiseMin(speeds_[b].least);
         all.most = all.most.cwiseMax(speeds_[b].most);
     }
@@ -150,6 +152,7 @@ void MatterContacts::find_sides(std::span<const BodyState> bodies, double left) 
     float spacing = 0, speed = 0;
     std::vector<Index> order;
     for (Index b = 0; b < bodies.size(); ++b) {
+        if (bodies[b].is_absent) continue;
         boxes[b] = box_of(bodies[b].positions);
         if (!boxes[b].size().allFinite()) continue;
         order.push_back(b);
@@ -180,7 +183,7 @@ void MatterContacts::find_sides(std::span<const BodyState> bodies, double left) 
         else
             sides.push_back({.body = body, .other = other, .law = {}, .pairs = {}});
         sides.back().speed = relative_speed(body, other);
-        sides.back().law = world_.contact_of(body, other);
+        sides.back().law = world_.contact_of(bodies[body].actor, bodies[other].actor);
         sides.back().spacing = float(std::min(bodies[body].body->spacing(), bodies[other].body->spacing()));
     }
     sides_ = std::move(sides);
@@ -193,8 +196,8 @@ void MatterContacts::find_approaching(std::span<const BodyState> bodies, double 
 }
 
 /// Pairs of a side anew; those that touch stay.
-void MatterContacts::find_pairs(Side& side, std::span<const Vec3f> points, const Box& near, const CellBoxes& cells,
-                                const RunContext& context) const {
+void MatterContacts::find_pairs(Side& side, std::span<const Vec3f> points, std::span<const std::uint8_t> hidden,
+                                const Box& near, const CellBoxes& cells, const RunContext& context) const {
     const bool own = side.body == side.other;
     const Matter& matter = *matter_[side.other];
     std::vector<Index> found(points.size());
@@ -203,7 +206,9 @@ void MatterContacts::find_pairs(Side& side, std::span<const Vec3f> points, const
         for (std::size_t s = begin; s < end; ++s) {
             const Vec3f& p = points[s];
             const bool is_near = own || ((p.array() >= low.array()) && (p.array() <= high.array())).all();
-            found[s] = is_near ? cells.find(p, own ? matter.cell_of_point(s) : kNoIndex) : kNoIndex;
+            found[s] = is_near && (hidden.empty() || !hidden[s])
+                           ? cells.find(p, own ? matter.cell_of_point(s) : kNoIndex)
+                           : kNoIndex;
         }
     });
     std::vector<Pair> pairs;
@@ -248,6 +253,7 @@ public:
         if (points.empty()) points = surface_places(bodies_[body].surface, bodies_[body].positions, context_);
         return points;
     }
+    std::span<const std::uint8_t> hidden(Index body) const { return bodies_[body].hidden; }
     const CellBoxes& cells(Index body) {
         const auto found = cells_.find(body);
         if (found != cells_.end()) return found->second;
@@ -269,7 +275,7 @@ void MatterContacts::find_own_pairs(Side& side, const BodyState& body, float ahe
     const float reach = kOwnReach * side.spacing;
     side.until = side.way + reach;
     const Vectors positions = positions_in(body, ahead);
-    find_pairs(side, surface_places(body.surface, positions, context), {},
+    find_pairs(side, surface_places(body.surface, positions, context), body.hidden, {},
                CellBoxes(*matter_[side.other], positions, reach), context);
 }
 
@@ -284,7 +290,8 @@ void MatterContacts::find_other_pairs(Side& side, Surroundings& around, double l
     }
     near.min.array() -= far;
     near.max.array() += far;
-    find_pairs(side, around.surface_points(side.body), near, around.cells(side.other), context);
+    find_pairs(side, around.surface_points(side.body), around.hidden(side.body), near, around.cells(side.other),
+               context);
 }
 
 bool MatterContacts::search(std::span<BodyState> bodies, double left, double frame, const RunContext& context) {

@@ -24,7 +24,7 @@ double way_of(const Keyed<Vec3d>& keyed, double from, double until) {
 double furthest_from(const Vec3d& point, std::span<const BodyState> bodies) {
     double squared = 0;
     for (const BodyState& body : bodies)
-        for (std::size_t i = 0; i < body.positions.size(); ++i)
+        for (std::size_t i = 0; i < body.positions.size() && !body.is_absent; ++i)
             squared = std::max(squared, (body.positions[i].cast<double>() - point).squaredNorm());
     return std::sqrt(squared);
 }

@@ -9,6 +9,7 @@ namespace {
 // The name of the format, its version last. 3: with what touches bodies.
 constexpr std::uint64_t kMagic = 0x33455441'54534c46; // "FLSTATE3"
 static_assert(sizeof(Contacts::Anchor) == 4 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
+static_assert(sizeof(LinkState) == 2 * sizeof(float) + sizeof(Vec3f), "padding would be saved");
 static_assert(sizeof(MatterContacts::Memory) == 6 * sizeof(Index) + 3 * sizeof(Vec3f), "padding would be saved");
 
 void write_pose(ByteWriter& writer, const std::optional<RigidPose>& pose) {
@@ -80,6 +81,11 @@ std::string write_saved_state(const SavedState& state) {
     writer.array(std::span(state.contacts.anchors));
     writer.array(std::span(state.contacts.matter));
     writer.array(std::span(state.contacts.recovering));
+    for (const CrackMemory& cracks : state.cracks) {
+        writer.value(cracks.is_open);
+        writer.array(std::span(cracks.links));
+        writer.array(std::span(cracks.broke));
+    }
     return writer.take();
 }
 
@@ -95,6 +101,12 @@ Result<SavedState> read_saved_state(std::string_view bytes) {
     state.contacts.anchors = reader.array<Contacts::Anchor>();
     state.contacts.matter = reader.array<MatterContacts::Memory>();
     state.contacts.recovering = reader.array<std::uint8_t>();
+    while (reader.ok() && !reader.at_end()) {
+        CrackMemory& cracks = state.cracks.emplace_back();
+        cracks.is_open = reader.value<std::uint32_t>();
+        cracks.links = reader.array<LinkState>();
+        cracks.broke = reader.array<double>();
+    }
     if (!reader.ok() || !reader.at_end())
         return Error{ErrorCode::bad_file, "The saved state is damaged; start the simulation anew."};
     return state;

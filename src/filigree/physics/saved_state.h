@@ -3,6 +3,7 @@
 
 #include "filigree/core/result.h"
 #include "filigree/physics/contact.h"
+#include "filigree/physics/cracks.h"
 
 #include <string>
 #include <string_view>
@@ -29,6 +30,7 @@ struct SavedState {
     std::uint64_t frame = 0;
     std::vector<SavedBody> bodies;
     Contacts::Memory contacts;
+    std::vector<CrackMemory> cracks; ///< of bodies that break
 };
 
 /// Values and arrays end to end after the version's name; no padding, so that equal states are equal bytes.

@@ -26,9 +26,10 @@ Status check_options(const StepOptions& options) {
     return Success{};
 }
 
-BodyState begin_body(const Actor& actor, bool meets_bodies, const RunContext& context) {
+BodyState begin_body(const Actor& actor, std::size_t number, bool meets_bodies, const RunContext& context) {
     BodyState state;
     state.body = actor.body;
+    state.actor = number;
     const Body& body = *actor.body;
     const std::size_t count = body.particle_count();
     state.elasticity = make_elasticity(body, context);
@@ -60,9 +61,11 @@ BodyState begin_body(const Actor& actor, bool meets_bodies, const RunContext& co
 /// Bodies that are too small or too stiff for explicit steps are made rigid; those of one kind go on sharing theirs.
 class AutomaticRigid {
 public:
-    AutomaticRigid(const World& world, const StepOptions& options, std::size_t bodies)
-        : options_(options), may_be_rigid_(bodies, options.automatic_rigid ? 1 : 0) {
+    AutomaticRigid(const World& world, const StepOptions& options, std::span<const Actor> actors)
+        : options_(options), may_be_rigid_(actors.size(), options.automatic_rigid ? 1 : 0) {
         for (const Pin& pin : world.pins) may_be_rigid_[pin.body] = 0;
+        for (std::size_t a = 0; a < actors.size(); ++a)
+            if (actors[a].fracture) may_be_rigid_[a] = 0;
     }
 
     /// "": it stays as it is.
@@ -94,15 +97,31 @@ private:
 };
 
 void begin_bodies(SimulationState& state, std::vector<Actor>& actors, const RunContext& context) {
-    AutomaticRigid automatic(state.world, state.options, actors.size());
+    AutomaticRigid automatic(state.world, state.options, actors);
     for (Actor& actor : actors) {
-        BodyState body = begin_body(actor, actors.size() > 1, context);
-        state.why_rigid.push_back(automatic.reason(state.bodies.size(), body));
+        const std::size_t number = state.bodies.size();
+        BodyState body = begin_body(actor, number, actors.size() > 1, context);
+        state.why_rigid.push_back(automatic.reason(number, body));
         if (!state.why_rigid.back().empty()) {
             actor.body = automatic.rigid(actor.body);
-            body = begin_body(actor, actors.size() > 1, context);
+            body = begin_body(actor, number, actors.size() > 1, context);
         }
         state.bodies.push_back(std::move(body));
+    }
+}
+
+/// Bodies for the pieces of those that break; they wait.
+void begin_pieces(SimulationState& state, std::span<const Actor> actors, const RunContext& context) {
+    for (std::size_t a = 0; a < actors.size(); ++a) {
+        if (!actors[a].fracture) continue;
+        const std::size_t first = state.bodies.size();
+        state.bodies[a].broken = actors[a].fracture->body;
+        state.bodies[a].first_piece = first;
+        for (const std::shared_ptr<const Body>& piece : actors[a].fracture->body->pieces) {
+            state.bodies.push_back(begin_body({piece, actors[a].placement}, a, false, context));
+            state.bodies.back().is_absent = true;
+        }
+        state.cracks.emplace_back(actors[a].fracture, a, first);
     }
 }
 
@@ -114,6 +133,12 @@ void begin_pins(SimulationState& state) {
             body.fixed[particle] = 1;
             body.inverse_mass[particle] = 0;
             from.push_back(body.positions[particle]);
+            if (!body.broken) continue;
+            for (const CornerCopy& copy : body.broken->copies_of(particle)) {
+                BodyState& piece = state.bodies[body.first_piece + copy.piece];
+                piece.fixed[copy.corner] = 1;
+                piece.is_held = true;
+            }
         }
         body.is_held = true;
     }
@@ -122,7 +147,13 @@ void begin_pins(SimulationState& state) {
 
 std::vector<Grip> make_grips(std::span<const Hand> hands, const SimulationState& state, const RunContext& context) {
     std::vector<Grip> grips;
-    for (const Hand& hand : hands) grips.push_back(make_grip(hand, state.bodies[hand.body], context));
+    for (Hand hand : hands) {
+        const BodyState& body = state.bodies[hand.body];
+        grips.push_back(make_grip(hand, body, context));
+        if (!body.broken) continue; // else it holds on to the piece that its point is of
+        hand.body = body.first_piece + body.broken->piece_at(hand.point.cast<double>());
+        grips.push_back(make_grip(hand, state.bodies[hand.body], context));
+    }
     return grips;
 }
 
@@ -196,6 +227,8 @@ Result<FrameReport> step_frame(SimulationState& state, const SavedState& start, 
     }
     if (context.is_cancelled()) return cancelled_error();
     report.clamped_particles += hold_lost_particles(state);
+    report.most_crushed = state.bodies[report.most_crushed].actor;
+    for (const Cracks& cracks : state.cracks) cracks.show_whole(state.bodies);
     let_rest(state, from, until);
     ++state.frame;
     return report;
@@ -212,13 +245,19 @@ Result<Simulation> Simulation::create(World world, std::vector<Actor> actors, co
                                       const RunContext& context) {
     if (Status checked = check_options(options); !checked) return checked.error();
     if (Status checked = check_world(world, actors); !checked) return checked.error();
-    auto state = std::make_unique<SimulationState>(std::move(world), actors.size(), options);
+    std::size_t count = actors.size();
+    for (const Actor& actor : actors)
+        if (actor.fracture) count += actor.fracture->body->pieces.size();
+    auto state = std::make_unique<SimulationState>(std::move(world), count, actors.size(), options);
     begin_bodies(*state, actors, context);
+    begin_pieces(*state, actors, context);
     for (const RegionForce& force : state->world.forces) state->bodies[force.body].is_held = true;
     if (state->external.has_wind())
         for (BodyState& body : state->bodies) body.is_held = true;
     state->external.set_grips(make_grips(state->world.hands, *state, context));
     begin_pins(*state);
+    for (Cracks& cracks : state->cracks)
+        if (!cracks.set_memory(cracks.memory(), state->bodies)) assert(false); // works out what follows from it
     state->contacts.begin(state->bodies);
     return Simulation(std::move(state));
 }
@@ -235,7 +274,7 @@ Result<FrameReport> Simulation::advance(const RunContext& context) {
 std::size_t Simulation::frame() const { return state_->frame; }
 double Simulation::time() const { return state_->time(); }
 const World& Simulation::world() const { return state_->world; }
-std::size_t Simulation::body_count() const { return state_->bodies.size(); }
+std::size_t Simulation::body_count() const { return state_->actor_count; }
 
 const Body& Simulation::body(std::size_t body) const {
     assert(body < body_count());
@@ -274,11 +313,14 @@ Status Simulation::check_vectors(std::size_t body, const Vectors& vectors, const
     if (vectors.size() != count)
         return usage("Body " + std::to_string(body) + " has " + std::to_string(count) + " particles and was given " +
                      std::to_string(vectors.size()) + " " + what + ".");
+    if (state_->bodies[body].is_absent) return usage("Body " + std::to_string(body) + " has broken.");
     return Success{};
 }
 
 Status Simulation::set_hands(std::vector<Hand> hands, const RunContext& context) {
     if (Status checked = check_hands(hands, body_count()); !checked) return checked;
+    for (const Cracks& cracks : state_->cracks)
+        if (!cracks.is_open()) cracks.follow_whole(state_->bodies);
     state_->external.set_grips(make_grips(hands, *state_, context));
     state_->world.hands = std::move(hands);
     return Success{};
@@ -287,6 +329,7 @@ Status Simulation::set_hands(std::vector<Hand> hands, const RunContext& context)
 Energy Simulation::energy(const RunContext& context) const {
     Energy energy;
     for (const BodyState& body : state_->bodies) {
+        if (body.is_absent) continue;
         energy.elastic += body.elasticity->energy(body.positions, context);
         for (std::size_t i = 0; i < body.positions.size(); ++i) {
             const double mass = double(body.body->mass[i]);
@@ -300,6 +343,7 @@ Energy Simulation::energy(const RunContext& context) const {
 Momentum Simulation::momentum() const {
     Momentum momentum;
     for (const BodyState& body : state_->bodies) {
+        if (body.is_absent) continue;
         const RigidState state = rigid_state(body);
         momentum.linear += state.linear;
         momentum.angular += state.angular + state.centre.cross(state.linear);
@@ -307,9 +351,36 @@ Momentum Simulation::momentum() const {
     return momentum;
 }
 
+FractureReport Simulation::fracture(std::size_t body) const {
+    assert(body < body_count());
+    const Cracks* cracks = state_->cracks_of(body);
+    return cracks ? cracks->report() : FractureReport{};
+}
+
 std::size_t Simulation::attach(std::size_t body, std::span<const Vec3f> points, const RunContext& context) {
     assert(body < body_count());
-    state_->attachments.push_back(filigree::attach(state_->bodies[body], body, points, context));
+    const BodyState& state = state_->bodies[body];
+    std::vector<Index> numbers;
+    if (state.broken)
+        for (const Vec3f& point : points) numbers.push_back(state.broken->partition.piece_at(point.cast<double>()));
+    return attach(body, points, numbers, context);
+}
+
+std::size_t Simulation::attach(std::size_t body, std::span<const Vec3f> points, std::span<const Index> pieces,
+                               const RunContext& context) {
+    assert(body < body_count());
+    const BodyState& state = state_->bodies[body];
+    assert(pieces.size() == (state.broken ? points.size() : 0));
+    state_->attachments.push_back(filigree::attach(state, body, points, context));
+    std::vector<PieceFollower>& followers = state_->followers.emplace_back();
+    if (state.broken) {
+        std::vector<Index> numbers;
+        for (std::size_t p = 0; p < points.size(); ++p) {
+            const Index piece = state.broken->piece_of_number[pieces[p]];
+            numbers.push_back(piece != kNoIndex ? piece : state.broken->piece_at(points[p].cast<double>()));
+        }
+        followers = make_followers(*state.broken, state_->attachments.back().embedding, numbers);
+    }
     return state_->attachments.size() - 1;
 }
 
@@ -317,7 +388,12 @@ void Simulation::attached(std::size_t attachment, std::span<Vec3f> points, std::
                           const RunContext& context) const {
     assert(attachment < state_->attachments.size());
     const Attachment& which = state_->attachments[attachment];
-    move_attached(state_->bodies[which.body], which, points, gradients, context);
+    const BodyState& body = state_->bodies[which.body];
+    if (body.is_absent)
+        move_followers(state_->followers[attachment], *state_->cracks_of(which.body), state_->bodies, points, gradients,
+                       context);
+    else
+        move_attached(body, which, points, gradients, context);
 }
 
 std::string Simulation::save() const { return write_saved_state(save_state(*state_)); }

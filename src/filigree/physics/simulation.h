@@ -3,6 +3,7 @@
 
 #include "filigree/physics/body.h"
 #include "filigree/physics/elasticity.h"
+#include "filigree/physics/fracture.h"
 #include "filigree/physics/world.h"
 
 namespace filigree {
@@ -13,6 +14,7 @@ struct Actor {
     Eigen::Isometry3d placement = Eigen::Isometry3d::Identity(); ///< from the body's rest positions to the world
     Vec3d velocity = Vec3d::Zero();                              ///< m/s
     Vec3d spin = Vec3d::Zero();                                  ///< rad/s about the centre of mass
+    std::shared_ptr<const Fracture> fracture = nullptr;          ///< of this body; null: it does not break
 };
 
 /// explicit_steps: velocity Verlet, as many substeps as stability asks for; where that is more than 20,000 a frame, or
@@ -93,7 +95,7 @@ public:
     const Body& body(std::size_t body) const; ///< as it is moved: rigid where automatic_rigid made it so
     /// Why automatic_rigid made a body rigid, as in "it has only 5 cells"; "" where it did not.
     const std::string& why_rigid(std::size_t body) const;
-    const Vectors& positions(std::size_t body) const;  ///< world, m
+    const Vectors& positions(std::size_t body) const;  ///< world, m; broken: of the heaviest of each corner's copies
     const Vectors& velocities(std::size_t body) const; ///< m/s
     /// For tests, and for whoever starts a body in another shape. Values may be anything; the next frame repairs what
     /// no step can take. Errors: usage (no such body, another number of particles).
@@ -105,10 +107,17 @@ public:
 
     Energy energy(const RunContext& context) const;
     Momentum momentum() const;
+    FractureReport fracture(std::size_t body) const;
 
     /// Points that go along with a body: its driver, or all of a mesh. Positions on the body at rest, m, also of a body
     /// that has flowed since. Returns a number for `attached`. Cost: as embed.
     std::size_t attach(std::size_t body, std::span<const Vec3f> points, const RunContext& context);
+    /// The same, each point with a piece, by the partition's number: what several pieces' copies of one point are
+    /// carried by. Until the body breaks copies have the same bytes, and where pieces hold together also afterwards;
+    /// then each goes with its own piece, also where that ends before it. Of a body that breaks; above, each point goes
+    /// with the piece it lies in.
+    std::size_t attach(std::size_t body, std::span<const Vec3f> points, std::span<const Index> pieces,
+                       const RunContext& context);
     /// Where they are now (world, m) and the gradients from rest to there: as many as were attached. `gradients` may be
     /// empty: not wanted.
     void attached(std::size_t attachment, std::span<Vec3f> points, std::span<Mat3f> gradients,

@@ -8,6 +8,7 @@ namespace filigree {
 namespace {
 
 SavedBody save_body(const BodyState& body) {
+    if (body.is_absent) return {};
     SavedBody saved{.positions = body.positions,
                     .velocities = body.velocities,
                     .elasticity = body.elasticity->state(),
@@ -82,6 +83,7 @@ SavedState save_state(const SimulationState& state) {
         if (state.bodies[attachment.body].has_flowed())
             saved.bodies[attachment.body].attachments.push_back({attachment.embedding.rest, attachment.gradients});
     saved.contacts = state.contacts.memory();
+    for (const Cracks& cracks : state.cracks) saved.cracks.push_back(cracks.memory());
     return saved;
 }
 
@@ -89,11 +91,17 @@ Status restore_state(SimulationState& state, SavedState saved) {
     const Error damaged{ErrorCode::bad_file, "The saved state is damaged; start the simulation anew."};
     const Error other{ErrorCode::mismatch,
                       "The saved state is of other bodies; resume it with the scene it was saved from."};
-    if (saved.bodies.size() != state.bodies.size()) return other;
+    if (saved.bodies.size() != state.bodies.size() || saved.cracks.size() != state.cracks.size()) return other;
+    for (std::size_t c = 0; c < saved.cracks.size(); ++c)
+        if (!state.cracks[c].set_memory(saved.cracks[c], state.bodies)) return damaged;
     const RunContext context(1);
     for (std::size_t b = 0; b < state.bodies.size(); ++b) {
         BodyState& body = state.bodies[b];
         SavedBody& from = saved.bodies[b];
+        if (body.is_absent) {
+            if (from.positions.size() != 0 || from.velocities.size() != 0) return other;
+            continue;
+        }
         const std::size_t count = body.body->particle_count();
         if (from.positions.size() != count || from.velocities.size() != count) return other;
         if (!from.flow.empty() && from.flow.size() != count) return other;
@@ -108,6 +116,7 @@ Status restore_state(SimulationState& state, SavedState saved) {
         body.flow = std::move(from.flow);
         if (!restore_points(body, from, state.attachments_of(b), had_flowed, context)) return other;
     }
+    for (const Cracks& cracks : state.cracks) cracks.show_whole(state.bodies);
     if (!state.contacts.set_memory(saved.contacts, state.bodies)) return damaged;
     state.frame = saved.frame;
     return Success{};

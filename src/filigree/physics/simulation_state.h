@@ -2,15 +2,19 @@
 #pragma once
 
 #include "filigree/physics/contact.h"
+#include "filigree/physics/cracks.h"
 #include "filigree/physics/external_forces.h"
+#include "filigree/physics/piece_followers.h"
 #include "filigree/physics/saved_state.h"
 #include "filigree/physics/simulation.h"
 
 namespace filigree {
 
 struct SimulationState {
-    SimulationState(World the_world, std::size_t body_count, const StepOptions& the_options)
-        : world(std::move(the_world)), options(the_options),
+    /// body_count: with pieces.
+    SimulationState(World the_world, std::size_t body_count, std::size_t the_actor_count,
+                    const StepOptions& the_options)
+        : world(std::move(the_world)), options(the_options), actor_count(the_actor_count),
           contacts(world, body_count, the_options.contacts_between_bodies, the_options.contacts_within_bodies),
           external(world, body_count) {}
     SimulationState(const SimulationState&) = delete; // contacts and external refer to the world
@@ -18,17 +22,21 @@ struct SimulationState {
 
     World world;
     const StepOptions options;
-    std::vector<BodyState> bodies;
-    std::vector<std::string> why_rigid; ///< of each body: Simulation::why_rigid
+    const std::size_t actor_count;
+    std::vector<BodyState> bodies;      ///< of the actors, then pieces
+    std::vector<std::string> why_rigid; ///< of each actor: Simulation::why_rigid
+    std::vector<Cracks> cracks;         ///< of bodies that break
     Contacts contacts;
     ExternalForces external;
     std::vector<Attachment> attachments;
-    std::vector<std::vector<Vec3f>> pinned_from; ///< of each pin: where its particles were at the start
-    std::size_t frame = 0;                       ///< frames done
+    std::vector<std::vector<PieceFollower>> followers; ///< of each attachment; empty: its body does not break
+    std::vector<std::vector<Vec3f>> pinned_from;       ///< of each pin: where its particles were at the start
+    std::size_t frame = 0;                             ///< frames done
 
     double frame_seconds() const { return 1 / options.frames_per_second; }
     double time() const { return double(frame) * frame_seconds(); }
     std::vector<Attachment*> attachments_of(std::size_t body);
+    const Cracks* cracks_of(std::size_t body) const; ///< null: it does not break
 };
 
 /// Steps by velocity Verlet as far as that goes. Returns the time reached: before `until` when steps became too many
@@ -52,8 +60,12 @@ void move_pins(SimulationState& state, double now, float dt);
 /// Whether anything was done.
 bool repair_start(SimulationState& state, std::span<const ElasticReport> elastic, FrameReport& report,
                   const RunContext& context);
+/// Moves out what contacts find too deep.
+void push_out(SimulationState& state, double now);
 /// Plastic flow and heat; neighbourhoods are renewed where that asks for it.
 void finish_substep(SimulationState& state, float dt, const RunContext& context);
+/// What lets go after a substep that ended at `now`. Whether anything did: contacts and forces are then found anew.
+bool break_bodies(SimulationState& state, double now, const RunContext& context);
 
 /// Everything that moves, and back. Errors of restore_state: mismatch (of other bodies), bad_file (numbers out of
 /// range); the state is then of no use.

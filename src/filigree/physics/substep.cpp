@@ -1,5 +1,6 @@
 // The parts of a substep that explicit steps and descent share.
 #include "filigree/core/random.h"
+#include "filigree/physics/rigid_body.h"
 #include "filigree/physics/simulation_state.h"
 
 #include <algorithm>
@@ -55,6 +56,11 @@ void note_deformation(FrameReport& report, std::size_t body, const ElasticReport
     report.most_crushed = body;
 }
 
+const Cracks* SimulationState::cracks_of(std::size_t body) const {
+    const auto found = std::ranges::find(cracks, body, &Cracks::whole);
+    return found == cracks.end() ? nullptr : &*found;
+}
+
 float most_particle_speed(std::span<const BodyState> bodies) {
     float squared = 0;
     for (const BodyState& body : bodies) {
@@ -81,12 +87,14 @@ void move_pins(SimulationState& state, double now, float dt) {
     for (std::size_t p = 0; p < state.world.pins.size(); ++p) {
         const Pin& pin = state.world.pins[p];
         const Eigen::Isometry3d motion = pin.motion.at(now), before = pin.motion.at(now - double(dt));
-        BodyState& body = state.bodies[pin.body];
         for (std::size_t k = 0; k < pin.particles.size(); ++k) {
             const Vec3d from = state.pinned_from[p][k].cast<double>(), place = motion * from;
-            body.positions.set(pin.particles[k], place.cast<float>());
-            body.velocities.set(pin.particles[k],
-                                dt > 0 ? Vec3f(((place - before * from) / double(dt)).cast<float>()) : Vec3f::Zero());
+            const Vec3d velocity = dt > 0 ? Vec3d((place - before * from) / double(dt)) : Vec3d(Vec3d::Zero());
+            each_copy(std::span(state.bodies), pin.body, pin.particles[k],
+                      [&](BodyState& body, std::size_t, Index particle) {
+                          body.positions.set(particle, place.cast<float>());
+                          body.velocities.set(particle, velocity.cast<float>());
+                      });
         }
     }
 }
@@ -105,6 +113,25 @@ bool repair_start(SimulationState& state, std::span<const ElasticReport> elastic
         report.clamped_particles += scale_down(state.bodies[b], factor);
     }
     return repaired;
+}
+
+void push_out(SimulationState& state, double now) {
+    for (Cracks& cracks : state.cracks) cracks.remember_places(state.bodies);
+    state.contacts.push_out(state.bodies, now);
+    const bool any = std::ranges::any_of(state.bodies, &BodyState::was_pushed);
+    for (BodyState& body : state.bodies)
+        if (std::exchange(body.was_pushed, false) && body.rigid) fit_pose(body);
+    if (!any) return;
+    for (const Cracks& cracks : state.cracks) cracks.rejoin(state.bodies);
+}
+
+bool break_bodies(SimulationState& state, double now, const RunContext& context) {
+    bool any = false;
+    for (Cracks& cracks : state.cracks) any |= cracks.advance(state.bodies, now, context);
+    if (!any) return false;
+    state.contacts.begin_anew();
+    state.external.find_wind(state.bodies, now, state.options.frames_per_second, context);
+    return true;
 }
 
 void finish_substep(SimulationState& state, float dt, const RunContext& context) {

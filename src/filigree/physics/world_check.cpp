@@ -53,6 +53,21 @@ public:
                 place + ".placement", "must be a turn and a shift");
         finite(actor.velocity, place + ".velocity");
         finite(actor.spin, place + ".spin");
+        if (actor.fracture) fracture(*actor.fracture, actor, place + ".fracture");
+    }
+    void fracture(const Fracture& fracture, const Actor& actor, const std::string& place) {
+        require(fracture.body && fracture.body->whole == actor.body, place + ".body", "must be of the actor's body");
+        const std::string wrong_material = check_fracture(fracture.material);
+        require(wrong_material.empty(), place + ".material", ("is wrong: " + wrong_material).c_str());
+        if (!wrong_.empty()) return;
+        for (const FractureEvent& event : fracture.events) {
+            require(std::isfinite(event.time), place + ".events", "must have finite times");
+            for (const Index piece : event.pieces)
+                require(piece < fracture.body->partition.count, place + ".events", "name a piece that is not there");
+            for (const Index particle : event.particles)
+                require(particle < actor.body->particle_count(), place + ".events",
+                        "name a particle that is not there");
+        }
     }
 
     void shape(const HalfSpace& ground, const std::string& place) {

@@ -1,0 +1,329 @@
+// Bodies that break: what holds pieces, when it lets go, and what is kept.
+#include "filigree/core/random.h"
+#include "filigree/physics/simulation.h"
+#include "test_bodies.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+namespace filigree {
+namespace {
+
+const RunContext context(2);
+
+/// Voronoi cells of points.
+Partition cells_of(std::vector<Vec3d> seeds) {
+    const auto count = Index(seeds.size());
+    return {count, [seeds = std::move(seeds)](const Vec3d& point) {
+                Index nearest = 0;
+                for (Index s = 1; s < seeds.size(); ++s)
+                    if ((seeds[s] - point).squaredNorm() < (seeds[nearest] - point).squaredNorm()) nearest = s;
+                return nearest;
+            }};
+}
+
+/// Two pieces on either side of a plane.
+Partition halves(const Vec3d& point, const Vec3d& normal) {
+    return cells_of({point - 0.1 * normal.normalized(), point + 0.1 * normal.normalized()});
+}
+
+Material brittle() {
+    Material material;
+    material.density = 1000;
+    material.young_modulus = 1e6;
+    material.poisson_ratio = 0.2;
+    material.damping = 0;
+    return material;
+}
+
+std::shared_ptr<Fracture> fracture_of(std::shared_ptr<const Body> whole, Partition partition, double strength,
+                                      double energy) {
+    auto fracture = std::make_shared<Fracture>();
+    fracture->body =
+        std::make_shared<const BrokenBody>(break_body(std::move(whole), std::move(partition), context).value());
+    fracture->material.strength = strength;
+    fracture->material.energy = energy;
+    return fracture;
+}
+
+World empty_world() {
+    World world;
+    world.gravity = Vec3d::Zero();
+    return world;
+}
+
+TEST(BrokenBody, PiecesAreTheWhole) {
+    const auto whole = block(6, 5, 4, 0.1, brittle());
+    BrokenBodyReport report;
+    const BrokenBody broken = break_body(whole, halves({0.013, 0, 0}, {1, 0.3, 0.2}), context, &report).value();
+    ASSERT_EQ(broken.pieces.size(), 2u);
+    // Masses of the copies add up to each corner's.
+    for (Index corner = 0; corner < whole->mass.size(); ++corner) {
+        double mass = 0;
+        for (const CornerCopy& copy : broken.copies_of(corner))
+            mass += double(broken.pieces[copy.piece]->mass[copy.corner]);
+        EXPECT_NEAR(mass, double(whole->mass[corner]), 1e-6 * double(whole->mass[corner]));
+    }
+    // The plane's area within the block: 0.5 * 0.4 over the cosine.
+    const double area = 0.5 * 0.4 * Vec3d(1, 0.3, 0.2).norm();
+    EXPECT_NEAR(report.crack_area, area, 0.02 * area);
+    double held = 0;
+    for (const CrackLink& link : broken.links) held += double(link.area);
+    EXPECT_NEAR(held, report.crack_area, 1e-4 * area);
+    // Energies of deformed copies add up to the whole's.
+    Vectors positions = whole->rest;
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+        const Vec3f p = whole->rest[i];
+        positions.set(i, p + Vec3f(0.1f * p.x() + 0.2f * p.y() * p.y(), -0.05f * p.y(), 0.3f * p.x() * p.z()));
+    }
+    double sum = 0;
+    for (std::size_t k = 0; k < 2; ++k) {
+        Vectors own(broken.pieces[k]->rest.size());
+        for (std::size_t c = 0; c < own.size(); ++c) own.set(c, positions[broken.corners_of_whole[k][c]]);
+        sum += make_elasticity(*broken.pieces[k], context)->energy(own, context);
+    }
+    const double energy = make_elasticity(*whole, context)->energy(positions, context);
+    EXPECT_NEAR(sum, energy, 1e-5 * energy);
+}
+
+/// A bar pulled at both ends at a constant speed.
+struct PulledBar {
+    std::shared_ptr<const Body> body;
+    World world;
+    double length;
+
+    PulledBar(std::shared_ptr<const Body> bar, double speed) : body(std::move(bar)), world(empty_world()) {
+        const Box box = bounds([&] {
+            std::vector<Vec3f> points;
+            for (std::size_t i = 0; i < body->rest.size(); ++i) points.push_back(body->rest[i]);
+            return points;
+        }());
+        length = box.size().x();
+        for (const double side : {-1.0, 1.0}) {
+            Pin pin;
+            for (std::size_t i = 0; i < body->rest.size(); ++i)
+                if (std::abs(double(body->rest[i].x()) - side * 0.5 * length) < 1e-4) pin.particles.push_back(Index(i));
+            pin.motion.move.times = {0, 100};
+            pin.motion.move.values = {Vec3d::Zero(), {side * 50 * speed, 0, 0}};
+            world.pins.push_back(pin);
+        }
+    }
+};
+
+TEST(Fracture, ABarBreaksAtItsStrength) {
+    Material material = brittle();
+    material.poisson_ratio = 0; // so that the pinned ends do no harm
+    material.damping = 20;
+    const double strength = 1e4; // a strain of 1 %
+    for (const double place : {0.0, 0.03, 0.05}) {
+        PulledBar bar(block(16, 3, 3, 0.1, material), 0.02);
+        const auto fracture = fracture_of(bar.body, halves({place, 0, 0}, {1, 0, 0}), strength, 5);
+        Simulation simulation = Simulation::create(bar.world, {{.body = bar.body, .fracture = fracture}},
+                                                   {.frames_per_second = 200, .contacts_within_bodies = false}, context)
+                                    .value();
+        double time = 0;
+        while (simulation.fracture(0).parts == 1 && time < 2) {
+            ASSERT_TRUE(simulation.advance(context).ok());
+            time = simulation.time();
+        }
+        const double stress = 1e6 * 0.02 * simulation.fracture(0).first / bar.length;
+        EXPECT_NEAR(stress, strength, 0.02 * strength) << place;
+        EXPECT_EQ(simulation.fracture(0).parts, 2u);
+    }
+}
+
+/// A free block whose ends fly apart, and turn a little.
+struct FlyingBlock {
+    std::shared_ptr<const Body> body = block(10, 3, 3, 0.1, brittle());
+    Vectors velocities{body->rest.size()};
+    explicit FlyingBlock(float rate) {
+        for (std::size_t i = 0; i < body->rest.size(); ++i) {
+            const Vec3f& p = body->rest[i];
+            velocities.set(i, {rate * p.x() + 1, -0.05f * rate * p.x() + 0.3f, 0.1f * rate * p.y()});
+        }
+    }
+    Simulation simulation(std::shared_ptr<const Fracture> fracture, StepMode mode = StepMode::explicit_steps) const {
+        Simulation made = Simulation::create(empty_world(), {{.body = body, .fracture = std::move(fracture)}},
+                                             {.frames_per_second = 100,
+                                              .mode = mode,
+                                              .contacts_between_bodies = false,
+                                              .contacts_within_bodies = false},
+                                             context)
+                              .value();
+        EXPECT_TRUE(made.set_velocities(0, velocities).ok());
+        return made;
+    }
+};
+
+TEST(Fracture, EnergyAndMomentum) {
+    for (const double energy : {5.0, 20.0, 60.0}) {
+        const FlyingBlock block(2);
+        Simulation simulation =
+            block.simulation(fracture_of(block.body, halves({0.02, 0, 0}, {1, 0.2, 0.1}), 1e4, energy));
+        const Energy start = simulation.energy(context);
+        const Momentum before = simulation.momentum();
+        for (int frame = 0; frame < 40; ++frame) {
+            ASSERT_TRUE(simulation.advance(context).ok());
+        }
+        const FractureReport report = simulation.fracture(0);
+        EXPECT_EQ(report.parts, 2u);
+        EXPECT_NEAR(report.broken_area, report.crack_area, 1e-6);
+        EXPECT_NEAR(report.dissipated, energy * report.crack_area, 0.01 * energy * report.crack_area);
+        const double lost = start.total() - simulation.energy(context).total();
+        EXPECT_NEAR(lost, energy * report.crack_area, 0.1 * energy * report.crack_area);
+        const Momentum after = simulation.momentum();
+        const double size = before.linear.norm();
+        EXPECT_LT((after.linear - before.linear).norm(), 1e-6 * size);
+        EXPECT_LT((after.angular - before.angular).norm(), 1e-5 * size * 0.5);
+    }
+}
+
+std::vector<Vec3d> scattered_seeds(std::size_t count, double reach, std::uint64_t seed) {
+    std::vector<Vec3d> seeds;
+    for (std::size_t s = 0; s < count; ++s)
+        seeds.push_back(reach * Vec3d(2 * random_unit(seed, 3 * s) - 1, 2 * random_unit(seed, 3 * s + 1) - 1,
+                                      2 * random_unit(seed, 3 * s + 2) - 1));
+    return seeds;
+}
+
+World ground_world() {
+    World world;
+    Obstacle ground;
+    ground.shape = HalfSpace{{0, -0.6, 0}, {0, 1, 0}};
+    world.obstacles.push_back(ground);
+    return world;
+}
+
+TEST(Fracture, WhatIsNeverReachedChangesNothing) {
+    const auto body = block(5, 5, 5, 0.1, brittle());
+    const auto fracture = fracture_of(body, cells_of(scattered_seeds(6, 0.25, 1)), 1e9, 1e9);
+    for (const StepMode mode : {StepMode::explicit_steps, StepMode::descent}) {
+        const auto last = [&](std::shared_ptr<const Fracture> breaks) {
+            Simulation simulation =
+                Simulation::create(ground_world(), {{.body = body, .velocity = {0, -2, 0}, .fracture = breaks}},
+                                   {.frames_per_second = 60, .mode = mode}, context)
+                    .value();
+            for (int frame = 0; frame < 30; ++frame) EXPECT_TRUE(simulation.advance(context).ok());
+            return simulation.positions(0);
+        };
+        const Vectors with = last(fracture), without = last(nullptr);
+        EXPECT_EQ(with.x, without.x);
+        EXPECT_EQ(with.y, without.y);
+        EXPECT_EQ(with.z, without.z);
+    }
+}
+
+TEST(Fracture, CopiesCoincideUntilTheirPiecesPart) {
+    const FlyingBlock flying(2);
+    const auto fracture = fracture_of(flying.body, cells_of({{-0.3, 0, 0}, {0, 0.02, 0}, {0.3, 0, 0.05}}), 1e9, 20);
+    fracture->events.push_back({.time = 0.05, .pieces = {2}, .particles = {}});
+    Simulation simulation = flying.simulation(fracture);
+    std::vector<Vec3f> points;
+    for (int n = 0; n < 60; ++n) points.push_back({-0.45f + 0.015f * float(n), 0.1f * std::sin(float(n)), 0.05f});
+    std::vector<std::size_t> of_piece;
+    for (Index piece = 0; piece < 3; ++piece)
+        of_piece.push_back(simulation.attach(0, points, std::vector<Index>(points.size(), piece), context));
+    const auto places = [&](std::size_t piece) {
+        std::vector<Vec3f> moved(points.size());
+        std::vector<Mat3f> gradients(points.size());
+        simulation.attached(of_piece[piece], moved, gradients, context);
+        for (const Mat3f& gradient : gradients)
+            for (int column = 0; column < 3; ++column) moved.push_back(gradient.col(column));
+        return moved;
+    };
+    for (int frame = 0; frame < 4; ++frame) ASSERT_TRUE(simulation.advance(context).ok());
+    EXPECT_EQ(simulation.fracture(0).parts, 1u);
+    EXPECT_EQ(places(0), places(1));
+    EXPECT_EQ(places(0), places(2));
+    for (int frame = 0; frame < 12; ++frame) ASSERT_TRUE(simulation.advance(context).ok());
+    EXPECT_EQ(simulation.fracture(0).parts, 2u);
+    EXPECT_NEAR(simulation.fracture(0).first, 0.05, 0.01);
+    const std::vector<Vec3f> first = places(0), middle = places(1), last = places(2);
+    for (int n = 0; n < 30; ++n) EXPECT_EQ(first[n], middle[n]) << n; // x up to 0: around the crack that holds
+    for (int n = 25; n < 50; ++n) EXPECT_GT((last[n] - middle[n]).norm(), 0.01f) << n;
+    for (const std::vector<Vec3f>* moved : {&first, &middle, &last})
+        for (const Vec3f& p : *moved) EXPECT_LT(p.norm(), 3);
+}
+
+/// A cube thrown on the ground; it breaks.
+Simulation thrown_cube(StepMode mode) {
+    Material material = brittle();
+    material.damping = 1;
+    const auto body = block(6, 6, 6, 0.05, material);
+    const auto fracture = fracture_of(body, cells_of(scattered_seeds(8, 0.15, 3)), 5e3, 1);
+    fracture->material.scatter = 0.2;
+    Actor actor{.body = body, .velocity = {0, -4, 0}, .spin = {1, 0, 2}, .fracture = fracture};
+    actor.placement.rotate(Eigen::AngleAxisd(0.5, Vec3d(1, 0, 1).normalized()));
+    return Simulation::create(ground_world(), {actor}, {.frames_per_second = 60, .mode = mode}, context).value();
+}
+
+TEST(Fracture, AThrownCubeBreaksAndItsPiecesLieOnTheGround) {
+    Simulation simulation = thrown_cube(StepMode::explicit_steps);
+    double least = 1e9, start = simulation.energy(context).total();
+    for (int frame = 0; frame < 150; ++frame) {
+        ASSERT_TRUE(simulation.advance(context).ok());
+        const double energy = simulation.energy(context).total();
+        EXPECT_LT(energy, start + 2) << frame; // J, of 216 that it has at first
+        start = std::min(start, energy);
+        for (std::size_t i = 0; i < simulation.positions(0).size(); ++i)
+            least = std::min(least, double(simulation.positions(0)[i].y()));
+    }
+    EXPECT_GT(simulation.fracture(0).parts, 3u);
+    EXPECT_GT(least, -0.63);                          // the ground is at -0.6
+    EXPECT_LT(simulation.energy(context).kinetic, 2); // of 216 J
+}
+
+TEST(Fracture, SavedInTheMiddleOfABreak) {
+    for (const StepMode mode : {StepMode::explicit_steps}) {
+        Simulation first = thrown_cube(mode);
+        std::string middle;
+        std::size_t broken_parts = 0;
+        for (int frame = 0; frame < 24; ++frame) {
+            ASSERT_TRUE(first.advance(context).ok());
+            if (first.fracture(0).broken_area > 0 && middle.empty()) {
+                middle = first.save();
+                broken_parts = first.fracture(0).parts;
+            }
+        }
+        ASSERT_FALSE(middle.empty());
+        Simulation second = thrown_cube(mode);
+        ASSERT_TRUE(second.restore(middle).ok());
+        EXPECT_EQ(second.fracture(0).parts, broken_parts);
+        EXPECT_EQ(second.save(), middle);
+        while (second.frame() < first.frame())
+            ASSERT_TRUE(second.advance(RunContext(1)).ok()); // another number of threads
+        EXPECT_EQ(second.save(), first.save());
+        EXPECT_EQ(second.positions(0).x, first.positions(0).x);
+    }
+}
+
+TEST(Fracture, AHandPullsAPieceOff) {
+    Material material = brittle();
+    material.damping = 5;
+    const auto body = block(10, 3, 3, 0.1, material);
+    const auto fracture = fracture_of(body, halves({0.2, 0, 0}, {1, 0, 0}), 5e3, 2);
+    World world = empty_world();
+    Pin pin;
+    for (std::size_t i = 0; i < body->rest.size(); ++i)
+        if (body->rest[i].x() < -0.49f) pin.particles.push_back(Index(i));
+    world.pins.push_back(pin);
+    Hand hand;
+    hand.point = {0.5f, 0, 0};
+    hand.target.times = {0, 1};
+    hand.target.values = {{0.5, 0, 0}, {1.5, 0.2, 0}};
+    world.hands.push_back(hand);
+    Simulation simulation =
+        Simulation::create(world, {{.body = body, .fracture = fracture}}, {.frames_per_second = 60}, context).value();
+    const std::size_t tip = simulation.attach(0, std::vector<Vec3f>{{0.5f, 0, 0}, {-0.4f, 0, 0}}, context);
+    for (int frame = 0; frame < 120; ++frame) ASSERT_TRUE(simulation.advance(context).ok());
+    EXPECT_EQ(simulation.fracture(0).parts, 2u);
+    std::vector<Vec3f> points(2);
+    simulation.attached(tip, points, {}, context);
+    EXPECT_NEAR(points[0].x(), 1.5f, 0.05f);
+    EXPECT_NEAR(points[1].x(), -0.4f, 0.01f);
+}
+
+} // namespace
+} // namespace filigree
