@@ -3,6 +3,7 @@
 
 #include "filigree/core/types.h"
 
+#include <array>
 #include <cstdint>
 
 namespace filigree {
@@ -29,10 +30,15 @@ public:
     Vec3d from_grid(const Vec3d& grid) const;
     /// A point of the grid with the stretch and the scale taken back, but not the noise: cracks are still planes.
     Vec3d unstretched(const Vec3d& grid) const { return from_linear_ * grid; }
+    Vec3d stretched(const Vec3d& unstretched) const { return to_linear_ * unstretched; }
+    /// Bumps finer than those of the map, down to those of `shortest` length, as a height over a crack's surface; model
+    /// units. They go on as the map's do; `fine_reach` is the highest there can be.
+    double fine_height(const Vec3d& point, double shortest) const;
+    double fine_reach(double shortest) const;
 
     /// Grid units in a model unit, across the grain.
     double scale() const { return scale_; }
-    bool is_rough() const { return amplitude_ > 0; }
+    bool is_rough() const { return amplitude_[0] > 0; }
     /// How far from its plane a crack may be, and the length of the finest bumps; model units.
     double reach() const;
     double finest_wavelength() const;
@@ -41,10 +47,13 @@ public:
 
 private:
     Vec3d noise(const Vec3d& point, Mat3d* gradient) const;
+    int fine_octaves(double shortest) const;
 
     Vec3d centre_;
     Mat3d to_linear_, from_linear_;
-    double scale_, tolerance_, amplitude_ = 0, frequency_ = 0;
+    static constexpr int kAllOctaves = 8;
+    double scale_, tolerance_, frequency_ = 0;
+    std::array<double, kAllOctaves> amplitude_ = {};
     std::uint64_t seed_;
 };
 
