@@ -66,7 +66,8 @@ void report_fracture(const FracturedMesh& fractured, double seconds, Report& rep
         {{"total", seconds}, {"surface", r.cut_seconds}, {"cracks", r.facet_seconds}, {"pieces", r.assemble_seconds}});
 }
 
-/// Keeps what tells pieces apart where the format holds it, and leaves the rest out without a word, as the mesh had none.
+/// Keeps what tells pieces apart where the format holds it, and leaves the rest out without a word, as the mesh had
+/// none.
 void fit_to_format(MeshFormat format, const Mesh& input, Mesh& mesh) {
     const bool is_ply = format == MeshFormat::ply;
     if (!is_ply) mesh.scalars.pop_back(); // "piece"
@@ -80,7 +81,8 @@ void fit_to_format(MeshFormat format, const Mesh& input, Mesh& mesh) {
 }
 
 /// A file a piece, together or not at all.
-void write_folder(const FracturedMesh& fractured, const Mesh& input, const FractureArguments& options, Session& session, Report& report) {
+void write_folder(const FracturedMesh& fractured, const Mesh& input, const FractureArguments& options, Session& session,
+                  Report& report) {
     const std::string extension = std::filesystem::path(options.input).extension().string();
     const MeshFormat format = require(mesh_format("piece" + extension));
     OutputFolder folder(options.output, options.input);
@@ -89,8 +91,9 @@ void write_folder(const FracturedMesh& fractured, const Mesh& input, const Fract
         files.push_back(folder.file(fmt::format("piece_{:04}{}", p, extension)));
     const RunContext quiet = session.silent_context();
     for (Index p = 0; p < fractured.pieces; ++p) {
-        session.warn(
-            require(write_mesh(piece_mesh(fractured, p), files[p], {.materials_beside = options.input}, quiet)));
+        Mesh piece = piece_mesh(fractured, p);
+        fit_to_format(format, input, piece);
+        session.warn(require(write_mesh(piece, files[p], {.materials_beside = options.input}, quiet)));
         session.context().report("writing pieces", double(p + 1) / fractured.pieces);
     }
     folder.keep();
