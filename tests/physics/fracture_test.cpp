@@ -1,6 +1,7 @@
 // Bodies that break: what holds pieces, when it lets go, and what is kept.
 #include "filigree/core/random.h"
 #include "filigree/physics/simulation.h"
+#include "filigree/mesh/shapes.h"
 #include "test_bodies.h"
 
 #include <gtest/gtest.h>
@@ -276,7 +277,7 @@ TEST(Fracture, AThrownCubeBreaksAndItsPiecesLieOnTheGround) {
 }
 
 TEST(Fracture, SavedInTheMiddleOfABreak) {
-    for (const StepMode mode : {StepMode::explicit_steps}) {
+    for (const StepMode mode : {StepMode::explicit_steps, StepMode::descent}) {
         Simulation first = thrown_cube(mode);
         std::string middle;
         std::size_t broken_parts = 0;
@@ -323,6 +324,86 @@ TEST(Fracture, AHandPullsAPieceOff) {
     simulation.attached(tip, points, {}, context);
     EXPECT_NEAR(points[0].x(), 1.5f, 0.05f);
     EXPECT_NEAR(points[1].x(), -0.4f, 0.01f);
+}
+
+TEST(Fracture, DescentBreaksToo) {
+    const FlyingBlock block(2);
+    for (const double damping : {0.0, 0.002}) {
+        Material material = block.body->material;
+        material.internal_damping = damping;
+        const auto body = std::make_shared<Body>(*block.body);
+        body->material = material;
+        Simulation simulation =
+            Simulation::create(empty_world(), {{.body = body, .fracture = fracture_of(body, halves({0.02, 0, 0}, {1, 0.2, 0.1}), 1e4, 5)}},
+                               {.frames_per_second = 200, .mode = StepMode::descent, .contacts_within_bodies = false},
+                               context)
+                .value();
+        ASSERT_TRUE(simulation.set_velocities(0, block.velocities).ok());
+        const Momentum before = simulation.momentum();
+        const double start = simulation.energy(context).total();
+        for (int frame = 0; frame < 60; ++frame) {
+            ASSERT_TRUE(simulation.advance(context).ok());
+        }
+        EXPECT_EQ(simulation.fracture(0).parts, 2u);
+        EXPECT_LT(simulation.energy(context).total(), start);
+        EXPECT_NEAR(simulation.fracture(0).dissipated, 5 * simulation.fracture(0).crack_area, 0.01);
+        EXPECT_LT((simulation.momentum().linear - before.linear).norm(), 1e-4 * before.linear.norm());
+    }
+}
+
+/// Pa: what a plate of 1 m x 2 m with an edge crack of 0.3 m carries, pulled at its ends, turned about the lattice.
+double notched_strength(double spacing, double degrees, double offset, double energy) {
+    const double thickness = spacing, angle = degrees * std::numbers::pi / 180;
+    const Vec3d along(std::cos(angle), std::sin(angle), 0), across(-std::sin(angle), std::cos(angle), 0);
+    Mesh mesh = make_box({0, 0, 0}, {2, 1, thickness});
+    for (Vec3f& p : mesh.positions)
+        p = (double(p.x()) * along + double(p.y()) * across + Vec3d(0, 0, double(p.z()))).cast<float>();
+    Material material = brittle();
+    material.damping = 10;
+    BodyOptions options;
+    options.cells.spacing = spacing;
+    const auto body = std::make_shared<const Body>(make_body(mesh, material, options, context).value());
+    const auto fracture = fracture_of(body, halves(offset * spacing * along, along), 1e9, energy);
+    FractureEvent notch;
+    World world = empty_world();
+    world.pins.resize(2);
+    for (Index i = 0; i < body->rest.size(); ++i) {
+        const Vec3d p = body->rest[i].cast<double>();
+        if (p.dot(across) <= -0.2) notch.particles.push_back(i);
+        for (int side = 0; side < 2; ++side)
+            if ((side ? 1 : -1) * p.dot(along) > 1 - 0.5 * spacing) world.pins[side].particles.push_back(i);
+    }
+    fracture->events.push_back(notch);
+    const double speed = 0.01; // m/s
+    for (int side = 0; side < 2; ++side) {
+        world.pins[side].motion.move.times = {0, 100};
+        world.pins[side].motion.move.values = {Vec3d::Zero(), (side ? 50 : -50) * speed * along};
+    }
+    Simulation simulation =
+        Simulation::create(world, {{.body = body, .fracture = fracture}},
+                           {.frames_per_second = 100,
+                            .mode = StepMode::explicit_steps,
+                            .contacts_between_bodies = false,
+                            .contacts_within_bodies = false},
+                           context)
+            .value();
+    double most = 0;
+    while (simulation.fracture(0).parts == 1 && simulation.time() < 4) {
+        EXPECT_TRUE(simulation.advance(context).ok());
+        if (simulation.time() > 0.2)
+            most = std::max(most, 2 * simulation.energy(context).elastic / (speed * simulation.time() * thickness));
+    }
+    EXPECT_EQ(simulation.fracture(0).parts, 2u);
+    return most;
+}
+
+TEST(Fracture, ANotchedPlateBreaksAtTheSameLoadOnAnyLattice) {
+    // K = 1.66 sqrt(pi a) stress for a / W = 0.3 [Tada 1985].
+    for (const double spacing : {1.0 / 8, 1.0 / 16, 1.0 / 32, 1.0/64})
+        for (const double offset : {0.5, 0.2})
+        printf("h 1/%g offset %g: %g\n", 1 / spacing, offset, notched_strength(spacing, 0, offset, 10));
+    for (const double degrees : {0.0, 15.0, 30.0, 45.0})
+        printf("angle %g: %g\n", degrees, notched_strength(1.0 / 16, degrees, 0.3, 10));
 }
 
 } // namespace

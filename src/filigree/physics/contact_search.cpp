@@ -31,6 +31,7 @@ void Contacts::find_near(std::span<const BodyState> bodies, double time, float t
     const ObstaclePoses poses(world_, time);
     for (std::size_t b = 0; b < bodies.size(); ++b) {
         const BodyState& body = bodies[b];
+        if (body.is_absent) near_[b].clear();
         if (body.sleeps()) continue;
         const std::size_t points = body.surface.size();
         std::vector<Vec3f> places(points);

@@ -76,7 +76,8 @@ private:
         {
             const Stopwatch watch(report_.elastic_seconds);
             for (BodyState& body : bodies_)
-                elastic_.push_back(body.elasticity->forces(body.positions, body.forces, context_));
+                elastic_.push_back(body.is_absent ? ElasticReport{}
+                                                  : body.elasticity->forces(body.positions, body.forces, context_));
         }
         repair_start(state_, elastic_, report_, context_);
     }
@@ -85,23 +86,30 @@ private:
     void predict() {
         const Stopwatch watch(report_.other_seconds);
         const std::vector<Vectors> regions = state_.external.region_accelerations(bodies_, now_);
+        std::vector<std::uint8_t> wild, falls; // of each actor, so that tied pieces begin alike
+        wild.assign(state_.actor_count, 0);
+        falls.assign(state_.actor_count, 1);
+        for (std::size_t b = 0; b < bodies_.size(); ++b) {
+            if (bodies_[b].is_absent) continue;
+            if (!(elastic_[b].least_volume_ratio > 0) || !(elastic_[b].most_stretch < kWildStretch))
+                wild[bodies_[b].actor] = 1;
+            if (bodies_[b].is_held || state_.contacts.is_touched(b)) falls[bodies_[b].actor] = 0;
+        }
         for (std::size_t b = 0; b < bodies_.size(); ++b) {
             BodyState& body = bodies_[b];
-            const std::size_t count = body.positions.size();
-            before_.push_back(rigid_state(body));
+            const std::size_t count = body.is_absent ? 0 : body.positions.size();
+            before_.push_back(body.is_absent ? RigidState{} : rigid_state(body));
             turn_.push_back(turn_in(before_.back(), double(dt_)));
             start_.push_back(body.positions);
             Vectors& target = target_.emplace_back(count);
             std::vector<float>& inertia = inertia_.emplace_back(count);
-            const bool wild = !(elastic_[b].least_volume_ratio > 0) || !(elastic_[b].most_stretch < kWildStretch);
-            const bool falls = !body.is_held && !state_.contacts.is_touched(b);
             for (std::size_t i = 0; i < count; ++i) {
                 Vec3f acceleration = state_.world.gravity.cast<float>() + regions[b][i];
                 if (state_.external.has_wind()) acceleration += state_.external.wind_acceleration(body, b, i);
                 const Vec3f coasted = body.positions[i] + dt_ * body.velocities[i];
                 inertia[i] = body.body->mass[i] / (dt_ * dt_);
                 target.set(i, coasted + dt_ * dt_ * acceleration);
-                if (!wild && !body.fixed[i]) body.positions.set(i, falls ? target[i] : coasted);
+                if (!wild[body.actor] && !body.fixed[i]) body.positions.set(i, falls[body.actor] ? target[i] : coasted);
             }
         }
         move_pins(state_, now_, dt_);
@@ -111,7 +119,10 @@ private:
         for (unsigned iteration = 0; iteration < state_.options.descent_iterations; ++iteration) {
             if (context_.is_cancelled()) return false;
             const Stopwatch watch(report_.elastic_seconds);
-            for (std::size_t b = 0; b < bodies_.size(); ++b) sweep(b);
+            for (std::size_t b = 0; b < bodies_.size(); ++b)
+                if (!bodies_[b].is_absent) sweep(b);
+            for (const Cracks& cracks : state_.cracks)
+                if (cracks.is_open()) sweep_cracks(cracks);
         }
         return true;
     }
@@ -121,9 +132,11 @@ private:
     /// x = (y + s x0) / (1 + s), a sweep moves y instead, towards (1 + s) target - s x0 by inertia / (1 + s).
     void sweep(std::size_t b) {
         BodyState& body = bodies_[b];
-        const float s = body.rigid ? 0.0f : float(body.body->material.internal_damping) / dt_;
+        const float s = damping(body);
+        const bool is_piece = b >= state_.actor_count;
         const auto terms = [&](const Vectors& target, std::span<const float> inertia) {
-            return Descent{target, inertia, body.fixed, blocks_[b].touched(), &blocks_[b]};
+            return Descent{target, inertia, is_piece ? left_out(b) : std::span<const std::uint8_t>(body.fixed),
+                           blocks_[b].touched(), &blocks_[b]};
         };
         if (!(s > 0)) {
             blocks_[b].update_places(bodies_, body.positions, 1);
@@ -131,18 +144,49 @@ private:
             return;
         }
         const std::size_t count = body.positions.size();
-        Vectors ahead(count), target(count);
+        Vectors ahead = positions_ahead_of(b, s), target(count);
         std::vector<float> inertia(count);
         for (std::size_t i = 0; i < count; ++i) {
-            const Vec3f from = turn_[b].of(start_[b][i]);
-            ahead.set(i, (1 + s) * body.positions[i] - s * from);
-            target.set(i, (1 + s) * target_[b][i] - s * from);
+            target.set(i, (1 + s) * target_[b][i] - s * turn_[b].of(start_[b][i]));
             inertia[i] = inertia_[b][i] / (1 + s);
         }
         blocks_[b].update_places(bodies_, ahead, 1 / (1 + s));
         body.elasticity->sweep(ahead, terms(target, inertia), context_);
+        const std::span<const std::uint8_t> stays = is_piece ? left_out(b) : std::span<const std::uint8_t>(body.fixed);
         for (std::size_t i = 0; i < count; ++i)
-            if (!body.fixed[i]) body.positions.set(i, (ahead[i] + s * turn_[b].of(start_[b][i])) / (1 + s));
+            if (!stays[i]) body.positions.set(i, (ahead[i] + s * turn_[b].of(start_[b][i])) / (1 + s));
+    }
+
+    float damping(const BodyState& body) const {
+        return body.rigid ? 0.0f : float(body.body->material.internal_damping) / dt_;
+    }
+    Vectors positions_ahead_of(std::size_t b, float s) const {
+        const Vectors& positions = bodies_[b].positions;
+        Vectors ahead(positions.size());
+        for (std::size_t i = 0; i < positions.size(); ++i)
+            ahead.set(i, (1 + s) * positions[i] - s * turn_[b].of(start_[b][i]));
+        return ahead;
+    }
+    std::span<const std::uint8_t> left_out(std::size_t piece_body) const {
+        const Cracks& cracks = *state_.cracks_of(bodies_[piece_body].actor);
+        return cracks.left_out(Index(piece_body - cracks.first_piece()));
+    }
+
+    /// What the pieces' own sweeps left out.
+    void sweep_cracks(const Cracks& cracks) {
+        const std::size_t first = cracks.first_piece(), count = cracks.body().pieces.size();
+        std::vector<Cracks::PieceSweep> pieces;
+        std::vector<Vectors> ahead(count);
+        for (std::size_t k = 0; k < count; ++k) {
+            const std::size_t b = first + k;
+            const float s = damping(bodies_[b]);
+            if (s > 0) ahead[k] = positions_ahead_of(b, s);
+            Vectors& swept = s > 0 ? ahead[k] : bodies_[b].positions;
+            blocks_[b].update_places(bodies_, swept, 1 / (1 + s));
+            pieces.push_back(
+                {&bodies_[b].positions, &swept, 1 + s, &target_[b], inertia_[b], &blocks_[b], blocks_[b].touched()});
+        }
+        cracks.sweep(pieces, bodies_, context_);
     }
 
     void finish() {
@@ -154,14 +198,14 @@ private:
             report_.deepest_in_matter = std::max(report_.deepest_in_matter, double(touching.deepest_in_matter));
         }
         const Stopwatch watch(report_.other_seconds);
-        for (std::size_t b = 0; b < bodies_.size(); ++b) update_velocities(b);
+        for (std::size_t b = 0; b < bodies_.size(); ++b)
+            if (!bodies_[b].is_absent) update_velocities(b);
         restore_momentum();
         for (BodyState& body : bodies_)
             if (body.rigid) fit_pose(body);
-        state_.contacts.push_out(bodies_, now_);
-        for (BodyState& body : bodies_)
-            if (std::exchange(body.was_pushed, false) && body.rigid) fit_pose(body);
+        push_out(state_, now_);
         finish_substep(state_, dt_, context_);
+        break_bodies(state_, now_, context_);
         ++report_.substeps;
     }
 
@@ -177,8 +221,9 @@ private:
     /// bodies push each other unequally. Bodies that touch nothing but each other get it back, as if they were one.
     void restore_momentum() {
         std::vector<Index> groups = state_.contacts.free_groups();
+        for (const Cracks& cracks : state_.cracks) join_parts(cracks, groups);
         for (std::size_t b = 0; b < bodies_.size(); ++b)
-            if (bodies_[b].is_held || state_.external.pull(b, now_))
+            if (bodies_[b].is_held || bodies_[b].is_absent || state_.external.pull(b, now_))
                 std::ranges::replace(groups, Index(groups[b]), kNoIndex);
         for (Index group = 0; group < bodies_.size(); ++group) {
             if (std::ranges::find(groups, group) == groups.end()) continue;
@@ -194,6 +239,16 @@ private:
                 after = together(after, rigid_state(bodies_[b]));
             }
             give_back(group, groups, before, kept, after);
+        }
+    }
+
+    /// Pieces that hang together are in one group.
+    static void join_parts(const Cracks& cracks, std::vector<Index>& groups) {
+        if (!cracks.is_open()) return;
+        const std::vector<Index> parts = cracks.parts();
+        for (std::size_t k = 0; k < parts.size(); ++k) {
+            const Index a = groups[cracks.first_piece() + k], b = groups[cracks.first_piece() + parts[k]];
+            if (a != b) std::ranges::replace(groups, Index(a == kNoIndex ? b : a), Index(a == kNoIndex ? a : b));
         }
     }
 
