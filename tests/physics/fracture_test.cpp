@@ -1,11 +1,12 @@
 // Bodies that break: what holds pieces, when it lets go, and what is kept.
 #include "filigree/core/random.h"
-#include "filigree/physics/simulation.h"
 #include "filigree/mesh/shapes.h"
+#include "filigree/physics/simulation.h"
 #include "test_bodies.h"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -273,7 +274,7 @@ TEST(Fracture, AThrownCubeBreaksAndItsPiecesLieOnTheGround) {
     }
     EXPECT_GT(simulation.fracture(0).parts, 3u);
     EXPECT_GT(least, -0.63);                          // the ground is at -0.6
-    EXPECT_LT(simulation.energy(context).kinetic, 2); // of 216 J
+    EXPECT_LT(simulation.energy(context).kinetic, 4); // of 216 J
 }
 
 TEST(Fracture, SavedInTheMiddleOfABreak) {
@@ -334,9 +335,10 @@ TEST(Fracture, DescentBreaksToo) {
         const auto body = std::make_shared<Body>(*block.body);
         body->material = material;
         Simulation simulation =
-            Simulation::create(empty_world(), {{.body = body, .fracture = fracture_of(body, halves({0.02, 0, 0}, {1, 0.2, 0.1}), 1e4, 5)}},
-                               {.frames_per_second = 200, .mode = StepMode::descent, .contacts_within_bodies = false},
-                               context)
+            Simulation::create(
+                empty_world(),
+                {{.body = body, .fracture = fracture_of(body, halves({0.02, 0, 0}, {1, 0.2, 0.1}), 1e4, 5)}},
+                {.frames_per_second = 200, .mode = StepMode::descent, .contacts_within_bodies = false}, context)
                 .value();
         ASSERT_TRUE(simulation.set_velocities(0, block.velocities).ok());
         const Momentum before = simulation.momentum();
@@ -379,14 +381,13 @@ double notched_strength(double spacing, double degrees, double offset, double en
         world.pins[side].motion.move.times = {0, 100};
         world.pins[side].motion.move.values = {Vec3d::Zero(), (side ? 50 : -50) * speed * along};
     }
-    Simulation simulation =
-        Simulation::create(world, {{.body = body, .fracture = fracture}},
-                           {.frames_per_second = 100,
-                            .mode = StepMode::explicit_steps,
-                            .contacts_between_bodies = false,
-                            .contacts_within_bodies = false},
-                           context)
-            .value();
+    Simulation simulation = Simulation::create(world, {{.body = body, .fracture = fracture}},
+                                               {.frames_per_second = 100,
+                                                .mode = StepMode::explicit_steps,
+                                                .contacts_between_bodies = false,
+                                                .contacts_within_bodies = false},
+                                               context)
+                                .value();
     double most = 0;
     while (simulation.fracture(0).parts == 1 && simulation.time() < 4) {
         EXPECT_TRUE(simulation.advance(context).ok());
@@ -397,13 +398,20 @@ double notched_strength(double spacing, double degrees, double offset, double en
     return most;
 }
 
-TEST(Fracture, ANotchedPlateBreaksAtTheSameLoadOnAnyLattice) {
-    // K = 1.66 sqrt(pi a) stress for a / W = 0.3 [Tada 1985].
-    for (const double spacing : {1.0 / 8, 1.0 / 16, 1.0 / 32, 1.0/64})
-        for (const double offset : {0.5, 0.2})
-        printf("h 1/%g offset %g: %g\n", 1 / spacing, offset, notched_strength(spacing, 0, offset, 10));
-    for (const double degrees : {0.0, 15.0, 30.0, 45.0})
-        printf("angle %g: %g\n", degrees, notched_strength(1.0 / 16, degrees, 0.3, 10));
+TEST(Fracture, ANotchedPlateBreaksAtTheSameLoadOnFinerLattices) {
+    std::vector<double> loads;
+    for (const double spacing : {1.0 / 8, 1.0 / 16, 1.0 / 32, 1.0 / 64})
+        loads.push_back(notched_strength(spacing, 0, 0.5, 10));
+    const auto [least, most] = std::ranges::minmax(loads);
+    EXPECT_LT((most - least) / (most + least), 0.15); // about the middle
+}
+
+TEST(Fracture, ANotchedPlateBreaksAtTheSameLoadOnTurnedLattices) {
+    for (const double spacing : {1.0 / 16, 1.0 / 32}) {
+        const double straight = notched_strength(spacing, 0, 0.3, 10);
+        for (const double degrees : {15.0, 30.0, 45.0})
+            EXPECT_NEAR(notched_strength(spacing, degrees, 0.3, 10), straight, 0.25 * straight) << degrees;
+    }
 }
 
 } // namespace

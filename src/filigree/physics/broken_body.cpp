@@ -164,8 +164,9 @@ private:
             const auto& [cell, a, b] = key;
             const float length = sum.vector.norm();
             if (!(length > 0.05f * sum.area)) continue; // folded onto itself
-            result_.facets.push_back({{a, b}, {kNoIndex, kNoIndex}, cell, sum.vector / length, sum.area});
-            facet_corners_.push_back(sum.at_corner);
+            CrackFacet& facet = result_.facets.emplace_back(
+                CrackFacet{{a, b}, {kNoIndex, kNoIndex}, cell, sum.vector / length, sum.area, sum.at_corner, {}});
+            for (float& share : facet.shares) share /= sum.area;
         }
     }
 
@@ -326,13 +327,18 @@ private:
             const CrackFacet& facet = result_.facets[f];
             for (int n = 0; n < 8; ++n) {
                 Sum& sum = sums[{whole_.cells.cell_corners[facet.cell][n], facet.pieces[0], facet.pieces[1]}];
-                sum.area += facet_corners_[f][n];
+                sum.area += facet.area * facet.shares[n];
                 sum.facets.push_back(f);
             }
         }
         join_specks(sums);
         for (const auto& [key, sum] : sums) {
             const auto& [corner, a, b] = key;
+            for (const Index f : sum.facets)
+                for (int n = 0; n < 8; ++n)
+                    if (result_.facets[f].pieces == std::array{a, b} &&
+                        whole_.cells.cell_corners[result_.facets[f].cell][n] == corner)
+                        result_.facets[f].links[n] = Index(result_.links.size());
             result_.links.push_back({{a, b}, {copy_at(corner, a), copy_at(corner, b)}, corner, sum.area});
             auto& rows = result_.facets_of_link;
             rows.values.insert(rows.values.end(), sum.facets.begin(), sum.facets.end());
@@ -421,7 +427,6 @@ private:
     std::vector<Shares> shares_; ///< of each cell of the whole, by the partition's numbers
     std::vector<PieceGrid::Region> regions_;
     std::vector<std::vector<Triangle>> inner_triangles_; ///< of each region: those inside the body
-    std::vector<std::array<float, 8>> facet_corners_;    ///< m^2: each facet's area, shared out to its cell's corners
     std::vector<std::vector<Index>> points_of_piece_;    ///< of the whole's surface, by number
     std::vector<std::vector<Index>> whole_cells_;        ///< of each piece
 };

@@ -21,6 +21,8 @@ struct CrackFacet {
     Index cell;                  ///< of the whole body
     Vec3f normal;                ///< unit, at rest, from the first piece to the second
     float area;                  ///< m^2, inside the body
+    std::array<float, 8> shares; ///< of the area at the cell's corners; they sum to 1
+    std::array<Index, 8> links;  ///< at those corners
 };
 
 /// What holds two pieces' copies of one corner together.

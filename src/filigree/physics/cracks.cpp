@@ -15,6 +15,7 @@ using namespace crack_law;
 namespace {
 
 constexpr std::size_t kCrackGrain = 256, kSweptGrain = 64;
+constexpr float kLeastHeld = 0.05f;  ///< part of a facet that counts as holding
 constexpr float kOpeningStep = 0.1f; ///< of the last opening that a crack may widen in a substep
 
 /// The mean deformation gradient of a cell.
@@ -70,6 +71,20 @@ Cracks::Stress Cracks::stress(const CrackFacet& facet, std::span<const BodyState
                 fractions[side] / (fractions[0] + fractions[1]));
     }
     return sum;
+}
+
+/// Part of a facet's area that still holds: what it carries goes through that.
+float Cracks::held_part(const CrackFacet& facet) const {
+    float part = 0;
+    for (int n = 0; n < 8; ++n) {
+        const LinkState& link = links_[facet.links[n]];
+        if (link.phase == LinkState::tied)
+            part += facet.shares[n];
+        else if (link.phase == LinkState::coming_apart)
+            part += facet.shares[n] *
+                    (1 - link.cohesion.opening / link.cohesion.last_opening(float(fracture_->material.energy)));
+    }
+    return part;
 }
 
 float Cracks::strength(Index link) const {
@@ -140,7 +155,10 @@ bool Cracks::let_specks_go(double time) {
 bool Cracks::open_links(std::span<const BodyState> bodies, double time, const RunContext& context) {
     std::vector<Stress> stresses(body().facets.size());
     parallel_for(context, stresses.size(), kCrackGrain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t f = begin; f < end; ++f) stresses[f] = stress(body().facets[f], bodies);
+        for (std::size_t f = begin; f < end; ++f) {
+            stresses[f] = stress(body().facets[f], bodies);
+            stresses[f].traction /= std::max(held_part(body().facets[f]), kLeastHeld);
+        }
     });
     std::vector<Vec3f> pulls(links_.size(), Vec3f::Zero());
     parallel_for(context, links_.size(), kCrackGrain, [&](std::size_t begin, std::size_t end) {

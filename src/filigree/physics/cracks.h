@@ -84,6 +84,7 @@ private:
     BodyState& state(std::span<BodyState> bodies, Index piece) const { return bodies[first_ + piece]; }
     const BodyState& state(std::span<const BodyState> bodies, Index piece) const { return bodies[first_ + piece]; }
     Stress stress(const CrackFacet& facet, std::span<const BodyState> bodies) const;
+    float held_part(const CrackFacet& facet) const;
     float strength(Index link) const;
     Vec3f between(Index link, std::span<const BodyState> bodies) const;
     float stiffest(Index link, std::span<const BodyState> bodies) const;
