@@ -2,6 +2,7 @@
 
 #include "filigree/core/random.h"
 #include "filigree/physics/cell_boxes.h"
+#include "filigree/physics/own_cells.h"
 #include "physics/test_bodies.h"
 
 #include <gtest/gtest.h>
@@ -318,7 +319,7 @@ TEST(Matter, FindsThePlaceOfAPoint) {
             {float(random_unit(1, 4 * n + 1)), float(random_unit(1, 4 * n + 2)), float(random_unit(1, 4 * n + 3))}};
         const Vec3f point = matter.mean(truth, positions);
         const CellBoxes boxes(matter, positions, 0.01f);
-        Matter::Place found{boxes.find(point, kNoIndex)};
+        Matter::Place found{boxes.find(point)};
         ASSERT_NE(found.cell, kNoIndex);
         Mat3f inverse;
         ASSERT_TRUE(matter.locate(positions, point, found, inverse));
@@ -334,7 +335,7 @@ TEST(Matter, KnowsDepthAndDirectionInABodyThatTurnedAndStretched) {
     for (std::size_t i = 0; i < positions.size(); ++i)
         positions.set(i, turn * Vec3f(1.5f * positions.x[i], positions.y[i], positions.z[i]));
     const Vec3f point = turn * Vec3f(0.4f, 0, 0);
-    Matter::Place place{CellBoxes(matter, positions, 0).find(point, kNoIndex)};
+    Matter::Place place{CellBoxes(matter, positions, 0).find(point)};
     Mat3f inverse;
     ASSERT_TRUE(matter.locate(positions, point, place, inverse));
     const auto depth = matter.depth(place, inverse, Vec3f::Zero());
@@ -353,6 +354,28 @@ TEST(Matter, CellsAcrossAGapAreNotTogether) {
     EXPECT_FALSE(matter.are_together(cell(0, 10), cell(0, 7)));
 }
 
+/// The cell that holds a point or the nearest within reach, of those that count.
+template <class Counts>
+Index nearest_cell(const Body& body, const Vectors& positions, const Vec3f& point, float reach, const Counts& counts) {
+    Index best = kNoIndex;
+    float least = 1e9f;
+    for (Index c = 0; c < body.cells.cells.size(); ++c) {
+        if (!counts(c)) continue;
+        Vec3f low = Vec3f::Constant(1e9f), high = -low, middle = Vec3f::Zero();
+        for (const Index corner : body.cells.cell_corners[c]) {
+            low = low.cwiseMin(positions[corner]);
+            high = high.cwiseMax(positions[corner]);
+            middle += positions[corner] / 8;
+        }
+        if (((point - low).array() < -reach).any() || ((point - high).array() > reach).any()) continue;
+        if (const float away = (middle - point).squaredNorm(); away < least) {
+            least = away;
+            best = c;
+        }
+    }
+    return best;
+}
+
 TEST(CellBoxes, FindsWhatBruteForceFinds) {
     const Body body = make_body(fork(), rubber());
     const Matter matter(body);
@@ -361,30 +384,47 @@ TEST(CellBoxes, FindsWhatBruteForceFinds) {
     const CellBoxes boxes(matter, positions, reach);
     std::size_t hits = 0;
     for (std::uint64_t n = 0; n < 2000; ++n) {
-        const Vec3f point(float(1.6 * random_unit(2, 4 * n) - 0.6), float(1.6 * random_unit(2, 4 * n + 1) - 0.2),
-                          float(0.8 * random_unit(2, 4 * n + 2) - 0.4));
-        const bool own = n % 2;
-        const Index apart = own ? Index(random_unit(2, 4 * n + 3) * double(body.cells.cells.size())) : kNoIndex;
-        Index best = kNoIndex;
-        float least = 1e9f;
-        for (Index c = 0; c < body.cells.cells.size(); ++c) {
-            Vec3f low = Vec3f::Constant(1e9f), high = -low, middle = Vec3f::Zero();
-            for (const Index corner : body.cells.cell_corners[c]) {
-                low = low.cwiseMin(positions[corner]);
-                high = high.cwiseMax(positions[corner]);
-                middle += positions[corner] / 8;
-            }
-            if (own && matter.are_together(apart, c)) continue;
-            if (((point - low).array() < -reach).any() || ((point - high).array() > reach).any()) continue;
-            if (const float away = (middle - point).squaredNorm(); away < least) {
-                least = away;
-                best = c;
-            }
-        }
-        EXPECT_EQ(boxes.find(point, apart), best) << n;
+        const Vec3f point(float(1.6 * random_unit(2, 3 * n) - 0.6), float(1.6 * random_unit(2, 3 * n + 1) - 0.2),
+                          float(0.8 * random_unit(2, 3 * n + 2) - 0.4));
+        const Index best = nearest_cell(body, positions, point, reach, [](Index) { return true; });
+        EXPECT_EQ(boxes.find(point), best) << n;
         hits += best != kNoIndex;
     }
     EXPECT_GT(hits, 200u);
+}
+
+// A fork whose arms are pressed together, and a long bar that is rolled up through itself.
+TEST(OwnCells, FindWhatBruteForceFinds) {
+    const float reach = 0.03f;
+    const auto compare = [&](const Body& body, const Vectors& positions) {
+        const Matter matter(body);
+        const OwnCells cells(matter);
+        const std::vector<Index> found = cells.find(positions, reach, RunContext(2));
+        std::size_t hits = 0;
+        for (Index s = 0; s < found.size(); ++s) {
+            const Vec3f point = embedded_point(body.surface.points, s, positions);
+            const Index own = matter.cell_of_point(s);
+            const Index best =
+                nearest_cell(body, positions, point, reach, [&](Index cell) { return cells.are_far(own, cell); });
+            EXPECT_EQ(found[s], best) << s;
+            hits += best != kNoIndex;
+        }
+        return hits;
+    };
+    const Body arms = make_body(fork(), rubber());
+    Vectors pressed = arms.rest;
+    for (std::size_t i = 0; i < pressed.size(); ++i)
+        if (pressed.y[i] > 0.3f) pressed.x[i] -= 0.2f * std::copysign(pressed.y[i] - 0.3f, pressed.x[i]);
+    EXPECT_GT(compare(arms, pressed), 50u);
+    EXPECT_EQ(compare(arms, arms.rest), 0u);
+
+    const Body bar = make_body(box_cells(60, 3, 3, 0.1), rubber());
+    Vectors rolled = bar.rest;
+    for (std::size_t i = 0; i < rolled.size(); ++i) {
+        const float angle = 1.3f * rolled.x[i], radius = 0.7f + rolled.y[i] + 0.01f * rolled.x[i];
+        rolled.set(i, {radius * std::cos(angle), radius * std::sin(angle), rolled.z[i]});
+    }
+    EXPECT_GT(compare(bar, rolled), 200u);
 }
 
 } // namespace

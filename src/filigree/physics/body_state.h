@@ -35,7 +35,7 @@ struct BodyState {
     float rest_squared_frequency = 0; ///< ElasticReport::squared_frequency at rest
     bool is_held = false;             ///< by pins, forces or wind: not left to itself
     std::optional<RigidPose> rigid;   ///< of a rigid body
-    bool was_pushed = false;          ///< particles were moved one by one, and a rigid body's pose has to follow
+    float pushed_way = 0; ///< m that particles were moved one by one, at most; a rigid body's pose has to follow
     bool sleeps() const { return is_absent || (rigid && rigid->sleeps); }
 
     // Contact: points of the surface; meshfree bodies touch each other by balls just below them.
@@ -117,7 +117,7 @@ inline void push_particle(BodyState& body, Index particle, float weight, const V
     const float share = weight * body.inverse_mass[particle];
     body.positions.add(particle, share * way);
     body.velocities.add(particle, share * velocity);
-    body.was_pushed = true;
+    body.pushed_way = std::max(body.pushed_way, std::abs(share) * way.norm());
 }
 
 } // namespace filigree

@@ -71,17 +71,9 @@ CellBoxes::CellBoxes(const Matter& matter, const Vectors& positions, float reach
     for (const Extent& extent : extents_) each_box(extent, [&](std::size_t box) { ++offsets_[box + 1]; });
     for (std::size_t box = 1; box < offsets_.size(); ++box) offsets_[box] += offsets_[box - 1];
     entries_.resize(offsets_.back());
-    ranges_.resize(offsets_.size() - 1);
     std::vector<Index> next(offsets_.begin(), offsets_.end() - 1);
     for (Index c = 0; c < extents_.size(); ++c)
-        each_box(extents_[c], [&](std::size_t box) {
-            entries_[next[box]++] = {c, cells.cells[c]};
-            Range& range = ranges_[box];
-            for (int axis = 0; axis < 3; ++axis) {
-                range.least[axis] = std::min(range.least[axis], cells.cells[c][axis]);
-                range.most[axis] = std::max(range.most[axis], cells.cells[c][axis]);
-            }
-        });
+        each_box(extents_[c], [&](std::size_t box) { entries_[next[box]++] = c; });
 }
 
 Index CellBoxes::find_rigid(const Vec3f& point) const {
@@ -91,7 +83,7 @@ Index CellBoxes::find_rigid(const Vec3f& point) const {
     return matter_.body().field->at(rest).distance - matter_.body().field_radius < reach_ ? 0 : kNoIndex;
 }
 
-Index CellBoxes::find(const Vec3f& point, Index apart_from) const {
+Index CellBoxes::find(const Vec3f& point) const {
     if (matter_.is_rigid()) return find_rigid(point);
     std::size_t box = 0;
     for (int axis = 2; axis >= 0; --axis) {
@@ -99,32 +91,15 @@ Index CellBoxes::find(const Vec3f& point, Index apart_from) const {
         if (!(at >= 0) || !(at < float(counts_[axis]))) return kNoIndex;
         box = box * counts_[axis] + std::size_t(at);
     }
-    if (apart_from == kNoIndex) return nearest(box, point, [](const Entry&) { return true; });
-    const Cells::LatticeIndex& own = matter_.body().cells.cells[apart_from];
-    const bool whole = matter_.is_whole_around(apart_from);
-    const auto is_close = [&](const Cells::LatticeIndex& at) {
-        return std::abs(int(at[0]) - own[0]) <= 2 && std::abs(int(at[1]) - own[1]) <= 2 &&
-               std::abs(int(at[2]) - own[2]) <= 2;
-    };
-    if (whole && is_close(ranges_[box].least) && is_close(ranges_[box].most)) return kNoIndex;
-    return nearest(box, point, [&](const Entry& entry) {
-        return !is_close(entry.at) || (!whole && !matter_.are_together(apart_from, entry.cell));
-    });
-}
-
-/// The cell of the box nearest to the point, of those that reach it and count.
-template <class Counts>
-Index CellBoxes::nearest(std::size_t box, const Vec3f& point, const Counts& counts) const {
     Index found = kNoIndex;
     float least = std::numeric_limits<float>::infinity();
     for (Index k = offsets_[box]; k < offsets_[box + 1]; ++k) {
-        if (!counts(entries_[k])) continue;
-        const Extent& extent = extents_[entries_[k].cell];
+        const Extent& extent = extents_[entries_[k]];
         if ((point.array() < extent.low.array()).any() || (point.array() > extent.high.array()).any()) continue;
         const float away = (extent.centre - point).squaredNorm();
         if (away >= least) continue;
         least = away;
-        found = entries_[k].cell;
+        found = entries_[k];
     }
     return found;
 }

@@ -11,15 +11,11 @@ public:
     /// reach: m, that points may still move before they are looked for again.
     CellBoxes(const Matter& matter, const Vectors& positions, float reach);
 
-    /// The cell that holds the point, or the nearest within reach; kNoIndex where there is none. apart_from: a cell of
-    /// the same body; what is one piece of matter with it does not count. kNoIndex: everything counts.
-    Index find(const Vec3f& point, Index apart_from) const;
+    /// The cell that holds the point, or the nearest within reach; kNoIndex where there is none.
+    Index find(const Vec3f& point) const;
 
 private:
-    struct Entry;
     Index find_rigid(const Vec3f& point) const;
-    template <class Counts>
-    Index nearest(std::size_t box, const Vec3f& point, const Counts& counts) const;
 
     const Matter& matter_;
     Mat3f inverse_ = Mat3f::Zero(); ///< of a rigid body: from the world to its cell 0
@@ -29,19 +25,11 @@ private:
     Vec3f low_ = Vec3f::Zero();
     float step_ = 1;
     std::array<int, 3> counts_{0, 0, 0};
-    struct Entry {
-        Index cell;
-        Cells::LatticeIndex at;
-    };
-    struct Range {
-        Cells::LatticeIndex least = {65535, 65535, 65535}, most = {0, 0, 0};
-    };
     struct Extent {
         Vec3f low, high, centre;
     };
     std::vector<Index> offsets_;
-    std::vector<Entry> entries_;  ///< of each box: cells that reach into it
-    std::vector<Range> ranges_;   ///< of their lattice indices
+    std::vector<Index> entries_;  ///< of each box: cells that reach into it
     std::vector<Extent> extents_; ///< of each cell, `reach` wider than it is
 };
 

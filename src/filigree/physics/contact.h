@@ -33,17 +33,32 @@ public:
     /// bodies.
     struct Search {
         double time;                      ///< s
-        float travelled;                  ///< m, bound on how far anything has moved since `begin_anew`, with obstacles
         float obstacle_reach, pair_reach; ///< m
-        double left, frame;               ///< s, of the frame
+        double frame;                     ///< s: for about so long what is found is to hold
     };
     void search(std::span<BodyState> bodies, const Search& search, const RunContext& context);
-    /// Positions have changed by dt times velocities.
-    void travel(std::span<const BodyState> bodies, float dt) { matter_.travel(bodies, dt); }
+    /// Before a frame of explicit steps.
+    void begin_frame(std::span<const BodyState> bodies) {
+        pairs_until_ = -1;
+        matter_.begin_frame(bodies);
+    }
+    /// Positions have changed by dt times velocities. way: m, bound on how far anything has gone, with obstacles.
+    void travel(std::span<const BodyState> bodies, float dt, float way) {
+        near_way_ += way;
+        pairs_way_ += way;
+        matter_.travel(bodies, dt);
+    }
+    /// A body's particles were moved by so much, m, beside their velocities.
+    void was_moved(std::size_t body, float way) {
+        near_way_ += way;
+        pairs_way_ += way;
+        matter_.was_moved(body, way);
+    }
     /// s: in longer steps something could pass through something.
     double longest_step() const { return matter_.longest_step(); }
-    /// The same before anything was searched for; begin_anew comes next.
+    /// The same before anything is searched for, of all that is found anew: before a substep of descent.
     double longest_step_from(std::span<const BodyState> bodies, double left) {
+        near_until_ = pairs_until_ = -1;
         matter_.find_approaching(bodies, left);
         return matter_.longest_step();
     }
@@ -54,10 +69,9 @@ public:
     }
     void clear_touches() { touched_.assign(touched_.size(), 0); }
 
-    /// Adds the forces of what touches now to the bodies' forces, and lets friction's anchors slide. travelled: as
-    /// above. dt: of the substep.
-    ContactReport add_forces(std::span<BodyState> bodies, double time, float travelled, float dt,
-                             const RunContext& context);
+    /// Adds the forces of what touches now to the bodies' forces, and lets friction's anchors slide. dt: of the
+    /// substep.
+    ContactReport add_forces(std::span<BodyState> bodies, double time, float dt, const RunContext& context);
 
     /// Moves what is deeper than a part of the spacing out, and takes its speed inwards away: for impacts faster than
     /// the penalty can stop. Looks at what the last add_forces or update_anchors found.
@@ -127,26 +141,28 @@ public:
     /// momentum. kNoIndex: of bodies that touch an obstacle, or others that do.
     std::vector<Index> free_groups() const;
 
-    /// Where friction holds a surface point on an obstacle, in the obstacle's own axes.
-    struct Anchor {
-        Index body, obstacle, point, slides;
-        Vec3f place;
+    /// A surface point near an obstacle, and where friction holds it in the obstacle's own axes.
+    struct NearMemory {
+        Index body, obstacle, point;
+        std::uint32_t flags; ///< 1: holds, 2: slides
+        float clear_until;
+        Vec3f anchor;
     };
     /// All that contacts remember.
     struct Memory {
-        std::vector<Anchor> anchors;                ///< ascending by body, obstacle and point
-        std::vector<MatterContacts::Memory> matter; ///< ascending by bodies and point
-        std::vector<std::uint8_t> recovering;       ///< one a body
+        std::vector<NearMemory> near; ///< ascending by body, obstacle and point
+        float near_way = 0, near_until = -1;
+        MatterContacts::Memory matter;
     };
     Memory memory() const;
-    /// Instead of what there is; begin_anew comes next. False, and nothing changed, where it is not of these bodies.
+    /// Instead of what there is. False, and nothing changed, where it is not of these bodies.
     bool set_memory(const Memory& memory, std::span<const BodyState> bodies);
 
 private:
     /// A surface point near an obstacle.
     struct Near {
         Index obstacle, point;
-        float clear_until = 0; ///< `travelled` until which this cannot touch
+        float clear_until = 0; ///< near_way_ until which this cannot touch
         float depth = 0;       ///< now
         contact_law::Grasp grasp;
         Vec3f anchor = Vec3f::Zero();
@@ -154,23 +170,23 @@ private:
     /// Two balls of different bodies near each other.
     struct NearPair {
         Index first_body, first, second_body, second;
-        float clear_until; ///< as above; both bodies travel
+        float clear_until; ///< pairs_way_ until which these cannot touch; both bodies travel
         PairContact law;
     };
     Blocks::Entry block_of(const Near& at, const BodyState& body, const ObstaclePoses& poses, float dt) const;
     Blocks::Entry block_of(const BodyState& body, Index point, const BodyState& other, Index other_point,
                            const PairContact& law, float dt) const;
-    Vec3f obstacle_force(Near& at, const BodyState& body, const ObstaclePoses& poses, float travelled, float dt) const;
-    Vec3f pair_force(NearPair& pair, std::span<const BodyState> bodies, float travelled, float dt) const;
-    void find_near(std::span<const BodyState> bodies, double time, float travelled, float reach,
-                   const RunContext& context);
-    void find_pairs(std::span<const BodyState> bodies, float travelled, float reach, const RunContext& context);
+    Vec3f obstacle_force(Near& at, const BodyState& body, const ObstaclePoses& poses, float dt) const;
+    Vec3f pair_force(NearPair& pair, std::span<const BodyState> bodies, float dt) const;
+    void find_near(std::span<const BodyState> bodies, double time, float reach, const RunContext& context);
+    void find_pairs(std::span<const BodyState> bodies, float reach, const RunContext& context);
 
     const World& world_;
     bool between_bodies_;
     std::vector<std::vector<Near>> near_; ///< by body, ascending by obstacle and point
     std::vector<NearPair> pairs_;
-    float near_until_ = -1, pairs_until_ = -1; ///< `travelled` until which they hold
+    float near_way_ = 0, pairs_way_ = 0;       ///< m that anything may have gone since they were found ...
+    float near_until_ = -1, pairs_until_ = -1; ///< ... and may go before they hold no more
     static constexpr std::uint8_t kOnObstacle = 1, kInMatter = MatterContacts::kTouched;
     std::vector<std::uint8_t> touched_; ///< of each body
     MatterContacts matter_;

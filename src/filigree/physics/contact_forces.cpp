@@ -43,17 +43,16 @@ std::vector<float> surface_stiffness(const Body& body, float rest_squared_freque
 }
 
 /// The force on a surface point; lets friction's anchor begin, slide and end.
-Vec3f Contacts::obstacle_force(Near& at, const BodyState& body, const ObstaclePoses& poses, float travelled,
-                               float dt) const {
+Vec3f Contacts::obstacle_force(Near& at, const BodyState& body, const ObstaclePoses& poses, float dt) const {
     at.depth = 0;
-    if (at.clear_until > travelled) {
+    if (at.clear_until > near_way_) {
         at.grasp = {};
         return Vec3f::Zero();
     }
     const Obstacle& obstacle = world_.obstacles[at.obstacle];
     const Vec3f place = embedded_point(body.surface, at.point, body.positions);
     const DistanceField::Sample surface = distance_to(obstacle, poses.at(at.obstacle), place);
-    at.clear_until = travelled + surface.distance;
+    at.clear_until = near_way_ + surface.distance;
     if (!(surface.distance < 0)) {
         at.grasp = {};
         return Vec3f::Zero();
@@ -75,13 +74,13 @@ Vec3f Contacts::obstacle_force(Near& at, const BodyState& body, const ObstaclePo
 }
 
 /// The force on the pair's first ball; minus it is that on the second.
-Vec3f Contacts::pair_force(NearPair& pair, std::span<const BodyState> bodies, float travelled, float dt) const {
-    if (pair.clear_until > travelled) return Vec3f::Zero();
+Vec3f Contacts::pair_force(NearPair& pair, std::span<const BodyState> bodies, float dt) const {
+    if (pair.clear_until > pairs_way_) return Vec3f::Zero();
     const BodyState &a = bodies[pair.first_body], &b = bodies[pair.second_body];
     const Vec3f between =
         embedded_point(a.balls, pair.first, a.positions) - embedded_point(b.balls, pair.second, b.positions);
     const float distance = between.norm(), depth = a.ball_radius + b.ball_radius - distance;
-    pair.clear_until = travelled - depth / 2;
+    pair.clear_until = pairs_way_ - depth / 2;
     if (!(depth > 0 && distance > 0)) return Vec3f::Zero();
     const Vec3f normal = between / distance;
     const Vec3f velocity =
@@ -93,8 +92,7 @@ Vec3f Contacts::pair_force(NearPair& pair, std::span<const BodyState> bodies, fl
     return push * normal + held;
 }
 
-ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, float travelled, float dt,
-                                   const RunContext& context) {
+ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, float dt, const RunContext& context) {
     ContactReport report;
     const ObstaclePoses poses(world_, time);
     std::vector<Vec3f> forces;
@@ -105,7 +103,7 @@ ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, flo
         if (body.sleeps()) continue;
         forces.assign(near.size(), Vec3f::Zero());
         parallel_for(context, near.size(), kContactForcesGrain, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t k = begin; k < end; ++k) forces[k] = obstacle_force(near[k], body, poses, travelled, dt);
+            for (std::size_t k = begin; k < end; ++k) forces[k] = obstacle_force(near[k], body, poses, dt);
         });
         for (std::size_t k = 0; k < near.size(); ++k) {
             if (!(near[k].depth > 0)) continue;
@@ -117,7 +115,7 @@ ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, flo
     }
     forces.assign(pairs_.size(), Vec3f::Zero());
     parallel_for(context, pairs_.size(), kContactForcesGrain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t k = begin; k < end; ++k) forces[k] = pair_force(pairs_[k], bodies, travelled, dt);
+        for (std::size_t k = begin; k < end; ++k) forces[k] = pair_force(pairs_[k], bodies, dt);
     });
     for (std::size_t k = 0; k < pairs_.size(); ++k) {
         if (forces[k].isZero(0)) continue;

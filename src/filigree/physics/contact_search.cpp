@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace filigree {
 
@@ -15,19 +16,20 @@ constexpr std::size_t kContactSearchGrain = 256;
 } // namespace
 
 void Contacts::search(std::span<BodyState> bodies, const Search& search, const RunContext& context) {
-    if (matter_.search(bodies, search.left, search.frame, context)) near_until_ = -1; // what woke has nothing near yet
-    if (search.travelled > near_until_ && !world_.obstacles.empty()) {
-        find_near(bodies, search.time, search.travelled, search.obstacle_reach, context);
-        near_until_ = search.travelled + search.obstacle_reach;
+    if (matter_.search(bodies, search.frame, context)) near_until_ = -1; // what woke has nothing near yet
+    if (near_way_ > near_until_ && !world_.obstacles.empty()) {
+        find_near(bodies, search.time, search.obstacle_reach, context);
+        near_way_ = 0;
+        near_until_ = search.obstacle_reach;
     }
-    if (search.travelled > pairs_until_ && between_bodies_ && bodies.size() > 1) {
-        find_pairs(bodies, search.travelled, search.pair_reach, context);
-        pairs_until_ = search.travelled + search.pair_reach;
+    if (pairs_way_ > pairs_until_ && between_bodies_ && bodies.size() > 1) {
+        find_pairs(bodies, search.pair_reach, context);
+        pairs_way_ = 0;
+        pairs_until_ = search.pair_reach;
     }
 }
 
-void Contacts::find_near(std::span<const BodyState> bodies, double time, float travelled, float reach,
-                         const RunContext& context) {
+void Contacts::find_near(std::span<const BodyState> bodies, double time, float reach, const RunContext& context) {
     const ObstaclePoses poses(world_, time);
     for (std::size_t b = 0; b < bodies.size(); ++b) {
         const BodyState& body = bodies[b];
@@ -55,14 +57,14 @@ void Contacts::find_near(std::span<const BodyState> bodies, double time, float t
                 Near& near = found.emplace_back(Near{.obstacle = Index(o), .point = s, .grasp = {}});
                 while (old != near_[b].end() && std::pair(old->obstacle, old->point) < std::pair(Index(o), s)) ++old;
                 if (old != near_[b].end() && old->obstacle == o && old->point == s) near = *old;
-                near.clear_until = travelled + distances[s];
+                near.clear_until = distances[s];
             }
         }
         near_[b] = std::move(found);
     }
 }
 
-void Contacts::find_pairs(std::span<const BodyState> bodies, float travelled, float reach, const RunContext& context) {
+void Contacts::find_pairs(std::span<const BodyState> bodies, float reach, const RunContext& context) {
     pairs_.clear();
     if (std::ranges::none_of(bodies, &BodyState::has_balls)) return;
     std::vector<Box> boxes(bodies.size());
@@ -110,34 +112,40 @@ void Contacts::find_pairs(std::span<const BodyState> bodies, float travelled, fl
                         for (; at != grid.end() && at->first <= Key{i, j, key[2] + 1}; ++at)
                             if (const float gap = (balls[b][at->second] - balls[a][s]).norm() - far + 2 * reach;
                                 gap < 2 * reach)
-                                pairs_.push_back({Index(a), s, Index(b), at->second, travelled + gap / 2, law});
+                                pairs_.push_back({Index(a), s, Index(b), at->second, gap / 2, law});
                     }
             }
         }
 }
 
 Contacts::Memory Contacts::memory() const {
-    Memory memory{{}, matter_.memories(), matter_.recovering()};
+    Memory memory{{}, near_way_, near_until_, matter_.memory()};
     for (Index b = 0; b < near_.size(); ++b)
         for (const Near& at : near_[b])
-            if (at.grasp.holds) memory.anchors.push_back({b, at.obstacle, at.point, Index(at.grasp.slides), at.anchor});
+            memory.near.push_back({b, at.obstacle, at.point, Index(at.grasp.holds) + 2 * Index(at.grasp.slides),
+                                   at.clear_until, at.anchor});
     return memory;
 }
 
 bool Contacts::set_memory(const Memory& memory, std::span<const BodyState> bodies) {
-    const bool sound =
-        memory.recovering.size() == bodies.size() &&
-        std::ranges::all_of(memory.anchors,
-                            [&](const Anchor& anchor) {
-                                return anchor.body < bodies.size() && anchor.obstacle < world_.obstacles.size() &&
-                                       anchor.point < bodies[anchor.body].surface.size();
-                            }) &&
-        std::ranges::all_of(memory.matter, [&](const auto& pair) { return matter_.is_sound(pair, bodies); });
-    if (!sound) return false;
+    const auto is_sound = [&](const NearMemory& near) {
+        return near.body < bodies.size() && near.obstacle < world_.obstacles.size() &&
+               near.point < bodies[near.body].surface.size() && near.anchor.allFinite() &&
+               std::isfinite(near.clear_until);
+    };
+    if (!std::isfinite(memory.near_way) || !std::isfinite(memory.near_until)) return false;
+    if (!std::ranges::all_of(memory.near, is_sound) || !matter_.is_sound(memory.matter, bodies)) return false;
     for (std::vector<Near>& near : near_) near.clear();
-    for (const Anchor& anchor : memory.anchors)
-        near_[anchor.body].push_back({anchor.obstacle, anchor.point, 0, 0, {true, anchor.slides != 0}, anchor.place});
-    matter_.set_memories(memory.matter, memory.recovering);
+    for (const NearMemory& near : memory.near)
+        near_[near.body].push_back({near.obstacle,
+                                    near.point,
+                                    near.clear_until,
+                                    0,
+                                    {(near.flags & 1) != 0, (near.flags & 2) != 0},
+                                    near.anchor});
+    near_way_ = memory.near_way;
+    near_until_ = memory.near_until;
+    matter_.set_memory(memory.matter, bodies);
     return true;
 }
 

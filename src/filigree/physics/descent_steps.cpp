@@ -54,13 +54,10 @@ private:
         const float speed = most_particle_speed(bodies_) + float(state_.world.gravity.norm()) * dt_;
         const float obstacles = float(obstacle_way(state_.world, bodies_, now_ - double(dt_), now_));
         const float way = 1.5f * speed * dt_ + 1.5f * obstacles, spacing = least_spacing(bodies_);
-        state_.contacts.begin_anew();
         state_.contacts.search(bodies_,
                                {.time = now_,
-                                .travelled = 0,
                                 .obstacle_reach = std::clamp(way, 0.25f * spacing, 8 * spacing),
                                 .pair_reach = std::clamp(way, 0.25f * spacing, 0.75f * spacing),
-                                .left = double(dt_),
                                 .frame = double(dt_)},
                                context_);
         frames_ = state_.contacts.matter_frames(bodies_, dt_);
@@ -304,6 +301,7 @@ void step_by_descent(SimulationState& state, double from, double until, FrameRep
         if (!DescentStep(state, next, float(next - now), report, context).run()) return;
         now = next;
     }
+    state.contacts.begin_anew(); // ways were not counted
 }
 
 } // namespace filigree

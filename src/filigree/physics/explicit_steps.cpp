@@ -54,24 +54,34 @@ public:
                           (state.options.contacts_between_bodies && state.bodies.size() > 1)) {}
 
     double run() {
+        speed_ = most_particle_speed(bodies_);
+        if (meets_anything_) state_.contacts.begin_frame(bodies_);
         find_contacts();
         const float first_dt = float(state_.frame_seconds() / state_.options.most_substeps);
         find_forces(first_dt);
-        if (repair_start(state_, elastic_, report_, context_)) find_forces(first_dt);
-        while (until_ - now_ > 1e-9 * state_.frame_seconds()) {
+        if (repair_start(state_, elastic_, report_, context_)) {
+            state_.contacts.begin_anew();
+            state_.contacts.begin_frame(bodies_);
+            find_contacts();
+            find_forces(first_dt);
+        }
+        const auto is_left = [&] { return until_ - now_ > 1e-9 * state_.frame_seconds(); };
+        while (is_left()) {
             const double steps = steps_left();
-            if (!(steps <= steps_allowed()) || context_.is_cancelled()) return now_;
+            if (!(steps <= steps_allowed()) || context_.is_cancelled()) break;
             const float dt = float((until_ - now_) / steps);
             move(dt, steps <= 1 ? until_ : now_ + double(dt));
             find_contacts();
             find_forces(dt);
             finish(dt);
             if (!break_bodies(state_, now_, context_)) continue;
-            travelled_ = 0;
+            place_rigid();
+            if (meets_anything_) state_.contacts.begin_frame(bodies_);
             find_contacts();
             find_forces(dt);
         }
-        return until_;
+        place_rigid();
+        return is_left() ? now_ : until_;
     }
 
 private:
@@ -87,31 +97,36 @@ private:
         return report_.substeps == 0 ? limit : 2.0 * limit - report_.substeps;
     }
 
+    /// Particles of rigid bodies as their poses have them after the last kick.
+    void place_rigid() {
+        for (BodyState& body : bodies_)
+            if (body.rigid && !body.sleeps()) place_particles(body);
+    }
+
     /// The first half of the kick, and the drift.
     void move(float dt, double until) {
         const Stopwatch watch(report_.other_seconds);
         kick(0.5f * dt, false);
         drift(dt);
-        if (meets_anything_) state_.contacts.travel(bodies_, dt);
         const double before = std::exchange(now_, until);
         move_pins(state_, now_, dt);
-        if (meets_anything_)
-            travelled_ += dt * most_particle_speed(bodies_) + float(obstacle_way(state_.world, bodies_, before, now_));
+        if (!meets_anything_) return;
+        speed_ = most_particle_speed(bodies_);
+        state_.contacts.travel(bodies_, dt, dt * speed_ + float(obstacle_way(state_.world, bodies_, before, now_)));
     }
 
     void find_contacts() {
         if (!meets_anything_) return;
         const Stopwatch watch(report_.contact_seconds);
-        const float speed = most_particle_speed(bodies_) + float(state_.world.gravity.norm() * state_.frame_seconds());
-        const float way = speed * float(until_ - now_) + float(obstacle_way(state_.world, bodies_, now_, until_));
+        const double frame = state_.frame_seconds();
+        const float way = (speed_ + float(state_.world.gravity.norm() * frame)) * float(frame) +
+                          float(obstacle_way(state_.world, bodies_, now_, now_ + frame));
         const float spacing = least_spacing(bodies_);
         state_.contacts.search(bodies_,
                                {.time = now_,
-                                .travelled = travelled_,
                                 .obstacle_reach = std::clamp(2 * way, 0.25f * spacing, 4 * spacing),
                                 .pair_reach = 0.5f * spacing,
-                                .left = until_ - now_,
-                                .frame = state_.frame_seconds()},
+                                .frame = frame},
                                context_);
     }
 
@@ -120,7 +135,7 @@ private:
         find_elastic_forces(dt);
         {
             const Stopwatch watch(report_.contact_seconds);
-            const ContactReport touching = state_.contacts.add_forces(bodies_, now_, travelled_, dt, context_);
+            const ContactReport touching = state_.contacts.add_forces(bodies_, now_, dt, context_);
             report_.contacts = touching.contacts;
             report_.deepest_contact = std::max(report_.deepest_contact, double(touching.deepest));
             report_.deepest_in_matter = std::max(report_.deepest_in_matter, double(touching.deepest_in_matter));
@@ -180,9 +195,7 @@ private:
             push_out(state_, now_);
         }
         const Stopwatch watch(report_.other_seconds);
-        kick(0.5f * dt, true);
-        for (BodyState& body : bodies_)
-            if (body.rigid && !body.sleeps()) place_particles(body);
+        kick(0.5f * dt, true); // rigid bodies' particles follow with the next drift, or place_rigid
         move_pins(state_, now_, dt);
         finish_substep(state_, dt, context_);
         ++report_.substeps;
@@ -233,7 +246,7 @@ private:
     FrameReport& report_;
     const RunContext& context_;
     double now_, until_;        // s
-    float travelled_ = 0;       // m, bound on any way since the frame's start
+    float speed_ = 0;           // m/s, of the fastest particle
     const bool meets_anything_; // obstacles, other bodies or parts of the same
     std::vector<ElasticReport> elastic_;
     double stable_step_ = 0; // s

@@ -59,7 +59,6 @@ Index Matter::cell_at(int i, int j, int k) const {
 void Matter::find_together() {
     const Cells& cells = body_.cells;
     together_.resize(cells.cells.size());
-    whole_around_.resize(cells.cells.size());
     for (Index c = 0; c < cells.cells.size(); ++c) {
         const auto& at = cells.cells[c];
         std::array<bool, 125> exists, reached = {};
@@ -78,7 +77,6 @@ void Matter::find_together() {
             if (near[n]) spread(n);
         for (int n = 0; n < 125; ++n)
             if (reached[n]) together_[c][n / 64] |= std::uint64_t(1) << (n % 64);
-        whole_around_[c] = reached == exists;
     }
 }
 
@@ -176,7 +174,13 @@ bool Matter::locate(const Vectors& positions, const Vec3f& point, Place& place, 
 }
 
 Mat3f Matter::inverse_derivative(const Vectors& positions, const Place& place) const {
-    if (is_rigid()) return map_cell(positions, corners(0), Vec3f::Zero()).slope.inverse();
+    if (is_rigid()) { // the derivative is the spacing times a rotation
+        const std::array<Index, 8>& corner = corners(0);
+        const Vec3f first = positions[corner[0]];
+        Mat3f inverse;
+        for (int axis = 0; axis < 3; ++axis) inverse.row(axis) = (positions[corner[1 << axis]] - first).transpose();
+        return inverse / float(body_.spacing() * body_.spacing());
+    }
     return map_cell(positions, corners(place.cell), place.local).slope.inverse();
 }
 

@@ -51,13 +51,11 @@ public:
     Vec3f rest_position(const Place& place) const; ///< m
     /// Whether two cells are the same piece of matter: one is reached from the other in two steps between neighbours.
     bool are_together(Index a, Index b) const;
-    /// Whether all cells within two steps along each axis are together with this one.
-    bool is_whole_around(Index cell) const { return whole_around_[cell]; }
+    Index cell_at(int i, int j, int k) const; ///< kNoIndex where there is none
     Index cell_of_point(std::size_t surface_point) const { return cell_of_point_[surface_point]; }
     const Body& body() const { return body_; }
 
 private:
-    Index cell_at(int i, int j, int k) const;
     std::optional<Index> neighbour(Index cell, Vec3f& local) const;
     void find_together();
     void find_cells_of_points();
@@ -66,7 +64,6 @@ private:
     std::array<int, 3> counts_{0, 0, 0};
     std::vector<Index> grid_;                            ///< cell at each lattice index, kNoIndex where there is none
     std::vector<std::array<std::uint64_t, 2>> together_; ///< of each cell: bits of the 5^3 cells around it
-    std::vector<std::uint8_t> whole_around_;
     std::vector<Index> cell_of_point_;
 };
 

@@ -6,6 +6,7 @@
 #include "filigree/physics/matter.h"
 
 #include <algorithm>
+#include <limits>
 #include <memory>
 
 namespace filigree {
@@ -17,6 +18,7 @@ struct ContactReport {
 };
 
 class CellBoxes;
+class OwnCells;
 
 /// Each surface point that lies in a cell of another body, or of a far part of its own, is pushed out along the normal
 /// of that matter's surface, and held by friction to the place in that matter where it landed. What pushes the point
@@ -34,13 +36,18 @@ public:
 
     /// The next search finds everything again; what touches is remembered.
     void begin_anew();
+    /// Before a frame: speeds, and which bodies meet themselves, as positions and velocities are now.
+    void begin_frame(std::span<const BodyState> bodies);
     /// Positions have changed by dt times velocities. Cost O(particles).
     void travel(std::span<const BodyState> bodies, float dt);
+    /// A body's particles were moved by so much, m, beside their velocities.
+    void was_moved(std::size_t body, float way);
     /// Finds which points might touch which cells, as far as what was found last does not hold any more. Sleeping
-    /// bodies that something touches wake; returns whether any did. left: s of the frame.
-    bool search(std::span<BodyState> bodies, double left, double frame, const RunContext& context);
-    /// Only which bodies are near each other, for longest_step.
-    void find_approaching(std::span<const BodyState> bodies, double left);
+    /// bodies that something touches wake; returns whether any did. frame: s, for about so long
+    /// what is found is to hold.
+    bool search(std::span<BodyState> bodies, double frame, const RunContext& context);
+    /// Begins anew, and finds only which bodies are near each other, for longest_step.
+    void find_approaching(std::span<const BodyState> bodies, double frame);
     /// Calls visit(body, other) for each two different bodies of which points touched at last.
     template <class Visit>
     void each_touching(const Visit& visit) const {
@@ -70,16 +77,25 @@ public:
         Vec3f entry = Vec3f::Zero(); ///< normal at rest on the side where the point came in; zero outside
         bool tangled = false;        ///< it did not come in from outside, and is left alone until it is out
     };
-    /// All that friction remembers: pairs that touch. In the order of sides and points.
-    struct Memory {
-        Index body, other, point, cell, anchor_cell;
-        std::uint32_t flags; ///< 1: slides, 2: tangled
+    struct PairMemory {
+        Index point, cell, anchor_cell;
+        std::uint32_t flags; ///< 1: holds, 2: slides, 4: tangled
         Vec3f local, anchor_local, entry;
     };
-    std::vector<Memory> memories() const;
-    const std::vector<std::uint8_t>& recovering() const { return recovers_; }
-    void set_memories(std::span<const Memory> memories, std::vector<std::uint8_t> recovering);
+    struct SideMemory {
+        Index body, other, pairs; ///< how many
+        float way, until, since;
+    };
+    /// All that was found and what friction remembers.
+    struct Memory {
+        float way = 0, until = -1;     ///< of find_sides
+        std::vector<SideMemory> sides; ///< ascending by bodies
+        std::vector<PairMemory> pairs; ///< of one side after the other, ascending by point
+        std::vector<std::uint8_t> recovers;
+    };
+    Memory memory() const;
     bool is_sound(const Memory& memory, std::span<const BodyState> bodies) const;
+    void set_memory(const Memory& memory, std::span<const BodyState> bodies);
 
     /// A pair as descent sees it in a substep: the matter's frame stands still.
     struct Frame {
@@ -101,11 +117,11 @@ private:
     /// Points of one body against the matter of another, or of its own.
     struct Side {
         Index body, other;
-        float way = 0;          ///< m, bound on what either has gone beside the other
-        float until = -1;       ///< way until which the pairs hold
-        double searched_at = 0; ///< s left of the frame at the last search
-        float speed = 0;        ///< m/s, the same bound's
-        float spacing = 0;      ///< m, the smaller of both
+        float way = 0;    ///< m, bound on what either has gone beside the other since the last search
+        float until = -1; ///< way until which the pairs hold
+        float since = std::numeric_limits<float>::max(); ///< s since the last search
+        float speed = 0;                                 ///< m/s, the same bound's
+        float spacing = 0;                               ///< m, the smaller of both
         PairContact law;
         std::vector<Pair> pairs;
     };
@@ -113,16 +129,17 @@ private:
         Vec3f least = Vec3f::Zero(), most = Vec3f::Zero();
     };
     float relative_speed(Index a, Index b) const;
-    void find_pairs(Side& side, std::span<const Vec3f> points, std::span<const std::uint8_t> hidden, const Box& near,
-                    const CellBoxes& cells, const RunContext& context) const;
+    Side make_side(Index body, Index other, std::span<const BodyState> bodies) const;
+    static void take_pairs(Side& side, const BodyState& body, std::span<const Index> found);
     class Surroundings;
     static bool both_sleep(const Side& side, std::span<const BodyState> bodies) {
         return bodies[side.body].sleeps() && bodies[side.other].sleeps();
     }
-    void find_own_pairs(Side& side, const BodyState& body, float ahead, const RunContext& context) const;
-    void find_other_pairs(Side& side, Surroundings& around, double left, const RunContext& context) const;
+    void find_own_pairs(Side& side, const BodyState& body, float frame, const RunContext& context) const;
+    void find_other_pairs(Side& side, Surroundings& around, float frame, const RunContext& context) const;
     bool wake_touched(std::span<BodyState> bodies) const;
-    void find_sides(std::span<const BodyState> bodies, double left);
+    void list_work(std::span<const BodyState> bodies);
+    void find_sides(std::span<const BodyState> bodies, double frame);
     std::optional<Vec3f> enter(Pair& pair, const Side& side, std::span<const BodyState> bodies) const;
     float crushed_part(const BodyState& body, const Matter& matter) const;
     void find_recovering(std::span<const BodyState> bodies);
@@ -135,9 +152,10 @@ private:
 
     const World& world_;
     bool between_bodies_, within_bodies_;
-    std::vector<std::shared_ptr<const Matter>> matter_; ///< null: of meshfree bodies
-    std::vector<std::vector<float>> per_area_;          ///< N/m^3 in each cell of each body
-    std::vector<std::uint8_t> recovers_;                ///< of each body: 1 while it does not meet itself
+    std::vector<std::shared_ptr<const Matter>> matter_;      ///< null: of meshfree bodies
+    std::vector<std::vector<float>> per_area_;               ///< N/m^3 in each cell of each body
+    std::vector<std::shared_ptr<const OwnCells>> own_cells_; ///< null: of bodies that do not meet themselves
+    std::vector<std::uint8_t> recovers_;                     ///< of each body: 1 while it does not meet itself
     std::vector<Speeds> speeds_;
     std::vector<Side> sides_; ///< ascending by bodies
     float way_ = 0, sides_until_ = -1;

@@ -2,9 +2,11 @@
 #include "filigree/core/parallel_for.h"
 #include "filigree/physics/cell_boxes.h"
 #include "filigree/physics/matter_contact.h"
+#include "filigree/physics/own_cells.h"
 #include "filigree/physics/rigid_body.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <map>
 
@@ -15,7 +17,7 @@ namespace {
 constexpr std::size_t kMatterSearchGrain = 512;
 constexpr float kLeastReach = 0.1f;      ///< spacings that anything may go between two searches; at most kMostReach
 constexpr float kOwnReach = 0.3f;        ///< the same of a body beside itself ...
-constexpr double kOwnSearches = 3;       ///< ... which is searched no more often than this in a frame
+constexpr float kOwnSearches = 3;        ///< ... which is searched no more often than this in a frame
 constexpr float kLongestWay = 0.3f;      ///< spacings a substep that one body may go towards another
 constexpr float kCrushed = 0.05f;        ///< volume ratio below which a cell counts as crushed
 constexpr float kTooManyCrushed = 0.05f; ///< part of a body's cells
@@ -83,11 +85,15 @@ std::vector<Vec3f> surface_places(const Embedding& points, const Vectors& positi
 
 void MatterContacts::begin(std::span<const BodyState> bodies) {
     std::map<const Body*, std::shared_ptr<const Matter>> known; // pieces of one kind share theirs
+    std::map<const Matter*, std::shared_ptr<const OwnCells>> own_cells;
     for (const BodyState& state : bodies) {
         std::shared_ptr<const Matter>& matter = known[state.body.get()];
         if (!matter && state.body->field) matter = std::make_shared<Matter>(*state.body);
         matter_.push_back(matter);
         per_area_.push_back(matter ? stiffness_per_area(state) : std::vector<float>());
+        std::shared_ptr<const OwnCells>& own = own_cells[matter.get()];
+        if (matter && within_bodies_ && !state.rigid && !own) own = std::make_shared<OwnCells>(*matter);
+        own_cells_.push_back(own);
     }
     speeds_.resize(bodies.size());
     recovers_.assign(bodies.size(), 0);
@@ -99,9 +105,22 @@ void MatterContacts::begin_anew() {
     for (Side& side : sides_) {
         side.way = 0;
         side.until = -1;
-        side.searched_at = std::numeric_limits<double>::infinity();
+        side.since = std::numeric_limits<float>::max();
         for (Pair& pair : side.pairs) pair.clear_until = 0;
     }
+}
+
+void MatterContacts::begin_frame(std::span<const BodyState> bodies) {
+    travel(bodies, 0);
+    find_recovering(bodies);
+    for (Side& side : sides_)
+        for (Pair& pair : side.pairs) pair.clear_until = 0; // by speeds that may have changed
+}
+
+void MatterContacts::was_moved(std::size_t body, float way) {
+    way_ += way;
+    for (Side& side : sides_)
+        if (side.body == body || side.other == body) side.way += way;
 }
 
 /// Bound on how fast particles of two bodies, or of one, move beside each other.
@@ -143,11 +162,12 @@ void MatterContacts::travel(std::span<const BodyState> bodies, float dt) {
     for (Side& side : sides_) {
         side.speed = relative_speed(side.body, side.other);
         side.way += dt * side.speed;
+        side.since += dt;
     }
 }
 
 /// Which bodies are near each other: boxes swept along x.
-void MatterContacts::find_sides(std::span<const BodyState> bodies, double left) {
+void MatterContacts::find_sides(std::span<const BodyState> bodies, double frame) {
     std::vector<Box> boxes(bodies.size());
     float spacing = 0, speed = 0;
     std::vector<Index> order;
@@ -159,8 +179,9 @@ void MatterContacts::find_sides(std::span<const BodyState> bodies, double left) 
         spacing = std::max(spacing, float(bodies[b].body->spacing()));
         speed = std::max(speed, relative_speed(b, order.front()));
     }
-    const float reach = std::max(spacing, std::min(speed * float(left), 4 * spacing));
-    sides_until_ = way_ + reach;
+    const float reach = std::max(spacing, std::min(speed * float(frame), 4 * spacing));
+    way_ = 0;
+    sides_until_ = reach;
     const double far = double(reach + spacing);
     std::ranges::sort(order, {}, [&](Index b) { return std::pair(boxes[b].min.x(), b); });
     std::vector<std::pair<Index, Index>> found;
@@ -181,45 +202,39 @@ void MatterContacts::find_sides(std::span<const BodyState> bodies, double left) 
         if (old != sides_.end() && old->body == body && old->other == other)
             sides.push_back(std::move(*old));
         else
-            sides.push_back({.body = body, .other = other, .law = {}, .pairs = {}});
+            sides.push_back(make_side(body, other, bodies));
         sides.back().speed = relative_speed(body, other);
-        sides.back().law = world_.contact_of(bodies[body].actor, bodies[other].actor);
-        sides.back().spacing = float(std::min(bodies[body].body->spacing(), bodies[other].body->spacing()));
     }
     sides_ = std::move(sides);
 }
 
-void MatterContacts::find_approaching(std::span<const BodyState> bodies, double left) {
-    begin_anew();
-    travel(bodies, 0);
-    find_sides(bodies, left);
+MatterContacts::Side MatterContacts::make_side(Index body, Index other, std::span<const BodyState> bodies) const {
+    Side side{
+        .body = body, .other = other, .law = world_.contact_of(bodies[body].actor, bodies[other].actor), .pairs = {}};
+    side.spacing = float(std::min(bodies[body].body->spacing(), bodies[other].body->spacing()));
+    return side;
 }
 
-/// Pairs of a side anew; those that touch stay.
-void MatterContacts::find_pairs(Side& side, std::span<const Vec3f> points, std::span<const std::uint8_t> hidden,
-                                const Box& near, const CellBoxes& cells, const RunContext& context) const {
-    const bool own = side.body == side.other;
-    const Matter& matter = *matter_[side.other];
-    std::vector<Index> found(points.size());
-    const Vec3f low = near.min.cast<float>(), high = near.max.cast<float>();
-    parallel_for(context, points.size(), kMatterSearchGrain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t s = begin; s < end; ++s) {
-            const Vec3f& p = points[s];
-            const bool is_near = own || ((p.array() >= low.array()) && (p.array() <= high.array())).all();
-            found[s] = is_near && (hidden.empty() || !hidden[s])
-                           ? cells.find(p, own ? matter.cell_of_point(s) : kNoIndex)
-                           : kNoIndex;
-        }
-    });
+void MatterContacts::find_approaching(std::span<const BodyState> bodies, double frame) {
+    begin_anew();
+    begin_frame(bodies);
+    find_sides(bodies, frame);
+}
+
+/// Pairs of a side anew, and its way counts from here; those that touch stay. found: of each point, the cell it is
+/// near.
+void MatterContacts::take_pairs(Side& side, const BodyState& body, std::span<const Index> found) {
     std::vector<Pair> pairs;
     auto old = side.pairs.begin();
-    for (Index s = 0; s < points.size(); ++s) {
+    for (Index s = 0; s < found.size(); ++s) {
         while (old != side.pairs.end() && old->point < s) ++old;
         if (old != side.pairs.end() && old->point == s && (old->grasp.holds || old->tangled))
             pairs.push_back(*old);
-        else if (found[s] != kNoIndex)
-            pairs.push_back({.point = s, .place = {found[s]}, .clear_until = side.way, .grasp = {}, .anchor = {}});
+        else if (found[s] != kNoIndex && !body.is_hidden(s))
+            pairs.push_back({.point = s, .place = {found[s]}, .grasp = {}, .anchor = {}});
     }
+    for (Pair& pair : pairs) pair.clear_until -= side.way;
+    side.way = 0;
     side.pairs = std::move(pairs);
 }
 
@@ -253,7 +268,7 @@ public:
         if (points.empty()) points = surface_places(bodies_[body].surface, bodies_[body].positions, context_);
         return points;
     }
-    std::span<const std::uint8_t> hidden(Index body) const { return bodies_[body].hidden; }
+    const BodyState& body(Index body) const { return bodies_[body]; }
     const CellBoxes& cells(Index body) {
         const auto found = cells_.find(body);
         if (found != cells_.end()) return found->second;
@@ -271,53 +286,64 @@ private:
 };
 
 /// Of a body and itself: where everything will be halfway to the next search.
-void MatterContacts::find_own_pairs(Side& side, const BodyState& body, float ahead, const RunContext& context) const {
+void MatterContacts::find_own_pairs(Side& side, const BodyState& body, float frame, const RunContext& context) const {
     const float reach = kOwnReach * side.spacing;
-    side.until = side.way + reach;
-    const Vectors positions = positions_in(body, ahead);
-    find_pairs(side, surface_places(body.surface, positions, context), body.hidden, {},
-               CellBoxes(*matter_[side.other], positions, reach), context);
+    const float ahead = 0.5f * std::clamp(reach / side.speed, frame / kOwnSearches, frame);
+    side.until = reach;
+    take_pairs(side, body, own_cells_[side.body]->find(positions_in(body, ahead), reach, context));
 }
 
-void MatterContacts::find_other_pairs(Side& side, Surroundings& around, double left, const RunContext& context) const {
-    const float reach = std::clamp(side.speed * float(left), kLeastReach * side.spacing, kMostReach * side.spacing);
-    side.until = side.way + reach;
+void MatterContacts::find_other_pairs(Side& side, Surroundings& around, float frame, const RunContext& context) const {
+    const float reach = std::clamp(side.speed * frame, kLeastReach * side.spacing, kMostReach * side.spacing);
+    side.until = reach;
     const double far = double(reach + kOutside * side.spacing);
     Box near = around.extent(side.other);
     if (!are_near(around.extent(side.body), near, far)) {
         side.pairs.clear();
+        side.way = 0;
         return;
     }
     near.min.array() -= far;
     near.max.array() += far;
-    find_pairs(side, around.surface_points(side.body), around.hidden(side.body), near, around.cells(side.other),
-               context);
+    const std::span<const Vec3f> points = around.surface_points(side.body);
+    const CellBoxes& cells = around.cells(side.other);
+    const Vec3f low = near.min.cast<float>(), high = near.max.cast<float>();
+    std::vector<Index> found(points.size());
+    parallel_for(context, points.size(), kMatterSearchGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t s = begin; s < end; ++s) {
+            const Vec3f& p = points[s];
+            const bool is_near = ((p.array() >= low.array()) && (p.array() <= high.array())).all();
+            found[s] = is_near ? cells.find(p) : kNoIndex;
+        }
+    });
+    take_pairs(side, around.body(side.body), found);
 }
 
-bool MatterContacts::search(std::span<BodyState> bodies, double left, double frame, const RunContext& context) {
-    const bool anew = sides_until_ < 0;
-    if (anew) travel(bodies, 0);
+bool MatterContacts::search(std::span<BodyState> bodies, double frame, const RunContext& context) {
     bool changed = way_ > sides_until_;
-    if (changed) find_sides(bodies, left);
-    if (anew) find_recovering(bodies);
+    if (changed) find_sides(bodies, frame);
     const bool woke = wake_touched(bodies);
     Surroundings around(*this, bodies, context);
     for (Side& side : sides_) {
         if (!(side.way > side.until) || both_sleep(side, bodies)) continue;
         const bool own = side.body == side.other;
-        if (own && side.searched_at - left < frame / kOwnSearches) continue;
-        side.searched_at = left;
+        if (own && side.since < float(frame) / kOwnSearches) continue;
+        side.since = 0;
         changed = true;
         if (own)
-            find_own_pairs(side, bodies[side.body], float(0.5 * std::min(left, frame / kOwnSearches)), context);
+            find_own_pairs(side, bodies[side.body], float(frame), context);
         else
-            find_other_pairs(side, around, left, context);
+            find_other_pairs(side, around, float(frame), context);
     }
-    if (!changed && !woke) return false;
+    if (changed || woke) list_work(bodies);
+    return woke;
+}
+
+/// What forces are asked for: pairs of which something is awake.
+void MatterContacts::list_work(std::span<const BodyState> bodies) {
     work_.clear();
     for (Index i = 0; i < sides_.size(); ++i)
         for (Index p = 0; p < sides_[i].pairs.size() && !both_sleep(sides_[i], bodies); ++p) work_.emplace_back(i, p);
-    return woke;
 }
 
 double MatterContacts::longest_step() const {
@@ -350,38 +376,61 @@ void MatterContacts::find_recovering(std::span<const BodyState> bodies) {
     }
 }
 
-std::vector<MatterContacts::Memory> MatterContacts::memories() const {
-    std::vector<Memory> memories;
-    for (const Side& side : sides_)
+MatterContacts::Memory MatterContacts::memory() const {
+    Memory memory{way_, sides_until_, {}, {}, recovers_};
+    for (const Side& side : sides_) {
+        memory.sides.push_back({side.body, side.other, Index(side.pairs.size()), side.way, side.until, side.since});
         for (const Pair& pair : side.pairs)
-            if (pair.grasp.holds || pair.tangled)
-                memories.push_back({side.body, side.other, pair.point, pair.place.cell, pair.anchor.cell,
-                                    Index(pair.grasp.slides) + 2 * Index(pair.tangled), pair.place.local,
-                                    pair.anchor.local, pair.entry});
-    return memories;
+            memory.pairs.push_back({pair.point, pair.place.cell, pair.anchor.cell,
+                                    Index(pair.grasp.holds) + 2 * Index(pair.grasp.slides) + 4 * Index(pair.tangled),
+                                    pair.place.local, pair.anchor.local, pair.entry});
+    }
+    return memory;
 }
 
 bool MatterContacts::is_sound(const Memory& memory, std::span<const BodyState> bodies) const {
-    if (memory.body >= bodies.size() || memory.other >= bodies.size() || !matter_[memory.other]) return false;
-    if (!memory.local.allFinite() || !memory.anchor_local.allFinite() || !memory.entry.allFinite()) return false;
-    const std::size_t cells = bodies[memory.other].body->cells.cells.size();
-    return memory.point < bodies[memory.body].surface.size() && memory.cell < cells && memory.anchor_cell < cells;
+    if (memory.recovers.size() != bodies.size() || !std::isfinite(memory.way) || !std::isfinite(memory.until))
+        return false;
+    std::size_t from = 0;
+    const SideMemory* before = nullptr;
+    for (const SideMemory& side : memory.sides) {
+        if (side.body >= bodies.size() || side.other >= bodies.size() || !matter_[side.other]) return false;
+        if (!std::isfinite(side.way) || !std::isfinite(side.until) || !(side.since >= 0)) return false;
+        if (before && std::pair(before->body, before->other) >= std::pair(side.body, side.other)) return false;
+        before = &side;
+        if (side.pairs > memory.pairs.size() - from) return false;
+        const std::size_t points = bodies[side.body].surface.size(),
+                          cells = bodies[side.other].body->cells.cells.size();
+        for (Index k = 0; k < side.pairs; ++k, ++from) {
+            const PairMemory& pair = memory.pairs[from];
+            if (pair.point >= points || pair.cell >= cells) return false;
+            if ((pair.flags & 1) && pair.anchor_cell >= cells) return false;
+            if (!pair.local.allFinite() || !pair.anchor_local.allFinite() || !pair.entry.allFinite()) return false;
+        }
+    }
+    return from == memory.pairs.size();
 }
 
-void MatterContacts::set_memories(std::span<const Memory> memories, std::vector<std::uint8_t> recovering) {
-    recovers_ = std::move(recovering);
+void MatterContacts::set_memory(const Memory& memory, std::span<const BodyState> bodies) {
+    way_ = memory.way;
+    sides_until_ = memory.until;
+    recovers_ = memory.recovers;
     sides_.clear();
-    for (const Memory& memory : memories) {
-        if (sides_.empty() || sides_.back().body != memory.body || sides_.back().other != memory.other)
-            sides_.push_back({.body = memory.body, .other = memory.other, .law = {}, .pairs = {}});
-        sides_.back().pairs.push_back({.point = memory.point,
-                                       .place = {memory.cell, memory.local},
-                                       .grasp = {!(memory.flags & 2), (memory.flags & 1) != 0},
-                                       .anchor = {memory.anchor_cell, memory.anchor_local},
-                                       .entry = memory.entry,
-                                       .tangled = (memory.flags & 2) != 0});
+    auto from = memory.pairs.begin();
+    for (const SideMemory& saved : memory.sides) {
+        Side& side = sides_.emplace_back(make_side(saved.body, saved.other, bodies));
+        side.way = saved.way;
+        side.until = saved.until;
+        side.since = saved.since;
+        for (Index k = 0; k < saved.pairs; ++k, ++from)
+            side.pairs.push_back({.point = from->point,
+                                  .place = {from->cell, from->local},
+                                  .grasp = {(from->flags & 1) != 0, (from->flags & 2) != 0},
+                                  .anchor = {from->anchor_cell, from->anchor_local},
+                                  .entry = from->entry,
+                                  .tangled = (from->flags & 4) != 0});
     }
-    begin_anew();
+    list_work(bodies);
 }
 
 } // namespace filigree

@@ -146,10 +146,19 @@ void place_particles(BodyState& body) {
     const Vec3f spin = (turned(pose, pose.inverse_inertia) * pose.angular).cast<float>();
     const Vec3f centre = pose.centre.cast<float>(), velocity = pose.velocity.cast<float>();
     const Vec3f from = pose.rest_centre.cast<float>();
-    for (std::size_t i = 0; i < body.positions.size(); ++i) {
-        const Vec3f arm = r * (body.body->rest[i] - from);
-        body.positions.set(i, centre + arm);
-        body.velocities.set(i, velocity + spin.cross(arm));
+    const Vectors& rest = body.body->rest;
+    Vectors &x = body.positions, &v = body.velocities;
+    for (std::size_t i = 0; i < rest.size(); ++i) { // numbers alone, so that the compiler uses vectors
+        const float qx = rest.x[i] - from.x(), qy = rest.y[i] - from.y(), qz = rest.z[i] - from.z();
+        const float ax = r(0, 0) * qx + r(0, 1) * qy + r(0, 2) * qz;
+        const float ay = r(1, 0) * qx + r(1, 1) * qy + r(1, 2) * qz;
+        const float az = r(2, 0) * qx + r(2, 1) * qy + r(2, 2) * qz;
+        x.x[i] = centre.x() + ax;
+        x.y[i] = centre.y() + ay;
+        x.z[i] = centre.z() + az;
+        v.x[i] = velocity.x() + (spin.y() * az - spin.z() * ay);
+        v.y[i] = velocity.y() + (spin.z() * ax - spin.x() * az);
+        v.z[i] = velocity.z() + (spin.x() * ay - spin.y() * ax);
     }
 }
 

@@ -6,11 +6,12 @@ namespace filigree {
 
 namespace {
 
-// The name of the format, its version last. 3: with what touches bodies.
-constexpr std::uint64_t kMagic = 0x33455441'54534c46; // "FLSTATE3"
-static_assert(sizeof(Contacts::Anchor) == 4 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
+// The name of the format, its version last. 4: with what is near bodies.
+constexpr std::uint64_t kMagic = 0x34455441'54534c46; // "FLSTATE4"
+static_assert(sizeof(Contacts::NearMemory) == 5 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
+static_assert(sizeof(MatterContacts::SideMemory) == 6 * sizeof(Index), "padding would be saved");
+static_assert(sizeof(MatterContacts::PairMemory) == 4 * sizeof(Index) + 3 * sizeof(Vec3f), "padding would be saved");
 static_assert(sizeof(LinkState) == 2 * sizeof(float) + sizeof(Vec3f), "padding would be saved");
-static_assert(sizeof(MatterContacts::Memory) == 6 * sizeof(Index) + 3 * sizeof(Vec3f), "padding would be saved");
 
 void write_pose(ByteWriter& writer, const std::optional<RigidPose>& pose) {
     writer.value(std::uint64_t(pose.has_value()));
@@ -70,6 +71,30 @@ SavedBody read_body(ByteReader& reader) {
     return body;
 }
 
+void write_contacts(ByteWriter& writer, const Contacts::Memory& contacts) {
+    writer.array(std::span(contacts.near));
+    writer.value(contacts.near_way);
+    writer.value(contacts.near_until);
+    writer.value(contacts.matter.way);
+    writer.value(contacts.matter.until);
+    writer.array(std::span(contacts.matter.sides));
+    writer.array(std::span(contacts.matter.pairs));
+    writer.array(std::span(contacts.matter.recovers));
+}
+
+Contacts::Memory read_contacts(ByteReader& reader) {
+    Contacts::Memory contacts;
+    contacts.near = reader.array<Contacts::NearMemory>();
+    contacts.near_way = reader.value<float>();
+    contacts.near_until = reader.value<float>();
+    contacts.matter.way = reader.value<float>();
+    contacts.matter.until = reader.value<float>();
+    contacts.matter.sides = reader.array<MatterContacts::SideMemory>();
+    contacts.matter.pairs = reader.array<MatterContacts::PairMemory>();
+    contacts.matter.recovers = reader.array<std::uint8_t>();
+    return contacts;
+}
+
 } // namespace
 
 std::string write_saved_state(const SavedState& state) {
@@ -78,9 +103,7 @@ std::string write_saved_state(const SavedState& state) {
     writer.value(state.frame);
     writer.value(std::uint64_t(state.bodies.size()));
     for (const SavedBody& body : state.bodies) write_body(writer, body);
-    writer.array(std::span(state.contacts.anchors));
-    writer.array(std::span(state.contacts.matter));
-    writer.array(std::span(state.contacts.recovering));
+    write_contacts(writer, state.contacts);
     for (const CrackMemory& cracks : state.cracks) {
         writer.value(cracks.is_open);
         writer.array(std::span(cracks.links));
@@ -98,9 +121,7 @@ Result<SavedState> read_saved_state(std::string_view bytes) {
     state.frame = reader.value<std::uint64_t>();
     state.bodies.resize(reader.count(sizeof(std::uint64_t)));
     for (SavedBody& body : state.bodies) body = read_body(reader);
-    state.contacts.anchors = reader.array<Contacts::Anchor>();
-    state.contacts.matter = reader.array<MatterContacts::Memory>();
-    state.contacts.recovering = reader.array<std::uint8_t>();
+    state.contacts = read_contacts(reader);
     while (reader.ok() && !reader.at_end()) {
         CrackMemory& cracks = state.cracks.emplace_back();
         cracks.is_open = reader.value<std::uint32_t>();

@@ -201,7 +201,6 @@ void let_rest(SimulationState& state, double from, double until) {
 Result<FrameReport> step_frame(SimulationState& state, const SavedState& start, const RunContext& context) {
     const double from = state.time(), until = double(state.frame + 1) * state.frame_seconds();
     FrameReport report;
-    state.contacts.begin_anew();
     state.contacts.clear_touches();
     state.external.find_wind(state.bodies, from, state.options.frames_per_second, context);
 
@@ -226,7 +225,10 @@ Result<FrameReport> step_frame(SimulationState& state, const SavedState& start, 
         step_by_descent(state, reached, until, report, context);
     }
     if (context.is_cancelled()) return cancelled_error();
-    report.clamped_particles += hold_lost_particles(state);
+    if (const std::size_t held = hold_lost_particles(state)) {
+        report.clamped_particles += held;
+        state.contacts.begin_anew();
+    }
     report.most_crushed = state.bodies[report.most_crushed].actor;
     for (const Cracks& cracks : state.cracks) cracks.show_whole(state.bodies);
     let_rest(state, from, until);
@@ -297,6 +299,7 @@ Status Simulation::set_positions(std::size_t body, const Vectors& positions) {
     if (Status checked = check_vectors(body, positions, "positions"); !checked) return checked;
     state_->bodies[body].positions = positions;
     if (state_->bodies[body].rigid) fit_pose(state_->bodies[body]);
+    state_->contacts.begin_anew();
     return Success{};
 }
 Status Simulation::set_velocities(std::size_t body, const Vectors& velocities) {

@@ -118,9 +118,14 @@ bool repair_start(SimulationState& state, std::span<const ElasticReport> elastic
 void push_out(SimulationState& state, double now) {
     for (Cracks& cracks : state.cracks) cracks.remember_places(state.bodies);
     state.contacts.push_out(state.bodies, now);
-    const bool any = std::ranges::any_of(state.bodies, &BodyState::was_pushed);
-    for (BodyState& body : state.bodies)
-        if (std::exchange(body.was_pushed, false) && body.rigid) fit_pose(body);
+    bool any = false;
+    for (std::size_t b = 0; b < state.bodies.size(); ++b) {
+        BodyState& body = state.bodies[b];
+        if (!(body.pushed_way > 0)) continue;
+        any = true;
+        state.contacts.was_moved(b, std::exchange(body.pushed_way, 0.0f));
+        if (body.rigid) fit_pose(body);
+    }
     if (!any) return;
     for (const Cracks& cracks : state.cracks) cracks.rejoin(state.bodies);
 }

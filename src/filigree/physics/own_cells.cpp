@@ -1,0 +1,243 @@
+#include "filigree/physics/own_cells.h"
+
+#include "filigree/core/parallel_for.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+namespace filigree {
+
+namespace {
+
+constexpr std::size_t kOwnCellsGrain = 16;
+constexpr float kClusterBoxSize = 2.5f;                          ///< spacings
+constexpr double kMostClusterBoxes = 8, kFewClusterBoxes = 4096; ///< a cluster, and whatever their number
+
+int chebyshev(const Cells::LatticeIndex& a, const Cells::LatticeIndex& b) {
+    int most = 0;
+    for (int axis = 0; axis < 3; ++axis) most = std::max(most, std::abs(int(a[axis]) - int(b[axis])));
+    return most;
+}
+
+} // namespace
+
+OwnCells::OwnCells(const Matter& matter) : matter_(matter), points_(matter.body().surface.points) {
+    const Cells& cells = matter.body().cells;
+    std::map<Key, std::vector<Index>> by_key;
+    for (Index c = 0; c < cells.cells.size(); ++c)
+        by_key[{cells.cells[c][0] / 2, cells.cells[c][1] / 2, cells.cells[c][2] / 2}].push_back(c);
+    std::vector<std::vector<Index>> points_of(cells.cells.size());
+    const auto spacing = float(cells.spacing);
+    for (Index s = 0; s < points_.size(); ++s) {
+        const Index cell = matter.cell_of_point(s);
+        points_of[cell].push_back(s);
+        const Vec3f middle = matter.rest_position({cell, Vec3f::Constant(0.5f)});
+        overhang_ = std::max(overhang_, (points_.rest[s] - middle).cwiseAbs().maxCoeff() - 0.5f * spacing);
+    }
+    for (const auto& [at, members] : by_key) {
+        clusters_.push_back({at, 0, Index(cells_.size()), Index(corners_.size()), Index(surface_points_.size())});
+        std::vector<Index> corners;
+        for (const Index cell : members) {
+            cells_.push_back(cell);
+            corners.insert(corners.end(), cells.cell_corners[cell].begin(), cells.cell_corners[cell].end());
+            surface_points_.insert(surface_points_.end(), points_of[cell].begin(), points_of[cell].end());
+        }
+        std::ranges::sort(corners);
+        corners.erase(std::ranges::unique(corners).begin(), corners.end());
+        corners_.insert(corners_.end(), corners.begin(), corners.end());
+    }
+    clusters_.push_back({{}, 0, Index(cells_.size()), Index(corners_.size()), Index(surface_points_.size())});
+
+    auto cluster = clusters_.begin();
+    for (const auto& [at, members] : by_key) {
+        for (int n = 0; n < 27; ++n) {
+            const auto other = by_key.find({at[0] + n % 3 - 1, at[1] + n / 3 % 3 - 1, at[2] + n / 9 - 1});
+            if (other == by_key.end()) continue;
+            for (const Index cell : members)
+                if (std::ranges::any_of(other->second, [&](Index its) { return are_far(cell, its); }))
+                    cluster->far_near |= 1u << n;
+        }
+        ++cluster;
+    }
+}
+
+/// Which of the 3^3 clusters around a cluster is b; -1: none.
+int OwnCells::neighbour(Index a, Index b) const {
+    const Key &from = clusters_[a].at, &to = clusters_[b].at;
+    const int i = to[0] - from[0] + 1, j = to[1] - from[1] + 1, k = to[2] - from[2] + 1;
+    return std::min({i, j, k}) < 0 || std::max({i, j, k}) > 2 ? -1 : i + 3 * j + 9 * k;
+}
+
+bool OwnCells::are_far(Index cell, Index other) const {
+    const Cells& cells = matter_.body().cells;
+    const auto &from = cells.cells[cell], &to = cells.cells[other];
+    if (matter_.are_together(cell, other)) return false;
+    const bool neighbours = std::abs(from[0] / 2 - to[0] / 2) <= 1 && std::abs(from[1] / 2 - to[1] / 2) <= 1 &&
+                            std::abs(from[2] / 2 - to[2] / 2) <= 1;
+    if (!neighbours || chebyshev(from, to) != 3) return true;
+    for (int n = 0; n < 27; ++n) {
+        const Index between = matter_.cell_at(to[0] + n % 3 - 1, to[1] + n / 3 % 3 - 1, to[2] + n / 9 - 1);
+        if (between != kNoIndex && matter_.are_together(cell, between)) return false;
+    }
+    return true;
+}
+
+std::vector<OwnCells::Extent> OwnCells::extents(const Vectors& positions) const {
+    std::vector<Extent> extents(clusters_.size() - 1);
+    for (std::size_t k = 0; k < extents.size(); ++k) {
+        Extent& extent = extents[k];
+        const std::span corners(&corners_[clusters_[k].first_corner],
+                                clusters_[k + 1].first_corner - clusters_[k].first_corner);
+        extent.low = extent.high = positions[corners[0]];
+        for (const Index corner : corners) {
+            const Vec3f p = positions[corner];
+            extent.low = extent.low.cwiseMin(p);
+            extent.high = extent.high.cwiseMax(p);
+        }
+        extent.centre = 0.5f * (extent.low + extent.high);
+        float squared = 0;
+        for (const Index corner : corners)
+            squared = std::max(squared, (positions[corner] - extent.centre).squaredNorm());
+        extent.radius = std::sqrt(squared);
+    }
+    return extents;
+}
+
+/// Pairs of clusters that come within `around` of each other and have cells that are far; ascending, both ways round.
+std::vector<std::pair<Index, Index>> OwnCells::near_clusters(std::span<const Extent> extents, float around) const {
+    Vec3f low = extents[0].low, high = extents[0].high;
+    for (const Extent& extent : extents) {
+        low = low.cwiseMin(extent.low);
+        high = high.cwiseMax(extent.high);
+    }
+    std::vector<std::pair<Index, Index>> near;
+    if (!(high - low).allFinite()) return near; // the frame is done again
+    const float half = 0.5f * around;
+    low.array() -= half;
+    high.array() += half;
+    float step = kClusterBoxSize * float(matter_.body().spacing());
+    const auto boxes = [&] { return ((high - low) / step).array().floor().cast<double>() + 1; };
+    while (boxes().prod() > kMostClusterBoxes * double(extents.size()) + kFewClusterBoxes) step *= 1.25f;
+    const Eigen::Array3i counts = boxes().cast<int>();
+    const auto each_box = [&](const Extent& extent, const auto& visit) {
+        Eigen::Array3i from, to;
+        for (int axis = 0; axis < 3; ++axis) {
+            from[axis] = int((extent.low[axis] - half - low[axis]) / step);
+            to[axis] = std::min(int((extent.high[axis] + half - low[axis]) / step), counts[axis] - 1);
+        }
+        for (int k = from[2]; k <= to[2]; ++k)
+            for (int j = from[1]; j <= to[1]; ++j)
+                for (int i = from[0]; i <= to[0]; ++i) visit((std::size_t(k) * counts[1] + j) * counts[0] + i);
+    };
+    std::vector<Index> offsets(std::size_t(counts.cast<double>().prod()) + 1, 0);
+    for (const Extent& extent : extents) each_box(extent, [&](std::size_t box) { ++offsets[box + 1]; });
+    for (std::size_t box = 1; box < offsets.size(); ++box) offsets[box] += offsets[box - 1];
+    std::vector<Index> entries(offsets.back()), next(offsets.begin(), offsets.end() - 1);
+    for (Index k = 0; k < extents.size(); ++k) each_box(extents[k], [&](std::size_t box) { entries[next[box]++] = k; });
+
+    struct Ball { // and what else decides most pairs, side by side in memory
+        Vec3f centre;
+        float radius;
+        Key at;
+        Index cluster;
+        std::uint32_t far_near;
+    };
+    const auto come_near = [&](const Ball& a, const Ball& b) {
+        const int i = b.at[0] - a.at[0] + 1, j = b.at[1] - a.at[1] + 1, k = b.at[2] - a.at[2] + 1;
+        if (unsigned(i) <= 2 && unsigned(j) <= 2 && unsigned(k) <= 2)
+            return (a.far_near >> (i + 3 * j + 9 * k) & 1) != 0;
+        const float far = a.radius + b.radius + around;
+        if ((a.centre - b.centre).squaredNorm() > far * far) return false;
+        const Extent &one = extents[a.cluster], &other = extents[b.cluster];
+        return (one.low.array() - around <= other.high.array()).all() &&
+               (other.low.array() - around <= one.high.array()).all();
+    };
+    std::vector<Ball> balls;
+    for (std::size_t box = 0; box + 1 < offsets.size(); ++box) {
+        balls.clear();
+        for (Index k = offsets[box]; k < offsets[box + 1]; ++k) {
+            const Index c = entries[k];
+            balls.push_back({extents[c].centre, extents[c].radius, clusters_[c].at, c, clusters_[c].far_near});
+        }
+        for (std::size_t p = 0; p < balls.size(); ++p)
+            for (std::size_t q = p; q < balls.size(); ++q) {
+                if (!come_near(balls[p], balls[q])) continue;
+                near.emplace_back(balls[p].cluster, balls[q].cluster);
+                if (p != q) near.emplace_back(balls[q].cluster, balls[p].cluster);
+            }
+    }
+    std::ranges::sort(near);
+    near.erase(std::ranges::unique(near).begin(), near.end());
+    return near;
+}
+
+/// near: a cluster with those whose cells its points might lie in.
+void OwnCells::look_into(std::span<const std::pair<Index, Index>> near, std::span<const Extent> extents,
+                         const Vectors& positions, float reach, std::vector<Index>& found) const {
+    const Index cluster = near[0].first;
+    struct Point {
+        Vec3f place;
+        Index number;
+        float least;
+    };
+    std::vector<Point> points;
+    std::vector<Point*> inside;
+    for (Index k = clusters_[cluster].first_point; k < clusters_[cluster + 1].first_point; ++k)
+        points.push_back({embedded_point(points_, surface_points_[k], positions), surface_points_[k],
+                          std::numeric_limits<float>::infinity()});
+    const auto is_within = [](const Vec3f& p, const Vec3f& low, const Vec3f& high) {
+        return p.x() >= low.x() && p.x() <= high.x() && p.y() >= low.y() && p.y() <= high.y() && p.z() >= low.z() &&
+               p.z() <= high.z();
+    };
+    for (const auto& [own, other] : near) {
+        const bool neighbours = neighbour(own, other) >= 0;
+        const Vec3f around = Vec3f::Constant(reach);
+        const Vec3f least = extents[other].low - around, most = extents[other].high + around;
+        inside.clear();
+        for (Point& point : points)
+            if (is_within(point.place, least, most)) inside.push_back(&point);
+        if (inside.empty()) continue;
+        for (Index c = clusters_[other].first_cell; c < clusters_[other + 1].first_cell; ++c) {
+            const Index cell = cells_[c];
+            const auto& corners = matter_.corners(cell);
+            Vec3f low = positions[corners[0]], high = low, centre = low;
+            for (int k = 1; k < 8; ++k) {
+                const Vec3f p = positions[corners[k]];
+                low = low.cwiseMin(p);
+                high = high.cwiseMax(p);
+                centre += p;
+            }
+            low -= around;
+            high += around;
+            centre /= 8;
+            for (Point* point : inside) {
+                if (!is_within(point->place, low, high)) continue;
+                const float away = (centre - point->place).squaredNorm();
+                if (away >= point->least) continue;
+                if (neighbours && !are_far(matter_.cell_of_point(point->number), cell)) continue;
+                point->least = away;
+                found[point->number] = cell;
+            }
+        }
+    }
+}
+
+std::vector<Index> OwnCells::find(const Vectors& positions, float reach, const RunContext& context) const {
+    std::vector<Index> found(points_.size(), kNoIndex);
+    if (clusters_.size() < 2) return found;
+    const std::vector<Extent> around = extents(positions);
+    const auto near = near_clusters(around, reach + 2 * overhang_); // twice: matter that is stretched
+    std::vector<std::size_t> starts;
+    for (std::size_t k = 0; k < near.size(); ++k)
+        if (k == 0 || near[k].first != near[k - 1].first) starts.push_back(k);
+    starts.push_back(near.size());
+    parallel_for(context, starts.size() - 1, kOwnCellsGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k)
+            look_into(std::span(near).subspan(starts[k], starts[k + 1] - starts[k]), around, positions, reach, found);
+    });
+    return found;
+}
+
+} // namespace filigree

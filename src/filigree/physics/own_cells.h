@@ -1,0 +1,47 @@
+// Finding where a body might meet itself. Private to the layer.
+#pragma once
+
+#include "filigree/physics/body_state.h"
+#include "filigree/physics/matter.h"
+
+namespace filigree {
+
+/// Surface points of a body that might lie in far cells of the same. Clusters of 2^3 cells are compared first, by boxes
+/// and balls around them, so that matter which lies where it belongs is not looked at point by point.
+///
+/// A cell is far from another if it is not reached in two steps through matter; nor in three, of neighbouring clusters.
+class OwnCells {
+public:
+    explicit OwnCells(const Matter& matter); ///< matter: not rigid; outlives this
+
+    /// For each surface point the far cell that holds it, or the nearest within reach (m); kNoIndex where there is
+    /// none. Cost O(clusters and points that are near far cells). positions: of the body's particles.
+    std::vector<Index> find(const Vectors& positions, float reach, const RunContext& context) const;
+
+    bool are_far(Index cell, Index other) const;
+
+private:
+    using Key = std::array<int, 3>;
+    struct Cluster {
+        Key at;                 ///< lattice index of its cells, halved
+        std::uint32_t far_near; ///< bits of the 3^3 clusters around: some of their cells are far from some of this one
+        Index first_cell, first_corner, first_point;
+    };
+    struct Extent {
+        Vec3f low, high, centre;
+        float radius;
+    };
+    int neighbour(Index a, Index b) const;
+    std::vector<Extent> extents(const Vectors& positions) const;
+    std::vector<std::pair<Index, Index>> near_clusters(std::span<const Extent> extents, float around) const;
+    void look_into(std::span<const std::pair<Index, Index>> near, std::span<const Extent> extents,
+                   const Vectors& positions, float reach, std::vector<Index>& found) const;
+
+    const Matter& matter_;
+    const Embedding& points_;
+    std::vector<Cluster> clusters_; ///< and one behind the last
+    std::vector<Index> cells_, corners_, surface_points_;
+    float overhang_ = 0; ///< m that points may lie outside of their cells
+};
+
+} // namespace filigree
