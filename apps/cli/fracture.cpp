@@ -25,7 +25,7 @@ struct FractureArguments {
 bool is_folder(const std::string& output) { return output.ends_with('/'); }
 
 void report_fracture(const FracturedMesh& fractured, double seconds, Report& report) {
-    const FractureReport& r = fractured.report;
+    const CutReport& r = fractured.report;
     const char* unit = r.is_sheet ? "area" : "volume";
     report.add("pieces",
                fmt::format("{}; {}: {:.3g} the smallest, {:.3g} the median, {:.3g} the largest",

@@ -2,9 +2,11 @@
 
 #include "filigree/core/random.h"
 #include "filigree/fracture/fracture_pattern.h"
+#include "filigree/mesh/normals.h"
 #include "filigree/mesh/shapes.h"
 #include "filigree/mesh/surface.h"
 #include "filigree/mesh/topology.h"
+#include "filigree/mesh/triangulate.h"
 
 #include <cstring>
 #include <gtest/gtest.h>
@@ -54,6 +56,12 @@ Mesh ball(std::size_t rings, std::uint64_t seed) {
     return mesh;
 }
 
+double area_of(const Mesh& mesh) {
+    double sum = 0;
+    for (const Triangle& t : triangulate(mesh).triangles) sum += 0.5 * doubled_area_vector(mesh.positions, t).norm();
+    return sum;
+}
+
 /// What holds for every closed mesh and any seeds.
 void expect_sound(const Mesh& mesh, const FracturedMesh& f) {
     ASSERT_EQ(check_mesh(f.mesh), "");
@@ -80,9 +88,9 @@ void expect_sound(const Mesh& mesh, const FracturedMesh& f) {
 }
 
 FracturedMesh broken(const Mesh& mesh, std::span<const Vec3d> seeds, double roughness,
-                     const FractureOptions& options = {}) {
+                     const FractureOptions& options = {}, double wavelength = 0.3) {
     const Box box = bounds(mesh.positions);
-    const CrackWarpOptions warp{.box = box, .roughness = roughness, .wavelength = 0.3 * box.diagonal()};
+    const CrackWarpOptions warp{.box = box, .roughness = roughness, .wavelength = wavelength * box.diagonal()};
     const RunContext context(1);
     return fracture(mesh, FractureCells::create(seeds, {}, warp, context).value(), options, context).value();
 }
@@ -150,7 +158,7 @@ void break_random_cases(std::uint64_t first, std::uint64_t count) {
             seeds = random_seeds(box, 1 + pick(3, 12), seed);
             break;
         }
-        const FracturedMesh f = broken(mesh, seeds, pick(4, 3) == 0 ? 0.8 : 0, {.edge = pick(5, 2) ? 0.7 : 0.0});
+        const FracturedMesh f = broken(mesh, seeds, pick(4, 3) == 0 ? 0.8 : 0, {.edge = pick(5, 2) ? 0.7 : 0.0}, 0.8);
         expect_sound(mesh, f);
         EXPECT_EQ(f.report.fan_facets, 0u);
         if (::testing::Test::HasFailure()) return;
@@ -187,6 +195,205 @@ TEST(Fracture, FacesThatNoCrackCrossesStayAsTheyWere) {
     for (std::size_t k = 0; k < mesh.face_count(); ++k)
         kept += faces.contains({mesh.face(k).begin(), mesh.face(k).end()});
     EXPECT_GT(double(kept), 0.9 * double(mesh.face_count()));
+}
+
+/// A strip of two quads with UVs, a colour ramp and one corner that has another normal.
+Mesh decorated_box() {
+    Mesh mesh = box_mesh(Vec3d(0, 0, 0), Vec3d(2, 1, 1));
+    for (std::size_t c = 0; c < mesh.corner_count(); ++c) {
+        const Vec3f& p = mesh.positions[mesh.corners[c]];
+        mesh.uvs.corners.push_back(static_cast<Index>(c));
+        mesh.uvs.values.emplace_back(3 * p[0] + p[1], p[2] - p[1]);
+    }
+    for (const Vec3f& p : mesh.positions) mesh.colors.emplace_back(p[0] / 2, p[1], p[2], 1);
+    mesh.scalars.push_back({"height", {}});
+    for (const Vec3f& p : mesh.positions) mesh.scalars[0].values.push_back(p[0] + 10 * p[2]);
+    mesh.materials.names = {"skin"};
+    mesh.materials.of_face.assign(mesh.face_count(), 0);
+    return mesh;
+}
+
+TEST(Fracture, AttributesAreThoseOfTheSurface) {
+    const Mesh mesh = decorated_box();
+    const FracturedMesh f = broken(mesh, random_seeds(bounds(mesh.positions), 7, 3), 0);
+    expect_sound(mesh, f);
+    std::size_t inside = 0;
+    for (std::size_t k = 0; k < f.mesh.face_count(); ++k) {
+        inside += f.is_inside[k];
+        EXPECT_EQ(f.mesh.materials.of_face[k], f.is_inside[k]); // "skin", and "inside" behind it
+        if (f.is_inside[k]) continue;
+        for (Index c = f.mesh.face_offsets[k]; c < f.mesh.face_offsets[k + 1]; ++c) {
+            const Vec3f& p = f.mesh.positions[f.mesh.corners[c]];
+            const Vec2f uv = f.mesh.uvs.values[f.mesh.uvs.corners[c]];
+            EXPECT_NEAR(uv[0], 3 * p[0] + p[1], 1e-5);
+            EXPECT_NEAR(uv[1], p[2] - p[1], 1e-5);
+            EXPECT_NEAR(f.mesh.colors[f.mesh.corners[c]][0], p[0] / 2, 1e-5);
+            EXPECT_NEAR(f.mesh.scalars[0].values[f.mesh.corners[c]], p[0] + 10 * p[2], 1e-4);
+        }
+    }
+    EXPECT_EQ(inside, 2 * f.report.inside_faces);
+    EXPECT_EQ(f.mesh.materials.names, (std::vector<std::string>{"skin", "inside"}));
+    EXPECT_EQ(f.mesh.scalars.back().name, "piece");
+}
+
+TEST(Fracture, CracksAreMeasuredInModelUnits) {
+    const Mesh cube = box_mesh(Vec3d(-1, -1, -1), Vec3d(1, 1, 1));
+    const FracturedMesh f = broken(cube, std::vector<Vec3d>{{-0.5, 0, 0}, {0.5, 0, 0}}, 0, {.edge = 0.3});
+    double area = 0, uv_area = 0;
+    for (std::size_t k = 0; k < f.mesh.face_count(); ++k) {
+        if (!f.is_inside[k]) continue;
+        const Index c = f.mesh.face_offsets[k];
+        const auto at = [&](Index n) { return f.mesh.positions[f.mesh.corners[c + n]]; };
+        const auto uv = [&](Index n) { return f.mesh.uvs.values[f.mesh.uvs.corners[c + n]]; };
+        const Vec3f cross = (at(1) - at(0)).cross(at(2) - at(0));
+        area += 0.5 * double(cross.norm());
+        const Vec2f a = uv(1) - uv(0), b = uv(2) - uv(0);
+        uv_area += 0.5 * std::abs(double(a[0] * b[1] - a[1] * b[0]));
+        const Vec3f normal = f.mesh.normals.values[f.mesh.normals.corners[c]];
+        EXPECT_GT(normal.dot(cross.normalized()), 0.999f); // out of the piece
+    }
+    EXPECT_NEAR(area, 8, 1e-4); // both sides
+    EXPECT_NEAR(uv_area, 8, 1e-4);
+}
+
+TEST(Fracture, OpenBordersStayOpenAndNothingElseIs) {
+    Mesh mesh = make_wavy_sphere({.resolution = 24});
+    Mesh holed = mesh;
+    holed.face_offsets = {0};
+    holed.corners.clear();
+    for (std::size_t f = 0; f < mesh.face_count(); ++f)
+        if (f % 97 != 0) holed.add_face(mesh.face(f));
+    const FracturedMesh f = broken(holed, random_seeds(bounds(mesh.positions), 8, 3), 0.5);
+    EXPECT_EQ(f.report.open_edges, 0u);
+    EXPECT_GT(f.report.closing_triangles, 0u);
+    EXPECT_FALSE(f.report.is_sheet);
+    double surface = 0;
+    for (std::size_t k = 0; k < f.mesh.face_count(); ++k)
+        if (!f.is_inside[k]) surface += 0.5 * doubled_area_vector(f.mesh.positions, f.mesh.face(k)).norm();
+    EXPECT_NEAR(surface / analyse_topology(holed, RunContext(1)).area, 1, 2e-3); // cones are not in it
+}
+
+TEST(Fracture, SheetsBreakIntoPartsOfTheirSurface) {
+    const Mesh plane = make_wavy_plane({.resolution = 32});
+    const FracturedMesh f = broken(plane, random_seeds(bounds(plane.positions), 9, 3), 0);
+    EXPECT_TRUE(f.report.is_sheet);
+    EXPECT_EQ(f.report.inside_faces, 0u);
+    EXPECT_GE(f.pieces, 7u);
+    EXPECT_NEAR(area_of(f.mesh) / area_of(plane), 1, 1e-5);
+}
+
+TEST(Fracture, IslandsArePiecesAndSplintersAreNot) {
+    Mesh mesh = box_mesh(Vec3d(0, 0, 0), Vec3d(1, 1, 1)); // two bodies in one cell
+    append(mesh, box_mesh(Vec3d(3, 0, 0), Vec3d(4, 1, 1)), false);
+    const std::vector<Vec3d> one = {{2, 0.5, 0.5}};
+    EXPECT_EQ(broken(mesh, one, 0).pieces, 2u);
+    EXPECT_EQ(broken(mesh, one, 0, {.pieces_are_cells = true}).pieces, 1u);
+    // A cell that cuts a corner off, of a ten-thousandth of the volume.
+    const Mesh cube = box_mesh(Vec3d(0, 0, 0), Vec3d(1, 1, 1));
+    const std::vector<Vec3d> corner = {{0.95, 0.95, 0.95}, {0.998, 0.998, 0.998}};
+    const FracturedMesh whole = broken(cube, corner, 0);
+    EXPECT_EQ(whole.pieces, 1u);
+    EXPECT_EQ(whole.report.joined, 1u);
+    EXPECT_EQ(whole.report.inside_faces, 0u);
+    expect_sound(cube, whole);
+    EXPECT_EQ(broken(cube, corner, 0, {.smallest = 0}).pieces, 2u);
+}
+
+TEST(Fracture, ThreadsDoNotMatter) {
+    const Mesh mesh = make_wavy_sphere({.resolution = 48});
+    const auto run = [&](unsigned threads) {
+        RunContext context(threads);
+        const FractureCells cells = make_fracture_cells(mesh, {.pieces = 25}, context).value();
+        return fracture(mesh, cells, {}, context).value();
+    };
+    const FracturedMesh one = run(1), two = run(2);
+    EXPECT_TRUE(one.mesh.positions == two.mesh.positions);
+    EXPECT_TRUE(one.mesh.corners == two.mesh.corners);
+    EXPECT_TRUE(one.piece_of_face == two.piece_of_face);
+}
+
+TEST(Fracture, ExplodeMovesWholePieces) {
+    const Mesh cube = box_mesh(Vec3d(-1, -1, -1), Vec3d(1, 1, 1));
+    FracturedMesh f = broken(cube, std::vector<Vec3d>{{-0.5, 0, 0}, {0.5, 0, 0}}, 0, {.edge = 0});
+    explode(f, 1);
+    EXPECT_NEAR(bounds(f.mesh.positions).size()[0], 3, 1e-6); // their middles were half a unit from the whole's
+    for (Index piece = 0; piece < 2; ++piece) EXPECT_NEAR(bounds(piece_mesh(f, piece).positions).size()[0], 1, 1e-6);
+}
+
+TEST(FracturePattern, EvenPiecesAreOfOneSize) {
+    const Mesh cube = box_mesh(Vec3d(-1, -1, -1), Vec3d(1, 1, 1));
+    const RunContext context(1);
+    for (const Index pieces : {1u, 2u, 40u}) {
+        const FracturedMesh f =
+            fracture(cube, make_fracture_cells(cube, {.pieces = pieces}, context).value(), {}, context).value();
+        EXPECT_EQ(f.pieces, pieces);
+        EXPECT_EQ(f.report.islands, 0u);
+        EXPECT_GT(f.report.smallest, 0.3 * f.report.median);
+        EXPECT_LT(f.report.largest, 2.5 * f.report.median);
+        expect_sound(cube, f);
+    }
+}
+
+TEST(FracturePattern, ImpactBreaksSmallWhereItHit) {
+    const Mesh cube = box_mesh(Vec3d(-1, -1, -1), Vec3d(1, 1, 1));
+    const RunContext context(1);
+    const Vec3d hit(1, 1, 1);
+    const FracturedMesh f =
+        fracture(cube,
+                 make_fracture_cells(cube, {.kind = FracturePatternKind::impact, .pieces = 40, .at = {hit}}, context)
+                     .value(),
+                 {}, context)
+            .value();
+    std::size_t near = 0;
+    for (Index piece = 0; piece < f.pieces; ++piece) {
+        const Box box = bounds(piece_mesh(f, piece).positions);
+        near += (box.centre() - hit).norm() < 1;
+    }
+    EXPECT_GT(near, f.pieces / 2); // in an eighth of the volume
+}
+
+TEST(FracturePattern, SlabsAreLongAlongTheGrain) {
+    const Mesh cube = box_mesh(Vec3d(-1, -1, -1), Vec3d(1, 1, 1));
+    const RunContext context(1);
+    const FracturedMesh f =
+        fracture(cube,
+                 make_fracture_cells(cube, {.kind = FracturePatternKind::slabs, .pieces = 30, .grain = Vec3d(0, 2, 0)},
+                                     context)
+                     .value(),
+                 {}, context)
+            .value();
+    Vec3d sum = Vec3d::Zero();
+    for (Index piece = 0; piece < f.pieces; ++piece) sum += bounds(piece_mesh(f, piece).positions).size();
+    EXPECT_GT(sum[1], 2.5 * sum[0]);
+    EXPECT_GT(sum[1], 2.5 * sum[2]);
+}
+
+TEST(FracturePattern, RaysOfGlassGoThroughItsThickness) {
+    const Mesh plate = box_mesh(Vec3d(-1, -1, -0.02), Vec3d(1, 1, 0.02));
+    const RunContext context(1);
+    const FracturedMesh f =
+        fracture(
+            plate,
+            make_fracture_cells(plate, {.kind = FracturePatternKind::radial, .pieces = 30, .roughness = 0}, context)
+                .value(),
+            {}, context)
+            .value();
+    EXPECT_GE(f.pieces, 30u);
+    for (Index piece = 0; piece < f.pieces; ++piece)
+        EXPECT_NEAR(bounds(piece_mesh(f, piece).positions).size()[2], 0.04, 1e-5);
+}
+
+TEST(FracturePattern, RefusesWhatMakesNoSense) {
+    const Mesh cube = box_mesh(Vec3d(-1, -1, -1), Vec3d(1, 1, 1));
+    const RunContext context(1);
+    const auto code = [&](const FracturePattern& pattern) {
+        return make_fracture_cells(cube, pattern, context).error().code;
+    };
+    EXPECT_EQ(code({.pieces = 0}), ErrorCode::usage);
+    EXPECT_EQ(code({.roughness = 1.5}), ErrorCode::usage);
+    EXPECT_EQ(code({.at = {Vec3d(NAN, 0, 0)}}), ErrorCode::usage);
+    EXPECT_EQ(code({.kind = FracturePatternKind::slabs, .grain = Vec3d::Zero()}), ErrorCode::usage);
+    EXPECT_EQ(make_fracture_cells(Mesh{}, {}, context).error().code, ErrorCode::unsuitable);
 }
 
 } // namespace

@@ -50,7 +50,7 @@ struct CellTriangle {
 };
 
 /// Everything that is in cells, facets from both sides.
-std::vector<CellTriangle> cell_triangles(const CutSurface& cut, const CrackFacets& facets) {
+std::vector<CellTriangle> cell_triangles(const CutSurface& cut, const CrackSurfaces& facets) {
     std::vector<CellTriangle> all;
     all.reserve(cut.triangles.size() + 2 * facets.triangles.size() + 2 * cut.polygons.size());
     std::size_t polygon = 0;
@@ -68,7 +68,7 @@ std::vector<CellTriangle> cell_triangles(const CutSurface& cut, const CrackFacet
         }
     }
     for (Index f = 0; f < facets.facets.size(); ++f) {
-        const CrackFacet& facet = facets.facets[f];
+        const CrackSurface& facet = facets.facets[f];
         for (Index k = 0; k < facet.count; ++k) {
             const Triangle& t = facets.triangles[facet.first + k];
             all.push_back({t, facet.i, kNoIndex, kNoIndex, f});
@@ -143,6 +143,12 @@ public:
         for (Index p = 0; p < count(); ++p) piece[p] = piece[sets.root(p)];
         islands_ = pieces > largest_of_cell.size() ? pieces - largest_of_cell.size() : 0;
         return piece;
+    }
+    /// The same, where each cell is one piece.
+    std::vector<Index> cell_numbers() {
+        joined_ = count() - cells();
+        islands_ = 0;
+        return cell_;
     }
     std::size_t cells() const {
         std::vector<Index> cells = cell_;
@@ -266,12 +272,13 @@ void sort_by_piece(FracturedMesh& fractured) {
     sort_faces(mesh.smoothing);
     sort_faces(fractured.piece_of_face);
     sort_faces(fractured.is_inside);
+    sort_faces(fractured.crack_of_face);
 }
 
 /// Puts pieces together from the cut's triangles.
 class Assembly {
 public:
-    Assembly(const Mesh& mesh, const Surface& surface, const CutSurface& cut, const CrackFacets& facets,
+    Assembly(const Mesh& mesh, const Surface& surface, const CutSurface& cut, const CrackSurfaces& facets,
              const FractureCells& cells, const RunContext& context)
         : mesh_(mesh), surface_(surface), cut_(cut), facets_(facets), cells_(cells), normals_(normals_of(context)),
           uv_(mesh.uvs, out_.mesh.uvs), normal_(normals_, out_.mesh.normals) {}
@@ -288,6 +295,9 @@ public:
         out.materials.names = mesh_.materials.names;
         inside_material_ = static_cast<Index>(out.materials.names.size());
         out_.piece_of_vertex.assign(mesh_.vertex_count(), kNoIndex);
+        out_.place.resize(mesh_.vertex_count());
+        std::iota(out_.place.begin(), out_.place.end(), Index{0});
+        for (const CrackSurface& facet : facets_.facets) out_.cells_of_crack.push_back({facet.i, facet.j});
         for (const Index piece : piece_of_part) out_.pieces = std::max(out_.pieces, piece + 1);
 
         std::size_t at = 0;
@@ -367,6 +377,7 @@ private:
             out_.piece_of_vertex.push_back(piece);
             const SurfacePoint source = cut_.vertices.surface_point(vertex);
             out_.sources.push_back(source);
+            out_.place.push_back(own == kNoIndex ? vertex : own);
             if (!out_.mesh.colors.empty()) out_.mesh.colors.push_back(color_at(source));
             for (std::size_t k = 0; k < out_.mesh.scalars.size(); ++k)
                 out_.mesh.scalars[k].values.push_back(scalar_at(mesh_.scalars[k], source));
@@ -388,7 +399,9 @@ private:
         return static_cast<float>(sum);
     }
 
-    void label(Index old_face, Index piece, bool is_inside) {
+    void label(Index old_face, Index piece, Index crack) {
+        const bool is_inside = crack != kNoIndex;
+        out_.crack_of_face.push_back(crack);
         out_.piece_of_face.push_back(piece);
         out_.is_inside.push_back(is_inside);
         const Index old_material = is_inside || mesh_.materials.empty() ? kNoIndex : mesh_.materials.of_face[old_face];
@@ -405,7 +418,7 @@ private:
             normal_.copy(c, vertex);
         }
         out_.mesh.add_face(corners);
-        label(face, piece, false);
+        label(face, piece, kNoIndex);
     }
 
     /// The corner of an old face at a place.
@@ -434,11 +447,11 @@ private:
             }
         }
         out_.mesh.add_face(corners);
-        label(face, piece, false);
+        label(face, piece, kNoIndex);
     }
 
     void add_inside_triangle(const CellTriangle& triangle, Index piece) {
-        const CrackFacet& facet = facets_.facets[triangle.facet];
+        const CrackSurface& facet = facets_.facets[triangle.facet];
         if (triangle.facet != frame_of_) {
             frame_of_ = triangle.facet;
             frame_ = facet_frame(cells_, facet.i, facet.j);
@@ -454,10 +467,10 @@ private:
             normal_.add(triangle.cell == facet.i ? normal : Vec3f(-normal));
         }
         out_.mesh.add_face(corners);
-        label(kNoIndex, piece, true);
+        label(kNoIndex, piece, triangle.facet);
     }
 
-    std::unordered_map<Index, Vec3f> facet_normals(const CrackFacet& facet) const {
+    std::unordered_map<Index, Vec3f> facet_normals(const CrackSurface& facet) const {
         std::unordered_map<Index, Vec3f> normals;
         for (Index k = 0; k < facet.count; ++k) {
             const Triangle& t = facets_.triangles[facet.first + k];
@@ -490,7 +503,7 @@ private:
     const Mesh& mesh_;
     const Surface& surface_;
     const CutSurface& cut_;
-    const CrackFacets& facets_;
+    const CrackSurfaces& facets_;
     const FractureCells& cells_;
     FracturedMesh out_;
     CornerAttribute<Vec3f> normals_; ///< the unbroken mesh's
@@ -535,7 +548,7 @@ std::size_t count_open_edges(const CutSurface& cut, std::span<const CellTriangle
 
 /// Signed volumes (areas of sheets) of pieces, and of the whole.
 void report_sizes(const CutSurface& cut, std::span<const CellTriangle> triangles, std::span<const Index> piece_of_part,
-                  Index pieces, FractureReport& report) {
+                  Index pieces, CutReport& report) {
     const Vec3d middle = bounds(cut.vertices.positions()).centre();
     const auto doubled = [&](const Triangle& t, Vec3d& a) {
         const auto at = [&](std::size_t k) -> Vec3d { return cut.vertices.position(t[k]).cast<double>() - middle; };
@@ -574,7 +587,7 @@ Result<FracturedMesh> fracture(const Mesh& mesh, const FractureCells& cells, con
         return Error{ErrorCode::unsuitable, "The mesh has no faces: there is nothing to break."};
     const Result<Surface> surface = make_surface(mesh, context);
     if (!surface) return surface.error();
-    FractureReport report;
+    CutReport report;
     double start = now();
     const auto lap = [&start] {
         const double before = start;
@@ -588,16 +601,17 @@ Result<FracturedMesh> fracture(const Mesh& mesh, const FractureCells& cells, con
 
     const double edge =
         options.edge.value_or((cells.warp().is_rough() ? kRoughEdge : kPlanarEdge) * piece_size(*cut, cells.count()));
-    const Result<CrackFacets> facets = report.is_sheet ? CrackFacets{} : crack_facets(*cut, cells, edge, context);
+    const Result<CrackSurfaces> facets = report.is_sheet ? CrackSurfaces{} : crack_surfaces(*cut, cells, edge, context);
     if (!facets) return facets.error();
     report.facet_seconds = lap();
     report.facets = facets->facets.size();
-    for (const CrackFacet& facet : facets->facets) report.fan_facets += facet.is_fan;
+    for (const CrackSurface& facet : facets->facets) report.fan_facets += facet.is_fan;
     context.report("putting pieces together", 0.8);
 
     std::vector<CellTriangle> triangles = cell_triangles(*cut, *facets);
     Parts parts(*cut, triangles, report.is_sheet);
-    const std::vector<Index> piece_of_part = parts.pieces(options.smallest);
+    const std::vector<Index> piece_of_part =
+        options.pieces_are_cells ? parts.cell_numbers() : parts.pieces(options.smallest);
     report.cells = parts.cells();
     report.islands = parts.islands();
     report.joined = parts.joined();

@@ -1,7 +1,7 @@
 // A mesh in pieces.
 #pragma once
 
-#include "filigree/fracture/crack_facets.h"
+#include "filigree/fracture/crack_surfaces.h"
 
 #include <optional>
 
@@ -13,9 +13,11 @@ struct FractureOptions {
     std::optional<double> edge = {};
     /// Parts below this share of the mean volume become one with the neighbour that they share most with.
     double smallest = 0.01;
+    /// Each cell that holds matter is one piece and the piece has its number; islands and small parts stay with it.
+    bool pieces_are_cells = false;
 };
 
-struct FractureReport {
+struct CutReport {
     std::size_t cells = 0;        ///< that hold matter
     std::size_t islands = 0;      ///< pieces beyond one a cell: parts of a cell that do not hang together
     std::size_t joined = 0;       ///< parts too small to be pieces
@@ -43,12 +45,16 @@ struct FracturedMesh {
     std::vector<std::uint8_t> is_inside;               ///< a face: whether it lies on a crack
     /// Of vertices behind the unbroken mesh's: where on its surface they are; all kNoIndex inside.
     std::vector<SurfacePoint> sources;
-    FractureReport report;
+    /// Of every vertex: a number that it shares with its copies in other pieces, and with nothing else.
+    std::vector<Index> place;
+    std::vector<Index> crack_of_face;                 ///< kNoIndex outside
+    std::vector<std::array<Index, 2>> cells_of_crack; ///< the two cells that each crack lies between, ascending
+    CutReport report;
 };
 
 /// Breaks a mesh along the borders of cells. Nothing rests on a tolerance: each piece is closed wherever the mesh is,
 /// at any place of the seeds (restricted Voronoi diagram, [Yan 2009], with exact signs). Cost: cut_surface and
-/// crack_facets; on one core about 0.1 s for 900,000 triangles and 20 planar cells. Errors: unsuitable (no faces),
+/// crack_surfaces; on one core about 0.1 s for 900,000 triangles and 20 planar cells. Errors: unsuitable (no faces),
 /// cancelled.
 Result<FracturedMesh> fracture(const Mesh& mesh, const FractureCells& cells, const FractureOptions& options,
                                const RunContext& context);

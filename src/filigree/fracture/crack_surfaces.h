@@ -6,14 +6,14 @@
 namespace filigree {
 
 /// Where two cells meet inside the body.
-struct CrackFacet {
+struct CrackSurface {
     Index i, j;         ///< i < j
-    Index first, count; ///< its triangles, in CrackFacets::triangles
+    Index first, count; ///< its triangles, in CrackSurfaces::triangles
     bool is_fan;        ///< its outline could be filled by a fan alone
 };
 
-struct CrackFacets {
-    std::vector<CrackFacet> facets;  ///< in the order of i, then j
+struct CrackSurfaces {
+    std::vector<CrackSurface> facets; ///< in the order of i, then j
     std::vector<Triangle> triangles; ///< over CutSurface::vertices; seen from j counter-clockwise, as they close cell i
 };
 
@@ -27,6 +27,7 @@ FacetFrame facet_frame(const FractureCells& cells, Index i, Index j);
 /// cancel. edge: the longest edges wanted inside facets, model units; 0: as few triangles as there can be. Where cracks
 /// are rough, points inside follow them, and finer bumps rise towards the middle. Cost: about 2 us a triangle, 4 where
 /// rough. Errors: cancelled.
-Result<CrackFacets> crack_facets(CutSurface& cut, const FractureCells& cells, double edge, const RunContext& context);
+Result<CrackSurfaces> crack_surfaces(CutSurface& cut, const FractureCells& cells, double edge,
+                                     const RunContext& context);
 
 } // namespace filigree

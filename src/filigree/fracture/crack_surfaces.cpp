@@ -1,4 +1,4 @@
-#include "filigree/fracture/crack_facets.h"
+#include "filigree/fracture/crack_surfaces.h"
 
 #include "filigree/core/parallel_for.h"
 #include "filigree/fracture/planar_fill.h"
@@ -296,13 +296,14 @@ FacetFrame facet_frame(const FractureCells& cells, Index i, Index j) {
     return frame;
 }
 
-Result<CrackFacets> crack_facets(CutSurface& cut, const FractureCells& cells, double edge, const RunContext& context) {
+Result<CrackSurfaces> crack_surfaces(CutSurface& cut, const FractureCells& cells, double edge,
+                                     const RunContext& context) {
     const CrackLines lines(cut, cells, edge);
     std::stable_sort(cut.segments.begin(), cut.segments.end(), [](const CrackSegment& a, const CrackSegment& b) {
         return std::pair(a.i, a.j) < std::pair(b.i, b.j);
     });
     // Outlines: along the surface, the other way round than the surface's own parts, and along the lines inside.
-    CrackFacets result;
+    CrackSurfaces result;
     std::vector<std::vector<PlanarSegment>> outlines;
     auto segment = cut.segments.begin();
     for (Index i = 0; i < cells.count(); ++i) {
@@ -325,14 +326,14 @@ Result<CrackFacets> crack_facets(CutSurface& cut, const FractureCells& cells, do
     std::vector<FilledFacet> filled(outlines.size());
     parallel_for(context, filled.size(), 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end && !context.is_cancelled(); ++k) {
-            const CrackFacet& facet = result.facets[k];
+            const CrackSurface& facet = result.facets[k];
             filled[k] = fill_facet(cut, cells, facet_frame(cells, facet.i, facet.j), std::move(outlines[k]), edge);
         }
     });
     if (context.is_cancelled()) return cancelled_error();
 
     for (std::size_t k = 0; k < filled.size(); ++k) {
-        CrackFacet& facet = result.facets[k];
+        CrackSurface& facet = result.facets[k];
         std::vector<Index> vertex = std::move(filled[k].outline);
         for (const AddedPoint& point : filled[k].added)
             vertex.push_back(cut.vertices.add(point.position, point.plane, {}));

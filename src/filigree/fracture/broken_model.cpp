@@ -1,0 +1,450 @@
+#include "filigree/fracture/broken_model.h"
+
+#include "filigree/fracture/constrained_delaunay.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <unordered_map>
+
+namespace filigree {
+
+namespace {
+
+constexpr double kFinestSpacing = 0.05; ///< of that asked for, on cracks too small for three points
+
+/// u and v of the point of a triangle that is closest to p; all three weights are 0 or more.
+struct Weights {
+    double u = 0, v = 0;
+};
+Weights closest_weights(const std::array<Vec3d, 3>& t, const Vec3d& p) {
+    const Vec3d e1 = t[1] - t[0], e2 = t[2] - t[0], d = p - t[0];
+    const double a = e1.squaredNorm(), b = e1.dot(e2), c = e2.squaredNorm(), x = d.dot(e1), y = d.dot(e2);
+    const double determinant = a * c - b * b;
+    if (determinant > 1e-12 * a * c) {
+        const Weights inside{(c * x - b * y) / determinant, (a * y - b * x) / determinant};
+        if (inside.u >= 0 && inside.v >= 0 && inside.u + inside.v <= 1) return inside;
+    }
+    Weights best;
+    double least = std::numeric_limits<double>::infinity();
+    const auto try_edge = [&](std::size_t from, std::size_t to) {
+        const Vec3d edge = t[to] - t[from];
+        const double length = edge.squaredNorm();
+        const double s = length > 0 ? std::clamp((p - t[from]).dot(edge) / length, 0.0, 1.0) : 0;
+        const double distance = (t[from] + s * edge - p).squaredNorm();
+        if (distance >= least) return;
+        least = distance;
+        std::array<double, 3> weight = {};
+        weight[from] = 1 - s;
+        weight[to] += s;
+        best = {weight[1], weight[2]};
+    };
+    try_edge(0, 1);
+    try_edge(1, 2);
+    try_edge(2, 0);
+    return best;
+}
+
+/// Some of the points, none closer to another than `spacing`; the first is always among them.
+std::vector<Index> thin(std::span<const Vec3d> points, double spacing) {
+    std::unordered_map<std::uint64_t, std::vector<Index>> kept_in; // boxes of a spacing's side
+    const auto box = [&](const Vec3d& p, int x, int y, int z) {
+        std::uint64_t key = 0;
+        for (const auto& [axis, step] : {std::pair(0, x), std::pair(1, y), std::pair(2, z)})
+            key = key << 21 |
+                  (static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(p[axis] / spacing)) + step) &
+                   0x1fffff);
+        return key;
+    };
+    std::vector<Index> kept;
+    for (Index k = 0; k < points.size(); ++k) {
+        bool is_free = true;
+        for (int n = 0; n < 27 && is_free; ++n) {
+            const auto found = kept_in.find(box(points[k], n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1));
+            if (found == kept_in.end()) continue;
+            for (const Index other : found->second)
+                is_free &= (points[other] - points[k]).squaredNorm() >= spacing * spacing;
+        }
+        if (!is_free) continue;
+        kept_in[box(points[k], 0, 0, 0)].push_back(k);
+        kept.push_back(k);
+    }
+    return kept;
+}
+
+/// Triangles of points in a plane.
+std::vector<Triangle> delaunay(std::span<const Vec2f> points) {
+    Vec2f lo = points[0], hi = points[0];
+    for (const Vec2f& p : points) {
+        lo = lo.cwiseMin(p);
+        hi = hi.cwiseMax(p);
+    }
+    const double scale = 0.95 * double(ConstrainedDelaunay::kPlaneHalf) / std::max(double((hi - lo).maxCoeff()), 1e-30);
+    ConstrainedDelaunay mesh;
+    std::vector<Index> point_of(3, kNoIndex);
+    for (Index k = 0; k < points.size(); ++k) {
+        const Vec2f p = points[k] - lo;
+        if (mesh.insert({std::llround(double(p[0]) * scale), std::llround(double(p[1]) * scale)}) == point_of.size())
+            point_of.push_back(k);
+    }
+    std::vector<Triangle> triangles;
+    for (std::size_t k = 0; k < mesh.face_count(); ++k) {
+        const auto& v = mesh.face(k).vertices;
+        if (std::none_of(v.begin(), v.end(), ConstrainedDelaunay::is_outer))
+            triangles.push_back({point_of[v[0]], point_of[v[1]], point_of[v[2]]});
+    }
+    return triangles;
+}
+
+/// The driver's copies and cells as they are asked for.
+class DriverCopies {
+public:
+    explicit DriverCopies(Mesh& mesh) : mesh_(mesh) {}
+
+    /// A driver vertex at a place for a piece; `own`: the mesh's vertex there that is of the piece (kNoIndex: a loose
+    /// one is made). place: any number that tells places apart.
+    Index vertex(std::uint64_t place, Index piece, Index own, const Vec3f& position) {
+        const auto [known, is_new] = numbers_.try_emplace({place, piece}, static_cast<Index>(vertices_.size()));
+        if (is_new) {
+            if (own == kNoIndex) {
+                own = static_cast<Index>(mesh_.positions.size());
+                mesh_.positions.push_back(position);
+                if (!mesh_.colors.empty()) mesh_.colors.push_back(Vec4f::Ones());
+                for (VertexScalar& scalar : mesh_.scalars) scalar.values.push_back(0);
+            }
+            vertices_.push_back({own, piece});
+        }
+        return known->second;
+    }
+    Index cell(const Triangle& corners) {
+        const auto [known, is_new] = cells_of_.try_emplace(corners, static_cast<Index>(cells_.size()));
+        if (is_new) cells_.push_back(corners);
+        return known->second;
+    }
+
+    struct Vertex {
+        Index mesh_vertex, piece;
+    };
+    const std::vector<Vertex>& vertices() const { return vertices_; }
+    const std::vector<Triangle>& cells() const { return cells_; }
+
+private:
+    Mesh& mesh_;
+    std::map<std::pair<std::uint64_t, Index>, Index> numbers_;
+    std::vector<Vertex> vertices_;
+    std::map<Triangle, Index> cells_of_;
+    std::vector<Triangle> cells_; ///< of numbers in vertices_
+};
+
+/// A vertex's bond to places, the same in every piece.
+struct PlaceBond {
+    std::array<Index, 3> places; ///< indices of crack points
+    Weights weights;
+};
+
+class ModelBreaker {
+public:
+    ModelBreaker(const Model& model, const FracturedMesh& fractured, const FractureCells& cells, double spacing)
+        : model_(model), detail_(std::get<BlendDetail>(model.detail)), fractured_(fractured), cells_(cells),
+          spacing_(spacing) {
+        broken_.model.mesh = fractured.mesh;
+    }
+
+    BrokenModel run() {
+        DriverCopies copies(broken_.model.mesh);
+        copies_ = &copies;
+        const std::size_t count = fractured_.mesh.vertex_count(), old = model_.mesh.vertex_count();
+        bonds_.resize(count);
+        find_old_bonds();
+        for (Index v = 0; v < old; ++v) hang_old(v);
+        for (Index v = static_cast<Index>(old); v < count; ++v)
+            if (fractured_.sources[v - old].vertices[0] != kNoIndex) hang_on_surface(v);
+        hang_inside();
+        return finish();
+    }
+
+private:
+    void find_old_bonds() {
+        old_bonds_.resize(model_.mesh.vertex_count());
+        for (Index cell = 0; cell + 1 < detail_.cell_offsets.size(); ++cell)
+            for (Index r = detail_.cell_offsets[cell]; r < detail_.cell_offsets[cell + 1]; ++r)
+                old_bonds_[detail_.order[r]] = {cell, detail_.u[r], detail_.v[r]};
+    }
+
+    Index piece_of(Index vertex) const {
+        const Index piece = fractured_.piece_of_vertex[vertex];
+        if (piece != kNoIndex) return piece;
+        return cells_.cell_at(model_.mesh.positions[vertex].cast<double>()); // a loose vertex of the mesh
+    }
+
+    /// The unbroken driver's cell, of a piece's copies.
+    Index surface_cell(Index cell, Index piece) {
+        Triangle corners;
+        for (std::size_t k = 0; k < 3; ++k) {
+            const Index vertex = model_.driver().vertices[detail_.cells[cell][k]];
+            const Index own = piece_of(vertex) == piece ? vertex : kNoIndex;
+            corners[k] = copies_->vertex(vertex, piece, own, model_.mesh.positions[vertex]);
+        }
+        return copies_->cell(corners);
+    }
+
+    void hang_old(Index vertex) {
+        bonds_[vertex] = old_bonds_[vertex];
+        bonds_[vertex].cell = surface_cell(old_bonds_[vertex].cell, piece_of(vertex));
+    }
+
+    void hang_on_surface(Index vertex) {
+        const SurfacePoint& source = fractured_.sources[vertex - model_.mesh.vertex_count()];
+        Index first = source.vertices[0];
+        for (const Index other : source.vertices)
+            if (other != kNoIndex) first = std::min(first, other);
+        const Index cell = old_bonds_[first].cell;
+        std::array<Vec3d, 3> corners;
+        for (std::size_t k = 0; k < 3; ++k)
+            corners[k] = model_.mesh.positions[model_.driver().vertices[detail_.cells[cell][k]]].cast<double>();
+        const Weights w = closest_weights(corners, fractured_.mesh.positions[vertex].cast<double>());
+        bonds_[vertex] = {surface_cell(cell, fractured_.piece_of_vertex[vertex]), static_cast<float>(w.u),
+                          static_cast<float>(w.v)};
+    }
+
+    bool is_inside(Index vertex) const {
+        return vertex >= model_.mesh.vertex_count() &&
+               fractured_.sources[vertex - model_.mesh.vertex_count()].vertices[0] == kNoIndex;
+    }
+
+    void hang_inside() {
+        // The places of each crack, those on the surface too, and the pieces that meet at each place inside.
+        std::vector<std::vector<Index>> vertices_of_crack(fractured_.cells_of_crack.size()); // of its first cell
+        std::unordered_map<Index, std::vector<Index>> copies_at;                             // of a place inside
+        for (std::size_t f = 0; f < fractured_.mesh.face_count(); ++f) {
+            const Index crack = fractured_.crack_of_face[f];
+            if (crack == kNoIndex || fractured_.piece_of_face[f] != fractured_.cells_of_crack[crack][0]) continue;
+            for (const Index v : fractured_.mesh.face(f)) vertices_of_crack[crack].push_back(v);
+        }
+        for (Index v = 0; v < fractured_.mesh.vertex_count(); ++v)
+            if (is_inside(v)) copies_at[fractured_.place[v]].push_back(v);
+
+        // Lines on which three and more pieces meet first: they are of several cracks.
+        std::map<std::vector<Index>, std::vector<Index>> lines; // pieces, and places
+        for (const auto& [place, copies] : copies_at) {
+            if (copies.size() < 3) continue;
+            std::vector<Index> pieces;
+            for (const Index v : copies) pieces.push_back(fractured_.piece_of_vertex[v]);
+            std::sort(pieces.begin(), pieces.end());
+            lines[pieces].push_back(place);
+        }
+        std::unordered_map<Index, PlaceBond> bond_at;
+        for (auto& [pieces, places] : lines) {
+            std::sort(places.begin(), places.end());
+            const std::vector<Index> drivers = thinned(places, copies_at);
+            for (const Index place : places) bond_at[place] = hang_on_line(place, drivers, copies_at);
+        }
+        for (std::size_t crack = 0; crack < vertices_of_crack.size(); ++crack)
+            hang_crack(crack, vertices_of_crack[crack], copies_at, bond_at);
+
+        for (const auto& [place, copies] : copies_at) {
+            const auto found = bond_at.find(place);
+            if (found != bond_at.end())
+                for (const Index v : copies) bonds_of_places_.emplace_back(v, found->second);
+        }
+        std::sort(bonds_of_places_.begin(), bonds_of_places_.end(),
+                  [](const auto& a, const auto& b) { return a.first < b.first; });
+        for (const auto& [vertex, bond] : bonds_of_places_) {
+            const Index piece = fractured_.piece_of_vertex[vertex];
+            Triangle corners;
+            for (std::size_t k = 0; k < 3; ++k)
+                corners[k] = copies_->vertex(std::uint64_t(1) << 32 | bond.places[k], piece, kNoIndex,
+                                             position_at(bond.places[k]));
+            bonds_[vertex] = {copies_->cell(corners), static_cast<float>(bond.weights.u),
+                              static_cast<float>(bond.weights.v)};
+        }
+        // What no crack holds any more (a face that rounding took away) hangs on the surface.
+        for (Index v = static_cast<Index>(model_.mesh.vertex_count()); v < bonds_.size(); ++v)
+            if (bonds_[v].cell == kNoIndex) bonds_[v] = {surface_cell(0, fractured_.piece_of_vertex[v]), 0, 0};
+    }
+
+    using CopiesAt = std::unordered_map<Index, std::vector<Index>>;
+
+    const Vec3f& position_at(Index place) const { return position_of_.at(place); }
+
+    std::vector<Index> thinned(std::span<const Index> places, const CopiesAt& copies_at) {
+        std::vector<Vec3d> points;
+        for (const Index place : places) {
+            const Vec3f& p = fractured_.mesh.positions[copies_at.at(place).front()];
+            points.push_back(p.cast<double>());
+            position_of_[place] = p;
+        }
+        std::vector<Index> drivers;
+        for (double spacing = spacing_; drivers.size() < 2 && spacing > kFinestSpacing * spacing_; spacing /= 2) {
+            drivers.clear();
+            for (const Index k : thin(points, spacing)) drivers.push_back(places[k]);
+        }
+        return drivers;
+    }
+
+    PlaceBond hang_on_line(Index place, std::span<const Index> drivers, const CopiesAt& copies_at) const {
+        const Vec3d p = fractured_.mesh.positions[copies_at.at(place).front()].cast<double>();
+        std::array<std::pair<double, Index>, 2> nearest;
+        nearest.fill({std::numeric_limits<double>::infinity(), drivers[0]});
+        for (const Index driver : drivers) {
+            const std::pair<double, Index> entry = {(position_at(driver).cast<double>() - p).squaredNorm(), driver};
+            if (entry < nearest[0]) {
+                nearest[1] = nearest[0];
+                nearest[0] = entry;
+            } else if (entry < nearest[1]) {
+                nearest[1] = entry;
+            }
+        }
+        const Index a = nearest[0].second, b = nearest[1].second;
+        const Vec3d from = position_at(a).cast<double>(), to = position_at(b).cast<double>();
+        return {{a, b, b}, closest_weights({from, to, to}, p)};
+    }
+
+    void hang_crack(std::size_t crack, std::vector<Index>& vertices, const CopiesAt& copies_at,
+                    std::unordered_map<Index, PlaceBond>& bond_at) {
+        std::sort(vertices.begin(), vertices.end());
+        vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+        if (vertices.empty()) return;
+        // Points on lines that are drivers already come first, so that they stay.
+        std::stable_partition(vertices.begin(), vertices.end(), [&](Index v) {
+            const auto found = bond_at.find(fractured_.place[v]);
+            return found != bond_at.end() && found->second.places[0] == fractured_.place[v];
+        });
+        const auto& [i, j] = fractured_.cells_of_crack[crack];
+        const FacetFrame frame = facet_frame(cells_, i, j);
+        std::vector<Vec3d> points;
+        for (const Index v : vertices) points.push_back(fractured_.mesh.positions[v].cast<double>());
+        std::vector<Index> drivers;
+        std::vector<Vec2f> flat;
+        std::vector<Triangle> triangles;
+        for (double spacing = spacing_; triangles.empty() && spacing > kFinestSpacing * spacing_; spacing /= 2) {
+            drivers.clear();
+            flat.clear();
+            for (const Index k : thin(points, spacing)) {
+                drivers.push_back(fractured_.place[vertices[k]]);
+                position_of_[drivers.back()] = fractured_.mesh.positions[vertices[k]];
+                flat.emplace_back(static_cast<float>(points[k].dot(frame.x)),
+                                  static_cast<float>(points[k].dot(frame.y)));
+            }
+            triangles = delaunay(flat);
+        }
+        for (std::size_t k = 0; k < vertices.size(); ++k) {
+            const Index place = fractured_.place[vertices[k]];
+            if (!is_inside(vertices[k]) || copies_at.at(place).size() != 2) continue;
+            const Vec3d p(points[k].dot(frame.x), points[k].dot(frame.y), 0);
+            PlaceBond best{{drivers[0], drivers[0], drivers[0]}, {}};
+            double least = std::numeric_limits<double>::infinity();
+            const auto corner = [&](Index at) { return Vec3d(double(flat[at][0]), double(flat[at][1]), 0); };
+            for (const Triangle& t : triangles) {
+                const std::array<Vec3d, 3> corners = {corner(t[0]), corner(t[1]), corner(t[2])};
+                const Weights w = closest_weights(corners, p);
+                const double distance =
+                    ((1 - w.u - w.v) * corners[0] + w.u * corners[1] + w.v * corners[2] - p).squaredNorm();
+                if (distance >= least) continue;
+                least = distance;
+                best = {{drivers[t[0]], drivers[t[1]], drivers[t[2]]}, w};
+                if (distance == 0) break;
+            }
+            // Beside points that are almost on a line there may be no triangle near.
+            const PlaceBond line = hang_on_line(place, drivers, copies_at);
+            const auto off_line = [&] {
+                const Vec3d from = position_at(line.places[0]).cast<double>(),
+                            to = position_at(line.places[1]).cast<double>();
+                return ((1 - line.weights.u - line.weights.v) * from + (line.weights.u + line.weights.v) * to -
+                        points[k])
+                    .squaredNorm();
+            };
+            if (!(least <= off_line())) best = line;
+            bond_at[place] = best;
+        }
+    }
+
+    BrokenModel finish() {
+        // The driver's vertices in the order of the mesh's.
+        const auto& vertices = copies_->vertices();
+        std::vector<Index> order(vertices.size()), number(vertices.size());
+        for (Index k = 0; k < order.size(); ++k) order[k] = k;
+        std::sort(order.begin(), order.end(),
+                  [&](Index a, Index b) { return vertices[a].mesh_vertex < vertices[b].mesh_vertex; });
+        Level driver;
+        for (Index k = 0; k < order.size(); ++k) {
+            number[order[k]] = k;
+            driver.vertices.push_back(vertices[order[k]].mesh_vertex);
+            broken_.piece_of_driver.push_back(vertices[order[k]].piece);
+        }
+        std::vector<Triangle> cells;
+        bonds_.resize(broken_.model.mesh.vertex_count()); // loose vertices
+        for (const Triangle& cell : copies_->cells()) {
+            const Triangle named = {number[cell[0]], number[cell[1]], number[cell[2]]};
+            for (std::size_t k = 0; k < 3; ++k) {
+                Bond& own = bonds_[driver.vertices[named[k]]];
+                if (own.cell == kNoIndex)
+                    own = {static_cast<Index>(cells.size()), k == 1 ? 1.0f : 0.0f, k == 2 ? 1.0f : 0.0f};
+            }
+            if (named[0] != named[1] && named[1] != named[2] && named[2] != named[0]) {
+                driver.corners.insert(driver.corners.end(), named.begin(), named.end());
+                driver.face_offsets.push_back(static_cast<Index>(driver.corners.size()));
+            }
+            cells.push_back(named);
+        }
+        broken_.model.levels = {driver};
+        broken_.model.detail = encode_blend(broken_.model.mesh.positions, driver.vertices, std::move(cells),
+                                            {std::move(bonds_), {}, {}}, detail_.precision);
+        return std::move(broken_);
+    }
+
+    const Model& model_;
+    const BlendDetail& detail_;
+    const FracturedMesh& fractured_;
+    const FractureCells& cells_;
+    double spacing_;
+    BrokenModel broken_;
+    DriverCopies* copies_ = nullptr;
+    std::vector<Bond> old_bonds_, bonds_; ///< of the unbroken mesh's vertices in its own cells; of the new mesh's
+    std::unordered_map<Index, Vec3f> position_of_;
+    std::vector<std::pair<Index, PlaceBond>> bonds_of_places_;
+};
+
+} // namespace
+
+Result<BrokenModel> break_model(const Model& model, const FracturedMesh& fractured, const FractureCells& cells,
+                                double crack_spacing, const RunContext& context) {
+    if (model.code() != DetailCode::blend)
+        return Error{ErrorCode::unsuitable, "Only models of the blend code break; strip the mesh with it."};
+    if (fractured.mesh.vertex_count() < model.mesh.vertex_count() ||
+        !std::equal(model.mesh.positions.begin(), model.mesh.positions.end(), fractured.mesh.positions.begin()))
+        return Error{ErrorCode::unsuitable, "The pieces are those of another mesh than the model's."};
+    if (!(crack_spacing > 0))
+        return Error{ErrorCode::usage, "The spacing of the driver's points on cracks is above 0."};
+    BrokenModel broken = ModelBreaker(model, fractured, cells, crack_spacing).run();
+    if (context.is_cancelled()) return cancelled_error();
+    return broken;
+}
+
+void drop_closed_cracks(Mesh& mesh, std::span<const Index> crack_of_face, std::span<const std::uint8_t> is_open) {
+    const Mesh before = mesh;
+    const auto keeps = [&](std::size_t f) { return crack_of_face[f] == kNoIndex || is_open[crack_of_face[f]]; };
+    mesh.face_offsets = {0};
+    mesh.corners.clear();
+    const auto keep_corners = [&](const std::vector<Index>& from, std::vector<Index>& to) {
+        to.clear();
+        for (std::size_t f = 0; f < before.face_count(); ++f)
+            if (keeps(f) && !from.empty())
+                to.insert(to.end(), from.begin() + before.face_offsets[f], from.begin() + before.face_offsets[f + 1]);
+    };
+    const auto keep_faces = [&](const auto& from, auto& to) {
+        to.clear();
+        for (std::size_t f = 0; f < before.face_count(); ++f)
+            if (keeps(f) && !from.empty()) to.push_back(from[f]);
+    };
+    for (std::size_t f = 0; f < before.face_count(); ++f)
+        if (keeps(f)) mesh.add_face(before.face(f));
+    keep_corners(before.uvs.corners, mesh.uvs.corners);
+    keep_corners(before.normals.corners, mesh.normals.corners);
+    keep_faces(before.objects.of_face, mesh.objects.of_face);
+    keep_faces(before.groups.of_face, mesh.groups.of_face);
+    keep_faces(before.materials.of_face, mesh.materials.of_face);
+    keep_faces(before.smoothing, mesh.smoothing);
+}
+
+} // namespace filigree

@@ -1,0 +1,29 @@
+// A model that breaks: bound once, whole, and moved piece by piece.
+#pragma once
+
+#include "filigree/fracture/fracture.h"
+#include "filigree/hierarchy/model.h"
+
+namespace filigree {
+
+/// A model of a mesh in pieces. Each piece has its own copies of the driver vertices that carry it. While copies are in
+/// one place with one gradient, so is what they carry, to the bit: nothing shows until a crack opens.
+struct BrokenModel {
+    /// One level, the driver. Its vertices are vertices of the mesh: those of the unbroken model's driver in their own
+    /// pieces, and loose ones, without a face, behind all others: copies for other pieces, and points on cracks.
+    Model model;
+    std::vector<Index> piece_of_driver; ///< a driver vertex
+};
+
+/// model: a blend model. fractured: its mesh, broken with pieces_are_cells. crack_spacing: between the driver's points
+/// on cracks, model units; about the edges of the driver. The unbroken mesh's vertices keep their bonds; crack points
+/// on the surface hang where the first vertex of their edge does; points inside hang on a coarse triangulation of their
+/// crack, the same from both sides. Cost O(V). Errors: unsuitable (another code than blend; another mesh), cancelled.
+Result<BrokenModel> break_model(const Model& model, const FracturedMesh& fractured, const FractureCells& cells,
+                                double crack_spacing, const RunContext& context);
+
+/// Takes away the faces of cracks that never opened: `is_open` says so of each of FracturedMesh::cells_of_crack, and
+/// crack_of_face which crack a face is on. Vertices stay, so that every frame has the same ones.
+void drop_closed_cracks(Mesh& mesh, std::span<const Index> crack_of_face, std::span<const std::uint8_t> is_open);
+
+} // namespace filigree
