@@ -1,6 +1,7 @@
 #include "simulate_report.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include <fmt/format.h>
 
@@ -52,6 +53,28 @@ void report_driver(const ReadyBody& body, const PoseSequence& poses, Json& json,
         json["expected"] = {{"spacing", error.spacing}, {"driver", error.driver}};
     }
     report.row(body.name + ", driver", text);
+}
+
+/// What broke, and when. Times that have not come are null.
+void report_fracture(const ReadyBody& body, const FractureReport& broken, Json& json, Report& report) {
+
+    const auto when = [](double time) { return std::isfinite(time) ? Json(time) : Json(); };
+    Json times = Json::array();
+    for (const double time : broken.broke) times.push_back(when(time));
+    json = {{"pieces", broken.pieces},
+            {"parts", broken.parts},
+            {"first_s", when(broken.first)},
+            {"broke_s", times},
+            {"crack_area_m2", broken.crack_area},
+            {"broken_area_m2", broken.broken_area},
+            {"dissipated_j", broken.dissipated}};
+    report.row(
+        body.name + ", cracks",
+        std::isfinite(broken.first)
+            ? fmt::format("{} parts of {} pieces, the first crack at {:.3g} s; {:.3g} of {:.3g} m^2 broken, {:.3g} J",
+                          with_commas(broken.parts), with_commas(broken.pieces), broken.first, broken.broken_area,
+                          broken.crack_area, broken.dissipated)
+            : fmt::format("none; {} pieces hold", with_commas(broken.pieces)));
 }
 
 /// Why descent took over, where it did.
@@ -156,6 +179,9 @@ void report_run(const SceneFile& scene, const ReadyScene& ready, const SceneRun&
     for (const ReadyBody& body : ready.bodies) report_body(body, report);
     for (std::size_t b = 0; b < ready.bodies.size(); ++b)
         report_driver(ready.bodies[b], run.recording().poses[b], report.set("bodies").at(b)["driver"], report);
+    for (std::size_t b = 0; b < ready.bodies.size(); ++b)
+        if (run.fracture(b).breaks)
+            report_fracture(ready.bodies[b], run.fracture(b), report.set("bodies").at(b)["fracture"], report);
     report_frames(scene, run, report);
     report_checks(ready, run, report);
 }

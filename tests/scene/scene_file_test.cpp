@@ -36,6 +36,22 @@ TEST_F(SceneFileTest, RefusesWithLineAndSuggestion) {
               "3: 'size' in [[body]] must be a number, above 0, and is 0.");
 }
 
+TEST_F(SceneFileTest, ReadsWhatBreaks) {
+    const std::string fracture = "[[fracture]]\npieces = 7\npattern = \"radial\"\nstrength = 2e3\nseed = 5\n";
+    const SceneFile scene = this->scene(kDrop + fracture + "[[crack]]\ntime = 0.5\npieces = [2]\n");
+    ASSERT_EQ(scene.fractures.size(), 1U);
+    EXPECT_EQ(scene.fractures[0].pattern.pieces, 7U);
+    EXPECT_EQ(scene.fractures[0].pattern.kind, FracturePatternKind::radial);
+    EXPECT_EQ(scene.fractures[0].material.strength, 2e3);
+    EXPECT_EQ(scene.fractures[0].material.seed, 5U);
+    EXPECT_FALSE(scene.fractures[0].energy);
+    ASSERT_EQ(scene.cracks.size(), 1U);
+    EXPECT_EQ(scene.cracks[0].pieces, std::vector<Index>{2});
+    EXPECT_NE(refusal("[[body]]\nshape = \"bar\"\nmaterial = \"clay\"\n[[fracture]]\n").find("only bodies"),
+              std::string::npos);
+    EXPECT_NE(refusal("[[body]]\nshape = \"bar\"\n[[crack]]\n").find("no [[fracture]]"), std::string::npos);
+}
+
 TEST_F(SceneFileTest, ContentIsTheMotionsAlone) {
     const std::string content = scene(kDrop).content;
     EXPECT_EQ(scene("# a comment\n" + kDrop + "[picture]\nview = \"top\"\n").content, content);

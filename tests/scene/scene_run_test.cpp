@@ -43,6 +43,24 @@ TEST_F(SceneRunTest, AResumedRunSavesWhatOneThatWentThroughSaves) {
     EXPECT_EQ(resumed->run->times().frames, 3U);
 }
 
+TEST_F(SceneRunTest, BodiesBreakAndGoOnFromTheMiddle) {
+    const std::string text = filigree_test::kDrop +
+                             "[[fracture]]\npieces = 4\nstrength = 1e9\nenergy = 1e6\nroughness = 0\n"
+                             "[[crack]]\ntime = 0.04\npieces = [0]\n";
+    const auto through = made(text);
+    const std::string half = state_after(*through, 4);
+    EXPECT_EQ(through->run->fracture(0).parts, 2U);
+    EXPECT_NEAR(through->run->fracture(0).first, 0.04, 0.01);
+    const auto resumed = made(text);
+    ASSERT_TRUE(resumed->run->resume(half, "half"));
+    EXPECT_EQ(state_after(*resumed, 6), state_after(*through, 6));
+    // Until it broke, the motion is that of a body that cannot break.
+    const auto whole = made();
+    ASSERT_TRUE(whole->run->advance_to(2, kContext));
+    EXPECT_EQ(whole->run->recording().poses[0].frames[2].positions,
+              through->run->recording().poses[0].frames[2].positions);
+}
+
 TEST_F(SceneRunTest, StatesThatDoNotFitAreRefusedAndChangeNothing) {
     const auto run = made();
     const std::string state = state_after(*run, 2);

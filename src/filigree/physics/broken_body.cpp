@@ -17,7 +17,7 @@ constexpr int kSamples = 6;     ///< along each axis of a cell that pieces share
 constexpr float kSpeck = 0.25f; ///< samples that a piece counts as which none found in a cell
 constexpr float kGap = 0.02f;   ///< spacings that a crack's surface points keep from the other pieces at rest
 constexpr int kGapSteps = 6;
-constexpr float kCrackPointSpacing = 0.5f; ///< spacings
+constexpr float kCrackPointSpacing = 1; ///< spacings
 
 /// Part of a triangle where a function, linear in it, is negative.
 float part_below_zero(const std::array<float, 3>& values) {

@@ -133,17 +133,13 @@ bool Cracks::let_events_go(double time) {
     return any;
 }
 
-/// Links of no area let go with the last of those beside that hold their second piece.
+/// Links of no area let go with the last of the facets nearby.
 bool Cracks::let_specks_go(double time) {
     bool any = false;
     for (Index l = 0; l < links_.size(); ++l) {
-        const CrackLink& link = body().links[l];
-        if (link.area > 0 || links_[l].phase != LinkState::tied) continue;
-        const bool held = std::ranges::any_of(body().links_beside[l], [&](Index other) {
-            const CrackLink& beside = body().links[other];
-            return beside.area > 0 && links_[other].phase == LinkState::tied &&
-                   (beside.pieces[0] == link.pieces[1] || beside.pieces[1] == link.pieces[1]);
-        });
+        if (body().links[l].area > 0 || links_[l].phase != LinkState::tied) continue;
+        const bool held =
+            std::ranges::any_of(body().facets_of_link[l], [&](Index f) { return held_part(body().facets[f]) > 0; });
         if (held) continue;
         let_go(l, Vec3f::Zero(), time);
         any = true;
@@ -163,7 +159,7 @@ bool Cracks::open_links(std::span<const BodyState> bodies, double time, const Ru
     std::vector<Vec3f> pulls(links_.size(), Vec3f::Zero());
     parallel_for(context, links_.size(), kCrackGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t l = begin; l < end; ++l) {
-            if (links_[l].phase != LinkState::tied || !(body().links[l].area > 0)) continue;
+            if (links_[l].phase != LinkState::tied) continue;
             Vec3f traction = Vec3f::Zero(), normal = Vec3f::Zero();
             float area = 0;
             for (const Index f : body().facets_of_link[l]) {
@@ -187,7 +183,6 @@ bool Cracks::open_links(std::span<const BodyState> bodies, double time, const Ru
 bool Cracks::advance(std::span<BodyState> bodies, double time, const RunContext& context) {
     bool changed = let_events_go(time);
     changed |= open_links(bodies, time, context);
-    if (changed) let_specks_go(time);
     bool any_ended = false;
     if (is_open_)
         for (Index l = 0; l < links_.size(); ++l) {
@@ -200,6 +195,7 @@ bool Cracks::advance(std::span<BodyState> bodies, double time, const RunContext&
             link.phase = LinkState::free;
             any_ended = true;
         }
+    if (changed || any_ended) changed |= let_specks_go(time);
     if (any_ended && !changed) find_groups(bodies);
     if (!changed) return false;
     if (!is_open_) {

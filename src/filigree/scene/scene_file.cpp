@@ -51,6 +51,8 @@ public:
             throw BadResultAccess({ErrorCode::bad_file, scene_.path + ": there is no [[body]], and a scene needs one "
                                                                       "(docs/scenes.md)."});
         each("obstacle", [&](const SceneTable& section) { read_obstacle(section); });
+        each("fracture", [&](const SceneTable& section) { read_fracture(section); });
+        each("crack", [&](const SceneTable& section) { read_crack(section); });
         each("pin", [&](const SceneTable& section) {
             scene_.pins.push_back({section.line(), body_of(section), section.region(), section.motion()});
             if (scene_.bodies[scene_.pins.back().body].material.model == MaterialModel::rigid)
@@ -296,6 +298,44 @@ private:
         for (const std::size_t first : bodies_called(in, "first"))
             for (const std::size_t second : bodies_called(in, "second"))
                 scene_.pairs.push_back({first, second, contact});
+    }
+
+    void read_fracture(const SceneTable& in) {
+        SceneFracture fracture;
+        fracture.line = in.line();
+        fracture.body = body_of(in);
+        const Material& material = scene_.bodies[fracture.body].material;
+        if (material.model != MaterialModel::fem)
+            in.fail(in.line(), "only bodies of model = \"fem\" break; this one's is another");
+        for (const SceneFracture& other : scene_.fractures)
+            if (other.body == fracture.body) in.fail(in.line(), "a body has one [[fracture]] at most");
+        in.set_whole("pieces", fracture.pattern.pieces);
+        fracture.pattern.kind = static_cast<FracturePatternKind>(in.word("pattern", 0));
+        in.set("at", fracture.at);
+        in.set("grain", fracture.pattern.grain);
+        if (fracture.pattern.grain && !(fracture.pattern.grain->norm() > 0))
+            in.fail("grain", "the grain has no direction");
+        in.set("stretch", fracture.pattern.stretch);
+        in.set("roughness", fracture.pattern.roughness);
+        fracture.material.seed = 1;
+        in.set_whole("seed", fracture.material.seed);
+        fracture.material.strength = 0.01 * material.young_modulus;
+        in.set("strength", fracture.material.strength);
+        in.set("scatter", fracture.material.scatter);
+        if (in.has("energy")) in.set("energy", fracture.energy.emplace());
+        scene_.fractures.push_back(std::move(fracture));
+    }
+
+    void read_crack(const SceneTable& in) {
+        SceneCrack crack;
+        crack.line = in.line();
+        crack.body = body_of(in);
+        const auto breaks = [&](const SceneFracture& fracture) { return fracture.body == crack.body; };
+        if (std::ranges::none_of(scene_.fractures, breaks)) in.fail(in.line(), "this body has no [[fracture]]");
+        in.set("time", crack.time);
+        if (in.has("pieces")) crack.pieces = in.ids("pieces");
+        crack.region = in.region();
+        scene_.cracks.push_back(std::move(crack));
     }
 
     void read_hand(const SceneTable& in) {

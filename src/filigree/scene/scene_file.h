@@ -3,6 +3,7 @@
 #pragma once
 
 #include "filigree/core/view.h"
+#include "filigree/fracture/fracture_pattern.h"
 #include "filigree/mesh/shapes.h"
 #include "filigree/physics/simulation.h"
 
@@ -58,6 +59,24 @@ struct SceneObstacle {
     bool visible = true;
 };
 
+struct SceneFracture {
+    unsigned line = 0;
+    std::size_t body = 0;
+    FracturePattern pattern;      ///< without points
+    std::optional<Vec3d> at = {}; ///< world, at the start
+    FractureMaterial material;
+    std::optional<double> energy = {}; ///< J/m^2; unset: by the strength
+};
+
+/// Something that lets go at a time.
+struct SceneCrack {
+    unsigned line = 0;
+    std::size_t body = 0;
+    double time = 0; ///< s
+    std::vector<Index> pieces;
+    SceneRegion region;
+};
+
 struct ScenePin {
     unsigned line = 0;
     std::size_t body = 0;
@@ -102,6 +121,8 @@ struct SceneFile {
     std::vector<SceneBody> bodies;
     std::vector<SceneObstacle> obstacles;
     std::vector<BodyPair> pairs;
+    std::vector<SceneFracture> fractures;
+    std::vector<SceneCrack> cracks;
     std::vector<ScenePin> pins;
     std::vector<SceneForce> forces;
     std::vector<SceneHand> hands;

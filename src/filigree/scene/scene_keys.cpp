@@ -127,6 +127,29 @@ constexpr KeyRule kKeys[] = {
     from(0, 100, "pair", "friction", number, "", "the world's", "Coulomb's coefficient where these touch"),
     from(0, 1, "pair", "restitution", number, "", "the world's", "where these touch"),
 
+    plain("fracture", "body", text, "", "the only one", "name of the body that breaks; it is of model fem"),
+    from(2, 100'000, "fracture", "pieces", whole, "", "20", "that it may break into"),
+    one_of(
+        "even impact slabs radial", "fracture", "pattern", "even",
+        "of about one size; small around a point; long ones, as of wood; rays and rings around a point, as of glass"),
+    plain("fracture", "at", vector, "m", "a corner; radial: the middle", "where the pattern impact or radial begins"),
+    plain("fracture", "grain", vector, "", "the longest axis",
+          "slabs: along which they are longer, on the mesh's axes"),
+    from(1, 100, "fracture", "stretch", number, "", "6", "slabs: how many times longer"),
+    from(0, 1, "fracture", "roughness", number, "", "0.5", "of cracks; 0 is planes"),
+    from(0, 1e9, "fracture", "seed", whole, "", "1", "of the pattern and the scatter"),
+    above(0, 1e12, "fracture", "strength", number, "Pa", "0.01 young_modulus", "the stress at which a crack begins"),
+    from(0, 1, "fracture", "scatter", number, "", "0", "of the strengths of cracks: their standard deviation, a share"),
+    above(0, 1e12, "fracture", "energy", number, "J/m^2", "strength^2 diagonal / (50 young_modulus)",
+          "that a crack costs by its area"),
+
+    plain("crack", "body", text, "", "the only one", "name of a body with a [[fracture]]"),
+    from(0, 1e9, "crack", "time", number, "s", "0", "when pieces let go of each other, whatever pulls them"),
+    plain("crack", "pieces", ids, "", "any", "of what holds these to others, by number; and"),
+    plain("crack", "box", box, "m", "everywhere", "of what is in a box at the start; or"),
+    plain("crack", "ball", ball, "m", "everywhere", "in a ball; or"),
+    plain("crack", "vertices", ids, "", "everywhere", "near vertices of its mesh"),
+
     plain("pin", "body", text, "", "the only one", "name of the body whose particles are held"),
     plain("pin", "box", box, "m", "", "those in a box at the start: `{ min = [x, y, z], max = [x, y, z] }`; or"),
     plain("pin", "ball", ball, "m", "", "in a ball: `{ centre = [x, y, z], radius = r }`; or"),
@@ -255,7 +278,7 @@ std::string type_text(KeyType type) {
     case ball:
         return "ball";
     case ids:
-        return "list of vertex ids";
+        return "list of numbers from 0";
     case rotation:
         return "axis and degrees";
     case pixels:

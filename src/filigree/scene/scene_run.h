@@ -31,6 +31,7 @@ public:
     const Recording& recording() const { return recording_; }
     const RunTimes& times() const { return times_; }
     const DescentCauses& descent_causes() const { return descent_causes_; }
+    FractureReport fracture(std::size_t body) const { return simulation_.fracture(body); }
     Energy energy() const { return simulation_.energy(always_); }
     /// The body's mesh in one of the recorded poses, at the scene's origin. Errors: as of Restorer::mesh.
     Result<Mesh> mesh(std::size_t body, std::size_t frame, const RunContext& context) const;

@@ -238,11 +238,11 @@ Vec3d SceneTable::vector_of(const toml::node& node, std::string_view key) const 
 std::vector<Index> SceneTable::ids(std::string_view key) const {
     const toml::node& node = *table_.get(key);
     const toml::array* list = node.as_array();
-    if (!list || list->empty()) wrong(node, key, "a list of vertex ids");
+    if (!list || list->empty()) wrong(node, key, "a list of whole numbers from 0");
     std::vector<Index> ids;
     for (const toml::node& entry : *list) {
         const auto id = entry.value_exact<std::int64_t>();
-        if (!id || *id < 0 || *id >= std::int64_t{kNoIndex}) wrong(entry, key, "a list of vertex ids");
+        if (!id || *id < 0 || *id >= std::int64_t{kNoIndex}) wrong(entry, key, "a list of whole numbers from 0");
         ids.push_back(static_cast<Index>(*id));
     }
     return ids;

@@ -51,6 +51,7 @@ public:
     /// Numbers that change in time, times `unit`.
     Keyed<Vec3d> keyed(std::string_view key, double unit = 1) const;
     SceneMotion motion() const;
+    std::vector<Index> ids(std::string_view key) const;
     SceneRegion region() const;
     Eigen::AngleAxisd rotation(std::string_view key) const;
     std::pair<unsigned, unsigned> pixels(std::string_view key) const;
@@ -65,7 +66,6 @@ private:
     double number_of(const toml::node& node, std::string_view key, const KeyRule& rule) const;
     std::int64_t whole_of(const toml::node& node, std::string_view key, const KeyRule& rule) const;
     Vec3d vector_of(const toml::node& node, std::string_view key) const;
-    std::vector<Index> ids(std::string_view key) const;
     const toml::table& sub_table(std::string_view key, std::array<std::string_view, 2> keys) const;
     void read_key(const toml::node& entry, std::string_view key, double unit, Keyed<Vec3d>& value) const;
 

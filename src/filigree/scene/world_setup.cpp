@@ -63,6 +63,7 @@ public:
         result_.bodies.reserve(scene_.bodies.size());
         for (const SceneBody& body : scene_.bodies) add_body(body);
         choose_origin();
+        for (const SceneFracture& fracture : scene_.fractures) add_fracture(fracture);
         for (const SceneObstacle& obstacle : scene_.obstacles) add_obstacle(from_origin(obstacle));
         for (const ScenePin& pin : scene_.pins) add_pin(pin);
         for (const SceneForce& force : scene_.forces)
@@ -196,6 +197,43 @@ private:
         if (region.box) region.box = Box{region.box->min - result_.origin, region.box->max - result_.origin};
         if (region.ball) region.ball->centre -= result_.origin;
         return region;
+    }
+
+    void add_fracture(const SceneFracture& from) {
+        ReadyBody& body = result_.bodies[from.body];
+        Actor& actor = result_.actors[from.body];
+        FracturePattern pattern = from.pattern;
+        if (from.at) pattern.at = {actor.placement.inverse() * (*from.at - result_.origin) / body.scale};
+        RunContext seeded = context_;
+        seeded.seed = from.material.seed;
+        auto fracture = std::make_shared<Fracture>();
+        fracture->material = from.material;
+        const double diagonal = body.scale * body_box(body).diagonal(), strength = from.material.strength;
+        fracture->material.energy =
+            from.energy.value_or(strength * strength * diagonal / (50 * body.body->material.young_modulus));
+        at_line(scene_, from.line, [&] {
+            body.cells =
+                std::make_shared<const FractureCells>(make_fracture_cells(body.model.mesh, pattern, seeded).value());
+            Partition partition{body.cells->count(), [cells = body.cells, scale = body.scale](const Vec3d& point) {
+                                    return cells->cell_at(point / scale);
+                                }};
+            fracture->body = std::make_shared<const BrokenBody>(
+                break_body(body.body, std::move(partition), context_, &body.broken).value());
+        });
+        for (const SceneCrack& crack : scene_.cracks) {
+            if (crack.body != from.body) continue;
+            for (const Index piece : crack.pieces)
+                if (piece >= body.cells->count())
+                    fail_in_scene(scene_, crack.line, ErrorCode::bad_file,
+                                  fmt::format("there is no piece {} of '{}', which has {}", piece, body.name,
+                                              body.cells->count()));
+            const SceneRegion& region = crack.region;
+            const bool everywhere = !region.box && !region.ball && region.vertices.empty();
+            fracture->events.push_back(
+                {crack.time, crack.pieces,
+                 everywhere ? std::vector<Index>() : particles_of(from.body, region, crack.line)});
+        }
+        actor.fracture = std::move(fracture);
     }
 
     static RigidMotion motion_of(const SceneMotion& from, const Vec3d& middle) {

@@ -14,6 +14,8 @@ struct ReadyBody {
     std::shared_ptr<const Body> body;
     BodyReport report;
     DriverEdges driver;
+    std::shared_ptr<const FractureCells> cells; ///< of a body that breaks, in model units; else null
+    BrokenBodyReport broken;
     Vec3f color = Vec3f::Zero();
     bool has_own_color = false; ///< of the mesh's own, if it has some
 
