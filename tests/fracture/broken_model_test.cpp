@@ -68,7 +68,7 @@ TEST(BrokenModel, MovesAsTheUnbrokenOneUntilPiecesPart) {
     }
     EXPECT_LT(worst_old, 2e-4);
     EXPECT_LT(worst_surface, 1e-3);
-    EXPECT_LT(worst_inside, 2e-3);
+    EXPECT_LT(worst_inside, 4e-3); // half the square of the way to a driver point, 0.08, times the twist
 }
 
 TEST(BrokenModel, EveryPieceMovesByItself) {

@@ -486,7 +486,8 @@ private:
         Mesh& out = out_.mesh;
         if (out_.report.inside_faces > 0) {
             out.materials.names.push_back("inside");
-            if (!out.embedded_materials.empty()) out.embedded_materials.emplace_back().name = "inside";
+            if (out.embedded_materials.size() + 1 == out.materials.names.size())
+                out.embedded_materials.emplace_back().name = "inside";
         } else if (mesh_.materials.empty()) {
             out.materials.of_face.clear();
         }

@@ -1,0 +1,86 @@
+// filigree fracture: pieces as one mesh or as files, and the report about them.
+#include "apps/program.h"
+
+using namespace filigree_test;
+
+namespace {
+
+class FractureCommand : public Program {
+protected:
+    /// In triangles: the volume of quads that are not flat depends on how they are cut.
+    void make_cube() {
+        ok({"make", "wavy-cube", "-o", "cube.stl", "--resolution", "16", "--quiet"});
+        ok({"deform", "cube.stl", "-o", "cube.obj", "--stretch", "1.2", "--quiet"});
+    }
+};
+
+} // namespace
+
+TEST_F(FractureCommand, ReportIsWhatInfoMeasures) {
+    make_cube();
+    const Json report = json({"fracture", "cube.obj", "-o", "broken.ply", "--pieces", "12"});
+    EXPECT_EQ(report.at("pieces"), 12);
+    EXPECT_EQ(report.at("open_edges"), 0);
+    EXPECT_EQ(report.at("cone_facets"), 0);
+    EXPECT_LT(report.at("volume_error"), 1e-9);
+    const Json info = json({"info", "broken.ply"});
+    EXPECT_EQ(info.at("faces"), report.at("faces"));
+    EXPECT_EQ(info.at("vertices"), report.at("vertices"));
+    EXPECT_NEAR(info.at("volume").get<double>() / report.at("volume").get<double>(), 1, 1e-6);
+    EXPECT_EQ(report.at("warnings"), Json::array());
+}
+
+TEST_F(FractureCommand, PiecesAreNamedInEveryFormat) {
+    make_cube();
+    for (const char* file : {"broken.obj", "broken.glb", "broken.ply", "broken.stl"})
+        EXPECT_EQ(json({"fracture", "cube.obj", "-o", file, "--pieces", "5"}).at("warnings"), Json::array()) << file;
+    const std::string obj = bytes_of(path("broken.obj"));
+    for (int piece = 0; piece < 5; ++piece) {
+        const std::string name = "piece_" + std::to_string(piece);
+        EXPECT_NE(obj.find("\ng " + name + "\n"), std::string::npos);
+        EXPECT_EQ(obj.find("\no " + name + "\n"), obj.rfind("\no " + name + "\n")); // each piece stands in one place
+        EXPECT_NE(bytes_of(path("broken.glb")).find("\"" + name + "\""), std::string::npos);
+    }
+    EXPECT_NE(obj.find("usemtl inside"), std::string::npos);
+    EXPECT_NE(bytes_of(path("broken.ply")).substr(0, 1000).find("piece"), std::string::npos);
+}
+
+TEST_F(FractureCommand, AFolderGetsAFileAPiece) {
+    make_cube();
+    const Json report = json({"fracture", "cube.obj", "-o", "pieces/", "--pieces", "4", "--roughness", "0"});
+    ASSERT_EQ(report.at("files").size(), 4u);
+    double volume = 0;
+    for (const Json& file : report.at("files")) {
+        const Json info = json({"info", file.get<std::string>()});
+        EXPECT_EQ(info.at("closed"), true);
+        EXPECT_EQ(info.at("manifold"), true);
+        volume += info.at("volume").get<double>();
+    }
+    EXPECT_NEAR(volume / report.at("volume").get<double>(), 1, 1e-6);
+}
+
+TEST_F(FractureCommand, SeedsAndThreadsDecideAsTheyShould) {
+    make_cube();
+    const auto bytes = [&](const std::string& name, std::vector<std::string> options) {
+        options.insert(options.begin(), {"fracture", "cube.obj", "-o", name, "--pieces", "6", "--quiet"});
+        ok(options);
+        return bytes_of(path(name));
+    };
+    const std::string first = bytes("a.ply", {"--threads", "1"});
+    EXPECT_TRUE(bytes("b.ply", {"--threads", "2"}) == first);
+    EXPECT_FALSE(bytes("c.ply", {"--seed", "2"}) == first);
+}
+
+TEST_F(FractureCommand, RefusesWhatItCannotDo) {
+    make_cube();
+    fails(2, {"fracture", "cube.obj", "-o", "x.ply", "--pieces", "0"}, {"--pieces"});
+    fails(2, {"fracture", "cube.obj", "-o", "x.ply", "--pattern", "straight"}, {"--pattern"});
+    fails(2, {"fracture", "cube.obj", "-o", "x.ply", "--at", "1,2"}, {"--at"});
+    fails(5, {"fracture", "cube.obj", "-o", "x.txt"}, {"x.txt"});
+    fails(2, {"fracture", "cube.obj", "-o", "cube.obj"}, {"cube.obj"});
+    write("points.obj", "v 0 0 0\nv 1 0 0\n");
+    const Ran points = run({"fracture", "points.obj", "-o", "x.ply"});
+    EXPECT_EQ(points.code, 7);
+    EXPECT_NE(points.err.find("there is nothing to break"), std::string::npos);
+    EXPECT_EQ(bytes_of(path("x.ply")), "");
+}
