@@ -74,7 +74,10 @@ void fit_to_format(MeshFormat format, const Mesh& input, Mesh& mesh) {
     if (format != MeshFormat::obj) mesh.groups = {};
     if (is_ply || format == MeshFormat::stl || format == MeshFormat::off) {
         mesh.objects = {};
-        if (input.materials.empty()) mesh.materials = {};
+        if (input.materials.empty()) {
+            mesh.materials = {};
+            mesh.embedded_materials = {};
+        }
         if (input.normals.empty()) mesh.normals = {};
         if (input.uvs.empty()) mesh.uvs = {};
     }

@@ -97,6 +97,22 @@ TEST(BrokenModel, CracksThatNeverOpenedCanBeLeftOut) {
     EXPECT_LT(wanted, ball.fractured.mesh.face_count());
 }
 
+TEST(BrokenModel, CracksOpenWhereCopiesPart) {
+    const Case ball = broken_ball(0);
+    Pose rest = rest_pose(ball.broken.model), moved = rest;
+    const auto open = [&](const Pose& pose) {
+        return open_cracks(ball.broken, ball.fractured.cells_of_crack, std::vector<Pose>{rest, pose, rest});
+    };
+    for (const std::uint8_t is_open : open(rest)) EXPECT_EQ(is_open, 0);
+    for (std::size_t d = 0; d < moved.positions.size(); ++d)
+        if (ball.broken.piece_of_driver[d] == 3) moved.positions[d] += Vec3f(1, 0, 0);
+    const std::vector<std::uint8_t> opened = open(moved);
+    for (std::size_t crack = 0; crack < opened.size(); ++crack) {
+        const auto& [i, j] = ball.fractured.cells_of_crack[crack];
+        EXPECT_EQ(opened[crack] != 0, i == 3 || j == 3);
+    }
+}
+
 TEST(BrokenModel, RefusesOtherMeshesAndCodes) {
     const Case ball = broken_ball(0);
     const Mesh other = make_wavy_cube({.resolution = 8});

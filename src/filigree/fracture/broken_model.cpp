@@ -421,6 +421,31 @@ Result<BrokenModel> break_model(const Model& model, const FracturedMesh& fractur
     return broken;
 }
 
+std::vector<std::uint8_t> open_cracks(const BrokenModel& broken, std::span<const std::array<Index, 2>> cells_of_crack,
+                                      std::span<const Pose> frames) {
+    const std::vector<Vec3f> rest = driver_positions(broken.model);
+    std::map<std::array<float, 3>, std::vector<Index>> copies; // at one place
+    for (Index d = 0; d < rest.size(); ++d) copies[{rest[d][0], rest[d][1], rest[d][2]}].push_back(d);
+    std::map<std::array<Index, 2>, std::vector<std::array<Index, 2>>> pairs; // of two pieces
+    for (const auto& [place, at] : copies)
+        for (const Index a : at)
+            for (const Index b : at)
+                if (broken.piece_of_driver[a] < broken.piece_of_driver[b])
+                    pairs[{broken.piece_of_driver[a], broken.piece_of_driver[b]}].push_back({a, b});
+    std::vector<std::uint8_t> is_open;
+    for (const std::array<Index, 2>& cells : cells_of_crack) {
+        const auto found = pairs.find(cells);
+        const bool opened =
+            found == pairs.end() || std::any_of(frames.begin(), frames.end(), [&](const Pose& pose) {
+                return std::any_of(found->second.begin(), found->second.end(), [&](const std::array<Index, 2>& pair) {
+                    return pose.positions[pair[0]] != pose.positions[pair[1]];
+                });
+            });
+        is_open.push_back(opened);
+    }
+    return is_open;
+}
+
 void drop_closed_cracks(Mesh& mesh, std::span<const Index> crack_of_face, std::span<const std::uint8_t> is_open) {
     const Mesh before = mesh;
     const auto keeps = [&](std::size_t f) { return crack_of_face[f] == kNoIndex || is_open[crack_of_face[f]]; };

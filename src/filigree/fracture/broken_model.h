@@ -3,6 +3,7 @@
 
 #include "filigree/fracture/fracture.h"
 #include "filigree/hierarchy/model.h"
+#include "filigree/hierarchy/pose.h"
 
 namespace filigree {
 
@@ -22,8 +23,13 @@ struct BrokenModel {
 Result<BrokenModel> break_model(const Model& model, const FracturedMesh& fractured, const FractureCells& cells,
                                 double crack_spacing, const RunContext& context);
 
-/// Takes away the faces of cracks that never opened: `is_open` says so of each of FracturedMesh::cells_of_crack, and
-/// crack_of_face which crack a face is on. Vertices stay, so that every frame has the same ones.
+/// One 0 or 1 for each of FracturedMesh::cells_of_crack: whether copies of a driver vertex on its two sides were ever
+/// apart. A crack between whose pieces no vertex has copies counts as open. Cost O(cracks + frames x driver).
+std::vector<std::uint8_t> open_cracks(const BrokenModel& broken, std::span<const std::array<Index, 2>> cells_of_crack,
+                                      std::span<const Pose> frames);
+
+/// Takes away the faces of cracks that never opened. crack_of_face, is_open: of FracturedMesh and open_cracks. Vertices
+/// stay, so that every frame has the same ones.
 void drop_closed_cracks(Mesh& mesh, std::span<const Index> crack_of_face, std::span<const std::uint8_t> is_open);
 
 } // namespace filigree
