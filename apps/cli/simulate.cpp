@@ -160,7 +160,10 @@ public:
             for (const std::string& path : outputs_.films) session_.begin_writing(path);
             for (FilmWriter& film : films_) require(film.finish());
         }
-        for (ReadyBody& body : ready_.bodies) body.model.mesh.origin = ready_.origin;
+        for (std::size_t b = 0; b < ready_.bodies.size(); ++b) {
+            ready_.bodies[b].model.mesh.origin = ready_.origin;
+            leave_out_closed_cracks(ready_.bodies[b], run_->recording().poses[b].frames);
+        }
         write_meshes();
         for (const std::string& path : outputs_.models)
             for (std::size_t b = 0; b < ready_.bodies.size(); ++b)

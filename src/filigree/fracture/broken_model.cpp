@@ -194,7 +194,7 @@ private:
     }
 
     void hang_on_surface(Index vertex) {
-        const SurfacePoint& source = fractured_.sources[vertex - model_.mesh.vertex_count()];
+        const FacePoint& source = fractured_.sources[vertex - model_.mesh.vertex_count()];
         Index first = source.vertices[0];
         for (const Index other : source.vertices)
             if (other != kNoIndex) first = std::min(first, other);
@@ -421,17 +421,18 @@ Result<BrokenModel> break_model(const Model& model, const FracturedMesh& fractur
     return broken;
 }
 
-std::vector<std::uint8_t> open_cracks(const BrokenModel& broken, std::span<const std::array<Index, 2>> cells_of_crack,
+std::vector<std::uint8_t> open_cracks(const Model& broken, std::span<const Index> piece_of_driver,
+                                      std::span<const std::array<Index, 2>> cells_of_crack,
                                       std::span<const Pose> frames) {
-    const std::vector<Vec3f> rest = driver_positions(broken.model);
+    const std::vector<Vec3f> rest = driver_positions(broken);
     std::map<std::array<float, 3>, std::vector<Index>> copies; // at one place
     for (Index d = 0; d < rest.size(); ++d) copies[{rest[d][0], rest[d][1], rest[d][2]}].push_back(d);
     std::map<std::array<Index, 2>, std::vector<std::array<Index, 2>>> pairs; // of two pieces
     for (const auto& [place, at] : copies)
         for (const Index a : at)
             for (const Index b : at)
-                if (broken.piece_of_driver[a] < broken.piece_of_driver[b])
-                    pairs[{broken.piece_of_driver[a], broken.piece_of_driver[b]}].push_back({a, b});
+                if (piece_of_driver[a] < piece_of_driver[b])
+                    pairs[{piece_of_driver[a], piece_of_driver[b]}].push_back({a, b});
     std::vector<std::uint8_t> is_open;
     for (const std::array<Index, 2>& cells : cells_of_crack) {
         const auto found = pairs.find(cells);

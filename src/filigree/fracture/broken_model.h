@@ -25,7 +25,8 @@ Result<BrokenModel> break_model(const Model& model, const FracturedMesh& fractur
 
 /// One 0 or 1 for each of FracturedMesh::cells_of_crack: whether copies of a driver vertex on its two sides were ever
 /// apart. A crack between whose pieces no vertex has copies counts as open. Cost O(cracks + frames x driver).
-std::vector<std::uint8_t> open_cracks(const BrokenModel& broken, std::span<const std::array<Index, 2>> cells_of_crack,
+std::vector<std::uint8_t> open_cracks(const Model& broken, std::span<const Index> piece_of_driver,
+                                      std::span<const std::array<Index, 2>> cells_of_crack,
                                       std::span<const Pose> frames);
 
 /// Takes away the faces of cracks that never opened. crack_of_face, is_open: of FracturedMesh and open_cracks. Vertices

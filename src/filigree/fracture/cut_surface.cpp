@@ -63,10 +63,10 @@ double doubled_area(const CutVertices& vertices, const Triangle& t) {
 }
 
 /// The middle of two points of a triangle.
-SurfacePoint between(const SurfacePoint& a, const SurfacePoint& b, double t) {
-    SurfacePoint middle;
+FacePoint between(const FacePoint& a, const FacePoint& b, double t) {
+    FacePoint middle;
     std::size_t used = 0;
-    const auto add = [&](const SurfacePoint& p, double share) {
+    const auto add = [&](const FacePoint& p, double share) {
         for (std::size_t k = 0; k < 3; ++k) {
             if (p.vertices[k] == kNoIndex || p.weights[k] == 0) continue;
             std::size_t slot = 0;
@@ -369,19 +369,19 @@ std::array<std::uint32_t, 3> CutVertices::key_of(const Vec3f& p) {
     return key;
 }
 
-SurfacePoint CutVertices::surface_point(Index vertex) const {
+FacePoint CutVertices::surface_point(Index vertex) const {
     if (vertex >= mesh_count_) return source(vertex);
     return {{vertex, kNoIndex, kNoIndex}, {1, 0, 0}};
 }
 
-Index CutVertices::add_corner(const Vec3f& position, const GridPoint& grid, const SurfacePoint& source) {
+Index CutVertices::add_corner(const Vec3f& position, const GridPoint& grid, const FacePoint& source) {
     positions_.push_back(position);
     grid_.push_back(grid);
     sources_.push_back(source);
     return count() - 1;
 }
 
-Index CutVertices::add(const Vec3f& position, const Vec3d& plane, const SurfacePoint& source) {
+Index CutVertices::add(const Vec3f& position, const Vec3d& plane, const FacePoint& source) {
     const auto [known, is_new] = places_.try_emplace(key_of(position), count());
     if (is_new) {
         positions_.push_back(position);

@@ -11,7 +11,7 @@ namespace filigree {
 
 /// Where a new vertex of the surface is: weights of two or three of the mesh's vertices (kNoIndex: none), all corners
 /// of one triangle.
-struct SurfacePoint {
+struct FacePoint {
     std::array<Index, 3> vertices = {kNoIndex, kNoIndex, kNoIndex};
     std::array<double, 3> weights = {0, 0, 0}; ///< add up to 1
 };
@@ -31,16 +31,16 @@ public:
     }
     const GridPoint& grid(Index vertex) const { return grid_[vertex]; } ///< of those that triangles had before the cut
     /// Of a vertex that the cut added; all kNoIndex inside the body.
-    const SurfacePoint& source(Index vertex) const { return sources_[vertex - mesh_count_]; }
+    const FacePoint& source(Index vertex) const { return sources_[vertex - mesh_count_]; }
     /// The mesh's own vertex, or an added vertex's source.
-    SurfacePoint surface_point(Index vertex) const;
+    FacePoint surface_point(Index vertex) const;
 
     /// Before the cut: a vertex of refined or closing triangles.
-    Index add_corner(const Vec3f& position, const GridPoint& grid, const SurfacePoint& source);
+    Index add_corner(const Vec3f& position, const GridPoint& grid, const FacePoint& source);
     /// Makes this vertex known to those that are added at its place.
     void register_place(Index vertex) { places_.try_emplace(key_of(positions_[vertex]), vertex); }
     /// From the cut on: the vertex at the place, a new one unless there is one.
-    Index add(const Vec3f& position, const Vec3d& plane, const SurfacePoint& source);
+    Index add(const Vec3f& position, const Vec3d& plane, const FacePoint& source);
 
 private:
     struct PlaceHash {
@@ -52,7 +52,7 @@ private:
     std::vector<Vec3f> positions_;
     std::vector<GridPoint> grid_;
     std::vector<Vec3d> planes_; ///< of vertices behind those in grid_
-    std::vector<SurfacePoint> sources_;
+    std::vector<FacePoint> sources_;
     std::unordered_map<std::array<std::uint32_t, 3>, Index, PlaceHash> places_;
 };
 

@@ -375,7 +375,7 @@ private:
         if (is_new) {
             out_.mesh.positions.push_back(cut_.vertices.position(vertex));
             out_.piece_of_vertex.push_back(piece);
-            const SurfacePoint source = cut_.vertices.surface_point(vertex);
+            const FacePoint source = cut_.vertices.surface_point(vertex);
             out_.sources.push_back(source);
             out_.place.push_back(own == kNoIndex ? vertex : own);
             if (!out_.mesh.colors.empty()) out_.mesh.colors.push_back(color_at(source));
@@ -385,14 +385,14 @@ private:
         return known->second;
     }
 
-    Vec4f color_at(const SurfacePoint& p) const {
+    Vec4f color_at(const FacePoint& p) const {
         if (p.vertices[0] == kNoIndex) return Vec4f(0.75f, 0.75f, 0.75f, 1);
         Vec4f sum = Vec4f::Zero();
         for (std::size_t k = 0; k < 3; ++k)
             if (p.vertices[k] != kNoIndex) sum += static_cast<float>(p.weights[k]) * mesh_.colors[p.vertices[k]];
         return sum;
     }
-    static float scalar_at(const VertexScalar& scalar, const SurfacePoint& p) {
+    static float scalar_at(const VertexScalar& scalar, const FacePoint& p) {
         double sum = 0;
         for (std::size_t k = 0; k < 3; ++k)
             if (p.vertices[k] != kNoIndex) sum += p.weights[k] * double(scalar.values[p.vertices[k]]);
@@ -431,7 +431,7 @@ private:
     void add_surface_triangle(const Triangle& triangle, Index face, Index piece) {
         std::array<Index, 3> corners;
         for (std::size_t k = 0; k < 3; ++k) {
-            const SurfacePoint point = cut_.vertices.surface_point(triangle[k]);
+            const FacePoint point = cut_.vertices.surface_point(triangle[k]);
             std::array<Index, 3> at = {kNoIndex, kNoIndex, kNoIndex}, own = at;
             for (std::size_t s = 0; s < 3; ++s)
                 if (point.vertices[s] != kNoIndex && (at[s] = corner_at(face, point.vertices[s])) != kNoIndex)

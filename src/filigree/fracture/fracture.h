@@ -44,7 +44,7 @@ struct FracturedMesh {
     std::vector<Index> piece_of_face, piece_of_vertex; ///< vertices without a face: kNoIndex
     std::vector<std::uint8_t> is_inside;               ///< a face: whether it lies on a crack
     /// Of vertices behind the unbroken mesh's: where on its surface they are; all kNoIndex inside.
-    std::vector<SurfacePoint> sources;
+    std::vector<FacePoint> sources;
     /// Of every vertex: a number that it shares with its copies in other pieces, and with nothing else.
     std::vector<Index> place;
     std::vector<Index> crack_of_face;                 ///< kNoIndex outside

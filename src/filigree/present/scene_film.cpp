@@ -72,7 +72,8 @@ private:
     void prepare(const ReadyBody& body) {
         ShownBody& shown = actors_.emplace_back();
         shown.body = &body;
-        shown.restore.level = level_within(body.model, scene_.picture.most_triangles);
+        // A model in pieces has no level between its driver, which has no detail, and all of it.
+        if (body.pieces.empty()) shown.restore.level = level_within(body.model, scene_.picture.most_triangles);
         if (scene_.picture.particles) {
             shown.ball_radius = float(0.4 * body.body->spacing());
             return;

@@ -77,15 +77,17 @@ Result<SceneRun> SceneRun::create(const SceneFile& scene, const ReadyScene& read
 Status SceneRun::follow(bool checks) {
     for (std::size_t b = 0; b < ready_->bodies.size(); ++b) {
         const ReadyBody& body = ready_->bodies[b];
-        const auto attach = [&](std::vector<Vec3f> points) {
-            return simulation_.attach(b, body.in_metres(std::move(points)), always_);
+        const auto attach = [&](std::vector<Vec3f> points, std::span<const Index> pieces) {
+            points = body.in_metres(std::move(points));
+            return pieces.empty() ? simulation_.attach(b, points, always_)
+                                  : simulation_.attach(b, points, pieces, always_);
         };
-        const std::size_t driver = attach(driver_positions(body.model));
+        const std::size_t driver = attach(driver_positions(body.model), body.pieces.driver);
         Result<Restorer> restorer = Restorer::create(body.model, {}, always_);
         if (!restorer) return restorer.error();
         Follower& follower = followers_.emplace_back(Follower{driver, {}, std::move(*restorer), {}, {}});
         follower.restored.resize(body.model.mesh.vertex_count());
-        if (checks) follower.direct = attach(body.model.mesh.positions);
+        if (checks) follower.direct = attach(body.model.mesh.positions, body.pieces.vertices);
     }
     recording_.poses.assign(ready_->bodies.size(), {scene_->step.frames_per_second, {}});
     if (scene_->picture.particles) recording_.particles.resize(ready_->bodies.size());

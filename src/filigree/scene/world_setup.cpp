@@ -1,5 +1,6 @@
 #include "filigree/scene/world_setup.h"
 
+#include "filigree/fracture/fracture.h"
 #include "filigree/io/file.h"
 #include "filigree/io/mesh_file.h"
 #include "filigree/io/model_file.h"
@@ -234,6 +235,28 @@ private:
                  everywhere ? std::vector<Index>() : particles_of(from.body, region, crack.line)});
         }
         actor.fracture = std::move(fracture);
+        at_line(scene_, from.line, [&] { break_model_of(body); });
+    }
+
+    /// The body's model becomes one in pieces; the body and its particles stay as they are.
+    void break_model_of(ReadyBody& body) {
+        FracturedMesh fractured =
+            filigree::fracture(body.model.mesh, *body.cells, {.pieces_are_cells = true}, context_).value();
+        BrokenModel broken =
+            break_model(body.model, fractured, *body.cells, body.body->spacing() / body.scale, context_).value();
+        body.model = std::move(broken.model);
+        body.pieces.driver = std::move(broken.piece_of_driver);
+        body.pieces.vertices = std::move(fractured.piece_of_vertex);
+        for (Index& piece : body.pieces.vertices)
+            piece = std::min(piece, body.cells->count() - 1); // of loose vertices: any
+        for (std::size_t d = 0; d < body.pieces.driver.size(); ++d) {
+            const Index vertex = body.model.driver().vertices[d];
+            if (vertex >= body.pieces.vertices.size()) body.pieces.vertices.resize(vertex + 1);
+            body.pieces.vertices[vertex] = body.pieces.driver[d];
+        }
+        body.pieces.vertices.resize(body.model.mesh.vertex_count());
+        body.pieces.crack_of_face = std::move(fractured.crack_of_face);
+        body.pieces.cells_of_crack = std::move(fractured.cells_of_crack);
     }
 
     static RigidMotion motion_of(const SceneMotion& from, const Vec3d& middle) {
@@ -375,6 +398,14 @@ private:
 std::vector<Vec3f> ReadyBody::in_metres(std::vector<Vec3f> points) const {
     for (Vec3f& p : points) p *= float(scale);
     return points;
+}
+
+void leave_out_closed_cracks(ReadyBody& body, std::span<const Pose> poses) {
+    if (body.pieces.empty()) return;
+    const std::vector<std::uint8_t> is_open =
+        open_cracks(body.model, body.pieces.driver, body.pieces.cells_of_crack, poses);
+    drop_closed_cracks(body.model.mesh, body.pieces.crack_of_face, is_open);
+    std::erase_if(body.pieces.crack_of_face, [&](Index crack) { return crack != kNoIndex && !is_open[crack]; });
 }
 
 Result<ReadyScene> set_up(const SceneFile& scene, const RunContext& context) {

@@ -1,10 +1,20 @@
 // From a scene's words to bodies, a world and what is drawn of it.
 #pragma once
 
+#include "filigree/fracture/broken_model.h"
 #include "filigree/scene/body_driver.h"
 #include "filigree/scene/scene_file.h"
 
 namespace filigree {
+
+/// Which piece carries what, of a body that breaks. Pieces are named by their cells.
+struct CarriedByPieces {
+    std::vector<Index> driver, vertices;              ///< the piece of each
+    std::vector<Index> crack_of_face;                 ///< kNoIndex: a face of the surface
+    std::vector<std::array<Index, 2>> cells_of_crack; ///< ascending
+
+    bool empty() const { return driver.empty(); }
+};
 
 struct ReadyBody {
     std::string name;
@@ -15,6 +25,7 @@ struct ReadyBody {
     BodyReport report;
     DriverEdges driver;
     std::shared_ptr<const FractureCells> cells; ///< of a body that breaks, in model units; else null
+    CarriedByPieces pieces;                     ///< of such a body, whose model is in pieces too
     BrokenBodyReport broken;
     Vec3f color = Vec3f::Zero();
     bool has_own_color = false; ///< of the mesh's own, if it has some
@@ -43,6 +54,9 @@ struct ReadyScene {
     std::uint64_t hash = 0;            ///< of all that the motion depends on
     std::vector<std::string> warnings; ///< sentences: of the meshes' files, and of bodies that are hard to simulate
 };
+
+/// Takes the faces of cracks that did not open in any of the poses out of a body's mesh; of other bodies nothing.
+void leave_out_closed_cracks(ReadyBody& body, std::span<const Pose> poses);
 
 /// Reads the scene's meshes, strips them and fills them with particles. Errors name the scene's line: those of the
 /// readers, of strip, make_body and DistanceField; bad_file (a region without particles, a vertex that is not there).
