@@ -116,12 +116,12 @@ TEST_P(EachStepMode, AStackHoldsOnASlopeOfTwentyDegrees) {
         EXPECT_LT((centre_of_mass(stack, b) - before[b]).norm() / 5, 1e-5) << "m/s, of body " << b;
 }
 
-TEST(MatterContact, SlidingFollowsCoulombOnObstaclesAndOnBodies) {
+TEST_P(EachStepMode, SlidingFollowsCoulombOnObstaclesAndOnBodies) {
     for (const bool on_body : {false, true})
         for (const double degrees : {26.0, 30.0, 40.0}) {
             Slope slope(degrees, on_body, 0.5);
             const std::size_t body = slope.add(block(4, 4, 4, 0.05, rubber()), 0.1002, 1.2, 1);
-            Simulation sliding = begin(slope.world, slope.actors);
+            Simulation sliding = begin(slope.world, slope.actors, GetParam());
             std::vector<double> way;
             for (int frame = 0; frame < 33; ++frame) {
                 ASSERT_TRUE(sliding.advance(kOneThread).ok());

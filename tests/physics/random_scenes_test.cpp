@@ -2,7 +2,7 @@
 // energy comes from nowhere. FILIGREE_SCENES and FILIGREE_SECONDS ask for more of them (a hundred of ten seconds:
 // scripts/soak-contact), FILIGREE_FIRST for others.
 #include "filigree/core/random.h"
-#include "filigree/physics/simulation.h"
+#include "physics/test_bodies.h"
 
 #include <gtest/gtest.h>
 
@@ -49,10 +49,11 @@ Scene random_scene(std::uint64_t seed) {
         material.young_modulus = std::pow(10, dice.between(4.5, 6.5));
         material.damping = dice.between(0, 1);
         const double spacing = dice.between(0.05, 0.1);
+        const std::size_t x = 2 + dice.below(4), y = 2 + dice.below(4), z = 2 + dice.below(4);
         Actor actor;
-        actor.body = std::make_shared<Body>(
-            make_body(box_cells(2 + dice.below(4), 2 + dice.below(4), 2 + dice.below(4), spacing), material));
-        actor.placement.translation() = Vec3d(dice.between(-0.4, 0.4), 0.7 + 0.8 * double(b), dice.between(-0.4, 0.4));
+        actor.body = block(x, y, z, spacing, material);
+        // Clear of the ball and of each other, however they are turned.
+        actor.placement.translation() = Vec3d(dice.between(-0.4, 0.4), 0.9 + 0.9 * double(b), dice.between(-0.4, 0.4));
         actor.placement.rotate(Eigen::AngleAxisd(dice.between(0, 6), (dice.vector(1) + Vec3d(2, 0, 0)).normalized()));
         actor.velocity = dice.vector(4);
         actor.spin = dice.vector(6);

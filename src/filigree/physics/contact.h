@@ -88,6 +88,8 @@ public:
         /// A further spring that pulls points of an embedding: a hand.
         void add_pull(const Embedding& points, std::size_t point, const Vec3f& target, float stiffness);
         std::span<const std::uint8_t> touched() const { return touched_; }
+        bool
+        holds() const; ///< whether friction holds something of the body, so that it touched when the substep begins
 
     private:
         friend class Contacts;
@@ -130,7 +132,6 @@ public:
     /// After a descent substep: anchors begin, slide and end as positions say.
     ContactReport update_anchors(std::span<const BodyState> bodies, double time);
 
-    bool is_touched(std::size_t body) const { return touched_[body]; } ///< by the last add_forces or update_anchors
     /// What the last add_forces may have added to the squared frequency of a body, in parts of that at rest. Two bodies
     /// that push each other swing by the sum of what each feels.
     double added_frequency(std::size_t body) const {

@@ -10,6 +10,16 @@ namespace filigree {
 
 using namespace contact_law;
 
+namespace {
+
+/// N/m of friction's spring at a stretch of `length`: less beyond Coulomb's limit, so that the force is that limit.
+float sliding_grip(float stiffness, float length, float limit) {
+    const float grip = kTangentialStiffness * stiffness;
+    return grip * length > limit ? limit / length : grip;
+}
+
+} // namespace
+
 /// Calls visit(particle, weight) for the particles of this body that move an entry's place.
 template <class Visit>
 void Contacts::Blocks::each_weight(const Entry& entry, const Visit& visit) const {
@@ -57,9 +67,9 @@ void Contacts::Blocks::add(Index particle, const Vectors& positions, Vec3f& forc
             force += weight * push * frame.normal;
             block.add_outer(frame.normal, squared * stiffness);
             if (!frame.holds) continue;
-            const float grip = kTangentialStiffness * stiffness;
             const Vec3f offset = frame.offset + along_surface(place, frame.normal);
-            force += weight * limited(-grip * offset, frame.friction * push);
+            const float grip = sliding_grip(stiffness, offset.norm(), frame.friction * push);
+            force -= weight * grip * offset;
             block.add_scaled_identity(squared * grip);
             block.add_outer(frame.normal, -squared * grip);
         } else if (entry.other) {
@@ -76,9 +86,9 @@ void Contacts::Blocks::add(Index particle, const Vectors& positions, Vec3f& forc
             force += weight * push * surface.normal;
             block.add_outer(surface.normal, squared * stiffness);
             if (!entry.anchored) continue;
-            const float grip = kTangentialStiffness * stiffness;
-            force +=
-                weight * limited(-grip * along_surface(place - entry.anchor, surface.normal), entry.friction * push);
+            const Vec3f offset = along_surface(place - entry.anchor, surface.normal);
+            const float grip = sliding_grip(stiffness, offset.norm(), entry.friction * push);
+            force -= weight * grip * offset;
             block.add_scaled_identity(squared * grip);
             block.add_outer(surface.normal, -squared * grip);
         } else {
@@ -86,6 +96,11 @@ void Contacts::Blocks::add(Index particle, const Vectors& positions, Vec3f& forc
             block.add_scaled_identity(squared * stiffness);
         }
     }
+}
+
+bool Contacts::Blocks::holds() const {
+    return std::ranges::any_of(entries_,
+                               [](const Entry& entry) { return entry.frame ? entry.frame->holds : entry.anchored; });
 }
 
 void Contacts::Blocks::add_pull(const Embedding& points, std::size_t point, const Vec3f& target, float stiffness) {

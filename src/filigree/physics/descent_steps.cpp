@@ -90,7 +90,7 @@ private:
             if (bodies_[b].is_absent) continue;
             if (!(elastic_[b].least_volume_ratio > 0) || !(elastic_[b].most_stretch < kWildStretch))
                 wild[bodies_[b].actor] = 1;
-            if (bodies_[b].is_held || state_.contacts.is_touched(b)) falls[bodies_[b].actor] = 0;
+            if (bodies_[b].is_held || blocks_[b].holds()) falls[bodies_[b].actor] = 0;
         }
         for (std::size_t b = 0; b < bodies_.size(); ++b) {
             BodyState& body = bodies_[b];
@@ -124,6 +124,14 @@ private:
         return true;
     }
 
+    /// Whether a body rests on or slides along something as a whole, so that its load and friction have to balance its
+    /// weight: eight sweeps alone leave a block 6 to 16 % more friction than there is.
+    bool is_carried(std::size_t b) const {
+        const BodyState& body = bodies_[b];
+        return !body.rigid && blocks_[b].holds() && !(elastic_[b].most_stretch > kWildStretch) &&
+               std::ranges::none_of(body.fixed, [](std::uint8_t fixed) { return fixed != 0; });
+    }
+
     /// Internal damping has elastic forces as they are at y = x + tau v, v less the turning (Kelvin-Voigt to first
     /// order, as in explicit steps). With x0 where the particles would be without other motion, s = tau / dt and so
     /// x = (y + s x0) / (1 + s), a sweep moves y instead, towards (1 + s) target - s x0 by inertia / (1 + s).
@@ -135,6 +143,10 @@ private:
             return Descent{target, inertia, is_piece ? left_out(b) : std::span<const std::uint8_t>(body.fixed),
                            blocks_[b].touched(), &blocks_[b]};
         };
+        if (is_carried(b)) {
+            blocks_[b].update_places(bodies_, body.positions, 1);
+            move_as_one(body.positions, body.body->mass, terms(target_[b], inertia_[b]));
+        }
         if (!(s > 0)) {
             blocks_[b].update_places(bodies_, body.positions, 1);
             body.elasticity->sweep(body.positions, terms(target_[b], inertia_[b]), context_);

@@ -170,18 +170,26 @@ std::vector<MatterContacts::Frame> MatterContacts::frames(std::span<const BodySt
             const Matter& matter = *matter_[side.other];
             std::optional<Vec3f> normal = enter(pair, side, bodies);
             float depth = pair.depth;
+            const Vec3f velocity =
+                embedded_point(body.surface, pair.point, body.velocities) - matter.mean(pair.place, other.velocities);
             if (!normal) { // what is outside may touch before the substep ends
                 if (pair.tangled || pair.clear_until > side.way + kMostReach * side.spacing) continue;
                 if (side.body == side.other && matter.are_together(matter.cell_of_point(pair.point), pair.place.cell))
                     continue;
-                const Mat3f inverse = matter.inverse_derivative(other.positions, pair.place);
-                const std::optional<Matter::Depth> found = matter.depth(pair.place, inverse, Vec3f::Zero());
-                if (!found || found->depth > 0 || !found->normal.allFinite()) continue;
-                normal = found->normal;
-                depth = found->depth;
             }
-            const Vec3f velocity =
-                embedded_point(body.surface, pair.point, body.velocities) - matter.mean(pair.place, other.velocities);
+            // The surface that is nearest when the substep ends: a point that comes in just behind an edge would run
+            // against the face that it is about to pass.
+            const Mat3f inverse = matter.inverse_derivative(other.positions, pair.place);
+            const Vec3f way = dt * velocity;
+            Matter::Place then = pair.place;
+            then.local += inverse * way;
+            const std::optional<Matter::Depth> found = matter.depth(then, inverse, pair.entry);
+            if (found && found->normal.allFinite() && (!normal || found->depth > 0)) {
+                depth = found->depth + way.dot(found->normal);
+                if (!normal) depth = std::min(0.0f, depth);
+                normal = found->normal;
+            }
+            if (!normal) continue;
             Frame& frame = frames.emplace_back();
             frame.body = side.body;
             frame.other = side.other;
