@@ -80,11 +80,18 @@ public:
         cell_kernel::sweep(plan_, positions, descent, context);
     }
 
+    void prepare_blocks() override {
+        const Cells& cells = body_.cells;
+        cells_at_.assign(cells.corners.size(),
+                         {kNoIndex, kNoIndex, kNoIndex, kNoIndex, kNoIndex, kNoIndex, kNoIndex, kNoIndex});
+        for (Index cell = 0; cell < cells.cells.size(); ++cell)
+            for (int corner = 0; corner < 8; ++corner) cells_at_[cells.cell_corners[cell][corner]][corner] = cell;
+    }
+
     void add_block(Index particle, const Vectors& positions, Vec3f& force, Symmetric3& block) const override {
         const Cells& cells = body_.cells;
-        const auto& at = cells.corners[particle];
         for (int corner = 0; corner < 8; ++corner) {
-            const Index cell = cells.find_cell(at[0] - (corner & 1), at[1] - (corner >> 1 & 1), at[2] - (corner >> 2));
+            const Index cell = cells_at_[particle][corner];
             if (cell == kNoIndex) continue;
             std::array<Vec3f, 8> corners;
             for (int c = 0; c < 8; ++c) corners[c] = positions[cells.cell_corners[cell][c]];
@@ -120,6 +127,8 @@ private:
     const Body& body_;
     cell_kernel::Plan plan_;
     cell_kernel::Sums sums_;
+    std::vector<std::array<Index, 8>>
+        cells_at_; ///< of each corner, the cell in which it is the n-th; by prepare_blocks
 };
 
 } // namespace

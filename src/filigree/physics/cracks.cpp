@@ -233,26 +233,36 @@ void Cracks::show_whole(std::span<BodyState> bodies) const {
     }
 }
 
-/// Which bodies move, what is tied, and which points of cracks touch others.
+/// Which bodies move, what is tied, and what lies beside cracks.
 void Cracks::take_part(std::span<BodyState> bodies) {
     bodies[whole_].is_absent = is_open_;
     if (is_open_) bodies[whole_].velocities = Vectors(bodies[whole_].positions.size());
     for (Index piece = 0; piece < body().pieces.size(); ++piece) {
         BodyState& to = state(bodies, piece);
         to.is_absent = !is_open_;
-        to.hidden.assign(to.surface.size(), 0);
-        std::fill(to.hidden.begin() + body().outer_points[piece], to.hidden.end(), std::uint8_t{1});
-    }
-    for (Index l = 0; l < links_.size(); ++l) {
-        if (links_[l].phase == LinkState::tied) continue;
-        const std::span<const Index> lit = body().points_of_link[l];
-        for (std::size_t n = 0; n < lit.size(); n += 2) state(bodies, lit[n]).hidden[lit[n + 1]] = 0;
+        if (to.hidden.empty()) hide(to, piece);
     }
     find_groups(bodies);
     std::ranges::fill(beside_crack_, std::uint8_t{0});
     for (Index l = 0; l < links_.size(); ++l)
         if (links_[l].phase != LinkState::tied)
             for (const Index other : body().links_beside[l]) beside_crack_[other] = 1;
+}
+
+void Cracks::hide(BodyState& to, Index piece) const {
+    to.hidden.assign(to.surface.size(), 0);
+    std::fill(to.hidden.begin() + body().outer_points[piece], to.hidden.end(), std::uint8_t{1});
+}
+
+bool Cracks::reveal(std::span<BodyState> bodies) {
+    bool any = false;
+    for (Index l = 0; l < links_.size(); ++l) {
+        if (links_[l].phase == LinkState::tied) continue;
+        const std::span<const Index> lit = body().points_of_link[l];
+        for (std::size_t n = 0; n < lit.size(); n += 2)
+            any |= std::exchange(state(bodies, lit[n]).hidden[lit[n + 1]], 0);
+    }
+    return any;
 }
 
 void Cracks::find_groups(std::span<BodyState> bodies) {
@@ -501,6 +511,8 @@ bool Cracks::set_memory(const CrackMemory& memory, std::span<BodyState> bodies) 
     broke_ = memory.broke;
     checked_until_ = -1;
     take_part(bodies);
+    for (Index piece = 0; piece < body().pieces.size(); ++piece) hide(state(bodies, piece), piece);
+    reveal(bodies);
     return true;
 }
 

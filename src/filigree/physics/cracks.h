@@ -39,6 +39,8 @@ public:
         float opening_step =
             std::numeric_limits<float>::infinity(); ///< s: in longer ones cracks open too far at a time
     };
+    /// Points of cracks that have opened touch others from now on. Whether there are any new ones.
+    bool reveal(std::span<BodyState> bodies);
     /// Adds what holds pieces that come apart, then adds up over tied copies.
     Pace add_forces(std::span<BodyState> bodies, const RunContext& context) const;
 
@@ -94,6 +96,7 @@ private:
     bool let_events_go(double time);
     bool let_specks_go(double time);
     void take_part(std::span<BodyState> bodies);
+    void hide(BodyState& to, Index piece) const;
     void find_groups(std::span<BodyState> bodies);
     void find_swept(std::span<const BodyState> bodies);
 

@@ -214,7 +214,7 @@ private:
             if (body.rigid) fit_pose(body);
         push_out(state_, now_);
         finish_substep(state_, dt_, context_);
-        break_bodies(state_, now_, context_);
+        break_bodies(state_, now_ - double(dt_), now_, context_);
         ++report_.substeps;
     }
 

@@ -74,7 +74,9 @@ public:
     /// x += (inertia I + H)^-1 (inertia (target - x) + f), f and H of the elastic energy at the current positions.
     virtual void sweep(Vectors& positions, const Descent& descent, const RunContext& context) = 0;
 
-    /// Adds the elastic force on one particle and its block, as a sweep has them. For fem alone; others add nothing.
+    /// Adds the elastic force on one particle and its block, as a sweep has them; prepare_blocks comes first, once. For
+    /// fem alone; others add nothing.
+    virtual void prepare_blocks();
     virtual void add_block(Index particle, const Vectors& positions, Vec3f& force, Symmetric3& block) const;
 
     /// Elastic energy, J; 0 at rest.

@@ -70,15 +70,18 @@ public:
             const double steps = steps_left();
             if (!(steps <= steps_allowed()) || context_.is_cancelled()) break;
             const float dt = float((until_ - now_) / steps);
+            const double before = now_;
             move(dt, steps <= 1 ? until_ : now_ + double(dt));
             find_contacts();
             find_forces(dt);
             finish(dt);
-            if (!break_bodies(state_, now_, context_)) continue;
-            place_rigid();
-            if (meets_anything_) state_.contacts.begin_frame(bodies_);
-            find_contacts();
-            find_forces(dt);
+            const Breaks breaks = break_bodies(state_, before, now_, context_);
+            if (breaks.contacts) {
+                place_rigid();
+                if (meets_anything_) state_.contacts.begin_frame(bodies_);
+                find_contacts();
+            }
+            if (breaks.forces || breaks.contacts) find_forces(dt);
         }
         place_rigid();
         return is_left() ? now_ : until_;
@@ -163,7 +166,8 @@ private:
         for (std::size_t b = 0; b < bodies_.size(); ++b)
             if (!bodies_[b].sleeps())
                 stable_step_ = std::min(stable_step_, stable_step(frequencies[b], double(delay_of(b, dt))));
-        stable_step_ = std::min(stable_step_, std::max(opening_step, kShortestOpening * stable_step_));
+        const double shortest = std::max(kShortestOpening * stable_step_, (until_ - now_) / steps_allowed());
+        stable_step_ = std::min(stable_step_, std::max(opening_step, shortest));
     }
 
     /// s of internal damping.

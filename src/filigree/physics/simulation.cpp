@@ -120,6 +120,7 @@ void begin_pieces(SimulationState& state, std::span<const Actor> actors, const R
         for (const std::shared_ptr<const Body>& piece : actors[a].fracture->body->pieces) {
             state.bodies.push_back(begin_body({piece, actors[a].placement}, a, false, context));
             state.bodies.back().is_absent = true;
+            state.bodies.back().elasticity->prepare_blocks();
         }
         state.cracks.emplace_back(actors[a].fracture, a, first);
     }

@@ -64,8 +64,12 @@ bool repair_start(SimulationState& state, std::span<const ElasticReport> elastic
 void push_out(SimulationState& state, double now);
 /// Plastic flow and heat; neighbourhoods are renewed where that asks for it.
 void finish_substep(SimulationState& state, float dt, const RunContext& context);
-/// What lets go after a substep that ended at `now`. Whether anything did: contacts and forces are then found anew.
-bool break_bodies(SimulationState& state, double now, const RunContext& context);
+/// What lets go after a substep. `forces`: anything did, and forces have to be found anew; `contacts`: and they, too.
+struct Breaks {
+    bool forces = false, contacts = false;
+};
+/// now: when the substep ended; before: when it began.
+Breaks break_bodies(SimulationState& state, double before, double now, const RunContext& context);
 
 /// Everything that moves, and back. Errors of restore_state: mismatch (of other bodies), bad_file (numbers out of
 /// range); the state is then of no use.

@@ -12,6 +12,7 @@ namespace filigree {
 namespace {
 
 constexpr float kMostStretch = 10; ///< a body stretched further starts scaled down ...
+constexpr double kReveals = 8;     ///< a frame: how often points of new cracks begin to touch others
 constexpr float kStretchAfter = 3; ///< ... to this
 
 void shake(BodyState& body, std::uint64_t seed) {
@@ -130,13 +131,22 @@ void push_out(SimulationState& state, double now) {
     for (const Cracks& cracks : state.cracks) cracks.rejoin(state.bodies);
 }
 
-bool break_bodies(SimulationState& state, double now, const RunContext& context) {
-    bool any = false;
-    for (Cracks& cracks : state.cracks) any |= cracks.advance(state.bodies, now, context);
-    if (!any) return false;
+Breaks break_bodies(SimulationState& state, double before, double now, const RunContext& context) {
+    Breaks breaks;
+    // A search for each substep in which something lets go would take longer than all else.
+    const auto part = [&](double time) {
+        return std::floor((time - state.time()) / state.frame_seconds() * kReveals + 1e-6);
+    };
+    for (Cracks& cracks : state.cracks) {
+        const bool was_open = cracks.is_open();
+        breaks.forces |= cracks.advance(state.bodies, now, context);
+        if (part(before) != part(now) || was_open != cracks.is_open())
+            breaks.contacts |= cracks.reveal(state.bodies) || was_open != cracks.is_open();
+    }
+    if (!breaks.contacts) return breaks;
     state.contacts.begin_anew();
     state.external.find_wind(state.bodies, now, state.options.frames_per_second, context);
-    return true;
+    return breaks;
 }
 
 void finish_substep(SimulationState& state, float dt, const RunContext& context) {
