@@ -128,6 +128,10 @@ public:
     Run(const SimulateArguments& options, Session& session)
         : options_(options), session_(session), scene_(require(read_scene(options.scene))), outputs_(options.outputs) {
         check_places(options, scene_, outputs_);
+        if (options.finer && !scene_.fractures.empty())
+            refuse(ErrorCode::unsuitable, options.scene +
+                                              ": --finer cannot judge bodies that break, as finer ones would "
+                                              "break elsewhere; take [[fracture]] out of the scene.");
         if (options.frames) scene_.frames = options.frames;
         open_outputs();
         ready_ = require(set_up(scene_, session.context()));

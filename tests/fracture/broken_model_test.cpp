@@ -101,8 +101,8 @@ TEST(BrokenModel, CracksOpenWhereCopiesPart) {
     const Case ball = broken_ball(0);
     Pose rest = rest_pose(ball.broken.model), moved = rest;
     const auto open = [&](const Pose& pose) {
-        return open_cracks(ball.broken.model, ball.broken.piece_of_driver, ball.fractured.cells_of_crack,
-                           std::vector<Pose>{rest, pose, rest});
+        return open_cracks(ball.broken.model, ball.broken.piece_of_driver, ball.broken.driver_is_on_crack,
+                           ball.fractured.cells_of_crack, std::vector<Pose>{rest, pose, rest}, 1e-3);
     };
     for (const std::uint8_t is_open : open(rest)) EXPECT_EQ(is_open, 0);
     for (std::size_t d = 0; d < moved.positions.size(); ++d)

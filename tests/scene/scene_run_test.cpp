@@ -54,11 +54,43 @@ TEST_F(SceneRunTest, BodiesBreakAndGoOnFromTheMiddle) {
     const auto resumed = made(text);
     ASSERT_TRUE(resumed->run->resume(half, "half"));
     EXPECT_EQ(state_after(*resumed, 6), state_after(*through, 6));
-    // Until it broke, the motion is that of a body that cannot break.
-    const auto whole = made(), before = made(text);
+    // Until it broke, the motion is that of a body that cannot break, and nothing shows.
+    const auto whole = made();
     ASSERT_TRUE(whole->run->advance_to(2, kContext));
-    ASSERT_TRUE(before->run->advance_to(2, kContext));
-    EXPECT_EQ(before->run->energy().total(), whole->run->energy().total());
+    const auto begun = made(text);
+    ASSERT_TRUE(begun->run->advance_to(2, kContext));
+    EXPECT_EQ(begun->run->energy().total(), whole->run->energy().total());
+    const Mesh unbroken = whole->run->mesh(0, 2, kContext).value(), before = through->run->mesh(0, 2, kContext).value();
+    ASSERT_GT(before.vertex_count(), unbroken.vertex_count());
+    for (std::size_t v = 0; v < unbroken.vertex_count(); ++v)
+        EXPECT_LT((unbroken.positions[v] - before.positions[v]).norm(), 1e-6f);
+}
+
+TEST_F(SceneRunTest, PiecesAreRestoredWhereTheirParticlesCarryThem) {
+    const auto run =
+        made(filigree_test::kDrop + "[[fracture]]\npieces = 4\nstrength = 1e9\nenergy = 1e6\nroughness = 0.5\n"
+                                    "[[crack]]\ntime = 0.03\npieces = [0]\n",
+             true);
+    ASSERT_TRUE(run->run->advance_to(6, kContext));
+    const auto whole = made(filigree_test::kDrop, true);
+    ASSERT_TRUE(whole->run->advance_to(6, kContext));
+    EXPECT_LT(run->run->recording().checks[0].worst_rms, 1.5 * whole->run->recording().checks[0].worst_rms);
+    // Only the cracks around the piece that came off are left.
+    ReadyBody& body = run->ready.bodies[0];
+    const auto inside = [&] {
+        return std::count_if(body.pieces.crack_of_face.begin(), body.pieces.crack_of_face.end(),
+                             [](Index crack) { return crack != kNoIndex; });
+    };
+    const auto all = inside();
+    leave_out_closed_cracks(body, run->run->recording().poses[0].frames);
+    EXPECT_LT(inside(), all);
+    EXPECT_GT(inside(), 0);
+    ASSERT_EQ(body.model.mesh.face_count(), body.pieces.crack_of_face.size());
+    for (const Index crack : body.pieces.crack_of_face)
+        if (crack != kNoIndex) {
+            EXPECT_EQ(body.pieces.cells_of_crack[crack][0], 0u);
+        }
+    EXPECT_EQ(check_model(body.model), "");
 }
 
 TEST_F(SceneRunTest, StatesThatDoNotFitAreRefusedAndChangeNothing) {

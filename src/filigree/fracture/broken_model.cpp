@@ -96,6 +96,8 @@ std::vector<Triangle> delaunay(std::span<const Vec2f> points) {
     return triangles;
 }
 
+constexpr std::uint64_t kOnCrack = std::uint64_t(1) << 32; ///< in a driver vertex's place: not of the unbroken driver
+
 /// The driver's copies and cells as they are asked for.
 class DriverCopies {
 public:
@@ -112,7 +114,7 @@ public:
                 if (!mesh_.colors.empty()) mesh_.colors.push_back(Vec4f::Ones());
                 for (VertexScalar& scalar : mesh_.scalars) scalar.values.push_back(0);
             }
-            vertices_.push_back({own, piece});
+            vertices_.push_back({own, piece, (place & kOnCrack) != 0});
         }
         return known->second;
     }
@@ -124,6 +126,7 @@ public:
 
     struct Vertex {
         Index mesh_vertex, piece;
+        bool is_on_crack;
     };
     const std::vector<Vertex>& vertices() const { return vertices_; }
     const std::vector<Triangle>& cells() const { return cells_; }
@@ -253,8 +256,7 @@ private:
             const Index piece = fractured_.piece_of_vertex[vertex];
             Triangle corners;
             for (std::size_t k = 0; k < 3; ++k)
-                corners[k] = copies_->vertex(std::uint64_t(1) << 32 | bond.places[k], piece, kNoIndex,
-                                             position_at(bond.places[k]));
+                corners[k] = copies_->vertex(kOnCrack | bond.places[k], piece, kNoIndex, position_at(bond.places[k]));
             bonds_[vertex] = {copies_->cell(corners), static_cast<float>(bond.weights.u),
                               static_cast<float>(bond.weights.v)};
         }
@@ -371,6 +373,7 @@ private:
             number[order[k]] = k;
             driver.vertices.push_back(vertices[order[k]].mesh_vertex);
             broken_.piece_of_driver.push_back(vertices[order[k]].piece);
+            broken_.driver_is_on_crack.push_back(vertices[order[k]].is_on_crack);
         }
         std::vector<Triangle> cells;
         bonds_.resize(broken_.model.mesh.vertex_count()); // loose vertices
@@ -422,11 +425,13 @@ Result<BrokenModel> break_model(const Model& model, const FracturedMesh& fractur
 }
 
 std::vector<std::uint8_t> open_cracks(const Model& broken, std::span<const Index> piece_of_driver,
+                                      std::span<const std::uint8_t> driver_is_on_crack,
                                       std::span<const std::array<Index, 2>> cells_of_crack,
-                                      std::span<const Pose> frames) {
+                                      std::span<const Pose> frames, double apart) {
     const std::vector<Vec3f> rest = driver_positions(broken);
     std::map<std::array<float, 3>, std::vector<Index>> copies; // at one place
-    for (Index d = 0; d < rest.size(); ++d) copies[{rest[d][0], rest[d][1], rest[d][2]}].push_back(d);
+    for (Index d = 0; d < rest.size(); ++d)
+        if (driver_is_on_crack[d]) copies[{rest[d][0], rest[d][1], rest[d][2]}].push_back(d);
     std::map<std::array<Index, 2>, std::vector<std::array<Index, 2>>> pairs; // of two pieces
     for (const auto& [place, at] : copies)
         for (const Index a : at)
@@ -439,7 +444,7 @@ std::vector<std::uint8_t> open_cracks(const Model& broken, std::span<const Index
         const bool opened =
             found == pairs.end() || std::any_of(frames.begin(), frames.end(), [&](const Pose& pose) {
                 return std::any_of(found->second.begin(), found->second.end(), [&](const std::array<Index, 2>& pair) {
-                    return pose.positions[pair[0]] != pose.positions[pair[1]];
+                    return (pose.positions[pair[0]] - pose.positions[pair[1]]).norm() > static_cast<float>(apart);
                 });
             });
         is_open.push_back(opened);

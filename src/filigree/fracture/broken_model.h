@@ -13,7 +13,8 @@ struct BrokenModel {
     /// One level, the driver. Its vertices are vertices of the mesh: those of the unbroken model's driver in their own
     /// pieces, and loose ones, without a face, behind all others: copies for other pieces, and points on cracks.
     Model model;
-    std::vector<Index> piece_of_driver; ///< a driver vertex
+    std::vector<Index> piece_of_driver;           ///< a driver vertex
+    std::vector<std::uint8_t> driver_is_on_crack; ///< whether it is a point on a crack, and not of the unbroken driver
 };
 
 /// model: a blend model. fractured: its mesh, broken with pieces_are_cells. crack_spacing: between the driver's points
@@ -23,11 +24,13 @@ struct BrokenModel {
 Result<BrokenModel> break_model(const Model& model, const FracturedMesh& fractured, const FractureCells& cells,
                                 double crack_spacing, const RunContext& context);
 
-/// One 0 or 1 for each of FracturedMesh::cells_of_crack: whether copies of a driver vertex on its two sides were ever
-/// apart. A crack between whose pieces no vertex has copies counts as open. Cost O(cracks + frames x driver).
+/// One 0 or 1 for each of FracturedMesh::cells_of_crack: whether the driver's points on it were ever further apart on
+/// its two sides than `apart`, in the poses' unit. A crack without such points counts as open. piece_of_driver,
+/// driver_is_on_crack: as in BrokenModel. Cost O(cracks + frames x driver).
 std::vector<std::uint8_t> open_cracks(const Model& broken, std::span<const Index> piece_of_driver,
+                                      std::span<const std::uint8_t> driver_is_on_crack,
                                       std::span<const std::array<Index, 2>> cells_of_crack,
-                                      std::span<const Pose> frames);
+                                      std::span<const Pose> frames, double apart);
 
 /// Takes away the faces of cracks that never opened. crack_of_face, is_open: of FracturedMesh and open_cracks. Vertices
 /// stay, so that every frame has the same ones.

@@ -15,7 +15,7 @@ namespace {
 constexpr double kWorstRadiusToEdge = 1.5; ///< circumradius to shortest edge: 19.5 degrees
 constexpr double kLargestRadius = 0.75;    ///< of the edge wanted; equilateral ones have 0.58
 constexpr double kGrading = 0.3;           ///< how much longer edges are wanted a unit of length further in
-constexpr double kShortestShare = 0.2;     ///< of the outline's mean length: what is shorter is not refined around
+constexpr double kShortestShare = 0.03;    ///< of the outline's mean length: what is shorter is not refined around
 
 /// How often edges run from their lower to their higher end, less how often back.
 class EdgeSum {

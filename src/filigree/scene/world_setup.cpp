@@ -53,6 +53,8 @@ private:
     XXH3_state_t state_;
 };
 
+constexpr double kOpen = 0.02; ///< spacings between a crack's two sides, from which on it is seen
+
 Box body_box(const ReadyBody& body) { return bounds(body.model.mesh.positions); }
 
 class Builder {
@@ -246,6 +248,7 @@ private:
             break_model(body.model, fractured, *body.cells, body.body->spacing() / body.scale, context_).value();
         body.model = std::move(broken.model);
         body.pieces.driver = std::move(broken.piece_of_driver);
+        body.pieces.driver_is_on_crack = std::move(broken.driver_is_on_crack);
         body.pieces.vertices = std::move(fractured.piece_of_vertex);
         for (Index& piece : body.pieces.vertices)
             piece = std::min(piece, body.cells->count() - 1); // of loose vertices: any
@@ -403,7 +406,8 @@ std::vector<Vec3f> ReadyBody::in_metres(std::vector<Vec3f> points) const {
 void leave_out_closed_cracks(ReadyBody& body, std::span<const Pose> poses) {
     if (body.pieces.empty()) return;
     const std::vector<std::uint8_t> is_open =
-        open_cracks(body.model, body.pieces.driver, body.pieces.cells_of_crack, poses);
+        open_cracks(body.model, body.pieces.driver, body.pieces.driver_is_on_crack, body.pieces.cells_of_crack, poses,
+                    kOpen * body.body->spacing());
     drop_closed_cracks(body.model.mesh, body.pieces.crack_of_face, is_open);
     std::erase_if(body.pieces.crack_of_face, [&](Index crack) { return crack != kNoIndex && !is_open[crack]; });
 }
