@@ -17,7 +17,7 @@ namespace {
 constexpr std::size_t kMatterSearchGrain = 512;
 constexpr float kLeastReach = 0.1f;      ///< spacings that anything may go between two searches; at most kMostReach
 constexpr float kOwnReach = 0.3f;        ///< the same of a body beside itself ...
-constexpr float kOwnSearches = 3;        ///< ... which is searched no more often than this in a frame
+constexpr float kOwnSearches = 4;        ///< ... which is searched no more often than this in a frame
 constexpr float kLongestWay = 0.3f;      ///< spacings a substep that one body may go towards another
 constexpr float kCrushed = 0.05f;        ///< volume ratio below which a cell counts as crushed
 constexpr float kTooManyCrushed = 0.05f; ///< part of a body's cells
