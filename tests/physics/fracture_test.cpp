@@ -414,5 +414,43 @@ TEST(Fracture, ANotchedPlateBreaksAtTheSameLoadOnTurnedLattices) {
     }
 }
 
+TEST(Fracture, AHeldBodyIsHitByAnother) {
+    Material material = brittle();
+    material.damping = 0.5;
+    const auto target = block(4, 10, 3, 0.1, material), ball = block(3, 3, 3, 0.1, material);
+    for (const StepMode mode : {StepMode::explicit_steps, StepMode::descent}) {
+        const auto fracture = fracture_of(target, cells_of(scattered_seeds(9, 0.4, 5)), 4e3, 2);
+        World world = empty_world();
+        Pin pin;
+        RegionForce force;
+        force.force.constant = {0, 3, 0};
+        for (Index i = 0; i < target->rest.size(); ++i) {
+            if (target->rest[i].y() < -0.49f) pin.particles.push_back(i);
+            if (target->rest[i].y() > 0.39f) force.particles.push_back(i);
+        }
+        world.pins.push_back(pin);
+        world.forces.push_back(force);
+        Actor flying{.body = ball, .velocity = {4, 0, 0}};
+        flying.placement.translate(Vec3d(-0.6, 0.2, 0.02));
+        Simulation simulation =
+            Simulation::create(world, {{.body = target, .fracture = fracture}, flying},
+                               {.frames_per_second = 60, .mode = mode, .automatic_rigid = false}, context)
+                .value();
+        const double start = simulation.energy(context).total();
+        for (int frame = 0; frame < 40; ++frame) ASSERT_TRUE(simulation.advance(context).ok());
+        EXPECT_GT(simulation.fracture(0).parts, 1u);
+        EXPECT_GT(simulation.fracture(0).first, 0.01);
+        const double work = 3 * 5; // J: of the force, over 5 m at most
+        EXPECT_LT(simulation.energy(context).total(), start + work);
+        double highest = 0;
+        for (std::size_t i = 0; i < target->rest.size(); ++i) {
+            ASSERT_TRUE(simulation.positions(0)[i].allFinite());
+            highest = std::max(highest, double(simulation.positions(0)[i].norm()));
+        }
+        EXPECT_LT(highest, 5);
+        EXPECT_GT(simulation.momentum().linear.x(), 0);
+    }
+}
+
 } // namespace
 } // namespace filigree

@@ -254,7 +254,9 @@ Result<Simulation> Simulation::create(World world, std::vector<Actor> actors, co
     auto state = std::make_unique<SimulationState>(std::move(world), count, actors.size(), options);
     begin_bodies(*state, actors, context);
     begin_pieces(*state, actors, context);
-    for (const RegionForce& force : state->world.forces) state->bodies[force.body].is_held = true;
+    for (const RegionForce& force : state->world.forces)
+        for (BodyState& body : state->bodies)
+            if (body.actor == force.body) body.is_held = true;
     if (state->external.has_wind())
         for (BodyState& body : state->bodies) body.is_held = true;
     state->external.set_grips(make_grips(state->world.hands, *state, context));
