@@ -137,14 +137,14 @@ std::vector<std::pair<Index, Index>> OwnCells::near_clusters(std::span<const Ext
     std::vector<Index> entries(offsets.back()), next(offsets.begin(), offsets.end() - 1);
     for (Index k = 0; k < extents.size(); ++k) each_box(extents[k], [&](std::size_t box) { entries[next[box]++] = k; });
 
-    struct Ball { // and what else decides most pairs, side by side in memory
+    struct ClusterBall { // and what else decides most pairs, side by side in memory
         Vec3f centre;
         float radius;
         Key at;
         Index cluster;
         std::uint32_t far_near;
     };
-    const auto come_near = [&](const Ball& a, const Ball& b) {
+    const auto come_near = [&](const ClusterBall& a, const ClusterBall& b) {
         const int i = b.at[0] - a.at[0] + 1, j = b.at[1] - a.at[1] + 1, k = b.at[2] - a.at[2] + 1;
         if (unsigned(i) <= 2 && unsigned(j) <= 2 && unsigned(k) <= 2)
             return (a.far_near >> (i + 3 * j + 9 * k) & 1) != 0;
@@ -154,7 +154,7 @@ std::vector<std::pair<Index, Index>> OwnCells::near_clusters(std::span<const Ext
         return (one.low.array() - around <= other.high.array()).all() &&
                (other.low.array() - around <= one.high.array()).all();
     };
-    std::vector<Ball> balls;
+    std::vector<ClusterBall> balls;
     for (std::size_t box = 0; box + 1 < offsets.size(); ++box) {
         balls.clear();
         for (Index k = offsets[box]; k < offsets[box + 1]; ++k) {
