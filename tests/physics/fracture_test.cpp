@@ -250,15 +250,18 @@ TEST(Fracture, CopiesCoincideUntilTheirPiecesPart) {
 }
 
 /// A cube thrown on the ground; it breaks.
-Simulation thrown_cube(StepMode mode) {
+Simulation thrown_cube(StepMode mode, double young_modulus = 1e6, bool pieces_touch = true) {
     Material material = brittle();
     material.damping = 1;
+    material.young_modulus = young_modulus;
     const auto body = block(6, 6, 6, 0.05, material);
-    const auto fracture = fracture_of(body, cells_of(scattered_seeds(8, 0.15, 3)), 5e3, 1);
+    const auto fracture = fracture_of(body, cells_of(scattered_seeds(8, 0.15, 3)), 5 * std::sqrt(young_modulus), 1);
     fracture->material.scatter = 0.2;
     Actor actor{.body = body, .velocity = {0, -4, 0}, .spin = {1, 0, 2}, .fracture = fracture};
     actor.placement.rotate(Eigen::AngleAxisd(0.5, Vec3d(1, 0, 1).normalized()));
-    return Simulation::create(ground_world(), {actor}, {.frames_per_second = 60, .mode = mode}, context).value();
+    return Simulation::create(ground_world(), {actor},
+                              {.frames_per_second = 60, .mode = mode, .contacts_between_bodies = pieces_touch}, context)
+        .value();
 }
 
 TEST(Fracture, AThrownCubeBreaksAndItsPiecesLieOnTheGround) {
@@ -275,6 +278,14 @@ TEST(Fracture, AThrownCubeBreaksAndItsPiecesLieOnTheGround) {
     EXPECT_GT(simulation.fracture(0).parts, 3u);
     EXPECT_GT(least, -0.63);                          // the ground is at -0.6
     EXPECT_LT(simulation.energy(context).kinetic, 4); // of 216 J
+}
+
+TEST(Fracture, StiffPiecesKeepTogetherInDescent) {
+    Simulation simulation = thrown_cube(StepMode::descent, 1e9, false);
+    const double start = simulation.energy(context).kinetic;
+    for (int frame = 0; frame < 20; ++frame) ASSERT_TRUE(simulation.advance(context).ok());
+    EXPECT_GT(simulation.fracture(0).broken_area, 0);
+    EXPECT_LT(simulation.energy(context).kinetic, start);
 }
 
 TEST(Fracture, SavedInTheMiddleOfABreak) {

@@ -129,7 +129,7 @@ private:
     bool is_carried(std::size_t b) const {
         const BodyState& body = bodies_[b];
         return !body.rigid && blocks_[b].holds() && !(elastic_[b].most_stretch > kWildStretch) &&
-               std::ranges::none_of(body.fixed, [](std::uint8_t fixed) { return fixed != 0; });
+               std::ranges::none_of(stays(b), [](std::uint8_t stays) { return stays != 0; });
     }
 
     /// Internal damping has elastic forces as they are at y = x + tau v, v less the turning (Kelvin-Voigt to first
@@ -138,10 +138,8 @@ private:
     void sweep(std::size_t b) {
         BodyState& body = bodies_[b];
         const float s = damping(body);
-        const bool is_piece = b >= state_.actor_count;
         const auto terms = [&](const Vectors& target, std::span<const float> inertia) {
-            return Descent{target, inertia, is_piece ? left_out(b) : std::span<const std::uint8_t>(body.fixed),
-                           blocks_[b].touched(), &blocks_[b]};
+            return Descent{target, inertia, stays(b), blocks_[b].touched(), &blocks_[b]};
         };
         if (is_carried(b)) {
             blocks_[b].update_places(bodies_, body.positions, 1);
@@ -161,9 +159,9 @@ private:
         }
         blocks_[b].update_places(bodies_, ahead, 1 / (1 + s));
         body.elasticity->sweep(ahead, terms(target, inertia), context_);
-        const std::span<const std::uint8_t> stays = is_piece ? left_out(b) : std::span<const std::uint8_t>(body.fixed);
+        const std::span<const std::uint8_t> stay = stays(b);
         for (std::size_t i = 0; i < count; ++i)
-            if (!stays[i]) body.positions.set(i, (ahead[i] + s * turn_[b].of(start_[b][i])) / (1 + s));
+            if (!stay[i]) body.positions.set(i, (ahead[i] + s * turn_[b].of(start_[b][i])) / (1 + s));
     }
 
     float damping(const BodyState& body) const {
@@ -176,9 +174,11 @@ private:
             ahead.set(i, (1 + s) * positions[i] - s * turn_[b].of(start_[b][i]));
         return ahead;
     }
-    std::span<const std::uint8_t> left_out(std::size_t piece_body) const {
-        const Cracks& cracks = *state_.cracks_of(bodies_[piece_body].actor);
-        return cracks.left_out(Index(piece_body - cracks.first_piece()));
+    /// What sweeps of the body leave where it is: pins, and of a piece what is tied to others.
+    std::span<const std::uint8_t> stays(std::size_t b) const {
+        if (b < state_.actor_count) return bodies_[b].fixed;
+        const Cracks& cracks = *state_.cracks_of(bodies_[b].actor);
+        return cracks.left_out(Index(b - cracks.first_piece()));
     }
 
     /// What the pieces' own sweeps left out.
