@@ -130,7 +130,8 @@ void cut(benchmark::State& state) {
         state.counters["angle_1pc"] = angles[angles.size() / 100];
         state.counters["angle_med"] = angles[angles.size() / 2];
     }
-    FracturedMesh unbroken{.mesh = mesh};
+    FracturedMesh unbroken;
+    unbroken.mesh = mesh;
     unbroken.crack_of_face.assign(mesh.face_count(), kNoIndex);
     state.counters["crossing"] = double(crossing_pairs(*made));
     state.counters["crossing_before"] = double(crossing_pairs(unbroken));
