@@ -1,6 +1,7 @@
 #include "filigree/fracture/broken_model.h"
 
 #include "filigree/fracture/constrained_delaunay.h"
+#include "filigree/fracture/crack_surfaces.h"
 
 #include <algorithm>
 #include <cmath>

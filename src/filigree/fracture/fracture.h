@@ -1,7 +1,7 @@
 // A mesh in pieces.
 #pragma once
 
-#include "filigree/fracture/crack_surfaces.h"
+#include "filigree/fracture/cut_surface.h"
 
 #include <optional>
 
