@@ -67,7 +67,7 @@ TEST_F(OptionTables, ManualPagesNameEveryOption) {
             EXPECT_NE(of_command.find("\\fB" + escaped + "\\fR"), std::string::npos) << name;
         }
     }
-    EXPECT_EQ(commands, 15u);
+    EXPECT_EQ(commands, 16u);
     fails(2, {"--man", "swim"}, {"swim"});
 }
 
