@@ -4,7 +4,7 @@
 
 PEERS: lines "name value unit". OURS: what `filigree bench --json` prints, {"results": [{"name", "value", "unit"}, ...]},
 and what `filigree sample --method scan --json` prints, each for another lattice: "inside.scan_N" has N points along the
-longest side.
+longest side; and what `filigree fracture --json` prints, with the choice of seeds and all naming of pieces in its time.
 Rates (…/s) are better high, all else (s, bytes) better low; a pair is shown when both sides were measured.
 """
 import json
@@ -29,6 +29,7 @@ PAIRS = [
     ("8,000 particles, a frame / neo-Hookean, implicit", "simulate.cube.frame", "bullet.neo_hookean_implicit"),
     ("8,000 particles, a frame / neo-Hookean, explicit", "simulate.cube.frame", "bullet.neo_hookean_explicit"),
     ("8,000 particles, springs / links, 10 iterations", "simulate.springs_stiff.frame", "bullet.springs"),
+    ("koala in 20 pieces, rough / Cell Fracture, planes", "fracture.seconds", "cellfracture.seconds"),
 ]
 for n in (64, 128, 256, 512):
     PAIRS += [
@@ -57,6 +58,8 @@ def read_ours(paths):
             said = json.load(file)
         if "results" in said:
             figures |= {figure["name"]: (figure["value"], figure["unit"]) for figure in said["results"]}
+        elif "cone_facets" in said:
+            figures["fracture.seconds"] = (said["seconds"]["total"], "s")
         else:
             figures[f"inside.scan_{max(said['lattice'])}"] = (said["tested"] / said["seconds"], "points/s")
     return figures
