@@ -117,14 +117,26 @@ void ConstrainedDelaunay::split_face(Index face, Index vertex) {
     legalize(vertex);
 }
 
-void ConstrainedDelaunay::split_edge(Index face, int edge, Index vertex) {
-    // (a, b, c) and (b, a, d) become (a, v, c), (v, b, c), (b, v, d), (v, a, d).
+ConstrainedDelaunay::EdgeSides ConstrainedDelaunay::both_sides(Index face, int edge) const {
     const Index other = faces_[face].across[edge];
     const int back = edge_to(other, face);
-    const Face f = faces_[face], g = faces_[other];
-    const Index a = f.vertices[edge], b = f.vertices[next_corner(edge)], c = f.vertices[previous_corner(edge)];
-    const Index d = g.vertices[previous_corner(back)];
-    const int bc = next_corner(edge), ca = previous_corner(edge), ad = next_corner(back), db = previous_corner(back);
+    const Face &f = faces_[face], &g = faces_[other];
+    return {other,
+            f,
+            g,
+            f.vertices[edge],
+            f.vertices[next_corner(edge)],
+            f.vertices[previous_corner(edge)],
+            g.vertices[previous_corner(back)],
+            next_corner(edge),
+            previous_corner(edge),
+            next_corner(back),
+            previous_corner(back)};
+}
+
+void ConstrainedDelaunay::split_edge(Index face, int edge, Index vertex) {
+    // (a, b, c) and (b, a, d) become (a, v, c), (v, b, c), (b, v, d), (v, a, d).
+    const auto [other, f, g, a, b, c, d, bc, ca, ad, db] = both_sides(face, edge);
     const Index second = static_cast<Index>(faces_.size()), fourth = second + 1;
     const int net = f.net[edge];
     faces_[face] = {{a, vertex, c}, {fourth, second, f.across[ca]}, {net, 0, f.net[ca]}, f.winding};
@@ -151,12 +163,7 @@ bool ConstrainedDelaunay::can_split_edge(Index face, int edge, const PlanePoint&
 
 void ConstrainedDelaunay::flip(Index face, int edge) {
     // (a, b, c) and (b, a, d) become (c, a, d) and (d, b, c).
-    const Index other = faces_[face].across[edge];
-    const int back = edge_to(other, face);
-    const Face f = faces_[face], g = faces_[other];
-    const Index a = f.vertices[edge], b = f.vertices[next_corner(edge)], c = f.vertices[previous_corner(edge)];
-    const Index d = g.vertices[previous_corner(back)];
-    const int bc = next_corner(edge), ca = previous_corner(edge), ad = next_corner(back), db = previous_corner(back);
+    const auto [other, f, g, a, b, c, d, bc, ca, ad, db] = both_sides(face, edge);
     faces_[face] = {{c, a, d}, {f.across[ca], g.across[ad], other}, {f.net[ca], g.net[ad], 0}, f.winding};
     faces_[other] = {{d, b, c}, {g.across[db], f.across[bc], face}, {g.net[db], f.net[bc], 0}, g.winding};
     relink(g.across[ad], other, face);

@@ -49,6 +49,14 @@ private:
         int edge;     ///< the point lies on this edge; -1: inside
         Index vertex; ///< the point is this vertex; kNoIndex: none
     };
+    /// The faces (a, b, c) and (b, a, d) at an edge a b, and the numbers of their other edges.
+    struct EdgeSides {
+        Index other; ///< the second of the two
+        Face first, second;
+        Index a, b, c, d;
+        int bc, ca, ad, db;
+    };
+    EdgeSides both_sides(Index face, int edge) const;
     Place locate(const PlanePoint& point);
     int side(Index a, Index b, Index c) const;
     int corner_of(Index face, Index vertex) const;
