@@ -15,6 +15,9 @@ namespace {
 
 constexpr double kEdgeOfWavelength = 0.35; ///< longest edges near rough cracks, of the finest bump
 constexpr int kMostRefinements = 12;
+/// Triangles after dividing are no more than so many times those before, and so many: long thin ones would be without
+/// end.
+constexpr std::size_t kMostGrowth = 3, kFewestRefined = 500'000;
 
 using Name = std::array<Index, 4>;
 struct NameHash {
@@ -88,6 +91,7 @@ public:
         : cut_(cut), cells_(cells), longest_(kEdgeOfWavelength * cells.warp().finest_wavelength()) {}
 
     void run() {
+        const std::size_t most = kMostGrowth * cut_.triangles.size() + kFewestRefined;
         for (int round = 0; round < kMostRefinements; ++round) {
             std::vector<UncutTriangle> next;
             next.reserve(cut_.triangles.size());
@@ -98,7 +102,7 @@ public:
                 divided += next.size() - before - 1;
                 if (triangle.source == kNoIndex) closing += next.size() - before;
             }
-            if (divided == 0) return;
+            if (divided == 0 || next.size() > most) return;
             cut_.triangles = std::move(next);
             cut_.closing_triangles = closing;
         }
@@ -109,7 +113,7 @@ private:
     Index middle(Index a, Index b) {
         if (a > b) std::swap(a, b);
         const Vec3d p = cut_.vertices.position(a).cast<double>(), q = cut_.vertices.position(b).cast<double>();
-        if ((q - p).squaredNorm() <= longest_ * longest_) return kNoIndex;
+        if ((q - p).squaredNorm() <= longest_ * longest_ || is_apex(a) || is_apex(b)) return kNoIndex;
         const auto [known, is_new] = middles_.try_emplace({a, b, 0, 0}, kNoIndex);
         if (!is_new || !is_near_crack(a, b)) return known->second;
         const Vec3d m = 0.5 * (p + q);
@@ -118,6 +122,9 @@ private:
                                      between(cut_.vertices.surface_point(a), cut_.vertices.surface_point(b), 0.5));
         return middles_[{a, b, 0, 0}] = vertex;
     }
+
+    /// Whether a vertex is the tip of a cone over an open border: cones are cut as they are.
+    bool is_apex(Index vertex) const { return cut_.vertices.surface_point(vertex).vertices[0] == kNoIndex; }
 
     /// Whether a crack may come as near to the edge as the edge is long.
     bool is_near_crack(Index a, Index b) const {

@@ -2,6 +2,7 @@
 
 #include "filigree/core/random.h"
 #include "filigree/mesh/triangulate.h"
+#include "filigree/sample/closure.h"
 #include "filigree/sample/spacing_for_count.h"
 #include "filigree/sample/spread_inside.h"
 
@@ -15,6 +16,7 @@ namespace filigree {
 namespace {
 
 constexpr std::size_t kPointsOfPiece = 100, kFewestPoints = 4'000, kMostPoints = 1'000'000;
+constexpr double kMostUnbalanced = 0.25; ///< edges a triangle
 constexpr int kLloydRounds = 3;
 constexpr double kWavelength = 0.8; ///< of the coarsest bumps, beside a piece's size
 
@@ -50,7 +52,12 @@ std::vector<Vec3d> points_on_surface(const Mesh& mesh, std::size_t count, std::u
 Result<Matter> matter_of(const Mesh& mesh, Index pieces, const RunContext& context) {
     const std::size_t count = std::clamp(kPointsOfPiece * pieces, kFewestPoints, kMostPoints);
     Matter matter;
-    const Result<double> spacing = spacing_for_count(mesh, count, {}, context);
+    const Result<WeldedTriangles> welded = weld_triangles(mesh, context);
+    if (!welded) return welded.error();
+    // Winding numbers of a tangle tell no inside, and looking for one takes minutes.
+    const bool is_tangle = double(welded->closure.unbalanced) > kMostUnbalanced * double(welded->triangles.size());
+    const Result<double> spacing =
+        is_tangle ? Result<double>(Error{ErrorCode::unsuitable, ""}) : spacing_for_count(mesh, count, {}, context);
     if (spacing) {
         const Result<Lattice> lattice = make_lattice(bounds(mesh.positions), {.spacing = *spacing});
         Result<std::vector<Vec3d>> inside = lattice ? spread_inside(mesh, *lattice, Pattern::jitter, {}, context)
