@@ -70,6 +70,9 @@ Result<FracturedMesh> fracture(const Mesh& mesh, const FractureCells& cells, con
         return Error{ErrorCode::unsuitable, "The mesh has no faces: there is nothing to break."};
     const Result<Surface> surface = make_surface(mesh, context);
     if (!surface) return surface.error();
+    if (surface->triangles.empty())
+        return Error{ErrorCode::unsuitable,
+                     "No face of the mesh has three different corners: there is nothing to break."};
     CutReport report;
     double start = now();
     const auto lap = [&start] {

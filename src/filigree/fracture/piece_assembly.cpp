@@ -227,11 +227,16 @@ private:
         label(face, piece, kNoIndex);
     }
 
-    /// The corner of an old face at a place.
-    Index corner_at(Index face, Index representative) const {
-        for (Index c = mesh_.face_offsets[face]; c < mesh_.face_offsets[face + 1]; ++c)
-            if (surface_.representative[mesh_.corners[c]] == representative) return c;
-        return kNoIndex;
+    /// The corner of an old face at a place; the first, where there are several.
+    Index corner_at(Index face, Index representative) {
+        if (face != corners_of_) {
+            corners_of_ = face;
+            corner_at_.clear();
+            for (Index c = mesh_.face_offsets[face]; c < mesh_.face_offsets[face + 1]; ++c)
+                corner_at_.try_emplace(surface_.representative[mesh_.corners[c]], c);
+        }
+        const auto found = corner_at_.find(representative);
+        return found == corner_at_.end() ? kNoIndex : found->second;
     }
 
     void add_surface_triangle(const Triangle& triangle, Index face, Index piece) {
@@ -317,6 +322,8 @@ private:
     std::unordered_map<std::uint64_t, Index> copies_;
     CornerCopier<Vec2f> uv_;
     CornerCopier<Vec3f> normal_;
+    Index corners_of_ = kNoIndex; ///< the face whose corners are in ...
+    std::unordered_map<Index, Index> corner_at_;
     Index inside_material_ = 0;
     Index frame_of_ = kNoIndex;
     FacetFrame frame_;
