@@ -1,7 +1,8 @@
 #include "filigree/fracture/broken_model.h"
 
-#include "filigree/fracture/constrained_delaunay.h"
 #include "filigree/fracture/crack_surfaces.h"
+#include "filigree/fracture/planar_fill.h"
+#include "filigree/mesh/closest_point.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,38 +14,6 @@ namespace filigree {
 namespace {
 
 constexpr double kFinestSpacing = 0.05; ///< of that asked for, on cracks too small for three points
-
-/// u and v of the point of a triangle that is closest to p; all three weights are 0 or more.
-struct Weights {
-    double u = 0, v = 0;
-};
-Weights closest_weights(const std::array<Vec3d, 3>& t, const Vec3d& p) {
-    const Vec3d e1 = t[1] - t[0], e2 = t[2] - t[0], d = p - t[0];
-    const double a = e1.squaredNorm(), b = e1.dot(e2), c = e2.squaredNorm(), x = d.dot(e1), y = d.dot(e2);
-    const double determinant = a * c - b * b;
-    if (determinant > 1e-12 * a * c) {
-        const Weights inside{(c * x - b * y) / determinant, (a * y - b * x) / determinant};
-        if (inside.u >= 0 && inside.v >= 0 && inside.u + inside.v <= 1) return inside;
-    }
-    Weights best;
-    double least = std::numeric_limits<double>::infinity();
-    const auto try_edge = [&](std::size_t from, std::size_t to) {
-        const Vec3d edge = t[to] - t[from];
-        const double length = edge.squaredNorm();
-        const double s = length > 0 ? std::clamp((p - t[from]).dot(edge) / length, 0.0, 1.0) : 0;
-        const double distance = (t[from] + s * edge - p).squaredNorm();
-        if (distance >= least) return;
-        least = distance;
-        std::array<double, 3> weight = {};
-        weight[from] = 1 - s;
-        weight[to] += s;
-        best = {weight[1], weight[2]};
-    };
-    try_edge(0, 1);
-    try_edge(1, 2);
-    try_edge(2, 0);
-    return best;
-}
 
 /// Some of the points, none closer to another than `spacing`; the first is always among them.
 std::vector<Index> thin(std::span<const Vec3d> points, double spacing) {
@@ -71,30 +40,6 @@ std::vector<Index> thin(std::span<const Vec3d> points, double spacing) {
         kept.push_back(k);
     }
     return kept;
-}
-
-/// Triangles of points in a plane.
-std::vector<Triangle> delaunay(std::span<const Vec2f> points) {
-    Vec2f lo = points[0], hi = points[0];
-    for (const Vec2f& p : points) {
-        lo = lo.cwiseMin(p);
-        hi = hi.cwiseMax(p);
-    }
-    const double scale = 0.95 * double(ConstrainedDelaunay::kPlaneHalf) / std::max(double((hi - lo).maxCoeff()), 1e-30);
-    ConstrainedDelaunay mesh;
-    std::vector<Index> point_of(3, kNoIndex);
-    for (Index k = 0; k < points.size(); ++k) {
-        const Vec2f p = points[k] - lo;
-        if (mesh.insert({std::llround(double(p[0]) * scale), std::llround(double(p[1]) * scale)}) == point_of.size())
-            point_of.push_back(k);
-    }
-    std::vector<Triangle> triangles;
-    for (std::size_t k = 0; k < mesh.face_count(); ++k) {
-        const auto& v = mesh.face(k).vertices;
-        if (std::none_of(v.begin(), v.end(), ConstrainedDelaunay::is_outer))
-            triangles.push_back({point_of[v[0]], point_of[v[1]], point_of[v[2]]});
-    }
-    return triangles;
 }
 
 constexpr std::uint64_t kOnCrack = std::uint64_t(1) << 32; ///< in a driver vertex's place: not of the unbroken driver
@@ -143,7 +88,8 @@ private:
 /// A vertex's bond to places, the same in every piece.
 struct PlaceBond {
     std::array<Index, 3> places; ///< indices of crack points
-    Weights weights;
+    float u, v;                  ///< weights of the second and the third
+    double distance;             ///< of the vertex from where it hangs, model units
 };
 
 class ModelBreaker {
@@ -203,12 +149,13 @@ private:
         for (const Index other : source.vertices)
             if (other != kNoIndex) first = std::min(first, other);
         const Index cell = old_bonds_[first].cell;
-        std::array<Vec3d, 3> corners;
-        for (std::size_t k = 0; k < 3; ++k)
-            corners[k] = model_.mesh.positions[model_.driver().vertices[detail_.cells[cell][k]]].cast<double>();
-        const Weights w = closest_weights(corners, fractured_.mesh.positions[vertex].cast<double>());
-        bonds_[vertex] = {surface_cell(cell, fractured_.piece_of_vertex[vertex]), static_cast<float>(w.u),
-                          static_cast<float>(w.v)};
+        const auto corner = [&](std::size_t k) -> const Vec3f& {
+            return model_.mesh.positions[model_.driver().vertices[detail_.cells[cell][k]]];
+        };
+        const SurfacePoint hook =
+            closest_point_on_triangle(fractured_.mesh.positions[vertex], corner(0), corner(1), corner(2));
+        bonds_[vertex] = {surface_cell(cell, fractured_.piece_of_vertex[vertex]), hook.barycentric[1],
+                          hook.barycentric[2]};
     }
 
     bool is_inside(Index vertex) const {
@@ -258,8 +205,7 @@ private:
             Triangle corners;
             for (std::size_t k = 0; k < 3; ++k)
                 corners[k] = copies_->vertex(kOnCrack | bond.places[k], piece, kNoIndex, position_at(bond.places[k]));
-            bonds_[vertex] = {copies_->cell(corners), static_cast<float>(bond.weights.u),
-                              static_cast<float>(bond.weights.v)};
+            bonds_[vertex] = {copies_->cell(corners), bond.u, bond.v};
         }
         // What no crack holds any more (a face that rounding took away) hangs on the surface.
         for (Index v = static_cast<Index>(model_.mesh.vertex_count()); v < bonds_.size(); ++v)
@@ -285,12 +231,16 @@ private:
         return drivers;
     }
 
+    static PlaceBond hung(const Triangle& places, const SurfacePoint& hook) {
+        return {places, hook.barycentric[1], hook.barycentric[2], hook.distance};
+    }
+
     PlaceBond hang_on_line(Index place, std::span<const Index> drivers, const CopiesAt& copies_at) const {
-        const Vec3d p = fractured_.mesh.positions[copies_at.at(place).front()].cast<double>();
-        std::array<std::pair<double, Index>, 2> nearest;
-        nearest.fill({std::numeric_limits<double>::infinity(), drivers[0]});
+        const Vec3f& p = fractured_.mesh.positions[copies_at.at(place).front()];
+        std::array<std::pair<float, Index>, 2> nearest;
+        nearest.fill({std::numeric_limits<float>::infinity(), drivers[0]});
         for (const Index driver : drivers) {
-            const std::pair<double, Index> entry = {(position_at(driver).cast<double>() - p).squaredNorm(), driver};
+            const std::pair<float, Index> entry = {(position_at(driver) - p).squaredNorm(), driver};
             if (entry < nearest[0]) {
                 nearest[1] = nearest[0];
                 nearest[0] = entry;
@@ -299,8 +249,7 @@ private:
             }
         }
         const Index a = nearest[0].second, b = nearest[1].second;
-        const Vec3d from = position_at(a).cast<double>(), to = position_at(b).cast<double>();
-        return {{a, b, b}, closest_weights({from, to, to}, p)};
+        return hung({a, b, b}, closest_point_on_triangle(p, position_at(a), position_at(b), position_at(b)));
     }
 
     void hang_crack(std::size_t crack, std::vector<Index>& vertices, const CopiesAt& copies_at,
@@ -318,7 +267,7 @@ private:
         std::vector<Vec3d> points;
         for (const Index v : vertices) points.push_back(fractured_.mesh.positions[v].cast<double>());
         std::vector<Index> drivers;
-        std::vector<Vec2f> flat;
+        std::vector<Vec2d> flat;
         std::vector<Triangle> triangles;
         for (double spacing = spacing_; triangles.empty() && spacing > kFinestSpacing * spacing_; spacing /= 2) {
             drivers.clear();
@@ -326,38 +275,23 @@ private:
             for (const Index k : thin(points, spacing)) {
                 drivers.push_back(fractured_.place[vertices[k]]);
                 position_of_[drivers.back()] = fractured_.mesh.positions[vertices[k]];
-                flat.emplace_back(static_cast<float>(points[k].dot(frame.x)),
-                                  static_cast<float>(points[k].dot(frame.y)));
+                flat.emplace_back(points[k].dot(frame.x), points[k].dot(frame.y));
             }
-            triangles = delaunay(flat);
+            triangles = delaunay_triangles(flat);
         }
         for (std::size_t k = 0; k < vertices.size(); ++k) {
             const Index place = fractured_.place[vertices[k]];
             if (!is_inside(vertices[k]) || copies_at.at(place).size() != 2) continue;
-            const Vec3d p(points[k].dot(frame.x), points[k].dot(frame.y), 0);
-            PlaceBond best{{drivers[0], drivers[0], drivers[0]}, {}};
-            double least = std::numeric_limits<double>::infinity();
-            const auto corner = [&](Index at) { return Vec3d(double(flat[at][0]), double(flat[at][1]), 0); };
-            for (const Triangle& t : triangles) {
-                const std::array<Vec3d, 3> corners = {corner(t[0]), corner(t[1]), corner(t[2])};
-                const Weights w = closest_weights(corners, p);
-                const double distance =
-                    ((1 - w.u - w.v) * corners[0] + w.u * corners[1] + w.v * corners[2] - p).squaredNorm();
-                if (distance >= least) continue;
-                least = distance;
-                best = {{drivers[t[0]], drivers[t[1]], drivers[t[2]]}, w};
-                if (distance == 0) break;
-            }
             // Beside points that are almost on a line there may be no triangle near.
-            const PlaceBond line = hang_on_line(place, drivers, copies_at);
-            const auto off_line = [&] {
-                const Vec3d from = position_at(line.places[0]).cast<double>(),
-                            to = position_at(line.places[1]).cast<double>();
-                return ((1 - line.weights.u - line.weights.v) * from + (line.weights.u + line.weights.v) * to -
-                        points[k])
-                    .squaredNorm();
-            };
-            if (!(least <= off_line())) best = line;
+            PlaceBond best = hang_on_line(place, drivers, copies_at);
+            const auto in_plane = [](const Vec2d& p) { return Vec3f(float(p[0]), float(p[1]), 0); };
+            const Vec3f p = in_plane({points[k].dot(frame.x), points[k].dot(frame.y)});
+            for (const Triangle& t : triangles) {
+                const SurfacePoint hook =
+                    closest_point_on_triangle(p, in_plane(flat[t[0]]), in_plane(flat[t[1]]), in_plane(flat[t[2]]));
+                if (hook.distance <= best.distance) best = hung({drivers[t[0]], drivers[t[1]], drivers[t[2]]}, hook);
+                if (hook.distance == 0) break;
+            }
             bond_at[place] = best;
         }
     }

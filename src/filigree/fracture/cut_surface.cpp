@@ -60,9 +60,17 @@ void close_borders(CutSurface& cut, std::size_t mesh_vertices, const FractureCel
         }
 }
 
-double doubled_area(const CutVertices& vertices, const Triangle& t) {
-    const Vec3d a = vertices.position(t[0]).cast<double>();
-    return (vertices.position(t[1]).cast<double>() - a).cross(vertices.position(t[2]).cast<double>() - a).norm();
+/// Areas, and the volume.
+void measure(CutSurface& cut) {
+    const Vec3d middle = bounds(cut.vertices.positions()).centre();
+    for (const UncutTriangle& t : cut.triangles) {
+        const auto at = [&](std::size_t k) -> Vec3d {
+            return cut.vertices.position(t.vertices[k]).cast<double>() - middle;
+        };
+        const Vec3d a = at(0), cross = (at(1) - a).cross(at(2) - a);
+        (t.source == kNoIndex ? cut.closing_area : cut.area) += 0.5 * cross.norm();
+        cut.volume += a.dot(cross) / 6;
+    }
 }
 
 /// The middle of two points of a triangle.
@@ -413,8 +421,7 @@ Result<CutSurface> cut_surface(const Mesh& mesh, const Surface& surface, const F
     close_borders(cut, mesh.vertex_count(), cells);
     if (context.is_cancelled()) return cancelled_error();
     if (cells.warp().is_rough()) CrackRefinement(cut, cells).run();
-    for (const UncutTriangle& t : cut.triangles)
-        (t.source == kNoIndex ? cut.closing_area : cut.area) += 0.5 * doubled_area(cut.vertices, t.vertices);
+    measure(cut);
 
     std::vector<Index> label(cut.vertices.count());
     parallel_for(context, label.size(), kGrain, [&](std::size_t begin, std::size_t end) {

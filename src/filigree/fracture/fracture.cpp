@@ -17,39 +17,25 @@ double now() { return std::chrono::duration<double>(std::chrono::steady_clock::n
 
 /// How far a piece of average volume is across.
 double piece_size(const CutSurface& cut, Index cells) {
-    double volume = 0;
-    const Vec3d middle = bounds(cut.vertices.positions()).centre();
-    for (const UncutTriangle& t : cut.triangles) {
-        const auto at = [&](std::size_t k) -> Vec3d {
-            return cut.vertices.position(t.vertices[k]).cast<double>() - middle;
-        };
-        volume += at(0).dot(at(1).cross(at(2))) / 6;
-    }
     const double thinnest = 1e-3 * std::pow(bounds(cut.vertices.positions()).diagonal(), 3);
-    return std::cbrt(std::max(std::abs(volume), thinnest) / double(cells));
+    return std::cbrt(std::max(std::abs(cut.volume), thinnest) / double(cells));
 }
 
-/// Signed volumes (areas of sheets) of pieces, and of the whole.
+/// The pieces' sizes, and how far they are from adding up.
 void report_sizes(const CutSurface& cut, std::span<const CellTriangle> triangles, std::span<const Index> piece_of_part,
                   Index pieces, CutReport& report) {
     const Vec3d middle = bounds(cut.vertices.positions()).centre();
-    const auto doubled = [&](const Triangle& t, Vec3d& a) {
-        const auto at = [&](std::size_t k) -> Vec3d { return cut.vertices.position(t[k]).cast<double>() - middle; };
-        a = at(0);
-        return Vec3d((at(1) - a).cross(at(2) - a));
-    };
     std::vector<double> volume(pieces, 0), area(pieces, 0);
-    Vec3d a;
     for (const CellTriangle& t : triangles) {
-        const Vec3d cross = doubled(t.vertices, a);
+        const auto at = [&](std::size_t k) -> Vec3d {
+            return cut.vertices.position(t.vertices[k]).cast<double>() - middle;
+        };
+        const Vec3d a = at(0), cross = (at(1) - a).cross(at(2) - a);
         volume[piece_of_part[t.part]] += a.dot(cross) / 6;
         if (t.facet == kNoIndex && cut.triangles[t.uncut].source != kNoIndex)
             area[piece_of_part[t.part]] += 0.5 * cross.norm();
     }
-    for (const UncutTriangle& t : cut.triangles) {
-        const Vec3d cross = doubled(t.vertices, a);
-        report.volume += a.dot(cross) / 6;
-    }
+    report.volume = cut.volume;
     double sum = 0;
     for (const double v : volume) sum += v;
     if (!report.is_sheet && report.volume != 0) report.volume_error = std::abs(sum / report.volume - 1);

@@ -206,4 +206,20 @@ PlanarFill fill_plane(std::span<const Vec2d> points, std::span<const PlanarSegme
     return fill;
 }
 
+std::vector<Triangle> delaunay_triangles(std::span<const Vec2d> points) {
+    std::vector<Triangle> triangles;
+    if (points.empty()) return triangles;
+    const PlaneGrid grid(points);
+    ConstrainedDelaunay mesh;
+    std::vector<Index> point_of(3, kNoIndex);
+    for (Index k = 0; k < points.size(); ++k)
+        if (mesh.insert(grid.to_grid(points[k])) == point_of.size()) point_of.push_back(k);
+    for (std::size_t k = 0; k < mesh.face_count(); ++k) {
+        const auto& v = mesh.face(k).vertices;
+        if (std::none_of(v.begin(), v.end(), ConstrainedDelaunay::is_outer))
+            triangles.push_back({point_of[v[0]], point_of[v[1]], point_of[v[2]]});
+    }
+    return triangles;
+}
+
 } // namespace filigree

@@ -30,4 +30,8 @@ struct PlanarFill {
 PlanarFill fill_plane(std::span<const Vec2d> points, std::span<const PlanarSegment> segments,
                       const PlanarFillOptions& options);
 
+/// Delaunay triangles of points, counter-clockwise; points that round to one place count once, and points on a line
+/// give none. Where points are almost on a line the hull may lack thin triangles. Cost: about 1 us a point.
+std::vector<Triangle> delaunay_triangles(std::span<const Vec2d> points);
+
 } // namespace filigree

@@ -341,8 +341,8 @@ private:
                         result_.facets[f].links[n] = Index(result_.links.size());
             result_.links.push_back({{a, b}, {copy_at(corner, a), copy_at(corner, b)}, corner, sum.area});
             auto& rows = result_.facets_of_link;
-            rows.values.insert(rows.values.end(), sum.facets.begin(), sum.facets.end());
-            rows.offsets.push_back(Index(rows.values.size()));
+            rows.items.insert(rows.items.end(), sum.facets.begin(), sum.facets.end());
+            rows.offsets.push_back(Index(rows.items.size()));
         }
     }
 
@@ -410,13 +410,13 @@ private:
                     const auto& of = result_.links[other].pieces;
                     const bool common = of[0] == link.pieces[0] || of[0] == link.pieces[1] || of[1] == link.pieces[0] ||
                                         of[1] == link.pieces[1];
-                    if (common && other != l) result_.links_beside.values.push_back(other);
+                    if (common && other != l) result_.links_beside.items.push_back(other);
                 }
             }
-            result_.links_beside.offsets.push_back(Index(result_.links_beside.values.size()));
+            result_.links_beside.offsets.push_back(Index(result_.links_beside.items.size()));
             for (const auto& [piece, point] : lit[l])
-                result_.points_of_link.values.insert(result_.points_of_link.values.end(), {piece, point});
-            result_.points_of_link.offsets.push_back(Index(result_.points_of_link.values.size()));
+                result_.points_of_link.items.insert(result_.points_of_link.items.end(), {piece, point});
+            result_.points_of_link.offsets.push_back(Index(result_.points_of_link.items.size()));
         }
     }
 

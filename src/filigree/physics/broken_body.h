@@ -1,6 +1,7 @@
 // A body as it is when it breaks: a body for each piece, and what holds them together. Nothing here moves.
 #pragma once
 
+#include "filigree/mesh/incidence.h"
 #include "filigree/physics/body.h"
 
 #include <functional>
@@ -33,15 +34,6 @@ struct CrackLink {
     float area;                  ///< m^2: the corner's share of the facets around, all links together the facets' area
 };
 
-/// Rows of numbers, one after the other.
-struct IndexRows {
-    std::vector<Index> offsets = {0}, values;
-    std::size_t size() const { return offsets.size() - 1; }
-    std::span<const Index> operator[](std::size_t row) const {
-        return std::span(values).subspan(offsets[row], offsets[row + 1] - offsets[row]);
-    }
-};
-
 /// A corner of a piece's body.
 struct CornerCopy {
     Index piece, corner;
@@ -59,12 +51,12 @@ struct BrokenBody {
     std::vector<CornerCopy> copies;                   ///< ... its copies, ascending by piece
     std::vector<CrackFacet> facets;
     std::vector<CrackLink> links; ///< ascending by corner
-    IndexRows facets_of_link;     ///< in the cells around its corner
-    IndexRows links_beside;       ///< those of a common piece at the corner itself and at the 26 around
+    IndexLists facets_of_link;    ///< in the cells around its corner
+    IndexLists links_beside;      ///< those of a common piece at the corner itself and at the 26 around
     /// Of each piece, the number of its surface's points that lie on the body's surface; those after it lie on cracks.
     std::vector<Index> outer_points;
     /// Of each link, surface points that come to light when it breaks: in turn pieces and points.
-    IndexRows points_of_link;
+    IndexLists points_of_link;
 
     std::span<const CornerCopy> copies_of(Index corner) const {
         return std::span(copies).subspan(copy_offsets[corner], copy_offsets[corner + 1] - copy_offsets[corner]);
