@@ -6,7 +6,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <numbers>
+#include <numeric>
 #include <thread>
 
 namespace filigree {
@@ -470,6 +472,27 @@ TEST(Simulation, AHandPulls) {
     EXPECT_NEAR(centre_of_mass(pulled).x(), 1.2, 0.05);
     ASSERT_TRUE(pulled.set_hands({}, RunContext(1)).ok());
     run(pulled, 10);
+}
+
+// A force on each particle moves the body as the sum of forces does, in either way of stepping, until it is taken away.
+TEST(Simulation, ForcesOnParticlesPush) {
+    for (const StepMode mode : {StepMode::explicit_steps, StepMode::descent}) {
+        const auto body = box(3, 3, 3, 0.1, material(MaterialModel::fem, 1e6));
+        Simulation pushed = simulation(free_space(), {actor(body)}, {.mode = mode});
+        Vectors forces(body->particle_count());
+        for (std::size_t i = 0; i < forces.size(); ++i) forces.set(i, Vec3f(2 * body->mass[i], 0, 0));
+        ASSERT_TRUE(pushed.set_forces(0, forces).ok());
+        run(pushed, 30); // half a second of 2 m/s^2
+        const double mass = std::accumulate(body->mass.begin(), body->mass.end(), 0.0);
+        EXPECT_NEAR(pushed.momentum().linear.x() / mass, 1, 0.01);
+        ASSERT_TRUE(pushed.set_forces(0, {}).ok());
+        run(pushed, 30);
+        EXPECT_NEAR(pushed.momentum().linear.x() / mass, 1, 0.01);
+        EXPECT_EQ(pushed.set_forces(0, Vectors(3)).error().code, ErrorCode::usage);
+        EXPECT_EQ(pushed.set_forces(1, {}).error().code, ErrorCode::usage);
+        forces.set(5, Vec3f::Constant(std::numeric_limits<float>::quiet_NaN()));
+        EXPECT_EQ(pushed.set_forces(0, forces).error().code, ErrorCode::usage);
+    }
 }
 
 TEST(Simulation, WindPushes) {

@@ -82,7 +82,7 @@ private:
     /// Where inertia and outer forces carry the particles, and where sweeps begin.
     void predict() {
         const Stopwatch watch(report_.other_seconds);
-        const std::vector<Vectors> regions = state_.external.region_accelerations(bodies_, now_);
+        const std::vector<Vectors> pushes = state_.external.push_accelerations(bodies_, now_);
         std::vector<std::uint8_t> wild, falls; // of each actor, so that tied pieces begin alike
         wild.assign(state_.actor_count, 0);
         falls.assign(state_.actor_count, 1);
@@ -101,7 +101,7 @@ private:
             Vectors& target = target_.emplace_back(count);
             std::vector<float>& inertia = inertia_.emplace_back(count);
             for (std::size_t i = 0; i < count; ++i) {
-                Vec3f acceleration = state_.world.gravity.cast<float>() + regions[b][i];
+                Vec3f acceleration = state_.world.gravity.cast<float>() + pushes[b][i];
                 if (state_.external.has_wind()) acceleration += state_.external.wind_acceleration(body, b, i);
                 const Vec3f coasted = body.positions[i] + dt_ * body.velocities[i];
                 inertia[i] = body.body->mass[i] / (dt_ * dt_);
@@ -232,7 +232,8 @@ private:
         std::vector<Index> groups = state_.contacts.free_groups();
         for (const Cracks& cracks : state_.cracks) join_parts(cracks, groups);
         for (std::size_t b = 0; b < bodies_.size(); ++b)
-            if (bodies_[b].is_held || bodies_[b].is_absent || state_.external.pull(b, now_))
+            if (bodies_[b].is_held || bodies_[b].is_absent || state_.external.pull(b, now_) ||
+                state_.external.push(bodies_[b].actor))
                 std::ranges::replace(groups, Index(groups[b]), kNoIndex);
         for (Index group = 0; group < bodies_.size(); ++group) {
             if (std::ranges::find(groups, group) == groups.end()) continue;

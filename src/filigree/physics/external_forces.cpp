@@ -108,14 +108,25 @@ void ExternalForces::find_wind(std::span<const BodyState> bodies, double time, d
     }
 }
 
-void ExternalForces::add_forces(std::span<BodyState> bodies, double time, const RunContext& context) const {
+template <class State, class Visit>
+void ExternalForces::each_push(std::span<State> bodies, double time, const Visit& visit) const {
+    const auto push = [&](std::size_t pushed, Index particle, const Vec3f& acceleration) {
+        each_copy(bodies, pushed, particle,
+                  [&](State& body, std::size_t index, Index copy) { visit(body, index, copy, acceleration); });
+    };
     for (const RegionForce& force : world_.forces) {
         const Vec3f acceleration = region_acceleration(force, *bodies[force.body].body, time);
-        for (const Index particle : force.particles)
-            each_copy(bodies, force.body, particle, [&](BodyState& body, std::size_t, Index copy) {
-                body.forces.add(copy, body.body->mass[copy] * acceleration);
-            });
+        for (const Index particle : force.particles) push(force.body, particle, acceleration);
     }
+    for (std::size_t b = 0; b < pushes_.size(); ++b)
+        for (Index i = 0; i < pushes_[b].size(); ++i)
+            if (const Vec3f force = pushes_[b][i]; !force.isZero(0)) push(b, i, force / bodies[b].body->mass[i]);
+}
+
+void ExternalForces::add_forces(std::span<BodyState> bodies, double time, const RunContext& context) const {
+    each_push(bodies, time, [](BodyState& body, std::size_t, Index particle, const Vec3f& acceleration) {
+        body.forces.add(particle, body.body->mass[particle] * acceleration);
+    });
     if (!has_wind()) return;
     for (std::size_t b = 0; b < bodies.size(); ++b) {
         if (bodies[b].is_absent) continue;
@@ -136,16 +147,12 @@ double ExternalForces::add_pulls(BodyState& body, std::size_t index, double time
     return squared_frequency;
 }
 
-std::vector<Vectors> ExternalForces::region_accelerations(std::span<const BodyState> bodies, double time) const {
+std::vector<Vectors> ExternalForces::push_accelerations(std::span<const BodyState> bodies, double time) const {
     std::vector<Vectors> accelerations(bodies.size());
     for (std::size_t b = 0; b < bodies.size(); ++b) accelerations[b] = Vectors(bodies[b].positions.size());
-    for (const RegionForce& force : world_.forces) {
-        const Vec3f acceleration = region_acceleration(force, *bodies[force.body].body, time);
-        for (const Index particle : force.particles)
-            each_copy(bodies, force.body, particle, [&](const BodyState&, std::size_t body, Index copy) {
-                accelerations[body].add(copy, acceleration);
-            });
-    }
+    each_push(bodies, time, [&](const BodyState&, std::size_t body, Index particle, const Vec3f& acceleration) {
+        accelerations[body].add(particle, acceleration);
+    });
     return accelerations;
 }
 

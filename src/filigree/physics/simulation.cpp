@@ -191,7 +191,7 @@ void let_rest(SimulationState& state, double from, double until) {
     for (std::size_t b = 0; b < state.bodies.size(); ++b) {
         BodyState& body = state.bodies[b];
         if (!body.rigid) continue;
-        if (disturbed || body.is_held || state.external.pull(b, until))
+        if (disturbed || body.is_held || state.external.pull(b, until) || state.external.push(body.actor))
             wake(body);
         else if (!body.rigid->sleeps)
             tire(body, state.frame_seconds());
@@ -311,7 +311,7 @@ Status Simulation::set_velocities(std::size_t body, const Vectors& velocities) {
     if (state_->bodies[body].rigid) fit_pose(state_->bodies[body]);
     return Success{};
 }
-Status Simulation::check_vectors(std::size_t body, const Vectors& vectors, const char* what) const {
+Status Simulation::check_count(std::size_t body, const Vectors& vectors, const char* what) const {
     if (body >= body_count())
         return usage("There is no body " + std::to_string(body) + "; there are " + std::to_string(body_count()) +
                      ", counted from 0.");
@@ -319,6 +319,10 @@ Status Simulation::check_vectors(std::size_t body, const Vectors& vectors, const
     if (vectors.size() != count)
         return usage("Body " + std::to_string(body) + " has " + std::to_string(count) + " particles and was given " +
                      std::to_string(vectors.size()) + " " + what + ".");
+    return Success{};
+}
+Status Simulation::check_vectors(std::size_t body, const Vectors& vectors, const char* what) const {
+    if (Status checked = check_count(body, vectors, what); !checked) return checked;
     if (state_->bodies[body].is_absent) return usage("Body " + std::to_string(body) + " has broken.");
     return Success{};
 }
@@ -329,6 +333,17 @@ Status Simulation::set_hands(std::vector<Hand> hands, const RunContext& context)
         if (!cracks.is_open()) cracks.follow_whole(state_->bodies);
     state_->external.set_grips(make_grips(hands, *state_, context));
     state_->world.hands = std::move(hands);
+    return Success{};
+}
+
+Status Simulation::set_forces(std::size_t body, const Vectors& newtons) {
+    if (newtons.size() > 0 || body >= body_count())
+        if (Status checked = check_count(body, newtons, "forces"); !checked) return checked;
+    for (std::size_t i = 0; i < newtons.size(); ++i)
+        if (!newtons[i].allFinite())
+            return usage("The force on particle " + std::to_string(i) + " of body " + std::to_string(body) +
+                         " is not finite.");
+    state_->external.set_pushes(body, newtons);
     return Success{};
 }
 

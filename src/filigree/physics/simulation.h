@@ -104,6 +104,11 @@ public:
     /// Hands may come and go while it runs, and take the place of those there were. Each seizes the particles that were
     /// around its point at rest, wherever these have flowed. Errors: as check_hands; the old hands then stay.
     Status set_hands(std::vector<Hand> hands, const RunContext& context);
+    /// Forces on a body's particles, N, from now on and in place of those set before; none at all: no such forces. A
+    /// body that is pushed does not sleep. Of a body that broke the copies of a particle share its force by mass. Like
+    /// hands they are no part of what save() keeps. Errors: usage (no such body, another number of particles, a force
+    /// that is not finite).
+    Status set_forces(std::size_t body, const Vectors& newtons);
 
     Energy energy(const RunContext& context) const;
     Momentum momentum() const;
@@ -130,6 +135,7 @@ public:
 
 private:
     explicit Simulation(std::unique_ptr<SimulationState> state);
+    Status check_count(std::size_t body, const Vectors& vectors, const char* what) const;
     Status check_vectors(std::size_t body, const Vectors& vectors, const char* what) const;
     std::unique_ptr<SimulationState> state_;
 };
