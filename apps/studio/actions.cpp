@@ -187,6 +187,14 @@ std::vector<Command> Actions::Impl::edit_menu() {
              workbench.make_quads();
          },
          [this] { return has_model() && workbench.state().source->topology.faces > 0; }},
+        {"fracture.cut", "Cut p&ieces", "Cuts the mesh where it would break, as the Fracture panel says", "X",
+         [this] {
+             window.show_panel("fracture");
+             workbench.cut_pieces();
+         },
+         [this] { return has_model() && workbench.state().source->topology.faces > 0; }},
+        {"fracture.whole", "Make &whole", "The mesh as it was before it was cut", "Shift+X",
+         [this] { workbench.make_whole(); }, [this] { return has_model() && workbench.state().source->pieces; }},
         {"detail.remove", "&Remove detail", "One level coarser", "PgDown", [this] { workbench.remove_detail(); },
          [this] { return can_remove_detail(); }, Icon::minus},
         {"detail.add", "&Add detail", "One level finer", "PgUp", [this] { workbench.add_detail(); },
@@ -249,6 +257,8 @@ std::vector<Command> Actions::Impl::look_menu() {
         view_choice("colors", "view.color_expected", "E&xpected error as colours",
                     "Where the pose is more curved than the driver can follow", "Shift+5", &V::coloring,
                     Coloring::expected_error),
+        view_choice("colors", "view.color_pieces", "Pi&eces as colours", "Each piece of a mesh that breaks", "Shift+6",
+                    &V::coloring, Coloring::pieces),
         {"view.measure_error", "M&easure error", "Measures what is shown against the full deformation", "Ctrl+M",
          [this] { workbench.measure_error(); }, has_model},
         kSeparator,
@@ -276,7 +286,8 @@ std::vector<Command> Actions::Impl::view_menu() {
         panel("detail", "Detail", "Ctrl+3"),
         panel("deform", "Deform", "Ctrl+4"),
         panel("body", "Body", "Ctrl+5"),
-        panel("view", "View", "Ctrl+6"),
+        panel("fracture", "Fracture", "Ctrl+6"),
+        panel("view", "View", "Ctrl+7"),
         kSeparator,
         theme("view.system_theme", "Theme of the s&ystem", "Light or dark, as the desktop is", Theme::system),
         theme("view.light_theme", "Light theme", "Dark text on light ground", Theme::light),

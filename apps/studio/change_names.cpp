@@ -61,6 +61,7 @@ QString name_of_change(const BodySettings& before, const BodySettings& after) {
     return name_of({{before.preset != after.preset || before.material != after.material, "Material"},
                     {before.particles != after.particles, counted(after.particles, "particle", "particles")},
                     {before.size != after.size, "Size of the body"},
+                    {before.strength != after.strength, "Strength"},
                     {before.drop != after.drop, "Height of the drop"},
                     {before.gravity != after.gravity, after.gravity ? "Gravity on" : "Gravity off"},
                     {before.ground != after.ground, after.ground ? "Ground on" : "Ground off"},

@@ -22,6 +22,7 @@
 namespace filigree::studio {
 
 struct MadeQuads;
+struct MadePieces;
 
 /// A mesh as it came and what is known of it. Never changes once made.
 struct Source {
@@ -32,6 +33,7 @@ struct Source {
     TopologyReport topology;
     SurfaceMaterials materials;
     std::shared_ptr<const MadeQuads> quads; ///< how they were made, when the mesh is quads of another; null: it is not
+    std::shared_ptr<const MadePieces> pieces; ///< how they were cut, when the mesh is in pieces; null: it is whole
 };
 
 /// A built-in shape and its settings.

@@ -41,6 +41,8 @@ void DrawnObjects::follow_colors() {
         return follow_error();
     case Coloring::expected_error:
         return follow_expected_error();
+    case Coloring::pieces:
+        return follow_pieces();
     }
 }
 
@@ -51,6 +53,17 @@ void DrawnObjects::follow_expected_error() {
     if (colors_are_ == Coloring::expected_error && color_stamp_ != 0 && expected_number_ == expected.number()) return;
     expected_number_ = expected.number();
     put_colors(Coloring::expected_error, {expected.colors().values, ColorMap::sequential, expected.colors().range});
+}
+
+void DrawnObjects::follow_pieces() {
+    const MadePieces* const pieces = workbench_.state().source->pieces.get();
+    if (!pieces) return drop_colors();
+    const std::vector<Index>& piece_of_vertex = pieces->breaking->carried.vertices;
+    if (piece_of_vertex.size() != shown_->model().mesh.vertex_count()) return drop_colors(); // not shown yet
+    if (colors_are_ == Coloring::pieces && color_stamp_ != 0) return;
+    std::vector<float> values;
+    for (const Index piece : piece_of_vertex) values.push_back(float(piece % kCategoryCount) + 0.5f);
+    put_colors(Coloring::pieces, {std::move(values), ColorMap::categorical, {0, float(kCategoryCount)}});
 }
 
 void DrawnObjects::follow_error() {

@@ -83,6 +83,7 @@ private:
     void put_colors(Coloring coloring, VertexColors colors);
     void drop_colors();
     void follow_error();
+    void follow_pieces();
     void follow_expected_error();
     void follow_defects();
     void ask_for(unsigned level, bool is_urgent);

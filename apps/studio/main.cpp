@@ -60,7 +60,7 @@ Result<Options> parse(const QApplication& application) {
     parser.addOptions({
         {"screenshot", "Show the window, save it as a PNG, leave.", "PNG"},
         {"size", "Size of the window, pixels.", "WxH"},
-        {"panel", "Open with this panel: model, quads, detail, deform, body or view.", "NAME"},
+        {"panel", "Open with this panel: model, quads, detail, deform, body, fracture or view.", "NAME"},
         {"frames", "Simulate so many frames first.", "N"},
         {"names", "Print what scripts can name, leave."},
         {"script", "Run a script of actions (docs/studio.md), leave.", "FILE"},
@@ -146,7 +146,7 @@ int main(int argc, char** argv) {
     if (options->leaves() || options->sizes) window.resize(options->size);
     if (!options->panel.isEmpty() && !window.show_panel(options->panel))
         return fail({ErrorCode::usage, "--panel: there is no panel '" + options->panel.toStdString() +
-                                           "'; there are model, quads, detail, deform, body and view."});
+                                           "'; there are model, quads, detail, deform, body, fracture and view."});
     if (options->names) {
         std::fputs(script_names(window).c_str(), stdout);
         return 0;

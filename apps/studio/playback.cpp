@@ -2,6 +2,7 @@
 
 #include "bell.h"
 #include "jobs.h"
+#include "pieces.h"
 #include "pins.h"
 
 #include <QCoreApplication>
@@ -28,7 +29,8 @@ std::size_t bytes_of(const Pose& pose) {
 
 Result<std::shared_ptr<const DroppedBody>> make_body_of(const State& state, const Vec3d& up,
                                                         const RunContext& context) {
-    return make_dropped_body(state.model, state.body, pinned_vertices(state.handles), up, context);
+    const auto breaking = state.source->pieces ? state.source->pieces->breaking : nullptr;
+    return make_dropped_body(state.model, breaking, state.body, pinned_vertices(state.handles), up, context);
 }
 
 struct Playback::Worker {

@@ -1,11 +1,22 @@
 #include "theme.h"
 
 #include <QApplication>
+#include <QProxyStyle>
 #include <QStyle>
 #include <QStyleFactory>
 
 namespace filigree::studio {
 namespace {
+
+/// Seven tabs fit the column.
+class NarrowTabs : public QProxyStyle {
+public:
+    using QProxyStyle::QProxyStyle;
+    int pixelMetric(PixelMetric metric, const QStyleOption* option, const QWidget* widget) const override {
+        constexpr int kTabSpace = 12; // beside a tab's text, both sides together
+        return metric == PM_TabBarTabHSpace ? kTabSpace : QProxyStyle::pixelMetric(metric, option, widget);
+    }
+};
 
 struct Shades {
     QColor window, base, alternate, button, text, disabled, line, highlight, link;
@@ -50,8 +61,8 @@ QColor bad_color(const QPalette& palette) { return is_dark(palette) ? "#ff9d92" 
 QColor quiet_color(const QPalette& palette) { return is_dark(palette) ? "#a6adb6" : "#565d67"; }
 
 void apply_theme(Theme theme) {
-    if (!QApplication::style() || QApplication::style()->name() != QStringLiteral("fusion"))
-        QApplication::setStyle(QStyleFactory::create(QStringLiteral("Fusion")));
+    if (!dynamic_cast<NarrowTabs*>(QApplication::style()))
+        QApplication::setStyle(new NarrowTabs(QStyleFactory::create(QStringLiteral("Fusion"))));
     QApplication::setPalette(QPalette()); // the desktop's, to see what it is
     const QPalette desktop = QApplication::palette();
     const bool dark = theme == Theme::dark || (theme == Theme::system && is_dark(desktop));

@@ -10,7 +10,7 @@
 namespace filigree::studio {
 
 enum class SurfaceStyle { shaded, edges, wireframe };
-enum class Coloring { own, error, levels, patches, expected_error };
+enum class Coloring { own, error, levels, patches, expected_error, pieces };
 enum class Tool { pull, pin, turn };
 
 struct ViewSettings {
@@ -23,6 +23,7 @@ struct ViewSettings {
     bool particles = false;     ///< the body's, instead of its surface
     bool inside_points = false; ///< points inside the mesh at rest
     std::size_t inside_count = 3000;
+    double apart = 0; ///< of the pieces of a mesh that breaks: how far each is moved, times its way from the middle
     bool clip = false;
     int clip_axis = 2;              ///< 0 x, 1 y, 2 z
     double clip_at = 0.5;           ///< fraction of the box

@@ -338,7 +338,8 @@ unsigned Viewport::Impl::level_for(bool moving) {
         change.start(ready, now());
     else
         change.set(ready);
-    if (!moving || !settings().keep_up) return ready;
+    const bool is_in_pieces = workbench.state().source->pieces != nullptr; // they have no level but the driver
+    if (!moving || !settings().keep_up || is_in_pieces) return ready;
     const unsigned fast =
         level_to_keep_up(shown.facts(), ready, std::min(drawn_level, ready), cost, pose_moves, kBudget);
     return shown.nearest_ready(fast).value_or(ready);

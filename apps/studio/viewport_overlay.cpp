@@ -82,7 +82,7 @@ private:
 
     void add_legend() {
         const VertexColors& colors = drawn_.colors();
-        if (colors.values.empty()) return;
+        if (colors.values.empty() || settings_.coloring == Coloring::pieces) return;
         const bool is_levels = settings_.coloring == Coloring::levels;
         const char* const title = is_levels ? "Level at which a vertex comes in"
                                   : settings_.coloring == Coloring::expected_error

@@ -7,6 +7,7 @@
 #include "panels/body_panel.h"
 #include "panels/deform_panel.h"
 #include "panels/detail_panel.h"
+#include "panels/fracture_panel.h"
 #include "panels/model_panel.h"
 #include "panels/overview.h"
 #include "panels/quads_panel.h"
@@ -40,7 +41,7 @@ namespace {
 
 constexpr qsizetype kRecentFiles = 10;
 constexpr int kColumnWidth = 356; // device-independent pixels, at the start
-constexpr std::array<const char*, 6> kPanels = {"model", "quads", "detail", "deform", "body", "view"};
+constexpr std::array<const char*, 7> kPanels = {"model", "quads", "detail", "deform", "body", "fracture", "view"};
 
 /// Whether a widget needs a key for itself that is a shortcut of the window as well.
 bool keeps_key(const QWidget* widget, int key) {
@@ -210,12 +211,13 @@ QWidget* MainWindow::Impl::make_column(MainWindow& window) {
     panels = new QStackedWidget(column);
     panels->setObjectName("panels.pages");
     body = new BodyPanel(*workbench, *actions);
-    const std::array<std::pair<Panel*, const char*>, 6> pages = {{
+    const std::array<std::pair<Panel*, const char*>, 7> pages = {{
         {new ModelPanel(*workbench, *actions, recent_menu), "The mesh: open, shapes, defects, save"},
         {new QuadsPanel(*workbench, *actions), "Regular quads of any mesh, in patches"},
         {new DetailPanel(*workbench), "Levels, the driver and how detail is stored"},
         {new DeformPanel(*workbench, *actions), "Pull by hand or deform by numbers"},
         {body, "A body that falls, bounces and can be pulled"},
+        {new FracturePanel(*workbench, *actions), "Where the mesh breaks, and how hard that is"},
         {new ViewPanel(*workbench, *viewport, window), "How the mesh is shown"},
     }};
     for (std::size_t k = 0; k < pages.size(); ++k) {

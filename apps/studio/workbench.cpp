@@ -60,6 +60,10 @@ Workbench::Workbench(QObject* parent) : QObject(parent), impl_(std::make_unique<
         show_pose();
         tell(error);
     });
+    connect(&view_, &ViewState::changed, this, [this] {
+        if (mode_ == Mode::deform && impl_->shown_apart != view_.settings().apart && state().source->pieces)
+            show_pose();
+    });
     connect(&impl_->replay, &QTimer::timeout, this, &Workbench::replay_frame);
 
     State state;
@@ -79,7 +83,7 @@ void Workbench::follow_document(const State& before) {
     }
     if (now.source != before.source) {
         inside_points_.clear();
-        jobs_.drop(kQuadsTopic); // of the mesh before
+        jobs_.drop(kSourceTopic); // of the mesh before
     }
     if (now.model != before.model) jobs_.drop(kModelTopic); // what is being made was meant for the one before
     if (is_pulling_ && drag_.is_active()) {
@@ -106,12 +110,21 @@ void Workbench::show_pose() {
     pose_ = {};
     if (mode_ == Mode::deform) {
         pose_ = deformed_pose(state(), impl_->context);
+        impl_->shown_apart = view_.settings().apart;
+        if (is_apart()) {
+            if (pose_.positions.empty()) pose_ = rest_pose(*state().model);
+            // A gradient from positions would see the gaps.
+            if (pose_.gradients.empty()) pose_.gradients.assign(pose_.positions.size(), Mat3f::Identity());
+            move_apart(*state().source->pieces, impl_->shown_apart, pose_);
+        }
     } else if (frame_count() > 0) {
         pose_ = recorded_pose(std::min(frame_, frame_count() - 1));
     }
     driver_milliseconds_ = milliseconds_since(begin);
     pose_is_new();
 }
+
+bool Workbench::is_apart() const { return mode_ == Mode::deform && impl_->shown_apart > 0 && state().source->pieces; }
 
 void Workbench::pose_is_new() {
     ++impl_->pose_number;
@@ -134,7 +147,7 @@ void Workbench::find_full() {
         full_is_new();
         return;
     }
-    if (is_pulling_ || state().pose_from_file ||
+    if (is_pulling_ || is_apart() || state().pose_from_file ||
         (state().handle_pose && state().model->mesh.vertex_count() > kMostPulledUnasked))
         return;
     const std::uint64_t number = impl_->pose_number;
@@ -172,6 +185,10 @@ void Workbench::measure_error() {
             Q_EMIT told("The error of a recorded moment is only known while its body is there: press Play, then pause.",
                         false);
         }
+        return;
+    }
+    if (is_apart()) {
+        Q_EMIT told("Pieces that are shown apart have no error: set Apart to 0 in the Fracture panel.", false);
         return;
     }
     const std::uint64_t number = impl_->pose_number;

@@ -5,6 +5,7 @@
 #include "document.h"
 #include "expected_error.h"
 #include "jobs.h"
+#include "pieces.h"
 #include "playback.h"
 #include "view.h"
 
@@ -57,6 +58,11 @@ public:
     const QuadRemeshOptions& quad_options() const; ///< of the quads made next; no part of the document
     void set_quad_options(const QuadRemeshOptions& options);
     void make_quads(); ///< the mesh becomes quads, in the background; quads again: of the mesh before
+    // Fracture
+    const PieceOptions& piece_options() const; ///< of the pieces cut next; no part of the document
+    void set_piece_options(const PieceOptions& options);
+    void cut_pieces(); ///< the mesh becomes pieces, in the background; again: of the whole mesh
+    void make_whole(); ///< the mesh before it was cut
     // Detail
     void set_strip(const StripOptions& options, const std::string& merge = {}); ///< strips again
     const StripOptions& wanted_strip() const;                                   ///< as being stripped, else as it is
@@ -128,6 +134,7 @@ Q_SIGNALS:
     void error_measured();
     void inside_points_ready();
     void quad_options_changed();
+    void piece_options_changed();
     void opened();                                     ///< another mesh or model than before
     void saved(const std::string& path);               ///< by save_model
     void told(const QString& sentence, bool is_error); ///< for the window's message bar
@@ -139,6 +146,7 @@ private:
     void follow_document(const State& before);
     void follow_playback();
     void show_pose();
+    bool is_apart() const; ///< pieces are shown apart
     void pose_is_new();
     void find_full();
     void forget_measuring();
@@ -147,6 +155,9 @@ private:
     void make_model(const QString& title, std::optional<Shape> shape, const StripOptions& strip,
                     const std::string& merge);
     void take_model(State& now, const State& made) const;
+    void change_source(const QString& title, const QString& name,
+                       std::function<Result<State>(State, const RunContext&)> make,
+                       std::function<void(const Source&)> then);
     void change_level(unsigned level, const QString& name, const std::string& merge);
     void make_body_then(After then);
     void put_body(std::shared_ptr<const DroppedBody> made);

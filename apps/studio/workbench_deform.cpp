@@ -78,6 +78,11 @@ void Workbench::begin_pull(Index vertex, const Vec3d& at) {
         playback_.grab(rest, at - mesh.origin);
         return;
     }
+    if (state().source->pieces) {
+        Q_EMIT told("What is in pieces is pulled as a body: make one (the Body panel), then pull it until it breaks.",
+                    false);
+        return;
+    }
     const double diagonal = bounds(mesh.positions).diagonal();
     Handle pull;
     pull.centre = rest;

@@ -155,7 +155,7 @@ void Workbench::open(const std::string& path) {
     pause();
     forget_measuring();
     jobs_.drop(kModelTopic);
-    jobs_.drop(kQuadsTopic);
+    jobs_.drop(kSourceTopic);
     jobs_.start<State>(
         "Opening " + file_name(path), kOpenTopic,
         [path, body = state().body](const RunContext& context) -> Result<State> {

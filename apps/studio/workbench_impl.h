@@ -16,7 +16,7 @@ Result<State> state_of_shape(State state, const Shape& shape, const RunContext& 
 double milliseconds_since(std::chrono::steady_clock::time_point begin);
 
 // Topics of work.
-inline const std::string kModelTopic = "model", kOpenTopic = "open", kBodyTopic = "body", kQuadsTopic = "quads";
+inline const std::string kModelTopic = "model", kOpenTopic = "open", kBodyTopic = "body", kSourceTopic = "source";
 
 struct Workbench::Impl {
     RunContext context;            ///< of what is done at once
@@ -33,6 +33,8 @@ struct Workbench::Impl {
     StripOptions wanted_strip;
 
     QuadRemeshOptions quad_options;
+    PieceOptions piece_options;
+    double shown_apart = 0; ///< how far pieces are apart in the pose shown
 
     QTimer replay;
     After then = After::nothing; ///< once the body is made

@@ -2,6 +2,7 @@
 #include "workbench_impl.h"
 
 #include "change_names.h"
+#include "pieces.h"
 #include "quads.h"
 #include "words.h"
 
@@ -20,6 +21,10 @@ void drop_what_refers_to_driver(State& state) {
 } // namespace
 
 Result<State> stripped_state(State state, const RunContext& context) {
+    if (state.source->pieces) {
+        const PieceOptions options = state.source->pieces->options;
+        return state_in_pieces(std::move(state), options, context);
+    }
     const bool was_finest = !state.model || state.level() == state.model->finest_level();
     Result<Stripped> stripped = strip(state.source->mesh, state.strip, context);
     if (!stripped) return stripped.error();
@@ -75,7 +80,7 @@ bool Workbench::is_refused(const std::string& topic, const QString& sentence) {
 void Workbench::make_model(const QString& title, std::optional<Shape> shape, const StripOptions& strip,
                            const std::string& merge) {
     if (is_refused(kOpenTopic, "A file is being opened: change the model once it is there, or cancel.") ||
-        is_refused(kQuadsTopic, "Quads are being made: change the model once they are there, or cancel."))
+        is_refused(kSourceTopic, "Quads or pieces are being made: change the model once they are there, or cancel."))
         return;
     State next = state();
     next.strip = strip;
@@ -141,32 +146,63 @@ void Workbench::set_quad_options(const QuadRemeshOptions& options) {
     Q_EMIT quad_options_changed();
 }
 
-void Workbench::make_quads() {
-    if (is_refused(kOpenTopic, "A file is being opened: make quads of it once it is there, or cancel.") ||
-        is_refused(kModelTopic, "The mesh is still being made: make quads of it once it is there."))
+/// In the background: the document's mesh becomes another one. make: from the state as it is now. then: once it is so.
+void Workbench::change_source(const QString& title, const QString& name,
+                              std::function<Result<State>(State, const RunContext&)> make,
+                              std::function<void(const Source&)> then) {
+    if (is_refused(kOpenTopic, "A file is being opened: go on once it is there, or cancel.") ||
+        is_refused(kModelTopic, "The mesh is still being made: go on once it is there."))
         return;
     pause();
     forget_measuring();
-    State next = state();
-    next.strip.levels.reset(); // quads have other levels
     jobs_.start<State>(
-        "Making quads", kQuadsTopic,
-        [next = std::move(next), options = impl_->quad_options](const RunContext& context) mutable -> Result<State> {
-            Result<std::shared_ptr<const Source>> quads = make_quads_of(input_of_quads(next.source), options, context);
-            if (!quads) return quads.error();
-            next.source = std::move(*quads);
-            next.shape.reset();
-            return stripped_state(std::move(next), context);
-        },
-        [this](const State& made) {
+        title, kSourceTopic,
+        [before = state(), make = std::move(make)](const RunContext& context) { return make(before, context); },
+        [this, name, then = std::move(then)](const State& made) {
             if (is_pulling_) end_pull();
             State now = state(); // warps and settings may have changed meanwhile
             now.source = made.source;
             now.shape = made.shape;
             take_model(now, made);
-            document_.change("Make quads", std::move(now));
-            Q_EMIT told(quads_summary(*made.source), false);
+            document_.change(name, std::move(now));
+            then(*made.source);
         });
+}
+
+void Workbench::make_quads() {
+    change_source(
+        "Making quads", "Make quads",
+        [options = impl_->quad_options](State next, const RunContext& context) -> Result<State> {
+            const auto input = input_of_quads(whole_source(next.source));
+            Result<std::shared_ptr<const Source>> quads = make_quads_of(input, options, context);
+            if (!quads) return quads.error();
+            next.source = std::move(*quads);
+            next.shape.reset();
+            next.strip.levels.reset(); // quads have other levels
+            return stripped_state(std::move(next), context);
+        },
+        [this](const Source& source) { Q_EMIT told(quads_summary(source), false); });
+}
+
+const PieceOptions& Workbench::piece_options() const { return impl_->piece_options; }
+
+void Workbench::set_piece_options(const PieceOptions& options) {
+    impl_->piece_options = options;
+    Q_EMIT piece_options_changed();
+}
+
+void Workbench::cut_pieces() {
+    change_source(
+        "Cutting pieces", "Cut pieces",
+        [options = impl_->piece_options](State next, const RunContext& context) {
+            return state_in_pieces(std::move(next), options, context);
+        },
+        [this](const Source& source) { Q_EMIT told(pieces_summary(*source.pieces), false); });
+}
+
+void Workbench::make_whole() {
+    if (!state().source->pieces) return;
+    change_source("Making it whole", "Make whole", state_made_whole, [](const Source&) {});
 }
 
 } // namespace filigree::studio

@@ -1,4 +1,5 @@
 #include "filigree/present/patch_colors.h"
+#include "filigree/render/color_map.h"
 
 #include "filigree/mesh/shapes.h"
 #include "filigree/present/patch_drawing.h"
@@ -27,7 +28,7 @@ TEST(PatchColors, NeighboursDiffer) {
                 EXPECT_NE(colors[a], colors[b]) << a << ' ' << b;
             }
         }
-    EXPECT_EQ(std::set<Index>(colors.begin(), colors.end()).size(), kPatchColorCount);
+    EXPECT_EQ(std::set<Index>(colors.begin(), colors.end()).size(), kCategoryCount);
 }
 
 TEST(PatchColors, LabelsAndDrawingHaveTheSame) {
@@ -39,8 +40,8 @@ TEST(PatchColors, LabelsAndDrawingHaveTheSame) {
     std::multiset<Index> in_labels(labels.of_face.begin(), labels.of_face.end()), in_drawing;
     for (std::size_t f = 0; f < drawn.face_count(); ++f) {
         const Vec3f color = drawn.colors[drawn.face(f)[0]].head<3>();
-        for (Index k = 0; k < kPatchColorCount; ++k)
-            if (patch_colors()[k] == color) in_drawing.insert(k);
+        for (Index k = 0; k < kCategoryCount; ++k)
+            if (category_colors()[k] == color) in_drawing.insert(k);
     }
     EXPECT_EQ(in_labels, in_drawing);
 }

@@ -45,6 +45,14 @@ TEST_F(SceneFileTest, ReadsWhatBreaks) {
     EXPECT_EQ(scene.fractures[0].material.strength, 2e3);
     EXPECT_EQ(scene.fractures[0].material.seed, 5U);
     EXPECT_FALSE(scene.fractures[0].energy);
+    EXPECT_TRUE(scene.fractures[0].at.empty());
+    const std::string hit = "[[fracture]]\npattern = \"impact\"\nkeep_closed = true\nat = ";
+    EXPECT_EQ(this->scene(kDrop + hit + "[1, 2, 3]\n").fractures[0].at, std::vector<Vec3d>({Vec3d(1, 2, 3)}));
+    const SceneFile twice = this->scene(kDrop + hit + "[[1, 2, 3], [0, 0, 1]]\n");
+    EXPECT_EQ(twice.fractures[0].at, std::vector<Vec3d>({Vec3d(1, 2, 3), Vec3d(0, 0, 1)}));
+    EXPECT_TRUE(twice.fractures[0].keep_closed);
+    EXPECT_NE(refusal(kDrop + "[[fracture]]\npattern = \"radial\"\nat = [[1, 2, 3], [0, 0, 1]]\n").find("at one point"),
+              std::string::npos);
     ASSERT_EQ(scene.cracks.size(), 1U);
     EXPECT_EQ(scene.cracks[0].pieces, std::vector<Index>{2});
     EXPECT_NE(refusal("[[body]]\nshape = \"bar\"\nmaterial = \"clay\"\n[[fracture]]\n").find("only bodies"),

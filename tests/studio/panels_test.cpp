@@ -332,7 +332,7 @@ TEST_F(Panels, NothingIsCutOff) {
     settings.coloring = Coloring::error;
     workbench().view().set(settings);
     choose("body.preset", 8); // wax: all of its rows
-    for (const char* panel : {"model", "quads", "detail", "deform", "body", "view"}) {
+    for (const char* panel : {"model", "quads", "detail", "deform", "body", "fracture", "view"}) {
         ASSERT_TRUE(window->show_panel(panel));
         for (int k = 0; k < 5; ++k) QCoreApplication::processEvents();
         const auto& area = get<QScrollArea>(panel);
@@ -359,7 +359,7 @@ TEST_F(Panels, NothingIsCutOff) {
 }
 
 TEST_F(Panels, TheColumnShowsWhatTheScriptNames) {
-    for (const char* panel : {"model", "quads", "detail", "deform", "body", "view"}) {
+    for (const char* panel : {"model", "quads", "detail", "deform", "body", "fracture", "view"}) {
         EXPECT_TRUE(window->show_panel(panel));
         EXPECT_EQ(window->panel(), panel);
         EXPECT_TRUE(get<QScrollArea>(panel).isVisible());
@@ -368,5 +368,5 @@ TEST_F(Panels, TheColumnShowsWhatTheScriptNames) {
     EXPECT_EQ(window->panel(), "view");
     auto& tabs = get<QTabBar>("panels");
     QTest::keyClick(&tabs, Qt::Key_Left);
-    EXPECT_EQ(window->panel(), "body");
+    EXPECT_EQ(window->panel(), "fracture");
 }

@@ -1,6 +1,7 @@
 #include "panels/body_panel.h"
 
 #include "actions.h"
+#include "pieces.h"
 
 #include "filigree/physics/named_materials.h"
 
@@ -222,7 +223,7 @@ void BodyPanel::add_advanced() {
 }
 
 double BodyPanel::volume(const BodySettings& settings) const {
-    const auto& source = state().source;
+    const auto source = whole_source(state().source);
     if (!source || !source->topology.is_closed()) return 0;
     const double scale = settings.size / source->topology.box.size().maxCoeff();
     return std::abs(source->topology.volume) * scale * scale * scale;

@@ -78,9 +78,9 @@ void ViewPanel::add_surface(MainWindow& window) {
     choice(rows,
            view.setting("view.coloring", "Colours",
                         "The mesh's own; how far it is from the full deformation; at which level a vertex is added; "
-                        "patches of regular quads; how far it is expected to be from the full deformation",
+                        "patches of regular quads; how far it is expected to be from the full deformation; pieces",
                         field(&Settings::coloring)),
-           {"Its own", "Error", "Levels", "Patches", "Expected error"});
+           {"Its own", "Error", "Levels", "Patches", "Expected error", "Pieces"});
     error_ = text(rows, "view.error", Tone::quiet);
     measure_ = new ActionButton("view.measure", window.actions().find("view.measure_error"), {}, page());
     beside(rows, {measure_});

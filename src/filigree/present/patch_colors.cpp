@@ -1,5 +1,3 @@
-// Based on:
-// [Ottosson 2020] OKLab, so that the patches' colours are equally light.
 #include "filigree/present/patch_colors.h"
 
 #include <algorithm>
@@ -9,19 +7,10 @@ namespace filigree {
 
 namespace {
 
-const std::array<Vec3f, kPatchColorCount> kColors = {{{0.95f, 0.64f, 0.73f},
-                                                      {0.95f, 0.67f, 0.54f},
-                                                      {0.84f, 0.73f, 0.46f},
-                                                      {0.64f, 0.80f, 0.56f},
-                                                      {0.45f, 0.82f, 0.75f},
-                                                      {0.46f, 0.80f, 0.92f},
-                                                      {0.65f, 0.73f, 0.99f},
-                                                      {0.84f, 0.67f, 0.91f}}};
-
 /// Steps around the circle of colours from one to another.
 std::size_t color_distance(std::size_t a, std::size_t b) {
     const std::size_t d = a > b ? a - b : b - a;
-    return std::min(d, kColors.size() - d);
+    return std::min(d, kCategoryCount - d);
 }
 
 /// The patches at each vertex that is a patch's corner.
@@ -34,16 +23,14 @@ std::map<Index, std::vector<std::size_t>> patches_at_corners(const RegularPatche
 
 } // namespace
 
-const std::array<Vec3f, kPatchColorCount>& patch_colors() { return kColors; }
-
 std::vector<Index> choose_patch_colors(const RegularPatches& patches) {
     const std::map<Index, std::vector<std::size_t>> at_corners = patches_at_corners(patches);
     std::vector<Index> result(patches.patch_count(), kNoIndex);
     for (std::size_t p = 0; p < result.size(); ++p) {
         std::size_t best = 0, best_distance = 0;
-        for (std::size_t k = 0; k < kColors.size(); ++k) {
-            const std::size_t wish = (3 * p + k) % kColors.size(); // every patch begins elsewhere: all are used
-            std::size_t nearest = kColors.size();
+        for (std::size_t k = 0; k < kCategoryCount; ++k) {
+            const std::size_t wish = (3 * p + k) % kCategoryCount; // every patch begins elsewhere: all are used
+            std::size_t nearest = kCategoryCount;
             for (const Index corner : patches.base[p])
                 for (const std::size_t neighbour : at_corners.at(corner))
                     if (result[neighbour] != kNoIndex)
@@ -67,7 +54,7 @@ Result<FaceLabels> patch_labels(const Mesh& mesh, unsigned most_levels, const Ru
             for (std::size_t i = 1; i < patches->side(); ++i) patch_inside[patches->at(p, i, j)] = Index(p);
     const std::vector<Index> colors = choose_patch_colors(*patches);
     FaceLabels labels;
-    labels.names.resize(kColors.size());
+    labels.names.resize(kCategoryCount);
     labels.of_face.assign(mesh.face_count(), kNoIndex);
     for (std::size_t f = 0; f < mesh.face_count(); ++f)
         for (const Index v : mesh.face(f)) // a patch has two quads a side or more, so one of them is inside

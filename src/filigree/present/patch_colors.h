@@ -3,15 +3,9 @@
 
 #include "filigree/hierarchy/regular_patches.h"
 
-#include <array>
-
 namespace filigree {
 
-/// sRGB: eight hues, evenly around OKLab's circle of lightness 0.80 and chroma 0.095, so that none stands out.
-inline constexpr std::size_t kPatchColorCount = 8;
-const std::array<Vec3f, kPatchColorCount>& patch_colors();
-
-/// One of patch_colors() a patch: the one that differs most from those its neighbours have by then.
+/// One of category_colors() a patch: the one that differs most from those its neighbours have by then.
 std::vector<Index> choose_patch_colors(const RegularPatches& patches);
 
 /// A label a face, its patch's colour; the labels' names are empty. most_levels, errors: as of find_regular_patches.

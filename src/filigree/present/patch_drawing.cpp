@@ -1,6 +1,7 @@
 #include "filigree/present/patch_drawing.h"
 
 #include "filigree/present/patch_colors.h"
+#include "filigree/render/color_map.h"
 
 #include <algorithm>
 #include <cmath>
@@ -68,7 +69,7 @@ Mesh colored_patches(const Mesh& mesh, const RegularPatches& patches) {
         const std::size_t first = drawn.positions.size();
         for (std::size_t k = 0; k < stride * stride; ++k) {
             drawn.positions.push_back(mesh.positions[patches.grid[p * stride * stride + k]]);
-            const Vec3f& color = patch_colors()[colors[p]];
+            const Vec3f& color = category_colors()[colors[p]];
             drawn.colors.emplace_back(color.x(), color.y(), color.z(), 1.0f);
         }
         const auto id = [&](std::size_t i, std::size_t j) { return static_cast<Index>(first + j * stride + i); };

@@ -1,6 +1,7 @@
 #include "filigree/present/patch_surface.h"
 
 #include "filigree/present/patch_colors.h"
+#include "filigree/render/color_map.h"
 
 namespace filigree {
 
@@ -13,7 +14,7 @@ Result<PatchData> PatchData::make(const Model& model, RestoreOptions restore, un
     colored->mesh.colors.clear();
     colored->mesh.uvs = {};
     SurfaceOptions options;
-    for (const Vec3f& color : patch_colors()) options.materials.push_back({color, nullptr});
+    for (const Vec3f& color : category_colors()) options.materials.push_back({color, nullptr});
     restore.level.reset();
     Result<DrawData> data = DrawData::model(*colored, restore, options, where, context);
     if (!data) return data.error();

@@ -15,6 +15,15 @@ namespace {
 constexpr std::size_t kTableSize = 256;
 using ColorTable = std::array<Vec3f, kTableSize>;
 
+const std::array<Vec3f, kCategoryCount> kCategories = {{{0.95f, 0.64f, 0.73f},
+                                                        {0.95f, 0.67f, 0.54f},
+                                                        {0.84f, 0.73f, 0.46f},
+                                                        {0.64f, 0.80f, 0.56f},
+                                                        {0.45f, 0.82f, 0.75f},
+                                                        {0.46f, 0.80f, 0.92f},
+                                                        {0.65f, 0.73f, 0.99f},
+                                                        {0.84f, 0.67f, 0.91f}}};
+
 /// Linear sRGB to the cube of the cones' answers, and from these to lightness, a and b [Ottosson 2020].
 const Mat3d& linear_to_cones() {
     static const Mat3d matrix = (Mat3d() << 0.4122214708, 0.5363325363, 0.0514459929, //
@@ -113,6 +122,12 @@ ColorTable make_diverging() {
     });
 }
 
+ColorTable make_categorical() {
+    ColorTable table;
+    for (std::size_t i = 0; i < kTableSize; ++i) table[i] = kCategories[i * kCategoryCount / kTableSize];
+    return table;
+}
+
 /// A number m * 10^power; exact where doubles can be.
 double decimal(double mantissa, int power) {
     return power < 0 ? mantissa / std::pow(10.0, -power) : mantissa * std::pow(10.0, power);
@@ -144,9 +159,12 @@ float to_float(double x) {
 
 } // namespace
 
+const std::array<Vec3f, kCategoryCount>& category_colors() { return kCategories; }
+
 std::span<const Vec3f> color_table(ColorMap map) {
-    static const ColorTable sequential = make_sequential(), diverging = make_diverging();
-    return map == ColorMap::sequential ? sequential : diverging;
+    static const ColorTable sequential = make_sequential(), diverging = make_diverging(),
+                            categorical = make_categorical();
+    return map == ColorMap::sequential ? sequential : map == ColorMap::diverging ? diverging : categorical;
 }
 
 Vec3f color_at(ColorMap map, float t) {

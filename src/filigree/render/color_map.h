@@ -3,12 +3,20 @@
 
 #include "filigree/core/types.h"
 
+#include <array>
+#include <span>
+
 namespace filigree {
 
 /// sequential: dark to bright, for amounts (an error, a strain). diverging: two hues from a pale middle, for signed
 /// amounts. Both are made in OKLab [Ottosson 2020] so that equal steps of the number look like equal steps of colour;
-/// lightness rises steadily in the first and is symmetric in the second, so they survive a grey print.
-enum class ColorMap { sequential, diverging };
+/// lightness rises steadily in the first and is symmetric in the second, so they survive a grey print. categorical:
+/// category_colors(), each an eighth, for things without an order.
+enum class ColorMap { sequential, diverging, categorical };
+
+/// sRGB: eight hues, evenly around OKLab's circle of lightness 0.80 and chroma 0.095, so that none stands out.
+inline constexpr std::size_t kCategoryCount = 8;
+const std::array<Vec3f, kCategoryCount>& category_colors();
 
 /// sRGB, 0 to 1, for t in [0, 1] (clamped; NaN gives a neutral grey). Cost: a few multiplications (a table inside).
 Vec3f color_at(ColorMap map, float t);

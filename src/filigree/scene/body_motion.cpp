@@ -4,6 +4,15 @@
 
 namespace filigree {
 
+namespace {
+
+std::span<const Index> pieces_of(const DroppedBody& dropped, std::vector<Index> CarriedByPieces::*which) {
+    if (!dropped.breaking) return {};
+    return dropped.breaking->carried.*which;
+}
+
+} // namespace
+
 Moment start_of(const DroppedBody& dropped) {
     Moment moment;
     moment.pose.positions = driver_positions(*dropped.model);
@@ -15,22 +24,24 @@ Moment start_of(const DroppedBody& dropped) {
 
 BodyMotion::BodyMotion(std::shared_ptr<const DroppedBody> dropped, Simulation simulation)
     : dropped_(std::move(dropped)), simulation_(std::move(simulation)), last_(start_of(*dropped_).pose) {
-    driver_ = attach(last_.positions);
+    driver_ = attach(last_.positions, pieces_of(*dropped_, &CarriedByPieces::driver));
     start_ = simulation_.save();
 }
 
 Result<BodyMotion> BodyMotion::create(std::shared_ptr<const DroppedBody> dropped, const RunContext& context) {
     Actor actor;
     actor.body = dropped->body;
+    actor.fracture = dropped->fracture;
     Result<Simulation> simulation = Simulation::create(dropped->world, {actor}, {}, context);
     if (!simulation) return simulation.error();
     return BodyMotion(std::move(dropped), std::move(*simulation));
 }
 
 /// Points in model units that go along with the body.
-std::size_t BodyMotion::attach(std::vector<Vec3f> points) {
+std::size_t BodyMotion::attach(std::vector<Vec3f> points, std::span<const Index> pieces) {
     for (Vec3f& p : points) p *= float(dropped_->scale);
-    return simulation_.attach(0, points, RunContext());
+    return pieces.empty() ? simulation_.attach(0, points, RunContext())
+                          : simulation_.attach(0, points, pieces, RunContext());
 }
 
 Status BodyMotion::rewind(const RunContext& context) {
@@ -51,6 +62,7 @@ Moment BodyMotion::look(bool with_full) {
     const auto far = static_cast<float>(kFarInAFrame * bounds(dropped_->model->mesh.positions).diagonal());
     Moment moment;
     moment.frame = simulation_.frame();
+    moment.fracture = simulation_.fracture(0);
     moment.pose.positions.resize(last_.positions.size());
     moment.pose.gradients.resize(last_.positions.size());
     simulation_.attached(driver_, moment.pose.positions, moment.pose.gradients, always);
@@ -61,7 +73,8 @@ Moment BodyMotion::look(bool with_full) {
     moment.particles.reserve(particles.size());
     for (std::size_t i = 0; i < particles.size(); ++i) moment.particles.push_back(to_units * particles[i]);
     if (!with_full) return moment;
-    if (!all_vertices_) all_vertices_ = attach(dropped_->model->mesh.positions);
+    if (!all_vertices_)
+        all_vertices_ = attach(dropped_->model->mesh.positions, pieces_of(*dropped_, &CarriedByPieces::vertices));
     moment.full.resize(dropped_->model->mesh.vertex_count());
     simulation_.attached(*all_vertices_, moment.full, {}, always);
     for (Vec3f& p : moment.full) p *= to_units;

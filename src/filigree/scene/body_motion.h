@@ -18,6 +18,7 @@ struct Moment {
     std::vector<Vec3f> particles;
     std::vector<Vec3f> full; ///< every vertex as the particles carry it; only when asked for
     FrameReport report;
+    FractureReport fracture; ///< of a body that breaks
     double milliseconds = 0; ///< of the simulation and the driver together
 };
 
@@ -42,7 +43,7 @@ public:
 
 private:
     BodyMotion(std::shared_ptr<const DroppedBody> dropped, Simulation simulation);
-    std::size_t attach(std::vector<Vec3f> points);
+    std::size_t attach(std::vector<Vec3f> points, std::span<const Index> pieces);
 
     std::shared_ptr<const DroppedBody> dropped_;
     Simulation simulation_;

@@ -128,6 +128,7 @@ void hold_pinned(std::span<const Index> pinned, DroppedBody& dropped) {
 } // namespace
 
 Result<std::shared_ptr<const DroppedBody>> make_dropped_body(std::shared_ptr<const Model> model,
+                                                             std::shared_ptr<const BreakingModel> breaking,
                                                              const DropOptions& options, std::span<const Index> pinned,
                                                              const Vec3d& up, const RunContext& context) {
     const Box box = bounds(model->mesh.positions);
@@ -141,13 +142,24 @@ Result<std::shared_ptr<const DroppedBody>> make_dropped_body(std::shared_ptr<con
     BodyOptions body_options;
     body_options.scale = dropped->scale;
     body_options.cells.count = options.particles;
-    Result<Body> body = make_body(dropped->model->mesh, options.material, body_options, context, &dropped->report);
+    const Mesh& whole = breaking ? *breaking->whole : dropped->model->mesh;
+    Result<Body> body = make_body(whole, options.material, body_options, context, &dropped->report);
     if (!body) return body.error();
     dropped->body = std::make_shared<const Body>(std::move(*body));
     if (const std::string coarse =
             driver_warning(measure_driver(*dropped->model, *dropped->body), *dropped->model, *dropped->body);
         !coarse.empty())
         dropped->report.warning += (dropped->report.warning.empty() ? "" : " ") + coarse;
+    if (breaking) {
+        FractureMaterial material;
+        const double stiffness = options.material.young_modulus;
+        material.strength = options.strength * stiffness;
+        material.energy = usual_fracture_energy(material.strength, stiffness, dropped->scale * box.diagonal());
+        Result<Fracture> fracture = make_fracture(dropped->body, breaking->cells, dropped->scale, material, context);
+        if (!fracture) return fracture.error();
+        dropped->fracture = std::make_shared<const Fracture>(std::move(*fracture));
+        dropped->breaking = std::move(breaking);
+    }
     DropBuilder(options, up, box, dropped->scale).build(*dropped);
     hold_pinned(pinned, *dropped);
     return std::shared_ptr<const DroppedBody>(std::move(dropped));

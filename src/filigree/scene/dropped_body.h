@@ -1,9 +1,8 @@
 // A mesh as a body above the ground, with an obstacle under it if wanted: a scene that needs no file.
 #pragma once
 
-#include "filigree/hierarchy/model.h"
-#include "filigree/physics/body.h"
 #include "filigree/physics/world.h"
+#include "filigree/scene/breaking.h"
 
 #include <memory>
 #include <span>
@@ -19,6 +18,7 @@ struct DropOptions {
     std::size_t particles = 2000; ///< about; the spacing follows
     double size = 1;              ///< m, the longest side of the mesh's box
     double drop = 0.5;            ///< m above the ground or the obstacle at the start
+    double strength = 0.01; ///< of a body that breaks: the share of Young's modulus at which cracks begin, above 0
     bool gravity = true, ground = true;
     ObstacleChoice obstacle = ObstacleChoice::none;
     double friction = 0.5, restitution = 0.9;
@@ -32,20 +32,31 @@ struct Surroundings {
     double ground_level = 0; ///< model units along `up`, relative to the model's origin
 };
 
+/// Along what a model breaks. Shared, and never changes.
+struct BreakingModel {
+    std::shared_ptr<const Mesh> whole; ///< that the model in pieces was cut from
+    std::shared_ptr<const FractureCells> cells;
+    CarriedByPieces carried;
+};
+
 /// A body that is ready to move. Shared, and never changes.
 struct DroppedBody {
     std::shared_ptr<const Model> model;
     std::shared_ptr<const Body> body;
+    std::shared_ptr<const BreakingModel> breaking; ///< null: it does not break
+    std::shared_ptr<const Fracture> fracture;      ///< null: it does not break
     BodyReport report;
     double scale = 1; ///< metres a model unit
     World world;      ///< metres, relative to the model's origin times the scale
     Surroundings surroundings;
 };
 
-/// The body starts where the mesh is, and the ground is put below it, so that nothing jumps when it is made. pinned:
-/// vertices of the model's driver; the particles near them are held fast where they are. up: along an axis. Errors:
-/// unsuitable (a mesh without extent), and as of make_body. Cost: make_body's.
+/// The body starts where the mesh is, and the ground is put below it, so that nothing jumps when it is made. breaking:
+/// of a model in pieces; null: it does not break. pinned: vertices of the model's driver; the particles near them are
+/// held fast where they are. up: along an axis. Errors: unsuitable (a mesh without extent), and as of make_body and
+/// break_body. Cost: theirs.
 Result<std::shared_ptr<const DroppedBody>> make_dropped_body(std::shared_ptr<const Model> model,
+                                                             std::shared_ptr<const BreakingModel> breaking,
                                                              const DropOptions& options, std::span<const Index> pinned,
                                                              const Vec3d& up, const RunContext& context);
 

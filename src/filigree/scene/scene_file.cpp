@@ -311,7 +311,9 @@ private:
             if (other.body == fracture.body) in.fail(in.line(), "a body has one [[fracture]] at most");
         in.set_whole("pieces", fracture.pattern.pieces);
         fracture.pattern.kind = static_cast<FracturePatternKind>(in.word("pattern", 0));
-        in.set("at", fracture.at);
+        fracture.at = in.points("at");
+        if (fracture.pattern.kind == FracturePatternKind::radial && fracture.at.size() > 1)
+            in.fail("at", "the pattern radial begins at one point");
         in.set("grain", fracture.pattern.grain);
         if (fracture.pattern.grain && !(fracture.pattern.grain->norm() > 0))
             in.fail("grain", "the grain has no direction");
@@ -323,6 +325,7 @@ private:
         in.set("strength", fracture.material.strength);
         in.set("scatter", fracture.material.scatter);
         if (in.has("energy")) in.set("energy", fracture.energy.emplace());
+        fracture.keep_closed = in.flag("keep_closed", false);
         scene_.fractures.push_back(std::move(fracture));
     }
 

@@ -62,10 +62,11 @@ struct SceneObstacle {
 struct SceneFracture {
     unsigned line = 0;
     std::size_t body = 0;
-    FracturePattern pattern;      ///< without points
-    std::optional<Vec3d> at = {}; ///< world, at the start
+    FracturePattern pattern; ///< without points
+    std::vector<Vec3d> at;   ///< world, at the start
     FractureMaterial material;
     std::optional<double> energy = {}; ///< J/m^2; unset: by the strength
+    bool keep_closed = false;          ///< also write inner faces of cracks that never opened
 };
 
 /// Something that lets go at a time.

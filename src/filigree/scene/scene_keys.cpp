@@ -132,7 +132,8 @@ constexpr KeyRule kKeys[] = {
     one_of(
         "even impact slabs radial", "fracture", "pattern", "even",
         "of about one size; small around a point; long ones, as of wood; rays and rings around a point, as of glass"),
-    plain("fracture", "at", vector, "m", "a corner; radial: the middle", "where the pattern impact or radial begins"),
+    plain("fracture", "at", points, "m", "a corner; radial: the middle",
+          "where the pattern impact or radial begins, at the start; radial takes one"),
     plain("fracture", "grain", vector, "", "the longest axis",
           "slabs: along which they are longer, on the mesh's axes"),
     from(1, 100, "fracture", "stretch", number, "", "6", "slabs: how many times longer"),
@@ -142,6 +143,7 @@ constexpr KeyRule kKeys[] = {
     from(0, 1, "fracture", "scatter", number, "", "0", "of the strengths of cracks: their standard deviation, a share"),
     above(0, 1e12, "fracture", "energy", number, "J/m^2", "strength^2 diagonal / (50 young_modulus)",
           "that a crack costs by its area"),
+    plain("fracture", "keep_closed", flag, "", "false", "also write the inner faces of cracks that never opened"),
 
     plain("crack", "body", text, "", "the only one", "name of a body with a [[fracture]]"),
     from(0, 1e9, "crack", "time", number, "s", "0", "when pieces let go of each other, whatever pulls them"),
@@ -269,6 +271,8 @@ std::string type_text(KeyType type) {
         return "true or false";
     case vector:
         return "three numbers";
+    case points:
+        return "three numbers, or a list of such";
     case keyed:
         return "three numbers, or keys";
     case color:

@@ -7,7 +7,7 @@
 
 namespace filigree {
 
-enum class KeyType { text, word, number, whole, flag, vector, keyed, color, box, ball, ids, rotation, pixels };
+enum class KeyType { text, word, number, whole, flag, vector, points, keyed, color, box, ball, ids, rotation, pixels };
 
 struct KeyRule {
     std::string_view table, key;

@@ -120,6 +120,16 @@ void SceneTable::set(std::string_view key, std::optional<Vec3f>& value) const {
     if (has(key)) value = color(key, text(key));
 }
 
+std::vector<Vec3d> SceneTable::points(std::string_view key) const {
+    std::vector<Vec3d> points;
+    const toml::node* node = table_.get(key);
+    if (!node) return points;
+    const toml::array* list = node->as_array();
+    if (!list || list->empty() || !list->get(0)->is_array()) return {vector_of(*node, key)};
+    for (const toml::node& entry : *list) points.push_back(vector_of(entry, key));
+    return points;
+}
+
 Vec3f SceneTable::color(std::string_view key, const std::string& written) const {
     const std::optional<Vec3f> color = parse_color(written);
     if (!color) fail(key, fmt::format("{}: '{}' is no colour; write it as #rrggbb, such as #d04030", key, written));

@@ -47,6 +47,7 @@ public:
             value = static_cast<Number>(whole_of(*node, key, *find_key(name_, key)));
     }
 
+    std::vector<Vec3d> points(std::string_view key) const; ///< one or a list; empty where it is not there
     Vec3f color(std::string_view key, const std::string& written) const;
     /// Numbers that change in time, times `unit`.
     Keyed<Vec3d> keyed(std::string_view key, double unit = 1) const;

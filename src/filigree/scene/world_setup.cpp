@@ -206,22 +206,20 @@ private:
         ReadyBody& body = result_.bodies[from.body];
         Actor& actor = result_.actors[from.body];
         FracturePattern pattern = from.pattern;
-        if (from.at) pattern.at = {actor.placement.inverse() * (*from.at - result_.origin) / body.scale};
+        for (const Vec3d& at : from.at)
+            pattern.at.emplace_back(actor.placement.inverse() * (at - result_.origin) / body.scale);
         RunContext seeded = context_;
         seeded.seed = from.material.seed;
-        auto fracture = std::make_shared<Fracture>();
-        fracture->material = from.material;
-        const double diagonal = body.scale * body_box(body).diagonal(), strength = from.material.strength;
-        fracture->material.energy =
-            from.energy.value_or(strength * strength * diagonal / (50 * body.body->material.young_modulus));
+        FractureMaterial material = from.material;
+        const double diagonal = body.scale * body_box(body).diagonal();
+        material.energy =
+            from.energy.value_or(usual_fracture_energy(material.strength, body.body->material.young_modulus, diagonal));
+        std::shared_ptr<Fracture> fracture;
         at_line(scene_, from.line, [&] {
             body.cells =
                 std::make_shared<const FractureCells>(make_fracture_cells(body.model.mesh, pattern, seeded).value());
-            Partition partition{body.cells->count(), [cells = body.cells, scale = body.scale](const Vec3d& point) {
-                                    return cells->cell_at(point / scale);
-                                }};
-            fracture->body = std::make_shared<const BrokenBody>(
-                break_body(body.body, std::move(partition), context_, &body.broken).value());
+            fracture = std::make_shared<Fracture>(
+                make_fracture(body.body, body.cells, body.scale, material, context_, &body.broken).value());
         });
         for (const SceneCrack& crack : scene_.cracks) {
             if (crack.body != from.body) continue;
@@ -237,29 +235,13 @@ private:
                  everywhere ? std::vector<Index>() : particles_of(from.body, region, crack.line)});
         }
         actor.fracture = std::move(fracture);
-        at_line(scene_, from.line, [&] { break_model_of(body); });
-    }
-
-    /// The body's model becomes one in pieces; the body and its particles stay as they are.
-    void break_model_of(ReadyBody& body) {
-        FracturedMesh fractured =
-            filigree::fracture(body.model.mesh, *body.cells, {.pieces_are_cells = true}, context_).value();
-        BrokenModel broken =
-            break_model(body.model, fractured, *body.cells, body.body->spacing() / body.scale, context_).value();
-        body.model = std::move(broken.model);
-        body.pieces.driver = std::move(broken.piece_of_driver);
-        body.pieces.driver_is_on_crack = std::move(broken.driver_is_on_crack);
-        body.pieces.vertices = std::move(fractured.piece_of_vertex);
-        for (Index& piece : body.pieces.vertices)
-            piece = std::min(piece, body.cells->count() - 1); // of loose vertices: any
-        for (std::size_t d = 0; d < body.pieces.driver.size(); ++d) {
-            const Index vertex = body.model.driver().vertices[d];
-            if (vertex >= body.pieces.vertices.size()) body.pieces.vertices.resize(vertex + 1);
-            body.pieces.vertices[vertex] = body.pieces.driver[d];
-        }
-        body.pieces.vertices.resize(body.model.mesh.vertex_count());
-        body.pieces.crack_of_face = std::move(fractured.crack_of_face);
-        body.pieces.cells_of_crack = std::move(fractured.cells_of_crack);
+        // The body and its particles stay as they are.
+        at_line(scene_, from.line, [&] {
+            ModelInPieces cut = cut_model(body.model, *body.cells, body.body->spacing() / body.scale, context_).value();
+            body.model = std::move(cut.model);
+            body.pieces = std::move(cut.carried);
+            body.keeps_closed_cracks = from.keep_closed;
+        });
     }
 
     static RigidMotion motion_of(const SceneMotion& from, const Vec3d& middle) {
@@ -404,7 +386,7 @@ std::vector<Vec3f> ReadyBody::in_metres(std::vector<Vec3f> points) const {
 }
 
 void leave_out_closed_cracks(ReadyBody& body, std::span<const Pose> poses) {
-    if (body.pieces.empty()) return;
+    if (body.pieces.empty() || body.keeps_closed_cracks) return;
     const std::vector<std::uint8_t> is_open =
         open_cracks(body.model, body.pieces.driver, body.pieces.driver_is_on_crack, body.pieces.cells_of_crack, poses,
                     kOpen * body.body->spacing());

@@ -1,21 +1,11 @@
 // From a scene's words to bodies, a world and what is drawn of it.
 #pragma once
 
-#include "filigree/fracture/broken_model.h"
 #include "filigree/scene/body_driver.h"
+#include "filigree/scene/breaking.h"
 #include "filigree/scene/scene_file.h"
 
 namespace filigree {
-
-/// Which piece carries what, of a body that breaks. Pieces are named by their cells.
-struct CarriedByPieces {
-    std::vector<Index> driver, vertices;              ///< the piece of each
-    std::vector<std::uint8_t> driver_is_on_crack;     ///< see BrokenModel
-    std::vector<Index> crack_of_face;                 ///< kNoIndex: a face of the surface
-    std::vector<std::array<Index, 2>> cells_of_crack; ///< ascending
-
-    bool empty() const { return driver.empty(); }
-};
 
 struct ReadyBody {
     std::string name;
@@ -28,6 +18,7 @@ struct ReadyBody {
     std::shared_ptr<const FractureCells> cells; ///< of a body that breaks, in model units; else null
     CarriedByPieces pieces;                     ///< of such a body, whose model is in pieces too
     BrokenBodyReport broken;
+    bool keeps_closed_cracks = false; ///< in what is written
     Vec3f color = Vec3f::Zero();
     bool has_own_color = false; ///< of the mesh's own, if it has some
 
@@ -56,7 +47,8 @@ struct ReadyScene {
     std::vector<std::string> warnings; ///< sentences: of the meshes' files, and of bodies that are hard to simulate
 };
 
-/// Takes the faces of cracks that did not open in any of the poses out of a body's mesh; of other bodies nothing.
+/// Takes the faces of cracks that did not open in any of the poses out of a body's mesh; nothing out of one that keeps
+/// them, or does not break.
 void leave_out_closed_cracks(ReadyBody& body, std::span<const Pose> poses);
 
 /// Reads the scene's meshes, strips them and fills them with particles. Errors name the scene's line: those of the
