@@ -1,9 +1,15 @@
 // filigree fracture: pieces as one mesh or as files, and the report about them.
 #include "apps/program.h"
 
+#include "filigree/io/model_file.h"
+#include "filigree/io/point_cache.h"
+
+using namespace filigree;
 using namespace filigree_test;
 
 namespace {
+
+const RunContext kContext;
 
 class FractureCommand : public Program {
 protected:
@@ -11,6 +17,12 @@ protected:
     void make_cube() {
         ok({"make", "wavy-cube", "-o", "cube.stl", "--resolution", "16", "--quiet"});
         ok({"deform", "cube.stl", "-o", "cube.obj", "--stretch", "1.2", "--quiet"});
+    }
+    std::vector<std::vector<Vec3f>> frames_of(const std::string& cache, const Mesh& mesh) const {
+        const MeshAnimation animation = open_animation(path(cache), mesh, {}, kContext).value();
+        std::vector<std::vector<Vec3f>> frames(animation.frames, std::vector<Vec3f>(mesh.vertex_count()));
+        for (std::size_t f = 0; f < frames.size(); ++f) EXPECT_TRUE(animation.positions(f, frames[f]).ok());
+        return frames;
     }
 };
 
@@ -69,6 +81,32 @@ TEST_F(FractureCommand, SeedsAndThreadsDecideAsTheyShould) {
     const std::string first = bytes("a.ply", {"--threads", "1"});
     EXPECT_TRUE(bytes("b.ply", {"--threads", "2"}) == first);
     EXPECT_FALSE(bytes("c.ply", {"--seed", "2"}) == first);
+}
+
+TEST_F(FractureCommand, AFilmOfPiecesIsTheSameInACacheASkinAndMorphTargets) {
+    write("fall.toml", "[simulation]\nframes = 24\n[[body]]\nshape = \"wavy-cube\"\nresolution = 16\n"
+                       "material = \"soft-rubber\"\nsize = 0.3\nparticles = 400\ncentre = [0, 0.3, 0]\n"
+                       "velocity = [0, -4, 0]\n[[fracture]]\npieces = 6\nstrength = 2e3\n"
+                       "[[obstacle]]\nshape = \"ground\"\n");
+    const Json report = json({"simulate", "fall.toml", "-o", "fall.fil", "-o", "fall.pc2"});
+    EXPECT_GT(report.at("bodies").at(0).at("fracture").at("parts"), 1);
+    const Mesh mesh = read_model(bytes_of(path("fall.fil")), "fall.fil", kContext).value().mesh;
+    ok({"export", "fall.fil", "-o", "skin.glb", "--full-precision", "--quiet"});
+    ok({"export", "fall.fil", "-o", "morph.glb", "--as", "morph", "--quiet"});
+    const std::vector<std::vector<Vec3f>> cache = frames_of("fall.pc2", mesh);
+    ASSERT_EQ(cache.size(), 25u);
+    const double diagonal = bounds(cache[0]).diagonal();
+    for (const std::string name : {"skin", "morph"}) {
+        ok({"export", name + ".glb", "-o", name + ".pc2", "--quiet"});
+        const std::vector<std::vector<Vec3f>> other = frames_of(name + ".pc2", mesh);
+        ASSERT_EQ(other.size(), cache.size());
+        double worst = 0;
+        for (std::size_t f = 0; f < cache.size(); ++f) {
+            for (std::size_t v = 0; v < cache[f].size(); ++v)
+                worst = std::max(worst, double((other[f][v] - cache[f][v]).norm()));
+        }
+        EXPECT_LT(worst / diagonal, 1e-5) << name;
+    }
 }
 
 TEST_F(FractureCommand, RefusesWhatItCannotDo) {
