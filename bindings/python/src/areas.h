@@ -1,0 +1,28 @@
+// The parts of the module, one source each; module.cpp calls them in this order.
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+namespace filigree::python {
+
+namespace py = pybind11;
+
+void add_errors(py::module_& m);
+void add_meshes(py::module_& m);
+void add_poses(py::module_& m);
+void add_models(py::module_& m);
+void add_files(py::module_& m);
+void add_restoring(py::module_& m);
+void add_warps(py::module_& m);
+void add_handles(py::module_& m);
+void add_comparing(py::module_& m);
+void add_sampling(py::module_& m);
+void add_remeshing(py::module_& m);
+void add_fracturing(py::module_& m);
+void add_bodies(py::module_& m);
+void add_simulation(py::module_& m);
+void add_scenes(py::module_& m);
+void add_exporting(py::module_& m);
+void add_pictures(py::module_& m);
+
+} // namespace filigree::python

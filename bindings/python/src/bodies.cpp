@@ -1,0 +1,242 @@
+#include "bodies.h"
+
+#include "calls.h"
+
+#include <filigree/physics/named_materials.h>
+#include <filigree/scene/particles_near.h>
+
+namespace filigree::python {
+
+namespace {
+
+const char* model_name(MaterialModel model) {
+    constexpr const char* names[] = {"fem", "springs", "meshfree", "rigid"};
+    return names[static_cast<std::size_t>(model)];
+}
+MaterialModel model_of_name(const std::string& name) {
+    return value_of<MaterialModel>(name, "model",
+                                   {{"fem", MaterialModel::fem},
+                                    {"springs", MaterialModel::springs},
+                                    {"meshfree", MaterialModel::meshfree},
+                                    {"rigid", MaterialModel::rigid}});
+}
+
+/// The numbers of a material, by the names of C++.
+constexpr std::pair<const char*, double Material::*> kQuantities[] = {
+    {"density", &Material::density},
+    {"young_modulus", &Material::young_modulus},
+    {"poisson_ratio", &Material::poisson_ratio},
+    {"damping", &Material::damping},
+    {"internal_damping", &Material::internal_damping},
+    {"bending", &Material::bending},
+    {"yield_stress", &Material::yield_stress},
+    {"creep_time", &Material::creep_time},
+    {"temperature", &Material::temperature},
+    {"melting_from", &Material::melting_from},
+    {"melting_to", &Material::melting_to},
+    {"viscosity", &Material::viscosity},
+    {"heating", &Material::heating},
+    {"conductivity", &Material::conductivity},
+};
+
+Material make_material(const std::string& name, const py::kwargs& changes) {
+    std::string known;
+    for (const NamedMaterial& named : named_materials()) {
+        known += (known.empty() ? "'" : ", '") + std::string(named.name) + "'";
+        if (named.name != name) continue;
+        Material material = named.material;
+        for (const auto& [key, value] : changes) {
+            const auto word = key.cast<std::string>();
+            if (word == "model") {
+                material.model = model_of_name(value.cast<std::string>());
+                continue;
+            }
+            const auto* quantity =
+                std::ranges::find(kQuantities, word, [](const auto& pair) { return std::string_view(pair.first); });
+            if (quantity == std::end(kQuantities)) refuse("A material has no '" + word + "'.");
+            material.*quantity->second = value.cast<double>();
+        }
+        if (const std::string wrong = check_material(material); !wrong.empty()) refuse(wrong);
+        return material;
+    }
+    refuse("There is no material '" + name + "'; there are " + known + ".");
+}
+
+PyBody make_one(const py::object& given, const py::object& material, std::size_t particles,
+                std::optional<double> spacing, double scale, unsigned threads, const py::object& progress) {
+    const MeshPtr mesh = mesh_of(given);
+    const Material of = material_of(material);
+    BodyOptions options;
+    options.scale = scale;
+    options.cells.count = particles;
+    if (spacing && !(*spacing > 0)) refuse("spacing has to be above 0.");
+    options.cells.spacing = spacing.value_or(0);
+    PyBody made{nullptr, mesh->origin};
+    made.body = LongCall{threads, progress}([&](const RunContext& context) {
+        return std::make_shared<const Body>(make_body(*mesh, of, options, context, &made.report).value());
+    });
+    if (!made.report.warning.empty()) warn({made.report.warning});
+    return made;
+}
+
+py::dict said_of(const PyBody& self) {
+    const BodyReport& report = self.report;
+    py::dict said;
+    said["cells"] = report.cells.cells;
+    said["whole_cells"] = report.cells.whole_cells;
+    said["added_cells"] = report.cells.added_cells;
+    said["thin_cells"] = report.cells.thin_cells;
+    said["loose_parts"] = report.cells.loose_parts;
+    said["volume"] = report.cells.volume;
+    said["surface_points"] = report.surface_points;
+    said["mass"] = report.mass;
+    said["warning"] = report.warning;
+    return said;
+}
+
+} // namespace
+
+Material material_of(const py::handle& given) {
+    if (py::isinstance<Material>(given)) return given.cast<Material>();
+    if (!py::isinstance<py::str>(given)) throw py::type_error("material has to be a filigree.Material or a name.");
+    return make_material(given.cast<std::string>(), {});
+}
+
+void add_bodies(py::module_& m) {
+    py::class_<Material> material(m, "Material", R"(What a body is made of, in SI units.
+
+Parameters
+----------
+name : str
+    What to begin with: one of `materials()`.
+**changes : float or str
+    What is otherwise: model ('fem', 'springs', 'meshfree' or 'rigid'), density (kg/m^3), young_modulus (Pa),
+    poisson_ratio (0 to 0.49), damping (1/s), internal_damping (s), bending; of meshfree ones yield_stress (Pa),
+    creep_time (s), temperature, melting_from and melting_to (K), viscosity (Pa s), heating (K/s), conductivity (m^2/s).
+
+Raises
+------
+UsageError
+    No such material or quantity; a number outside its range.
+
+Examples
+--------
+>>> filigree.Material("jelly", density=1200).density
+1200.0
+)");
+    material
+        .def(py::init(&make_material), py::arg("name") = "rubber",
+             R"(__init__(self, name='rubber', **changes)
+--
+
+)")
+        .def_property_readonly(
+            "model", [](const Material& self) { return model_name(self.model); },
+            "'fem', 'springs', 'meshfree' or 'rigid'.")
+        .def(
+            "__eq__", [](const Material& self, const Material& other) { return self == other; }, py::is_operator())
+        .def(py::pickle(
+            [](const Material& self) {
+                py::dict state;
+                state["model"] = model_name(self.model);
+                for (const auto& [name, quantity] : kQuantities) state[name] = self.*quantity;
+                return state;
+            },
+            [](const py::dict& state) { return make_material("rubber", py::kwargs(state)); }));
+    for (const auto& [name, quantity] : kQuantities)
+        material.def_property_readonly(
+            name, [quantity](const Material& self) { return self.*quantity; }, "As `Material` takes it, SI units.");
+    m.def(
+        "materials",
+        [] {
+            py::dict names;
+            for (const NamedMaterial& named : named_materials()) names[py::str(std::string(named.name))] = named.text;
+            return names;
+        },
+        R"(materials()
+--
+
+The materials by name, with what they do: dict of str to str.
+)");
+
+    py::class_<PyBody>(m, "Body",
+                       R"(Matter inside a mesh: particles, what they weigh, how they hang together. Never changes.
+
+Parameters
+----------
+mesh : Mesh, or an object with vertices and faces or triangles
+material : Material or str
+particles : int
+    About how many.
+spacing : float, optional
+    Between them, m; in place of `particles`.
+scale : float
+    Metres a model unit, above 0.
+
+Raises
+------
+UsageError, UnsuitableError, Cancelled
+
+Warns
+-----
+FiligreeWarning
+    Parts thinner than two cells, or left out.
+
+Examples
+--------
+>>> body = filigree.Body(filigree.make("bar", resolution=4), "jelly", spacing=0.25)
+>>> len(body), body.mass.sum()
+(425, 4000.0)
+)")
+        .def(
+            py::init(&make_one), py::arg("mesh"), py::arg("material") = "rubber", py::kw_only(),
+            py::arg("particles") = 8000, py::arg("spacing") = py::none(), py::arg("scale") = 1.0,
+            py::arg("threads") = 0, py::arg("progress") = py::none(),
+            R"(__init__(self, mesh, material='rubber', *, particles=8000, spacing=None, scale=1.0, threads=0, progress=None)
+--
+
+)")
+        .def_property_readonly(
+            "material", [](const PyBody& self) { return self.body->material; }, "What it is made of.")
+        .def_property_readonly(
+            "scale", [](const PyBody& self) { return self.body->scale; }, "Metres a model unit.")
+        .def_property_readonly(
+            "spacing", [](const PyBody& self) { return self.body->spacing(); }, "Between particles, m.")
+        .def_property_readonly(
+            "rest", [](const PyBody& self) { return array_of(self.body->rest); },
+            "Particles at rest, m, relative to the mesh's origin, a copy, float32 (p, 3).")
+        .def_property_readonly(
+            "mass", [](const py::object& self) { return view(self.cast<const PyBody&>().body->mass, self); },
+            "Of each particle, kg, float32 (p,), read-only.")
+        .def_property_readonly(
+            "volume", [](const py::object& self) { return view(self.cast<const PyBody&>().body->volume, self); },
+            "Of each particle, m^3, float32 (p,), read-only.")
+        .def_property_readonly("report", &said_of, "What it took: counts, 'volume' (m^3), 'mass' (kg), 'warning'.")
+        .def(
+            "particles_near",
+            [](const PyBody& self, const py::object& points) {
+                const std::vector<Vec3f> at = points_of(points, "points");
+                return take(without_interpreter([&] { return particles_near(*self.body, at); }));
+            },
+            py::arg("points"), R"(particles_near(self, points)
+--
+
+Particles at a place of the body: those within half a cell's diagonal of any of the points, and the nearest to each.
+
+Parameters
+----------
+points : array_like, (n, 3)
+    Of the body at rest, m.
+
+Returns
+-------
+ndarray of uint32
+    Ascending ids.
+)")
+        .def("__len__", [](const PyBody& self) { return self.body->particle_count(); })
+        .def("__repr__", [](const PyBody& self) {
+            return "<filigree.Body: " + std::to_string(self.body->particle_count()) + " particles>";
+        });
+}
+
+} // namespace filigree::python

@@ -1,0 +1,40 @@
+// Errors of the library as Python's.
+#pragma once
+
+#include "areas.h"
+
+#include <filigree/core/result.h>
+
+#include <initializer_list>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace filigree::python {
+
+/// Raises the Python class of the code with this sentence.
+[[noreturn]] void refuse(ErrorCode code, const std::string& sentence);
+/// Raises UsageError.
+[[noreturn]] void refuse(const std::string& sentence);
+
+/// Says every sentence as a FiligreeWarning. Needs the interpreter.
+void warn(const std::vector<std::string>& sentences);
+
+/// A sentence of the library that names options of the command line, as Python writes them: "--max-edge 0.1" becomes
+/// "max_edge=0.1".
+std::string in_python_words(const std::string& sentence);
+
+/// What a word stands for; refuses others with the list of those there are.
+template <class Value>
+Value value_of(const std::string& word, const char* name,
+               std::initializer_list<std::pair<std::string_view, Value>> words) {
+    std::string list;
+    for (const auto& [known, value] : words) {
+        if (known == word) return value;
+        list += (list.empty() ? "'" : ", '") + std::string(known) + "'";
+    }
+    refuse(std::string(name) + " is '" + word + "', and has to be one of " + list + ".");
+}
+
+} // namespace filigree::python

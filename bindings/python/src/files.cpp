@@ -1,0 +1,200 @@
+#include "models.h"
+
+#include <filigree/io/mesh_file.h>
+#include <filigree/io/model_file.h>
+#include <filigree/io/point_cache.h>
+
+#include <pybind11/stl/filesystem.h>
+
+namespace filigree::python {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// "-" is the program's standard input and output, and Python has its own.
+void refuse_pipe(const fs::path& path) {
+    if (path == "-") refuse("'-' is standard input or output for the program alone; give a file's name.");
+}
+
+MeshPtr read_mesh_file(const fs::path& path, unsigned threads, const py::object& progress) {
+    refuse_pipe(path);
+    MeshFile file =
+        LongCall{threads, progress}([&](const RunContext& context) { return read_mesh(path, context).value(); });
+    warn(file.warnings);
+    return std::make_shared<Mesh>(std::move(file.mesh));
+}
+
+std::optional<MeshFormat> format_of(const std::optional<std::string>& name) {
+    if (!name) return {};
+    return value_of<MeshFormat>(*name, "format",
+                                {{"obj", MeshFormat::obj},
+                                 {"ply", MeshFormat::ply},
+                                 {"stl", MeshFormat::stl},
+                                 {"off", MeshFormat::off},
+                                 {"gltf", MeshFormat::gltf}});
+}
+
+void write_mesh_file(const py::object& given, const fs::path& path, const std::optional<std::string>& format,
+                     bool ascii, bool big_endian, const fs::path& materials_beside, unsigned threads,
+                     const py::object& progress) {
+    refuse_pipe(path);
+    const MeshPtr mesh = mesh_of(given);
+    const WriteMeshOptions options{format_of(format), ascii, big_endian, materials_beside};
+    warn(LongCall{threads, progress}(
+        [&](const RunContext& context) { return write_mesh(*mesh, path, options, context).value(); }));
+}
+
+PyModel read_model_file(const fs::path& path, unsigned threads, const py::object& progress) {
+    refuse_pipe(path);
+    return {LongCall{threads, progress}(
+        [&](const RunContext& context) { return std::make_shared<const Model>(read_model(path, context).value()); })};
+}
+
+void write_model_file(const PyModel& model, const fs::path& path, const py::object& poses, unsigned threads,
+                      const py::object& progress) {
+    refuse_pipe(path);
+    const PoseSequence sequence = poses.is_none() ? PoseSequence{} : poses_of(poses, 60);
+    LongCall{threads, progress}(
+        [&](const RunContext& context) { return write_model(*model.model, sequence, path, context).value(); });
+}
+
+PoseSequence read_pose_file(const fs::path& path, const py::object& model, std::optional<double> frames_per_second,
+                            const std::string& animation, unsigned threads, const py::object& progress) {
+    const LongCall call{threads, progress};
+    if (model.is_none()) return call([&](const RunContext& context) { return read_poses(path, context).value(); });
+    const auto of = model_of(model);
+    return call([&](const RunContext& context) {
+        const PoseStream stream =
+            open_poses(path, of->driver().vertices.size(), of->mesh.origin, {frames_per_second, animation}, context)
+                .value();
+        PoseSequence poses{stream.frames_per_second, {}};
+        for (std::size_t frame = 0; frame < stream.frames; ++frame) {
+            if (context.is_cancelled()) throw BadResultAccess(cancelled_error());
+            context.report("reading poses", double(frame) / double(stream.frames));
+            poses.frames.push_back(stream.pose(frame).value());
+        }
+        return poses;
+    });
+}
+
+} // namespace
+
+void add_files(py::module_& m) {
+    m.def("read_mesh", &read_mesh_file, py::arg("path"), py::kw_only(), py::arg("threads") = 0,
+          py::arg("progress") = py::none(), R"(read_mesh(path, *, threads=0, progress=None)
+--
+
+Read a mesh: OBJ, PLY, STL, OFF, glTF (.gltf, .glb).
+
+Vertex and face order are the file's. What could not be kept or had to be mended is said as a `FiligreeWarning`.
+
+Raises
+------
+NotFoundError, BadFileError, UnsupportedError, OutOfMemoryError, Cancelled
+
+Examples
+--------
+>>> filigree.write_mesh(filigree.make("torus", resolution=8), "torus.ply")
+>>> filigree.read_mesh("torus.ply")
+<filigree.Mesh: 128 vertices, 128 faces>
+)");
+    m.def(
+        "write_mesh", &write_mesh_file, py::arg("mesh"), py::arg("path"), py::kw_only(), py::arg("format") = py::none(),
+        py::arg("ascii") = false, py::arg("big_endian") = false, py::arg("materials_beside") = "",
+        py::arg("threads") = 0, py::arg("progress") = py::none(),
+        R"(write_mesh(mesh, path, *, format=None, ascii=False, big_endian=False, materials_beside='', threads=0, progress=None)
+--
+
+Write a mesh whole, or leave `path` untouched.
+
+Parameters
+----------
+mesh : Mesh, or an object with vertices and faces or triangles
+path : path
+    .obj, .ply, .stl, .off, .glb or .gltf.
+format : str, optional
+    'obj', 'ply', 'stl', 'off' or 'gltf'; None: from the path's ending.
+ascii : bool
+    PLY and STL: text.
+big_endian : bool
+    PLY: most significant byte first.
+materials_beside : path
+    GLB: where the mesh came from; colours and textures of the material libraries beside it are embedded.
+
+Raises
+------
+UnwritableError, UnsupportedError, UnsuitableError, OutOfMemoryError, Cancelled
+
+Warns
+-----
+FiligreeWarning
+    What the format cannot hold.
+)");
+    m.def("read_model", &read_model_file, py::arg("path"), py::kw_only(), py::arg("threads") = 0,
+          py::arg("progress") = py::none(), R"(read_model(path, *, threads=0, progress=None)
+--
+
+Read a model (.fil). Its poses, where it holds some, `read_poses` gives.
+
+Raises
+------
+NotFoundError, BadFileError, OutOfMemoryError, Cancelled
+)");
+    m.def("write_model", &write_model_file, py::arg("model"), py::arg("path"), py::kw_only(),
+          py::arg("poses") = py::none(), py::arg("threads") = 0, py::arg("progress") = py::none(),
+          R"(write_model(model, path, *, poses=None, threads=0, progress=None)
+--
+
+Write a model (.fil) whole, or leave `path` untouched; with poses of its driver where there are any.
+
+Parameters
+----------
+model : Model
+path : path
+poses : PoseSequence, array_like (f, d, 3), or sequence of Pose, optional
+    Gradients in all frames or in none; arrays are 60 frames a second.
+
+Raises
+------
+MismatchError
+    A pose of another number of vertices than the driver.
+UnwritableError, OutOfMemoryError, Cancelled
+
+Examples
+--------
+>>> model = filigree.strip(filigree.make("bar", resolution=8))
+>>> filigree.write_model(model, "bar.fil", poses=[model.driver.vertices] * 3)
+>>> filigree.read_model("bar.fil"), filigree.read_poses("bar.fil")
+(<filigree.Model: 1154 vertices on a driver of 57>, <filigree.PoseSequence: 3 frames>)
+)");
+    m.def("read_poses", &read_pose_file, py::arg("path"), py::arg("model") = py::none(), py::kw_only(),
+          py::arg("frames_per_second") = py::none(), py::arg("animation") = "", py::arg("threads") = 0,
+          py::arg("progress") = py::none(),
+          R"(read_poses(path, model=None, *, frames_per_second=None, animation='', threads=0, progress=None)
+--
+
+Read the poses that a model's file holds, or with `model` those of a driver that another program moved.
+
+Parameters
+----------
+path : path
+    .fil; with `model` also .pc2, .mdd, a folder of numbered meshes or NAME_####.ply, an animated glTF.
+model : Model, optional
+    Whose driver was moved.
+frames_per_second : float, optional
+    Of files that do not say it; glTF: frames to take a second.
+animation : str
+    Of a glTF with several; empty: the first.
+
+Returns
+-------
+PoseSequence
+
+Raises
+------
+NotFoundError, BadFileError, MismatchError, UnsupportedError, UsageError, Cancelled
+)");
+}
+
+} // namespace filigree::python

@@ -1,0 +1,226 @@
+#include "models.h"
+
+#include <filigree/deform/fidelity.h>
+#include <filigree/io/model_file.h>
+
+namespace filigree::python {
+
+namespace {
+
+py::bytes bytes_of(const PyModel& model) {
+    const std::string bytes = without_interpreter([&] { return write_model(*model.model); });
+    return py::bytes(bytes);
+}
+PyModel model_of_bytes(const py::bytes& bytes, const std::string& name) {
+    const std::string_view view(bytes);
+    return {without_interpreter(
+        [&] { return std::make_shared<const Model>(read_model(view, name, RunContext()).value()); })};
+}
+
+py::dict report_of(const StripReport& report) {
+    py::dict said;
+    said["welded_vertices"] = report.welded_vertices;
+    said["across_gap"] = report.across_gap;
+    said["facing_away"] = report.facing_away;
+    said["forced_collapses"] = report.forced_collapses;
+    said["simplify_error"] = report.simplify_error;
+    py::dict seconds;
+    seconds["simplify"] = report.simplify_seconds;
+    seconds["bind"] = report.bind_seconds;
+    seconds["encode"] = report.encode_seconds;
+    said["seconds"] = seconds;
+    return said;
+}
+
+PoseSource source_of(const std::string& from) {
+    return value_of<PoseSource>(from, "fidelity_from",
+                                {{"positions", PoseSource::positions}, {"gradients", PoseSource::gradients}});
+}
+
+PyModel strip_mesh(const py::object& given, std::optional<std::size_t> base, std::optional<unsigned> levels,
+                   std::optional<double> error, std::optional<double> fidelity, const std::string& fidelity_from,
+                   std::optional<double> max_edge, const std::string& code, const std::string& precision,
+                   unsigned references, unsigned threads, const py::object& progress) {
+    const MeshPtr mesh = mesh_of(given);
+    StripOptions options{
+        .base = base, .levels = levels, .error = error, .max_edge = max_edge, .references = references};
+    options.code =
+        value_of<DetailCode>(code, "code", {{"blend", DetailCode::blend}, {"reference", DetailCode::reference}});
+    options.precision =
+        value_of<Precision>(precision, "precision", {{"float", Precision::float32}, {"int16", Precision::int16}});
+    const LongCall call{threads, progress};
+    if (!fidelity) {
+        Stripped stripped = call([&](const RunContext& context) { return strip(*mesh, options, context).value(); });
+        return {std::make_shared<const Model>(std::move(stripped.model)), report_of(stripped.report)};
+    }
+    const FidelityGoal goal{*fidelity, source_of(fidelity_from)};
+    StrippedToFidelity found =
+        call([&](const RunContext& context) { return strip_to_fidelity(*mesh, options, goal, context).value(); });
+    py::dict report = report_of(found.stripped.report), reached;
+    reached["error"] = found.error;
+    reached["asked"] = *fidelity;
+    reached["from"] = fidelity_from;
+    reached["tried"] = found.tried;
+    report["fidelity"] = reached;
+    return {std::make_shared<const Model>(std::move(found.stripped.model)), report};
+}
+
+} // namespace
+
+std::shared_ptr<const Model> model_of(const py::handle& given, const char* name) {
+    if (!py::isinstance<PyModel>(given))
+        throw py::type_error(std::string(name) + " has to be a filigree.Model; this is of type " +
+                             Py_TYPE(given.ptr())->tp_name + ".");
+    return given.cast<const PyModel&>().model;
+}
+
+void add_models(py::module_& m) {
+    py::class_<PyModel>(m, "Model",
+                        R"(A stripped mesh: everything that is needed to restore it from a pose of its driver.
+
+Made by `strip` and `read_model`; never changes. Pickles as the bytes of its file.
+)")
+        .def_property_readonly(
+            "mesh", [](const PyModel& self) { return MeshPtr(self.model, const_cast<Mesh*>(&self.model->mesh)); },
+            "The finest level: the mesh as it came in.")
+        .def_property_readonly(
+            "driver", [](const PyModel& self) { return std::make_shared<Mesh>(level_mesh(*self.model, 0)); },
+            "Level 0, what is moved, as a mesh.")
+        .def_property_readonly(
+            "driver_vertices",
+            [](const py::object& self) { return view(self.cast<const PyModel&>().model->driver().vertices, self); },
+            "The driver's vertices as ids in `mesh`, ascending, uint32 (d,), read-only.")
+        .def_property_readonly(
+            "finest_level", [](const PyModel& self) { return self.model->finest_level(); },
+            "Number of the finest level; 0 is the driver.")
+        .def_property_readonly(
+            "code", [](const PyModel& self) { return self.model->code() == DetailCode::blend ? "blend" : "reference"; },
+            "'blend' or 'reference'.")
+        .def_property_readonly(
+            "report", [](const PyModel& self) { return self.report; },
+            "What `strip` counted and how long it took; empty for a model from a file.")
+        .def(
+            "level",
+            [](const PyModel& self, unsigned level) {
+                if (level > self.model->finest_level())
+                    refuse("There is no level " + std::to_string(level) + "; there are 0 to " +
+                           std::to_string(self.model->finest_level()) + ".");
+                return std::make_shared<Mesh>(without_interpreter([&] { return level_mesh(*self.model, level); }));
+            },
+            py::arg("level"), R"(level(self, level)
+--
+
+A level as a mesh of its own, 0 (the driver) to `finest_level`.
+
+Raises
+------
+UsageError
+    No such level.
+)")
+        .def("tobytes", &bytes_of, R"(tobytes(self)
+--
+
+The bytes of the model's file (.fil); the same model gives the same bytes.
+)")
+        .def_static(
+            "frombytes", [](const py::bytes& bytes) { return model_of_bytes(bytes, "bytes"); }, py::arg("bytes"),
+            R"(frombytes(bytes)
+--
+
+The model of a file's bytes, as `tobytes` gives them.
+
+Raises
+------
+BadFileError
+    Bytes that are no model, or damaged ones.
+)")
+        .def(
+            "fidelity",
+            [](const PyModel& self, unsigned threads, const py::object& progress) {
+                const DriverFidelity found = LongCall{threads, progress}(
+                    [&](const RunContext& context) { return driver_fidelity(*self.model, context).value(); });
+                py::dict said;
+                said["positions"] = found.positions;
+                if (self.model->code() == DetailCode::blend) said["gradients"] = found.gradients;
+                return said;
+            },
+            py::kw_only(), py::arg("threads") = 0, py::arg("progress") = py::none(),
+            R"(fidelity(self, *, threads=0, progress=None)
+--
+
+What the driver is good for: the largest rms error over bends, a twist, a taper and random warps.
+
+Returns
+-------
+dict
+    'positions': from positions alone; 'gradients' (blend code): with gradients. Fractions of the diagonal.
+)")
+        .def("__repr__",
+             [](const PyModel& self) {
+                 return "<filigree.Model: " + std::to_string(self.model->mesh.vertex_count()) +
+                        " vertices on a driver of " + std::to_string(self.model->driver().vertices.size()) + ">";
+             })
+        .def(py::pickle([](const PyModel& self) { return bytes_of(self); },
+                        [](const py::bytes& bytes) { return model_of_bytes(bytes, "pickle"); }));
+
+    m.def(
+        "strip", &strip_mesh, py::arg("mesh"), py::kw_only(), py::arg("base") = py::none(),
+        py::arg("levels") = py::none(), py::arg("error") = py::none(), py::arg("fidelity") = py::none(),
+        py::arg("fidelity_from") = "positions", py::arg("max_edge") = py::none(), py::arg("code") = "blend",
+        py::arg("precision") = "float", py::arg("references") = 3, py::arg("threads") = 0,
+        py::arg("progress") = py::none(),
+        R"(strip(mesh, *, base=None, levels=None, error=None, fidelity=None, fidelity_from='positions', max_edge=None, code='blend', precision='float', references=3, threads=0, progress=None)
+--
+
+Take the detail off a mesh: a model with a light driver.
+
+Parameters
+----------
+mesh : Mesh, or an object with vertices and faces or triangles
+    Any mesh that has a vertex; what cannot be bound well is counted in the model's `report`.
+base : int, optional
+    Vertices of the driver, about; 3 or more. At most one of `base`, `levels`, `error` and `fidelity`; with none 1,000,
+    fewer for meshes below 20,000.
+levels : int, optional
+    Levels below the finest, each with a quarter of the vertices of the next.
+error : float, optional
+    How far the driver may leave the mesh (rms), fraction of the diagonal.
+fidelity : float, optional
+    Smallest driver that restores bends, twists, tapers and random warps to this rms error, fraction of the diagonal.
+fidelity_from : str
+    What poses will come with: 'positions', or 'gradients' too.
+max_edge : float, optional
+    Longest edge that simplifying may leave, fraction of the diagonal: flat parts keep vertices.
+code : str
+    'blend' for any mesh, 'reference' for the report's, which needs quads with subdivision connectivity.
+precision : str
+    Of the blend code: 'float', 20 bytes a vertex, or 'int16', 10 bytes.
+references : int
+    Of the reference code: 3, 4 or 6 coarse points that a point refers to.
+threads : int
+    0: all of the processor's. Results are the same bytes for any.
+progress : callable, optional
+    Called with the phase and the fraction done; when it returns False, the work is cancelled.
+
+Returns
+-------
+Model
+
+Raises
+------
+UsageError
+    Options that make no sense.
+UnsuitableError
+    No vertices; for the reference code, no subdivision connectivity.
+Cancelled
+    `progress` returned False.
+
+Examples
+--------
+>>> mesh = filigree.make("wavy-sphere", resolution=24)
+>>> filigree.strip(mesh, base=200)
+<filigree.Model: 3458 vertices on a driver of 200>
+)");
+}
+
+} // namespace filigree::python

@@ -1,0 +1,31 @@
+// Models and poses as Python has them.
+#pragma once
+
+#include "arrays.h"
+#include "calls.h"
+#include "meshes.h"
+
+#include <filigree/hierarchy/restore.h>
+#include <filigree/hierarchy/strip.h>
+
+#include <memory>
+#include <optional>
+
+namespace filigree::python {
+
+/// A model never changes once Python has it.
+struct PyModel {
+    std::shared_ptr<const Model> model;
+    py::dict report = {}; ///< of strip; empty for a model from a file
+};
+
+std::shared_ptr<const Model> model_of(const py::handle& given, const char* name = "model");
+
+/// A pose: one of ours, or positions of shape (d, 3) with what else there is.
+Pose pose_of(const py::handle& pose, const py::handle& gradients, const py::handle& ghosts);
+/// A sequence of poses: ours, positions of shape (f, d, 3), or a list of poses.
+PoseSequence poses_of(const py::handle& poses, double frames_per_second);
+
+RestoreOptions restore_options(const std::optional<std::string>& law, bool thin_shell, std::optional<unsigned> level);
+
+} // namespace filigree::python

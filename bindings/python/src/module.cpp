@@ -1,0 +1,17 @@
+// filigree._core: what `import filigree` shows.
+//
+// Every docstring begins with the signature in the form that Python takes apart for inspect.signature and help(), so
+// pybind11's own is off; filigree/_core.pyi says the types, and a test holds the two against each other.
+#include "areas.h"
+
+PYBIND11_MODULE(_core, m) {
+    using namespace filigree::python;
+    py::options options;
+    options.disable_function_signatures();
+    m.attr("__name__") = "filigree"; // so that classes and functions are of the package, as pickles and messages say
+    for (const auto add : {add_errors, add_meshes, add_poses, add_models, add_files, add_restoring, add_warps,
+                           add_handles, add_comparing, add_sampling, add_remeshing, add_fracturing, add_bodies,
+                           add_simulation, add_scenes, add_exporting, add_pictures})
+        add(m);
+    m.attr("__name__") = "filigree._core";
+}

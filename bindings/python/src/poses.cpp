@@ -1,0 +1,176 @@
+#include "models.h"
+
+namespace filigree::python {
+
+namespace {
+
+Pose make_pose(const py::handle& positions, const py::handle& gradients, const py::handle& ghosts) {
+    Pose pose{points_of(positions, "positions"), {}, {}};
+    if (!gradients.is_none()) pose.gradients = gradients_of(gradients, "gradients");
+    if (!ghosts.is_none()) pose.ghosts = points_of(ghosts, "ghosts");
+    const auto check = [&](std::size_t count, const char* what) {
+        if (count != 0 && count != pose.positions.size())
+            refuse(ErrorCode::mismatch, "There are " + std::to_string(pose.positions.size()) + " positions and " +
+                                            std::to_string(count) + " " + what + ".");
+    };
+    check(pose.gradients.size(), "gradients");
+    check(pose.ghosts.size(), "ghosts");
+    return pose;
+}
+
+PoseSequence make_sequence(const py::object& frames, double frames_per_second, const py::object& gradients) {
+    if (!(frames_per_second > 0)) refuse("frames_per_second has to be above 0.");
+    PoseSequence sequence{frames_per_second, {}};
+    const auto count = py::len(frames);
+    if (!gradients.is_none() && py::len(gradients) != count)
+        refuse(ErrorCode::mismatch, "There are " + std::to_string(count) + " frames and gradients for " +
+                                        std::to_string(py::len(gradients)) + ".");
+    for (std::size_t k = 0; k < count; ++k) {
+        const py::object frame = frames[py::int_(k)];
+        sequence.frames.push_back(
+            pose_of(frame, gradients.is_none() ? gradients : py::object(gradients[py::int_(k)]), py::none()));
+    }
+    return sequence;
+}
+
+py::object gradients_view(const py::object& self) {
+    const Pose& pose = self.cast<const Pose&>();
+    return pose.gradients.empty() ? py::object(py::none()) : view(pose.gradients, self);
+}
+py::object ghosts_view(const py::object& self) {
+    const Pose& pose = self.cast<const Pose&>();
+    return pose.ghosts.empty() ? py::object(py::none()) : view(pose.ghosts, self);
+}
+
+py::tuple state_of(const Pose& pose) {
+    return py::make_tuple(take(std::vector(pose.positions)), take(std::vector(pose.gradients)),
+                          take(std::vector(pose.ghosts)));
+}
+Pose pose_of_state(const py::tuple& state) { return make_pose(state[0], state[1], state[2]); }
+
+/// Frames are looked at and not copied: they keep the sequence.
+py::object frame_of(const py::object& self, py::ssize_t frame) {
+    const PoseSequence& poses = self.cast<const PoseSequence&>();
+    const auto count = static_cast<py::ssize_t>(poses.frames.size());
+    if (frame < 0) frame += count;
+    if (frame < 0 || frame >= count) throw py::index_error("There are " + std::to_string(count) + " frames.");
+    return py::cast(&poses.frames[static_cast<std::size_t>(frame)], py::return_value_policy::reference_internal, self);
+}
+
+py::array_t<float> all_positions(const PoseSequence& poses) {
+    const auto frames = static_cast<py::ssize_t>(poses.frames.size());
+    const auto points = frames > 0 ? static_cast<py::ssize_t>(poses.frames[0].positions.size()) : 0;
+    std::vector<Vec3f> all;
+    all.reserve(static_cast<std::size_t>(frames * points));
+    for (const Pose& pose : poses.frames) all.insert(all.end(), pose.positions.begin(), pose.positions.end());
+    return take<float>(std::move(all), Shape{frames, points, 3});
+}
+
+} // namespace
+
+Pose pose_of(const py::handle& pose, const py::handle& gradients, const py::handle& ghosts) {
+    if (!py::isinstance<Pose>(pose)) return make_pose(pose, gradients, ghosts);
+    if (!gradients.is_none() || !ghosts.is_none())
+        refuse("A Pose holds its gradients and ghosts; leave the others out, or give positions alone.");
+    return pose.cast<const Pose&>();
+}
+
+PoseSequence poses_of(const py::handle& poses, double frames_per_second) {
+    if (py::isinstance<PoseSequence>(poses)) return poses.cast<const PoseSequence&>();
+    return make_sequence(py::reinterpret_borrow<py::object>(poses), frames_per_second, py::none());
+}
+
+void add_poses(py::module_& m) {
+    py::class_<Pose>(m, "Pose",
+                     R"(Where a driver is now, and how the space around each of its vertices is deformed.
+
+Parameters
+----------
+positions : array_like, (d, 3)
+    Of the driver's vertices, in its order, model units, relative to the mesh's `origin`.
+gradients : array_like, (d, 3, 3), optional
+    Deformation gradients, [vertex, row, column]: how a small vector at rest at that vertex has changed.
+ghosts : array_like, (d, 3), optional
+    Where the points off the surface went that `Restorer.rest_ghosts` gives.
+
+Raises
+------
+UsageError
+    Numbers that are not finite, other shapes.
+MismatchError
+    Another number of gradients or ghosts than of positions.
+
+Examples
+--------
+>>> pose = filigree.Pose(numpy.zeros((5, 3)))
+>>> pose.positions.dtype, pose.gradients
+(dtype('float32'), None)
+)")
+        .def(py::init([](const py::object& positions, const py::object& gradients, const py::object& ghosts) {
+                 return make_pose(positions, gradients, ghosts);
+             }),
+             py::arg("positions"), py::arg("gradients") = py::none(), py::arg("ghosts") = py::none(),
+             R"(__init__(self, positions, gradients=None, ghosts=None)
+--
+
+)")
+        .def_property_readonly(
+            "positions", [](const py::object& self) { return view(self.cast<const Pose&>().positions, self); },
+            "float32 (d, 3), read-only.")
+        .def_property_readonly("gradients", &gradients_view, "float32 (d, 3, 3), read-only; None without.")
+        .def_property_readonly("ghosts", &ghosts_view, "float32 (d, 3), read-only; None without.")
+        .def("__len__", [](const Pose& pose) { return pose.positions.size(); })
+        .def("__repr__",
+             [](const Pose& pose) {
+                 return "<filigree.Pose: " + std::to_string(pose.positions.size()) + " vertices" +
+                        (pose.gradients.empty() ? "" : " with gradients") + ">";
+             })
+        .def(py::pickle(&state_of, &pose_of_state));
+
+    py::class_<PoseSequence>(m, "PoseSequence", R"(Poses of one driver, moment after moment.
+
+Parameters
+----------
+frames : array_like, (f, d, 3), or sequence of Pose
+    Positions frame by frame, relative to the mesh's `origin`.
+frames_per_second : float
+    Above 0.
+gradients : array_like, (f, d, 3, 3), optional
+    Where `frames` are positions.
+
+Examples
+--------
+>>> poses = filigree.PoseSequence(numpy.zeros((24, 5, 3)), 24)
+>>> len(poses), poses[-1]
+(24, <filigree.Pose: 5 vertices>)
+)")
+        .def(py::init(&make_sequence), py::arg("frames"), py::arg("frames_per_second") = 60.0,
+             py::arg("gradients") = py::none(),
+             R"(__init__(self, frames, frames_per_second=60.0, gradients=None)
+--
+
+)")
+        .def_property_readonly(
+            "frames_per_second", [](const PoseSequence& poses) { return poses.frames_per_second; },
+            "How fast it plays.")
+        .def_property_readonly("positions", &all_positions, "All positions, a copy, float32 (f, d, 3).")
+        .def("__len__", [](const PoseSequence& poses) { return poses.frames.size(); })
+        .def("__getitem__", &frame_of, py::arg("frame"))
+        .def("__repr__",
+             [](const PoseSequence& poses) {
+                 return "<filigree.PoseSequence: " + std::to_string(poses.frames.size()) + " frames>";
+             })
+        .def(py::pickle(
+            [](const PoseSequence& poses) {
+                py::list frames;
+                for (const Pose& pose : poses.frames) frames.append(state_of(pose));
+                return py::make_tuple(poses.frames_per_second, frames);
+            },
+            [](const py::tuple& state) {
+                PoseSequence poses{state[0].cast<double>(), {}};
+                for (const py::handle frame : state[1]) poses.frames.push_back(pose_of_state(frame.cast<py::tuple>()));
+                return poses;
+            }));
+}
+
+} // namespace filigree::python

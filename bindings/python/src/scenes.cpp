@@ -1,0 +1,209 @@
+#include "models.h"
+
+#include <filigree/scene/scene_run.h>
+
+#include <pybind11/stl/filesystem.h>
+
+#include <mutex>
+
+namespace filigree::python {
+
+namespace {
+
+/// A scene with all that its run refers to; one thread moves it at a time.
+struct PyScene {
+    SceneFile file;
+    ReadyScene ready;
+    std::optional<SceneRun> run;
+    unsigned threads;
+    std::mutex mutex = {};
+
+    const ReadyBody& body(std::size_t number) const {
+        if (number >= ready.bodies.size())
+            refuse("There is no body " + std::to_string(number) + "; there are " + std::to_string(ready.bodies.size()) +
+                   ", counted from 0.");
+        return ready.bodies[number];
+    }
+};
+
+std::unique_ptr<PyScene> make_scene(const std::filesystem::path& path, bool checks, unsigned threads,
+                                    const py::object& progress) {
+    auto scene = LongCall{threads, progress}([&](const RunContext& context) {
+        auto made = std::unique_ptr<PyScene>(new PyScene{read_scene(path.string()).value(), {}, {}, threads});
+        made->ready = set_up(made->file, context).value();
+        made->run = SceneRun::create(made->file, made->ready, checks, context).value();
+        return made;
+    });
+    warn(scene->ready.warnings);
+    return scene;
+}
+
+void advance(PyScene& self, std::uint64_t frame, const py::object& progress) {
+    LongCall{self.threads, progress}([&](const RunContext& context) {
+        const std::lock_guard lock(self.mutex);
+        return self.run->advance_to(frame, context).value();
+    });
+}
+
+} // namespace
+
+void add_scenes(py::module_& m) {
+    py::class_<PyScene>(
+        m, "SceneRun",
+        R"(A scene of a TOML file (docs/scenes.md), set up and moved frame by frame; what `filigree simulate` runs.
+
+Parameters
+----------
+path : path
+checks : bool
+    Also carry every vertex by the particles and compare: dearer.
+
+Raises
+------
+NotFoundError, BadFileError
+    With file and line.
+UsageError, UnsuitableError, Cancelled
+
+Warns
+-----
+FiligreeWarning
+    What is hard to simulate.
+)")
+        .def(py::init(&make_scene), py::arg("path"), py::kw_only(), py::arg("checks") = false, py::arg("threads") = 0,
+             py::arg("progress") = py::none(),
+             R"(__init__(self, path, *, checks=False, threads=0, progress=None)
+--
+
+)")
+        .def(
+            "step", [](PyScene& self, std::uint64_t frames) { advance(self, self.run->frame() + frames, py::none()); },
+            py::arg("frames") = 1, R"(step(self, frames=1)
+--
+
+So many frames more.
+)")
+        .def("advance_to", &advance, py::arg("frame"), py::kw_only(), py::arg("progress") = py::none(),
+             R"(advance_to(self, frame, *, progress=None)
+--
+
+Simulate until so many frames are done. What was recorded before an error or Ctrl-C is whole.
+)")
+        .def_property_readonly(
+            "frame", [](const PyScene& self) { return self.run->frame(); }, "Frames done.")
+        .def_property_readonly(
+            "frames", [](const PyScene& self) { return self.file.frames; }, "As many as the file asks for.")
+        .def_property_readonly(
+            "bodies",
+            [](const PyScene& self) {
+                std::vector<std::string> names;
+                for (const ReadyBody& body : self.ready.bodies) names.push_back(body.name);
+                return names;
+            },
+            "Their names, a list of str.")
+        .def_property_readonly(
+            "origin", [](const PyScene& self) { return array_of(self.ready.origin); },
+            "What poses and meshes are relative to, m, float64 (3,).")
+        .def_property_readonly(
+            "warnings", [](const PyScene& self) { return self.run->warnings(); },
+            "What makes the motion so far doubtful, a list of sentences.")
+        .def(
+            "model",
+            [](const py::object& self, std::size_t body) {
+                const PyScene& scene = self.cast<const PyScene&>();
+                return PyModel{std::make_shared<const Model>(scene.body(body).model)};
+            },
+            py::arg("body"), R"(model(self, body)
+--
+
+The model of a body's mesh, a copy.
+)")
+        .def(
+            "poses",
+            [](PyScene& self, std::size_t body) {
+                self.body(body);
+                return without_interpreter([&] {
+                    const std::lock_guard lock(self.mutex);
+                    return self.run->recording().poses[body];
+                });
+            },
+            py::arg("body"), R"(poses(self, body)
+--
+
+The driver's poses so far, in metres, the first of the start: a PoseSequence, a copy. `restore(model(body), pose)` gives the
+mesh then, `write_model` a file that plays.
+)")
+        .def(
+            "mesh",
+            [](PyScene& self, std::size_t body, std::size_t frame) {
+                self.body(body);
+                if (frame > self.run->frame())
+                    refuse("There is no frame " + std::to_string(frame) + "; there are 0 to " +
+                           std::to_string(self.run->frame()) + ".");
+                const RunContext& context = short_context(self.threads);
+                return without_interpreter([&] {
+                    const std::lock_guard lock(self.mutex);
+                    return std::make_shared<Mesh>(self.run->mesh(body, frame, context).value());
+                });
+            },
+            py::arg("body"), py::arg("frame"), R"(mesh(self, body, frame)
+--
+
+A body's mesh in one of the frames so far, 0 the start, metres.
+)")
+        .def(
+            "energy",
+            [](PyScene& self) {
+                const Energy energy = without_interpreter([&] {
+                    const std::lock_guard lock(self.mutex);
+                    return self.run->energy();
+                });
+                py::dict said;
+                said["kinetic"] = energy.kinetic;
+                said["elastic"] = energy.elastic;
+                said["potential"] = energy.potential;
+                return said;
+            },
+            R"(energy(self)
+--
+
+'kinetic', 'elastic' and 'potential', J.
+)")
+        .def(
+            "save",
+            [](PyScene& self) {
+                return py::bytes(without_interpreter([&] {
+                    const std::lock_guard lock(self.mutex);
+                    return self.run->save();
+                }));
+            },
+            R"(save(self)
+--
+
+The state as bytes, as `filigree simulate --state` writes it.
+)")
+        .def(
+            "resume",
+            [](PyScene& self, const py::bytes& state) {
+                const std::string_view bytes(state);
+                without_interpreter([&] {
+                    const std::lock_guard lock(self.mutex);
+                    return self.run->resume(bytes, "state").value();
+                });
+            },
+            py::arg("state"), R"(resume(self, state)
+--
+
+Go on from a state of the same scene.
+
+Raises
+------
+BadFileError
+    Damaged.
+MismatchError
+    Of another scene.
+UsageError
+    Recorded with checks, and this run is without, or the other way round.
+)");
+}
+
+} // namespace filigree::python
