@@ -15,7 +15,7 @@ if(TARGET filigree_cli)
   install(DIRECTORY ${manual_pages} DESTINATION ${CMAKE_INSTALL_MANDIR} COMPONENT programs OPTIONAL)
 endif()
 
-# Debian packages, by scripts/package: the programs, the library, the development files.
+# Debian packages, by scripts/package: the programs, the library, the development files, the Python module.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME filigree)
 set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})
@@ -48,5 +48,16 @@ set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEVELOPMENT_DESCRIPTION "${PROJECT_DESCRIPTION}: headers, and what CMake and pkg-config need")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "libeigen3-dev, libtbb-dev")
 set(CPACK_COMPONENT_DEVELOPMENT_DEPENDS library)
+
+if(TARGET filigree_python)
+  list(APPEND CPACK_COMPONENTS_ALL python)
+  math(EXPR next_python "${Python3_VERSION_MINOR} + 1")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-filigree)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
+  set(CPACK_DEBIAN_PYTHON_DESCRIPTION "${PROJECT_DESCRIPTION}: the Python module")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
+      "python3 (>= 3.${Python3_VERSION_MINOR}), python3 (<< 3.${next_python}), python3-numpy")
+  set(CPACK_COMPONENT_PYTHON_DEPENDS library)
+endif()
 
 include(CPack)

@@ -100,8 +100,8 @@ py::dict info(const py::object& given, unsigned threads) {
 py::dict compare(const py::object& a, const py::object& b, std::size_t samples, unsigned threads,
                  const py::object& progress) {
     const MeshPtr first = mesh_of(a, "a"), second = mesh_of(b, "b");
-    const MeshDistance distance = LongCall{threads, progress}(
-        [&](const RunContext& context) { return mesh_distance(*first, *second, samples, context).value(); });
+    const MeshDistance distance = LongCall{threads, progress}.owning(
+        [=](const RunContext& context) { return mesh_distance(*first, *second, samples, context).value(); });
     py::dict said;
     said["diagonal_units"] = distance.diagonal;
     const auto add = [&](const std::string& key, double units) {
@@ -193,8 +193,8 @@ MismatchError
         "distances_to_surface",
         [](const py::object& a, const py::object& b, unsigned threads, const py::object& progress) {
             const MeshPtr first = mesh_of(a, "a"), second = mesh_of(b, "b");
-            return take(LongCall{threads, progress}(
-                [&](const RunContext& context) { return distances_to_surface(*first, *second, context).value(); }));
+            return take(LongCall{threads, progress}.owning(
+                [=](const RunContext& context) { return distances_to_surface(*first, *second, context).value(); }));
         },
         py::arg("a"), py::arg("b"), py::kw_only(), py::arg("threads") = 0, py::arg("progress") = py::none(),
         R"(distances_to_surface(a, b, *, threads=0, progress=None)

@@ -84,6 +84,9 @@ void add_errors(py::module_& m) {
             if (thrown) std::rethrow_exception(thrown);
         } catch (const BadResultAccess& failed) {
             raise(failed.error());
+        } catch (const py::cast_error&) { // deep inside a list, a tuple or keywords
+            PyErr_SetString(PyExc_TypeError,
+                            "Something in a list, a tuple or keywords is not of the type that belongs there.");
         } catch (const std::bad_alloc&) {
             raise({ErrorCode::out_of_memory, "There is not enough memory for this."});
         }

@@ -221,6 +221,10 @@ mesh : Mesh, or an object with vertices and faces or triangles
 positions : array_like, (f, n, 3)
     World coordinates of its vertices, frame by frame.
 path : path
+frames_per_second : float
+    Above 0.
+morph_normals : bool
+    Morph targets: normals of each frame too.
 
 Raises
 ------

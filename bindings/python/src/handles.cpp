@@ -49,7 +49,7 @@ HandleRegion make_region(const py::object& vertices, const py::object& box, cons
     if (!vertices.is_none()) region.vertices = indices_of(vertices, "vertices", kNoIndex);
     if (!box.is_none()) region.box = box_of(box);
     if (!sphere.is_none()) {
-        const auto pair = sphere.cast<py::sequence>();
+        const py::list pair(sphere);
         if (pair.size() != 2) refuse("sphere has to be a centre and a radius.");
         region.sphere = {vector_of(pair[0], "sphere"), pair[1].cast<double>()};
     }

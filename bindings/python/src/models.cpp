@@ -50,12 +50,13 @@ PyModel strip_mesh(const py::object& given, std::optional<std::size_t> base, std
         value_of<Precision>(precision, "precision", {{"float", Precision::float32}, {"int16", Precision::int16}});
     const LongCall call{threads, progress};
     if (!fidelity) {
-        Stripped stripped = call([&](const RunContext& context) { return strip(*mesh, options, context).value(); });
+        Stripped stripped =
+            call.owning([=](const RunContext& context) { return strip(*mesh, options, context).value(); });
         return {std::make_shared<const Model>(std::move(stripped.model)), report_of(stripped.report)};
     }
     const FidelityGoal goal{*fidelity, source_of(fidelity_from)};
-    StrippedToFidelity found =
-        call([&](const RunContext& context) { return strip_to_fidelity(*mesh, options, goal, context).value(); });
+    StrippedToFidelity found = call.owning(
+        [=](const RunContext& context) { return strip_to_fidelity(*mesh, options, goal, context).value(); });
     py::dict report = report_of(found.stripped.report), reached;
     reached["error"] = found.error;
     reached["asked"] = *fidelity;

@@ -3,6 +3,7 @@
 // Every docstring begins with the signature in the form that Python takes apart for inspect.signature and help(), so
 // pybind11's own is off; filigree/_core.pyi says the types, and a test holds the two against each other.
 #include "areas.h"
+#include "calls.h"
 
 PYBIND11_MODULE(_core, m) {
     using namespace filigree::python;
@@ -14,4 +15,5 @@ PYBIND11_MODULE(_core, m) {
                            add_simulation, add_scenes, add_exporting, add_pictures})
         add(m);
     m.attr("__name__") = "filigree._core";
+    py::module_::import("atexit").attr("register")(py::cpp_function(&join_left_work));
 }

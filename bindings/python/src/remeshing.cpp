@@ -85,8 +85,8 @@ py::tuple remesh(const py::object& given, std::size_t quads, std::optional<unsig
         value_of<SmallParts>(small_parts, "small_parts", {{"remove", SmallParts::remove}, {"keep", SmallParts::keep}});
     options.wrap = value_of<WrapUse>(
         wrap, "wrap", {{"auto", WrapUse::automatic}, {"never", WrapUse::never}, {"always", WrapUse::always}});
-    QuadRemeshed made = LongCall{threads, progress}(
-        [&](const RunContext& context) { return quad_remesh(*mesh, options, context).value(); });
+    QuadRemeshed made = LongCall{threads, progress}.owning(
+        [=](const RunContext& context) { return quad_remesh(*mesh, options, context).value(); });
     py::dict said = said_of(made.report, made.mesh.face_count());
     return py::make_tuple(std::make_shared<Mesh>(std::move(made.mesh)), said);
 }

@@ -240,6 +240,12 @@ Examples
 
 How far the restored mesh is expected to be from deforming every vertex, judged from the pose alone.
 
+Parameters
+----------
+model : Model
+pose : Pose, or array_like (d, 3)
+    As of `Restorer.positions`.
+
 Returns
 -------
 dict

@@ -26,7 +26,7 @@ InsideOptions inside_options(const std::string& method, const std::string& overl
 
 /// What prepares the question, and points of the world.
 struct PyInsideTest {
-    InsideTest test;
+    std::shared_ptr<const InsideTest> test;
     Vec3d origin;
 };
 
@@ -34,17 +34,19 @@ PyInsideTest make_test(const py::object& given, const std::string& method, const
                        const py::object& eye, unsigned threads, const py::object& progress) {
     const MeshPtr mesh = mesh_of(given);
     const InsideOptions options = inside_options(method, overlap, accuracy, eye, *mesh);
-    return {LongCall{threads, progress}(
-                [&](const RunContext& context) { return InsideTest::create(*mesh, options, context).value(); }),
-            mesh->origin};
+    auto test = LongCall{threads, progress}.owning([=](const RunContext& context) {
+        return std::make_shared<const InsideTest>(InsideTest::create(*mesh, options, context).value());
+    });
+    return {std::move(test), mesh->origin};
 }
 
 py::array_t<bool> ask(const PyInsideTest& self, const py::object& given, unsigned threads, const py::object& progress) {
     std::vector<Vec3d> points = double_points_of(given, "points");
-    std::vector<std::uint8_t> inside = LongCall{threads, progress}([&](const RunContext& context) {
-        for (Vec3d& point : points) point -= self.origin;
-        return self.test.contains(points, context).value();
-    });
+    for (Vec3d& point : points) point -= self.origin;
+    std::vector<std::uint8_t> inside =
+        LongCall{threads, progress}.owning([test = self.test, points = std::move(points)](const RunContext& context) {
+            return test->contains(points, context).value();
+        });
     const auto count = static_cast<py::ssize_t>(inside.size());
     return take<bool>(std::move(inside), Shape{count});
 }
@@ -59,9 +61,10 @@ py::array_t<double> sample(const py::object& given, std::optional<double> spacin
     const auto how =
         value_of<Pattern>(pattern, "pattern",
                           {{"lattice", Pattern::lattice}, {"jitter", Pattern::jitter}, {"poisson", Pattern::poisson}});
-    LatticeOptions lattice{.spacing = spacing.value_or(0)};
-    if (const auto at = optional_vector_of(origin, "origin")) lattice.origin = *at - mesh->origin;
-    return take(LongCall{threads, progress, seed}([&](const RunContext& context) {
+    LatticeOptions wanted{.spacing = spacing.value_or(0)};
+    if (const auto at = optional_vector_of(origin, "origin")) wanted.origin = *at - mesh->origin;
+    return take(LongCall{threads, progress, seed}.owning([=](const RunContext& context) {
+        LatticeOptions lattice = wanted;
         if (count) lattice.spacing = spacing_for_count(*mesh, *count, options, context).value();
         const Lattice points = make_lattice(bounds(mesh->positions), lattice).value();
         std::vector<Vec3d> inside = spread_inside(*mesh, points, how, options, context).value();
@@ -127,6 +130,8 @@ Parameters
 mesh : Mesh, or an object with vertices and faces or triangles
 points : array_like, (n, 3)
     World coordinates.
+method, overlap, accuracy
+    As of `InsideTest`.
 
 Returns
 -------

@@ -111,7 +111,7 @@ struct Attachment {
     }
 };
 
-SimulationPtr make_simulation(const py::sequence& bodies, const py::object& gravity,
+SimulationPtr make_simulation(const py::object& bodies, const py::object& gravity,
                               const std::vector<Obstacle>& obstacles, const std::vector<Pin>& pins,
                               const std::vector<RegionForce>& forces, const std::vector<Hand>& hands,
                               const py::object& wind, double air_density, double friction, double restitution,
@@ -120,7 +120,9 @@ SimulationPtr make_simulation(const py::sequence& bodies, const py::object& grav
                               bool contacts_within_bodies, bool automatic_rigid, unsigned threads) {
     std::vector<PyBody> held;
     std::vector<Actor> actors;
-    for (const py::handle given : bodies) {
+    for (const py::handle given : py::list(bodies)) {
+        if (!py::isinstance<PyActor>(given) && !py::isinstance<PyBody>(given))
+            throw py::type_error("bodies has to hold filigree.Body or filigree.Actor.");
         const PyActor actor = py::isinstance<PyActor>(given)
                                   ? given.cast<PyActor>()
                                   : make_actor(given.cast<PyBody>(), py::make_tuple(0, 0, 0), py::make_tuple(0, 1, 0),
@@ -468,7 +470,7 @@ dict
         .def_property_readonly(
             "frame", [](const PySimulation& self) { return self.simulation.frame(); }, "Frames done.")
         .def_property_readonly(
-            "time", [](const PySimulation& self) { return self.simulation.time(); }, "s.")
+            "time", [](const PySimulation& self) { return self.simulation.time(); }, "Seconds done.")
         .def_property_readonly(
             "bodies", [](const PySimulation& self) { return self.bodies; }, "A list of Body.")
         .def(

@@ -48,7 +48,10 @@ void check_number(double value, bool is_allowed, const char* wanted) {
 
 Warp chain(const py::args& warps) {
     std::vector<Warp> steps;
-    for (const py::handle warp : warps) steps.push_back(warp.cast<Warp>());
+    for (const py::handle warp : warps) {
+        if (!py::isinstance<Warp>(warp)) throw py::type_error("chain takes filigree.Warp alone.");
+        steps.push_back(warp.cast<Warp>());
+    }
     return {std::make_shared<SharedChain>(std::move(steps))};
 }
 

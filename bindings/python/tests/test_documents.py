@@ -1,0 +1,87 @@
+"""Every name has a docstring that says what it takes; every example in one runs; the types are right."""
+
+import doctest
+import inspect
+import os
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+
+import numpy
+import pytest
+
+import filigree
+
+CODE = [getattr(filigree, name) for name in filigree.__all__]
+CLASSES = [thing for thing in CODE if inspect.isclass(thing) and not issubclass(thing, BaseException)]
+METHODS = [
+    (f"{kind.__name__}.{name}", member)
+    for kind in CLASSES
+    for name, member in vars(kind).items()
+    if not name.startswith("_") or name == "__call__"
+]
+NAMED = [(thing.__name__, thing) for thing in CODE] + METHODS
+
+
+def test_everything_public_is_named():
+    assert sorted(filigree.__all__) == [name for name in dir(filigree._core) if not name.startswith("_")]
+
+
+@pytest.mark.parametrize("name, thing", NAMED, ids=[name for name, _ in NAMED])
+def test_docstrings(name, thing):
+    assert thing.__doc__ and len(thing.__doc__) > 3
+    if isinstance(thing, property) or inspect.isclass(thing):
+        return
+    thing = thing.__func__ if isinstance(thing, staticmethod) else thing
+    said = inspect.signature(thing)
+    if name in filigree.__all__ and "As of" not in thing.__doc__ and "as of" not in thing.__doc__:
+        for parameter in said.parameters.values():
+            if parameter.name not in ("path", "picture", "threads", "progress"):
+                assert parameter.name in thing.__doc__, parameter.name
+
+
+@pytest.mark.parametrize("name, thing", NAMED + [("filigree", filigree)], ids=[name for name, _ in NAMED] + ["filigree"])
+def test_examples(name, thing, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    example = doctest.DocTestParser().get_doctest(thing.__doc__, {"filigree": filigree, "numpy": numpy}, name, None, None)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        assert doctest.DocTestRunner().run(example).failed == 0
+
+
+def test_help_is_worth_reading():
+    text = subprocess.run(
+        [sys.executable, "-c", "import filigree; help(filigree.strip)"], capture_output=True, text=True, check=True
+    ).stdout
+    assert "strip(mesh, *, base=None" in text and "fraction of the diagonal" in text and "Examples" in text
+
+
+def test_stubs():
+    folder = Path(filigree.__file__).parent.parent
+    allowed = Path(__file__).parent / "stubs_allowed.txt"
+    checked = subprocess.run(
+        [sys.executable, "-m", "mypy.stubtest", "filigree", "--allowlist", str(allowed)],
+        cwd=folder,
+        env={**os.environ, "MYPYPATH": str(folder), "MYPY_CACHE_DIR": os.devnull},
+        capture_output=True,
+        text=True,
+    )
+    assert checked.returncode == 0, checked.stdout + checked.stderr
+
+
+def test_types_are_understood(tmp_path):
+    (tmp_path / "use.py").write_text(
+        "import filigree\n"
+        "model = filigree.strip(filigree.make('torus'), base=100)\n"
+        "reveal_type(filigree.Restorer(model).mesh(model.driver.vertices).vertices)\n"
+        "filigree.strip(mesh=5, bass=3)\n"
+    )
+    said = subprocess.run(
+        [sys.executable, "-m", "mypy", "--cache-dir", os.devnull, "use.py"],
+        cwd=tmp_path,
+        env={**os.environ, "MYPYPATH": str(Path(filigree.__file__).parent.parent)},
+        capture_output=True,
+        text=True,
+    ).stdout
+    assert "floating[numpy._typing._32Bit]" in said and '"bass"' in said

@@ -1,0 +1,86 @@
+"""Bodies step by step: forces of one's own, pins, hands, saved states."""
+
+import numpy
+import pytest
+
+import filigree
+from conftest import same
+
+BAR = filigree.make("bar", resolution=4)
+
+
+@pytest.fixture(scope="module")
+def body():
+    return filigree.Body(BAR, "jelly", spacing=0.25)
+
+
+def test_forces_of_ones_own(body):
+    simulation = filigree.Simulation([body], gravity=(0, 0, 0))
+    simulation.set_forces(0, body.mass[:, None] * [0, 3.0, 0])
+    simulation.step(30)
+    linear, _ = simulation.momentum()
+    lost = body.material.damping * 0.5
+    assert linear[1] == pytest.approx(body.mass.sum() * 1.5, rel=lost)
+    simulation.set_forces(0, None)
+    before = simulation.momentum()[0][1]
+    simulation.step()
+    assert simulation.momentum()[0][1] <= before
+
+
+def test_pins_hold_and_move(body):
+    held = numpy.flatnonzero(body.rest[:, 0] < body.rest[:, 0].min() + 1e-4)
+    motion = filigree.RigidMotion([0, 1], move=[[0, 0, 0], [0, 0.5, 0]])
+    simulation = filigree.Simulation([body], pins=[filigree.Pin(0, held, motion)])
+    simulation.step(60)
+    assert abs(simulation.positions(0)[held] - body.rest[held] - [0, 0.5, 0]).max() < 1e-5
+
+
+def test_hands_pull(body):
+    simulation = filigree.Simulation([body], gravity=(0, 0, 0))
+    simulation.set_hands([filigree.Hand(0, (2, 0, 0), (3, 0, 0))])
+    simulation.step(90)
+    assert simulation.positions(0).mean(0)[0] > 0.3
+
+
+def test_saved_states_go_on_with_the_same_bytes(body):
+    floor = filigree.Obstacle.plane((0, -0.6, 0))
+    simulation = filigree.Simulation([body], obstacles=[floor])
+    simulation.step(5)
+    state = simulation.save()
+    wanted = (simulation.step(10), simulation.positions(0))[1]
+    for threads in (1, 2):
+        other = filigree.Simulation([body], obstacles=[floor], threads=threads)
+        other.restore(state)
+        other.step(10)
+        assert same(other.positions(0), wanted)
+    with pytest.raises(filigree.BadFileError):
+        simulation.restore(state[:-5])
+    assert same(simulation.positions(0), wanted)
+
+
+def test_what_is_wrong_is_said(body):
+    simulation = filigree.Simulation([body])
+    for call in (
+        lambda: simulation.positions(1),
+        lambda: simulation.set_forces(0, numpy.zeros((3, 3))),
+        lambda: simulation.set_velocities(2, body.rest),
+        lambda: filigree.Simulation([]),
+        lambda: filigree.Simulation([body], pins=[filigree.Pin(4, [0])]),
+        lambda: filigree.Simulation([body], pins=[filigree.Pin(0, [10**9])]),
+        lambda: filigree.Simulation([body], frames_per_second=-1),
+        lambda: filigree.Simulation([body], obstacles=[filigree.Obstacle.ball((0, 0, 0), -1)]),
+        lambda: simulation.step(0),
+    ):
+        with pytest.raises(filigree.UsageError):
+            call()
+
+
+def test_actors_and_obstacles(body):
+    ball = filigree.Obstacle.mesh(filigree.make("wavy-sphere", resolution=16), friction=0.2)
+    moved = filigree.Actor(body, move=(0, 3, 0), axis=(0, 0, 1), degrees=90, velocity=(0, -1, 0), spin=(0, 1, 0))
+    simulation = filigree.Simulation([moved], obstacles=[ball, filigree.Obstacle.box((0, -2, 0), (9, 1, 9))])
+    assert abs(simulation.positions(0).mean(0) - [0, 3, 0]).max() < 1e-3
+    assert simulation.momentum()[0][1] == pytest.approx(-body.mass.sum(), rel=1e-3)
+    energy = simulation.energy()
+    simulation.step(40)
+    assert simulation.energy()["potential"] < energy["potential"]
