@@ -8,7 +8,7 @@ import numpy
 
 import filigree
 
-mesh = filigree.make("torus", resolution=64)
+mesh = filigree.make("torus", resolution=32)
 spacing = 0.02
 middles = filigree.sample(mesh, spacing=spacing)  # of the elements
 print(len(middles), "elements")

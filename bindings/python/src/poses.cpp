@@ -21,15 +21,13 @@ Pose make_pose(const py::handle& positions, const py::handle& gradients, const p
 PoseSequence make_sequence(const py::object& frames, double frames_per_second, const py::object& gradients) {
     if (!(frames_per_second > 0)) refuse("frames_per_second has to be above 0.");
     PoseSequence sequence{frames_per_second, {}};
-    const auto count = py::len(frames);
-    if (!gradients.is_none() && py::len(gradients) != count)
-        refuse(ErrorCode::mismatch, "There are " + std::to_string(count) + " frames and gradients for " +
-                                        std::to_string(py::len(gradients)) + ".");
-    for (std::size_t k = 0; k < count; ++k) {
-        const py::object frame = frames[py::int_(k)];
+    const py::list each(frames), of_each(gradients.is_none() ? py::object(py::list()) : gradients);
+    if (!gradients.is_none() && of_each.size() != each.size())
+        refuse(ErrorCode::mismatch, "There are " + std::to_string(each.size()) + " frames and gradients for " +
+                                        std::to_string(of_each.size()) + ".");
+    for (std::size_t k = 0; k < each.size(); ++k)
         sequence.frames.push_back(
-            pose_of(frame, gradients.is_none() ? gradients : py::object(gradients[py::int_(k)]), py::none()));
-    }
+            pose_of(each[k], gradients.is_none() ? py::object(py::none()) : py::object(of_each[k]), py::none()));
     return sequence;
 }
 
