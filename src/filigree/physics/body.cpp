@@ -22,6 +22,8 @@ constexpr double kMostFieldPoints = 0x1p25;
 /// Spacings. Between points of its grid the field sees as little as a quarter of a spacing in a part that is one thick.
 constexpr float kSheetDepth = 0.2f, kSheetRadius = 0.4f;
 
+bool uses_centroids(MaterialModel model) { return model == MaterialModel::meshfree || model == MaterialModel::mpm; }
+
 /// Particles at the corners: each cell gives an eighth of its mass to each of its corners.
 void use_corners(Body& body) {
     const Cells& cells = body.cells;
@@ -68,7 +70,8 @@ std::vector<std::uint8_t> find_spread(const Cells& cells, const RunContext& cont
 /// One particle a cell, or eight where one would have no gradient. Returns how many cells have eight.
 std::size_t use_centroids(Body& body, const RunContext& context) {
     const Cells& cells = body.cells;
-    const std::vector<std::uint8_t> spread = find_spread(cells, context);
+    std::vector<std::uint8_t> spread(cells.cells.size(), 1);
+    if (body.material.model == MaterialModel::meshfree) spread = find_spread(cells, context);
     const auto split = std::size_t(std::count(spread.begin(), spread.end(), 0));
     body.rest = Vectors(cells.cells.size() + 7 * split);
     body.volume.resize(body.rest.size());
@@ -91,7 +94,7 @@ std::size_t use_centroids(Body& body, const RunContext& context) {
 /// Fills rest, volume and mass. Returns how many cells were split.
 std::size_t make_particles(Body& body, const RunContext& context) {
     std::size_t split = 0;
-    if (body.material.model == MaterialModel::meshfree)
+    if (uses_centroids(body.material.model))
         split = use_centroids(body, context);
     else
         use_corners(body);
@@ -101,12 +104,13 @@ std::size_t make_particles(Body& body, const RunContext& context) {
 }
 
 Embedding embed_surface(std::span<const Vec3f> points, const Body& body, const RunContext& context) {
-    return body.material.model == MaterialModel::meshfree ? embed(points, body.rest, body.spacing(), context)
-                                                          : embed_in_cells(points, body.cells, context);
+    return uses_centroids(body.material.model) ? embed(points, body.rest, body.spacing(), context)
+                                               : embed_in_cells(points, body.cells, context);
 }
 
 /// What make_particles would make.
 std::size_t count_particles(const Cells& cells, MaterialModel model, const RunContext& context) {
+    if (model == MaterialModel::mpm) return cells.cells.size();
     if (model != MaterialModel::meshfree) return cells.corners.size();
     const std::vector<std::uint8_t> spread = find_spread(cells, context);
     return cells.cells.size() + 7 * std::size_t(std::count(spread.begin(), spread.end(), 0));
@@ -198,7 +202,7 @@ double field_spacing(const Body& body) {
 
 /// The distance from the surface at rest. A mesh whose inside is thinner than cells can see counts as a sheet.
 Status add_field(Body& body, const Mesh& mesh, const RunContext& context) {
-    if (body.material.model == MaterialModel::meshfree) return Success{};
+    if (uses_centroids(body.material.model)) return Success{};
     RunContext quiet = context;
     quiet.progress = nullptr;
     Result<DistanceField> field = DistanceField::create(mesh, body.scale, field_spacing(body), quiet);

@@ -25,8 +25,8 @@ struct Body {
     Material material;
     double scale = 1; ///< metres a model unit
     Cells cells;
-    /// fem, springs: the corners of the cells. meshfree: one in each cell, at the centroid of its occupied part (and
-    /// eight in a cell whose neighbours lie in a plane or line, so that gradients exist everywhere).
+    /// fem, springs: the corners of the cells. meshfree, mpm: one in each cell, at the centroid of its occupied part
+    /// (and, meshfree, eight in a cell whose neighbours lie in a plane or line, so that gradients exist everywhere).
     Vectors rest;
     std::vector<float> mass;   ///< kg
     std::vector<float> volume; ///< m^3: occupied, shared out as the mass is

@@ -23,8 +23,9 @@ struct RigidPose {
 
 struct BodyState {
     std::shared_ptr<const Body> body;
-    std::size_t actor = 0;                    ///< that it belongs to: a piece, to the one that broke
-    bool is_absent = false;                   ///< a body that has broken, or a piece of one that has not
+    std::size_t actor = 0;   ///< that it belongs to: a piece, to the one that broke
+    bool is_absent = false;  ///< a body that has broken, a piece of one that has not, or one on the grid
+    bool is_on_grid = false; ///< of the model mpm: moved by mpm::Bodies; it has no elasticity
     std::shared_ptr<const BrokenBody> broken; ///< of a body that breaks: its pieces ...
     std::size_t first_piece = 0;              ///< ... and the first of their numbers
     std::unique_ptr<Elasticity> elasticity;
@@ -52,10 +53,12 @@ struct BodyState {
     bool has_flowed() const { return !flow.empty(); }
 };
 
-/// Calls visit(body, number, particle) for a particle of a body, or of one that has broken for each of its copies.
+/// Calls visit(body, number, particle) for a particle of a body, or of one that has broken for each of its copies; of
+/// one on the grid not at all.
 template <class State, class Visit>
 void each_copy(std::span<State> bodies, std::size_t body, Index particle, const Visit& visit) {
     const BodyState& whole = bodies[body];
+    if (whole.is_on_grid) return;
     if (!whole.is_absent) return visit(bodies[body], body, particle);
     for (const CornerCopy& copy : whole.broken->copies_of(particle))
         visit(bodies[whole.first_piece + copy.piece], whole.first_piece + copy.piece, copy.corner);

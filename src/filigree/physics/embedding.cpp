@@ -425,4 +425,34 @@ void move_embedded(const Embedding& embedding, const Vectors& rest, const Vector
     });
 }
 
+void fit_embedded(const Embedding& embedding, const Vectors& rest, const Vectors& positions, std::span<Vec3f> points,
+                  std::span<Mat3f> gradients, const RunContext& context) {
+    parallel_for(context, points.size(), kEmbeddingGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t p = begin; p < end; ++p) {
+            const std::span<const Index> around =
+                std::span(embedding.particles)
+                    .subspan(embedding.offsets[p], embedding.offsets[p + 1] - embedding.offsets[p]);
+            points[p] = embedding.rest[p];
+            gradients[p].setIdentity();
+            if (around.empty()) continue;
+            Vec3d from = Vec3d::Zero(), to = Vec3d::Zero();
+            for (const Index j : around) {
+                from += rest[j].cast<double>() / double(around.size());
+                to += positions[j].cast<double>() / double(around.size());
+            }
+            Mat3d moments = Mat3d::Zero(), moved = Mat3d::Zero();
+            for (const Index j : around) {
+                const Vec3d arm = rest[j].cast<double>() - from;
+                moments += arm * arm.transpose();
+                moved += (positions[j].cast<double>() - to) * arm.transpose();
+            }
+            const double scale = moments.trace();
+            Mat3d gradient = Mat3d::Identity();
+            if (scale > 0 && moments.determinant() > 1e-6 * scale * scale * scale) gradient = moved * moments.inverse();
+            gradients[p] = gradient.cast<float>();
+            points[p] = (to + gradient * (embedding.rest[p].cast<double>() - from)).cast<float>();
+        }
+    });
+}
+
 } // namespace filigree

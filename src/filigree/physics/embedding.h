@@ -50,4 +50,9 @@ void move_embedded(const Embedding& embedding, const Vectors& rest, const Vector
                    std::span<const Mat3f> particle_gradients, std::span<Vec3f> points, std::span<Mat3f> gradients,
                    const RunContext& context);
 
+/// The same from positions alone: the affine motion that fits those of each point's particles best. For particles that
+/// have no gradients.
+void fit_embedded(const Embedding& embedding, const Vectors& rest, const Vectors& positions, std::span<Vec3f> points,
+                  std::span<Mat3f> gradients, const RunContext& context);
+
 } // namespace filigree

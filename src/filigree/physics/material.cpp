@@ -31,8 +31,11 @@ std::string check_material(const Material& material) {
     if (!is_positive(material.viscosity)) return "The viscosity must be above 0 Pa s.";
     if (!std::isfinite(material.heating)) return "The heating must be a number (K/s).";
     if (!is_not_negative(material.conductivity)) return "The conductivity must be 0 m^2/s or more.";
-    if (material.model != MaterialModel::meshfree && (material.is_plastic() || material.melts()))
-        return "Only the meshfree model yields and melts; take it, or leave yield stress and melting out.";
+    if (!is_positive(material.specific_heat)) return "The specific heat must be above 0 J/(kg K).";
+    if (!is_not_negative(material.latent_heat)) return "The latent heat must be 0 J/kg or more.";
+    if (material.model != MaterialModel::meshfree && material.model != MaterialModel::mpm &&
+        (material.is_plastic() || material.melts()))
+        return "Only the models meshfree and mpm yield and melt; take one, or leave yield stress and melting out.";
     return "";
 }
 

@@ -6,8 +6,8 @@ namespace filigree {
 
 namespace {
 
-// The name of the format, its version last. 4: with what is near bodies.
-constexpr std::uint64_t kMagic = 0x34455441'54534c46; // "FLSTATE4"
+// The name of the format, its version last. 5: with bodies on the grid.
+constexpr std::uint64_t kMagic = 0x35455441'54534c46; // "FLSTATE5"
 static_assert(sizeof(Contacts::NearMemory) == 5 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
 static_assert(sizeof(MatterContacts::SideMemory) == 6 * sizeof(Index), "padding would be saved");
 static_assert(sizeof(MatterContacts::PairMemory) == 4 * sizeof(Index) + 3 * sizeof(Vec3f), "padding would be saved");
@@ -104,6 +104,7 @@ std::string write_saved_state(const SavedState& state) {
     writer.value(std::uint64_t(state.bodies.size()));
     for (const SavedBody& body : state.bodies) write_body(writer, body);
     write_contacts(writer, state.contacts);
+    writer.array(std::span(state.grid));
     for (const CrackMemory& cracks : state.cracks) {
         writer.value(cracks.is_open);
         writer.array(std::span(cracks.links));
@@ -122,6 +123,8 @@ Result<SavedState> read_saved_state(std::string_view bytes) {
     state.bodies.resize(reader.count(sizeof(std::uint64_t)));
     for (SavedBody& body : state.bodies) body = read_body(reader);
     state.contacts = read_contacts(reader);
+    const std::vector<char> grid = reader.array<char>();
+    state.grid.assign(grid.begin(), grid.end());
     while (reader.ok() && !reader.at_end()) {
         CrackMemory& cracks = state.cracks.emplace_back();
         cracks.is_open = reader.value<std::uint32_t>();

@@ -30,6 +30,7 @@ struct SavedState {
     std::uint64_t frame = 0;
     std::vector<SavedBody> bodies;
     Contacts::Memory contacts;
+    std::string grid;                ///< mpm::Bodies::state
     std::vector<CrackMemory> cracks; ///< of bodies that break
 };
 

@@ -26,15 +26,13 @@ Status check_options(const StepOptions& options) {
     return Success{};
 }
 
-BodyState begin_body(const Actor& actor, std::size_t number, bool meets_bodies, const RunContext& context) {
+/// Everything that is the same for a body whether it is stepped by itself or on the grid.
+BodyState place_body(const Actor& actor, std::size_t number) {
     BodyState state;
     state.body = actor.body;
     state.actor = number;
     const Body& body = *actor.body;
     const std::size_t count = body.particle_count();
-    state.elasticity = make_elasticity(body, context);
-    state.forces = Vectors(count);
-    state.rest_squared_frequency = state.elasticity->forces(body.rest, state.forces, context).squared_frequency;
     state.positions = state.velocities = Vectors(count);
     for (std::size_t i = 0; i < count; ++i)
         state.positions.set(i, (actor.placement * body.rest[i].cast<double>()).cast<float>());
@@ -42,6 +40,16 @@ BodyState begin_body(const Actor& actor, std::size_t number, bool meets_bodies, 
     for (std::size_t i = 0; i < count; ++i)
         state.velocities.set(
             i, (actor.velocity + actor.spin.cross(state.positions[i].cast<double>() - centre)).cast<float>());
+    return state;
+}
+
+BodyState begin_body(const Actor& actor, std::size_t number, bool meets_bodies, const RunContext& context) {
+    BodyState state = place_body(actor, number);
+    const Body& body = *actor.body;
+    const std::size_t count = body.particle_count();
+    state.elasticity = make_elasticity(body, context);
+    state.forces = Vectors(count);
+    state.rest_squared_frequency = state.elasticity->forces(body.rest, state.forces, context).squared_frequency;
     state.fixed.assign(count, 0);
     state.inverse_mass.resize(count);
     for (std::size_t i = 0; i < count; ++i) state.inverse_mass[i] = 1 / body.mass[i];
@@ -56,6 +64,20 @@ BodyState begin_body(const Actor& actor, std::size_t number, bool meets_bodies, 
     state.ball_radius = kBallRadius * float(body.spacing());
     embed_surface_at_rest(state, meets_bodies && body.material.model == MaterialModel::meshfree, context);
     return state;
+}
+
+BodyState begin_on_grid(SimulationState& state, const Actor& actor, std::size_t number) {
+    BodyState body = place_body(actor, number);
+    body.is_on_grid = body.is_absent = true;
+    body.fixed.assign(body.positions.size(), 0);
+    body.inverse_mass.assign(body.positions.size(), 0);
+    state.grid->set_positions(number, body.positions);
+    state.grid->set_velocities(number, body.velocities);
+    Mat3f turning;
+    turning << 0, -float(actor.spin.z()), float(actor.spin.y()), float(actor.spin.z()), 0, -float(actor.spin.x()),
+        -float(actor.spin.y()), float(actor.spin.x()), 0;
+    state.grid->set_velocity_gradient(number, turning);
+    return body;
 }
 
 /// Bodies that are too small or too stiff for explicit steps are made rigid; those of one kind go on sharing theirs.
@@ -100,6 +122,11 @@ void begin_bodies(SimulationState& state, std::vector<Actor>& actors, const RunC
     AutomaticRigid automatic(state.world, state.options, actors);
     for (Actor& actor : actors) {
         const std::size_t number = state.bodies.size();
+        if (state.grid->has(number)) {
+            state.bodies.push_back(begin_on_grid(state, actor, number));
+            state.why_rigid.emplace_back();
+            continue;
+        }
         BodyState body = begin_body(actor, number, actors.size() > 1, context);
         state.why_rigid.push_back(automatic.reason(number, body));
         if (!state.why_rigid.back().empty()) {
@@ -143,6 +170,7 @@ void begin_pins(SimulationState& state) {
         }
         body.is_held = true;
     }
+    state.grid->begin_pins();
     move_pins(state, 0, 0);
 }
 
@@ -225,6 +253,9 @@ Result<FrameReport> step_frame(SimulationState& state, const SavedState& start, 
         report.why_descent = cause;
         step_by_descent(state, reached, until, report, context);
     }
+    state.grid->advance(from, until, report, context);
+    for (BodyState& body : state.bodies)
+        if (body.is_on_grid) state.grid->read(body.actor, body.positions, body.velocities);
     if (context.is_cancelled()) return cancelled_error();
     if (const std::size_t held = hold_lost_particles(state)) {
         report.clamped_particles += held;
@@ -252,6 +283,7 @@ Result<Simulation> Simulation::create(World world, std::vector<Actor> actors, co
     for (const Actor& actor : actors)
         if (actor.fracture) count += actor.fracture->body->pieces.size();
     auto state = std::make_unique<SimulationState>(std::move(world), count, actors.size(), options);
+    state->grid = std::make_unique<mpm::Bodies>(state->world, actors);
     begin_bodies(*state, actors, context);
     begin_pieces(*state, actors, context);
     for (const RegionForce& force : state->world.forces)
@@ -302,6 +334,7 @@ Status Simulation::set_positions(std::size_t body, const Vectors& positions) {
     if (Status checked = check_vectors(body, positions, "positions"); !checked) return checked;
     state_->bodies[body].positions = positions;
     if (state_->bodies[body].rigid) fit_pose(state_->bodies[body]);
+    if (state_->bodies[body].is_on_grid) state_->grid->set_positions(body, positions);
     state_->contacts.begin_anew();
     return Success{};
 }
@@ -309,6 +342,7 @@ Status Simulation::set_velocities(std::size_t body, const Vectors& velocities) {
     if (Status checked = check_vectors(body, velocities, "velocities"); !checked) return checked;
     state_->bodies[body].velocities = velocities;
     if (state_->bodies[body].rigid) fit_pose(state_->bodies[body]);
+    if (state_->bodies[body].is_on_grid) state_->grid->set_velocities(body, velocities);
     return Success{};
 }
 Status Simulation::check_count(std::size_t body, const Vectors& vectors, const char* what) const {
@@ -323,12 +357,15 @@ Status Simulation::check_count(std::size_t body, const Vectors& vectors, const c
 }
 Status Simulation::check_vectors(std::size_t body, const Vectors& vectors, const char* what) const {
     if (Status checked = check_count(body, vectors, what); !checked) return checked;
-    if (state_->bodies[body].is_absent) return usage("Body " + std::to_string(body) + " has broken.");
+    if (state_->bodies[body].is_absent && !state_->bodies[body].is_on_grid)
+        return usage("Body " + std::to_string(body) + " has broken.");
     return Success{};
 }
 
 Status Simulation::set_hands(std::vector<Hand> hands, const RunContext& context) {
     if (Status checked = check_hands(hands, body_count()); !checked) return checked;
+    for (const Hand& hand : hands)
+        if (state_->bodies[hand.body].is_on_grid) return usage("Hands do not hold bodies of the model mpm.");
     for (const Cracks& cracks : state_->cracks)
         if (!cracks.is_open()) cracks.follow_whole(state_->bodies);
     state_->external.set_grips(make_grips(hands, *state_, context));
@@ -339,6 +376,8 @@ Status Simulation::set_hands(std::vector<Hand> hands, const RunContext& context)
 Status Simulation::set_forces(std::size_t body, const Vectors& newtons) {
     if (newtons.size() > 0 || body >= body_count())
         if (Status checked = check_count(body, newtons, "forces"); !checked) return checked;
+    if (state_->bodies[body].is_on_grid && newtons.size() > 0)
+        return usage("Forces on single particles do not act on bodies of the model mpm.");
     for (std::size_t i = 0; i < newtons.size(); ++i)
         if (!newtons[i].allFinite())
             return usage("The force on particle " + std::to_string(i) + " of body " + std::to_string(body) +
@@ -350,25 +389,28 @@ Status Simulation::set_forces(std::size_t body, const Vectors& newtons) {
 Energy Simulation::energy(const RunContext& context) const {
     Energy energy;
     for (const BodyState& body : state_->bodies) {
-        if (body.is_absent) continue;
-        energy.elastic += body.elasticity->energy(body.positions, context);
+        if (body.is_absent && !body.is_on_grid) continue;
+        if (!body.is_on_grid) energy.elastic += body.elasticity->energy(body.positions, context);
         for (std::size_t i = 0; i < body.positions.size(); ++i) {
             const double mass = double(body.body->mass[i]);
             energy.kinetic += 0.5 * mass * body.velocities[i].cast<double>().squaredNorm();
             energy.potential -= mass * state_->world.gravity.dot(body.positions[i].cast<double>());
         }
     }
+    energy.elastic += state_->grid->elastic_energy();
+    energy.kinetic += state_->grid->affine_energy();
     return energy;
 }
 
 Momentum Simulation::momentum() const {
     Momentum momentum;
     for (const BodyState& body : state_->bodies) {
-        if (body.is_absent) continue;
+        if (body.is_absent && !body.is_on_grid) continue;
         const RigidState state = rigid_state(body);
         momentum.linear += state.linear;
         momentum.angular += state.angular + state.centre.cross(state.linear);
     }
+    momentum.angular += state_->grid->affine_momentum();
     return momentum;
 }
 
@@ -387,12 +429,27 @@ std::size_t Simulation::attach(std::size_t body, std::span<const Vec3f> points, 
     return attach(body, points, numbers, context);
 }
 
+/// Points go on from where the particles that were around them at rest have them now.
+std::size_t Simulation::attach_on_grid(std::size_t body, std::span<const Vec3f> points, const RunContext& context) {
+    const BodyState& state = state_->bodies[body];
+    const Embedding around = embed(points, state.body->rest, state.body->spacing(), context);
+    std::vector<Vec3f> places(points.size());
+    std::vector<Mat3f> gradients(points.size());
+    fit_embedded(around, state.body->rest, state.positions, places, gradients, context);
+    state_->first_tracers.push_back(state_->grid->add_tracers(body, places, gradients));
+    state_->attachments.push_back({body, {points.begin(), points.end()}, {}, {}});
+    state_->followers.emplace_back();
+    return state_->attachments.size() - 1;
+}
+
 std::size_t Simulation::attach(std::size_t body, std::span<const Vec3f> points, std::span<const Index> pieces,
                                const RunContext& context) {
     assert(body < body_count());
     const BodyState& state = state_->bodies[body];
+    if (state.is_on_grid) return attach_on_grid(body, points, context);
     assert(pieces.size() == (state.broken ? points.size() : 0));
     state_->attachments.push_back(filigree::attach(state, body, points, context));
+    state_->first_tracers.push_back(0);
     std::vector<PieceFollower>& followers = state_->followers.emplace_back();
     if (state.broken) {
         std::vector<Index> numbers;
@@ -405,12 +462,28 @@ std::size_t Simulation::attach(std::size_t body, std::span<const Vec3f> points, 
     return state_->attachments.size() - 1;
 }
 
+void Simulation::renewal(std::size_t attachment, std::span<float> renewal) const {
+    assert(attachment < state_->attachments.size());
+    if (state_->bodies[state_->attachments[attachment].body].is_on_grid)
+        state_->grid->read_renewal(state_->first_tracers[attachment], renewal);
+    else
+        std::ranges::fill(renewal, 0.0f);
+}
+
+MatterParticles Simulation::matter(std::size_t body) const {
+    assert(body < body_count());
+    return state_->bodies[body].is_on_grid ? state_->grid->matter(body) : MatterParticles{};
+}
+double Simulation::heat() const { return state_->grid->heat(); }
+
 void Simulation::attached(std::size_t attachment, std::span<Vec3f> points, std::span<Mat3f> gradients,
                           const RunContext& context) const {
     assert(attachment < state_->attachments.size());
     const Attachment& which = state_->attachments[attachment];
     const BodyState& body = state_->bodies[which.body];
-    if (body.is_absent)
+    if (body.is_on_grid)
+        state_->grid->read_tracers(state_->first_tracers[attachment], points, gradients);
+    else if (body.is_absent)
         move_followers(state_->followers[attachment], *state_->cracks_of(which.body), state_->bodies, points, gradients,
                        context);
     else

@@ -4,6 +4,7 @@
 #include "filigree/physics/body.h"
 #include "filigree/physics/elasticity.h"
 #include "filigree/physics/fracture.h"
+#include "filigree/physics/matter_particles.h"
 #include "filigree/physics/world.h"
 
 namespace filigree {
@@ -128,6 +129,13 @@ public:
     void attached(std::size_t attachment, std::span<Vec3f> points, std::span<Mat3f> gradients,
                   const RunContext& context) const;
 
+    /// How far the matter around attached points is new: 0 as it was at the start, 1 molten or kneaded through; it
+    /// never falls. Of bodies that are not of mpm 0. As many as were attached.
+    void renewal(std::size_t attachment, std::span<float> renewal) const;
+    /// The particles of a body of mpm; of others none.
+    MatterParticles matter(std::size_t body) const;
+    double heat() const; ///< J in bodies of mpm, from 0 K
+
     /// Everything that moves, as bytes (docs/scenes.md), and back. Errors: bad_file (damaged), mismatch (of other
     /// bodies).
     std::string save() const;
@@ -136,6 +144,7 @@ public:
 private:
     explicit Simulation(std::unique_ptr<SimulationState> state);
     Status check_count(std::size_t body, const Vectors& vectors, const char* what) const;
+    std::size_t attach_on_grid(std::size_t body, std::span<const Vec3f> points, const RunContext& context);
     Status check_vectors(std::size_t body, const Vectors& vectors, const char* what) const;
     std::unique_ptr<SimulationState> state_;
 };

@@ -83,6 +83,7 @@ SavedState save_state(const SimulationState& state) {
         if (state.bodies[attachment.body].has_flowed())
             saved.bodies[attachment.body].attachments.push_back({attachment.embedding.rest, attachment.gradients});
     saved.contacts = state.contacts.memory();
+    saved.grid = state.grid->state();
     for (const Cracks& cracks : state.cracks) saved.cracks.push_back(cracks.memory());
     return saved;
 }
@@ -116,6 +117,9 @@ Status restore_state(SimulationState& state, SavedState saved) {
         body.flow = std::move(from.flow);
         if (!restore_points(body, from, state.attachments_of(b), had_flowed, context)) return other;
     }
+    if (!state.grid->restore_state(saved.grid)) return other;
+    for (BodyState& body : state.bodies)
+        if (body.is_on_grid) state.grid->read(body.actor, body.positions, body.velocities);
     for (const Cracks& cracks : state.cracks) cracks.show_whole(state.bodies);
     if (!state.contacts.set_memory(saved.contacts, state.bodies)) return damaged;
     state.frame = saved.frame;

@@ -4,6 +4,7 @@
 #include "filigree/physics/contact.h"
 #include "filigree/physics/cracks.h"
 #include "filigree/physics/external_forces.h"
+#include "filigree/physics/mpm.h"
 #include "filigree/physics/piece_followers.h"
 #include "filigree/physics/saved_state.h"
 #include "filigree/physics/simulation.h"
@@ -28,7 +29,9 @@ struct SimulationState {
     std::vector<Cracks> cracks;         ///< of bodies that break
     Contacts contacts;
     ExternalForces external;
+    std::unique_ptr<mpm::Bodies> grid; ///< of bodies of mpm; never null
     std::vector<Attachment> attachments;
+    std::vector<std::size_t> first_tracers; ///< of each attachment: its points on the grid, where it is of such a body
     std::vector<std::vector<PieceFollower>> followers; ///< of each attachment; empty: its body does not break
     std::vector<std::vector<Vec3f>> pinned_from;       ///< of each pin: where its particles were at the start
     std::size_t frame = 0;                             ///< frames done

@@ -61,6 +61,8 @@ struct Obstacle {
     /// 0 .. 1: speed of a hard point after the bounce over that before. A soft body bounces by its own elasticity too.
     double restitution = 0.5;
     double stiffness = 1; ///< above 0, to 1: of the contact; less for ground that is softer than the bodies
+    Keyed<double> temperature{{}, {}, 293}; ///< K, above 0; of what bodies of mpm touch
+    double heat_transfer = 0;               ///< W/(m^2 K), 0 or more: heat that it exchanges with them
 };
 
 /// Distance and outward normal of an obstacle that stands at `motion` (its RigidMotion at some time). World, m.
@@ -89,6 +91,13 @@ struct Hand {
     double from = 0, until = std::numeric_limits<double>::infinity(); ///< s
 };
 
+/// Something that warms bodies of mpm: matter in a ball takes up its power, shared out by mass.
+struct HeatSource {
+    Ball ball;
+    Keyed<Vec3d> move{{}, {}, Vec3d::Zero()}; ///< m
+    Keyed<double> power{{}, {}, 0};           ///< W; below 0 it cools
+};
+
 /// How two bodies touch.
 struct PairContact {
     double friction = 0.3;    ///< Coulomb's coefficient, 0 or more
@@ -102,9 +111,12 @@ struct BodyPair {
 };
 
 struct World {
-    Vec3d gravity = {0, -9.81, 0};            ///< m/s^2
-    Keyed<Vec3d> wind{{}, {}, Vec3d::Zero()}; ///< m/s
-    double air_density = 0;                   ///< kg/m^3: wind presses by 1/2 density |v| v on the area that faces it
+    Vec3d gravity = {0, -9.81, 0};              ///< m/s^2
+    Keyed<Vec3d> wind{{}, {}, Vec3d::Zero()};   ///< m/s
+    double air_density = 0;                     ///< kg/m^3: wind presses by 1/2 density |v| v on the area that faces it
+    Keyed<double> air_temperature{{}, {}, 293}; ///< K, above 0
+    double air_heat_transfer = 0;               ///< W/(m^2 K), 0 or more: between the air and bodies of mpm
+    std::vector<HeatSource> heat_sources;
     std::vector<Obstacle> obstacles;
     std::vector<Pin> pins;
     std::vector<RegionForce> forces;

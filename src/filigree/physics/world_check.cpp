@@ -1,11 +1,15 @@
 // What a world and its actors must be before anything moves: checked once, each complaint with the name of its place.
 #include "filigree/physics/simulation.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace filigree {
 
 namespace {
+
+constexpr double kLeastTemperature = std::numeric_limits<double>::min(); ///< K
 
 /// Keeps the first thing that is wrong.
 class Checker {
@@ -20,13 +24,24 @@ public:
         require(std::isfinite(value) && value >= least, place, what);
     }
 
+    /// least: of each value.
+    void keys(const Keyed<double>& keyed, double least, const std::string& place) {
+        times(keyed, place);
+        const auto is_right = [&](double value) { return std::isfinite(value) && value >= least; };
+        require((!keyed.times.empty() || is_right(keyed.constant)) && std::ranges::all_of(keyed.values, is_right), place,
+                least > 0 ? "must be above 0 K" : "must be finite");
+    }
     void keys(const Keyed<Vec3d>& keyed, const std::string& place) {
         finite(keyed.constant, place + ".constant");
+        times(keyed, place);
+        for (const Vec3d& value : keyed.values) finite(value, place + ".values");
+    }
+    template <class T>
+    void times(const Keyed<T>& keyed, const std::string& place) {
         require(keyed.values.size() == keyed.times.size(), place + ".values", "must be as many as its times");
         for (std::size_t k = 0; k < keyed.times.size(); ++k)
             require(std::isfinite(keyed.times[k]) && (k == 0 || keyed.times[k - 1] <= keyed.times[k]), place + ".times",
                     "must be finite and ascend");
-        for (const Vec3d& value : keyed.values) finite(value, place + ".values");
     }
     void motion(const RigidMotion& motion, const std::string& place) {
         finite(motion.centre, place + ".centre");
@@ -93,6 +108,8 @@ public:
         at_least(obstacle.friction, 0, place + ".friction", "must be 0 or more");
         require(obstacle.restitution >= 0 && obstacle.restitution <= 1, place + ".restitution", "must be from 0 to 1");
         require(obstacle.stiffness > 0 && obstacle.stiffness <= 1, place + ".stiffness", "must be above 0, to 1");
+        keys(obstacle.temperature, kLeastTemperature, place + ".temperature");
+        at_least(obstacle.heat_transfer, 0, place + ".heat_transfer", "must be 0 W/(m^2 K) or more");
     }
     void hand(const Hand& hand, const std::string& place) {
         body(hand.body, place);
@@ -136,6 +153,15 @@ Status check_world(const World& world, std::span<const Actor> actors) {
         check.at_least(pair.contact.friction, 0, place + ".contact.friction", "must be 0 or more");
         check.require(pair.contact.restitution >= 0 && pair.contact.restitution <= 1, place + ".contact.restitution",
                       "must be from 0 to 1");
+    }
+    check.keys(world.air_temperature, kLeastTemperature, "world.air_temperature");
+    check.at_least(world.air_heat_transfer, 0, "world.air_heat_transfer", "must be 0 W/(m^2 K) or more");
+    for (std::size_t s = 0; s < world.heat_sources.size(); ++s) {
+        const HeatSource& source = world.heat_sources[s];
+        const std::string place = numbered("world.heat_sources", s);
+        check.shape(source.ball, place + ".ball");
+        check.keys(source.move, place + ".move");
+        check.keys(source.power, std::numeric_limits<double>::lowest(), place + ".power");
     }
     for (std::size_t o = 0; o < world.obstacles.size(); ++o)
         check.obstacle(world.obstacles[o], numbered("world.obstacles", o));

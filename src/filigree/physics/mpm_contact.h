@@ -1,0 +1,56 @@
+// What the nodes of the material point method meet: obstacles, and matter of other bodies; and what warms particles.
+// Private to the layer.
+#pragma once
+
+#include "filigree/physics/mpm_grid.h"
+#include "filigree/physics/obstacle_motion.h"
+#include "filigree/physics/world.h"
+
+namespace filigree::mpm {
+
+/// Bodies that are cold slide on each other, by Coulomb's law, and part again; where there is matter that has melted
+/// they are one.
+class NodeContacts {
+public:
+    /// Before nodes have velocities: looks at masses alone. actors: of each body of the grid.
+    NodeContacts(const Grid& grid, const World& world, std::span<const std::size_t> actors, const RunContext& context);
+
+    /// Places of blocks, each with the blocks of all bodies there.
+    std::size_t place_count() const { return first_block_.size() - 1; }
+    std::span<const std::uint32_t> blocks(std::size_t place) const {
+        return std::span(blocks_).subspan(first_block_[place], first_block_[place + 1] - first_block_[place]);
+    }
+    /// Changes the nodes' velocities.
+    void act(Grid& grid, const ObstaclePoses& poses, const RunContext& context) const;
+
+private:
+    void meet_bodies(Grid& grid, std::size_t place) const;
+    void meet_obstacles(Grid& grid, std::size_t place, const ObstaclePoses& poses) const;
+
+    const World& world_;
+    std::span<const std::size_t> actors_;
+    std::vector<std::uint32_t> blocks_, first_block_;
+    std::vector<std::vector<Vec3f>> normals_; ///< of each place: of nodes with several bodies, one a body; outward
+};
+
+/// Heat that comes and goes over the matter's surface, and from sources.
+class HeatExchange {
+public:
+    HeatExchange(const World& world, double time, float dt, float grid_spacing, std::span<const Particle> particles);
+
+    /// emptiness: gradient of the share of space that is full, 1/m; its norm is the surface in a unit of volume.
+    void act(Particle& particle, const Matter& matter, const Vec3f& emptiness, const ObstaclePoses& poses) const;
+
+private:
+    const World& world_;
+    double time_;
+    float dt_, grid_spacing_, air_temperature_;
+    std::vector<float> obstacle_temperature_; ///< K; of those that exchange heat
+    struct Source {
+        Vec3f centre;
+        float squared_radius, watts_a_kilogram;
+    };
+    std::vector<Source> sources_;
+};
+
+} // namespace filigree::mpm

@@ -1,0 +1,70 @@
+// A particle of the material point method, and how its matter answers. Private to the layer.
+// Based on:
+// [Hu 2018] A moving least squares material point method with displacement discontinuity and two-way rigid body
+//           coupling
+// [Simo 1988] the isochoric return map, with the elastic left Cauchy-Green tensor in place of gradients
+#pragma once
+
+#include "filigree/core/lanes.h"
+#include "filigree/core/types.h"
+#include "filigree/physics/material.h"
+
+namespace filigree::mpm {
+
+using Float4 = Lanes<4>::Float;
+
+/// Two cache lines.
+struct alignas(16) Particle {
+    float x[3], mass;   ///< m, kg
+    float v[3], volume; ///< m/s; m^3 at rest
+    float c[3][4];      ///< columns of the velocity's gradient, 1/s; fourth: J, plastic strain, enthalpy (J/kg)
+    float b[6];         ///< elastic left Cauchy-Green tensor of determinant 1: xx, yy, zz, xy, xz, yz
+    float renewal;      ///< 0: as it was at the start, 1: new matter; never falls
+    float melted;       ///< 1: has been fluid, and has grown together with whatever it met
+    float warming[3];   ///< gradient of the temperature, K/m
+    float unused;
+
+    float volume_ratio() const { return c[0][3]; }
+    float& volume_ratio() { return c[0][3]; }
+    float plastic_strain() const { return c[1][3]; }
+    float& plastic_strain() { return c[1][3]; }
+    float enthalpy() const { return c[2][3]; }
+    float& enthalpy() { return c[2][3]; }
+};
+static_assert(sizeof(Particle) == 128);
+
+/// A material as the particles' loop wants it.
+class Matter {
+public:
+    explicit Matter(const Material& material);
+
+    /// K, of so much enthalpy, J/kg (0 at 0 K).
+    float temperature(float enthalpy) const;
+    float enthalpy(float temperature) const;
+    float liquid(float enthalpy) const; ///< 0 solid .. 1 fluid
+
+    float density() const { return density_; }
+    float damping() const { return damping_; }
+    float heating() const { return heating_; }
+    float specific_heat() const { return specific_heat_; }
+    float heat_conductivity() const { return diffusivity_ * density_ * specific_heat_; } ///< W/(m K)
+    bool has_heat() const { return has_heat_; }
+
+    /// s, the longest step that is stable on a grid of this spacing, m; without what moves.
+    float longest_step(float grid_spacing) const;
+    /// Viscosity is limited to what steps a quarter as long as elasticity's can carry, on this grid.
+    void limit_viscosity(float grid_spacing);
+
+    /// Volume times Kirchhoff stress (J/m^3 m^3) of the particle: xx, yy, zz, xy, xz, yz.
+    void stress(const Particle& particle, float stress[6]) const;
+    /// What the particle remembers after a step dt in which c was the velocity's gradient.
+    void deform(Particle& particle, float dt) const;
+    double energy(const Particle& particle) const; ///< J, elastic
+
+private:
+    float density_, bulk_, shear_, yield_, viscosity_, damping_;
+    float melting_from_, melting_to_, specific_heat_, latent_heat_, diffusivity_, heating_;
+    bool melts_, has_heat_;
+};
+
+} // namespace filigree::mpm
