@@ -85,3 +85,15 @@ def test_types_are_understood(tmp_path):
         text=True,
     ).stdout
     assert "floating[numpy._typing._32Bit]" in said and '"bass"' in said
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/python.md"])
+def test_pages(page, tmp_path, monkeypatch):
+    """What pages show runs, block after block."""
+    root = Path(__file__).resolve().parents[3]
+    monkeypatch.chdir(tmp_path)
+    blocks = (root / page).read_text().split("```python\n")[1:]
+    assert blocks
+    names = {}
+    for block in blocks:
+        exec(block.split("```")[0], names)
