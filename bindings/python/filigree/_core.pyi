@@ -79,6 +79,7 @@ class Actor:
 
 class Attachment:
     def pose(self) -> Pose: ...
+    def renewal(self) -> _Floats: ...
     def __len__(self) -> int: ...
 
 class Body:
@@ -185,6 +186,17 @@ class HandleSolver:
     ) -> Pose: ...
     def reset(self) -> None: ...
 
+class HeatSource:
+    def __init__(
+        self,
+        centre: ArrayLike,
+        radius: float,
+        power: ArrayLike,
+        times: ArrayLike | None = None,
+        *,
+        move: ArrayLike | None = None,
+    ) -> None: ...
+
 class InsideTest:
     def __init__(
         self,
@@ -231,6 +243,10 @@ class Material:
     def heating(self) -> float: ...
     @property
     def conductivity(self) -> float: ...
+    @property
+    def specific_heat(self) -> float: ...
+    @property
+    def latent_heat(self) -> float: ...
     def __eq__(self, other: object) -> bool: ...
     __hash__: None  # type: ignore[assignment]
 
@@ -315,6 +331,8 @@ class Obstacle:
         friction: float = 0.5,
         restitution: float = 0.5,
         stiffness: float = 1.0,
+        temperature: float = 293.0,
+        heat_transfer: float = 0.0,
     ) -> Obstacle: ...
     @staticmethod
     def ball(
@@ -325,6 +343,8 @@ class Obstacle:
         friction: float = 0.5,
         restitution: float = 0.5,
         stiffness: float = 1.0,
+        temperature: float = 293.0,
+        heat_transfer: float = 0.0,
     ) -> Obstacle: ...
     @staticmethod
     def box(
@@ -335,6 +355,8 @@ class Obstacle:
         friction: float = 0.5,
         restitution: float = 0.5,
         stiffness: float = 1.0,
+        temperature: float = 293.0,
+        heat_transfer: float = 0.0,
     ) -> Obstacle: ...
     @staticmethod
     def mesh(
@@ -346,6 +368,8 @@ class Obstacle:
         friction: float = 0.5,
         restitution: float = 0.5,
         stiffness: float = 1.0,
+        temperature: float = 293.0,
+        heat_transfer: float = 0.0,
         threads: int = 0,
         progress: _Progress | None = None,
     ) -> Obstacle: ...
@@ -472,6 +496,9 @@ class Simulation:
         hands: Sequence[Hand] = ...,
         wind: ArrayLike = ...,
         air_density: float = 0.0,
+        air_temperature: float = 293.0,
+        air_heat_transfer: float = 0.0,
+        heat_sources: Sequence[HeatSource] = ...,
         friction: float = 0.3,
         restitution: float = 0.7,
         frames_per_second: float = 60.0,
@@ -498,6 +525,8 @@ class Simulation:
     def set_velocities(self, body: int, velocities: ArrayLike) -> None: ...
     def set_forces(self, body: int, newtons: ArrayLike | None) -> None: ...
     def set_hands(self, hands: Sequence[Hand]) -> None: ...
+    def matter(self, body: int) -> dict[str, _Floats]: ...
+    def heat(self) -> float: ...
     def attach(self, body: int, what: Model | ArrayLike) -> Attachment: ...
     def energy(self) -> dict[str, float]: ...
     def momentum(self) -> tuple[_Doubles, _Doubles]: ...

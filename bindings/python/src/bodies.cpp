@@ -10,7 +10,7 @@ namespace filigree::python {
 namespace {
 
 const char* model_name(MaterialModel model) {
-    constexpr const char* names[] = {"fem", "springs", "meshfree", "rigid"};
+    constexpr const char* names[] = {"fem", "springs", "meshfree", "rigid", "mpm"};
     return names[static_cast<std::size_t>(model)];
 }
 MaterialModel model_of_name(const std::string& name) {
@@ -18,7 +18,8 @@ MaterialModel model_of_name(const std::string& name) {
                                    {{"fem", MaterialModel::fem},
                                     {"springs", MaterialModel::springs},
                                     {"meshfree", MaterialModel::meshfree},
-                                    {"rigid", MaterialModel::rigid}});
+                                    {"rigid", MaterialModel::rigid},
+                                    {"mpm", MaterialModel::mpm}});
 }
 
 /// The numbers of a material, by the names of C++.
@@ -37,6 +38,8 @@ constexpr std::pair<const char*, double Material::*> kQuantities[] = {
     {"viscosity", &Material::viscosity},
     {"heating", &Material::heating},
     {"conductivity", &Material::conductivity},
+    {"specific_heat", &Material::specific_heat},
+    {"latent_heat", &Material::latent_heat},
 };
 
 Material make_material(const std::string& name, const py::kwargs& changes) {
@@ -110,9 +113,10 @@ Parameters
 name : str
     What to begin with: one of `materials()`.
 **changes : float or str
-    What is otherwise: model ('fem', 'springs', 'meshfree' or 'rigid'), density (kg/m^3), young_modulus (Pa),
-    poisson_ratio (0 to 0.49), damping (1/s), internal_damping (s), bending; of meshfree ones yield_stress (Pa),
-    creep_time (s), temperature, melting_from and melting_to (K), viscosity (Pa s), heating (K/s), conductivity (m^2/s).
+    What is otherwise: model ('fem', 'springs', 'meshfree', 'rigid' or 'mpm'), density (kg/m^3), young_modulus (Pa),
+    poisson_ratio (0 to 0.49), damping (1/s), internal_damping (s), bending; of 'meshfree' and 'mpm' yield_stress (Pa),
+    creep_time (s), temperature, melting_from and melting_to (K), viscosity (Pa s), heating (K/s), conductivity (m^2/s); of
+    'mpm' specific_heat (J/(kg K)), latent_heat (J/kg).
 
 Raises
 ------
@@ -132,7 +136,7 @@ Examples
 )")
         .def_property_readonly(
             "model", [](const Material& self) { return model_name(self.model); },
-            "'fem', 'springs', 'meshfree' or 'rigid'.")
+            "'fem', 'springs', 'meshfree', 'rigid' or 'mpm'.")
         .def(
             "__eq__", [](const Material& self, const Material& other) { return self == other; }, py::is_operator())
         .def(py::pickle(

@@ -19,6 +19,22 @@ Keyed<Vec3d> keyed_of(const py::object& values, const py::object& times, const c
     return keyed;
 }
 
+HeatSource make_heat_source(const py::object& centre, double radius, const py::object& power, const py::object& times,
+                            const py::object& move) {
+    HeatSource source{{vector_of(centre, "centre"), radius}, {}, {}};
+    if (times.is_none()) {
+        source.power.constant = power.cast<double>();
+    } else {
+        source.power.times = double_values_of(times, "times");
+        source.power.values = double_values_of(power, "power");
+        if (source.power.times.size() != source.power.values.size())
+            refuse("There are " + std::to_string(source.power.times.size()) + " times and " +
+                   std::to_string(source.power.values.size()) + " of power.");
+    }
+    source.move = move.is_none() ? Keyed<Vec3d>{{}, {}, Vec3d::Zero()} : keyed_of(move, times, "move");
+    return source;
+}
+
 RigidMotion make_motion(const py::object& times, const py::object& move, const py::object& degrees,
                         const py::object& centre) {
     RigidMotion motion;
@@ -52,13 +68,16 @@ PyActor make_actor(const PyBody& body, const py::object& move, const py::object&
 }
 
 template <class Shape>
-Obstacle make_obstacle(Shape shape, const RigidMotion& motion, double friction, double restitution, double stiffness) {
+Obstacle make_obstacle(Shape shape, const RigidMotion& motion, double friction, double restitution, double stiffness,
+                       double temperature, double heat_transfer) {
     Obstacle obstacle;
     obstacle.shape = std::move(shape);
     obstacle.motion = motion;
     obstacle.friction = friction;
     obstacle.restitution = restitution;
     obstacle.stiffness = stiffness;
+    obstacle.temperature.constant = temperature;
+    obstacle.heat_transfer = heat_transfer;
     return obstacle;
 }
 
@@ -114,10 +133,12 @@ struct Attachment {
 SimulationPtr make_simulation(const py::object& bodies, const py::object& gravity,
                               const std::vector<Obstacle>& obstacles, const std::vector<Pin>& pins,
                               const std::vector<RegionForce>& forces, const std::vector<Hand>& hands,
-                              const py::object& wind, double air_density, double friction, double restitution,
-                              double frames_per_second, const std::string& mode, unsigned most_substeps,
-                              unsigned descent_substeps, unsigned descent_iterations, bool contacts_between_bodies,
-                              bool contacts_within_bodies, bool automatic_rigid, unsigned threads) {
+                              const py::object& wind, double air_density, double air_temperature,
+                              double air_heat_transfer, const std::vector<HeatSource>& heat_sources, double friction,
+                              double restitution, double frames_per_second, const std::string& mode,
+                              unsigned most_substeps, unsigned descent_substeps, unsigned descent_iterations,
+                              bool contacts_between_bodies, bool contacts_within_bodies, bool automatic_rigid,
+                              unsigned threads) {
     std::vector<PyBody> held;
     std::vector<Actor> actors;
     for (const py::handle given : py::list(bodies)) {
@@ -134,6 +155,9 @@ SimulationPtr make_simulation(const py::object& bodies, const py::object& gravit
     world.gravity = vector_of(gravity, "gravity");
     world.wind.constant = vector_of(wind, "wind");
     world.air_density = air_density;
+    world.air_temperature.constant = air_temperature;
+    world.air_heat_transfer = air_heat_transfer;
+    world.heat_sources = heat_sources;
     world.obstacles = obstacles;
     world.pins = pins;
     world.forces = forces;
@@ -238,29 +262,32 @@ Made by `Obstacle.plane`, `Obstacle.ball`, `Obstacle.box` and `Obstacle.mesh`.
 )");
     const auto add = [&](const char* name, auto make, auto first, auto second, const char* text) {
         obstacle.def_static(name, make, first, second, py::kw_only(), py::arg("motion") = RigidMotion{},
-                            py::arg("friction") = 0.5, py::arg("restitution") = 0.5, py::arg("stiffness") = 1.0, text);
+                            py::arg("friction") = 0.5, py::arg("restitution") = 0.5, py::arg("stiffness") = 1.0,
+                            py::arg("temperature") = 293.0, py::arg("heat_transfer") = 0.0, text);
     };
     add(
         "plane",
         [](const py::object& point, const py::object& normal, const RigidMotion& motion, double friction,
-           double restitution, double stiffness) {
+           double restitution, double stiffness, double temperature, double heat_transfer) {
             return make_obstacle(HalfSpace{vector_of(point, "point"), vector_of(normal, "normal")}, motion, friction,
-                                 restitution, stiffness);
+                                 restitution, stiffness, temperature, heat_transfer);
         },
         py::arg("point") = py::make_tuple(0, 0, 0), py::arg("normal") = py::make_tuple(0, 1, 0),
-        R"(plane(point=(0, 0, 0), normal=(0, 1, 0), *, motion=..., friction=0.5, restitution=0.5, stiffness=1.0)
+        R"(plane(point=(0, 0, 0), normal=(0, 1, 0), *, motion=..., friction=0.5, restitution=0.5, stiffness=1.0, temperature=293.0, heat_transfer=0.0)
 --
 
-Solid below a plane. `friction`: Coulomb's coefficient; `restitution`: 0 to 1; `stiffness` of the contact: above 0, to 1.
+Solid below a plane. `friction`: Coulomb's coefficient; `restitution`: 0 to 1; `stiffness` of the contact: above 0,
+to 1; `temperature` (K) and `heat_transfer` (W/(m^2 K)): of what bodies of 'mpm' touch.
 )");
     add(
         "ball",
         [](const py::object& centre, double radius, const RigidMotion& motion, double friction, double restitution,
-           double stiffness) {
-            return make_obstacle(Ball{vector_of(centre, "centre"), radius}, motion, friction, restitution, stiffness);
+           double stiffness, double temperature, double heat_transfer) {
+            return make_obstacle(Ball{vector_of(centre, "centre"), radius}, motion, friction, restitution, stiffness,
+                                 temperature, heat_transfer);
         },
         py::arg("centre"), py::arg("radius"),
-        R"(ball(centre, radius, *, motion=..., friction=0.5, restitution=0.5, stiffness=1.0)
+        R"(ball(centre, radius, *, motion=..., friction=0.5, restitution=0.5, stiffness=1.0, temperature=293.0, heat_transfer=0.0)
 --
 
 A ball; m. The others as of `plane`.
@@ -268,12 +295,12 @@ A ball; m. The others as of `plane`.
     add(
         "box",
         [](const py::object& centre, const py::object& size, const RigidMotion& motion, double friction,
-           double restitution, double stiffness) {
+           double restitution, double stiffness, double temperature, double heat_transfer) {
             return make_obstacle(Cuboid{vector_of(centre, "centre"), vector_of(size, "size")}, motion, friction,
-                                 restitution, stiffness);
+                                 restitution, stiffness, temperature, heat_transfer);
         },
         py::arg("centre"), py::arg("size"),
-        R"(box(centre, size, *, motion=..., friction=0.5, restitution=0.5, stiffness=1.0)
+        R"(box(centre, size, *, motion=..., friction=0.5, restitution=0.5, stiffness=1.0, temperature=293.0, heat_transfer=0.0)
 --
 
 A box along the axes before its motion; m. The others as of `plane`.
@@ -281,19 +308,21 @@ A box along the axes before its motion; m. The others as of `plane`.
     obstacle.def_static(
         "mesh",
         [](const py::object& given, double scale, double spacing, const RigidMotion& motion, double friction,
-           double restitution, double stiffness, unsigned threads, const py::object& progress) {
+           double restitution, double stiffness, double temperature, double heat_transfer, unsigned threads,
+           const py::object& progress) {
             const MeshPtr mesh = mesh_of(given);
             auto field = LongCall{threads, progress}([&](const RunContext& context) {
                 return std::make_shared<const DistanceField>(
                     DistanceField::create(*mesh, scale, spacing, context).value());
             });
             return make_obstacle(MeshObstacle{std::move(field), scale * mesh->origin}, motion, friction, restitution,
-                                 stiffness);
+                                 stiffness, temperature, heat_transfer);
         },
         py::arg("mesh"), py::arg("scale") = 1.0, py::kw_only(), py::arg("spacing") = 0.0,
         py::arg("motion") = RigidMotion{}, py::arg("friction") = 0.5, py::arg("restitution") = 0.5,
-        py::arg("stiffness") = 1.0, py::arg("threads") = 0, py::arg("progress") = py::none(),
-        R"(mesh(mesh, scale=1.0, *, spacing=0.0, motion=..., friction=0.5, restitution=0.5, stiffness=1.0, threads=0, progress=None)
+        py::arg("stiffness") = 1.0, py::arg("temperature") = 293.0, py::arg("heat_transfer") = 0.0,
+        py::arg("threads") = 0, py::arg("progress") = py::none(),
+        R"(mesh(mesh, scale=1.0, *, spacing=0.0, motion=..., friction=0.5, restitution=0.5, stiffness=1.0, temperature=293.0, heat_transfer=0.0, threads=0, progress=None)
 --
 
 A mesh, `scale` metres a model unit, as a field of distances with this `spacing` (m; 0: a 64th of the longest side).
@@ -370,6 +399,27 @@ begin, end : float
 --
 
 )");
+    py::class_<HeatSource>(m, "HeatSource",
+                           R"(Something that warms bodies of 'mpm': matter in a ball takes up its power.
+
+Parameters
+----------
+centre : array_like, (3,)
+radius : float
+    World, m.
+power : float, or array_like (k,) with `times`
+    W; below 0 it cools.
+times : array_like, (k,), optional
+    Seconds, ascending; linear between.
+move : array_like, (3,), or (k, 3) with `times`, optional
+    Of the ball, m.
+)")
+        .def(py::init(&make_heat_source), py::arg("centre"), py::arg("radius"), py::arg("power"),
+             py::arg("times") = py::none(), py::kw_only(), py::arg("move") = py::none(),
+             R"(__init__(self, centre, radius, power, times=None, *, move=None)
+--
+
+)");
     py::class_<PyActor>(m, "Actor",
                         R"(A body and how it starts: turned about its mesh's origin, then moved from where its mesh is.
 
@@ -403,6 +453,22 @@ void add_simulation(py::module_& m) {
 
 Where they are now, with gradients from rest to there: a Pose, of a driver in model units, of points in metres.
 )")
+        .def(
+            "renewal",
+            [](const Attachment& self) {
+                std::vector<float> renewal(self.count);
+                self.simulation->alone([&] {
+                    self.simulation->simulation.renewal(self.number, renewal);
+                    return Success{};
+                });
+                return take(std::move(renewal));
+            },
+            R"(renewal(self)
+--
+
+How far the matter around each point is new, float32 (n,): 0 as it was at the start, 1 molten or kneaded through. Of bodies
+that are not of 'mpm' 0.
+)")
         .def("__len__", [](const Attachment& self) { return self.count; });
 
     py::class_<PySimulation, SimulationPtr>(
@@ -417,6 +483,9 @@ gravity, wind : array_like, (3,)
 obstacles, pins, forces, hands : sequence of Obstacle, Pin, Force, Hand
 air_density : float
     kg/m^3: how hard the wind presses.
+air_temperature, air_heat_transfer : float
+    K and W/(m^2 K): heat between the air and bodies of 'mpm'.
+heat_sources : sequence of HeatSource
 friction, restitution : float
     Where bodies touch each other.
 frames_per_second : float
@@ -448,12 +517,13 @@ Examples
             py::init(&make_simulation), py::arg("bodies"), py::kw_only(),
             py::arg("gravity") = py::make_tuple(0, -9.81, 0), py::arg("obstacles") = py::tuple(),
             py::arg("pins") = py::tuple(), py::arg("forces") = py::tuple(), py::arg("hands") = py::tuple(),
-            py::arg("wind") = py::make_tuple(0, 0, 0), py::arg("air_density") = 0.0, py::arg("friction") = 0.3,
+            py::arg("wind") = py::make_tuple(0, 0, 0), py::arg("air_density") = 0.0, py::arg("air_temperature") = 293.0,
+            py::arg("air_heat_transfer") = 0.0, py::arg("heat_sources") = py::tuple(), py::arg("friction") = 0.3,
             py::arg("restitution") = 0.7, py::arg("frames_per_second") = 60.0, py::arg("mode") = "auto",
             py::arg("most_substeps") = 256, py::arg("descent_substeps") = 4, py::arg("descent_iterations") = 8,
             py::arg("contacts_between_bodies") = true, py::arg("contacts_within_bodies") = true,
             py::arg("automatic_rigid") = true, py::arg("threads") = 0,
-            R"(__init__(self, bodies, *, gravity=(0, -9.81, 0), obstacles=(), pins=(), forces=(), hands=(), wind=(0, 0, 0), air_density=0.0, friction=0.3, restitution=0.7, frames_per_second=60.0, mode='auto', most_substeps=256, descent_substeps=4, descent_iterations=8, contacts_between_bodies=True, contacts_within_bodies=True, automatic_rigid=True, threads=0)
+            R"(__init__(self, bodies, *, gravity=(0, -9.81, 0), obstacles=(), pins=(), forces=(), hands=(), wind=(0, 0, 0), air_density=0.0, air_temperature=293.0, air_heat_transfer=0.0, heat_sources=(), friction=0.3, restitution=0.7, frames_per_second=60.0, mode='auto', most_substeps=256, descent_substeps=4, descent_iterations=8, contacts_between_bodies=True, contacts_within_bodies=True, automatic_rigid=True, threads=0)
 --
 
 )")
@@ -562,6 +632,32 @@ UsageError
 --
 
 Hands that pull from now on, in place of those there were: a sequence of Hand.
+)")
+        .def(
+            "matter",
+            [](PySimulation& self, std::size_t body) {
+                self.checked(body);
+                MatterParticles matter = self.alone([&] { return self.simulation.matter(body); });
+                py::dict said;
+                said["positions"] = take(std::move(matter.positions));
+                said["volumes"] = take(std::move(matter.volumes));
+                said["temperatures"] = take(std::move(matter.temperatures));
+                said["liquid"] = take(std::move(matter.liquid));
+                said["renewal"] = take(std::move(matter.renewal));
+                return said;
+            },
+            py::arg("body"), R"(matter(self, body)
+--
+
+The particles of a body of 'mpm', dict of arrays (none in them for others): 'positions' (world, m), 'volumes' (m^3),
+'temperatures' (K), 'liquid' (0 solid to 1 fluid), 'renewal' (0 as it was at the start to 1 new).
+)")
+        .def(
+            "heat", [](PySimulation& self) { return self.alone([&] { return self.simulation.heat(); }); },
+            R"(heat(self)
+--
+
+In bodies of 'mpm', J, from 0 K.
 )")
         .def("attach", &attach, py::arg("body"), py::arg("what"), R"(attach(self, body, what)
 --

@@ -194,7 +194,7 @@ def test_nothing_leaks(tmp_path):
         lambda: filigree.compare(mesh, mesh, samples=10),
         lambda: (simulation.step(), driver.pose(), simulation.positions(0)),
         lambda: simulation.restore(simulation.save()),
-        lambda: filigree.Body(box, "clay", particles=8),
+        lambda: filigree.Body(box, "jelly", particles=8),
         lambda: pickle.loads(pickle.dumps((model, mesh, restorer))),
         lambda: (filigree.write_mesh(mesh, file), filigree.read_mesh(file)),
         lambda: (filigree.write_model(model, model_file), filigree.read_model(model_file)),

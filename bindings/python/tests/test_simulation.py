@@ -84,3 +84,19 @@ def test_actors_and_obstacles(body):
     energy = simulation.energy()
     simulation.step(40)
     assert simulation.energy()["potential"] < energy["potential"]
+
+
+def test_matter_melts():
+    wax = filigree.Material("wax", model="mpm", temperature=310)
+    block = filigree.make("bar", resolution=2, length=1, size=0.2)
+    body = filigree.Body(block, wax, particles=200)
+    lamp = filigree.HeatSource((0, 0, 0), 1, 5e5)
+    floor = filigree.Obstacle.plane((0, -0.2, 0), temperature=350, heat_transfer=100)
+    simulation = filigree.Simulation([body], obstacles=[floor], heat_sources=[lamp])
+    heat, cold = simulation.heat(), simulation.matter(0)
+    assert len(cold["positions"]) == len(body) and cold["liquid"].max() == 0 and abs(cold["temperatures"] - 310).max() < 1
+    points = simulation.attach(0, block.vertices)
+    simulation.step(20)
+    warm = simulation.matter(0)
+    assert simulation.heat() > heat and warm["temperatures"].min() > 311 and warm["liquid"].mean() > 0.1
+    assert len(points.renewal()) == len(block.vertices)
