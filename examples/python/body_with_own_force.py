@@ -48,5 +48,5 @@ assert turn > 10
 
 # %%
 twisted = filigree.restore(model, poses[-1])
-filigree.write_picture(filigree.render(twisted, width=640, height=480), "whirl.png")
+filigree.write_picture(filigree.render(twisted, width=640, height=480, passes=8), "whirl.png")
 filigree.write_model(model, "whirl.fil", poses=filigree.PoseSequence(poses, 60))

@@ -38,4 +38,4 @@ assert error < 1e-3
 
 # %%
 filigree.write_animation(mesh, frames, "wave.pc2", frames_per_second=24)
-filigree.write_picture(filigree.render(mesh.with_vertices(frames[10]), width=640, height=480), "wave.png")
+filigree.write_picture(filigree.render(mesh.with_vertices(frames[10]), width=640, height=480, passes=8), "wave.png")

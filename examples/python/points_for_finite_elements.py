@@ -56,5 +56,5 @@ assert abs(numpy.median(heat[abs(middles[:, 0]) < spacing]) - 0.5) < 0.02
 
 # %%
 nearest = numpy.array([((middles - v) ** 2).sum(1).argmin() for v in mesh.vertices])
-picture = filigree.render(mesh, scalars=heat[nearest], up="z", width=640, height=480)
+picture = filigree.render(mesh, scalars=heat[nearest], up="z", width=640, height=480, passes=8)
 filigree.write_picture(picture, "heat.png")

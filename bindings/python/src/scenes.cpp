@@ -104,7 +104,13 @@ Simulate until so many frames are done. What was recorded before an error or Ctr
             "origin", [](const PyScene& self) { return array_of(self.ready.origin); },
             "What poses and meshes are relative to, m, float64 (3,).")
         .def_property_readonly(
-            "warnings", [](const PyScene& self) { return self.run->warnings(); },
+            "warnings",
+            [](PyScene& self) {
+                return without_interpreter([&] {
+                    const std::lock_guard lock(self.mutex);
+                    return self.run->warnings();
+                });
+            },
             "What makes the motion so far doubtful, a list of sentences.")
         .def(
             "model",
