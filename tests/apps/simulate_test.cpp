@@ -423,11 +423,14 @@ TEST_F(Simulate, TheManualShowsEveryKey) {
 TEST_F(Simulate, KeysThatDoNothingForAModelAreRefused) {
     for (const std::string key : {"yield_stress", "creep_time", "temperature", "melting_from", "melting_to",
                                   "viscosity", "heating", "conductivity"}) {
-        const std::string needle = "'" + key + "' in [[body]] is for model = \"meshfree\", and this body's is \"";
+        const std::string models = key == "creep_time" ? "\"meshfree\"" : "\"meshfree\" or \"mpm\"";
+        const std::string needle = "'" + key + "' in [[body]] is for model = " + models + ", and this body's is \"";
         refused(kBody + key + " = 1\n", {"bad.toml:3: " + needle + "fem\"."});
         refused(kBody + "material = \"lattice\"\n" + key + " = 1\n", {"bad.toml:4: " + needle + "springs\"."});
         refused(kBody + "material = \"wax\"\nmodel = \"fem\"\n" + key + " = 1\n", {"bad.toml:5: " + needle});
     }
+    for (const std::string key : {"specific_heat", "latent_heat"})
+        refused(kBody + "material = \"clay\"\n" + key + " = 1\n", {"bad.toml:4:", "'" + key + "'", "\"mpm\""});
     refused(kBody + "bending = 0.1\n", {"bad.toml:3:", "'bending'", "\"springs\"", "\"fem\""});
     refused(kBody + "material = \"clay\"\nbending = 0.1\n", {"bad.toml:4:", "'bending'", "\"meshfree\""});
     refused(kBody + "material = \"lattice\"\npoisson_ratio = 0.25\n",

@@ -34,7 +34,7 @@ Bodies::Bodies(const World& world, std::span<const Actor> actors)
         field_of_[a] = Index(matter_.size());
         first_.push_back(particles_.size());
         actor_of_field_.push_back(a);
-        matter_.emplace_back(body.material);
+        matter_.emplace_back(body.material, world.heat_pace);
         has_heat_ |= matter_.back().has_heat();
         spacing_ = std::max(spacing_, float(body.spacing()));
         const float enthalpy = matter_.back().enthalpy(float(body.material.temperature));

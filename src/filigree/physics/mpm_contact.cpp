@@ -172,7 +172,7 @@ HeatExchange::HeatExchange(const World& world, double time, float dt, float grid
         double mass = 0;
         for (const Particle& p : particles)
             if ((Vec3f(p.x[0], p.x[1], p.x[2]) - centre).squaredNorm() < squared_radius) mass += double(p.mass);
-        if (mass > 0) sources_.push_back({centre, squared_radius, float(watts / mass)});
+        if (mass > 0) sources_.push_back({centre, squared_radius, float(watts * world.heat_pace / mass)});
     }
 }
 
@@ -182,7 +182,7 @@ void HeatExchange::act(Particle& p, const Matter& matter, const Vec3f& emptiness
     const float temperature = matter.temperature(p.enthalpy()), heat_capacity = p.mass * matter.specific_heat();
     // Never beyond what is around it.
     const auto exchange = [&](float around, double transfer, float surface) {
-        const float share = std::min(1.0f, float(transfer) * surface * dt_ / heat_capacity);
+        const float share = std::min(1.0f, float(transfer * world_.heat_pace) * surface * dt_ / heat_capacity);
         p.enthalpy() += share * matter.specific_heat() * (around - temperature);
     };
     p.enthalpy() += matter.specific_heat() * matter.heating() * dt_ * std::min(1.0f, emptiness.norm() * grid_spacing_);

@@ -54,12 +54,12 @@ void with_determinant_one(Symmetric& d, float mean) {
 
 } // namespace
 
-Matter::Matter(const Material& material)
+Matter::Matter(const Material& material, double heat_pace)
     : density_(float(material.density)), yield_(float(material.yield_stress)), viscosity_(float(material.viscosity)),
       damping_(float(material.damping)), melting_from_(float(material.melting_from)),
       melting_to_(float(material.melting_to)), specific_heat_(float(material.specific_heat)),
-      latent_heat_(float(material.latent_heat)), diffusivity_(float(material.conductivity)),
-      heating_(float(material.heating)), melts_(material.melts()) {
+      latent_heat_(float(material.latent_heat)), diffusivity_(float(material.conductivity * heat_pace)),
+      heating_(float(material.heating * heat_pace)), melts_(material.melts()) {
     const LameParameters lame = lame_parameters(material.young_modulus, material.poisson_ratio);
     shear_ = float(lame.mu);
     bulk_ = float(lame.lambda + 2 * lame.mu / 3);

@@ -36,7 +36,8 @@ static_assert(sizeof(Particle) == 128);
 /// A material as the particles' loop wants it.
 class Matter {
 public:
-    explicit Matter(const Material& material);
+    /// heat_pace: as World has it.
+    Matter(const Material& material, double heat_pace);
 
     /// K, of so much enthalpy, J/kg (0 at 0 K).
     float temperature(float enthalpy) const;

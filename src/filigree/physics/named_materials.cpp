@@ -18,6 +18,23 @@ NamedMaterial made(std::string_view name, std::string_view text, double density,
     return named;
 }
 
+struct Melt {
+    double yield, viscosity, specific, latent, diffusivity; ///< Pa, Pa s, J/(kg K), J/kg, m^2/s
+};
+
+/// from, to: K.
+void melts(Material& material, double from, double to, const Melt& melt) {
+    material.model = MaterialModel::mpm;
+    material.melting_from = from;
+    material.melting_to = to;
+    material.yield_stress = melt.yield;
+    material.viscosity = melt.viscosity;
+    material.specific_heat = melt.specific;
+    material.latent_heat = melt.latent;
+    material.conductivity = melt.diffusivity;
+    material.damping = 0.1;
+}
+
 } // namespace
 
 std::span<const NamedMaterial> named_materials() {
@@ -41,15 +58,33 @@ std::span<const NamedMaterial> named_materials() {
                  m.creep_time = 0.02;
                  m.damping = 2;
              }),
-        made("wax", "melts from 45 to 65 degrees Celsius", 900, 2e5, 0.35,
+        made("wax", "melts from 45 to 65 degrees Celsius", 900, 3e5, 0.35,
              [](Material& m) {
-                 m.model = MaterialModel::meshfree;
-                 m.yield_stress = 2e4;
-                 m.melting_from = 318;
-                 m.melting_to = 338;
-                 m.viscosity = 20;
-                 m.conductivity = 1e-4;
-                 m.damping = 1;
+                 melts(m, 318, 338,
+                       {.yield = 2e4, .viscosity = 2, .specific = 2100, .latent = 2e5, .diffusivity = 1.3e-7});
+             }),
+        made("chocolate", "melts from 27 to 36 degrees Celsius", 1300, 4e5, 0.35,
+             [](Material& m) {
+                 melts(m, 300, 309,
+                       {.yield = 4e4, .viscosity = 3, .specific = 1600, .latent = 4.5e4, .diffusivity = 1.2e-7});
+             }),
+        made("butter", "soft; melts from 15 to 35 degrees Celsius", 910, 3e5, 0.4,
+             [](Material& m) {
+                 melts(m, 288, 308,
+                       {.yield = 6e3, .viscosity = 0.5, .specific = 2300, .latent = 8e4, .diffusivity = 1e-7});
+                 m.temperature = 280;
+             }),
+        made("ice", "melts to water at 0 degrees Celsius", 917, 3e5, 0.33,
+             [](Material& m) {
+                 melts(m, 273.15, 273.15,
+                       {.yield = 2e5, .viscosity = 0.002, .specific = 2050, .latent = 3.34e5, .diffusivity = 1.2e-6});
+                 m.temperature = 268;
+             }),
+        made("lava", "fluid at 1200 degrees Celsius, rock at 1000", 2700, 5e5, 0.25,
+             [](Material& m) {
+                 melts(m, 1273, 1473,
+                       {.yield = 2e5, .viscosity = 300, .specific = 1150, .latent = 4e5, .diffusivity = 5e-7});
+                 m.temperature = 1480;
              }),
     };
     return materials;

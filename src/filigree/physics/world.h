@@ -117,6 +117,7 @@ struct World {
     Keyed<double> air_temperature{{}, {}, 293}; ///< K, above 0
     double air_heat_transfer = 0;               ///< W/(m^2 K), 0 or more: between the air and bodies of mpm
     std::vector<HeatSource> heat_sources;
+    double heat_pace = 1; ///< above 0: how many times quicker than in truth all heat goes, in bodies of mpm
     std::vector<Obstacle> obstacles;
     std::vector<Pin> pins;
     std::vector<RegionForce> forces;

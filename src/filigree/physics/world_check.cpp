@@ -156,6 +156,7 @@ Status check_world(const World& world, std::span<const Actor> actors) {
     }
     check.keys(world.air_temperature, kLeastTemperature, "world.air_temperature");
     check.at_least(world.air_heat_transfer, 0, "world.air_heat_transfer", "must be 0 W/(m^2 K) or more");
+    check.require(std::isfinite(world.heat_pace) && world.heat_pace > 0, "world.heat_pace", "must be above 0");
     for (std::size_t s = 0; s < world.heat_sources.size(); ++s) {
         const HeatSource& source = world.heat_sources[s];
         const std::string place = numbered("world.heat_sources", s);

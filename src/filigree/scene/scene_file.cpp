@@ -61,6 +61,12 @@ public:
         each("force", [&](const SceneTable& section) {
             scene_.forces.push_back({section.line(), body_of(section), section.region(), section.keyed("newtons")});
         });
+        each("heat", [&](const SceneTable& section) {
+            HeatSource source{{.radius = 0.1}, section.keyed("move"), section.keyed_number("power", 0)};
+            section.set("centre", source.ball.centre);
+            section.set("radius", source.ball.radius);
+            scene_.heat_sources.push_back(std::move(source));
+        });
         each("pair", [&](const SceneTable& section) { read_pair(section); });
         each("hand", [&](const SceneTable& section) { read_hand(section); });
         scene_.content = spelled();
@@ -127,6 +133,9 @@ private:
         scene_.air_density = in.number("air_density", in.has("wind") ? kAir : 0);
         in.set("body_friction", scene_.body_friction);
         in.set("body_restitution", scene_.body_restitution);
+        scene_.air_temperature = in.keyed_number("air_temperature", scene_.air_temperature.constant);
+        in.set("air_heat_transfer", scene_.air_heat_transfer);
+        in.set("heat_pace", scene_.heat_pace);
     }
 
     void read_body(const SceneTable& in) {
@@ -178,16 +187,21 @@ private:
 
     /// Refuses keys that do nothing for the body's model.
     static void refuse_other_models(const SceneTable& in, MaterialModel model) {
-        constexpr std::array kNames = {"fem", "springs", "meshfree", "rigid"};
+        constexpr std::array kNames = {"fem", "springs", "meshfree", "rigid", "mpm"};
         const auto refuse = [&](std::string_view key, const char* models) {
             if (in.has(key))
                 in.fail(key, fmt::format("'{}' in [[body]] is for model = {}, and this body's is \"{}\"", key, models,
                                          kNames[std::size_t(model)]));
         };
-        if (model != MaterialModel::meshfree)
-            for (const char* key : {"yield_stress", "creep_time", "temperature", "melting_from", "melting_to",
-                                    "viscosity", "heating", "conductivity"})
-                refuse(key, "\"meshfree\"");
+        const bool is_mpm = model == MaterialModel::mpm;
+        if (model != MaterialModel::meshfree && !is_mpm)
+            for (const char* key :
+                 {"yield_stress", "temperature", "melting_from", "melting_to", "viscosity", "heating", "conductivity"})
+                refuse(key, "\"meshfree\" or \"mpm\"");
+        if (model != MaterialModel::meshfree) refuse("creep_time", "\"meshfree\"");
+        if (!is_mpm)
+            for (const char* key : {"specific_heat", "latent_heat"}) refuse(key, "\"mpm\"");
+        if (is_mpm) refuse("internal_damping", "\"fem\", \"springs\" or \"meshfree\"");
         if (model != MaterialModel::springs) refuse("bending", "\"springs\"");
         if (model == MaterialModel::springs) refuse("poisson_ratio", "\"fem\" or \"meshfree\"");
         if (model == MaterialModel::rigid)
@@ -209,7 +223,8 @@ private:
         material = named_materials()[std::size_t(found - names.begin())].material;
         material.model = static_cast<MaterialModel>(in.word("model", static_cast<int>(material.model)));
         refuse_other_models(in, material.model);
-        if (material.model != MaterialModel::meshfree) // a flowing material as another model does not flow
+        if (material.model != MaterialModel::meshfree &&
+            material.model != MaterialModel::mpm) // a flowing material as another model does not flow
             material.yield_stress = material.melting_from = material.melting_to = Material::kNever;
         in.set("density", material.density);
         in.set("young_modulus", material.young_modulus);
@@ -225,6 +240,8 @@ private:
         in.set("viscosity", material.viscosity);
         in.set("heating", material.heating);
         in.set("conductivity", material.conductivity);
+        in.set("specific_heat", material.specific_heat);
+        in.set("latent_heat", material.latent_heat);
         if (std::string wrong = check_material(material); !wrong.empty()) {
             while (wrong.back() == '.') wrong.pop_back();
             in.fail(in.line(), wrong);
@@ -257,6 +274,8 @@ private:
         in.set("restitution", obstacle.restitution);
         obstacle.sets_restitution = in.has("restitution");
         in.set("stiffness", obstacle.stiffness);
+        obstacle.temperature = in.keyed_number("temperature", obstacle.temperature.constant);
+        in.set("heat_transfer", obstacle.heat_transfer);
         in.set("color", obstacle.color);
         obstacle.visible = in.flag("visible", true);
         scene_.obstacles.push_back(std::move(obstacle));

@@ -55,6 +55,8 @@ struct SceneObstacle {
     SceneMotion motion;
     double friction = 0.5, restitution = 0.5, stiffness = 1;
     bool sets_restitution = false; ///< in the file
+    Keyed<double> temperature{{}, {}, 293};
+    double heat_transfer = 0;
     std::optional<Vec3f> color = {};
     bool visible = true;
 };
@@ -119,6 +121,9 @@ struct SceneFile {
     Vec3d gravity = {0, -9.81, 0};
     Keyed<Vec3d> wind{{}, {}, Vec3d::Zero()};
     double air_density = 0, body_friction = 0.3, body_restitution = 0.7;
+    Keyed<double> air_temperature{{}, {}, 293};
+    double air_heat_transfer = 0, heat_pace = 1;
+    std::vector<HeatSource> heat_sources; ///< world
     std::vector<SceneBody> bodies;
     std::vector<SceneObstacle> obstacles;
     std::vector<BodyPair> pairs;

@@ -57,6 +57,12 @@ constexpr KeyRule kKeys[] = {
     from(0, 100, "world", "body_friction", number, "", "0.3", "Coulomb's coefficient between bodies"),
     from(0, 1, "world", "body_restitution", number, "", "0.7", "between bodies, as that of obstacles"),
 
+    from(0, 1e5, "world", "air_temperature", keyed_number, "K", "293", "around bodies of mpm"),
+    from(0, 1e9, "world", "air_heat_transfer", number, "W/(m^2 K)", "0",
+         "how well the air warms and cools them; still air 10"),
+    above(0, 1e9, "world", "heat_pace", number, "", "1",
+          "how many times quicker than in truth heat goes, in and around them"),
+
     plain("body", "name", text, "", "that of the mesh or shape",
           "of files, and for pins, forces and hands; letters, digits, - and _"),
     plain("body", "mesh", text, "", "", "file of a mesh or model (.fil), seen from the scene's folder; or"),
@@ -74,8 +80,8 @@ constexpr KeyRule kKeys[] = {
     from(8, 1e8, "body", "particles", whole, "", "8000", "about so many"),
     above(0, 1e6, "body", "spacing", number, "m", "", "instead of `particles`: from one to the next"),
     plain("body", "material", text, "", "rubber", "one of the materials below; the keys from `model` on change it"),
-    one_of("fem springs meshfree rigid", "body", "model", "by the material",
-           "finite elements, springs, or mesh-free, which alone flows; rigid does not deform"),
+    one_of("fem springs meshfree rigid mpm", "body", "model", "by the material",
+           "finite elements, springs, or mesh-free, which flows; rigid does not deform; mpm melts, parts and joins"),
     above(0, 1e6, "body", "density", number, "kg/m^3", "by the material", "mass by volume"),
     above(0, 1e12, "body", "young_modulus", number, "Pa", "by the material", "stiffness"),
     from(0, 0.49, "body", "poisson_ratio", number, "", "by the material",
@@ -86,14 +92,18 @@ constexpr KeyRule kKeys[] = {
          "stress by the rate of strain, as a multiple of stiffness"),
     from(0, 0.2, "body", "bending", number, "", "by the material", "springs: share of bending springs"),
     above(0, 1e12, "body", "yield_stress", number, "Pa", "by the material",
-          "mesh-free: above it the shape changes for good"),
+          "mesh-free, mpm: above it the shape changes for good"),
     from(0, 1e6, "body", "creep_time", number, "s", "by the material", "mesh-free: how slowly; 0 is at once"),
-    from(0, 1e5, "body", "temperature", number, "K", "by the material", "mesh-free: at the start"),
-    from(0, 1e5, "body", "melting_from", number, "K", "by the material", "mesh-free: stiff below"),
-    from(0, 1e5, "body", "melting_to", number, "K", "by the material", "mesh-free: fluid above"),
-    from(0, 1e9, "body", "viscosity", number, "Pa s", "by the material", "mesh-free: of the melt"),
-    from(-1e6, 1e6, "body", "heating", number, "K/s", "by the material", "mesh-free: of the surface, from around"),
-    from(0, 1e3, "body", "conductivity", number, "m^2/s", "by the material", "mesh-free: thermal diffusivity inside"),
+    from(0, 1e5, "body", "temperature", number, "K", "by the material", "mesh-free, mpm: at the start"),
+    from(0, 1e5, "body", "melting_from", number, "K", "by the material", "mesh-free, mpm: stiff below"),
+    from(0, 1e5, "body", "melting_to", number, "K", "by the material", "mesh-free, mpm: fluid above"),
+    from(0, 1e9, "body", "viscosity", number, "Pa s", "by the material", "mesh-free, mpm: of the melt"),
+    from(-1e6, 1e6, "body", "heating", number, "K/s", "by the material", "mesh-free, mpm: of the surface, from around"),
+    from(0, 1e3, "body", "conductivity", number, "m^2/s", "by the material",
+         "mesh-free, mpm: thermal diffusivity inside"),
+    above(0, 1e6, "body", "specific_heat", number, "J/(kg K)", "by the material", "mpm: solid and fluid"),
+    from(0, 1e9, "body", "latent_heat", number, "J/kg", "by the material",
+         "mpm: that melting takes, and freezing gives back"),
     plain("body", "centre", vector, "m", "where its coordinates say", "of the body's box at the start"),
     plain("body", "rotate", rotation, "degrees", "", "about that centre: `{ axis = [0, 1, 0], degrees = 30 }`"),
     plain("body", "velocity", vector, "m/s", "[0, 0, 0]", "at the start"),
@@ -116,11 +126,19 @@ constexpr KeyRule kKeys[] = {
          "of hard points: speed after the bounce over that before; a soft body bounces by its own elasticity, use "
          "`internal_damping` to deaden it"),
     above(0, 1, "obstacle", "stiffness", number, "", "1", "of the contact; less for ground softer than the bodies"),
+    from(0, 1e5, "obstacle", "temperature", keyed_number, "K", "293", "of what bodies of mpm touch"),
+    from(0, 1e9, "obstacle", "heat_transfer", number, "W/(m^2 K)", "0", "how well it warms and cools them; metal 1000"),
     plain("obstacle", "move", keyed, "m", "[0, 0, 0]", "from where it is"),
     plain("obstacle", "turn", keyed, "degrees", "[0, 0, 0]", "axis times angle, before it moves"),
     plain("obstacle", "pivot", vector, "m", "its centre", "what it turns about"),
     plain("obstacle", "color", color, "", "grey", "in pictures"),
     plain("obstacle", "visible", flag, "", "true", "in pictures"),
+
+    plain("heat", "centre", vector, "m", "[0, 0, 0]", "of a ball whose matter is warmed, in bodies of mpm"),
+    above(0, 1e6, "heat", "radius", number, "m", "0.1", "of the ball"),
+    plain("heat", "move", keyed, "m", "[0, 0, 0]", "from where it is"),
+    from(-1e12, 1e12, "heat", "power", keyed_number, "W", "0",
+         "that the matter in it takes up, shared out by mass; below 0 it cools"),
 
     plain("pair", "first", text, "", "", "name of a body, or of a material: all bodies of it; must be there"),
     plain("pair", "second", text, "", "", "the same of what it touches; of one body with itself, its name again"),
@@ -275,6 +293,8 @@ std::string type_text(KeyType type) {
         return "three numbers, or a list of such";
     case keyed:
         return "three numbers, or keys";
+    case keyed_number:
+        return "number, or keys";
     case color:
         return "colour";
     case box:
@@ -317,7 +337,7 @@ std::string scene_manual() {
         "\n### Materials\n\n| name | model | density | young_modulus | poisson_ratio | damping | internal_damping | "
         "yield_stress | creep_time | melting_from, melting_to | viscosity | |\n"
         "|---|---|---|---|---|---|---|---|---|---|---|---|\n";
-    constexpr std::array<std::string_view, 4> kModels = {"fem", "springs", "meshfree", "rigid"};
+    constexpr std::array<std::string_view, 5> kModels = {"fem", "springs", "meshfree", "rigid", "mpm"};
     for (const NamedMaterial& named : named_materials()) {
         const Material& m = named.material;
         manual +=

@@ -7,7 +7,23 @@
 
 namespace filigree {
 
-enum class KeyType { text, word, number, whole, flag, vector, points, keyed, color, box, ball, ids, rotation, pixels };
+enum class KeyType {
+    text,
+    word,
+    number,
+    whole,
+    flag,
+    vector,
+    points,
+    keyed,
+    keyed_number,
+    color,
+    box,
+    ball,
+    ids,
+    rotation,
+    pixels
+};
 
 struct KeyRule {
     std::string_view table, key;

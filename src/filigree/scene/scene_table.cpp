@@ -145,7 +145,28 @@ Keyed<Vec3d> SceneTable::keyed(std::string_view key, double unit) const {
         value.constant = unit * vector_of(*node, key);
         return value;
     }
-    for (const toml::node& entry : *list) read_key(entry, key, unit, value);
+    for (const toml::node& entry : *list) {
+        value.times.push_back(
+            time_of(entry, key, value.times, "three numbers, or a list of { time = t, value = [x, y, z] }"));
+        value.values.push_back(unit * vector_of(*entry.as_table()->get("value"), fmt::format("{}.value", key)));
+    }
+    return value;
+}
+
+Keyed<double> SceneTable::keyed_number(std::string_view key, double unset) const {
+    Keyed<double> value{{}, {}, unset};
+    const toml::node* node = table_.get(key);
+    if (!node) return value;
+    const KeyRule& rule = *find_key(name_, key);
+    const toml::array* list = node->as_array();
+    if (!list || list->empty()) {
+        value.constant = number_of(*node, key, rule);
+        return value;
+    }
+    for (const toml::node& entry : *list) {
+        value.times.push_back(time_of(entry, key, value.times, "a number, or a list of { time = t, value = v }"));
+        value.values.push_back(number_of(*entry.as_table()->get("value"), key, rule));
+    }
     return value;
 }
 
@@ -266,15 +287,15 @@ const toml::table& SceneTable::sub_table(std::string_view key, std::array<std::s
     return *table;
 }
 
-void SceneTable::read_key(const toml::node& entry, std::string_view key, double unit, Keyed<Vec3d>& value) const {
+double SceneTable::time_of(const toml::node& entry, std::string_view key, std::span<const double> before,
+                           const char* wanted) const {
     const toml::table* table = entry.as_table();
     if (!table || table->size() != 2 || !table->contains("time") || !table->contains("value"))
-        wrong(entry, key, "three numbers, or a list of { time = t, value = [x, y, z] }");
+        wrong(entry, key, wanted);
     const double time = finite_of(*table->get("time"), fmt::format("{}.time", key), "a number");
-    if (!value.times.empty() && time <= value.times.back())
+    if (!before.empty() && time <= before.back())
         fail(line_of(entry), fmt::format("the times of '{}' in {} must ascend", key, shown_table(name_)));
-    value.times.push_back(time);
-    value.values.push_back(unit * vector_of(*table->get("value"), fmt::format("{}.value", key)));
+    return time;
 }
 
 } // namespace filigree

@@ -51,6 +51,7 @@ public:
     Vec3f color(std::string_view key, const std::string& written) const;
     /// Numbers that change in time, times `unit`.
     Keyed<Vec3d> keyed(std::string_view key, double unit = 1) const;
+    Keyed<double> keyed_number(std::string_view key, double unset) const;
     SceneMotion motion() const;
     std::vector<Index> ids(std::string_view key) const;
     SceneRegion region() const;
@@ -68,7 +69,9 @@ private:
     std::int64_t whole_of(const toml::node& node, std::string_view key, const KeyRule& rule) const;
     Vec3d vector_of(const toml::node& node, std::string_view key) const;
     const toml::table& sub_table(std::string_view key, std::array<std::string_view, 2> keys) const;
-    void read_key(const toml::node& entry, std::string_view key, double unit, Keyed<Vec3d>& value) const;
+    /// The time of one of a list of keys, which ascend; `before`: those read by now.
+    double time_of(const toml::node& entry, std::string_view key, std::span<const double> before,
+                   const char* wanted) const;
 
     const std::string& path_;
     std::string_view name_;

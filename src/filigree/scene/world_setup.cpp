@@ -76,6 +76,13 @@ public:
         result_.world.gravity = scene_.gravity;
         result_.world.wind = scene_.wind;
         result_.world.air_density = scene_.air_density;
+        result_.world.air_temperature = scene_.air_temperature;
+        result_.world.air_heat_transfer = scene_.air_heat_transfer;
+        result_.world.heat_pace = scene_.heat_pace;
+        for (HeatSource source : scene_.heat_sources) {
+            source.ball.centre -= result_.origin;
+            result_.world.heat_sources.push_back(std::move(source));
+        }
         result_.world.body_friction = scene_.body_friction;
         result_.world.body_restitution = scene_.body_restitution;
         result_.world.body_pairs = scene_.pairs;
@@ -290,6 +297,8 @@ private:
         }
         obstacle.motion = drawn.motion = motion_of(from.motion, middle);
         obstacle.friction = from.friction;
+        obstacle.temperature = from.temperature;
+        obstacle.heat_transfer = from.heat_transfer;
         obstacle.restitution = from.restitution;
         obstacle.stiffness = from.stiffness;
         result_.world.obstacles.push_back(std::move(obstacle));
