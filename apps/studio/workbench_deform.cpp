@@ -71,6 +71,10 @@ void Workbench::begin_pull(Index vertex, const Vec3d& at) {
             Q_EMIT told("A recording cannot be pulled: make the body first.", false);
             return;
         }
+        if (playback_.made()->body->material.model == MaterialModel::mpm) {
+            Q_EMIT told("Bodies of the grid method cannot be pulled.", false);
+            return;
+        }
         impl_->replay.stop();
         show_last_frame();
         is_pulling_ = true;

@@ -71,8 +71,10 @@ const Field<Body> kMeltingTo = {[](const Body& body) { return body.material.melt
 bool is_of_springs(const Body& body) { return body.material.model == MaterialModel::springs; }
 bool is_not_of_springs(const Body& body) { return !is_of_springs(body); }
 bool is_meshfree(const Body& body) { return body.material.model == MaterialModel::meshfree; }
-bool is_plastic(const Body& body) { return is_meshfree(body) && body.material.is_plastic(); }
-bool melts(const Body& body) { return is_meshfree(body) && body.material.melts(); }
+bool flows(const Body& body) { return is_meshfree(body) || body.material.model == MaterialModel::mpm; }
+bool is_plastic(const Body& body) { return flows(body) && body.material.is_plastic(); }
+bool creeps(const Body& body) { return is_meshfree(body) && body.material.is_plastic(); }
+bool melts(const Body& body) { return flows(body) && body.material.melts(); }
 
 } // namespace
 
@@ -184,9 +186,11 @@ void BodyPanel::add_advanced() {
         number(rows, settings.setting(name, label, tooltip, of, is_shown), spec);
     };
     choice(rows,
-           settings.setting("body.model", "Method",
-                            "How elasticity is computed. Meshfree is the one that flows and melts.", kModel),
-           {"Finite elements", "Springs", "Meshfree"});
+           settings.setting(
+               "body.model", "Method",
+               "How elasticity is computed. Meshfree flows and melts as one body; the grid method parts and joins.",
+               kModel),
+           {"Finite elements", "Springs", "Meshfree", "Rigid", "Grid (mpm)"});
     add("body.poisson", "Poisson", material_field(&Material::poisson_ratio),
         {.least = 0, .most = 0.49, .step = 0.01, .decimals = 2},
         "Poisson's ratio: how much thinner when stretched; 0.49 keeps the volume", is_not_of_springs);
@@ -199,16 +203,15 @@ void BodyPanel::add_advanced() {
     add("body.bending", "Bending", material_field(&Material::bending),
         {.least = 0, .most = 0.2, .step = 0.01, .decimals = 2}, "Springs: share of the stiffness given to bending",
         is_of_springs);
-    check(rows, settings.setting("body.plastic", "Keeps dents",
-                                 "Meshfree: stress beyond the yield stress stays as shape", kPlastic, is_meshfree));
+    check(rows, settings.setting("body.plastic", "Keeps dents", "Stress beyond the yield stress stays as shape",
+                                 kPlastic, flows));
     add("body.yield", "Yield", material_field(&Material::yield_stress),
         {.least = 100, .most = 1e9, .decimals = 0, .unit = "Pa", .logarithmic = true, .thousands = true},
         "Stress from which shape is lost, pascals", is_plastic);
     add("body.creep", "Creep", material_field(&Material::creep_time),
         {.least = 0, .most = 1, .step = 0.01, .decimals = 2, .unit = "s"},
-        "How fast stress beyond yield relaxes, seconds; 0: at once", is_plastic);
-    check(rows,
-          settings.setting("body.melts", "Melts", "Meshfree: stiff when cold, fluid when warm", kMelts, is_meshfree));
+        "How fast stress beyond yield relaxes, seconds; 0: at once", creeps);
+    check(rows, settings.setting("body.melts", "Melts", "Stiff when cold, fluid when warm", kMelts, flows));
     const NumberSpec temperature = {.least = -50, .most = 500, .step = 1, .decimals = 0, .unit = "°C"};
     add("body.melting_from", "Soft from", kMeltingFrom, temperature, "Stiff below, degrees Celsius", melts);
     add("body.melting_to", "Fluid from", kMeltingTo, temperature, "Fluid above, degrees Celsius", melts);
