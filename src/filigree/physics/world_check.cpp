@@ -28,8 +28,8 @@ public:
     void keys(const Keyed<double>& keyed, double least, const std::string& place) {
         times(keyed, place);
         const auto is_right = [&](double value) { return std::isfinite(value) && value >= least; };
-        require((!keyed.times.empty() || is_right(keyed.constant)) && std::ranges::all_of(keyed.values, is_right), place,
-                least > 0 ? "must be above 0 K" : "must be finite");
+        require((!keyed.times.empty() || is_right(keyed.constant)) && std::ranges::all_of(keyed.values, is_right),
+                place, least > 0 ? "must be above 0 K" : "must be finite");
     }
     void keys(const Keyed<Vec3d>& keyed, const std::string& place) {
         finite(keyed.constant, place + ".constant");
