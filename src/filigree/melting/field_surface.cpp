@@ -1,0 +1,219 @@
+#include "filigree/melting/field_surface.h"
+
+#include "filigree/core/parallel_for.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <utility>
+
+namespace filigree {
+
+namespace {
+
+constexpr std::size_t kBlocksAtOnce = 8;
+
+/// Corner q of a cell has the coordinates q & 1, q >> 1 & 1, q >> 2. An edge's number
+/// is 8 * its axis + its lower corner.
+constexpr int edge_between(int p, int q) {
+    const int axis = (p ^ q) == 1 ? 0 : (p ^ q) == 2 ? 1 : 2;
+    return 8 * axis + (p & q);
+}
+
+/// The loops in which the surface crosses a cell's faces, for each pattern of inside corners.
+struct CellLoops {
+    struct Pattern {
+        std::uint8_t loop_count = 0, edge_count = 0;
+        std::array<std::uint8_t, 4> sizes = {};
+        std::array<std::uint8_t, 12> edges = {}; ///< of one loop after the other, counter-clockwise from outside
+    };
+    std::array<Pattern, 256> patterns = {};
+
+    constexpr CellLoops() {
+        for (int inside = 0; inside < 256; ++inside) fill(inside, patterns[std::size_t(inside)]);
+    }
+
+private:
+    static constexpr void fill(int inside, Pattern& pattern) {
+        int next[24] = {};
+        for (int& n : next) n = -1;
+        for (int axis = 0; axis < 3; ++axis)
+            for (int side = 0; side < 2; ++side) {
+                // The face's corners, counter-clockwise seen from outside the cell.
+                const int u = 1 << (axis + 1) % 3, v = 1 << (axis + 2) % 3, base = side << axis;
+                int face[4] = {base, base + u, base + u + v, base + v};
+                if (side == 0) std::swap(face[1], face[3]);
+                // From each edge where the boundary enters the inside back to the one where it left it.
+                for (int i = 0; i < 4; ++i) {
+                    const int a = face[i], b = face[(i + 1) % 4];
+                    if ((inside >> a & 1) || !(inside >> b & 1)) continue;
+                    int j = (i + 1) % 4; // the last inside corner of this run
+                    while (inside >> face[(j + 1) % 4] & 1) j = (j + 1) % 4;
+                    next[edge_between(a, b)] = edge_between(face[j], face[(j + 1) % 4]);
+                }
+            }
+        for (int e = 0; e < 24; ++e) {
+            if (next[e] < 0) continue;
+            std::uint8_t size = 0;
+            for (int at = e; next[at] >= 0; ++size) {
+                pattern.edges[pattern.edge_count++] = std::uint8_t(at);
+                const int to = next[at];
+                next[at] = -1;
+                at = to;
+            }
+            pattern.sizes[pattern.loop_count++] = size;
+        }
+    }
+};
+
+constexpr CellLoops kLoops;
+
+struct Counts {
+    std::size_t crossings = 0, middles = 0, triangles = 0;
+};
+
+class FieldMesher {
+public:
+    FieldMesher(const ParticleField& field, const RunContext& context)
+        : grid_(field.grid), field_(field), context_(context) {}
+
+    Result<Mesh> run() {
+        masks_.assign(grid_.slot_count(), 0);
+        first_.assign(grid_.slot_count(), kNoIndex);
+        std::vector<Counts> starts(grid_.block_count() + 1);
+        for_blocks([&](std::size_t b) { starts[b + 1] = count(b); });
+        if (context_.is_cancelled()) return cancelled_error();
+        for (std::size_t b = 0; b < grid_.block_count(); ++b) {
+            starts[b + 1].crossings += starts[b].crossings;
+            starts[b + 1].middles += starts[b].middles;
+            starts[b + 1].triangles += starts[b].triangles;
+        }
+        const Counts& all = starts.back();
+        if (3 * all.triangles >= kNoIndex) // there are fewer vertices than corners
+            return Error{ErrorCode::unsuitable, "The surface has too many triangles; ask for a larger cell."};
+        mesh_.positions.resize(all.crossings + all.middles);
+        mesh_.normals.values.resize(mesh_.positions.size());
+        mesh_.corners.resize(3 * all.triangles);
+        mesh_.face_offsets.resize(all.triangles + 1);
+        for (std::size_t t = 0; t <= all.triangles; ++t) mesh_.face_offsets[t] = Index(3 * t);
+        for_blocks([&](std::size_t b) { place_crossings(b, starts[b].crossings); });
+        for_blocks([&](std::size_t b) { fill_cells(b, all.crossings + starts[b].middles, starts[b].triangles); });
+        if (context_.is_cancelled()) return cancelled_error();
+        return std::move(mesh_);
+    }
+
+private:
+    template <class Work>
+    void for_blocks(const Work& work) const {
+        parallel_for(context_, grid_.block_count(), kBlocksAtOnce, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t b = begin; b < end && !context_.is_cancelled(); ++b) work(b);
+        });
+    }
+
+    bool is_inside(Index slot) const { return slot != kNoIndex && field_.values[slot] > 0; }
+
+    Index corner(Index slot, int q) const { return grid_.step(slot, q & 1, q >> 1 & 1, q >> 2); }
+
+    std::uint8_t inside_corners(Index slot) const {
+        unsigned mask = 0;
+        for (int q = 0; q < 8; ++q) mask |= unsigned(is_inside(corner(slot, q))) << q;
+        return std::uint8_t(mask);
+    }
+
+    /// The axes along which the surface crosses the edge above a cell's first corner, a bit each.
+    static unsigned crossed_axes(unsigned mask) {
+        const unsigned first = mask & 1;
+        return unsigned((mask >> 1 & 1) != first) | unsigned((mask >> 2 & 1) != first) << 1 |
+               unsigned((mask >> 4 & 1) != first) << 2;
+    }
+
+    Counts count(std::size_t b) {
+        Counts counts;
+        for (std::size_t slot = b * BlockGrid::kNodes; slot < (b + 1) * BlockGrid::kNodes; ++slot) {
+            const std::uint8_t mask = masks_[slot] = inside_corners(Index(slot));
+            counts.crossings += std::size_t(std::popcount(crossed_axes(mask)));
+            const CellLoops::Pattern& pattern = kLoops.patterns[mask];
+            for (int l = 0; l < pattern.loop_count; ++l) {
+                const std::size_t size = pattern.sizes[std::size_t(l)];
+                counts.middles += size > 3;
+                counts.triangles += size > 3 ? size : 1;
+            }
+        }
+        return counts;
+    }
+
+    void place_crossings(std::size_t b, std::size_t vertex) {
+        for (std::size_t slot = b * BlockGrid::kNodes; slot < (b + 1) * BlockGrid::kNodes; ++slot) {
+            const unsigned crossed = crossed_axes(masks_[slot]);
+            if (!crossed) continue;
+            first_[slot] = Index(vertex);
+            const Vec3d from = grid_.position(grid_.node(Index(slot)));
+            const float here = field_.values[slot];
+            for (int axis = 0; axis < 3; ++axis) {
+                if (!(crossed >> axis & 1)) continue;
+                const Index above = grid_.step(Index(slot), axis, 1);
+                const float there = above == kNoIndex ? ParticleField::kOutside : field_.values[above];
+                Vec3d at = from;
+                // Not quite on nodes, where vertices of several edges would be at one place.
+                at[axis] += grid_.cell() * std::clamp(double(here) / (double(here) - double(there)), 0.002, 0.998);
+                set_vertex(vertex++, at.cast<float>());
+            }
+        }
+    }
+
+    void set_vertex(std::size_t vertex, const Vec3f& at) {
+        Vec3f gradient;
+        field_.value(at, &gradient);
+        const float length = gradient.norm();
+        mesh_.positions[vertex] = at;
+        mesh_.normals.values[vertex] = length > 0 ? Vec3f(-gradient / length) : Vec3f::UnitZ();
+    }
+
+    Index crossing(Index slot, int edge) const {
+        const int axis = edge >> 3;
+        const Index base = corner(slot, edge & 7);
+        return first_[base] + Index(std::popcount(crossed_axes(masks_[base]) & ((1u << axis) - 1)));
+    }
+
+    void fill_cells(std::size_t b, std::size_t middle, std::size_t triangle) {
+        const auto add = [&](Index p, Index q, Index r) {
+            const std::array<Index, 3> corners = {p, q, r};
+            std::copy(corners.begin(), corners.end(), mesh_.corners.begin() + std::ptrdiff_t(3 * triangle++));
+        };
+        for (std::size_t slot = b * BlockGrid::kNodes; slot < (b + 1) * BlockGrid::kNodes; ++slot) {
+            const CellLoops::Pattern& pattern = kLoops.patterns[masks_[slot]];
+            const std::uint8_t* edges = pattern.edges.data();
+            for (int l = 0; l < pattern.loop_count; edges += pattern.sizes[std::size_t(l++)]) {
+                const std::size_t size = pattern.sizes[std::size_t(l)];
+                std::array<Index, 12> loop;
+                Vec3f sum = Vec3f::Zero();
+                for (std::size_t i = 0; i < size; ++i) {
+                    loop[i] = crossing(Index(slot), edges[i]);
+                    sum += mesh_.positions[loop[i]];
+                }
+                if (size == 3) {
+                    add(loop[0], loop[1], loop[2]);
+                    continue;
+                }
+                set_vertex(middle, sum / float(size));
+                for (std::size_t i = 0; i < size; ++i) add(Index(middle), loop[i], loop[(i + 1) % size]);
+                ++middle;
+            }
+        }
+    }
+
+    const BlockGrid& grid_;
+    const ParticleField& field_;
+    const RunContext& context_;
+    std::vector<std::uint8_t> masks_; ///< of each cell: inside corners
+    std::vector<Index> first_;        ///< of a slot's crossings, along x before y before z
+    Mesh mesh_;
+};
+
+} // namespace
+
+Result<Mesh> make_field_surface(const ParticleField& field, const RunContext& context) {
+    return FieldMesher(field, context).run();
+}
+
+} // namespace filigree
