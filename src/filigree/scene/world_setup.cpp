@@ -73,6 +73,7 @@ public:
             result_.world.forces.push_back(
                 {force.body, particles_of(force.body, force.region, force.line), force.newtons});
         for (const SceneHand& hand : scene_.hands) add_hand(hand);
+        warn_of_models_that_do_not_meet();
         result_.world.gravity = scene_.gravity;
         result_.world.wind = scene_.wind;
         result_.world.air_density = scene_.air_density;
@@ -92,6 +93,13 @@ public:
 
 private:
     void warn(std::string sentence) { result_.warnings.push_back(std::move(sentence)); }
+
+    void warn_of_models_that_do_not_meet() {
+        std::size_t on_grid = 0;
+        for (const SceneBody& body : scene_.bodies) on_grid += body.material.model == MaterialModel::mpm;
+        if (on_grid > 0 && on_grid < scene_.bodies.size())
+            warn("bodies of the model mpm touch obstacles and each other, and pass through bodies of other models");
+    }
 
     Mesh mesh_of(const std::string& bytes, const std::string& path) {
         MeshFile file = read_mesh(bytes, path, context_).value();
