@@ -446,10 +446,12 @@ TEST_F(Simulate, IceMeltsAndSaysWhatItPassesThrough) {
     write("ice.toml", "[world]\nair_temperature = [{ time = 0, value = 300 }, { time = 1, value = 400 }]\n"
                       "air_heat_transfer = 1e5\n[[body]]\nshape = \"wavy-cube\"\nresolution = 8\nparticles = 200\n"
                       "material = \"ice\"\n[[body]]\nshape = \"bar\"\nresolution = 4\nparticles = 100\n"
-                      "centre = [5, 0, 0]\n[[heat]]\nradius = 1\npower = 1e3\n");
-    const Ran ran = run(words("ice.toml", {"--frames", "3", "-o", "ice.fil", "--json"}));
+                      "centre = [5, 0, 0]\n[[heat]]\nradius = 1\npower = 1e3\n"
+                      "[picture]\nmatter = true\nsize = [64, 48]\npasses = 1\n");
+    const Ran ran = run(words("ice.toml", {"--frames", "3", "-o", "ice.fil", "-o", "ice.mp4", "--json"}));
     ASSERT_EQ(ran.code, 0) << ran.err;
     EXPECT_NE(ran.out.find("pass through bodies of other models"), std::string::npos) << ran.out;
+    refused(kBody + "[picture]\nparticles = true\nmatter = true\n", {"one of particles and matter"});
     refused(kBody + "material = \"ice\"\nlatent_heat = -1\n", {"bad.toml:4:", "latent_heat"});
     refused("[world]\nair_temperature = [{ time = 1, value = 3 }, { time = 1, value = 4 }]\n" + kBody,
             {"bad.toml:2:", "must ascend"});

@@ -87,10 +87,10 @@ def test_actors_and_obstacles(body):
 
 
 def test_matter_melts():
-    wax = filigree.Material("wax", model="mpm", temperature=310)
+    wax = filigree.Material("wax", temperature=310)
     block = filigree.make("bar", resolution=2, length=1, size=0.2)
     body = filigree.Body(block, wax, particles=200)
-    lamp = filigree.HeatSource((0, 0, 0), 1, 5e5)
+    lamp = filigree.HeatSource((0, 0, 0), 1, 2e6)
     floor = filigree.Obstacle.plane((0, -0.2, 0), temperature=350, heat_transfer=100)
     simulation = filigree.Simulation([body], obstacles=[floor], heat_sources=[lamp])
     heat, cold = simulation.heat(), simulation.matter(0)

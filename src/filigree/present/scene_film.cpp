@@ -1,6 +1,7 @@
 #include "filigree/present/scene_film.h"
 
 #include "filigree/hierarchy/restore.h"
+#include "filigree/melting/field_surface.h"
 #include "filigree/present/film_frames.h"
 #include "filigree/render/surface_materials.h"
 
@@ -43,7 +44,9 @@ public:
 
     Result<Picture> frame(std::size_t number, HeadlessRenderer& renderer) {
         Scene shown;
-        for (std::size_t b = 0; b < actors_.size(); ++b) shown.objects.push_back(body_at(b, number));
+        for (std::size_t b = 0; b < actors_.size(); ++b)
+            if (!is_matter(b)) shown.objects.push_back(body_at(b, number));
+        show_matter(number, shown);
         for (std::size_t k = 0; k < ready_.drawn.size() && scene_.picture.obstacles; ++k)
             if (const Drawable* drawable = obstacle_at(k, number))
                 shown.objects.push_back({drawable, {.color = ready_.drawn[k].color, .gloss = 0.1f}});
@@ -98,6 +101,31 @@ private:
             shown.drawable->set_pose(pose, quiet_).value();
         }
         return {&*shown.drawable, {.color = shown.body->color, .own_colors = shown.body->has_own_color}};
+    }
+
+    /// Whether a body is drawn as a part of the matter of all bodies of mpm.
+    bool is_matter(std::size_t b) const {
+        return scene_.picture.matter && ready_.bodies[b].body->material.model == MaterialModel::mpm;
+    }
+
+    /// What has flowed together is one surface, in the colour of the first body.
+    void show_matter(std::size_t frame, Scene& shown) {
+        MatterParticles particles;
+        const ShownBody* first = nullptr;
+        for (std::size_t b = 0; b < actors_.size(); ++b) {
+            if (!is_matter(b)) continue;
+            if (!first) first = &actors_[b];
+            const Body& body = *ready_.bodies[b].body;
+            const std::vector<Vec3f>& positions = recording_.particles[b][frame];
+            particles.positions.insert(particles.positions.end(), positions.begin(), positions.end());
+            particles.volumes.insert(particles.volumes.end(), body.volume.begin(), body.volume.end());
+            particles.spacing = std::max(particles.spacing, float(body.spacing()));
+        }
+        if (!first) return;
+        const Mesh surface = make_field_surface(make_particle_field(particles, {}, quiet_).value(), quiet_).value();
+        if (surface.face_count() == 0) return;
+        matter_ = Drawable::surface(surface, {}, quiet_).value();
+        shown.objects.push_back({&*matter_, {.color = first->body->color}});
     }
 
     double time_of(std::size_t frame) const { return double(frame) / scene_.step.frames_per_second; }
@@ -248,6 +276,7 @@ private:
     RunContext quiet_;
     std::vector<ShownBody> actors_;
     std::vector<std::optional<Drawable>> obstacles_;
+    std::optional<Drawable> matter_;
     Box box_; ///< of the bodies, in all frames
     double lowest_obstacle_ = std::numeric_limits<double>::infinity(), ground_level_ = 0;
     Camera camera_;

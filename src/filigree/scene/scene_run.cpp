@@ -90,7 +90,7 @@ Status SceneRun::follow(bool checks) {
         if (checks) follower.direct = attach(body.model.mesh.positions, body.pieces.vertices);
     }
     recording_.poses.assign(ready_->bodies.size(), {scene_->step.frames_per_second, {}});
-    if (scene_->picture.particles) recording_.particles.resize(ready_->bodies.size());
+    if (scene_->picture.records_particles()) recording_.particles.resize(ready_->bodies.size());
     if (checks) recording_.checks.resize(ready_->bodies.size());
     return Success{};
 }
