@@ -9,6 +9,7 @@
 #include "filigree/io/point_cache.h"
 #include "filigree/present/scene_film.h"
 #include "filigree/scene/finer_check.h"
+#include "filigree/scene/melting_surface.h"
 #include "filigree/scene/scene_keys.h"
 #include "filigree/scene/scene_run.h"
 
@@ -123,6 +124,17 @@ void check_places(const SimulateArguments& options, const SceneFile& scene, cons
     }
 }
 
+/// With the scalar `origin`: which vertex of the bodies' meshes a vertex is, -1 for a new one.
+Result<Mesh> melting_mesh(MeltingSurface& melting, const Recording& recording, std::size_t frame, const Vec3d& origin,
+                          const RunContext& context) {
+    Result<CompositeSurface> surface = melting.frame(recording, frame, context);
+    if (!surface) return surface.error();
+    VertexScalar& from = surface->mesh.scalars.emplace_back(VertexScalar{"origin", {}});
+    for (const Index v : surface->origin) from.values.push_back(v == kNoIndex ? -1 : float(v));
+    surface->mesh.origin = origin;
+    return std::move(surface->mesh);
+}
+
 class Run {
 public:
     Run(const SimulateArguments& options, Session& session)
@@ -174,6 +186,7 @@ public:
                 session_.write_model(ready_.bodies[b].model,
                                      model_path(path, ready_.bodies.size(), ready_.bodies[b].name),
                                      run_->recording().poses[b]);
+        warn_of_one_topology();
         write_animations();
         write_seconds_ = now_seconds() - start;
     }
@@ -181,6 +194,25 @@ public:
     void report() const;
 
 private:
+    /// What has one topology cannot part and join.
+    void warn_of_one_topology() {
+        std::vector<std::string> paths = outputs_.models;
+        paths.insert(paths.end(), outputs_.animations.begin(), outputs_.animations.end());
+        if (paths.empty()) return;
+        for (std::size_t b = 0; b < ready_.bodies.size(); ++b) {
+            const auto& frames = run_->recording().matter[b];
+            const auto is_new = [](const MatterParticles& matter) {
+                return std::any_of(matter.renewal.begin(), matter.renewal.end(),
+                                   [](float renewal) { return renewal > CompositeMesher::kFadeBegin; });
+            };
+            const auto first = std::find_if(frames.begin(), frames.end(), is_new);
+            if (first == frames.end()) continue;
+            session_.warn({fmt::format("{} holds one topology, so from frame {} on, where body '{}' flows, its mesh "
+                                       "is stretched instead of parted; a folder of meshes (-o NAME/) or a film holds "
+                                       "what parts and joins",
+                                       fmt::join(paths, " and "), first - frames.begin(), ready_.bodies[b].name)});
+        }
+    }
     void write_animations() {
         for (const std::string& path : outputs_.animations)
             for (std::size_t b = 0; b < ready_.bodies.size(); ++b) {
@@ -219,9 +251,16 @@ private:
         const RunContext silent = session_.silent_context();
         for (const std::string& path : outputs_.folders) {
             std::vector<NumberedMeshes> parts;
+            MeltingSurface melting = require(MeltingSurface::create(ready_, silent));
+            session_.warn(melting.warnings);
+            if (!melting.is_empty())
+                parts.push_back({mesh_names(path, melting.name()), [&](std::size_t frame) {
+                                     return melting_mesh(melting, run_->recording(), frame, ready_.origin, silent);
+                                 }});
             for (std::size_t b = 0; b < ready_.bodies.size(); ++b)
-                parts.push_back({mesh_names(path, ready_.bodies[b].name),
-                                 [&, b](std::size_t frame) { return run_->mesh(b, frame, silent); }});
+                if (!melting.has_body(b))
+                    parts.push_back({mesh_names(path, ready_.bodies[b].name),
+                                     [&, b](std::size_t frame) { return run_->mesh(b, frame, silent); }});
             session_.begin_writing(path);
             const std::size_t frames = run_->recording().poses[0].frames.size();
             session_.warn(require(write_numbered_meshes(frames, parts, session_.context())));

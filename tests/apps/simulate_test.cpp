@@ -447,11 +447,16 @@ TEST_F(Simulate, IceMeltsAndSaysWhatItPassesThrough) {
                       "air_heat_transfer = 1e5\n[[body]]\nshape = \"wavy-cube\"\nresolution = 8\nparticles = 200\n"
                       "material = \"ice\"\n[[body]]\nshape = \"bar\"\nresolution = 4\nparticles = 100\n"
                       "centre = [5, 0, 0]\n[[heat]]\nradius = 1\npower = 1e3\n"
-                      "[picture]\nmatter = true\nsize = [64, 48]\npasses = 1\n");
-    const Ran ran = run(words("ice.toml", {"--frames", "3", "-o", "ice.fil", "-o", "ice.mp4", "--json"}));
+                      "[picture]\nsize = [64, 48]\npasses = 1\n");
+    const Ran ran = run(words("ice.toml", {"--frames", "3", "-o", "ice.fil", "-o", "ice.mp4", "-o", "ice/", "--json"}));
     ASSERT_EQ(ran.code, 0) << ran.err;
+    // Both bodies are one surface, closed in every frame; the start is their meshes.
+    for (const std::string number : {"0001", "0004"}) {
+        const std::string info = ok({"info", "ice/wavy-cube+bar_" + number + ".ply"}).out;
+        EXPECT_EQ(info.find("closed                 no"), std::string::npos) << info;
+        EXPECT_EQ(info.find("manifold               no"), std::string::npos) << info;
+    }
     EXPECT_NE(ran.out.find("pass through bodies of other models"), std::string::npos) << ran.out;
-    refused(kBody + "[picture]\nparticles = true\nmatter = true\n", {"one of particles and matter"});
     refused(kBody + "material = \"ice\"\nlatent_heat = -1\n", {"bad.toml:4:", "latent_heat"});
     refused("[world]\nair_temperature = [{ time = 1, value = 3 }, { time = 1, value = 4 }]\n" + kBody,
             {"bad.toml:2:", "must ascend"});

@@ -61,7 +61,12 @@ Index BlockGrid::slot(const GridNode& node) const {
 GridNode BlockGrid::node_below(const Vec3d& at) const {
     GridNode node;
     for (int a = 0; a < 3; ++a) {
-        std::int32_t n = std::int32_t(std::ceil((at[a] - shift_[a]) / cell_)) - 1;
+        const double scaled = std::clamp((at[a] - shift_[a]) / cell_, -double(kFarthest), double(kFarthest));
+        std::int32_t n = std::int32_t(std::ceil(scaled)) - 1;
+        if (std::abs(n) >= kFarthest - 1) {
+            node[std::size_t(a)] = n;
+            continue;
+        }
         while (n * cell_ + shift_[a] >= at[a]) --n; // what the division rounded
         while ((n + 1) * cell_ + shift_[a] < at[a]) ++n;
         node[std::size_t(a)] = n;
@@ -94,6 +99,27 @@ float interpolate(const BlockGrid& grid, const std::vector<float>& values, float
         *gradient = Vec3f(dx, mix(x10 - x00, x11 - x01, f[2]), y1 - y0) / float(grid.cell());
     }
     return mix(y0, y1, f[2]);
+}
+
+Vec3f smooth_gradient(const BlockGrid& grid, const std::vector<float>& values, float outside, const Vec3d& at) {
+    const Vec3d scaled = (at - grid.shift()) / grid.cell();
+    const Vec3d low = scaled.array().floor();
+    const Vec3f part = (scaled - low).cast<float>();
+    const GridNode node = {std::int32_t(low[0]), std::int32_t(low[1]), std::int32_t(low[2])};
+    const Index base = grid.slot(node);
+    const auto value = [&](int x, int y, int z) {
+        const Index slot =
+            base != kNoIndex ? grid.step(base, x, y, z) : grid.slot({node[0] + x, node[1] + y, node[2] + z});
+        return slot == kNoIndex ? outside : values[slot];
+    };
+    Vec3f gradient = Vec3f::Zero();
+    for (int q = 0; q < 8; ++q) {
+        const int x = q & 1, y = q >> 1 & 1, z = q >> 2;
+        const float weight = (x ? part[0] : 1 - part[0]) * (y ? part[1] : 1 - part[1]) * (z ? part[2] : 1 - part[2]);
+        gradient += weight * Vec3f(value(x + 1, y, z) - value(x - 1, y, z), value(x, y + 1, z) - value(x, y - 1, z),
+                                   value(x, y, z + 1) - value(x, y, z - 1));
+    }
+    return gradient / float(2 * grid.cell());
 }
 
 } // namespace filigree

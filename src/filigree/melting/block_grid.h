@@ -65,4 +65,7 @@ private:
 float interpolate(const BlockGrid& grid, const std::vector<float>& values, float outside, const Vec3d& at,
                   Vec3f* gradient = nullptr);
 
+/// The differences of the values across nodes, interpolated the same way: a gradient without steps between cells.
+Vec3f smooth_gradient(const BlockGrid& grid, const std::vector<float>& values, float outside, const Vec3d& at);
+
 } // namespace filigree

@@ -1,72 +1,17 @@
 #include "filigree/melting/field_surface.h"
 
 #include "filigree/core/parallel_for.h"
+#include "filigree/melting/cell_loops.h"
 
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <utility>
 
 namespace filigree {
 
 namespace {
 
 constexpr std::size_t kBlocksAtOnce = 8;
-
-/// Corner q of a cell has the coordinates q & 1, q >> 1 & 1, q >> 2. An edge's number
-/// is 8 * its axis + its lower corner.
-constexpr int edge_between(int p, int q) {
-    const int axis = (p ^ q) == 1 ? 0 : (p ^ q) == 2 ? 1 : 2;
-    return 8 * axis + (p & q);
-}
-
-/// The loops in which the surface crosses a cell's faces, for each pattern of inside corners.
-struct CellLoops {
-    struct Pattern {
-        std::uint8_t loop_count = 0, edge_count = 0;
-        std::array<std::uint8_t, 4> sizes = {};
-        std::array<std::uint8_t, 12> edges = {}; ///< of one loop after the other, counter-clockwise from outside
-    };
-    std::array<Pattern, 256> patterns = {};
-
-    constexpr CellLoops() {
-        for (int inside = 0; inside < 256; ++inside) fill(inside, patterns[std::size_t(inside)]);
-    }
-
-private:
-    static constexpr void fill(int inside, Pattern& pattern) {
-        int next[24] = {};
-        for (int& n : next) n = -1;
-        for (int axis = 0; axis < 3; ++axis)
-            for (int side = 0; side < 2; ++side) {
-                // The face's corners, counter-clockwise seen from outside the cell.
-                const int u = 1 << (axis + 1) % 3, v = 1 << (axis + 2) % 3, base = side << axis;
-                int face[4] = {base, base + u, base + u + v, base + v};
-                if (side == 0) std::swap(face[1], face[3]);
-                // From each edge where the boundary enters the inside back to the one where it left it.
-                for (int i = 0; i < 4; ++i) {
-                    const int a = face[i], b = face[(i + 1) % 4];
-                    if ((inside >> a & 1) || !(inside >> b & 1)) continue;
-                    int j = (i + 1) % 4; // the last inside corner of this run
-                    while (inside >> face[(j + 1) % 4] & 1) j = (j + 1) % 4;
-                    next[edge_between(a, b)] = edge_between(face[j], face[(j + 1) % 4]);
-                }
-            }
-        for (int e = 0; e < 24; ++e) {
-            if (next[e] < 0) continue;
-            std::uint8_t size = 0;
-            for (int at = e; next[at] >= 0; ++size) {
-                pattern.edges[pattern.edge_count++] = std::uint8_t(at);
-                const int to = next[at];
-                next[at] = -1;
-                at = to;
-            }
-            pattern.sizes[pattern.loop_count++] = size;
-        }
-    }
-};
-
-constexpr CellLoops kLoops;
 
 struct Counts {
     std::size_t crossings = 0, middles = 0, triangles = 0;
@@ -132,7 +77,7 @@ private:
         for (std::size_t slot = b * BlockGrid::kNodes; slot < (b + 1) * BlockGrid::kNodes; ++slot) {
             const std::uint8_t mask = masks_[slot] = inside_corners(Index(slot));
             counts.crossings += std::size_t(std::popcount(crossed_axes(mask)));
-            const CellLoops::Pattern& pattern = kLoops.patterns[mask];
+            const CellLoops::Pattern& pattern = kCellLoops.patterns[mask];
             for (int l = 0; l < pattern.loop_count; ++l) {
                 const std::size_t size = pattern.sizes[std::size_t(l)];
                 counts.middles += size > 3;
@@ -162,11 +107,9 @@ private:
     }
 
     void set_vertex(std::size_t vertex, const Vec3f& at) {
-        Vec3f gradient;
-        field_.value(at, &gradient);
-        const float length = gradient.norm();
+        const Vec3f normal = field_.normal(at);
         mesh_.positions[vertex] = at;
-        mesh_.normals.values[vertex] = length > 0 ? Vec3f(-gradient / length) : Vec3f::UnitZ();
+        mesh_.normals.values[vertex] = normal.isZero() ? Vec3f::UnitZ() : normal;
     }
 
     Index crossing(Index slot, int edge) const {
@@ -181,7 +124,7 @@ private:
             std::copy(corners.begin(), corners.end(), mesh_.corners.begin() + std::ptrdiff_t(3 * triangle++));
         };
         for (std::size_t slot = b * BlockGrid::kNodes; slot < (b + 1) * BlockGrid::kNodes; ++slot) {
-            const CellLoops::Pattern& pattern = kLoops.patterns[masks_[slot]];
+            const CellLoops::Pattern& pattern = kCellLoops.patterns[masks_[slot]];
             const std::uint8_t* edges = pattern.edges.data();
             for (int l = 0; l < pattern.loop_count; edges += pattern.sizes[std::size_t(l++)]) {
                 const std::size_t size = pattern.sizes[std::size_t(l)];

@@ -219,6 +219,13 @@ Status keep_volume(ParticleField& field, double spacing, const RunContext& conte
 
 } // namespace
 
+Vec3f ParticleField::normal(const Vec3f& at) const {
+    constexpr float kFlat = 0.02f; // change over a cell
+    const Vec3f gradient = smooth_gradient(grid, values, kOutside, at.cast<double>());
+    const float length = gradient.norm();
+    return length * float(grid.cell()) > kFlat ? Vec3f(-gradient / length) : Vec3f::Zero();
+}
+
 Result<ParticleField> make_particle_field(const MatterParticles& particles, const ParticleFieldOptions& options,
                                           const RunContext& context) {
     if (const Status checked = check_matter(particles, options); !checked) return checked.error();

@@ -22,6 +22,8 @@ struct ParticleField {
     float value(const Vec3f& at, Vec3f* gradient = nullptr) const {
         return interpolate(grid, values, kOutside, at.cast<double>(), gradient);
     }
+    /// Outward, unit; zero where the field is flat.
+    Vec3f normal(const Vec3f& at) const;
 };
 
 /// Anisotropic kernels [Yu and Turk 2013] over a block grid; then the surface is moved along its normals until it

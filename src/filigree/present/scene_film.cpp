@@ -1,9 +1,9 @@
 #include "filigree/present/scene_film.h"
 
 #include "filigree/hierarchy/restore.h"
-#include "filigree/melting/field_surface.h"
 #include "filigree/present/film_frames.h"
 #include "filigree/render/surface_materials.h"
+#include "filigree/scene/melting_surface.h"
 
 #include <algorithm>
 #include <cmath>
@@ -37,6 +37,8 @@ public:
         quiet_.progress = nullptr; // the bar tells of frames
         actors_.reserve(ready.bodies.size());
         for (const ReadyBody& body : ready.bodies) prepare(body);
+        if (!scene.picture.particles) melting_ = MeltingSurface::create(ready, quiet_).value();
+        warnings.insert(warnings.end(), melting_.warnings.begin(), melting_.warnings.end());
         look_ahead();
         choose_ground();
         obstacles_.resize(ready.drawn.size());
@@ -45,8 +47,12 @@ public:
     Result<Picture> frame(std::size_t number, HeadlessRenderer& renderer) {
         Scene shown;
         for (std::size_t b = 0; b < actors_.size(); ++b)
-            if (!is_matter(b)) shown.objects.push_back(body_at(b, number));
-        show_matter(number, shown);
+            if (!melting_.has_body(b)) shown.objects.push_back(body_at(b, number));
+        if (!melting_.is_empty()) {
+            const CompositeSurface surface = melting_.frame(recording_, number, quiet_).value();
+            melting_drawable_ = Drawable::surface(surface.mesh, {}, quiet_).value();
+            shown.objects.push_back({&*melting_drawable_, {.own_colors = true}});
+        }
         for (std::size_t k = 0; k < ready_.drawn.size() && scene_.picture.obstacles; ++k)
             if (const Drawable* drawable = obstacle_at(k, number))
                 shown.objects.push_back({drawable, {.color = ready_.drawn[k].color, .gloss = 0.1f}});
@@ -103,31 +109,6 @@ private:
         return {&*shown.drawable, {.color = shown.body->color, .own_colors = shown.body->has_own_color}};
     }
 
-    /// Whether a body is drawn as a part of the matter of all bodies of mpm.
-    bool is_matter(std::size_t b) const {
-        return scene_.picture.matter && ready_.bodies[b].body->material.model == MaterialModel::mpm;
-    }
-
-    /// What has flowed together is one surface, in the colour of the first body.
-    void show_matter(std::size_t frame, Scene& shown) {
-        MatterParticles particles;
-        const ShownBody* first = nullptr;
-        for (std::size_t b = 0; b < actors_.size(); ++b) {
-            if (!is_matter(b)) continue;
-            if (!first) first = &actors_[b];
-            const Body& body = *ready_.bodies[b].body;
-            const std::vector<Vec3f>& positions = recording_.particles[b][frame];
-            particles.positions.insert(particles.positions.end(), positions.begin(), positions.end());
-            particles.volumes.insert(particles.volumes.end(), body.volume.begin(), body.volume.end());
-            particles.spacing = std::max(particles.spacing, float(body.spacing()));
-        }
-        if (!first) return;
-        const Mesh surface = make_field_surface(make_particle_field(particles, {}, quiet_).value(), quiet_).value();
-        if (surface.face_count() == 0) return;
-        matter_ = Drawable::surface(surface, {}, quiet_).value();
-        shown.objects.push_back({&*matter_, {.color = first->body->color}});
-    }
-
     double time_of(std::size_t frame) const { return double(frame) / scene_.step.frames_per_second; }
 
     /// Null where the level ground of the picture stands for it.
@@ -181,7 +162,10 @@ private:
             for (std::size_t frame = 0; frame < frames_; ++frame) {
                 if (context_.is_cancelled()) throw BadResultAccess(cancelled_error());
                 context_.report("looking ahead", double(frame) / double(frames_));
-                restorer.positions(recording_.poses[b].frames[frame], positions, quiet_).value();
+                if (melting_.has_body(b))
+                    positions = recording_.matter[b][frame].positions;
+                else
+                    restorer.positions(recording_.poses[b].frames[frame], positions, quiet_).value();
                 extend(box_, positions);
                 for (std::size_t v = frame % stride; v < positions.size(); v += stride) seen.push_back(positions[v]);
             }
@@ -276,7 +260,8 @@ private:
     RunContext quiet_;
     std::vector<ShownBody> actors_;
     std::vector<std::optional<Drawable>> obstacles_;
-    std::optional<Drawable> matter_;
+    MeltingSurface melting_;
+    std::optional<Drawable> melting_drawable_;
     Box box_; ///< of the bodies, in all frames
     double lowest_obstacle_ = std::numeric_limits<double>::infinity(), ground_level_ = 0;
     Camera camera_;

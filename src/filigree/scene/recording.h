@@ -48,6 +48,7 @@ struct DescentCauses {
 struct Recording {
     std::vector<PoseSequence> poses;                        ///< one a body; the first is the start
     std::vector<std::vector<std::vector<Vec3f>>> particles; ///< of each body and frame, where they are drawn
+    std::vector<std::vector<MatterParticles>> matter;       ///< of each body and frame; none of bodies not of mpm
     std::vector<CheckTotals> checks;                        ///< one a body where that was asked for, else none
     RunTotals totals;
 };

@@ -11,7 +11,7 @@ namespace filigree {
 
 namespace {
 
-constexpr std::string_view kFormat = "FILSTAT", kMagic = "FILSTAT4"; // ends in the version
+constexpr std::string_view kFormat = "FILSTAT", kMagic = "FILSTAT5"; // ends in the version
 
 void write_totals(ByteWriter& out, const RunTotals& t) {
     for (const std::uint64_t count : {t.frames, t.explicit_frames, t.descent_frames, t.substeps, t.least_substeps,
@@ -65,6 +65,29 @@ std::vector<std::vector<Vec3f>> read_particles(ByteReader& in) {
     return frames;
 }
 
+void write_matter(ByteWriter& out, const std::vector<MatterParticles>& frames) {
+    out.value(std::uint64_t{frames.size()});
+    for (const MatterParticles& matter : frames) {
+        out.array(std::span(matter.positions));
+        out.array(std::span(matter.volumes));
+        out.array(std::span(matter.renewal));
+        out.value(matter.spacing);
+    }
+}
+
+std::vector<MatterParticles> read_matter(ByteReader& in) {
+    std::vector<MatterParticles> frames;
+    const std::uint64_t count = in.value<std::uint64_t>();
+    for (std::uint64_t frame = 0; frame < count && in.ok(); ++frame) {
+        MatterParticles& matter = frames.emplace_back();
+        matter.positions = in.array<Vec3f>();
+        matter.volumes = in.array<float>();
+        matter.renewal = in.array<float>();
+        matter.spacing = in.value<float>();
+    }
+    return frames;
+}
+
 /// What lies between the magic and the checksum, in the order of pack_state.
 struct SavedRun {
     Recording recording;
@@ -76,11 +99,14 @@ struct SavedRun {
         for (std::size_t b = 0; b < bodies; ++b) recording.poses.push_back(read_poses(in));
         const std::uint64_t with_particles = in.value<std::uint64_t>();
         for (std::uint64_t b = 0; b < with_particles && in.ok(); ++b) recording.particles.push_back(read_particles(in));
+        for (std::size_t b = 0; b < bodies; ++b) recording.matter.push_back(read_matter(in));
         recording.checks = in.array<CheckTotals>();
         simulation = in.array<char>();
         is_whole = in.ok() && in.at_end();
         for (const PoseSequence& poses : recording.poses)
             is_whole = is_whole && poses.frames.size() == recording.totals.frames + 1;
+        for (const std::vector<MatterParticles>& frames : recording.matter)
+            is_whole = is_whole && (frames.empty() || frames.size() == recording.totals.frames + 1);
     }
 };
 
@@ -96,6 +122,7 @@ std::string pack_state(const Recording& recording, const Simulation& simulation,
         out.value(std::uint64_t{frames.size()});
         for (const std::vector<Vec3f>& particles : frames) out.array(std::span(particles));
     }
+    for (const std::vector<MatterParticles>& frames : recording.matter) write_matter(out, frames);
     out.array(std::span(recording.checks));
     const std::string state = simulation.save();
     out.array(std::span(state));

@@ -397,8 +397,6 @@ private:
         picture.ground = in.flag("ground", true);
         picture.obstacles = in.flag("obstacles", true);
         picture.particles = in.flag("particles", false);
-        picture.matter = in.flag("matter", false);
-        if (picture.particles && picture.matter) in.fail("matter", "give one of particles and matter");
         in.set_whole("passes", picture.passes);
         in.set_whole("most_triangles", picture.most_triangles);
     }
@@ -412,7 +410,7 @@ private:
             simulation->erase("duration");
         }
         std::ostringstream text;
-        text << toml::toml_formatter(kept) << "\nparticles drawn: " << scene_.picture.records_particles();
+        text << toml::toml_formatter(kept) << "\nparticles drawn: " << scene_.picture.particles;
         return text.str();
     }
 

@@ -110,8 +110,6 @@ struct ScenePicture {
     unsigned width = 960, height = 720, passes = 8;
     std::optional<Vec3f> background_top = {}, background_bottom = {};
     bool ground = true, obstacles = true, particles = false;
-    bool matter = false; ///< bodies of mpm as one surface of their particles
-    bool records_particles() const { return particles || matter; }
     std::size_t most_triangles = 300'000; ///< of a body as it is drawn
 };
 

@@ -204,8 +204,6 @@ constexpr KeyRule kKeys[] = {
     plain("picture", "ground", flag, "", "true", "whether a level ground, or the lowest point, catches the shadow"),
     plain("picture", "obstacles", flag, "", "true", "whether they are drawn"),
     plain("picture", "particles", flag, "", "false", "whether particles are drawn in place of the surface"),
-    plain("picture", "matter", flag, "", "false",
-          "whether bodies of mpm are drawn as one surface around their particles, which parts and joins with them"),
     from(1, 1000, "picture", "passes", whole, "", "8", "light directions that are averaged"),
     from(1, 1e9, "picture", "most_triangles", whole, "", "300000",
          "of a body; a larger one is drawn at a coarser level"),

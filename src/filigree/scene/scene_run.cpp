@@ -90,7 +90,8 @@ Status SceneRun::follow(bool checks) {
         if (checks) follower.direct = attach(body.model.mesh.positions, body.pieces.vertices);
     }
     recording_.poses.assign(ready_->bodies.size(), {scene_->step.frames_per_second, {}});
-    if (scene_->picture.records_particles()) recording_.particles.resize(ready_->bodies.size());
+    recording_.matter.resize(ready_->bodies.size());
+    if (scene_->picture.particles) recording_.particles.resize(ready_->bodies.size());
     if (checks) recording_.checks.resize(ready_->bodies.size());
     return Success{};
 }
@@ -138,6 +139,11 @@ Status SceneRun::record_body(std::size_t b) {
     times_.coupling += moved - start;
     times_.restore += now_seconds() - moved;
     if (follower.direct) check_body(b);
+    if (body.body->material.model == MaterialModel::mpm) {
+        MatterParticles& matter = recording_.matter[b].emplace_back(simulation_.matter(b));
+        matter.temperatures = {}; // what the surface is not made of
+        matter.liquid = {};
+    }
     if (recording_.particles.empty()) return Success{};
     const Vectors& particles = simulation_.positions(b);
     std::vector<Vec3f>& drawn = recording_.particles[b].emplace_back();

@@ -1,0 +1,178 @@
+#include "filigree/scene/melting_surface.h"
+
+#include "filigree/core/parallel_for.h"
+#include "filigree/melting/search_boxes.h"
+#include "filigree/mesh/normals.h"
+
+#include <algorithm>
+#include <limits>
+
+#include <fmt/format.h>
+
+namespace filigree {
+
+namespace {
+
+/// Finds the particles around places at rest.
+class ParticlesAtRest {
+public:
+    ParticlesAtRest(const std::vector<Vec3f>& positions, double spacing)
+        : positions_(positions), width_(1.5 * spacing), boxes_(positions, width_) {}
+
+    /// The four nearest, farther ones with less share; fewer where there are no more.
+    void near(const Vec3f& at, std::array<Index, 4>& particles, std::array<float, 4>& shares) const {
+        std::array<std::pair<float, Index>, 4> nearest;
+        nearest.fill({std::numeric_limits<float>::infinity(), kNoIndex});
+        const Vec3d scaled = (at.cast<double>() / width_).array().floor();
+        // A ring of boxes more than where the first was found, as a nearer one may be there.
+        for (int ring = 0, last = kMostRings; ring <= last; ++ring) {
+            for_ring(scaled, ring, [&](Index particle) {
+                const std::pair<float, Index> found = {(positions_[particle] - at).squaredNorm(), particle};
+                if (!(found < nearest.back())) return;
+                nearest.back() = found;
+                std::sort(nearest.begin(), nearest.end());
+            });
+            if (last == kMostRings && nearest[0].second != kNoIndex) last = std::min(ring + 1, kMostRings - 1);
+        }
+        const float softening = float(0.01 * width_ * width_);
+        float sum = 0;
+        for (std::size_t k = 0; k < 4; ++k) {
+            particles[k] = nearest[k].second == kNoIndex ? 0 : nearest[k].second;
+            shares[k] = nearest[k].second == kNoIndex ? 0 : 1 / (nearest[k].first + softening);
+            sum += shares[k];
+        }
+        for (float& share : shares) share = sum > 0 ? share / sum : 0;
+    }
+
+private:
+    static constexpr int kMostRings = 40; ///< of boxes; a vertex so far from all matter counts as old
+
+    template <class Visit>
+    void for_ring(const Vec3d& middle, int ring, const Visit& visit) const {
+        for (int z = -ring; z <= ring; ++z)
+            for (int y = -ring; y <= ring; ++y) {
+                const bool is_whole_row = std::abs(z) == ring || std::abs(y) == ring;
+                for (int x = -ring; x <= ring; x += is_whole_row || ring == 0 ? 1 : 2 * ring) {
+                    const Index box = boxes_.lookup.block(BlockGrid::key_of_block(
+                        std::int32_t(middle[0]) + x, std::int32_t(middle[1]) + y, std::int32_t(middle[2]) + z));
+                    if (box == kNoIndex) continue;
+                    for (std::size_t i = boxes_.starts[box]; i < boxes_.starts[box + 1]; ++i)
+                        visit(boxes_.entries[i].particle);
+                }
+            }
+    }
+
+    const std::vector<Vec3f>& positions_;
+    double width_;
+    SearchBoxes boxes_;
+};
+
+std::vector<Vec3f> placed(std::vector<Vec3f> points, const Eigen::Isometry3d& placement) {
+    for (Vec3f& p : points) p = (placement * p.cast<double>()).cast<float>();
+    return points;
+}
+
+Vec4f opaque(const Vec3f& color) { return {color[0], color[1], color[2], 1}; }
+
+/// Puts a mesh behind another: positions, faces, colours, and normals where the mesh has a normal a corner or vertex.
+void append(const Mesh& part, const Vec3f& color, const RunContext& context, Mesh& whole) {
+    const Index first = Index(whole.positions.size()), first_normal = Index(whole.normals.values.size());
+    whole.positions.insert(whole.positions.end(), part.positions.begin(), part.positions.end());
+    for (std::size_t f = 0; f < part.face_count(); ++f) {
+        for (const Index v : part.face(f)) whole.corners.push_back(first + v);
+        whole.face_offsets.push_back(Index(whole.corners.size()));
+    }
+    if (part.colors.empty())
+        whole.colors.insert(whole.colors.end(), part.positions.size(), opaque(color));
+    else
+        whole.colors.insert(whole.colors.end(), part.colors.begin(), part.colors.end());
+    std::vector<Vec3f> normals = part.normals.values;
+    if (normals.empty()) normals = vertex_normals(part, part.positions, context);
+    whole.normals.values.insert(whole.normals.values.end(), normals.begin(), normals.end());
+    const bool per_vertex = part.normals.empty() || part.normals.per_vertex();
+    for (const Index corner : per_vertex ? part.corners : part.normals.corners)
+        whole.normals.corners.push_back(first_normal + corner);
+}
+
+} // namespace
+
+Result<MeltingSurface> MeltingSurface::create(const ReadyScene& ready, const RunContext& context) {
+    MeltingSurface surface;
+    surface.ready_ = &ready;
+    for (std::size_t b = 0; b < ready.bodies.size(); ++b) {
+        if (ready.bodies[b].body->material.model != MaterialModel::mpm) continue;
+        if (const Status added = surface.add(b, context); !added) return added.error();
+    }
+    return surface;
+}
+
+Status MeltingSurface::add(std::size_t b, const RunContext& context) {
+    const ReadyBody& body = ready_->bodies[b];
+    Result<CompositeMesher> mesher = CompositeMesher::create(body.model.mesh, context);
+    if (!mesher && mesher.error().code == ErrorCode::unsuitable) {
+        warnings.push_back(fmt::format("body '{}': its mesh is not closed, so it neither parts nor joins where it "
+                                       "melts; `filigree info` shows where it is open",
+                                       body.name));
+        return Success{};
+    }
+    if (!mesher) return mesher.error();
+    Result<Restorer> restorer = Restorer::create(body.model, {}, context);
+    if (!restorer) return restorer.error();
+    BodyPart& part =
+        bodies_.emplace_back(BodyPart{b, std::move(*restorer), body.in_metres(body.model.mesh.positions), {}, {}});
+    std::vector<Vec3f> rest;
+    for (std::size_t p = 0; p < body.body->particle_count(); ++p) rest.push_back(body.body->rest[p]);
+    const ParticlesAtRest particles(rest, body.body->spacing());
+    part.particles.resize(part.start.size());
+    part.shares.resize(part.start.size());
+    parallel_for(context, part.start.size(), 1024, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t v = begin; v < end; ++v) particles.near(part.start[v], part.particles[v], part.shares[v]);
+    });
+    particle_colors_.insert(particle_colors_.end(), rest.size(), opaque(body.color));
+    name_ += (name_.empty() ? "" : "+") + body.name;
+    if (mesher_)
+        mesher_->append(*mesher);
+    else
+        mesher_.emplace(std::move(*mesher));
+    return Success{};
+}
+
+bool MeltingSurface::has_body(std::size_t body) const {
+    return std::any_of(bodies_.begin(), bodies_.end(), [&](const BodyPart& part) { return part.body == body; });
+}
+
+Result<CompositeSurface> MeltingSurface::frame(const Recording& recording, std::size_t frame,
+                                               const RunContext& context) {
+    if (frame == 0) dead_.clear();
+    MatterParticles matter;
+    Mesh restored;
+    std::vector<float> renewal;
+    for (const BodyPart& part : bodies_) {
+        const ReadyBody& body = ready_->bodies[part.body];
+        const MatterParticles& own = recording.matter[part.body][frame];
+        matter.spacing = std::max(matter.spacing, own.spacing);
+        matter.positions.insert(matter.positions.end(), own.positions.begin(), own.positions.end());
+        matter.volumes.insert(matter.volumes.end(), own.volumes.begin(), own.volumes.end());
+        matter.renewal.insert(matter.renewal.end(), own.renewal.begin(), own.renewal.end());
+        if (frame == 0) {
+            Mesh start = body.model.mesh;
+            start.positions = placed(part.start, ready_->actors[part.body].placement);
+            start.normals = {}; // of the mesh before it was turned
+            append(start, body.color, context, restored);
+        } else {
+            const Result<Mesh> now = part.restorer.mesh(recording.poses[part.body].frames[frame], context);
+            if (!now) return now.error();
+            append(*now, body.color, context, restored);
+        }
+        for (std::size_t v = 0; v < part.start.size(); ++v) {
+            float sum = 0;
+            for (std::size_t k = 0; k < 4; ++k) sum += part.shares[v][k] * own.renewal[part.particles[v][k]];
+            renewal.push_back(sum);
+        }
+    }
+    const Result<ParticleField> field = make_particle_field(matter, {}, context);
+    if (!field) return field.error();
+    return mesher_->make(restored, renewal, matter, particle_colors_, *field, dead_, context);
+}
+
+} // namespace filigree

@@ -1,0 +1,51 @@
+// The bodies of a scene that melt, as one surface that parts and joins.
+#pragma once
+
+#include "filigree/hierarchy/restore.h"
+#include "filigree/melting/composite_surface.h"
+#include "filigree/scene/recording.h"
+#include "filigree/scene/world_setup.h"
+
+namespace filigree {
+
+/// Of all bodies of mpm together, as what is molten flows together.
+class MeltingSurface {
+public:
+    /// Bodies whose mesh is open or not manifold are left out, as ever a mesh of one topology; `warnings` says so.
+    /// ready has to outlive the surface. Cost: welding, and O(vertices). Errors: cancelled.
+    static Result<MeltingSurface> create(const ReadyScene& ready, const RunContext& context);
+
+    /// Whether the scene has such bodies. Without them there is no frame to ask for.
+    bool is_empty() const { return bodies_.empty(); }
+    bool has_body(std::size_t body) const;
+    /// The bodies' names, with + between.
+    const std::string& name() const { return name_; }
+
+    /// Metres, in the scene's frame; in the colours of the bodies or their meshes. The start is the bodies' own meshes,
+    /// to the byte. Frames are made in order from the start on, as what died in one stays dead. Cost
+    /// O(mesh + particles). Errors: cancelled.
+    Result<CompositeSurface> frame(const Recording& recording, std::size_t frame, const RunContext& context);
+
+    std::vector<std::string> warnings;
+
+private:
+    struct BodyPart {
+        std::size_t body;
+        Restorer restorer;
+        std::vector<Vec3f> start; ///< m
+        /// Of each vertex: the particles that say how far its matter is renewed, and their shares.
+        std::vector<std::array<Index, 4>> particles;
+        std::vector<std::array<float, 4>> shares;
+    };
+
+    Status add(std::size_t body, const RunContext& context);
+
+    const ReadyScene* ready_ = nullptr;
+    std::vector<BodyPart> bodies_;
+    std::string name_;
+    std::vector<Vec4f> particle_colors_;
+    std::optional<CompositeMesher> mesher_;
+    std::vector<std::uint8_t> dead_; ///< vertices, so far
+};
+
+} // namespace filigree
