@@ -1,6 +1,7 @@
 #include "filigree/scene/scene_run.h"
 
 #include "filigree/core/text.h"
+#include "filigree/melting/composite_surface.h"
 #include "filigree/mesh/normals.h"
 #include "filigree/scene/saved_state.h"
 
@@ -31,11 +32,16 @@ double percentile_95(std::vector<float>& values) {
 /// A part of a volume in words; below 0: inside out.
 std::string volume_text(float ratio) { return ratio > 0 ? fmt::format("{:.2g} %", 100 * ratio) : "less than none"; }
 
-/// A frame's distances of the restored mesh from the one that the particles carry; diagonal: of the body, m.
+/// A frame's distances of the restored mesh from the one that the particles carry, of vertices that are not about to be
+/// the particles' surface; diagonal: of the body, m.
 void add_frame(CheckTotals& check, const Mesh& mesh, std::span<const Vec3f> restored, std::span<const Vec3f> direct,
-               double diagonal, const RunContext& context) {
+               std::span<const float> renewal, double diagonal, const RunContext& context) {
+    const auto is_old = [&](std::size_t v) { return renewal[v] <= CompositeMesher::kFadeBegin; };
     double squares = 0, most = 0;
+    std::size_t old = 0;
     for (std::size_t v = 0; v < direct.size(); ++v) {
+        if (!is_old(v)) continue;
+        ++old;
         const double distance = (direct[v] - restored[v]).cast<double>().norm();
         squares += distance * distance;
         most = std::max(most, distance);
@@ -44,10 +50,11 @@ void add_frame(CheckTotals& check, const Mesh& mesh, std::span<const Vec3f> rest
                              theirs = vertex_normals(mesh, direct, context);
     std::vector<float> angles;
     for (std::size_t v = 0; v < ours.size(); ++v)
-        if (!ours[v].isZero() && !theirs[v].isZero())
+        if (is_old(v) && !ours[v].isZero() && !theirs[v].isZero())
             angles.push_back(std::atan2(ours[v].cross(theirs[v]).norm(), ours[v].dot(theirs[v])) * 180 /
                              std::numbers::pi_v<float>);
-    const double p95 = percentile_95(angles), rms = std::sqrt(squares / double(direct.size())) / diagonal;
+    const double p95 = percentile_95(angles),
+                 rms = std::sqrt(squares / double(std::max<std::size_t>(old, 1))) / diagonal;
     check.rms_sum += rms;
     check.worst_rms = std::max(check.worst_rms, rms);
     check.worst_max = std::max(check.worst_max, most / diagonal);
@@ -177,7 +184,9 @@ void SceneRun::check_body(std::size_t b) {
     simulation_.attached(*follower.direct, direct, {}, always_);
     times_.direct += now_seconds() - start;
     const double diagonal = body.scale * bounds(body.model.mesh.positions).diagonal();
-    add_frame(recording_.checks[b], body.model.mesh, follower.restored, direct, diagonal, always_);
+    std::vector<float> renewal(direct.size());
+    simulation_.renewal(*follower.direct, renewal);
+    add_frame(recording_.checks[b], body.model.mesh, follower.restored, direct, renewal, diagonal, always_);
 }
 
 Result<Mesh> SceneRun::mesh(std::size_t body, std::size_t frame, const RunContext& context) const {
