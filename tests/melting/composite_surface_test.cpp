@@ -2,6 +2,7 @@
 #include "matter.h"
 
 #include "filigree/melting/composite_surface.h"
+#include "filigree/mesh/mesh_distance.h"
 #include "filigree/mesh/shapes.h"
 
 #include <cmath>
@@ -19,12 +20,13 @@ struct MeltingBody {
 
     explicit MeltingBody(Mesh mesh) : rest(std::move(mesh)), restored(rest), renewal(rest.positions.size(), 0) {}
 
-    Result<CompositeSurface> surface(unsigned threads = 1, std::span<const Vec4f> colors = {}) const {
+    Result<CompositeSurface> surface(unsigned threads = 1, std::span<const Vec4f> colors = {},
+                                     const ParticleFieldOptions& options = {}) const {
         const RunContext context(threads);
         const CompositeMesher mesher = CompositeMesher::create(rest, context).value();
         std::vector<std::uint8_t> dead;
-        return mesher.make(restored, renewal, matter, colors, make_particle_field(matter, {}, context).value(), dead,
-                           context);
+        return mesher.make(restored, renewal, matter, colors, make_particle_field(matter, options, context).value(),
+                           dead, context);
     }
 };
 
@@ -120,6 +122,31 @@ TEST(CompositeSurface, ClosedManifoldAndOrientedWhateverMelts) {
         }
         checked_volume(body.surface().value().mesh);
     }
+}
+
+/// Where the grid lies must not show: its shift by half a cell moves the surface by little.
+TEST(CompositeSurface, AnotherGridGivesTheSameSurface) {
+    MeltingBody body = melting_ball();
+    melt_above(body, 0.1f);
+    const double cell = 0.8 * double(kSpacing);
+    const Mesh one = body.surface(1, {}, {.shift = {0.37, 0.41, 0.29}}).value().mesh;
+    const CompositeSurface other = body.surface(1, {}, {.shift = {0.87, 0.91, 0.79}}).value();
+    const std::vector<float> distances = distances_to_surface(other.mesh, one, RunContext(1)).value();
+    double kept = 0, seam = 0, matter = 0;
+    std::size_t kept_count = 0, seam_count = 0, matter_count = 0;
+    for (std::size_t v = 0; v < distances.size(); ++v) {
+        const double squared = std::pow(double(distances[v]) / cell, 2);
+        const bool is_near_seam = std::abs(other.mesh.positions[v][2] - 0.1f) < 2 * kSpacing;
+        double& sum = other.origin[v] != kNoIndex ? kept : is_near_seam ? seam : matter;
+        sum += squared;
+        ++(other.origin[v] != kNoIndex ? kept_count : is_near_seam ? seam_count : matter_count);
+    }
+    EXPECT_LT(std::sqrt(kept / double(kept_count)), 0.03);
+    EXPECT_LT(std::sqrt(seam / double(seam_count)), 0.11);
+    EXPECT_LT(std::sqrt(matter / double(matter_count)), 0.15);
+    RecordProperty("kept", std::to_string(std::sqrt(kept / double(kept_count))));
+    RecordProperty("seam", std::to_string(std::sqrt(seam / double(seam_count))));
+    RecordProperty("matter", std::to_string(std::sqrt(matter / double(matter_count))));
 }
 
 TEST(CompositeSurface, TwoMelt) {
