@@ -50,6 +50,15 @@ public:
     Index step(Index slot, int axis, int by) const {
         return step(slot, axis == 0 ? by : 0, axis == 1 ? by : 0, axis == 2 ? by : 0);
     }
+    /// The slots of a cell's corners: corner q at q & 1, q >> 1 & 1, q >> 2.
+    std::array<Index, 8> corners(Index slot) const {
+        constexpr Index kLast = 7;
+        if ((slot & 7) != kLast && (slot >> 3 & 7) != kLast && (slot >> 6 & 7) != kLast)
+            return {slot, slot + 1, slot + 8, slot + 9, slot + 64, slot + 65, slot + 72, slot + 73};
+        std::array<Index, 8> all;
+        for (int q = 0; q < 8; ++q) all[std::size_t(q)] = step(slot, q & 1, q >> 1 & 1, q >> 2);
+        return all;
+    }
     /// The node below `at`, where a coordinate that is a node's counts as below it: what `sample` says of points.
     GridNode node_below(const Vec3d& at) const;
 

@@ -446,12 +446,9 @@ private:
         const BlockGrid& grid = cells_->grid();
         for (Index slot = 0; slot < grid.slot_count() && !context_.is_cancelled(); ++slot) {
             if (cells_->keeps(slot)) continue;
-            std::array<Index, 8> corners;
+            const std::array<Index, 8> corners = grid.corners(slot);
             unsigned inside = 0;
-            for (int q = 0; q < 8; ++q) {
-                corners[std::size_t(q)] = grid.step(slot, q & 1, q >> 1 & 1, q >> 2);
-                inside |= unsigned(cells_->is_inside(corners[std::size_t(q)])) << q;
-            }
+            for (unsigned q = 0; q < 8; ++q) inside |= unsigned(cells_->is_inside(corners[q])) << q;
             const auto rim = rims_.find(slot);
             if ((inside == 0 || inside == 255) && rim == rims_.end()) continue;
             segments_.clear();

@@ -60,8 +60,9 @@ private:
     Index corner(Index slot, int q) const { return grid_.step(slot, q & 1, q >> 1 & 1, q >> 2); }
 
     std::uint8_t inside_corners(Index slot) const {
+        const std::array<Index, 8> corners = grid_.corners(slot);
         unsigned mask = 0;
-        for (int q = 0; q < 8; ++q) mask |= unsigned(is_inside(corner(slot, q))) << q;
+        for (unsigned q = 0; q < 8; ++q) mask |= unsigned(is_inside(corners[q])) << q;
         return std::uint8_t(mask);
     }
 

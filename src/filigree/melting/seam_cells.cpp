@@ -28,6 +28,7 @@ void SeamCells::make_grid(const LivingMesh& mesh, const ParticleField& field) {
     nodes_below_.resize(mesh.positions.size());
     for (std::size_t v = 0; v < mesh.positions.size(); ++v)
         nodes_below_[v] = from.node_below(mesh.positions[v].cast<double>());
+    std::uint64_t last = ~std::uint64_t{0};
     const auto add_box = [&](const Triangle& t) {
         GridNode low, high;
         for (std::size_t a = 0; a < 3; ++a) {
@@ -39,9 +40,11 @@ void SeamCells::make_grid(const LivingMesh& mesh, const ParticleField& field) {
             for (std::int32_t y = low[1]; y <= high[1]; ++y)
                 for (std::int32_t x = low[0]; x <= high[0]; ++x) {
                     const std::uint64_t key = BlockGrid::key_of_block(x, y, z);
-                    if (keys.empty() || keys.back() != key) keys.push_back(key);
+                    if (key == last) continue; // triangles one after the other share blocks
+                    last = key;
+                    if (from.block(key) == kNoIndex) keys.push_back(key);
                 }
-        if (keys.size() > (std::size_t{1} << 22)) { // triangles one after the other share blocks
+        if (keys.size() > (std::size_t{1} << 22)) {
             std::sort(keys.begin(), keys.end());
             keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
         }
@@ -213,8 +216,7 @@ void SeamCells::sign_nodes() {
     std::vector<std::uint8_t> sources(grid_.slot_count(), kNone);
     std::vector<Index> front, next;
     const auto claim = [&](Index cell, Source source) {
-        for (int q = 0; q < 8; ++q) {
-            const Index node = grid_.step(cell, q & 1, q >> 1 & 1, q >> 2);
+        for (const Index node : grid_.corners(cell)) {
             if (node == kNoIndex || sources[node] != kNone) continue;
             sources[node] = source;
             front.push_back(node);
