@@ -209,7 +209,7 @@ def test_nothing_leaks(tmp_path):
     for call in calls:
         for _ in range(100):
             call()
-        for _ in range(4):  # an allocator's habits end, a leak does not
+        for _ in range(12):  # an allocator's habits end, a leak does not
             before = kilobytes()
             for _ in range(1000):
                 call()
