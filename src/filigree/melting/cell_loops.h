@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstdint>
-#include <utility>
 
 namespace filigree {
 
@@ -14,22 +13,27 @@ constexpr int edge_between(int p, int q) {
     return 8 * axis + (p & q);
 }
 
+/// The corners of a cell's face, counter-clockwise seen from outside the cell. side: 0 or 1, its coordinate along
+/// `axis`.
+constexpr std::array<int, 4> face_corners(int axis, int side) {
+    const int u = 1 << (axis + 1) % 3, v = 1 << (axis + 2) % 3, base = side << axis;
+    if (side == 0) return {base, base + v, base + u + v, base + u};
+    return {base, base + u, base + u + v, base + v};
+}
+
 /// Calls visit(from, to), two edges of the cell, for each segment of the surface on one of its faces: counter-clockwise
 /// around the surface in the cell, seen from outside. Inside corners across the face's diagonal stay apart. inside: a
-/// bit for each corner; side: 0 or 1, the face's coordinate along `axis`.
+/// bit for each corner.
 template <class Visit>
 constexpr void for_face_segments(int inside, int axis, int side, const Visit& visit) {
-    // The face's corners, counter-clockwise seen from outside the cell.
-    const int u = 1 << (axis + 1) % 3, v = 1 << (axis + 2) % 3, base = side << axis;
-    int face[4] = {base, base + u, base + u + v, base + v};
-    if (side == 0) std::swap(face[1], face[3]);
+    const std::array<int, 4> face = face_corners(axis, side);
     // From each edge where the boundary enters the inside back to the one where it left it.
     for (int i = 0; i < 4; ++i) {
-        const int a = face[i], b = face[(i + 1) % 4];
+        const int a = face[std::size_t(i)], b = face[std::size_t((i + 1) % 4)];
         if ((inside >> a & 1) || !(inside >> b & 1)) continue;
         int j = (i + 1) % 4; // the last inside corner of this run
-        while (inside >> face[(j + 1) % 4] & 1) j = (j + 1) % 4;
-        visit(edge_between(a, b), edge_between(face[j], face[(j + 1) % 4]));
+        while (inside >> face[std::size_t((j + 1) % 4)] & 1) j = (j + 1) % 4;
+        visit(edge_between(a, b), edge_between(face[std::size_t(j)], face[std::size_t((j + 1) % 4)]));
     }
 }
 

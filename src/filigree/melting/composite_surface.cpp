@@ -157,6 +157,7 @@ public:
         find_pieces();
         keep_vertices();
         keep_faces();
+        mark_cells_at_pieces();
         fill_cells();
         if (context_.is_cancelled()) return cancelled_error();
         add_unknown_normals();
@@ -426,12 +427,10 @@ private:
         divide(middle, b, outline);
     }
 
-    /// The vertex where the surface crosses the edge of the grid above a node.
+    /// The vertex where the field's surface crosses the edge of the grid above a node.
     Index crossing(Index slot, int axis) {
         const auto [found, is_new] = crossing_.try_emplace(4 * std::uint64_t(slot) + std::uint64_t(axis), kNoIndex);
         if (!is_new) return found->second;
-        if (const Index on_mesh = cells_->mesh_crossing(slot, axis); on_mesh != kNoIndex)
-            return found->second = cut_vertex(on_mesh);
         const float here = cells_->value(slot), there = cells_->value(cells_->grid().step(slot, axis, 1));
         // Where the mesh says who is inside, the field may not change its sign; it is nearest to that at one end.
         const float part = (here > 0) != (there > 0)          ? here / (here - there)
@@ -449,19 +448,56 @@ private:
             const std::array<Index, 8> corners = grid.corners(slot);
             unsigned inside = 0;
             for (unsigned q = 0; q < 8; ++q) inside |= unsigned(cells_->is_inside(corners[q])) << q;
-            const auto rim = rims_.find(slot);
-            if ((inside == 0 || inside == 255) && rim == rims_.end()) continue;
+            const bool is_at_pieces = is_at_pieces_[slot];
+            if ((inside == 0 || inside == 255) && !is_at_pieces) continue;
             segments_.clear();
-            if (rim != rims_.end())
+            if (const auto rim = rims_.find(slot); rim != rims_.end())
                 for (const auto& [from, to] : rim->second) segments_.push_back({cut_vertex(from), cut_vertex(to)});
             const auto at_edge = [&](int edge) { return crossing(corners[std::size_t(edge & 7)], edge >> 3); };
             for (int axis = 0; axis < 3; ++axis)
-                for (int side = 0; side < 2; ++side)
-                    if (!cells_->keeps(grid.step(slot, axis, 2 * side - 1)))
+                for (int side = 0; side < 2; ++side) {
+                    if (cells_->keeps(grid.step(slot, axis, 2 * side - 1))) continue;
+                    if (is_at_pieces)
+                        add_face_segments(corners, inside, axis, side);
+                    else
                         for_face_segments(int(inside), axis, side, [&](int from, int to) {
                             segments_.push_back({at_edge(from), at_edge(to)});
                         });
+                }
             link_loops();
+        }
+    }
+
+    /// As for_face_segments, of edges that may be crossed several times.
+    void add_face_segments(const std::array<Index, 8>& corners, unsigned inside, int axis, int side) {
+        outline_.clear();
+        const std::array<int, 4> face = face_corners(axis, side);
+        for (std::size_t i = 0; i < 4; ++i) {
+            const int from = face[i], to = face[(i + 1) % 4], edge = edge_between(from, to);
+            const Index slot = corners[std::size_t(edge & 7)];
+            const std::size_t first = outline_.size();
+            if (cells_->touches_pieces(slot, edge >> 3)) {
+                for (const SeamCells::Crossing& c : cells_->crossings(slot, edge >> 3))
+                    outline_.push_back(cut_vertex(c.vertex));
+                if (from > to) std::reverse(outline_.begin() + std::ptrdiff_t(first), outline_.end());
+            } else if ((inside >> from & 1) != (inside >> to & 1)) {
+                outline_.push_back(crossing(slot, edge >> 3));
+            }
+        }
+        // Crossings lead in and out in turn; the first one in where the walk begins outside.
+        const std::size_t count = outline_.size();
+        for (std::size_t i = inside >> face[0] & 1; i < count; i += 2)
+            segments_.push_back({outline_[i], outline_[(i + 1) % count]});
+    }
+
+    void mark_cells_at_pieces() {
+        const BlockGrid& grid = cells_->grid();
+        is_at_pieces_.assign(grid.slot_count(), false);
+        for (Index slot = 0; slot < grid.slot_count(); ++slot) {
+            if (!cells_->keeps(slot)) continue;
+            for (int q = 0; q < 27; ++q)
+                if (const Index near = grid.step(slot, q % 3 - 1, q / 3 % 3 - 1, q / 9 - 1); near != kNoIndex)
+                    is_at_pieces_[near] = true;
         }
     }
 
@@ -490,6 +526,7 @@ private:
             end_face(kNoIndex);
             ++result_.matter_triangles;
         };
+        if (loop_.size() < 3) return; // there and back along an edge of the grid
         if (loop_.size() == 3) return add(loop_[0], loop_[1], loop_[2]);
         Vec3f sum = Vec3f::Zero();
         for (const Index v : loop_) sum += result_.mesh.positions[v];
@@ -550,7 +587,8 @@ private:
     std::unordered_set<Index> unknown_normals_;
     std::unordered_map<Index, Index> cut_at_; ///< of new vertices
     std::vector<std::array<Index, 2>> segments_;
-    std::vector<Index> loop_;
+    std::vector<Index> loop_, outline_;
+    std::vector<bool> is_at_pieces_; ///< of cells: whether one that keeps its pieces touches it
     CompositeSurface result_;
 };
 

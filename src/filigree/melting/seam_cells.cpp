@@ -149,12 +149,14 @@ void SeamCells::find_crossings() {
                 const Index slot = grid_.slot(node);
                 const bool same_side = (piece.cell[std::size_t(u)] == node[std::size_t(u)]) ==
                                        (piece.cell[std::size_t(v)] == node[std::size_t(v)]);
-                Crossing& crossing = crossings_[4 * std::uint64_t(slot) + std::uint64_t(axis)];
-                if (crossing.vertex == at) continue;
-                crossing.vertex = at;
-                crossing.count = std::int8_t(std::min(crossing.count + 1, 2));
-                crossing.leaves = along_u == same_side;
-                vote(slot, axis, crossing.leaves);
+                std::vector<Crossing>& here = crossings_[4 * std::uint64_t(slot) + std::uint64_t(axis)];
+                if (std::any_of(here.begin(), here.end(), [&](const Crossing& c) { return c.vertex == at; })) continue;
+                const float place = cut_->position(at)[axis];
+                const auto above = std::find_if(here.begin(), here.end(), [&](const Crossing& c) {
+                    return cut_->position(c.vertex)[axis] > place;
+                });
+                here.insert(above, {at, along_u == same_side});
+                vote(slot, axis, along_u == same_side);
             }
         }
     for (Index t = 0; t < mesh_.kept.size(); ++t)
@@ -282,21 +284,26 @@ std::array<Index, 4> SeamCells::cells_around(Index slot, int axis) const {
     return cells;
 }
 
-Index SeamCells::mesh_crossing(Index slot, int axis) const {
+bool SeamCells::touches_pieces(Index slot, int axis) const {
     const std::array<Index, 4> cells = cells_around(slot, axis);
-    if (std::none_of(cells.begin(), cells.end(), [&](Index cell) { return keeps(cell); })) return kNoIndex;
+    return std::any_of(cells.begin(), cells.end(), [&](Index cell) { return keeps(cell); });
+}
+
+std::span<const SeamCells::Crossing> SeamCells::crossings(Index slot, int axis) const {
     const auto found = crossings_.find(4 * std::uint64_t(slot) + std::uint64_t(axis));
-    return found == crossings_.end() ? kNoIndex : found->second.vertex;
+    return found == crossings_.end() ? std::span<const Crossing>() : found->second;
 }
 
 bool SeamCells::is_in_conflict(Index slot, int axis) const {
     std::size_t kept = 0;
     for (const Index cell : cells_around(slot, axis)) kept += keeps(cell);
     if (kept == 0 || kept == 4) return false;
-    const bool parts = is_inside(slot) != is_inside(grid_.step(slot, axis, 1));
-    const auto found = crossings_.find(4 * std::uint64_t(slot) + std::uint64_t(axis));
-    if (found == crossings_.end()) return parts;
-    return !parts || found->second.count != 1 || found->second.leaves != is_inside(slot);
+    bool inside = is_inside(slot);
+    for (const Crossing& crossing : crossings(slot, axis)) {
+        if (crossing.leaves != inside) return true;
+        inside = !inside;
+    }
+    return inside != is_inside(grid_.step(slot, axis, 1));
 }
 
 /// Returns whether all that was given up had been cut; else another round cuts it.

@@ -18,9 +18,9 @@ struct LivingMesh {
 
 /// The field's grid, larger where the mesh goes beyond it, with the mesh near what is renewed cut into its cells. Cells
 /// keep their pieces of kept triangles; all others are filled from the signs of their nodes. Around an edge of the grid
-/// that touches both, either there is one crossing of the mesh, and it parts inside from outside as the nodes have it,
-/// or there is none and the nodes agree: cells where that does not hold give up their pieces. That alone makes the
-/// whole closed and manifold; signs only decide how much is kept.
+/// that touches both, the mesh's crossings lead in and out in turn, from the side that one end is on to that of the
+/// other: cells where that does not hold give up their pieces. That alone makes the whole closed and manifold; signs
+/// only decide how much is kept.
 class SeamCells {
 public:
     /// renewed: positions of particles of new matter.
@@ -36,8 +36,14 @@ public:
     bool keeps(const GridNode& cell) const { return keeps(grid_.slot(cell)); }
     bool is_inside(Index slot) const { return slot != kNoIndex && inside_[slot]; }
     float value(Index slot) const { return slot == kNoIndex ? ParticleField::kOutside : values_[slot]; }
-    /// The mesh's only crossing of the edge above a node, where a cell around it keeps its pieces; else kNoIndex.
-    Index mesh_crossing(Index slot, int axis) const;
+    struct Crossing {
+        Index vertex; ///< of the cut
+        bool leaves;  ///< whether what is above is outside
+    };
+    /// Whether a cell around the edge above a node keeps its pieces.
+    bool touches_pieces(Index slot, int axis) const;
+    /// The mesh's crossings of such an edge, upward.
+    std::span<const Crossing> crossings(Index slot, int axis) const;
 
 private:
     enum CellBits : std::uint8_t {
@@ -46,12 +52,6 @@ private:
         kFar = 4, ///< of triangles that are not cut
         kBand = 8,
     };
-    struct Crossing {
-        Index vertex = kNoIndex;
-        std::int8_t count = 0;
-        bool leaves = false; ///< whether the upper end is outside
-    };
-
     void make_grid(const LivingMesh& mesh, const ParticleField& field);
     void mark_band(int width);
     void cut_band();
@@ -79,7 +79,7 @@ private:
     std::vector<std::uint8_t> crossed_; ///< of a slot: axes whose edge the mesh crosses, a bit each
     std::vector<std::int8_t> votes_;    ///< of a node: crossings that say inside, less those that say outside
     std::vector<std::uint8_t> inside_;
-    std::unordered_map<std::uint64_t, Crossing> crossings_; ///< of cut triangles, by 4 * slot + axis
+    std::unordered_map<std::uint64_t, std::vector<Crossing>> crossings_; ///< of cut triangles, by 4 * slot + axis
 };
 
 } // namespace filigree
