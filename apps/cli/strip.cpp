@@ -12,7 +12,7 @@ namespace filigree::cli {
 namespace {
 
 struct StripCommandOptions {
-    std::string input, output;
+    std::string input, output, driver;
     StripOptions strip;
     std::optional<double> fidelity;
     PoseSource fidelity_from = PoseSource::positions;
@@ -87,7 +87,10 @@ void run(const StripCommandOptions& options, Session& session) {
     Mesh mesh = session.read_mesh(options.input);
     const double read = now_seconds();
     StrippedToFidelity result;
-    if (options.fidelity)
+    if (!options.driver.empty())
+        result.stripped = require(strip_to_driver(std::move(mesh), session.read_mesh(options.driver),
+                                                  options.strip.precision, session.context()));
+    else if (options.fidelity)
         result = require(
             strip_to_fidelity(mesh, options.strip, {*options.fidelity, options.fidelity_from}, session.context()));
     else
@@ -117,6 +120,12 @@ Command strip_command() {
                  Option("--base", strip.base, "Vertices of the driver (unset: 1,000, fewer for small meshes)")
                      .whole_from(3)
                      .excludes({"--levels", "--error", "--fidelity"}),
+                 Option("--driver", options->driver,
+                        "Mesh to bind to, made elsewhere: its vertices are the driver's; restored meshes have them "
+                        "behind their own")
+                     .is_read()
+                     .excludes({"--base", "--levels", "--error", "--fidelity", "--fidelity-from", "--max-edge",
+                                "--code", "--references"}),
                  Option("--levels", strip.levels, "Levels to remove, each leaves a quarter of the vertices")
                      .whole_from(1)
                      .excludes({"--error", "--fidelity"}),
@@ -146,6 +155,7 @@ Command strip_command() {
             .examples = "  filigree strip scan.ply -o scan.fil\n"
                         "  filigree strip scan.ply -o scan.fil --base 5000 --precision int16\n"
                         "  filigree strip scan.ply -o scan.fil --fidelity 1e-5\n"
+                        "  filigree strip scan.ply -o scan.fil --driver cage.obj\n"
                         "  filigree strip cube.obj -o cube.fil --code reference",
             .run = [options](Session& session) { run(*options, session); }};
 }

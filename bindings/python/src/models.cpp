@@ -37,17 +37,42 @@ PoseSource source_of(const std::string& from) {
                                 {{"positions", PoseSource::positions}, {"gradients", PoseSource::gradients}});
 }
 
-PyModel strip_mesh(const py::object& given, std::optional<std::size_t> base, std::optional<unsigned> levels,
-                   std::optional<double> error, std::optional<double> fidelity, const std::string& fidelity_from,
-                   std::optional<double> max_edge, const std::string& code, const std::string& precision,
-                   unsigned references, unsigned threads, const py::object& progress) {
+Precision precision_of(const std::string& precision) {
+    return value_of<Precision>(precision, "precision", {{"float", Precision::float32}, {"int16", Precision::int16}});
+}
+
+PyModel strip_to(const py::object& given, const py::object& driver_given, const std::string& precision,
+                 unsigned threads, const py::object& progress) {
+    const MeshPtr mesh = mesh_of(given), driver = mesh_of(driver_given);
+    const Precision stored = precision_of(precision);
+    Stripped stripped = LongCall{threads, progress}.owning(
+        [=](const RunContext& context) { return strip_to_driver(*mesh, *driver, stored, context).value(); });
+    return {std::make_shared<const Model>(std::move(stripped.model)), report_of(stripped.report)};
+}
+
+/// The vertices that a list of the blend code names; none for the reference code.
+py::object listed(const py::object& self, const std::vector<Index> BlendDetail::*list) {
+    static const std::vector<Index> none;
+    const auto* detail = std::get_if<BlendDetail>(&self.cast<const PyModel&>().model->detail);
+    return view(detail ? detail->*list : none, self);
+}
+
+PyModel strip_mesh(const py::object& given, const py::object& driver, std::optional<std::size_t> base,
+                   std::optional<unsigned> levels, std::optional<double> error, std::optional<double> fidelity,
+                   const std::string& fidelity_from, std::optional<double> max_edge, const std::string& code,
+                   const std::string& precision, unsigned references, unsigned threads, const py::object& progress) {
+    if (!driver.is_none()) {
+        if (base || levels || error || fidelity || max_edge || code != "blend")
+            refuse("With driver, how coarse the driver is is settled: leave out base, levels, error, fidelity, "
+                   "max_edge and code.");
+        return strip_to(given, driver, precision, threads, progress);
+    }
     const MeshPtr mesh = mesh_of(given);
     StripOptions options{
         .base = base, .levels = levels, .error = error, .max_edge = max_edge, .references = references};
     options.code =
         value_of<DetailCode>(code, "code", {{"blend", DetailCode::blend}, {"reference", DetailCode::reference}});
-    options.precision =
-        value_of<Precision>(precision, "precision", {{"float", Precision::float32}, {"int16", Precision::int16}});
+    options.precision = precision_of(precision);
     const LongCall call{threads, progress};
     if (!fidelity) {
         Stripped stripped =
@@ -91,6 +116,12 @@ Made by `strip` and `read_model`; never changes. Pickles as the bytes of its fil
             "driver_vertices",
             [](const py::object& self) { return view(self.cast<const PyModel&>().model->driver().vertices, self); },
             "The driver's vertices as ids in `mesh`, ascending, uint32 (d,), read-only.")
+        .def_property_readonly(
+            "across_gap", [](const py::object& self) { return listed(self, &BlendDetail::across_gap); },
+            "Vertices of `mesh` bound across a gap, as their part has no driver of its own: uint32 (k,), read-only.")
+        .def_property_readonly(
+            "facing_away", [](const py::object& self) { return listed(self, &BlendDetail::facing_away); },
+            "Vertices of `mesh` bound to a driver triangle that faces another way: uint32 (k,), read-only.")
         .def_property_readonly(
             "finest_level", [](const PyModel& self) { return self.model->finest_level(); },
             "Number of the finest level; 0 is the driver.")
@@ -165,12 +196,12 @@ dict
                         [](const py::bytes& bytes) { return model_of_bytes(bytes, "pickle"); }));
 
     m.def(
-        "strip", &strip_mesh, py::arg("mesh"), py::kw_only(), py::arg("base") = py::none(),
-        py::arg("levels") = py::none(), py::arg("error") = py::none(), py::arg("fidelity") = py::none(),
-        py::arg("fidelity_from") = "positions", py::arg("max_edge") = py::none(), py::arg("code") = "blend",
-        py::arg("precision") = "float", py::arg("references") = 3, py::arg("threads") = 0,
+        "strip", &strip_mesh, py::arg("mesh"), py::kw_only(), py::arg("driver") = py::none(),
+        py::arg("base") = py::none(), py::arg("levels") = py::none(), py::arg("error") = py::none(),
+        py::arg("fidelity") = py::none(), py::arg("fidelity_from") = "positions", py::arg("max_edge") = py::none(),
+        py::arg("code") = "blend", py::arg("precision") = "float", py::arg("references") = 3, py::arg("threads") = 0,
         py::arg("progress") = py::none(),
-        R"(strip(mesh, *, base=None, levels=None, error=None, fidelity=None, fidelity_from='positions', max_edge=None, code='blend', precision='float', references=3, threads=0, progress=None)
+        R"(strip(mesh, *, driver=None, base=None, levels=None, error=None, fidelity=None, fidelity_from='positions', max_edge=None, code='blend', precision='float', references=3, threads=0, progress=None)
 --
 
 Take the detail off a mesh: a model with a light driver.
@@ -179,6 +210,9 @@ Parameters
 ----------
 mesh : Mesh, or an object with vertices and faces or triangles
     Any mesh that has a vertex; what cannot be bound well is counted in the model's `report`.
+driver : Mesh, or an object with vertices and faces or triangles, optional
+    Mesh to bind to that was made elsewhere: its vertices, in their order, are the driver's. Restored meshes have them
+    behind their own, without faces. Goes with `precision` alone.
 base : int, optional
     Vertices of the driver, about; 3 or more. At most one of `base`, `levels`, `error` and `fidelity`; with none 1,000,
     fewer for meshes below 20,000.

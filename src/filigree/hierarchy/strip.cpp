@@ -1,6 +1,8 @@
 #include "filigree/hierarchy/strip.h"
 
+#include "filigree/core/parallel_for.h"
 #include "filigree/hierarchy/simplify.h"
+#include "filigree/mesh/closest_point.h"
 #include "filigree/mesh/normals.h"
 #include "filigree/mesh/surface.h"
 
@@ -146,6 +148,63 @@ Cells make_cells(const Level& driver) {
     return cells;
 }
 
+/// The driver's vertices as vertices of the mesh, behind its own, where no face uses them. Colours are white, texture
+/// coordinates and other numbers 0.
+void append_driver(Mesh& mesh, const Mesh& driver, std::span<const Vec3f> driver_normals) {
+    for (std::size_t v = 0; v < driver.vertex_count(); ++v)
+        mesh.positions.push_back((driver.world_position(v) - mesh.origin).cast<float>());
+    const std::size_t count = mesh.vertex_count();
+    if (!mesh.normals.empty() && mesh.normals.per_vertex())
+        mesh.normals.values.insert(mesh.normals.values.end(), driver_normals.begin(), driver_normals.end());
+    if (!mesh.uvs.empty() && mesh.uvs.per_vertex()) mesh.uvs.values.resize(count, Vec2f::Zero());
+    if (!mesh.colors.empty()) mesh.colors.resize(count, Vec4f::Ones());
+    for (VertexScalar& scalar : mesh.scalars) scalar.values.resize(count, 0);
+}
+
+/// Threads between each driver vertex and the corners of the mesh's triangle that is closest to it and faces the same
+/// way: along them the driver's vertices find the part of the mesh that is theirs.
+std::vector<Triangle> link_driver(const WorkingMesh& work, std::size_t first_driver_vertex, const RunContext& context) {
+    std::vector<Triangle> links;
+    const std::span<const Triangle> triangles = work.surface.triangles;
+    if (triangles.empty()) return links;
+    std::optional<ClosestPointTree> tree; // Embree builds on the threads of the arena it is called in
+    context.execute([&] { tree.emplace(work.positions, triangles); });
+    const std::size_t count = work.positions.size() - first_driver_vertex;
+    links.resize(2 * count);
+    parallel_for(context, count, 1 << 10, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            const auto v = static_cast<Index>(first_driver_vertex + i);
+            SurfacePoint point =
+                tree->closest(work.positions[v], std::numeric_limits<double>::infinity(), work.normals[v]);
+            if (point.triangle == kNoIndex) point = tree->closest(work.positions[v]);
+            const Triangle& t = triangles[point.triangle];
+            links[2 * i] = {v, t[0], t[1]};
+            links[2 * i + 1] = {v, t[1], t[2]};
+        }
+    });
+    return links;
+}
+
+/// The driver as a level: `count` vertices of the mesh from `first` on.
+Level make_driver_level(std::size_t first, std::size_t count, std::span<const Triangle> triangles) {
+    Level level;
+    for (std::size_t i = 0; i < count; ++i) level.vertices.push_back(static_cast<Index>(first + i));
+    for (const Triangle& t : triangles) {
+        level.corners.insert(level.corners.end(), t.begin(), t.end());
+        level.face_offsets.push_back(static_cast<Index>(level.corners.size()));
+    }
+    return level;
+}
+
+std::optional<Error> check_driver(const Mesh& mesh, const Mesh& driver) {
+    if (mesh.vertex_count() == 0) return Error{ErrorCode::unsuitable, "The mesh has no vertices: nothing to bind."};
+    if (driver.vertex_count() == 0)
+        return Error{ErrorCode::unsuitable, "The driver has no vertices: nothing to bind to."};
+    if (mesh.vertex_count() + driver.vertex_count() >= kNoIndex)
+        return Error{ErrorCode::unsuitable, "The mesh and its driver have more vertices than 32-bit indices can name."};
+    return std::nullopt;
+}
+
 Result<Stripped> strip_blend(Mesh mesh, const StripOptions& options, const RunContext& context) {
     Stripped result;
     const Stopwatch simplify_time;
@@ -225,6 +284,44 @@ std::optional<Error> check_options(const Mesh& mesh, const StripOptions& options
 }
 
 } // namespace
+
+Result<Stripped> strip_to_driver(Mesh mesh, const Mesh& driver, Precision precision, const RunContext& context) {
+    if (std::optional<Error> error = check_driver(mesh, driver)) return *error;
+    const Stopwatch bind_time;
+    Result<Surface> driver_surface = make_surface(driver, context);
+    if (!driver_surface) return driver_surface.error();
+    split_shared_normals(mesh);
+    const std::size_t own = mesh.vertex_count();
+    const std::vector<Vec3f> driver_normals = vertex_normals(driver_surface->triangles, driver.positions, context);
+    append_driver(mesh, driver, driver_normals);
+    Result<WorkingMesh> work = make_working_mesh(mesh, context);
+    if (!work) return work.error();
+    // Not welded to the mesh, though a driver's vertex may lie on one of its.
+    for (std::size_t i = 0; i < driver.vertex_count(); ++i)
+        work->surface.representative[own + i] = static_cast<Index>(own + driver_surface->representative[i]);
+    std::copy(driver_normals.begin(), driver_normals.end(), work->normals.begin() + static_cast<std::ptrdiff_t>(own));
+    const std::vector<Triangle> links = link_driver(*work, own, context);
+    work->surface.triangles.insert(work->surface.triangles.end(), links.begin(), links.end());
+
+    Level level = make_driver_level(own, driver.vertex_count(), driver_surface->triangles);
+    Cells cells = make_cells(level);
+    Result<Binding> binding = bind_to_driver(work->positions, work->surface, work->normals, cells.global, context);
+    if (!binding) return binding.error();
+    const auto drop_drivers = [own](std::vector<Index>& ids) {
+        ids.erase(std::lower_bound(ids.begin(), ids.end(), own), ids.end());
+    };
+    drop_drivers(binding->across_gap);
+    drop_drivers(binding->facing_away);
+
+    Stripped result;
+    result.report.across_gap = binding->across_gap.size();
+    result.report.facing_away = binding->facing_away.size();
+    result.report.bind_seconds = bind_time.seconds();
+    result.model.detail = encode_blend(mesh.positions, level.vertices, std::move(cells.local), *binding, precision);
+    result.model.levels.push_back(std::move(level));
+    result.model.mesh = std::move(mesh);
+    return result;
+}
 
 Result<Stripped> strip(Mesh mesh, const StripOptions& options, const RunContext& context) {
     if (std::optional<Error> error = check_options(mesh, options)) return *error;
