@@ -18,10 +18,10 @@ def follow_driver(high, driver, model):
     settings.model["filigree_vertices"] = len(high.data.vertices)
     settings.driver = driver
     models.remove(before)
-    _remove_object(settings.level_object)
-    meshes.set_at_rest(high.data)  # before the modifier, which moves all vertices to where the attribute says
+    if settings.carrier is None:
+        settings.carrier = nodes.make_carrier(high)
     restore_setup(high)
-    show_level(high)
+    nodes.show_level(high)
 
 
 def restore_setup(high):
@@ -30,7 +30,7 @@ def restore_setup(high):
     scene = bpy.context.scene
     if settings.driver.name not in scene.objects:
         meshes.link_beside(settings.driver, high)
-    _remove_object(settings.anchor)
+    nodes.remove_object(settings.anchor)
     settings.anchor = nodes.make_anchor(high, settings.driver)
     meshes.link_beside(settings.anchor, high)
     settings.anchor.hide_set(True)
@@ -41,32 +41,6 @@ def restore_setup(high):
     settings.message = ""
     scene.render.use_lock_interface = True  # Blender may not draw the mesh while a render's frame is written to it
     follow.follow(high, bpy.context.evaluated_depsgraph_get())
-
-
-def show_level(high):
-    """Makes or removes the object that the viewport shows instead of the finest level."""
-    settings = high.filigree
-    model = models.model_of(settings) if settings.model else None
-    wanted = model is not None and 0 <= settings.viewport_level < model.finest_level
-    _remove_object(settings.level_object)
-    settings.level_object = None
-    if wanted:
-        made = meshes.blender_mesh(model.level(settings.viewport_level), f"{high.name} level {settings.viewport_level}")
-        for material in high.data.materials:
-            made.materials.append(material)
-        settings.level_object = bpy.data.objects.new(made.name, made)
-        settings.level_object["filigree_level"] = settings.viewport_level
-        meshes.set_at_rest(made)
-    if settings.model is not None:
-        nodes.follow_by_nodes(high)
-
-
-def _remove_object(obj):
-    if obj is not None:
-        mesh = obj.data
-        bpy.data.objects.remove(obj)
-        if mesh.users == 0:
-            bpy.data.meshes.remove(mesh)
 
 
 def _select_doubtful(high, model):
@@ -164,9 +138,11 @@ class FILIGREE_OT_unbind(bpy.types.Operator):
             modifier = high.modifiers.get(name)
             if modifier is not None:
                 high.modifiers.remove(modifier)
-        meshes.remove_attribute(high.data, meshes.POSITION)
-        _remove_object(settings.anchor)
-        _remove_object(settings.level_object)
+        nodes.remove_object(settings.anchor)
+        if sum(o.filigree.carrier == settings.carrier for o in bpy.data.objects) == 1:
+            nodes.remove_object(settings.carrier)
+        settings.carrier = None
+        nodes.remove_object(settings.level_object)
         before, settings.model, settings.driver, settings.message = settings.model, None, None, ""
         models.remove(before)
         return {"FINISHED"}

@@ -4,20 +4,31 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
-from . import meshes, models
+from . import meshes, models, nodes
 from .library import filigree
 
 
 def followers(scene):
-    """The objects of a scene that follow a driver, one a mesh: objects that share a mesh have one shape."""
-    seen = set()
-    for obj in scene.objects:
-        if obj.type == "MESH" and (obj.filigree.model or obj.filigree.driver):
-            if obj.data.name_full not in seen:
-                yield obj
-            elif not obj.filigree.message:
-                obj.filigree.message = "Shares its mesh with another object that follows: Object > Relations > Make Single User"
-            seen.add(obj.data.name_full)
+    """The objects of a scene that follow a driver."""
+    return [o for o in scene.objects
+            if o.type == "MESH" and (o.filigree.model or o.filigree.driver) and nodes.MODIFIER in o.modifiers]
+
+
+def _separate_copies(objects):
+    """A copied object has the carrier of the one it was copied from: it gets one of its own, and a level of its own."""
+    owned = set()
+    for high in objects:
+        settings = high.filigree
+        if settings.carrier in owned:
+            settings.carrier, settings.level_object = nodes.make_carrier(high), None
+            nodes.show_level(high)
+        owned.add(settings.carrier)
+
+
+def set_at_rest(high):
+    """Shows the mesh's own shape."""
+    if high.filigree.carrier is not None:
+        meshes.set_vertices(high.filigree.carrier.data, meshes.vertices_of(high.data))
 
 
 def driver_pose(high, depsgraph):
@@ -62,24 +73,23 @@ def _place(high, depsgraph):
     level_object = settings.level_object
     if level_object is not None and depsgraph.mode == "VIEWPORT":
         level = level_object.get("filigree_level")
-        meshes.set_attribute(level_object.data, meshes.POSITION, restore(high, pose, level))
+        meshes.set_vertices(level_object.data, restore(high, pose, level))
     else:
-        meshes.set_attribute(high.data, meshes.POSITION, restore(high, pose)[:count])
+        meshes.set_vertices(settings.carrier.data, restore(high, pose)[:count])
     return ""
 
 
 def follow(high, depsgraph):
     """Restores `high` as its driver is now, and says in its panel what is in the way."""
     settings = high.filigree
-    if not settings.enabled or high.mode == "EDIT":
+    if not settings.enabled or settings.carrier is None or high.mode == "EDIT":
         return
     try:
         message = _place(high, depsgraph)
     except filigree.Error as error:
         message = str(error)
-    if message and (not settings.message or meshes.POSITION not in high.data.attributes
-                    or len(high.data.attributes[meshes.POSITION].data) != len(high.data.vertices)):
-        meshes.set_at_rest(high.data)
+    if message and (not settings.message or len(settings.carrier.data.vertices) != len(high.data.vertices)):
+        set_at_rest(high)
     if message != settings.message:
         settings.message = message
 
@@ -88,10 +98,9 @@ def refresh(high, context):
     """After a setting was changed."""
     if filigree is None or not (high.filigree.model or high.filigree.driver):
         return
+    nodes.follow_by_nodes(high)
     if not high.filigree.enabled:
-        meshes.set_at_rest(high.data)
-        if high.filigree.level_object is not None:
-            meshes.set_at_rest(high.filigree.level_object.data)
+        set_at_rest(high)
     else:
         follow(high, context.evaluated_depsgraph_get())
 
@@ -110,7 +119,9 @@ def _on_update(scene, depsgraph):
     touched = {u.id.original for u in depsgraph.updates if isinstance(u.id, bpy.types.Object)}
     if not touched:
         return
-    for high in followers(scene):
+    objects = followers(scene)
+    _separate_copies(objects)
+    for high in objects:
         if high.filigree.driver in touched or (high in touched and high.filigree.object_motion):
             follow(high, depsgraph)
 

@@ -5,9 +5,6 @@ import numpy as np
 
 from .library import filigree
 
-POSITION = "filigree_position"  # where the restored vertices are stored on the mesh
-
-
 def vertices_of(mesh):
     """Positions of a mesh's vertices in its object's space, float32 (n, 3)."""
     flat = np.empty(3 * len(mesh.vertices), np.float32)
@@ -51,7 +48,7 @@ def blender_mesh(mesh, name):
     return made
 
 
-def set_attribute(mesh, name, values, kind="FLOAT_VECTOR", field="vector"):
+def set_attribute(mesh, name, values, kind, field):
     """Writes one value a vertex; the attribute is made where it is missing or of another kind."""
     attribute = mesh.attributes.get(name)
     if attribute is not None and (attribute.domain != "POINT" or attribute.data_type != kind):
@@ -63,15 +60,13 @@ def set_attribute(mesh, name, values, kind="FLOAT_VECTOR", field="vector"):
     mesh.update_tag()
 
 
-def remove_attribute(mesh, name):
-    attribute = mesh.attributes.get(name)
-    if attribute is not None:
-        mesh.attributes.remove(attribute)
-
-
-def set_at_rest(mesh):
-    """The shape without a driver: the mesh's own."""
-    set_attribute(mesh, POSITION, vertices_of(mesh))
+def set_vertices(mesh, positions):
+    """Writes positions (n, 3); a mesh of another number of vertices gets new ones, and loses its faces."""
+    if len(mesh.vertices) != len(positions):
+        mesh.clear_geometry()
+        mesh.vertices.add(len(positions))
+    mesh.vertices.foreach_set("co", np.ascontiguousarray(positions, np.float32).reshape(-1))
+    mesh.update_tag()
 
 
 def link_beside(obj, other):

@@ -17,14 +17,15 @@ def _changed(settings, context):
 
 
 def _level_changed(settings, context):
-    from . import binding
+    from . import nodes
 
-    binding.show_level(settings.id_data)
+    nodes.show_level(settings.id_data)
     _changed(settings, context)
 
 
 class FiligreeSettings(bpy.types.PropertyGroup):
     driver: bpy.props.PointerProperty(type=bpy.types.Object, name="Driver", description="The light mesh that is followed")
+    carrier: bpy.props.PointerProperty(type=bpy.types.Object, description="Bare vertices, where they are restored to")
     anchor: bpy.props.PointerProperty(type=bpy.types.Object)
     level_object: bpy.props.PointerProperty(type=bpy.types.Object)
     model: bpy.props.PointerProperty(type=bpy.types.Text, description="Where the file keeps the detail")
@@ -38,7 +39,7 @@ class FiligreeSettings(bpy.types.PropertyGroup):
     thin_shell: bpy.props.BoolProperty(
         name="Thin Shell", update=_changed, description="Bumps keep their shape, as on cloth and skin, and do not shear with the body")
     viewport_level: bpy.props.IntProperty(
-        name="Viewport Level", default=-1, min=-1, max=16, update=_level_changed,
+        name="Level", default=-1, min=-1, max=16, update=_level_changed,
         description="Level shown in the viewport, 0 the coarsest; -1 the finest. Renders have the finest")
     message: bpy.props.StringProperty()
 
