@@ -217,7 +217,7 @@ Cancelled
         py::arg("a"), py::arg("rest"), R"(edge_strains(a, rest)
 --
 
-How much the edges at each vertex have changed their length: the mean of |length in a / length in rest - 1|,
+How much the edges at each vertex have changed their length: the mean of abs(length in a / length in rest - 1),
 float32 (n,).
 
 Raises

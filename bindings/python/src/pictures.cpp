@@ -184,7 +184,7 @@ edges, surface : bool
 point_radius : float
     Above 0: draw the vertices as balls of this radius, model units.
 scalars : array_like, (n,), optional
-    A number a vertex, shown as colour, from `range`[0] to `range`[1].
+    A number a vertex, shown as colour, from the first to the second of `range`.
 map : str
     'sequential' for amounts, 'diverging' for signed amounts.
 passes : int

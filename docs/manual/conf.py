@@ -1,0 +1,24 @@
+"""Sphinx's settings for the HTML manual (scripts/docs). The pages are docs/*.md, as stage.py lays them out."""
+
+project = "Filigree"
+copyright = "the authors of Filigree, MIT licence"
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+root_doc = "index"
+html_theme = "furo"
+html_title = "Filigree"
+html_show_sourcelink = False
+html_copy_source = False
+html_static_path = []
+
+# Headings can be linked to as on GitHub.
+myst_heading_anchors = 4
+myst_enable_extensions = []
+
+# C++ knows no links to std and Eigen here; every other name that is not found is an error of ours.
+primary_domain = "cpp"
+highlight_language = "text"
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"
+napoleon_numpy_docstring = True
+napoleon_google_docstring = False
+napoleon_use_rtype = False
