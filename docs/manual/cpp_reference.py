@@ -48,19 +48,23 @@ def write(root, folder):
         for entry in tree.parse(xml / "index.xml").getroot().findall("compound[@kind='file']"):
             compound = tree.parse(xml / f"{entry.get('refid')}.xml").getroot().find("compounddef")
             files[compound.find("location").get("file").split("src/")[-1]] = compound
+        members = {}  # of the namespace, by header
+        space = tree.parse(xml / "namespacefiligree.xml").getroot().find("compounddef")
+        for member in space.findall("sectiondef/memberdef"):
+            members.setdefault(member.find("location").get("file").split("src/")[-1], []).append(member)
         for layer in LAYERS:
             lines = [layer, "=" * len(layer), ""]
             for header in headers:
                 name = str(header.relative_to(root / "src"))
                 if header.parent.name == layer:
-                    lines += _header(name, header, files[name], xml)
+                    lines += _header(name, header, files[name], members.get(name, []), xml)
             (out / f"{layer}.rst").write_text("\n".join(lines) + "\n")
     index = ["C++", "===", "", "A page a layer; each layer uses those above it. Everything is in the namespace ``filigree``.", "",
              ".. toctree::", "   :maxdepth: 2", ""]
     (out / "index.rst").write_text("\n".join(index + [f"   {layer}" for layer in LAYERS]) + "\n")
 
 
-def _header(name, path, compound, xml):
+def _header(name, path, compound, members, xml):
     title = f"``{name}``"
     lines = [title, "-" * len(title), "", *_opening(path), ""]
     for inner in compound.findall("innerclass"):
@@ -68,9 +72,8 @@ def _header(name, path, compound, xml):
             declared = tree.parse(xml / f"{inner.get('refid')}.xml").getroot().find("compounddef")
             if declared.get("prot") == "public" and inner.text.count("::") == 1:
                 lines += _class(declared, xml, "")
-    for member in compound.findall("sectiondef/memberdef"):
-        if member.get("static") == "no" and not _is_detail(member):
-            lines += _member(member, "")
+    for member in members:
+        lines += _member(member, "")
     return lines
 
 
@@ -88,10 +91,6 @@ def _opening(path):
             lines.append("")
         lines.append(line if is_formula else _escaped(line))
     return lines
-
-
-def _is_detail(member):
-    return "detail::" in (member.findtext("qualifiedname") or member.findtext("definition") or "")
 
 
 def _class(compound, xml, indent):
