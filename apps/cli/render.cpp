@@ -59,6 +59,10 @@ void check(const RenderOptions& options, bool is_film) {
     const bool has_page = is_film ? !options.scalar.empty()
                                   : !options.scalar.empty() || !options.captions.empty() || options.files.size() > 1 ||
                                         lower_extension(options.output) != ".png";
+    if (options.as == DrawnAs::surfels &&
+        (options.points || options.edges || options.wireframe || options.restore.level))
+        refuse("--as surfels draws neither points nor edges nor levels; leave --points, --edges, --wireframe and "
+               "--level out.");
     if (options.background == "transparent" && has_page)
         refuse("--background transparent is for one picture in a .png without captions and legend; a page is white.");
     if (options.turntable && !is_film)
@@ -98,6 +102,8 @@ OptionList look_options(RenderOptions& options) {
             Option("--edges", options.edges, "Draw the polygons' edges over the surface"),
             Option("--edge-color", options.edge_color, "#rrggbb"),
             Option("--wireframe", options.wireframe, "Draw the edges alone"),
+            choice<DrawnAs>("--as", options.as, {{"polygons", DrawnAs::polygons}, {"surfels", DrawnAs::surfels}},
+                            "polygons (default), or surfels: overlapping discs, the file's own or some made of it"),
             Option("--points", options.points, "Draw the vertices as balls"),
             Option("--point-radius", options.point_radius, "Of the balls, model units (unset: by their spacing)")
                 .above_zero(),

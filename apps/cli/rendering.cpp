@@ -24,6 +24,17 @@ Background parse_background(const std::string& text) {
 
 } // namespace
 
+/// The file's own surfels, or some made of its surface.
+void Rendering::choose_surfels(Subject& subject, const std::string& path) {
+    if (subject.model && subject.model->code() != DetailCode::blend)
+        refuse(ErrorCode::unsuitable, path + ": has the reference code, which knows no gradients to carry surfels by.");
+    subject.surfels = surfels_of_points(subject.mesh);
+    if (!subject.surfels) subject.surfels = require(make_surfels(subject.mesh, context()));
+    if (subject.surfels->size() == 0)
+        refuse(ErrorCode::unsuitable,
+               path + ": has neither faces to make surfels of nor surfels of its own (ux uy uz vx vy vz).");
+}
+
 std::unique_ptr<Subject> Rendering::read(const std::string& path) {
     auto subject = std::make_unique<Subject>();
     Session::Content content = session_.read_any(path);
@@ -47,6 +58,7 @@ std::unique_ptr<Subject> Rendering::read(const std::string& path) {
         refuse(ErrorCode::unsuitable, path + ": has no vertices, so there is nothing to draw.");
     if (!std::exchange(up_known_, true)) up_ = up_of(options_.up, subject->mesh, path);
     choose_scalars(*subject, path);
+    if (options_.as == DrawnAs::surfels) choose_surfels(*subject, path);
     return subject;
 }
 
@@ -90,9 +102,24 @@ ValueRange Rendering::range_of(std::span<const float> values) const {
     return legend_range(values, false);
 }
 
+/// The surfels as polygons, each corner with its vertex's scalar.
+void Rendering::upload_surfels(Subject& subject) {
+    Surfels surfels = *subject.surfels;
+    if (!subject.gradients.empty())
+        surfels = split_surfels(carried_surfels(surfels, subject.mesh.positions, subject.gradients));
+    const Mesh polygons = surfel_polygons(surfels);
+    std::vector<float> scalars;
+    for (std::size_t f = 0; f < polygons.face_count() && !subject.scalars.empty(); ++f)
+        scalars.insert(scalars.end(), polygons.face_size(f), subject.scalars[surfels.corners[f][0]]);
+    SurfaceOptions surface;
+    surface.scalars = {scalars, options_.map, range_};
+    subject.drawable = require(Drawable::surface(polygons, surface, context()));
+}
 void Rendering::upload(Subject& subject) {
     ScalarColors scalars{subject.scalars, options_.map, range_};
-    if (options_.points || subject.mesh.face_count() == 0) {
+    if (subject.surfels) {
+        upload_surfels(subject);
+    } else if (options_.points || subject.mesh.face_count() == 0) {
         const float radius = film_radius_ > 0 ? film_radius_ : static_cast<float>(options_.point_radius);
         PointOptions points{radius, scalars, subject.mesh.colors};
         subject.drawable = require(Drawable::points(subject.mesh.positions, subject.mesh.origin, points, context()));
@@ -112,8 +139,15 @@ void Rendering::upload(Subject& subject) {
 void Rendering::set_pose(Subject& subject, const Pose& pose, bool on_screen) {
     if (!subject.restorer) subject.restorer = require(Restorer::create(*subject.model, options_.restore, context()));
     require(subject.restorer->positions(pose, subject.mesh.positions, context()));
+    if (subject.surfels) {
+        const auto& detail = std::get<BlendDetail>(subject.model->detail);
+        subject.gradients = vertex_gradients(detail, require(subject.restorer->gradients(pose, context())));
+    }
     if (!on_screen) return;
-    if (const std::size_t points = subject.drawable->point_count()) { // which are not restored on the GPU
+    if (subject.surfels) {
+        triangles_ -= subject.drawable->triangle_count();
+        upload(subject);
+    } else if (const std::size_t points = subject.drawable->point_count()) { // which are not restored on the GPU
         points_ -= points;
         upload(subject);
     } else {
@@ -127,7 +161,7 @@ Scene Rendering::scene_of(const Subject& subject) const {
     if (!options_.color.empty()) {
         look.color = parse_color(options_.color, "--color");
         look.own_colors = has_scalars();
-    } else if (subject.mesh.face_count() == 0 || options_.points) {
+    } else if (!subject.surfels && (subject.mesh.face_count() == 0 || options_.points)) {
         look.color = {0.30f, 0.50f, 0.78f};
     }
     if (!options_.edge_color.empty()) look.edge_color = parse_color(options_.edge_color, "--edge-color");

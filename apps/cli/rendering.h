@@ -4,6 +4,7 @@
 #include "pictures.h"
 #include "restore_options.h"
 
+#include "filigree/mesh/surfels.h"
 #include "filigree/present/film_extent.h"
 #include "filigree/present/page.h"
 
@@ -21,6 +22,9 @@ struct ClipOption {
     double fraction = 0.5;       ///< of the object's box
 };
 
+/// What a surface is drawn as.
+enum class DrawnAs { polygons, surfels };
+
 struct RenderOptions {
     std::vector<std::string> files, poses, captions;
     std::string output;
@@ -34,6 +38,7 @@ struct RenderOptions {
     Shading shading = Shading::automatic;
     bool edges = false, wireframe = false, points = false, no_ground = false, no_captions = false;
     double point_radius = 0;
+    DrawnAs as = DrawnAs::polygons;
     std::optional<ClipOption> clip;
     std::string scalar, against, unit;
     std::vector<double> range;
@@ -60,6 +65,8 @@ struct Subject {
     std::vector<float> scalars; ///< one a vertex, or empty
     std::string scalar_title;
     std::optional<Restorer> restorer; ///< of the level, where there are poses
+    std::optional<Surfels> surfels;   ///< at rest, where they are drawn
+    std::vector<Mat3f> gradients;     ///< of the pose, one a vertex, where surfels are drawn
     std::optional<Drawable> drawable;
 };
 
@@ -74,7 +81,9 @@ protected:
     const RunContext& context() const { return session_.context(); }
     std::unique_ptr<Subject> read(const std::string& path);
     void choose_scalars(Subject& subject, const std::string& path);
+    void choose_surfels(Subject& subject, const std::string& path);
     void upload(Subject& subject);
+    void upload_surfels(Subject& subject);
     Pose read_pose(const Subject& subject, const std::string& path) const {
         return pose_of_mesh(session_.read_mesh(path), subject.model->mesh.origin);
     }

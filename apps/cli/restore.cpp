@@ -3,6 +3,7 @@
 #include "pictures.h"
 #include "restore_options.h"
 
+#include "filigree/mesh/surfels.h"
 #include "filigree/present/error_picture.h"
 #include "filigree/present/page.h"
 
@@ -37,7 +38,7 @@ struct RestoreArguments {
     std::string model, pose, poses, ghosts, output, picture;
     std::optional<UpAxis> up;
     std::size_t frame = 0; ///< of the model's own, from 1; 0: none
-    bool all_frames = false;
+    bool all_frames = false, as_surfels = false;
     PoseFileOptions poses_file;
     RestoreOptions restore;
     AnimationOutput animation;
@@ -63,6 +64,8 @@ void check(const RestoreArguments& options, const Session& session) {
     if (!options.picture.empty() && options.restore.level)
         refuse("--picture draws the finest level; leave out --level.");
     if (!options.picture.empty()) check_picture_path(options.picture);
+    if (options.as_surfels && (options.is_animation() || options.restore.level))
+        refuse("--surfels writes one moment of the finest level: give --pose or --frame, and no --level.");
     const std::string given = given_animation_option(session);
     if (!options.is_animation() && !given.empty()) refuse(given + " belongs to --poses or --frames.");
     if (!options.is_animation()) return;
@@ -108,6 +111,19 @@ void report_expected_error(const Model& model, const PoseError::Estimate& estima
     if (!options.picture.empty()) draw_expected_error(model, estimate, mesh, options, session, report);
 }
 
+/// The mesh's surfels, made at rest and carried to where it is now.
+Mesh surfels_of(const Model& model, const Mesh& restored, std::span<const Mat3f> gradients,
+                const RestoreArguments& options, Session& session) {
+    const auto* detail = std::get_if<BlendDetail>(&model.detail);
+    if (!detail)
+        refuse(ErrorCode::unsuitable,
+               options.model + ": has the reference code, which knows no gradients to carry surfels by.");
+    const Surfels rest = require(make_surfels(model.mesh, session.context()));
+    if (rest.size() == 0) refuse(ErrorCode::unsuitable, options.model + ": has no faces to make surfels of.");
+    return surfel_points(
+        split_surfels(carried_surfels(rest, restored.positions, vertex_gradients(*detail, gradients))));
+}
+
 void restore_one(const RestoreArguments& options, Session& session) {
     PoseSequence own;
     const Model model = session.read_model(options.model, options.frame ? &own : nullptr);
@@ -125,7 +141,8 @@ void restore_one(const RestoreArguments& options, Session& session) {
                           "'filigree level MODEL 0' writes the driver as it is."));
     const Mesh mesh = require(restorer.mesh(pose, gradients, session.context()));
     const double seconds = now_seconds() - start;
-    session.write_mesh(mesh, options.output, options.model);
+    session.write_mesh(options.as_surfels ? surfels_of(model, mesh, gradients, options, session) : mesh, options.output,
+                       options.model);
     const char* from = source_of(model, pose);
     Report report;
     report.say(fmt::format("{}: {} vertices restored from {} in {}\n", options.output, with_commas(mesh.vertex_count()),
@@ -182,7 +199,9 @@ Command restore_command() {
                                   "and so on, or NAME_####.obj")
                                .is_written()
                                .required()} +
-                OptionList{Option("--picture", options->picture,
+                OptionList{Option("--surfels", options->as_surfels,
+                                  "Write surfels: points with a normal and two half axes, carried from rest (.ply)"),
+                           Option("--picture", options->picture,
                                   "Also draw the mesh coloured by the error to expect (.png, .svg, .pdf)")
                                .is_written(),
                            found_up_option(options->up)} +

@@ -30,7 +30,7 @@ struct SimulateArguments {
     std::string scene, save, resume;
     std::vector<std::string> outputs;
     std::size_t frames = 0, stop_at = 0; ///< 0: as the scene says; not before the end
-    bool check = false, finer = false, keys = false;
+    bool check = false, finer = false, keys = false, as_surfels = false;
     AnimationOutput animation;
 };
 
@@ -126,9 +126,16 @@ void check_places(const SimulateArguments& options, const SceneFile& scene, cons
 
 /// With the scalar `origin`: which vertex of the bodies' meshes a vertex is, -1 for a new one.
 Result<Mesh> melting_mesh(MeltingSurface& melting, const Recording& recording, std::size_t frame, const Vec3d& origin,
-                          const RunContext& context) {
+                          bool as_surfels, const RunContext& context) {
     Result<CompositeSurface> surface = melting.frame(recording, frame, context);
     if (!surface) return surface.error();
+    if (as_surfels) {
+        const Result<Surfels> surfels = melting.surfels(*surface, recording, frame, context);
+        if (!surfels) return surfels.error();
+        Mesh points = surfel_points(*surfels);
+        points.origin = origin;
+        return points;
+    }
     VertexScalar& from = surface->mesh.scalars.emplace_back(VertexScalar{"origin", {}});
     for (const Index v : surface->origin) from.values.push_back(v == kNoIndex ? -1 : float(v));
     surface->mesh.origin = origin;
@@ -255,7 +262,8 @@ private:
             session_.warn(melting.warnings);
             if (!melting.is_empty())
                 parts.push_back({mesh_names(path, melting.name()), [&](std::size_t frame) {
-                                     return melting_mesh(melting, run_->recording(), frame, ready_.origin, silent);
+                                     return melting_mesh(melting, run_->recording(), frame, ready_.origin,
+                                                         options_.as_surfels, silent);
                                  }});
             for (std::size_t b = 0; b < ready_.bodies.size(); ++b)
                 if (!melting.has_body(b))
@@ -333,6 +341,8 @@ Command simulate_command() {
                            "A model with its poses (.fil), a film (.mp4, .gif, NAME_%04d.png), the detailed mesh "
                            "moving (.glb, .pc2, .mdd, .usda), or a folder of meshes (NAME/); may come several times")
                         .one_at_a_time(),
+                    Option("--surfels", options->as_surfels,
+                           "Folders hold surfels of bodies of mpm: points with a normal and two half axes"),
                     Option("--frames", options->frames, "Frames to compute (unset: as the scene says)").whole_from(1),
                     Option("--check", options->check,
                            "Also carry every vertex by the particles, and say how far the restored mesh is from that"),

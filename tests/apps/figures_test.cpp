@@ -65,8 +65,8 @@ protected:
 TEST_F(Figures, EveryFigureBecomesAFile) {
     if (!can_render()) GTEST_SKIP() << "no OpenGL";
     const Json result = json(command({}));
-    std::vector<std::string> names, in_order = {"1.1", "2.1", "2.2",  "2.3", "2.4",    "2.5",   "2.6", "2.7",
-                                                "2.8", "2.9", "2.10", "3.1", "border", "codes", "scan"};
+    std::vector<std::string> names, in_order = {"1.1", "2.1", "2.2",  "2.3", "2.4",    "2.5",   "2.6",     "2.7",
+                                                "2.8", "2.9", "2.10", "3.1", "border", "codes", "surfels", "scan"};
     for (const Json& figure : result.at("figures")) {
         names.push_back(figure.at("name"));
         const std::string bytes = bytes_of(path(figure.at("file")));
@@ -76,7 +76,7 @@ TEST_F(Figures, EveryFigureBecomesAFile) {
         EXPECT_EQ(bytes.substr(16, 4), std::string("\0\0\0\xb4", 4)) << figure.at("name");
     }
     EXPECT_EQ(names, in_order);
-    EXPECT_EQ(std::distance(std::filesystem::directory_iterator(path("out")), {}), 15);
+    EXPECT_EQ(std::distance(std::filesystem::directory_iterator(path("out")), {}), 16);
 }
 
 TEST_F(Figures, SimpleTriangleObeysTheInverseLaw) {
@@ -147,6 +147,13 @@ TEST_F(Figures, DeformedCubesKeepWhatTheCaptionsSay) {
     const Json methods = values("codes").at("methods");
     EXPECT_LT(methods.at("blend code").at("rms"), 0.1 * methods.at("wrap deformer").at("rms").get<double>());
     EXPECT_LT(methods.at("blend code").at("rms"), 0.1 * methods.at("reference code").at("rms").get<double>());
+}
+
+TEST_F(Figures, CarriedSurfelsKeepWhatDrawnOnesLose) {
+    if (!can_render()) GTEST_SKIP() << "no OpenGL";
+    const Json v = values("surfels");
+    EXPECT_LT(v.at("carried_rms").get<double>(), 0.02 * v.at("drawn_rms").get<double>());
+    EXPECT_GT(v.at("surfels_split"), v.at("surfels"));
 }
 
 TEST_F(Figures, ScansGoThroughTheReportsProcess) {

@@ -102,6 +102,27 @@ TEST_F(Render, DrawsMeshesPointSetsAndModels) {
     EXPECT_EQ(bytes_of(path("piped.png")).substr(1, 3), "PNG");
 }
 
+TEST_F(Render, SurfelsLookLikeTheirSurface) {
+    ok({"make", "wavy-sphere", "-o", "ball.ply", "--resolution", "64", "--quiet"});
+    ok({"strip", "ball.ply", "-o", "ball.fil", "--quiet"});
+    const Picture mesh = drawn("ball.ply", {"--size", "200x150"});
+    EXPECT_LT(picture_distance(drawn("ball.ply", {"--as", "surfels", "--size", "200x150"}), mesh), 12);
+    EXPECT_LT(picture_distance(drawn("ball.fil", {"--as", "surfels", "--size", "200x150"}), mesh), 12);
+    ok({"level", "ball.fil", "0", "-o", "driver.ply", "--quiet"});
+    ok({"deform", "driver.ply", "-o", "moved.ply", "--bend", "90", "--axis", "z", "--quiet"});
+    ok({"restore", "ball.fil", "--pose", "moved.ply", "-o", "bent.ply", "--quiet"});
+    ok({"restore", "ball.fil", "--pose", "moved.ply", "--surfels", "-o", "surfels.ply", "--quiet"});
+    EXPECT_LT(picture_distance(drawn("surfels.ply", {"--as", "surfels", "--size", "200x150"}),
+                               drawn("bent.ply", {"--size", "200x150"})),
+              14);
+    write("points.ply", kPoints);
+    const Ran points = run(quick("points.ply", "none.png", {"--as", "surfels"})); // a warning, and why not
+    EXPECT_EQ(points.code, 7);
+    EXPECT_NE(points.err.find("neither faces to make surfels of nor surfels"), std::string::npos) << points.err;
+    fails(2, quick("ball.ply", "none.png", {"--as", "surfels", "--edges"}), {"--edges"});
+    fails(2, {"restore", "ball.fil", "--frames", "--surfels", "-o", "x/"}, {"--surfels", "one moment"});
+}
+
 TEST_F(Render, SameBytesWhateverTheThreads) {
     make_cube();
     ok(quick("cube.ply", "one.png", {"--threads", "1"}));

@@ -75,6 +75,19 @@ BlendDetail encode_blend(std::span<const Vec3f> positions, std::span<const Index
     return detail;
 }
 
+std::vector<Mat3f> vertex_gradients(const BlendDetail& detail, std::span<const Mat3f> driver_gradients) {
+    std::vector<Mat3f> gradients(detail.order.size());
+    for (std::size_t c = 0; c < detail.cells.size(); ++c) {
+        const Triangle& cell = detail.cells[c];
+        for (Index r = detail.cell_offsets[c]; r < detail.cell_offsets[c + 1]; ++r) {
+            const float u = detail.u[r], v = detail.v[r];
+            gradients[detail.order[r]] =
+                (1 - u - v) * driver_gradients[cell[0]] + u * driver_gradients[cell[1]] + v * driver_gradients[cell[2]];
+        }
+    }
+    return gradients;
+}
+
 void decode_rest(const BlendDetail& detail, std::span<const Index> driver, std::span<Vec3f> positions) {
     std::vector<Vec3f> driver_rest;
     for (Index v : driver) driver_rest.push_back(positions[v]);

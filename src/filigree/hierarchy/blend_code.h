@@ -49,6 +49,9 @@ BlendDetail encode_blend(std::span<const Vec3f> positions, std::span<const Index
 /// The positions an int16 detail decodes to at rest: those of the driver are given, the rest is written. Cost O(V).
 void decode_rest(const BlendDetail& detail, std::span<const Index> driver, std::span<Vec3f> positions);
 
+/// How space is deformed around each vertex of the mesh: A_p above. driver_gradients: one a driver vertex. Cost O(V).
+std::vector<Mat3f> vertex_gradients(const BlendDetail& detail, std::span<const Mat3f> driver_gradients);
+
 /// Restores chosen vertices, and normals, from positions and gradients, again and again.
 class BlendRestorer {
 public:

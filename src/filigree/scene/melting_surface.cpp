@@ -118,8 +118,12 @@ Status MeltingSurface::add(std::size_t b, const RunContext& context) {
     if (!mesher) return mesher.error();
     Result<Restorer> restorer = Restorer::create(body.model, {}, context);
     if (!restorer) return restorer.error();
-    BodyPart& part =
-        bodies_.emplace_back(BodyPart{b, std::move(*restorer), body.in_metres(body.model.mesh.positions), {}, {}});
+    Result<Surfels> surfels = make_surfels(body.model.mesh, context);
+    if (!surfels) return surfels.error();
+    for (float& radius : surfels->rest_radius) radius *= float(body.body->scale);
+    if (surfels->colors.empty()) surfels->colors.assign(surfels->size(), opaque(body.color));
+    BodyPart& part = bodies_.emplace_back(
+        BodyPart{b, std::move(*restorer), body.in_metres(body.model.mesh.positions), std::move(*surfels), {}, {}});
     std::vector<Vec3f> rest;
     for (std::size_t p = 0; p < body.body->particle_count(); ++p) rest.push_back(body.body->rest[p]);
     const ParticlesAtRest particles(rest, body.body->spacing());
@@ -135,6 +139,13 @@ Status MeltingSurface::add(std::size_t b, const RunContext& context) {
     else
         mesher_.emplace(std::move(*mesher));
     return Success{};
+}
+
+/// How far the matter at a vertex is renewed.
+float MeltingSurface::renewal_at(const BodyPart& part, std::size_t vertex, const MatterParticles& matter) {
+    float sum = 0;
+    for (std::size_t k = 0; k < 4; ++k) sum += part.shares[vertex][k] * matter.renewal[part.particles[vertex][k]];
+    return sum;
 }
 
 bool MeltingSurface::has_body(std::size_t body) const {
@@ -164,15 +175,67 @@ Result<CompositeSurface> MeltingSurface::frame(const Recording& recording, std::
             if (!now) return now.error();
             append(*now, body.color, context, restored);
         }
-        for (std::size_t v = 0; v < part.start.size(); ++v) {
-            float sum = 0;
-            for (std::size_t k = 0; k < 4; ++k) sum += part.shares[v][k] * own.renewal[part.particles[v][k]];
-            renewal.push_back(sum);
-        }
+        for (std::size_t v = 0; v < part.start.size(); ++v) renewal.push_back(renewal_at(part, v, own));
     }
     const Result<ParticleField> field = make_particle_field(matter, {}, context);
     if (!field) return field.error();
     return mesher_->make(restored, renewal, matter, particle_colors_, *field, dead_, context);
+}
+
+Result<Surfels> MeltingSurface::surfels(const CompositeSurface& surface, const Recording& recording, std::size_t frame,
+                                        const RunContext& context) const {
+    // Where each vertex of the bodies is in the surface, as long as it is where it was restored to.
+    std::vector<Index> now;
+    for (const BodyPart& part : bodies_) now.resize(now.size() + part.start.size(), kNoIndex);
+    for (Index v = 0; v < surface.origin.size(); ++v)
+        if (surface.origin[v] != kNoIndex) now[surface.origin[v]] = v;
+    std::vector<bool> is_kept(surface.origin.size(), false);
+    std::size_t first = 0;
+    for (const BodyPart& part : bodies_) {
+        for (std::size_t v = 0; v < part.start.size(); ++v) {
+            Index& at = now[first + v];
+            if (renewal_at(part, v, recording.matter[part.body][frame]) > CompositeMesher::kFadeBegin) at = kNoIndex;
+            if (at != kNoIndex) is_kept[at] = true;
+        }
+        first += part.start.size();
+    }
+
+    Surfels all;
+    all.origin = surface.mesh.origin;
+    const auto append_if = [&](const Surfels& some, const auto& is_wanted) {
+        for (std::size_t i = 0; i < some.size(); ++i) {
+            if (!is_wanted(some.corners[i])) continue;
+            all.positions.push_back(some.positions[i]);
+            all.u.push_back(some.u[i]);
+            all.v.push_back(some.v[i]);
+            all.colors.push_back(some.colors[i]);
+            all.rest_radius.push_back(some.rest_radius[i]);
+            all.corners.push_back(some.corners[i]);
+            all.weights.push_back(some.weights[i]);
+        }
+    };
+    first = 0;
+    for (const BodyPart& part : bodies_) {
+        const Model& model = ready_->bodies[part.body].model;
+        const Result<std::vector<Mat3f>> driver =
+            part.restorer.gradients(recording.poses[part.body].frames[frame], context);
+        if (!driver) return driver.error();
+        std::vector<Vec3f> places(part.start.size(), Vec3f::Zero());
+        for (std::size_t v = 0; v < places.size(); ++v)
+            if (const Index at = now[first + v]; at != kNoIndex) places[v] = surface.mesh.positions[at];
+        Surfels own =
+            carried_surfels(part.surfels, places, vertex_gradients(std::get<BlendDetail>(model.detail), *driver));
+        append_if(own, [&](const Triangle& t) {
+            return std::all_of(t.begin(), t.end(), [&](Index v) { return now[first + v] != kNoIndex; });
+        });
+        first += part.start.size();
+    }
+    all = split_surfels(all);
+    Result<Surfels> fresh = make_surfels(surface.mesh, context);
+    if (!fresh) return fresh.error();
+    append_if(*fresh,
+              [&](const Triangle& t) { return std::any_of(t.begin(), t.end(), [&](Index v) { return !is_kept[v]; }); });
+    return all;
 }
 
 } // namespace filigree

@@ -3,6 +3,7 @@
 
 #include "filigree/hierarchy/restore.h"
 #include "filigree/melting/composite_surface.h"
+#include "filigree/mesh/surfels.h"
 #include "filigree/scene/recording.h"
 #include "filigree/scene/world_setup.h"
 
@@ -26,6 +27,11 @@ public:
     /// O(mesh + particles). Errors: cancelled.
     Result<CompositeSurface> frame(const Recording& recording, std::size_t frame, const RunContext& context);
 
+    /// The surfels of a frame that frame() has made: those of the mesh are carried from the start; where it fades or is
+    /// replaced they are made of the surface. Errors: as frame's.
+    Result<Surfels> surfels(const CompositeSurface& surface, const Recording& recording, std::size_t frame,
+                            const RunContext& context) const;
+
     std::vector<std::string> warnings;
 
 private:
@@ -33,12 +39,14 @@ private:
         std::size_t body;
         Restorer restorer;
         std::vector<Vec3f> start; ///< m
+        Surfels surfels;          ///< at rest, model units; but colours and rest_radius, m
         /// Of each vertex: the particles that say how far its matter is renewed, and their shares.
         std::vector<std::array<Index, 4>> particles;
         std::vector<std::array<float, 4>> shares;
     };
 
     Status add(std::size_t body, const RunContext& context);
+    static float renewal_at(const BodyPart& part, std::size_t vertex, const MatterParticles& matter);
 
     const ReadyScene* ready_ = nullptr;
     std::vector<BodyPart> bodies_;
