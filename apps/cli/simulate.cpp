@@ -125,6 +125,13 @@ void check_places(const SimulateArguments& options, const SceneFile& scene, cons
 }
 
 /// With the scalar `origin`: which vertex of the bodies' meshes a vertex is, -1 for a new one.
+Mesh with_origins(CompositeSurface surface, const Vec3d& origin) {
+    VertexScalar& from = surface.mesh.scalars.emplace_back(VertexScalar{"origin", {}});
+    for (const Index v : surface.origin) from.values.push_back(v == kNoIndex ? -1 : float(v));
+    surface.mesh.origin = origin;
+    return std::move(surface.mesh);
+}
+
 Result<Mesh> melting_mesh(MeltingSurface& melting, const Recording& recording, std::size_t frame, const Vec3d& origin,
                           bool as_surfels, const RunContext& context) {
     Result<CompositeSurface> surface = melting.frame(recording, frame, context);
@@ -136,10 +143,7 @@ Result<Mesh> melting_mesh(MeltingSurface& melting, const Recording& recording, s
         points.origin = origin;
         return points;
     }
-    VertexScalar& from = surface->mesh.scalars.emplace_back(VertexScalar{"origin", {}});
-    for (const Index v : surface->origin) from.values.push_back(v == kNoIndex ? -1 : float(v));
-    surface->mesh.origin = origin;
-    return std::move(surface->mesh);
+    return with_origins(std::move(*surface), origin);
 }
 
 class Run {
@@ -204,7 +208,8 @@ private:
     /// What has one topology cannot part and join.
     void warn_of_one_topology() {
         std::vector<std::string> paths = outputs_.models;
-        paths.insert(paths.end(), outputs_.animations.begin(), outputs_.animations.end());
+        for (const std::string& path : outputs_.animations)
+            if (!is_usd(path)) paths.push_back(path);
         if (paths.empty()) return;
         for (std::size_t b = 0; b < ready_.bodies.size(); ++b) {
             const auto& frames = run_->recording().matter[b];
@@ -220,9 +225,37 @@ private:
                                        fmt::join(paths, " and "), first - frames.begin(), ready_.bodies[b].name)});
         }
     }
+    static bool is_usd(const std::string& path) { return lower_extension(path) == ".usda"; }
+
+    /// What melts as one surface whose faces change in time, with velocities for motion blur.
+    void write_melting_usd(MeltingSurface& melting, const std::string& path) {
+        const RunContext silent = session_.silent_context();
+        const Recording& recording = run_->recording();
+        const double rate = scene_.step.frames_per_second;
+        session_.warn(melting.warnings);
+        const auto moment = [&](std::size_t frame) -> Result<MeshMoment> {
+            Result<CompositeSurface> surface = melting.frame(recording, frame, silent);
+            if (!surface) return surface.error();
+            Result<std::vector<Vec3f>> velocities = melting.velocities(*surface, recording, frame, rate, silent);
+            if (!velocities) return velocities.error();
+            return MeshMoment{with_origins(std::move(*surface), ready_.origin), std::move(*velocities)};
+        };
+        std::vector<std::string> warnings;
+        session_.begin_writing(path);
+        require(write_usda_moments(recording.poses[0].frames.size(), rate, moment, path, warnings, session_.context()));
+        session_.warn(warnings);
+        Report report;
+        report.set("output", path);
+        animations_.push_back(report.json());
+    }
+
     void write_animations() {
-        for (const std::string& path : outputs_.animations)
+        for (const std::string& path : outputs_.animations) {
+            MeltingSurface melting;
+            if (is_usd(path)) melting = require(MeltingSurface::create(ready_, session_.silent_context()));
+            if (!melting.is_empty()) write_melting_usd(melting, model_path(path, ready_.bodies.size(), melting.name()));
             for (std::size_t b = 0; b < ready_.bodies.size(); ++b) {
+                if (melting.has_body(b)) continue;
                 Report report;
                 write_animation_output(ready_.bodies[b].model, stream_of(run_->recording().poses[b]), {},
                                        options_.animation,
@@ -231,6 +264,7 @@ private:
                 animation_rows_.add_rows(report);
                 animations_.push_back(report.json());
             }
+        }
     }
     void film() {
         const double start = now_seconds();

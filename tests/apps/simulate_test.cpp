@@ -448,8 +448,8 @@ TEST_F(Simulate, IceMeltsAndSaysWhatItPassesThrough) {
                       "material = \"ice\"\n[[body]]\nshape = \"bar\"\nresolution = 4\nparticles = 100\n"
                       "centre = [5, 0, 0]\n[[heat]]\nradius = 1\npower = 1e3\n"
                       "[picture]\nsize = [64, 48]\npasses = 1\n");
-    const Ran ran =
-        run(words("ice.toml", {"--frames", "3", "-o", "ice.fil", "-o", "ice.mp4", "-o", path("ice/"), "--json"}));
+    const Ran ran = run(words("ice.toml", {"--frames", "3", "-o", "ice.fil", "-o", "ice.mp4", "-o", "ice.usda", "-o",
+                                           path("ice/"), "--json"}));
     ASSERT_EQ(ran.code, 0) << ran.err;
     // Both bodies are one surface, closed in every frame; the start is their meshes.
     for (const std::string number : {"0001", "0004"}) {
@@ -457,6 +457,10 @@ TEST_F(Simulate, IceMeltsAndSaysWhatItPassesThrough) {
         EXPECT_EQ(info.find("closed                 no"), std::string::npos) << info;
         EXPECT_EQ(info.find("manifold               no"), std::string::npos) << info;
     }
+    const std::string usd = bytes_of(path("ice_wavy-cube.usda")); // the bar is of rubber, and a file of its own
+    for (const char* word : {"faceVertexCounts.timeSamples", "velocities.timeSamples", "primvars:origin.timeSamples"})
+        EXPECT_NE(usd.find(word), std::string::npos) << word;
+    EXPECT_EQ(bytes_of(path("ice_bar.usda")).find("velocities"), std::string::npos);
     EXPECT_NE(ran.out.find("pass through bodies of other models"), std::string::npos) << ran.out;
     refused(kBody + "material = \"ice\"\nlatent_heat = -1\n", {"bad.toml:4:", "latent_heat"});
     refused("[world]\nair_temperature = [{ time = 1, value = 3 }, { time = 1, value = 4 }]\n" + kBody,

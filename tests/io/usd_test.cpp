@@ -87,5 +87,61 @@ TEST(Usd, HoldsEveryFrameToTheBit) {
     EXPECT_FLOAT_EQ(colors[2], 0);
 }
 
+TEST(Usd, FacesMayChangeInTime) {
+    const auto moment = [](std::size_t frame) -> Result<MeshMoment> {
+        MeshMoment now;
+        now.mesh = make_sheet();
+        now.mesh.scalars = {{"origin", {0, 1, 2, 3, 4, -1}}};
+        if (frame == 1) { // one quad less
+            now.mesh.corners.resize(4);
+            now.mesh.face_offsets.pop_back();
+        }
+        for (Vec3f& p : now.mesh.positions) p.z() += float(frame);
+        now.velocities.assign(6, Vec3f(0, 0, float(frame) - 24));
+        return now;
+    };
+    const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / "filigree_usd_moments.usda";
+    std::vector<std::string> warnings;
+    ASSERT_TRUE(write_usda_moments(2, 24, moment, path, warnings, kContext).ok());
+    const std::string text = read_file(path).value();
+    EXPECT_EQ(std::count(text.begin(), text.end(), '{'), std::count(text.begin(), text.end(), '}'));
+    const auto sample = [&](const std::string& attribute, std::size_t frame) {
+        const std::string part = text.substr(text.find(attribute + ".timeSamples"));
+        return numbers_after(part, "\n        " + std::to_string(frame) + ": ");
+    };
+    for (std::size_t frame = 0; frame < 2; ++frame) {
+        EXPECT_EQ(sample("points", frame), flat(moment(frame)->mesh.positions));
+        EXPECT_EQ(sample("velocities", frame), flat(moment(frame)->velocities));
+        EXPECT_EQ(sample("primvars:origin", frame), (std::vector<float>{0, 1, 2, 3, 4, -1}));
+        EXPECT_EQ(sample("normals", frame).size(), 18u);
+        EXPECT_EQ(sample("primvars:displayColor", frame).size(), 18u);
+    }
+    EXPECT_EQ(sample("faceVertexCounts", 0), (std::vector<float>{4, 4}));
+    EXPECT_EQ(sample("faceVertexCounts", 1), (std::vector<float>{4}));
+    EXPECT_EQ(sample("faceVertexIndices", 1), (std::vector<float>{0, 1, 4, 3}));
+
+    // Whole or not at all, and nothing beside it.
+    const auto fails = [&](std::size_t frames, const std::function<Result<MeshMoment>(std::size_t)>& given) {
+        return write_usda_moments(frames, 24, given, path, warnings, kContext).error().code;
+    };
+    EXPECT_EQ(fails(0, moment), ErrorCode::unsuitable);
+    EXPECT_EQ(fails(3,
+                    [&](std::size_t frame) {
+                        auto now = moment(frame);
+                        if (frame == 2) now->velocities.clear();
+                        return now;
+                    }),
+              ErrorCode::unsuitable);
+    EXPECT_EQ(fails(3,
+                    [&](std::size_t frame) {
+                        return frame < 2 ? moment(frame) : Result<MeshMoment>(Error{ErrorCode::cancelled, "Stop."});
+                    }),
+              ErrorCode::cancelled);
+    EXPECT_EQ(read_file(path).value(), text);
+    std::filesystem::remove(path);
+    for (const auto& entry : std::filesystem::directory_iterator(testing::TempDir()))
+        EXPECT_FALSE(entry.path().filename().string().starts_with(".filigree-")) << entry.path();
+}
+
 } // namespace
 } // namespace filigree

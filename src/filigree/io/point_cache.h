@@ -74,4 +74,20 @@ struct NumberedMeshes {
 Result<std::vector<std::string>> write_numbered_meshes(std::size_t frames, std::span<const NumberedMeshes> parts,
                                                        const RunContext& context);
 
+/// A mesh as it is at one moment.
+struct MeshMoment {
+    Mesh mesh;
+    std::vector<Vec3f> velocities; ///< model units a second, one a vertex; or none
+};
+
+/// Writes a .usda whose faces change in time: for every frame points, extent, faces, normals, colours, velocities, and
+/// the mesh's scalar `origin` as a primvar where they are there. moment: of a frame, 0 .. frames - 1, asked for once
+/// and in order. One frame in memory; as much room as the file again beside it while it is written. Whole or not at
+/// all. Errors: unsuitable (no frames; a frame lacks what the first has), unwritable, cancelled, and what `moment`
+/// gives.
+Status write_usda_moments(std::size_t frames, double frames_per_second,
+                          const std::function<Result<MeshMoment>(std::size_t frame)>& moment,
+                          const std::filesystem::path& path, std::vector<std::string>& warnings,
+                          const RunContext& context);
+
 } // namespace filigree

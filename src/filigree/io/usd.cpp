@@ -2,8 +2,13 @@
 #include "filigree/core/srgb.h"
 #include "filigree/io/file.h"
 #include "filigree/io/mesh_formats.h"
+#include "filigree/io/point_cache.h"
+#include "filigree/io/temporary_file.h"
 #include "filigree/io/text_writer.h"
 #include "filigree/mesh/normals.h"
+
+#include <fstream>
+#include <memory>
 
 namespace filigree {
 
@@ -14,7 +19,9 @@ constexpr std::size_t kLargeText = 200'000'000; // bytes; above, programs take m
 /// Text on its way into a file, in pieces.
 class UsdText {
 public:
-    explicit UsdText(FileWriter& file) : file_(file) {}
+    using Sink = std::function<Status(std::string_view bytes)>;
+    explicit UsdText(Sink sink) : sink_(std::move(sink)) {}
+    explicit UsdText(FileWriter& file) : UsdText([&file](std::string_view bytes) { return file.write(bytes); }) {}
 
     UsdText& text(std::string_view s) {
         writer_.text(s);
@@ -63,30 +70,34 @@ private:
     void drain(std::size_t until) {
         if (until == 0) writer_.flush();
         if (bytes_.size() <= until) return;
-        if (written_) written_ = file_.write(bytes_);
+        if (written_) written_ = sink_(bytes_);
         bytes_.clear();
     }
 
-    FileWriter& file_;
+    Sink sink_;
     std::string bytes_;
     TextWriter writer_{bytes_};
     Status written_ = Success{};
 };
 
-void write_header(UsdText& out, const MeshAnimation& animation) {
+void write_header(UsdText& out, std::size_t frames, double frames_per_second) {
     out.text("#usda 1.0\n(\n    defaultPrim = \"mesh\"\n    doc = \"Written by Filigree\"\n    endTimeCode = ")
-        .number(animation.frames - 1)
+        .number(frames - 1)
         .text("\n    framesPerSecond = ")
-        .number(animation.frames_per_second)
+        .number(frames_per_second)
         .text("\n    startTimeCode = 0\n    timeCodesPerSecond = ")
-        .number(animation.frames_per_second)
+        .number(frames_per_second)
         .text("\n    upAxis = \"Y\"\n)\n\ndef Mesh \"mesh\"\n{\n");
 }
 
-void write_faces(UsdText& out, const Mesh& mesh) {
+std::vector<Index> face_sizes(const Mesh& mesh) {
     std::vector<Index> sizes(mesh.face_count());
     for (std::size_t f = 0; f < sizes.size(); ++f) sizes[f] = mesh.face_size(f);
-    out.text("    int[] faceVertexCounts = ").list(sizes);
+    return sizes;
+}
+
+void write_faces(UsdText& out, const Mesh& mesh) {
+    out.text("    int[] faceVertexCounts = ").list(face_sizes(mesh));
     out.text("\n    int[] faceVertexIndices = ").list(mesh.corners);
     out.text("\n    uniform token subdivisionScheme = \"none\"\n");
 }
@@ -106,17 +117,20 @@ void write_uvs(UsdText& out, const Mesh& mesh) {
     if (!corners.empty()) out.text("    int[] primvars:st:indices = ").list(corners).text("\n");
 }
 
+std::vector<Vec3f> display_colors(const Mesh& mesh) {
+    std::vector<Vec3f> colors;
+    const auto linear = [](float channel) { return static_cast<float>(linear_from_srgb(channel)); };
+    for (const Vec4f& color : mesh.colors) colors.emplace_back(linear(color.x()), linear(color.y()), linear(color.z()));
+    return colors;
+}
+
+constexpr std::string_view kVertex = " (\n        interpolation = \"vertex\"\n    )\n";
+
 void write_colors(UsdText& out, const Mesh& mesh) {
     if (mesh.colors.empty()) return;
-    std::vector<Vec3f> colors;
     std::vector<float> opacities;
-    const auto linear = [](float channel) { return static_cast<float>(linear_from_srgb(channel)); };
-    for (const Vec4f& color : mesh.colors) {
-        colors.emplace_back(linear(color.x()), linear(color.y()), linear(color.z()));
-        opacities.push_back(color.w());
-    }
-    constexpr std::string_view kVertex = " (\n        interpolation = \"vertex\"\n    )\n";
-    out.text("    color3f[] primvars:displayColor = ").list(colors).text(kVertex);
+    for (const Vec4f& color : mesh.colors) opacities.push_back(color.w());
+    out.text("    color3f[] primvars:displayColor = ").list(display_colors(mesh)).text(kVertex);
     if (mesh.colors_have_alpha) out.text("    float[] primvars:displayOpacity = ").list(opacities).text(kVertex);
 }
 
@@ -198,6 +212,109 @@ private:
     }
 };
 
+/// Text that is made frame by frame and belongs behind other text: in a file that nobody else sees.
+class WaitingText {
+public:
+    explicit WaitingText(const std::filesystem::path& folder) {
+        const std::filesystem::path path = temporary_path(folder);
+        file_.open(path, std::ios::in | std::ios::out | std::ios::trunc | std::ios::binary);
+        std::error_code ignored;
+        std::filesystem::remove(path, ignored); // it goes when it is closed
+    }
+
+    UsdText text{[this](std::string_view bytes) {
+        file_.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+        return status();
+    }};
+
+    Status append_to(FileWriter& out) {
+        if (Status written = text.finish(); !written) return written;
+        file_.flush();
+        file_.seekg(0);
+        std::string piece(std::size_t{1} << 20, '\0');
+        while (file_.read(piece.data(), static_cast<std::streamsize>(piece.size())) || file_.gcount() > 0)
+            if (Status written = out.write({piece.data(), static_cast<std::size_t>(file_.gcount())}); !written)
+                return written;
+        file_.clear();
+        return Success{};
+    }
+
+private:
+    Status status() const {
+        if (file_) return Success{};
+        return Error{ErrorCode::unwritable, "A temporary file beside the USD text cannot be written: is there room?"};
+    }
+
+    std::fstream file_;
+};
+
+/// The time samples of one attribute: declared when the first frame has it.
+struct SampledAttribute {
+    std::string declared; ///< "point3f[] points", with what belongs behind the name
+    WaitingText samples;
+};
+
+/// Every attribute of a mesh whose faces change.
+class Moments {
+public:
+    explicit Moments(const std::filesystem::path& folder) : folder_(folder) {}
+
+    Status add(std::size_t frame, const MeshMoment& moment, const RunContext& context) {
+        const Mesh& mesh = moment.mesh;
+        std::vector<Vec3f> points;
+        for (std::size_t v = 0; v < mesh.vertex_count(); ++v) points.push_back(mesh.world_position(v).cast<float>());
+        const Box box = bounds(points);
+        is_first_ = frame == 0;
+        count_ = 0;
+        add(frame, "point3f[] points", points);
+        add(frame, "float3[] extent", std::array<Vec3f, 2>{box.min.cast<float>(), box.max.cast<float>()});
+        add(frame, "int[] faceVertexCounts", face_sizes(mesh));
+        add(frame, "int[] faceVertexIndices", mesh.corners);
+        add(frame, "normal3f[] normals", vertex_normals(mesh, mesh.positions, context));
+        if (!mesh.colors.empty()) add(frame, "color3f[] primvars:displayColor", display_colors(mesh));
+        if (!moment.velocities.empty()) add(frame, "vector3f[] velocities", moment.velocities);
+        for (const VertexScalar& scalar : mesh.scalars) {
+            if (scalar.name != "origin") continue;
+            std::vector<std::int64_t> origin;
+            for (const float v : scalar.values) origin.push_back(static_cast<std::int64_t>(v));
+            add(frame, "int[] primvars:origin", origin);
+        }
+        if (count_ == attributes_.size()) return Success{};
+        return Error{ErrorCode::unsuitable, "Frame " + std::to_string(frame) +
+                                                " lacks colours, velocities or origins that the first frame has."};
+    }
+
+    Status append_to(FileWriter& out) {
+        for (const auto& attribute : attributes_) {
+            const std::string& name = attribute->declared;
+            const bool is_a_vertex = name.find("normals") != name.npos || name.find("primvars:") != name.npos;
+            std::string opening;
+            if (is_a_vertex) opening = "    " + name + std::string(kVertex);
+            opening += "    " + name + ".timeSamples = {\n";
+            if (Status written = out.write(opening); !written) return written;
+            if (Status written = attribute->samples.append_to(out); !written) return written;
+            if (Status written = out.write("    }\n"); !written) return written;
+        }
+        return Success{};
+    }
+
+private:
+    std::filesystem::path folder_;
+    std::vector<std::unique_ptr<SampledAttribute>> attributes_;
+    bool is_first_ = true;
+    std::size_t count_ = 0; ///< attributes of the frame at hand
+
+    template <class Items>
+    void add(std::size_t frame, const char* declared, const Items& items) {
+        if (is_first_) attributes_.emplace_back(new SampledAttribute{declared, WaitingText(folder_)});
+        for (const auto& attribute : attributes_)
+            if (attribute->declared == declared) {
+                attribute->samples.text.sample(frame, items);
+                ++count_;
+            }
+    }
+};
+
 } // namespace
 
 Status write_usda(const MeshAnimation& animation, const WorldPositions& positions, const std::filesystem::path& path,
@@ -205,7 +322,7 @@ Status write_usda(const MeshAnimation& animation, const WorldPositions& position
     Result<FileWriter> file = FileWriter::create(path);
     if (!file) return file.error();
     UsdText out(*file);
-    write_header(out, animation);
+    write_header(out, animation.frames, animation.frames_per_second);
     write_faces(out, *animation.rest);
     write_uvs(out, *animation.rest);
     write_colors(out, *animation.rest);
@@ -215,6 +332,36 @@ Status write_usda(const MeshAnimation& animation, const WorldPositions& position
     if (context.is_cancelled()) return cancelled_error();
     context.report("writing", 1);
     add_warnings(animation, warnings);
+    return file->finish();
+}
+
+Status write_usda_moments(std::size_t frames, double frames_per_second,
+                          const std::function<Result<MeshMoment>(std::size_t frame)>& moment,
+                          const std::filesystem::path& path, std::vector<std::string>& warnings,
+                          const RunContext& context) {
+    if (frames == 0) return Error{ErrorCode::unsuitable, path.string() + ": there are no frames to write."};
+    Result<FileWriter> file = FileWriter::create(path);
+    if (!file) return file.error();
+    Moments moments(std::filesystem::absolute(path).parent_path());
+    std::size_t bytes = 0;
+    for (std::size_t frame = 0; frame < frames; ++frame) {
+        context.report("writing", double(frame) / double(frames));
+        if (context.is_cancelled()) return cancelled_error();
+        const Result<MeshMoment> now = moment(frame);
+        if (!now) return now.error();
+        if (Status added = moments.add(frame, *now, context); !added) return added;
+        bytes += 200 * now->mesh.vertex_count();
+    }
+    UsdText header(*file);
+    write_header(header, frames, frames_per_second);
+    header.text("    uniform token subdivisionScheme = \"none\"\n");
+    if (Status written = header.finish(); !written) return written;
+    if (Status written = moments.append_to(*file); !written) return written;
+    if (Status written = file->write("}\n"); !written) return written;
+    context.report("writing", 1);
+    if (bytes > kLargeText)
+        warnings.push_back("The USD text is about " + std::to_string(bytes / 1'000'000) +
+                           " MB, which programs open slowly; a folder of meshes (NAME/) is half of it.");
     return file->finish();
 }
 

@@ -13,14 +13,14 @@ namespace filigree {
 
 namespace {
 
-/// Finds the particles around places at rest.
-class ParticlesAtRest {
+/// Finds the particles around a place.
+class ParticlesNear {
 public:
-    ParticlesAtRest(const std::vector<Vec3f>& positions, double spacing)
+    ParticlesNear(const std::vector<Vec3f>& positions, double spacing)
         : positions_(positions), width_(1.5 * spacing), boxes_(positions, width_) {}
 
     /// The four nearest, farther ones with less share; fewer where there are no more.
-    void near(const Vec3f& at, std::array<Index, 4>& particles, std::array<float, 4>& shares) const {
+    void find(const Vec3f& at, std::array<Index, 4>& particles, std::array<float, 4>& shares) const {
         std::array<std::pair<float, Index>, 4> nearest;
         nearest.fill({std::numeric_limits<float>::infinity(), kNoIndex});
         const Vec3d scaled = (at.cast<double>() / width_).array().floor();
@@ -126,11 +126,11 @@ Status MeltingSurface::add(std::size_t b, const RunContext& context) {
         BodyPart{b, std::move(*restorer), body.in_metres(body.model.mesh.positions), std::move(*surfels), {}, {}});
     std::vector<Vec3f> rest;
     for (std::size_t p = 0; p < body.body->particle_count(); ++p) rest.push_back(body.body->rest[p]);
-    const ParticlesAtRest particles(rest, body.body->spacing());
+    const ParticlesNear particles(rest, body.body->spacing());
     part.particles.resize(part.start.size());
     part.shares.resize(part.start.size());
     parallel_for(context, part.start.size(), 1024, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t v = begin; v < end; ++v) particles.near(part.start[v], part.particles[v], part.shares[v]);
+        for (std::size_t v = begin; v < end; ++v) particles.find(part.start[v], part.particles[v], part.shares[v]);
     });
     particle_colors_.insert(particle_colors_.end(), rest.size(), opaque(body.color));
     name_ += (name_.empty() ? "" : "+") + body.name;
@@ -236,6 +236,35 @@ Result<Surfels> MeltingSurface::surfels(const CompositeSurface& surface, const R
     append_if(*fresh,
               [&](const Triangle& t) { return std::any_of(t.begin(), t.end(), [&](Index v) { return !is_kept[v]; }); });
     return all;
+}
+
+Result<std::vector<Vec3f>> MeltingSurface::velocities(const CompositeSurface& surface, const Recording& recording,
+                                                      std::size_t frame, double frames_per_second,
+                                                      const RunContext& context) const {
+    // Ahead to the next frame; at the end back to the one before.
+    const std::size_t frames = bodies_.empty() ? 0 : recording.matter[bodies_[0].body].size();
+    const std::size_t from = frame + 1 < frames || frame == 0 ? frame : frame - 1;
+    std::vector<Vec3f> positions, ways;
+    double spacing = 0;
+    for (const BodyPart& part : bodies_) {
+        const auto& matter = recording.matter[part.body];
+        const std::vector<Vec3f>& next = matter[std::min(from + 1, frames - 1)].positions;
+        positions.insert(positions.end(), matter[frame].positions.begin(), matter[frame].positions.end());
+        for (std::size_t p = 0; p < next.size(); ++p) ways.push_back(next[p] - matter[from].positions[p]);
+        spacing = std::max(spacing, double(matter[frame].spacing));
+    }
+    std::vector<Vec3f> velocities(surface.mesh.vertex_count(), Vec3f::Zero());
+    const ParticlesNear particles(positions, spacing);
+    parallel_for(context, velocities.size(), 1024, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t v = begin; v < end; ++v) {
+            std::array<Index, 4> near;
+            std::array<float, 4> shares;
+            particles.find(surface.mesh.positions[v], near, shares);
+            for (std::size_t k = 0; k < 4; ++k) velocities[v] += shares[k] * float(frames_per_second) * ways[near[k]];
+        }
+    });
+    if (context.is_cancelled()) return cancelled_error();
+    return velocities;
 }
 
 } // namespace filigree

@@ -32,6 +32,11 @@ public:
     Result<Surfels> surfels(const CompositeSurface& surface, const Recording& recording, std::size_t frame,
                             const RunContext& context) const;
 
+    /// How fast the vertices of a frame that frame() has made go, m/s: as the particles nearest to each, to the next
+    /// frame. Errors: cancelled.
+    Result<std::vector<Vec3f>> velocities(const CompositeSurface& surface, const Recording& recording,
+                                          std::size_t frame, double frames_per_second, const RunContext& context) const;
+
     std::vector<std::string> warnings;
 
 private:
