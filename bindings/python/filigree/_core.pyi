@@ -11,6 +11,7 @@ _Doubles = NDArray[np.float64]
 _Ids = NDArray[np.uint32]
 _Bools = NDArray[np.bool_]
 _Bytes = NDArray[np.uint8]
+_Keyed = Union[float, tuple[ArrayLike, ArrayLike]]
 _Labels = tuple[list[str], _Ids]
 _Report = dict[str, Any]
 _Path = Union[str, PathLike[str]]
@@ -335,7 +336,7 @@ class Obstacle:
         friction: float = 0.5,
         restitution: float = 0.5,
         stiffness: float = 1.0,
-        temperature: float = 293.0,
+        temperature: _Keyed = 293.0,
         heat_transfer: float = 0.0,
     ) -> Obstacle: ...
     @staticmethod
@@ -347,7 +348,7 @@ class Obstacle:
         friction: float = 0.5,
         restitution: float = 0.5,
         stiffness: float = 1.0,
-        temperature: float = 293.0,
+        temperature: _Keyed = 293.0,
         heat_transfer: float = 0.0,
     ) -> Obstacle: ...
     @staticmethod
@@ -359,7 +360,7 @@ class Obstacle:
         friction: float = 0.5,
         restitution: float = 0.5,
         stiffness: float = 1.0,
-        temperature: float = 293.0,
+        temperature: _Keyed = 293.0,
         heat_transfer: float = 0.0,
     ) -> Obstacle: ...
     @staticmethod
@@ -372,7 +373,7 @@ class Obstacle:
         friction: float = 0.5,
         restitution: float = 0.5,
         stiffness: float = 1.0,
-        temperature: float = 293.0,
+        temperature: _Keyed = 293.0,
         heat_transfer: float = 0.0,
         threads: int = 0,
         progress: _Progress | None = None,
@@ -484,6 +485,7 @@ class SceneRun:
     def model(self, body: int) -> Model: ...
     def poses(self, body: int) -> PoseSequence: ...
     def mesh(self, body: int, frame: int) -> Mesh: ...
+    def melting_mesh(self, frame: int, *, progress: _Progress | None = None) -> Mesh: ...
     def energy(self) -> dict[str, float]: ...
     def save(self) -> bytes: ...
     def resume(self, state: bytes) -> None: ...
@@ -500,7 +502,7 @@ class Simulation:
         hands: Sequence[Hand] = ...,
         wind: ArrayLike = ...,
         air_density: float = 0.0,
-        air_temperature: float = 293.0,
+        air_temperature: _Keyed = 293.0,
         air_heat_transfer: float = 0.0,
         heat_sources: Sequence[HeatSource] = ...,
         friction: float = 0.3,
@@ -693,6 +695,8 @@ def sample(
     overlap: str = 'parity',
     accuracy: float = 0.01,
     seed: int = 1,
+    frustum: Sequence[int] | None = None,
+    eye: ArrayLike | None = None,
     threads: int = 0,
     progress: _Progress | None = None,
 ) -> _Doubles: ...

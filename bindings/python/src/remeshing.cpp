@@ -88,6 +88,7 @@ py::tuple remesh(const py::object& given, std::size_t quads, std::optional<unsig
     QuadRemeshed made = LongCall{threads, progress}.owning(
         [=](const RunContext& context) { return quad_remesh(*mesh, options, context).value(); });
     py::dict said = said_of(made.report, made.mesh.face_count());
+    said["base"] = std::make_shared<Mesh>(base_mesh(made));
     return py::make_tuple(std::make_shared<Mesh>(std::move(made.mesh)), said);
 }
 
@@ -127,7 +128,7 @@ Returns
 mesh : Mesh
     Quads alone, patch by patch.
 report : dict
-    The keys of `filigree remesh --json`.
+    The keys of `filigree remesh --json`; and 'base', the patches' corners as a Mesh, a quad each.
 
 Raises
 ------

@@ -1,6 +1,7 @@
 #include "calls.h"
 #include "meshes.h"
 
+#include <filigree/sample/frustum.h>
 #include <filigree/sample/inside_test.h>
 #include <filigree/sample/spacing_for_count.h>
 #include <filigree/sample/spread_inside.h>
@@ -51,13 +52,29 @@ py::array_t<bool> ask(const PyInsideTest& self, const py::object& given, unsigne
     return take<bool>(std::move(inside), Shape{count});
 }
 
+/// The report's points: in the view from the eye, in regular steps across the picture and in depth.
+py::array_t<double> sample_in_view(const MeshPtr& mesh, const std::array<std::size_t, 3>& counts, InsideOptions options,
+                                   const LongCall& call) {
+    Frustum frustum = frustum_around(bounds(mesh->positions), options.eye);
+    options.eye = frustum.eye;
+    frustum.counts = counts;
+    return take(call.owning([=](const RunContext& context) {
+        std::vector<Vec3d> inside = points_inside(*mesh, frustum_points(frustum).value(), options, context).value();
+        for (Vec3d& point : inside) point += mesh->origin;
+        return inside;
+    }));
+}
+
 py::array_t<double> sample(const py::object& given, std::optional<double> spacing, std::optional<std::size_t> count,
                            const std::string& pattern, const py::object& origin, const std::string& method,
-                           const std::string& overlap, double accuracy, std::uint64_t seed, unsigned threads,
-                           const py::object& progress) {
+                           const std::string& overlap, double accuracy, std::uint64_t seed,
+                           const std::optional<std::array<std::size_t, 3>>& frustum, const py::object& eye,
+                           unsigned threads, const py::object& progress) {
     const MeshPtr mesh = mesh_of(given);
-    if (spacing.has_value() == count.has_value()) refuse("Say how many points: spacing or count.");
-    const InsideOptions options = inside_options(method, overlap, accuracy, py::none(), *mesh);
+    if (int(spacing.has_value()) + int(count.has_value()) + int(frustum.has_value()) != 1)
+        refuse("Say how many points: spacing, count or frustum.");
+    InsideOptions options = inside_options(method, overlap, accuracy, eye, *mesh);
+    if (frustum) return sample_in_view(mesh, *frustum, options, LongCall{threads, progress, seed});
     const auto how =
         value_of<Pattern>(pattern, "pattern",
                           {{"lattice", Pattern::lattice}, {"jitter", Pattern::jitter}, {"poisson", Pattern::poisson}});
@@ -146,8 +163,9 @@ array([False,  True])
         "sample", &sample, py::arg("mesh"), py::kw_only(), py::arg("spacing") = py::none(),
         py::arg("count") = py::none(), py::arg("pattern") = "lattice", py::arg("origin") = py::none(),
         py::arg("method") = "auto", py::arg("overlap") = "parity", py::arg("accuracy") = 0.01, py::arg("seed") = 1,
-        py::arg("threads") = 0, py::arg("progress") = py::none(),
-        R"(sample(mesh, *, spacing=None, count=None, pattern='lattice', origin=None, method='auto', overlap='parity', accuracy=0.01, seed=1, threads=0, progress=None)
+        py::arg("frustum") = py::none(), py::arg("eye") = py::none(), py::arg("threads") = 0,
+        py::arg("progress") = py::none(),
+        R"(sample(mesh, *, spacing=None, count=None, pattern='lattice', origin=None, method='auto', overlap='parity', accuracy=0.01, seed=1, frustum=None, eye=None, threads=0, progress=None)
 --
 
 Fill a mesh with points.
@@ -156,7 +174,7 @@ Parameters
 ----------
 mesh : Mesh, or an object with vertices and faces or triangles
 spacing : float, optional
-    Between lattice points, model units. Either this or `count`.
+    Between lattice points, model units. One of this, `count` and `frustum`.
 count : int, optional
     Choose the spacing so that about as many are inside.
 pattern : str
@@ -168,6 +186,10 @@ method, overlap, accuracy
     As of `InsideTest`.
 seed : int
     Of the patterns.
+frustum : (int, int, int), optional
+    The report's points instead of a lattice: so many across the view from `eye`, up and in depth.
+eye : array_like, (3,), optional
+    World coordinates; unset: in front of the mesh.
 
 Returns
 -------

@@ -1,5 +1,6 @@
 #include "models.h"
 
+#include <filigree/scene/melting_surface.h>
 #include <filigree/scene/scene_run.h>
 
 #include <pybind11/stl/filesystem.h>
@@ -17,6 +18,8 @@ struct PyScene {
     std::optional<SceneRun> run;
     unsigned threads;
     std::mutex mutex = {};
+    std::optional<MeltingSurface> melting = {}; ///< of what melts, and the frame that it made last
+    std::optional<std::size_t> melted_frame = {};
 
     const ReadyBody& body(std::size_t number) const {
         if (number >= ready.bodies.size())
@@ -42,6 +45,28 @@ void advance(PyScene& self, std::uint64_t frame, const py::object& progress) {
     LongCall{self.threads, progress}([&](const RunContext& context) {
         const std::lock_guard lock(self.mutex);
         return self.run->advance_to(frame, context).value();
+    });
+}
+
+/// Frames before the one asked for are made as well, as what dies stays dead: once, where frames are asked for in
+/// order.
+MeshPtr melting_mesh(PyScene& self, std::size_t frame, const py::object& progress) {
+    return LongCall{self.threads, progress}([&](const RunContext& context) {
+        const std::lock_guard lock(self.mutex);
+        if (frame > self.run->frame())
+            refuse("There is no frame " + std::to_string(frame) + "; there are 0 to " +
+                   std::to_string(self.run->frame()) + ".");
+        if (!self.melting) self.melting = MeltingSurface::create(self.ready, context).value();
+        if (self.melting->is_empty()) refuse("No body of the scene melts: none is of the model mpm and closed.");
+        std::size_t next = self.melted_frame && *self.melted_frame < frame ? *self.melted_frame + 1 : 0;
+        self.melted_frame.reset();
+        CompositeSurface surface;
+        for (; next <= frame; ++next) surface = self.melting->frame(self.run->recording(), next, context).value();
+        self.melted_frame = frame;
+        VertexScalar& origin = surface.mesh.scalars.emplace_back(VertexScalar{"origin", {}});
+        for (const Index v : surface.origin) origin.values.push_back(v == kNoIndex ? -1 : float(v));
+        surface.mesh.origin = self.ready.origin;
+        return std::make_shared<Mesh>(std::move(surface.mesh));
     });
 }
 
@@ -155,6 +180,18 @@ mesh then, `write_model` a file that plays.
 --
 
 A body's mesh in one of the frames so far, 0 the start, metres.
+)")
+        .def("melting_mesh", &melting_mesh, py::arg("frame"), py::kw_only(), py::arg("progress") = py::none(),
+             R"(melting_mesh(self, frame, *, progress=None)
+--
+
+The bodies of 'mpm' as one surface in one of the frames so far, which parts and joins, metres. The scalar 'origin' says which
+vertex of their meshes a vertex is, -1 for a new one. Cheapest frame after frame, from the start on.
+
+Raises
+------
+UsageError
+    No such frame; no body that melts.
 )")
         .def(
             "energy",

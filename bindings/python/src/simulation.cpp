@@ -19,6 +19,18 @@ Keyed<Vec3d> keyed_of(const py::object& values, const py::object& times, const c
     return keyed;
 }
 
+/// A number, or (times, values).
+Keyed<double> keyed_number_of(const py::object& given, const char* name) {
+    if (!py::isinstance<py::tuple>(given) && !py::isinstance<py::list>(given)) return {{}, {}, given.cast<double>()};
+    const auto pair = given.cast<py::sequence>();
+    if (pair.size() != 2) refuse(std::string(name) + " has to be a number, or a pair of times and values.");
+    Keyed<double> keyed{double_values_of(pair[0], "times"), double_values_of(pair[1], name), 0};
+    if (keyed.times.empty() || keyed.times.size() != keyed.values.size())
+        refuse("There are " + std::to_string(keyed.times.size()) + " times and " + std::to_string(keyed.values.size()) +
+               " of " + name + ".");
+    return keyed;
+}
+
 HeatSource make_heat_source(const py::object& centre, double radius, const py::object& power, const py::object& times,
                             const py::object& move) {
     HeatSource source{{vector_of(centre, "centre"), radius}, {}, {}};
@@ -69,14 +81,14 @@ PyActor make_actor(const PyBody& body, const py::object& move, const py::object&
 
 template <class Shape>
 Obstacle make_obstacle(Shape shape, const RigidMotion& motion, double friction, double restitution, double stiffness,
-                       double temperature, double heat_transfer) {
+                       const py::object& temperature, double heat_transfer) {
     Obstacle obstacle;
     obstacle.shape = std::move(shape);
     obstacle.motion = motion;
     obstacle.friction = friction;
     obstacle.restitution = restitution;
     obstacle.stiffness = stiffness;
-    obstacle.temperature.constant = temperature;
+    obstacle.temperature = keyed_number_of(temperature, "temperature");
     obstacle.heat_transfer = heat_transfer;
     return obstacle;
 }
@@ -133,7 +145,7 @@ struct Attachment {
 SimulationPtr make_simulation(const py::object& bodies, const py::object& gravity,
                               const std::vector<Obstacle>& obstacles, const std::vector<Pin>& pins,
                               const std::vector<RegionForce>& forces, const std::vector<Hand>& hands,
-                              const py::object& wind, double air_density, double air_temperature,
+                              const py::object& wind, double air_density, const py::object& air_temperature,
                               double air_heat_transfer, const std::vector<HeatSource>& heat_sources, double friction,
                               double restitution, double frames_per_second, const std::string& mode,
                               unsigned most_substeps, unsigned descent_substeps, unsigned descent_iterations,
@@ -155,7 +167,7 @@ SimulationPtr make_simulation(const py::object& bodies, const py::object& gravit
     world.gravity = vector_of(gravity, "gravity");
     world.wind.constant = vector_of(wind, "wind");
     world.air_density = air_density;
-    world.air_temperature.constant = air_temperature;
+    world.air_temperature = keyed_number_of(air_temperature, "air_temperature");
     world.air_heat_transfer = air_heat_transfer;
     world.heat_sources = heat_sources;
     world.obstacles = obstacles;
@@ -268,7 +280,7 @@ Made by `Obstacle.plane`, `Obstacle.ball`, `Obstacle.box` and `Obstacle.mesh`.
     add(
         "plane",
         [](const py::object& point, const py::object& normal, const RigidMotion& motion, double friction,
-           double restitution, double stiffness, double temperature, double heat_transfer) {
+           double restitution, double stiffness, const py::object& temperature, double heat_transfer) {
             return make_obstacle(HalfSpace{vector_of(point, "point"), vector_of(normal, "normal")}, motion, friction,
                                  restitution, stiffness, temperature, heat_transfer);
         },
@@ -277,12 +289,13 @@ Made by `Obstacle.plane`, `Obstacle.ball`, `Obstacle.box` and `Obstacle.mesh`.
 --
 
 Solid below a plane. `friction`: Coulomb's coefficient; `restitution`: 0 to 1; `stiffness` of the contact: above 0,
-to 1; `temperature` (K) and `heat_transfer` (W/(m^2 K)): of what bodies of 'mpm' touch.
+to 1; `temperature` (K; a number, or a pair of times and values) and `heat_transfer` (W/(m^2 K)): of what bodies of
+'mpm' touch.
 )");
     add(
         "ball",
         [](const py::object& centre, double radius, const RigidMotion& motion, double friction, double restitution,
-           double stiffness, double temperature, double heat_transfer) {
+           double stiffness, const py::object& temperature, double heat_transfer) {
             return make_obstacle(Ball{vector_of(centre, "centre"), radius}, motion, friction, restitution, stiffness,
                                  temperature, heat_transfer);
         },
@@ -295,7 +308,7 @@ A ball; m. The others as of `plane`.
     add(
         "box",
         [](const py::object& centre, const py::object& size, const RigidMotion& motion, double friction,
-           double restitution, double stiffness, double temperature, double heat_transfer) {
+           double restitution, double stiffness, const py::object& temperature, double heat_transfer) {
             return make_obstacle(Cuboid{vector_of(centre, "centre"), vector_of(size, "size")}, motion, friction,
                                  restitution, stiffness, temperature, heat_transfer);
         },
@@ -308,7 +321,7 @@ A box along the axes before its motion; m. The others as of `plane`.
     obstacle.def_static(
         "mesh",
         [](const py::object& given, double scale, double spacing, const RigidMotion& motion, double friction,
-           double restitution, double stiffness, double temperature, double heat_transfer, unsigned threads,
+           double restitution, double stiffness, const py::object& temperature, double heat_transfer, unsigned threads,
            const py::object& progress) {
             const MeshPtr mesh = mesh_of(given);
             auto field = LongCall{threads, progress}([&](const RunContext& context) {
@@ -484,7 +497,7 @@ obstacles, pins, forces, hands : sequence of Obstacle, Pin, Force, Hand
 air_density : float
     kg/m^3: how hard the wind presses.
 air_temperature, air_heat_transfer : float
-    K and W/(m^2 K): heat between the air and bodies of 'mpm'.
+    K (a number, or a pair of times and values) and W/(m^2 K): heat between the air and bodies of 'mpm'.
 heat_sources : sequence of HeatSource
 friction, restitution : float
     Where bodies touch each other.

@@ -54,7 +54,7 @@ def test_help_is_worth_reading():
     text = subprocess.run(
         [sys.executable, "-c", "import filigree; help(filigree.strip)"], capture_output=True, text=True, check=True
     ).stdout
-    assert "strip(mesh, *, base=None" in text and "fraction of the diagonal" in text and "Examples" in text
+    assert "strip(mesh, *, driver=None, base=None" in text and "fraction of the diagonal" in text and "Examples" in text
 
 
 def test_stubs():

@@ -41,7 +41,7 @@ def test_each_is_raised(tmp_path, mesh, model):
     raises("UsageError", r"faces\[0\]\[2\] is 9; there are 3", lambda: filigree.Mesh(numpy.eye(3), [[0, 1, 9]]))
     raises("UsageError", r"vertices\[1\] is not finite", lambda: filigree.Mesh([[0, 0, 0], [0, numpy.nan, 0]]))
     raises("UsageError", r"positions\[0\] is not finite", lambda: filigree.restore(model, numpy.full((200, 3), numpy.inf)))
-    raises("UsageError", "spacing or count", lambda: filigree.sample(mesh))
+    raises("UsageError", "spacing, count or frustum", lambda: filigree.sample(mesh))
     raises("UsageError", "wood", lambda: filigree.Material("concrete"))
     raises("UsageError", "density", lambda: filigree.Material(density=-1))
     raises("UsageError", "no level 9", lambda: model.level(9))

@@ -100,3 +100,67 @@ def test_matter_melts():
     warm = simulation.matter(0)
     assert simulation.heat() > heat and warm["temperatures"].min() > 311 and warm["liquid"].mean() > 0.1
     assert len(points.renewal()) == len(block.vertices)
+
+
+MELTING = """[simulation]
+frames = 6
+frames_per_second = 30
+[[body]]
+shape = "wavy-cube"
+resolution = 8
+material = "ice"
+particles = 300
+centre = [0, 0.55, 0]
+temperature = 272.9
+[[obstacle]]
+shape = "ground"
+temperature = [{ time = 0, value = 300 }, { time = 0.1, value = 900 }]
+heat_transfer = 1e6
+"""
+
+
+def test_what_melts_is_one_surface(tmp_path):
+    path = tmp_path / "melt.toml"
+    path.write_text(MELTING)
+    scene = filigree.SceneRun(path)
+    with pytest.raises(filigree.UsageError):
+        scene.melting_mesh(1)
+    scene.step(6)
+    start = scene.melting_mesh(0)
+    assert abs(start.vertices - scene.mesh(0, 0).vertices).max() < 1e-6
+    assert (start.scalars["origin"] == numpy.arange(len(start.vertices))).all()
+    later = scene.melting_mesh(6)
+    assert filigree.info(later)["closed"] and filigree.info(later)["manifold"]
+    scene.melting_mesh(2)
+    assert same(scene.melting_mesh(6).vertices, later.vertices)  # whatever was asked for before
+    path.write_text(MELTING.replace('"ice"', '"rubber"').replace("temperature = 272.9\n", ""))
+    with pytest.raises(filigree.UsageError, match="No body of the scene melts"):
+        filigree.SceneRun(path).melting_mesh(0)
+
+
+def test_temperatures_may_have_keys():
+    body = filigree.Body(filigree.make("wavy-cube", resolution=8), "wax", particles=200)
+    keys = ([0.0, 0.2], [293.0, 800.0])
+    floor = filigree.Obstacle.plane((0, -0.6, 0), temperature=keys, heat_transfer=1e5)
+    steady = filigree.Obstacle.plane((0, -0.6, 0), heat_transfer=1e5)
+    heats = []
+    for obstacle, air in ((floor, 293.0), (steady, keys), (steady, 293.0)):
+        simulation = filigree.Simulation([body], obstacles=[obstacle], air_temperature=air, air_heat_transfer=1e4)
+        before = simulation.heat()
+        simulation.step(15)
+        heats.append(simulation.heat() - before)
+    assert heats[1] > heats[2] and abs(heats[2]) < 0.1 * heats[1]
+    for wrong in (([0, 1], [293]), ([], []), (1, 2, 3)):
+        with pytest.raises(filigree.UsageError):
+            filigree.Obstacle.plane(temperature=wrong)
+
+
+def test_points_of_the_view_and_the_patches_corners():
+    ball = filigree.make("wavy-sphere", resolution=24)
+    points = filigree.sample(ball, frustum=(20, 20, 20), method="rays")
+    assert 500 < len(points) < 8000 and filigree.contains(ball, points).all()
+    assert not same(points, filigree.sample(ball, frustum=(20, 20, 20), eye=(5, 0, 0), method="rays"))
+    with pytest.raises(filigree.UsageError):
+        filigree.sample(ball, frustum=(20, 20, 20), count=5)
+    quads, report = filigree.remesh(ball, 2000)
+    assert len(report["base"].faces) == report["patches"] and len(quads.faces) == report["quads"]
