@@ -104,6 +104,42 @@ def test_what_cannot_be_is_said():
     refused(bpy.ops.filigree.bind, "without vertices", driver="nothing")
 
 
+def corner_normals(mesh):
+    mesh.calc_normals_split()
+    normals = np.empty(3 * len(mesh.loops), np.float32)
+    mesh.loops.foreach_get("normal", normals)
+    return normals.reshape(-1, 3)
+
+
+def test_custom_normals_and_uvs_come_along():
+    """Blender turns custom normals with the faces around them, the library by the gradient."""
+    begin()
+    ball = filigree.make("wavy-sphere", resolution=40)
+    high = add(ball, "ball")
+    high.data.use_auto_smooth = True
+    lean = np.array([0.3, 0.2, 0.9])
+    own = ball.vertices / np.linalg.norm(ball.vertices, axis=1)[:, None] + 0.3 * lean  # of no surface
+    own /= np.linalg.norm(own, axis=1)[:, None]
+    high.data.normals_split_custom_set_from_vertices(own)
+    uvs = high.data.uv_layers.new(name="map")
+    uvs.data.foreach_set("uv", np.arange(2 * len(high.data.loops), dtype=np.float32))
+    bpy.ops.filigree.make_driver(vertices=300)
+    bend(high.filigree.driver)
+    bpy.context.view_layer.update()
+    evaluated = high.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    seen = corner_normals(evaluated)
+    with_normals = filigree.Mesh(ball.vertices, ball.corners, ball.face_offsets, normals=own)
+    model = filigree.strip(with_normals, base=300)
+    wanted = filigree.restore(model, shown(high.filigree.driver))
+    wanted = wanted.normals[ball.corners if wanted.normal_corners is None else wanted.normal_corners]
+    angles = np.degrees(np.arccos(np.clip((seen * wanted).sum(axis=1), -1, 1)))
+    at_rest = np.degrees(np.arccos(np.clip((seen * own[ball.corners]).sum(axis=1), -1, 1)))
+    assert angles.mean() < 3 and angles.mean() < 0.3 * at_rest.mean(), (angles.mean(), at_rest.mean())
+    kept = np.empty(2 * len(evaluated.loops), np.float32)
+    evaluated.uv_layers["map"].data.foreach_get("uv", kept)
+    assert (kept == np.arange(len(kept))).all()
+
+
 def test_unbinding_gives_everything_back():
     begin()
     high = add(filigree.make("wavy-sphere", resolution=16), "ball")
