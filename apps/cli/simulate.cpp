@@ -24,6 +24,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr double kMoltenKeys = 10;        // a second of a GLB whose faces change in time
 constexpr std::size_t kFinerMoments = 20; // of a run that are compared with that of eight times the particles
 
 struct SimulateArguments {
@@ -209,7 +210,7 @@ private:
     void warn_of_one_topology() {
         std::vector<std::string> paths = outputs_.models;
         for (const std::string& path : outputs_.animations)
-            if (!is_usd(path)) paths.push_back(path);
+            if (!holds_moments(path)) paths.push_back(path);
         if (paths.empty()) return;
         for (std::size_t b = 0; b < ready_.bodies.size(); ++b) {
             const auto& frames = run_->recording().matter[b];
@@ -225,24 +226,35 @@ private:
                                        fmt::join(paths, " and "), first - frames.begin(), ready_.bodies[b].name)});
         }
     }
-    static bool is_usd(const std::string& path) { return lower_extension(path) == ".usda"; }
+    /// Formats that hold a mesh whose faces change in time.
+    static bool holds_moments(const std::string& path) {
+        const std::string ending = lower_extension(path);
+        return ending == ".usda" || ending == ".glb";
+    }
 
-    /// What melts as one surface whose faces change in time, with velocities for motion blur.
-    void write_melting_usd(MeltingSurface& melting, const std::string& path) {
+    /// What melts as one surface whose faces change in time: USD with velocities for motion blur, GLB as key frames.
+    void write_melting(MeltingSurface& melting, const std::string& path) {
         const RunContext silent = session_.silent_context();
         const Recording& recording = run_->recording();
         const double rate = scene_.step.frames_per_second;
+        const bool is_glb = lower_extension(path) == ".glb";
         session_.warn(melting.warnings);
         const auto moment = [&](std::size_t frame) -> Result<MeshMoment> {
             Result<CompositeSurface> surface = melting.frame(recording, frame, silent);
             if (!surface) return surface.error();
+            if (is_glb) return MeshMoment{with_origins(std::move(*surface), ready_.origin), {}};
             Result<std::vector<Vec3f>> velocities = melting.velocities(*surface, recording, frame, rate, silent);
             if (!velocities) return velocities.error();
             return MeshMoment{with_origins(std::move(*surface), ready_.origin), std::move(*velocities)};
         };
         std::vector<std::string> warnings;
         session_.begin_writing(path);
-        require(write_usda_moments(recording.poses[0].frames.size(), rate, moment, path, warnings, session_.context()));
+        const std::size_t frames = recording.poses[0].frames.size();
+        if (is_glb)
+            require(write_glb_moments(frames, rate, options_.animation.skin.key_rate.value_or(kMoltenKeys), moment,
+                                      path, session_.context()));
+        else
+            require(write_usda_moments(frames, rate, moment, path, warnings, session_.context()));
         session_.warn(warnings);
         Report report;
         report.set("output", path);
@@ -252,8 +264,8 @@ private:
     void write_animations() {
         for (const std::string& path : outputs_.animations) {
             MeltingSurface melting;
-            if (is_usd(path)) melting = require(MeltingSurface::create(ready_, session_.silent_context()));
-            if (!melting.is_empty()) write_melting_usd(melting, model_path(path, ready_.bodies.size(), melting.name()));
+            if (holds_moments(path)) melting = require(MeltingSurface::create(ready_, session_.silent_context()));
+            if (!melting.is_empty()) write_melting(melting, model_path(path, ready_.bodies.size(), melting.name()));
             for (std::size_t b = 0; b < ready_.bodies.size(); ++b) {
                 if (melting.has_body(b)) continue;
                 Report report;

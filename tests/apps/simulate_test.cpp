@@ -460,6 +460,8 @@ TEST_F(Simulate, IceMeltsAndSaysWhatItPassesThrough) {
     const std::string usd = bytes_of(path("ice_wavy-cube.usda")); // the bar is of rubber, and a file of its own
     for (const char* word : {"faceVertexCounts.timeSamples", "velocities.timeSamples", "primvars:origin.timeSamples"})
         EXPECT_NE(usd.find(word), std::string::npos) << word;
+    EXPECT_NE(bytes_of(path("ice_wavy-cube.glb")).find("\"STEP\""), std::string::npos);
+    EXPECT_NE(bytes_of(path("ice_bar.glb")).find("\"skins\""), std::string::npos);
     EXPECT_EQ(bytes_of(path("ice_bar.usda")).find("velocities"), std::string::npos);
     EXPECT_NE(ran.out.find("pass through bodies of other models"), std::string::npos) << ran.out;
     refused(kBody + "material = \"ice\"\nlatent_heat = -1\n", {"bad.toml:4:", "latent_heat"});
