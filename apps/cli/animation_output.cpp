@@ -121,7 +121,8 @@ OptionList animation_options(AnimationOutput& output) {
         choice<GlbMotion>("--as", output.glb, {{"skin", GlbMotion::skin}, {"morph", GlbMotion::morph}},
                           "GLB: a skin, one joint a driver vertex, or morph targets, every frame's positions (unset: a "
                           "skin where the model's code makes one)"),
-        Option("--key-rate", output.skin.key_rate, "Skin: keys a second (unset: one a frame; what melts: 10)").above_zero(),
+        Option("--key-rate", output.skin.key_rate, "Skin: keys a second (unset: one a frame; what melts: 10)")
+            .above_zero(),
         choice<KeyInterpolation>("--interpolation", output.skin.interpolation,
                                  {{"linear", KeyInterpolation::linear}, {"cubic", KeyInterpolation::cubic}},
                                  "Skin: between keys (unset: linear; cubic needs fewer keys, but Blender ignores it)"),

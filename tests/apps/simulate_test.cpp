@@ -449,7 +449,7 @@ TEST_F(Simulate, IceMeltsAndSaysWhatItPassesThrough) {
                       "centre = [5, 0, 0]\n[[heat]]\nradius = 1\npower = 1e3\n"
                       "[picture]\nsize = [64, 48]\npasses = 1\n");
     const Ran ran = run(words("ice.toml", {"--frames", "3", "-o", "ice.fil", "-o", "ice.mp4", "-o", "ice.usda", "-o",
-                                           path("ice/"), "--json"}));
+                                           "ice.glb", "-o", path("ice/"), "--json"}));
     ASSERT_EQ(ran.code, 0) << ran.err;
     // Both bodies are one surface, closed in every frame; the start is their meshes.
     for (const std::string number : {"0001", "0004"}) {
