@@ -98,6 +98,31 @@ TEST(Mpm, KeepsMomentumAndGainsNoEnergy) {
     EXPECT_LT(simulation.energy(kContext).total(), 1.01 * energy);
 }
 
+/// A bar held at its left end sags: Euler and Bernoulli's beam, and Timoshenko's shear.
+TEST(Mpm, BarSagsAsTheoryHasIt) {
+    const double h = 0.02, length = 30 * h, height = 8 * h, young = 1e6;
+    Material material = elastic(young);
+    material.damping = 12; // about critical
+    const auto body = box(34, 8, 8, h, material);
+    World world = no_gravity();
+    world.gravity = {0, -2, 0};
+    Pin pin;
+    for (Index p = 0; p < body->particle_count(); ++p)
+        if (body->rest[p].x() < 4 * h) pin.particles.push_back(p);
+    world.pins.push_back(pin);
+    Simulation simulation = begin(std::move(world), {{body}}, 60);
+    const std::size_t tip = body->particle_count() - 1;
+    const double rest = double(simulation.positions(0)[tip].y());
+    run(simulation, 90);
+    const double sag = rest - double(simulation.positions(0)[tip].y());
+    const double load = 1000 * 2 * height, inertia = height * height * height / 12; // by the bar's width
+    const double shear = young / 2.6 * height * 5 / 6;
+    const double theory = load * std::pow(length, 4) / (8 * young * inertia) + load * length * length / (2 * shear);
+    EXPECT_NEAR(sag, theory, 0.15 * theory); // the clamp, a cell wide, gives way
+    run(simulation, 30);
+    EXPECT_NEAR(rest - double(simulation.positions(0)[tip].y()), sag, 0.02 * sag) << "it has come to rest";
+}
+
 /// A bar held at its left end that hangs out and swings: Euler and Bernoulli's beam.
 TEST(Mpm, BarSwingsAtItsFirstFrequency) {
     const double h = 0.02, length = 30 * h, height = 8 * h, young = 1e6;
