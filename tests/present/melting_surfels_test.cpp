@@ -2,6 +2,7 @@
 #include "filigree/scene/melting_surface.h"
 #include "filigree/scene/scene_run.h"
 #include "render/rendered.h"
+#include "render/surfel_coverage.h"
 
 #include <filesystem>
 #include <fstream>
@@ -9,8 +10,6 @@
 using namespace filigree_test;
 
 namespace {
-
-class MeltingSurfels : public Rendered {};
 
 constexpr const char* kScene = R"([simulation]
 frames = 40
@@ -34,20 +33,9 @@ temperature = 300
 heat_transfer = 200
 )";
 
-double open_share(const Picture& full, const Picture& covered) {
-    std::size_t open = 0, all = 0;
-    for (unsigned y = 0; y < full.height; ++y)
-        for (unsigned x = 0; x < full.width; ++x) {
-            all += full.pixel(x, y)[3] == 255;
-            open += full.pixel(x, y)[3] == 255 && covered.pixel(x, y)[3] == 0;
-        }
-    EXPECT_GT(all, 5'000u);
-    return double(open) / double(std::max<std::size_t>(all, 1));
-}
-
 } // namespace
 
-TEST_F(MeltingSurfels, CoverOldFadingAndNewParts) {
+TEST(MeltingSurfels, CoverOldFadingAndNewParts) {
     const std::string path = testing::TempDir() + "melting_surfels.toml";
     std::ofstream(path) << kScene;
     const SceneFile scene = read_scene(path).value();
@@ -59,17 +47,8 @@ TEST_F(MeltingSurfels, CoverOldFadingAndNewParts) {
     for (std::size_t frame = 0; frame <= scene.frames; frame += 10) {
         const CompositeSurface surface = melting.frame(run.recording(), frame, kOneThread).value();
         const Surfels surfels = melting.surfels(surface, run.recording(), frame, kOneThread).value();
-        const Mesh polygons = surfel_polygons(surfels);
-        const Drawable whole = filigree_test::surface(surface.mesh), discs = filigree_test::surface(polygons);
-        for (const View view : {View::front, View::top, View::iso}) {
-            const auto picture = [&](const Drawable& drawn) {
-                Scene shown = scene_of(drawn);
-                shown.background.transparent = true;
-                shown.ground = false;
-                return draw(shown, camera_on(surface.mesh, view), {.width = 320, .height = 240, .passes = 1});
-            };
-            EXPECT_LT(open_share(picture(whole), picture(discs)), 1e-3) << frame;
-        }
+        for (const View view : {View::front, View::top, View::iso})
+            EXPECT_LT(open_share(surface.mesh, surfels, camera_on(surface.mesh, view), 640, 480), 1e-3) << frame;
         new_vertices += std::size_t(std::count(surface.origin.begin(), surface.origin.end(), kNoIndex));
     }
     EXPECT_GT(new_vertices, 100u); // it did melt

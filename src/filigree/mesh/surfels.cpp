@@ -13,6 +13,7 @@ namespace filigree {
 namespace {
 
 constexpr float kLeastFacing = 0.5f; ///< cosine to a triangle below which discs do not grow further
+constexpr float kOverlap = 1.2f;     ///< of a disc's radius: edges fold between discs, and views are oblique
 constexpr float kChildLength = 0.62f, kChildAt = 1 - kChildLength; ///< of the longest half axis; ends stay ends
 constexpr std::array<const char*, 6> kAxisNames = {"ux", "uy", "uz", "vx", "vy", "vz"};
 
@@ -55,7 +56,8 @@ std::vector<TriangleDiscs> discs_of_triangles(std::span<const Vec3f> positions, 
     double sum = 0;
     for (const Triangle& t : triangles) {
         const std::array<Vec3f, 3> p = {positions[t[0]], positions[t[1]], positions[t[2]]};
-        discs.push_back({(p[1] - p[0]).cross(p[2] - p[0]).stableNormalized(), covering_radius(p[0], p[1], p[2]), 1});
+        discs.push_back(
+            {(p[1] - p[0]).cross(p[2] - p[0]).stableNormalized(), kOverlap * covering_radius(p[0], p[1], p[2]), 1});
         sum += double(discs.back().radius);
     }
     const double largest = kLargest * sum / double(std::max<std::size_t>(triangles.size(), 1));

@@ -24,8 +24,9 @@ struct Surfels {
 };
 
 /// A disc at each vertex that has a face, across the vertex normal, and further ones in triangles much larger than
-/// others. Each is as large as it takes to cover its share of the triangles around it, seen along their normals: discs
-/// together leave no gap in the surface. Colours come along. Cost O(V + corners + surfels). Errors: cancelled.
+/// others. Each is a fifth larger than it takes to cover its share of the triangles around it, seen along their
+/// normals: discs together leave no gap in the surface, seen obliquely hardly one. Colours come along. Cost O(V +
+/// corners + surfels). Errors: cancelled.
 Result<Surfels> make_surfels(const Mesh& mesh, const RunContext& context);
 
 /// Surfels moved with what is around them: each goes with its vertex (between three, with the triangle), and its axes
