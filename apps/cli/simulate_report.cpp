@@ -157,11 +157,16 @@ void report_checks(const ReadyScene& ready, const SceneRun& run, Report& report)
                         "95 % of normals within {:.3g} degrees (worst frame {:.3g})",
                         check.rms_sum / frames, check.worst_rms, check.worst_max, check.p95_sum / frames,
                         check.worst_p95));
+        if (check.worst_fading_rms > 0)
+            report.row(ready.bodies[b].name + ", fading",
+                       fmt::format("rms {:.2e} of the diagonal from all attached in the worst frame, before it fades",
+                                   check.worst_fading_rms));
         report.set("bodies").at(b)["check"] = {{"rms_mean", check.rms_sum / frames},
                                                {"rms_worst", check.worst_rms},
                                                {"max_worst", check.worst_max},
                                                {"normal_p95_deg_mean", check.p95_sum / frames},
-                                               {"normal_p95_deg_worst", check.worst_p95}};
+                                               {"normal_p95_deg_worst", check.worst_p95},
+                                               {"fading_rms_worst", check.worst_fading_rms}};
     }
     if (checks.empty() || times.frames == 0) return;
     const double direct = 1e3 * times.direct / double(times.frames);

@@ -13,6 +13,9 @@ namespace filigree {
 struct CheckTotals {
     double rms_sum = 0, worst_rms = 0, worst_max = 0; ///< fractions of the diagonal at rest
     double p95_sum = 0, worst_p95 = 0;                ///< degrees between normals
+    /// The same as worst_rms for vertices whose matter is between kFadeBegin and kFadeEnd, where they fade; 0: none
+    /// did.
+    double worst_fading_rms = 0;
 };
 
 /// Sums over all frames so far. No times: equal runs have equal totals.

@@ -11,7 +11,7 @@ namespace filigree {
 
 namespace {
 
-constexpr std::string_view kFormat = "FILSTAT", kMagic = "FILSTAT5"; // ends in the version
+constexpr std::string_view kFormat = "FILSTAT", kMagic = "FILSTAT6"; // ends in the version
 
 void write_totals(ByteWriter& out, const RunTotals& t) {
     for (const std::uint64_t count : {t.frames, t.explicit_frames, t.descent_frames, t.substeps, t.least_substeps,

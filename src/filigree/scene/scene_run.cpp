@@ -37,14 +37,18 @@ std::string volume_text(float ratio) { return ratio > 0 ? fmt::format("{:.2g} %"
 void add_frame(CheckTotals& check, const Mesh& mesh, std::span<const Vec3f> restored, std::span<const Vec3f> direct,
                std::span<const float> renewal, double diagonal, const RunContext& context) {
     const auto is_old = [&](std::size_t v) { return renewal[v] <= CompositeMesher::kFadeBegin; };
-    double squares = 0, most = 0;
-    std::size_t old = 0;
+    double squares = 0, fading_squares = 0, most = 0;
+    std::size_t old = 0, fading = 0;
     for (std::size_t v = 0; v < direct.size(); ++v) {
-        if (!is_old(v)) continue;
-        ++old;
         const double distance = (direct[v] - restored[v]).cast<double>().norm();
-        squares += distance * distance;
-        most = std::max(most, distance);
+        if (is_old(v)) {
+            ++old;
+            squares += distance * distance;
+            most = std::max(most, distance);
+        } else if (renewal[v] < CompositeMesher::kFadeEnd) {
+            ++fading;
+            fading_squares += distance * distance;
+        }
     }
     const std::vector<Vec3f> ours = vertex_normals(mesh, restored, context),
                              theirs = vertex_normals(mesh, direct, context);
@@ -55,6 +59,8 @@ void add_frame(CheckTotals& check, const Mesh& mesh, std::span<const Vec3f> rest
                              std::numbers::pi_v<float>);
     const double p95 = percentile_95(angles),
                  rms = std::sqrt(squares / double(std::max<std::size_t>(old, 1))) / diagonal;
+    const double fading_rms = std::sqrt(fading_squares / double(std::max<std::size_t>(fading, 1))) / diagonal;
+    check.worst_fading_rms = std::max(check.worst_fading_rms, fading_rms);
     check.rms_sum += rms;
     check.worst_rms = std::max(check.worst_rms, rms);
     check.worst_max = std::max(check.worst_max, most / diagonal);
