@@ -1,8 +1,8 @@
 """Filigree in Blender: a detailed mesh follows a light one, in the viewport and in every render.
 
 What is where: `library` finds the Python module; `settings` is what a file stores; `meshes` moves arrays between
-Blender and numpy; `models` keeps models in the file; `nodes` puts the restored shape on the mesh; `follow` restores
-when Blender says that something moved; `jobs` runs long work; `binding`, `baking`, `error_map`, `simulating` and
+Blender and numpy; `models` keeps models in the file; `nodes` shows the restored shape; `follow` restores when Blender
+says that something moved; `jobs` runs long work; `binding`, `baking`, `error_map`, `simulating` (with `obstacles`) and
 `breaking` are the panel's buttons; `panel` draws them.
 """
 
