@@ -63,6 +63,8 @@ QString name_of_change(const BodySettings& before, const BodySettings& after) {
                     {before.size != after.size, "Size of the body"},
                     {before.strength != after.strength, "Strength"},
                     {before.drop != after.drop, "Height of the drop"},
+                    {before.air_temperature != after.air_temperature, "Air"},
+                    {before.melting_time != after.melting_time, "Melting time"},
                     {before.gravity != after.gravity, after.gravity ? "Gravity on" : "Gravity off"},
                     {before.ground != after.ground, after.ground ? "Ground on" : "Ground off"},
                     {before.obstacle != after.obstacle, "Obstacle"},

@@ -4,8 +4,14 @@
 
 namespace filigree::studio {
 
-void Recording::follow(const PoseSequence& poses) {
+bool is_same_body(BodySettings a, const BodySettings& b) {
+    a.air_temperature = b.air_temperature;
+    return a == b;
+}
+
+void Recording::follow(const PoseSequence& poses, std::span<const std::shared_ptr<const Mesh>> surfaces_of_all) {
     frames_per_second = poses.frames_per_second;
+    surfaces.assign(surfaces_of_all.begin(), surfaces_of_all.end());
     for (std::size_t k = frames.size(); k < poses.frames.size(); ++k)
         frames.push_back(std::make_shared<const Pose>(poses.frames[k]));
 }

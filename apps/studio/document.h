@@ -64,14 +64,23 @@ struct BodySettings : DropOptions {
     bool operator==(const BodySettings&) const = default;
 };
 
+/// Whether the body of one is that of the other: what may change around it while it moves is not compared.
+bool is_same_body(BodySettings a, const BodySettings& b);
+
 /// What a body did, for the driver. Frames are shared between the steps of the history, so a longer recording costs its
 /// new frames alone.
 struct Recording {
     double frames_per_second = 60;
     std::vector<std::shared_ptr<const Pose>> frames; ///< the first is the start; none is null
+    /// One a frame, of a body that melts: what there is in place of the restored mesh; null: nothing. Beyond the end:
+    /// null.
+    std::vector<std::shared_ptr<const Mesh>> surfaces;
 
-    /// Adds the frames of `poses` that are beyond those there are.
-    void follow(const PoseSequence& poses);
+    std::shared_ptr<const Mesh> surface(std::size_t frame) const {
+        return frame < surfaces.size() ? surfaces[frame] : nullptr;
+    }
+    /// Adds the frames of `poses` that are beyond those there are, and their surfaces.
+    void follow(const PoseSequence& poses, std::span<const std::shared_ptr<const Mesh>> surfaces_of_all = {});
     PoseSequence poses() const; ///< a copy, for files
 };
 

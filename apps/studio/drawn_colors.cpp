@@ -28,6 +28,11 @@ void DrawnObjects::drop_colors() {
 
 void DrawnObjects::follow_colors() {
     if (!shown_) return;
+    if (settings_.coloring != Coloring::heat && std::exchange(melt_is_colored_, false)) {
+        with_opengl_([this] { (void)melt_->set_scalars({}); });
+        colors_ = {};
+        color_stamp_ = 0;
+    }
     switch (settings_.coloring) {
     case Coloring::own:
     case Coloring::patches: // as another surface
@@ -43,7 +48,36 @@ void DrawnObjects::follow_colors() {
         return follow_expected_error();
     case Coloring::pieces:
         return follow_pieces();
+    case Coloring::heat:
+        return follow_heat();
     }
+}
+
+/// Known of the latest moment of a body that melts.
+void DrawnObjects::follow_heat() {
+    constexpr float kCelsius = 273.15f, kAround = 20; // K, K
+    const auto made = workbench_.playback().made();
+    const Moment* const moment = workbench_.playback().moment();
+    const std::size_t count = melt_of_ ? melt_of_->positions.size() : shown_->model().mesh.vertex_count();
+    if (!made || !moment || moment->surface != melt_of_ || moment->temperatures.size() != count) {
+        if (!melt_of_) drop_colors();
+        return;
+    }
+    const Material& material = made->body->material;
+    VertexColors colors;
+    for (const float kelvins : moment->temperatures) colors.values.push_back(kelvins - kCelsius);
+    colors.range = {float(std::min(material.temperature, material.melting_from)) - kCelsius - kAround,
+                    float(material.melting_to) - kCelsius + kAround};
+    if (melt_) {
+        melt_is_colored_ = false;
+        with_opengl_([&] {
+            melt_is_colored_ = bool(melt_->set_scalars({colors.values, ColorMap::sequential, colors.range}));
+        });
+        colors_ = std::move(colors); // for the legend
+        colors_are_ = Coloring::heat;
+        return Q_EMIT changed(false);
+    }
+    put_colors(Coloring::heat, std::move(colors));
 }
 
 /// While things move, the colours stay those of a pose just before.

@@ -4,6 +4,8 @@
 #include "theme.h"
 
 #include "filigree/deform/carried_points.h"
+#include "filigree/mesh/ray_hit.h"
+#include "filigree/mesh/triangulate.h"
 
 #include <QElapsedTimer>
 
@@ -53,7 +55,10 @@ DrawnObjects::DrawnObjects(Workbench& workbench, WithOpenGl with_opengl)
     });
     connect(&workbench, &Workbench::mode_changed, this, [this] { follow_view(); });
     connect(&workbench.playback(), &Playback::state_changed, this, [this] { follow_view(); });
-    connect(&workbench.playback(), &Playback::moved, this, [this] { follow_particles(); });
+    connect(&workbench.playback(), &Playback::moved, this, [this] {
+        follow_particles();
+        if (settings_.coloring == Coloring::heat) follow_colors();
+    });
     connect(&workbench.expected_error(), &ExpectedError::changed, this, [this] {
         if (settings_.coloring == Coloring::expected_error) follow_colors();
     });
@@ -78,6 +83,8 @@ void DrawnObjects::stop() {
     inside_.reset();
     full_.reset();
     full_asked_ = 0;
+    melt_.reset();
+    melt_of_ = nullptr;
     patches_.reset();
     patches_of_ = nullptr;
     obstacles_.clear();
@@ -141,6 +148,7 @@ void DrawnObjects::follow_pose() {
     follow_particles();
     follow_inside_points();
     follow_full();
+    follow_melt();
     follow_colors();
     Q_EMIT changed(true);
 }
@@ -150,12 +158,14 @@ void DrawnObjects::follow_view() {
     settings_ = workbench_.view().settings();
     const bool wants_full = settings_.split || settings_.coloring == Coloring::error;
     workbench_.want_full(wants_full);
+    workbench_.want_temperatures(settings_.coloring == Coloring::heat);
     workbench_.expected_error().want_colors(settings_.coloring == Coloring::expected_error);
     follow_surroundings();
     follow_particles();
     follow_inside_points();
     follow_defects();
     follow_full();
+    follow_melt();
     follow_colors();
     follow_patches();
     if (shown_ && settings_.driver) shown_->measure(background_, [this] { Q_EMIT changed(false); });
@@ -236,6 +246,30 @@ void DrawnObjects::follow_inside_points() {
         if (!is_there) inside_.reset(); // of a mesh not shown yet
     });
     Q_EMIT changed(false);
+}
+
+/// The surface of what has melted, in place of the restored mesh.
+void DrawnObjects::follow_melt() {
+    const std::shared_ptr<const Mesh> surface = is_started_ && shown_ ? workbench_.melt_surface() : nullptr;
+    if (surface == melt_of_) return;
+    melt_of_ = surface;
+    melt_is_colored_ = false;
+    with_opengl_([this] {
+        melt_.reset();
+        if (!melt_of_) return;
+        Result<Drawable> drawable = Drawable::surface(*melt_of_, {}, RunContext());
+        if (drawable) melt_ = std::move(*drawable);
+    });
+    Q_EMIT changed(true);
+}
+
+std::optional<Picked> DrawnObjects::pick_melt(const Camera::Ray& ray) const {
+    if (!melt_of_) return std::nullopt;
+    const std::vector<Triangle> triangles = triangulate(*melt_of_).triangles;
+    const std::optional<RayHit> hit =
+        first_hit(melt_of_->positions, triangles, ray.origin - origin(), ray.direction, RunContext());
+    if (!hit) return std::nullopt;
+    return Picked{ray.origin + hit->distance * ray.direction, 0};
 }
 
 bool DrawnObjects::has_full_vertices() const {
@@ -448,6 +482,11 @@ void DrawnObjects::add_level(Scene& scene, unsigned level, const Appearance& loo
 /// The restored mesh, with what is seen in it and over it. `from` melts into `level`, of which `part` is drawn.
 void DrawnObjects::add_restored(Scene& scene, unsigned level, std::optional<unsigned> from, double part,
                                 const Appearance& look) {
+    if (melt_) {
+        scene.objects.push_back({&*melt_, look});
+        scene.objects.back().appearance.own_colors = settings_.coloring == Coloring::own || melt_is_colored_;
+        return;
+    }
     const bool sees_inside = inside_ && !settings_.clip;
     if (from) add_level(scene, *from, look, static_cast<float>(-part));
     add_level(scene, level, look, from ? static_cast<float>(part) : sees_inside ? kSeenThrough : 1.0f);
@@ -523,7 +562,9 @@ Box DrawnObjects::box() {
     const std::optional<unsigned> ready =
         shown_ ? shown_->nearest_ready(workbench_.state().level()) : std::optional<unsigned>();
     Box box;
-    if (ready) {
+    if (melt_) {
+        box = melt_->box();
+    } else if (ready) {
         box = bounds(positions(*ready));
         box.min += origin();
         box.max += origin();

@@ -61,6 +61,10 @@ public:
     std::optional<ClipPlane> clip();
 
     const VertexColors& colors() const { return colors_; }
+    /// What is shown in place of the restored mesh, because it melts; null: nothing.
+    const std::shared_ptr<const Mesh>& melt() const { return melt_of_; }
+    /// Where a ray in the world meets it.
+    std::optional<Picked> pick_melt(const Camera::Ray& ray) const;
     const std::vector<DefectEdge>& defects() const { return defects_; }
     bool shows_particles() const;
 
@@ -77,6 +81,7 @@ private:
     void pose_net();
     bool has_full_vertices() const;
     void follow_full();
+    void follow_melt();
     void follow_patches();
     PatchSurface* patches_at(unsigned level); ///< what is drawn in its place; null: itself
     void follow_colors();
@@ -85,6 +90,7 @@ private:
     void follow_error();
     void follow_pieces();
     void follow_expected_error();
+    void follow_heat();
     void follow_defects();
     void ask_for(unsigned level, bool is_urgent);
     void adopt();
@@ -104,7 +110,9 @@ private:
     Pose pose_;
     std::uint64_t pose_stamp_ = 0, last_stamp_ = 0;
 
-    std::optional<Drawable> particles_, inside_, full_;
+    std::optional<Drawable> particles_, inside_, full_, melt_;
+    std::shared_ptr<const Mesh> melt_of_;
+    bool melt_is_colored_ = false; ///< by heat
     std::shared_ptr<const DroppedBody> particles_of_, surroundings_of_;
     std::uint64_t full_asked_ = 0; ///< which pose the full deformation is of, or will be; 0: none
     std::string full_error_;       ///< why it cannot be drawn

@@ -31,6 +31,7 @@ struct Gesture {
 constexpr std::array kGestures = {
     Gesture{"Drag the surface", "pulls it; with the tool Pin: pins it"},
     Gesture{"Ctrl+drag", "with the tool Pin: takes pins out"},
+    Gesture{"Hold the surface", "with the tool Torch: warms a body that melts; with Ctrl: cools it"},
     Gesture{"Drag a knob", "deforms as the sliders do"},
     Gesture{"Drag beside it", "turns the view; so does a right drag"},
     Gesture{"Middle drag", "moves the view; so does Shift+drag"},

@@ -13,6 +13,7 @@ enum class Icon {
     pull,
     pin,
     turn,
+    torch,
     play,
     pause,
     step,

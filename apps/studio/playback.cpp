@@ -25,6 +25,11 @@ std::size_t bytes_of(const Pose& pose) {
     return pose.positions.size() * sizeof(Vec3f) + pose.gradients.size() * sizeof(Mat3f);
 }
 
+std::size_t bytes_of(const Mesh& mesh) {
+    return (mesh.positions.size() + mesh.normals.values.size()) * sizeof(Vec3f) + mesh.colors.size() * sizeof(Vec4f) +
+           (mesh.corners.size() + mesh.face_offsets.size() + mesh.normals.corners.size()) * sizeof(Index);
+}
+
 } // namespace
 
 Result<std::shared_ptr<const DroppedBody>> make_body_of(const State& state, const Vec3d& up,
@@ -50,7 +55,11 @@ struct Playback::Worker {
 
     /// What the main thread gets the next time it looks.
     struct Outbox {
-        std::vector<Pose> poses; ///< of all frames since the last time
+        struct Frame {
+            Pose pose;
+            std::shared_ptr<const Mesh> surface;
+        };
+        std::vector<Frame> frames; ///< all since the last time
         std::optional<Moment> moment;
         std::optional<Error> error;
     };
@@ -64,10 +73,14 @@ struct Playback::Worker {
     std::condition_variable wake, parked;
     // Under the lock:
     RunContext context; ///< of the frame: another one after each cancel
-    bool plays = false, quits = false, resets = false, shows_again = false, wants_full = false;
+    bool plays = false, quits = false, resets = false, shows_again = false;
+    MomentWishes wishes;
     bool is_idle = false;
     std::size_t steps = 0;
-    std::optional<std::vector<Hand>> hands; ///< to be set before the next frame
+    // To be set before the next frame:
+    std::optional<std::vector<Hand>> hands;
+    std::optional<std::vector<HeatSource>> heat_sources;
+    std::optional<double> air_temperature; ///< K
     Outbox outbox;
 
     std::thread thread;
@@ -93,10 +106,11 @@ struct Playback::Worker {
         park();
         std::unique_lock lock(mutex);
         hands.reset();
+        heat_sources.reset();
         resets = true;
         wake.notify_one();
         parked.wait(lock, [&] { return is_idle && (!resets || quits); });
-        outbox.poses.clear(); // an error is still to be told
+        outbox.frames.clear(); // an error is still to be told
         outbox.moment.reset();
     }
 
@@ -104,8 +118,11 @@ private:
     /// What the worker is to do next, as it was asked for when it looked.
     struct Order {
         RunContext context = RunContext(); ///< of the frame
-        bool is_frame = false, rewinds = false, with_full = false;
+        bool is_frame = false, rewinds = false;
+        MomentWishes wishes = {};
         std::optional<std::vector<Hand>> hands = {};
+        std::optional<std::vector<HeatSource>> heat_sources = {};
+        std::optional<double> air_temperature = {};
     };
 
     void work() {
@@ -142,7 +159,12 @@ private:
             }
             if (context.is_cancelled()) context = RunContext();
             shows_again = false;
-            return Order{context, plays || steps > 0, false, wants_full, std::exchange(hands, std::nullopt)};
+            return Order{.context = context,
+                         .is_frame = plays || steps > 0,
+                         .wishes = wishes,
+                         .hands = std::exchange(hands, std::nullopt),
+                         .heat_sources = std::exchange(heat_sources, std::nullopt),
+                         .air_temperature = std::exchange(air_temperature, std::nullopt)};
         }
     }
 
@@ -169,6 +191,10 @@ private:
         const Clock::time_point begun = Clock::now();
         if (order.hands)
             if (Status seized = motion.set_hands(std::move(*order.hands), life); !seized) return seized;
+        if (order.heat_sources)
+            if (Status lit = motion.set_heat_sources(std::move(*order.heat_sources)); !lit) return lit;
+        if (order.air_temperature)
+            if (Status warmed = motion.set_air_temperature(*order.air_temperature); !warmed) return warmed;
         FrameReport report;
         if (order.is_frame) {
             const Result<FrameReport> advanced = motion.advance(order.context);
@@ -176,13 +202,13 @@ private:
             if (!advanced) return advanced.error();
             report = *advanced;
         }
-        Moment moment = motion.look(order.with_full);
+        Moment moment = motion.look(order.wishes);
         moment.report = report;
         moment.milliseconds = std::chrono::duration<double, std::milli>(Clock::now() - begun).count();
         {
             const std::scoped_lock lock(mutex);
             if (order.is_frame) {
-                outbox.poses.push_back(moment.pose);
+                outbox.frames.push_back({moment.pose, moment.surface});
                 if (steps > 0) --steps;
             }
             outbox.moment = std::move(moment);
@@ -204,13 +230,27 @@ Playback::~Playback() = default;
 void Playback::put(std::shared_ptr<const DroppedBody> made) {
     worker_.reset();
     made_ = std::move(made);
-    is_playing_ = is_grabbed_ = false;
-    moment_ = std::make_unique<Moment>(start_of(*made_));
-    recording_ = {60, {moment_->pose}};
     worker_ = std::make_unique<Worker>(made_, *bell_);
-    if (wants_full_) want_full(true);
+    begin_anew();
     Q_EMIT state_changed();
     Q_EMIT moved();
+}
+
+/// The recording holds the start alone, and nothing moves.
+void Playback::begin_anew() {
+    is_playing_ = is_grabbed_ = has_torch_ = false;
+    moment_ = std::make_unique<Moment>(start_of(*made_));
+    recording_ = {60, {}};
+    surfaces_.clear();
+    recorded_bytes_ = 0;
+    record(moment_->pose, nullptr);
+    want(wishes_);
+}
+
+void Playback::record(const Pose& pose, std::shared_ptr<const Mesh> surface) {
+    recorded_bytes_ += bytes_of(pose) + (surface ? bytes_of(*surface) : 0);
+    recording_.frames.push_back(pose);
+    surfaces_.push_back(std::move(surface));
 }
 
 void Playback::remove() {
@@ -219,7 +259,8 @@ void Playback::remove() {
     made_ = nullptr;
     moment_ = nullptr;
     recording_ = {};
-    is_playing_ = is_grabbed_ = false;
+    surfaces_.clear();
+    is_playing_ = is_grabbed_ = has_torch_ = false;
     Q_EMIT state_changed();
 }
 
@@ -233,9 +274,12 @@ void Playback::play() {
 void Playback::pause() {
     if (!has_body()) return;
     const bool was_playing = std::exchange(is_playing_, false);
-    is_grabbed_ = false;
+    is_grabbed_ = has_torch_ = false;
     worker_->park();
-    worker_->change([&] { worker_->hands.emplace(); });
+    worker_->change([&] {
+        worker_->hands.emplace();
+        worker_->heat_sources.emplace();
+    });
     worker_->steps_awaited = 0;
     deliver();
     if (was_playing) Q_EMIT state_changed();
@@ -254,10 +298,7 @@ void Playback::reset() {
     if (!has_body()) return;
     worker_->rewind();
     worker_->steps_awaited = 0;
-    is_playing_ = is_grabbed_ = false;
-    moment_ = std::make_unique<Moment>(start_of(*made_));
-    recording_.frames = {moment_->pose};
-    if (wants_full_) want_full(true);
+    begin_anew();
     Q_EMIT state_changed();
     Q_EMIT moved();
 }
@@ -289,13 +330,29 @@ void Playback::let_go() {
     worker_->change([&] { worker_->hands.emplace(); });
 }
 
-void Playback::want_full(bool wanted) {
-    wants_full_ = wanted;
+void Playback::want(const MomentWishes& wishes) {
+    wishes_ = wishes;
     if (!has_body()) return;
     worker_->change([&] {
-        worker_->shows_again |= wanted;
-        worker_->wants_full = wanted;
+        worker_->shows_again |= wishes.full || wishes.temperatures;
+        worker_->wishes = wishes;
     });
+}
+
+void Playback::set_air_temperature(double kelvins) {
+    if (has_body()) worker_->change([&] { worker_->air_temperature = kelvins; });
+}
+
+void Playback::hold_torch(const Vec3d& place, bool cools) {
+    if (!has_body() || !can_melt(*made_) || !place.allFinite()) return;
+    has_torch_ = true;
+    worker_->change([&] { worker_->heat_sources = std::vector<HeatSource>{torch_at(*made_, place, cools)}; });
+    play();
+}
+
+void Playback::put_out_torch() {
+    if (!std::exchange(has_torch_, false)) return;
+    worker_->change([&] { worker_->heat_sources.emplace(); });
 }
 
 void Playback::deliver() {
@@ -305,18 +362,18 @@ void Playback::deliver() {
         const std::scoped_lock lock(worker_->mutex);
         news = std::exchange(worker_->outbox, {});
     }
-    delivered_ += news.poses.size();
-    worker_->steps_awaited -= std::min(worker_->steps_awaited, news.poses.size());
-    for (Pose& pose : news.poses) recording_.frames.push_back(std::move(pose));
+    delivered_ += news.frames.size();
+    worker_->steps_awaited -= std::min(worker_->steps_awaited, news.frames.size());
+    for (Worker::Outbox::Frame& frame : news.frames) record(frame.pose, std::move(frame.surface));
     if (news.error) {
-        is_playing_ = is_grabbed_ = false;
+        is_playing_ = is_grabbed_ = has_torch_ = false;
         worker_->steps_awaited = 0;
         Q_EMIT failed(*news.error);
         return remove(); // nothing moves it any more
     }
     if (!news.moment) return;
     *moment_ = std::move(*news.moment);
-    const bool is_full = recording_.frames.size() * bytes_of(moment_->pose) > kMostRecordedBytes;
+    const bool is_full = recorded_bytes_ > kMostRecordedBytes;
     Q_EMIT moved();
     if (is_full && is_playing_) {
         pause();

@@ -43,13 +43,24 @@ public:
     void let_go();
     bool is_grabbed() const { return is_grabbed_; }
 
-    /// Every vertex with each moment (split view, errors): dearer.
-    void want_full(bool wanted);
+    /// What each moment is to tell besides: dearer.
+    void want(const MomentWishes& wishes);
+    const MomentWishes& wishes() const { return wishes_; }
+
+    /// Of the air around a body that melts, from the next frame on.
+    void set_air_temperature(double kelvins);
+    /// Warms (or cools) what is near a place, model units relative to the origin, until put_out_torch(). Plays, if it
+    /// did not. Of a body that melts.
+    void hold_torch(const Vec3d& place, bool cools);
+    void put_out_torch();
 
     /// The latest moment delivered; null without a body.
     const Moment* moment() const { return moment_.get(); }
     /// Poses since the start, the first is the start itself; grows by a frame a moment.
     const PoseSequence& recording() const { return recording_; }
+    /// Of a body that melts: what there is in place of the restored mesh. Null: nothing.
+    std::shared_ptr<const Mesh> surface(std::size_t frame) const { return surfaces_[frame]; }
+    std::span<const std::shared_ptr<const Mesh>> surfaces() const { return surfaces_; } ///< one a frame
 
 Q_SIGNALS:
     void moved();                    ///< another moment
@@ -59,11 +70,16 @@ Q_SIGNALS:
 private:
     struct Worker;
     void deliver();
+    void record(const Pose& pose, std::shared_ptr<const Mesh> surface);
+    void begin_anew();
 
     std::shared_ptr<const DroppedBody> made_;
     std::unique_ptr<Moment> moment_;
     PoseSequence recording_;
-    bool is_playing_ = false, is_grabbed_ = false, wants_full_ = false;
+    std::vector<std::shared_ptr<const Mesh>> surfaces_; ///< one a frame of the recording
+    std::size_t recorded_bytes_ = 0;
+    MomentWishes wishes_;
+    bool is_playing_ = false, is_grabbed_ = false, has_torch_ = false;
     Vec3f grabbed_ = Vec3f::Zero();
     std::size_t delivered_ = 0; ///< frames, in all
     std::unique_ptr<Bell> bell_;

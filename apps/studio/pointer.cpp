@@ -35,7 +35,10 @@ Box Pointer::rest_box() const {
     return state.source ? world_bounds(state.source->mesh) : Box();
 }
 
-double Pointer::grip() const { return settings().grip * rest_box().diagonal(); }
+double Pointer::grip() const {
+    const auto body = settings().tool == Tool::torch ? workbench_.playback().made() : nullptr;
+    return body ? torch_radius(*body) : settings().grip * rest_box().diagonal();
+}
 
 // Buttons
 
@@ -72,6 +75,10 @@ void Pointer::press_left(const QMouseEvent& event) {
         painted_ = VertexSet(workbench_.state().model->driver().vertices.size());
         drag_ = Drag::paint;
         paint_pins(pressed_);
+    } else if (settings().tool == Tool::torch) {
+        cools_ = event.modifiers() & (Qt::ControlModifier | Qt::AltModifier);
+        drag_ = Drag::torch;
+        hold_torch(pressed_);
     } else {
         drag_ = Drag::pending_pull;
     }
@@ -102,6 +109,8 @@ void Pointer::move(const QMouseEvent& event) {
         workbench_.view().pan(-moved.x() / size.height, moved.y() / size.height);
     } else if (drag_ == Drag::paint) {
         paint_pins(at);
+    } else if (drag_ == Drag::torch) {
+        hold_torch(at);
     } else if (drag_ == Drag::gizmo) {
         const QPointF tile_at = camera_.in_tile(at);
         workbench_.set_warps(gizmo_->moved_to(tile_at.x(), tile_at.y()), "gizmo");
@@ -112,6 +121,7 @@ void Pointer::move(const QMouseEvent& event) {
 void Pointer::release() {
     const Drag was = std::exchange(drag_, Drag::none);
     if (was == Drag::pull) workbench_.end_pull();
+    if (was == Drag::torch) workbench_.put_out_torch();
     if (was == Drag::gizmo) workbench_.document().end_merge();
     if (was == Drag::paint) {
         const std::vector<Index> painted = painted_.members();
@@ -126,6 +136,7 @@ bool Pointer::escape() {
     const Drag was = std::exchange(drag_, Drag::none);
     if (was == Drag::none) return false;
     if (was == Drag::pull) workbench_.cancel_pull();
+    if (was == Drag::torch) workbench_.put_out_torch();
     if (was == Drag::gizmo) {
         QUndoStack& history = workbench_.document().undo_stack();
         workbench_.document().end_merge();
@@ -142,6 +153,7 @@ void Pointer::drop() {
     if (drag_ == Drag::none || drag_ == Drag::orbit || drag_ == Drag::pan) return;
     const Drag was = std::exchange(drag_, Drag::none);
     if (was == Drag::pull) workbench_.cancel_pull();
+    if (was == Drag::torch) workbench_.put_out_torch();
     if (was == Drag::gizmo) workbench_.document().end_merge();
     end_drag();
     hover_.reset();
@@ -193,6 +205,14 @@ void Pointer::paint_pins(const QPointF& point) {
         if (distance <= reach) painted_.add(v);
     }
     painted_.add(nearest);
+}
+
+/// Warms what is under the mouse; beside the body nothing.
+void Pointer::hold_torch(const QPointF& point) {
+    if (const std::optional<Picked> picked = pick_(point))
+        workbench_.hold_torch(picked->at, cools_);
+    else
+        workbench_.put_out_torch();
 }
 
 std::vector<Index> Pointer::shown_pins() const {
@@ -258,12 +278,13 @@ Qt::CursorShape Pointer::cursor() const {
     case Drag::orbit:
         return Qt::ArrowCursor;
     case Drag::paint:
+    case Drag::torch:
         return Qt::CrossCursor;
     case Drag::none:
         break;
     }
     if (hot_part_) return Qt::PointingHandCursor;
-    if (hover_) return settings().tool == Tool::pin ? Qt::CrossCursor : Qt::OpenHandCursor;
+    if (hover_) return settings().tool == Tool::pull ? Qt::OpenHandCursor : Qt::CrossCursor;
     return Qt::ArrowCursor;
 }
 

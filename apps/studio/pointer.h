@@ -48,12 +48,13 @@ Q_SIGNALS:
     void has_begun(); ///< a drag: hints are not needed any more
 
 private:
-    enum class Drag { none, pending_pull, pull, orbit, pan, paint, gizmo };
+    enum class Drag { none, pending_pull, pull, orbit, pan, paint, gizmo, torch };
 
     void press_left(const QMouseEvent& event);
     void drop();
     void end_drag();
     void paint_pins(const QPointF& point);
+    void hold_torch(const QPointF& point);
     void update_hover();
     void show_cursor();
     Qt::CursorShape cursor() const;
@@ -72,6 +73,7 @@ private:
     std::optional<GizmoPart> hot_part_;
     VertexSet painted_{0};
     bool unpins_ = false; ///< what is painted
+    bool cools_ = false;  ///< the torch
     QTimer hover_timer_;
 };
 

@@ -10,8 +10,8 @@
 namespace filigree::studio {
 
 enum class SurfaceStyle { shaded, edges, wireframe };
-enum class Coloring { own, error, levels, patches, expected_error, pieces };
-enum class Tool { pull, pin, turn };
+enum class Coloring { own, error, levels, patches, expected_error, pieces, heat };
+enum class Tool { pull, pin, turn, torch };
 
 struct ViewSettings {
     SurfaceStyle style = SurfaceStyle::shaded;

@@ -455,6 +455,7 @@ std::optional<Picked> Viewport::Impl::pick(const QPointF& point) {
     if (!level) return std::nullopt;
     const QPointF at = camera.in_tile(point);
     const PictureSize size = camera.tile_size();
+    if (drawn.melt()) return drawn.pick_melt(camera.camera().ray(at.x(), at.y(), size.width, size.height));
     return shown->level(*level)->shape->pick(
         drawn.positions(*level), camera.camera().ray(at.x(), at.y(), size.width, size.height), drawn.clip());
 }

@@ -84,6 +84,10 @@ private:
         const VertexColors& colors = drawn_.colors();
         if (colors.values.empty() || settings_.coloring == Coloring::pieces) return;
         const bool is_levels = settings_.coloring == Coloring::levels;
+        if (settings_.coloring == Coloring::heat) {
+            content.legend = OverlayContent::Legend{"Temperature", "°C", colors.map, colors.range, 1.0, true};
+            return;
+        }
         const char* const title = is_levels ? "Level at which a vertex comes in"
                                   : settings_.coloring == Coloring::expected_error
                                       ? "Expected error"
@@ -171,6 +175,8 @@ private:
             return QString::fromStdString(drawn_.patches_problem());
         if (shown && settings_.coloring == Coloring::expected_error && state.model->code() != DetailCode::blend)
             return "The expected error is known for the blend code alone.";
+        if (shown && settings_.coloring == Coloring::heat && drawn_.colors().values.empty())
+            return "Heat is known of a body that melts while it moves: choose wax or ice in the Body panel.";
         if (!state.source) return {};
         if (!(pointer_.rest_box().diagonal() > 0))
             return "All vertices are in one place, so there is no shape to show.";

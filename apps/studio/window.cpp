@@ -166,7 +166,8 @@ void MainWindow::Impl::add_toolbar(MainWindow& window) {
     bar->setMovable(false);
     bar->setFloatable(false);
     bar->setIconSize(QSize(20, 20));
-    for (const char* name : {"tool.pull", "tool.pin", "tool.turn", "", "view.show_all", "", "edit.undo", "edit.redo"}) {
+    for (const char* name :
+         {"tool.pull", "tool.pin", "tool.turn", "tool.torch", "", "view.show_all", "", "edit.undo", "edit.redo"}) {
         if (*name)
             bar->addAction(actions->find(name));
         else

@@ -76,7 +76,9 @@ Workbench::~Workbench() = default;
 void Workbench::follow_document(const State& before) {
     const State& now = state();
     const bool is_same_motion =
-        now.model == before.model && now.recording == before.recording && now.body == before.body;
+        now.model == before.model && now.recording == before.recording && is_same_body(now.body, before.body);
+    if (now.body.air_temperature != before.body.air_temperature)
+        playback_.set_air_temperature(now.body.air_temperature);
     if (!is_same_motion && !impl_->keeps_body) {
         impl_->replay.stop();
         playback_.remove();
@@ -106,7 +108,7 @@ void Workbench::follow_document(const State& before) {
 
 void Workbench::show_pose() {
     const auto begin = std::chrono::steady_clock::now();
-    if (std::exchange(impl_->measures_next, false) && !wants_full_) playback_.want_full(false);
+    if (std::exchange(impl_->measures_next, false) && !wants_full_) want_every_vertex(false);
     pose_ = {};
     if (mode_ == Mode::deform) {
         pose_ = deformed_pose(state(), impl_->context);
@@ -169,18 +171,30 @@ void Workbench::full_is_new() {
 void Workbench::want_full(bool wanted) {
     if (wants_full_ == wanted) return;
     wants_full_ = wanted;
-    playback_.want_full(wanted);
+    want_every_vertex(wanted);
     if (wanted)
         find_full();
     else
         full_.clear();
 }
 
+void Workbench::want_every_vertex(bool wanted) {
+    MomentWishes wishes = playback_.wishes();
+    wishes.full = wanted;
+    playback_.want(wishes);
+}
+
 void Workbench::measure_error() {
+    if (melt_surface()) {
+        Q_EMIT told("What has melted has no error: its surface is made of the particles. filigree simulate --check "
+                    "measures the parts that are left.",
+                    false);
+        return;
+    }
     if (mode_ == Mode::body && (!is_live_frame() || playback_.moment()->full.empty())) {
         if (is_live_frame()) {
             impl_->measures_next = true;
-            playback_.want_full(true); // another look at this moment, with every vertex
+            want_every_vertex(true); // another look at this moment, with every vertex
         } else {
             Q_EMIT told("The error of a recorded moment is only known while its body is there: press Play, then pause.",
                         false);

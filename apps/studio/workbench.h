@@ -97,6 +97,17 @@ public:
     void reset();
     void animate(); ///< the report's button: drops the mesh on the ground and plays
     bool is_playing() const;
+    /// Warms what is near a place on the surface (in the world, as shown), and plays; cools: freezes it. Of a body that
+    /// melts; of others it says so, once.
+    void hold_torch(const Vec3d& at, bool cools);
+    void put_out_torch();
+    /// The air so warm that the body melts, or so cold that it freezes; plays, and makes the body where there is none.
+    void melt();
+    void freeze();
+    bool can_melt() const; ///< the material of the body, or of the one to be made
+    /// What is shown in place of the restored mesh: of a body that melts; null: nothing.
+    std::shared_ptr<const Mesh> melt_surface() const;
+    void want_temperatures(bool wanted); ///< as the playback's moment tells them
     // Timeline
     std::size_t frame_count() const; ///< recorded frames, the start included; 0: none
     std::size_t frame() const;       ///< shown, 0 .. frame_count() - 1
@@ -149,6 +160,7 @@ private:
     bool is_apart() const; ///< pieces are shown apart
     void pose_is_new();
     void find_full();
+    void want_every_vertex(bool wanted); ///< with each moment of the body
     void forget_measuring();
     void full_is_new();
     void show_drag(const std::shared_ptr<const Pose>& pose, double milliseconds);
@@ -160,6 +172,7 @@ private:
                        std::function<void(const Source&)> then);
     void change_level(unsigned level, const QString& name, const std::string& merge);
     void make_body_then(After then);
+    void set_air(double kelvins);
     void put_body(std::shared_ptr<const DroppedBody> made);
     bool is_refused(const std::string& topic, const QString& sentence);
     const Pose& recorded_pose(std::size_t frame) const; ///< the body's, else the document's

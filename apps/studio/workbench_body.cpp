@@ -31,6 +31,9 @@ QString warning_of(const DroppedBody& made) {
 
 void Workbench::set_body(const BodySettings& settings, const std::string& merge) {
     if (settings == state().body) return;
+    if (is_same_body(settings, state().body)) // the air changes around it
+        return document_.edit(
+            name_of_change(state().body, settings), [&](State& next) { next.body = settings; }, merge);
     const bool had_body = playback_.has_body(), was_playing = is_playing();
     if (had_body) pause();
     impl_->keeps_body = had_body; // until the new one is there
@@ -49,6 +52,58 @@ void Workbench::set_body(const BodySettings& settings, const std::string& merge)
 }
 
 void Workbench::make_body() { make_body_then(After::nothing); }
+
+namespace {
+
+constexpr double kBeyond = 60; // K that air is warmer than the melt, or colder than what it freezes to
+
+} // namespace
+
+bool Workbench::can_melt() const {
+    const Material& material = state().body.material;
+    return material.model == MaterialModel::mpm && material.melts();
+}
+
+void Workbench::set_air(double kelvins) {
+    BodySettings body = state().body;
+    body.air_temperature = std::max(kelvins, 1.0);
+    set_body(body);
+    if (!is_playing()) play();
+}
+
+void Workbench::melt() { set_air(state().body.material.melting_to + kBeyond); }
+void Workbench::freeze() { set_air(state().body.material.melting_from - kBeyond); }
+
+void Workbench::hold_torch(const Vec3d& at, bool cools) {
+    const auto made = playback_.made();
+    const bool is_there = mode_ == Mode::body && made && filigree::can_melt(*made);
+    if (!is_there) {
+        if (!std::exchange(impl_->told_of_torch, true))
+            Q_EMIT told("The torch is for a body that melts: choose wax, chocolate, butter, ice or lava in the Body "
+                        "panel, and press Animate.",
+                        false);
+        return;
+    }
+    impl_->replay.stop();
+    show_last_frame();
+    playback_.hold_torch(at - made->model->mesh.origin, cools);
+}
+
+void Workbench::put_out_torch() {
+    impl_->told_of_torch = false;
+    playback_.put_out_torch();
+}
+
+std::shared_ptr<const Mesh> Workbench::melt_surface() const {
+    if (mode_ != Mode::body) return nullptr;
+    if (!playback_.has_body()) return state().recording ? state().recording->surface(frame_) : nullptr;
+    return playback_.surface(std::min(frame_, playback_.recording().frames.size() - 1));
+}
+
+void Workbench::want_temperatures(bool wanted) {
+    MomentWishes wishes = playback_.wishes();
+    if (std::exchange(wishes.temperatures, wanted) != wanted) playback_.want(wishes);
+}
 
 void Workbench::fit_driver() {
     if (!playback_.has_body()) return;
@@ -240,7 +295,7 @@ void Workbench::follow_playback() {
     if (mode_ != Mode::body || impl_->keeps_body) return;
     if (!is_another && frame_ != moment.frame) return; // looked at once more, for its vertices, and not shown
     frame_ = std::min(moment.frame, frame_count() - 1);
-    if (pose_.positions != moment.pose.positions || pose_.gradients != moment.pose.gradients) {
+    if (is_another || pose_.positions != moment.pose.positions || pose_.gradients != moment.pose.gradients) {
         pose_ = moment.pose;
         driver_milliseconds_ = moment.milliseconds;
         pose_is_new();
@@ -251,7 +306,7 @@ void Workbench::follow_playback() {
     }
     if (impl_->measures_next && !moment.full.empty()) {
         impl_->measures_next = false;
-        if (!wants_full_) playback_.want_full(false);
+        if (!wants_full_) want_every_vertex(false);
         measure_error();
     }
     if (impl_->commits_steps && !playback_.is_playing() && !playback_.is_stepping()) {
@@ -267,7 +322,7 @@ void Workbench::commit_recording(const QString& name, const std::string& merge) 
     if (count <= (state().recording ? state().recording->frames.size() : 1)) return;
     auto recording =
         state().recording ? std::make_shared<Recording>(*state().recording) : std::make_shared<Recording>();
-    recording->follow(playback_.recording());
+    recording->follow(playback_.recording(), playback_.surfaces());
     State next = state();
     next.recording = std::move(recording);
     impl_->keeps_body = true;

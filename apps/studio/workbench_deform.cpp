@@ -72,7 +72,7 @@ void Workbench::begin_pull(Index vertex, const Vec3d& at) {
             return;
         }
         if (playback_.made()->body->material.model == MaterialModel::mpm) {
-            Q_EMIT told("Bodies of the grid method cannot be pulled.", false);
+            Q_EMIT told("Bodies of the grid method cannot be pulled: hold the torch to them (H).", false);
             return;
         }
         impl_->replay.stop();

@@ -128,7 +128,10 @@ Result<QString> write_frames(const State& state, const Recording& poses, const N
     if (!restorer) return restorer.error();
     RunContext quiet = context; // the progress is that of the frames
     quiet.progress = nullptr;
-    const NumberedMeshes meshes{name, [&](std::size_t frame) { return restorer->mesh(*poses.frames[frame], quiet); }};
+    const NumberedMeshes meshes{name, [&](std::size_t frame) -> Result<Mesh> {
+                                    if (const auto surface = poses.surface(frame)) return *surface;
+                                    return restorer->mesh(*poses.frames[frame], quiet);
+                                }};
     const auto warnings = write_numbered_meshes(poses.frames.size(), std::span(&meshes, 1), context);
     if (!warnings) return warnings.error();
     QString text = QString("Saved %1 to %2.")
@@ -237,8 +240,8 @@ void Workbench::save_model(const std::string& path) {
 
 void Workbench::save_mesh(const std::string& path) {
     save("Saving " + file_name(path), path,
-         [path, state = state(), pose = pose_](const RunContext& context) -> Result<QString> {
-             const Result<Mesh> mesh = posed_mesh(state, pose, context);
+         [path, state = state(), pose = pose_, melt = melt_surface()](const RunContext& context) -> Result<QString> {
+             const Result<Mesh> mesh = melt ? Result<Mesh>(*melt) : posed_mesh(state, pose, context);
              if (!mesh) return mesh.error();
              return write_told(*mesh, path, context, state.source ? state.source->path : "");
          });
@@ -279,6 +282,7 @@ void Workbench::export_film(const std::string& path, const FilmSettings& setting
     film->look.surface = view.style != SurfaceStyle::wireframe;
     if (state().recording) film->poses = state().recording->poses();
     film->pose = pose_;
+    if (state().recording) film->surfaces = state().recording->surfaces;
     if (playback_.has_body()) film->surroundings = playback_.made()->surroundings;
     film->camera = view_.camera();
     film->up = view.up;

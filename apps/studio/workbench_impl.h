@@ -40,6 +40,7 @@ struct Workbench::Impl {
     After then = After::nothing; ///< once the body is made
     std::size_t looked_at = 0;   ///< frame of the last moment of the body, shown or not
     bool told_of_rest = false;   ///< that a body is made of the shape at rest
+    bool told_of_torch = false;  ///< that it does nothing here
     QString body_warning;
     std::optional<StripOptions> fits_driver; ///< once a model is made with these, a body is
     bool keeps_body = false;                 ///< a step of our own, after which the body still fits

@@ -20,9 +20,9 @@ TEST(BodyMotion, FallsFreelyAndGoesBackToItsStart) {
     const auto body = dropped(jelly());
     BodyMotion motion = BodyMotion::create(body, kContext).value();
     const Moment start = start_of(*body);
-    EXPECT_EQ(motion.look(false).pose.positions.size(), start.pose.positions.size());
+    EXPECT_EQ(motion.look({}).pose.positions.size(), start.pose.positions.size());
     for (int frame = 0; frame < 6; ++frame) ASSERT_TRUE(motion.advance(kContext).ok());
-    const Moment fallen = motion.look(true);
+    const Moment fallen = motion.look({.full = true});
     EXPECT_EQ(fallen.frame, 6u);
     const double time = 0.1; // in model units: the ball of 1 m is 2 units
     EXPECT_NEAR(lowest(start.pose.positions) - lowest(fallen.pose.positions), 2 * 0.5 * 9.81 * time * time, 5e-3);
@@ -30,9 +30,9 @@ TEST(BodyMotion, FallsFreelyAndGoesBackToItsStart) {
     EXPECT_NEAR(lowest(fallen.full), lowest(fallen.pose.positions), 0.05);
     EXPECT_EQ(fallen.particles.size(), body->body->particle_count());
     ASSERT_TRUE(motion.rewind(kContext));
-    EXPECT_EQ(motion.look(false).frame, 0u);
+    EXPECT_EQ(motion.look({}).frame, 0u);
     ASSERT_TRUE(motion.advance(kContext).ok());
-    EXPECT_LT(lowest(start.pose.positions) - lowest(motion.look(false).pose.positions), 0.02f);
+    EXPECT_LT(lowest(start.pose.positions) - lowest(motion.look({}).pose.positions), 0.02f);
 }
 
 TEST(BodyMotion, FollowsAHandAndIsFreeAfterARewind) {
@@ -46,10 +46,10 @@ TEST(BodyMotion, FollowsAHandAndIsFreeAfterARewind) {
     ASSERT_TRUE(motion.set_hands({hand}, kContext));
     for (int frame = 0; frame < 10; ++frame) ASSERT_TRUE(motion.advance(kContext).ok());
     const float rest = lowest(start_of(*body).pose.positions);
-    EXPECT_GT(lowest(motion.look(false).pose.positions), rest + 0.05f);
+    EXPECT_GT(lowest(motion.look({}).pose.positions), rest + 0.05f);
     ASSERT_TRUE(motion.rewind(kContext));
     for (int frame = 0; frame < 10; ++frame) ASSERT_TRUE(motion.advance(kContext).ok());
-    EXPECT_NEAR(lowest(motion.look(false).pose.positions), rest, 0.01f);
+    EXPECT_NEAR(lowest(motion.look({}).pose.positions), rest, 0.01f);
 }
 
 } // namespace

@@ -1,5 +1,11 @@
 #include "scene/dropped_ball.h"
 
+#include "filigree/physics/named_materials.h"
+#include "filigree/physics/simulation.h"
+
+#include <algorithm>
+#include <numeric>
+
 #include <gtest/gtest.h>
 
 using namespace filigree_test;
@@ -55,6 +61,30 @@ TEST(DroppedBody, HoldsParticlesNearPinnedVertices) {
     ASSERT_EQ(body->world.pins.size(), 1u);
     EXPECT_GE(body->world.pins[0].particles.size(), 2u);
     EXPECT_TRUE(dropped(jelly())->world.pins.empty());
+}
+
+TEST(DroppedBody, MeltsInAboutTheTimeAsked) {
+    DropOptions options = jelly();
+    options.material = std::ranges::find(named_materials(), "wax", &NamedMaterial::name)->material;
+    options.drop = 0;
+    options.melting_time = 1;
+    options.air_temperature = options.material.melting_to + 60;
+    const auto body = dropped(options);
+    ASSERT_TRUE(can_melt(*body));
+    ASSERT_TRUE(body->melting);
+    Simulation simulation = Simulation::create(body->world, {Actor{body->body}}, {}, kContext).value();
+    const auto liquid = [&] {
+        const std::vector<float> parts = simulation.matter(0).liquid;
+        return std::accumulate(parts.begin(), parts.end(), 0.0) / double(parts.size());
+    };
+    for (int frame = 0; frame < 15; ++frame) ASSERT_TRUE(simulation.advance(kContext));
+    EXPECT_LT(liquid(), 0.3);
+    for (int frame = 15; frame < 60; ++frame) ASSERT_TRUE(simulation.advance(kContext));
+    EXPECT_GT(liquid(), 0.6);
+    EXPECT_LE(liquid(), 1.0);
+
+    EXPECT_FALSE(can_melt(*dropped(jelly())));
+    EXPECT_FALSE(dropped(jelly())->melting);
 }
 
 TEST(DroppedBody, RefusesWhatHasNoVolumeInWords) {

@@ -88,6 +88,9 @@ TEST_F(ActionsTest, AllAreNamedExplainedAndInAMenu) {
                              "tool.pull",
                              "tool.pin",
                              "tool.turn",
+                             "tool.torch",
+                             "body.melt",
+                             "body.freeze",
                              "help.shortcuts",
                              "help.about"})
         EXPECT_TRUE(window->actions().find(name)) << name;
@@ -152,8 +155,10 @@ TEST_F(ActionsTest, SwitchesAndChoicesOfTheView) {
     EXPECT_TRUE(action("view.wireframe").isChecked());
     trigger("view.color_levels");
     EXPECT_EQ(workbench().view().settings().coloring, Coloring::levels);
-    for (const auto& [name, tool] :
-         {std::pair{"tool.pin", Tool::pin}, {"tool.turn", Tool::turn}, {"tool.pull", Tool::pull}}) {
+    for (const auto& [name, tool] : {std::pair{"tool.pin", Tool::pin},
+                                     {"tool.turn", Tool::turn},
+                                     {"tool.torch", Tool::torch},
+                                     {"tool.pull", Tool::pull}}) {
         trigger(name);
         EXPECT_EQ(workbench().view().settings().tool, tool) << name;
     }

@@ -137,12 +137,69 @@ TEST(Playback, EveryVertexWhenAskedFor) {
     Playback playback;
     playback.put(made_of(state));
     EXPECT_TRUE(playback.moment()->full.empty());
-    playback.want_full(true); // shows the same moment again
+    playback.want({.full = true}); // shows the same moment again
     EXPECT_TRUE(QTest::qWaitFor([&] { return !playback.moment()->full.empty(); }));
     ASSERT_EQ(playback.moment()->full.size(), state.model->mesh.vertex_count());
     EXPECT_EQ(playback.recording().frames.size(), 1u);
     for (std::size_t v = 0; v < playback.moment()->full.size(); ++v)
         EXPECT_LT((playback.moment()->full[v] - state.model->mesh.positions[v]).norm(), 1e-4f);
+}
+
+State wax_state() {
+    BodySettings body;
+    body.drop = 0;
+    State state = ball_state(body);
+    state.body.material = material_named("wax");
+    return state;
+}
+
+TEST(Playback, ATorchMeltsWhatItIsHeldToAndTheSurfaceFollows) {
+    const State state = wax_state();
+    Playback playback;
+    playback.put(made_of(state));
+    playback.want({.temperatures = true});
+    playback.step();
+    playback.wait_for_frames(0);
+    ASSERT_EQ(playback.moment()->temperatures.size(), state.model->mesh.vertex_count());
+    EXPECT_EQ(playback.moment()->surface, nullptr) << "all of it is as it was";
+    const auto hottest = [&] { return *std::ranges::max_element(playback.moment()->temperatures); };
+    const float before = hottest();
+    EXPECT_NEAR(before, 293, 1);
+
+    const Vec3d top = {0, 1, 0};
+    playback.hold_torch(top, false);
+    EXPECT_TRUE(playback.is_playing());
+    EXPECT_TRUE(QTest::qWaitFor([&] { return hottest() > float(state.body.material.melting_to); }, 60'000));
+    ASSERT_NE(playback.moment()->surface, nullptr);
+    const Mesh& surface = *playback.moment()->surface;
+    EXPECT_EQ(playback.moment()->temperatures.size(), surface.vertex_count());
+    EXPECT_TRUE(analyse_topology(surface, RunContext()).is_closed());
+    playback.put_out_torch();
+    playback.pause();
+    EXPECT_EQ(playback.surface(0), nullptr);
+    EXPECT_EQ(playback.surface(playback.recording().frames.size() - 1), playback.moment()->surface);
+
+    playback.reset();
+    EXPECT_EQ(playback.moment()->surface, nullptr);
+    for (int k = 0; k < 3; ++k) playback.step();
+    playback.wait_for_frames(0);
+    EXPECT_EQ(playback.moment()->surface, nullptr) << "the torch is out";
+    EXPECT_NEAR(hottest(), 293, 1);
+}
+
+TEST(Playback, AirMeltsAndFreezes) {
+    State state = wax_state();
+    state.body.melting_time = 1;
+    Playback playback;
+    playback.put(made_of(state));
+    playback.want({.temperatures = true});
+    playback.set_air_temperature(state.body.material.melting_to + 60);
+    playback.play();
+    EXPECT_TRUE(QTest::qWaitFor([&] { return playback.moment()->surface != nullptr; }, 60'000));
+    playback.set_air_temperature(200);
+    const auto coldest = [&] { return *std::ranges::min_element(playback.moment()->temperatures); };
+    EXPECT_TRUE(QTest::qWaitFor([&] { return coldest() < 250; }, 60'000));
+    playback.pause();
 }
 
 TEST(Playback, PinnedVerticesHoldTheBody) {

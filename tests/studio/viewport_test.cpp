@@ -4,6 +4,9 @@
 #include "drawn_objects.h"
 #include "overlay.h"
 
+#include "studio/materials.h"
+
+#include "filigree/io/mesh_file.h"
 #include "filigree/mesh/shapes.h"
 
 #include <QApplication>
@@ -272,6 +275,57 @@ TEST(Viewport, ADragBesideTheShapeTurnsAndTheWheelZooms) {
     EXPECT_GE(view.zoom(), ViewState::kLeastZoom * 0.9999);
     QTest::mouseDClick(stand.viewport, Qt::LeftButton, {}, QPoint(3, 3));
     EXPECT_NEAR(view.zoom(), 1, 1e-6) << "a double click beside the shape shows all";
+}
+
+TEST(Viewport, TheTorchMeltsABodyUnderTheMouse) {
+    Stand stand("wavy-sphere");
+    ASSERT_TRUE(stand.is_ready());
+    Workbench& workbench = stand.workbench;
+    QStringList told;
+    QObject::connect(&workbench, &Workbench::told, [&](const QString& sentence) { told << sentence; });
+    stand.set([](ViewSettings& s) { s.tool = Tool::torch; });
+    stand.drag(stand.middle(), stand.middle() + QPoint(8, 0));
+    ASSERT_EQ(told.size(), 1) << "there is no body yet";
+    EXPECT_TRUE(told[0].contains("torch"));
+    EXPECT_FALSE(workbench.pose());
+
+    BodySettings body = workbench.state().body;
+    body.material = material_named("wax");
+    body.particles = 300;
+    body.drop = 0;
+    workbench.set_body(body);
+    workbench.make_body();
+    workbench.wait_until_idle();
+    ASSERT_TRUE(stand.is_ready());
+    stand.set([](ViewSettings& s) { s.coloring = Coloring::heat; });
+    QTest::mousePress(stand.viewport, Qt::LeftButton, {}, stand.middle());
+    EXPECT_TRUE(QTest::qWaitFor([&] { return workbench.melt_surface() != nullptr; }, 60'000));
+    QTest::mouseRelease(stand.viewport, Qt::LeftButton, {}, stand.middle());
+    workbench.pause();
+    ASSERT_TRUE(stand.is_drawn());
+    EXPECT_TRUE(stand.viewport->pick(stand.middle())) << "what has melted is taken hold of too";
+    const auto* overlay = static_cast<const Overlay*>(stand.viewport->findChild<QWidget*>("viewport.overlay"));
+    ASSERT_TRUE(overlay->content().legend);
+    EXPECT_EQ(overlay->content().legend->unit, "°C");
+
+    // What is seen is what is saved.
+    QTemporaryDir folder;
+    const std::string path = folder.filePath("melt.ply").toStdString();
+    workbench.save_mesh(path);
+    workbench.wait_until_idle();
+    const auto saved = read_mesh(path, RunContext());
+    ASSERT_TRUE(saved);
+    EXPECT_EQ(saved->mesh.vertex_count(), workbench.melt_surface()->vertex_count());
+
+    // Back to the start there is the mesh again, and nothing is lost by a change of the air.
+    const std::size_t frames = workbench.frame_count();
+    workbench.freeze();
+    workbench.pause();
+    EXPECT_GE(workbench.frame_count(), frames);
+    workbench.document().undo_stack().undo();
+    EXPECT_TRUE(workbench.playback().has_body() || workbench.state().recording == nullptr);
+    workbench.go_to_frame(0);
+    EXPECT_EQ(workbench.melt_surface(), nullptr);
 }
 
 TEST(Viewport, ThePinToolPinsAndUnpins) {

@@ -75,6 +75,7 @@ bool flows(const Body& body) { return is_meshfree(body) || body.material.model =
 bool is_plastic(const Body& body) { return flows(body) && body.material.is_plastic(); }
 bool creeps(const Body& body) { return is_meshfree(body) && body.material.is_plastic(); }
 bool melts(const Body& body) { return flows(body) && body.material.melts(); }
+bool parts_and_joins(const Body& body) { return body.material.model == MaterialModel::mpm && body.material.melts(); }
 
 } // namespace
 
@@ -149,6 +150,10 @@ void BodyPanel::add_motion(const Actions& actions) {
                                       field(&ViewSettings::particles), {},
                                       [this](const ViewSettings&) { return workbench().playback().has_body(); })));
     rows->addLayout(buttons, rows->rowCount(), 0, 1, 3);
+    melt_ = new ActionButton("body.melt_button", actions.find("body.melt"), {}, page());
+    freeze_ = new ActionButton("body.freeze_button", actions.find("body.freeze"), {}, page());
+    torch_ = new ActionButton("body.torch_button", actions.find("tool.torch"), {}, page());
+    beside(rows, {melt_, freeze_, torch_});
     report_ = text(rows, "body.report", Tone::quiet);
     fit_driver_ = new ActionButton("body.fit", actions.find("body.fit_driver"), {}, page());
     beside(rows, {fit_driver_});
@@ -165,6 +170,17 @@ void BodyPanel::add_world() {
            {.least = 0, .most = 5, .step = 0.05, .decimals = 2, .unit = "m"});
     choice(rows, settings.setting("body.obstacle", "Obstacle", "Something to fall on", drop_field(&Body::obstacle)),
            {"None", "Ball", "Step", "Slope"});
+    const Field<Body> air = {[](const Body& body) { return body.air_temperature - kCelsius; },
+                             [](Body& body, double degrees) { body.air_temperature = degrees + kCelsius; }};
+    number(rows,
+           settings.setting("body.air", "Air", "How warm the air is, degrees Celsius; may change while it plays", air,
+                            parts_and_joins),
+           {.least = -150, .most = 1500, .step = 1, .decimals = 0, .unit = "°C"});
+    number(rows,
+           settings.setting("body.melting_time", "Melts in",
+                            "About how long all of it takes to melt in air 60 °C warmer than its melt, seconds",
+                            drop_field(&Body::melting_time), parts_and_joins),
+           {.least = 1, .most = 600, .decimals = 0, .unit = "s", .logarithmic = true});
     number(rows,
            settings.setting("body.friction", "Friction", "Coulomb's coefficient: 0 slides for ever",
                             drop_field(&Body::friction)),
@@ -243,6 +259,7 @@ void BodyPanel::refresh() {
     sentence_->setText(sentence());
     if (const QString text = report(); report_->text() != text) report_->setText(text);
     fit_driver_->setVisible(!workbench().body_warning().isEmpty());
+    for (QPushButton* button : {melt_, freeze_, torch_}) button->setVisible(workbench().can_melt());
 }
 
 QString BodyPanel::sentence() const {

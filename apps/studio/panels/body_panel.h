@@ -28,7 +28,7 @@ private:
     QString report() const;
 
     Text *sentence_ = nullptr, *report_ = nullptr;
-    QPushButton* fit_driver_ = nullptr;
+    QPushButton *fit_driver_ = nullptr, *melt_ = nullptr, *freeze_ = nullptr, *torch_ = nullptr;
     NumberControl* spacing_ = nullptr;
     FoldButton* fold_ = nullptr;
 };

@@ -75,12 +75,13 @@ void ViewPanel::add_surface(MainWindow& window) {
     QGridLayout* rows = section("Surface");
     choice(rows, view.setting("view.style", "Style", "How the surface is drawn", field(&Settings::style)),
            {"Shaded", "Shaded with edges", "Wireframe"});
-    choice(rows,
-           view.setting("view.coloring", "Colours",
-                        "The mesh's own; how far it is from the full deformation; at which level a vertex is added; "
-                        "patches of regular quads; how far it is expected to be from the full deformation; pieces",
-                        field(&Settings::coloring)),
-           {"Its own", "Error", "Levels", "Patches", "Expected error", "Pieces"});
+    choice(
+        rows,
+        view.setting("view.coloring", "Colours",
+                     "The mesh's own; how far it is from the full deformation; at which level a vertex is added; "
+                     "patches of regular quads; how far it is expected to be from the full deformation; pieces; heat",
+                     field(&Settings::coloring)),
+        {"Its own", "Error", "Levels", "Patches", "Expected error", "Pieces", "Heat"});
     error_ = text(rows, "view.error", Tone::quiet);
     measure_ = new ActionButton("view.measure", window.actions().find("view.measure_error"), {}, page());
     beside(rows, {measure_});

@@ -386,6 +386,18 @@ Status Simulation::set_forces(std::size_t body, const Vectors& newtons) {
     return Success{};
 }
 
+Status Simulation::set_air(const Keyed<double>& temperature, double heat_transfer) {
+    if (Status checked = check_air(temperature, heat_transfer); !checked) return checked;
+    state_->world.air_temperature = temperature;
+    state_->world.air_heat_transfer = heat_transfer;
+    return Success{};
+}
+Status Simulation::set_heat_sources(std::vector<HeatSource> sources) {
+    if (Status checked = check_heat_sources(sources); !checked) return checked;
+    state_->world.heat_sources = std::move(sources);
+    return Success{};
+}
+
 Energy Simulation::energy(const RunContext& context) const {
     Energy energy;
     for (const BodyState& body : state_->bodies) {

@@ -69,8 +69,10 @@ struct Momentum {
 /// more." Everything is checked: that there are bodies with particles, that what is named is there, that numbers are
 /// finite and in their ranges, that keys ascend. Cost O(keys and particles named).
 Status check_world(const World& world, std::span<const Actor> actors);
-/// The same for hands that pull some of so many bodies.
+/// The same for hands that pull some of so many bodies, for the air and for heat sources.
 Status check_hands(std::span<const Hand> hands, std::size_t body_count);
+Status check_air(const Keyed<double>& temperature, double heat_transfer);
+Status check_heat_sources(std::span<const HeatSource> sources);
 
 struct SimulationState;
 
@@ -110,6 +112,11 @@ public:
     /// hands they are no part of what save() keeps. Errors: usage (no such body, another number of particles, a force
     /// that is not finite).
     Status set_forces(std::size_t body, const Vectors& newtons);
+
+    /// The air around bodies of mpm and what warms them (World), from now on and in place of those before; hands' rules
+    /// hold. Errors: as check_world; what was set before then stays.
+    Status set_air(const Keyed<double>& temperature, double heat_transfer);
+    Status set_heat_sources(std::vector<HeatSource> sources);
 
     Energy energy(const RunContext& context) const;
     Momentum momentum() const;

@@ -111,6 +111,16 @@ public:
         keys(obstacle.temperature, kLeastTemperature, place + ".temperature");
         at_least(obstacle.heat_transfer, 0, place + ".heat_transfer", "must be 0 W/(m^2 K) or more");
     }
+    /// place: of what holds both.
+    void air(const Keyed<double>& temperature, double heat_transfer, const std::string& place) {
+        keys(temperature, kLeastTemperature, place + "air_temperature");
+        at_least(heat_transfer, 0, place + "air_heat_transfer", "must be 0 W/(m^2 K) or more");
+    }
+    void heat_source(const HeatSource& source, const std::string& place) {
+        shape(source.ball, place + ".ball");
+        keys(source.move, place + ".move");
+        keys(source.power, std::numeric_limits<double>::lowest(), place + ".power");
+    }
     void hand(const Hand& hand, const std::string& place) {
         body(hand.body, place);
         require(hand.point.allFinite(), place + ".point", "must be finite");
@@ -154,16 +164,10 @@ Status check_world(const World& world, std::span<const Actor> actors) {
         check.require(pair.contact.restitution >= 0 && pair.contact.restitution <= 1, place + ".contact.restitution",
                       "must be from 0 to 1");
     }
-    check.keys(world.air_temperature, kLeastTemperature, "world.air_temperature");
-    check.at_least(world.air_heat_transfer, 0, "world.air_heat_transfer", "must be 0 W/(m^2 K) or more");
+    check.air(world.air_temperature, world.air_heat_transfer, "world.");
     check.require(std::isfinite(world.heat_pace) && world.heat_pace > 0, "world.heat_pace", "must be above 0");
-    for (std::size_t s = 0; s < world.heat_sources.size(); ++s) {
-        const HeatSource& source = world.heat_sources[s];
-        const std::string place = numbered("world.heat_sources", s);
-        check.shape(source.ball, place + ".ball");
-        check.keys(source.move, place + ".move");
-        check.keys(source.power, std::numeric_limits<double>::lowest(), place + ".power");
-    }
+    for (std::size_t s = 0; s < world.heat_sources.size(); ++s)
+        check.heat_source(world.heat_sources[s], numbered("world.heat_sources", s));
     for (std::size_t o = 0; o < world.obstacles.size(); ++o)
         check.obstacle(world.obstacles[o], numbered("world.obstacles", o));
     for (std::size_t p = 0; p < world.pins.size(); ++p) {
@@ -190,6 +194,18 @@ Status check_hands(std::span<const Hand> hands, std::size_t body_count) {
     const std::vector<Actor> bodies(body_count);
     Checker check(bodies);
     for (std::size_t h = 0; h < hands.size(); ++h) check.hand(hands[h], numbered("hands", h));
+    return check.status();
+}
+
+Status check_air(const Keyed<double>& temperature, double heat_transfer) {
+    Checker check({});
+    check.air(temperature, heat_transfer, "");
+    return check.status();
+}
+
+Status check_heat_sources(std::span<const HeatSource> sources) {
+    Checker check({});
+    for (std::size_t s = 0; s < sources.size(); ++s) check.heat_source(sources[s], numbered("heat_sources", s));
     return check.status();
 }
 

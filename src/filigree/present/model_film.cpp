@@ -78,12 +78,20 @@ Result<std::size_t> film_model(const ModelFilm& film, const std::string& path, c
     const Result<std::vector<Drawable>> obstacles = obstacle_drawables(film, quiet);
     if (!obstacles) return obstacles.error();
 
-    const Scene scene = scene_of(film, *model, *obstacles);
+    Scene scene = scene_of(film, *model, *obstacles);
+    std::optional<Drawable> melt;
     Camera camera = film.camera;
     camera.up = up_vector(film.up);
     const auto draw = [&](std::size_t frame, const RunContext&) -> Result<Picture> {
-        if (!turns)
+        scene.objects[0].drawable = &*model;
+        if (!turns && frame < film.surfaces.size() && film.surfaces[frame]) {
+            Result<Drawable> drawable = Drawable::surface(*film.surfaces[frame], {}, quiet);
+            if (!drawable) return drawable.error();
+            melt = std::move(*drawable);
+            scene.objects[0].drawable = &*melt;
+        } else if (!turns) {
             if (const Status posed = model->set_pose(film.poses.frames[frame], quiet); !posed) return posed.error();
+        }
         return renderer->picture(scene, turns ? turned(camera, 360.0 * double(frame) / double(frames)) : camera,
                                  {.width = film.width, .height = film.height, .passes = film.passes}, quiet);
     };

@@ -20,8 +20,10 @@ struct ModelFilm {
     RestoreOptions restore;
     SurfaceOptions surface;
     Appearance look;
-    PoseSequence poses;                       ///< no frames: a turntable of `pose`, 90 pictures, 30 a second
-    Pose pose;                                ///< no positions: at rest
+    PoseSequence poses; ///< no frames: a turntable of `pose`, 90 pictures, 30 a second
+    Pose pose;          ///< no positions: at rest
+    /// Of poses: what is drawn in place of the restored mesh; null, and beyond the end: nothing.
+    std::vector<std::shared_ptr<const Mesh>> surfaces = {};
     std::optional<Surroundings> surroundings; ///< drawn, and their ground; unset: the ground is below all
     Camera camera;                            ///< its `up` is taken from below
     UpAxis up = UpAxis::y;

@@ -47,6 +47,10 @@ std::size_t BodyMotion::attach(std::vector<Vec3f> points, std::span<const Index>
 Status BodyMotion::rewind(const RunContext& context) {
     if (Status restored = simulation_.restore(start_); !restored) return restored;
     last_ = start_of(*dropped_).pose;
+    dead_.clear();
+    surface_frame_ = 0;
+    surface_ = nullptr;
+    if (Status out = simulation_.set_heat_sources({}); !out) return out;
     return simulation_.set_hands({}, context);
 }
 
@@ -54,9 +58,37 @@ Status BodyMotion::set_hands(std::vector<Hand> hands, const RunContext& context)
     return simulation_.set_hands(std::move(hands), context);
 }
 
+Status BodyMotion::set_air_temperature(double kelvins) {
+    return simulation_.set_air({{}, {}, kelvins}, dropped_->world.air_heat_transfer);
+}
+
+Status BodyMotion::set_heat_sources(std::vector<HeatSource> sources) {
+    return simulation_.set_heat_sources(std::move(sources));
+}
+
 Result<FrameReport> BodyMotion::advance(const RunContext& context) { return simulation_.advance(context); }
 
-Moment BodyMotion::look(bool with_full) {
+/// The surface of a frame is made once, as what died in it stays dead.
+void BodyMotion::look_at_melt(const MomentWishes& wishes, Moment& moment) {
+    const RunContext always;
+    const MatterParticles matter = scaled(simulation_.matter(0), 1 / dropped_->scale);
+    if (moment.frame != surface_frame_) {
+        surface_frame_ = moment.frame;
+        Result<std::optional<Mesh>> made = dropped_->melting->surface(moment.pose, matter, dead_, always);
+        surface_ = made && *made ? std::make_shared<const Mesh>(std::move(**made)) : nullptr;
+    }
+    moment.surface = surface_;
+    if (!wishes.temperatures) return;
+    if (!surface_) {
+        moment.temperatures = dropped_->melting->temperatures(matter);
+        return;
+    }
+    const MatterAtPoints near(surface_->positions, matter.positions, double(matter.spacing), always);
+    for (std::size_t v = 0; v < near.size(); ++v)
+        moment.temperatures.push_back(near.at<float>(v, matter.temperatures, matter.temperatures.front()));
+}
+
+Moment BodyMotion::look(const MomentWishes& wishes) {
     const RunContext always; // a frame that was simulated is delivered
     const float to_units = float(1 / dropped_->scale);
     const auto far = static_cast<float>(kFarInAFrame * bounds(dropped_->model->mesh.positions).diagonal());
@@ -72,7 +104,8 @@ Moment BodyMotion::look(bool with_full) {
     const Vectors& particles = simulation_.positions(0);
     moment.particles.reserve(particles.size());
     for (std::size_t i = 0; i < particles.size(); ++i) moment.particles.push_back(to_units * particles[i]);
-    if (!with_full) return moment;
+    if (dropped_->melting) look_at_melt(wishes, moment);
+    if (!wishes.full) return moment;
     if (!all_vertices_)
         all_vertices_ = attach(dropped_->model->mesh.positions, pieces_of(*dropped_, &CarriedByPieces::vertices));
     moment.full.resize(dropped_->model->mesh.vertex_count());

@@ -125,7 +125,59 @@ void hold_pinned(std::span<const Index> pinned, DroppedBody& dropped) {
     if (!pin.particles.empty()) dropped.world.pins.push_back(std::move(pin));
 }
 
+/// J a kilogram takes up from its start until it has melted.
+double heat_of_melting(const Material& material) {
+    return material.specific_heat * std::max(0.0, material.melting_to - material.temperature) + material.latent_heat;
+}
+
+/// The air, and the surface that parts and joins. A mesh that is open melts too, but neither parts nor joins.
+Status let_it_melt(const DropOptions& options, DroppedBody& dropped, const RunContext& context) {
+    constexpr double kWarmer = 60; // K
+    constexpr double kSlower = 2;  // as the warmth has to get inside
+    const Body& body = *dropped.body;
+    World& world = dropped.world;
+    world.air_temperature.constant = options.air_temperature;
+    world.air_heat_transfer = kAirHeatTransfer;
+    const double volume = double(body.particle_count()) * std::pow(body.spacing(), 3);
+    const double area = std::cbrt(36 * std::numbers::pi * volume * volume); // of a ball of that volume
+    const double seconds =
+        volume * body.material.density * heat_of_melting(body.material) / (kAirHeatTransfer * area * kWarmer);
+    world.heat_pace = std::max(1.0, kSlower * seconds / options.melting_time);
+    Result<MeltingModel> melting = MeltingModel::create(dropped.model, body, dropped.scale, context);
+    if (melting) {
+        dropped.melting = std::make_shared<const MeltingModel>(std::move(*melting));
+    } else if (melting.error().code == ErrorCode::unsuitable) {
+        dropped.report.warning += std::string(dropped.report.warning.empty() ? "" : " ") +
+                                  "The mesh is not closed, so it neither parts nor joins where it melts.";
+    } else {
+        return melting.error();
+    }
+    return Success{};
+}
+
 } // namespace
+
+bool can_melt(const DroppedBody& dropped) {
+    const Material& material = dropped.body->material;
+    return material.model == MaterialModel::mpm && material.melts();
+}
+
+double torch_radius(const DroppedBody& dropped) {
+    constexpr double kPart = 0.15, kSpacings = 4; // of the body's size; less does not flow on its grid
+    const double longest = bounds(dropped.model->mesh.positions).size().maxCoeff();
+    return std::max(kPart * longest, kSpacings * dropped.body->spacing() / dropped.scale);
+}
+
+HeatSource torch_at(const DroppedBody& dropped, const Vec3d& place, bool cools) {
+    constexpr double kSeconds = 1.0 / 3;
+    const Material& material = dropped.body->material;
+    const double radius = dropped.scale * torch_radius(dropped);
+    const double mass = 2.0 / 3 * std::numbers::pi * radius * radius * radius * material.density; // of half a ball
+    HeatSource torch;
+    torch.ball = {dropped.scale * place, radius};
+    torch.power.constant = (cools ? -1 : 1) * mass * heat_of_melting(material) / (kSeconds * dropped.world.heat_pace);
+    return torch;
+}
 
 Result<std::shared_ptr<const DroppedBody>> make_dropped_body(std::shared_ptr<const Model> model,
                                                              std::shared_ptr<const BreakingModel> breaking,
@@ -162,6 +214,8 @@ Result<std::shared_ptr<const DroppedBody>> make_dropped_body(std::shared_ptr<con
     }
     DropBuilder(options, up, box, dropped->scale).build(*dropped);
     hold_pinned(pinned, *dropped);
+    if (can_melt(*dropped))
+        if (const Status melts = let_it_melt(options, *dropped, context); !melts) return melts.error();
     return std::shared_ptr<const DroppedBody>(std::move(dropped));
 }
 

@@ -3,6 +3,7 @@
 
 #include "filigree/physics/world.h"
 #include "filigree/scene/breaking.h"
+#include "filigree/scene/melting_model.h"
 
 #include <memory>
 #include <span>
@@ -19,6 +20,10 @@ struct DropOptions {
     double size = 1;              ///< m, the longest side of the mesh's box
     double drop = 0.5;            ///< m above the ground or the obstacle at the start
     double strength = 0.01; ///< of a body that breaks: the share of Young's modulus at which cracks begin, above 0
+    double air_temperature = 293; ///< K, above 0; of a body of mpm that melts
+    /// s, above 0; of such a body: heat goes so much quicker than in truth that air 60 K warmer than the melt has about
+    /// melted all of it by then.
+    double melting_time = 15;
     bool gravity = true, ground = true;
     ObstacleChoice obstacle = ObstacleChoice::none;
     double friction = 0.5, restitution = 0.9;
@@ -45,6 +50,7 @@ struct DroppedBody {
     std::shared_ptr<const Body> body;
     std::shared_ptr<const BreakingModel> breaking; ///< null: it does not break
     std::shared_ptr<const Fracture> fracture;      ///< null: it does not break
+    std::shared_ptr<const MeltingModel> melting;   ///< null: it does not melt, or its mesh is open
     BodyReport report;
     double scale = 1; ///< metres a model unit
     World world;      ///< metres, relative to the model's origin times the scale
@@ -59,6 +65,17 @@ Result<std::shared_ptr<const DroppedBody>> make_dropped_body(std::shared_ptr<con
                                                              std::shared_ptr<const BreakingModel> breaking,
                                                              const DropOptions& options, std::span<const Index> pinned,
                                                              const Vec3d& up, const RunContext& context);
+
+/// Whether heat does anything to it: it is of mpm and melts.
+bool can_melt(const DroppedBody& dropped);
+/// W/(m^2 K): between a dropped body and the air.
+inline constexpr double kAirHeatTransfer = 20;
+
+/// Something held to the surface of a dropped body that melts, at a place in model units relative to the model's
+/// origin: what is near it melts within a third of a second or, `cools`, freezes.
+HeatSource torch_at(const DroppedBody& dropped, const Vec3d& place, bool cools);
+/// How far it reaches, model units.
+double torch_radius(const DroppedBody& dropped);
 
 /// Where the body starts, what it falls on and what stands around it, in the world. up: an axis.
 Box room_of(const DroppedBody& dropped, const Vec3d& up);

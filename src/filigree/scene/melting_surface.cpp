@@ -1,71 +1,15 @@
 #include "filigree/scene/melting_surface.h"
 
 #include "filigree/core/parallel_for.h"
-#include "filigree/melting/search_boxes.h"
 #include "filigree/mesh/normals.h"
 
 #include <algorithm>
-#include <limits>
 
 #include <fmt/format.h>
 
 namespace filigree {
 
 namespace {
-
-/// Finds the particles around a place.
-class ParticlesNear {
-public:
-    ParticlesNear(const std::vector<Vec3f>& positions, double spacing)
-        : positions_(positions), width_(1.5 * spacing), boxes_(positions, width_) {}
-
-    /// The four nearest, farther ones with less share; fewer where there are no more.
-    void find(const Vec3f& at, std::array<Index, 4>& particles, std::array<float, 4>& shares) const {
-        std::array<std::pair<float, Index>, 4> nearest;
-        nearest.fill({std::numeric_limits<float>::infinity(), kNoIndex});
-        const Vec3d scaled = (at.cast<double>() / width_).array().floor();
-        // A ring of boxes more than where the first was found, as a nearer one may be there.
-        for (int ring = 0, last = kMostRings; ring <= last; ++ring) {
-            for_ring(scaled, ring, [&](Index particle) {
-                const std::pair<float, Index> found = {(positions_[particle] - at).squaredNorm(), particle};
-                if (!(found < nearest.back())) return;
-                nearest.back() = found;
-                std::sort(nearest.begin(), nearest.end());
-            });
-            if (last == kMostRings && nearest[0].second != kNoIndex) last = std::min(ring + 1, kMostRings - 1);
-        }
-        const float softening = float(0.01 * width_ * width_);
-        float sum = 0;
-        for (std::size_t k = 0; k < 4; ++k) {
-            particles[k] = nearest[k].second == kNoIndex ? 0 : nearest[k].second;
-            shares[k] = nearest[k].second == kNoIndex ? 0 : 1 / (nearest[k].first + softening);
-            sum += shares[k];
-        }
-        for (float& share : shares) share = sum > 0 ? share / sum : 0;
-    }
-
-private:
-    static constexpr int kMostRings = 40; ///< of boxes; a vertex so far from all matter counts as old
-
-    template <class Visit>
-    void for_ring(const Vec3d& middle, int ring, const Visit& visit) const {
-        for (int z = -ring; z <= ring; ++z)
-            for (int y = -ring; y <= ring; ++y) {
-                const bool is_whole_row = std::abs(z) == ring || std::abs(y) == ring;
-                for (int x = -ring; x <= ring; x += is_whole_row || ring == 0 ? 1 : 2 * ring) {
-                    const Index box = boxes_.lookup.block(BlockGrid::key_of_block(
-                        std::int32_t(middle[0]) + x, std::int32_t(middle[1]) + y, std::int32_t(middle[2]) + z));
-                    if (box == kNoIndex) continue;
-                    for (std::size_t i = boxes_.starts[box]; i < boxes_.starts[box + 1]; ++i)
-                        visit(boxes_.entries[i].particle);
-                }
-            }
-    }
-
-    const std::vector<Vec3f>& positions_;
-    double width_;
-    SearchBoxes boxes_;
-};
 
 std::vector<Vec3f> placed(std::vector<Vec3f> points, const Eigen::Isometry3d& placement) {
     for (Vec3f& p : points) p = (placement * p.cast<double>()).cast<float>();
@@ -123,16 +67,15 @@ Status MeltingSurface::add(std::size_t b, const RunContext& context) {
     for (float& radius : surfels->rest_radius) radius *= float(body.body->scale);
     if (surfels->colors.empty()) surfels->colors.assign(surfels->size(), opaque(body.color));
     BodyPart& part = bodies_.emplace_back(
-        BodyPart{b, std::move(*restorer), body.in_metres(body.model.mesh.positions), std::move(*surfels), {}, {}});
+        BodyPart{b, std::move(*restorer), body.in_metres(body.model.mesh.positions), std::move(*surfels), {}});
     std::vector<Vec3f> rest;
     for (std::size_t p = 0; p < body.body->particle_count(); ++p) rest.push_back(body.body->rest[p]);
-    const ParticlesNear particles(rest, body.body->spacing());
-    part.particles.resize(part.start.size());
-    part.shares.resize(part.start.size());
-    parallel_for(context, part.start.size(), 1024, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t v = begin; v < end; ++v) particles.find(part.start[v], part.particles[v], part.shares[v]);
-    });
-    particle_colors_.insert(particle_colors_.end(), rest.size(), opaque(body.color));
+    part.matter = MatterAtPoints(part.start, rest, body.body->spacing(), context);
+    const std::vector<Vec4f> colors = matter_colors(body.model.mesh, part.start, rest, body.body->spacing(), context);
+    if (colors.empty())
+        particle_colors_.insert(particle_colors_.end(), rest.size(), opaque(body.color));
+    else
+        particle_colors_.insert(particle_colors_.end(), colors.begin(), colors.end());
     name_ += (name_.empty() ? "" : "+") + body.name;
     if (mesher_)
         mesher_->append(*mesher);
@@ -143,9 +86,7 @@ Status MeltingSurface::add(std::size_t b, const RunContext& context) {
 
 /// How far the matter at a vertex is renewed.
 float MeltingSurface::renewal_at(const BodyPart& part, std::size_t vertex, const MatterParticles& matter) {
-    float sum = 0;
-    for (std::size_t k = 0; k < 4; ++k) sum += part.shares[vertex][k] * matter.renewal[part.particles[vertex][k]];
-    return sum;
+    return part.matter.at<float>(vertex, matter.renewal, 0); // so far from all matter it counts as old
 }
 
 bool MeltingSurface::has_body(std::size_t body) const {
@@ -254,15 +195,9 @@ Result<std::vector<Vec3f>> MeltingSurface::velocities(const CompositeSurface& su
         spacing = std::max(spacing, double(matter[frame].spacing));
     }
     std::vector<Vec3f> velocities(surface.mesh.vertex_count(), Vec3f::Zero());
-    const ParticlesNear particles(positions, spacing);
-    parallel_for(context, velocities.size(), 1024, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t v = begin; v < end; ++v) {
-            std::array<Index, 4> near;
-            std::array<float, 4> shares;
-            particles.find(surface.mesh.positions[v], near, shares);
-            for (std::size_t k = 0; k < 4; ++k) velocities[v] += shares[k] * float(frames_per_second) * ways[near[k]];
-        }
-    });
+    const MatterAtPoints matter(surface.mesh.positions, positions, spacing, context);
+    for (std::size_t v = 0; v < velocities.size(); ++v)
+        velocities[v] = float(frames_per_second) * matter.at<Vec3f>(v, ways, Vec3f::Zero());
     if (context.is_cancelled()) return cancelled_error();
     return velocities;
 }

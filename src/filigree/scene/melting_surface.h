@@ -4,6 +4,7 @@
 #include "filigree/hierarchy/restore.h"
 #include "filigree/melting/composite_surface.h"
 #include "filigree/mesh/surfels.h"
+#include "filigree/scene/matter_at_points.h"
 #include "filigree/scene/recording.h"
 #include "filigree/scene/world_setup.h"
 
@@ -45,9 +46,7 @@ private:
         Restorer restorer;
         std::vector<Vec3f> start; ///< m
         Surfels surfels;          ///< at rest, model units; but colours and rest_radius, m
-        /// Of each vertex: the particles that say how far its matter is renewed, and their shares.
-        std::vector<std::array<Index, 4>> particles;
-        std::vector<std::array<float, 4>> shares;
+        MatterAtPoints matter;    ///< at its vertices
     };
 
     Status add(std::size_t body, const RunContext& context);

@@ -1,0 +1,43 @@
+// One model that melts, in model units: its surface, and how warm that is, moment by moment.
+#pragma once
+
+#include "filigree/hierarchy/restore.h"
+#include "filigree/melting/composite_surface.h"
+#include "filigree/physics/body.h"
+#include "filigree/scene/matter_at_points.h"
+
+#include <memory>
+#include <optional>
+
+namespace filigree {
+
+/// Never changes once made. What a moment is made of is in model units, relative to the model's origin.
+class MeltingModel {
+public:
+    /// body: of the model, `scale` metres a model unit. Errors: unsuitable (the mesh is not closed, or as
+    /// Restorer::create), cancelled. Cost: welding, and O(vertices + particles).
+    static Result<MeltingModel> create(std::shared_ptr<const Model> model, const Body& body, double scale,
+                                       const RunContext& context);
+
+    /// The surface of a moment; none while nothing of it is renewed, as the restored mesh is it then. dead: as of
+    /// CompositeMesher::make, of the moments before. Cost O(mesh + particles). Errors: as make's.
+    Result<std::optional<Mesh>> surface(const Pose& pose, const MatterParticles& matter,
+                                        std::vector<std::uint8_t>& dead, const RunContext& context) const;
+    /// K, one a vertex of the model's mesh.
+    std::vector<float> temperatures(const MatterParticles& matter) const;
+
+private:
+    MeltingModel(std::shared_ptr<const Model> model, Restorer restorer, CompositeMesher mesher)
+        : model_(std::move(model)), restorer_(std::move(restorer)), mesher_(std::move(mesher)) {}
+
+    std::shared_ptr<const Model> model_;
+    Restorer restorer_;
+    CompositeMesher mesher_;
+    MatterAtPoints at_vertices_;
+    std::vector<Vec4f> particle_colors_;
+};
+
+/// In other units: metres times `scale`.
+MatterParticles scaled(MatterParticles matter, double scale);
+
+} // namespace filigree
