@@ -647,6 +647,39 @@ UsageError
 Hands that pull from now on, in place of those there were: a sequence of Hand.
 )")
         .def(
+            "set_air",
+            [](PySimulation& self, const py::object& temperature, double heat_transfer) {
+                const Keyed<double> keyed = keyed_number_of(temperature, "temperature");
+                self.alone([&] { return self.simulation.set_air(keyed, heat_transfer).value(); });
+            },
+            py::arg("temperature"), py::arg("heat_transfer"), R"(set_air(self, temperature, heat_transfer)
+--
+
+The air around bodies of 'mpm' from now on.
+
+Parameters
+----------
+temperature : float, or (times, values)
+    K, above 0.
+heat_transfer : float
+    W/(m^2 K), 0 or more.
+
+Raises
+------
+UsageError
+    A number out of its range.
+)")
+        .def(
+            "set_heat_sources",
+            [](PySimulation& self, const std::vector<HeatSource>& sources) {
+                self.alone([&] { return self.simulation.set_heat_sources(sources).value(); });
+            },
+            py::arg("heat_sources"), R"(set_heat_sources(self, heat_sources)
+--
+
+What warms bodies of 'mpm' from now on, in place of what did before: a sequence of HeatSource.
+)")
+        .def(
             "matter",
             [](PySimulation& self, std::size_t body) {
                 self.checked(body);

@@ -164,3 +164,29 @@ def test_points_of_the_view_and_the_patches_corners():
         filigree.sample(ball, frustum=(20, 20, 20), count=5)
     quads, report = filigree.remesh(ball, 2000)
     assert len(report["base"].faces) == report["patches"] and len(quads.faces) == report["quads"]
+
+
+def test_air_and_heat_sources_change_while_it_runs():
+    block = filigree.make("wavy-cube", resolution=8)
+    simulation = filigree.Simulation([filigree.Body(block, "wax", particles=200)], gravity=(0, 0, 0))
+    simulation.step(2)
+    heat = simulation.heat()
+    simulation.step(2)
+    assert abs(simulation.heat() - heat) < 1e-4 * heat  # nothing warms it yet
+    simulation.set_air(500, 1e5)
+    simulation.step(2)
+    warm = simulation.heat()
+    assert warm > 1.001 * heat
+    simulation.set_air(293, 0)
+    simulation.set_heat_sources([filigree.HeatSource((0, 0, 0), 1, -1e6)])
+    simulation.step(2)
+    cooled = simulation.heat()
+    assert cooled < warm
+    simulation.set_heat_sources([])
+    simulation.step(2)
+    assert abs(simulation.heat() - cooled) < 1e-4 * cooled
+    for wrong in (-1, 0, float("nan")):
+        with pytest.raises(filigree.UsageError, match="air_temperature"):
+            simulation.set_air(wrong, 1)
+    with pytest.raises(filigree.UsageError, match=r"heat_sources\[0\]"):
+        simulation.set_heat_sources([filigree.HeatSource((0, 0, 0), -1, 1)])
