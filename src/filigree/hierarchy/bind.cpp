@@ -3,6 +3,7 @@
 #include "filigree/hierarchy/bind.h"
 
 #include "filigree/core/parallel_for.h"
+#include "filigree/hierarchy/nearest_sources.h"
 #include "filigree/mesh/closest_point.h"
 #include "filigree/mesh/incidence.h"
 
@@ -12,53 +13,6 @@
 namespace filigree {
 
 namespace {
-
-/// For each vertex the nearest vertex with `is_source`, by the length of the shortest path over edges; kNoIndex where
-/// there is none. Ties go to the path found first, which depends on the mesh alone.
-/// Instead of a heap, buckets as wide as a mean edge, emptied in order [Meyer 2003].
-std::vector<Index> nearest_sources(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
-                                   const IndexLists& around, const std::vector<bool>& is_source) {
-    std::vector<Index> source(positions.size(), kNoIndex);
-    std::vector<float> distance(positions.size(), std::numeric_limits<float>::infinity());
-    double length = 0;
-    for (const Triangle& t : triangles) length += double((positions[t[1]] - positions[t[0]]).norm());
-    const float width = static_cast<float>(length / double(std::max<std::size_t>(triangles.size(), 1)));
-    if (!(width > 0)) return source;
-
-    constexpr float kLastBucket = 65535; // paths of more mean edges than this share one bucket
-    std::vector<std::vector<Index>> buckets(1);
-    for (Index v = 0; v < positions.size(); ++v)
-        if (is_source[v]) {
-            distance[v] = 0;
-            source[v] = v;
-            buckets[0].push_back(v);
-        }
-    std::vector<Index> current;
-    std::vector<float> spread_at(positions.size(), -1); // the distance a vertex last passed on
-    for (std::size_t b = 0; b < buckets.size(); ++b)
-        while (!buckets[b].empty()) {
-            current.clear();
-            current.swap(buckets[b]);
-            for (Index v : current) {
-                const float d = distance[v];
-                if (static_cast<std::size_t>(std::min(d / width, kLastBucket)) != b) continue; // came closer since
-                if (spread_at[v] == d) continue;                                               // twice in the bucket
-                spread_at[v] = d;
-                for (Index t : around[v])
-                    for (Index w : triangles[t]) {
-                        if (d >= distance[w]) continue; // most neighbours, without a look at where they are
-                        const float through = d + (positions[w] - positions[v]).norm();
-                        if (!(through < distance[w])) continue;
-                        distance[w] = through;
-                        source[w] = source[v];
-                        const auto bucket = static_cast<std::size_t>(std::min(through / width, kLastBucket));
-                        if (bucket >= buckets.size()) buckets.resize(bucket + 1);
-                        buckets[bucket].push_back(w);
-                    }
-            }
-        }
-    return source;
-}
 
 /// What rules a cell out quickly: its normal (any length) and a sphere around it.
 struct CellShape {
@@ -90,13 +44,14 @@ public:
         double cost = std::numeric_limits<double>::infinity(); ///< distance, more when facing away
     };
 
-    Found closest(const Vec3f& p, const Vec3f& normal, Index start) {
+    /// start: some vertices of cells.
+    Found closest(const Vec3f& p, const Vec3f& normal, std::span<const Index> start) {
         if (++stamp_ == 0) {
             std::fill(visited_.begin(), visited_.end(), 0);
             stamp_ = 1;
         }
         Found best;
-        visit_ring(start, p, normal, best);
+        for (const Index vertex : start) visit_ring(vertex, p, normal, best);
         for (Index at = kNoIndex; at != best.point.triangle;) {
             at = best.point.triangle;
             for (Index corner : cells_[at]) visit_ring(corner, p, normal, best);
@@ -148,28 +103,41 @@ std::vector<Index> nearest_driver_vertices(std::span<const Vec3f> positions, std
     return nearest_sources(positions, triangles, triangles_at_vertices(triangles, positions.size()), in_driver);
 }
 
-/// Bonds of the representatives by a walk from their source, the nearest driver vertex; without one, a gap.
+/// Bonds of the representatives by a walk from their source, the nearest driver vertex, or from the cell of the vertex
+/// they were removed beside; without either, a gap.
 void walk_to_bonds(std::span<const Vec3f> positions, const Surface& surface, std::span<const Vec3f> normals,
-                   std::span<const Triangle> cells, std::span<const Index> source, std::span<Bond> bonds,
-                   std::span<BondKind> kinds, const RunContext& context) {
+                   std::span<const Triangle> cells, std::span<const Index> source, const RemovedVertices& removed,
+                   std::span<Bond> bonds, std::span<BondKind> kinds, const RunContext& context) {
     const IndexLists around = triangles_at_vertices(cells, positions.size());
     std::vector<CellShape> shapes;
     for (const Triangle& cell : cells)
         shapes.push_back(cell_shape(positions[cell[0]], positions[cell[1]], positions[cell[2]]));
-    parallel_for(context, positions.size(), 1 << 14, [&](std::size_t begin, std::size_t end) {
-        if (context.is_cancelled()) return;
-        Walk walk(positions, cells, around, shapes);
-        for (std::size_t v = begin; v < end; ++v) {
-            if (surface.representative[v] != v) continue;
-            if (source[v] == kNoIndex) {
-                kinds[v] = BondKind::gap;
-                continue;
+    const auto start_of = [&](Index v) -> std::span<const Index> {
+        const Index beside = removed.empty() ? kNoIndex : removed.nearest_left[v];
+        if (beside != kNoIndex && bonds[beside].cell != kNoIndex) return cells[bonds[beside].cell];
+        if (source[v] != kNoIndex) return source.subspan(v, 1);
+        return {};
+    };
+    const auto walk_round = [&](std::uint8_t round) {
+        parallel_for(context, positions.size(), 1 << 14, [&](std::size_t begin, std::size_t end) {
+            if (context.is_cancelled()) return;
+            Walk walk(positions, cells, around, shapes);
+            for (std::size_t v = begin; v < end; ++v) {
+                if (surface.representative[v] != v) continue;
+                if (!removed.empty() && removed.removed[v] != round) continue;
+                const std::span<const Index> start = start_of(Index(v));
+                if (start.empty()) {
+                    kinds[v] = BondKind::gap;
+                    continue;
+                }
+                const Walk::Found found = walk.closest(positions[v], normals[v], start);
+                bonds[v] = bond_at(found.point);
+                if (found.faces_away) kinds[v] = BondKind::away;
             }
-            const Walk::Found found = walk.closest(positions[v], normals[v], source[v]);
-            bonds[v] = bond_at(found.point);
-            if (found.faces_away) kinds[v] = BondKind::away;
-        }
-    });
+        });
+    };
+    walk_round(0); // what was left last first: the others hang near it
+    for (std::uint8_t round = removed.rounds; round > 0; --round) walk_round(round);
 }
 
 /// Bonds of the gaps: the closest cell that faces the same way, else the closest.
@@ -190,22 +158,32 @@ void bond_across_gaps(std::span<const Vec3f> positions, std::span<const Vec3f> n
     });
 }
 
+std::optional<Error> check_size(const Surface& surface, std::span<const Triangle> cells) {
+    if (std::max(surface.triangles.size(), cells.size()) <= kMostListedTriangles) return std::nullopt;
+    return Error{ErrorCode::unsuitable, "The mesh has more triangles than 32-bit indices can list (" +
+                                            std::to_string(kMostListedTriangles) + "); split it into parts."};
+}
+
 } // namespace
 
 Result<Binding> bind_to_driver(std::span<const Vec3f> positions, const Surface& surface, std::span<const Vec3f> normals,
                                std::span<const Triangle> cells, const RunContext& context) {
     context.report("bind", 0);
-    if (std::max(surface.triangles.size(), cells.size()) > kMostListedTriangles)
-        return Error{ErrorCode::unsuitable, "The mesh has more triangles than 32-bit indices can list (" +
-                                                std::to_string(kMostListedTriangles) + "); split it into parts."};
+    if (std::optional<Error> error = check_size(surface, cells)) return *error;
     const std::vector<Index> source = nearest_driver_vertices(positions, surface.triangles, cells);
     if (context.is_cancelled()) return cancelled_error();
     context.report("bind", 0.4);
+    return bind_to_driver(positions, surface, normals, cells, source, {}, context);
+}
 
+Result<Binding> bind_to_driver(std::span<const Vec3f> positions, const Surface& surface, std::span<const Vec3f> normals,
+                               std::span<const Triangle> cells, std::span<const Index> source,
+                               const RemovedVertices& removed, const RunContext& context) {
+    if (std::optional<Error> error = check_size(surface, cells)) return *error;
     Binding binding;
     binding.bonds.resize(positions.size());
     std::vector<BondKind> kinds(positions.size(), BondKind::good);
-    walk_to_bonds(positions, surface, normals, cells, source, binding.bonds, kinds, context);
+    walk_to_bonds(positions, surface, normals, cells, source, removed, binding.bonds, kinds, context);
     if (context.is_cancelled()) return cancelled_error();
     bond_across_gaps(positions, normals, cells, kinds, binding.bonds, context);
     if (context.is_cancelled()) return cancelled_error();

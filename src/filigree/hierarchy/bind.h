@@ -12,6 +12,14 @@ struct Bond {
     float u = 0, v = 0;
 };
 
+/// Vertices that were taken off a mesh round by round, each of which hangs near one that its round left.
+struct RemovedVertices {
+    std::vector<Index> nearest_left;   ///< of each vertex; kNoIndex: it was not removed, or alone
+    std::vector<std::uint8_t> removed; ///< in which round, from 1 on; 0: in none
+    std::uint8_t rounds = 0;
+    bool empty() const { return nearest_left.empty(); }
+};
+
 /// A bond a vertex, and what could not be bound the good way.
 struct Binding {
     std::vector<Bond> bonds;
@@ -31,5 +39,11 @@ struct Binding {
 /// Errors: unsuitable (more than kMostListedTriangles), cancelled.
 Result<Binding> bind_to_driver(std::span<const Vec3f> positions, const Surface& surface, std::span<const Vec3f> normals,
                                std::span<const Triangle> cells, const RunContext& context);
+
+/// The same with what is nearest to each vertex along the surface already known: source, V, a vertex of a cell or
+/// kNoIndex. A vertex that was removed walks from the cell of the one it hangs near. removed: of V vertices, or empty.
+Result<Binding> bind_to_driver(std::span<const Vec3f> positions, const Surface& surface, std::span<const Vec3f> normals,
+                               std::span<const Triangle> cells, std::span<const Index> source,
+                               const RemovedVertices& removed, const RunContext& context);
 
 } // namespace filigree

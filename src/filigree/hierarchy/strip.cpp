@@ -1,7 +1,7 @@
 #include "filigree/hierarchy/strip.h"
 
 #include "filigree/core/parallel_for.h"
-#include "filigree/hierarchy/simplify.h"
+#include "filigree/hierarchy/simplify_levels.h"
 #include "filigree/mesh/closest_point.h"
 #include "filigree/mesh/normals.h"
 #include "filigree/mesh/surface.h"
@@ -21,113 +21,6 @@ public:
 private:
     std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
-
-constexpr double kLevelFactor = 4; // vertices of a level as a multiple of the next coarser one's, as in subdivision
-
-std::size_t default_base(std::size_t vertices) {
-    if (vertices >= 20'000) return 1'000;
-    return std::min(vertices, std::max<std::size_t>(50, vertices / 20));
-}
-
-/// The mesh as the blend code sees it: welded, around the origin and about one unit large, so that no product leaves
-/// float's range.
-struct WorkingMesh {
-    std::vector<Vec3f> positions;
-    Surface surface;
-    std::vector<Vec3f> normals;
-};
-
-Result<WorkingMesh> make_working_mesh(const Mesh& mesh, const RunContext& context) {
-    WorkingMesh work;
-    const Box box = bounds(mesh.positions);
-    const double diagonal = box.diagonal();
-    const double scale = diagonal > 0 ? 1 / diagonal : 1;
-    work.positions.resize(mesh.vertex_count());
-    for (std::size_t v = 0; v < mesh.vertex_count(); ++v)
-        work.positions[v] = (scale * (mesh.positions[v].cast<double>() - box.centre())).cast<float>();
-    Result<Surface> surface = make_surface(mesh, context);
-    if (!surface) return surface.error();
-    work.surface = std::move(*surface);
-    work.normals = vertex_normals(work.surface.triangles, work.positions, context);
-    return work;
-}
-
-Level make_level(std::vector<Triangle> triangles, std::size_t vertex_count) {
-    Level level;
-    std::vector<Index> local(vertex_count, kNoIndex);
-    for (const Triangle& t : triangles)
-        for (Index v : t) local[v] = 0;
-    for (Index v = 0; v < vertex_count; ++v)
-        if (local[v] == 0) {
-            local[v] = static_cast<Index>(level.vertices.size());
-            level.vertices.push_back(v);
-        }
-    level.corners.reserve(triangles.size() * 3);
-    level.face_offsets.reserve(triangles.size() + 1);
-    for (const Triangle& t : triangles) {
-        for (Index v : t) level.corners.push_back(local[v]);
-        level.face_offsets.push_back(static_cast<Index>(level.corners.size()));
-    }
-    return level;
-}
-
-/// A driver for a mesh without a triangle: distinct points of it, evenly spread over their numbers, and no faces.
-Level make_point_level(const WorkingMesh& work, std::size_t target) {
-    std::vector<Index> distinct;
-    for (Index v = 0; v < work.positions.size(); ++v)
-        if (work.surface.representative[v] == v) distinct.push_back(v);
-    Level level;
-    const std::size_t count = std::min(target, distinct.size());
-    for (std::size_t i = 0; i < count; ++i) level.vertices.push_back(distinct[i * distinct.size() / count]);
-    return level;
-}
-
-/// How many vertices each level should have, coarse to fine, without the finest. vertices: distinct ones, as vertices
-/// at one place are one here.
-std::vector<std::size_t> level_targets(std::size_t vertices, const StripOptions& options) {
-    std::vector<std::size_t> targets;
-    if (options.levels) {
-        double count = double(vertices);
-        for (unsigned k = 0; k < *options.levels; ++k) {
-            count /= kLevelFactor;
-            targets.insert(targets.begin(), std::max<std::size_t>(3, static_cast<std::size_t>(count)));
-        }
-        return targets;
-    }
-    const double base = double(options.error ? 3 : std::min(vertices, options.base.value_or(default_base(vertices))));
-    for (double count = base; targets.empty() || count * 2 < double(vertices); count *= kLevelFactor)
-        targets.push_back(static_cast<std::size_t>(count));
-    return targets;
-}
-
-/// The levels of a blend model, coarse to fine, each simplified from the next finer one.
-std::vector<Level> simplify_levels(const WorkingMesh& work, const StripOptions& options, StripReport& report,
-                                   const RunContext& context) {
-    const std::vector<std::size_t> targets = level_targets(work.surface.place_count, options);
-    std::vector<Level> levels;
-    if (work.surface.triangles.empty()) {
-        levels.push_back(make_point_level(work, targets.front()));
-        return levels;
-    }
-    std::vector<Triangle> current = work.surface.triangles;
-    for (std::size_t k = targets.size(); k-- > 0 && !context.is_cancelled();) {
-        context.report("simplify", 1 - double(k + 1) / double(targets.size()));
-        SimplifyOptions simplify_options{.target_vertices = targets[k], .max_edge = options.max_edge};
-        if (options.error) {
-            simplify_options.max_error = *options.error - report.simplify_error;
-            if (*simplify_options.max_error <= 0 && !levels.empty()) break;
-        }
-        Simplified simplified = simplify(work.positions, current, simplify_options, context);
-        const bool stuck = simplified.triangles.size() == current.size();
-        report.simplify_error += simplified.error;
-        report.forced_collapses += simplified.forced;
-        current = std::move(simplified.triangles);
-        const bool is_driver = k == 0 && levels.empty(); // without it there is no model, so it may be all of the mesh
-        if (stuck && !is_driver) continue;               // a level that removes nothing is none
-        levels.insert(levels.begin(), make_level(current, work.positions.size()));
-    }
-    return levels;
-}
 
 /// The driver's cells over its own vertices, and as triangles over the mesh's.
 struct Cells {
@@ -211,13 +104,18 @@ Result<Stripped> strip_blend(Mesh mesh, const StripOptions& options, const RunCo
     const Result<WorkingMesh> work = make_working_mesh(mesh, context);
     if (!work) return work.error();
     result.report.welded_vertices = mesh.vertex_count() - work->surface.place_count;
-    std::vector<Level> levels = simplify_levels(*work, options, result.report, context);
+    SimplifiedLevels simplified = simplify_levels(*work, options, context);
     if (context.is_cancelled()) return cancelled_error();
+    std::vector<Level>& levels = simplified.levels;
+    result.report.simplify_error = simplified.error;
+    result.report.forced_collapses = simplified.forced;
     result.report.simplify_seconds = simplify_time.seconds();
 
     const Stopwatch bind_time;
     Cells cells = make_cells(levels.front());
-    Result<Binding> binding = bind_to_driver(work->positions, work->surface, work->normals, cells.global, context);
+    const std::vector<Index> source = nearest_driver_vertices(*work, simplified, context);
+    Result<Binding> binding = bind_to_driver(work->positions, work->surface, work->normals, cells.global, source,
+                                             simplified.removed, context);
     if (!binding) return binding.error();
     result.report.across_gap = binding->across_gap.size();
     result.report.facing_away = binding->facing_away.size();

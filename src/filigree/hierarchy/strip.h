@@ -20,6 +20,9 @@ struct StripOptions {
     std::optional<double> max_edge = {};
     Precision precision = Precision::float32; ///< blend code only
     unsigned references = 3;                  ///< reference code only: 3, 4 or 6
+    /// Larger levels are simplified in clusters on all threads, in time that grows as the mesh does, and those from so
+    /// many vertices on in one piece. Blend code without max_edge only.
+    std::size_t one_piece = 1'200'000;
     bool operator==(const StripOptions&) const = default;
 };
 
@@ -41,7 +44,7 @@ struct Stripped {
 /// Strips a mesh. The blend code takes every mesh that has a vertex: what it cannot bind well it counts. The reference
 /// code needs quads with subdivision connectivity.
 /// Errors: usage (options that make no sense), unsuitable (no vertices; no subdivision connectivity), cancelled.
-/// Cost: simplification, O(F log F); the rest linear but for a shortest-path search, O(V log V).
+/// Cost O(F): about 2.5 processor seconds a million vertices. Same bytes for any number of threads.
 Result<Stripped> strip(Mesh mesh, const StripOptions& options, const RunContext& context);
 
 /// Takes the detail off a mesh down to a driver that somebody else made: any mesh near it, of vertices of its own. Its

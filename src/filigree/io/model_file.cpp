@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstring>
 #include <map>
+#include <memory>
 #include <new>
 #include <stdexcept>
 
@@ -44,58 +45,73 @@ static_assert(sizeof(Section) == 40);
 
 // ---------------------------------------------------------------------------------------------------------- writing
 
+/// Lays out the sections. What is in the model is not copied: it has to outlive the writer.
 class SectionWriter {
 public:
     template <class T>
     void array(std::string_view name, const std::vector<T>& items, std::uint32_t index = 0) {
-        if (!items.empty()) raw(name, index, items.data(), sizeof(T), items.size());
+        if (!items.empty()) add(name, index, items.data(), sizeof(T), items.size());
+    }
+    /// Of numbers that nobody else keeps.
+    template <class T>
+    void array(std::string_view name, std::vector<T>&& items, std::uint32_t index = 0) {
+        if (items.empty()) return;
+        const auto kept = std::make_shared<const std::vector<T>>(std::move(items));
+        kept_.push_back(kept);
+        array(name, *kept, index);
     }
     template <class T>
     void value(std::string_view name, const T& item) {
-        raw(name, 0, &item, sizeof(T), 1);
+        array(name, std::vector<T>{item});
     }
     void bytes(std::string_view name, std::string_view items, std::uint32_t index) {
-        raw(name, index, items.data(), 1, items.size());
+        add(name, index, items.data(), 1, items.size());
     }
     void strings(std::string_view name, const std::vector<std::string>& items) {
         std::vector<char> bytes; // each ended by a zero byte, so a name that holds one ends there
         for (const std::string& item : items)
             bytes.insert(bytes.end(), item.c_str(), item.c_str() + std::strlen(item.c_str()) + 1);
-        array(name, bytes);
+        array(name, std::move(bytes));
     }
 
-    std::string finish() {
+    /// The file, piece after piece. Call it once.
+    std::vector<std::string_view> finish() {
         const std::size_t table_bytes = sections_.size() * sizeof(Section);
         for (Section& section : sections_) section.offset += sizeof(ModelHeader) + table_bytes;
         ModelHeader header{};
         std::memcpy(header.magic, kMagic, sizeof kMagic);
         header.version = kVersion;
         header.section_count = static_cast<std::uint32_t>(sections_.size());
-        header.file_size = sizeof(ModelHeader) + table_bytes + content_.size();
+        header.file_size = sizeof(ModelHeader) + table_bytes + content_bytes_;
         header.table_hash = XXH3_64bits(sections_.data(), table_bytes);
-        std::string file;
-        file.reserve(header.file_size);
-        file.append(reinterpret_cast<const char*>(&header), sizeof header);
-        file.append(reinterpret_cast<const char*>(sections_.data()), table_bytes);
-        return file += content_;
+        front_.assign(reinterpret_cast<const char*>(&header), sizeof header);
+        front_.append(reinterpret_cast<const char*>(sections_.data()), table_bytes);
+        pieces_.insert(pieces_.begin(), front_);
+        return pieces_;
     }
 
 private:
-    void raw(std::string_view name, std::uint32_t index, const void* items, std::size_t item_size, std::size_t count) {
+    void add(std::string_view name, std::uint32_t index, const void* items, std::size_t item_size, std::size_t count) {
+        static constexpr std::string_view kZeros("\0\0\0\0\0\0\0\0", 8);
+        const std::string_view bytes(static_cast<const char*>(items), item_size * count);
         Section section{};
         std::memcpy(section.name, name.data(), std::min<std::size_t>(name.size(), sizeof section.name));
         section.index = index;
         section.item_size = static_cast<std::uint32_t>(item_size);
-        section.offset = content_.size();
+        section.offset = content_bytes_;
         section.count = count;
-        section.hash = XXH3_64bits(items, item_size * count);
+        section.hash = XXH3_64bits(bytes.data(), bytes.size());
         sections_.push_back(section);
-        content_.append(static_cast<const char*>(items), item_size * count);
-        content_.append((8 - content_.size() % 8) % 8, '\0');
+        pieces_.push_back(bytes);
+        pieces_.push_back(kZeros.substr(0, (8 - bytes.size() % 8) % 8));
+        content_bytes_ += bytes.size() + pieces_.back().size();
     }
 
     std::vector<Section> sections_;
-    std::string content_;
+    std::vector<std::string_view> pieces_;
+    std::vector<std::shared_ptr<const void>> kept_;
+    std::string front_;
+    std::size_t content_bytes_ = 0;
 };
 
 template <class T>
@@ -115,7 +131,10 @@ void write_faces(SectionWriter& out, const std::string& name, std::uint32_t inde
     const Index size = offsets.size() > 1 ? offsets[1] : 0;
     bool uniform = size > 0;
     for (std::size_t f = 0; uniform && f < offsets.size(); ++f) uniform = offsets[f] == f * size;
-    out.array(name + (uniform ? ".siz" : ".off"), uniform ? std::vector<Index>{size} : offsets, index);
+    if (uniform)
+        out.array(name + ".siz", std::vector<Index>{size}, index);
+    else
+        out.array(name + ".off", offsets, index);
     out.array(name + ".cor", corners, index);
 }
 
@@ -145,7 +164,7 @@ void write_material_sections(SectionWriter& out, const std::vector<MeshMaterial>
                            m.double_sided ? 1u : 0u,
                            picture});
     }
-    out.array("mat.emb", records);
+    out.array("mat.emb", std::move(records));
     for (std::uint32_t i = 0; i < pictures.size(); ++i) out.bytes("mat.pic", *pictures[i], i);
 }
 
@@ -211,14 +230,13 @@ using FileGradient = std::array<float, 9>; // row-major
 void write_poses(SectionWriter& out, const PoseSequence& poses) {
     if (poses.empty()) return;
     out.value("pose.fps", poses.frames_per_second);
-    std::vector<FileGradient> gradients;
     for (std::uint32_t frame = 0; frame < poses.frames.size(); ++frame) {
         const Pose& pose = poses.frames[frame];
         out.array("pose.pos", pose.positions, frame);
-        gradients.resize(pose.gradients.size());
+        std::vector<FileGradient> gradients(pose.gradients.size());
         for (std::size_t v = 0; v < gradients.size(); ++v)
             for (int k = 0; k < 9; ++k) gradients[v][std::size_t(k)] = pose.gradients[v](k / 3, k % 3);
-        out.array("pose.grd", gradients, frame);
+        out.array("pose.grd", std::move(gradients), frame);
     }
 }
 
@@ -525,8 +543,9 @@ auto guarded(std::string_view bytes, const std::string& name, const RunContext& 
 
 bool is_model_file(std::string_view bytes) { return bytes.starts_with(std::string_view(kMagic, sizeof kMagic)); }
 
-std::string write_model(const Model& model, const PoseSequence& poses) {
-    SectionWriter out;
+namespace {
+
+void write_sections(SectionWriter& out, const Model& model, const PoseSequence& poses) {
     const auto* blend = std::get_if<BlendDetail>(&model.detail);
     write_mesh_sections(out, model.mesh, !blend || blend->precision == Precision::float32);
     out.value("code", static_cast<std::uint32_t>(model.code()));
@@ -540,7 +559,16 @@ std::string write_model(const Model& model, const PoseSequence& poses) {
     else
         write_reference(out, std::get<ReferenceDetail>(model.detail));
     write_poses(out, poses);
-    return out.finish();
+}
+
+} // namespace
+
+std::string write_model(const Model& model, const PoseSequence& poses) {
+    SectionWriter out;
+    write_sections(out, model, poses);
+    std::string file;
+    for (const std::string_view piece : out.finish()) file += piece;
+    return file;
 }
 
 std::string write_model(const Model& model) { return write_model(model, PoseSequence()); }
@@ -553,8 +581,9 @@ Status write_model(const Model& model, const PoseSequence& poses, const std::fil
         return Error{ErrorCode::mismatch, path.string() + ": not written: " + wrong + "."};
     context.report("write", 0);
     try {
-        const std::string bytes = write_model(model, poses);
-        Status status = write_file(path, bytes);
+        SectionWriter out;
+        write_sections(out, model, poses);
+        Status status = write_file(path, out.finish());
         context.report("write", 1);
         return status;
     } catch (const std::bad_alloc&) {
