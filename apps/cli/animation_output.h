@@ -45,6 +45,12 @@ OptionList pose_file_options(PoseFileOptions& options);
 PoseStream poses_of(const std::string& poses, const PoseFileOptions& options, const Model& model,
                     const PoseSequence& own, const std::string& model_path, Session& session);
 
+/// "3/40" as the third of forty chunks. Refuses what is none.
+AnimationChunk chunk_of(const std::string& text);
+/// Restores one chunk of the frames into `path`, a .pc2 that other processes write too.
+ChunkReport write_chunk_output(const Model& model, const PoseStream& poses, const RestoreOptions& restore,
+                               const AnimationChunk& chunk, const std::string& path, Session& session);
+
 /// Writes a model's poses to `path`: .glb as a skin (or morph targets), everything else restored frame by frame, one in
 /// memory at a time. Reports what was written. materials_beside: the model's or mesh's own path.
 void write_animation_output(const Model& model, const PoseStream& poses, const RestoreOptions& restore,

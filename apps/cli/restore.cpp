@@ -35,7 +35,7 @@ const Pose& own_pose(const PoseSequence& poses, std::size_t frame, const std::st
 namespace {
 
 struct RestoreArguments {
-    std::string model, pose, poses, ghosts, output, picture;
+    std::string model, pose, poses, ghosts, output, picture, chunk;
     std::optional<UpAxis> up;
     std::size_t frame = 0; ///< of the model's own, from 1; 0: none
     bool all_frames = false, as_surfels = false;
@@ -66,6 +66,10 @@ void check(const RestoreArguments& options, const Session& session) {
     if (!options.picture.empty()) check_picture_path(options.picture);
     if (options.as_surfels && (options.is_animation() || options.restore.level))
         refuse("--surfels writes one moment of the finest level: give --pose or --frame, and no --level.");
+    if (!options.chunk.empty() && !options.is_animation()) refuse("--chunk belongs to --poses or --frames.");
+    if (!options.chunk.empty()) (void)chunk_of(options.chunk);
+    if (!options.chunk.empty() && animation_format(options.output).value() != AnimationFormat::pc2)
+        refuse(options.output + ": chunks are written of .pc2 alone, whose frames all have one size.");
     const std::string given = given_animation_option(session);
     if (!options.is_animation() && !given.empty()) refuse(given + " belongs to --poses or --frames.");
     if (!options.is_animation()) return;
@@ -158,7 +162,50 @@ void restore_one(const RestoreArguments& options, Session& session) {
     session.print(report);
 }
 
+/// What the frames are made of: the bytes of the inputs, and the settings.
+std::string job_of(const RestoreArguments& options) {
+    std::vector<std::filesystem::path> inputs{options.model};
+    if (!options.poses.empty())
+        for (const std::filesystem::path& path : animation_files(options.poses)) inputs.push_back(path);
+    const RestoreOptions& restore = options.restore;
+    const PoseFileOptions& file = options.poses_file;
+    return fmt::format("{} level {} law {} thin-shell {} rate {} animation {}", require(hash_of_files(inputs)),
+                       restore.level ? std::to_string(*restore.level) : "finest",
+                       restore.law ? std::to_string(int(*restore.law)) : "own", restore.thin_shell,
+                       file.frames_per_second.value_or(0), file.animation);
+}
+
+void restore_chunk(const RestoreArguments& options, Session& session) {
+    PoseSequence own;
+    AnimationChunk chunk = chunk_of(options.chunk);
+    chunk.job = job_of(options);
+    const Model model = session.read_model(options.model, options.all_frames ? &own : nullptr);
+    const PoseStream poses = poses_of(options.poses, options.poses_file, model, own, options.model, session);
+    const double start = now_seconds();
+    const ChunkReport written = write_chunk_output(model, poses, options.restore, chunk, options.output, session);
+    const double seconds = now_seconds() - start;
+    Report report;
+    const std::string frames = written.frames == 0 ? "no frames"
+                                                   : fmt::format("frames {} to {}", written.first_frame + 1,
+                                                                 written.first_frame + written.frames);
+    report.say(
+        fmt::format("{}: chunk {} of {} ({}) {}; {}\n", options.output, chunk.number, chunk.count, frames,
+                    written.was_done ? "was done before" : "written in " + seconds_text(seconds),
+                    written.is_whole ? "the file is whole" : fmt::format("{} chunks are done", written.chunks_done)));
+    report.set("output", options.output);
+    report.set("chunk", chunk.number);
+    report.set("chunks", chunk.count);
+    report.set("first_frame", written.first_frame + 1);
+    report.set("frames", written.frames);
+    report.set("was_done", written.was_done);
+    report.set("chunks_done", written.chunks_done);
+    report.set("is_whole", written.is_whole);
+    report.set("seconds", seconds);
+    session.print(report);
+}
+
 void restore_all(const RestoreArguments& options, Session& session) {
+    if (!options.chunk.empty()) return restore_chunk(options, session);
     PoseSequence own;
     const Model model = session.read_model(options.model, options.all_frames ? &own : nullptr);
     const PoseStream poses = poses_of(options.poses, options.poses_file, model, own, options.model, session);
@@ -199,7 +246,10 @@ Command restore_command() {
                                   "and so on, or NAME_####.obj")
                                .is_written()
                                .required()} +
-                OptionList{Option("--surfels", options->as_surfels,
+                OptionList{Option("--chunk", options->chunk,
+                                  "K/N: the K-th of N parts of the frames alone, into a .pc2 that other processes "
+                                  "write too, on any machine"),
+                           Option("--surfels", options->as_surfels,
                                   "Write surfels: points with a normal and two half axes, carried from rest (.ply)"),
                            Option("--picture", options->picture,
                                   "Also draw the mesh coloured by the error to expect (.png, .svg, .pdf)")
@@ -211,7 +261,8 @@ Command restore_command() {
                         "  filigree restore scan.fil --pose moved.obj -o restored.ply --picture errors.png\n"
                         "  filigree restore bounce.fil --frame 30 -o half_a_second.ply\n"
                         "  filigree restore bounce.fil --frames -o frames/\n"
-                        "  filigree restore scan.fil --poses cloth.pc2 --frame-rate 24 -o detailed.pc2",
+                        "  filigree restore scan.fil --poses cloth.pc2 --frame-rate 24 -o detailed.pc2\n"
+                        "  filigree restore scan.fil --poses cloth.pc2 -o shot.pc2 --chunk 3/40",
             .run = [options](Session& session) {
                 check(*options, session);
                 options->is_animation() ? restore_all(*options, session) : restore_one(*options, session);

@@ -67,44 +67,6 @@ Status check_rate(const PoseFileOptions& options) {
     return Success{};
 }
 
-/// Adds the origin, checks, and keeps account of the digits that 32 bits lose.
-class WorldFrames {
-public:
-    WorldFrames(const MeshAnimation& animation, fs::path path) : animation_(animation), path_(std::move(path)) {}
-
-    Status fetch(std::size_t frame, std::span<Vec3f> positions) {
-        if (Status fetched = animation_.positions(frame, positions); !fetched) return fetched;
-        const Vec3d& origin = animation_.rest->origin;
-        const bool is_far = !origin.isZero();
-        for (Vec3f& p : positions) {
-            if (is_far) {
-                const Vec3d world = origin + p.cast<double>();
-                p = world.cast<float>();
-                lost_ = std::max(lost_, (p.cast<double>() - world).cwiseAbs().maxCoeff());
-            }
-            if (!p.allFinite())
-                return Error{ErrorCode::unsuitable, path_.string() + ": not written: frame " +
-                                                        std::to_string(frame + 1) +
-                                                        " is beyond what numbers can hold; deform less."};
-        }
-        return Success{};
-    }
-    void warn(std::vector<std::string>& warnings) const {
-        constexpr double kUnseen = 1e-7; // of the diagonal: what 32 bits lose anyway
-        const double diagonal = bounds(animation_.rest->positions).diagonal();
-        if (!(lost_ > kUnseen * diagonal)) return;
-        std::string digits = std::to_string(lost_ / diagonal * 1e6);
-        warnings.push_back("The mesh is far from the world's origin, and the format holds 32 bits a coordinate: "
-                           "positions are up to " +
-                           digits.substr(0, digits.find('.') + 2) + " millionths of the diagonal off.");
-    }
-
-private:
-    const MeshAnimation& animation_;
-    fs::path path_;
-    double lost_ = 0;
-};
-
 /// The rest mesh as a frame moves it.
 Result<Mesh> mesh_at(const MeshAnimation& animation, std::size_t frame, const RunContext& context) {
     Mesh mesh = *animation.rest;
@@ -114,6 +76,33 @@ Result<Mesh> mesh_at(const MeshAnimation& animation, std::size_t frame, const Ru
 }
 
 } // namespace
+
+Status WorldFrames::fetch(std::size_t frame, std::span<Vec3f> positions) {
+    if (Status fetched = animation_.positions(frame, positions); !fetched) return fetched;
+    const Vec3d& origin = animation_.rest->origin;
+    const bool is_far = !origin.isZero();
+    for (Vec3f& p : positions) {
+        if (is_far) {
+            const Vec3d world = origin + p.cast<double>();
+            p = world.cast<float>();
+            lost_ = std::max(lost_, (p.cast<double>() - world).cwiseAbs().maxCoeff());
+        }
+        if (!p.allFinite())
+            return Error{ErrorCode::unsuitable, path_.string() + ": not written: frame " + std::to_string(frame + 1) +
+                                                    " is beyond what numbers can hold; deform less."};
+    }
+    return Success{};
+}
+
+void WorldFrames::warn(std::vector<std::string>& warnings) const {
+    constexpr double kUnseen = 1e-7; // of the diagonal: what 32 bits lose anyway
+    const double diagonal = bounds(animation_.rest->positions).diagonal();
+    if (!(lost_ > kUnseen * diagonal)) return;
+    std::string digits = std::to_string(lost_ / diagonal * 1e6);
+    warnings.push_back("The mesh is far from the world's origin, and the format holds 32 bits a coordinate: "
+                       "positions are up to " +
+                       digits.substr(0, digits.find('.') + 2) + " millionths of the diagonal off.");
+}
 
 Result<AnimationFormat> animation_format(const fs::path& path) {
     std::error_code ignored;

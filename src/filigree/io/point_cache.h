@@ -61,6 +61,32 @@ Result<MeshAnimation> open_animation(const std::filesystem::path& path, const Me
 Result<std::vector<std::string>> write_animation(const MeshAnimation& animation, const std::filesystem::path& path,
                                                  const RunContext& context);
 
+/// One part of an animation that several processes write, on one machine or many.
+struct AnimationChunk {
+    std::size_t number = 1, count = 1; ///< 1 .. count
+    /// What the animation is made of, as a line of text: a hash of the inputs and the settings. Chunks of different
+    /// jobs are not mixed.
+    std::string job;
+};
+struct ChunkReport {
+    std::size_t first_frame = 0, frames = 0; ///< of this chunk
+    bool was_done = false;                   ///< before: nothing was written
+    std::size_t chunks_done = 0;             ///< of all, this one too
+    bool is_whole = false;                   ///< the file is in its place
+};
+
+/// Writes a chunk's frames into a .pc2 (frames are shared out evenly). The frames of all gather in the folder
+/// PATH.chunks; whoever writes the last one puts the file into its place and removes the folder. PATH.plan says what
+/// the file is made of, and stays. Each chunk may be written again, at the same time too: it writes the same bytes. A
+/// process that is killed at any moment leaves a chunk to be written again, and what stood at `path` as it was.
+/// Errors: usage (a number beyond the count, a name that does not end in .pc2), mismatch (another job is at work
+/// there), unsuitable, unwritable, cancelled. Cost: the chunk's frames; memory one frame.
+Result<ChunkReport> write_animation_chunk(const MeshAnimation& animation, const std::filesystem::path& path,
+                                          const AnimationChunk& chunk, const RunContext& context);
+
+/// A hash of files' bytes, in this order, as 32 hexadecimal digits. Errors: as of read_file.
+Result<std::string> hash_of_files(std::span<const std::filesystem::path> paths);
+
 /// Numbered meshes alone, from whoever makes them: `mesh` gives that of a frame, 0 .. frames - 1.
 Result<std::vector<std::string>> write_numbered_meshes(std::size_t frames,
                                                        const std::function<Result<Mesh>(std::size_t frame)>& mesh,

@@ -31,8 +31,25 @@ using WorldPositions = std::function<Status(std::size_t frame, std::span<Vec3f> 
 
 Status write_pc2(const MeshAnimation& animation, const WorldPositions& positions, const std::filesystem::path& path,
                  const RunContext& context);
+/// The first bytes of a PC2, frames behind them. Errors: unsuitable (more than its 32-bit numbers hold).
+Result<std::string> pc2_header(const MeshAnimation& animation, const std::filesystem::path& path);
 Status write_mdd(const MeshAnimation& animation, const WorldPositions& positions, const std::filesystem::path& path,
                  const RunContext& context);
+
+/// Adds the origin, checks, and keeps account of the digits that 32 bits lose. animation must outlive it.
+class WorldFrames {
+public:
+    WorldFrames(const MeshAnimation& animation, std::filesystem::path path)
+        : animation_(animation), path_(std::move(path)) {}
+
+    Status fetch(std::size_t frame, std::span<Vec3f> positions);
+    void warn(std::vector<std::string>& warnings) const;
+
+private:
+    const MeshAnimation& animation_;
+    std::filesystem::path path_;
+    double lost_ = 0;
+};
 
 /// The rate where nothing says another, frames a second.
 inline constexpr double kUnsaidRate = 60;

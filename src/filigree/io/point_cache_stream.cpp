@@ -223,18 +223,24 @@ Result<PointSource> open_mdd(const fs::path& path, std::size_t points, std::opti
     return source_of(*file, counts[0], *rate, start, true);
 }
 
-Status write_pc2(const MeshAnimation& animation, const WorldPositions& positions, const fs::path& path,
-                 const RunContext& context) {
-    if (Status sound = check_sizes(animation, path); !sound) return sound;
-    Result<FileWriter> file = FileWriter::create(path);
-    if (!file) return file.error();
+Result<std::string> pc2_header(const MeshAnimation& animation, const fs::path& path) {
+    if (Status sound = check_sizes(animation, path); !sound) return sound.error();
     std::string header(kPc2Magic);
     append(header, kPc2Version);
     append(header, static_cast<std::int32_t>(animation.rest->vertex_count()));
     append(header, 0.0f); // the first frame's number in the scene
     append(header, 1.0f); // frames of the scene from one to the next
     append(header, static_cast<std::int32_t>(animation.frames));
-    if (Status written = file->write(header); !written) return written;
+    return header;
+}
+
+Status write_pc2(const MeshAnimation& animation, const WorldPositions& positions, const fs::path& path,
+                 const RunContext& context) {
+    const Result<std::string> header = pc2_header(animation, path);
+    if (!header) return header.error();
+    Result<FileWriter> file = FileWriter::create(path);
+    if (!file) return file.error();
+    if (Status written = file->write(*header); !written) return written;
     return write_frames(*file, animation, positions, false, context);
 }
 
