@@ -216,6 +216,11 @@ private:
         add(name + ".in_mesh_order",
             count / median_seconds([&] { restorer.restore(driver, gradients, positions, {}, true, context_); }),
             "vertices/s");
+        add(name + ".in_mesh_order.with_normals",
+            count / median_seconds([&] {
+                restorer.restore(driver, gradients, positions, out_normals, true, context_);
+            }),
+            "vertices/s");
     }
 
     void restore_reference(double triad) {

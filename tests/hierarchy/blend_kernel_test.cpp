@@ -211,6 +211,73 @@ TEST(BlendKernel, LargeOutputsOnThreadsAreTheSameBytes) {
         }
 }
 
+/// Gives every block of slots its own records, in some order.
+void sort_into_blocks(Scene& scene) {
+    Records& records = scene.records;
+    std::mt19937 random(8);
+    for (std::size_t begin = 0; begin < records.count; begin += kBlock) {
+        const std::size_t end = std::min(records.count, begin + kBlock);
+        std::iota(records.slot.begin() + begin, records.slot.begin() + end, static_cast<Index>(begin));
+        std::shuffle(records.slot.begin() + begin, records.slot.begin() + end, random);
+    }
+    records.from.resize(records.count);
+    for (std::size_t r = 0; r < records.count; ++r)
+        records.from[records.slot[r]] = static_cast<std::uint16_t>(r % kBlock);
+    for (std::size_t run = 0; run < records.runs.size(); ++run)
+        if (records.runs[run].first % kBlock == 0) records.block_runs.push_back(static_cast<Index>(run));
+    records.block_runs.push_back(static_cast<Index>(records.runs.size()));
+}
+
+/// In memory that the caches hold and in more, at every alignment of a float, in every width and on threads.
+TEST(BlendKernel, BlocksAreTheSameBytesAsScatteredRecords) {
+    for (const bool int16 : {false, true})
+        for (const std::size_t blocks : {3u, 44u}) {
+            std::vector<Index> lengths(blocks * kBlock / 256, 256);
+            for (Index length : {200, 3}) lengths.push_back(length); // the last block is not full
+            Scene scene = make_scene(lengths, int16, 9);
+            sort_into_blocks(scene);
+            Scene scattered = scene;
+            scattered.records.block_runs.clear();
+            const Restored wanted = restored(scattered, lane_counts().back(), true);
+            for (const int lanes : lane_counts()) {
+                const Restored out = restored(scene, lanes, true, RunContext(2));
+                EXPECT_TRUE(same_bytes(out.positions, wanted.positions)) << blocks << ' ' << lanes;
+                EXPECT_TRUE(same_bytes(out.normals, wanted.normals)) << blocks << ' ' << lanes;
+            }
+            for (const std::size_t shift : {1u, 2u, 3u}) {
+                std::vector<Vec3f> out(scene.records.count + 4, Vec3f::Constant(7));
+                blend_kernel::restore(scene.records, scene.transforms,
+                                      {.positions = out.data() + shift, .in_order = true, .scale = 2}, kOneThread);
+                EXPECT_EQ(out[shift - 1], Vec3f(Vec3f::Constant(7)));
+                EXPECT_EQ(out[shift + scene.records.count], Vec3f(Vec3f::Constant(7)));
+                for (std::size_t v = 0; v < scene.records.count; ++v)
+                    ASSERT_EQ(out[shift + v], Vec3f(2 * wanted.positions[v])) << v;
+            }
+        }
+}
+
+/// A run's last lanes may write past its end, but not into what follows the output, nor into another thread's part.
+TEST(BlendKernel, WritesNothingBehindItsOutput) {
+    for (const bool int16 : {false, true})
+        for (Index last = 1; last <= 40; ++last) {
+            const Scene scene = make_scene({100, 3, last}, int16, last);
+            const Restored wanted = restored(scene, lane_counts().back(), true);
+            for (const int lanes : lane_counts()) {
+                std::vector<Vec3f> out(scene.records.count + 16, Vec3f::Constant(7)), normals = out;
+                blend_kernel::restore(scene.records, scene.transforms,
+                                      {.positions = out.data(), .normals = normals.data()}, lanes, kOneThread);
+                for (std::size_t r = 0; r < scene.records.count; ++r) {
+                    ASSERT_EQ(out[r], wanted.positions[scene.records.slot[r]]) << lanes << ' ' << last;
+                    ASSERT_EQ(normals[r], wanted.normals[scene.records.slot[r]]) << lanes << ' ' << last;
+                }
+                for (std::size_t r = scene.records.count; r < out.size(); ++r) {
+                    ASSERT_EQ(out[r], Vec3f(Vec3f::Constant(7))) << lanes << ' ' << last;
+                    ASSERT_EQ(normals[r], Vec3f(Vec3f::Constant(7))) << lanes << ' ' << last;
+                }
+            }
+        }
+}
+
 TEST(BlendKernel, NoThreadChangesAByte) {
     FILIGREE_NEEDS_TWO_THREADS();
     for (const bool int16 : {false, true}) {

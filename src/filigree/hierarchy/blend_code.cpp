@@ -107,6 +107,43 @@ struct BlendRestorer::Content {
     double scale = 1;        ///< of everything inside; a power of two, other than 1 only for extreme sizes
 };
 
+namespace {
+
+struct WantedRecord {
+    Index cell, record, item;
+};
+
+/// Sorts records by block of slots, then as they were, where every slot is there once and that leaves runs long enough.
+/// Cost O(items).
+bool sort_into_blocks(std::span<const BlendRestorer::Item> items, std::vector<WantedRecord>& wanted) {
+    // A run costs a cell's transform: with fewer records than these each, scattered writes are as fast.
+    constexpr std::size_t kShortMeanRun = 16;
+    if (items.empty() || wanted.size() != items.size()) return false;
+    const std::size_t blocks = (items.size() + blend_kernel::kBlock - 1) / blend_kernel::kBlock;
+    std::vector<bool> is_there(items.size(), false);
+    std::vector<std::size_t> starts(blocks + 1, 0);
+    std::vector<Index> last_cell(blocks, kNoIndex);
+    std::size_t runs = 0, runs_in_blocks = 0;
+    for (std::size_t k = 0; k < wanted.size(); ++k) {
+        const Index cell = wanted[k].cell, slot = items[wanted[k].item].slot;
+        if (slot >= items.size() || is_there[slot]) return false;
+        is_there[slot] = true;
+        const std::size_t block = slot / blend_kernel::kBlock;
+        ++starts[block + 1];
+        runs += k == 0 || wanted[k - 1].cell != cell;
+        runs_in_blocks += std::exchange(last_cell[block], cell) != cell;
+    }
+    if (runs_in_blocks * kShortMeanRun > items.size() && 2 * runs_in_blocks > 3 * runs) return false;
+    for (std::size_t b = 0; b < blocks; ++b) starts[b + 1] += starts[b];
+    std::vector<WantedRecord> sorted(wanted.size());
+    for (const WantedRecord& record : wanted)
+        sorted[starts[items[record.item].slot / blend_kernel::kBlock]++] = record;
+    wanted = std::move(sorted);
+    return true;
+}
+
+} // namespace
+
 BlendRestorer::BlendRestorer(BlendRestorer&&) noexcept = default;
 BlendRestorer& BlendRestorer::operator=(BlendRestorer&&) noexcept = default;
 BlendRestorer::~BlendRestorer() = default;
@@ -149,33 +186,41 @@ BlendRestorer::BlendRestorer(const BlendDetail& detail, std::span<const Vec3f> p
         for (auto& n : records.normal) n.assign(padded, 0);
     records.slot.reserve(items.size());
 
-    for (Index c = 0; c < detail.cells.size(); ++c) {
+    std::vector<WantedRecord> wanted;
+    wanted.reserve(items.size());
+    for (Index c = 0; c < detail.cells.size(); ++c)
+        for (Index r = detail.cell_offsets[c]; r < detail.cell_offsets[c + 1]; ++r)
+            for (Index i = first_item[detail.order[r]]; i != kNoIndex; i = next_item[i]) wanted.push_back({c, r, i});
+    const bool in_blocks = sort_into_blocks(items, wanted);
+    for (const auto& [c, r, i] : wanted) {
         const Triangle& cell = detail.cells[c];
-        for (Index r = detail.cell_offsets[c]; r < detail.cell_offsets[c + 1]; ++r) {
-            const Index vertex = detail.order[r];
-            for (Index i = first_item[vertex]; i != kNoIndex; i = next_item[i]) {
-                const Index at = static_cast<Index>(records.slot.size());
-                if (records.runs.empty() || records.runs.back().cell != c ||
-                    records.runs.back().count == blend_kernel::kMaxRun)
-                    records.runs.push_back({c, at, 0});
-                ++records.runs.back().count;
-                records.slot.push_back(items[i].slot);
-                if (!normals.empty())
-                    for (int k = 0; k < 3; ++k) records.normal[k][at] = normals[i][k];
-                if (int16) {
-                    records.u16[at] = static_cast<std::int16_t>(std::round(detail.u[r] * 32767.0f));
-                    records.v16[at] = static_cast<std::int16_t>(std::round(detail.v[r] * 32767.0f));
-                    for (int k = 0; k < 3; ++k) records.offset[k][at] = detail.offsets[r][k];
-                    continue;
-                }
-                records.u[at] = detail.u[r];
-                records.v[at] = detail.v[r];
-                const Vec3d m = scale * (anchor(cell, detail.u[r], detail.v[r], positions, driver) - centre);
-                const Vec3d q = scale * (positions[vertex].cast<double>() - centre) - 0.5 * m;
-                for (int k = 0; k < 3; ++k) records.q[k][at] = static_cast<float>(q[k]);
-            }
+        const Index vertex = detail.order[r], at = static_cast<Index>(records.slot.size());
+        const bool begins_block = in_blocks && at % blend_kernel::kBlock == 0;
+        if (begins_block) records.block_runs.push_back(static_cast<Index>(records.runs.size()));
+        if (records.runs.empty() || begins_block || records.runs.back().cell != c ||
+            records.runs.back().count == blend_kernel::kMaxRun)
+            records.runs.push_back({c, at, 0});
+        ++records.runs.back().count;
+        records.slot.push_back(items[i].slot);
+        if (!normals.empty())
+            for (int k = 0; k < 3; ++k) records.normal[k][at] = normals[i][k];
+        if (int16) {
+            records.u16[at] = static_cast<std::int16_t>(std::round(detail.u[r] * 32767.0f));
+            records.v16[at] = static_cast<std::int16_t>(std::round(detail.v[r] * 32767.0f));
+            for (int k = 0; k < 3; ++k) records.offset[k][at] = detail.offsets[r][k];
+            continue;
         }
+        records.u[at] = detail.u[r];
+        records.v[at] = detail.v[r];
+        const Vec3d m = scale * (anchor(cell, detail.u[r], detail.v[r], positions, driver) - centre);
+        const Vec3d q = scale * (positions[vertex].cast<double>() - centre) - 0.5 * m;
+        for (int k = 0; k < 3; ++k) records.q[k][at] = static_cast<float>(q[k]);
     }
+    if (!in_blocks) return;
+    records.block_runs.push_back(static_cast<Index>(records.runs.size()));
+    records.from.resize(items.size());
+    for (std::size_t at = 0; at < records.slot.size(); ++at)
+        records.from[records.slot[at]] = static_cast<std::uint16_t>(at % blend_kernel::kBlock);
 }
 
 std::span<const Index> BlendRestorer::slots() const { return content_->records.slot; }

@@ -23,6 +23,8 @@ struct Run {
 /// Arrays are padded so that 16 values can be read from any record; `runs` have at most kMaxRun records each.
 inline constexpr Index kMaxRun = 512;
 inline constexpr std::size_t kPadding = 16;
+/// Slots that are restored at a time when order is asked for: their points stay in the second-level cache.
+inline constexpr Index kBlock = 1 << 15;
 
 /// Everything about the records that does not change from pose to pose. Per record either q or offset is filled.
 struct Records {
@@ -35,6 +37,9 @@ struct Records {
     std::vector<float> scale;            ///< int16 records: one a cell
     std::vector<float> normal[3];        ///< empty or unit rest normals
     std::vector<Index> slot;             ///< where record r goes when order is asked for
+    /// Where the mesh's order allows it, records come block by block of kBlock slots, and in a block by cell. Else none.
+    std::vector<Index> block_runs;   ///< the first run of each block, and the end
+    std::vector<std::uint16_t> from; ///< of each slot: which record of its block goes there
 
     bool is_int16() const { return !u16.empty(); }
     std::size_t count = 0;
