@@ -217,9 +217,8 @@ private:
             count / median_seconds([&] { restorer.restore(driver, gradients, positions, {}, true, context_); }),
             "vertices/s");
         add(name + ".in_mesh_order.with_normals",
-            count / median_seconds([&] {
-                restorer.restore(driver, gradients, positions, out_normals, true, context_);
-            }),
+            count /
+                median_seconds([&] { restorer.restore(driver, gradients, positions, out_normals, true, context_); }),
             "vertices/s");
     }
 
