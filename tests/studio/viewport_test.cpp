@@ -317,13 +317,12 @@ TEST(Viewport, TheTorchMeltsABodyUnderTheMouse) {
     ASSERT_TRUE(saved);
     EXPECT_EQ(saved->mesh.vertex_count(), workbench.melt_surface()->vertex_count());
 
-    // Back to the start there is the mesh again, and nothing is lost by a change of the air.
+    // Nothing is lost by a change of the air; at the start there is the mesh again, also once that is undone.
     const std::size_t frames = workbench.frame_count();
     workbench.freeze();
     workbench.pause();
     EXPECT_GE(workbench.frame_count(), frames);
     workbench.document().undo_stack().undo();
-    EXPECT_TRUE(workbench.playback().has_body() || workbench.state().recording == nullptr);
     workbench.go_to_frame(0);
     EXPECT_EQ(workbench.melt_surface(), nullptr);
 }
