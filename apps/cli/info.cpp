@@ -122,10 +122,10 @@ void describe_mesh(const Mesh& mesh, Session& session, Report& report) {
     if (topology.quads > 0) describe_quads(mesh, session, report);
 }
 
-void describe_levels(const Model& model, Report& report) {
+void describe_levels(const ModelOutline& model, Report& report) {
     Json levels = Json::array();
-    for (unsigned k = 0; k <= model.finest_level(); ++k) {
-        const LevelCounts counts = level_counts(model, k);
+    for (std::size_t k = 0; k < model.levels.size(); ++k) {
+        const LevelCounts& counts = model.levels[k];
         report.row(fmt::format("level {}", k), fmt::format("{} vertices, {} faces{}", with_commas(counts.vertices),
                                                            with_commas(counts.faces), k == 0 ? "  (driver)" : ""));
         levels.push_back({{"vertices", counts.vertices}, {"faces", counts.faces}});
@@ -140,28 +140,27 @@ Json vertices_json(const std::vector<Index>& ids) {
     return {{"count", ids.size()}, {"places", std::vector<Index>(ids.begin(), end)}};
 }
 
-void describe_code(const Model& model, Report& report) {
-    if (const auto* blend = std::get_if<BlendDetail>(&model.detail)) {
-        const bool int16 = blend->precision == Precision::int16;
-        report.add("precision", int16 ? "int16, 10 bytes a vertex" : "float, 20 bytes a vertex", "precision",
-                   int16 ? "int16" : "float");
-        report.add("bound across gaps", with_commas(blend->across_gap.size()), "across_gap",
-                   vertices_json(blend->across_gap));
-        report.add("bound facing away", with_commas(blend->facing_away.size()), "facing_away",
-                   vertices_json(blend->facing_away));
-    } else {
-        const auto& reference = std::get<ReferenceDetail>(model.detail);
-        report.add("references", std::to_string(reference.references), "references", reference.references);
-        report.count("patches", "patches", reference.patches.patch_count());
+void describe_code(const ModelOutline& model, Report& report) {
+    if (model.code == DetailCode::reference) {
+        report.add("references", std::to_string(model.references), "references", model.references);
+        report.count("patches", "patches", model.patches);
+        return;
     }
+    const bool int16 = model.precision == Precision::int16;
+    report.add("precision", int16 ? "int16, 10 bytes a vertex" : "float, 20 bytes a vertex", "precision",
+               int16 ? "int16" : "float");
+    report.add("bound across gaps", with_commas(model.across_gap.size()), "across_gap",
+               vertices_json(model.across_gap));
+    report.add("bound facing away", with_commas(model.facing_away.size()), "facing_away",
+               vertices_json(model.facing_away));
 }
 
-constexpr std::size_t kQuickDriver = 20000;      ///< vertices, of a driver that is judged in a second or so
-constexpr std::size_t kQuickReference = 2000000; ///< vertices, of a mesh restored six times in a few seconds
+constexpr std::size_t kQuickDriver = 20'000;  ///< vertices, of a driver that is judged in a second or so
+constexpr std::size_t kQuickMesh = 2'000'000; ///< vertices, of a mesh read and judged in a second or so
 
-bool is_judged_quickly(const Model& model) {
-    return model.code() == DetailCode::blend ? model.driver().vertices.size() <= kQuickDriver
-                                             : model.mesh.vertex_count() <= kQuickReference;
+bool is_judged_quickly(const ModelOutline& model) {
+    return model.levels.back().vertices <= kQuickMesh &&
+           (model.code == DetailCode::reference || model.levels.front().vertices <= kQuickDriver);
 }
 
 /// What the driver is good for.
@@ -178,22 +177,21 @@ void describe_fidelity(const Model& model, Session& session, Report& report) {
                "fidelity", {{"positions", fidelity.positions}, {"gradients", fidelity.gradients}});
 }
 
-void describe_model(const Model& model, const PoseSequence& poses, std::size_t bytes, Report& report) {
-    const char* code = model.code() == DetailCode::blend ? "blend" : "reference";
+void describe_model(const ModelOutline& model, Report& report) {
+    const char* code = model.code == DetailCode::blend ? "blend" : "reference";
     report.add("code", code, "code", code);
     describe_levels(model, report);
     describe_code(model, report);
-    if (!poses.empty()) {
-        const bool has_gradients = !poses.frames[0].gradients.empty();
+    if (model.frames > 0) {
         report.add("poses",
-                   fmt::format("{} at {} frames a second{}", with_commas(poses.frames.size()), poses.frames_per_second,
-                               has_gradients ? ", with gradients" : ""),
+                   fmt::format("{} at {} frames a second{}", with_commas(model.frames), model.frames_per_second,
+                               model.has_gradients ? ", with gradients" : ""),
                    "poses",
-                   {{"frames", poses.frames.size()},
-                    {"frames_per_second", poses.frames_per_second},
-                    {"gradients", has_gradients}});
+                   {{"frames", model.frames},
+                    {"frames_per_second", model.frames_per_second},
+                    {"gradients", model.has_gradients}});
     }
-    report.count("bytes", "bytes", bytes);
+    report.count("bytes", "bytes", model.bytes);
 }
 
 /// What an export of ours measured about itself.
@@ -234,21 +232,33 @@ struct InfoArguments {
     bool fidelity = false; ///< also where it takes long
 };
 
+/// A mesh, and what else its file holds.
+void describe_mesh_file(const FileReader& file, const std::string& path, Session& session, Report& report) {
+    const std::string bytes = require(file.read_all());
+    if (!is_gltf(bytes)) return describe_mesh(session.parse_mesh(bytes, path), session, report);
+    const GltfScene scene = require(GltfScene::read(bytes, path, session.context()));
+    session.warn(scene.warnings());
+    describe_mesh(scene.mesh(), session, report);
+    describe_scene(scene, report);
+}
+
 void run(const InfoArguments& options, Session& session) {
     const std::string& path = options.path;
-    const Session::Content content = session.read_any(path, true);
+    const FileReader file = session.open(path);
     Report report;
     report.add("file", path, "file", path);
-    if (const auto* mesh = std::get_if<Mesh>(&content.value)) {
-        report.set("kind", "mesh");
-        describe_mesh(*mesh, session, report);
-        if (content.scene) describe_scene(*content.scene, report);
-        if (options.fidelity) refuse(path + ": is a mesh, and --fidelity belongs to models.");
-    } else {
+    if (is_model_file(file)) {
+        const ModelOutline model = session.outline(file, path);
         report.set("kind", "model");
-        const Model& model = std::get<Model>(content.value);
-        describe_model(model, content.poses, content.bytes, report);
-        if (options.fidelity || is_judged_quickly(model)) describe_fidelity(model, session, report);
+        describe_model(model, report);
+        if (options.fidelity || is_judged_quickly(model))
+            describe_fidelity(session.read_model(file, path), session, report);
+        else
+            report.row("fidelity", "not measured: it would take long; --fidelity does");
+    } else {
+        if (options.fidelity) refuse(path + ": is a mesh, and --fidelity belongs to models.");
+        report.set("kind", "mesh");
+        describe_mesh_file(file, path, session, report);
     }
     session.print(report);
 }
@@ -257,17 +267,18 @@ void run(const InfoArguments& options, Session& session) {
 
 Command info_command() {
     const auto options = std::make_shared<InfoArguments>();
-    return {.name = "info",
-            .text = "Say what a mesh or a model is, and what is wrong with it",
-            .options = {Option("file", options->path, "Mesh or model").required(),
-                        Option("--fidelity", options->fidelity,
-                               fmt::format("Measure what a model's driver is good for, also where it takes long (a "
-                                           "driver of more than {} vertices)",
-                                           with_commas(kQuickDriver)))},
-            .examples = "  filigree info scan.ply\n"
-                        "  filigree info scan.ply --json | jq .defects\n"
-                        "  filigree info scan.fil",
-            .run = [options](Session& session) { run(*options, session); }};
+    return {
+        .name = "info",
+        .text = "Say what a mesh or a model is, and what is wrong with it",
+        .options = {Option("file", options->path, "Mesh or model").required(),
+                    Option("--fidelity", options->fidelity,
+                           fmt::format("Measure what a model's driver is good for, also where it takes long (more than "
+                                       "{} vertices, or {} in the driver)",
+                                       with_commas(kQuickMesh), with_commas(kQuickDriver)))},
+        .examples = "  filigree info scan.ply\n"
+                    "  filigree info scan.ply --json | jq .defects\n"
+                    "  filigree info scan.fil",
+        .run = [options](Session& session) { run(*options, session); }};
 }
 
 } // namespace filigree::cli

@@ -1,8 +1,6 @@
 #include "commands.h"
 #include "restore_options.h"
 
-#include <fmt/format.h>
-
 namespace filigree::cli {
 
 namespace {
@@ -22,12 +20,11 @@ Mesh ghost_points(const Model& model, const RunContext& context) {
 
 void run(const LevelOptions& options, Session& session) {
     check_second_output("--ghosts", options.ghosts, options.output);
-    const Model model = session.read_model(options.model);
-    if (options.level > model.finest_level())
-        refuse(fmt::format("{} has levels 0 to {}; there is no level {}.", options.model, model.finest_level(),
-                           options.level));
-    const Mesh mesh = options.level == 0 ? driver_mesh(model) : level_mesh(model, options.level);
-    const Mesh ghosts = options.ghosts.empty() ? Mesh() : ghost_points(model, session.context());
+    const FileReader file = session.open_model(options.model);
+    Mesh mesh = session.read_level(file, options.level, options.model);
+    if (options.level == 0) mesh = driver_mesh(std::move(mesh));
+    const Mesh ghosts =
+        options.ghosts.empty() ? Mesh() : ghost_points(session.read_model(file, options.model), session.context());
     session.write_mesh(mesh, options.output, options.model);
     if (!options.ghosts.empty()) session.write_mesh(ghosts, options.ghosts);
     Report report;

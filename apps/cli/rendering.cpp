@@ -37,7 +37,13 @@ void Rendering::choose_surfels(Subject& subject, const std::string& path) {
 
 std::unique_ptr<Subject> Rendering::read(const std::string& path) {
     auto subject = std::make_unique<Subject>();
-    Session::Content content = session_.read_any(path);
+    const FileReader file = session_.open(path);
+    if (is_level_at_rest(file, path)) {
+        subject->mesh = session_.read_level(file, *options_.restore.level, path);
+        finish(*subject, path);
+        return subject;
+    }
+    Session::Content content = session_.read_any(file, path);
     if (auto* model = std::get_if<Model>(&content.value)) {
         subject->model = std::move(*model);
         subject->poses = std::move(content.poses);
@@ -52,14 +58,23 @@ std::unique_ptr<Subject> Rendering::read(const std::string& path) {
             refuse(path + ": is a mesh, and --poses and --frame move a model; 'filigree strip' makes one of it.");
         subject->mesh = std::move(std::get<Mesh>(content.value));
     }
-    subject->materials = load_surface_materials(subject->mesh, path);
-    session_.warn(subject->materials.warnings);
-    if (subject->mesh.vertex_count() == 0)
-        refuse(ErrorCode::unsuitable, path + ": has no vertices, so there is nothing to draw.");
-    if (!std::exchange(up_known_, true)) up_ = up_of(options_.up, subject->mesh, path);
-    choose_scalars(*subject, path);
-    if (options_.as == DrawnAs::surfels) choose_surfels(*subject, path);
+    finish(*subject, path);
     return subject;
+}
+
+bool Rendering::is_level_at_rest(const FileReader& file, const std::string& path) const {
+    return options_.restore.level && options_.poses.empty() && options_.frame == 0 && options_.scalar != "level" &&
+           options_.as == DrawnAs::polygons && is_model_file(file) && session_.outline(file, path).frames == 0;
+}
+
+void Rendering::finish(Subject& subject, const std::string& path) {
+    subject.materials = load_surface_materials(subject.mesh, path);
+    session_.warn(subject.materials.warnings);
+    if (subject.mesh.vertex_count() == 0)
+        refuse(ErrorCode::unsuitable, path + ": has no vertices, so there is nothing to draw.");
+    if (!std::exchange(up_known_, true)) up_ = up_of(options_.up, subject.mesh, path);
+    choose_scalars(subject, path);
+    if (options_.as == DrawnAs::surfels) choose_surfels(subject, path);
 }
 
 void Rendering::choose_scalars(Subject& subject, const std::string& path) {

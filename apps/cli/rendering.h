@@ -80,6 +80,10 @@ public:
 protected:
     const RunContext& context() const { return session_.context(); }
     std::unique_ptr<Subject> read(const std::string& path);
+    /// A level of a model that does not move: its own part of the file is enough.
+    bool is_level_at_rest(const FileReader& file, const std::string& path) const;
+    /// What any mesh needs before it is drawn.
+    void finish(Subject& subject, const std::string& path);
     void choose_scalars(Subject& subject, const std::string& path);
     void choose_surfels(Subject& subject, const std::string& path);
     void upload(Subject& subject);

@@ -126,12 +126,12 @@ void Session::warn(const std::vector<std::string>& sentences) {
     for (const std::string& sentence : sentences) warn(sentence);
 }
 
-std::string Session::read_bytes(const std::string& path) const {
+FileReader Session::open(const std::string& path) const {
     std::error_code ignored;
     is_waiting_for_input = path == "-" || !std::filesystem::is_regular_file(path, ignored); // a pipe, a terminal
-    Result<std::string> bytes = read_file(path);
+    Result<FileReader> file = FileReader::open(path);
     is_waiting_for_input = 0;
-    return require(std::move(bytes));
+    return require(std::move(file));
 }
 
 Mesh Session::parse_mesh(const std::string& bytes, const std::string& path) {
@@ -141,35 +141,47 @@ Mesh Session::parse_mesh(const std::string& bytes, const std::string& path) {
 }
 
 Mesh Session::read_mesh(const std::string& path) {
-    const std::string bytes = read_bytes(path);
-    if (is_model_file(bytes))
+    const FileReader file = open(path);
+    if (is_model_file(file))
         refuse(ErrorCode::bad_file, shown_name(path) + ": is a model where a mesh belongs; "
                                                        "'filigree level MODEL 0 -o MESH' writes its driver.");
-    return parse_mesh(bytes, path);
+    return parse_mesh(require(file.read_all()), path);
+}
+
+FileReader Session::open_model(const std::string& path) const {
+    FileReader file = open(path);
+    if (!is_model_file(file))
+        refuse(ErrorCode::bad_file,
+               shown_name(path) + " is not a Filigree model: make one of a mesh with 'filigree strip'.");
+    return file;
 }
 
 Model Session::read_model(const std::string& path, PoseSequence* poses) {
-    const std::string bytes = read_bytes(path);
-    if (!is_model_file(bytes))
-        refuse(ErrorCode::bad_file,
-               shown_name(path) + " is not a Filigree model: make one of a mesh with 'filigree strip'.");
-    if (poses) *poses = require(read_poses(bytes, shown_name(path), context()));
-    return require(filigree::read_model(bytes, shown_name(path), context()));
+    return read_model(open_model(path), path, poses);
 }
 
-Session::Content Session::read_any(const std::string& path, bool keep_scene) {
-    const std::string bytes = read_bytes(path);
-    if (keep_scene && is_gltf(bytes)) {
-        GltfScene scene = require(GltfScene::read(bytes, shown_name(path), context()));
-        warn(scene.warnings());
-        return {scene.mesh(), bytes.size(), {}, std::move(scene)};
-    }
-    if (!is_model_file(bytes)) return {parse_mesh(bytes, path), bytes.size(), {}, {}};
-    return {require(filigree::read_model(bytes, shown_name(path), context())),
-            bytes.size(),
-            require(read_poses(bytes, shown_name(path), context())),
-            {}};
+Model Session::read_model(const FileReader& file, const std::string& path, PoseSequence* poses) {
+    if (poses) *poses = require(read_poses(file, shown_name(path), context()));
+    return require(filigree::read_model(file, shown_name(path), context()));
 }
+
+Mesh Session::read_level(const FileReader& file, unsigned level, const std::string& path) const {
+    const unsigned finest = unsigned(outline(file, path).levels.size()) - 1;
+    if (level > finest) refuse(fmt::format("{}: has levels 0 to {}; there is no level {}.", path, finest, level));
+    return require(read_model_level(file, level, shown_name(path), context()));
+}
+
+ModelOutline Session::outline(const FileReader& file, const std::string& path) const {
+    return require(read_model_outline(file, shown_name(path), context()));
+}
+
+Session::Content Session::read_any(const FileReader& file, const std::string& path) {
+    if (!is_model_file(file)) return {parse_mesh(require(file.read_all()), path), {}};
+    return {require(filigree::read_model(file, shown_name(path), context())),
+            require(read_poses(file, shown_name(path), context()))};
+}
+
+Session::Content Session::read_any(const std::string& path) { return read_any(open(path), path); }
 
 void Session::begin_writing(const std::string& path) {
     if (context().is_cancelled()) throw Failure{cancelled_error()};

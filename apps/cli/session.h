@@ -10,6 +10,7 @@
 #include "filigree/hierarchy/pose.h"
 #include "filigree/io/gltf.h"
 #include "filigree/io/mesh_file.h"
+#include "filigree/io/model_file.h"
 #include "filigree/mesh/mesh_distance.h"
 
 #include <functional>
@@ -62,17 +63,27 @@ public:
     /// The same without progress, for parts of a work whose whole is shown.
     RunContext silent_context() const;
 
+    /// A file to read a part of; while a pipe is waited for, Ctrl-C ends the program.
+    FileReader open(const std::string& path) const;
+    /// The same of a model, and nothing else.
+    FileReader open_model(const std::string& path) const;
+
     Mesh read_mesh(const std::string& path);
+    /// A mesh of a file's bytes; its warnings are said.
+    Mesh parse_mesh(const std::string& bytes, const std::string& path);
     /// poses: where to put the model's own; null: not wanted.
     Model read_model(const std::string& path, PoseSequence* poses = nullptr);
+    Model read_model(const FileReader& file, const std::string& path, PoseSequence* poses = nullptr);
+    /// What a model's file says of it, and one of its levels, without reading all of it.
+    ModelOutline outline(const FileReader& file, const std::string& path) const;
+    Mesh read_level(const FileReader& file, unsigned level, const std::string& path) const;
     struct Content {
         std::variant<Mesh, Model> value;
-        std::size_t bytes;                   ///< of the file
-        PoseSequence poses;                  ///< of a model that has been moved
-        std::optional<GltfScene> scene = {}; ///< that the mesh is of, where it was asked for
+        PoseSequence poses; ///< of a model that has been moved
     };
-    /// A mesh or a model, told by the content. keep_scene: whether what else a glTF file holds is wanted.
-    Content read_any(const std::string& path, bool keep_scene = false);
+    /// A mesh or a model, told by the content.
+    Content read_any(const std::string& path);
+    Content read_any(const FileReader& file, const std::string& path);
     /// source: the file that the mesh came from, for formats that take materials in (GLB); empty: none.
     void write_mesh(const Mesh& mesh, const std::string& path, const std::string& source = {});
     void write_model(const Model& model, const std::string& path, const PoseSequence& poses = {});
@@ -90,9 +101,6 @@ public:
     void print(const std::string& text, Json object);
 
 private:
-    std::string read_bytes(const std::string& path) const;
-    Mesh parse_mesh(const std::string& bytes, const std::string& path);
-
     std::optional<RunContext> context_;
     std::vector<std::string> warnings_, given_;
     bool wrote_file_ = false;

@@ -362,6 +362,17 @@ TEST(ModelFile, ADriverSectionInAFloatModelIsNoReasonToReadPastItsEnd) {
     EXPECT_NE(error_of(again.bytes()), "");
 }
 
+/// What is read in part is sound or refused, like the whole.
+void expect_sound_parts(const std::string& bytes) {
+    const FileReader file{std::string_view(bytes)};
+    const Result<ModelOutline> outline = read_model_outline(file, "a.fil", kContext);
+    if (!outline) return;
+    for (unsigned k = 0; k < outline->levels.size(); ++k) {
+        const Result<Mesh> level = read_model_level(file, k, "a.fil", kContext);
+        EXPECT_EQ(level ? check_mesh(*level) : "", "");
+    }
+}
+
 TEST(ModelFile, FuzzedFilesAreSoundOrRefused) {
     std::vector<std::string> seeds;
     for (const Model& model : small_models()) seeds.push_back(write_model(model));
@@ -394,8 +405,69 @@ TEST(ModelFile, FuzzedFilesAreSoundOrRefused) {
         std::string bytes = patcher.bytes(); // checksums are right; sometimes damaged once more
         if (below(8) == 0) bytes.resize(below(bytes.size()));
         ASSERT_NO_FATAL_FAILURE(expect_sound_or_refused(bytes)) << "round " << rounds;
+        ASSERT_NO_FATAL_FAILURE(expect_sound_parts(bytes)) << "round " << rounds;
     }
     EXPECT_GT(rounds, 100u);
+}
+
+bool same_mesh(const Mesh& a, const Mesh& b) {
+    if (a.scalars.size() != b.scalars.size()) return false;
+    for (std::size_t i = 0; i < a.scalars.size(); ++i)
+        if (a.scalars[i].name != b.scalars[i].name || a.scalars[i].values != b.scalars[i].values) return false;
+    return a.origin == b.origin && same_bytes(a.positions, b.positions) && a.corners == b.corners &&
+           a.face_offsets == b.face_offsets && same_bytes(a.normals.values, b.normals.values) &&
+           a.normals.corners == b.normals.corners && a.uvs.values == b.uvs.values && a.colors == b.colors;
+}
+
+TEST(ModelFile, ALevelIsReadAlone) {
+    for (const Model& written : small_models()) {
+        const std::string bytes = write_model(written);
+        const Model model = *read(bytes); // int16 records round positions
+        const FileReader file{std::string_view(bytes)};
+        for (unsigned k = 0; k <= model.finest_level(); ++k) {
+            const Result<Mesh> level = read_model_level(file, k, "a.fil", kContext);
+            ASSERT_TRUE(level.ok()) << level.error().message;
+            EXPECT_TRUE(same_mesh(*level, level_mesh(model, k))) << k;
+        }
+        EXPECT_EQ(read_model_level(file, model.finest_level() + 1, "a.fil", kContext).error().code, ErrorCode::usage);
+    }
+}
+
+TEST(ModelFile, AnOutlineSaysWhatTheModelIs) {
+    for (const Model& model : small_models()) {
+        PoseSequence poses{25, {}};
+        if (model.code() == DetailCode::blend) poses.frames.assign(3, rest_pose(model));
+        const std::string bytes = write_model(model, poses);
+        const Result<ModelOutline> outline = read_model_outline(FileReader(bytes), "a.fil", kContext);
+        ASSERT_TRUE(outline.ok()) << outline.error().message;
+        EXPECT_EQ(outline->code, model.code());
+        ASSERT_EQ(outline->levels.size(), model.finest_level() + 1);
+        for (unsigned k = 0; k <= model.finest_level(); ++k) {
+            EXPECT_EQ(outline->levels[k].vertices, level_counts(model, k).vertices);
+            EXPECT_EQ(outline->levels[k].faces, level_counts(model, k).faces);
+            EXPECT_EQ(outline->levels[k].corners, level_counts(model, k).corners);
+        }
+        EXPECT_EQ(outline->bytes, bytes.size());
+        EXPECT_EQ(outline->frames, poses.frames.size());
+        EXPECT_EQ(outline->frames_per_second, poses.frames.empty() ? 0 : 25);
+        if (const auto* detail = std::get_if<BlendDetail>(&model.detail)) {
+            EXPECT_EQ(outline->precision, detail->precision);
+            EXPECT_EQ(outline->facing_away, detail->facing_away);
+        } else {
+            EXPECT_EQ(outline->references, std::get<ReferenceDetail>(model.detail).references);
+            EXPECT_EQ(outline->patches, std::get<ReferenceDetail>(model.detail).patches.patch_count());
+        }
+    }
+}
+
+TEST(ModelFile, AnOutlineReadsNothingElse) {
+    const Model model = stripped(make_wavy_cube({.resolution = 200}), {.base = 100});
+    std::string bytes = write_model(model);
+    const std::size_t positions = bytes.find(std::string(reinterpret_cast<const char*>(&model.mesh.positions[0]), 24));
+    ASSERT_NE(positions, std::string::npos);
+    bytes[positions + 7] ^= 1; // seen by who reads all of it
+    EXPECT_FALSE(read(bytes).ok());
+    EXPECT_TRUE(read_model_outline(FileReader(bytes), "a.fil", kContext).ok());
 }
 
 TEST(ModelFile, WritingFailsWithoutHarm) {

@@ -136,8 +136,7 @@ bool sort_into_blocks(std::span<const BlendRestorer::Item> items, std::vector<Wa
     if (runs_in_blocks * kShortMeanRun > items.size() && 2 * runs_in_blocks > 3 * runs) return false;
     for (std::size_t b = 0; b < blocks; ++b) starts[b + 1] += starts[b];
     std::vector<WantedRecord> sorted(wanted.size());
-    for (const WantedRecord& record : wanted)
-        sorted[starts[items[record.item].slot / blend_kernel::kBlock]++] = record;
+    for (const WantedRecord& record : wanted) sorted[starts[items[record.item].slot / blend_kernel::kBlock]++] = record;
     wanted = std::move(sorted);
     return true;
 }

@@ -120,10 +120,9 @@ FILIGREE_INLINE void restore_run(const Records& records, const Run& run, const C
                                    L::load(&records.normal[2][r])};
             for (int i = 0; i < 3; ++i) { // cofactor: columns a1 x a2, a2 x a0, a0 x a1
                 const int j = (i + 1) % 3, l = (i + 2) % 3;
-                L::store(normals.at[i] + first + k,
-                         (a[3 + j] * a[6 + l] - a[3 + l] * a[6 + j]) * rest[0] +
-                             (a[6 + j] * a[l] - a[6 + l] * a[j]) * rest[1] +
-                             (a[j] * a[3 + l] - a[l] * a[3 + j]) * rest[2]);
+                L::store(normals.at[i] + first + k, (a[3 + j] * a[6 + l] - a[3 + l] * a[6 + j]) * rest[0] +
+                                                        (a[6 + j] * a[l] - a[6 + l] * a[j]) * rest[1] +
+                                                        (a[j] * a[3 + l] - a[l] * a[3 + j]) * rest[2]);
             }
         }
     }
@@ -244,9 +243,9 @@ FILIGREE_INLINE Group restore_block(const Job& job, std::size_t run_begin, std::
     Group done{run_begin, 0};
     while (done.run_end < run_end && done.count < kBlock) {
         const std::size_t room = buffers.kRoom - done.count;
-        const Group group = restore_group<N, Int16, Positions, Normals>(
-            job, done.run_end, run_end, {buffers.positions() + 3 * done.count, room},
-            {buffers.normals() + 3 * done.count, room});
+        const Group group = restore_group<N, Int16, Positions, Normals>(job, done.run_end, run_end,
+                                                                        {buffers.positions() + 3 * done.count, room},
+                                                                        {buffers.normals() + 3 * done.count, room});
         done = {group.run_end, done.count + group.count};
     }
     return done;
@@ -299,8 +298,7 @@ FILIGREE_INLINE void restore_blocks(const Job& job, std::size_t begin, std::size
         const std::span from = std::span(job.records.from).subspan(first, done.count);
         if constexpr (Positions)
             put_in_order(buffers.positions(), from, job.streaming, job.output.positions[first].data());
-        if constexpr (Normals)
-            put_in_order(buffers.normals(), from, job.streaming, job.output.normals[first].data());
+        if constexpr (Normals) put_in_order(buffers.normals(), from, job.streaming, job.output.normals[first].data());
     }
 }
 

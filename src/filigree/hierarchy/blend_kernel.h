@@ -37,7 +37,8 @@ struct Records {
     std::vector<float> scale;            ///< int16 records: one a cell
     std::vector<float> normal[3];        ///< empty or unit rest normals
     std::vector<Index> slot;             ///< where record r goes when order is asked for
-    /// Where the mesh's order allows it, records come block by block of kBlock slots, and in a block by cell. Else none.
+    /// Where the mesh's order allows it, records come block by block of kBlock slots, and in a block by cell. Else
+    /// none.
     std::vector<Index> block_runs;   ///< the first run of each block, and the end
     std::vector<std::uint16_t> from; ///< of each slot: which record of its block goes there
 

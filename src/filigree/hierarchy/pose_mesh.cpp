@@ -43,8 +43,9 @@ Pose pose_of_mesh(const Mesh& moved, const Vec3d& origin) {
     return pose;
 }
 
-Mesh driver_mesh(const Model& model) {
-    Mesh driver = level_mesh(model, 0);
+Mesh driver_mesh(const Model& model) { return driver_mesh(level_mesh(model, 0)); }
+
+Mesh driver_mesh(Mesh driver) {
     std::erase_if(driver.scalars, [](const VertexScalar& scalar) { return is_gradient_name(scalar.name); });
     return driver;
 }

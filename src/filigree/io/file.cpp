@@ -3,6 +3,7 @@
 #include "filigree/io/large_memory.h"
 #include "filigree/io/temporary_file.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <new>
@@ -44,6 +45,18 @@ private:
     int descriptor_;
 };
 
+/// What `read` gives, or that there is no room for it.
+template <class Read>
+Result<std::string> in_memory(const fs::path& path, const Read& read) {
+    try {
+        return read();
+    } catch (const std::bad_alloc&) {
+        return Error{ErrorCode::out_of_memory, path.string() + ": does not fit into memory."};
+    } catch (const std::length_error&) {
+        return Error{ErrorCode::out_of_memory, path.string() + ": does not fit into memory."};
+    }
+}
+
 Result<std::string> read_descriptor(int descriptor, const fs::path& path) {
     constexpr std::size_t kPipePiece = std::size_t{1} << 16;
     struct stat status {};
@@ -66,6 +79,10 @@ Result<std::string> read_descriptor(int descriptor, const fs::path& path) {
             return bytes;
         }
     }
+}
+
+Result<std::string> read_whole(int descriptor, const fs::path& path) {
+    return in_memory(path, [&] { return read_descriptor(descriptor, path); });
 }
 
 /// Where a descriptor's file can be linked from.
@@ -100,16 +117,82 @@ int open_temporary(const fs::path& folder, fs::path& temporary) {
 } // namespace
 
 Result<std::string> read_file(const fs::path& path) {
-    try {
-        if (path == "-") return read_descriptor(STDIN_FILENO, "standard input");
-        const FileDescriptor descriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-        if (!descriptor.is_open()) return cannot_read(path, errno);
-        return read_descriptor(descriptor.get(), path);
-    } catch (const std::bad_alloc&) {
-        return Error{ErrorCode::out_of_memory, path.string() + ": does not fit into memory."};
-    } catch (const std::length_error&) {
-        return Error{ErrorCode::out_of_memory, path.string() + ": does not fit into memory."};
+    if (path == "-") return read_whole(STDIN_FILENO, "standard input");
+    const FileDescriptor descriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+    if (!descriptor.is_open()) return cannot_read(path, errno);
+    return read_whole(descriptor.get(), path);
+}
+
+struct FileReader::OpenFile {
+    fs::path path;
+    FileDescriptor descriptor{-1}; ///< of a file that can be read anywhere; else the bytes are all here
+    std::string kept;
+    std::string_view bytes;
+    std::uint64_t size = 0;
+};
+
+FileReader::FileReader(std::unique_ptr<OpenFile> file) : file_(std::move(file)) {}
+FileReader::FileReader(FileReader&&) noexcept = default;
+FileReader& FileReader::operator=(FileReader&&) noexcept = default;
+FileReader::~FileReader() = default;
+
+FileReader::FileReader(std::string_view bytes) : file_(std::make_unique<OpenFile>()) {
+    file_->bytes = bytes;
+    file_->size = bytes.size();
+}
+
+Result<FileReader> FileReader::open(const fs::path& path) {
+    auto file = std::make_unique<OpenFile>();
+    file->path = path;
+    struct stat status {};
+    if (path != "-") {
+        file->descriptor.reset(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+        if (!file->descriptor.is_open() || ::fstat(file->descriptor.get(), &status) != 0)
+            return cannot_read(path, errno);
+        file->size = static_cast<std::uint64_t>(status.st_size);
+        if (S_ISREG(status.st_mode) && file->size > 0) return FileReader(std::move(file));
     }
+    Result<std::string> bytes = read_whole(path == "-" ? STDIN_FILENO : file->descriptor.get(),
+                                           path == "-" ? fs::path("standard input") : path);
+    if (!bytes) return bytes.error();
+    file->descriptor.close();
+    file->kept = std::move(*bytes);
+    file->bytes = file->kept;
+    file->size = file->bytes.size();
+    return FileReader(std::move(file));
+}
+
+std::uint64_t FileReader::size() const { return file_->size; }
+
+Status FileReader::read(std::uint64_t offset, std::span<char> to) const {
+    const OpenFile& file = *file_;
+    const auto is_shorter = [&] {
+        return Error{ErrorCode::not_found, file.path.string() + ": cannot be read: it became shorter meanwhile."};
+    };
+    if (offset > file.size || to.size() > file.size - offset) return is_shorter();
+    if (!file.descriptor.is_open()) {
+        std::copy_n(file.bytes.data() + offset, to.size(), to.data());
+        return Success{};
+    }
+    while (!to.empty()) {
+        const ssize_t got = ::pread(file.descriptor.get(), to.data(), to.size(), static_cast<off_t>(offset));
+        if (got < 0 && errno == EINTR) continue;
+        if (got < 0) return cannot_read(file.path, errno);
+        if (got == 0) return is_shorter();
+        to = to.subspan(static_cast<std::size_t>(got));
+        offset += static_cast<std::uint64_t>(got);
+    }
+    return Success{};
+}
+
+Result<std::string> FileReader::read_all() const {
+    return in_memory(file_->path, [&]() -> Result<std::string> {
+        std::string bytes;
+        reserve_large(bytes, size());
+        bytes.resize(size());
+        if (Status filled = read(0, bytes); !filled) return filled.error();
+        return bytes;
+    });
 }
 
 struct FileWriter::OpenFile {

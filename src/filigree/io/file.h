@@ -3,6 +3,7 @@
 
 #include "filigree/core/result.h"
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <span>
@@ -13,6 +14,30 @@ namespace filigree {
 
 /// The bytes of a file; "-" is standard input. Errors: not_found (missing, a directory, no permission), out_of_memory.
 Result<std::string> read_file(const std::filesystem::path& path);
+
+/// A file whose pieces are read when they are asked for. A pipe or standard input is read whole when it is opened.
+class FileReader {
+public:
+    /// "-" is standard input. Errors: as of read_file.
+    static Result<FileReader> open(const std::filesystem::path& path);
+    /// Bytes that somebody else keeps.
+    explicit FileReader(std::string_view bytes);
+    FileReader(FileReader&&) noexcept;
+    FileReader& operator=(FileReader&&) noexcept;
+    ~FileReader();
+
+    std::uint64_t size() const;
+    /// Fills `to` with the bytes from `offset` on. Errors: not_found (they cannot be read, or the file has become
+    /// shorter).
+    Status read(std::uint64_t offset, std::span<char> to) const;
+    /// All of it. Errors: as of read, and out_of_memory.
+    Result<std::string> read_all() const;
+
+private:
+    struct OpenFile;
+    explicit FileReader(std::unique_ptr<OpenFile> file);
+    std::unique_ptr<OpenFile> file_;
+};
 
 /// Replaces `path` by `pieces`, one after the other: written to a temporary file in the same folder, flushed, then
 /// renamed. On any error, or when the process dies, `path` is as it was. "-" is standard output. Only a device or pipe

@@ -2,8 +2,6 @@
 // own checksum. Reading goes through the table alone, so sections of later versions are passed over.
 #include "filigree/io/model_file.h"
 
-#include "filigree/io/file.h"
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -271,30 +269,31 @@ struct Damage {
 
 class SectionReader {
 public:
-    explicit SectionReader(std::string_view bytes) : bytes_(bytes) {
+    /// The file has to outlive the reader.
+    explicit SectionReader(const FileReader& file) : file_(file) {
         ModelHeader header;
-        if (bytes.size() < sizeof header) throw Damage{"is cut off in its header"};
-        std::memcpy(&header, bytes.data(), sizeof header);
+        if (file.size() < sizeof header) throw Damage{"is cut off in its header"};
+        read(0, std::span(&header, 1));
         if (header.version != kVersion)
             throw Damage{"is of version " + std::to_string(header.version) + " and this program reads version " +
                              std::to_string(kVersion),
                          "use a newer program, or strip the mesh again"};
-        if (header.file_size != bytes.size())
+        if (header.file_size != file.size())
             throw Damage{"should have " + std::to_string(header.file_size) + " bytes and has " +
-                         std::to_string(bytes.size()) + ": it was cut off or added to"};
-        if (header.section_count > (bytes.size() - sizeof header) / sizeof(Section))
+                         std::to_string(file.size()) + ": it was cut off or added to"};
+        if (header.section_count > (file.size() - sizeof header) / sizeof(Section))
             throw Damage{"names more sections than fit into it"};
-        const std::size_t table_bytes = header.section_count * sizeof(Section);
-        if (XXH3_64bits(bytes.data() + sizeof header, table_bytes) != header.table_hash)
+        std::vector<Section> table(header.section_count);
+        read(sizeof header, std::span(table));
+        const std::size_t table_bytes = table.size() * sizeof(Section);
+        if (XXH3_64bits(table.data(), table_bytes) != header.table_hash)
             throw Damage{"has a damaged table of sections (checksum)"};
         // No two sections share bytes, so all of them together need no more memory than the file.
         std::size_t end = sizeof header + table_bytes;
-        for (std::size_t i = 0; i < header.section_count; ++i) {
-            Section section;
-            std::memcpy(&section, bytes.data() + sizeof header + i * sizeof section, sizeof section);
+        for (const Section& section : table) {
             const std::string name(section.name, strnlen(section.name, sizeof section.name));
-            if (section.offset < end || section.offset > bytes.size() || section.item_size == 0 ||
-                section.count > (bytes.size() - section.offset) / section.item_size)
+            if (section.offset < end || section.offset > file.size() || section.item_size == 0 ||
+                section.count > (file.size() - section.offset) / section.item_size)
                 throw Damage{"has a section " + name + " that overlaps another or reaches past its end"};
             end = section.offset + section.count * section.item_size;
             sections_.emplace(std::pair(name, section.index), section);
@@ -304,16 +303,38 @@ public:
     /// The items of a section; empty when there is none.
     template <class T>
     std::vector<T> array(std::string_view name, std::uint32_t index = 0) const {
-        const auto found = sections_.find({std::string(name), index});
-        if (found == sections_.end()) return {};
-        const Section& section = found->second;
-        if (section.item_size != sizeof(T)) throw Damage{"has items of a wrong size in section " + found->first.first};
-        const char* begin = bytes_.data() + section.offset;
-        if (XXH3_64bits(begin, section.count * sizeof(T)) != section.hash)
-            throw Damage{"has a damaged section " + found->first.first + " (checksum)"};
-        std::vector<T> items(section.count);
-        if (!items.empty()) std::memcpy(static_cast<void*>(items.data()), begin, items.size() * sizeof(T));
+        const Section* section = find<T>(name, index);
+        if (!section) return {};
+        std::vector<T> items(section->count);
+        read(section->offset, std::span(items));
+        if (XXH3_64bits(items.data(), items.size() * sizeof(T)) != section->hash)
+            throw Damage{"has a damaged section " + std::string(name) + " (checksum)"};
         return items;
+    }
+    /// How many items a section has.
+    template <class T>
+    std::size_t item_count(std::string_view name, std::uint32_t index = 0) const {
+        const Section* section = find<T>(name, index);
+        return section ? section->count : 0;
+    }
+    /// Some items of a section alone, without its checksum. ids: ascending.
+    template <class T>
+    std::vector<T> items(std::string_view name, std::span<const Index> ids, std::uint32_t index = 0) const {
+        constexpr std::size_t kGap = 4096 / sizeof(T), kPiece = (std::size_t{1} << 20) / sizeof(T); // items
+        const Section* section = find<T>(name, index);
+        if (!section) return {};
+        if (!ids.empty() && ids.back() >= section->count) throw Damage{"lacks items in section " + std::string(name)};
+        std::vector<T> chosen(ids.size()), piece;
+        for (std::size_t begin = 0, end = 0; begin < ids.size(); begin = end) {
+            // what lies close together is read at once
+            for (end = begin + 1;
+                 end < ids.size() && ids[end] - ids[end - 1] <= kGap && ids[end] - ids[begin] < kPiece;)
+                ++end;
+            piece.resize(ids[end - 1] - ids[begin] + 1);
+            read(section->offset + ids[begin] * sizeof(T), std::span(piece));
+            for (std::size_t k = begin; k < end; ++k) chosen[k] = piece[ids[k] - ids[begin]];
+        }
+        return chosen;
     }
     template <class T>
     T value(std::string_view name) const {
@@ -341,7 +362,22 @@ public:
     }
 
 private:
-    std::string_view bytes_;
+    template <class T>
+    void read(std::uint64_t offset, std::span<T> items) const {
+        const std::span bytes(reinterpret_cast<char*>(items.data()), items.size_bytes());
+        if (Status filled = file_.read(offset, bytes); !filled) throw filled.error();
+    }
+    /// Null: there is no such section.
+    template <class T>
+    const Section* find(std::string_view name, std::uint32_t index) const {
+        const auto found = sections_.find({std::string(name), index});
+        if (found == sections_.end()) return nullptr;
+        if (found->second.item_size != sizeof(T))
+            throw Damage{"has items of a wrong size in section " + found->first.first};
+        return &found->second;
+    }
+
+    const FileReader& file_;
     std::map<std::pair<std::string, std::uint32_t>, Section> sections_; ///< by name and index; of equals the first
 };
 
@@ -460,8 +496,8 @@ std::size_t frame_count(const SectionReader& in, const std::string& name) {
     return count;
 }
 
-PoseSequence read_pose_sections(std::string_view bytes) {
-    const SectionReader in(bytes);
+PoseSequence read_pose_sections(const FileReader& file) {
+    const SectionReader in(file);
     PoseSequence poses;
     const std::size_t frames = frame_count(in, "pose.pos"), with_gradients = frame_count(in, "pose.grd");
     if (frames == 0 && with_gradients == 0) return poses;
@@ -482,8 +518,8 @@ PoseSequence read_pose_sections(std::string_view bytes) {
     return poses;
 }
 
-Model read_sections(std::string_view bytes) {
-    const SectionReader in(bytes);
+Model read_sections(const FileReader& file) {
+    const SectionReader in(file);
     Model model;
     model.mesh = read_mesh_sections(in);
     const auto level_count = in.value<std::uint32_t>("levels");
@@ -521,15 +557,78 @@ Model read_sections(std::string_view bytes) {
     return model;
 }
 
-/// What `read` makes of a file's bytes; what it throws as an Error.
+ModelOutline read_outline_sections(const FileReader& file) {
+    const SectionReader in(file);
+    ModelOutline outline;
+    const auto faces = [&](const std::string& name, std::uint32_t index) {
+        const std::size_t corners = in.item_count<Index>(name + ".cor", index);
+        const std::vector<Index> size = in.array<Index>(name + ".siz", index);
+        const std::size_t offsets = in.item_count<Index>(name + ".off", index);
+        return size.size() == 1 && size[0] > 0 ? corners / size[0] : offsets - (offsets > 0);
+    };
+    const auto level_count = in.value<std::uint32_t>("levels");
+    if (level_count < 1 || level_count > 64) throw Damage{"has a number of levels that makes no sense"};
+    for (std::uint32_t k = 0; k < level_count; ++k)
+        outline.levels.push_back(
+            {in.item_count<Index>("lev.vert", k), faces("lev", k), in.item_count<Index>("lev.cor", k)});
+    outline.levels.push_back({in.value<std::uint64_t>("mesh.num"), faces("mesh", 0), in.item_count<Index>("mesh.cor")});
+    if (in.value<std::uint32_t>("code") == static_cast<std::uint32_t>(DetailCode::reference)) {
+        outline.code = DetailCode::reference;
+        outline.references = in.value<std::array<std::uint32_t, 2>>("rf.par")[1];
+        outline.patches = in.item_count<std::array<Index, 4>>("rf.base");
+    } else {
+        const auto precision = in.value<std::uint32_t>("bl.prec");
+        if (precision > 1) throw Damage{"has records of a precision that is not known"};
+        outline.precision = static_cast<Precision>(precision);
+        outline.across_gap = in.array<Index>("bl.gap");
+        outline.facing_away = in.array<Index>("bl.away");
+    }
+    outline.frames = frame_count(in, "pose.pos");
+    outline.has_gradients = frame_count(in, "pose.grd") > 0;
+    if (outline.frames > 0) outline.frames_per_second = in.value<double>("pose.fps");
+    outline.bytes = file.size();
+    return outline;
+}
+
+Mesh read_level_sections(const FileReader& file, unsigned k) {
+    const SectionReader in(file);
+    const std::uint32_t level_count = in.value<std::uint32_t>("levels");
+    if (k > level_count)
+        throw Error{ErrorCode::usage, "The model has levels 0 to " + std::to_string(level_count) +
+                                          "; there is no level " + std::to_string(k) + "."};
+    const bool positions_are_coded = in.item_count<Vec3f>("mesh.pos") == 0;
+    if (k == level_count || positions_are_coded) return level_mesh(read_sections(file), k);
+    const std::vector<Index> vertices = in.array<Index>("lev.vert", k);
+    if (!std::is_sorted(vertices.begin(), vertices.end()))
+        throw Damage{"is inconsistent: a level's vertices do not ascend"};
+    Mesh mesh;
+    const auto origin = in.value<std::array<double, 3>>("mesh.org");
+    mesh.origin = {origin[0], origin[1], origin[2]};
+    read_faces(in, "lev", k, mesh.face_offsets, mesh.corners);
+    mesh.positions = in.items<Vec3f>("mesh.pos", vertices);
+    const auto per_vertex = [&](const std::string& name) { return in.item_count<Index>(name + ".cor") == 0; };
+    if (per_vertex("uv")) mesh.uvs.values = in.items<Vec2f>("uv.val", vertices);
+    if (per_vertex("nrm")) mesh.normals.values = in.items<Vec3f>("nrm.val", vertices);
+    mesh.colors = in.items<Vec4f>("col.val", vertices);
+    mesh.colors_have_alpha = !in.array<std::uint32_t>("col.alp").empty();
+    const std::vector<std::string> names = in.strings("scal.nam");
+    for (std::uint32_t i = 0; i < names.size(); ++i)
+        mesh.scalars.push_back({names[i], in.items<float>("scal.val", vertices, i)});
+    if (const std::string wrong = check_mesh(mesh); !wrong.empty()) throw Damage{"is inconsistent: " + wrong};
+    return mesh;
+}
+
+/// What `read` makes of a file; what it throws as an Error.
 template <class Read>
-auto guarded(std::string_view bytes, const std::string& name, const RunContext& context, const Read& read)
-    -> Result<decltype(read(bytes))> {
+auto guarded(const FileReader& file, const std::string& name, const RunContext& context, const Read& read)
+    -> Result<decltype(read(file))> {
     if (context.is_cancelled()) return cancelled_error();
-    if (!is_model_file(bytes))
-        return Error{ErrorCode::bad_file, name + " is not a Filigree model: strip a mesh to make one."};
     try {
-        return read(bytes);
+        if (!is_model_file(file))
+            return Error{ErrorCode::bad_file, name + " is not a Filigree model: strip a mesh to make one."};
+        return read(file);
+    } catch (const Error& error) {
+        return error;
     } catch (const Damage& damage) {
         return Error{ErrorCode::bad_file, name + " " + damage.what + "; " + damage.remedy + "."};
     } catch (const std::bad_alloc&) {
@@ -542,6 +641,11 @@ auto guarded(std::string_view bytes, const std::string& name, const RunContext& 
 } // namespace
 
 bool is_model_file(std::string_view bytes) { return bytes.starts_with(std::string_view(kMagic, sizeof kMagic)); }
+
+bool is_model_file(const FileReader& file) {
+    char first[sizeof kMagic];
+    return file.size() >= sizeof first && file.read(0, first) && is_model_file(std::string_view(first, sizeof first));
+}
 
 namespace {
 
@@ -595,27 +699,44 @@ Status write_model(const Model& model, const std::filesystem::path& path, const 
     return write_model(model, PoseSequence(), path, context);
 }
 
-Result<Model> read_model(std::string_view bytes, const std::string& name, const RunContext& context) {
-    return guarded(bytes, name, context, read_sections);
-}
-
-Result<PoseSequence> read_poses(std::string_view bytes, const std::string& name, const RunContext& context) {
-    return guarded(bytes, name, context, read_pose_sections);
-}
-
-Result<Model> read_model(const std::filesystem::path& path, const RunContext& context) {
+Result<Model> read_model(const FileReader& file, const std::string& name, const RunContext& context) {
     context.report("read", 0);
-    Result<std::string> bytes = read_file(path);
-    if (!bytes) return bytes.error();
-    Result<Model> model = read_model(*bytes, path.string(), context);
+    Result<Model> model = guarded(file, name, context, read_sections);
     context.report("read", 1);
     return model;
 }
 
+Result<Model> read_model(std::string_view bytes, const std::string& name, const RunContext& context) {
+    return read_model(FileReader(bytes), name, context);
+}
+
+Result<Model> read_model(const std::filesystem::path& path, const RunContext& context) {
+    const Result<FileReader> file = FileReader::open(path);
+    if (!file) return file.error();
+    return read_model(*file, path.string(), context);
+}
+
+Result<PoseSequence> read_poses(const FileReader& file, const std::string& name, const RunContext& context) {
+    return guarded(file, name, context, read_pose_sections);
+}
+
+Result<PoseSequence> read_poses(std::string_view bytes, const std::string& name, const RunContext& context) {
+    return read_poses(FileReader(bytes), name, context);
+}
+
 Result<PoseSequence> read_poses(const std::filesystem::path& path, const RunContext& context) {
-    Result<std::string> bytes = read_file(path);
-    if (!bytes) return bytes.error();
-    return read_poses(*bytes, path.string(), context);
+    const Result<FileReader> file = FileReader::open(path);
+    if (!file) return file.error();
+    return read_poses(*file, path.string(), context);
+}
+
+Result<ModelOutline> read_model_outline(const FileReader& file, const std::string& name, const RunContext& context) {
+    return guarded(file, name, context, read_outline_sections);
+}
+
+Result<Mesh> read_model_level(const FileReader& file, unsigned level, const std::string& name,
+                              const RunContext& context) {
+    return guarded(file, name, context, [&](const FileReader& from) { return read_level_sections(from, level); });
 }
 
 } // namespace filigree

@@ -5,6 +5,7 @@
 #include "filigree/core/run_context.h"
 #include "filigree/hierarchy/model.h"
 #include "filigree/hierarchy/pose.h"
+#include "filigree/io/file.h"
 
 #include <filesystem>
 #include <string>
@@ -13,17 +14,42 @@ namespace filigree {
 
 /// Whether a file's first bytes are those of a model.
 bool is_model_file(std::string_view bytes);
+bool is_model_file(const FileReader& file);
 
 /// Reads a model; "-" is standard input. Nothing in the file is trusted: sizes are held against the file's length
 /// before anything is allocated, every section has a checksum, and what comes back passes check_model.
 /// Errors: not_found, bad_file (truncated, damaged, of a later version, not a model), out_of_memory, cancelled.
 Result<Model> read_model(const std::filesystem::path& path, const RunContext& context);
-/// The same from bytes in memory; `name` stands in messages.
+/// The same from a file that is open, or from bytes in memory; `name` stands in messages.
+Result<Model> read_model(const FileReader& file, const std::string& name, const RunContext& context);
 Result<Model> read_model(std::string_view bytes, const std::string& name, const RunContext& context);
+
+/// What a model file says of its model.
+struct ModelOutline {
+    DetailCode code = DetailCode::blend;
+    std::vector<LevelCounts> levels; ///< coarse to fine, with the finest
+    Precision precision = Precision::float32;
+    std::vector<Index> across_gap, facing_away; ///< blend code, as in BlendDetail
+    unsigned references = 0;                    ///< reference code
+    std::size_t patches = 0;                    ///< reference code
+    std::size_t frames = 0;                     ///< poses
+    double frames_per_second = 0;
+    bool has_gradients = false; ///< in the poses
+    std::uint64_t bytes = 0;    ///< of the file
+};
+/// Reads that alone: as quick for a large model as for a small one. Whether all sections fit together is known when
+/// the model is read. Errors: as read_model.
+Result<ModelOutline> read_model_outline(const FileReader& file, const std::string& name, const RunContext& context);
+/// Reads a level's own part of the file (int16 records: all of it, for they hold the positions). The same mesh as
+/// level_mesh. Of positions and attributes, which are read in part, no checksum is held. Errors: as read_model, usage
+/// (no such level).
+Result<Mesh> read_model_level(const FileReader& file, unsigned level, const std::string& name,
+                              const RunContext& context);
 
 /// The poses that a model file holds beside its model; no frames where there are none. Errors: as read_model (a frame
 /// missing or of another number of vertices than the driver, numbers that are not finite).
 Result<PoseSequence> read_poses(const std::filesystem::path& path, const RunContext& context);
+Result<PoseSequence> read_poses(const FileReader& file, const std::string& name, const RunContext& context);
 Result<PoseSequence> read_poses(std::string_view bytes, const std::string& name, const RunContext& context);
 
 /// Writes a model through a temporary file and a rename; "-" is standard output. Errors: unwritable,

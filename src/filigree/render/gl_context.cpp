@@ -91,8 +91,7 @@ bool has_room(std::size_t bytes) {
 Result<HeadlessContext> HeadlessContext::create() {
     if (!can_load("libEGL.so.1")) return no_opengl("libEGL.so.1 is not installed");
     if (!can_load("libGL.so.1") && !can_load("libOpenGL.so.0")) return no_opengl("libOpenGL.so.0 is not installed");
-    constexpr std::size_t kDriverRoom = std::size_t{384}
-                                        << 20; // without it Mesa's compiler of shaders ends the program
+    constexpr std::size_t kDriverRoom = std::size_t{576} << 20; // with less Mesa crashes while it compiles shaders
     if (!has_room(kDriverRoom))
         return Error{ErrorCode::out_of_memory, "There is too little address space for OpenGL; allow more (ulimit -v)."};
     for (EGLDisplay display : displays()) {
