@@ -218,6 +218,14 @@ ChunkReport write_chunk_output(const Model& model, const PoseStream& poses, cons
                                          chunk, session.context()));
 }
 
+void write_chunks_output(const ModelChunks& model, const PoseStream& poses, const RestoreOptions& restore,
+                         const std::string& path, Session& session, Report& report) {
+    session.begin_writing(path);
+    session.warn(require(write_restored_chunks(model, poses, restore, path, session.context())));
+    report_size(path, bytes_of_file(path), report);
+    report_frames(poses.frames, poses.frames_per_second, model.vertex_count(), report);
+}
+
 void write_animation_output(const Model& model, const PoseStream& poses, const RestoreOptions& restore,
                             const AnimationOutput& output, const std::string& path, const std::string& materials_beside,
                             Session& session, Report& report) {

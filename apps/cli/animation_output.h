@@ -5,6 +5,7 @@
 
 #include "filigree/hierarchy/restore.h"
 #include "filigree/io/gltf_export.h"
+#include "filigree/io/model_chunks.h"
 #include "filigree/io/point_cache.h"
 
 namespace filigree::cli {
@@ -50,6 +51,10 @@ AnimationChunk chunk_of(const std::string& text);
 /// Restores one chunk of the frames into `path`, a .pc2 that other processes write too.
 ChunkReport write_chunk_output(const Model& model, const PoseStream& poses, const RestoreOptions& restore,
                                const AnimationChunk& chunk, const std::string& path, Session& session);
+
+/// Restores the poses into `path`, a .pc2, while the model stays in its file. Reports as write_animation_output.
+void write_chunks_output(const ModelChunks& model, const PoseStream& poses, const RestoreOptions& restore,
+                         const std::string& path, Session& session, Report& report);
 
 /// Writes a model's poses to `path`: .glb as a skin (or morph targets), everything else restored frame by frame, one in
 /// memory at a time. Reports what was written. materials_beside: the model's or mesh's own path.

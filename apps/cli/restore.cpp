@@ -175,14 +175,49 @@ std::string job_of(const RestoreArguments& options) {
                        file.frames_per_second.value_or(0), file.animation);
 }
 
-void restore_chunk(const RestoreArguments& options, Session& session) {
+/// The model where it can stay in its file: restored to its finest level, into a .pc2, from a file that can be read
+/// here and there.
+std::optional<ModelChunks> chunks_in_file(const RestoreArguments& options, Session& session) {
+    if (options.model == "-" || options.restore.level ||
+        animation_format(animation_place(options.output)).value() != AnimationFormat::pc2)
+        return {};
+    Result<ModelChunks> chunks = ModelChunks::open(session.open_model(options.model), options.model, session.context());
+    if (!chunks && chunks.error().code == ErrorCode::unsuitable) return {};
+    return require(std::move(chunks));
+}
+
+/// A model to restore frames of: in its file, or in memory.
+struct AnimatedModel {
     PoseSequence own;
+    std::optional<ModelChunks> in_file;
+    std::optional<Model> in_memory;
+    PoseStream poses;
+
+    const Model& driver() const { return in_file ? in_file->driver() : *in_memory; } ///< has the driver, or more
+};
+
+/// It is where it is made: its stream refers to it.
+void read_animated(const RestoreArguments& options, Session& session, AnimatedModel& model) {
+    model.in_file = chunks_in_file(options, session);
+    if (!model.in_file)
+        model.in_memory = session.read_model(options.model, options.all_frames ? &model.own : nullptr);
+    else if (options.all_frames)
+        model.own = require(read_poses(session.open_model(options.model), options.model, session.context()));
+    model.poses = poses_of(options.poses, options.poses_file, model.driver(), model.own, options.model, session);
+}
+
+void restore_chunk(const RestoreArguments& options, Session& session) {
     AnimationChunk chunk = chunk_of(options.chunk);
     chunk.job = job_of(options);
-    const Model model = session.read_model(options.model, options.all_frames ? &own : nullptr);
-    const PoseStream poses = poses_of(options.poses, options.poses_file, model, own, options.model, session);
+    AnimatedModel model;
+    read_animated(options, session, model);
     const double start = now_seconds();
-    const ChunkReport written = write_chunk_output(model, poses, options.restore, chunk, options.output, session);
+    session.begin_writing(options.output);
+    const ChunkReport written =
+        model.in_file
+            ? require(write_restored_chunks(*model.in_file, model.poses, options.restore, options.output, chunk,
+                                            session.context()))
+            : write_chunk_output(*model.in_memory, model.poses, options.restore, chunk, options.output, session);
     const double seconds = now_seconds() - start;
     Report report;
     const std::string frames = written.frames == 0 ? "no frames"
@@ -206,14 +241,16 @@ void restore_chunk(const RestoreArguments& options, Session& session) {
 
 void restore_all(const RestoreArguments& options, Session& session) {
     if (!options.chunk.empty()) return restore_chunk(options, session);
-    PoseSequence own;
-    const Model model = session.read_model(options.model, options.all_frames ? &own : nullptr);
-    const PoseStream poses = poses_of(options.poses, options.poses_file, model, own, options.model, session);
-    const char* from = source_of(model, require(poses.pose(0)));
+    AnimatedModel model;
+    read_animated(options, session, model);
+    const char* from = source_of(model.driver(), require(model.poses.pose(0)));
     Report report;
     const double start = now_seconds();
-    write_animation_output(model, poses, options.restore, options.animation, animation_place(options.output),
-                           options.model, session, report);
+    if (model.in_file)
+        write_chunks_output(*model.in_file, model.poses, options.restore, options.output, session, report);
+    else
+        write_animation_output(*model.in_memory, model.poses, options.restore, options.animation,
+                               animation_place(options.output), options.model, session, report);
     const double seconds = now_seconds() - start;
     report.set("output", options.output);
     report.add("restored from", fmt::format("{} in {}", from, seconds_text(seconds)), "from", from);

@@ -264,7 +264,7 @@ TEST(ModelFile, SectionsOfLaterProgramsArePassedOver) {
 }
 
 TEST(ModelFile, OtherVersionsAreRefusedWithASentence) {
-    for (const std::uint32_t version : {0u, 2u, 0xffffffffu}) {
+    for (const std::uint32_t version : {0u, 3u, 0xffffffffu}) {
         Patcher patcher(write_model(small_models()[0]));
         patcher.header.version = version;
         const std::string message = error_of(patcher.bytes());
@@ -320,7 +320,7 @@ TEST(ModelFile, HostileNumbers) {
         patcher.set(name, item, value);
         EXPECT_NE(error_of(patcher.bytes()), "") << name;
     };
-    for (const char* name : {"mesh.cor", "lev.vert", "lev.cor", "bl.cell", "bl.coff", "bl.order"})
+    for (const char* name : {"mesh.cor", "lev.vert", "lev.cor", "bl.cell", "bl.run"})
         for (const Index id : {49u, 1000000u, kNoIndex}) refuses(blend, name, id);
     for (const char* name : {"mesh.pos", "bl.u", "bl.v", "nrm.val", "scal.val"})
         for (const float x : {NAN, INFINITY}) refuses(blend, name, x);
@@ -334,7 +334,10 @@ TEST(ModelFile, HostileNumbers) {
     refuses(blend, "code", 2u, 0);
     refuses(blend, "code", 1000u, 0);
     refuses(blend, "bl.prec", 7u, 0);
-    refuses(blend, "bl.order", Patcher(blend).get<Index>("bl.order", 0)); // twice: no permutation
+    for (const Index count : {0u, 50u, 1u << 31, 0xffffffffu})
+        refuses(blend, "bl.run", std::array<Index, 2>{0, count}, 0);
+    refuses(blend, "bl.from", Patcher(blend).get<std::uint16_t>("bl.from", 0)); // twice: no permutation
+    for (const int record : {49, 32767, 32768, 65535}) refuses(blend, "bl.from", static_cast<std::uint16_t>(record));
     refuses(blend, "lev.vert", Patcher(blend).get<Index>("lev.vert", 0)); // not ascending
 
     refuses(rounded, "bl.scale", NAN);
@@ -417,6 +420,52 @@ bool same_mesh(const Mesh& a, const Mesh& b) {
     return a.origin == b.origin && same_bytes(a.positions, b.positions) && a.corners == b.corners &&
            a.face_offsets == b.face_offsets && same_bytes(a.normals.values, b.normals.values) &&
            a.normals.corners == b.normals.corners && a.uvs.values == b.uvs.values && a.colors == b.colors;
+}
+
+bool same_detail(const BlendDetail& a, const BlendDetail& b) {
+    return a.cells == b.cells && a.cell_offsets == b.cell_offsets && a.order == b.order && a.u == b.u && a.v == b.v &&
+           a.precision == b.precision && a.offsets == b.offsets && a.cell_scales == b.cell_scales &&
+           a.across_gap == b.across_gap && a.facing_away == b.facing_away;
+}
+
+TEST(ModelFile, ManyChunksComeBack) {
+    for (const Precision precision : {Precision::float32, Precision::int16}) {
+        const Model written = stripped(make_wavy_cube({.resolution = 220}), {.base = 200, .precision = precision});
+        ASSERT_GT(written.mesh.vertex_count(), std::size_t{1} << 18);
+        const std::string bytes = write_model(written);
+        const Result<Model> model = read(bytes);
+        ASSERT_TRUE(model.ok()) << model.error().message;
+        EXPECT_TRUE(same_detail(std::get<BlendDetail>(model->detail), std::get<BlendDetail>(written.detail)));
+        EXPECT_EQ(write_model(*model), bytes);
+        const FileReader file{std::string_view(bytes)};
+        for (unsigned k = 0; k <= model->finest_level(); ++k)
+            EXPECT_TRUE(same_mesh(*read_model_level(file, k, "a.fil", kContext), level_mesh(*model, k))) << k;
+    }
+}
+
+TEST(ModelFile, VersionOneIsRead) {
+    const auto model_of = [](const std::string& name) {
+        Result<Model> model = read_model(FILIGREE_ROOT "/tests/io/version_1/" + name, kContext);
+        EXPECT_TRUE(model.ok()) << model.error().message;
+        return std::move(*model);
+    };
+    const Mesh plane = make_wavy_plane({.resolution = 6});
+    for (const char* name : {"float.fil", "int16.fil"}) {
+        const Model model = model_of(name);
+        ASSERT_EQ(model.mesh.vertex_count(), plane.vertex_count());
+        EXPECT_EQ(model.driver().vertices.size(), 9u);
+        const std::vector<Vec3f> restored =
+            *Restorer::create(model, {}, kContext)->positions(rest_pose(model), kContext);
+        for (std::size_t v = 0; v < restored.size(); ++v)
+            EXPECT_LT((restored[v] - plane.positions[v]).norm(), 2e-5f) << name << ' ' << v;
+        const FileReader file = *FileReader::open(FILIGREE_ROOT "/tests/io/version_1/" + std::string(name));
+        EXPECT_TRUE(same_mesh(*read_model_level(file, 0, name, kContext), level_mesh(model, 0)));
+        EXPECT_EQ(read_model_outline(file, name, kContext)->levels[0].vertices, 9u);
+        // written anew it is of today's version, and the same
+        const Model again = *read(write_model(model));
+        EXPECT_TRUE(same_detail(std::get<BlendDetail>(model.detail), std::get<BlendDetail>(again.detail)));
+    }
+    EXPECT_EQ(model_of("reference.fil").code(), DetailCode::reference);
 }
 
 TEST(ModelFile, ALevelIsReadAlone) {

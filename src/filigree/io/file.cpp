@@ -276,6 +276,17 @@ Status FileWriter::write(std::string_view bytes) {
     return Success{};
 }
 
+Status FileWriter::write_at(std::uint64_t offset, std::string_view bytes) {
+    while (!bytes.empty()) {
+        const ssize_t written = ::pwrite(file_->get(), bytes.data(), bytes.size(), static_cast<off_t>(offset));
+        if (written < 0 && errno == EINTR) continue;
+        if (written < 0) return cannot_write(file_->path, errno);
+        bytes.remove_prefix(static_cast<std::size_t>(written));
+        offset += static_cast<std::uint64_t>(written);
+    }
+    return Success{};
+}
+
 Status FileWriter::finish() {
     OpenFile& file = *file_;
     if (file.is_standard_output) return Success{};

@@ -60,6 +60,9 @@ public:
     ~FileWriter();
 
     Status write(std::string_view bytes);
+    /// Writes somewhere in the file, and leaves where write goes on. Errors: also of what cannot be written there and
+    /// back (standard output, a pipe).
+    Status write_at(std::uint64_t offset, std::string_view bytes);
     /// Puts what was written in the place of `path`.
     Status finish();
 

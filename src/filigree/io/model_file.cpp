@@ -1,116 +1,15 @@
-// A header, a table of sections, and the sections: plain little-endian arrays, each on an eight-byte boundary with its
-// own checksum. Reading goes through the table alone, so sections of later versions are passed over.
 #include "filigree/io/model_file.h"
 
-#include <algorithm>
-#include <bit>
+#include "filigree/io/model_records.h"
+#include "filigree/io/model_sections.h"
+
 #include <cmath>
-#include <cstring>
-#include <map>
-#include <memory>
 #include <new>
 #include <stdexcept>
-
-#define XXH_INLINE_ALL
-#include <xxhash.h>
-
-static_assert(std::endian::native == std::endian::little, "model files are written as the processor keeps them");
 
 namespace filigree {
 
 namespace {
-
-constexpr char kMagic[8] = {'F', 'I', 'L', 'I', 'G', 'R', 'E', 'E'};
-constexpr std::uint32_t kVersion = 1;
-
-struct ModelHeader {
-    char magic[8];
-    std::uint32_t version, section_count;
-    std::uint64_t file_size;
-    std::uint64_t table_hash; ///< XXH3-64 of the table
-};
-static_assert(sizeof(ModelHeader) == 32);
-
-struct Section {
-    char name[8];            ///< padded with zeros
-    std::uint32_t index;     ///< of a level, a scalar, a picture or a pose; else 0
-    std::uint32_t item_size; ///< bytes
-    std::uint64_t offset;    ///< from the start of the file, a multiple of 8
-    std::uint64_t count;     ///< items
-    std::uint64_t hash;      ///< XXH3-64 of the section's bytes
-};
-static_assert(sizeof(Section) == 40);
-
-// ---------------------------------------------------------------------------------------------------------- writing
-
-/// Lays out the sections. What is in the model is not copied: it has to outlive the writer.
-class SectionWriter {
-public:
-    template <class T>
-    void array(std::string_view name, const std::vector<T>& items, std::uint32_t index = 0) {
-        if (!items.empty()) add(name, index, items.data(), sizeof(T), items.size());
-    }
-    /// Of numbers that nobody else keeps.
-    template <class T>
-    void array(std::string_view name, std::vector<T>&& items, std::uint32_t index = 0) {
-        if (items.empty()) return;
-        const auto kept = std::make_shared<const std::vector<T>>(std::move(items));
-        kept_.push_back(kept);
-        array(name, *kept, index);
-    }
-    template <class T>
-    void value(std::string_view name, const T& item) {
-        array(name, std::vector<T>{item});
-    }
-    void bytes(std::string_view name, std::string_view items, std::uint32_t index) {
-        add(name, index, items.data(), 1, items.size());
-    }
-    void strings(std::string_view name, const std::vector<std::string>& items) {
-        std::vector<char> bytes; // each ended by a zero byte, so a name that holds one ends there
-        for (const std::string& item : items)
-            bytes.insert(bytes.end(), item.c_str(), item.c_str() + std::strlen(item.c_str()) + 1);
-        array(name, std::move(bytes));
-    }
-
-    /// The file, piece after piece. Call it once.
-    std::vector<std::string_view> finish() {
-        const std::size_t table_bytes = sections_.size() * sizeof(Section);
-        for (Section& section : sections_) section.offset += sizeof(ModelHeader) + table_bytes;
-        ModelHeader header{};
-        std::memcpy(header.magic, kMagic, sizeof kMagic);
-        header.version = kVersion;
-        header.section_count = static_cast<std::uint32_t>(sections_.size());
-        header.file_size = sizeof(ModelHeader) + table_bytes + content_bytes_;
-        header.table_hash = XXH3_64bits(sections_.data(), table_bytes);
-        front_.assign(reinterpret_cast<const char*>(&header), sizeof header);
-        front_.append(reinterpret_cast<const char*>(sections_.data()), table_bytes);
-        pieces_.insert(pieces_.begin(), front_);
-        return pieces_;
-    }
-
-private:
-    void add(std::string_view name, std::uint32_t index, const void* items, std::size_t item_size, std::size_t count) {
-        static constexpr std::string_view kZeros("\0\0\0\0\0\0\0\0", 8);
-        const std::string_view bytes(static_cast<const char*>(items), item_size * count);
-        Section section{};
-        std::memcpy(section.name, name.data(), std::min<std::size_t>(name.size(), sizeof section.name));
-        section.index = index;
-        section.item_size = static_cast<std::uint32_t>(item_size);
-        section.offset = content_bytes_;
-        section.count = count;
-        section.hash = XXH3_64bits(bytes.data(), bytes.size());
-        sections_.push_back(section);
-        pieces_.push_back(bytes);
-        pieces_.push_back(kZeros.substr(0, (8 - bytes.size() % 8) % 8));
-        content_bytes_ += bytes.size() + pieces_.back().size();
-    }
-
-    std::vector<Section> sections_;
-    std::vector<std::string_view> pieces_;
-    std::vector<std::shared_ptr<const void>> kept_;
-    std::string front_;
-    std::size_t content_bytes_ = 0;
-};
 
 template <class T>
 void write_attribute(SectionWriter& out, const std::string& name, const CornerAttribute<T>& attribute) {
@@ -167,7 +66,11 @@ void write_material_sections(SectionWriter& out, const std::vector<MeshMaterial>
 }
 
 void write_mesh_sections(SectionWriter& out, const Mesh& mesh, bool with_positions) {
-    if (with_positions) out.array("mesh.pos", mesh.positions);
+    if (with_positions)
+        for (std::uint32_t k = 0; k < chunk_count(mesh.vertex_count()); ++k) {
+            const std::size_t begin = k * kChunkVertices, count = std::min(kChunkVertices, mesh.vertex_count() - begin);
+            out.items("mesh.pos", std::span(mesh.positions).subspan(begin, count), k);
+        }
     out.value("mesh.org", std::array<double, 3>{mesh.origin[0], mesh.origin[1], mesh.origin[2]});
     out.value("mesh.num", static_cast<std::uint64_t>(mesh.vertex_count()));
     write_faces(out, "mesh", 0, mesh.face_offsets, mesh.corners);
@@ -192,20 +95,12 @@ void write_mesh_sections(SectionWriter& out, const Mesh& mesh, bool with_positio
 void write_blend(SectionWriter& out, const Model& model, const BlendDetail& detail) {
     out.value("bl.prec", static_cast<std::uint32_t>(detail.precision));
     out.array("bl.cell", detail.cells);
-    out.array("bl.coff", detail.cell_offsets);
-    out.array("bl.order", detail.order);
     if (detail.precision == Precision::float32) {
-        out.array("bl.u", detail.u);
-        out.array("bl.v", detail.v);
-    } else {
-        const auto rounded = [](const std::vector<float>& weights) {
-            std::vector<std::int16_t> steps;
-            for (float w : weights) steps.push_back(static_cast<std::int16_t>(std::lround(w * 32767.0f)));
-            return steps;
-        };
-        out.array("bl.u16", rounded(detail.u));
-        out.array("bl.v16", rounded(detail.v));
-        out.array("bl.off16", detail.offsets);
+        write_chunk_records(out, detail, model.mesh.positions);
+    } else { // boxes are of the positions that are read back
+        std::vector<Vec3f> decoded = model.mesh.positions;
+        decode_rest(detail, model.driver().vertices, decoded);
+        write_chunk_records(out, detail, decoded);
         out.array("bl.scale", detail.cell_scales);
         out.array("drv.pos", driver_positions(model));
     }
@@ -260,127 +155,6 @@ std::string check_poses(const PoseSequence& poses, std::size_t driver_vertices) 
     return "";
 }
 
-// ---------------------------------------------------------------------------------------------------------- reading
-
-/// What is wrong with a file, thrown inside this source file only and turned into an Error at its door.
-struct Damage {
-    std::string what, remedy = "strip the mesh again";
-};
-
-class SectionReader {
-public:
-    /// The file has to outlive the reader.
-    explicit SectionReader(const FileReader& file) : file_(file) {
-        ModelHeader header;
-        if (file.size() < sizeof header) throw Damage{"is cut off in its header"};
-        read(0, std::span(&header, 1));
-        if (header.version != kVersion)
-            throw Damage{"is of version " + std::to_string(header.version) + " and this program reads version " +
-                             std::to_string(kVersion),
-                         "use a newer program, or strip the mesh again"};
-        if (header.file_size != file.size())
-            throw Damage{"should have " + std::to_string(header.file_size) + " bytes and has " +
-                         std::to_string(file.size()) + ": it was cut off or added to"};
-        if (header.section_count > (file.size() - sizeof header) / sizeof(Section))
-            throw Damage{"names more sections than fit into it"};
-        std::vector<Section> table(header.section_count);
-        read(sizeof header, std::span(table));
-        const std::size_t table_bytes = table.size() * sizeof(Section);
-        if (XXH3_64bits(table.data(), table_bytes) != header.table_hash)
-            throw Damage{"has a damaged table of sections (checksum)"};
-        // No two sections share bytes, so all of them together need no more memory than the file.
-        std::size_t end = sizeof header + table_bytes;
-        for (const Section& section : table) {
-            const std::string name(section.name, strnlen(section.name, sizeof section.name));
-            if (section.offset < end || section.offset > file.size() || section.item_size == 0 ||
-                section.count > (file.size() - section.offset) / section.item_size)
-                throw Damage{"has a section " + name + " that overlaps another or reaches past its end"};
-            end = section.offset + section.count * section.item_size;
-            sections_.emplace(std::pair(name, section.index), section);
-        }
-    }
-
-    /// The items of a section; empty when there is none.
-    template <class T>
-    std::vector<T> array(std::string_view name, std::uint32_t index = 0) const {
-        const Section* section = find<T>(name, index);
-        if (!section) return {};
-        std::vector<T> items(section->count);
-        read(section->offset, std::span(items));
-        if (XXH3_64bits(items.data(), items.size() * sizeof(T)) != section->hash)
-            throw Damage{"has a damaged section " + std::string(name) + " (checksum)"};
-        return items;
-    }
-    /// How many items a section has.
-    template <class T>
-    std::size_t item_count(std::string_view name, std::uint32_t index = 0) const {
-        const Section* section = find<T>(name, index);
-        return section ? section->count : 0;
-    }
-    /// Some items of a section alone, without its checksum. ids: ascending.
-    template <class T>
-    std::vector<T> items(std::string_view name, std::span<const Index> ids, std::uint32_t index = 0) const {
-        constexpr std::size_t kGap = 4096 / sizeof(T), kPiece = (std::size_t{1} << 20) / sizeof(T); // items
-        const Section* section = find<T>(name, index);
-        if (!section) return {};
-        if (!ids.empty() && ids.back() >= section->count) throw Damage{"lacks items in section " + std::string(name)};
-        std::vector<T> chosen(ids.size()), piece;
-        for (std::size_t begin = 0, end = 0; begin < ids.size(); begin = end) {
-            // what lies close together is read at once
-            for (end = begin + 1;
-                 end < ids.size() && ids[end] - ids[end - 1] <= kGap && ids[end] - ids[begin] < kPiece;)
-                ++end;
-            piece.resize(ids[end - 1] - ids[begin] + 1);
-            read(section->offset + ids[begin] * sizeof(T), std::span(piece));
-            for (std::size_t k = begin; k < end; ++k) chosen[k] = piece[ids[k] - ids[begin]];
-        }
-        return chosen;
-    }
-    template <class T>
-    T value(std::string_view name) const {
-        const std::vector<T> items = array<T>(name);
-        if (items.size() != 1) throw Damage{"lacks its section " + std::string(name)};
-        return items[0];
-    }
-    /// Entries of that name, whatever their index; and the largest index.
-    std::pair<std::size_t, std::uint32_t> count(const std::string& name) const {
-        const auto first = sections_.lower_bound({name, 0}), end = sections_.upper_bound({name, ~std::uint32_t{0}});
-        return {static_cast<std::size_t>(std::distance(first, end)), first == end ? 0 : std::prev(end)->first.second};
-    }
-    std::vector<std::string> strings(std::string_view name) const {
-        std::vector<std::string> items;
-        std::string item;
-        for (char c : array<char>(name)) {
-            if (c != '\0') {
-                item += c;
-                continue;
-            }
-            items.push_back(std::move(item));
-            item.clear();
-        }
-        return items;
-    }
-
-private:
-    template <class T>
-    void read(std::uint64_t offset, std::span<T> items) const {
-        const std::span bytes(reinterpret_cast<char*>(items.data()), items.size_bytes());
-        if (Status filled = file_.read(offset, bytes); !filled) throw filled.error();
-    }
-    /// Null: there is no such section.
-    template <class T>
-    const Section* find(std::string_view name, std::uint32_t index) const {
-        const auto found = sections_.find({std::string(name), index});
-        if (found == sections_.end()) return nullptr;
-        if (found->second.item_size != sizeof(T))
-            throw Damage{"has items of a wrong size in section " + found->first.first};
-        return &found->second;
-    }
-
-    const FileReader& file_;
-    std::map<std::pair<std::string, std::uint32_t>, Section> sections_; ///< by name and index; of equals the first
-};
-
 template <class T>
 CornerAttribute<T> read_attribute(const SectionReader& in, const std::string& name) {
     return {in.array<T>(name + ".val"), in.array<Index>(name + ".cor")};
@@ -400,7 +174,7 @@ void read_faces(const SectionReader& in, const std::string& name, std::uint32_t 
         return;
     }
     if (size.size() != 1 || size[0] == 0 || corners.size() % size[0] != 0)
-        throw Damage{"has faces that do not divide their corners"};
+        throw FileDamage{"has faces that do not divide their corners"};
     offsets.resize(corners.size() / size[0] + 1);
     for (std::size_t f = 0; f < offsets.size(); ++f) offsets[f] = static_cast<Index>(f * size[0]);
 }
@@ -408,7 +182,7 @@ void read_faces(const SectionReader& in, const std::string& name, std::uint32_t 
 std::vector<MeshMaterial> read_material_sections(const SectionReader& in, const std::vector<std::string>& names) {
     const std::vector<FileMaterial> records = in.array<FileMaterial>("mat.emb");
     if (records.empty()) return {};
-    if (records.size() != names.size()) throw Damage{"has another number of materials than of their names"};
+    if (records.size() != names.size()) throw FileDamage{"has another number of materials than of their names"};
     std::map<std::uint32_t, std::shared_ptr<const std::string>> pictures;
     std::vector<MeshMaterial> materials;
     for (std::size_t i = 0; i < records.size(); ++i) {
@@ -424,7 +198,7 @@ std::vector<MeshMaterial> read_material_sections(const SectionReader& in, const 
         std::shared_ptr<const std::string>& picture = pictures[record.picture];
         if (!picture) {
             const std::vector<char> bytes = in.array<char>("mat.pic", record.picture);
-            if (bytes.empty()) throw Damage{"lacks the picture of a material"};
+            if (bytes.empty()) throw FileDamage{"lacks the picture of a material"};
             picture = std::make_shared<const std::string>(bytes.begin(), bytes.end());
         }
         material.picture_bytes = picture;
@@ -434,7 +208,7 @@ std::vector<MeshMaterial> read_material_sections(const SectionReader& in, const 
 
 Mesh read_mesh_sections(const SectionReader& in) {
     Mesh mesh;
-    mesh.positions = in.array<Vec3f>("mesh.pos");
+    mesh.positions = in.all<Vec3f>("mesh.pos");
     const auto origin = in.value<std::array<double, 3>>("mesh.org");
     mesh.origin = {origin[0], origin[1], origin[2]};
     read_faces(in, "mesh", 0, mesh.face_offsets, mesh.corners);
@@ -456,19 +230,28 @@ Mesh read_mesh_sections(const SectionReader& in) {
 BlendDetail read_blend(const SectionReader& in) {
     BlendDetail detail;
     const auto precision = in.value<std::uint32_t>("bl.prec");
-    if (precision > 1) throw Damage{"has records of a precision that is not known"};
+    if (precision > 1) throw FileDamage{"has records of a precision that is not known"};
     detail.precision = static_cast<Precision>(precision);
     detail.cells = in.array<Triangle>("bl.cell");
-    detail.cell_offsets = in.array<Index>("bl.coff");
-    detail.order = in.array<Index>("bl.order");
-    if (detail.precision == Precision::float32) {
-        detail.u = in.array<float>("bl.u");
-        detail.v = in.array<float>("bl.v");
+    if (detail.precision == Precision::int16) detail.cell_scales = in.array<float>("bl.scale");
+    if (in.version() == 1) {
+        detail.cell_offsets = in.array<Index>("bl.coff");
+        detail.order = in.array<Index>("bl.order");
+        if (detail.precision == Precision::float32) {
+            detail.u = in.array<float>("bl.u");
+            detail.v = in.array<float>("bl.v");
+        } else {
+            for (std::int16_t step : in.array<std::int16_t>("bl.u16"))
+                detail.u.push_back(float(step) * (1.0f / 32767.0f));
+            for (std::int16_t step : in.array<std::int16_t>("bl.v16"))
+                detail.v.push_back(float(step) * (1.0f / 32767.0f));
+            detail.offsets = in.array<std::array<std::int16_t, 3>>("bl.off16");
+        }
     } else {
-        for (std::int16_t step : in.array<std::int16_t>("bl.u16")) detail.u.push_back(float(step) * (1.0f / 32767.0f));
-        for (std::int16_t step : in.array<std::int16_t>("bl.v16")) detail.v.push_back(float(step) * (1.0f / 32767.0f));
-        detail.offsets = in.array<std::array<std::int16_t, 3>>("bl.off16");
-        detail.cell_scales = in.array<float>("bl.scale");
+        const auto vertices = in.value<std::uint64_t>("mesh.num");
+        if (vertices >= kNoIndex || chunk_count(vertices) != in.count("bl.run").first)
+            throw FileDamage{"is inconsistent: there are not as many chunks as its vertices fill"};
+        read_chunk_records(in, 0, chunk_count(vertices), vertices, 0, detail);
     }
     detail.across_gap = in.array<Index>("bl.gap");
     detail.facing_away = in.array<Index>("bl.away");
@@ -492,7 +275,7 @@ ReferenceDetail read_reference(const SectionReader& in) {
 /// Frames 0 .. n - 1 without a gap: so no index is larger than the table is long.
 std::size_t frame_count(const SectionReader& in, const std::string& name) {
     const auto [count, last] = in.count(name);
-    if (count > 0 && last != count - 1) throw Damage{"lacks one of its poses (" + name + ")", "simulate it again"};
+    if (count > 0 && last != count - 1) throw FileDamage{"lacks one of its poses (" + name + ")", "simulate it again"};
     return count;
 }
 
@@ -502,7 +285,7 @@ PoseSequence read_pose_sections(const FileReader& file) {
     const std::size_t frames = frame_count(in, "pose.pos"), with_gradients = frame_count(in, "pose.grd");
     if (frames == 0 && with_gradients == 0) return poses;
     if (with_gradients != 0 && with_gradients != frames)
-        throw Damage{"has gradients for some of its poses alone", "simulate it again"};
+        throw FileDamage{"has gradients for some of its poses alone", "simulate it again"};
     poses.frames_per_second = in.value<double>("pose.fps");
     poses.frames.resize(frames);
     for (std::uint32_t frame = 0; frame < frames; ++frame) {
@@ -514,7 +297,7 @@ PoseSequence read_pose_sections(const FileReader& file) {
         }
     }
     if (const std::string wrong = check_poses(poses, in.array<Index>("lev.vert").size()); !wrong.empty())
-        throw Damage{"is inconsistent: " + wrong, "simulate it again"};
+        throw FileDamage{"is inconsistent: " + wrong, "simulate it again"};
     return poses;
 }
 
@@ -523,14 +306,14 @@ Model read_sections(const FileReader& file) {
     Model model;
     model.mesh = read_mesh_sections(in);
     const auto level_count = in.value<std::uint32_t>("levels");
-    if (level_count > 64) throw Damage{"has more levels than make sense"};
+    if (level_count > 64) throw FileDamage{"has more levels than make sense"};
     for (std::uint32_t k = 0; k < level_count; ++k) {
         Level& level = model.levels.emplace_back();
         level.vertices = in.array<Index>("lev.vert", k);
         read_faces(in, "lev", k, level.face_offsets, level.corners);
     }
     const auto code = in.value<std::uint32_t>("code");
-    if (code > 1) throw Damage{"has a detail code that is not known"};
+    if (code > 1) throw FileDamage{"has a detail code that is not known"};
     if (static_cast<DetailCode>(code) == DetailCode::reference)
         model.detail = read_reference(in);
     else
@@ -541,19 +324,19 @@ Model read_sections(const FileReader& file) {
     const std::vector<Vec3f> driver = in.array<Vec3f>("drv.pos");
     const auto vertex_count = in.value<std::uint64_t>("mesh.num");
     if (driver.empty() && vertex_count != model.mesh.vertex_count())
-        throw Damage{"does not have as many positions as it says"};
+        throw FileDamage{"does not have as many positions as it says"};
     if (!driver.empty()) {
         auto* detail = std::get_if<BlendDetail>(&model.detail);
         if (!detail || vertex_count != detail->order.size() || model.levels.empty() ||
             driver.size() != model.driver().vertices.size() || detail->precision != Precision::int16)
-            throw Damage{"has records that do not fit its vertices"};
+            throw FileDamage{"has records that do not fit its vertices"};
         model.mesh.positions.assign(vertex_count, Vec3f::Zero());
         for (std::size_t i = 0; i < driver.size(); ++i)
             if (model.driver().vertices[i] < vertex_count) model.mesh.positions[model.driver().vertices[i]] = driver[i];
-        if (const std::string wrong = check_model(model); !wrong.empty()) throw Damage{"is inconsistent: " + wrong};
+        if (const std::string wrong = check_model(model); !wrong.empty()) throw FileDamage{"is inconsistent: " + wrong};
         decode_rest(*detail, model.driver().vertices, model.mesh.positions);
     }
-    if (const std::string wrong = check_model(model); !wrong.empty()) throw Damage{"is inconsistent: " + wrong};
+    if (const std::string wrong = check_model(model); !wrong.empty()) throw FileDamage{"is inconsistent: " + wrong};
     return model;
 }
 
@@ -567,7 +350,7 @@ ModelOutline read_outline_sections(const FileReader& file) {
         return size.size() == 1 && size[0] > 0 ? corners / size[0] : offsets - (offsets > 0);
     };
     const auto level_count = in.value<std::uint32_t>("levels");
-    if (level_count < 1 || level_count > 64) throw Damage{"has a number of levels that makes no sense"};
+    if (level_count < 1 || level_count > 64) throw FileDamage{"has a number of levels that makes no sense"};
     for (std::uint32_t k = 0; k < level_count; ++k)
         outline.levels.push_back(
             {in.item_count<Index>("lev.vert", k), faces("lev", k), in.item_count<Index>("lev.cor", k)});
@@ -578,7 +361,7 @@ ModelOutline read_outline_sections(const FileReader& file) {
         outline.patches = in.item_count<std::array<Index, 4>>("rf.base");
     } else {
         const auto precision = in.value<std::uint32_t>("bl.prec");
-        if (precision > 1) throw Damage{"has records of a precision that is not known"};
+        if (precision > 1) throw FileDamage{"has records of a precision that is not known"};
         outline.precision = static_cast<Precision>(precision);
         outline.across_gap = in.array<Index>("bl.gap");
         outline.facing_away = in.array<Index>("bl.away");
@@ -590,31 +373,48 @@ ModelOutline read_outline_sections(const FileReader& file) {
     return outline;
 }
 
+/// The positions of some vertices, ascending.
+std::vector<Vec3f> positions_of(const SectionReader& in, std::span<const Index> vertices) {
+    if (in.version() == 1) return in.chosen<Vec3f>("mesh.pos", vertices);
+    std::vector<Vec3f> positions;
+    std::vector<Index> in_chunk;
+    for (std::size_t begin = 0, end = 0; begin < vertices.size(); begin = end) {
+        const std::size_t chunk = vertices[begin] / kChunkVertices;
+        in_chunk.clear();
+        for (; end < vertices.size() && vertices[end] / kChunkVertices == chunk; ++end)
+            in_chunk.push_back(static_cast<Index>(vertices[end] % kChunkVertices));
+        const std::vector<Vec3f> some = in.chosen<Vec3f>("mesh.pos", in_chunk, static_cast<std::uint32_t>(chunk));
+        if (some.size() != in_chunk.size()) throw FileDamage{"lacks positions of a level"};
+        positions.insert(positions.end(), some.begin(), some.end());
+    }
+    return positions;
+}
+
 Mesh read_level_sections(const FileReader& file, unsigned k) {
     const SectionReader in(file);
     const std::uint32_t level_count = in.value<std::uint32_t>("levels");
     if (k > level_count)
         throw Error{ErrorCode::usage, "The model has levels 0 to " + std::to_string(level_count) +
                                           "; there is no level " + std::to_string(k) + "."};
-    const bool positions_are_coded = in.item_count<Vec3f>("mesh.pos") == 0;
+    const bool positions_are_coded = in.count("mesh.pos").first == 0;
     if (k == level_count || positions_are_coded) return level_mesh(read_sections(file), k);
     const std::vector<Index> vertices = in.array<Index>("lev.vert", k);
     if (!std::is_sorted(vertices.begin(), vertices.end()))
-        throw Damage{"is inconsistent: a level's vertices do not ascend"};
+        throw FileDamage{"is inconsistent: a level's vertices do not ascend"};
     Mesh mesh;
     const auto origin = in.value<std::array<double, 3>>("mesh.org");
     mesh.origin = {origin[0], origin[1], origin[2]};
     read_faces(in, "lev", k, mesh.face_offsets, mesh.corners);
-    mesh.positions = in.items<Vec3f>("mesh.pos", vertices);
+    mesh.positions = positions_of(in, vertices);
     const auto per_vertex = [&](const std::string& name) { return in.item_count<Index>(name + ".cor") == 0; };
-    if (per_vertex("uv")) mesh.uvs.values = in.items<Vec2f>("uv.val", vertices);
-    if (per_vertex("nrm")) mesh.normals.values = in.items<Vec3f>("nrm.val", vertices);
-    mesh.colors = in.items<Vec4f>("col.val", vertices);
+    if (per_vertex("uv")) mesh.uvs.values = in.chosen<Vec2f>("uv.val", vertices);
+    if (per_vertex("nrm")) mesh.normals.values = in.chosen<Vec3f>("nrm.val", vertices);
+    mesh.colors = in.chosen<Vec4f>("col.val", vertices);
     mesh.colors_have_alpha = !in.array<std::uint32_t>("col.alp").empty();
     const std::vector<std::string> names = in.strings("scal.nam");
     for (std::uint32_t i = 0; i < names.size(); ++i)
-        mesh.scalars.push_back({names[i], in.items<float>("scal.val", vertices, i)});
-    if (const std::string wrong = check_mesh(mesh); !wrong.empty()) throw Damage{"is inconsistent: " + wrong};
+        mesh.scalars.push_back({names[i], in.chosen<float>("scal.val", vertices, i)});
+    if (const std::string wrong = check_mesh(mesh); !wrong.empty()) throw FileDamage{"is inconsistent: " + wrong};
     return mesh;
 }
 
@@ -629,8 +429,8 @@ auto guarded(const FileReader& file, const std::string& name, const RunContext& 
         return read(file);
     } catch (const Error& error) {
         return error;
-    } catch (const Damage& damage) {
-        return Error{ErrorCode::bad_file, name + " " + damage.what + "; " + damage.remedy + "."};
+    } catch (const FileDamage& damage) {
+        return error_of(damage, name);
     } catch (const std::bad_alloc&) {
         return Error{ErrorCode::out_of_memory, name + " does not fit into memory."};
     } catch (const std::length_error&) {
@@ -640,10 +440,12 @@ auto guarded(const FileReader& file, const std::string& name, const RunContext& 
 
 } // namespace
 
-bool is_model_file(std::string_view bytes) { return bytes.starts_with(std::string_view(kMagic, sizeof kMagic)); }
+bool is_model_file(std::string_view bytes) {
+    return bytes.starts_with(std::string_view(kModelMagic, sizeof kModelMagic));
+}
 
 bool is_model_file(const FileReader& file) {
-    char first[sizeof kMagic];
+    char first[sizeof kModelMagic];
     return file.size() >= sizeof first && file.read(0, first) && is_model_file(std::string_view(first, sizeof first));
 }
 

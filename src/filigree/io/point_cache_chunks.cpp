@@ -50,14 +50,14 @@ int write_at(int descriptor, std::uint64_t offset, std::string_view bytes) {
 /// What the processes of one job share.
 class SharedFile {
 public:
-    SharedFile(const MeshAnimation& animation, const fs::path& path, const AnimationChunk& chunk, std::string header)
+    SharedFile(std::size_t frames, std::size_t points, const fs::path& path, const AnimationChunk& chunk,
+               std::string header)
         : path_(path), folder_(path.string() + ".chunks"), plan_path_(path.string() + ".plan"),
           frames_(folder_ / "frames"), header_(std::move(header)),
-          frame_bytes_(animation.rest->vertex_count() * sizeof(Vec3f)),
-          size_(header_.size() + animation.frames * frame_bytes_), count_(chunk.count) {
+          size_(header_.size() + std::uint64_t{frames} * points * sizeof(Vec3f)), count_(chunk.count) {
         plan_ = "A point cache that filigree writes in chunks\njob " + chunk.job + "\nframes " +
-                std::to_string(animation.frames) + "\nvertices " + std::to_string(animation.rest->vertex_count()) +
-                "\nchunks " + std::to_string(chunk.count) + "\n";
+                std::to_string(frames) + "\nvertices " + std::to_string(points) + "\nchunks " +
+                std::to_string(chunk.count) + "\n";
     }
 
     /// Whether the file was finished by this very job.
@@ -101,21 +101,16 @@ public:
         return count;
     }
 
-    Status write(std::size_t first, std::size_t last, WorldFrames& positions, std::size_t vertices,
-                 const RunContext& context) const {
+    /// Has `fill` write frames, and keeps them safe.
+    Status write(const std::function<Status(const WriteAt&)>& fill) const {
         const Descriptor file(::open(frames_.c_str(), O_WRONLY | O_CLOEXEC));
         if (file.get() < 0) return cannot_write(frames_, errno);
-        std::vector<Vec3f> points(vertices);
-        const std::string_view bytes(reinterpret_cast<const char*>(points.data()), frame_bytes_);
-        for (std::size_t frame = first; frame < last; ++frame) {
-            context.report("writing", double(frame - first) / double(last - first));
-            if (context.is_cancelled()) return cancelled_error();
-            if (Status fetched = positions.fetch(frame, points); !fetched) return fetched;
-            if (const int wrong = write_at(file.get(), header_.size() + frame * frame_bytes_, bytes))
-                return cannot_write(frames_, wrong);
-        }
+        const auto write_some = [&](std::uint64_t offset, std::string_view bytes) -> Status {
+            if (const int wrong = write_at(file.get(), offset, bytes)) return cannot_write(frames_, wrong);
+            return Success{};
+        };
+        if (Status filled = fill(write_some); !filled) return filled;
         if (::fsync(file.get()) != 0) return cannot_write(frames_, errno);
-        context.report("writing", 1);
         return Success{};
     }
 
@@ -144,29 +139,28 @@ private:
 
     fs::path path_, folder_, plan_path_, frames_;
     std::string header_, plan_;
-    std::size_t frame_bytes_;
     std::uint64_t size_;
     std::size_t count_;
 };
 
 } // namespace
 
-Result<ChunkReport> write_animation_chunk(const MeshAnimation& animation, const fs::path& path,
-                                          const AnimationChunk& chunk, const RunContext& context) {
+Result<ChunkReport>
+write_shared_pc2(std::size_t frames, std::size_t points, const fs::path& path, const AnimationChunk& chunk,
+                 const std::function<Status(std::size_t first, std::size_t last, const WriteAt& write_at)>& fill) {
     if (chunk.number < 1 || chunk.number > chunk.count)
         return Error{ErrorCode::usage, "There is no chunk " + std::to_string(chunk.number) + " of " +
                                            std::to_string(chunk.count) + "; they are counted from 1."};
     if (lower_extension(path) != ".pc2")
         return Error{ErrorCode::usage,
                      path.string() + ": chunks are written of .pc2 alone, whose frames all have one size."};
-    if (animation.frames == 0)
-        return Error{ErrorCode::unsuitable, path.string() + ": not written: there are no frames."};
-    Result<std::string> header = pc2_header(animation, path);
+    if (frames == 0) return Error{ErrorCode::unsuitable, path.string() + ": not written: there are no frames."};
+    Result<std::string> header = pc2_header(frames, points, path);
     if (!header) return header.error();
-    const SharedFile file(animation, path, chunk, std::move(*header));
+    const SharedFile file(frames, points, path, chunk, std::move(*header));
     ChunkReport report;
-    report.first_frame = animation.frames * (chunk.number - 1) / chunk.count;
-    report.frames = animation.frames * chunk.number / chunk.count - report.first_frame;
+    report.first_frame = frames * (chunk.number - 1) / chunk.count;
+    report.frames = frames * chunk.number / chunk.count - report.first_frame;
     const auto whole = [&] {
         report.chunks_done = chunk.count;
         report.is_whole = true;
@@ -179,9 +173,9 @@ Result<ChunkReport> write_animation_chunk(const MeshAnimation& animation, const 
     if (Status begun = file.begin(); !begun) return begun.error();
     report.was_done = file.is_done(chunk.number);
     if (!report.was_done) {
-        WorldFrames positions(animation, path);
-        Status written = file.write(report.first_frame, report.first_frame + report.frames, positions,
-                                    animation.rest->vertex_count(), context);
+        Status written = file.write([&](const WriteAt& write_at) {
+            return fill(report.first_frame, report.first_frame + report.frames, write_at);
+        });
         if (written) written = file.mark_done(chunk.number);
         if (!written && file.is_whole()) return whole(); // another process wrote the same chunk, and was the last
         if (!written) return written.error();
@@ -191,6 +185,25 @@ Result<ChunkReport> write_animation_chunk(const MeshAnimation& animation, const 
     if (report.chunks_done < chunk.count) return report;
     if (Status finished = file.finish(); !finished) return finished.error();
     return whole();
+}
+
+Result<ChunkReport> write_animation_chunk(const MeshAnimation& animation, const fs::path& path,
+                                          const AnimationChunk& chunk, const RunContext& context) {
+    const auto fill = [&](std::size_t first, std::size_t last, const WriteAt& write_at) -> Status {
+        WorldFrames positions(animation, path);
+        std::vector<Vec3f> points(animation.rest->vertex_count());
+        const std::string_view bytes(reinterpret_cast<const char*>(points.data()), points.size() * sizeof(Vec3f));
+        for (std::size_t frame = first; frame < last; ++frame) {
+            context.report("writing", double(frame - first) / double(last - first));
+            if (context.is_cancelled()) return cancelled_error();
+            if (Status fetched = positions.fetch(frame, points); !fetched) return fetched;
+            if (Status written = write_at(kPc2HeaderBytes + std::uint64_t{frame} * bytes.size(), bytes); !written)
+                return written;
+        }
+        context.report("writing", 1);
+        return Success{};
+    };
+    return write_shared_pc2(animation.frames, animation.rest->vertex_count(), path, chunk, fill);
 }
 
 Result<std::string> hash_of_files(std::span<const fs::path> paths) {

@@ -31,8 +31,15 @@ using WorldPositions = std::function<Status(std::size_t frame, std::span<Vec3f> 
 
 Status write_pc2(const MeshAnimation& animation, const WorldPositions& positions, const std::filesystem::path& path,
                  const RunContext& context);
-/// The first bytes of a PC2, frames behind them. Errors: unsuitable (more than its 32-bit numbers hold).
-Result<std::string> pc2_header(const MeshAnimation& animation, const std::filesystem::path& path);
+inline constexpr std::uint64_t kPc2HeaderBytes = 32;
+/// The first bytes of a PC2, frames behind them. Errors: unsupported (more than its 32-bit numbers hold).
+Result<std::string> pc2_header(std::size_t frames, std::size_t points, const std::filesystem::path& path);
+/// Writes bytes somewhere in a file.
+using WriteAt = std::function<Status(std::uint64_t offset, std::string_view bytes)>;
+/// write_animation_chunk, whatever makes the frames: fill writes those from first to last - 1 into the file.
+Result<ChunkReport>
+write_shared_pc2(std::size_t frames, std::size_t points, const std::filesystem::path& path, const AnimationChunk& chunk,
+                 const std::function<Status(std::size_t first, std::size_t last, const WriteAt& write_at)>& fill);
 Status write_mdd(const MeshAnimation& animation, const WorldPositions& positions, const std::filesystem::path& path,
                  const RunContext& context);
 

@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kPc2Magic("POINTCACHE2\0", 12);
 constexpr std::int32_t kPc2Version = 1;
-constexpr std::uint64_t kPc2Header = 32, kMddHeader = 8;
+constexpr std::uint64_t kMddHeader = 8;
 constexpr std::size_t kPointBytes = sizeof(Vec3f);
 static_assert(kPointBytes == 12);
 
@@ -148,9 +148,9 @@ Result<double> rate_of(const RandomFile& file, std::span<const float> times) {
     return whole > 0 && std::abs(rate - whole) <= kRounding * rate ? whole : rate;
 }
 
-Status check_sizes(const MeshAnimation& animation, const fs::path& path) {
+Status check_sizes(std::size_t frames, std::size_t points, const fs::path& path) {
     constexpr std::size_t kMost = std::numeric_limits<std::int32_t>::max();
-    if (animation.frames <= kMost && animation.rest->vertex_count() <= kMost) return Success{};
+    if (frames <= kMost && points <= kMost) return Success{};
     return Error{ErrorCode::unsupported, path.string() + ": point caches hold at most 2147483647 frames and points."};
 }
 
@@ -184,12 +184,12 @@ Result<PointSource> open_pc2(const fs::path& path, std::size_t points, std::opti
         std::int32_t frames;
     } header{};
     constexpr double kMostRate = 1000; // frames a sample, or samples a frame: beyond, the number is no rate
-    static_assert(kPc2Magic.size() + sizeof header == kPc2Header);
+    static_assert(kPc2Magic.size() + sizeof header == kPc2HeaderBytes);
     const Result<FilePointer> file = RandomFile::open(path);
     if (!file) return file.error();
     const RandomFile& in = **file;
     char magic[kPc2Magic.size()];
-    if (in.size() < kPc2Header) return in.error("is too short for a PC2 point cache.");
+    if (in.size() < kPc2HeaderBytes) return in.error("is too short for a PC2 point cache.");
     if (Status read = in.read(0, magic, sizeof magic); !read) return read.error();
     if (Status read = in.read(sizeof magic, &header, sizeof header); !read) return read.error();
     if (std::string_view(magic, sizeof magic) != kPc2Magic)
@@ -200,9 +200,10 @@ Result<PointSource> open_pc2(const fs::path& path, std::size_t points, std::opti
     const double samples = header.sample_rate;
     if (!std::isfinite(header.first_frame) || !(samples >= 1 / kMostRate && samples <= kMostRate))
         return in.error("its header's start frame or sample rate makes no sense; it is damaged.");
-    if (Status sound = check_counts(in, header.frames, header.points, kPc2Header, points); !sound) return sound.error();
+    if (Status sound = check_counts(in, header.frames, header.points, kPc2HeaderBytes, points); !sound)
+        return sound.error();
     const double rate = frames_per_second.value_or(kUnsaidRate) / samples;
-    return source_of(*file, header.frames, rate, kPc2Header, false);
+    return source_of(*file, header.frames, rate, kPc2HeaderBytes, false);
 }
 
 Result<PointSource> open_mdd(const fs::path& path, std::size_t points, std::optional<double> frames_per_second) {
@@ -223,20 +224,20 @@ Result<PointSource> open_mdd(const fs::path& path, std::size_t points, std::opti
     return source_of(*file, counts[0], *rate, start, true);
 }
 
-Result<std::string> pc2_header(const MeshAnimation& animation, const fs::path& path) {
-    if (Status sound = check_sizes(animation, path); !sound) return sound.error();
+Result<std::string> pc2_header(std::size_t frames, std::size_t points, const fs::path& path) {
+    if (Status sound = check_sizes(frames, points, path); !sound) return sound.error();
     std::string header(kPc2Magic);
     append(header, kPc2Version);
-    append(header, static_cast<std::int32_t>(animation.rest->vertex_count()));
+    append(header, static_cast<std::int32_t>(points));
     append(header, 0.0f); // the first frame's number in the scene
     append(header, 1.0f); // frames of the scene from one to the next
-    append(header, static_cast<std::int32_t>(animation.frames));
+    append(header, static_cast<std::int32_t>(frames));
     return header;
 }
 
 Status write_pc2(const MeshAnimation& animation, const WorldPositions& positions, const fs::path& path,
                  const RunContext& context) {
-    const Result<std::string> header = pc2_header(animation, path);
+    const Result<std::string> header = pc2_header(animation.frames, animation.rest->vertex_count(), path);
     if (!header) return header.error();
     Result<FileWriter> file = FileWriter::create(path);
     if (!file) return file.error();
@@ -246,7 +247,7 @@ Status write_pc2(const MeshAnimation& animation, const WorldPositions& positions
 
 Status write_mdd(const MeshAnimation& animation, const WorldPositions& positions, const fs::path& path,
                  const RunContext& context) {
-    if (Status sound = check_sizes(animation, path); !sound) return sound;
+    if (Status sound = check_sizes(animation.frames, animation.rest->vertex_count(), path); !sound) return sound;
     Result<FileWriter> file = FileWriter::create(path);
     if (!file) return file.error();
     std::string header;

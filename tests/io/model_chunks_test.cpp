@@ -1,0 +1,170 @@
+// Models that stay in their files: chunk by chunk the same bytes as the whole.
+#include "filigree/io/model_chunks.h"
+
+#include "filigree/hierarchy/strip.h"
+#include "filigree/io/model_file.h"
+#include "filigree/mesh/shapes.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include <unistd.h>
+
+using namespace filigree;
+namespace fs = std::filesystem;
+
+namespace {
+
+const RunContext kContext(2);
+
+Model model_of(Precision precision, const Vec3d& origin = Vec3d::Zero()) {
+    Mesh mesh = make_wavy_cube({.resolution = 220}); // two chunks
+    mesh.origin = origin;
+    return std::move(strip(mesh, {.base = 200, .precision = precision}, kContext)->model);
+}
+
+PoseSequence bent_poses(const Model& model, bool with_gradients) {
+    PoseSequence poses{24, {}};
+    for (int frame = 0; frame < 3; ++frame) {
+        Pose& pose = poses.frames.emplace_back(rest_pose(model));
+        for (Vec3f& p : pose.positions) {
+            Mat3f gradient = Mat3f::Identity();
+            gradient(0, 1) = 0.2f * float(frame) * p.y();
+            if (with_gradients) pose.gradients.push_back(gradient);
+            p.x() += 0.1f * float(frame) * p.y() * p.y();
+        }
+    }
+    return poses;
+}
+
+std::string bytes_of(const fs::path& path) {
+    Result<std::string> bytes = read_file(path);
+    EXPECT_TRUE(bytes.ok()) << (bytes.ok() ? "" : bytes.error().message);
+    return bytes.ok() ? *bytes : "";
+}
+
+class ModelChunksTest : public testing::Test {
+protected:
+    ModelChunksTest() {
+        std::string name = (fs::temp_directory_path() / "filigree-XXXXXX").string();
+        folder_ = ::mkdtemp(name.data());
+    }
+    ~ModelChunksTest() override { fs::remove_all(folder_); }
+
+    Result<ModelChunks> open(const Model& model, const PoseSequence& poses = {}) {
+        EXPECT_TRUE(write_model(model, poses, path("m.fil"), kContext).ok());
+        return ModelChunks::open(*FileReader::open(path("m.fil")), "m.fil", kContext);
+    }
+    /// By way of the whole mesh.
+    std::string whole(const PoseSequence& poses, const RestoreOptions& options = {}) {
+        const Model model = *read_model(path("m.fil"), kContext);
+        const Restorer restorer = *Restorer::create(model, options, kContext);
+        const MeshAnimation animation{&model.mesh, poses.frames.size(), 24,
+                                      [&](std::size_t frame, std::span<Vec3f> out) {
+                                          return restorer.positions(poses.frames[frame], out, kContext);
+                                      }};
+        EXPECT_TRUE(write_animation(animation, path("whole.pc2"), kContext).ok());
+        return bytes_of(path("whole.pc2"));
+    }
+    fs::path path(const std::string& name) const { return folder_ / name; }
+
+    fs::path folder_;
+};
+
+TEST_F(ModelChunksTest, RestoreTheSameBytesAsTheWhole) {
+    for (const Precision precision : {Precision::float32, Precision::int16})
+        for (const bool with_gradients : {false, true}) {
+            const Model model = model_of(precision);
+            const PoseSequence poses = bent_poses(model, with_gradients);
+            const Result<ModelChunks> chunks = open(model);
+            ASSERT_TRUE(chunks.ok()) << chunks.error().message;
+            EXPECT_EQ(chunks->count(), 2u);
+            EXPECT_EQ(chunks->vertex_count(), model.mesh.vertex_count());
+            const Mesh rest = read_model(path("m.fil"), kContext)->mesh; // int16 records round positions
+            for (std::size_t k = 0; k < 2; ++k) {
+                const Box box = chunks->box(k);
+                Box own;
+                for (std::size_t v = chunks->first_vertex(k); v < chunks->first_vertex(k + 1); ++v)
+                    own.extend(rest.positions[v].cast<double>());
+                EXPECT_EQ(box.min, own.min);
+                EXPECT_EQ(box.max, own.max);
+            }
+            for (const RestoreOptions& options :
+                 {RestoreOptions{}, RestoreOptions{.law = HeightLaw::keep, .thin_shell = true}}) {
+                const auto written =
+                    write_restored_chunks(*chunks, stream_of(poses), options, path("chunks.pc2"), kContext);
+                ASSERT_TRUE(written.ok()) << written.error().message;
+                EXPECT_TRUE(written->empty());
+                EXPECT_TRUE(bytes_of(path("chunks.pc2")) == whole(poses, options));
+            }
+        }
+}
+
+TEST_F(ModelChunksTest, AreSharedByProcesses) {
+    const Model model = model_of(Precision::float32);
+    const PoseSequence poses = bent_poses(model, false);
+    const Result<ModelChunks> chunks = open(model);
+    for (std::size_t part = 1; part <= 2; ++part) {
+        const auto report = write_restored_chunks(*chunks, stream_of(poses), {}, path("shared.pc2"),
+                                                  AnimationChunk{part, 2, "job"}, kContext);
+        ASSERT_TRUE(report.ok()) << report.error().message;
+        EXPECT_EQ(report->is_whole, part == 2);
+    }
+    EXPECT_TRUE(bytes_of(path("shared.pc2")) == whole(poses));
+}
+
+TEST_F(ModelChunksTest, FarFromTheOriginLostDigitsAreSaid) {
+    const Model model = model_of(Precision::float32, {1e6, 0, 0});
+    const PoseSequence poses = bent_poses(model, false);
+    const auto written = write_restored_chunks(*open(model), stream_of(poses), {}, path("chunks.pc2"), kContext);
+    ASSERT_TRUE(written.ok());
+    EXPECT_EQ(written->size(), 1u);
+    EXPECT_TRUE(bytes_of(path("chunks.pc2")) == whole(poses));
+}
+
+TEST_F(ModelChunksTest, DamageIsSeenWhereItIsRead) {
+    const Model model = model_of(Precision::float32);
+    const PoseSequence poses = bent_poses(model, false);
+    ASSERT_TRUE(open(model).ok());
+    std::string bytes = bytes_of(path("m.fil"));
+    const Vec3f& last = model.mesh.positions.back();
+    const std::size_t at = bytes.find(std::string(reinterpret_cast<const char*>(&last), sizeof last));
+    ASSERT_NE(at, std::string::npos);
+    bytes[at] ^= 1;
+    ASSERT_TRUE(write_file(path("m.fil"), bytes).ok());
+    const Result<ModelChunks> chunks = ModelChunks::open(*FileReader::open(path("m.fil")), "m.fil", kContext);
+    ASSERT_TRUE(chunks.ok());
+    EXPECT_TRUE(chunks->restorer(0).ok());
+    EXPECT_EQ(chunks->restorer(1).error().code, ErrorCode::bad_file);
+    const auto written = write_restored_chunks(*chunks, stream_of(poses), {}, path("c.pc2"), kContext);
+    EXPECT_EQ(written.error().code, ErrorCode::bad_file);
+    EXPECT_NE(written.error().message.find("mesh.pos"), std::string::npos) << written.error().message;
+    EXPECT_FALSE(fs::exists(path("c.pc2")));
+}
+
+TEST_F(ModelChunksTest, WhatHasNoneIsRefused) {
+    const Stripped reference = *strip(make_wavy_cube({.resolution = 8}), {.code = DetailCode::reference}, kContext);
+    EXPECT_EQ(open(reference.model).error().code, ErrorCode::unsuitable);
+    const auto old = ModelChunks::open(*FileReader::open(FILIGREE_ROOT "/tests/io/version_1/float.fil"), "a", kContext);
+    EXPECT_EQ(old.error().code, ErrorCode::unsuitable);
+    const Model model = model_of(Precision::float32);
+    const Result<ModelChunks> chunks = open(model);
+    const PoseSequence poses = bent_poses(model, false);
+    const auto code = [&](const PoseSequence& given, const RestoreOptions& options, const char* name) {
+        return write_restored_chunks(*chunks, stream_of(given), options, path(name), kContext).error().code;
+    };
+    EXPECT_EQ(code(poses, {.level = 1}, "a.pc2"), ErrorCode::usage);
+    EXPECT_EQ(code(poses, {}, "a.mdd"), ErrorCode::usage);
+    EXPECT_EQ(code({}, {}, "a.pc2"), ErrorCode::unsuitable);
+    PoseSequence other = poses;
+    other.frames[1].positions.pop_back();
+    EXPECT_EQ(code(other, {}, "a.pc2"), ErrorCode::mismatch);
+    RunContext cancelled(1);
+    cancelled.cancel();
+    EXPECT_EQ(write_restored_chunks(*chunks, stream_of(poses), {}, path("a.pc2"), cancelled).error().code,
+              ErrorCode::cancelled);
+    EXPECT_FALSE(fs::exists(path("a.pc2")));
+}
+
+} // namespace
