@@ -276,6 +276,12 @@ Status FileWriter::write(std::string_view bytes) {
     return Success{};
 }
 
+Status FileWriter::reserve(std::uint64_t bytes) {
+    const bool has_room = ::fallocate(file_->get(), 0, 0, static_cast<off_t>(bytes)) == 0;
+    if (!has_room && (errno == ENOSPC || errno == EFBIG || errno == EDQUOT)) return cannot_write(file_->path, errno);
+    return Success{};
+}
+
 Status FileWriter::write_at(std::uint64_t offset, std::string_view bytes) {
     while (!bytes.empty()) {
         const ssize_t written = ::pwrite(file_->get(), bytes.data(), bytes.size(), static_cast<off_t>(offset));

@@ -60,6 +60,9 @@ public:
     ~FileWriter();
 
     Status write(std::string_view bytes);
+    /// Makes room for a file of so many bytes, where the file system can: pieces that come in any order then lie
+    /// together, and a full disk is known at once. Errors: unwritable (the disk is full).
+    Status reserve(std::uint64_t bytes);
     /// Writes somewhere in the file, and leaves where write goes on. Errors: also of what cannot be written there and
     /// back (standard output, a pipe).
     Status write_at(std::uint64_t offset, std::string_view bytes);

@@ -251,6 +251,8 @@ Result<std::vector<std::string>> write_restored_chunks(const ModelChunks& model,
     if (!header) return header.error();
     Result<FileWriter> file = FileWriter::create(path);
     if (!file) return file.error();
+    const std::uint64_t points = std::uint64_t{poses.frames} * model.vertex_count();
+    if (Status reserved = file->reserve(kPc2HeaderBytes + points * sizeof(Vec3f)); !reserved) return reserved.error();
     if (Status written = file->write(*header); !written) return written.error();
     ChunkRestoration restoration(model, poses, path, context);
     const WriteAt write_at = [&](std::uint64_t offset, std::string_view bytes) {

@@ -210,16 +210,23 @@ Result<std::string> hash_of_files(std::span<const fs::path> paths) {
     XXH3_state_t* const state = XXH3_createState();
     if (!state) return Error{ErrorCode::out_of_memory, "Not enough memory to hash a file."};
     XXH3_128bits_reset(state);
-    std::optional<Error> error;
-    for (const fs::path& path : paths) {
-        const Result<std::string> bytes = read_file(path);
-        if (!bytes) error = bytes.error();
-        if (error) break;
-        XXH3_128bits_update(state, bytes->data(), bytes->size());
-    }
+    const auto take = [&](const fs::path& path) -> Status {
+        const Result<FileReader> file = FileReader::open(path);
+        if (!file) return file.error();
+        std::string piece;
+        for (std::uint64_t offset = 0; offset < file->size(); offset += piece.size()) {
+            piece.resize(std::min<std::uint64_t>(std::uint64_t{1} << 20, file->size() - offset));
+            if (Status filled = file->read(offset, piece); !filled) return filled;
+            XXH3_128bits_update(state, piece.data(), piece.size());
+        }
+        return Success{};
+    };
+    Status taken = Success{};
+    for (const fs::path& path : paths)
+        if (taken) taken = take(path);
     const XXH128_hash_t hash = XXH3_128bits_digest(state);
     XXH3_freeState(state);
-    if (error) return *error;
+    if (!taken) return taken.error();
     constexpr char kDigits[] = "0123456789abcdef";
     std::string text;
     for (const XXH64_hash_t half : {hash.high64, hash.low64})

@@ -53,7 +53,8 @@ struct CellLanes : Lanes<N> {
     static FILIGREE_INLINE Float magnitude(Float x) { return (Float)((Int)x & 0x7fffffff); }
 
     static FILIGREE_INLINE Float square_root(Float x) {
-#if defined(__x86_64__) // the vector types have no such operation; rounding is the same everywhere
+#if defined(__x86_64__) &&                                                                                             \
+    !defined(__clang__) // the vector types have no such operation; rounding is the same everywhere
         Float y;
         if constexpr (N == 4)
             asm("sqrtps %1, %0" : "=x"(y) : "x"(x));
