@@ -8,6 +8,8 @@
 #include <string_view>
 #include <system_error>
 
+#include <malloc.h>
+
 using namespace filigree;
 
 namespace {
@@ -71,9 +73,17 @@ bool is_thread_refused(const std::exception& error) {
     return std::string_view(error.what()).starts_with("pthread_create");
 }
 
+/// Buffers of a few megabytes that come and go (a chunk of a model, a frame) stay with the program: to give them back
+/// and have them again costs a page fault every 4 KiB, more than what is done with them.
+void keep_freed_memory() {
+    mallopt(M_MMAP_THRESHOLD, 32 << 20);
+    mallopt(M_TRIM_THRESHOLD, 256 << 20);
+}
+
 } // namespace
 
 int main(int argc, char** argv) {
+    keep_freed_memory();
     try {
         return run(argc, argv);
     } catch (const cli::Failure& failure) {

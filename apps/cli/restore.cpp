@@ -3,6 +3,7 @@
 #include "pictures.h"
 #include "restore_options.h"
 
+#include "filigree/hierarchy/vertex_order.h"
 #include "filigree/mesh/surfels.h"
 #include "filigree/present/error_picture.h"
 #include "filigree/present/page.h"
@@ -38,7 +39,7 @@ struct RestoreArguments {
     std::string model, pose, poses, ghosts, output, picture, chunk;
     std::optional<UpAxis> up;
     std::size_t frame = 0; ///< of the model's own, from 1; 0: none
-    bool all_frames = false, as_surfels = false;
+    bool all_frames = false, as_surfels = false, in_input_order = false;
     PoseFileOptions poses_file;
     RestoreOptions restore;
     AnimationOutput animation;
@@ -66,6 +67,8 @@ void check(const RestoreArguments& options, const Session& session) {
     if (!options.picture.empty()) check_picture_path(options.picture);
     if (options.as_surfels && (options.is_animation() || options.restore.level))
         refuse("--surfels writes one moment of the finest level: give --pose or --frame, and no --level.");
+    if (options.in_input_order && (options.is_animation() || options.restore.level || options.as_surfels))
+        refuse("--input-order writes one mesh, the finest: give --pose or --frame, and neither --level nor --surfels.");
     if (!options.chunk.empty() && !options.is_animation()) refuse("--chunk belongs to --poses or --frames.");
     if (!options.chunk.empty()) (void)chunk_of(options.chunk);
     if (!options.chunk.empty() && animation_format(options.output).value() != AnimationFormat::pc2)
@@ -145,8 +148,13 @@ void restore_one(const RestoreArguments& options, Session& session) {
                           "'filigree level MODEL 0' writes the driver as it is."));
     const Mesh mesh = require(restorer.mesh(pose, gradients, session.context()));
     const double seconds = now_seconds() - start;
-    session.write_mesh(options.as_surfels ? surfels_of(model, mesh, gradients, options, session) : mesh, options.output,
-                       options.model);
+    if (options.as_surfels)
+        session.write_mesh(surfels_of(model, mesh, gradients, options, session), options.output, options.model);
+    else if (options.in_input_order && !model.source_order.empty())
+        session.write_mesh(with_vertex_order(mesh, inverse_order(model.source_order), session.context()),
+                           options.output, options.model);
+    else
+        session.write_mesh(mesh, options.output, options.model);
     const char* from = source_of(model, pose);
     Report report;
     report.say(fmt::format("{}: {} vertices restored from {} in {}\n", options.output, with_commas(mesh.vertex_count()),
@@ -288,6 +296,8 @@ Command restore_command() {
                                   "write too, on any machine"),
                            Option("--surfels", options->as_surfels,
                                   "Write surfels: points with a normal and two half axes, carried from rest (.ply)"),
+                           Option("--input-order", options->in_input_order,
+                                  "Write the vertices in the order they had before 'strip --reorder'"),
                            Option("--picture", options->picture,
                                   "Also draw the mesh coloured by the error to expect (.png, .svg, .pdf)")
                                .is_written(),

@@ -1,5 +1,6 @@
 #include "commands.h"
 #include "session.h"
+#include "spill.h"
 
 #include "filigree/deform/fidelity.h"
 
@@ -14,6 +15,7 @@ namespace {
 struct StripCommandOptions {
     std::string input, output, driver;
     StripOptions strip;
+    std::string memory;
     std::optional<double> fidelity;
     PoseSource fidelity_from = PoseSource::positions;
 };
@@ -79,8 +81,21 @@ void report_fidelity(const StrippedToFidelity& result, const StripCommandOptions
         "fidelity", {{"error", result.error}, {"asked", *options.fidelity}, {"from", from}, {"tried", result.tried}});
 }
 
+/// Arrays beyond the memory that may be used go into a file beside the output.
+void bound_memory(const StripCommandOptions& options) {
+    const bool is_asked = !options.memory.empty();
+    const std::uint64_t limit = is_asked ? parse_size(options.memory) : memory_to_use();
+    if (limit == 0) refuse("--memory: '" + options.memory + "' is not a size; give one such as 8G or 500M.");
+    const std::filesystem::path folder = std::filesystem::path(options.output).parent_path();
+    spill_beyond(limit, folder);
+    if (is_asked && !can_spill())
+        refuse(ErrorCode::unwritable, options.output + ": no file can be made and mapped beside it for what exceeds " +
+                                          options.memory + "; give no --memory, or write to another disk.");
+}
+
 void run(const StripCommandOptions& options, Session& session) {
     refuse_mesh_name(options.output);
+    bound_memory(options);
     if (!options.fidelity && !session.first_given({"--fidelity-from"}).empty())
         refuse("--fidelity-from belongs to --fidelity.");
     const double start = now_seconds();
@@ -98,6 +113,9 @@ void run(const StripCommandOptions& options, Session& session) {
     const double done = now_seconds();
     session.write_model(result.stripped.model, options.output);
     Report report = make_report(result.stripped, options.output, {read - start, done - read, now_seconds() - done});
+    const std::uint64_t spilled = most_spilled();
+    if (spilled > 0) report.row("beside the output", fmt::format("{} MiB that did not fit in memory", spilled >> 20));
+    report.set("spilled_bytes", spilled);
     if (options.fidelity) report_fidelity(result, options, report);
     if (options.fidelity && result.error > *options.fidelity)
         session.warn(
@@ -149,6 +167,14 @@ Command strip_command() {
                  choice<Precision>("--precision", strip.precision,
                                    {{"float", Precision::float32}, {"int16", Precision::int16}},
                                    "Of the blend code: float, 20 bytes a vertex (default), or int16, 10 bytes"),
+                 Option("--reorder", strip.reorder,
+                        "Renumber vertices by where they are: a mesh whose order is hopeless restores faster; "
+                        "'restore --input-order' gives meshes in the old order")
+                     .excludes({"--driver"}),
+                 Option("--memory", options->memory,
+                        "How much its arrays may take, such as 8G; the others lie in a file beside the output while it "
+                        "runs (unset: three quarters of what is free)")
+                     .named("SIZE"),
                  Option("--references", strip.references, "Of the reference code: coarse points that a point refers to")
                      .one_of({3, 4, 6})
                      .with_default()},

@@ -170,6 +170,38 @@ TEST_F(Cli, StripSaysWhereAFidelityIsBelowRounding) {
     EXPECT_NE(said.at("warnings").dump().find("rounding"), std::string::npos);
 }
 
+TEST_F(Cli, WhatDoesNotFitInMemoryLiesBesideTheOutput) {
+    ok({"make", "wavy-cube", "-o", "cube.ply", "--resolution", "256", "--quiet"});
+    const Json whole = json({"strip", "cube.ply", "-o", "whole.fil"});
+    const Json spilled = json({"strip", "cube.ply", "-o", "spilled.fil", "--memory", "10M"});
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+    EXPECT_GT(spilled.at("spilled_bytes").get<double>(), 1 << 24);
+#endif
+    EXPECT_EQ(whole.at("spilled_bytes"), 0);
+    EXPECT_EQ(bytes_of(path("whole.fil")), bytes_of(path("spilled.fil")));
+    EXPECT_EQ(files().size(), 3u); // no file is left behind
+
+    for (const char* size : {"8Q", "", "-3G", "0", "nan", "1e300G"})
+        fails(2, {"strip", "cube.ply", "-o", "no.fil", std::string("--memory=") + size}, {"--memory"});
+    const Ran full = run_shell("ulimit -f 20000; exec \"$0\" \"$@\"",
+                               {"strip", "cube.ply", "-o", "no.fil", "--memory", "10M"}); // as a full disk is
+    EXPECT_EQ(full.code, 9) << full.err;
+    EXPECT_EQ(files().size(), 3u);
+}
+
+TEST_F(Cli, ReorderedVerticesAreWrittenInTheirOldOrder) {
+    ok({"make", "wavy-sphere", "-o", "sphere.ply", "--resolution", "32", "--quiet"});
+    ok({"strip", "sphere.ply", "-o", "sphere.fil", "--reorder", "--quiet"});
+    ok({"level", "sphere.fil", "0", "-o", "driver.ply", "--quiet"});
+    ok({"restore", "sphere.fil", "--pose", "driver.ply", "-o", "old.ply", "--input-order", "--quiet"});
+    ok({"restore", "sphere.fil", "--pose", "driver.ply", "-o", "new.ply", "--quiet"});
+    EXPECT_LT(json({"compare", "old.ply", "sphere.ply"}).at("max").get<double>(), 1e-6);
+    EXPECT_GT(json({"compare", "new.ply", "sphere.ply"}).at("max").get<double>(), 0.1);
+    fails(2, {"restore", "sphere.fil", "--pose", "driver.ply", "-o", "x.ply", "--input-order", "--level", "0"},
+          {"--input-order"});
+    fails(2, {"strip", "sphere.ply", "-o", "x.fil", "--reorder", "--code", "reference"}, {"reorder"});
+}
+
 TEST_F(Cli, InfoSaysWhatADriverIsGoodFor) {
     ok({"make", "wavy-sphere", "-o", "sphere.ply", "--resolution", "32", "--quiet"});
     double coarser = 1;

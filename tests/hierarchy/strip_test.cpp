@@ -1,6 +1,7 @@
 // Stripping any mesh: the driver is a subset, the levels are nested, and at rest everything comes back.
 #include "filigree/hierarchy/strip.h"
 
+#include "filigree/hierarchy/vertex_order.h"
 #include "filigree/mesh/mesh_distance.h"
 #include "filigree/mesh/shapes.h"
 #include "hierarchy/stripping.h"
@@ -249,4 +250,33 @@ TEST(Strip, OptionsThatMakeNoSenseAreRefused) {
     const Result<Stripped> result = strip(mesh, {}, cancelled);
     ASSERT_FALSE(result.ok());
     EXPECT_EQ(result.error().code, ErrorCode::cancelled);
+}
+
+TEST(Strip, VerticesInAnotherOrderComeBackInTheirOwn) {
+    Mesh mesh = make_wavy_sphere({.resolution = 48});
+    std::mt19937 random(7);
+    std::vector<Index> shuffled(mesh.vertex_count());
+    std::iota(shuffled.begin(), shuffled.end(), Index{0});
+    std::shuffle(shuffled.begin(), shuffled.end(), random);
+    mesh.scalars.push_back({"number", {}});
+    for (std::size_t v = 0; v < mesh.vertex_count(); ++v) mesh.scalars[0].values.push_back(float(v));
+    mesh = with_vertex_order(std::move(mesh), shuffled, kOneThread);
+
+    const Model model = strip(mesh, {.reorder = true}, kOneThread).value().model;
+    EXPECT_EQ(check_model(model), "");
+    const auto far_steps = [](const Mesh& m) { // how far it is from vertex to vertex
+        double sum = 0;
+        for (std::size_t v = 1; v < m.vertex_count(); ++v) sum += (m.positions[v] - m.positions[v - 1]).norm();
+        return sum;
+    };
+    EXPECT_LT(far_steps(model.mesh), far_steps(mesh) / 10);
+    const Mesh back = with_vertex_order(model.mesh, inverse_order(model.source_order), kOneThread);
+    EXPECT_EQ(back.positions, mesh.positions);
+    EXPECT_EQ(back.corners, mesh.corners);
+    EXPECT_EQ(back.scalars[0].values, mesh.scalars[0].values);
+
+    Model wrong = model;
+    wrong.source_order[0] = wrong.source_order[1];
+    EXPECT_NE(check_model(wrong), "");
+    EXPECT_EQ(strip(mesh, {.code = DetailCode::reference, .reorder = true}, kOneThread).error().code, ErrorCode::usage);
 }

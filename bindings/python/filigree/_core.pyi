@@ -311,6 +311,8 @@ class Model:
     @property
     def driver_vertices(self) -> _Ids: ...
     @property
+    def source_order(self) -> _Ids: ...
+    @property
     def across_gap(self) -> _Ids: ...
     @property
     def facing_away(self) -> _Ids: ...
@@ -718,6 +720,7 @@ def strip(
     code: str = 'blend',
     precision: str = 'float',
     references: int = 3,
+    reorder: bool = False,
     threads: int = 0,
     progress: _Progress | None = None,
 ) -> Model: ...

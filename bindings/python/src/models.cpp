@@ -60,11 +60,12 @@ py::object listed(const py::object& self, const std::vector<Index> BlendDetail::
 PyModel strip_mesh(const py::object& given, const py::object& driver, std::optional<std::size_t> base,
                    std::optional<unsigned> levels, std::optional<double> error, std::optional<double> fidelity,
                    const std::string& fidelity_from, std::optional<double> max_edge, const std::string& code,
-                   const std::string& precision, unsigned references, unsigned threads, const py::object& progress) {
+                   const std::string& precision, unsigned references, bool reorder, unsigned threads,
+                   const py::object& progress) {
     if (!driver.is_none()) {
-        if (base || levels || error || fidelity || max_edge || code != "blend")
+        if (base || levels || error || fidelity || max_edge || reorder || code != "blend")
             refuse("With driver, how coarse the driver is is settled: leave out base, levels, error, fidelity, "
-                   "max_edge and code.");
+                   "max_edge, reorder and code.");
         return strip_to(given, driver, precision, threads, progress);
     }
     const MeshPtr mesh = mesh_of(given);
@@ -73,6 +74,7 @@ PyModel strip_mesh(const py::object& given, const py::object& driver, std::optio
     options.code =
         value_of<DetailCode>(code, "code", {{"blend", DetailCode::blend}, {"reference", DetailCode::reference}});
     options.precision = precision_of(precision);
+    options.reorder = reorder;
     const LongCall call{threads, progress};
     if (!fidelity) {
         Stripped stripped =
@@ -116,6 +118,11 @@ Made by `strip` and `read_model`; never changes. Pickles as the bytes of its fil
             "driver_vertices",
             [](const py::object& self) { return view(self.cast<const PyModel&>().model->driver().vertices, self); },
             "The driver's vertices as ids in `mesh`, ascending, uint32 (d,), read-only.")
+        .def_property_readonly(
+            "source_order",
+            [](const py::object& self) { return view(self.cast<const PyModel&>().model->source_order, self); },
+            "Where each vertex of `mesh` was in the mesh that was stripped with `reorder`: uint32 (v,), else (0,), "
+            "read-only.")
         .def_property_readonly(
             "across_gap", [](const py::object& self) { return listed(self, &BlendDetail::across_gap); },
             "Vertices of `mesh` bound across a gap, as their part has no driver of its own: uint32 (k,), read-only.")
@@ -199,9 +206,9 @@ dict
         "strip", &strip_mesh, py::arg("mesh"), py::kw_only(), py::arg("driver") = py::none(),
         py::arg("base") = py::none(), py::arg("levels") = py::none(), py::arg("error") = py::none(),
         py::arg("fidelity") = py::none(), py::arg("fidelity_from") = "positions", py::arg("max_edge") = py::none(),
-        py::arg("code") = "blend", py::arg("precision") = "float", py::arg("references") = 3, py::arg("threads") = 0,
-        py::arg("progress") = py::none(),
-        R"(strip(mesh, *, driver=None, base=None, levels=None, error=None, fidelity=None, fidelity_from='positions', max_edge=None, code='blend', precision='float', references=3, threads=0, progress=None)
+        py::arg("code") = "blend", py::arg("precision") = "float", py::arg("references") = 3,
+        py::arg("reorder") = false, py::arg("threads") = 0, py::arg("progress") = py::none(),
+        R"(strip(mesh, *, driver=None, base=None, levels=None, error=None, fidelity=None, fidelity_from='positions', max_edge=None, code='blend', precision='float', references=3, reorder=False, threads=0, progress=None)
 --
 
 Take the detail off a mesh: a model with a light driver.
@@ -232,6 +239,9 @@ precision : str
     Of the blend code: 'float', 20 bytes a vertex, or 'int16', 10 bytes.
 references : int
     Of the reference code: 3, 4 or 6 coarse points that a point refers to.
+reorder : bool
+    Put the vertices in an order along which neighbours lie together, so that a mesh whose order is hopeless restores
+    faster; the model's `source_order` says where they were. Of the blend code.
 threads : int
     0: all of the processor's. Results are the same bytes for any.
 progress : callable, optional

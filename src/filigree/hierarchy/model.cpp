@@ -108,10 +108,24 @@ std::string check_blend(const BlendDetail& detail, std::size_t vertex_count, std
     return "";
 }
 
+/// Whether it is empty or has each of so many vertices once.
+bool is_order(std::span<const Index> order, std::size_t vertices) {
+    if (order.empty()) return true;
+    if (order.size() != vertices) return false;
+    std::vector<bool> is_named(vertices);
+    for (const Index v : order) {
+        if (v >= vertices || is_named[v]) return false;
+        is_named[v] = true;
+    }
+    return true;
+}
+
 } // namespace
 
 std::string check_model(const Model& model) {
     if (std::string wrong = check_mesh(model.mesh); !wrong.empty()) return wrong;
+    if (!is_order(model.source_order, model.mesh.vertex_count()))
+        return "the vertices' order in the source does not name each of them once";
     if (model.levels.empty()) return "there is no driver";
     for (const Level& level : model.levels)
         if (std::string wrong = check_level(level, model.mesh.vertex_count()); !wrong.empty()) return wrong;

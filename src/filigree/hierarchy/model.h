@@ -27,6 +27,8 @@ struct Model {
     Mesh mesh;                 ///< the finest level, as it came in
     std::vector<Level> levels; ///< coarse to fine, without the finest; levels[0] is the driver
     std::variant<ReferenceDetail, BlendDetail> detail;
+    /// Vertex i of the mesh was vertex source_order[i] of the mesh that was stripped; empty: the order is the same.
+    std::vector<Index> source_order = {};
 
     DetailCode code() const { return static_cast<DetailCode>(detail.index()); }
     /// The number of the finest level; levels 0 .. finest_level() exist.

@@ -2,6 +2,7 @@
 
 #include "filigree/core/parallel_for.h"
 #include "filigree/hierarchy/simplify_levels.h"
+#include "filigree/hierarchy/vertex_order.h"
 #include "filigree/mesh/closest_point.h"
 #include "filigree/mesh/normals.h"
 #include "filigree/mesh/surface.h"
@@ -101,6 +102,10 @@ std::optional<Error> check_driver(const Mesh& mesh, const Mesh& driver) {
 Result<Stripped> strip_blend(Mesh mesh, const StripOptions& options, const RunContext& context) {
     Stripped result;
     const Stopwatch simplify_time;
+    if (options.reorder) {
+        result.model.source_order = order_by_place(mesh, context);
+        mesh = with_vertex_order(std::move(mesh), result.model.source_order, context);
+    }
     const Result<WorkingMesh> work = make_working_mesh(mesh, context);
     if (!work) return work.error();
     result.report.welded_vertices = mesh.vertex_count() - work->surface.place_count;
@@ -173,6 +178,8 @@ std::optional<Error> check_options(const Mesh& mesh, const StripOptions& options
         return Error{ErrorCode::usage, "error must be above 0 and at most 1: it is a fraction of the diagonal."};
     if (options.code == DetailCode::reference && options.error)
         return Error{ErrorCode::usage, "The reference code removes whole levels: give base or levels, not error."};
+    if (options.code == DetailCode::reference && options.reorder)
+        return Error{ErrorCode::usage, "The reference code orders vertices by itself: reorder is for the blend code."};
     if (options.max_edge && !(*options.max_edge > 0 && *options.max_edge <= 1))
         return Error{ErrorCode::usage, "max_edge must be above 0 and at most 1: it is a fraction of the diagonal."};
     if (options.code == DetailCode::reference && options.max_edge)

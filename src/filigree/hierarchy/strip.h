@@ -23,6 +23,9 @@ struct StripOptions {
     /// Larger levels are simplified in clusters on all threads, in time that grows as the mesh does, and those from so
     /// many vertices on in one piece. Blend code without max_edge only.
     std::size_t one_piece = 1'200'000;
+    /// The mesh's vertices are put in order_by_place() first, and Model::source_order says where they were: for meshes
+    /// whose order is hopeless, which restore slowly. Blend code only.
+    bool reorder = false;
     bool operator==(const StripOptions&) const = default;
 };
 

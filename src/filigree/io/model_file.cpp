@@ -305,6 +305,7 @@ Model read_sections(const FileReader& file) {
     const SectionReader in(file);
     Model model;
     model.mesh = read_mesh_sections(in);
+    model.source_order = in.array<Index>("mesh.ord");
     const auto level_count = in.value<std::uint32_t>("levels");
     if (level_count > 64) throw FileDamage{"has more levels than make sense"};
     for (std::uint32_t k = 0; k < level_count; ++k) {
@@ -454,6 +455,7 @@ namespace {
 void write_sections(SectionWriter& out, const Model& model, const PoseSequence& poses) {
     const auto* blend = std::get_if<BlendDetail>(&model.detail);
     write_mesh_sections(out, model.mesh, !blend || blend->precision == Precision::float32);
+    out.array("mesh.ord", model.source_order);
     out.value("code", static_cast<std::uint32_t>(model.code()));
     out.value("levels", static_cast<std::uint32_t>(model.levels.size()));
     for (std::uint32_t k = 0; k < model.levels.size(); ++k) {
