@@ -1,0 +1,251 @@
+#include "filigree/coding/geometry_code.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdlib>
+
+namespace filigree {
+
+namespace {
+
+using Wide = std::array<std::int64_t, 3>;
+
+constexpr int kOneBits = 14;
+constexpr std::int32_t kOne = 1 << kOneBits;  // length of the frame's axes
+constexpr std::int32_t kFarthest = 1 << 26;   // of a place, in sixteenths of a step
+constexpr unsigned kSizeClasses = 16, kSupport = 3;
+static_assert(3 * kSizeClasses * kSupport <= kGeometryContexts);
+
+Wide operator+(const Wide& a, const Wide& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
+Wide operator-(const Wide& a, const Wide& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+Wide cross(const Wide& a, const Wide& b) {
+    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+std::int64_t dot(const Wide& a, const Wide& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+/// To the nearest, halves away from zero. |value| < 2^53, by > 0. A quotient of doubles is the same on every machine,
+/// and quicker than one of integers.
+std::int64_t divide(std::int64_t value, std::int64_t by) {
+    const double quotient = double(value) / double(by);
+    return std::int64_t(quotient + (quotient < 0 ? -0.5 : 0.5));
+}
+/// The same by kOne.
+std::int64_t divide_by_one(std::int64_t value) { return (value + kOne / 2) >> kOneBits; }
+
+/// Made kOne long; false: it has no direction.
+bool normalise(Wide& v) {
+    const std::int64_t largest = std::max({std::abs(v[0]), std::abs(v[1]), std::abs(v[2])});
+    if (largest == 0) return false;
+    const int shift = int(std::bit_width(std::uint64_t(largest))) - 25; // so that squares add up to less than 2^53
+    for (std::int64_t& x : v) x = shift > 0 ? x >> shift : x << -shift;
+    const auto length = std::int64_t(std::sqrt(double(dot(v, v)))); // rounded as IEEE 754 has it: the same everywhere
+    for (std::int64_t& x : v) x = divide(x * kOne, length);
+    return true;
+}
+
+/// The normal, and two directions across it.
+struct Frame {
+    std::array<Wide, 3> axes = {Wide{kOne, 0, 0}, Wide{0, kOne, 0}, Wide{0, 0, kOne}};
+
+    Frame() = default;
+    Frame(Wide normal, Wide ahead) {
+        if (!normalise(normal)) return;
+        Wide side = cross(normal, ahead);
+        if (!normalise(side)) return;
+        Wide across = cross(side, normal);
+        normalise(across);
+        axes = {normal, across, side};
+    }
+};
+
+/// Visits vertices, best known first. `Coder` says where each is, given what is expected.
+template <class Coder>
+class Traversal {
+public:
+    Traversal(const ClosedMap& map, GeometrySteps steps, Coder& coder)
+        : map_(map), coder_(coder), steps_{steps.normal, steps.tangential, steps.tangential},
+          places_(map.vertex_count()), sizes_(map.vertex_count(), 0), support_(map.vertex_count(), 0),
+          is_known_(map.vertex_count(), false), spoke_(map.vertex_count(), kNoIndex),
+          known_corners_(map.triangles.size(), 0) {
+        for (Index h = 0; h < map.opposite.size(); ++h) spoke_[map.origin(h)] = h;
+        for (std::size_t t = 0; t < map.triangles.size(); ++t)
+            if (!map.is_own(map.triangles[t])) known_corners_[t] = kClosesHole;
+    }
+
+    std::vector<FinePlace> run() {
+        Index last = kNoIndex;
+        for (Index v = 0; v < map_.vertex_count(); ++v) {
+            if (is_known_[v] || map_.closes_hole[v]) continue;
+            visit_first(v, last);
+            last = v;
+            for (Index w = next_vertex(); w != kNoIndex; w = next_vertex()) {
+                visit(w);
+                last = w;
+            }
+            if (coder_.is_damaged()) break;
+        }
+        return std::move(places_);
+    }
+
+private:
+    static constexpr std::size_t kTurns = 4;
+    static constexpr std::uint8_t kClosesHole = 4; // instead of a triangle's known corners
+
+    Wide at(Index v) const { return {places_[v][0], places_[v][1], places_[v][2]}; }
+
+    Index next_vertex() {
+        for (std::size_t turn = kTurns; turn-- > 1;)
+            while (!turns_[turn].empty()) {
+                const Index v = turns_[turn].back();
+                turns_[turn].pop_back();
+                if (!is_known_[v] && std::min<std::size_t>(support_[v], kTurns - 1) == turn) return v;
+            }
+        return kNoIndex;
+    }
+
+    /// One that no known triangle lies beside: it goes by a known neighbour, or by the one before.
+    void visit_first(Index v, Index last) {
+        Wide expected{};
+        Index near = last;
+        for (Index h = spoke_[v];;) {
+            const Index w = map_.origin(ClosedMap::next(h));
+            if (is_known_[w]) near = w;
+            h = map_.turn_clockwise(h);
+            if (h == spoke_[v]) break;
+        }
+        if (near != kNoIndex) expected = at(near);
+        code(v, expected, Frame(), near != kNoIndex ? sizes_[near] : 0, 0);
+    }
+
+    void visit(Index v) {
+        Wide sum{}, normal{}, ahead{};
+        std::int64_t count = 0, size = 0;
+        for (Index h = spoke_[v];;) {
+            const Index across = map_.opposite[ClosedMap::next(h)]; // the triangle behind the edge that faces v
+            if (known_corners_[across / 3] == 3 && known_corners_[h / 3] != kClosesHole) {
+                const Index a = map_.origin(across), b = map_.origin(ClosedMap::next(across)),
+                            c = map_.origin(ClosedMap::previous(across));
+                const Wide at_a = at(a), at_b = at(b), at_c = at(c);
+                sum = sum + (at_a + at_b - at_c);
+                normal = normal + cross(at_b - at_a, at_c - at_a);
+                ahead = ahead + (at_a + at_b - at_c - at_c);
+                size += sizes_[a] + sizes_[b] + sizes_[c];
+                ++count;
+            }
+            h = map_.turn_clockwise(h);
+            if (h == spoke_[v]) break;
+        }
+        Wide expected{};
+        for (std::size_t k = 0; k < 3; ++k) expected[k] = divide(sum[k], count);
+        code(v, expected, Frame(normal, ahead), std::int32_t(size / (3 * count)),
+             unsigned(std::min<std::int64_t>(count, kSupport)) - 1);
+    }
+
+    void code(Index v, const Wide& expected, const Frame& frame, std::int32_t size, unsigned support) {
+        std::array<std::int32_t, 3> steps{};
+        std::int64_t so_far = size; // what differences to expect, in quarters of a step
+        for (std::size_t k = 0; k < 3; ++k) {
+            const auto size_class = unsigned(class_of(std::uint32_t(so_far)));
+            steps[k] = coder_.step(v, expected, frame.axes[k], std::int64_t{steps_[k]} * kFine,
+                                   unsigned(k * kSizeClasses + size_class) * kSupport + support);
+            const std::int64_t own = 4 * std::int64_t{std::abs(steps[k])};
+            so_far = k == 0 ? (3 * so_far + 2 * own) / 4 : (so_far + own) / 2;
+        }
+        std::int64_t all = 0;
+        Wide place = expected;
+        for (std::size_t k = 0; k < 3; ++k) {
+            all += std::abs(std::int64_t{steps[k]});
+            for (std::size_t j = 0; j < 3; ++j)
+                place[j] += divide_by_one(std::int64_t{steps[k]} * steps_[k] * kFine * frame.axes[k][j]);
+        }
+        for (std::size_t j = 0; j < 3; ++j)
+            places_[v][j] = std::int32_t(std::clamp<std::int64_t>(place[j], -kFarthest, kFarthest));
+        sizes_[v] = std::int32_t(std::min<std::int64_t>(4 * all / 3, 1 << 20));
+        is_known_[v] = true;
+        tell_neighbours(v);
+    }
+
+    /// 0, 1, then two a power of two.
+    static std::uint32_t class_of(std::uint32_t size) {
+        const std::uint32_t one_more = size + 1;
+        const auto exponent = std::uint32_t(std::bit_width(one_more)) - 1;
+        const std::uint32_t half = exponent ? one_more >> (exponent - 1) & 1 : 0;
+        return std::min(2 * exponent + half, kSizeClasses - 1);
+    }
+
+    /// The triangles that are known through v are beside others.
+    void tell_neighbours(Index v) {
+        for (Index h = spoke_[v];;) {
+            std::uint8_t& known = known_corners_[h / 3];
+            if (known != kClosesHole && ++known == 3)
+                for (Index k = 0; k < 3; ++k) {
+                    const Index across = map_.opposite[h / 3 * 3 + k];
+                    const Index w = map_.origin(ClosedMap::previous(across));
+                    if (is_known_[w] || known_corners_[across / 3] == kClosesHole) continue;
+                    ++support_[w];
+                    turns_[std::min<std::size_t>(support_[w], kTurns - 1)].push_back(w);
+                }
+            h = map_.turn_clockwise(h);
+            if (h == spoke_[v]) break;
+        }
+    }
+
+    const ClosedMap& map_;
+    Coder& coder_;
+    std::array<std::int32_t, 3> steps_;
+    std::vector<FinePlace> places_;
+    std::vector<std::int32_t> sizes_; ///< of each vertex's difference, quarters of a step
+    std::vector<std::uint32_t> support_; ///< known triangles beside each vertex
+    std::vector<bool> is_known_;
+    std::vector<Index> spoke_;                ///< a half-edge from each vertex
+    std::vector<std::uint8_t> known_corners_; ///< of each triangle
+    std::array<std::vector<Index>, kTurns> turns_;
+};
+
+class PlaceWriter {
+public:
+    PlaceWriter(std::span<const FinePlace> places, unsigned first, SymbolWriter& out)
+        : places_(places), first_(first), out_(out) {}
+    bool is_damaged() const { return false; }
+    std::int32_t step(Index v, const Wide& expected, const Wide& axis, std::int64_t size, unsigned context) {
+        const Wide place = {places_[v][0], places_[v][1], places_[v][2]};
+        const auto steps = std::int32_t(divide(dot(place - expected, axis), size * kOne));
+        out_.number_with_sign(first_ + context, steps);
+        return steps;
+    }
+
+private:
+    std::span<const FinePlace> places_;
+    unsigned first_;
+    SymbolWriter& out_;
+};
+
+class PlaceReader {
+public:
+    PlaceReader(unsigned first, SymbolReader& in) : first_(first), in_(in) {}
+    bool is_damaged() const { return in_.is_damaged(); }
+    std::int32_t step(Index, const Wide&, const Wide&, std::int64_t, unsigned context) {
+        return std::clamp(in_.number_with_sign(first_ + context), -kFarthest, kFarthest);
+    }
+
+private:
+    unsigned first_;
+    SymbolReader& in_;
+};
+
+} // namespace
+
+std::vector<FinePlace> encode_geometry(const ClosedMap& map, std::span<const FinePlace> places, GeometrySteps steps,
+                                       unsigned first_context, SymbolWriter& out) {
+    PlaceWriter writer(places, first_context, out);
+    return Traversal<PlaceWriter>(map, steps, writer).run();
+}
+
+std::vector<FinePlace> decode_geometry(const ClosedMap& map, GeometrySteps steps, unsigned first_context,
+                                       SymbolReader& in) {
+    PlaceReader reader(first_context, in);
+    return Traversal<PlaceReader>(map, steps, reader).run();
+}
+
+} // namespace filigree

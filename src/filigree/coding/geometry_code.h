@@ -1,0 +1,31 @@
+// Where the vertices of a map are: each is predicted from triangles that are known, best known first, and the difference
+// is coded in the frame of the surface there, where its normal part is small. Integers alone.
+#pragma once
+
+#include "filigree/coding/closed_map.h"
+#include "filigree/coding/symbols.h"
+
+#include <array>
+
+namespace filigree {
+
+/// Contexts of a SymbolWriter that places take, from `first` on.
+inline constexpr unsigned kGeometryContexts = 160;
+
+/// A place in sixteenths of a step, 2^26 at most.
+using FinePlace = std::array<std::int32_t, 3>;
+inline constexpr std::int32_t kFine = 16;
+
+struct GeometrySteps {
+    std::int32_t normal = 1, tangential = 1; ///< sizes of the steps along the normal and across it
+};
+
+/// Writes places, of vertices that close no hole. Returns them as they will be read: half a step off at most, along each
+/// axis of their own. Cost O(V).
+std::vector<FinePlace> encode_geometry(const ClosedMap& map, std::span<const FinePlace> places, GeometrySteps steps,
+                                       unsigned first_context, SymbolWriter& out);
+
+std::vector<FinePlace> decode_geometry(const ClosedMap& map, GeometrySteps steps, unsigned first_context,
+                                       SymbolReader& in);
+
+} // namespace filigree
