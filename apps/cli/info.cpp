@@ -140,6 +140,34 @@ Json vertices_json(const std::vector<Index>& ids) {
     return {{"count", ids.size()}, {"places", std::vector<Index>(ids.begin(), end)}};
 }
 
+/// What a coded file spends its bits on.
+void describe_coding(const ModelOutline& model, Report& report) {
+    const Coding& coding = *model.coding;
+    report.add("coded",
+               fmt::format("{} bits{}{}", coding.options.bits, coding.options.surface ? ", by surface" : "",
+                           coding.options.keep_order ? ", in the input's order" : ""),
+               "coding",
+               {{"bits", coding.options.bits},
+                {"surface", coding.options.surface},
+                {"keep_order", coding.options.keep_order},
+                {"step_units", coding.step}});
+    const double vertices = double(std::max<std::size_t>(model.levels.back().vertices, 1));
+    Json& shares = report.set("bits_per_vertex");
+    shares = Json::object();
+    std::string text;
+    const auto share = [&](const char* name, std::uint64_t bytes) {
+        const double bits = 8 * double(bytes) / vertices;
+        shares[name] = bits;
+        text += fmt::format("{}{:.2f} {}", text.empty() ? "" : ", ", bits, name);
+    };
+    share("connectivity", coding.bytes.connectivity);
+    share("places", coding.bytes.places);
+    share("attributes", coding.bytes.attributes);
+    share("order", coding.bytes.order);
+    share("driver", coding.bytes.driver);
+    report.row("bits a vertex", text);
+}
+
 void describe_code(const ModelOutline& model, Report& report) {
     if (model.code == DetailCode::reference) {
         report.add("references", std::to_string(model.references), "references", model.references);
@@ -149,6 +177,7 @@ void describe_code(const ModelOutline& model, Report& report) {
     const bool int16 = model.precision == Precision::int16;
     report.add("precision", int16 ? "int16, 10 bytes a vertex" : "float, 20 bytes a vertex", "precision",
                int16 ? "int16" : "float");
+    if (model.coding) return describe_coding(model, report);
     report.add("bound across gaps", with_commas(model.across_gap.size()), "across_gap",
                vertices_json(model.across_gap));
     report.add("bound facing away", with_commas(model.facing_away.size()), "facing_away",

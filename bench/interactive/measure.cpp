@@ -9,6 +9,7 @@
 #include "timing.h"
 #include "triad.h"
 
+#include "filigree/coding/mesh_code.h"
 #include "filigree/deform/handles.h"
 #include "filigree/deform/space_warp.h"
 #include "filigree/hierarchy/blend_code.h"
@@ -75,6 +76,23 @@ public:
             add(fmt::format("files.read_{}", name), megabytes / read, "MB/s");
             add(fmt::format("files.write_{}", name), megabytes / write, "MB/s");
             add(fmt::format("files.read_{}_of_memcpy", name), memcpy_seconds / read, "ratio");
+        }
+    }
+
+    /// Meshes in few bits.
+    void coding() {
+        const double vertices = double(mesh_.vertex_count()), diagonal = world_bounds(mesh_).diagonal();
+        for (const unsigned bits : {12u, 14u}) {
+            const std::string name = "coding." + std::to_string(bits);
+            MeshCodeReport report;
+            CodedMesh coded;
+            const double encode =
+                median_seconds([&] { coded = encode_mesh(mesh_, {.bits = bits}, &report, context_).value(); });
+            const double decode = median_seconds([&] { (void)decode_mesh(coded, context_).value(); });
+            add(name + "_bits", 8 * double(coded.connectivity.size() + coded.places.size()) / vertices, "bits/vertex");
+            add(name + "_rms", report.rms / diagonal, "of the diagonal");
+            add(name + "_encode", vertices / encode, "vertices/s");
+            add(name + "_decode", vertices / decode, "vertices/s");
         }
     }
 
@@ -252,8 +270,8 @@ private:
 } // namespace
 
 const std::vector<std::string>& measure_names() {
-    static const std::vector<std::string> names = {"all",      "restore",  "strip",    "files",   "deform", "handles",
-                                                   "fidelity", "simulate", "estimate", "drivers", "goals"};
+    static const std::vector<std::string> names = {"all",    "restore",  "strip",    "files",    "deform",  "handles",
+                                                   "coding", "fidelity", "simulate", "estimate", "drivers", "goals"};
     return names;
 }
 
@@ -268,6 +286,7 @@ Measured measure(std::vector<NamedMesh> meshes, const MeasureOptions& options, c
     if (wants("restore")) bench.restore();
     if (wants("strip")) bench.strip_phases();
     if (wants("files")) bench.files();
+    if (wants("coding")) bench.coding();
     if (wants("deform")) bench.deform();
     if (wants("handles")) bench.handles();
     if (wants("fidelity")) bench.fidelity();

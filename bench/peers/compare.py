@@ -31,6 +31,12 @@ PAIRS = [
     ("8,000 particles, springs / links, 10 iterations", "simulate.springs_stiff.frame", "bullet.springs"),
     ("koala in 20 pieces, rough / Cell Fracture, planes", "fracture.seconds", "cellfracture.seconds"),
 ]
+for bits in (12, 14):
+    for level in (7, 10):
+        PAIRS += [
+            (f"coded at {bits} bits / Draco -cl {level}", f"coding.{bits}_bits", f"draco.cl{level}_{bits}_bits"),
+            (f"decoding at {bits} bits / Draco -cl {level}", f"coding.{bits}_decode", f"draco.cl{level}_{bits}_decode"),
+        ]
 for n in (64, 128, 256, 512):
     PAIRS += [
         (f"inside, {n}: scan / CGAL, exact", f"inside.scan_{n}", f"inside.cgal_{n}"),
@@ -79,7 +85,7 @@ def main():
     for what, (mine, unit), (theirs, their_unit) in shown:
         if unit != their_unit:
             sys.exit(f"{what}: ours is in {unit}, theirs in {their_unit}")
-        ratio = mine / theirs if unit.endswith("/s") else theirs / mine
+        ratio = mine / theirs if unit.endswith("s/s") else theirs / mine
         print(f"{what:<52} {mine:>10.4g} {theirs:>10.4g} {ratio:>8.3g}  {unit}")
 
 

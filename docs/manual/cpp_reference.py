@@ -7,7 +7,7 @@ import tempfile
 import xml.etree.ElementTree as tree
 from pathlib import Path
 
-LAYERS = ["core", "mesh", "hierarchy", "deform", "sample", "fracture", "physics", "melting", "remesh", "io", "scene", "render", "present"]
+LAYERS = ["core", "mesh", "hierarchy", "deform", "coding", "sample", "fracture", "physics", "melting", "remesh", "io", "scene", "render", "present"]
 DOXYFILE = """
 INPUT = {inputs}
 GENERATE_HTML = NO

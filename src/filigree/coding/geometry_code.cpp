@@ -11,9 +11,9 @@ namespace {
 
 using Wide = std::array<std::int64_t, 3>;
 
-constexpr int kOneBits = 14;
-constexpr std::int32_t kOne = 1 << kOneBits;  // length of the frame's axes
-constexpr std::int32_t kFarthest = 1 << 26;   // of a place, in sixteenths of a step
+constexpr int kOneBits = 20;
+constexpr std::int32_t kOne = 1 << kOneBits; // length of the frame's axes
+constexpr std::int32_t kFarthest = 1 << 26;  // of a place, in sixteenths of a step
 constexpr unsigned kSizeClasses = 16, kSupport = 3;
 static_assert(3 * kSizeClasses * kSupport <= kGeometryContexts);
 
@@ -195,7 +195,7 @@ private:
     Coder& coder_;
     std::array<std::int32_t, 3> steps_;
     std::vector<FinePlace> places_;
-    std::vector<std::int32_t> sizes_; ///< of each vertex's difference, quarters of a step
+    std::vector<std::int32_t> sizes_;    ///< of each vertex's difference, quarters of a step
     std::vector<std::uint32_t> support_; ///< known triangles beside each vertex
     std::vector<bool> is_known_;
     std::vector<Index> spoke_;                ///< a half-edge from each vertex

@@ -1,5 +1,5 @@
-// Where the vertices of a map are: each is predicted from triangles that are known, best known first, and the difference
-// is coded in the frame of the surface there, where its normal part is small. Integers alone.
+// Where the vertices of a map are: each is predicted from triangles that are known, best known first, and the
+// difference is coded in the frame of the surface there, where its normal part is small. Integers alone.
 #pragma once
 
 #include "filigree/coding/closed_map.h"
@@ -20,8 +20,8 @@ struct GeometrySteps {
     std::int32_t normal = 1, tangential = 1; ///< sizes of the steps along the normal and across it
 };
 
-/// Writes places, of vertices that close no hole. Returns them as they will be read: half a step off at most, along each
-/// axis of their own. Cost O(V).
+/// Writes places, of vertices that close no hole. Returns them as they will be read: half a step off at most, along
+/// each axis of their own. Cost O(V).
 std::vector<FinePlace> encode_geometry(const ClosedMap& map, std::span<const FinePlace> places, GeometrySteps steps,
                                        unsigned first_context, SymbolWriter& out);
 

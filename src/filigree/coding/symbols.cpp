@@ -10,17 +10,14 @@ namespace {
 
 constexpr std::uint32_t kLowestState = 1u << 16; // states are kLowestState to 2^32 - 1, words of 16 bits go in and out
 
-// Numbers as symbols: 0 to 15 themselves, then two a power of two with the other bits behind; the last one for the rest.
+// Numbers as symbols: 0 to 15 themselves, then two a power of two with the other bits behind; the last one for the
+// rest.
 constexpr unsigned kDirect = 16, kWholeNumber = SymbolModel::kSymbols - 1;
 constexpr unsigned kLargestExponent = 26;
 static_assert(kDirect + (kLargestExponent - 4) * 2 + 1 < kWholeNumber);
 
-std::uint32_t without_sign(std::int32_t value) {
-    return (std::uint32_t(value) << 1) ^ (value < 0 ? 0xffffffffu : 0u);
-}
-std::int32_t with_sign(std::uint32_t value) {
-    return std::int32_t(value >> 1) ^ -std::int32_t(value & 1);
-}
+std::uint32_t without_sign(std::int32_t value) { return (std::uint32_t(value) << 1) ^ (value < 0 ? 0xffffffffu : 0u); }
+std::int32_t with_sign(std::uint32_t value) { return std::int32_t(value >> 1) ^ -std::int32_t(value & 1); }
 
 void put_u32(std::string& bytes, std::uint32_t value) {
     for (unsigned k = 0; k < 4; ++k) bytes.push_back(char(value >> (8 * k)));

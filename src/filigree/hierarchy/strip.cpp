@@ -228,6 +228,24 @@ Result<Stripped> strip_to_driver(Mesh mesh, const Mesh& driver, Precision precis
     return result;
 }
 
+Result<Model> bind_to_own_driver(Mesh mesh, Level driver, Precision precision, const RunContext& context) {
+    if (driver.vertices.empty()) return Error{ErrorCode::unsuitable, "The driver has no vertices: nothing to bind to."};
+    const Result<WorkingMesh> work = make_working_mesh(mesh, context);
+    if (!work) return work.error();
+    Cells cells = make_cells(driver);
+    std::vector<Triangle> over_places = cells.global; // a driver's vertex may lie where an earlier one does
+    for (Triangle& cell : over_places)
+        for (Index& v : cell) v = work->surface.representative[v];
+    const Result<Binding> binding = bind_to_driver(work->positions, work->surface, work->normals, over_places, context);
+    if (!binding) return binding.error();
+    Model model;
+    model.detail = encode_blend(mesh.positions, driver.vertices, std::move(cells.local), *binding, precision);
+    model.levels.push_back(std::move(driver));
+    model.mesh = std::move(mesh);
+    split_shared_normals(model.mesh);
+    return model;
+}
+
 Result<Stripped> strip(Mesh mesh, const StripOptions& options, const RunContext& context) {
     if (std::optional<Error> error = check_options(mesh, options)) return *error;
     return options.code == DetailCode::blend ? strip_blend(std::move(mesh), options, context)

@@ -57,4 +57,8 @@ Result<Stripped> strip(Mesh mesh, const StripOptions& options, const RunContext&
 /// Errors: unsuitable (no vertices in either, more triangles or vertices than indices), cancelled. Cost O(V log V).
 Result<Stripped> strip_to_driver(Mesh mesh, const Mesh& driver, Precision precision, const RunContext& context);
 
+/// Takes the detail off a mesh down to a driver of its own vertices that is known already: two levels, the driver and
+/// the mesh. driver: triangles. Errors: unsuitable (no vertices), cancelled. Cost O(V log V).
+Result<Model> bind_to_own_driver(Mesh mesh, Level driver, Precision precision, const RunContext& context);
+
 } // namespace filigree

@@ -1,5 +1,6 @@
 #include "filigree/io/model_file.h"
 
+#include "filigree/io/model_code.h"
 #include "filigree/io/model_records.h"
 #include "filigree/io/model_sections.h"
 
@@ -296,13 +297,20 @@ PoseSequence read_pose_sections(const FileReader& file) {
             for (int k = 0; k < 9; ++k) gradient(k / 3, k % 3) = entries[std::size_t(k)];
         }
     }
-    if (const std::string wrong = check_poses(poses, in.array<Index>("lev.vert").size()); !wrong.empty())
+    const std::size_t driver = is_coded(in) ? read_file_code(in).driver_vertices : in.array<Index>("lev.vert").size();
+    if (const std::string wrong = check_poses(poses, driver); !wrong.empty())
         throw FileDamage{"is inconsistent: " + wrong, "simulate it again"};
     return poses;
 }
 
-Model read_sections(const FileReader& file) {
+Model read_sections(const FileReader& file, const RunContext& context) {
     const SectionReader in(file);
+    if (is_coded(in)) {
+        Model model = read_model_code(in, read_mesh_sections(in), context);
+        model.source_order = in.array<Index>("mesh.ord");
+        if (const std::string wrong = check_model(model); !wrong.empty()) throw FileDamage{"is inconsistent: " + wrong};
+        return model;
+    }
     Model model;
     model.mesh = read_mesh_sections(in);
     model.source_order = in.array<Index>("mesh.ord");
@@ -341,9 +349,25 @@ Model read_sections(const FileReader& file) {
     return model;
 }
 
+void read_frames(const SectionReader& in, ModelOutline& outline) {
+    outline.frames = frame_count(in, "pose.pos");
+    outline.has_gradients = frame_count(in, "pose.grd") > 0;
+    if (outline.frames > 0) outline.frames_per_second = in.value<double>("pose.fps");
+}
+
 ModelOutline read_outline_sections(const FileReader& file) {
     const SectionReader in(file);
     ModelOutline outline;
+    if (is_coded(in)) {
+        const FileCode code = read_file_code(in);
+        outline.levels = {{code.driver_vertices, code.driver_faces, code.driver_corners},
+                          {code.vertices, code.faces, code.corners}};
+        outline.precision = static_cast<Precision>(code.precision);
+        outline.coding = coding_of(in, code);
+        read_frames(in, outline);
+        outline.bytes = file.size();
+        return outline;
+    }
     const auto faces = [&](const std::string& name, std::uint32_t index) {
         const std::size_t corners = in.item_count<Index>(name + ".cor", index);
         const std::vector<Index> size = in.array<Index>(name + ".siz", index);
@@ -367,9 +391,7 @@ ModelOutline read_outline_sections(const FileReader& file) {
         outline.across_gap = in.array<Index>("bl.gap");
         outline.facing_away = in.array<Index>("bl.away");
     }
-    outline.frames = frame_count(in, "pose.pos");
-    outline.has_gradients = frame_count(in, "pose.grd") > 0;
-    if (outline.frames > 0) outline.frames_per_second = in.value<double>("pose.fps");
+    read_frames(in, outline);
     outline.bytes = file.size();
     return outline;
 }
@@ -391,14 +413,14 @@ std::vector<Vec3f> positions_of(const SectionReader& in, std::span<const Index> 
     return positions;
 }
 
-Mesh read_level_sections(const FileReader& file, unsigned k) {
+Mesh read_level_sections(const FileReader& file, unsigned k, const RunContext& context) {
     const SectionReader in(file);
-    const std::uint32_t level_count = in.value<std::uint32_t>("levels");
+    const std::uint32_t level_count = is_coded(in) ? 1 : in.value<std::uint32_t>("levels");
     if (k > level_count)
         throw Error{ErrorCode::usage, "The model has levels 0 to " + std::to_string(level_count) +
                                           "; there is no level " + std::to_string(k) + "."};
     const bool positions_are_coded = in.count("mesh.pos").first == 0;
-    if (k == level_count || positions_are_coded) return level_mesh(read_sections(file), k);
+    if (k == level_count || positions_are_coded) return level_mesh(read_sections(file, context), k);
     const std::vector<Index> vertices = in.array<Index>("lev.vert", k);
     if (!std::is_sorted(vertices.begin(), vertices.end()))
         throw FileDamage{"is inconsistent: a level's vertices do not ascend"};
@@ -499,13 +521,36 @@ Status write_model(const Model& model, const PoseSequence& poses, const std::fil
     }
 }
 
+Result<CodingReport> write_coded_model(const Model& model, const PoseSequence& poses, const MeshCodeOptions& options,
+                                       const std::filesystem::path& path, const RunContext& context) {
+    if (const std::string wrong = poses.empty() ? "" : check_poses(poses, model.driver().vertices.size());
+        !wrong.empty())
+        return Error{ErrorCode::mismatch, path.string() + ": not written: " + wrong + "."};
+    context.report("code", 0);
+    Result<CodedModel> coded = code_model(model, options, context);
+    if (!coded) return coded.error();
+    context.report("code", 1);
+    try {
+        SectionWriter out;
+        write_mesh_sections(out, coded->mesh.rest, false);
+        if (options.keep_order) out.array("mesh.ord", model.source_order);
+        write_model_code(out, *coded);
+        write_poses(out, poses);
+        if (const Status status = write_file(path, out.finish()); !status) return status.error();
+        return coded->report;
+    } catch (const std::bad_alloc&) {
+        return Error{ErrorCode::out_of_memory, path.string() + ": not enough memory for the file's bytes."};
+    }
+}
+
 Status write_model(const Model& model, const std::filesystem::path& path, const RunContext& context) {
     return write_model(model, PoseSequence(), path, context);
 }
 
 Result<Model> read_model(const FileReader& file, const std::string& name, const RunContext& context) {
     context.report("read", 0);
-    Result<Model> model = guarded(file, name, context, read_sections);
+    Result<Model> model =
+        guarded(file, name, context, [&](const FileReader& from) { return read_sections(from, context); });
     context.report("read", 1);
     return model;
 }
@@ -540,7 +585,8 @@ Result<ModelOutline> read_model_outline(const FileReader& file, const std::strin
 
 Result<Mesh> read_model_level(const FileReader& file, unsigned level, const std::string& name,
                               const RunContext& context) {
-    return guarded(file, name, context, [&](const FileReader& from) { return read_level_sections(from, level); });
+    return guarded(file, name, context,
+                   [&](const FileReader& from) { return read_level_sections(from, level, context); });
 }
 
 } // namespace filigree

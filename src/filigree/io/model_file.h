@@ -1,6 +1,7 @@
 // Models in files: .fil, described byte for byte in docs/fil-format.md.
 #pragma once
 
+#include "filigree/coding/mesh_code.h"
 #include "filigree/core/result.h"
 #include "filigree/core/run_context.h"
 #include "filigree/hierarchy/model.h"
@@ -24,6 +25,16 @@ Result<Model> read_model(const std::filesystem::path& path, const RunContext& co
 Result<Model> read_model(const FileReader& file, const std::string& name, const RunContext& context);
 Result<Model> read_model(std::string_view bytes, const std::string& name, const RunContext& context);
 
+/// What a coded model takes, in bytes.
+struct CodedBytes {
+    std::uint64_t connectivity = 0, places = 0, attributes = 0, order = 0, driver = 0;
+};
+struct Coding {
+    MeshCodeOptions options;
+    double step = 0; ///< between places along an axis, model units
+    CodedBytes bytes;
+};
+
 /// What a model file says of its model.
 struct ModelOutline {
     DetailCode code = DetailCode::blend;
@@ -34,8 +45,9 @@ struct ModelOutline {
     std::size_t patches = 0;                    ///< reference code
     std::size_t frames = 0;                     ///< poses
     double frames_per_second = 0;
-    bool has_gradients = false; ///< in the poses
-    std::uint64_t bytes = 0;    ///< of the file
+    bool has_gradients = false;        ///< in the poses
+    std::optional<Coding> coding = {}; ///< of a coded file
+    std::uint64_t bytes = 0;           ///< of the file
 };
 /// Reads that alone: as quick for a large model as for a small one. Whether all sections fit together is known when
 /// the model is read. Errors: as read_model.
@@ -64,5 +76,17 @@ std::string write_model(const Model& model);
 Status write_model(const Model& model, const PoseSequence& poses, const std::filesystem::path& path,
                    const RunContext& context);
 std::string write_model(const Model& model, const PoseSequence& poses);
+
+/// How a coded model came out. Distances in model units.
+struct CodingReport {
+    double rms = 0, largest = 0; ///< of the vertices
+    CodedBytes bytes;
+};
+/// Writes a model in few bits (docs/coding.md): its mesh rounded and in an order of the code's own, its driver with the
+/// same vertices in the same order, so that poses fit as before. Levels between are dropped; vertices are bound to the
+/// driver anew when the file is read. Errors: as write_model, and as encode_mesh; unsuitable (the reference code, a
+/// driver made elsewhere).
+Result<CodingReport> write_coded_model(const Model& model, const PoseSequence& poses, const MeshCodeOptions& options,
+                                       const std::filesystem::path& path, const RunContext& context);
 
 } // namespace filigree

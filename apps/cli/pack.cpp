@@ -1,0 +1,143 @@
+#include "commands.h"
+#include "session.h"
+
+#include "filigree/hierarchy/strip.h"
+
+#include <fmt/format.h>
+
+namespace filigree::cli {
+
+namespace {
+
+struct PackArguments {
+    std::string input, output;
+    std::optional<std::size_t> base;
+    MeshCodeOptions code;
+};
+
+void report_coding(const Model& model, const CodingReport& coding, const PackArguments& options, double seconds,
+                   Report& report) {
+    const double vertices = double(model.mesh.vertex_count()), diagonal = world_bounds(model.mesh).diagonal();
+    const double share = diagonal > 0 ? 1 / diagonal : 0;
+    const std::uint64_t bytes = std::filesystem::is_regular_file(options.output)
+                                    ? std::uint64_t(std::filesystem::file_size(options.output))
+                                    : 0;
+    report.set("output", options.output);
+    report.count("vertices", "vertices", model.mesh.vertex_count());
+    report.count("driver", "driver_vertices", model.driver().vertices.size());
+    const auto bits = [&](std::uint64_t part) { return 8 * double(part) / vertices; };
+    report.add("bits a vertex",
+               fmt::format("{:.2f}: {:.2f} connectivity, {:.2f} places, {:.2f} attributes, {:.2f} order, {:.2f} driver",
+                           bits(bytes), bits(coding.bytes.connectivity), bits(coding.bytes.places),
+                           bits(coding.bytes.attributes), bits(coding.bytes.order), bits(coding.bytes.driver)),
+               "bits_per_vertex",
+               {{"all", bits(bytes)},
+                {"connectivity", bits(coding.bytes.connectivity)},
+                {"places", bits(coding.bytes.places)},
+                {"attributes", bits(coding.bytes.attributes)},
+                {"order", bits(coding.bytes.order)},
+                {"driver", bits(coding.bytes.driver)}});
+    report.add("vertex error",
+               fmt::format("{:.2g} of the diagonal (rms), {:.2g} at most", coding.rms * share, coding.largest * share),
+               "vertex_error", {{"rms", coding.rms * share}, {"max", coding.largest * share}});
+    report.count("bytes", "bytes", bytes);
+    report.set("seconds", seconds);
+}
+
+/// Reads the file back, and says how far its surface is off.
+void report_surface(const Model& model, const PackArguments& options, Session& session, Report& report) {
+    if (model.mesh.face_count() == 0) return;
+    const RunContext context = session.silent_context();
+    const double start = now_seconds();
+    const Mesh read = require(read_model(options.output, context)).mesh;
+    const double seconds = now_seconds() - start;
+    constexpr std::size_t kSamples = 100'000;
+    const MeshDistance distance = require(mesh_distance(read, model.mesh, kSamples, context));
+    if (!distance.surfaces) return;
+    report.add("surface error",
+               fmt::format("{:.2g} of the diagonal (rms)", distance.relative(distance.surfaces->rms_distance)),
+               "surface_error",
+               {{"rms", distance.relative(distance.surfaces->rms_distance)},
+                {"hausdorff", distance.relative(distance.surfaces->hausdorff)}});
+    report.add("reads in", seconds_text(seconds), "read_seconds", seconds);
+}
+
+/// A model as it is, a mesh stripped.
+Model model_of(const PackArguments& options, Session& session, PoseSequence& poses) {
+    const FileReader file = session.open(options.input);
+    if (is_model_file(file)) {
+        if (options.base) refuse("--base is for meshes: the model has its driver.");
+        return session.read_model(file, options.input, &poses);
+    }
+    Mesh mesh = session.parse_mesh(require(file.read_all()), options.input);
+    return require(strip(std::move(mesh), {.base = options.base}, session.context())).model;
+}
+
+void run(const PackArguments& options, Session& session) {
+    if (mesh_format(options.output).ok())
+        refuse(options.output + ": is the name of a mesh; give the model another, such as NAME.fil.");
+    PoseSequence poses;
+    const Model model = model_of(options, session, poses);
+    const double start = now_seconds();
+    session.begin_writing(options.output);
+    const CodingReport coding =
+        require(write_coded_model(model, poses, options.code, options.output, session.context()));
+    Report report;
+    report_coding(model, coding, options, now_seconds() - start, report);
+    if (options.output != "-") report_surface(model, options, session, report);
+    session.print(report);
+}
+
+struct UnpackArguments {
+    std::string input, output;
+};
+
+void run_unpack(const UnpackArguments& options, Session& session) {
+    PoseSequence poses;
+    const Model model = session.read_model(session.open_model(options.input), options.input, &poses);
+    session.begin_writing(options.output);
+    const Status written = write_model(model, poses, options.output, session.context());
+    if (!written) throw Failure{written.error()};
+    Report report;
+    report.say(fmt::format("{}: {} vertices, a driver of {}\n", options.output, with_commas(model.mesh.vertex_count()),
+                           with_commas(model.driver().vertices.size())));
+    report.set("output", options.output);
+    report.set("vertices", model.mesh.vertex_count());
+    report.set("driver_vertices", model.driver().vertices.size());
+    session.print(report);
+}
+
+} // namespace
+
+Command pack_command() {
+    const auto options = std::make_shared<PackArguments>();
+    return {
+        .name = "pack",
+        .text = "Code a mesh or a model in few bits: a model file that every command reads",
+        .options = {Option("input", options->input, "Mesh or model").is_read().required(),
+                    Option("-o,--output", options->output, "Model file to write (.fil)").is_written().required(),
+                    Option("--bits", options->code.bits, "Of positions, along the longest side of the box")
+                        .between(10, 16)
+                        .with_default(),
+                    Option("--surface", options->code.surface,
+                           "Keep the surface rather than its vertices: they may slide along it by four times as much"),
+                    Option("--keep-order", options->code.keep_order,
+                           "Vertices and faces come back in their order, which costs more than all the rest"),
+                    Option("--base", options->base, "Vertices of a mesh's driver (unset: as for strip)").whole_from(3)},
+        .examples = "  filigree pack scan.ply -o scan.fil\n"
+                    "  filigree pack scan.fil -o small.fil --bits 12 --surface\n"
+                    "  filigree pack shot.fil -o small.fil --keep-order",
+        .run = [options](Session& session) { run(*options, session); }};
+}
+
+Command unpack_command() {
+    const auto options = std::make_shared<UnpackArguments>();
+    return {.name = "unpack",
+            .text = "Write a coded model as a plain one, which reads at once",
+            .options = {Option("model", options->input, "Coded model").is_read().required(),
+                        Option("-o,--output", options->output, "Model file to write (.fil)").is_written().required()},
+            .examples = "  filigree unpack small.fil -o plain.fil",
+            .run = [options](Session& session) { run_unpack(*options, session); }};
+}
+
+} // namespace filigree::cli

@@ -1,0 +1,273 @@
+#include "filigree/coding/face_code.h"
+
+#include <algorithm>
+#include <bit>
+#include <utility>
+
+namespace filigree {
+
+namespace {
+
+constexpr unsigned kPlain = kConnectivityContexts, kCut = kPlain + 1, kCopies = kCut + 6, kCopyAt = kCopies + 1,
+                   kOddFaces = kCopyAt + 1, kOddSize = kOddFaces + 1;
+static_assert(kOddSize < kFaceContexts);
+
+/// Bits that name one of `count`.
+unsigned bits_for(std::size_t count) { return count > 1 ? unsigned(std::bit_width(count - 1)) : 0; }
+
+/// Faces as triangles: a fan from the first corner of each.
+struct FanTriangles {
+    std::vector<Triangle> triangles;
+    std::vector<Index> face, place; ///< of each triangle: its face; its second corner there
+
+    Index corner(Index half_edge) const {
+        const Index t = half_edge / 3, k = half_edge % 3;
+        return k == 0 ? 0 : place[t] + k - 1;
+    }
+};
+
+struct FaceSpans {
+    std::span<const Index> offsets, corners;
+    std::size_t size() const { return offsets.size() - 1; }
+    std::span<const Index> operator[](std::size_t f) const {
+        return corners.subspan(offsets[f], offsets[f + 1] - offsets[f]);
+    }
+};
+
+bool repeats_a_vertex(std::span<const Index> face) {
+    std::vector<Index> sorted(face.begin(), face.end());
+    std::ranges::sort(sorted);
+    return std::ranges::adjacent_find(sorted) != sorted.end();
+}
+
+FanTriangles fans_of(const FaceSpans& faces, const std::vector<bool>& is_odd) {
+    FanTriangles fans;
+    for (Index f = 0; f < faces.size(); ++f) {
+        if (is_odd[f]) continue;
+        const auto face = faces[f];
+        for (Index k = 1; k + 1 < face.size(); ++k) {
+            fans.triangles.push_back({face[0], face[k], face[k + 1]});
+            fans.face.push_back(f);
+            fans.place.push_back(k);
+        }
+    }
+    return fans;
+}
+
+/// Whether a half-edge is a cut through its face: its own triangle's neighbour in the fan is behind it.
+bool is_cut(const FanTriangles& fans, const ClosedMap& map, Index half_edge) {
+    const Index behind = map.opposite[half_edge] / 3, t = half_edge / 3;
+    return behind < fans.triangles.size() && fans.face[behind] == fans.face[t] &&
+           (half_edge % 3 == 0 ? fans.place[behind] + 1 == fans.place[t]
+                               : half_edge % 3 == 2 && fans.place[behind] == fans.place[t] + 1);
+}
+
+/// The surface of the faces that lie in one; the others become odd.
+ClosedSurface surface_of(const FaceSpans& faces, std::vector<bool>& is_odd, FanTriangles& fans) {
+    for (;;) {
+        fans = fans_of(faces, is_odd);
+        ClosedSurface surface = make_closed_surface(fans.triangles);
+        bool is_changed = false;
+        for (Index t = 0; t < fans.triangles.size(); ++t) {
+            const Index f = fans.face[t];
+            const bool has_next = fans.place[t] + 2 < faces[f].size();
+            if (has_next && !is_cut(fans, surface.map, 3 * t + 2)) is_odd[f] = is_changed = true;
+        }
+        if (!is_changed) return surface;
+    }
+}
+
+/// Polygons out of triangles: what lies between cuts, in the order of their first triangles.
+class Polygons {
+public:
+    /// cuts: of each half-edge, both sides. False: that is no set of polygons.
+    static bool assemble(const ClosedMap& map, const std::vector<bool>& cuts, WalkedFaces& walked,
+                         std::vector<Index>* first_half_edges) {
+        std::vector<bool> is_done(map.triangles.size(), false);
+        for (Index t = 0; t < map.triangles.size(); ++t) {
+            if (is_done[t] || !map.is_own(map.triangles[t])) continue;
+            Index start = 3 * t;
+            while (start < 3 * t + 3 && cuts[start]) ++start;
+            if (start == 3 * t + 3) { // cut on all sides: the outline starts at a neighbour's
+                start = outline_near(map, cuts, 3 * t);
+                if (start == kNoIndex) return false;
+            }
+            const std::size_t begin = walked.corners.size();
+            for (Index h = start;;) {
+                is_done[h / 3] = true;
+                walked.corners.push_back(walked.number[map.origin(h)]);
+                if (walked.corners.size() - begin > 3 * map.triangles.size()) return false;
+                for (h = ClosedMap::next(h); cuts[h]; h = ClosedMap::next(map.opposite[h])) {
+                    is_done[map.opposite[h] / 3] = true;
+                    if (h == start) return false;
+                }
+                if (h == start) break;
+            }
+            if (walked.corners.size() - begin < 3) return false;
+            walked.face_offsets.push_back(static_cast<Index>(walked.corners.size()));
+            if (first_half_edges) first_half_edges->push_back(start);
+        }
+        return true;
+    }
+
+private:
+    static Index outline_near(const ClosedMap& map, const std::vector<bool>& cuts, Index half_edge) {
+        Index h = half_edge;
+        for (std::size_t turn = 0; turn < map.opposite.size(); ++turn) {
+            if (!cuts[h]) return h;
+            h = ClosedMap::next(map.opposite[h]);
+        }
+        return kNoIndex;
+    }
+};
+
+/// Whether an edge is expected to be a cut: in a grid a triangle and its neighbour are each other turned by half a
+/// turn, so their cuts lie alike beside the edge that they share. 0: it is, 1: it is not, 2: no neighbour tells.
+unsigned expectation(const ClosedMap& map, const std::vector<bool>& cuts, Index half_edge) {
+    for (const Index shared : {ClosedMap::next(half_edge), ClosedMap::previous(half_edge)}) {
+        const Index other = map.opposite[shared];
+        if (other > half_edge || !map.is_own(map.triangles[other / 3])) continue; // not known yet, or of a hole
+        if (cuts[ClosedMap::next(other)]) return ClosedMap::next(shared) == half_edge ? 0 : 1;
+        if (cuts[ClosedMap::previous(other)]) return ClosedMap::previous(shared) == half_edge ? 0 : 1;
+    }
+    return 2;
+}
+
+/// Which edges are cuts, an edge once, from the side that is walked first. `code` writes or reads.
+template <class Code>
+std::vector<bool> code_cuts(const ClosedMap& map, const Code& code) {
+    std::vector<bool> cuts(map.opposite.size(), false);
+    std::vector<std::uint8_t> joined(map.triangles.size(), 0);
+    for (Index h = 0; h < map.opposite.size(); ++h) {
+        const Index o = map.opposite[h];
+        if (o < h || !map.is_own(map.triangles[h / 3]) || !map.is_own(map.triangles[o / 3])) continue;
+        std::uint8_t &a = joined[h / 3], &b = joined[o / 3];
+        const bool cut = code(kCut + (a + b > 0 ? 2 + std::min(unsigned(a + b), 3u) : expectation(map, cuts, h)), h);
+        if (!cut) continue;
+        cuts[h] = cuts[o] = true;
+        a = std::min<std::uint8_t>(a + 1, 2);
+        b = std::min<std::uint8_t>(b + 1, 2);
+    }
+    return cuts;
+}
+
+} // namespace
+
+EncodedFaces encode_faces(std::span<const Index> face_offsets, std::span<const Index> corners, std::size_t vertices,
+                          SymbolWriter& out) {
+    const FaceSpans faces{face_offsets, corners};
+    std::vector<bool> is_odd(faces.size());
+    bool all_triangles = true;
+    for (std::size_t f = 0; f < faces.size(); ++f) {
+        is_odd[f] = repeats_a_vertex(faces[f]);
+        all_triangles = all_triangles && faces[f].size() == 3;
+    }
+    FanTriangles fans;
+    const ClosedSurface surface = surface_of(faces, is_odd, fans);
+    WalkedMap walk = encode_connectivity(surface.map, out);
+
+    EncodedFaces encoded;
+    WalkedFaces& walked = encoded.walked;
+    const auto source_of = [&](Index half_edge) { // in the surface's map
+        Index source = walk.half_edge[half_edge / 3];
+        for (Index k = 0; k < half_edge % 3; ++k) source = ClosedMap::next(source);
+        return source;
+    };
+    out.symbol(kPlain, all_triangles);
+    std::vector<bool> cuts(walk.map.opposite.size(), false);
+    if (!all_triangles)
+        cuts = code_cuts(walk.map, [&](unsigned context, Index h) {
+            const bool cut = is_cut(fans, surface.map, source_of(h));
+            out.symbol(context, cut);
+            return cut;
+        });
+
+    // Numbers, in the order of the walk; who had one before is a copy.
+    std::vector<Index> number_of(vertices, kNoIndex);
+    std::vector<std::pair<Index, Index>> copies; // the map's vertex, and its number
+    walked.number.assign(walk.vertex.size(), kNoIndex);
+    for (Index w = 0; w < walk.vertex.size(); ++w) {
+        const Index v = surface.source[walk.vertex[w]];
+        if (v == kNoIndex) continue;
+        if (number_of[v] != kNoIndex) {
+            copies.emplace_back(w, number_of[v]);
+        } else {
+            number_of[v] = static_cast<Index>(encoded.vertex.size());
+            encoded.vertex.push_back(v);
+        }
+        walked.number[w] = number_of[v];
+    }
+    walked.met = encoded.vertex.size();
+    out.number(kCopies, static_cast<std::uint32_t>(copies.size()));
+    Index before = 0;
+    for (const auto& [w, number] : copies) {
+        out.number(kCopyAt, w - std::exchange(before, w));
+        out.bits(number, bits_for(vertices));
+    }
+    for (Index v = 0; v < vertices; ++v)
+        if (number_of[v] == kNoIndex) {
+            number_of[v] = static_cast<Index>(encoded.vertex.size());
+            encoded.vertex.push_back(v);
+        }
+
+    std::vector<Index> first_half_edges;
+    Polygons::assemble(walk.map, cuts, walked, &first_half_edges);
+    for (const Index h : first_half_edges) {
+        const Index source = source_of(h);
+        encoded.face.push_back(fans.face[source / 3]);
+        encoded.first_corner.push_back(fans.corner(source));
+    }
+    out.number(kOddFaces, static_cast<std::uint32_t>(std::ranges::count(is_odd, true)));
+    for (Index f = 0; f < faces.size(); ++f) {
+        if (!is_odd[f]) continue;
+        out.number(kOddSize, static_cast<std::uint32_t>(faces[f].size()));
+        for (const Index v : faces[f]) {
+            out.bits(number_of[v], bits_for(vertices));
+            walked.corners.push_back(number_of[v]);
+        }
+        walked.face_offsets.push_back(static_cast<Index>(walked.corners.size()));
+        encoded.face.push_back(f);
+        encoded.first_corner.push_back(0);
+    }
+    walked.map = std::move(walk.map);
+    return encoded;
+}
+
+std::optional<WalkedFaces> decode_faces(SymbolReader& in, std::size_t vertices, std::size_t corners) {
+    std::optional<WalkedMap> walk = decode_connectivity(in, 2 * corners + 2); // a triangle a corner closes holes
+    if (!walk) return std::nullopt;
+    WalkedFaces walked;
+    walked.map = std::move(walk->map);
+    std::vector<bool> cuts(walked.map.opposite.size(), false);
+    if (in.symbol(kPlain) == 0)
+        cuts = code_cuts(walked.map, [&](unsigned context, Index) { return in.symbol(context) != 0; });
+
+    std::vector<Index> copy_of(walked.map.vertex_count(), kNoIndex);
+    const std::uint32_t copies = in.number(kCopies);
+    for (std::uint64_t k = 0, at = 0; k < copies; ++k) {
+        at += in.number(kCopyAt);
+        if (at >= copy_of.size() || in.is_damaged()) return std::nullopt;
+        copy_of[at] = in.bits(bits_for(vertices));
+    }
+    walked.number.assign(walked.map.vertex_count(), kNoIndex);
+    for (std::size_t w = 0; w < walked.number.size(); ++w) {
+        if (walked.map.closes_hole[w]) continue;
+        if (copy_of[w] != kNoIndex && copy_of[w] >= walked.met) return std::nullopt;
+        walked.number[w] = copy_of[w] != kNoIndex ? copy_of[w] : static_cast<Index>(walked.met++);
+    }
+    if (walked.met > vertices || !Polygons::assemble(walked.map, cuts, walked, nullptr)) return std::nullopt;
+    const std::uint32_t odd_faces = in.number(kOddFaces);
+    for (std::uint32_t f = 0; f < odd_faces; ++f) {
+        const std::uint32_t size = in.number(kOddSize);
+        if (size < 3 || size > corners || in.is_damaged()) return std::nullopt;
+        for (std::uint32_t k = 0; k < size && !in.is_damaged(); ++k) {
+            walked.corners.push_back(in.bits(bits_for(vertices)));
+            if (walked.corners.back() >= vertices) return std::nullopt;
+        }
+        walked.face_offsets.push_back(static_cast<Index>(walked.corners.size()));
+    }
+    if (in.is_damaged() || walked.corners.size() != corners) return std::nullopt;
+    return walked;
+}
+
+} // namespace filigree

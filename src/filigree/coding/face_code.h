@@ -1,0 +1,37 @@
+// Polygons by their connectivity: cut into triangles, walked over, and put together again along the cuts.
+#pragma once
+
+#include "filigree/coding/connectivity_code.h"
+
+#include <optional>
+
+namespace filigree {
+
+/// Contexts of a SymbolWriter that faces take, from 0 on.
+inline constexpr unsigned kFaceContexts = kConnectivityContexts + 16;
+
+/// Faces over vertices that are numbered in the order in which they are met, and the map they came from.
+struct WalkedFaces {
+    std::vector<Index> face_offsets = {0}, corners;
+    ClosedMap map;
+    std::vector<Index> number; ///< of each of the map's vertices; kNoIndex where it closes a hole
+    std::size_t met = 0;       ///< vertices; those of odd faces alone and those of no face are not met
+};
+
+/// What an encoder knows besides: where everything was.
+struct EncodedFaces {
+    WalkedFaces walked;
+    std::vector<Index> vertex;       ///< of each number the vertex: met ones, then the others, ascending
+    std::vector<Index> face;         ///< of each walked face the face
+    std::vector<Index> first_corner; ///< and which of its corners is first now
+};
+
+/// Writes faces. Corners that name a vertex twice, and what does not lie in a surface, are written one by one. Cost
+/// O(F log F).
+EncodedFaces encode_faces(std::span<const Index> face_offsets, std::span<const Index> corners, std::size_t vertices,
+                          SymbolWriter& out);
+
+/// None: damaged, or more than so many vertices or corners.
+std::optional<WalkedFaces> decode_faces(SymbolReader& in, std::size_t vertices, std::size_t corners);
+
+} // namespace filigree

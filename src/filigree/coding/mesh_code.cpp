@@ -1,0 +1,535 @@
+#include "filigree/coding/mesh_code.h"
+
+#include "filigree/coding/face_code.h"
+#include "filigree/coding/geometry_code.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace filigree {
+
+namespace {
+
+constexpr unsigned kLoosePlace = kGeometryContexts, kPlaceContexts = kLoosePlace + 3;
+constexpr unsigned kVertexOrder = 0, kFaceOrder = 1, kFirstCorner = 2, kOrderContexts = 3;
+
+struct Damage {};
+
+// --- Places -------------------------------------------------------------------------------------------------------
+
+GeometrySteps steps_of(const MeshCodeOptions& options) { return {1, options.surface ? 4 : 1}; }
+
+/// Sixteenths of a step from the box's corner.
+FinePlace fine_place(const Vec3f& position, const CodedMesh& coded) {
+    FinePlace place{};
+    for (int k = 0; k < 3; ++k)
+        place[std::size_t(k)] = static_cast<std::int32_t>(
+            std::lround((double(position[k]) - coded.low[std::size_t(k)]) / coded.step * kFine));
+    return place;
+}
+
+Vec3f position_of(const FinePlace& place, const CodedMesh& coded) {
+    Vec3f position;
+    for (int k = 0; k < 3; ++k)
+        position[k] = static_cast<float>(coded.low[std::size_t(k)] + coded.step * place[std::size_t(k)] / kFine);
+    return position;
+}
+
+std::vector<std::size_t> first_with_number(const WalkedFaces& walked) { // of each number the first of the map's
+    std::vector<std::size_t> first(walked.met, walked.number.size());
+    for (std::size_t w = walked.number.size(); w-- > 0;)
+        if (walked.number[w] != kNoIndex) first[walked.number[w]] = w;
+    return first;
+}
+
+/// A whole step, for vertices that no face meets: each from the one before.
+std::int32_t whole_steps(std::int32_t fine) { return (fine + (fine < 0 ? -kFine / 2 : kFine / 2)) / kFine; }
+
+// --- Attributes ---------------------------------------------------------------------------------------------------
+
+/// Codes attributes. `Code` writes or reads numbers; what it is given is what a reader will have.
+template <class Code>
+class Attributes {
+public:
+    Attributes(Code& code, Mesh& mesh, const WalkedFaces& walked) : code_(code), mesh_(mesh), walked_(walked) {
+        neighbour_.assign(mesh.vertex_count(), kNoIndex);
+        for (std::size_t h = 0; h < walked.map.opposite.size(); ++h) { // an earlier one beside each vertex
+            const Index a = walked.number[walked.map.origin(Index(h))],
+                        b = walked.number[walked.map.origin(ClosedMap::next(Index(h)))];
+            if (a == kNoIndex || b == kNoIndex || a == b) continue;
+            const auto [low, high] = std::minmax(a, b);
+            if (neighbour_[high] == kNoIndex || low > neighbour_[high]) neighbour_[high] = low;
+        }
+    }
+
+    void run() {
+        corner_attribute(mesh_.uvs, 12);
+        corner_attribute(mesh_.normals, 10);
+        colors();
+        for (VertexScalar& scalar : mesh_.scalars) scalars(scalar.values);
+        labels(mesh_.objects.of_face);
+        labels(mesh_.groups.of_face);
+        labels(mesh_.materials.of_face);
+        labels(mesh_.smoothing);
+    }
+
+private:
+    /// Rounds `values` to so many bits along their longest side.
+    template <class T>
+    std::vector<std::array<std::int32_t, 3>> quantised(std::vector<T>& values, unsigned bits, T& low, float& step) {
+        constexpr int n = int(T::RowsAtCompileTime);
+        std::vector<std::array<std::int32_t, 3>> steps(values.size());
+        if (code_.writes && !values.empty()) {
+            low = values[0];
+            T high = low;
+            for (const T& v : values) {
+                low = low.cwiseMin(v);
+                high = high.cwiseMax(v);
+            }
+            step = std::max((high - low).maxCoeff(), 1e-30f) / float((1u << bits) - 1);
+            for (std::size_t i = 0; i < values.size(); ++i)
+                for (int k = 0; k < n; ++k)
+                    steps[i][std::size_t(k)] = static_cast<std::int32_t>(std::lround((values[i][k] - low[k]) / step));
+        }
+        for (int k = 0; k < n; ++k) code_.real(low[k]);
+        code_.real(step);
+        return steps;
+    }
+    template <class T>
+    static void fill(std::vector<T>& values, const std::vector<std::array<std::int32_t, 3>>& steps, const T& low,
+                     float step) {
+        for (std::size_t i = 0; i < values.size(); ++i)
+            for (int k = 0; k < int(T::RowsAtCompileTime); ++k)
+                values[i][k] = low[k] + step * float(steps[i][std::size_t(k)]);
+    }
+
+    template <class T>
+    void corner_attribute(CornerAttribute<T>& attribute, unsigned bits) {
+        std::uint32_t count = static_cast<std::uint32_t>(attribute.values.size());
+        std::uint32_t is_indexed = !attribute.per_vertex();
+        code_.number(kCount, count);
+        if (count == 0) return;
+        code_.number(kCount, is_indexed);
+        if (is_indexed) return indexed(attribute, count, bits);
+        if (count != mesh_.vertex_count()) throw Damage();
+        attribute.values.resize(count);
+        T low = T::Zero();
+        float step = 0;
+        auto steps = quantised(attribute.values, bits, low, step);
+        for (std::size_t v = 0; v < count; ++v)
+            for (std::size_t k = 0; k < std::size_t(T::RowsAtCompileTime); ++k) {
+                const std::int32_t expected = neighbour_[v] != kNoIndex ? steps[neighbour_[v]][k] : 0;
+                code_.difference(kValue + unsigned(k), steps[v][k], expected);
+            }
+        fill(attribute.values, steps, low, step);
+    }
+
+    /// Values in the order in which corners name them. At a vertex most corners have one value.
+    template <class T>
+    void indexed(CornerAttribute<T>& attribute, std::uint32_t count, unsigned bits) {
+        constexpr auto n = std::size_t(T::RowsAtCompileTime);
+        if (count > mesh_.corner_count()) throw Damage();
+        attribute.values.resize(count);
+        attribute.corners.resize(mesh_.corner_count(), kNoIndex);
+        T low = T::Zero();
+        float step = 0;
+        auto steps = quantised(attribute.values, bits, low, step);
+        std::vector<Index> latest(mesh_.vertex_count(), kNoIndex); // the value that a vertex had last
+        std::uint32_t next = 0;
+        Index before = kNoIndex; // the value of the corner before
+        for (std::size_t f = 0; f < mesh_.face_count(); ++f)
+            for (std::size_t c = mesh_.face_offsets[f]; c < mesh_.face_offsets[f + 1]; ++c) {
+                Index& value = attribute.corners[c];
+                Index& last = latest[mesh_.corners[c]];
+                // 0: the vertex's last one, 1: a new one, 2: none, 3: an older one
+                std::uint32_t kind = value == kNoIndex ? 2 : value == last ? 0 : value == next ? 1 : 3;
+                code_.number(kKind + (last == kNoIndex), kind);
+                if (kind == 0 && last != kNoIndex)
+                    value = last;
+                else if (kind == 1 && next < count) {
+                    value = next++;
+                    for (std::size_t k = 0; k < n; ++k) {
+                        const Index near = last != kNoIndex ? last : before;
+                        code_.difference(kValue + 3 + unsigned(k), steps[value][k],
+                                         near != kNoIndex ? steps[near][k] : 0);
+                    }
+                } else if (kind == 2)
+                    value = kNoIndex;
+                else {
+                    std::uint32_t back = next - 1 - value;
+                    code_.number(kOlder, back);
+                    if (back >= next) throw Damage();
+                    value = next - 1 - back;
+                }
+                if (value != kNoIndex) last = before = value;
+                code_.check();
+            }
+        fill(attribute.values, steps, low, step);
+    }
+
+    void colors() {
+        std::uint32_t count = static_cast<std::uint32_t>(mesh_.colors.size());
+        std::uint32_t has_alpha = mesh_.colors_have_alpha;
+        code_.number(kCount, count);
+        if (count == 0) return;
+        if (count != mesh_.vertex_count()) throw Damage();
+        code_.number(kCount, has_alpha);
+        mesh_.colors_have_alpha = has_alpha != 0;
+        mesh_.colors.resize(count, Vec4f::Ones());
+        std::vector<std::array<std::int32_t, 4>> steps(count);
+        for (std::size_t v = 0; v < count; ++v)
+            for (int k = 0; k < 3 + int(has_alpha != 0); ++k) {
+                std::int32_t& step = steps[v][std::size_t(k)];
+                step = static_cast<std::int32_t>(std::lround(std::clamp(mesh_.colors[v][k], 0.0f, 1.0f) * 255));
+                const Index near = neighbour_[v];
+                code_.difference(kColor + unsigned(k), step, near != kNoIndex ? steps[near][std::size_t(k)] : 0);
+                mesh_.colors[v][k] = float(step) / 255;
+            }
+    }
+
+    /// Bit for bit: the difference of the numbers that floats are as integers.
+    void scalars(std::vector<float>& values) {
+        values.resize(mesh_.vertex_count());
+        std::uint32_t before = 0;
+        for (float& value : values) {
+            std::int32_t difference = std::int32_t(std::bit_cast<std::uint32_t>(value) - before);
+            code_.difference(kScalar, difference, 0);
+            before += std::uint32_t(difference);
+            value = std::bit_cast<float>(before);
+        }
+    }
+
+    void labels(std::vector<Index>& of_face) {
+        std::uint32_t count = static_cast<std::uint32_t>(of_face.size());
+        code_.number(kCount, count);
+        if (count == 0) return;
+        if (count != mesh_.face_count()) throw Damage();
+        of_face.resize(count, 0);
+        Index before = 0;
+        for (Index& label : of_face) {
+            std::uint32_t is_new = label != before;
+            code_.number(kLabel, is_new);
+            if (is_new)
+                code_.number(kLabel + 1, label);
+            else
+                label = before;
+            before = label;
+            code_.check();
+        }
+    }
+
+public:
+    static constexpr unsigned kCount = 0, kValue = 1, kKind = 7, kOlder = 9, kColor = 10, kScalar = 14, kLabel = 15,
+                              kContexts = 17;
+
+private:
+    Code& code_;
+    Mesh& mesh_;
+    const WalkedFaces& walked_;
+    std::vector<Index> neighbour_;
+};
+
+struct NumberWriter {
+    static constexpr bool writes = true;
+    SymbolWriter& out;
+    void number(unsigned context, std::uint32_t& value) { out.number(context, value); }
+    void difference(unsigned context, std::int32_t& value, std::int32_t expected) {
+        out.number_with_sign(context, std::int32_t(std::uint32_t(value) - std::uint32_t(expected)));
+    }
+    void real(float& value) { out.bits(std::bit_cast<std::uint32_t>(value), 32); }
+    void check() const {}
+};
+
+struct NumberReader {
+    static constexpr bool writes = false;
+    SymbolReader& in;
+    void number(unsigned context, std::uint32_t& value) {
+        value = in.number(context);
+        check();
+    }
+    void difference(unsigned context, std::int32_t& value, std::int32_t expected) {
+        value = std::int32_t(std::uint32_t(in.number_with_sign(context)) + std::uint32_t(expected));
+        check();
+    }
+    void real(float& value) {
+        value = std::bit_cast<float>(in.bits(32));
+        if (!std::isfinite(value)) throw Damage();
+    }
+    void check() const {
+        if (in.is_damaged()) throw Damage();
+    }
+};
+
+// --- Order --------------------------------------------------------------------------------------------------------
+
+/// The mesh in the order of its code.
+struct OrderedMesh {
+    Mesh mesh;
+    std::vector<Index> vertex, face, first_corner;
+};
+
+template <class T>
+std::vector<T> in_order(const std::vector<T>& values, std::span<const Index> order) {
+    std::vector<T> moved;
+    if (values.empty()) return moved;
+    moved.reserve(order.size());
+    for (const Index i : order) moved.push_back(values[i]);
+    return moved;
+}
+
+/// Values in the order in which corners first name them; those that none names are dropped.
+template <class T>
+void renumber_values(CornerAttribute<T>& attribute) {
+    if (attribute.per_vertex()) return;
+    std::vector<Index> number(attribute.values.size(), kNoIndex);
+    std::vector<T> values;
+    for (Index& c : attribute.corners) {
+        if (c == kNoIndex) continue;
+        if (number[c] == kNoIndex) {
+            number[c] = static_cast<Index>(values.size());
+            values.push_back(attribute.values[c]);
+        }
+        c = number[c];
+    }
+    attribute.values = std::move(values);
+    if (attribute.values.empty()) attribute.corners.clear();
+}
+
+template <class T>
+CornerAttribute<T> attribute_in_order(const CornerAttribute<T>& attribute, const OrderedMesh& ordered,
+                                      const Mesh& mesh) {
+    if (attribute.per_vertex()) return {in_order(attribute.values, ordered.vertex), {}};
+    CornerAttribute<T> moved{attribute.values, {}};
+    for (std::size_t f = 0; f < ordered.face.size(); ++f) {
+        const Index begin = mesh.face_offsets[ordered.face[f]], size = mesh.face_size(ordered.face[f]);
+        for (Index k = 0; k < size; ++k)
+            moved.corners.push_back(attribute.corners[begin + (ordered.first_corner[f] + k) % size]);
+    }
+    return moved;
+}
+
+/// Without positions.
+void put_attributes_in_order(const Mesh& mesh, OrderedMesh& ordered) {
+    Mesh& moved = ordered.mesh;
+    moved.origin = mesh.origin;
+    moved.uvs = attribute_in_order(mesh.uvs, ordered, mesh);
+    moved.normals = attribute_in_order(mesh.normals, ordered, mesh);
+    moved.colors = in_order(mesh.colors, ordered.vertex);
+    moved.colors_have_alpha = mesh.colors_have_alpha;
+    for (const VertexScalar& scalar : mesh.scalars)
+        moved.scalars.push_back({scalar.name, in_order(scalar.values, ordered.vertex)});
+    const auto labels = [&](const FaceLabels& from) {
+        return FaceLabels{from.names, in_order(from.of_face, ordered.face)};
+    };
+    moved.objects = labels(mesh.objects);
+    moved.groups = labels(mesh.groups);
+    moved.materials = labels(mesh.materials);
+    moved.smoothing = in_order(mesh.smoothing, ordered.face);
+    moved.material_files = mesh.material_files;
+    moved.embedded_materials = mesh.embedded_materials;
+}
+
+std::string write_order(const OrderedMesh& ordered) {
+    SymbolWriter out(kOrderContexts);
+    const auto put = [&](unsigned context, std::span<const Index> order) {
+        std::uint32_t expected = 0;
+        for (const Index i : order) {
+            out.number_with_sign(context, std::int32_t(i - expected));
+            expected = i + 1;
+        }
+    };
+    put(kVertexOrder, ordered.vertex);
+    put(kFaceOrder, ordered.face);
+    for (const Index k : ordered.first_corner) out.number(kFirstCorner, k);
+    return out.finish();
+}
+
+std::vector<Index> read_permutation(SymbolReader& in, unsigned context, std::size_t count) {
+    std::vector<Index> order(count);
+    std::vector<bool> is_named(count);
+    std::uint32_t expected = 0;
+    for (Index& i : order) {
+        i = expected + std::uint32_t(in.number_with_sign(context));
+        if (i >= count || is_named[i] || in.is_damaged()) throw Damage();
+        is_named[i] = true;
+        expected = i + 1;
+    }
+    return order;
+}
+
+std::vector<Index> inverse_of(std::span<const Index> order) {
+    std::vector<Index> inverse(order.size());
+    for (std::size_t i = 0; i < order.size(); ++i) inverse[order[i]] = static_cast<Index>(i);
+    return inverse;
+}
+
+/// Back into the order of the source.
+Mesh put_back(const Mesh& mesh, std::string_view stream) {
+    SymbolReader in(stream, kOrderContexts);
+    const std::vector<Index> vertex = read_permutation(in, kVertexOrder, mesh.vertex_count()),
+                             face = read_permutation(in, kFaceOrder, mesh.face_count());
+    OrderedMesh back; // what it was coded from is what comes out: vertex i is the code's back.vertex[i]
+    back.vertex = inverse_of(vertex);
+    back.face = inverse_of(face);
+    back.first_corner.resize(face.size());
+    for (std::size_t f = 0; f < face.size(); ++f) { // the code's face f began with corner k of the source's
+        const std::uint32_t k = in.number(kFirstCorner), size = mesh.face_size(f);
+        if (k >= size || in.is_damaged()) throw Damage();
+        back.first_corner[face[f]] = (size - k) % size;
+    }
+    put_attributes_in_order(mesh, back);
+    back.mesh.positions = in_order(mesh.positions, back.vertex);
+    for (std::size_t f = 0; f < back.face.size(); ++f) {
+        const auto corners = mesh.face(back.face[f]);
+        for (std::size_t k = 0; k < corners.size(); ++k)
+            back.mesh.corners.push_back(vertex[corners[(back.first_corner[f] + k) % corners.size()]]);
+        back.mesh.face_offsets.push_back(static_cast<Index>(back.mesh.corners.size()));
+    }
+    return std::move(back.mesh);
+}
+
+/// Those that no face meets, along Morton's curve, so that each is near the one before.
+void sort_loose(const Mesh& mesh, const CodedMesh& coded, std::span<Index> loose) {
+    std::vector<std::pair<std::uint64_t, Index>> keys;
+    for (const Index v : loose) {
+        const FinePlace place = fine_place(mesh.positions[v], coded);
+        std::uint64_t key = 0;
+        for (unsigned bit = 0; bit < 20; ++bit)
+            for (std::size_t k = 0; k < 3; ++k)
+                key |= std::uint64_t(std::uint32_t(place[k]) >> bit & 1) << (3 * bit + k);
+        keys.emplace_back(key, v);
+    }
+    std::ranges::sort(keys);
+    for (std::size_t i = 0; i < loose.size(); ++i) loose[i] = keys[i].second;
+}
+
+Mesh decode(const CodedMesh& coded, const RunContext& context) {
+    if (coded.vertices >= kNoIndex || coded.corners >= kNoIndex / 4 || !(coded.step > 0) ||
+        !std::isfinite(coded.step * (1 << 27)))
+        throw Damage();
+    SymbolReader faces_in(coded.connectivity, kFaceContexts);
+    std::optional<WalkedFaces> walked = decode_faces(faces_in, coded.vertices, coded.corners);
+    if (!walked || walked->face_offsets.size() != coded.faces + 1 || context.is_cancelled()) throw Damage();
+
+    SymbolReader places_in(coded.places, kPlaceContexts);
+    const std::vector<FinePlace> places = decode_geometry(walked->map, steps_of(coded.options), 0, places_in);
+    Mesh mesh = coded.rest;
+    for (const std::size_t w : first_with_number(*walked)) mesh.positions.push_back(position_of(places[w], coded));
+    FinePlace place{};
+    while (mesh.vertex_count() < coded.vertices) {
+        for (unsigned k = 0; k < 3; ++k) place[k] += kFine * places_in.number_with_sign(kLoosePlace + k);
+        if (places_in.is_damaged()) throw Damage();
+        mesh.positions.push_back(position_of(place, coded));
+    }
+    if (places_in.is_damaged()) throw Damage();
+    mesh.face_offsets = std::move(walked->face_offsets);
+    mesh.corners = std::move(walked->corners);
+    if (std::ranges::any_of(mesh.corners, [&](Index v) { return v >= coded.vertices; })) throw Damage();
+    SymbolReader attributes_in(coded.attributes, Attributes<NumberReader>::kContexts);
+    NumberReader numbers{attributes_in};
+    Attributes<NumberReader>(numbers, mesh, *walked).run();
+    if (coded.options.keep_order) mesh = put_back(mesh, coded.order);
+    return mesh;
+}
+
+} // namespace
+
+Result<CodedMesh> encode_mesh(const Mesh& mesh, const MeshCodeOptions& options, MeshCodeReport* report,
+                              const RunContext& context) {
+    if (options.bits < 10 || options.bits > 16)
+        return Error{ErrorCode::usage,
+                     "Positions are coded with 10 to 16 bits; " + std::to_string(options.bits) + " were asked for."};
+    if (mesh.vertex_count() == 0) return Error{ErrorCode::unsuitable, "The mesh has no vertices: nothing to code."};
+    if (mesh.corner_count() >= kNoIndex / 4)
+        return Error{ErrorCode::unsuitable, "The mesh has more than a thousand million corners: too many to code."};
+    CodedMesh coded;
+    coded.vertices = mesh.vertex_count();
+    coded.faces = mesh.face_count();
+    coded.corners = mesh.corner_count();
+    coded.options = options;
+    const Box box = bounds(mesh.positions);
+    coded.low = {box.min[0], box.min[1], box.min[2]};
+    const double longest = box.size().maxCoeff();
+    coded.step = (longest > 0 ? longest : 1.0) / double((1u << options.bits) - 1);
+
+    SymbolWriter faces_out(kFaceContexts);
+    EncodedFaces faces = encode_faces(mesh.face_offsets, mesh.corners, mesh.vertex_count(), faces_out);
+    if (context.is_cancelled()) return cancelled_error();
+    coded.connectivity = faces_out.finish();
+    const WalkedFaces& walked = faces.walked;
+
+    OrderedMesh ordered;
+    ordered.vertex = std::move(faces.vertex);
+    ordered.face = std::move(faces.face);
+    ordered.first_corner = std::move(faces.first_corner);
+    Mesh& moved = ordered.mesh;
+    moved.face_offsets = walked.face_offsets;
+    moved.corners = walked.corners;
+    const bool has_odd_faces = std::ranges::any_of(moved.corners, [&](Index v) { return v >= walked.met; });
+    if (!has_odd_faces) sort_loose(mesh, coded, std::span(ordered.vertex).subspan(walked.met)); // else they are named
+    put_attributes_in_order(mesh, ordered);
+    renumber_values(moved.uvs);
+    renumber_values(moved.normals);
+
+    SymbolWriter places_out(kPlaceContexts);
+    std::vector<FinePlace> places(walked.number.size());
+    for (std::size_t w = 0; w < places.size(); ++w)
+        if (walked.number[w] != kNoIndex)
+            places[w] = fine_place(mesh.positions[ordered.vertex[walked.number[w]]], coded);
+    const std::vector<FinePlace> read = encode_geometry(walked.map, places, steps_of(options), 0, places_out);
+    for (const std::size_t w : first_with_number(walked)) moved.positions.push_back(position_of(read[w], coded));
+    FinePlace before{};
+    for (std::size_t v = walked.met; v < mesh.vertex_count(); ++v) {
+        const FinePlace place = fine_place(mesh.positions[ordered.vertex[v]], coded);
+        for (unsigned k = 0; k < 3; ++k) {
+            const std::int32_t steps = whole_steps(place[k] - before[k]);
+            places_out.number_with_sign(kLoosePlace + k, steps);
+            before[k] += kFine * steps;
+        }
+        moved.positions.push_back(position_of(before, coded));
+    }
+    coded.places = places_out.finish();
+    if (context.is_cancelled()) return cancelled_error();
+
+    if (report) {
+        report->vertex = ordered.vertex;
+        double squares = 0, largest = 0;
+        for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
+            const double off =
+                (moved.positions[v].cast<double>() - mesh.positions[ordered.vertex[v]].cast<double>()).squaredNorm();
+            squares += off;
+            largest = std::max(largest, off);
+        }
+        report->rms = std::sqrt(squares / double(mesh.vertex_count()));
+        report->largest = std::sqrt(largest);
+    }
+    SymbolWriter attributes_out(Attributes<NumberWriter>::kContexts);
+    NumberWriter numbers{attributes_out};
+    Attributes<NumberWriter>(numbers, moved, walked).run();
+    coded.attributes = attributes_out.finish();
+    if (options.keep_order) coded.order = write_order(ordered);
+
+    coded.rest.origin = mesh.origin;
+    for (const VertexScalar& scalar : mesh.scalars) coded.rest.scalars.push_back({scalar.name, {}});
+    coded.rest.objects.names = mesh.objects.names;
+    coded.rest.groups.names = mesh.groups.names;
+    coded.rest.materials.names = mesh.materials.names;
+    coded.rest.material_files = mesh.material_files;
+    coded.rest.embedded_materials = mesh.embedded_materials;
+    return coded;
+}
+
+Result<Mesh> decode_mesh(const CodedMesh& coded, const RunContext& context) {
+    try {
+        Mesh mesh = decode(coded, context);
+        if (const std::string wrong = check_mesh(mesh); !wrong.empty())
+            return Error{ErrorCode::bad_file, "The coded mesh is inconsistent: " + wrong};
+        return mesh;
+    } catch (const Damage&) {
+        if (context.is_cancelled()) return cancelled_error();
+        return Error{ErrorCode::bad_file, "The coded mesh is damaged."};
+    }
+}
+
+} // namespace filigree

@@ -1,0 +1,220 @@
+// Coded meshes: the same faces, places within half a step along each axis, attributes; in any order, and in theirs;
+// what was damaged is named, and never takes the program down.
+#include "filigree/coding/mesh_code.h"
+
+#include "filigree/io/mesh_file.h"
+#include "filigree/mesh/shapes.h"
+#include "io/corpus.h"
+
+#include <cmath>
+#include <gtest/gtest.h>
+#include <map>
+#include <random>
+
+using namespace filigree;
+using namespace filigree_test;
+
+namespace {
+
+const RunContext kContext(1);
+
+/// A face by its vertices, beginning with the lowest: the same whatever corner was first.
+std::vector<Index> turned(std::vector<Index> face) {
+    std::ranges::rotate(face, std::ranges::min_element(face));
+    return face;
+}
+
+std::map<std::vector<Index>, int> faces_of(const Mesh& mesh, std::span<const Index> vertex) {
+    std::map<std::vector<Index>, int> faces;
+    for (std::size_t f = 0; f < mesh.face_count(); ++f) {
+        std::vector<Index> face;
+        for (const Index v : mesh.face(f)) face.push_back(vertex.empty() ? v : vertex[v]);
+        ++faces[turned(face)];
+    }
+    return faces;
+}
+
+struct Coded {
+    CodedMesh code;
+    MeshCodeReport report;
+    Mesh mesh;
+};
+
+Coded coded(const Mesh& mesh, const MeshCodeOptions& options = {}) {
+    Coded result;
+    result.code = encode_mesh(mesh, options, &result.report, kContext).value();
+    result.mesh = decode_mesh(result.code, kContext).value();
+    return result;
+}
+
+/// Faces and places, whatever the order.
+void expect_same_surface(const Mesh& mesh, const MeshCodeOptions& options) {
+    const Coded out = coded(mesh, options);
+    ASSERT_EQ(out.mesh.vertex_count(), mesh.vertex_count());
+    ASSERT_EQ(out.mesh.face_count(), mesh.face_count());
+    const std::vector<Index> none;
+    EXPECT_EQ(faces_of(out.mesh, options.keep_order ? none : out.report.vertex), faces_of(mesh, none));
+    // Half a step along each axis of a frame, and what is rounded to sixteenths on the way.
+    const double along = options.surface ? 4 : 1,
+                 most = (std::sqrt(0.25 * (1 + 2 * along * along)) + 0.12) * out.code.step;
+    for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
+        const Vec3f was = mesh.positions[options.keep_order ? v : out.report.vertex[v]];
+        ASSERT_LT((out.mesh.positions[v] - was).cast<double>().norm(), most + 2e-7 * was.norm());
+    }
+}
+
+void expect_same_in_order(const Mesh& mesh) {
+    const Coded out = coded(mesh, {.keep_order = true});
+    EXPECT_EQ(out.mesh.corners, mesh.corners);
+    EXPECT_EQ(out.mesh.face_offsets, mesh.face_offsets);
+    EXPECT_EQ(out.mesh.objects.of_face, mesh.objects.of_face);
+    EXPECT_EQ(out.mesh.groups.of_face, mesh.groups.of_face);
+    EXPECT_EQ(out.mesh.materials.of_face, mesh.materials.of_face);
+    EXPECT_EQ(out.mesh.materials.names, mesh.materials.names);
+    EXPECT_EQ(out.mesh.smoothing, mesh.smoothing);
+    ASSERT_EQ(out.mesh.uvs.corners.size(), mesh.uvs.corners.size());
+    const Box box = [&] {
+        Box all;
+        for (const Vec2f& uv : mesh.uvs.values) all.extend({uv[0], uv[1], 0});
+        return all;
+    }();
+    const double step = mesh.uvs.empty() ? 0 : box.size().maxCoeff() / 4095;
+    for (std::size_t c = 0; c < mesh.uvs.corners.size(); ++c) {
+        const Index was = mesh.uvs.corners[c], is = out.mesh.uvs.corners[c];
+        ASSERT_EQ(was == kNoIndex, is == kNoIndex);
+        if (was == kNoIndex) continue;
+        ASSERT_LT((out.mesh.uvs.values[is] - mesh.uvs.values[was]).cwiseAbs().maxCoeff(), 0.51 * step + 1e-6);
+    }
+}
+
+Mesh random_mesh(std::mt19937& random) {
+    Mesh mesh;
+    const std::size_t vertices = 3 + random() % 30, faces = random() % 60;
+    for (std::size_t v = 0; v < vertices; ++v)
+        mesh.positions.emplace_back(float(random() % 1000), float(random() % 1000), float(random() % 1000));
+    for (std::size_t f = 0; f < faces; ++f) {
+        std::vector<Index> face(3 + random() % 4 * (random() % 3 == 0));
+        for (Index& v : face) v = Index(random() % vertices); // some twice in one face
+        mesh.add_face(face);
+    }
+    return mesh;
+}
+
+} // namespace
+
+TEST(MeshCode, ShapesKeepTheirFacesAndPlaces) {
+    for (const std::string_view name : shape_names()) {
+        const Mesh mesh = *make_shape(name, {.resolution = 24});
+        for (const unsigned bits : {10u, 12u, 16u}) expect_same_surface(mesh, {.bits = bits});
+        expect_same_surface(mesh, {.surface = true});
+        expect_same_in_order(mesh);
+    }
+}
+
+TEST(MeshCode, AnyFacesAtAll) { // edges of many faces, faces that turn back, vertices twice in one face, loose ones
+    for (unsigned seed = 0; seed < 3000; ++seed) {
+        std::mt19937 random(seed);
+        const Mesh mesh = random_mesh(random);
+        SCOPED_TRACE(seed);
+        expect_same_surface(mesh, {});
+        if (seed % 4 == 0) expect_same_surface(mesh, {.bits = 10, .keep_order = true});
+        if (HasFailure()) break;
+    }
+}
+
+TEST(MeshCode, Attributes) {
+    Mesh mesh = make_wavy_sphere({.resolution = 16});
+    std::mt19937 random(5);
+    mesh.scalars.push_back({"heat", {}});
+    for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
+        mesh.colors.emplace_back(float(random() % 256) / 255, 0.5f, float(v % 7) / 7, 1.0f);
+        mesh.scalars[0].values.push_back(float(random()) * 1e-7f);
+        mesh.normals.values.push_back(mesh.positions[v].normalized());
+    }
+    mesh.materials.names = {"gold", "jade"};
+    for (std::size_t f = 0; f < mesh.face_count(); ++f)
+        mesh.materials.of_face.push_back(f % 5 ? 0 : f % 3 ? 1 : kNoIndex);
+    for (const bool keep_order : {false, true}) {
+        const Coded out = coded(mesh, {.keep_order = keep_order});
+        for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
+            const Index was = keep_order ? Index(v) : out.report.vertex[v];
+            ASSERT_EQ(out.mesh.scalars[0].values[v], mesh.scalars[0].values[was]);
+            ASSERT_LT((out.mesh.colors[v] - mesh.colors[was]).cwiseAbs().maxCoeff(), 0.51f / 255);
+            ASSERT_LT((out.mesh.normals.values[v] - mesh.normals.values[was]).cwiseAbs().maxCoeff(), 1.1e-3f);
+        }
+        EXPECT_EQ(out.mesh.scalars[0].name, "heat");
+        EXPECT_EQ(std::ranges::count(out.mesh.materials.of_face, 1u), std::ranges::count(mesh.materials.of_face, 1u));
+    }
+    expect_same_in_order(mesh);
+}
+
+TEST(MeshCode, PointsAndTinyMeshes) {
+    Mesh points;
+    std::mt19937 random(6);
+    for (int i = 0; i < 500; ++i)
+        points.positions.emplace_back(float(random() % 100), float(random() % 100), float(random() % 100));
+    expect_same_surface(points, {});
+    Mesh one;
+    one.positions.emplace_back(1e9f, -3, 0);
+    expect_same_surface(one, {});
+    EXPECT_EQ(encode_mesh(Mesh(), {}, nullptr, kContext).error().code, ErrorCode::unsuitable);
+    EXPECT_EQ(encode_mesh(one, {.bits = 9}, nullptr, kContext).error().code, ErrorCode::usage);
+}
+
+TEST(MeshCode, FewBits) {
+    const auto bits = [](const Mesh& mesh, unsigned precision) {
+        const CodedMesh code = coded(mesh, {.bits = precision}).code;
+        return std::pair(8.0 * double(code.connectivity.size()) / double(mesh.vertex_count()),
+                         8.0 * double(code.places.size()) / double(mesh.vertex_count()));
+    };
+    const auto [quads, waves] = bits(make_wavy_cube({.resolution = 128}), 14);
+    EXPECT_LT(quads, 0.3);
+    const std::filesystem::path koala = corpus_folder() / "good/koala_100k.obj";
+    if (!std::filesystem::exists(koala)) GTEST_SKIP() << "no corpus";
+    const auto [connectivity, places] = bits(read_mesh(koala, kContext).value().mesh, 12);
+    EXPECT_LT(connectivity, 2.2);           // Draco: 2.3
+    EXPECT_LT(connectivity + places, 15.0); // Draco at its best: 17.1
+}
+
+TEST(MeshCode, EveryDamagedByteIsNamedOrHarmless) {
+    const Mesh mesh = make_wavy_sphere({.resolution = 6});
+    const CodedMesh code = coded(mesh, {.keep_order = true}).code;
+    for (std::string CodedMesh::*part :
+         {&CodedMesh::connectivity, &CodedMesh::places, &CodedMesh::attributes, &CodedMesh::order}) {
+        for (std::size_t at = 0; at < (code.*part).size(); ++at)
+            for (const int by : {1, 128, 255}) {
+                CodedMesh damaged = code;
+                (damaged.*part)[at] = char((damaged.*part)[at] ^ by);
+                const Result<Mesh> read = decode_mesh(damaged, kContext);
+                if (read)
+                    ASSERT_EQ(check_mesh(*read), "");
+                else
+                    ASSERT_EQ(read.error().code, ErrorCode::bad_file);
+            }
+        for (std::size_t length = 0; length < (code.*part).size(); length += 3) {
+            CodedMesh cut = code;
+            (cut.*part).resize(length);
+            EXPECT_FALSE(decode_mesh(cut, kContext).ok());
+        }
+    }
+    for (std::uint64_t CodedMesh::*count : {&CodedMesh::vertices, &CodedMesh::faces, &CodedMesh::corners})
+        for (const std::uint64_t wrong :
+             {std::uint64_t{0}, code.*count + 1, std::uint64_t{1} << 31, ~std::uint64_t{0}}) {
+            CodedMesh damaged = code;
+            damaged.*count = wrong;
+            EXPECT_FALSE(decode_mesh(damaged, kContext).ok());
+        }
+}
+
+TEST(MeshCode, CorpusComesBack) {
+    std::size_t tried = 0;
+    for (const CorpusRow& row : read_corpus()) {
+        const Result<MeshFile> file = read_mesh(row.path, kContext);
+        if (!file || file->mesh.vertex_count() == 0 || file->mesh.corner_count() > 300'000) continue;
+        SCOPED_TRACE(row.file);
+        expect_same_in_order(file->mesh);
+        if (std::isfinite(world_bounds(file->mesh).diagonal())) expect_same_surface(file->mesh, {});
+        ++tried;
+    }
+    if (tried == 0) GTEST_SKIP() << "no corpus";
+}
