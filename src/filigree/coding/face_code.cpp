@@ -80,10 +80,13 @@ ClosedSurface surface_of(const FaceSpans& faces, std::vector<bool>& is_odd, FanT
 /// Polygons out of triangles: what lies between cuts, in the order of their first triangles.
 class Polygons {
 public:
-    /// cuts: of each half-edge, both sides. False: that is no set of polygons.
+    /// cuts: of each half-edge, both sides; empty: none. False: that is no set of polygons.
     static bool assemble(const ClosedMap& map, const std::vector<bool>& cuts, WalkedFaces& walked,
                          std::vector<Index>* first_half_edges) {
+        if (cuts.empty()) return triangles(map, walked, first_half_edges);
         std::vector<bool> is_done(map.triangles.size(), false);
+        walked.corners.reserve(3 * map.triangles.size());
+        walked.face_offsets.reserve(map.triangles.size() + 1);
         for (Index t = 0; t < map.triangles.size(); ++t) {
             if (is_done[t] || !map.is_own(map.triangles[t])) continue;
             Index start = 3 * t;
@@ -111,6 +114,18 @@ public:
     }
 
 private:
+    static bool triangles(const ClosedMap& map, WalkedFaces& walked, std::vector<Index>* first_half_edges) {
+        walked.corners.reserve(3 * map.triangles.size());
+        walked.face_offsets.reserve(map.triangles.size() + 1);
+        for (Index t = 0; t < map.triangles.size(); ++t) {
+            const Triangle& triangle = map.triangles[t];
+            if (!map.is_own(triangle)) continue;
+            for (const Index v : triangle) walked.corners.push_back(walked.number[v]);
+            walked.face_offsets.push_back(static_cast<Index>(walked.corners.size()));
+            if (first_half_edges) first_half_edges->push_back(3 * t);
+        }
+        return true;
+    }
     static Index outline_near(const ClosedMap& map, const std::vector<bool>& cuts, Index half_edge) {
         Index h = half_edge;
         for (std::size_t turn = 0; turn < map.opposite.size(); ++turn) {
@@ -174,7 +189,7 @@ EncodedFaces encode_faces(std::span<const Index> face_offsets, std::span<const I
         return source;
     };
     out.symbol(kPlain, all_triangles);
-    std::vector<bool> cuts(walk.map.opposite.size(), false);
+    std::vector<bool> cuts; // none: all are triangles
     if (!all_triangles)
         cuts = code_cuts(walk.map, [&](unsigned context, Index h) {
             const bool cut = is_cut(fans, surface.map, source_of(h));
@@ -238,7 +253,7 @@ std::optional<WalkedFaces> decode_faces(SymbolReader& in, std::size_t vertices, 
     if (!walk) return std::nullopt;
     WalkedFaces walked;
     walked.map = std::move(walk->map);
-    std::vector<bool> cuts(walked.map.opposite.size(), false);
+    std::vector<bool> cuts;
     if (in.symbol(kPlain) == 0)
         cuts = code_cuts(walked.map, [&](unsigned context, Index) { return in.symbol(context) != 0; });
 

@@ -17,20 +17,20 @@ constexpr std::int32_t kFarthest = 1 << 26;  // of a place, in sixteenths of a s
 constexpr unsigned kSizeClasses = 16, kSupport = 3;
 static_assert(3 * kSizeClasses * kSupport <= kGeometryContexts);
 
-Wide operator+(const Wide& a, const Wide& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
 Wide operator-(const Wide& a, const Wide& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 Wide cross(const Wide& a, const Wide& b) {
     return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 std::int64_t dot(const Wide& a, const Wide& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-/// To the nearest, halves away from zero. |value| < 2^53, by > 0. A quotient of doubles is the same on every machine,
-/// and quicker than one of integers.
+// What follows uses doubles where they are quicker than integers, and in such a way that every machine has the same:
+// whole numbers below 2^53, one operation that IEEE 754 rounds, and back to whole numbers towards zero.
+
+/// To the nearest, halves away from zero. by > 0.
 std::int64_t divide(std::int64_t value, std::int64_t by) {
-    const double quotient = double(value) / double(by);
-    return std::int64_t(quotient + (quotient < 0 ? -0.5 : 0.5));
+    return std::int64_t(double(2 * value + (value < 0 ? -by : by)) / double(2 * by));
 }
-/// The same by kOne.
+/// By kOne.
 std::int64_t divide_by_one(std::int64_t value) { return (value + kOne / 2) >> kOneBits; }
 
 /// Made kOne long; false: it has no direction.
@@ -39,8 +39,8 @@ bool normalise(Wide& v) {
     if (largest == 0) return false;
     const int shift = int(std::bit_width(std::uint64_t(largest))) - 25; // so that squares add up to less than 2^53
     for (std::int64_t& x : v) x = shift > 0 ? x >> shift : x << -shift;
-    const auto length = std::int64_t(std::sqrt(double(dot(v, v)))); // rounded as IEEE 754 has it: the same everywhere
-    for (std::int64_t& x : v) x = divide(x * kOne, length);
+    const double scale = double(kOne) / std::sqrt(double(dot(v, v)));
+    for (std::int64_t& x : v) x = std::int64_t(double(x) * scale);
     return true;
 }
 
@@ -54,7 +54,7 @@ struct Frame {
         Wide side = cross(normal, ahead);
         if (!normalise(side)) return;
         Wide across = cross(side, normal);
-        normalise(across);
+        for (std::int64_t& x : across) x = divide_by_one(x);
         axes = {normal, across, side};
     }
 };
@@ -65,7 +65,7 @@ class Traversal {
 public:
     Traversal(const ClosedMap& map, GeometrySteps steps, Coder& coder)
         : map_(map), coder_(coder), steps_{steps.normal, steps.tangential, steps.tangential},
-          places_(map.vertex_count()), sizes_(map.vertex_count(), 0), support_(map.vertex_count(), 0),
+          places_(map.vertex_count()), sizes_(map.vertex_count(), 0), expected_(map.vertex_count()),
           is_known_(map.vertex_count(), false), spoke_(map.vertex_count(), kNoIndex),
           known_corners_(map.triangles.size(), 0) {
         for (Index h = 0; h < map.opposite.size(); ++h) spoke_[map.origin(h)] = h;
@@ -92,6 +92,17 @@ private:
     static constexpr std::size_t kTurns = 4;
     static constexpr std::uint8_t kClosesHole = 4; // instead of a triangle's known corners
 
+    /// What the known triangles beside a vertex say of it, added up. Places that make sense do not leave 32 bits.
+    struct alignas(64) Expectation {
+        Wide normal{};
+        std::array<std::uint32_t, 3> sum{}, ahead{};
+        std::uint32_t size = 0, count = 0;
+    };
+    static constexpr std::uint32_t kMostSupport = 200;
+
+    static Wide wide(const std::array<std::uint32_t, 3>& a) {
+        return {std::int32_t(a[0]), std::int32_t(a[1]), std::int32_t(a[2])};
+    }
     Wide at(Index v) const { return {places_[v][0], places_[v][1], places_[v][2]}; }
 
     Index next_vertex() {
@@ -99,7 +110,7 @@ private:
             while (!turns_[turn].empty()) {
                 const Index v = turns_[turn].back();
                 turns_[turn].pop_back();
-                if (!is_known_[v] && std::min<std::size_t>(support_[v], kTurns - 1) == turn) return v;
+                if (!is_known_[v] && std::min<std::size_t>(expected_[v].count, kTurns - 1) == turn) return v;
             }
         return kNoIndex;
     }
@@ -119,27 +130,11 @@ private:
     }
 
     void visit(Index v) {
-        Wide sum{}, normal{}, ahead{};
-        std::int64_t count = 0, size = 0;
-        for (Index h = spoke_[v];;) {
-            const Index across = map_.opposite[ClosedMap::next(h)]; // the triangle behind the edge that faces v
-            if (known_corners_[across / 3] == 3 && known_corners_[h / 3] != kClosesHole) {
-                const Index a = map_.origin(across), b = map_.origin(ClosedMap::next(across)),
-                            c = map_.origin(ClosedMap::previous(across));
-                const Wide at_a = at(a), at_b = at(b), at_c = at(c);
-                sum = sum + (at_a + at_b - at_c);
-                normal = normal + cross(at_b - at_a, at_c - at_a);
-                ahead = ahead + (at_a + at_b - at_c - at_c);
-                size += sizes_[a] + sizes_[b] + sizes_[c];
-                ++count;
-            }
-            h = map_.turn_clockwise(h);
-            if (h == spoke_[v]) break;
-        }
+        const Expectation& e = expected_[v];
         Wide expected{};
-        for (std::size_t k = 0; k < 3; ++k) expected[k] = divide(sum[k], count);
-        code(v, expected, Frame(normal, ahead), std::int32_t(size / (3 * count)),
-             unsigned(std::min<std::int64_t>(count, kSupport)) - 1);
+        for (std::size_t k = 0; k < 3; ++k) expected[k] = divide(std::int32_t(e.sum[k]), e.count);
+        code(v, expected, Frame(e.normal, wide(e.ahead)), std::int32_t(e.size / (3 * e.count)),
+             std::min<unsigned>(e.count, kSupport) - 1);
     }
 
     void code(Index v, const Wide& expected, const Frame& frame, std::int32_t size, unsigned support) {
@@ -178,16 +173,32 @@ private:
     void tell_neighbours(Index v) {
         for (Index h = spoke_[v];;) {
             std::uint8_t& known = known_corners_[h / 3];
-            if (known != kClosesHole && ++known == 3)
-                for (Index k = 0; k < 3; ++k) {
-                    const Index across = map_.opposite[h / 3 * 3 + k];
-                    const Index w = map_.origin(ClosedMap::previous(across));
-                    if (is_known_[w] || known_corners_[across / 3] == kClosesHole) continue;
-                    ++support_[w];
-                    turns_[std::min<std::size_t>(support_[w], kTurns - 1)].push_back(w);
-                }
+            if (known != kClosesHole && ++known == 3) tell_beside(h / 3);
             h = map_.turn_clockwise(h);
             if (h == spoke_[v]) break;
+        }
+    }
+
+    void tell_beside(Index triangle) {
+        const Triangle& t = map_.triangles[triangle];
+        const std::array<Wide, 3> corner = {at(t[0]), at(t[1]), at(t[2])};
+        const Wide normal = cross(corner[1] - corner[0], corner[2] - corner[0]);
+        const auto size = std::uint32_t(sizes_[t[0]] + sizes_[t[1]] + sizes_[t[2]]);
+        for (Index k = 0; k < 3; ++k) {
+            const Index across = map_.opposite[3 * triangle + k];
+            const Index w = map_.origin(ClosedMap::previous(across));
+            if (is_known_[w] || known_corners_[across / 3] == kClosesHole) continue;
+            const Wide &a = corner[k], &b = corner[(k + 1) % 3], &c = corner[(k + 2) % 3];
+            Expectation& e = expected_[w];
+            if (e.count >= kMostSupport) continue;
+            for (std::size_t j = 0; j < 3; ++j) {
+                e.sum[j] += std::uint32_t(a[j] + b[j] - c[j]);
+                e.ahead[j] += std::uint32_t(a[j] + b[j] - 2 * c[j]);
+                e.normal[j] += normal[j];
+            }
+            e.size += size;
+            ++e.count;
+            turns_[std::min<std::size_t>(e.count, kTurns - 1)].push_back(w);
         }
     }
 
@@ -195,8 +206,8 @@ private:
     Coder& coder_;
     std::array<std::int32_t, 3> steps_;
     std::vector<FinePlace> places_;
-    std::vector<std::int32_t> sizes_;    ///< of each vertex's difference, quarters of a step
-    std::vector<std::uint32_t> support_; ///< known triangles beside each vertex
+    std::vector<std::int32_t> sizes_; ///< of each vertex's difference, quarters of a step
+    std::vector<Expectation> expected_;
     std::vector<bool> is_known_;
     std::vector<Index> spoke_;                ///< a half-edge from each vertex
     std::vector<std::uint8_t> known_corners_; ///< of each triangle
