@@ -2,6 +2,7 @@
 add_library(filigree_options INTERFACE)
 target_compile_options(filigree_options INTERFACE
   -Wall -Wextra -Wno-restrict -Wno-array-bounds -Wno-stringop-overflow -Wno-stringop-overread -Wno-free-nonheap-object  # false alarms about std::string and std::vector, GCC 12
+  $<$<CXX_COMPILER_ID:Clang>:-Wno-unknown-warning-option>
   -Wshadow -Wconversion -Wno-sign-conversion -Wno-psabi
   -ffp-contract=off      # no fused multiply-add: the same bytes whatever the processor has
   $<$<BOOL:${FILIGREE_STRICT}>:-Werror>
@@ -13,6 +14,9 @@ endif()
 if(BUILD_SHARED_LIBS) # calls of our own stay direct, as in a static library
   target_compile_options(filigree_options INTERFACE -fno-semantic-interposition)
   target_link_options(filigree_options INTERFACE -Wl,-Bsymbolic-functions)
+endif()
+if(FILIGREE_FUZZ)
+  target_compile_options(filigree_options INTERFACE -fsanitize=fuzzer-no-link)
 endif()
 if(FILIGREE_SANITIZE)
   target_compile_options(filigree_options INTERFACE -fsanitize=${FILIGREE_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)

@@ -1,5 +1,8 @@
+#include "animation_output.h"
 #include "commands.h"
 #include "rendering.h"
+
+#include "filigree/io/numbered_name.h"
 
 #include <algorithm>
 #include <charconv>
@@ -65,6 +68,9 @@ void check(const RenderOptions& options, bool is_film) {
                "--level out.");
     if (options.background == "transparent" && has_page)
         refuse("--background transparent is for one picture in a .png without captions and legend; a page is white.");
+    if (!options.chunk.empty() && !printf_numbered_name(options.output))
+        refuse("--chunk is of numbered pictures; let -o be a name such as frame_%04d.png.");
+    if (!options.chunk.empty()) (void)chunk_of(options.chunk);
     if (options.turntable && !is_film)
         refuse("--turntable makes a film; give -o a name that ends in .mp4 or .gif, or frame_%04d.png.");
     if (!options.poses.empty() && options.frame > 0) refuse("--poses and --frame both pose the model; give one.");
@@ -139,6 +145,8 @@ OptionList film_options(RenderOptions& options) {
                 .is_read(),
             Option("--turntable", options.turntable, "A film once around the object"),
             Option("--frames", options.frames, "Frames of a turntable").whole_from(1).with_default(),
+            Option("--chunk", options.chunk,
+                   "K/N: the K-th of N parts of the frames alone, of numbered pictures that other processes draw too"),
             Option("--frame", options.frame,
                    "One of the poses that the model holds, from 1 (unset: a film plays them all, a picture shows the "
                    "model at rest)")

@@ -1,4 +1,5 @@
 // Films: what changes from frame to frame is the pose, the file or the camera.
+#include "animation_output.h"
 #include "rendering.h"
 
 #include "filigree/present/film_frames.h"
@@ -35,17 +36,32 @@ public:
         const double start = now_seconds();
         const double rate = options_.frames_per_second.value_or(
             is_own_ && options_.frame == 0 && !options_.turntable ? subject_->poses.frames_per_second : 30);
-        FilmWriter writer = require(FilmWriter::create(options_.output, size_.width, size_.height, rate));
+        std::size_t first = 0, end = frames_; // drawn here
+        if (!options_.chunk.empty()) {
+            const AnimationChunk chunk = chunk_of(options_.chunk);
+            first = (chunk.number - 1) * frames_ / chunk.count;
+            end = chunk.number * frames_ / chunk.count;
+        }
+        if (first == end) return report_none();
+        FilmWriter writer = require(FilmWriter::create(options_.output, size_.width, size_.height, rate, first + 1));
         look_ahead();
         show_first();
         choose_camera();
         shown_ = by_pose_ ? moments_ : 0;
         require(film_frames(
-            frames_, [&](std::size_t frame, const RunContext& quiet) { return draw(frame, quiet); },
+            end - first, [&](std::size_t frame, const RunContext& quiet) { return draw(first + frame, quiet); },
             std::span(&writer, 1), "filming", context()));
         session_.begin_writing(options_.output);
         require(writer.finish());
-        report(fmt::format("{} frames of ", frames_), size_, frames_, now_seconds() - start);
+        report(fmt::format("{} frames of ", end - first), size_, end - first, now_seconds() - start);
+    }
+
+    /// More chunks than frames.
+    void report_none() {
+        Report none;
+        none.say("No frames are left for this chunk.\n");
+        none.set("frames", 0);
+        session_.print(none);
     }
 
 private:

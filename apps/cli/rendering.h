@@ -45,6 +45,7 @@ struct RenderOptions {
     ColorMap map = ColorMap::sequential;
     unsigned passes = 0;
     bool turntable = false;
+    std::string chunk; ///< K/N: of numbered pictures; empty: all
     unsigned frames = 90;
     std::size_t frame = 0;                   ///< of the model's own poses, from 1; 0: all in a film, else none
     std::optional<double> frames_per_second; ///< unset: the poses' own, or 30

@@ -3,7 +3,7 @@
 # What stands together, in the order of a first use; everything public of the module is in one of these.
 AREAS = {
     "Meshes": ["Mesh", "make", "read_mesh", "write_mesh", "info"],
-    "Strip and restore": ["strip", "Model", "read_model", "write_model", "Restorer", "restore", "expected_error"],
+    "Strip and restore": ["strip", "Model", "read_model", "write_model", "pack", "Restorer", "restore", "expected_error"],
     "Poses": ["Pose", "PoseSequence", "read_poses", "Warp", "stretch", "squeeze", "bend", "twist", "taper", "smooth_random", "rbf", "chain"],
     "Handles": ["HandleSolver", "HandleRegion", "move_by_handles", "read_handles"],
     "Comparing": ["compare", "vertex_distances", "distances_to_surface", "edge_strains"],

@@ -344,6 +344,17 @@ TEST_F(Render, FilmsAreNumberedPictures) {
     EXPECT_TRUE(shows_something(picture("file_1.png"), picture("file_2.png")));
 }
 
+TEST_F(Render, FilmsInChunksAreTheSamePictures) {
+    ok(quick("square.ply", "whole_%d.png", {"--turntable", "--frames", "5"}));
+    for (const char* chunk : {"3/3", "1/3", "2/3"})
+        ok(quick("square.ply", "part_%d.png", {"--turntable", "--frames", "5", "--chunk", chunk}));
+    for (const char* number : {"1", "2", "3", "4", "5"})
+        EXPECT_EQ(bytes_of(path(std::string("part_") + number + ".png")),
+                  bytes_of(path(std::string("whole_") + number + ".png")));
+    EXPECT_EQ(json(quick("square.ply", "no_%d.png", {"--turntable", "--frames", "2", "--chunk", "1/3"}))["frames"], 0);
+    refused(2, quick("square.ply", "x.mp4", {"--turntable", "--chunk", "1/2"}), {"--chunk"});
+}
+
 TEST_F(Render, FilmsNeedFfmpegOrSayHowToDoWithout) {
     const std::vector<std::string> film = quick("square.ply", "film.mp4", {"--turntable", "--frames", "4"});
     const Ran without = run_shell("PATH=/nonexistent; exec \"$0\" \"$@\"", film);

@@ -756,4 +756,15 @@ def write_model(
     threads: int = 0,
     progress: _Progress | None = None,
 ) -> None: ...
+def pack(
+    model: Model,
+    path: _Path,
+    *,
+    bits: int = 14,
+    surface: bool = False,
+    keep_order: bool = False,
+    poses: _PosesLike | None = None,
+    threads: int = 0,
+    progress: _Progress | None = None,
+) -> dict[str, Any]: ...
 def write_picture(picture: _Bytes, path: _Path) -> None: ...

@@ -60,7 +60,8 @@ public:
         Index found = kNoIndex;
         reach(start, 0);
         while (!queue_.empty()) {
-            const auto [distance, vertex] = queue_.top();
+            const double distance = queue_.top().first;
+            const Index vertex = queue_.top().second;
             queue_.pop();
             if (distance >= best_) break;
             if (distance > reached_[vertex]) continue;

@@ -265,10 +265,11 @@ public:
 
 class NumberedPictures : public FrameSink {
 public:
-    NumberedPictures(NumberedName name, FileBatch files) : name_(std::move(name)), files_(std::move(files)) {}
+    NumberedPictures(NumberedName name, FileBatch files, std::size_t first)
+        : name_(std::move(name)), files_(std::move(files)), next_(first) {}
 
     Status add(const Picture& frame) override {
-        const fs::path target = name_.file(++count_), file = files_.path(target.filename().string());
+        const fs::path target = name_.file(next_++), file = files_.path(target.filename().string());
         if (Status free = files_.check_place(target.filename().string()); !free) return free;
         const Status written = write_file(file, encode_png(frame));
         return written ? written : renamed(written.error(), file, target);
@@ -279,7 +280,7 @@ public:
 private:
     NumberedName name_;
     FileBatch files_;
-    std::size_t count_ = 0;
+    std::size_t next_;
 };
 
 class EncodedFilm : public FrameSink {
@@ -351,7 +352,8 @@ FilmWriter::FilmWriter(FilmWriter&&) noexcept = default;
 FilmWriter& FilmWriter::operator=(FilmWriter&&) noexcept = default;
 FilmWriter::~FilmWriter() = default;
 
-Result<FilmWriter> FilmWriter::create(const fs::path& path, unsigned width, unsigned height, double frames_per_second) {
+Result<FilmWriter> FilmWriter::create(const fs::path& path, unsigned width, unsigned height, double frames_per_second,
+                                      std::size_t first) {
     const FilmKind kind = film_kind(path);
     if (kind == FilmKind::none)
         return Error{ErrorCode::usage, path.string() +
@@ -375,7 +377,7 @@ Result<FilmWriter> FilmWriter::create(const fs::path& path, unsigned width, unsi
     if (kind == FilmKind::numbered) {
         Result<FileBatch> files = FileBatch::create(path.parent_path());
         if (!files) return renamed(files.error(), path.parent_path().empty() ? "." : path.parent_path(), path);
-        content->sink = std::make_unique<NumberedPictures>(*printf_numbered_name(path), std::move(*files));
+        content->sink = std::make_unique<NumberedPictures>(*printf_numbered_name(path), std::move(*files), first);
     } else {
         Result<TemporaryFile> file = TemporaryFile::create(path);
         if (!file) return file.error();

@@ -1,0 +1,101 @@
+// Readers of models, plain and coded: the outline, every level, the poses and the whole. What the whole says, the parts
+// say. Checksums are mended first, or no change would get past them.
+#include "fuzz.h"
+
+#include "filigree/hierarchy/restore.h"
+#include "filigree/hierarchy/strip.h"
+#include "filigree/io/model_chunks.h"
+#include "filigree/io/model_file.h"
+#include "filigree/io/model_sections.h"
+#include "filigree/mesh/shapes.h"
+
+#include <filesystem>
+
+#include <unistd.h>
+
+using namespace filigree_fuzz;
+
+namespace {
+
+/// The file with sums that fit its sections and its table, and with its own length.
+std::string with_sums(std::string file) {
+    ModelHeader header;
+    if (file.size() < sizeof header) return file;
+    std::memcpy(&header, file.data(), sizeof header);
+    header.file_size = file.size();
+    const std::size_t most = (file.size() - sizeof header) / sizeof(FileSection);
+    if (header.section_count > most) header.section_count = std::uint32_t(most);
+    char* const table = file.data() + sizeof header;
+    for (std::uint32_t k = 0; k < header.section_count; ++k) {
+        FileSection section;
+        std::memcpy(&section, table + k * sizeof section, sizeof section);
+        if (section.item_size == 0 || section.offset > file.size() ||
+            section.count > (file.size() - section.offset) / section.item_size)
+            continue;
+        section.hash = XXH3_64bits(file.data() + section.offset, section.count * section.item_size);
+        std::memcpy(table + k * sizeof section, &section, sizeof section);
+    }
+    header.table_hash = XXH3_64bits(table, header.section_count * sizeof(FileSection));
+    std::memcpy(file.data(), &header, sizeof header);
+    return file;
+}
+
+std::string coded_file(const Model& model, const MeshCodeOptions& options) {
+    const std::filesystem::path path =
+        std::filesystem::temp_directory_path() / ("fuzz-" + std::to_string(::getpid()) + ".fil");
+    std::string bytes;
+    if (write_coded_model(model, {}, options, path, kContext)) {
+        const Result<FileReader> file = FileReader::open(path);
+        bytes = file->read_all().value();
+    }
+    std::filesystem::remove(path);
+    return bytes;
+}
+
+} // namespace
+
+namespace filigree_fuzz {
+
+std::vector<std::string> seeds() {
+    const Mesh mesh = make_wavy_sphere({.resolution = 3});
+    std::vector<std::string> all;
+    for (const Precision precision : {Precision::float32, Precision::int16}) {
+        const Model model = strip(mesh, {.base = 12, .precision = precision}, kContext).value().model;
+        all.push_back(write_model(model));
+        PoseSequence poses;
+        poses.frames = {rest_pose(model), rest_pose(model)};
+        all.push_back(write_model(model, poses));
+        all.push_back(coded_file(model, {}));
+        all.push_back(coded_file(model, {.bits = 10, .surface = true, .keep_order = true}));
+    }
+    const Mesh cube = make_wavy_cube({.resolution = 4});
+    all.push_back(write_model(strip(cube, {.code = DetailCode::reference}, kContext).value().model));
+    all.push_back(write_model(strip(cube, {.base = 20, .reorder = true}, kContext).value().model));
+    return all;
+}
+
+} // namespace filigree_fuzz
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+    const std::string bytes = with_sums(std::string(reinterpret_cast<const char*>(data), size));
+    const FileReader file{std::string_view(bytes)};
+    const Result<ModelOutline> outline = read_model_outline(file, "fuzz", kContext);
+    const Result<Model> model = read_model(file, "fuzz", kContext);
+    const Result<PoseSequence> poses = read_poses(file, "fuzz", kContext);
+    is_sound(poses);
+    if (is_sound(outline))
+        for (unsigned k = 0; k < outline->levels.size() + 1; ++k) {
+            const Result<Mesh> level = read_model_level(file, k, "fuzz", kContext);
+            if (is_sound(level)) require(check_mesh(*level).empty(), "a level is a sound mesh");
+        }
+    is_sound(ModelChunks::open(FileReader(std::string_view(bytes)), "fuzz", kContext));
+    if (!is_sound(model)) return 0;
+    require(check_model(*model).empty(), "what was read is a sound model");
+    require(outline.ok() && outline->levels.size() == model->levels.size() + 1, "the outline has the model's levels");
+    for (unsigned k = 0; k < outline->levels.size(); ++k)
+        require(outline->levels[k].vertices == level_counts(*model, k).vertices,
+                "the outline has the levels' vertices");
+    const Result<Restorer> restorer = Restorer::create(*model, {}, kContext);
+    if (is_sound(restorer)) is_sound(restorer->positions(rest_pose(*model), kContext));
+    return 0;
+}
