@@ -1,6 +1,6 @@
 # The page of `filigree export --web`: web/src and three.js as one script, and what goes beside it, in share/filigree/web
 # of the build tree and of the installed one. Without node or web/node_modules (scripts/setup fetches them) there is no
-# page, and the program says so when it is asked for one.
+# page, and the program says so when it is asked for one. Without clang for WebAssembly the page plays no streams.
 
 set(web ${PROJECT_SOURCE_DIR}/web)
 set(esbuild ${web}/node_modules/esbuild/bin/esbuild)
@@ -15,11 +15,41 @@ target_compile_definitions(filigree_cli PRIVATE FILIGREE_WEB_FROM_PROGRAM="${web
 if(FILIGREE_NODE AND bundler)
   cmake_path(SET web_folder NORMALIZE ${CMAKE_RUNTIME_OUTPUT_DIRECTORY}/${web_from_program})
   file(GLOB web_sources CONFIGURE_DEPENDS ${web}/src/*.js)
+
+  # The library's decoder for the page, with nothing of the system in it.
+  set(decoder ${CMAKE_CURRENT_BINARY_DIR}/web/decoder.wasm)
+  file(MAKE_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/web)
+  find_program(FILIGREE_WASM_CLANG clang++-16 DOC "Clang, which compiles the page's decoder")
+  set(wasm_library /usr/lib/llvm-16/lib/wasm32-wasi)
+  file(GLOB wasm_standard CONFIGURE_DEPENDS ${wasm_library}/libc++.a)
+  if(FILIGREE_WASM_CLANG AND wasm_standard)
+    set(decoder_sources ${web}/decoder/decoder.cpp)
+    foreach(name coding/clip_code coding/closed_map coding/connectivity_code coding/driver_code coding/face_code
+                 coding/geometry_code coding/level_reader coding/symbols mesh/triangle_point)
+      list(APPEND decoder_sources ${PROJECT_SOURCE_DIR}/src/filigree/${name}.cpp)
+    endforeach()
+    file(GLOB decoder_headers CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/filigree/coding/*.h)
+    find_path(FILIGREE_EIGEN_FOLDER Eigen/Core PATH_SUFFIXES eigen3)
+    add_custom_command(
+      OUTPUT ${decoder}
+      COMMAND ${FILIGREE_WASM_CLANG} --target=wasm32-wasi --sysroot=/usr -mexec-model=reactor -std=c++20 -O3
+              -fno-exceptions -fno-rtti -ffunction-sections -fdata-sections -DNDEBUG -I ${PROJECT_SOURCE_DIR}/src
+              -nostdinc++ -isystem /usr/lib/llvm-16/include/wasm32-wasi/c++/v1 -isystem /usr/include/wasm32-wasi
+              -isystem ${FILIGREE_EIGEN_FOLDER} ${decoder_sources} -o ${decoder} -L${wasm_library} -L/usr/lib/wasm32-wasi
+              -Wl,--gc-sections -Wl,--strip-all
+      DEPENDS ${decoder_sources} ${decoder_headers}
+      COMMENT "Compiling the web page's decoder" VERBATIM)
+    target_compile_definitions(filigree_cli PRIVATE FILIGREE_WEB_STREAMS)
+  else()
+    file(WRITE ${decoder} "")
+    message(STATUS "The web page plays no streams: clang 16 for WebAssembly is missing; scripts/setup installs it")
+  endif()
   add_custom_command(
     OUTPUT ${web_folder}/filigree.js
     COMMAND ${FILIGREE_NODE} ${esbuild} ${web}/src/main.js --bundle --minify --format=iife --target=es2022
             --legal-comments=none --log-level=warning --outfile=${web_folder}/filigree.js
-    DEPENDS ${web_sources} ${web}/package-lock.json
+            --loader:.wasm=binary --alias:filigree-decoder.wasm=${decoder}
+    DEPENDS ${web_sources} ${web}/package-lock.json ${decoder}
     COMMENT "Bundling the web page" VERBATIM)
   add_custom_command(
     OUTPUT ${web_folder}/index.html ${web_folder}/filigree.css ${web_folder}/three-license.txt

@@ -131,6 +131,8 @@ OptionList animation_options(AnimationOutput& output) {
                          "Skin: joints a vertex (unset: 3, which plays in everything; 6 shows Blender the true rest "
                          "shape)"),
         Option("--full-precision", output.skin.full_precision, "Skin: float rotations and weights"),
+        Option("--compress", output.compress,
+               "GLB: packed for the web (EXT_meshopt_compression, KHR_mesh_quantization), which viewers have to know"),
         Option("--all-levels", output.skin.all_levels, "Skin: coarser levels too (MSFT_lod)"),
         Option("--no-normals", output.no_normals,
                "GLB: leave normals out; viewers then shade flat, which is right under any stretch"),
@@ -139,7 +141,7 @@ OptionList animation_options(AnimationOutput& output) {
 
 std::string given_animation_option(const Session& session) {
     return session.first_given({"--as", "--key-rate", "--interpolation", "--influences", "--full-precision",
-                                "--all-levels", "--no-normals", "--morph-normals"});
+                                "--all-levels", "--compress", "--no-normals", "--morph-normals"});
 }
 
 bool is_animation_path(const std::string& path) { return animation_format(path).ok(); }
@@ -235,6 +237,7 @@ void write_animation_output(const Model& model, const PoseStream& poses, const R
     if (format == AnimationFormat::glb && makes_skin) {
         SkinOptions options = output.skin;
         if (output.no_normals) options.normals = ExportNormals::leave;
+        options.compress = output.compress;
         options.restore = restore;
         options.materials_beside = materials_beside;
         session.begin_writing(path);
@@ -268,6 +271,7 @@ void write_animation_output(const MeshAnimation& animation, const AnimationOutpu
                                                  "out --as skin for morph targets.");
         MorphOptions options = output.morph;
         if (output.no_normals) options.normals = ExportNormals::leave;
+        options.compress = output.compress;
         options.materials_beside = materials_beside;
         const ExportReport exported = require(write_morph_glb(animation, options, path, session.context()));
         warn_of_export(exported, !output.no_normals, path, session);

@@ -1,4 +1,5 @@
 #include "animation_output.h"
+#include "coding_report.h"
 #include "commands.h"
 #include "pictures.h"
 #include "restore_options.h"
@@ -19,7 +20,8 @@ namespace fs = std::filesystem;
 struct ExportArguments {
     std::string input, output, poses;
     PoseFileOptions pose_file;
-    bool at_rest = false, web = false;
+    bool at_rest = false, web = false, stream = false;
+    unsigned bits = 14;
     RestoreOptions restore;
     AnimationOutput animation;
 };
@@ -32,8 +34,8 @@ void export_levels(const Model& model, const ExportArguments& options, Session& 
                    " model at rest goes to .glb, or with --web to a folder with a page; 'filigree simulate' makes "
                    "poses, and --poses takes another program's.");
     const std::string given = session.first_given({"--as", "--key-rate", "--interpolation", "--influences",
-                                                   "--full-precision", "--no-normals", "--morph-normals", "--law",
-                                                   "--level", "--thin-shell", "--frame-rate", "--animation"});
+                                                   "--full-precision", "--compress", "--no-normals", "--morph-normals",
+                                                   "--law", "--level", "--thin-shell", "--frame-rate", "--animation"});
     if (!given.empty())
         refuse(given + " belongs to a model that moves, and " + options.input +
                " is exported at rest; 'filigree level' writes one level of it.");
@@ -68,17 +70,45 @@ void export_model(const Model& model, const PoseSequence& own, const ExportArgum
                            report);
 }
 
+/// The model as a coded file that comes level by level, with its poses.
+void export_stream(const Model& model, const PoseSequence& own, const ExportArguments& options, Session& session,
+                   Report& report) {
+    const std::string given =
+        session.first_given({"--as", "--key-rate", "--interpolation", "--influences", "--full-precision",
+                             "--no-normals", "--morph-normals", "--law", "--level", "--thin-shell"});
+    if (!given.empty()) refuse(given + " belongs to pages that play a GLB; leave out --stream.");
+    PoseSequence poses;
+    if (!options.at_rest && (!options.poses.empty() || !own.empty())) {
+        const PoseStream from = poses_of(options.poses, options.pose_file, model, own, options.input, session);
+        poses.frames_per_second = from.frames_per_second;
+        for (std::size_t frame = 0; frame < from.frames; ++frame) poses.frames.push_back(require(from.pose(frame)));
+    }
+    session.begin_writing(options.output);
+    const CodingReport coding = require(
+        write_coded_model(model, poses, {.bits = options.bits, .levels = true}, options.output, session.context()));
+    const auto bytes = fs::file_size(options.output);
+    report.set("vertices", model.mesh.vertex_count());
+    report.count("frames", "frames", poses.frames.size());
+    report.count("bytes", "bytes", bytes);
+    add_coding_shares(coding.bytes, model.mesh.vertex_count(), bytes, report);
+    const FileReader file = require(FileReader::open(options.output));
+    add_stream_marks(require(read_model_outline(file, options.output, session.silent_context())), report);
+}
+
 /// A folder with a page that shows the model.
 void export_page(const Model& model, const PoseSequence& own, ExportArguments options, Session& session,
                  Report& report) {
     const std::string folder_name = options.output;
     OutputFolder folder(folder_name, options.input);
     folder.protect(animation_files(options.poses));
-    WebPage page(folder, fs::path(options.input).stem().string());
+    WebPage page(folder, fs::path(options.input).stem().string(), options.stream ? WebModel::stream : WebModel::glb);
     options.output = page.model_path();
     options.animation.skin.all_levels = true;
     if (model.code() == DetailCode::reference) options.animation.glb = GlbMotion::morph;
-    export_model(model, own, options, session, report);
+    if (options.stream)
+        export_stream(model, own, options, session, report);
+    else
+        export_model(model, own, options, session, report);
     page.write(session);
     folder.keep();
     const std::string index = (fs::path(folder_name) / "index.html").string();
@@ -88,6 +118,9 @@ void export_page(const Model& model, const PoseSequence& own, ExportArguments op
 
 void run(const ExportArguments& options, Session& session) {
     if (options.at_rest && !options.poses.empty()) refuse("--rest leaves the poses out that --poses names.");
+    if (options.web && options.animation.compress)
+        refuse("--compress is for other programs' viewers; --stream makes the page's model small.");
+    if (options.stream && !options.web) refuse("--stream belongs to --web; 'filigree pack' writes a stream alone.");
     if (!options.web) {
         check_animation_path(options.output);
         check_not_input(options.output, {options.input, options.poses});
@@ -132,13 +165,19 @@ Command export_command() {
                            .is_read()} +
             pose_file_options(options->pose_file) +
             OptionList{Option("--rest", options->at_rest, "The levels at rest, though the model has poses"),
-                       Option("--web", options->web, "A folder that shows the model in a browser, without a network")} +
+                       Option("--web", options->web, "A folder that shows the model in a browser, without a network"),
+                       Option("--stream", options->stream,
+                              "The page's model coded, coarse to fine: it is seen and moves from its first bytes on"),
+                       Option("--bits", options->bits, "Of a stream's positions, along the longest side of the box")
+                           .between(10, 16)
+                           .with_default()} +
             animation_options(options->animation) + restore_options(options->restore),
         .examples = "  filigree export bounce.fil -o bounce.glb\n"
                     "  filigree export bounce.fil -o bounce.glb --key-rate 30 --interpolation cubic\n"
                     "  filigree export scan.fil --poses driver.pc2 -o scan.pc2\n"
                     "  filigree export scan.fil -o levels.glb\n"
-                    "  filigree export bounce.fil -o page/ --web",
+                    "  filigree export bounce.fil -o page/ --web\n"
+                    "  filigree export bounce.fil -o page/ --web --stream",
         .run = [options](Session& session) { run(*options, session); }};
 }
 

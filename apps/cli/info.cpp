@@ -1,3 +1,4 @@
+#include "coding_report.h"
 #include "commands.h"
 #include "session.h"
 
@@ -144,28 +145,17 @@ Json vertices_json(const std::vector<Index>& ids) {
 void describe_coding(const ModelOutline& model, Report& report) {
     const Coding& coding = *model.coding;
     report.add("coded",
-               fmt::format("{} bits{}{}", coding.options.bits, coding.options.surface ? ", by surface" : "",
+               fmt::format("{} bits{}{}{}", coding.options.bits, coding.options.levels ? ", as a stream" : "",
+                           coding.options.surface ? ", by surface" : "",
                            coding.options.keep_order ? ", in the input's order" : ""),
                "coding",
                {{"bits", coding.options.bits},
                 {"surface", coding.options.surface},
                 {"keep_order", coding.options.keep_order},
+                {"profile", coding.options.levels ? "stream" : "compact"},
                 {"step_units", coding.step}});
-    const double vertices = double(std::max<std::size_t>(model.levels.back().vertices, 1));
-    Json& shares = report.set("bits_per_vertex");
-    shares = Json::object();
-    std::string text;
-    const auto share = [&](const char* name, std::uint64_t bytes) {
-        const double bits = 8 * double(bytes) / vertices;
-        shares[name] = bits;
-        text += fmt::format("{}{:.2f} {}", text.empty() ? "" : ", ", bits, name);
-    };
-    share("connectivity", coding.bytes.connectivity);
-    share("places", coding.bytes.places);
-    share("attributes", coding.bytes.attributes);
-    share("order", coding.bytes.order);
-    share("driver", coding.bytes.driver);
-    report.row("bits a vertex", text);
+    add_coding_shares(coding.bytes, model.levels.back().vertices, std::nullopt, report);
+    add_stream_marks(model, report);
 }
 
 void describe_code(const ModelOutline& model, Report& report) {

@@ -3,12 +3,15 @@
 #include "session.h"
 
 #include <cstdio>
+#include <cstdlib>
+#include <exception>
 #include <new>
 #include <stdexcept>
 #include <string_view>
 #include <system_error>
 
 #include <malloc.h>
+#include <unistd.h>
 
 using namespace filigree;
 
@@ -80,10 +83,27 @@ void keep_freed_memory() {
     mallopt(M_TRIM_THRESHOLD, 256 << 20);
 }
 
+/// Where memory ends in a destructor (nlohmann's JSON takes some when it goes), no exception comes here.
+[[noreturn]] void end_at_once() {
+    constexpr std::string_view kLine =
+        "filigree: Out of memory; nothing was written. Close other programs or use a smaller mesh.\n";
+    if (const std::exception_ptr thrown = std::current_exception()) {
+        try {
+            std::rethrow_exception(thrown);
+        } catch (const std::bad_alloc&) {
+            [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, kLine.data(), kLine.size());
+            ::_exit(static_cast<int>(ErrorCode::out_of_memory));
+        } catch (...) {
+        }
+    }
+    std::abort();
+}
+
 } // namespace
 
 int main(int argc, char** argv) {
     keep_freed_memory();
+    std::set_terminate(end_at_once);
     try {
         return run(argc, argv);
     } catch (const cli::Failure& failure) {

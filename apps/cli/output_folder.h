@@ -3,17 +3,19 @@
 
 #include "session.h"
 
+#include "filigree/io/file_batch.h"
 #include "filigree/io/new_folders.h"
 
 #include <algorithm>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 namespace filigree::cli {
 
-/// Made with its parents where it is not there. Unless it is kept, files and folders that were not there before go
-/// again.
+/// Made with its parents where it is not there. Its files are made aside and come into it together, when it is kept;
+/// until then it is as it was, and a new one goes again.
 class OutputFolder {
 public:
     /// input: a file that must not be written over; empty: none.
@@ -21,12 +23,12 @@ public:
         : path_(std::move(path)), inputs_{input}, folders_(path_) {
         if (!folders_.are_there())
             refuse(ErrorCode::unwritable, path_.string() + ": the folder cannot be made; choose another with -o.");
+        files_.emplace(require(FileBatch::create(path_)));
+        show_folder_as(files_->path("").string(), (path_ / "").string());
     }
     ~OutputFolder() {
-        std::error_code ignored;
-        if (is_kept_) return;
-        for (const std::filesystem::path& file : new_files_) std::filesystem::remove(file, ignored);
-        folders_.remove();
+        files_.reset();
+        if (!is_kept_) folders_.remove();
     }
     OutputFolder(const OutputFolder&) = delete;
     OutputFolder& operator=(const OutputFolder&) = delete;
@@ -45,15 +47,19 @@ public:
         if (std::any_of(inputs_.begin(), inputs_.end(), is_one))
             refuse(file.string() + ": is the input and would be overwritten; choose another "
                                    "folder with -o.");
-        if (!std::filesystem::exists(file, failed)) new_files_.push_back(file);
-        return file.string();
+        require(files_->check_place(name));
+        return files_->path(name).string();
     }
-    void keep() { is_kept_ = true; }
+    void keep() {
+        require(files_->finish());
+        is_kept_ = true;
+    }
 
 private:
     std::filesystem::path path_;
-    std::vector<std::filesystem::path> inputs_, new_files_;
+    std::vector<std::filesystem::path> inputs_;
     NewFolders folders_;
+    std::optional<FileBatch> files_;
     bool is_kept_ = false;
 };
 

@@ -1,7 +1,9 @@
+#include "coding_report.h"
 #include "commands.h"
 #include "session.h"
 
 #include "filigree/hierarchy/strip.h"
+#include "filigree/io/model_stream.h"
 
 #include <fmt/format.h>
 
@@ -17,7 +19,7 @@ struct PackArguments {
 
 void report_coding(const Model& model, const CodingReport& coding, const PackArguments& options, double seconds,
                    Report& report) {
-    const double vertices = double(model.mesh.vertex_count()), diagonal = world_bounds(model.mesh).diagonal();
+    const double diagonal = world_bounds(model.mesh).diagonal();
     const double share = diagonal > 0 ? 1 / diagonal : 0;
     const std::uint64_t bytes = std::filesystem::is_regular_file(options.output)
                                     ? std::uint64_t(std::filesystem::file_size(options.output))
@@ -25,18 +27,7 @@ void report_coding(const Model& model, const CodingReport& coding, const PackArg
     report.set("output", options.output);
     report.count("vertices", "vertices", model.mesh.vertex_count());
     report.count("driver", "driver_vertices", model.driver().vertices.size());
-    const auto bits = [&](std::uint64_t part) { return 8 * double(part) / vertices; };
-    report.add("bits a vertex",
-               fmt::format("{:.2f}: {:.2f} connectivity, {:.2f} places, {:.2f} attributes, {:.2f} order, {:.2f} driver",
-                           bits(bytes), bits(coding.bytes.connectivity), bits(coding.bytes.places),
-                           bits(coding.bytes.attributes), bits(coding.bytes.order), bits(coding.bytes.driver)),
-               "bits_per_vertex",
-               {{"all", bits(bytes)},
-                {"connectivity", bits(coding.bytes.connectivity)},
-                {"places", bits(coding.bytes.places)},
-                {"attributes", bits(coding.bytes.attributes)},
-                {"order", bits(coding.bytes.order)},
-                {"driver", bits(coding.bytes.driver)}});
+    add_coding_shares(coding.bytes, model.mesh.vertex_count(), bytes, report);
     report.add("vertex error",
                fmt::format("{:.2g} of the diagonal (rms), {:.2g} at most", coding.rms * share, coding.largest * share),
                "vertex_error", {{"rms", coding.rms * share}, {"max", coding.largest * share}});
@@ -49,8 +40,10 @@ void report_surface(const Model& model, const PackArguments& options, Session& s
     if (model.mesh.face_count() == 0) return;
     const RunContext context = session.silent_context();
     const double start = now_seconds();
-    const Mesh read = require(read_model(options.output, context)).mesh;
+    const FileReader file = require(FileReader::open(options.output));
+    const Mesh read = require(read_model(file, options.output, context)).mesh;
     const double seconds = now_seconds() - start;
+    add_stream_marks(require(read_model_outline(file, options.output, context)), report);
     constexpr std::size_t kSamples = 100'000;
     const MeshDistance distance = require(mesh_distance(read, model.mesh, kSamples, context));
     if (!distance.surfaces) return;
@@ -90,9 +83,39 @@ void run(const PackArguments& options, Session& session) {
 
 struct UnpackArguments {
     std::string input, output;
+    std::optional<std::uint64_t> bytes;
 };
 
+/// The mesh that the first bytes of a stream give.
+void unpack_beginning(const UnpackArguments& options, Session& session) {
+    const FileReader file = session.open(options.input);
+    std::string beginning(std::min(*options.bytes, file.size()), '\0');
+    require(file.read(0, beginning));
+    ModelStream stream(options.input);
+    require(stream.feed(beginning));
+    if (stream.level_count() == 0)
+        refuse(ErrorCode::unsuitable,
+               fmt::format("{}: its first {} bytes hold no level yet{}.", options.input, with_commas(beginning.size()),
+                           stream.next_level_end() > 0
+                               ? fmt::format("; the first is whole at {}", with_commas(stream.next_level_end()))
+                               : std::string()));
+    const Mesh mesh = stream.mesh();
+    session.begin_writing(options.output);
+    session.write_mesh(mesh, options.output);
+    const double diagonal = world_bounds(mesh).diagonal();
+    Report report;
+    report.say(fmt::format("{}: {} vertices, off by {:.2g} of the diagonal (rms)\n", options.output,
+                           with_commas(mesh.vertex_count()), stream.error() / diagonal));
+    report.set("output", options.output);
+    report.set("vertices", mesh.vertex_count());
+    report.set("levels", stream.level_count());
+    report.set("error", stream.error() / diagonal);
+    report.set("next_level_bytes", stream.next_level_end());
+    session.print(report);
+}
+
 void run_unpack(const UnpackArguments& options, Session& session) {
+    if (options.bytes) return unpack_beginning(options, session);
     PoseSequence poses;
     const Model model = session.read_model(session.open_model(options.input), options.input, &poses);
     session.begin_writing(options.output);
@@ -116,6 +139,9 @@ Command pack_command() {
         .text = "Code a mesh or a model in few bits: a model file that every command reads",
         .options = {Option("input", options->input, "Mesh or model").is_read().required(),
                     Option("-o,--output", options->output, "Model file to write (.fil)").is_written().required(),
+                    choice<bool>("--profile", options->code.levels, {{"compact", false}, {"stream", true}},
+                                 "compact: the fewest bits; stream: coarse to fine, so that its first bytes show the "
+                                 "whole shape (compact unless said)"),
                     Option("--bits", options->code.bits, "Of positions, along the longest side of the box")
                         .between(10, 16)
                         .with_default(),
@@ -126,7 +152,8 @@ Command pack_command() {
                     Option("--base", options->base, "Vertices of a mesh's driver (unset: as for strip)").whole_from(3)},
         .examples = "  filigree pack scan.ply -o scan.fil\n"
                     "  filigree pack scan.fil -o small.fil --bits 12 --surface\n"
-                    "  filigree pack shot.fil -o small.fil --keep-order",
+                    "  filigree pack shot.fil -o small.fil --keep-order\n"
+                    "  filigree pack scan.ply -o scan.fil --profile stream",
         .run = [options](Session& session) { run(*options, session); }};
 }
 
@@ -135,8 +162,13 @@ Command unpack_command() {
     return {.name = "unpack",
             .text = "Write a coded model as a plain one, which reads at once",
             .options = {Option("model", options->input, "Coded model").is_read().required(),
-                        Option("-o,--output", options->output, "Model file to write (.fil)").is_written().required()},
-            .examples = "  filigree unpack small.fil -o plain.fil",
+                        Option("-o,--output", options->output, "Model file to write (.fil), or a mesh with --bytes")
+                            .is_written()
+                            .required(),
+                        Option("--bytes", options->bytes,
+                               "Write the mesh that so many of a stream's first bytes give; the file may end there")},
+            .examples = "  filigree unpack small.fil -o plain.fil\n"
+                        "  filigree unpack stream.fil -o early.ply --bytes 20000",
             .run = [options](Session& session) { run_unpack(*options, session); }};
 }
 

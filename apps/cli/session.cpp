@@ -29,9 +29,21 @@ void on_interrupt(int signal) {
     if (signal == SIGINT) std::signal(SIGINT, SIG_DFL); // a second Ctrl-C ends the program at once
 }
 
+/// Folders in which files are made aside, and those in which they will be: all texts name the latter.
+std::vector<std::pair<std::string, std::string>>& shown_folders() {
+    static std::vector<std::pair<std::string, std::string>> folders;
+    return folders;
+}
+std::string with_shown_folders(std::string text) {
+    for (const auto& [made_in, shown] : shown_folders())
+        for (std::size_t at = text.find(made_in); at != std::string::npos; at = text.find(made_in, at + shown.size()))
+            text.replace(at, made_in.size(), shown);
+    return text;
+}
+
 /// To stderr, whole and at once. When nobody can read it, nothing is lost that matters.
 void write_text(const std::string& text) {
-    std::fputs(text.c_str(), stderr);
+    std::fputs(with_shown_folders(text).c_str(), stderr);
     std::fflush(stderr);
 }
 
@@ -206,7 +218,7 @@ void Session::print(const std::string& text, Json object) {
     if (!wrote_file_ && context().is_cancelled()) throw Failure{cancelled_error()};
     if (!json && quiet && wrote_file_) return;
     object["warnings"] = warnings_;
-    const std::string shown = json ? object.text() + "\n" : text;
+    const std::string shown = with_shown_folders(json ? object.text() + "\n" : text);
     if (standard_output_taken_) return write_text(shown);
     if (std::fputs(shown.c_str(), stdout) == EOF || std::fflush(stdout) == EOF)
         refuse(ErrorCode::unwritable,
@@ -233,6 +245,10 @@ void report_mesh_written(const Mesh& mesh, const std::string& path, Report& repo
                            with_commas(mesh.face_count())));
     report.set("vertices", mesh.vertex_count());
     report.set("faces", mesh.face_count());
+}
+
+void show_folder_as(const std::string& made_in, const std::string& shown) {
+    shown_folders().emplace_back(made_in, shown);
 }
 
 void say(const std::string& line) { write_text(line + "\n"); }

@@ -119,6 +119,8 @@ void report_mesh_written(const Mesh& mesh, const std::string& path, Report& repo
 
 /// A line on stderr.
 void say(const std::string& line);
+/// Texts that name something in the first folder name it in the second: files are made aside and moved later.
+void show_folder_as(const std::string& made_in, const std::string& shown);
 
 /// "3.2e-05 of the diagonal (0.0012 units)".
 std::string distance_text(const MeshDistance& distance, double units);

@@ -52,17 +52,27 @@ std::string base64(std::string_view bytes) {
     return text;
 }
 
+std::string model_name(WebModel model) { return model == WebModel::glb ? "model.glb" : "model.fil"; }
+
 } // namespace
 
-WebPage::WebPage(OutputFolder& folder, std::string title)
-    : parts_(find_parts()), title_(std::move(title)), index_(folder.file("index.html")),
+WebPage::WebPage(OutputFolder& folder, std::string title, WebModel model)
+    : kind_(model), parts_(find_parts()), title_(std::move(title)), index_(folder.file("index.html")),
       script_(folder.file("filigree.js")), style_(folder.file("filigree.css")),
-      license_(folder.file("three-license.txt")), model_(folder.file("model.glb")),
-      model_script_(folder.file("model.glb.js")) {}
+      license_(folder.file("three-license.txt")), model_(folder.file(model_name(model))),
+      model_script_(folder.file(model_name(model) + ".js")) {
+#ifndef FILIGREE_WEB_STREAMS
+    if (model == WebModel::stream)
+        refuse(ErrorCode::unsupported,
+               "--stream: this program was built without the page's decoder, which clang 16 for "
+               "WebAssembly makes; run scripts/setup and build again.");
+#endif
+}
 
 void WebPage::write(Session& session) {
     const std::string index = require(read_file(parts_ / "index.html"));
-    require(write_file(index_, replaced(index, "{{title}}", html_text(title_))));
+    const std::string titled = replaced(index, "{{title}}", html_text(title_));
+    require(write_file(index_, replaced(titled, "{{model}}", kind_ == WebModel::glb ? "glb" : "stream")));
     for (const std::string& file : {script_, style_, license_})
         require(write_file(file, require(read_file(parts_ / fs::path(file).filename()))));
     write_model_script(session);

@@ -54,9 +54,10 @@ void expect_same_surface(const Mesh& mesh, const MeshCodeOptions& options) {
     ASSERT_EQ(out.mesh.face_count(), mesh.face_count());
     const std::vector<Index> none;
     EXPECT_EQ(faces_of(out.mesh, options.keep_order ? none : out.report.vertex), faces_of(mesh, none));
-    // Half a step along each axis of a frame, and what is rounded to sixteenths on the way.
-    const double along = options.surface ? 4 : 1,
-                 most = (std::sqrt(0.25 * (1 + 2 * along * along)) + 0.12) * out.code.step;
+    // Half a step along each axis of a frame, and what is rounded to sixteenths on the way; refinements' frames are
+    // rougher.
+    const double along = options.surface ? 4 : 1, rounded = options.levels && !options.surface ? 0.25 : 0.12,
+                 most = (std::sqrt(0.25 * (1 + 2 * along * along)) + rounded) * out.code.step;
     for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
         const Vec3f was = mesh.positions[options.keep_order ? v : out.report.vertex[v]];
         ASSERT_LT((out.mesh.positions[v] - was).cast<double>().norm(), most + 2e-7 * was.norm());
@@ -107,6 +108,8 @@ TEST(MeshCode, ShapesKeepTheirFacesAndPlaces) {
         const Mesh mesh = *make_shape(name, {.resolution = 24});
         for (const unsigned bits : {10u, 12u, 16u}) expect_same_surface(mesh, {.bits = bits});
         expect_same_surface(mesh, {.surface = true});
+        expect_same_surface(mesh, {.levels = true});
+        expect_same_surface(mesh, {.surface = true, .levels = true});
         expect_same_in_order(mesh);
     }
 }
@@ -118,6 +121,7 @@ TEST(MeshCode, AnyFacesAtAll) { // edges of many faces, faces that turn back, ve
         SCOPED_TRACE(seed);
         expect_same_surface(mesh, {});
         if (seed % 4 == 0) expect_same_surface(mesh, {.bits = 10, .keep_order = true});
+        if (seed % 4 == 1) expect_same_surface(mesh, {.keep_order = seed % 8 == 1, .levels = true});
         if (HasFailure()) break;
     }
 }
@@ -134,8 +138,10 @@ TEST(MeshCode, Attributes) {
     mesh.materials.names = {"gold", "jade"};
     for (std::size_t f = 0; f < mesh.face_count(); ++f)
         mesh.materials.of_face.push_back(f % 5 ? 0 : f % 3 ? 1 : kNoIndex);
-    for (const bool keep_order : {false, true}) {
-        const Coded out = coded(mesh, {.keep_order = keep_order});
+    for (const MeshCodeOptions& options :
+         {MeshCodeOptions{}, {.keep_order = true}, {.levels = true}, {.keep_order = true, .levels = true}}) {
+        const bool keep_order = options.keep_order;
+        const Coded out = coded(mesh, options);
         for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
             const Index was = keep_order ? Index(v) : out.report.vertex[v];
             ASSERT_EQ(out.mesh.scalars[0].values[v], mesh.scalars[0].values[was]);
@@ -213,7 +219,10 @@ TEST(MeshCode, CorpusComesBack) {
         if (!file || file->mesh.vertex_count() == 0 || file->mesh.corner_count() > 300'000) continue;
         SCOPED_TRACE(row.file);
         expect_same_in_order(file->mesh);
-        if (std::isfinite(world_bounds(file->mesh).diagonal())) expect_same_surface(file->mesh, {});
+        if (std::isfinite(world_bounds(file->mesh).diagonal())) {
+            expect_same_surface(file->mesh, {});
+            expect_same_surface(file->mesh, {.levels = true});
+        }
         ++tried;
     }
     if (tried == 0) GTEST_SKIP() << "no corpus";

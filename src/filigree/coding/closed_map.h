@@ -2,7 +2,10 @@
 // vertex each, and vertices where several sheets meet taken apart.
 #pragma once
 
-#include "filigree/mesh/mesh.h"
+#include "filigree/core/types.h"
+
+#include <span>
+#include <vector>
 
 namespace filigree {
 

@@ -170,6 +170,12 @@ std::vector<bool> code_cuts(const ClosedMap& map, const Code& code) {
 
 EncodedFaces encode_faces(std::span<const Index> face_offsets, std::span<const Index> corners, std::size_t vertices,
                           SymbolWriter& out) {
+    const MapCode in_one_piece = [&](const ClosedSurface& surface) { return encode_connectivity(surface.map, out); };
+    return encode_faces(face_offsets, corners, vertices, in_one_piece, out);
+}
+
+EncodedFaces encode_faces(std::span<const Index> face_offsets, std::span<const Index> corners, std::size_t vertices,
+                          const MapCode& code_map, SymbolWriter& out) {
     const FaceSpans faces{face_offsets, corners};
     std::vector<bool> is_odd(faces.size());
     bool all_triangles = true;
@@ -179,7 +185,7 @@ EncodedFaces encode_faces(std::span<const Index> face_offsets, std::span<const I
     }
     FanTriangles fans;
     const ClosedSurface surface = surface_of(faces, is_odd, fans);
-    WalkedMap walk = encode_connectivity(surface.map, out);
+    WalkedMap walk = code_map(surface);
 
     EncodedFaces encoded;
     WalkedFaces& walked = encoded.walked;
@@ -249,10 +255,14 @@ EncodedFaces encode_faces(std::span<const Index> face_offsets, std::span<const I
 }
 
 std::optional<WalkedFaces> decode_faces(SymbolReader& in, std::size_t vertices, std::size_t corners) {
-    std::optional<WalkedMap> walk = decode_connectivity(in, 2 * corners + 2); // a triangle a corner closes holes
+    std::optional<WalkedMap> walk = decode_connectivity(in, most_triangles(corners));
     if (!walk) return std::nullopt;
+    return decode_faces(std::move(walk->map), in, vertices, corners);
+}
+
+std::optional<WalkedFaces> decode_faces(ClosedMap map, SymbolReader& in, std::size_t vertices, std::size_t corners) {
     WalkedFaces walked;
-    walked.map = std::move(walk->map);
+    walked.map = std::move(map);
     std::vector<bool> cuts;
     if (in.symbol(kPlain) == 0)
         cuts = code_cuts(walked.map, [&](unsigned context, Index) { return in.symbol(context) != 0; });

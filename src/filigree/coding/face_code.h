@@ -3,11 +3,12 @@
 
 #include "filigree/coding/connectivity_code.h"
 
+#include <functional>
 #include <optional>
 
 namespace filigree {
 
-/// Contexts of a SymbolWriter that faces take, from 0 on.
+/// Contexts of a SymbolWriter that faces and their map's connectivity take, from 0 on.
 inline constexpr unsigned kFaceContexts = kConnectivityContexts + 16;
 
 /// Faces over vertices that are numbered in the order in which they are met, and the map they came from.
@@ -26,12 +27,22 @@ struct EncodedFaces {
     std::vector<Index> first_corner; ///< and which of its corners is first now
 };
 
-/// Writes faces. Corners that name a vertex twice, and what does not lie in a surface, are written one by one. Cost
-/// O(F log F).
+/// Writes a surface's map, and says in which order a reader will have it.
+using MapCode = std::function<WalkedMap(const ClosedSurface&)>;
+
+/// Writes faces: their map by `code_map`, the rest to `out`. Corners that name a vertex twice, and what does not lie in
+/// a surface, are written one by one. Cost O(F log F).
+EncodedFaces encode_faces(std::span<const Index> face_offsets, std::span<const Index> corners, std::size_t vertices,
+                          const MapCode& code_map, SymbolWriter& out);
+/// With the map's connectivity in one piece.
 EncodedFaces encode_faces(std::span<const Index> face_offsets, std::span<const Index> corners, std::size_t vertices,
                           SymbolWriter& out);
 
-/// None: damaged, or more than so many vertices or corners.
+/// The faces of a map that was read before. None: damaged, or more than so many vertices or corners.
+std::optional<WalkedFaces> decode_faces(ClosedMap map, SymbolReader& in, std::size_t vertices, std::size_t corners);
 std::optional<WalkedFaces> decode_faces(SymbolReader& in, std::size_t vertices, std::size_t corners);
+
+/// Triangles that so many corners can have, with those that close holes.
+constexpr std::size_t most_triangles(std::size_t corners) { return 2 * corners + 2; }
 
 } // namespace filigree

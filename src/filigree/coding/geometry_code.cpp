@@ -1,63 +1,16 @@
 #include "filigree/coding/geometry_code.h"
 
+#include "filigree/coding/integer_frame.h"
+
 #include <algorithm>
-#include <bit>
-#include <cmath>
 #include <cstdlib>
 
 namespace filigree {
 
 namespace {
 
-using Wide = std::array<std::int64_t, 3>;
-
-constexpr int kOneBits = 20;
-constexpr std::int32_t kOne = 1 << kOneBits; // length of the frame's axes
-constexpr std::int32_t kFarthest = 1 << 26;  // of a place, in sixteenths of a step
 constexpr unsigned kSizeClasses = 16, kSupport = 3;
 static_assert(3 * kSizeClasses * kSupport <= kGeometryContexts);
-
-Wide operator-(const Wide& a, const Wide& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-Wide cross(const Wide& a, const Wide& b) {
-    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-std::int64_t dot(const Wide& a, const Wide& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
-// What follows uses doubles where they are quicker than integers, and in such a way that every machine has the same:
-// whole numbers below 2^53, one operation that IEEE 754 rounds, and back to whole numbers towards zero.
-
-/// To the nearest, halves away from zero. by > 0.
-std::int64_t divide(std::int64_t value, std::int64_t by) {
-    return std::int64_t(double(2 * value + (value < 0 ? -by : by)) / double(2 * by));
-}
-/// By kOne.
-std::int64_t divide_by_one(std::int64_t value) { return (value + kOne / 2) >> kOneBits; }
-
-/// Made kOne long; false: it has no direction.
-bool normalise(Wide& v) {
-    const std::int64_t largest = std::max({std::abs(v[0]), std::abs(v[1]), std::abs(v[2])});
-    if (largest == 0) return false;
-    const int shift = int(std::bit_width(std::uint64_t(largest))) - 25; // so that squares add up to less than 2^53
-    for (std::int64_t& x : v) x = shift > 0 ? x >> shift : x << -shift;
-    const double scale = double(kOne) / std::sqrt(double(dot(v, v)));
-    for (std::int64_t& x : v) x = std::int64_t(double(x) * scale);
-    return true;
-}
-
-/// The normal, and two directions across it.
-struct Frame {
-    std::array<Wide, 3> axes = {Wide{kOne, 0, 0}, Wide{0, kOne, 0}, Wide{0, 0, kOne}};
-
-    Frame() = default;
-    Frame(Wide normal, Wide ahead) {
-        if (!normalise(normal)) return;
-        Wide side = cross(normal, ahead);
-        if (!normalise(side)) return;
-        Wide across = cross(side, normal);
-        for (std::int64_t& x : across) x = divide_by_one(x);
-        axes = {normal, across, side};
-    }
-};
 
 /// Visits vertices, best known first. `Coder` says where each is, given what is expected.
 template <class Coder>
@@ -141,9 +94,9 @@ private:
         std::array<std::int32_t, 3> steps{};
         std::int64_t so_far = size; // what differences to expect, in quarters of a step
         for (std::size_t k = 0; k < 3; ++k) {
-            const auto size_class = unsigned(class_of(std::uint32_t(so_far)));
+            const unsigned size_context = unsigned(size_class(std::uint32_t(so_far), kSizeClasses));
             steps[k] = coder_.step(v, expected, frame.axes[k], std::int64_t{steps_[k]} * kFine,
-                                   unsigned(k * kSizeClasses + size_class) * kSupport + support);
+                                   unsigned(k * kSizeClasses + size_context) * kSupport + support);
             const std::int64_t own = 4 * std::int64_t{std::abs(steps[k])};
             so_far = k == 0 ? (3 * so_far + 2 * own) / 4 : (so_far + own) / 2;
         }
@@ -159,14 +112,6 @@ private:
         sizes_[v] = std::int32_t(std::min<std::int64_t>(4 * all / 3, 1 << 20));
         is_known_[v] = true;
         tell_neighbours(v);
-    }
-
-    /// 0, 1, then two a power of two.
-    static std::uint32_t class_of(std::uint32_t size) {
-        const std::uint32_t one_more = size + 1;
-        const auto exponent = std::uint32_t(std::bit_width(one_more)) - 1;
-        const std::uint32_t half = exponent ? one_more >> (exponent - 1) & 1 : 0;
-        return std::min(2 * exponent + half, kSizeClasses - 1);
     }
 
     /// The triangles that are known through v are beside others.

@@ -12,7 +12,7 @@ namespace filigree {
 /// Contexts of a SymbolWriter that places take, from `first` on.
 inline constexpr unsigned kGeometryContexts = 160;
 
-/// A place in sixteenths of a step, 2^26 at most.
+/// A place in sixteenths of a step, 2^22 at most.
 using FinePlace = std::array<std::int32_t, 3>;
 inline constexpr std::int32_t kFine = 16;
 

@@ -2,6 +2,7 @@
 
 #include "filigree/coding/face_code.h"
 #include "filigree/coding/geometry_code.h"
+#include "filigree/coding/integer_frame.h"
 
 #include <algorithm>
 #include <bit>
@@ -17,6 +18,8 @@ constexpr unsigned kVertexOrder = 0, kFaceOrder = 1, kFirstCorner = 2, kOrderCon
 struct Damage {};
 
 // --- Places -------------------------------------------------------------------------------------------------------
+
+constexpr std::size_t kCoarsestVertices = 500;
 
 GeometrySteps steps_of(const MeshCodeOptions& options) { return {1, options.surface ? 4 : 1}; }
 
@@ -404,21 +407,41 @@ void sort_loose(const Mesh& mesh, const CodedMesh& coded, std::span<Index> loose
     for (std::size_t i = 0; i < loose.size(); ++i) loose[i] = keys[i].second;
 }
 
+LevelReader decode_levels(const CodedMesh& coded, const RunContext& context) {
+    const LevelCodeOptions options = level_options(coded.options);
+    LevelReader reader(options.steps, options.is_refined, most_triangles(coded.corners));
+    if (!reader.read_coarsest(coded.levels.connectivity, coded.levels.places)) throw Damage();
+    for (const CodedLevel& level : coded.levels.levels)
+        if (context.is_cancelled() || !reader.read_level(level.splits, level.batches)) throw Damage();
+    for (const CodedLevel& level : coded.levels.levels)
+        if (options.is_refined && !reader.refine_level(level.refinement)) throw Damage();
+    return reader;
+}
+
 Mesh decode(const CodedMesh& coded, const RunContext& context) {
     if (coded.vertices >= kNoIndex || coded.corners >= kNoIndex / 4 || !(coded.step > 0) ||
         !std::isfinite(coded.step * (1 << 27)))
         throw Damage();
-    SymbolReader faces_in(coded.connectivity, kFaceContexts);
-    std::optional<WalkedFaces> walked = decode_faces(faces_in, coded.vertices, coded.corners);
+    SymbolReader faces_in(coded.connectivity, kFaceContexts), places_in(coded.places, kPlaceContexts);
+    std::optional<WalkedFaces> walked;
+    std::vector<FinePlace> places;
+    if (coded.options.levels) {
+        const LevelReader levels = decode_levels(coded, context);
+        places.assign(levels.places().begin(), levels.places().end());
+        walked = decode_faces(levels.map(), faces_in, coded.vertices, coded.corners);
+    } else
+        walked = decode_faces(faces_in, coded.vertices, coded.corners);
     if (!walked || walked->face_offsets.size() != coded.faces + 1 || context.is_cancelled()) throw Damage();
-
-    SymbolReader places_in(coded.places, kPlaceContexts);
-    const std::vector<FinePlace> places = decode_geometry(walked->map, steps_of(coded.options), 0, places_in);
+    if (!coded.options.levels) places = decode_geometry(walked->map, steps_of(coded.options), 0, places_in);
     Mesh mesh = coded.rest;
     for (const std::size_t w : first_with_number(*walked)) mesh.positions.push_back(position_of(places[w], coded));
     FinePlace place{};
     while (mesh.vertex_count() < coded.vertices) {
-        for (unsigned k = 0; k < 3; ++k) place[k] += kFine * places_in.number_with_sign(kLoosePlace + k);
+        for (unsigned k = 0; k < 3; ++k) {
+            const std::int64_t next = place[k] + std::int64_t{kFine} * places_in.number_with_sign(kLoosePlace + k);
+            if (std::abs(next) > kFarthest) throw Damage();
+            place[k] = std::int32_t(next);
+        }
         if (places_in.is_damaged()) throw Damage();
         mesh.positions.push_back(position_of(place, coded));
     }
@@ -434,6 +457,31 @@ Mesh decode(const CodedMesh& coded, const RunContext& context) {
 }
 
 } // namespace
+
+LevelCodeOptions level_options(const MeshCodeOptions& options) {
+    const std::int32_t long_step = 4;
+    return {.fewest = kCoarsestVertices,
+            .steps = options.surface ? steps_of(options) : GeometrySteps{long_step, long_step},
+            .is_refined = !options.surface};
+}
+
+Mesh mesh_of_levels(const LevelReader& levels, const CodedMesh& coded) {
+    const ClosedMap& map = levels.map();
+    Mesh mesh;
+    mesh.origin = coded.rest.origin;
+    std::vector<Index> number(map.vertex_count(), kNoIndex);
+    for (std::size_t v = 0; v < map.vertex_count(); ++v) {
+        if (map.closes_hole[v]) continue;
+        number[v] = static_cast<Index>(mesh.vertex_count());
+        mesh.positions.push_back(position_of(levels.places()[v], coded));
+    }
+    for (const Triangle& t : map.triangles) {
+        if (!map.is_own(t)) continue;
+        for (const Index v : t) mesh.corners.push_back(number[v]);
+        mesh.face_offsets.push_back(static_cast<Index>(mesh.corners.size()));
+    }
+    return mesh;
+}
 
 Result<CodedMesh> encode_mesh(const Mesh& mesh, const MeshCodeOptions& options, MeshCodeReport* report,
                               const RunContext& context) {
@@ -454,7 +502,17 @@ Result<CodedMesh> encode_mesh(const Mesh& mesh, const MeshCodeOptions& options, 
     coded.step = (longest > 0 ? longest : 1.0) / double((1u << options.bits) - 1);
 
     SymbolWriter faces_out(kFaceContexts);
-    EncodedFaces faces = encode_faces(mesh.face_offsets, mesh.corners, mesh.vertex_count(), faces_out);
+    EncodedLevels levels;
+    const MapCode code_map = [&](const ClosedSurface& surface) {
+        if (!options.levels) return encode_connectivity(surface.map, faces_out);
+        std::vector<FinePlace> places(surface.source.size());
+        for (std::size_t v = 0; v < places.size(); ++v)
+            if (surface.source[v] != kNoIndex) places[v] = fine_place(mesh.positions[surface.source[v]], coded);
+        levels = encode_levels(surface.map, places, level_options(options), context);
+        return std::move(levels.walked);
+    };
+    EncodedFaces faces = encode_faces(mesh.face_offsets, mesh.corners, mesh.vertex_count(), code_map, faces_out);
+    coded.levels = std::move(levels.code);
     if (context.is_cancelled()) return cancelled_error();
     coded.connectivity = faces_out.finish();
     const WalkedFaces& walked = faces.walked;
@@ -473,11 +531,14 @@ Result<CodedMesh> encode_mesh(const Mesh& mesh, const MeshCodeOptions& options, 
     renumber_values(moved.normals);
 
     SymbolWriter places_out(kPlaceContexts);
-    std::vector<FinePlace> places(walked.number.size());
-    for (std::size_t w = 0; w < places.size(); ++w)
-        if (walked.number[w] != kNoIndex)
-            places[w] = fine_place(mesh.positions[ordered.vertex[walked.number[w]]], coded);
-    const std::vector<FinePlace> read = encode_geometry(walked.map, places, steps_of(options), 0, places_out);
+    std::vector<FinePlace> read = std::move(levels.read);
+    if (!options.levels) {
+        std::vector<FinePlace> places(walked.number.size());
+        for (std::size_t w = 0; w < places.size(); ++w)
+            if (walked.number[w] != kNoIndex)
+                places[w] = fine_place(mesh.positions[ordered.vertex[walked.number[w]]], coded);
+        read = encode_geometry(walked.map, places, steps_of(options), 0, places_out);
+    }
     for (const std::size_t w : first_with_number(walked)) moved.positions.push_back(position_of(read[w], coded));
     FinePlace before{};
     for (std::size_t v = walked.met; v < mesh.vertex_count(); ++v) {

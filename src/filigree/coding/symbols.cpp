@@ -105,10 +105,20 @@ std::string SymbolWriter::finish() {
         stream.push_back(char(words[i]));
         stream.push_back(char(words[i] >> 8));
     }
-    return stream + bits_;
+    stream += bits_;
+    coded_.clear();
+    bits_.clear();
+    pending_ = pending_count_ = 0;
+    return stream;
 }
 
-SymbolReader::SymbolReader(std::string_view stream, unsigned contexts) : models_(contexts) {
+SymbolReader::SymbolReader(std::string_view stream, unsigned contexts) : models_(contexts) { read_next(stream); }
+
+void SymbolReader::read_next(std::string_view stream) {
+    turn_ = 0;
+    pending_ = pending_count_ = 0;
+    is_damaged_ = false;
+    words_ = bits_ = {};
     constexpr std::size_t kFront = 20;
     if (stream.size() < kFront || get_u32(stream, 0) > (stream.size() - kFront) / 2) {
         is_damaged_ = true;

@@ -54,7 +54,8 @@ public:
     /// The same with a sign.
     void number_with_sign(unsigned context, std::int32_t value);
 
-    /// Everything, and a few bytes that say how much it is.
+    /// Everything, and a few bytes that say how much it is. What comes then is another stream, with the shares as they
+    /// have become.
     std::string finish();
 
 private:
@@ -73,6 +74,8 @@ private:
 class SymbolReader {
 public:
     SymbolReader(std::string_view stream, unsigned contexts);
+    /// Goes on with the writer's next stream.
+    void read_next(std::string_view stream);
 
     unsigned symbol(unsigned context);
     std::uint32_t bits(unsigned count);

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <span>
@@ -12,6 +13,8 @@ namespace filigree {
 
 using Index = std::uint32_t; ///< of a vertex, a face or a corner; see docs/conventions.md
 inline constexpr Index kNoIndex = std::numeric_limits<Index>::max();
+
+using Triangle = std::array<Index, 3>;
 
 using Vec2f = Eigen::Vector2f;
 using Vec3f = Eigen::Vector3f;

@@ -60,7 +60,8 @@ struct PlaneGrid {
             hi = hi.cwiseMax(p);
         }
         centre = 0.5 * (lo + hi);
-        scale = 0.95 * double(ConstrainedDelaunay::kPlaneHalf) / std::max(0.5 * (hi - lo).maxCoeff(), 1e-300);
+        const double half = 0.5 * (hi - lo).maxCoeff();
+        scale = half > 1e-290 ? 0.95 * double(ConstrainedDelaunay::kPlaneHalf) / half : 1.0; // else all in one point
     }
     PlanePoint to_grid(const Vec2d& p) const {
         return {std::llround((p[0] - centre[0]) * scale), std::llround((p[1] - centre[1]) * scale)};

@@ -8,6 +8,8 @@
 // never too late.
 #include "filigree/hierarchy/edge_collapse.h"
 
+#include "filigree/mesh/quadric.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -27,28 +29,6 @@ constexpr std::size_t kHub = 1024;       // triangles at a vertex from which it 
 constexpr std::size_t kFewTriangles = 8; // a list this long is no trouble even when all of it is gone
 constexpr double kHubSlack =
     1.5; // an edge of a hub may have become this much dearer since it was priced: 1.2 in distance
-
-/// Sum of area x (distance to a plane)^2, about the mesh's centre.
-struct Quadric {
-    Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
-    Vec3d b = Vec3d::Zero();
-    double c = 0, area = 0;
-
-    void add_plane(const Vec3d& unit_normal, const Vec3d& point, double weight) {
-        const double d = -unit_normal.dot(point);
-        a += weight * unit_normal * unit_normal.transpose();
-        b += weight * d * unit_normal;
-        c += weight * d * d;
-    }
-    Quadric& operator+=(const Quadric& other) {
-        a += other.a;
-        b += other.b;
-        c += other.c;
-        area += other.area;
-        return *this;
-    }
-    double at(const Vec3d& p) const { return std::max(0.0, p.dot(a * p) + 2 * b.dot(p) + c); }
-};
 
 struct Collapse {
     double cost;  ///< what it is sorted by

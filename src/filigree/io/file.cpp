@@ -136,9 +136,11 @@ FileReader::FileReader(FileReader&&) noexcept = default;
 FileReader& FileReader::operator=(FileReader&&) noexcept = default;
 FileReader::~FileReader() = default;
 
-FileReader::FileReader(std::string_view bytes) : file_(std::make_unique<OpenFile>()) {
-    file_->bytes = bytes;
-    file_->size = bytes.size();
+FileReader::FileReader(std::string_view bytes) : FileReader(bytes, bytes.size()) {}
+
+FileReader::FileReader(std::string_view beginning, std::uint64_t size) : file_(std::make_unique<OpenFile>()) {
+    file_->bytes = beginning;
+    file_->size = size;
 }
 
 Result<FileReader> FileReader::open(const fs::path& path) {
@@ -169,7 +171,8 @@ Status FileReader::read(std::uint64_t offset, std::span<char> to) const {
     const auto is_shorter = [&] {
         return Error{ErrorCode::not_found, file.path.string() + ": cannot be read: it became shorter meanwhile."};
     };
-    if (offset > file.size || to.size() > file.size - offset) return is_shorter();
+    const std::uint64_t size = file.descriptor.is_open() ? file.size : file.bytes.size();
+    if (offset > size || to.size() > size - offset) return is_shorter();
     if (!file.descriptor.is_open()) {
         std::copy_n(file.bytes.data() + offset, to.size(), to.data());
         return Success{};

@@ -22,6 +22,8 @@ public:
     static Result<FileReader> open(const std::filesystem::path& path);
     /// Bytes that somebody else keeps.
     explicit FileReader(std::string_view bytes);
+    /// The same, of a file that has `size` bytes and of which only the beginning is there yet.
+    FileReader(std::string_view beginning, std::uint64_t size);
     FileReader(FileReader&&) noexcept;
     FileReader& operator=(FileReader&&) noexcept;
     ~FileReader();

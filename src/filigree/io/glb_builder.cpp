@@ -1,7 +1,9 @@
 #include "filigree/io/glb_builder.h"
 #include "filigree/io/file.h"
+#include "filigree/io/glb_compression.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numeric>
 
@@ -10,6 +12,7 @@ namespace filigree {
 namespace {
 
 constexpr std::size_t kHeader = 12, kChunkHeader = 8;
+constexpr int kPositionBits = 17; // of rounded positions, along the longest side
 
 std::size_t padded(std::size_t bytes) { return (bytes + 3) / 4 * 4; }
 
@@ -69,12 +72,18 @@ std::size_t GlbBuilder::add_view(std::string bytes) {
     return add_part({count, std::move(bytes), {}}, GltfTarget::none);
 }
 
-std::size_t GlbBuilder::add_positions(std::span<const Vec3f> positions) {
-    const Box box = bounds(positions);
+std::size_t GlbBuilder::add_positions(std::span<const Vec3f> given) {
+    std::vector<Vec3f> positions(given.begin(), given.end());
+    Box box = bounds(positions);
+    if (rounds_positions_ && !box.empty() && box.size().maxCoeff() > 0) {
+        const float step = std::ldexp(1.0f, std::ilogb(box.size().maxCoeff()) - kPositionBits); // exact in floats
+        for (Vec3f& p : positions) p = (p / step).array().round() * step;
+        box = bounds(positions);
+    }
     GltfAccessor accessor{.type = "VEC3", .target = GltfTarget::vertices, .count = positions.size()};
     accessor.min.assign(box.min.data(), box.min.data() + 3);
     accessor.max.assign(box.max.data(), box.max.data() + 3);
-    return add(std::move(accessor), bytes_of(positions));
+    return add(std::move(accessor), bytes_of(std::span<const Vec3f>(positions)));
 }
 
 std::size_t GlbBuilder::add_vectors(std::span<const Vec3f> vectors, GltfTarget target) {
@@ -109,7 +118,8 @@ std::string GlbBuilder::json_chunk() const {
         else
             document[key] = value;
     }
-    if (data_bytes_ > 0) document["buffers"] = Json::array({{{"byteLength", data_bytes_}}});
+    if (data_bytes_ > 0 && !json.contains("buffers"))
+        document["buffers"] = Json::array({{{"byteLength", data_bytes_}}});
     std::string text = document.dump(-1, ' ', false, Json::error_handler_t::replace);
     text.resize(padded(text.size()), ' ');
     return text;
@@ -177,6 +187,17 @@ Result<std::string> GlbBuilder::bytes() const {
     });
     if (!written) return written.error();
     return all;
+}
+
+Status GlbBuilder::compress() {
+    if (gathered_.empty())
+        if (const Result<std::string_view> all = gather(); !all) return all.error();
+    Result<std::string> packed =
+        compress_views(json, std::string_view(gathered_).substr(gathered_.size() - data_bytes_));
+    if (!packed) return packed.error();
+    gathered_ = std::move(*packed);
+    data_bytes_ = gathered_.size();
+    return Success{};
 }
 
 Result<std::string_view> GlbBuilder::gather() {

@@ -58,6 +58,11 @@ public:
     std::size_t add_indices(std::span<const Index> indices); ///< uint16 where every index is below 65535, else uint32
     std::size_t add_scalars(std::span<const float> values, GltfTarget target, bool with_bounds = false);
 
+    /// Rounds the positions that come to a 2^17th of their box's longest side, so that compress packs them well.
+    void round_positions() { rounds_positions_ = true; }
+    /// Packs everything (glb_compression.h); only `asset` may change afterwards. Errors: as of gather.
+    Status compress();
+
     /// Bytes of the whole file when it is written now.
     std::size_t byte_count() const;
     /// Writes it, through a temporary file and a rename. Errors: unwritable, unsupported (4 GiB or more), cancelled.
@@ -76,6 +81,7 @@ private:
     };
     std::vector<Part> parts_;
     std::size_t data_bytes_ = 0;
+    bool rounds_positions_ = false;
     std::string gathered_; ///< the file, and in its last bytes the parts; empty: they are in parts_
 
     std::size_t add_part(Part part, GltfTarget target);

@@ -51,6 +51,7 @@ public:
                          path.string() + ": " + std::to_string(animation_.frames) + " morph targets of " +
                              std::to_string(parts_.vertex_count()) +
                              " vertices pass the 4 GiB that a GLB can have; write a .pc2, fewer frames, or a skin."};
+        if (options_.compress) builder_.round_positions();
         add_mesh();
         if (Status added = add_targets(); !added) return added.error();
         add_weights();
@@ -58,6 +59,8 @@ public:
         report_.keys = animation_.frames;
         report_.seconds = double(animation_.frames - 1) / animation_.frames_per_second;
         builder_.json["asset"] = {{"extras", {{"filigree", report_json()}}}};
+        if (options_.compress)
+            if (Status packed = builder_.compress(); !packed) return packed.error();
         if (Status written = builder_.write(path, context_); !written) return written.error();
         report_.bytes = builder_.byte_count();
         return report_;

@@ -13,6 +13,7 @@ namespace filigree {
 struct MorphOptions {
     ExportNormals normals = ExportNormals::keep;
     bool morph_normals = false;                  ///< a normal a vertex and frame too: right shading, twice the size
+    bool compress = false;                       ///< as of SkinOptions; the whole file is in memory then
     std::filesystem::path materials_beside = {}; ///< where libraries are looked for: the mesh's path
 };
 

@@ -98,6 +98,7 @@ public:
         if (!restorer) return restorer.error();
         PoseSampler poses(poses_, [&](const Pose& pose) { return check_pose(model_, pose); });
 
+        if (options_.compress) builder_.round_positions();
         Skin skin;
         for (unsigned k = level + 1; k-- > 0;) {
             if (k < level && !options_.all_levels) break;
@@ -125,6 +126,8 @@ public:
         report_.normal_error_degrees = animation->normal_error_degrees();
         if (Status measured = measure(keys, poses, *restorer); !measured) return measured.error();
         builder_.json["asset"] = {{"extras", {{"filigree", report_json()}}}};
+        if (options_.compress)
+            if (Status packed = builder_.compress(); !packed) return packed.error();
         if (Status written = builder_.write(path, context_); !written) return written.error();
         report_.bytes = builder_.byte_count();
         return report_;

@@ -24,6 +24,7 @@ struct SkinOptions {
     /// for each edge of the driver, and the true rest shape (for Blender; three.js drops the last two).
     unsigned influences = 3;
     bool full_precision = false; ///< float rotations and weights; else int16 and uint16, 3e-6 of the diagonal
+    bool compress = false;       ///< EXT_meshopt_compression and KHR_mesh_quantization, which viewers have to know
     bool all_levels = false;     ///< coarser levels too, as MSFT_lod, on the same joints
     ExportNormals normals = ExportNormals::keep;
     std::filesystem::path materials_beside = {}; ///< where libraries are looked for: the mesh's or model's path

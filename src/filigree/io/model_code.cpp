@@ -1,49 +1,25 @@
 #include "filigree/io/model_code.h"
 
-#include "filigree/coding/face_code.h"
+#include "filigree/coding/clip_code.h"
+#include "filigree/coding/driver_code.h"
+#include "filigree/hierarchy/restore.h"
 #include "filigree/hierarchy/strip.h"
 #include "filigree/hierarchy/vertex_order.h"
-
-#include <bit>
+#include "filigree/mesh/mesh_distance.h"
 
 namespace filigree {
 
 namespace {
 
-/// Bits that name one of `count`.
-unsigned bits_to_name(std::size_t count) { return count > 1 ? unsigned(std::bit_width(count - 1)) : 0; }
-
-/// The driver's faces; which of its vertices each number is; which vertex of the coded mesh each of its vertices is.
-std::string code_driver(const Level& driver, std::span<const Index> place_in_code) {
-    SymbolWriter out(kFaceContexts);
-    const std::size_t count = driver.vertices.size();
-    const EncodedFaces faces = encode_faces(driver.face_offsets, driver.corners, count, out);
-    for (const Index i : faces.vertex) out.bits(i, bits_to_name(count));
-    for (const Index v : driver.vertices) out.bits(place_in_code[v], bits_to_name(place_in_code.size()));
-    return out.finish();
-}
-
-Level decode_driver(std::string_view stream, const FileCode& code) {
-    const FileDamage damage{"has a damaged driver"};
-    SymbolReader in(stream, kFaceContexts);
-    std::optional<WalkedFaces> faces = decode_faces(in, code.driver_vertices, code.driver_corners);
-    if (!faces || faces->face_offsets.size() != code.driver_faces + 1) throw damage;
-    Level driver;
-    std::vector<Index> vertex_of(code.driver_vertices); // of each number
-    for (Index& i : vertex_of) {
-        i = in.bits(bits_to_name(code.driver_vertices));
-        if (i >= code.driver_vertices || in.is_damaged()) throw damage;
-    }
-    driver.face_offsets = std::move(faces->face_offsets);
-    for (const Index c : faces->corners) driver.corners.push_back(vertex_of[c]);
-    std::vector<bool> is_used(code.vertices);
-    for (std::size_t i = 0; i < code.driver_vertices; ++i) {
-        const Index v = in.bits(bits_to_name(code.vertices));
-        if (v >= code.vertices || is_used[v] || in.is_damaged()) throw damage;
-        is_used[v] = true;
-        driver.vertices.push_back(v);
-    }
-    return driver;
+Level driver_of(std::string_view stream, const FileCode& code) {
+    std::optional<DriverFaces> driver =
+        decode_driver(stream, {code.driver_vertices, code.driver_faces, code.driver_corners, code.vertices});
+    if (!driver) throw FileDamage{"has a damaged driver"};
+    Level level;
+    level.vertices = std::move(driver->vertices);
+    level.face_offsets = std::move(driver->face_offsets);
+    level.corners = std::move(driver->corners);
+    return level;
 }
 
 /// The driver's vertices first and in their order, so that they ascend; then the others.
@@ -65,14 +41,104 @@ bool is_made_elsewhere(const Model& model) {
     return std::ranges::none_of(model.driver().vertices, [&](Index v) { return is_used[v]; });
 }
 
-std::string stream_of(const SectionReader& in, std::string_view name) {
-    const std::vector<char> bytes = in.array<char>(name);
+std::string stream_of(const SectionReader& in, std::string_view name, std::uint32_t index = 0) {
+    const std::vector<char> bytes = in.array<char>(name, index);
     return {bytes.begin(), bytes.end()};
+}
+
+constexpr double kClipError = 6e-6;     // of the diagonal: restored vertices are 1e-5 off, finer than restoring is
+constexpr double kGradientReach = 0.01; // of the diagonal: how far vertices lie from their driver, about
+constexpr std::size_t kClipNumbers = std::size_t{1} << 25; // in a block
+
+std::vector<float> clip_numbers(std::span<const Vec3f> positions, std::span<const Mat3f> gradients,
+                                std::size_t numbers) {
+    std::vector<float> values;
+    for (std::size_t v = 0; v < positions.size(); ++v) {
+        values.insert(values.end(), positions[v].data(), positions[v].data() + 3);
+        if (numbers == 3) continue;
+        const Mat3f gradient = gradients.empty() ? Mat3f::Identity() : gradients[v];
+        values.insert(values.end(), gradient.data(), gradient.data() + 9);
+    }
+    return values;
+}
+
+/// With gradients, as a page's decoder does not estimate them.
+PoseSequence with_gradients(const Model& model, const PoseSequence& poses, const RunContext& context) {
+    if (!poses.frames[0].gradients.empty()) return poses;
+    const Result<Restorer> restorer = Restorer::create(model, {.level = 0}, context);
+    if (!restorer) throw restorer.error();
+    PoseSequence filled = poses;
+    for (Pose& pose : filled.frames) {
+        Result<std::vector<Mat3f>> gradients = restorer->gradients(pose, context);
+        if (!gradients) throw gradients.error();
+        pose.gradients = std::move(*gradients);
+    }
+    return filled;
+}
+
+void code_clips(const Model& model, const PoseSequence& poses, CodedModel& coded) {
+    const Level& driver = model.driver();
+    const ClipOrder order = clip_order(driver.face_offsets, driver.corners, driver.vertices.size());
+    coded.clip = {static_cast<std::uint32_t>(poses.frames.size()), poses.frames[0].gradients.empty() ? 3u : 12u};
+    coded.frames_per_second = poses.frames_per_second;
+    const std::size_t numbers = coded.clip.numbers;
+    const double diagonal = world_bounds(model.mesh).diagonal(), unit = diagonal > 0 ? diagonal : 1;
+    std::vector<double> weights(numbers, kGradientReach * unit);
+    std::fill_n(weights.begin(), 3, 1.0);
+    const std::vector<float> rest = clip_numbers(driver_positions(model), {}, numbers);
+    const std::size_t block = std::clamp<std::size_t>(kClipNumbers / rest.size(), 8, kClipFrames) - 1;
+    for (std::size_t begin = 0; begin < poses.frames.size(); begin += block) {
+        ClipFrames frames = {rest};
+        for (std::size_t f = begin; f < std::min(begin + block, poses.frames.size()); ++f)
+            frames.push_back(clip_numbers(poses.frames[f].positions, poses.frames[f].gradients, numbers));
+        coded.clips.push_back(encode_clip(frames, weights, kClipError * unit, order));
+        coded.report.bytes.clips += coded.clips.back().size();
+    }
+}
+
+/// The faces as fans from their first corners, as they are coded: quads that are not flat have two surfaces.
+Mesh as_fans(const Mesh& mesh) {
+    Mesh fans;
+    fans.positions = mesh.positions;
+    fans.origin = mesh.origin;
+    for (std::size_t f = 0; f < mesh.face_count(); ++f) {
+        const auto face = mesh.face(f);
+        for (std::size_t k = 1; k + 1 < face.size(); ++k) fans.add_face(std::array{face[0], face[k], face[k + 1]});
+    }
+    return fans;
+}
+
+/// How far the surface of every beginning of a stream is off; the last one's is that of all of it.
+std::vector<FileLevel> levels_of(const CodedMesh& coded, const Mesh& mesh, const RunContext& context) {
+    const LevelCodeOptions options = level_options(coded.options);
+    LevelReader reader(options.steps, options.is_refined, kNoIndex);
+    const Mesh fans = as_fans(mesh);
+    std::vector<FileLevel> levels;
+    const auto add = [&](std::uint32_t vertices, std::uint32_t triangles, std::uint32_t batches) {
+        constexpr std::size_t kSamples = 20'000;
+        float error = 0;
+        if (const Result<MeshDistance> distance = mesh_distance(mesh_of_levels(reader, coded), fans, kSamples, context);
+            distance && distance->surfaces)
+            error = static_cast<float>(distance->surfaces->rms_distance);
+        levels.push_back({vertices, triangles, batches, error});
+    };
+    const CodedLevels& code = coded.levels;
+    reader.read_coarsest(code.connectivity, code.places);
+    add(code.vertices, code.triangles, 0);
+    for (const CodedLevel& level : code.levels) {
+        reader.read_level(level.splits, level.batches);
+        add(level.vertices, level.triangles, level.batches);
+    }
+    if (!options.is_refined || code.levels.empty()) return levels;
+    for (const CodedLevel& level : code.levels) reader.refine_level(level.refinement);
+    add(code.levels.back().vertices, code.levels.back().triangles, 0);
+    return levels;
 }
 
 } // namespace
 
-Result<CodedModel> code_model(const Model& model, const MeshCodeOptions& options, const RunContext& context) {
+Result<CodedModel> code_model(const Model& model, const PoseSequence& poses, const MeshCodeOptions& options,
+                              const RunContext& context) {
     const auto* detail = std::get_if<BlendDetail>(&model.detail);
     if (!detail)
         return Error{ErrorCode::unsuitable,
@@ -85,10 +151,13 @@ Result<CodedModel> code_model(const Model& model, const MeshCodeOptions& options
     Result<CodedMesh> mesh = encode_mesh(model.mesh, options, &report, context);
     if (!mesh) return mesh.error();
     coded.mesh = std::move(*mesh);
+    if (options.levels) coded.levels = levels_of(coded.mesh, model.mesh, context);
     const Level& driver = model.driver();
     std::vector<Index> place(model.mesh.vertex_count());
     for (Index i = 0; i < place.size(); ++i) place[options.keep_order ? i : report.vertex[i]] = i;
-    coded.driver = code_driver(driver, place);
+    std::vector<Index> driver_places;
+    for (const Index v : driver.vertices) driver_places.push_back(place[v]);
+    coded.driver = encode_driver(driver.face_offsets, driver.corners, driver_places, place.size());
     coded.code = {.vertices = coded.mesh.vertices,
                   .faces = coded.mesh.faces,
                   .corners = coded.mesh.corners,
@@ -105,12 +174,32 @@ Result<CodedModel> code_model(const Model& model, const MeshCodeOptions& options
                     .largest = report.largest,
                     .bytes = {coded.mesh.connectivity.size(), coded.mesh.places.size(), coded.mesh.attributes.size(),
                               coded.mesh.order.size(), coded.driver.size()}};
+    if (!poses.empty()) code_clips(model, options.levels ? with_gradients(model, poses, context) : poses, coded);
+    for (const CodedLevel& level : coded.mesh.levels.levels) {
+        coded.report.bytes.levels += level.splits.size();
+        coded.report.bytes.refinements += level.refinement.size();
+    }
+    coded.report.bytes.levels += coded.mesh.levels.connectivity.size() + coded.mesh.levels.places.size();
     return coded;
 }
 
 void write_model_code(SectionWriter& out, const CodedModel& coded) {
     out.value("cd.par", coded.code);
+    out.array("cd.stm", coded.levels);
+    const CodedLevels& levels = coded.mesh.levels;
+    if (!coded.levels.empty()) { // what is wanted first comes first
+        out.bytes("cd.bcon", levels.connectivity, 0);
+        out.bytes("cd.bpos", levels.places, 0);
+    }
     out.bytes("cd.drv", coded.driver, 0);
+    if (!coded.clips.empty()) {
+        out.value("pose.fps", coded.frames_per_second);
+        out.value("cd.pose", coded.clip);
+    }
+    for (std::uint32_t k = 0; k < coded.clips.size(); ++k) out.bytes("cd.clip", coded.clips[k], k);
+    for (std::uint32_t k = 0; k < levels.levels.size(); ++k) out.bytes("cd.lev", levels.levels[k].splits, k + 1);
+    for (std::uint32_t k = 0; k < levels.levels.size(); ++k)
+        if (!levels.levels[k].refinement.empty()) out.bytes("cd.ref", levels.levels[k].refinement, k + 1);
     out.bytes("cd.con", coded.mesh.connectivity, 0);
     out.bytes("cd.pos", coded.mesh.places, 0);
     out.bytes("cd.att", coded.mesh.attributes, 0);
@@ -127,30 +216,98 @@ FileCode read_file_code(const SectionReader& in) {
     return code;
 }
 
+FileClip clip_of(const SectionReader& in) {
+    if (in.count("cd.pose").first == 0) return {};
+    const auto clip = in.value<FileClip>("cd.pose");
+    if (clip.numbers != 3 && clip.numbers != 12) throw FileDamage{"has poses that make no sense"};
+    return clip;
+}
+
+PoseSequence read_clips(const SectionReader& in) {
+    PoseSequence poses;
+    const FileClip clip = clip_of(in);
+    if (clip.frames == 0) return poses;
+    const FileDamage damage{"has damaged poses", "pack it again"};
+    poses.frames_per_second = in.value<double>("pose.fps");
+    const Level driver = driver_of(stream_of(in, "cd.drv"), read_file_code(in));
+    const ClipOrder order = clip_order(driver.face_offsets, driver.corners, driver.vertices.size());
+    for (std::uint32_t k = 0; poses.frames.size() < clip.frames; ++k) {
+        const std::optional<ClipFrames> frames = decode_clip(stream_of(in, "cd.clip", k), clip.numbers, order);
+        if (!frames || frames->size() < 2 || poses.frames.size() + frames->size() - 1 > clip.frames) throw damage;
+        for (std::size_t f = 1; f < frames->size(); ++f) {
+            Pose& pose = poses.frames.emplace_back();
+            for (const float* v = (*frames)[f].data(); v < (*frames)[f].data() + (*frames)[f].size();
+                 v += clip.numbers) {
+                pose.positions.emplace_back(v[0], v[1], v[2]);
+                if (clip.numbers == 12) pose.gradients.push_back(Eigen::Map<const Mat3f>(v + 3));
+            }
+        }
+    }
+    return poses;
+}
+
+CodedMesh coded_outline(const SectionReader& in, const FileCode& code) {
+    return {.vertices = code.vertices,
+            .faces = code.faces,
+            .corners = code.corners,
+            .low = code.low,
+            .step = code.step,
+            .options = {code.bits, code.surface != 0, code.keep_order != 0, in.count("cd.stm").first > 0}};
+}
+
 Coding coding_of(const SectionReader& in, const FileCode& code) {
-    return {.options = {code.bits, code.surface != 0, code.keep_order != 0},
+    const std::vector<FileLevel> table = in.array<FileLevel>("cd.stm");
+    std::vector<CodedLevelMark> levels;
+    std::uint64_t level_bytes = in.item_count<char>("cd.bcon") + in.item_count<char>("cd.bpos"), refinements = 0;
+    std::uint64_t clips = 0;
+    for (std::uint32_t k = 0; k < in.count("cd.clip").first; ++k) clips += in.item_count<char>("cd.clip", k);
+    for (std::uint32_t k = 0; k < table.size(); ++k) {
+        level_bytes += in.item_count<char>("cd.lev", k);
+        refinements += in.item_count<char>("cd.ref", k);
+        const bool is_refinement = k > 0 && table[k].batches == 0;
+        const std::uint64_t end = k == 0          ? in.end_of("cd.bpos")
+                                  : is_refinement ? in.end_of("cd.ref", k - 1)
+                                                  : in.end_of("cd.lev", k);
+        levels.push_back({table[k].vertices, table[k].error, end});
+    }
+    return {.options = coded_outline(in, code).options,
             .step = code.step,
             .bytes = {in.item_count<char>("cd.con"), in.item_count<char>("cd.pos"), in.item_count<char>("cd.att"),
-                      in.item_count<char>("cd.ord"), in.item_count<char>("cd.drv")}};
+                      in.item_count<char>("cd.ord"), in.item_count<char>("cd.drv"), level_bytes, refinements, clips},
+            .levels = std::move(levels)};
+}
+
+CodedLevels read_levels(const SectionReader& in) {
+    const std::vector<FileLevel> table = in.array<FileLevel>("cd.stm");
+    CodedLevels levels;
+    if (table.empty()) return levels;
+    if (table.size() > 64) throw FileDamage{"has more levels than make sense"};
+    levels.vertices = table[0].vertices;
+    levels.triangles = table[0].triangles;
+    levels.connectivity = stream_of(in, "cd.bcon");
+    levels.places = stream_of(in, "cd.bpos");
+    for (std::uint32_t k = 1; k < table.size() && table[k].batches > 0; ++k)
+        levels.levels.push_back({.batches = table[k].batches,
+                                 .vertices = table[k].vertices,
+                                 .triangles = table[k].triangles,
+                                 .splits = stream_of(in, "cd.lev", k),
+                                 .refinement = stream_of(in, "cd.ref", k)});
+    return levels;
 }
 
 Model read_model_code(const SectionReader& in, Mesh rest, const RunContext& context) {
     const FileCode code = read_file_code(in);
-    CodedMesh coded{.vertices = code.vertices,
-                    .faces = code.faces,
-                    .corners = code.corners,
-                    .low = code.low,
-                    .step = code.step,
-                    .options = {code.bits, code.surface != 0, code.keep_order != 0},
-                    .connectivity = stream_of(in, "cd.con"),
-                    .places = stream_of(in, "cd.pos"),
-                    .attributes = stream_of(in, "cd.att"),
-                    .order = stream_of(in, "cd.ord"),
-                    .rest = std::move(rest)};
+    CodedMesh coded = coded_outline(in, code);
+    coded.connectivity = stream_of(in, "cd.con");
+    coded.places = stream_of(in, "cd.pos");
+    coded.attributes = stream_of(in, "cd.att");
+    coded.order = stream_of(in, "cd.ord");
+    coded.levels = read_levels(in);
+    coded.rest = std::move(rest);
     Result<Mesh> mesh = decode_mesh(coded, context);
     if (!mesh && mesh.error().code == ErrorCode::cancelled) throw mesh.error();
     if (!mesh) throw FileDamage{"holds a coded mesh that is damaged", "pack it again"};
-    Level driver = decode_driver(stream_of(in, "cd.drv"), code);
+    Level driver = driver_of(stream_of(in, "cd.drv"), code);
     if (code.keep_order && !std::ranges::is_sorted(driver.vertices)) throw FileDamage{"has a damaged driver"};
     if (!code.keep_order) *mesh = with_driver_first(std::move(*mesh), driver, context);
     Result<Model> model =

@@ -18,21 +18,46 @@ struct FileCode {
 };
 static_assert(sizeof(FileCode) == 96);
 
+/// What there is after level k of a stream, 0 the coarsest: entry k of the section "cd.stm". After the last level comes
+/// one without batches where refinements follow, for what they make of it.
+struct FileLevel {
+    std::uint32_t vertices, triangles; ///< of the map, with those that close holes
+    std::uint32_t batches;
+    float error; ///< rms distance from the mesh's surface, model units
+};
+static_assert(sizeof(FileLevel) == 16);
+
+/// The section "cd.pose": the poses of a coded file, in blocks "cd.clip". Each begins with the driver at rest.
+struct FileClip {
+    std::uint32_t frames, numbers; ///< of a vertex: 3, or 12 with gradients
+};
+
 struct CodedModel {
     CodedMesh mesh;
     FileCode code{};
+    std::vector<FileLevel> levels; ///< of a stream
     std::string driver;
+    FileClip clip{};
+    double frames_per_second = 0;
+    std::vector<std::string> clips; ///< blocks
     CodingReport report;
 };
 
 /// Errors: as write_coded_model.
-Result<CodedModel> code_model(const Model& model, const MeshCodeOptions& options, const RunContext& context);
+Result<CodedModel> code_model(const Model& model, const PoseSequence& poses, const MeshCodeOptions& options,
+                              const RunContext& context);
 /// Refers to `coded`, which has to outlive the writer.
 void write_model_code(SectionWriter& out, const CodedModel& coded);
 
 bool is_coded(const SectionReader& in);
 FileCode read_file_code(const SectionReader& in);
+/// The coded mesh without its streams.
+CodedMesh coded_outline(const SectionReader& in, const FileCode& code);
 Coding coding_of(const SectionReader& in, const FileCode& code);
+/// How many poses, and whether with gradients.
+FileClip clip_of(const SectionReader& in);
+/// The poses; none where there are none. Throws FileDamage.
+PoseSequence read_clips(const SectionReader& in);
 /// rest: what of the mesh is not coded. Throws FileDamage, and Error where it is cancelled.
 Model read_model_code(const SectionReader& in, Mesh rest, const RunContext& context);
 

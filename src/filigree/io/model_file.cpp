@@ -282,6 +282,7 @@ std::size_t frame_count(const SectionReader& in, const std::string& name) {
 
 PoseSequence read_pose_sections(const FileReader& file) {
     const SectionReader in(file);
+    if (is_coded(in) && clip_of(in).frames > 0) return read_clips(in);
     PoseSequence poses;
     const std::size_t frames = frame_count(in, "pose.pos"), with_gradients = frame_count(in, "pose.grd");
     if (frames == 0 && with_gradients == 0) return poses;
@@ -350,6 +351,12 @@ Model read_sections(const FileReader& file, const RunContext& context) {
 }
 
 void read_frames(const SectionReader& in, ModelOutline& outline) {
+    if (const FileClip clip = clip_of(in); clip.frames > 0) {
+        outline.frames = clip.frames;
+        outline.has_gradients = clip.numbers > 3;
+        outline.frames_per_second = in.value<double>("pose.fps");
+        return;
+    }
     outline.frames = frame_count(in, "pose.pos");
     outline.has_gradients = frame_count(in, "pose.grd") > 0;
     if (outline.frames > 0) outline.frames_per_second = in.value<double>("pose.fps");
@@ -527,17 +534,18 @@ Result<CodingReport> write_coded_model(const Model& model, const PoseSequence& p
         !wrong.empty())
         return Error{ErrorCode::mismatch, path.string() + ": not written: " + wrong + "."};
     context.report("code", 0);
-    Result<CodedModel> coded = code_model(model, options, context);
-    if (!coded) return coded.error();
-    context.report("code", 1);
     try {
+        Result<CodedModel> coded = code_model(model, poses, options, context);
+        if (!coded) return coded.error();
+        context.report("code", 1);
         SectionWriter out;
         write_mesh_sections(out, coded->mesh.rest, false);
         if (options.keep_order) out.array("mesh.ord", model.source_order);
         write_model_code(out, *coded);
-        write_poses(out, poses);
         if (const Status status = write_file(path, out.finish()); !status) return status.error();
         return coded->report;
+    } catch (const Error& error) {
+        return error;
     } catch (const std::bad_alloc&) {
         return Error{ErrorCode::out_of_memory, path.string() + ": not enough memory for the file's bytes."};
     }

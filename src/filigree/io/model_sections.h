@@ -179,6 +179,12 @@ public:
         const FileSection* section = find<T>(name, index);
         return section ? section->count : 0;
     }
+    /// Where in the file a section ends; 0 when there is none.
+    std::uint64_t end_of(const std::string& name, std::uint32_t index = 0) const {
+        const auto found = sections_.find({name, index});
+        if (found == sections_.end()) return 0;
+        return found->second.offset + found->second.count * found->second.item_size;
+    }
     /// The sections of that name one after the other, by index: what is kept in chunks.
     template <class T>
     std::vector<T> all(const std::string& name) const {

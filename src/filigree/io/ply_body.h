@@ -119,6 +119,7 @@ struct Table {
     /// Calls set(row, value) for a column; one switch on the type a column, not a value.
     template <class F>
     void for_each(std::size_t column, const F& set) const {
+        if (rows == 0) return;
         with_type(columns[column].type, [&](auto t) {
             const char* p = data + columns[column].offset;
             for (std::size_t row = 0; row < rows; ++row, p += row_bytes) set(row, load<decltype(t)>(p, swap));

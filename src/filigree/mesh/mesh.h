@@ -97,8 +97,6 @@ inline Box world_bounds(const Mesh& mesh) {
     return box;
 }
 
-using Triangle = std::array<Index, 3>;
-
 /// Positions with their origin split off, so that float keeps their digits far from the world's origin.
 struct SplitPositions {
     std::vector<Vec3f> positions;

@@ -409,7 +409,7 @@ void move_embedded(const Embedding& embedding, const Vectors& rest, const Vector
                 const Float4 tail =
                     load(f + 5); // f22 of the second column, and the third: nothing past the end is read
                 const Float4 f0 = w * load(f), f1 = w * load(f + 3);
-                const Float4 f2 = w * __builtin_shuffle(tail, (Float4){}, (decltype(tail < tail)){1, 2, 3, 0});
+                const Float4 f2 = w * __builtin_shufflevector(tail, tail, 1, 2, 3, 0);
                 const float dx = c.x() - rest.x[j], dy = c.y() - rest.y[j], dz = c.z() - rest.z[j];
                 a0 += f0;
                 a1 += f1;

@@ -25,24 +25,30 @@ FILIGREE_INLINE void prefetch(const T& object) {
         __builtin_prefetch(reinterpret_cast<const char*>(&object) + byte);
 }
 
-/// A bit for each lane of a comparison. As an instruction, since the compiler makes twenty out of the same in C++, and
-/// its own function for it cannot be inlined into code for several processors.
+/// A bit for each lane of a comparison. As an instruction, since GCC makes twenty out of the same in C++, and its own
+/// function for it cannot be inlined into code for several processors.
 template <bool Avx2>
 FILIGREE_INLINE unsigned lane_bits(Int8 mask) {
     unsigned bits = 0;
-    if constexpr (Avx2)
+#ifndef __clang__
+    if constexpr (Avx2) {
         asm("vmovmskps %1, %0" : "=r"(bits) : "x"(mask));
-    else
-        for (int lane = 0; lane < 8; ++lane) bits |= (mask[lane] & 1u) << lane;
+        return bits;
+    }
+#endif
+    for (int lane = 0; lane < 8; ++lane) bits |= (mask[lane] & 1u) << lane;
     return bits;
 }
 template <bool Avx2>
 FILIGREE_INLINE unsigned lane_bits(Long4 mask) {
     unsigned bits = 0;
-    if constexpr (Avx2)
+#ifndef __clang__
+    if constexpr (Avx2) {
         asm("vmovmskpd %1, %0" : "=r"(bits) : "x"(mask));
-    else
-        for (int lane = 0; lane < 4; ++lane) bits |= static_cast<unsigned>(mask[lane] & 1) << lane;
+        return bits;
+    }
+#endif
+    for (int lane = 0; lane < 4; ++lane) bits |= static_cast<unsigned>(mask[lane] & 1) << lane;
     return bits;
 }
 

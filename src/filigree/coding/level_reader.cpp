@@ -1,0 +1,85 @@
+#include "filigree/coding/level_reader.h"
+
+#include "filigree/coding/connectivity_code.h"
+#include "filigree/coding/level_walk.h"
+
+namespace filigree {
+
+namespace {
+
+class SplitReader {
+public:
+    SymbolReader in{{}, kLevelContexts};
+
+    bool is_damaged() const { return in.is_damaged(); }
+    bool splits(unsigned context, Index) { return in.symbol(context) != 0; }
+    std::size_t sector(unsigned context, const SplitRing&) { return std::size_t{in.number(context)} + 1; }
+    std::size_t begin(unsigned context, const SplitRing& ring, std::size_t expected) {
+        const auto size = std::int64_t(ring.size);
+        const std::int64_t begin = std::int64_t(expected) + in.number_with_sign(context);
+        return begin < -size ? ring.size : std::size_t((begin + 2 * size) % size);
+    }
+    void did_split(Index, Index, Index, Index) {}
+    std::int32_t step(unsigned context, Index, const Wide&, const Wide&, std::int64_t) {
+        return std::clamp(in.number_with_sign(context), -kFarthest, kFarthest);
+    }
+};
+
+} // namespace
+
+class LevelReader::Reading {
+public:
+    Reading(GeometrySteps steps, bool is_refined, std::size_t most)
+        : walk(reader, steps, is_refined), most_vertices(most) {}
+
+    SplitReader reader;
+    LevelWalk<SplitReader> walk;
+    SymbolReader refinement{{}, kRefinementContexts};
+    std::size_t most_vertices;
+    std::vector<std::size_t> level_ends; ///< vertices after the coarsest and each level
+    std::size_t refined_levels = 0;
+};
+
+LevelReader::LevelReader(GeometrySteps steps, bool is_refined, std::size_t most_vertices)
+    : reading_(std::make_unique<Reading>(steps, is_refined, most_vertices)) {}
+LevelReader::~LevelReader() = default;
+LevelReader::LevelReader(LevelReader&&) noexcept = default;
+LevelReader& LevelReader::operator=(LevelReader&&) noexcept = default;
+
+bool LevelReader::read_coarsest(std::string_view connectivity, std::string_view places) {
+    SymbolReader in(connectivity, kConnectivityContexts), places_in(places, kGeometryContexts);
+    std::optional<WalkedMap> walked = decode_connectivity(in, 2 * reading_->most_vertices);
+    if (!walked || walked->map.vertex_count() > reading_->most_vertices) return false;
+    std::vector<FinePlace> there = decode_geometry(walked->map, {1, 1}, 0, places_in);
+    if (places_in.is_damaged()) return false;
+    reading_->level_ends.push_back(walked->map.vertex_count());
+    reading_->walk.begin(std::move(walked->map), std::move(there));
+    return true;
+}
+
+bool LevelReader::read_level(std::string_view splits, std::uint32_t batches) {
+    reading_->reader.in.read_next(splits);
+    for (std::uint32_t k = 0; k < batches; ++k)
+        if (!reading_->walk.run_batch(reading_->most_vertices)) return false;
+    reading_->level_ends.push_back(reading_->walk.map.vertex_count());
+    return true;
+}
+
+bool LevelReader::refine_level(std::string_view refinement) {
+    Reading& r = *reading_;
+    if (r.refined_levels + 1 >= r.level_ends.size()) return false;
+    r.refinement.read_next(refinement);
+    const std::size_t begin = r.level_ends[r.refined_levels], count = r.level_ends[r.refined_levels + 1] - begin;
+    if (r.walk.frames.size() < begin - r.level_ends[0] + count) return false;
+    refine(std::span(r.walk.frames).subspan(begin - r.level_ends[0], count),
+           std::span(r.walk.places).subspan(begin, count),
+           [&](std::size_t, std::size_t k, const Wide&) { return r.refinement.number_with_sign(unsigned(k)); });
+    ++r.refined_levels;
+    return !r.refinement.is_damaged();
+}
+
+const ClosedMap& LevelReader::map() const { return reading_->walk.map; }
+std::span<const FinePlace> LevelReader::places() const { return reading_->walk.places; }
+std::span<const Index> LevelReader::parents() const { return reading_->walk.parents; }
+
+} // namespace filigree

@@ -1,0 +1,38 @@
+// A map level by level: the coarsest, then splits of vertices that make it finer, best first [Hoppe 1996, in batches as
+// Pajarola and Rossignac 2000], then what makes places more precise. Every stream's beginning is a mesh.
+#pragma once
+
+#include "filigree/coding/closed_map.h"
+#include "filigree/coding/geometry_code.h"
+
+#include <memory>
+#include <string_view>
+
+namespace filigree {
+
+/// Takes the streams of CodedLevels one after the other: the coarsest, levels, refinements. Integers alone; memory is
+/// what has been read.
+class LevelReader {
+public:
+    LevelReader(GeometrySteps steps, bool is_refined, std::size_t most_vertices);
+    ~LevelReader();
+    LevelReader(LevelReader&&) noexcept;
+    LevelReader& operator=(LevelReader&&) noexcept;
+
+    /// False, of each: it is damaged, and so is what this reader holds.
+    bool read_coarsest(std::string_view connectivity, std::string_view places);
+    bool read_level(std::string_view splits, std::uint32_t batches);
+    /// Makes the places of levels more precise, in their order, when all levels are read. The coarsest is precise.
+    bool refine_level(std::string_view refinement);
+
+    const ClosedMap& map() const;
+    std::span<const FinePlace> places() const;
+    /// Of each vertex, one that was there before it and is beside it; of the coarsest's, itself.
+    std::span<const Index> parents() const;
+
+private:
+    class Reading;
+    std::unique_ptr<Reading> reading_;
+};
+
+} // namespace filigree

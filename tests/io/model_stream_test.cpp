@@ -1,0 +1,107 @@
+// Streams: the mesh gets better with every byte, however the bytes come; the whole file is a model with its poses.
+#include "filigree/io/model_stream.h"
+
+#include "filigree/hierarchy/strip.h"
+#include "filigree/mesh/shapes.h"
+
+#include <cstdlib>
+#include <gtest/gtest.h>
+
+using namespace filigree;
+
+namespace {
+
+const RunContext kContext(2);
+
+Model wavy_model() { return strip(make_wavy_sphere({.resolution = 40}), {.base = 200}, kContext)->model; }
+
+/// The driver turned and drawn out, with gradients.
+PoseSequence turning(const Model& model, std::size_t frames) {
+    PoseSequence poses{30, {}};
+    for (std::size_t t = 0; t < frames; ++t) {
+        Pose& pose = poses.frames.emplace_back(rest_pose(model));
+        const float angle = 0.05f * float(t);
+        Mat3f turn = Eigen::AngleAxisf(angle, Vec3f::UnitY()).toRotationMatrix();
+        turn *= 1 + 0.01f * float(t);
+        for (Vec3f& p : pose.positions) p = turn * p;
+        pose.gradients.assign(pose.positions.size(), turn);
+    }
+    return poses;
+}
+
+std::string stream_of(const Model& model, const PoseSequence& poses) {
+    std::string name = (std::filesystem::temp_directory_path() / "filigree-stream-XXXXXX").string();
+    const std::filesystem::path folder = ::mkdtemp(name.data()), path = folder / "stream.fil";
+    write_coded_model(model, poses, {.levels = true}, path, kContext).value();
+    std::string bytes = read_file(path).value();
+    std::filesystem::remove_all(folder);
+    return bytes;
+}
+
+} // namespace
+
+TEST(ModelStream, BetterWithEveryLevel) {
+    const Model model = wavy_model();
+    const std::string bytes = stream_of(model, {});
+    const ModelOutline outline = read_model_outline(FileReader(bytes), "it", kContext).value();
+    const std::vector<CodedLevelMark>& marks = outline.coding->levels;
+    ASSERT_GE(marks.size(), 4u);
+    EXPECT_LT(marks[0].bytes, bytes.size() / 4);
+    for (const std::size_t piece : {std::size_t{1}, std::size_t{97}, bytes.size()}) {
+        ModelStream stream("it");
+        EXPECT_EQ(stream.mesh().vertex_count(), 0u);
+        std::size_t levels = 0;
+        for (std::size_t at = 0; at < bytes.size(); at += piece) {
+            ASSERT_TRUE(stream.feed(std::string_view(bytes).substr(at, piece)).ok());
+            const std::uint64_t there = std::min(at + piece, bytes.size());
+            for (; levels < stream.level_count(); ++levels) EXPECT_GE(there, marks[levels].bytes);
+            const std::uint64_t next = stream.next_level_end();
+            ASSERT_TRUE(next == 0 || levels == marks.size() || next == marks[levels].bytes);
+            if (levels == 0 || piece == 1) continue;
+            EXPECT_EQ(stream.error(), marks[levels - 1].error);
+            ASSERT_EQ(stream.mesh().vertex_count(), marks[levels - 1].vertices);
+        }
+        EXPECT_EQ(levels, marks.size());
+        EXPECT_EQ(stream.mesh().vertex_count(), model.mesh.vertex_count());
+    }
+}
+
+TEST(ModelStream, TheWholeFileIsAModelWithItsPoses) {
+    const Model model = wavy_model();
+    const PoseSequence poses = turning(model, 300); // more than a block
+    const std::string bytes = stream_of(model, poses);
+    const Model back = read_model(bytes, "it", kContext).value();
+    EXPECT_EQ(back.mesh.face_count(), model.mesh.face_count());
+    EXPECT_EQ(back.driver().vertices.size(), model.driver().vertices.size());
+    const PoseSequence read = read_poses(bytes, "it", kContext).value();
+    ASSERT_EQ(read.frames.size(), poses.frames.size());
+    EXPECT_EQ(read.frames_per_second, 30);
+    const float diagonal = float(world_bounds(model.mesh).diagonal());
+    for (std::size_t t = 0; t < poses.frames.size(); t += 37)
+        for (std::size_t v = 0; v < poses.frames[t].positions.size(); ++v) {
+            ASSERT_LT((read.frames[t].positions[v] - poses.frames[t].positions[v]).norm(), 1e-4f * diagonal);
+            ASSERT_LT((read.frames[t].gradients[v] - poses.frames[t].gradients[v]).norm(), 1e-2f);
+        }
+    const ModelOutline outline = read_model_outline(FileReader(bytes), "it", kContext).value();
+    EXPECT_EQ(outline.frames, 300u);
+    EXPECT_TRUE(outline.has_gradients);
+}
+
+TEST(ModelStream, OtherFilesAndDamageAreNamed) {
+    const Model model = wavy_model();
+    ModelStream plain("plain.fil");
+    EXPECT_EQ(plain.feed(write_model(model)).error().code, ErrorCode::unsuitable);
+    ModelStream text("it.txt");
+    EXPECT_EQ(text.feed(std::string(100, 'x')).error().code, ErrorCode::bad_file);
+    const std::string bytes = stream_of(model, {});
+    for (std::size_t at = 0; at < bytes.size(); at += 11) {
+        std::string damaged = bytes;
+        damaged[at] = char(damaged[at] ^ 0x41);
+        ModelStream stream("it");
+        const Status fed = stream.feed(damaged);
+        if (fed)
+            EXPECT_EQ(check_mesh(stream.mesh()), "");
+        else
+            EXPECT_EQ(fed.error().code, ErrorCode::bad_file) << fed.error().message;
+    }
+}
