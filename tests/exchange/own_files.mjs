@@ -32,6 +32,9 @@ filigree('export', ...moving, '-o', 'skin_6.glb', '--influences', '6', '--full-p
 filigree('export', ...moving, '-o', 'skin_flat.glb', '--no-normals', '--key-rate', '6');
 filigree('export', ...moving, '-o', 'morph.glb', '--as', 'morph', '--morph-normals');
 filigree('export', ...moving, '-o', 'page', '--web');
+filigree('export', ...moving, '-o', 'stream_page', '--web', '--stream');
+filigree('restore', 'stream_page/model.fil', '--frame', String(kFrames), '-o', 'stream_last.obj');
+filigree('export', ...moving, '-o', 'compressed.glb', '--compress');
 
 // Two objects, two materials and a UV seam: a tube of which each half is an object, its texture's ends at one edge.
 const kAround = 24, kRings = 16;

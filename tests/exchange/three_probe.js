@@ -1,12 +1,13 @@
 // Runs in the browser: three.js' own loader and skinning, asked for every vertex.
 import * as THREE from 'three';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
+import { MeshoptDecoder } from 'three/addons/libs/meshopt_decoder.module.js';
 
 let scene, mixer, action, mesh;
 
 /// Loads the model. Returns { vertices, triangles, joints, duration }.
 export async function load(url) {
-    const gltf = await new GLTFLoader().loadAsync(url);
+    const gltf = await new GLTFLoader().setMeshoptDecoder(MeshoptDecoder).loadAsync(url);
     scene = gltf.scene;
     scene.updateMatrixWorld(true);
     scene.traverse((node) => { if (node.isMesh && !mesh) mesh = node; });

@@ -9,6 +9,8 @@ const kHidden = 0.28; // opacity of what lies behind the surface
 
 /// Lines that follow the coarsest level's mesh. Null where there is nothing to show.
 export function make_driver(model, diagonal) {
+  if (model.driver_level) return new DriverEdges(model.driver_level, kNearer * diagonal);
+  if (model.is_stream) return null;
   if (model.levels.length > 1) return new DriverEdges(model.levels.at(-1), kNearer * diagonal);
   const skinned = model.levels[0].meshes.find((mesh) => mesh.isSkinnedMesh);
   return skinned ? new DriverJoints(skinned.skeleton) : null;

@@ -4,6 +4,7 @@ import { count_text, facts_of, size_text, sizes_of } from './facts.js';
 import { load_bytes, Model } from './model.js';
 import { correct_skinned_normals } from './normals.js';
 import { Stage } from './stage.js';
+import { StreamModel } from './stream_model.js';
 import { Wireframe } from './wireframe.js';
 
 const element = (id) => document.getElementById(id);
@@ -38,6 +39,32 @@ class Page {
     if (model.action && !matchMedia('(prefers-reduced-motion: reduce)').matches) this.toggle_play();
   }
 
+  // ---- a model that comes level by level
+
+  /// Takes levels as they come, but none that would not be seen; goes on when the view comes nearer.
+  async receive() {
+    const { model } = this;
+    while (!model.is_whole) {
+      if (model.chooses && !model.choose_level(this.stage.camera, this.stage.height).wants_more)
+        await new Promise((resolve) => { this.wake = resolve; });
+      else {
+        await model.next_level();
+        this.fill_levels();
+        this.fill_facts();
+        if (model.chooses) this.choose_level();
+        else this.show_level(model.level);
+        this.draw();
+      }
+      await new Promise((resolve) => { setTimeout(resolve); }); // a picture between two levels
+    }
+  }
+
+  choose_level() {
+    const { number, wants_more } = this.model.choose_level(this.stage.camera, this.stage.height);
+    if (wants_more) this.wake?.();
+    if (number !== this.model.level || !this.model.levels[number].nodes[0].visible) this.show_level(number);
+  }
+
   // ---- drawing
 
   /// Soon, once for all that changes until then.
@@ -50,6 +77,7 @@ class Page {
       this.advance(passed * this.speed);
     }
     this.last_drawn = now;
+    if (this.model.chooses) this.choose_level();
     if (this.stage.draw() || this.is_playing) this.draw();
   }
 
@@ -128,13 +156,22 @@ class Page {
     this.wireframe.follow_level();
     const { vertices, triangles } = levels[number];
     for (const button of element('levels').children) {
-      const chosen = Number(button.dataset.level) === number;
+      const chosen = button.dataset.level === undefined ? this.model.chooses
+        : !this.model.chooses && Number(button.dataset.level) === number;
       button.setAttribute('aria-checked', chosen);
       button.tabIndex = chosen ? 0 : -1;
     }
     const counts = `${count_text(vertices)} vertices, ${count_text(triangles)} triangles`;
-    element('level-note').textContent = number === levels.length - 1 && number > 0 ? `The driver: ${counts}` : counts;
+    element('level-note').textContent = number === levels.length - 1 && number > 0 && !this.model.is_stream ? `The driver: ${counts}` : counts;
     this.draw();
+  }
+
+  /// The user's choice.
+  pick_level(number) {
+    if (number < 0 || number >= this.model.levels.length) return;
+    this.model.chooses = false;
+    this.wake?.();
+    this.show_level(number);
   }
 
   show_driver(shown) {
@@ -155,13 +192,21 @@ class Page {
   fill_levels() {
     const { levels } = this.model;
     element('levels-section').hidden = levels.length < 2;
+    element('levels').replaceChildren();
+    if (this.model.is_stream) {
+      const button = text_in('button', 'Auto');
+      button.title = 'The level whose error is smaller than a pixel';
+      button.setAttribute('role', 'radio');
+      button.onclick = () => { this.model.chooses = true; this.choose_level(); this.show_level(this.model.level); };
+      element('levels').append(button);
+    }
     for (let number = levels.length - 1; number >= 0; --number) {
       const button = document.createElement('button');
       button.textContent = levels.length - 1 - number;
       button.dataset.level = number;
       button.title = `${count_text(levels[number].triangles)} triangles`;
       button.setAttribute('role', 'radio');
-      button.onclick = () => this.show_level(number);
+      button.onclick = () => this.pick_level(number);
       element('levels').append(button);
     }
     element('driver').disabled = !this.driver;
@@ -189,7 +234,9 @@ class Page {
       ? `${ratio >= 10 ? Math.round(ratio) : ratio.toFixed(1)} times smaller than every vertex at every key`
       : '';
     element('facts').replaceChildren(...facts_of(this.model).flatMap(([name, value]) => [text_in('dt', name), text_in('dd', value)]));
-    element('summary').textContent = `${count_text(this.model.levels[0].triangles)} triangles, ${size_text(this.model.bytes)}`;
+    const { is_stream, is_whole, bytes, bytes_read } = this.model;
+    const size = is_stream && !is_whole ? `${size_text(bytes_read)} of ${size_text(bytes)}` : size_text(bytes);
+    element('summary').textContent = `${count_text(this.model.levels[0].triangles)} triangles, ${size}`;
   }
 
   choose_clip(number) {
@@ -230,8 +277,8 @@ class Page {
       ' ': () => this.toggle_play(),
       ArrowLeft: () => this.step(-1),
       ArrowRight: () => this.step(1),
-      ArrowUp: () => this.show_level(this.model.level - 1),
-      ArrowDown: () => this.show_level(this.model.level + 1),
+      ArrowUp: () => this.pick_level(this.model.level - 1),
+      ArrowDown: () => this.pick_level(this.model.level + 1),
       d: () => this.show_driver(!element('driver').checked),
       w: () => this.show_wireframe(!element('wireframe').checked),
       l: () => this.toggle_loop(),
@@ -240,7 +287,7 @@ class Page {
       h: () => element('help').showModal(),
       '?': () => element('help').showModal(),
     };
-    const action = /^[0-9]$/.test(event.key) ? () => this.show_level(levels.length - 1 - Number(event.key))
+    const action = /^[0-9]$/.test(event.key) ? () => this.pick_level(levels.length - 1 - Number(event.key))
       : keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
     if (!action) return;
     event.preventDefault();
@@ -257,16 +304,19 @@ function text_in(name, text) {
 async function open() {
   try {
     correct_skinned_normals();
-    const model = await Model.load(await load_bytes());
+    const is_stream = document.documentElement.dataset.model === 'stream';
+    const model = is_stream ? await StreamModel.load() : await Model.load(await load_bytes());
     window.filigree = new Page(model);
+    element('loading').remove();
+    if (is_stream) await window.filigree.receive();
   } catch (cause) {
     document.documentElement.dataset.theme = matchMedia('(prefers-color-scheme: dark)').matches ? 'dark' : 'light';
     element('failure').hidden = false;
     element('failure-cause').textContent = /WebGL/.test(cause.message)
       ? 'This browser does not draw in three dimensions (WebGL 2); try another one, or allow it in the settings.'
       : cause.message;
+    element('loading')?.remove();
   }
-  element('loading').remove();
 }
 
 open();

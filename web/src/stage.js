@@ -101,6 +101,7 @@ export class Stage {
   resize(width, height, right, bottom) {
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.renderer.setSize(width, height, false);
+    this.height = height * this.renderer.getPixelRatio(); // pixels of the screen
     this.camera.aspect = width / height;
     this.free = { width: width - right, height: height - bottom };
     this.camera.setViewOffset(width, height, right / 2, bottom / 2, width, height);

@@ -26,11 +26,11 @@ export class Wireframe {
 
   copy(mesh) {
     if (!this.copies.has(mesh)) {
-      const copy = mesh.isSkinnedMesh ? new THREE.SkinnedMesh(mesh.geometry, this.material)
-        : new THREE.Mesh(mesh.geometry, this.material);
+      const copy = new mesh.constructor(mesh.geometry, this.material);
       if (mesh.isSkinnedMesh) copy.bind(mesh.skeleton, mesh.bindMatrix);
       copy.morphTargetInfluences = mesh.morphTargetInfluences;
       copy.frustumCulled = false;
+      if (mesh.boundingSphere !== undefined) copy.boundingSphere = mesh.boundingSphere;
       mesh.add(copy);
       this.copies.set(mesh, copy);
     }
