@@ -3,6 +3,7 @@
 #include <chrono>
 #include <exception>
 #include <map>
+#include <pthread.h>
 #include <thread>
 #include <vector>
 
@@ -15,12 +16,6 @@ using std::chrono::milliseconds;
 constexpr milliseconds kSignalsEvery(20);
 constexpr milliseconds kPatience(100); ///< after an interruption, with work that may be left
 
-/// Threads that were left. Guarded by the interpreter.
-std::vector<std::thread>& left_threads() {
-    static std::vector<std::thread> threads;
-    return threads;
-}
-
 /// In the thread of the work, which may outlive the call.
 void do_work(const std::shared_ptr<Job>& job) {
     try {
@@ -32,6 +27,68 @@ void do_work(const std::shared_ptr<Job>& job) {
     const std::lock_guard lock(job->mutex);
     job->is_done = true;
     job->changed.notify_one();
+}
+
+/// A thread that does one job after the other. Libraries keep something for every thread that ever called them (Embree
+/// a few kilobytes), so threads are kept.
+class Worker {
+public:
+    Worker() : thread_([this] { work(); }) {}
+    ~Worker() {
+        give(nullptr);
+        thread_.join();
+    }
+    Worker(const Worker&) = delete;
+    Worker& operator=(const Worker&) = delete;
+
+    /// Null: no more will come.
+    void give(std::shared_ptr<Job> job) {
+        const std::lock_guard lock(mutex_);
+        next_ = std::move(job);
+        has_next_ = true;
+        changed_.notify_one();
+    }
+
+private:
+    void work() {
+        for (;;) {
+            std::shared_ptr<Job> job;
+            {
+                std::unique_lock lock(mutex_);
+                changed_.wait(lock, [&] { return has_next_; });
+                has_next_ = false;
+                job = std::move(next_);
+            }
+            if (!job) return;
+            do_work(job);
+        }
+    }
+
+    std::mutex mutex_;
+    std::condition_variable changed_;
+    std::shared_ptr<Job> next_;
+    bool has_next_ = false;
+    std::thread thread_; ///< the last member: it uses the others
+};
+
+/// Workers that wait, and those that were left at work. Guarded by the interpreter. A forked process has none of these
+/// threads, so it forgets them.
+struct Workers {
+    std::vector<std::unique_ptr<Worker>> idle, left;
+};
+Workers*& workers() {
+    static Workers* all = [] {
+        ::pthread_atfork(nullptr, nullptr, [] { workers() = new Workers; });
+        return new Workers;
+    }();
+    return all;
+}
+std::unique_ptr<Worker> idle_worker() {
+    auto& idle = workers()->idle;
+    if (idle.empty()) return std::make_unique<Worker>();
+    std::unique_ptr<Worker> worker = std::move(idle.back());
+    idle.pop_back();
+    return worker;
 }
 
 /// Waits a while for the end; whether it has come.
@@ -61,7 +118,8 @@ void LongCall::run(const std::shared_ptr<Job>& job, bool may_be_left) const {
             job.has_news = true;
         };
     }
-    std::thread worker([job] { do_work(job); });
+    std::unique_ptr<Worker> worker = idle_worker();
+    worker->give(job);
 
     std::exception_ptr raised; // by a signal's handler or the callback
     for (bool is_done = false; !is_done && !raised;) {
@@ -85,16 +143,20 @@ void LongCall::run(const std::shared_ptr<Job>& job, bool may_be_left) const {
         }
     }
     if (raised && may_be_left && !wait_for_end(*job, kPatience)) {
-        left_threads().push_back(std::move(worker));
+        workers()->left.push_back(std::move(worker));
         std::rethrow_exception(raised);
     }
-    without_interpreter([&] { worker.join(); });
+    while (!wait_for_end(*job, kPatience)) {
+    }
+    workers()->idle.push_back(std::move(worker));
     if (raised) std::rethrow_exception(raised);
     if (job->thrown) std::rethrow_exception(job->thrown);
 }
 
 void join_left_work() {
-    for (std::thread& thread : std::exchange(left_threads(), {})) without_interpreter([&] { thread.join(); });
+    Workers ended = std::move(*workers());
+    *workers() = {};
+    without_interpreter([&] { ended = {}; });
 }
 
 } // namespace filigree::python

@@ -90,10 +90,10 @@ py::dict export_poses(const Model& model, const PoseSequence& poses, const Expor
 
 py::dict export_model(const PyModel& self, const fs::path& path, const py::object& poses, double frames_per_second,
                       const std::optional<std::string>& as, std::optional<double> key_rate,
-                      const std::string& interpolation, unsigned influences, bool full_precision, bool all_levels,
-                      bool normals, bool morph_normals, const std::optional<std::string>& law, bool thin_shell,
-                      std::optional<unsigned> level, const fs::path& materials_beside, unsigned threads,
-                      const py::object& progress) {
+                      const std::string& interpolation, unsigned influences, bool full_precision, bool compress,
+                      bool all_levels, bool normals, bool morph_normals, const std::optional<std::string>& law,
+                      bool thin_shell, std::optional<unsigned> level, const fs::path& materials_beside,
+                      unsigned threads, const py::object& progress) {
     const Model& model = *self.model;
     const LongCall call{threads, progress};
     if (poses.is_none()) {
@@ -118,6 +118,7 @@ py::dict export_model(const PyModel& self, const fs::path& path, const py::objec
     if (influences != 3 && influences != 6) refuse("influences has to be 3 or 6.");
     options.skin.influences = influences;
     options.skin.full_precision = full_precision;
+    options.skin.compress = options.morph.compress = compress;
     options.skin.all_levels = all_levels;
     options.skin.normals = options.morph.normals = normals ? ExportNormals::keep : ExportNormals::leave;
     options.morph.morph_normals = morph_normals;
@@ -154,10 +155,11 @@ void add_exporting(py::module_& m) {
         "export", &export_model, py::arg("model"), py::arg("path"), py::arg("poses") = py::none(), py::kw_only(),
         py::arg("frames_per_second") = 60.0, py::arg("motion") = py::none(), py::arg("key_rate") = py::none(),
         py::arg("interpolation") = "linear", py::arg("influences") = 3, py::arg("full_precision") = false,
-        py::arg("all_levels") = false, py::arg("normals") = true, py::arg("morph_normals") = false,
-        py::arg("law") = py::none(), py::arg("thin_shell") = false, py::arg("level") = py::none(),
-        py::arg("materials_beside") = "", py::arg("threads") = 0, py::arg("progress") = py::none(),
-        R"(export(model, path, poses=None, *, frames_per_second=60.0, motion=None, key_rate=None, interpolation='linear', influences=3, full_precision=False, all_levels=False, normals=True, morph_normals=False, law=None, thin_shell=False, level=None, materials_beside='', threads=0, progress=None)
+        py::arg("compress") = false, py::arg("all_levels") = false, py::arg("normals") = true,
+        py::arg("morph_normals") = false, py::arg("law") = py::none(), py::arg("thin_shell") = false,
+        py::arg("level") = py::none(), py::arg("materials_beside") = "", py::arg("threads") = 0,
+        py::arg("progress") = py::none(),
+        R"(export(model, path, poses=None, *, frames_per_second=60.0, motion=None, key_rate=None, interpolation='linear', influences=3, full_precision=False, compress=False, all_levels=False, normals=True, morph_normals=False, law=None, thin_shell=False, level=None, materials_beside='', threads=0, progress=None)
 --
 
 Write a model, moving or at rest, for other programs.
@@ -181,6 +183,8 @@ influences : int
     Skin: 3 joints a vertex, which plays in everything, or 6.
 full_precision, all_levels : bool
     Skin: float rotations and weights; coarser levels too.
+compress : bool
+    GLB: packed with EXT_meshopt_compression and KHR_mesh_quantization, which viewers have to know.
 normals : bool
     GLB: False leaves them out, and viewers shade flat.
 morph_normals : bool
