@@ -67,6 +67,7 @@ std::vector<std::string> seeds() {
         all.push_back(write_model(model, poses));
         all.push_back(coded_file(model, {}));
         all.push_back(coded_file(model, {.bits = 10, .surface = true, .keep_order = true}));
+        all.push_back(coded_file(model, {.levels = true}));
     }
     const Mesh cube = make_wavy_cube({.resolution = 4});
     all.push_back(write_model(strip(cube, {.code = DetailCode::reference}, kContext).value().model));
@@ -91,7 +92,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     is_sound(ModelChunks::open(FileReader(std::string_view(bytes)), "fuzz", kContext));
     if (!is_sound(model)) return 0;
     require(check_model(*model).empty(), "what was read is a sound model");
-    require(outline.ok() && outline->levels.size() == model->levels.size() + 1, "the outline has the model's levels");
+    require(outline.ok(), outline.ok() ? "" : outline.error().message.c_str());
+    require(outline->levels.size() == model->levels.size() + 1, "the outline has the model's levels");
     for (unsigned k = 0; k < outline->levels.size(); ++k)
         require(outline->levels[k].vertices == level_counts(*model, k).vertices,
                 "the outline has the levels' vertices");

@@ -1,0 +1,44 @@
+#!/usr/bin/python3
+"""Writes docs/reliability.md. Usage: reliability.py COUNTS PAGE ROOT"""
+import json, sys
+from collections import defaultdict
+from pathlib import Path
+
+counts, page, root = (Path(word) for word in sys.argv[1:4])
+lines = ['# Reliability', '',
+         'Written by `scripts/reliability` from what `scripts/fuzz` and `scripts/torture` counted last; not by hand.', '']
+
+executions = defaultdict(lambda: [0, 0, '', ''])
+if (counts / 'fuzz').exists():
+    for line in (counts / 'fuzz').read_text().splitlines():
+        name, runs, minutes, status, day, commit = line.split()
+        entry = executions[name]
+        entry[0] += int(runs)
+        entry[1] += int(minutes)
+        entry[2:] = ['broke it' if status != '0' else 'none broke it', f'{day}, {commit}']
+    lines += ['## Fuzzing', '',
+              "libFuzzer with the address and undefined-behaviour sanitizers (`scripts/fuzz`). What broke a target lies in `tests/fuzz/crashes` and is replayed by `scripts/test`.", '',
+              '| target | inputs | minutes | in the last run | last run |', '|---|---|---|---|---|']
+    for name, (runs, minutes, said, when) in sorted(executions.items()):
+        kept = len(list((root / 'tests/fuzz/crashes' / name).glob('*')))
+        lines.append(f'| `{name}` | {runs:,} | {minutes} | {said}{f"; {kept} kept as tests" if kept else ""} | {when} |')
+    lines += [f'| all | {sum(entry[0] for entry in executions.values()):,} | | | |', '']
+
+if (counts / 'torture.json').exists():
+    told = json.loads((counts / 'torture.json').read_text())
+    when = (counts / 'torture.when').read_text().strip()
+    lines += ['## Torture of outputs', '',
+              'Twelve kinds of output under kills, failing calls (write, fsync, rename, open, malloc), full disks, file-size and memory limits, and two writers at once (`scripts/torture`). Afterwards the old file has to be there whole or the new one byte for byte, with nothing beside it.', '',
+              '| | |', '|---|---|',
+              f'| kills that struck before the end | {told["kills_struck"]} of {told["kills"]} |',
+              f'| failing calls that struck | {told["failures_struck"]} of {told["failures"]} |',
+              f'| limits, full disks, rival writers | {told["limits"]} |',
+              f'| wrong | {told["wrong"]} |',
+              f'| last run | {when} |', '']
+    lines += [f'- {sentence}' for sentence in told.get('sentences', [])]
+
+lines += ['## What nothing covers', '',
+          '- Fuzz targets are missing for poses, scenes, handles, materials and pictures, remesh, the melting surface and bodies; these are fuzzed by tests of random input alone.',
+          '- The studio is played by scripts, not by hours of random actions.',
+          '- No line coverage, no mutation testing, no soak of a day.', '']
+page.write_text('\n'.join(lines))
