@@ -82,18 +82,23 @@ public:
     /// Meshes in few bits.
     void coding() {
         const double vertices = double(mesh_.vertex_count()), diagonal = world_bounds(mesh_).diagonal();
-        for (const unsigned bits : {12u, 14u}) {
-            const std::string name = "coding." + std::to_string(bits);
-            MeshCodeReport report;
-            CodedMesh coded;
-            const double encode =
-                median_seconds([&] { coded = encode_mesh(mesh_, {.bits = bits}, &report, context_).value(); });
-            const double decode = median_seconds([&] { (void)decode_mesh(coded, context_).value(); });
-            add(name + "_bits", 8 * double(coded.connectivity.size() + coded.places.size()) / vertices, "bits/vertex");
-            add(name + "_rms", report.rms / diagonal, "of the diagonal");
-            add(name + "_encode", vertices / encode, "vertices/s");
-            add(name + "_decode", vertices / decode, "vertices/s");
-        }
+        for (const unsigned bits : {12u, 14u})
+            for (const bool levels : {false, true}) {
+                const std::string name = (levels ? "coding.stream_" : "coding.") + std::to_string(bits);
+                MeshCodeReport report;
+                CodedMesh coded;
+                const double encode = median_seconds(
+                    [&] { coded = encode_mesh(mesh_, {.bits = bits, .levels = levels}, &report, context_).value(); });
+                const double decode = median_seconds([&] { (void)decode_mesh(coded, context_).value(); });
+                std::size_t bytes = coded.connectivity.size() + coded.places.size() + coded.levels.connectivity.size() +
+                                    coded.levels.places.size();
+                for (const CodedLevel& level : coded.levels.levels)
+                    bytes += level.splits.size() + level.refinement.size();
+                add(name + "_bits", 8 * double(bytes) / vertices, "bits/vertex");
+                add(name + "_rms", report.rms / diagonal, "of the diagonal");
+                add(name + "_encode", vertices / encode, "vertices/s");
+                add(name + "_decode", vertices / decode, "vertices/s");
+            }
     }
 
     /// A deformer that costs something, over every vertex and over the driver alone.

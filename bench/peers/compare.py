@@ -37,6 +37,10 @@ for bits in (12, 14):
             (f"coded at {bits} bits / Draco -cl {level}", f"coding.{bits}_bits", f"draco.cl{level}_{bits}_bits"),
             (f"decoding at {bits} bits / Draco -cl {level}", f"coding.{bits}_decode", f"draco.cl{level}_{bits}_decode"),
         ]
+    PAIRS += [
+        (f"stream at {bits} bits / Draco -cl 7", f"coding.stream_{bits}_bits", f"draco.cl7_{bits}_bits"),
+        (f"decoding a stream at {bits} bits / Draco -cl 7", f"coding.stream_{bits}_decode", f"draco.cl7_{bits}_decode"),
+    ]
 for n in (64, 128, 256, 512):
     PAIRS += [
         (f"inside, {n}: scan / CGAL, exact", f"inside.scan_{n}", f"inside.cgal_{n}"),

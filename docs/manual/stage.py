@@ -19,7 +19,7 @@ PARTS = {
     "First steps": ["command-line", "python", "blender", "studio", "gallery"],
     "Guides": ["blend-code", "coding", "handles", "bodies", "scenes", "fracture", "melting", "remesh", "inside-points", "rendering", "exchange", "cluster", "web"],
     "File formats": ["formats", "animations", "fil-format"],
-    "How it works": ["reference-code", "figures", "benchmarks", "conventions", "architecture", "contributing"],
+    "How it works": ["reference-code", "figures", "benchmarks", "reliability", "conventions", "architecture", "contributing"],
 }
 CODE = {".cpp": "cpp", ".h": "cpp", ".py": "python", ".toml": "toml", ".sh": "bash"}
 
