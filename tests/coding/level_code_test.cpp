@@ -1,7 +1,7 @@
 // A mesh in levels: what a reader has is what was written; every beginning of the streams is a closed map; each level
 // is nearer; damage is named.
 #include "filigree/coding/coarsening.h"
-#include "filigree/coding/mesh_code.h"
+#include "filigree/coding/mesh_levels.h"
 #include "filigree/mesh/mesh_distance.h"
 #include "filigree/mesh/shapes.h"
 

@@ -1,6 +1,7 @@
 // Writes a map level by level, as level_reader.h reads it.
 #pragma once
 
+#include "filigree/coding/coded_levels.h"
 #include "filigree/coding/connectivity_code.h"
 #include "filigree/coding/geometry_code.h"
 #include "filigree/core/run_context.h"
@@ -11,17 +12,6 @@ struct LevelCodeOptions {
     std::size_t fewest = 500; ///< vertices of the coarsest level, or more where none can go
     GeometrySteps steps;      ///< of the levels
     bool is_refined = false;  ///< whether quarters of the steps follow, which are four then
-};
-
-struct CodedLevel {
-    std::uint32_t batches = 0, vertices = 0, triangles = 0; ///< the map's after it, those that close holes included
-    std::string splits = {}, refinement = {};
-};
-
-struct CodedLevels {
-    std::uint32_t vertices = 0, triangles = 0; ///< the coarsest's
-    std::string connectivity = {}, places = {};
-    std::vector<CodedLevel> levels = {}; ///< each about twice as many vertices as the one before
 };
 
 struct EncodedLevels {

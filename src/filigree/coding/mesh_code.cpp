@@ -3,6 +3,7 @@
 #include "filigree/coding/face_code.h"
 #include "filigree/coding/geometry_code.h"
 #include "filigree/coding/integer_frame.h"
+#include "filigree/coding/mesh_levels.h"
 
 #include <algorithm>
 #include <bit>

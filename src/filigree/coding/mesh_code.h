@@ -2,8 +2,7 @@
 // on.
 #pragma once
 
-#include "filigree/coding/level_reader.h"
-#include "filigree/coding/level_writer.h"
+#include "filigree/coding/coded_levels.h"
 #include "filigree/core/result.h"
 #include "filigree/core/run_context.h"
 #include "filigree/mesh/mesh.h"
@@ -17,7 +16,7 @@ struct MeshCodeOptions {
     /// Steps across the surface four times as long as along its normal: vertices slide in the surface.
     bool surface = false;
     bool keep_order = false; ///< vertices, faces and first corners come back in their order
-    bool levels = false;     ///< coarse to fine, so that every beginning is a mesh, see level_reader.h
+    bool levels = false;     ///< coarse to fine, so that every beginning is a mesh, see coded_levels.h
     bool operator==(const MeshCodeOptions&) const = default;
 };
 
@@ -38,12 +37,6 @@ struct MeshCodeReport {
     std::vector<Index> vertex;   ///< of each coded vertex: which one it was
     double rms = 0, largest = 0; ///< of the places, model units
 };
-
-/// How a mesh's levels are coded: steps four times as long first, then quarters of them, unless they are long already.
-LevelCodeOptions level_options(const MeshCodeOptions& options);
-
-/// What a reader of levels has so far, as triangles. No normals, no attributes; copies of vertices where sheets meet.
-Mesh mesh_of_levels(const LevelReader& levels, const CodedMesh& coded);
 
 /// Errors: usage (bits), unsuitable (nothing to code), cancelled. Cost O(size log size), about 0.6 processor seconds a
 /// million vertices.

@@ -2,6 +2,7 @@
 
 #include "filigree/coding/clip_code.h"
 #include "filigree/coding/driver_code.h"
+#include "filigree/coding/mesh_levels.h"
 #include "filigree/hierarchy/restore.h"
 #include "filigree/hierarchy/strip.h"
 #include "filigree/hierarchy/vertex_order.h"

@@ -1,6 +1,7 @@
 #include "filigree/io/model_stream.h"
 
 #include "filigree/coding/face_code.h"
+#include "filigree/coding/mesh_levels.h"
 #include "filigree/io/model_code.h"
 
 #include <limits>
