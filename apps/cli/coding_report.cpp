@@ -22,6 +22,7 @@ void add_coding_shares(const CodedBytes& parts, std::size_t vertices, std::optio
         share("refinements", parts.refinements);
     }
     share("connectivity", parts.connectivity);
+    if (parts.records > 0) share("records", parts.records);
     share("places", parts.places);
     share("attributes", parts.attributes);
     share("order", parts.order);

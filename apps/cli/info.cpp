@@ -159,6 +159,10 @@ void describe_coding(const ModelOutline& model, Report& report) {
 }
 
 void describe_code(const ModelOutline& model, Report& report) {
+    if (model.lossless) {
+        report.add("coded", "lossless", "coding", {{"profile", "lossless"}});
+        add_coding_shares(*model.lossless, model.levels.back().vertices, model.bytes, report);
+    }
     if (model.code == DetailCode::reference) {
         report.add("references", std::to_string(model.references), "references", model.references);
         report.count("patches", "patches", model.patches);

@@ -11,19 +11,24 @@ namespace filigree::cli {
 
 namespace {
 
+enum class Profile { compact, stream, lossless };
+
 struct PackArguments {
     std::string input, output;
     std::optional<std::size_t> base;
+    Profile profile = Profile::compact;
     MeshCodeOptions code;
 };
+
+std::uint64_t size_of(const std::string& path) {
+    return std::filesystem::is_regular_file(path) ? std::uint64_t(std::filesystem::file_size(path)) : 0;
+}
 
 void report_coding(const Model& model, const CodingReport& coding, const PackArguments& options, double seconds,
                    Report& report) {
     const double diagonal = world_bounds(model.mesh).diagonal();
     const double share = diagonal > 0 ? 1 / diagonal : 0;
-    const std::uint64_t bytes = std::filesystem::is_regular_file(options.output)
-                                    ? std::uint64_t(std::filesystem::file_size(options.output))
-                                    : 0;
+    const std::uint64_t bytes = size_of(options.output);
     report.set("output", options.output);
     report.count("vertices", "vertices", model.mesh.vertex_count());
     report.count("driver", "driver_vertices", model.driver().vertices.size());
@@ -66,13 +71,46 @@ Model model_of(const PackArguments& options, Session& session, PoseSequence& pos
     return require(strip(std::move(mesh), {.base = options.base}, session.context())).model;
 }
 
-void run(const PackArguments& options, Session& session) {
+/// Codes the model bit for bit, reads it back, and says how much smaller it became.
+void pack_lossless(const Model& model, const PoseSequence& poses, const PackArguments& options, Session& session) {
+    const double start = now_seconds();
+    const LosslessReport coding = require(write_lossless_model(model, poses, options.output, session.context()));
+    const double seconds = now_seconds() - start;
+    const std::uint64_t bytes = size_of(options.output);
+    Report report;
+    report.set("output", options.output);
+    report.count("vertices", "vertices", model.mesh.vertex_count());
+    report.count("driver", "driver_vertices", model.driver().vertices.size());
+    add_coding_shares(coding.bytes, model.mesh.vertex_count(), bytes, report);
+    report.count("bytes", "bytes", bytes);
+    report.set("seconds", seconds);
+    if (options.output == "-") return session.print(report);
+    const RunContext context = session.silent_context();
+    const double read_start = now_seconds();
+    const FileReader file = require(FileReader::open(options.output));
+    require(read_model(file, options.output, context)); // held against the plain sections' checksums
+    require(read_poses(file, options.output, context));
+    const double read_seconds = now_seconds() - read_start;
+    report.add("plain model",
+               fmt::format("{} bytes, {:.2f} times as many; every number came back", with_commas(coding.plain),
+                           double(coding.plain) / double(std::max<std::uint64_t>(bytes, 1))),
+               "plain_bytes", coding.plain);
+    report.add("reads in", seconds_text(read_seconds), "read_seconds", read_seconds);
+    session.print(report);
+}
+
+void run(PackArguments options, Session& session) {
     if (mesh_format(options.output).ok())
         refuse(options.output + ": is the name of a mesh; give the model another, such as NAME.fil.");
+    options.code.levels = options.profile == Profile::stream;
+    if (options.profile == Profile::lossless && options.code != MeshCodeOptions())
+        refuse("--bits, --surface and --keep-order are for what rounds; --profile lossless keeps every number and "
+               "their order.");
     PoseSequence poses;
     const Model model = model_of(options, session, poses);
-    const double start = now_seconds();
     session.begin_writing(options.output);
+    if (options.profile == Profile::lossless) return pack_lossless(model, poses, options, session);
+    const double start = now_seconds();
     const CodingReport coding =
         require(write_coded_model(model, poses, options.code, options.output, session.context()));
     Report report;
@@ -139,9 +177,11 @@ Command pack_command() {
         .text = "Code a mesh or a model in few bits: a model file that every command reads",
         .options = {Option("input", options->input, "Mesh or model").is_read().required(),
                     Option("-o,--output", options->output, "Model file to write (.fil)").is_written().required(),
-                    choice<bool>("--profile", options->code.levels, {{"compact", false}, {"stream", true}},
-                                 "compact: the fewest bits; stream: coarse to fine, so that its first bytes show the "
-                                 "whole shape (compact unless said)"),
+                    choice<Profile>(
+                        "--profile", options->profile,
+                        {{"compact", Profile::compact}, {"stream", Profile::stream}, {"lossless", Profile::lossless}},
+                        "compact: the fewest bits; stream: coarse to fine, so that its first bytes show "
+                        "the whole shape; lossless: every number comes back (compact unless said)"),
                     Option("--bits", options->code.bits, "Of positions, along the longest side of the box")
                         .between(10, 16)
                         .with_default(),
@@ -153,7 +193,8 @@ Command pack_command() {
         .examples = "  filigree pack scan.ply -o scan.fil\n"
                     "  filigree pack scan.fil -o small.fil --bits 12 --surface\n"
                     "  filigree pack shot.fil -o small.fil --keep-order\n"
-                    "  filigree pack scan.ply -o scan.fil --profile stream",
+                    "  filigree pack scan.ply -o scan.fil --profile stream\n"
+                    "  filigree pack shot.fil -o shot-small.fil --profile lossless",
         .run = [options](Session& session) { run(*options, session); }};
 }
 

@@ -52,6 +52,15 @@ std::string coded_file(const Model& model, const MeshCodeOptions& options) {
     return bytes;
 }
 
+std::string lossless_file(const Model& model, const PoseSequence& poses) {
+    const std::filesystem::path path =
+        std::filesystem::temp_directory_path() / ("fuzz-" + std::to_string(::getpid()) + ".fil");
+    std::string bytes;
+    if (write_lossless_model(model, poses, path, kContext)) bytes = FileReader::open(path)->read_all().value();
+    std::filesystem::remove(path);
+    return bytes;
+}
+
 } // namespace
 
 namespace filigree_fuzz {
@@ -65,6 +74,7 @@ std::vector<std::string> seeds() {
         PoseSequence poses;
         poses.frames = {rest_pose(model), rest_pose(model)};
         all.push_back(write_model(model, poses));
+        all.push_back(lossless_file(model, poses));
         all.push_back(coded_file(model, {}));
         all.push_back(coded_file(model, {.bits = 10, .surface = true, .keep_order = true}));
         all.push_back(coded_file(model, {.levels = true}));

@@ -64,9 +64,15 @@ py::dict pack_model_file(const PyModel& model, const fs::path& path, unsigned bi
                          const py::object& progress) {
     refuse_pipe(path);
     const PoseSequence sequence = poses.is_none() ? PoseSequence{} : poses_of(poses, 60);
-    const bool levels = value_of<bool>(profile, "profile", {{"compact", false}, {"stream", true}});
+    enum class Profile { compact, stream, lossless };
+    const auto chosen = value_of<Profile>(
+        profile, "profile",
+        {{"compact", Profile::compact}, {"stream", Profile::stream}, {"lossless", Profile::lossless}});
     const CodingReport report = LongCall{threads, progress}([&](const RunContext& context) {
-        return write_coded_model(*model.model, sequence, {bits, surface, keep_order, levels}, path, context).value();
+        if (chosen == Profile::lossless)
+            return CodingReport{.bytes = write_lossless_model(*model.model, sequence, path, context).value().bytes};
+        const MeshCodeOptions options{bits, surface, keep_order, chosen == Profile::stream};
+        return write_coded_model(*model.model, sequence, options, path, context).value();
     });
     const double diagonal = world_bounds(model.model->mesh).diagonal();
     py::dict said, bytes;
@@ -80,6 +86,7 @@ py::dict pack_model_file(const PyModel& model, const fs::path& path, unsigned bi
     bytes["refinements"] = report.bytes.refinements;
     bytes["clips"] = report.bytes.clips;
     bytes["driver"] = report.bytes.driver;
+    bytes["records"] = report.bytes.records;
     said["bytes"] = bytes;
     return said;
 }
@@ -216,7 +223,8 @@ surface : bool
 keep_order : bool
     Vertices and faces come back in their order, at 20 to 50 bits a vertex.
 profile : str
-    'compact', the fewest bits, or 'stream': coarse to fine, so that every beginning of the file is a mesh.
+    'compact', the fewest bits; 'stream': coarse to fine, so that every beginning of the file is a mesh; 'lossless':
+    any model, levels included, and every number comes back bit for bit, whatever `bits`, `surface` and `keep_order`.
 poses : PoseSequence, array_like (f, d, 3), or sequence of Pose, optional
     As of `write_model`; coded too, 1e-5 of the diagonal off (rms).
 

@@ -12,7 +12,7 @@ namespace filigree {
 
 using Wide = std::array<std::int64_t, 3>;
 
-inline constexpr int kOneBits = 20;
+inline constexpr int kOneBits = 24;
 inline constexpr std::int32_t kOne = 1 << kOneBits; // length of the frame's axes
 inline constexpr std::int32_t kFarthest = 1 << 22;  // of a place, in sixteenths of a step
 

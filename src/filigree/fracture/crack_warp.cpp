@@ -72,7 +72,8 @@ CrackWarp::CrackWarp(const CrackWarpOptions& options) : centre_(options.box.cent
     }
     const Mat3d shrink = Mat3d::Identity() - (1 - 1 / options.stretch) * options.grain * options.grain.transpose();
     const Vec3d half = 0.5 * options.box.size() + Vec3d::Constant(reach());
-    const double extent = std::max((shrink.cwiseAbs() * half).maxCoeff(), 1e-300);
+    const double extent =
+        std::max((shrink.cwiseAbs() * half).maxCoeff(), 1e-60); // all in one point; its third power has an inverse
     scale_ = kGridShare * kGridHalf / extent;
     to_linear_ = scale_ * shrink;
     from_linear_ = to_linear_.inverse();

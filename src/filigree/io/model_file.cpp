@@ -4,6 +4,8 @@
 #include "filigree/io/model_records.h"
 #include "filigree/io/model_sections.h"
 
+#include "filigree/core/parallel_for.h"
+
 #include <cmath>
 #include <new>
 #include <stdexcept>
@@ -351,7 +353,7 @@ Model read_sections(const FileReader& file, const RunContext& context) {
 }
 
 void read_frames(const SectionReader& in, ModelOutline& outline) {
-    if (const FileClip clip = clip_of(in); clip.frames > 0) {
+    if (const FileClip clip = is_coded(in) ? clip_of(in) : FileClip(); clip.frames > 0) {
         outline.frames = clip.frames;
         outline.has_gradients = clip.numbers > 3;
         outline.frames_per_second = in.value<double>("pose.fps");
@@ -360,6 +362,31 @@ void read_frames(const SectionReader& in, ModelOutline& outline) {
     outline.frames = frame_count(in, "pose.pos");
     outline.has_gradients = frame_count(in, "pose.grd") > 0;
     if (outline.frames > 0) outline.frames_per_second = in.value<double>("pose.fps");
+}
+
+/// What sections of so many bytes are parts of.
+CodedBytes lossless_parts(const std::vector<std::pair<std::string, std::uint64_t>>& sizes) {
+    CodedBytes parts;
+    for (const auto& [name, bytes] : sizes) {
+        const auto is_one_of = [&](std::initializer_list<std::string_view> names) {
+            return std::ranges::any_of(names, [&](std::string_view start) { return name.starts_with(start); });
+        };
+        if (is_one_of({"mesh.siz", "mesh.off", "mesh.cor"}))
+            parts.connectivity += bytes;
+        else if (is_one_of({"mesh.ord"}))
+            parts.order += bytes;
+        else if (is_one_of({"mesh."}))
+            parts.places += bytes;
+        else if (is_one_of({"lev", "drv.", "rf.drv", "bl.cell"}))
+            parts.driver += bytes;
+        else if (is_one_of({"bl.", "ck.", "rf.", "code"}))
+            parts.records += bytes;
+        else if (is_one_of({"pose."}))
+            parts.clips += bytes;
+        else
+            parts.attributes += bytes;
+    }
+    return parts;
 }
 
 ModelOutline read_outline_sections(const FileReader& file) {
@@ -375,6 +402,7 @@ ModelOutline read_outline_sections(const FileReader& file) {
         outline.bytes = file.size();
         return outline;
     }
+    if (in.is_lossless()) outline.lossless = lossless_parts(in.coded_sizes());
     const auto faces = [&](const std::string& name, std::uint32_t index) {
         const std::size_t corners = in.item_count<Index>(name + ".cor", index);
         const std::vector<Index> size = in.array<Index>(name + ".siz", index);
@@ -546,6 +574,49 @@ Result<CodingReport> write_coded_model(const Model& model, const PoseSequence& p
         return coded->report;
     } catch (const Error& error) {
         return error;
+    } catch (const std::bad_alloc&) {
+        return Error{ErrorCode::out_of_memory, path.string() + ": not enough memory for the file's bytes."};
+    }
+}
+
+Result<LosslessReport> write_lossless_model(const Model& model, const PoseSequence& poses,
+                                            const std::filesystem::path& path, const RunContext& context) {
+    if (const std::string wrong = poses.empty() ? "" : check_poses(poses, model.driver().vertices.size());
+        !wrong.empty())
+        return Error{ErrorCode::mismatch, path.string() + ": not written: " + wrong + "."};
+    context.report("code", 0);
+    try {
+        SectionWriter plain;
+        write_sections(plain, model, poses);
+        const std::vector<FileSection>& sections = plain.sections();
+        std::map<std::pair<std::string, std::uint32_t>, std::size_t> number;
+        for (std::size_t k = 0; k < sections.size(); ++k)
+            number.try_emplace({name_of(sections[k]), sections[k].index}, k);
+        const SectionGuide guide([&](std::string_view name, std::uint32_t index) {
+            const auto found = number.find({std::string(name), index});
+            return found == number.end() ? std::string() : std::string(plain.section_bytes(found->second));
+        });
+        std::vector<std::string> codes(sections.size());
+        constexpr std::size_t kAtOnce = 16; // between two reports
+        for (std::size_t first = 0; first < codes.size(); first += kAtOnce) {
+            if (context.is_cancelled()) return cancelled_error();
+            parallel_for(context, std::min(kAtOnce, codes.size() - first), 1, [&](std::size_t begin, std::size_t end) {
+                for (std::size_t k = first + begin; k < first + end; ++k)
+                    codes[k] = encode_section(sections[k], plain.section_bytes(k), guide);
+            });
+            context.report("code", double(std::min(first + kAtOnce, codes.size())) / double(codes.size()));
+        }
+        SectionWriter out;
+        out.array("ll.tab", sections);
+        std::vector<std::pair<std::string, std::uint64_t>> sizes;
+        for (std::uint32_t k = 0; k < codes.size(); ++k) {
+            out.bytes("ll.sec", codes[k], k);
+            sizes.emplace_back(name_of(sections[k]), codes[k].size());
+        }
+        if (const Status status = write_file(path, out.finish()); !status) return status.error();
+        std::uint64_t plain_bytes = 0;
+        for (const std::string_view piece : plain.finish()) plain_bytes += piece.size();
+        return LosslessReport{lossless_parts(sizes), plain_bytes};
     } catch (const std::bad_alloc&) {
         return Error{ErrorCode::out_of_memory, path.string() + ": not enough memory for the file's bytes."};
     }

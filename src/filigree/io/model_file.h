@@ -30,6 +30,7 @@ struct CodedBytes {
     std::uint64_t connectivity = 0, places = 0, attributes = 0, order = 0, driver = 0;
     std::uint64_t levels = 0, refinements = 0; ///< of a stream, whose map and places these are
     std::uint64_t clips = 0;                   ///< the poses
+    std::uint64_t records = 0;                 ///< of a lossless file: how vertices hang on the driver
 };
 /// What has arrived at a byte of a stream.
 struct CodedLevelMark {
@@ -54,9 +55,10 @@ struct ModelOutline {
     std::size_t patches = 0;                    ///< reference code
     std::size_t frames = 0;                     ///< poses
     double frames_per_second = 0;
-    bool has_gradients = false;        ///< in the poses
-    std::optional<Coding> coding = {}; ///< of a coded file
-    std::uint64_t bytes = 0;           ///< of the file
+    bool has_gradients = false;              ///< in the poses
+    std::optional<Coding> coding = {};       ///< of a coded file
+    std::optional<CodedBytes> lossless = {}; ///< of one whose sections are coded bit for bit
+    std::uint64_t bytes = 0;                 ///< of the file
 };
 /// Reads that alone: as quick for a large model as for a small one. Whether all sections fit together is known when
 /// the model is read. Errors: as read_model.
@@ -98,5 +100,14 @@ struct CodingReport {
 /// driver made elsewhere).
 Result<CodingReport> write_coded_model(const Model& model, const PoseSequence& poses, const MeshCodeOptions& options,
                                        const std::filesystem::path& path, const RunContext& context);
+struct LosslessReport {
+    CodedBytes bytes;
+    std::uint64_t plain = 0; ///< bytes of the plain file
+};
+/// Writes any model and its poses in fewer bytes, and every number comes back bit for bit, in its order: the file that
+/// is read is the one that write_model would have written. Cost O(size), about 1.5 processor seconds a million
+/// vertices; reading asks for no more sections than a plain file's reader does. Errors: as write_model, cancelled.
+Result<LosslessReport> write_lossless_model(const Model& model, const PoseSequence& poses,
+                                            const std::filesystem::path& path, const RunContext& context);
 
 } // namespace filigree

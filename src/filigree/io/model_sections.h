@@ -4,6 +4,7 @@
 #pragma once
 
 #include "filigree/io/file.h"
+#include "filigree/io/lossless_sections.h"
 #include "filigree/mesh/mesh.h"
 
 #include <algorithm>
@@ -44,6 +45,10 @@ struct FileSection {
 };
 static_assert(sizeof(FileSection) == 40);
 
+inline std::string name_of(const FileSection& section) {
+    return {section.name, strnlen(section.name, sizeof section.name)};
+}
+
 /// Lays out the sections. What is in the model is not copied: it has to outlive the writer.
 class SectionWriter {
 public:
@@ -76,6 +81,10 @@ public:
             bytes.insert(bytes.end(), item.c_str(), item.c_str() + std::strlen(item.c_str()) + 1);
         array(name, std::move(bytes));
     }
+
+    /// What was added; before finish().
+    const std::vector<FileSection>& sections() const { return sections_; }
+    std::string_view section_bytes(std::size_t k) const { return pieces_[2 * k]; }
 
     /// The file, piece after piece. Call it once.
     std::vector<std::string_view> finish() {
@@ -151,14 +160,17 @@ public:
         // No two sections share bytes, so all of them together need no more memory than the file.
         std::size_t end = sizeof header + table_bytes;
         for (const FileSection& section : table) {
-            const std::string name(section.name, strnlen(section.name, sizeof section.name));
+            const std::string name = name_of(section);
             if (section.offset < end || section.offset > file.size() || section.item_size == 0 ||
                 section.count > (file.size() - section.offset) / section.item_size)
                 throw FileDamage{"has a section " + name + " that overlaps another or reaches past its end"};
             end = section.offset + section.count * section.item_size;
             sections_.emplace(std::pair(name, section.index), section);
         }
+        if (sections_.contains({"ll.tab", 0})) open_lossless();
     }
+    SectionReader(const SectionReader&) = delete;
+    SectionReader& operator=(const SectionReader&) = delete;
 
     std::uint32_t version() const { return version_; }
 
@@ -167,6 +179,7 @@ public:
     std::vector<T> array(std::string_view name, std::uint32_t index = 0) const {
         const FileSection* section = find<T>(name, index);
         if (!section) return {};
+        if (lossless_) return items_of<T>(lossless_->bytes(std::string(name), *section));
         std::vector<T> items(section->count);
         read(section->offset, std::span(items));
         if (XXH3_64bits(items.data(), items.size() * sizeof(T)) != section->hash)
@@ -206,6 +219,11 @@ public:
         if (!ids.empty() && ids.back() >= section->count)
             throw FileDamage{"lacks items in section " + std::string(name)};
         std::vector<T> items(ids.size()), piece;
+        if (lossless_) {
+            const std::vector<T> all = array<T>(name, index);
+            for (std::size_t k = 0; k < ids.size(); ++k) items[k] = all[ids[k]];
+            return items;
+        }
         for (std::size_t begin = 0, end = 0; begin < ids.size(); begin = end) {
             // what lies close together is read at once
             for (end = begin + 1;
@@ -242,7 +260,82 @@ public:
         return items;
     }
 
+    bool is_lossless() const { return lossless_ != nullptr; }
+    /// Of a lossless file: what each plain section takes, coded.
+    std::vector<std::pair<std::string, std::uint64_t>> coded_sizes() const {
+        std::vector<std::pair<std::string, std::uint64_t>> sizes;
+        if (lossless_)
+            for (const auto& [key, k] : lossless_->number)
+                if (const auto code = lossless_->codes.find(k); code != lossless_->codes.end())
+                    sizes.emplace_back(key.first, code->second.count);
+        return sizes;
+    }
+
 private:
+    using Key = std::pair<std::string, std::uint32_t>; ///< name and index
+
+    /// The sections of a lossless file as the plain file had them.
+    struct Lossless {
+        const SectionReader& reader;
+        std::map<Key, std::uint32_t> number;        ///< of plain sections
+        std::map<std::uint32_t, FileSection> codes; ///< by that number
+        SectionGuide guide;
+        std::recursive_mutex poses;
+        std::map<std::string, std::pair<std::uint32_t, std::string>> latest_pose; ///< the next one follows from it
+
+        explicit Lossless(const SectionReader& of)
+            : reader(of), guide([this](std::string_view name, std::uint32_t index) {
+                  const auto found = reader.sections_.find({std::string(name), index});
+                  return found == reader.sections_.end() ? std::string() : bytes(found->first.first, found->second);
+              }) {}
+
+        std::string bytes(const std::string& name, const FileSection& section) {
+            if (!name.starts_with("pose.")) return decoded(name, section);
+            const std::lock_guard lock(poses);
+            if (const auto at = latest_pose.find(name); at != latest_pose.end() && at->second.first == section.index)
+                return at->second.second;
+            std::string frame = decoded(name, section);
+            latest_pose[name] = {section.index, frame};
+            return frame;
+        }
+        std::string decoded(const std::string& name, const FileSection& section) {
+            const auto code = codes.find(number.at({name, section.index}));
+            if (code == codes.end()) throw FileDamage{"lacks the code of its section " + name, "pack it again"};
+            std::string stream(code->second.count, '\0');
+            reader.read(code->second.offset, std::span(stream));
+            std::optional<std::string> bytes;
+            if (XXH3_64bits(stream.data(), stream.size()) == code->second.hash)
+                bytes = decode_section(section, stream, guide);
+            if (!bytes || XXH3_64bits(bytes->data(), bytes->size()) != section.hash)
+                throw FileDamage{"has a damaged section " + name + " (checksum)", "pack it again"};
+            return std::move(*bytes);
+        }
+    };
+
+    void open_lossless() {
+        const std::vector<FileSection> plain = array<FileSection>("ll.tab");
+        auto lossless = std::make_unique<Lossless>(*this);
+        std::map<Key, FileSection> sections;
+        for (std::uint32_t k = 0; k < plain.size(); ++k) {
+            const FileSection& section = plain[k];
+            const std::string name = name_of(section);
+            if (section.item_size == 0 || section.count > (std::uint64_t{1} << 48) / section.item_size)
+                throw FileDamage{"has a section " + name + " that makes no sense", "pack it again"};
+            const auto code = sections_.find({"ll.sec", k});
+            if (code != sections_.end() && code->second.item_size == 1) lossless->codes.emplace(k, code->second);
+            lossless->number.emplace(Key(name, section.index), k);
+            sections.emplace(Key(name, section.index), section);
+        }
+        sections_ = std::move(sections);
+        lossless_ = std::move(lossless);
+    }
+
+    template <class T>
+    static std::vector<T> items_of(const std::string& bytes) {
+        std::vector<T> items(bytes.size() / sizeof(T));
+        std::memcpy(static_cast<void*>(items.data()), bytes.data(), items.size() * sizeof(T));
+        return items;
+    }
     template <class T>
     void read(std::uint64_t offset, std::span<T> items) const {
         const std::span bytes(reinterpret_cast<char*>(items.data()), items.size_bytes());
@@ -260,7 +353,8 @@ private:
 
     const FileReader& file_;
     std::uint32_t version_ = 0;
-    std::map<std::pair<std::string, std::uint32_t>, FileSection> sections_; ///< by name and index; of equals the first
+    std::map<Key, FileSection> sections_; ///< of equals the first
+    std::unique_ptr<Lossless> lossless_;  ///< of a lossless file, whose plain sections these are
 };
 
 } // namespace filigree

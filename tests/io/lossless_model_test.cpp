@@ -1,0 +1,138 @@
+// Lossless model files: byte for byte the plain file, whatever the model; parts of it are read as from a plain one.
+#include "corpus.h"
+#include "sample_meshes.h"
+
+#include "filigree/hierarchy/restore.h"
+#include "filigree/hierarchy/strip.h"
+#include "filigree/io/mesh_file.h"
+#include "filigree/io/model_chunks.h"
+#include "filigree/io/model_file.h"
+#include "filigree/io/model_sections.h"
+#include "filigree/mesh/shapes.h"
+
+#include <cstdlib>
+#include <gtest/gtest.h>
+
+using namespace filigree;
+
+namespace {
+
+const RunContext kContext(2);
+
+PoseSequence bending(const Model& model, std::size_t frames, bool with_gradients) {
+    PoseSequence poses{24, {}};
+    for (std::size_t t = 0; t < frames; ++t) {
+        Pose& pose = poses.frames.emplace_back(rest_pose(model));
+        for (Vec3f& p : pose.positions) p.x() += 0.01f * float(t) * std::sin(3 * p.y());
+        if (with_gradients)
+            for (const Vec3f& p : pose.positions) pose.gradients.push_back(Mat3f::Identity() * (1 + 0.01f * p.x()));
+    }
+    return poses;
+}
+
+std::string lossless_file(const Model& model, const PoseSequence& poses, std::uint64_t* plain = nullptr) {
+    std::string name = (std::filesystem::temp_directory_path() / "filigree-lossless-XXXXXX").string();
+    const std::filesystem::path folder = ::mkdtemp(name.data()), path = folder / "it.fil";
+    const LosslessReport report = write_lossless_model(model, poses, path, kContext).value();
+    if (plain) *plain = report.plain;
+    std::string bytes = read_file(path).value();
+    std::filesystem::remove_all(folder);
+    return bytes;
+}
+
+/// Bytes of the lossless file, which gives the plain one again.
+std::size_t expect_same(const Model& model, const PoseSequence& poses) {
+    std::uint64_t plain_bytes = 0;
+    const std::string coded = lossless_file(model, poses, &plain_bytes), plain = write_model(model, poses);
+    EXPECT_EQ(plain_bytes, plain.size());
+    const Result<Model> read = read_model(coded, "it", kContext);
+    EXPECT_TRUE(read.ok()) << (read ? "" : read.error().message);
+    EXPECT_TRUE(read && write_model(*read, read_poses(coded, "it", kContext).value()) == plain);
+    return coded.size();
+}
+
+} // namespace
+
+TEST(LosslessModel, EveryKindComesBackByteForByte) {
+    const Mesh sphere = make_wavy_sphere({.resolution = 12}), cube = make_wavy_cube({.resolution = 8});
+    const Model model = strip(sphere, {.base = 40}, kContext)->model;
+    expect_same(model, {});
+    expect_same(model, bending(model, 70, true));
+    expect_same(model, bending(model, 3, false));
+    expect_same(strip(sphere, {.base = 40, .precision = Precision::int16}, kContext)->model, {});
+    expect_same(strip(cube, {.base = 30, .reorder = true}, kContext)->model, {});
+    expect_same(strip(cube, {.code = DetailCode::reference}, kContext)->model, {});
+    for (const Mesh& mesh : {filigree_test::make_vertex_attribute_mesh(), filigree_test::make_corner_attribute_mesh(),
+                             filigree_test::make_far_mesh()})
+        expect_same(strip(mesh, {.base = 3}, kContext)->model, {});
+}
+
+TEST(LosslessModel, SeveralChunksAndSmaller) {
+    const Mesh mesh = make_wavy_cube({.resolution = 220}); // 290,402 vertices
+    const Model model = strip(mesh, {.base = 500}, kContext)->model;
+    const PoseSequence poses = bending(model, 2, true);
+    const std::size_t bytes = expect_same(model, poses);
+    EXPECT_LT(double(bytes), 0.45 * double(write_model(model, poses).size()));
+}
+
+TEST(LosslessModel, PartsAreReadAsFromAPlainFile) {
+    const Model model = strip(make_wavy_sphere({.resolution = 30}), {.base = 100}, kContext)->model;
+    const PoseSequence poses = bending(model, 40, true);
+    const std::string coded = lossless_file(model, poses), plain = write_model(model, poses);
+    const FileReader one(coded), other(plain);
+    const ModelOutline outline = read_model_outline(one, "it", kContext).value();
+    ASSERT_TRUE(outline.lossless.has_value());
+    EXPECT_GT(outline.lossless->places, 0u);
+    EXPECT_GT(outline.lossless->clips, 0u);
+    EXPECT_FALSE(outline.coding.has_value());
+    EXPECT_EQ(outline.frames, 40u);
+    ASSERT_EQ(outline.levels.size(), model.levels.size() + 1);
+    for (unsigned k = 0; k < outline.levels.size(); ++k) {
+        const Mesh a = read_model_level(one, k, "it", kContext).value();
+        const Mesh b = read_model_level(other, k, "it", kContext).value();
+        EXPECT_EQ(a.positions, b.positions);
+        EXPECT_EQ(a.corners, b.corners);
+    }
+    const ModelChunks chunks = ModelChunks::open(FileReader(coded), "it", kContext).value();
+    EXPECT_EQ(chunks.vertex_count(), model.mesh.vertex_count());
+    EXPECT_TRUE(chunks.restorer(0).ok());
+    const SectionReader in(one); // any frame, in any order
+    const SectionReader flat(other);
+    for (const std::uint32_t frame : {39u, 0u, 31u, 32u, 33u, 5u})
+        EXPECT_EQ(in.array<Vec3f>("pose.pos", frame), flat.array<Vec3f>("pose.pos", frame));
+}
+
+TEST(LosslessModel, EveryChangedByteIsNamed) {
+    const Model model = strip(filigree_test::make_corner_attribute_mesh(), {.base = 3}, kContext)->model;
+    const std::string coded = lossless_file(model, bending(model, 2, false)), plain = write_model(model);
+    std::size_t named = 0;
+    for (std::size_t at = 0; at < coded.size(); ++at) {
+        std::string damaged = coded;
+        damaged[at] = char(damaged[at] ^ 0x41);
+        const Result<Model> read = read_model(damaged, "it", kContext);
+        if (!read) {
+            ++named;
+            EXPECT_FALSE(read.error().message.empty());
+        } else
+            EXPECT_TRUE(write_model(*read) == plain) << at; // bytes between sections, and poses
+    }
+    EXPECT_GT(named, coded.size() / 2);
+    EXPECT_FALSE(read_model(coded.substr(0, coded.size() - 1), "it", kContext).ok());
+}
+
+TEST(LosslessModel, GoodMeshesOfTheCorpus) {
+    const auto rows = filigree_test::read_corpus();
+    if (rows.empty()) GTEST_SKIP() << "there is no corpus beside the project";
+    std::size_t tried = 0;
+    for (const filigree_test::CorpusRow& row : rows) {
+        if (!row.file.starts_with("good/")) continue;
+        Result<MeshFile> mesh = read_mesh(row.path, kContext);
+        if (!mesh) continue;
+        SCOPED_TRACE(row.file);
+        const auto stripped = strip(std::move(mesh->mesh), {}, kContext);
+        if (!stripped) continue;
+        expect_same(stripped->model, bending(stripped->model, 3, true));
+        ++tried;
+    }
+    EXPECT_GT(tried, 10u);
+}
