@@ -168,6 +168,13 @@ std::vector<bool> code_cuts(const ClosedMap& map, const Code& code) {
 
 } // namespace
 
+std::vector<std::size_t> WalkedFaces::first_with_number() const {
+    std::vector<std::size_t> first(met, number.size());
+    for (std::size_t w = number.size(); w-- > 0;)
+        if (number[w] != kNoIndex) first[number[w]] = w;
+    return first;
+}
+
 EncodedFaces encode_faces(std::span<const Index> face_offsets, std::span<const Index> corners, std::size_t vertices,
                           SymbolWriter& out) {
     const MapCode in_one_piece = [&](const ClosedSurface& surface) { return encode_connectivity(surface.map, out); };

@@ -17,6 +17,9 @@ struct WalkedFaces {
     ClosedMap map;
     std::vector<Index> number; ///< of each of the map's vertices; kNoIndex where it closes a hole
     std::size_t met = 0;       ///< vertices; those of odd faces alone and those of no face are not met
+
+    /// Of each number the first of the map's vertices that has it.
+    std::vector<std::size_t> first_with_number() const;
 };
 
 /// What an encoder knows besides: where everything was.

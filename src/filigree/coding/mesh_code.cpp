@@ -4,6 +4,7 @@
 #include "filigree/coding/geometry_code.h"
 #include "filigree/coding/integer_frame.h"
 #include "filigree/coding/mesh_levels.h"
+#include "filigree/coding/regular_code.h"
 
 #include <algorithm>
 #include <bit>
@@ -13,7 +14,7 @@ namespace filigree {
 
 namespace {
 
-constexpr unsigned kLoosePlace = kGeometryContexts, kPlaceContexts = kLoosePlace + 3;
+constexpr unsigned kLoosePlace = std::max(kGeometryContexts, kRegularContexts), kPlaceContexts = kLoosePlace + 3;
 constexpr unsigned kVertexOrder = 0, kFaceOrder = 1, kFirstCorner = 2, kOrderContexts = 3;
 
 struct Damage {};
@@ -40,11 +41,10 @@ Vec3f position_of(const FinePlace& place, const CodedMesh& coded) {
     return position;
 }
 
-std::vector<std::size_t> first_with_number(const WalkedFaces& walked) { // of each number the first of the map's
-    std::vector<std::size_t> first(walked.met, walked.number.size());
-    for (std::size_t w = walked.number.size(); w-- > 0;)
-        if (walked.number[w] != kNoIndex) first[walked.number[w]] = w;
-    return first;
+void fill_shape(RegularMesh&& from, const CodedMesh& coded, Mesh& mesh) {
+    mesh.face_offsets = std::move(from.face_offsets);
+    mesh.corners = std::move(from.corners);
+    for (const FinePlace& place : from.places) mesh.positions.push_back(position_of(place, coded));
 }
 
 /// A whole step, for vertices that no face meets: each from the one before.
@@ -56,14 +56,13 @@ std::int32_t whole_steps(std::int32_t fine) { return (fine + (fine < 0 ? -kFine 
 template <class Code>
 class Attributes {
 public:
-    Attributes(Code& code, Mesh& mesh, const WalkedFaces& walked) : code_(code), mesh_(mesh), walked_(walked) {
-        neighbour_.assign(mesh.vertex_count(), kNoIndex);
-        for (std::size_t h = 0; h < walked.map.opposite.size(); ++h) { // an earlier one beside each vertex
-            const Index a = walked.number[walked.map.origin(Index(h))],
-                        b = walked.number[walked.map.origin(ClosedMap::next(Index(h)))];
-            if (a == kNoIndex || b == kNoIndex || a == b) continue;
-            const auto [low, high] = std::minmax(a, b);
-            if (neighbour_[high] == kNoIndex || low > neighbour_[high]) neighbour_[high] = low;
+    Attributes(Code& code, Mesh& mesh) : code_(code), mesh_(mesh), neighbour_(mesh.vertex_count(), kNoIndex) {
+        for (std::size_t f = 0; f < mesh.face_count(); ++f) {
+            const auto face = mesh.face(f);
+            for (std::size_t k = 0; k < face.size(); ++k) {
+                const auto [low, high] = std::minmax(face[k], face[(k + 1) % face.size()]);
+                if (low != high && (neighbour_[high] == kNoIndex || low > neighbour_[high])) neighbour_[high] = low;
+            }
         }
     }
 
@@ -230,8 +229,7 @@ public:
 private:
     Code& code_;
     Mesh& mesh_;
-    const WalkedFaces& walked_;
-    std::vector<Index> neighbour_;
+    std::vector<Index> neighbour_; ///< of each vertex the last of those before it on its faces' edges
 };
 
 struct NumberWriter {
@@ -408,6 +406,78 @@ void sort_loose(const Mesh& mesh, const CodedMesh& coded, std::span<Index> loose
     for (std::size_t i = 0; i < loose.size(); ++i) loose[i] = keys[i].second;
 }
 
+// --- Faces and places ---------------------------------------------------------------------------------------------
+
+/// Of a quad mesh with subdivision connectivity.
+std::optional<OrderedMesh> encode_regular_shape(const Mesh& mesh, CodedMesh& coded, const RunContext& context) {
+    std::vector<FinePlace> places;
+    for (const Vec3f& position : mesh.positions) places.push_back(fine_place(position, coded));
+    SymbolWriter faces_out(kFaceContexts), places_out(kPlaceContexts);
+    faces_out.bits(true, 1);
+    std::optional<EncodedRegular> encoded =
+        encode_regular(mesh, places, steps_of(coded.options), faces_out, places_out, context);
+    if (!encoded) return std::nullopt;
+    coded.connectivity = faces_out.finish();
+    coded.places = places_out.finish();
+    OrderedMesh ordered;
+    ordered.vertex = std::move(encoded->vertex);
+    ordered.face = std::move(encoded->face);
+    ordered.first_corner = std::move(encoded->first_corner);
+    fill_shape(std::move(encoded->read), coded, ordered.mesh);
+    return ordered;
+}
+
+/// Of any mesh.
+OrderedMesh encode_shape(const Mesh& mesh, CodedMesh& coded, const RunContext& context) {
+    SymbolWriter faces_out(kFaceContexts), places_out(kPlaceContexts);
+    faces_out.bits(false, 1);
+    EncodedLevels levels;
+    const MapCode code_map = [&](const ClosedSurface& surface) {
+        if (!coded.options.levels) return encode_connectivity(surface.map, faces_out);
+        std::vector<FinePlace> places(surface.source.size());
+        for (std::size_t v = 0; v < places.size(); ++v)
+            if (surface.source[v] != kNoIndex) places[v] = fine_place(mesh.positions[surface.source[v]], coded);
+        levels = encode_levels(surface.map, places, level_options(coded.options), context);
+        return std::move(levels.walked);
+    };
+    EncodedFaces faces = encode_faces(mesh.face_offsets, mesh.corners, mesh.vertex_count(), code_map, faces_out);
+    coded.levels = std::move(levels.code);
+    coded.connectivity = faces_out.finish();
+    OrderedMesh ordered;
+    if (context.is_cancelled()) return ordered;
+    const WalkedFaces& walked = faces.walked;
+    ordered.vertex = std::move(faces.vertex);
+    ordered.face = std::move(faces.face);
+    ordered.first_corner = std::move(faces.first_corner);
+    Mesh& moved = ordered.mesh;
+    moved.face_offsets = walked.face_offsets;
+    moved.corners = walked.corners;
+    const bool has_odd_faces = std::ranges::any_of(moved.corners, [&](Index v) { return v >= walked.met; });
+    if (!has_odd_faces) sort_loose(mesh, coded, std::span(ordered.vertex).subspan(walked.met)); // else they are named
+
+    std::vector<FinePlace> read = std::move(levels.read);
+    if (!coded.options.levels) {
+        std::vector<FinePlace> places(walked.number.size());
+        for (std::size_t w = 0; w < places.size(); ++w)
+            if (walked.number[w] != kNoIndex)
+                places[w] = fine_place(mesh.positions[ordered.vertex[walked.number[w]]], coded);
+        read = encode_geometry(walked.map, places, steps_of(coded.options), 0, places_out);
+    }
+    for (const std::size_t w : walked.first_with_number()) moved.positions.push_back(position_of(read[w], coded));
+    FinePlace before{};
+    for (std::size_t v = walked.met; v < mesh.vertex_count(); ++v) {
+        const FinePlace place = fine_place(mesh.positions[ordered.vertex[v]], coded);
+        for (unsigned k = 0; k < 3; ++k) {
+            const std::int32_t steps = whole_steps(place[k] - before[k]);
+            places_out.number_with_sign(kLoosePlace + k, steps);
+            before[k] += kFine * steps;
+        }
+        moved.positions.push_back(position_of(before, coded));
+    }
+    coded.places = places_out.finish();
+    return ordered;
+}
+
 LevelReader decode_levels(const CodedMesh& coded, const RunContext& context) {
     const LevelCodeOptions options = level_options(coded.options);
     LevelReader reader(options.steps, options.is_refined, most_triangles(coded.corners));
@@ -419,11 +489,9 @@ LevelReader decode_levels(const CodedMesh& coded, const RunContext& context) {
     return reader;
 }
 
-Mesh decode(const CodedMesh& coded, const RunContext& context) {
-    if (coded.vertices >= kNoIndex || coded.corners >= kNoIndex / 4 || !(coded.step > 0) ||
-        !std::isfinite(coded.step * (1 << 27)))
-        throw Damage();
-    SymbolReader faces_in(coded.connectivity, kFaceContexts), places_in(coded.places, kPlaceContexts);
+/// Into `mesh`. Throws Damage.
+void decode_shape(const CodedMesh& coded, SymbolReader& faces_in, SymbolReader& places_in, const RunContext& context,
+                  Mesh& mesh) {
     std::optional<WalkedFaces> walked;
     std::vector<FinePlace> places;
     if (coded.options.levels) {
@@ -432,10 +500,9 @@ Mesh decode(const CodedMesh& coded, const RunContext& context) {
         walked = decode_faces(levels.map(), faces_in, coded.vertices, coded.corners);
     } else
         walked = decode_faces(faces_in, coded.vertices, coded.corners);
-    if (!walked || walked->face_offsets.size() != coded.faces + 1 || context.is_cancelled()) throw Damage();
+    if (!walked || context.is_cancelled()) throw Damage();
     if (!coded.options.levels) places = decode_geometry(walked->map, steps_of(coded.options), 0, places_in);
-    Mesh mesh = coded.rest;
-    for (const std::size_t w : first_with_number(*walked)) mesh.positions.push_back(position_of(places[w], coded));
+    for (const std::size_t w : walked->first_with_number()) mesh.positions.push_back(position_of(places[w], coded));
     FinePlace place{};
     while (mesh.vertex_count() < coded.vertices) {
         for (unsigned k = 0; k < 3; ++k) {
@@ -446,13 +513,29 @@ Mesh decode(const CodedMesh& coded, const RunContext& context) {
         if (places_in.is_damaged()) throw Damage();
         mesh.positions.push_back(position_of(place, coded));
     }
-    if (places_in.is_damaged()) throw Damage();
     mesh.face_offsets = std::move(walked->face_offsets);
     mesh.corners = std::move(walked->corners);
-    if (std::ranges::any_of(mesh.corners, [&](Index v) { return v >= coded.vertices; })) throw Damage();
+}
+
+Mesh decode(const CodedMesh& coded, const RunContext& context) {
+    if (coded.vertices >= kNoIndex || coded.corners >= kNoIndex / 4 || !(coded.step > 0) ||
+        !std::isfinite(coded.step * (1 << 27)))
+        throw Damage();
+    SymbolReader faces_in(coded.connectivity, kFaceContexts), places_in(coded.places, kPlaceContexts);
+    Mesh mesh = coded.rest;
+    if (faces_in.bits(1) != 0) {
+        std::optional<RegularMesh> regular =
+            decode_regular(faces_in, places_in, steps_of(coded.options), coded.vertices, coded.corners);
+        if (!regular) throw Damage();
+        fill_shape(std::move(*regular), coded, mesh);
+    } else
+        decode_shape(coded, faces_in, places_in, context, mesh);
+    if (places_in.is_damaged() || mesh.face_count() != coded.faces ||
+        std::ranges::any_of(mesh.corners, [&](Index v) { return v >= coded.vertices; }))
+        throw Damage();
     SymbolReader attributes_in(coded.attributes, Attributes<NumberReader>::kContexts);
     NumberReader numbers{attributes_in};
-    Attributes<NumberReader>(numbers, mesh, *walked).run();
+    Attributes<NumberReader>(numbers, mesh).run();
     if (coded.options.keep_order) mesh = put_back(mesh, coded.order);
     return mesh;
 }
@@ -502,64 +585,21 @@ Result<CodedMesh> encode_mesh(const Mesh& mesh, const MeshCodeOptions& options, 
     const double longest = box.size().maxCoeff();
     coded.step = (longest > 0 ? longest : 1.0) / double((1u << options.bits) - 1);
 
-    SymbolWriter faces_out(kFaceContexts);
-    EncodedLevels levels;
-    const MapCode code_map = [&](const ClosedSurface& surface) {
-        if (!options.levels) return encode_connectivity(surface.map, faces_out);
-        std::vector<FinePlace> places(surface.source.size());
-        for (std::size_t v = 0; v < places.size(); ++v)
-            if (surface.source[v] != kNoIndex) places[v] = fine_place(mesh.positions[surface.source[v]], coded);
-        levels = encode_levels(surface.map, places, level_options(options), context);
-        return std::move(levels.walked);
-    };
-    EncodedFaces faces = encode_faces(mesh.face_offsets, mesh.corners, mesh.vertex_count(), code_map, faces_out);
-    coded.levels = std::move(levels.code);
+    std::optional<OrderedMesh> ordered;
+    if (!options.levels) ordered = encode_regular_shape(mesh, coded, context);
+    if (!ordered && !context.is_cancelled()) ordered = encode_shape(mesh, coded, context);
     if (context.is_cancelled()) return cancelled_error();
-    coded.connectivity = faces_out.finish();
-    const WalkedFaces& walked = faces.walked;
-
-    OrderedMesh ordered;
-    ordered.vertex = std::move(faces.vertex);
-    ordered.face = std::move(faces.face);
-    ordered.first_corner = std::move(faces.first_corner);
-    Mesh& moved = ordered.mesh;
-    moved.face_offsets = walked.face_offsets;
-    moved.corners = walked.corners;
-    const bool has_odd_faces = std::ranges::any_of(moved.corners, [&](Index v) { return v >= walked.met; });
-    if (!has_odd_faces) sort_loose(mesh, coded, std::span(ordered.vertex).subspan(walked.met)); // else they are named
-    put_attributes_in_order(mesh, ordered);
+    Mesh& moved = ordered->mesh;
+    put_attributes_in_order(mesh, *ordered);
     renumber_values(moved.uvs);
     renumber_values(moved.normals);
 
-    SymbolWriter places_out(kPlaceContexts);
-    std::vector<FinePlace> read = std::move(levels.read);
-    if (!options.levels) {
-        std::vector<FinePlace> places(walked.number.size());
-        for (std::size_t w = 0; w < places.size(); ++w)
-            if (walked.number[w] != kNoIndex)
-                places[w] = fine_place(mesh.positions[ordered.vertex[walked.number[w]]], coded);
-        read = encode_geometry(walked.map, places, steps_of(options), 0, places_out);
-    }
-    for (const std::size_t w : first_with_number(walked)) moved.positions.push_back(position_of(read[w], coded));
-    FinePlace before{};
-    for (std::size_t v = walked.met; v < mesh.vertex_count(); ++v) {
-        const FinePlace place = fine_place(mesh.positions[ordered.vertex[v]], coded);
-        for (unsigned k = 0; k < 3; ++k) {
-            const std::int32_t steps = whole_steps(place[k] - before[k]);
-            places_out.number_with_sign(kLoosePlace + k, steps);
-            before[k] += kFine * steps;
-        }
-        moved.positions.push_back(position_of(before, coded));
-    }
-    coded.places = places_out.finish();
-    if (context.is_cancelled()) return cancelled_error();
-
     if (report) {
-        report->vertex = ordered.vertex;
+        report->vertex = ordered->vertex;
         double squares = 0, largest = 0;
         for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
             const double off =
-                (moved.positions[v].cast<double>() - mesh.positions[ordered.vertex[v]].cast<double>()).squaredNorm();
+                (moved.positions[v].cast<double>() - mesh.positions[ordered->vertex[v]].cast<double>()).squaredNorm();
             squares += off;
             largest = std::max(largest, off);
         }
@@ -568,9 +608,9 @@ Result<CodedMesh> encode_mesh(const Mesh& mesh, const MeshCodeOptions& options, 
     }
     SymbolWriter attributes_out(Attributes<NumberWriter>::kContexts);
     NumberWriter numbers{attributes_out};
-    Attributes<NumberWriter>(numbers, moved, walked).run();
+    Attributes<NumberWriter>(numbers, moved).run();
     coded.attributes = attributes_out.finish();
-    if (options.keep_order) coded.order = write_order(ordered);
+    if (options.keep_order) coded.order = write_order(*ordered);
 
     coded.rest.origin = mesh.origin;
     for (const VertexScalar& scalar : mesh.scalars) coded.rest.scalars.push_back({scalar.name, {}});

@@ -118,6 +118,7 @@ void SymbolReader::read_next(std::string_view stream) {
     turn_ = 0;
     pending_ = pending_count_ = 0;
     is_damaged_ = false;
+    size_ = stream.size();
     words_ = bits_ = {};
     constexpr std::size_t kFront = 20;
     if (stream.size() < kFront || get_u32(stream, 0) > (stream.size() - kFront) / 2) {

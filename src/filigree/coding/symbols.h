@@ -83,8 +83,10 @@ public:
     std::int32_t number_with_sign(unsigned context);
 
     bool is_damaged() const { return is_damaged_; }
+    std::size_t size() const { return size_; } ///< of the stream, bytes
 
 private:
+    std::size_t size_ = 0;
     std::vector<SymbolModel> models_;
     std::array<std::uint32_t, 4> states_{};
     unsigned turn_ = 0;

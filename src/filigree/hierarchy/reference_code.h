@@ -14,7 +14,7 @@
 #pragma once
 
 #include "filigree/hierarchy/height_law.h"
-#include "filigree/hierarchy/regular_patches.h"
+#include "filigree/mesh/regular_patches.h"
 
 #include <memory>
 #include <string>

@@ -185,6 +185,7 @@ Result<CodedModel> code_model(const Model& model, const PoseSequence& poses, con
 }
 
 void write_model_code(SectionWriter& out, const CodedModel& coded) {
+    out.value("cd.rev", kCodeRevision);
     out.value("cd.par", coded.code);
     out.array("cd.stm", coded.levels);
     const CodedLevels& levels = coded.mesh.levels;
@@ -210,6 +211,8 @@ void write_model_code(SectionWriter& out, const CodedModel& coded) {
 bool is_coded(const SectionReader& in) { return in.count("cd.par").first > 0; }
 
 FileCode read_file_code(const SectionReader& in) {
+    if (in.count("cd.rev").first == 0 || in.value<std::uint32_t>("cd.rev") != kCodeRevision)
+        throw FileDamage{"was packed by another version of filigree", "pack its source again"};
     const auto code = in.value<FileCode>("cd.par");
     if (code.precision > 1 || code.bits > 16 || code.driver_vertices == 0 || code.driver_vertices > code.vertices ||
         code.vertices >= kNoIndex)

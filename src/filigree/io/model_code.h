@@ -8,6 +8,9 @@
 
 namespace filigree {
 
+/// The section "cd.rev": raised when streams come to mean something else.
+inline constexpr std::uint32_t kCodeRevision = 1;
+
 /// The section "cd.par".
 struct FileCode {
     std::uint64_t vertices, faces, corners;

@@ -4,6 +4,7 @@
 #include "filigree/coding/mesh_levels.h"
 #include "filigree/io/model_code.h"
 
+#include <algorithm>
 #include <limits>
 #include <optional>
 
@@ -42,7 +43,7 @@ private:
         const SectionReader in(file);
         if (in.count("cd.stm").first == 0)
             throw Error{ErrorCode::unsuitable, name + ": is no stream; filigree pack --profile stream makes one."};
-        const std::uint64_t stated = std::max(in.end_of("cd.par"), in.end_of("cd.stm"));
+        const std::uint64_t stated = std::max({in.end_of("cd.rev"), in.end_of("cd.par"), in.end_of("cd.stm")});
         if (bytes.size() < std::max(stated, in.end_of("mesh.org"))) return false;
         const FileCode code = read_file_code(in);
         outline = coded_outline(in, code);

@@ -2,7 +2,7 @@
 // dark.
 #pragma once
 
-#include "filigree/hierarchy/regular_patches.h"
+#include "filigree/mesh/regular_patches.h"
 #include "filigree/render/renderer.h"
 
 namespace filigree {

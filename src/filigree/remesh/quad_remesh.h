@@ -1,7 +1,7 @@
 // Any mesh as a semi-regular quad mesh: a coarse base of quads, each a grid of (2^levels + 1)^2 vertices.
 #pragma once
 
-#include "filigree/hierarchy/regular_patches.h"
+#include "filigree/mesh/regular_patches.h"
 #include "filigree/remesh/manifold_surface.h"
 #include "filigree/remesh/quad_quality.h"
 #include "filigree/remesh/transfer_attributes.h"

@@ -2,7 +2,7 @@
 // [Taubin 2002] Detecting and reconstructing subdivision connectivity: a mesh is subdivided when its faces can be
 // gathered around every second vertex. We do it for quads, where what one face keeps decides for its whole component,
 // so that one pass follows all four guesses.
-#include "filigree/hierarchy/regular_patches.h"
+#include "filigree/mesh/regular_patches.h"
 
 #include <algorithm>
 #include <optional>
@@ -44,7 +44,7 @@ Error unsuitable(std::string reason) {
 }
 std::string name_of(const char* what, std::size_t index) { return std::string(what) + ' ' + std::to_string(index); }
 
-std::optional<Error> check_faces(const Mesh& mesh) {
+std::optional<Error> check_quads(const Mesh& mesh) {
     if (mesh.face_count() == 0) return unsuitable("The mesh has no faces");
     for (std::size_t f = 0; f < mesh.face_count(); ++f) {
         if (mesh.face_size(f) != 4)
@@ -310,7 +310,7 @@ std::vector<Index> lay_out_grid(std::span<const Undone> levels, const Quads& fin
 } // namespace
 
 Result<RegularPatches> find_regular_patches(const Mesh& mesh, unsigned max_levels, const RunContext& context) {
-    if (auto error = check_faces(mesh)) return *error;
+    if (auto error = check_quads(mesh)) return *error;
     if (mesh.corners.size() >= kNoIndex) return unsuitable("The mesh has more than a thousand million faces");
     Quads finest;
     finest.corners = mesh.corners;

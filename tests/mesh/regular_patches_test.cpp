@@ -1,4 +1,4 @@
-#include "filigree/hierarchy/regular_patches.h"
+#include "filigree/mesh/regular_patches.h"
 #include "filigree/io/mesh_file.h"
 #include "filigree/mesh/shapes.h"
 
