@@ -1,5 +1,6 @@
 #include "filigree/coding/mesh_code.h"
 
+#include "filigree/coding/attribute_code.h"
 #include "filigree/coding/face_code.h"
 #include "filigree/coding/geometry_code.h"
 #include "filigree/coding/integer_frame.h"
@@ -7,7 +8,6 @@
 #include "filigree/coding/regular_code.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 namespace filigree {
@@ -41,233 +41,22 @@ Vec3f position_of(const FinePlace& place, const CodedMesh& coded) {
     return position;
 }
 
-void fill_shape(RegularMesh&& from, const CodedMesh& coded, Mesh& mesh) {
-    mesh.face_offsets = std::move(from.face_offsets);
-    mesh.corners = std::move(from.corners);
-    for (const FinePlace& place : from.places) mesh.positions.push_back(position_of(place, coded));
+std::vector<Vec3f> positions_of(std::span<const FinePlace> places, const CodedMesh& coded) {
+    std::vector<Vec3f> positions;
+    positions.reserve(places.size());
+    for (const FinePlace& place : places) positions.push_back(position_of(place, coded));
+    return positions;
 }
 
 /// A whole step, for vertices that no face meets: each from the one before.
 std::int32_t whole_steps(std::int32_t fine) { return (fine + (fine < 0 ? -kFine / 2 : kFine / 2)) / kFine; }
-
-// --- Attributes ---------------------------------------------------------------------------------------------------
-
-/// Codes attributes. `Code` writes or reads numbers; what it is given is what a reader will have.
-template <class Code>
-class Attributes {
-public:
-    Attributes(Code& code, Mesh& mesh) : code_(code), mesh_(mesh), neighbour_(mesh.vertex_count(), kNoIndex) {
-        for (std::size_t f = 0; f < mesh.face_count(); ++f) {
-            const auto face = mesh.face(f);
-            for (std::size_t k = 0; k < face.size(); ++k) {
-                const auto [low, high] = std::minmax(face[k], face[(k + 1) % face.size()]);
-                if (low != high && (neighbour_[high] == kNoIndex || low > neighbour_[high])) neighbour_[high] = low;
-            }
-        }
-    }
-
-    void run() {
-        corner_attribute(mesh_.uvs, 12);
-        corner_attribute(mesh_.normals, 10);
-        colors();
-        for (VertexScalar& scalar : mesh_.scalars) scalars(scalar.values);
-        labels(mesh_.objects.of_face);
-        labels(mesh_.groups.of_face);
-        labels(mesh_.materials.of_face);
-        labels(mesh_.smoothing);
-    }
-
-private:
-    /// Rounds `values` to so many bits along their longest side.
-    template <class T>
-    std::vector<std::array<std::int32_t, 3>> quantised(std::vector<T>& values, unsigned bits, T& low, float& step) {
-        constexpr int n = int(T::RowsAtCompileTime);
-        std::vector<std::array<std::int32_t, 3>> steps(values.size());
-        if (code_.writes && !values.empty()) {
-            low = values[0];
-            T high = low;
-            for (const T& v : values) {
-                low = low.cwiseMin(v);
-                high = high.cwiseMax(v);
-            }
-            step = std::max((high - low).maxCoeff(), 1e-30f) / float((1u << bits) - 1);
-            for (std::size_t i = 0; i < values.size(); ++i)
-                for (int k = 0; k < n; ++k)
-                    steps[i][std::size_t(k)] = static_cast<std::int32_t>(std::lround((values[i][k] - low[k]) / step));
-        }
-        for (int k = 0; k < n; ++k) code_.real(low[k]);
-        code_.real(step);
-        return steps;
-    }
-    template <class T>
-    static void fill(std::vector<T>& values, const std::vector<std::array<std::int32_t, 3>>& steps, const T& low,
-                     float step) {
-        for (std::size_t i = 0; i < values.size(); ++i)
-            for (int k = 0; k < int(T::RowsAtCompileTime); ++k)
-                values[i][k] = low[k] + step * float(steps[i][std::size_t(k)]);
-    }
-
-    template <class T>
-    void corner_attribute(CornerAttribute<T>& attribute, unsigned bits) {
-        std::uint32_t count = static_cast<std::uint32_t>(attribute.values.size());
-        std::uint32_t is_indexed = !attribute.per_vertex();
-        code_.number(kCount, count);
-        if (count == 0) return;
-        code_.number(kCount, is_indexed);
-        if (is_indexed) return indexed(attribute, count, bits);
-        if (count != mesh_.vertex_count()) throw Damage();
-        attribute.values.resize(count);
-        T low = T::Zero();
-        float step = 0;
-        auto steps = quantised(attribute.values, bits, low, step);
-        for (std::size_t v = 0; v < count; ++v)
-            for (std::size_t k = 0; k < std::size_t(T::RowsAtCompileTime); ++k) {
-                const std::int32_t expected = neighbour_[v] != kNoIndex ? steps[neighbour_[v]][k] : 0;
-                code_.difference(kValue + unsigned(k), steps[v][k], expected);
-            }
-        fill(attribute.values, steps, low, step);
-    }
-
-    /// Values in the order in which corners name them. At a vertex most corners have one value.
-    template <class T>
-    void indexed(CornerAttribute<T>& attribute, std::uint32_t count, unsigned bits) {
-        constexpr auto n = std::size_t(T::RowsAtCompileTime);
-        if (count > mesh_.corner_count()) throw Damage();
-        attribute.values.resize(count);
-        attribute.corners.resize(mesh_.corner_count(), kNoIndex);
-        T low = T::Zero();
-        float step = 0;
-        auto steps = quantised(attribute.values, bits, low, step);
-        std::vector<Index> latest(mesh_.vertex_count(), kNoIndex); // the value that a vertex had last
-        std::uint32_t next = 0;
-        Index before = kNoIndex; // the value of the corner before
-        for (std::size_t f = 0; f < mesh_.face_count(); ++f)
-            for (std::size_t c = mesh_.face_offsets[f]; c < mesh_.face_offsets[f + 1]; ++c) {
-                Index& value = attribute.corners[c];
-                Index& last = latest[mesh_.corners[c]];
-                // 0: the vertex's last one, 1: a new one, 2: none, 3: an older one
-                std::uint32_t kind = value == kNoIndex ? 2 : value == last ? 0 : value == next ? 1 : 3;
-                code_.number(kKind + (last == kNoIndex), kind);
-                if (kind == 0 && last != kNoIndex)
-                    value = last;
-                else if (kind == 1 && next < count) {
-                    value = next++;
-                    for (std::size_t k = 0; k < n; ++k) {
-                        const Index near = last != kNoIndex ? last : before;
-                        code_.difference(kValue + 3 + unsigned(k), steps[value][k],
-                                         near != kNoIndex ? steps[near][k] : 0);
-                    }
-                } else if (kind == 2)
-                    value = kNoIndex;
-                else {
-                    std::uint32_t back = next - 1 - value;
-                    code_.number(kOlder, back);
-                    if (back >= next) throw Damage();
-                    value = next - 1 - back;
-                }
-                if (value != kNoIndex) last = before = value;
-                code_.check();
-            }
-        fill(attribute.values, steps, low, step);
-    }
-
-    void colors() {
-        std::uint32_t count = static_cast<std::uint32_t>(mesh_.colors.size());
-        std::uint32_t has_alpha = mesh_.colors_have_alpha;
-        code_.number(kCount, count);
-        if (count == 0) return;
-        if (count != mesh_.vertex_count()) throw Damage();
-        code_.number(kCount, has_alpha);
-        mesh_.colors_have_alpha = has_alpha != 0;
-        mesh_.colors.resize(count, Vec4f::Ones());
-        std::vector<std::array<std::int32_t, 4>> steps(count);
-        for (std::size_t v = 0; v < count; ++v)
-            for (int k = 0; k < 3 + int(has_alpha != 0); ++k) {
-                std::int32_t& step = steps[v][std::size_t(k)];
-                step = static_cast<std::int32_t>(std::lround(std::clamp(mesh_.colors[v][k], 0.0f, 1.0f) * 255));
-                const Index near = neighbour_[v];
-                code_.difference(kColor + unsigned(k), step, near != kNoIndex ? steps[near][std::size_t(k)] : 0);
-                mesh_.colors[v][k] = float(step) / 255;
-            }
-    }
-
-    /// Bit for bit: the difference of the numbers that floats are as integers.
-    void scalars(std::vector<float>& values) {
-        values.resize(mesh_.vertex_count());
-        std::uint32_t before = 0;
-        for (float& value : values) {
-            std::int32_t difference = std::int32_t(std::bit_cast<std::uint32_t>(value) - before);
-            code_.difference(kScalar, difference, 0);
-            before += std::uint32_t(difference);
-            value = std::bit_cast<float>(before);
-        }
-    }
-
-    void labels(std::vector<Index>& of_face) {
-        std::uint32_t count = static_cast<std::uint32_t>(of_face.size());
-        code_.number(kCount, count);
-        if (count == 0) return;
-        if (count != mesh_.face_count()) throw Damage();
-        of_face.resize(count, 0);
-        Index before = 0;
-        for (Index& label : of_face) {
-            std::uint32_t is_new = label != before;
-            code_.number(kLabel, is_new);
-            if (is_new)
-                code_.number(kLabel + 1, label);
-            else
-                label = before;
-            before = label;
-            code_.check();
-        }
-    }
-
-public:
-    static constexpr unsigned kCount = 0, kValue = 1, kKind = 7, kOlder = 9, kColor = 10, kScalar = 14, kLabel = 15,
-                              kContexts = 17;
-
-private:
-    Code& code_;
-    Mesh& mesh_;
-    std::vector<Index> neighbour_; ///< of each vertex the last of those before it on its faces' edges
-};
-
-struct NumberWriter {
-    static constexpr bool writes = true;
-    SymbolWriter& out;
-    void number(unsigned context, std::uint32_t& value) { out.number(context, value); }
-    void difference(unsigned context, std::int32_t& value, std::int32_t expected) {
-        out.number_with_sign(context, std::int32_t(std::uint32_t(value) - std::uint32_t(expected)));
-    }
-    void real(float& value) { out.bits(std::bit_cast<std::uint32_t>(value), 32); }
-    void check() const {}
-};
-
-struct NumberReader {
-    static constexpr bool writes = false;
-    SymbolReader& in;
-    void number(unsigned context, std::uint32_t& value) {
-        value = in.number(context);
-        check();
-    }
-    void difference(unsigned context, std::int32_t& value, std::int32_t expected) {
-        value = std::int32_t(std::uint32_t(in.number_with_sign(context)) + std::uint32_t(expected));
-        check();
-    }
-    void real(float& value) {
-        value = std::bit_cast<float>(in.bits(32));
-        if (!std::isfinite(value)) throw Damage();
-    }
-    void check() const {
-        if (in.is_damaged()) throw Damage();
-    }
-};
 
 // --- Order --------------------------------------------------------------------------------------------------------
 
 /// The mesh in the order of its code.
 struct OrderedMesh {
     Mesh mesh;
+    std::vector<FinePlace> places; ///< as they will be read
     std::vector<Index> vertex, face, first_corner;
 };
 
@@ -278,24 +67,6 @@ std::vector<T> in_order(const std::vector<T>& values, std::span<const Index> ord
     moved.reserve(order.size());
     for (const Index i : order) moved.push_back(values[i]);
     return moved;
-}
-
-/// Values in the order in which corners first name them; those that none names are dropped.
-template <class T>
-void renumber_values(CornerAttribute<T>& attribute) {
-    if (attribute.per_vertex()) return;
-    std::vector<Index> number(attribute.values.size(), kNoIndex);
-    std::vector<T> values;
-    for (Index& c : attribute.corners) {
-        if (c == kNoIndex) continue;
-        if (number[c] == kNoIndex) {
-            number[c] = static_cast<Index>(values.size());
-            values.push_back(attribute.values[c]);
-        }
-        c = number[c];
-    }
-    attribute.values = std::move(values);
-    if (attribute.values.empty()) attribute.corners.clear();
 }
 
 template <class T>
@@ -423,7 +194,9 @@ std::optional<OrderedMesh> encode_regular_shape(const Mesh& mesh, CodedMesh& cod
     ordered.vertex = std::move(encoded->vertex);
     ordered.face = std::move(encoded->face);
     ordered.first_corner = std::move(encoded->first_corner);
-    fill_shape(std::move(encoded->read), coded, ordered.mesh);
+    ordered.mesh.face_offsets = std::move(encoded->read.face_offsets);
+    ordered.mesh.corners = std::move(encoded->read.corners);
+    ordered.places = std::move(encoded->read.places);
     return ordered;
 }
 
@@ -463,7 +236,7 @@ OrderedMesh encode_shape(const Mesh& mesh, CodedMesh& coded, const RunContext& c
                 places[w] = fine_place(mesh.positions[ordered.vertex[walked.number[w]]], coded);
         read = encode_geometry(walked.map, places, steps_of(coded.options), 0, places_out);
     }
-    for (const std::size_t w : walked.first_with_number()) moved.positions.push_back(position_of(read[w], coded));
+    for (const std::size_t w : walked.first_with_number()) ordered.places.push_back(read[w]);
     FinePlace before{};
     for (std::size_t v = walked.met; v < mesh.vertex_count(); ++v) {
         const FinePlace place = fine_place(mesh.positions[ordered.vertex[v]], coded);
@@ -472,7 +245,7 @@ OrderedMesh encode_shape(const Mesh& mesh, CodedMesh& coded, const RunContext& c
             places_out.number_with_sign(kLoosePlace + k, steps);
             before[k] += kFine * steps;
         }
-        moved.positions.push_back(position_of(before, coded));
+        ordered.places.push_back(before);
     }
     coded.places = places_out.finish();
     return ordered;
@@ -489,9 +262,9 @@ LevelReader decode_levels(const CodedMesh& coded, const RunContext& context) {
     return reader;
 }
 
-/// Into `mesh`. Throws Damage.
-void decode_shape(const CodedMesh& coded, SymbolReader& faces_in, SymbolReader& places_in, const RunContext& context,
-                  Mesh& mesh) {
+/// Of any mesh, as encode_shape wrote it. Throws Damage.
+CodedShape decode_shape(const CodedMesh& coded, SymbolReader& faces_in, SymbolReader& places_in,
+                        const RunContext& context) {
     std::optional<WalkedFaces> walked;
     std::vector<FinePlace> places;
     if (coded.options.levels) {
@@ -502,19 +275,19 @@ void decode_shape(const CodedMesh& coded, SymbolReader& faces_in, SymbolReader& 
         walked = decode_faces(faces_in, coded.vertices, coded.corners);
     if (!walked || context.is_cancelled()) throw Damage();
     if (!coded.options.levels) places = decode_geometry(walked->map, steps_of(coded.options), 0, places_in);
-    for (const std::size_t w : walked->first_with_number()) mesh.positions.push_back(position_of(places[w], coded));
+    CodedShape shape{std::move(walked->face_offsets), std::move(walked->corners), {}};
+    for (const std::size_t w : walked->first_with_number()) shape.places.push_back(places[w]);
     FinePlace place{};
-    while (mesh.vertex_count() < coded.vertices) {
+    while (shape.places.size() < coded.vertices) {
         for (unsigned k = 0; k < 3; ++k) {
             const std::int64_t next = place[k] + std::int64_t{kFine} * places_in.number_with_sign(kLoosePlace + k);
             if (std::abs(next) > kFarthest) throw Damage();
             place[k] = std::int32_t(next);
         }
         if (places_in.is_damaged()) throw Damage();
-        mesh.positions.push_back(position_of(place, coded));
+        shape.places.push_back(place);
     }
-    mesh.face_offsets = std::move(walked->face_offsets);
-    mesh.corners = std::move(walked->corners);
+    return shape;
 }
 
 Mesh decode(const CodedMesh& coded, const RunContext& context) {
@@ -522,20 +295,21 @@ Mesh decode(const CodedMesh& coded, const RunContext& context) {
         !std::isfinite(coded.step * (1 << 27)))
         throw Damage();
     SymbolReader faces_in(coded.connectivity, kFaceContexts), places_in(coded.places, kPlaceContexts);
+    std::optional<CodedShape> shape;
+    if (faces_in.bits(1) != 0)
+        shape = decode_regular(faces_in, places_in, steps_of(coded.options), coded.vertices, coded.corners);
+    else
+        shape = decode_shape(coded, faces_in, places_in, context);
+    if (!shape) throw Damage();
     Mesh mesh = coded.rest;
-    if (faces_in.bits(1) != 0) {
-        std::optional<RegularMesh> regular =
-            decode_regular(faces_in, places_in, steps_of(coded.options), coded.vertices, coded.corners);
-        if (!regular) throw Damage();
-        fill_shape(std::move(*regular), coded, mesh);
-    } else
-        decode_shape(coded, faces_in, places_in, context, mesh);
+    mesh.face_offsets = std::move(shape->face_offsets);
+    mesh.corners = std::move(shape->corners);
+    mesh.positions = positions_of(shape->places, coded);
     if (places_in.is_damaged() || mesh.face_count() != coded.faces ||
         std::ranges::any_of(mesh.corners, [&](Index v) { return v >= coded.vertices; }))
         throw Damage();
-    SymbolReader attributes_in(coded.attributes, Attributes<NumberReader>::kContexts);
-    NumberReader numbers{attributes_in};
-    Attributes<NumberReader>(numbers, mesh).run();
+    SymbolReader attributes_in(coded.attributes, kAttributeContexts);
+    if (!decode_attributes(mesh, shape->places, attributes_in)) throw Damage();
     if (coded.options.keep_order) mesh = put_back(mesh, coded.order);
     return mesh;
 }
@@ -590,9 +364,8 @@ Result<CodedMesh> encode_mesh(const Mesh& mesh, const MeshCodeOptions& options, 
     if (!ordered && !context.is_cancelled()) ordered = encode_shape(mesh, coded, context);
     if (context.is_cancelled()) return cancelled_error();
     Mesh& moved = ordered->mesh;
+    moved.positions = positions_of(ordered->places, coded);
     put_attributes_in_order(mesh, *ordered);
-    renumber_values(moved.uvs);
-    renumber_values(moved.normals);
 
     if (report) {
         report->vertex = ordered->vertex;
@@ -606,9 +379,8 @@ Result<CodedMesh> encode_mesh(const Mesh& mesh, const MeshCodeOptions& options, 
         report->rms = std::sqrt(squares / double(mesh.vertex_count()));
         report->largest = std::sqrt(largest);
     }
-    SymbolWriter attributes_out(Attributes<NumberWriter>::kContexts);
-    NumberWriter numbers{attributes_out};
-    Attributes<NumberWriter>(numbers, moved).run();
+    SymbolWriter attributes_out(kAttributeContexts);
+    encode_attributes(moved, ordered->places, attributes_out);
     coded.attributes = attributes_out.finish();
     if (options.keep_order) coded.order = write_order(*ordered);
 

@@ -214,7 +214,7 @@ private:
 };
 
 /// Patch by patch, row by row.
-void append_faces(const GridNumbers& numbers, RegularMesh& mesh) {
+void append_faces(const GridNumbers& numbers, CodedShape& mesh) {
     for (std::size_t p = 0; p < numbers.patch_count(); ++p)
         for (std::size_t j = 0; j < numbers.side(); ++j)
             for (std::size_t i = 0; i < numbers.side(); ++i) {
@@ -328,8 +328,8 @@ std::optional<EncodedRegular> encode_regular(const Mesh& mesh, std::span<const F
     return encoded;
 }
 
-std::optional<RegularMesh> decode_regular(SymbolReader& faces_in, SymbolReader& places_in, GeometrySteps steps,
-                                          std::size_t vertices, std::size_t corners) {
+std::optional<CodedShape> decode_regular(SymbolReader& faces_in, SymbolReader& places_in, GeometrySteps steps,
+                                         std::size_t vertices, std::size_t corners) {
     const unsigned levels = faces_in.bits(4);
     const std::size_t base_vertices = faces_in.bits(32), quads = std::size_t{1} << (2 * levels);
     if (levels == 0 || faces_in.is_damaged() || base_vertices > vertices || corners % (4 * quads) != 0 ||
@@ -345,7 +345,7 @@ std::optional<RegularMesh> decode_regular(SymbolReader& faces_in, SymbolReader& 
     GridReader reader(places_in);
     GridTraversal<GridReader> traversal(numbers, steps, places_of_numbers(*base, of_map), reader);
     if (!traversal.run(RunContext())) return std::nullopt;
-    RegularMesh mesh;
+    CodedShape mesh;
     append_faces(numbers, mesh);
     mesh.places = traversal.take_places();
     return mesh;

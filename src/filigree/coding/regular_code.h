@@ -15,14 +15,14 @@ namespace filigree {
 /// Contexts of a SymbolWriter that the places of such a mesh take, from 0 on: its base's and its levels'.
 inline constexpr unsigned kRegularContexts = kGeometryContexts + 108;
 
-/// A quad mesh in the order of its code.
-struct RegularMesh {
+/// Faces and places in the order of their code.
+struct CodedShape {
     std::vector<Index> face_offsets = {0}, corners;
     std::vector<FinePlace> places;
 };
 
 struct EncodedRegular {
-    RegularMesh read;                              ///< as it will be read
+    CodedShape read;                               ///< as it will be read
     std::vector<Index> vertex, face, first_corner; ///< which each was; the corner of the face that is first now
 };
 
@@ -33,7 +33,7 @@ std::optional<EncodedRegular> encode_regular(const Mesh& mesh, std::span<const F
                                              const RunContext& context);
 
 /// None: damaged, or it has not so many vertices and corners, or more vertices than its bytes can hold.
-std::optional<RegularMesh> decode_regular(SymbolReader& faces_in, SymbolReader& places_in, GeometrySteps steps,
-                                          std::size_t vertices, std::size_t corners);
+std::optional<CodedShape> decode_regular(SymbolReader& faces_in, SymbolReader& places_in, GeometrySteps steps,
+                                         std::size_t vertices, std::size_t corners);
 
 } // namespace filigree

@@ -31,9 +31,9 @@ std::uint32_t get_u32(std::string_view bytes, std::size_t at) {
 } // namespace
 
 SymbolModel::SymbolModel() {
-    for (unsigned s = 0; s < kSymbols; ++s) counts_[s] = s < 32 ? 2 : 1;
+    for (unsigned s = 0; s < kSymbols; ++s) counts_[s] = 1 + (24u >> (s / 6));
     update();
-    pause_ = until_update_ = 16;
+    pause_ = until_update_ = 4;
 }
 
 void SymbolModel::update() {

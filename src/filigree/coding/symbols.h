@@ -38,7 +38,7 @@ private:
     std::array<std::uint16_t, kSymbols + 1> starts_;
     std::array<std::uint8_t, (kShares >> kCoarse)> first_; ///< the symbol at the start of every 64 shares
     std::array<std::uint32_t, kSymbols> counts_;
-    unsigned pause_ = 16, until_update_ = 16;
+    unsigned pause_ = 4, until_update_ = 4;
 };
 
 class SymbolWriter {
