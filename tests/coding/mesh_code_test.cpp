@@ -143,12 +143,16 @@ TEST(MeshCode, Attributes) {
          {MeshCodeOptions{}, {.keep_order = true}, {.levels = true}, {.keep_order = true, .levels = true}}) {
         const bool keep_order = options.keep_order;
         const Coded out = coded(mesh, options);
+        float normal_squares = 0;
         for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
             const Index was = keep_order ? Index(v) : out.report.vertex[v];
             ASSERT_EQ(out.mesh.scalars[0].values[v], mesh.scalars[0].values[was]);
             ASSERT_LT((out.mesh.colors[v] - mesh.colors[was]).cwiseAbs().maxCoeff(), 0.51f / 255);
-            ASSERT_LT((out.mesh.normals.values[v] - mesh.normals.values[was]).norm(), 1.75e-3f); // 0.1 degrees
+            const float off = (out.mesh.normals.values[v] - mesh.normals.values[was]).norm();
+            ASSERT_LT(off, 4.2e-3f); // half a step each way, where the octahedron's square is stretched most
+            normal_squares += off * off;
         }
+        EXPECT_LT(std::sqrt(normal_squares / float(mesh.vertex_count())), 1e-3f);
         EXPECT_EQ(out.mesh.scalars[0].name, "heat");
         EXPECT_EQ(std::ranges::count(out.mesh.materials.of_face, 1u), std::ranges::count(mesh.materials.of_face, 1u));
     }

@@ -37,8 +37,17 @@ if (counts / 'torture.json').exists():
               f'| last run | {when} |', '']
     lines += [f'- {sentence}' for sentence in told.get('sentences', [])]
 
+if (counts / 'bounds.json').exists():
+    told = json.loads((counts / 'bounds.json').read_text())
+    when = (counts / 'bounds.when').read_text().strip()
+    lines += ['## Bounds', '',
+              f'Every command over {told["rungs"]} meshes from {told["first"]:,} vertices on, each twice the one before (`scripts/bounds`): processor seconds and memory of the largest, and the most that either grew at a step. 2.5 is the limit; steps below 0.3 s and 60 MiB are not judged (0).', '',
+              '| command | seconds | growth | MiB | growth |', '|---|---|---|---|---|']
+    for name, row in told['commands'].items():
+        lines.append(f'| {name} | {row["seconds"][-1]:.2f} | {row["seconds_growth"]:.2f} | {row["mib"][-1]:.0f} | {row["mib_growth"]:.2f} |')
+    lines += ['', f'Last run: {when}.', '']
+
 lines += ['## What nothing covers', '',
-          '- Fuzz targets are missing for poses, scenes, handles, materials and pictures, remesh, the melting surface and bodies; these are fuzzed by tests of random input alone.',
           '- The studio is played by scripts, not by hours of random actions.',
           '- No line coverage, no mutation testing, no soak of a day.', '']
 page.write_text('\n'.join(lines))

@@ -13,7 +13,7 @@ namespace {
 struct AttributeDamage {};
 
 /// Contexts. kUv: how it is expected, axis, size of differences nearby. kNormal: what it is expected from, axis, size.
-constexpr unsigned kSizes = 12, kCount = 0, kPlainValue = kCount + 1, kKind = kPlainValue + 3, kOlderValue = kKind + 2,
+constexpr unsigned kSizes = 12, kCount = 0, kPlainValue = kCount + 1, kKind = kPlainValue + 3, kOlderValue = kKind + 17,
                    kColorStep = kOlderValue + 1, kScalarBits = kColorStep + 4, kLabel = kScalarBits + 1,
                    kUv = kLabel + 2, kNormalGuess = kUv + 3 * 2 * kSizes, kNormal = kNormalGuess + 4,
                    kAttributeEnd = kNormal + 3 * 2 * kSizes;
@@ -107,12 +107,21 @@ private:
         std::span<const Index> known; ///< of each corner of the face its value, kNoIndex where it is not known yet
         Index before;                 ///< another value that is known, kNoIndex: none is
     };
+    /// An edge's ends, as corners of another face; kNoIndex: there is none.
+    struct Edge {
+        Index from = kNoIndex, to = kNoIndex;
+    };
     static constexpr std::size_t kNoFace = ~std::size_t{0};
 
     /// Says which value each corner has, and calls code_value(value, fresh) once for each, in the reader's order:
     /// in each face first the corners of vertices that have one.
     template <class T, class CodeValue>
     void walk(CornerAttribute<T>& attribute, bool is_indexed, const CodeValue& code_value) {
+        if (at_vertex_.size() == 0) {
+            at_vertex_ = corners_at_vertices(mesh_.corners, mesh_.vertex_count());
+            for (std::size_t f = 0; f < mesh_.face_count(); ++f)
+                face_of_.insert(face_of_.end(), mesh_.face_size(f), static_cast<Index>(f));
+        }
         const auto count = static_cast<Index>(attribute.values.size());
         std::vector<Index> latest(mesh_.vertex_count(), kNoIndex), known, order;
         Index next = 0, before = kNoIndex;
@@ -120,19 +129,27 @@ private:
             const auto face = mesh_.face(f);
             known.assign(face.size(), kNoIndex);
             known_first(face, latest, order);
+            find_edges(f);
             for (const Index k : order) {
                 Index& last = latest[face[k]];
                 Index value = face[k];
                 bool is_new = last == kNoIndex;
                 if (is_indexed) {
                     Index& named = attribute.corners[mesh_.face_offsets[f] + k];
-                    // 0: the vertex's last one, 1: a new one, 2: none, 3: an older one
-                    std::uint32_t kind = named == kNoIndex ? 2 : named == last ? 0 : named == next ? 1 : 3;
-                    code_.number(kKind + (last == kNoIndex), kind);
-                    if (kind == 0 && last == kNoIndex) throw AttributeDamage();
-                    is_new = kind == 1 && next < count;
-                    value = kind == 0 ? last : is_new ? next++ : kNoIndex;
-                    if (kind != 2 && value == kNoIndex) value = older(named, next);
+                    const Candidate candidate = candidate_at(k, last, known, attribute.corners);
+                    std::uint32_t kind = named == kNoIndex          ? kNone
+                                         : named == candidate.value ? kCandidate
+                                         : named == next            ? kNew
+                                         : named == last            ? kLast
+                                                                    : kOlder;
+                    code_.number(kKind + candidate.context, kind);
+                    is_new = kind == kNew && next < count;
+                    value = is_new               ? next++
+                            : kind == kCandidate ? candidate.value
+                            : kind == kLast      ? last
+                            : kind == kNone      ? kNoIndex
+                                                 : older(named, next);
+                    if (kind != kNone && value == kNoIndex) throw AttributeDamage();
                     named = value;
                 }
                 if (is_new) code_value(value, Fresh{f, k, known, before});
@@ -147,6 +164,45 @@ private:
         }
         if (is_indexed && next != count) throw AttributeDamage();
     }
+    /// Which value a corner has: the one that is expected, a new one, none, an older one, or its vertex's last one.
+    enum ValueKind : std::uint32_t { kCandidate, kNew, kNone, kOlder, kLast };
+
+    /// The value that a corner is expected to have, and how sure that is.
+    struct Candidate {
+        Index value;
+        unsigned context;
+    };
+    /// Edges on whose other end the face and the one behind agree are no seams.
+    Candidate candidate_at(Index k, Index last, std::span<const Index> known, const std::vector<Index>& values) const {
+        if (last == kNoIndex) return {kNoIndex, 16};
+        const std::size_t n = known.size(), k_before = (k + n - 1) % n, k_after = (k + 1) % n;
+        const auto state = [&](Index here, Index there) { // 0: nothing behind, 1: not known, 2: they agree, 3: a seam
+            return there == kNoIndex ? 0u : here == kNoIndex ? 1u : here == values[there] ? 2u : 3u;
+        };
+        const Edge &before = edges_[k_before], &after = edges_[k];
+        const unsigned by_before = state(known[k_before], before.from), by_after = state(known[k_after], after.to);
+        Candidate candidate{last, 4 * by_before + by_after};
+        for (const unsigned wanted : {1u, 2u}) { // the surest last
+            if (by_before == wanted && values[before.to] != kNoIndex) candidate.value = values[before.to];
+            if (by_after == wanted && values[after.from] != kNoIndex) candidate.value = values[after.from];
+        }
+        return candidate;
+    }
+
+    /// Finds, for each edge of a face, its ends as corners of an earlier face.
+    void find_edges(std::size_t f) {
+        const auto face = mesh_.face(f);
+        edges_.assign(face.size(), {});
+        for (std::size_t k = 0; k < face.size(); ++k)
+            for (const Index corner : at_vertex_[face[k]]) {
+                const Index g = face_of_[corner];
+                if (g >= f) break; // corners ascend
+                const Index begin = mesh_.face_offsets[g], size = mesh_.face_size(g), at = corner - begin;
+                const Index ahead = begin + (at + size - 1) % size;
+                if (mesh_.corners[ahead] == face[(k + 1) % face.size()]) edges_[k] = {corner, ahead};
+            }
+    }
+
     /// A face's corners: those of vertices that have a value, then the others.
     static void known_first(std::span<const Index> face, const std::vector<Index>& latest, std::vector<Index>& order) {
         order.clear();
@@ -244,11 +300,6 @@ private:
         float step = 0;
         std::vector<Steps> steps = quantised(mesh_.uvs.values, kUvBits, low, step);
         std::vector<std::uint16_t> sizes(steps.size(), 0);
-        if (at_vertex_.size() == 0) {
-            at_vertex_ = corners_at_vertices(mesh_.corners, mesh_.vertex_count());
-            for (std::size_t f = 0; f < mesh_.face_count(); ++f)
-                face_of_.insert(face_of_.end(), mesh_.face_size(f), static_cast<Index>(f));
-        }
         walk(mesh_.uvs, is_indexed, [&](Index value, const Fresh& fresh) {
             const Guess guess = expected_uv(fresh, steps, sizes);
             std::uint32_t size = 0;
@@ -302,7 +353,8 @@ private:
                                           along = {steps[value_b][0] - from[0], steps[value_b][1] - from[1]};
         const double height = length_of(cross(edge, to_v));
         std::int64_t ahead = fixed_quotient(double(dot(edge, to_v)), square);
-        const auto [other, other_value] = behind(fresh.face, face[a], face[b], value_a, value_b);
+        const auto [other, other_value] =
+            b == (a + 1) % face.size() ? behind(a, value_a, value_b) : std::pair(kNoIndex, kNoIndex);
         const Wide to_other = other != kNoIndex ? wide(places_[other]) - origin : Wide{};
         const double depth = length_of(cross(edge, to_other));
         if (depth > 0 && height <= 8 * depth) { // the faces unfolded into a plane, and mapped as the one behind is
@@ -321,18 +373,16 @@ private:
         return true;
     }
 
-    /// In a face before this one that has the edge, with the same values: its next vertex, and that one's value.
-    std::pair<Index, Index> behind(std::size_t face, Index a, Index b, Index value_a, Index value_b) const {
-        for (const Index corner : at_vertex_[a]) {
-            const Index g = face_of_[corner];
-            if (g >= face || value_at(corner) != value_a) continue;
-            const Index begin = mesh_.face_offsets[g], size = mesh_.face_size(g), k = corner - begin;
-            const Index after = begin + (k + 1) % size, ahead = begin + (k + size - 1) % size;
-            for (const auto& [there, other] : {std::pair(after, ahead), {ahead, after}})
-                if (mesh_.corners[there] == b && value_at(there) == value_b && value_at(other) != kNoIndex)
-                    return {mesh_.corners[other], value_at(other)};
-        }
-        return {kNoIndex, kNoIndex};
+    /// In the face behind the edge from corner a to the next one, where the values are the same: its other vertex
+    /// beside the edge, and that one's value.
+    std::pair<Index, Index> behind(std::size_t a, Index value_a, Index value_b) const {
+        const auto [corner_a, corner_b] = edges_[a];
+        if (corner_a == kNoIndex || value_at(corner_a) != value_a || value_at(corner_b) != value_b)
+            return {kNoIndex, kNoIndex};
+        const Index g = face_of_[corner_a], begin = mesh_.face_offsets[g], size = mesh_.face_size(g);
+        const Index other = begin + (corner_a - begin + 1) % size;
+        if (value_at(other) == kNoIndex) return {kNoIndex, kNoIndex};
+        return {mesh_.corners[other], value_at(other)};
     }
     Index value_at(Index corner) const {
         return mesh_.uvs.per_vertex() ? mesh_.corners[corner] : mesh_.uvs.corners[corner];
@@ -494,8 +544,9 @@ private:
     Code& code_;
     Mesh& mesh_;
     std::span<const FinePlace> places_;
-    IndexLists at_vertex_;       ///< corners, for texture coordinates
+    IndexLists at_vertex_;       ///< corners
     std::vector<Index> face_of_; ///< of each corner
+    std::vector<Edge> edges_;    ///< of the face that a walk is at
     std::uint32_t last_guess_ = 0;
 };
 

@@ -8,7 +8,7 @@
 namespace filigree {
 
 /// Contexts of a SymbolWriter that attributes take, from 0 on.
-inline constexpr unsigned kAttributeContexts = 170;
+inline constexpr unsigned kAttributeContexts = 185;
 
 /// Writes what `mesh` has, and makes it what a reader will have: rounded, values in the order in which they are met.
 /// places: of its vertices. Cost O(size).

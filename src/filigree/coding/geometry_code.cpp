@@ -16,8 +16,8 @@ static_assert(3 * kSizeClasses * kSupport <= kGeometryContexts);
 template <class Coder>
 class Traversal {
 public:
-    Traversal(const ClosedMap& map, GeometrySteps steps, Coder& coder)
-        : map_(map), coder_(coder), steps_{steps.normal, steps.tangential, steps.tangential},
+    Traversal(const ClosedMap& map, GeometrySteps steps, bool is_turned, Coder& coder)
+        : map_(map), coder_(coder), is_turned_(is_turned), steps_{steps.normal, steps.tangential, steps.tangential},
           places_(map.vertex_count()), sizes_(map.vertex_count(), 0), expected_(map.vertex_count()),
           is_known_(map.vertex_count(), false), spoke_(map.vertex_count(), kNoIndex),
           known_corners_(map.triangles.size(), 0) {
@@ -86,7 +86,7 @@ private:
         const Expectation& e = expected_[v];
         Wide expected{};
         for (std::size_t k = 0; k < 3; ++k) expected[k] = divide(std::int32_t(e.sum[k]), e.count);
-        code(v, expected, Frame(e.normal, wide(e.ahead)), std::int32_t(e.size / (3 * e.count)),
+        code(v, expected, is_turned_ ? Frame(e.normal, wide(e.ahead)) : Frame(), std::int32_t(e.size / (3 * e.count)),
              std::min<unsigned>(e.count, kSupport) - 1);
     }
 
@@ -149,6 +149,7 @@ private:
 
     const ClosedMap& map_;
     Coder& coder_;
+    bool is_turned_;
     std::array<std::int32_t, 3> steps_;
     std::vector<FinePlace> places_;
     std::vector<std::int32_t> sizes_; ///< of each vertex's difference, quarters of a step
@@ -194,14 +195,17 @@ private:
 
 std::vector<FinePlace> encode_geometry(const ClosedMap& map, std::span<const FinePlace> places, GeometrySteps steps,
                                        unsigned first_context, SymbolWriter& out) {
-    PlaceWriter writer(places, first_context, out);
-    return Traversal<PlaceWriter>(map, steps, writer).run();
+    return encode_shorter(steps, out, [&](SymbolWriter& trial, bool is_turned) {
+        PlaceWriter writer(places, first_context, trial);
+        return Traversal<PlaceWriter>(map, steps, is_turned, writer).run();
+    });
 }
 
 std::vector<FinePlace> decode_geometry(const ClosedMap& map, GeometrySteps steps, unsigned first_context,
                                        SymbolReader& in) {
+    const bool is_turned = in.bits(1) != 0;
     PlaceReader reader(first_context, in);
-    return Traversal<PlaceReader>(map, steps, reader).run();
+    return Traversal<PlaceReader>(map, steps, is_turned, reader).run();
 }
 
 } // namespace filigree

@@ -71,8 +71,10 @@ private:
 template <class Coder>
 class GridTraversal {
 public:
-    GridTraversal(const GridNumbers& numbers, GeometrySteps steps, std::vector<FinePlace> base, Coder& coder)
-        : numbers_(numbers), steps_(steps), coder_(coder), places_(std::move(base)), sizes_(numbers.vertex_count(), 0) {
+    GridTraversal(const GridNumbers& numbers, GeometrySteps steps, bool is_turned, std::vector<FinePlace> base,
+                  Coder& coder)
+        : numbers_(numbers), steps_(steps), is_turned_(is_turned), coder_(coder), places_(std::move(base)),
+          sizes_(numbers.vertex_count(), 0) {
         places_.resize(numbers.vertex_count());
     }
 
@@ -134,7 +136,7 @@ private:
                 const Wide across = on_cubic([&](std::size_t k) { return vertex(i, k); }, j, step);
                 for (std::size_t k = 0; k < 3; ++k) expected[k] += across[k];
                 const Wide along_row = at(right) - at(left), along_column = at(above) - at(below);
-                code(vertex(i, j), expected, 32, Frame(cross(along_row, along_column), along_row), steps_, at_centre,
+                code(vertex(i, j), expected, 32, frame(along_row, along_column), steps_, at_centre,
                      (sizes_[left] + sizes_[right] + sizes_[below] + sizes_[above]) / 2);
             }
     }
@@ -151,9 +153,13 @@ private:
                     for (std::size_t c = 0; c < 3; ++c)
                         across[c] += places_[vertex(k, j + 2 * step)][c] - places_[vertex(k, j - 2 * step)][c];
                 const Index before = i > step ? line(i - 2 * step) : vertex(i, j - 2 * step);
-                code(line(i), on_cubic(line, i, step), 16, Frame(cross(along, across), along), steps_, on_line,
+                code(line(i), on_cubic(line, i, step), 16, frame(along, across), steps_, on_line,
                      sizes_[before] + sizes_[vertex(i, j - 2 * step)]);
             }
+    }
+
+    Frame frame(const Wide& along, const Wide& across) const {
+        return is_turned_ ? Frame(cross(along, across), along) : Frame();
     }
 
     /// sum: `weight` times where it is expected. size: of two differences that are known.
@@ -177,6 +183,7 @@ private:
 
     const GridNumbers& numbers_;
     GeometrySteps steps_;
+    bool is_turned_;
     Coder& coder_;
     std::vector<FinePlace> places_;
     std::vector<std::uint16_t> sizes_; ///< of each vertex's difference, steps
@@ -321,10 +328,13 @@ std::optional<EncodedRegular> encode_regular(const Mesh& mesh, std::span<const F
     for (std::size_t w = 0; w < of_map.size(); ++w)
         if (base.walked.number[w] != kNoIndex) of_map[w] = places[encoded.vertex[base.walked.number[w]]];
     const std::vector<FinePlace> read = encode_geometry(base.walked.map, of_map, steps, 0, places_out);
-    GridWriter writer(places, encoded.vertex, places_out);
-    GridTraversal<GridWriter> traversal(numbers, steps, places_of_numbers(base.walked, read), writer);
-    if (!traversal.run(context)) return std::nullopt;
-    encoded.read.places = traversal.take_places();
+    encoded.read.places = encode_shorter(steps, places_out, [&](SymbolWriter& trial, bool is_turned) {
+        GridWriter writer(places, encoded.vertex, trial);
+        GridTraversal<GridWriter> traversal(numbers, steps, is_turned, places_of_numbers(base.walked, read), writer);
+        traversal.run(context);
+        return traversal.take_places();
+    });
+    if (context.is_cancelled()) return std::nullopt;
     return encoded;
 }
 
@@ -342,8 +352,9 @@ std::optional<CodedShape> decode_regular(SymbolReader& faces_in, SymbolReader& p
     const GridNumbers numbers(base->corners, base_vertices, levels);
     if (numbers.vertex_count() != vertices) return std::nullopt;
     const std::vector<FinePlace> of_map = decode_geometry(base->map, steps, 0, places_in);
+    const bool is_turned = places_in.bits(1) != 0;
     GridReader reader(places_in);
-    GridTraversal<GridReader> traversal(numbers, steps, places_of_numbers(*base, of_map), reader);
+    GridTraversal<GridReader> traversal(numbers, steps, is_turned, places_of_numbers(*base, of_map), reader);
     if (!traversal.run(RunContext())) return std::nullopt;
     CodedShape mesh;
     append_faces(numbers, mesh);

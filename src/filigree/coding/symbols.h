@@ -57,6 +57,8 @@ public:
     /// Everything, and a few bytes that say how much it is. What comes then is another stream, with the shares as they
     /// have become.
     std::string finish();
+    /// How many bytes finish() would give. Cost O(what was written).
+    std::size_t size() const { return SymbolWriter(*this).finish().size(); }
 
 private:
     struct Share {

@@ -1,0 +1,60 @@
+#!/usr/bin/env python3
+"""Bits a vertex of whole meshes with texture coordinates and normals, `pack` beside Draco with as many bits.
+
+Usage: bench/coded_attributes.py PROGRAM MESH...
+Blender makes the charts (Smart UV Project) and smooth normals; draco_encoder is Debian's package draco.
+"""
+
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+UNWRAP = """
+import bpy, math, sys
+source, target = sys.argv[-2:]
+bpy.ops.wm.read_factory_settings(use_empty=True)
+bpy.ops.wm.obj_import(filepath=source)
+bpy.context.view_layer.objects.active = bpy.context.selected_objects[0]
+bpy.ops.object.shade_smooth()
+bpy.ops.object.mode_set(mode="EDIT")
+bpy.ops.mesh.select_all(action="SELECT")
+bpy.ops.uv.smart_project(angle_limit=math.radians(66), island_margin=0.002)
+bpy.ops.object.mode_set(mode="OBJECT")
+bpy.ops.wm.obj_export(filepath=target, export_materials=False)
+"""
+
+
+def run(*words):
+    done = subprocess.run([str(word) for word in words], capture_output=True, text=True)
+    if done.returncode != 0:
+        sys.exit(f"bench/coded_attributes.py: {' '.join(map(str, words))}: {done.stderr.strip()}")
+    return done.stdout
+
+
+def row(program, folder, mesh):
+    source, script, dressed = folder / "source.obj", folder / "unwrap.py", folder / "dressed.obj"
+    script.write_text(UNWRAP)
+    run(program, "deform", mesh, "--stretch", 1, "-o", source)  # a copy as OBJ
+    run("blender", "-b", "--python-exit-code", "1", "--python", script, "--", source, dressed)
+    packed = json.loads(run(program, "pack", dressed, "-o", folder / "coded.fil", "--bits", 14, "--json"))
+    vertices, part = packed["vertices"], packed["bits_per_vertex"]
+    draco = folder / "dressed.drc"
+    run("draco_encoder", "-i", dressed, "-o", draco, "-qp", 14, "-qt", 12, "-qn", 10, "-cl", 10)
+    peer = 8 * draco.stat().st_size / vertices
+    ours = part["connectivity"] + part["places"] + part["attributes"]
+    print(f"{mesh.stem:20} {vertices:>9,} {ours:>8.2f} {part['attributes']:>12.2f} {peer:>13.2f} {ours / peer:>7.2f}")
+
+
+def main():
+    if len(sys.argv) < 3:
+        sys.exit(__doc__.strip())
+    print(f"{'':20} {'vertices':>9} {'ours':>8} {'(attributes)':>12} {'Draco -cl 10':>13} {'ratio':>7}")
+    with tempfile.TemporaryDirectory() as name:
+        for mesh in sys.argv[2:]:
+            row(pathlib.Path(sys.argv[1]), pathlib.Path(name), pathlib.Path(mesh))
+
+
+if __name__ == "__main__":
+    main()
