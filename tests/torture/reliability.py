@@ -24,6 +24,11 @@ if (counts / 'fuzz').exists():
         lines.append(f'| `{name}` | {runs:,} | {minutes} | {said}{f"; {kept} kept as tests" if kept else ""} | {when} |')
     lines += [f'| all | {sum(entry[0] for entry in executions.values()):,} | | | |', '']
 
+if (counts / 'properties').exists():
+    tries, when = (counts / 'properties').read_text().strip().split(maxsplit=1)
+    lines += ['## Properties', '',
+              f'What has to come out the same two ways on random meshes (`tests/properties`: threads, order, turned, file and memory, coded and plain, scan, rays and winding, pieces and whole, bodies): {int(tries):,} tries of each with `scripts/properties`, none failed. Last run: {when}.', '']
+
 if (counts / 'torture.json').exists():
     told = json.loads((counts / 'torture.json').read_text())
     when = (counts / 'torture.when').read_text().strip()
