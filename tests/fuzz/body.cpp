@@ -30,7 +30,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const std::size_t points = simulation->attach(0, mesh.positions, kContext);
     for (int frame = 0; frame < 10; ++frame)
         if (!is_sound(simulation->advance(kContext))) return 0;
-    for (const Vec3f& p : simulation->positions(0)) require(p.allFinite(), "particles stay finite");
+    const Vectors& positions = simulation->positions(0);
+    for (std::size_t k = 0; k < positions.size(); ++k) require(positions[k].allFinite(), "particles stay finite");
     std::vector<Vec3f> carried(mesh.vertex_count());
     simulation->attached(points, carried, {}, kContext);
     for (const Vec3f& p : carried) require(p.allFinite(), "points that go along stay finite");
