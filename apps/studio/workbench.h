@@ -40,7 +40,9 @@ public:
     void set_mode(Mode mode);
 
     // Files. All in the background; errors come through told().
-    void open(const std::string& path); ///< mesh or model, told by the content; history starts anew
+    /// Mesh or model, told by the content; history starts anew. Of a large stream the first levels are there at once,
+    /// and can be warped while the rest is read.
+    void open(const std::string& path);
     /// .fil with the recording, or with the pose; the document counts as saved when the file holds its whole shape.
     void save_model(const std::string& path);
     /// What of the document a model file does not hold, as it would be said: "the pins". None: it holds all.
@@ -154,6 +156,8 @@ private:
     struct Impl;
     enum class After { nothing, play, step };
 
+    void open_whole(const std::string& path, std::shared_ptr<const Source> look);
+    void replace_document(State state);
     void follow_document(const State& before);
     void follow_playback();
     void show_pose();

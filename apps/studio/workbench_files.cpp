@@ -8,12 +8,15 @@
 #include "filigree/io/file.h"
 #include "filigree/io/mesh_file.h"
 #include "filigree/io/model_file.h"
+#include "filigree/io/model_stream.h"
 #include "filigree/io/numbered_name.h"
 #include "filigree/io/point_cache.h"
 #include "filigree/present/model_film.h"
 
 #include <algorithm>
 #include <filesystem>
+#include <optional>
+#include <utility>
 
 namespace filigree::studio {
 
@@ -71,6 +74,49 @@ Result<State> read_state(const std::string& path, const RunContext& context) {
     if (!state.model) return stripped_state(std::move(state), context);
     state.restore.level = state.model->finest_level();
     return state;
+}
+
+constexpr std::uint64_t kSmallStream = 1 << 18; ///< bytes: it is read at once
+constexpr std::size_t kFirstLook = 30'000;      ///< vertices
+
+/// Feeds the next bytes of a stream; false: there are none, or it is no stream.
+bool feed(ModelStream& stream, const FileReader& file, std::uint64_t& offset) {
+    std::string bytes(std::min<std::uint64_t>(1 << 16, file.size() - offset), '\0');
+    if (bytes.empty() || !file.read(offset, bytes) || !stream.feed(bytes)) return false;
+    offset += bytes.size();
+    return true;
+}
+
+/// Whether a file is a stream that is better looked at before all of it is read.
+bool is_large_stream(const std::string& path) {
+    const Result<FileReader> file = FileReader::open(path);
+    ModelStream stream(path);
+    std::uint64_t offset = 0;
+    return file && file->size() > kSmallStream && feed(stream, *file, offset);
+}
+
+/// The first levels of a stream, stripped. None: they are damaged, which reading all of it will tell.
+Result<std::optional<State>> first_look(const std::string& path, const BodySettings& body, const RunContext& context) {
+    context.report("reading", 0);
+    const Result<FileReader> file = FileReader::open(path);
+    ModelStream stream(path);
+    auto source = std::make_shared<Source>();
+    std::size_t levels = 0;
+    for (std::uint64_t offset = 0; file && source->mesh.vertex_count() < kFirstLook && feed(stream, *file, offset);) {
+        if (context.is_cancelled()) return cancelled_error();
+        if (std::exchange(levels, stream.level_count()) != stream.level_count()) source->mesh = stream.mesh();
+    }
+    if (source->mesh.face_count() == 0) return std::optional<State>();
+    source->path = path;
+    source->name = file_name(path).toStdString();
+    source->topology = analyse_topology(source->mesh, context);
+    source->materials = load_surface_materials(source->mesh, path);
+    State state;
+    state.body = body;
+    state.source = std::move(source);
+    Result<State> stripped = stripped_state(std::move(state), context);
+    if (!stripped && stripped.error().code == ErrorCode::cancelled) return stripped.error();
+    return stripped ? std::optional<State>(std::move(*stripped)) : std::nullopt;
 }
 
 /// What was opened, in a sentence.
@@ -159,6 +205,21 @@ void Workbench::open(const std::string& path) {
     forget_measuring();
     jobs_.drop(kModelTopic);
     jobs_.drop(kSourceTopic);
+    if (!is_large_stream(path)) return open_whole(path, nullptr);
+    jobs_.start<std::optional<State>>(
+        "Opening " + file_name(path), kOpenTopic,
+        [path, body = state().body](const RunContext& context) { return first_look(path, body, context); },
+        [this, path, id = document_.state_id()](std::optional<State> look) {
+            if (look && document_.state_id() == id) {
+                replace_document(std::move(*look));
+                set_mode(Mode::deform);
+                Q_EMIT told("A first look at " + file_name(path) + "; the rest is being read.", false);
+            }
+            open_whole(path, look ? state().source : nullptr);
+        });
+}
+
+void Workbench::open_whole(const std::string& path, std::shared_ptr<const Source> look) {
     jobs_.start<State>(
         "Opening " + file_name(path), kOpenTopic,
         [path, body = state().body](const RunContext& context) -> Result<State> {
@@ -167,22 +228,35 @@ void Workbench::open(const std::string& path) {
             state->body = body;
             return state;
         },
-        [this, path, id = document_.state_id()](State state) {
+        [this, path, look, id = document_.state_id()](State state) {
             if (is_pulling_) end_pull();
             pause();
-            if (document_.state_id() != id) {
+            const State& now = this->state();
+            const bool is_warped_look = look && now.source == look && now.handles.empty() && !now.recording;
+            if (document_.state_id() != id && !is_warped_look) {
                 Q_EMIT told("The document was changed while " + file_name(path) + " was read; open it again.", true);
                 return;
             }
+            if (is_warped_look) state.warps = now.warps;
             const QString text = summary(state);
             const bool has_motion = state.recording != nullptr;
-            frame_ = 0;
-            impl_->is_opening = true;
-            document_.replace(std::move(state));
-            impl_->is_opening = false;
-            set_mode(has_motion ? Mode::body : Mode::deform);
+            if (look)
+                document_.replace(std::move(state)); // seen from where the first look was
+            else
+                replace_document(std::move(state));
+            if (!look || has_motion) set_mode(has_motion ? Mode::body : Mode::deform);
             Q_EMIT told(text, false);
-        });
+        },
+        {.is_urgent = look != nullptr});
+}
+
+void Workbench::replace_document(State state) {
+    if (is_pulling_) end_pull();
+    pause();
+    frame_ = 0;
+    impl_->is_opening = true;
+    document_.replace(std::move(state));
+    impl_->is_opening = false;
 }
 
 void Workbench::save(const QString& title, const std::string& path,

@@ -73,11 +73,11 @@ inline Mesh mesh_of(Bytes& bytes) {
     return mesh;
 }
 
-/// The bytes of random meshes, as seeds.
-inline std::vector<std::string> mesh_seeds() {
+/// The bytes of so many random meshes, and of a closed one, as seeds.
+inline std::vector<std::string> mesh_seeds(int count = 24) {
     std::vector<std::string> all;
     std::uint32_t state = 1;
-    for (int seed = 0; seed < 24; ++seed) {
+    for (int seed = 0; seed < count; ++seed) {
         std::string bytes;
         for (int k = 0; k < 20 + 12 * seed; ++k) {
             state = state * 1664525 + 1013904223;

@@ -3,16 +3,47 @@
 #include "fuzz.h"
 
 #include "filigree/coding/mesh_code.h"
+#include "filigree/mesh/shapes.h"
 
 using namespace filigree_fuzz;
 
 namespace filigree_fuzz {
 
-std::vector<std::string> seeds() { return mesh_seeds(); }
+std::vector<std::string> seeds() {
+    std::vector<std::string> all;
+    for (const std::string& mesh : mesh_seeds(12))
+        for (const int kind : {0, 1, 6, 11, 24, 56}) all.push_back(char(kind) + mesh);
+    return all;
+}
 
 } // namespace filigree_fuzz
 
 namespace {
+
+/// Any faces, or a regular mesh whose vertices were moved.
+Mesh any_mesh(Bytes& bytes, unsigned kind) {
+    if (kind % 5 != 1) return mesh_of(bytes);
+    Mesh mesh = kind & 128 ? make_wavy_sphere({.resolution = 2 + kind / 8 % 8})
+                           : make_wavy_cube({.resolution = 2 + kind / 8 % 8});
+    for (unsigned k = 0; k < 20 && !bytes.empty(); ++k)
+        mesh.positions[(bytes.byte() * 256 + bytes.byte()) % mesh.vertex_count()] *= float(bytes.byte()) / 64;
+    return mesh;
+}
+
+/// Values one a vertex, or named by corners in any way.
+template <class T>
+void add_values(CornerAttribute<T>& attribute, const Mesh& mesh, Bytes& bytes, bool is_indexed) {
+    const std::size_t count = is_indexed ? 1 + bytes.byte() % 20 : mesh.vertex_count();
+    for (std::size_t k = 0; k < count; ++k) {
+        T value;
+        for (float& x : value) x = float(bytes.byte()) / 16 - 8;
+        attribute.values.push_back(value);
+    }
+    for (std::size_t c = 0; is_indexed && c < mesh.corner_count(); ++c) {
+        const std::size_t named = bytes.byte() % (count + 1);
+        attribute.corners.push_back(named == count ? kNoIndex : Index(named));
+    }
+}
 
 /// Changes a byte of one of its streams, and reads what became of it.
 void damage(const CodedMesh& coded, std::string& stream, Bytes& bytes) {
@@ -27,8 +58,15 @@ void damage(const CodedMesh& coded, std::string& stream, Bytes& bytes) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     Bytes bytes(data, size);
-    const unsigned options = bytes.byte();
-    const Mesh mesh = mesh_of(bytes);
+    const unsigned kind = bytes.byte(), options = bytes.byte();
+    Mesh mesh = any_mesh(bytes, kind);
+    if (kind & 2 && mesh.corner_count() > 0) add_values(mesh.uvs, mesh, bytes, kind & 4);
+    if (kind & 8 && mesh.corner_count() > 0) {
+        add_values(mesh.normals, mesh, bytes, kind & 16);
+        if (kind & 32)
+            for (Vec3f& n : mesh.normals.values) n = n.norm() > 0 ? n.normalized() : Vec3f(0, 0, 1);
+    }
+    const float uv_step = mesh.uvs.empty() ? 0 : 16.0f / 4095;
     const MeshCodeOptions how{10 + options % 7, (options & 64) != 0, (options & 128) != 0, (options & 32) != 0};
     MeshCodeReport report;
     CodedMesh coded = encode_mesh(mesh, how, &report, kContext).value();
@@ -39,6 +77,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         const Vec3f was = mesh.positions[how.keep_order ? v : report.vertex[v]];
         require((read.positions[v] - was).norm() <= float(coded.step * (how.surface ? 3.1 : 1.0)) + 1e-5f,
                 "places are near");
+    }
+    for (std::size_t c = 0; how.keep_order && c < mesh.uvs.corners.size(); ++c) {
+        const Index was = mesh.uvs.corners[c], is = read.uvs.corners[c];
+        require((was == kNoIndex) == (is == kNoIndex), "corners without a value stay without");
+        if (was != kNoIndex)
+            require((read.uvs.values[is] - mesh.uvs.values[was]).cwiseAbs().maxCoeff() <= uv_step,
+                    "texture coordinates are near");
     }
     for (std::string CodedMesh::*part :
          {&CodedMesh::connectivity, &CodedMesh::places, &CodedMesh::attributes, &CodedMesh::order})

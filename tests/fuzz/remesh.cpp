@@ -7,7 +7,7 @@ using namespace filigree_fuzz;
 
 namespace filigree_fuzz {
 
-std::vector<std::string> seeds() { return mesh_seeds(); }
+std::vector<std::string> seeds() { return mesh_seeds(4); }
 
 } // namespace filigree_fuzz
 

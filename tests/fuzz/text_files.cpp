@@ -12,33 +12,20 @@ namespace filigree_fuzz {
 
 /// The first byte says what the text is.
 std::vector<std::string> seeds() {
-    return {
+    std::vector<std::string> all = {
         std::string(1, 0) + R"({"handles": [{"name": "foot", "box": {"min": [-9, -9, -9], "max": [-1.3, 9, 9]}},
  {"sphere": {"centre": [1.5, 0, 0], "radius": 0.6}, "axis": [1, 0, 0], "degrees": 60, "move": [0.3, 0, 0.5]},
  {"vertices": [0, 1, 2], "centre": [0, 0, 0], "axis": [0, 0, 1], "degrees": 5, "comment": null}]})",
-        std::string(1, 1) + R"(frames = 30
-[[body]]
-name = "ball"
-shape = "wavy-sphere"
-resolution = 8
-material = "wax"
-centre = [0, 0.5, 0]
-spin = [0, 90, 0]
-[[obstacle]]
-shape = "ground"
-friction = 0.5
-[[obstacle]]
-shape = "ball"
-radius = 0.2
-move = [[0, [0, 0, 0]], [1.5, [0, 1, 0]]]
-[[hand]]
-body = "ball"
-point = [0, 1, 0]
-)",
         std::string(1, 2) +
             "# library\nnewmtl gold\nKd 0.8 0.6 0.1\nKa 0 0 0\nd 0.5\nTr 0.5\nmap_Kd -s 1 1 1 gold.png\n"
             "newmtl jade\nKd 0 1 0\nillum 2\nPr 0.3\nPm 1\n",
     };
+    for (const auto& entry : std::filesystem::directory_iterator(FILIGREE_ROOT "/examples/scenes")) {
+        std::ifstream scene(entry.path(), std::ios::binary);
+        if (entry.path().extension() == ".toml")
+            all.push_back(std::string(1, 1) + std::string(std::istreambuf_iterator<char>(scene), {}));
+    }
+    return all;
 }
 
 } // namespace filigree_fuzz

@@ -7,6 +7,7 @@
 #include "filigree/io/file.h"
 #include "filigree/io/mesh_file.h"
 #include "filigree/io/model_file.h"
+#include "filigree/mesh/shapes.h"
 #include "filigree/physics/named_materials.h"
 #include "filigree/render/gl_context.h"
 
@@ -16,6 +17,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 
 #include <gtest/gtest.h>
 
@@ -476,6 +478,40 @@ TEST_F(WorkbenchTest, OpeningCanBeCancelled) {
     EXPECT_EQ(opened, 1);
     EXPECT_EQ(state().source->name, "cube.ply");
     EXPECT_EQ(state().source->path, path("cube.ply"));
+}
+
+TEST_F(WorkbenchTest, ALargeStreamIsLookedAtAndWarpedBeforeAllOfItIsRead) {
+    const RunContext context;
+    const Mesh mesh = make_wavy_sphere({.resolution = 150});
+    const Model model = strip(mesh, {.base = 300}, context).value().model;
+    ASSERT_TRUE(write_coded_model(model, {}, {.levels = true}, path("ball.fil"), context).ok());
+    ASSERT_GT(fs::file_size(path("ball.fil")), 1u << 18);
+    std::size_t first = 0;
+    QObject::connect(&bench, &Workbench::told, &bench, [&](const QString& sentence, bool) {
+        if (!sentence.startsWith("A first look at ball.fil")) return;
+        first = state().source->mesh.vertex_count();
+        Warps warps;
+        warps.bend = 30;
+        bench.set_warps(warps);
+    });
+    bench.open(path("ball.fil"));
+    bench.wait_until_idle();
+    EXPECT_TRUE(errors.empty());
+    EXPECT_GT(first, 1000u);
+    EXPECT_LT(first, mesh.vertex_count() / 2);
+    EXPECT_EQ(state().source->mesh.vertex_count(), mesh.vertex_count());
+    EXPECT_EQ(state().model->driver().vertices.size(), model.driver().vertices.size());
+    EXPECT_EQ(state().warps.bend, 30);
+    EXPECT_EQ(opened, 1);
+
+    std::string bytes = read_file(path("ball.fil")).value();
+    bytes.resize((1u << 18) + 100); // cut off: what is there is looked at, and the rest is told to be missing
+    std::ofstream(path("half.fil"), std::ios::binary) << bytes;
+    bench.open(path("half.fil"));
+    bench.wait_until_idle();
+    EXPECT_EQ(errors.size(), 1u);
+    EXPECT_EQ(state().source->name, "half.fil");
+    EXPECT_LT(state().source->mesh.vertex_count(), mesh.vertex_count() / 2);
 }
 
 TEST_F(WorkbenchTest, PlayingMakesTheBodyAndPausingRecordsIt) {

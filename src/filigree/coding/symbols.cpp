@@ -120,16 +120,16 @@ void SymbolReader::read_next(std::string_view stream) {
     is_damaged_ = false;
     size_ = stream.size();
     words_ = bits_ = {};
-    constexpr std::size_t kFront = 20;
-    if (stream.size() < kFront || get_u32(stream, 0) > (stream.size() - kFront) / 2) {
+    constexpr std::size_t kHead = 20;
+    if (stream.size() < kHead || get_u32(stream, 0) > (stream.size() - kHead) / 2) {
         is_damaged_ = true;
         states_.fill(kLowestState);
         return;
     }
     const std::size_t words = get_u32(stream, 0);
     for (std::size_t k = 0; k < 4; ++k) states_[k] = get_u32(stream, 4 + 4 * k);
-    words_ = stream.substr(kFront, 2 * words);
-    bits_ = stream.substr(kFront + 2 * words);
+    words_ = stream.substr(kHead, 2 * words);
+    bits_ = stream.substr(kHead + 2 * words);
 }
 
 unsigned SymbolReader::symbol(unsigned context) {
