@@ -1,5 +1,5 @@
-#include "filigree/mesh/regular_patches.h"
 #include "filigree/io/mesh_file.h"
+#include "filigree/mesh/regular_patches.h"
 #include "filigree/mesh/shapes.h"
 
 #include <algorithm>
