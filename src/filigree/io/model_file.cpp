@@ -538,12 +538,20 @@ std::string write_model(const Model& model, const PoseSequence& poses) {
 
 std::string write_model(const Model& model) { return write_model(model, PoseSequence()); }
 
+namespace {
+
+Status check_fits(const PoseSequence& poses, const Model& model, const std::filesystem::path& path) {
+    const std::string wrong = poses.empty() ? "" : check_poses(poses, model.driver().vertices.size());
+    if (wrong.empty()) return Success{};
+    return Error{ErrorCode::mismatch, path.string() + ": not written: " + wrong + "."};
+}
+
+} // namespace
+
 Status write_model(const Model& model, const PoseSequence& poses, const std::filesystem::path& path,
                    const RunContext& context) {
     if (context.is_cancelled()) return cancelled_error();
-    if (const std::string wrong = poses.empty() ? "" : check_poses(poses, model.driver().vertices.size());
-        !wrong.empty())
-        return Error{ErrorCode::mismatch, path.string() + ": not written: " + wrong + "."};
+    if (const Status fits = check_fits(poses, model, path); !fits) return fits.error();
     context.report("write", 0);
     try {
         SectionWriter out;
@@ -558,9 +566,7 @@ Status write_model(const Model& model, const PoseSequence& poses, const std::fil
 
 Result<CodingReport> write_coded_model(const Model& model, const PoseSequence& poses, const MeshCodeOptions& options,
                                        const std::filesystem::path& path, const RunContext& context) {
-    if (const std::string wrong = poses.empty() ? "" : check_poses(poses, model.driver().vertices.size());
-        !wrong.empty())
-        return Error{ErrorCode::mismatch, path.string() + ": not written: " + wrong + "."};
+    if (const Status fits = check_fits(poses, model, path); !fits) return fits.error();
     context.report("code", 0);
     try {
         Result<CodedModel> coded = code_model(model, poses, options, context);
@@ -581,9 +587,7 @@ Result<CodingReport> write_coded_model(const Model& model, const PoseSequence& p
 
 Result<LosslessReport> write_lossless_model(const Model& model, const PoseSequence& poses,
                                             const std::filesystem::path& path, const RunContext& context) {
-    if (const std::string wrong = poses.empty() ? "" : check_poses(poses, model.driver().vertices.size());
-        !wrong.empty())
-        return Error{ErrorCode::mismatch, path.string() + ": not written: " + wrong + "."};
+    if (const Status fits = check_fits(poses, model, path); !fits) return fits.error();
     context.report("code", 0);
     try {
         SectionWriter plain;
