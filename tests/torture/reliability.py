@@ -52,7 +52,15 @@ if (counts / 'bounds.json').exists():
         lines.append(f'| {name} | {row["seconds"][-1]:.2f} | {row["seconds_growth"]:.2f} | {row["mib"][-1]:.0f} | {row["mib_growth"]:.2f} |')
     lines += ['', f'Last run: {when}.', '']
 
+if (counts / 'mutants.json').exists():
+    told = json.loads((counts / 'mutants.json').read_text())
+    when = (counts / 'mutants.when').read_text().strip() if (counts / 'mutants.when').exists() else ''
+    lines += ['## Tests of the tests', '',
+              f'Small changes of hierarchy, sample, coding and fracture, one at a time (`scripts/mutate --count {told["made"]} --seed {told["seed"]}`): {told["caught"]} of {told["made"]} made a test fail. Last run: {when}.', '']
+    if told['escaped']:
+        lines += ['What escaped:', ''] + [f'- `{m["where"]}`: `{m["became"]}`' for m in told['escaped']] + ['']
+
 lines += ['## What nothing covers', '',
           '- The studio is played by scripts, not by hours of random actions.',
-          '- No line coverage, no mutation testing, no soak of a day.', '']
+          '- No line coverage, no soak of a day.', '']
 page.write_text('\n'.join(lines))
