@@ -149,10 +149,11 @@ TEST(MeshCode, Attributes) {
             ASSERT_EQ(out.mesh.scalars[0].values[v], mesh.scalars[0].values[was]);
             ASSERT_LT((out.mesh.colors[v] - mesh.colors[was]).cwiseAbs().maxCoeff(), 0.51f / 255);
             const float off = (out.mesh.normals.values[v] - mesh.normals.values[was]).norm();
-            ASSERT_LT(off, 4.2e-3f); // half a step each way, where the octahedron's square is stretched most
+            ASSERT_LT(off, 6.1e-3f); // half a step each way, where the octahedron's square is stretched most
             normal_squares += off * off;
         }
-        EXPECT_LT(std::sqrt(normal_squares / float(mesh.vertex_count())), 1e-3f);
+        EXPECT_LT(std::sqrt(normal_squares / float(mesh.vertex_count())),
+                  2e-3f); // of directions that the shape does not tell
         EXPECT_EQ(out.mesh.scalars[0].name, "heat");
         EXPECT_EQ(std::ranges::count(out.mesh.materials.of_face, 1u), std::ranges::count(mesh.materials.of_face, 1u));
     }

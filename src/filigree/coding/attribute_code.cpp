@@ -20,7 +20,8 @@ constexpr unsigned kSizes = 12, kCount = 0, kPlainValue = kCount + 1, kKind = kP
 static_assert(kAttributeEnd <= kAttributeContexts);
 
 constexpr unsigned kUvBits = 12, kPlainBits = 10;
-constexpr std::int64_t kOctahedron = 512; // steps from the middle of an octahedron's square to its border
+constexpr double kGuessBits = 4;          // what it takes to expect a normal from something else than the last one
+constexpr std::int64_t kOctahedron = 352; // steps from the middle of an octahedron's square to its border
 
 Wide wide(const FinePlace& place) { return {place[0], place[1], place[2]}; }
 
@@ -421,30 +422,39 @@ private:
     /// size: of what was left lately.
     Wide coded_normal(const Vec3f& normal, const std::array<Wide, 3>& guesses, std::uint32_t& size) {
         std::uint32_t best = 0;
-        double nearest = -2;
+        double fewest = 1e30; // bits, about
         for (std::uint32_t g = 0; g < guesses.size() && code_.writes; ++g) {
             Wide guess = guesses[g];
             if (!normalise(guess)) continue;
             double along = 0;
             for (std::size_t k = 0; k < 3; ++k) along += double(normal[int(k)]) * double(guess[k]) / double(kOne);
-            if (along <= nearest + 1e-4) continue;
-            nearest = along;
+            const double angle = std::acos(std::clamp(along, -1.0, 1.0));
+            const double bits = 2 * std::log2(1 + double(kOctahedron) * angle) + (g == last_guess_ ? 0 : kGuessBits);
+            if (bits >= fewest) continue;
+            fewest = bits;
             best = g;
         }
         code_.number(kNormalGuess + last_guess_, best);
         if (best >= guesses.size()) throw AttributeDamage();
         last_guess_ = best;
         const Frame frame = frame_around(guesses[best]);
+        const std::uint32_t near = (size / 2 + rounding_of_normal(guesses[0])) / 2;
         std::array<std::int32_t, 2> steps{};
         if (code_.writes) steps = octahedral(normal, frame);
         std::uint32_t all = 0;
         for (unsigned k = 0; k < 2; ++k) {
-            code_.difference(kNormal + (best * 2 + k) * kSizes + size_class(size / 2 + all, kSizes), steps[k], 0);
+            code_.difference(kNormal + (best * 2 + k) * kSizes + size_class(near + all, kSizes), steps[k], 0);
             steps[k] = std::clamp<std::int32_t>(steps[k], -kOctahedron, kOctahedron);
             all += static_cast<std::uint32_t>(std::abs(steps[k]));
         }
         size = (3 * size + 2 * all + 2) / 4;
         return from_octahedral(steps[0], steps[1], frame);
+    }
+
+    /// How far rounded places turn a normal, steps: the smaller the area around, the farther.
+    static std::uint32_t rounding_of_normal(const Wide& sum_of_areas) {
+        const double side = std::sqrt(length_of(sum_of_areas)); // sixteenths of a step
+        return static_cast<std::uint32_t>(double(kOctahedron * kFine) / std::max(side, 8.0));
     }
 
     /// Its length grows with the face's area.
