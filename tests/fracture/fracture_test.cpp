@@ -280,6 +280,18 @@ TEST(Fracture, SheetsBreakIntoPartsOfTheirSurface) {
     EXPECT_EQ(f.report.inside_faces, 0u);
     EXPECT_GE(f.pieces, 7u);
     EXPECT_NEAR(area_of(f.mesh) / area_of(plane), 1, 1e-5);
+    std::vector<double> areas(f.pieces, 0); // which stand for the volumes that sheets do not have
+    for (std::size_t k = 0; k < f.mesh.face_count(); ++k)
+        for (Index c = 1; c + 1 < f.mesh.face_size(k); ++c) {
+            const auto face = f.mesh.face(k);
+            const std::array<Index, 3> fan = {face[0], face[c], face[c + 1]};
+            areas[f.piece_of_face[k]] += 0.5 * doubled_area_vector(f.mesh.positions, fan).norm();
+        }
+    std::ranges::sort(areas);
+    EXPECT_GT(areas.front(), 0); // no piece without faces
+    EXPECT_NEAR(f.report.smallest / areas.front(), 1, 1e-2);
+    EXPECT_NEAR(f.report.median / areas[areas.size() / 2], 1, 1e-2);
+    EXPECT_NEAR(f.report.largest / areas.back(), 1, 1e-2);
 }
 
 TEST(Fracture, IslandsArePiecesAndSplintersAreNot) {

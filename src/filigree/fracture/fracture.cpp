@@ -81,6 +81,8 @@ Result<FracturedMesh> fracture(const Mesh& mesh, const FractureCells& cells, con
     context.report("putting pieces together", 0.8);
 
     std::vector<CellTriangle> triangles = cell_triangles(*cut, *facets);
+    if (report.is_sheet) // what closed it is no matter: a cell that holds nothing else is no piece
+        std::erase_if(triangles, [&](const CellTriangle& t) { return cut->triangles[t.uncut].source == kNoIndex; });
     const std::optional<double> smallest =
         options.pieces_are_cells ? std::nullopt : std::optional<double>(options.smallest);
     const PartPieces parts = find_pieces(*cut, triangles, smallest, report.is_sheet);
