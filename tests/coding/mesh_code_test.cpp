@@ -160,6 +160,20 @@ TEST(MeshCode, Attributes) {
     expect_same_in_order(mesh);
 }
 
+TEST(MeshCode, NormalsOfAnyLength) { // of vertices and of corners
+    for (const bool is_indexed : {false, true}) {
+        Mesh mesh = make_wavy_sphere({.resolution = 12});
+        for (const Vec3f& p : mesh.positions) mesh.normals.values.push_back((1 + p.y()) * p);
+        if (is_indexed) mesh.normals.corners = mesh.corners;
+        const Coded out = coded(mesh, {.keep_order = true});
+        for (std::size_t c = 0; c < mesh.corner_count(); ++c) {
+            const Index was = mesh.corners[c], is = is_indexed ? out.mesh.normals.corners[c] : out.mesh.corners[c];
+            const Vec3f off = out.mesh.normals.values[is] - mesh.normals.values[was];
+            ASSERT_LT(off.cwiseAbs().maxCoeff(), 0.51f * 4 / 1023); // half a step of the box, at most 4 wide
+        }
+    }
+}
+
 /// Vertices, faces and first corners in any order.
 Mesh shuffled(const Mesh& mesh, unsigned seed) {
     std::mt19937 random(seed);

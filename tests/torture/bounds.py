@@ -61,12 +61,13 @@ def main():
     parser.add_argument("--json", type=pathlib.Path)
     options = parser.parse_args()
     program = str(options.program.resolve())
-    rows = {name: [] for name in COMMANDS}
+    rows, sizes = {name: [] for name in COMMANDS}, []
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         for rung in range(options.rungs):
             side = 8 * round(math.sqrt(options.first * 2**rung / 6) / 8)  # so that rows can go
             vertices = 6 * side * side + 2
+            sizes.append(vertices)
             mesh, triangles = folder / "mesh.ply", folder / "triangles.stl"
             measure([program, "make", "wavy-cube", "--resolution", str(side), "-o", str(mesh)])
             measure([program, "deform", str(mesh), "-o", str(triangles), "--stretch", "1"])
@@ -79,8 +80,8 @@ def main():
     for command, measured in rows.items():
         growth = []
         for which, least in ((0, LEAST_SECONDS), (1, LEAST_MIB)):
-            steps = [after[which] / before[which]
-                     for before, after in zip(measured, measured[1:]) if before[which] >= least]
+            steps = [after[which] / before[which] * 2 * sizes[k] / sizes[k + 1]  # as if it were twice, to the vertex
+                     for k, (before, after) in enumerate(zip(measured, measured[1:])) if before[which] >= least]
             growth.append(max(steps, default=0))
         told[command] = {"seconds": [m[0] for m in measured], "mib": [m[1] for m in measured],
                          "seconds_growth": growth[0], "mib_growth": growth[1]}
