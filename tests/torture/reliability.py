@@ -6,7 +6,7 @@ from pathlib import Path
 
 counts, page, root = (Path(word) for word in sys.argv[1:4])
 lines = ['# Reliability', '',
-         'Written by `scripts/reliability` from what `scripts/fuzz` and `scripts/torture` counted last; not by hand.', '']
+         'Written by `scripts/reliability` from what `scripts/fuzz`, `properties`, `torture`, `bounds` and `mutate` counted last; not by hand.', '']
 
 executions = defaultdict(lambda: [0, 0, '', ''])
 if (counts / 'fuzz').exists():
@@ -46,10 +46,12 @@ if (counts / 'bounds.json').exists():
     told = json.loads((counts / 'bounds.json').read_text())
     when = (counts / 'bounds.when').read_text().strip()
     lines += ['## Bounds', '',
-              f'Every command over {told["rungs"]} meshes from {told["first"]:,} vertices on, each twice the one before (`scripts/bounds`): processor seconds and memory of the largest, and the most that either grew at a step. 2.5 is the limit; steps below 0.3 s and 60 MiB are not judged (0).', '',
+              f'Every command over {told["rungs"]} meshes from {told["first"]:,} vertices on, each twice the one before (`scripts/bounds`): processor seconds and memory of the largest, and the most that either grew at a step. 2.5 is the limit, and what is beyond it is in bold; steps below 0.3 s and 60 MiB are not judged (0).', '',
               '| command | seconds | growth | MiB | growth |', '|---|---|---|---|---|']
+    def marked(growth):
+        return f'**{growth:.2f}**' if growth > 2.5 else f'{growth:.2f}'
     for name, row in told['commands'].items():
-        lines.append(f'| {name} | {row["seconds"][-1]:.2f} | {row["seconds_growth"]:.2f} | {row["mib"][-1]:.0f} | {row["mib_growth"]:.2f} |')
+        lines.append(f'| {name} | {row["seconds"][-1]:.2f} | {marked(row["seconds_growth"])} | {row["mib"][-1]:.0f} | {marked(row["mib_growth"])} |')
     lines += ['', f'Last run: {when}.', '']
 
 if (counts / 'mutants.json').exists():
