@@ -1,4 +1,6 @@
 // What contacts cost: a frame of bodies that meet, with the part of it that contacts take. One thread.
+#include "heap.h"
+
 #include "filigree/io/mesh_file.h"
 #include "filigree/physics/simulation.h"
 
@@ -50,29 +52,11 @@ void run(benchmark::State& state, const World& world, const std::vector<Actor>& 
     state.counters["deepest_spacings"] = deepest / actors[0].body->spacing();
 }
 
-/// 200 rigid pieces over a tray: 0 falling, 1 heaped.
+/// 0: the heap's pieces fall, 1: they lie.
 void heap(benchmark::State& state) {
-    World world = ground();
-    world.body_friction = 0.5;
-    world.body_restitution = 0.3;
-    for (const Vec3d& side : {Vec3d(1, 0, 0), Vec3d(-1, 0, 0), Vec3d(0, 0, 1), Vec3d(0, 0, -1)})
-        world.obstacles.emplace_back().shape = HalfSpace{-0.5 * side, side};
-    Material stone;
-    stone.model = MaterialModel::rigid;
-    stone.density = 2600;
-    std::vector<std::shared_ptr<const Body>> kinds;
-    for (const auto& [x, y, z] : {std::array{3u, 3u, 3u}, {4u, 3u, 2u}, {5u, 2u, 3u}, {3u, 4u, 3u}})
-        kinds.push_back(std::make_shared<Body>(
-            make_body(box_cells(x, y, z, 0.025, -0.0125 * Vec3d(double(x), double(y), double(z))), stone)));
-    std::vector<Actor> actors;
-    for (int i = 0; i < 200; ++i) {
-        const int x = i % 5, z = i / 5 % 5, y = i / 25;
-        actors.push_back(put(kinds[std::size_t(i % 4)],
-                             {0.16 * (x - 2) + 0.01 * (y % 3), 0.1 + 0.15 * y, 0.14 * (z - 2) + 0.01 * (2 * y % 3)}));
-        actors.back().placement.rotate(Eigen::AngleAxisd(0.4 * (7 * i % 16), Vec3d(1, i % 3, i % 5).normalized()));
-    }
-    const int from = state.range(0) ? 300 : 0;
-    run(state, world, actors, from, from + 60);
+    const bench::Heap heap = bench::make_heap();
+    const int from = state.range(0) ? bench::kHeapRests : 0;
+    run(state, heap.world, heap.actors, from, from + 60);
 }
 
 /// A mesh of 1 m, FILIGREE_SCAN, that falls 0.3 m; 0 or 1: whether it meets itself.

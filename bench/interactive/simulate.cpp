@@ -1,5 +1,6 @@
 #include "simulate.h"
 
+#include "../heap.h"
 #include "cell_forces.h"
 #include "timing.h"
 
@@ -315,6 +316,25 @@ public:
         }
     }
 
+    /// Rigid pieces: as long as they fall, and once they lie. On one thread, as Bullet's.
+    void heap() {
+        const bench::Heap heap = bench::make_heap();
+        std::vector<double> falling, resting;
+        for (unsigned run = 0; run < kRuns && !context_.is_cancelled(); ++run) {
+            Simulation simulation = Simulation::create(heap.world, heap.actors, {}, one_thread_).value();
+            const auto seconds_of = [&](std::size_t frames) {
+                const double begin = now_seconds();
+                for (std::size_t frame = 0; frame < frames; ++frame) simulation.advance(one_thread_).value();
+                return (now_seconds() - begin) / double(frames);
+            };
+            falling.push_back(seconds_of(kFrames));
+            seconds_of(kHeapRests - kFrames);
+            resting.push_back(seconds_of(kFrames));
+        }
+        add("heap.falling", 1e3 * std::ranges::min(falling), "ms");
+        add("heap.resting", 1e3 * std::ranges::min(resting), "ms");
+    }
+
     /// The mesh, a metre long, dropped on the ground with all its detail.
     void fall(const Mesh& mesh) {
         Mesh copy = mesh;
@@ -430,6 +450,7 @@ std::vector<Measurement> measure_simulation(const Mesh& mesh, const SimulateBenc
     bench.swings();
     bench.materials();
     bench.growth();
+    bench.heap();
     bench.fall(mesh);
     return bench.take();
 }

@@ -1,5 +1,6 @@
 // Bullet: a solid cube of 20 x 20 x 20 nodes, held at one face and swinging under gravity, as tetrahedra of neo-Hookean
-// matter and as a lattice of links. The scenes are those of `filigree bench simulate`.
+// matter and as a lattice of links; and 200 rigid pieces that fall into a heap. The scenes are those of
+// `filigree bench simulate`.
 #include "peer.h"
 
 #include <cmath>
@@ -153,9 +154,97 @@ double measure_springs(int frames) {
     return 1e3 * times[times.size() / 2];
 }
 
+/// 200 boxes in a tray, as in bench/heap.h, with Bullet's own defaults but for the margin, which would be half a box.
+class Heap {
+public:
+    Heap() {
+        world_.setGravity(kGravity);
+        const btVector3 up(0, 1, 0), along_x(1, 0, 0), along_z(0, 0, 1);
+        add_plane(up, 0);
+        for (const btVector3& side : {along_x, -along_x, along_z, -along_z}) add_plane(side, btScalar(-0.5));
+        for (int i = 0; i < 200; ++i) add_piece(i);
+    }
+    ~Heap() {
+        for (const auto& body : bodies_) world_.removeRigidBody(body.get());
+    }
+    Heap(const Heap&) = delete;
+    Heap& operator=(const Heap&) = delete;
+
+    double milliseconds(int frames) {
+        return 1e3 / frames * peer::seconds([&] {
+                   for (int frame = 0; frame < frames; ++frame) world_.stepSimulation(kFrame, 1, kFrame);
+               });
+    }
+    /// m, of all that touches now.
+    double deepest() {
+        double deepest = 0;
+        for (int m = 0; m < dispatcher_.getNumManifolds(); ++m) {
+            const btPersistentManifold& manifold = *dispatcher_.getManifoldByIndexInternal(m);
+            for (int p = 0; p < manifold.getNumContacts(); ++p)
+                deepest = std::max(deepest, -double(manifold.getContactPoint(p).getDistance()));
+        }
+        return deepest;
+    }
+
+private:
+    void add(btScalar mass, const btTransform& at, std::unique_ptr<btCollisionShape> shape) {
+        btVector3 inertia(0, 0, 0);
+        if (mass > 0) shape->calculateLocalInertia(mass, inertia);
+        btRigidBody::btRigidBodyConstructionInfo info(mass, nullptr, shape.get(), inertia);
+        info.m_startWorldTransform = at;
+        info.m_friction = btScalar(0.7071); // Bullet multiplies both bodies' : 0.5
+        info.m_restitution = btScalar(0.5477);
+        shapes_.push_back(std::move(shape));
+        bodies_.push_back(std::make_unique<btRigidBody>(info));
+        world_.addRigidBody(bodies_.back().get());
+    }
+    void add_plane(const btVector3& normal, btScalar offset) {
+        add(0, btTransform::getIdentity(), std::make_unique<btStaticPlaneShape>(normal, offset));
+    }
+    void add_piece(int i) {
+        constexpr int kCells[4][3] = {{3, 3, 3}, {4, 3, 2}, {5, 2, 3}, {3, 4, 3}};
+        constexpr btScalar kCell = btScalar(0.025);
+        const int* cells = kCells[i % 4];
+        const btVector3 size = kCell * btVector3(btScalar(cells[0]), btScalar(cells[1]), btScalar(cells[2]));
+        auto shape = std::make_unique<btBoxShape>(size / 2);
+        shape->setMargin(btScalar(0.001));
+        const int x = i % 5, z = i / 5 % 5, y = i / 25;
+        const btQuaternion turn(btVector3(1, btScalar(i % 3), btScalar(i % 5)).normalized(),
+                                btScalar(0.4) * btScalar(7 * i % 16));
+        const btVector3 at(btScalar(0.16) * btScalar(x - 2) + btScalar(0.01) * btScalar(y % 3),
+                           btScalar(0.1) + btScalar(0.15) * btScalar(y),
+                           btScalar(0.14) * btScalar(z - 2) + btScalar(0.01) * btScalar(2 * y % 3));
+        add(2600 * size.x() * size.y() * size.z(), btTransform(turn, at), std::move(shape));
+    }
+
+    btDefaultCollisionConfiguration configuration_;
+    btCollisionDispatcher dispatcher_{&configuration_};
+    btDbvtBroadphase broadphase_;
+    btSequentialImpulseConstraintSolver solver_;
+    btDiscreteDynamicsWorld world_{&dispatcher_, &broadphase_, &solver_, &configuration_};
+    std::vector<std::unique_ptr<btCollisionShape>> shapes_;
+    std::vector<std::unique_ptr<btRigidBody>> bodies_;
+};
+
+void measure_heap() {
+    constexpr int kFalls = 60, kRests = 300, kRuns = 5;
+    double falling = INFINITY, resting = INFINITY, deep = 0;
+    for (int run = 0; run < kRuns; ++run) {
+        Heap heap;
+        falling = std::min(falling, heap.milliseconds(kFalls));
+        deep = heap.deepest();
+        heap.milliseconds(kRests - kFalls);
+        resting = std::min(resting, heap.milliseconds(60));
+    }
+    std::fprintf(stderr, "heap: %g m deep after %d frames\n", deep, kFalls);
+    peer::report("bullet.heap_falling", falling, "ms");
+    peer::report("bullet.heap_resting", resting, "ms");
+}
+
 } // namespace
 
 int main() {
+    measure_heap();
     peer::report("bullet.neo_hookean_implicit", measure_neo_hookean(true, 1, 60), "ms");
     // Its example steps explicitly, at 1/240 s; stiffer bodies need more.
     for (const int substeps : {4, 16, 32, 64})

@@ -29,6 +29,8 @@ PAIRS = [
     ("8,000 particles, a frame / neo-Hookean, implicit", "simulate.cube.frame", "bullet.neo_hookean_implicit"),
     ("8,000 particles, a frame / neo-Hookean, explicit", "simulate.cube.frame", "bullet.neo_hookean_explicit"),
     ("8,000 particles, springs / links, 10 iterations", "simulate.springs_stiff.frame", "bullet.springs"),
+    ("200 rigid pieces fall into a heap, a frame / Bullet", "simulate.heap.falling", "bullet.heap_falling"),
+    ("the heap at rest, a frame / Bullet", "simulate.heap.resting", "bullet.heap_resting"),
     ("koala in 20 pieces, rough / Cell Fracture, planes", "fracture.seconds", "cellfracture.seconds"),
 ]
 for bits in (12, 14):

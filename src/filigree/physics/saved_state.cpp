@@ -7,7 +7,7 @@ namespace filigree {
 namespace {
 
 // The name of the format, its version last. 5: with bodies on the grid.
-constexpr std::uint64_t kMagic = 0x35455441'54534c46; // "FLSTATE5"
+constexpr std::uint64_t kMagic = 0x36455441'54534c46; // "FLSTATE6"
 static_assert(sizeof(Contacts::NearMemory) == 5 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
 static_assert(sizeof(MatterContacts::SideMemory) == 6 * sizeof(Index), "padding would be saved");
 static_assert(sizeof(MatterContacts::PairMemory) == 4 * sizeof(Index) + 3 * sizeof(Vec3f), "padding would be saved");
