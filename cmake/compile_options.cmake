@@ -22,3 +22,6 @@ if(FILIGREE_SANITIZE)
   target_compile_options(filigree_options INTERFACE -fsanitize=${FILIGREE_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
   target_link_options(filigree_options INTERFACE -fsanitize=${FILIGREE_SANITIZE})
 endif()
+
+# What xxHash says always has to be inlined is an error at -Og, the preset dev's.
+target_compile_definitions(filigree_options INTERFACE $<$<CONFIG:Debug>:XXH_NO_INLINE_HINTS=1>)
