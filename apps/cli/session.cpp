@@ -91,10 +91,6 @@ private:
 
 } // namespace
 
-double now_seconds() {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
 OptionList Session::common_options() {
     return {Option("--json", json, "Print the result as JSON"),
             Option("--threads", threads, "Threads to use; 0 for all (results never depend on it)").between(0, 1024),

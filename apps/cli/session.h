@@ -4,6 +4,7 @@
 #include "options.h"
 #include "report.h"
 
+#include "filigree/core/now_seconds.h"
 #include "filigree/core/result.h"
 #include "filigree/core/run_context.h"
 #include "filigree/hierarchy/model.h"
@@ -124,8 +125,6 @@ void show_folder_as(const std::string& made_in, const std::string& shown);
 
 /// "3.2e-05 of the diagonal (0.0012 units)".
 std::string distance_text(const MeshDistance& distance, double units);
-
-double now_seconds(); ///< a monotonic clock
 
 /// Vertices of make_wavy_cube with so many quads along a side.
 constexpr std::size_t wavy_cube_vertices(std::size_t resolution) { return 6 * resolution * resolution + 2; }

@@ -7,10 +7,6 @@
 
 namespace filigree::bench {
 
-double now_seconds() {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
 double median_seconds(const std::function<void()>& work) {
     std::vector<double> seconds;
     const double start = now_seconds();

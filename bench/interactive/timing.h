@@ -1,11 +1,12 @@
 // How long a call takes.
 #pragma once
 
+#include "filigree/core/now_seconds.h"
+
 #include <functional>
 
 namespace filigree::bench {
 
-double now_seconds(); ///< a monotonic clock
 /// Median seconds of a call: at least five, for about 0.4 seconds.
 double median_seconds(const std::function<void()>& work);
 /// Seconds of a call at its quickest, of five or more in 0.2 seconds: what the machine can do when nothing else wants

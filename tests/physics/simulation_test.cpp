@@ -1,106 +1,31 @@
 #include "filigree/physics/simulation.h"
 
 #include "filigree/core/random.h"
+#include "physics/simulation_scenes.h"
 #include "physics/test_bodies.h"
 
-#include <gtest/gtest.h>
-
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <numeric>
-#include <thread>
 
 namespace filigree {
 namespace {
 
-Material material(MaterialModel model, double young_modulus = 1e5) {
-    Material material;
-    material.model = model;
-    material.young_modulus = young_modulus;
-    material.damping = 0;
-    return material;
-}
-
-std::shared_ptr<const Body> box(std::size_t nx, std::size_t ny, std::size_t nz, double spacing, const Material& of) {
-    return std::make_shared<Body>(make_body(box_cells(nx, ny, nz, spacing), of));
-}
-
-World free_space() {
-    World world;
-    world.gravity.setZero();
-    return world;
-}
-
-World with_ground(double restitution = 0.5) {
-    World world;
-    Obstacle ground;
-    ground.shape = HalfSpace{};
-    ground.restitution = restitution;
-    world.obstacles.push_back(ground);
-    return world;
-}
-
-Simulation simulation(World world, std::vector<Actor> actors, StepOptions options = {}, unsigned threads = 1) {
-    Result<Simulation> made = Simulation::create(std::move(world), std::move(actors), options, RunContext(threads));
-    EXPECT_TRUE(made.ok()) << (made ? "" : made.error().message);
-    return *std::move(made);
-}
-
-Actor actor(std::shared_ptr<const Body> body, const Vec3d& at = Vec3d::Zero()) {
-    Actor actor;
-    actor.body = std::move(body);
-    actor.placement.translation() = at;
-    return actor;
-}
-
-FrameReport run(Simulation& simulation, std::size_t frames, unsigned threads = 1) {
-    const RunContext context(threads);
-    FrameReport last;
-    for (std::size_t f = 0; f < frames; ++f) {
-        Result<FrameReport> report = simulation.advance(context);
-        EXPECT_TRUE(report.ok());
-        last = *report;
-    }
-    return last;
-}
-
-bool all_finite(const Vectors& values) {
-    for (std::size_t i = 0; i < values.size(); ++i)
-        if (!values[i].allFinite()) return false;
-    return true;
-}
-
-/// Largest distance of a particle from the rigid motion that fits the body's start best.
-double shape_error(const Simulation& simulation, std::size_t body = 0) {
-    const Vectors &rest = simulation.body(body).rest, &now = simulation.positions(body);
-    Eigen::Matrix3Xd from(3, rest.size()), to(3, rest.size());
-    for (std::size_t i = 0; i < rest.size(); ++i) {
-        from.col(i) = rest[i].cast<double>();
-        to.col(i) = now[i].cast<double>();
-    }
-    const Eigen::Matrix4d motion = Eigen::umeyama(from, to, false);
-    return ((motion.topLeftCorner<3, 3>() * from).colwise() + motion.topRightCorner<3, 1>() - to)
-        .colwise()
-        .norm()
-        .maxCoeff();
-}
-
-const auto kModels = testing::Values(MaterialModel::fem, MaterialModel::springs, MaterialModel::meshfree);
-std::string model_name(const testing::TestParamInfo<MaterialModel>& info) {
-    return std::array{"fem", "springs", "meshfree"}[std::size_t(info.param)];
-}
+using namespace simulation_scenes;
 
 class EachMaterial : public testing::TestWithParam<MaterialModel> {};
+
 INSTANTIATE_TEST_SUITE_P(Simulation, EachMaterial, kModels, model_name);
 
 class EachMode : public testing::TestWithParam<StepMode> {};
+
 INSTANTIATE_TEST_SUITE_P(Simulation, EachMode, testing::Values(StepMode::explicit_steps, StepMode::descent),
                          [](const testing::TestParamInfo<StepMode>& mode) {
                              return mode.param == StepMode::descent ? "descent" : "explicit_steps";
                          });
 
 // Half a second of fall is g t^2 / 2, to the rounding of positions, whatever the step.
+
 TEST_P(EachMode, FreeFallIsExact) {
     for (const double rate : {10.0, 60.0, 1000.0}) {
         StepOptions options;
@@ -137,6 +62,7 @@ TEST_P(EachMaterial, KeepsMomentumWithExplicitSteps) {
 }
 
 // Implicit Euler loses angular momentum; the correction gives it back.
+
 TEST(Simulation, KeepsMomentumWithDescent) {
     StepOptions options;
     options.mode = StepMode::descent;
@@ -165,6 +91,7 @@ TEST(Simulation, KeepsEnergyWithExplicitSteps) {
 }
 
 // On a mat much softer than itself a body behaves like a hard point: it leaves with e times its speed.
+
 TEST(Simulation, BounceHeightFollowsRestitution) {
     for (const double restitution : {1.0, 0.7, 0.0}) {
         World world = with_ground(restitution);
@@ -184,6 +111,7 @@ TEST(Simulation, BounceHeightFollowsRestitution) {
 }
 
 // A soft body that bounces on a ground of restitution 1 turns its fall into swinging, and back; nothing is lost.
+
 TEST(Simulation, BounceKeepsEnergy) {
     World world = with_ground(1);
     world.obstacles[0].friction = 0; // the foot widens as it lands, and would rub
@@ -210,6 +138,7 @@ TEST_P(EachMaterial, RestStaysAtRest) {
 }
 
 // 100,000 frames, 28 minutes of it.
+
 TEST_P(EachMode, RestStaysAtRestForLong) {
     StepOptions options;
     options.mode = GetParam();
@@ -248,6 +177,7 @@ TEST(Simulation, RestsOnTheGround) {
 }
 
 // A block on a slope of 30 degrees stays for a friction above tan 30 = 0.577 and slides at g (sin - mu cos) below.
+
 TEST(Simulation, FrictionHoldsAndSlides) {
     for (const double friction : {0.7, 0.3}) {
         World world;
@@ -276,7 +206,9 @@ TEST(Simulation, FrictionHoldsAndSlides) {
 }
 
 // First bending frequency of a clamped bar, 4 cells across: Euler and Bernoulli's less what shear and the bar's
+
 // thickness take (Timoshenko), 0.56 (h / L^2) sqrt(E / (12 rho)) ...
+
 TEST(Simulation, BarSwingsAtItsFrequency) {
     const double length = 1, height = 0.1, young = 1e7, density = 1000;
     Material rubber = material(MaterialModel::fem, young);
@@ -310,6 +242,7 @@ TEST(Simulation, BarSwingsAtItsFrequency) {
 }
 
 // A block that is sent along the ground stops after v^2 / (2 mu g), trembling or not.
+
 TEST(Simulation, SlidingFollowsCoulomb) {
     for (const double restitution : {0.0, 0.5, 1.0})
         for (const double friction : {0.2, 0.5}) {
@@ -327,6 +260,7 @@ TEST(Simulation, SlidingFollowsCoulomb) {
 }
 
 // Damping inside a body acts on what deforms it, not on how it turns.
+
 TEST(Simulation, InternalDampingLetsBodiesSpin) {
     Material jelly = material(MaterialModel::fem, 1e6);
     jelly.internal_damping = 2e-3;
@@ -339,21 +273,8 @@ TEST(Simulation, InternalDampingLetsBodiesSpin) {
 }
 
 // Hands and ground share particles of one color among many points: each sees its own moves alone.
-TEST_P(EachMaterial, DescentIsTheSameForAnyThreads) {
-    const auto body = box(12, 12, 12, 0.08, material(GetParam(), 1e7));
-    const auto at_end = [&](unsigned threads) {
-        World world = with_ground();
-        Hand hand;
-        hand.point = {0.96f, 0.48f, 0.48f};
-        hand.target.constant = Vec3d(1.2, 0.6, 0.5);
-        world.hands.push_back(hand);
-        Simulation held = simulation(world, {actor(body)}, {.mode = StepMode::descent}, threads);
-        run(held, 4, threads);
-        return held.save();
-    };
-    const std::string bytes = at_end(1);
-    for (int attempt = 0; attempt < 3; ++attempt) EXPECT_TRUE(bytes == at_end(2));
-}
+
+// A surface that halves the outer cells: they are whole with half the mass and half the stiffness, which bends a little
 
 /// How far the tip of a bar along x sinks when its other end is held.
 double sag(std::shared_ptr<const Body> body, const Vec3d& tip) {
@@ -372,8 +293,8 @@ double sag(std::shared_ptr<const Body> body, const Vec3d& tip) {
     return double(body->rest.y[nearest] - bar.positions(0).y[nearest]);
 }
 
-// A surface that halves the outer cells: they are whole with half the mass and half the stiffness, which bends a little
 // less than the true bar. Eight spacings across.
+
 TEST(Simulation, HalfFullCellsAreALittleStiff) {
     Material rubber = material(MaterialModel::fem, 1e6);
     rubber.damping = 8;
@@ -391,6 +312,7 @@ TEST(Simulation, HalfFullCellsAreALittleStiff) {
 }
 
 // A bar pulled at its ends: stress over strain is E, and it thins by nu.
+
 TEST(Simulation, StretchGivesModulusAndPoissonRatio) {
     Material rubber = material(MaterialModel::fem, 1e5);
     rubber.damping = 5;
@@ -475,6 +397,7 @@ TEST(Simulation, AHandPulls) {
 }
 
 // A force on each particle moves the body as the sum of forces does, in either way of stepping, until it is taken away.
+
 TEST(Simulation, ForcesOnParticlesPush) {
     for (const StepMode mode : {StepMode::explicit_steps, StepMode::descent}) {
         const auto body = box(3, 3, 3, 0.1, material(MaterialModel::fem, 1e6));
@@ -507,6 +430,7 @@ TEST(Simulation, WindPushes) {
 }
 
 // Attached points follow an affine motion of the particles exactly, with its gradient.
+
 TEST_P(EachMaterial, AttachedPointsFollowAffineMotions) {
     const auto body = box(5, 5, 5, 0.2, material(GetParam()));
     Simulation moved = simulation(free_space(), {actor(body)});
@@ -529,159 +453,11 @@ TEST_P(EachMaterial, AttachedPointsFollowAffineMotions) {
     }
 }
 
-TEST_P(EachMaterial, SameBytesForAnyThreadsAndAfterARestore) {
-    for (const StepMode mode : {StepMode::explicit_steps, StepMode::descent}) {
-        Material plain = material(GetParam());
-        if (GetParam() == MaterialModel::meshfree) plain.yield_stress = 2e3;
-        const auto body = box(4, 4, 3, 0.15, plain);
-        Actor falling = actor(body, {0, 0.05, 0});
-        falling.spin = {1, 2, 3};
-        const auto at_end = [&](unsigned threads) {
-            Simulation one = simulation(with_ground(), {falling, actor(body, {0.2, 0.6, 0})}, {.mode = mode}, threads);
-            run(one, 20, threads);
-            return one.save();
-        };
-        const std::string bytes = at_end(1);
-        EXPECT_TRUE(bytes == at_end(2)) << int(mode);
-        Simulation first = simulation(with_ground(), {falling, actor(body, {0.2, 0.6, 0})}, {.mode = mode});
-        run(first, 11);
-        const std::string middle = first.save();
-        Simulation second = simulation(with_ground(), {falling, actor(body, {0.2, 0.6, 0})}, {.mode = mode});
-        ASSERT_TRUE(second.restore(middle).ok());
-        run(second, 9);
-        EXPECT_TRUE(bytes == second.save()) << int(mode);
-    }
-}
-
-TEST(Simulation, RefusesStatesThatAreDamagedOrOfOthers) {
-    Simulation one = simulation(with_ground(), {actor(box(3, 3, 3, 0.1, material(MaterialModel::fem)))});
-    run(one, 3);
-    const std::string bytes = one.save();
-    for (std::size_t length = 0; length < bytes.size(); length += 7)
-        EXPECT_FALSE(one.restore(std::string_view(bytes).substr(0, length)).ok());
-    EXPECT_TRUE(one.restore(bytes).ok());
-    Simulation other = simulation(with_ground(), {actor(box(3, 3, 2, 0.1, material(MaterialModel::fem)))});
-    const Status refused = other.restore(bytes);
-    ASSERT_FALSE(refused.ok());
-    EXPECT_EQ(refused.error().code, ErrorCode::mismatch);
-}
-
 // Starts that would break most solvers come back to the shape they had.
-class BadStart : public testing::TestWithParam<std::tuple<MaterialModel, const char*>> {};
-INSTANTIATE_TEST_SUITE_P(Simulation, BadStart,
-                         testing::Combine(kModels,
-                                          testing::Values("inverted", "plane", "line", "point", "shrunk", "random")),
-                         [](const auto& start) {
-                             return std::string(std::array{"fem", "springs",
-                                                           "meshfree"}[std::size_t(std::get<0>(start.param))]) +
-                                    "_" + std::get<1>(start.param);
-                         });
-
-TEST_P(BadStart, ComesBackToRest) {
-    const auto [model, start] = GetParam();
-    Material rubber = material(model, 1e5);
-    rubber.damping = 2;
-    const auto body = box(4, 4, 4, 0.25, rubber);
-    Simulation wild = simulation(free_space(), {actor(body)});
-    Vectors positions = wild.positions(0);
-    const std::string kind = start;
-    for (std::size_t i = 0; i < positions.size(); ++i) {
-        Vec3f p = positions[i];
-        if (kind == "inverted") p.y() = -p.y();
-        if (kind == "plane") p.y() = 0;
-        if (kind == "line") p.y() = p.z() = 0;
-        if (kind == "point") p.setZero();
-        if (kind == "shrunk") p *= 1e-3f;
-        if (kind == "random")
-            p = Vec3f(float(random_unit(7, 3 * i)), float(random_unit(7, 3 * i + 1)), float(random_unit(7, 3 * i + 2)));
-        positions.set(i, p);
-    }
-    ASSERT_TRUE(wild.set_positions(0, positions).ok());
-    FrameReport report;
-    const auto is_at_rest = [&] { return shape_error(wild) < 5e-3 && report.least_volume_ratio > 0.98f; };
-    for (int second = 0; second < 40 && (second < 2 || !is_at_rest()); ++second) report = run(wild, 60);
-    ASSERT_TRUE(all_finite(wild.positions(0)));
-    EXPECT_LT(shape_error(wild), 5e-3);
-    EXPECT_GT(report.least_volume_ratio, 0.98f);
-}
 
 // Huge starts, steps, stiffnesses and mass ratios: finite, whatever else.
-TEST_P(EachMaterial, NeverNotFinite) {
-    for (const double scale : {10.0, 1000.0})
-        for (const double rate : {10.0, 60.0, 1000.0})
-            for (const double young : {1e2, 1e5, 1e9}) {
-                const auto body = box(3, 3, 3, 0.25, material(GetParam(), young));
-                Simulation wild = simulation(with_ground(), {actor(body, {0, 0.2, 0})}, {.frames_per_second = rate});
-                Vectors positions = wild.positions(0);
-                for (std::size_t i = 0; i < positions.size(); ++i) positions.set(i, float(scale) * positions[i]);
-                ASSERT_TRUE(wild.set_positions(0, positions).ok());
-                const FrameReport first = run(wild, 1);
-                if (scale == 1000) {
-                    EXPECT_GT(first.clamped_particles, 0u);
-                }
-                run(wild, 30);
-                EXPECT_TRUE(all_finite(wild.positions(0))) << scale << " " << rate << " " << young;
-                double furthest = 0;
-                for (std::size_t i = 0; i < positions.size(); ++i)
-                    furthest = std::max(furthest, double(wild.positions(0)[i].norm()));
-                EXPECT_LT(furthest, 2e3 * scale) << scale << " " << rate << " " << young;
-            }
-}
-
-TEST(Simulation, AHeavyBodyOnALightOne) {
-    Material light = material(MaterialModel::fem, 1e5), heavy = light;
-    light.density = 100;
-    heavy.density = 1e5;
-    light.damping = heavy.damping = 1;
-    Simulation stacked = simulation(
-        with_ground(), {actor(box(4, 4, 4, 0.25, light)), actor(box(2, 2, 2, 0.25, heavy), {0.25, 1.05, 0.25})});
-    run(stacked, 120);
-    EXPECT_TRUE(all_finite(stacked.positions(0)));
-    EXPECT_TRUE(all_finite(stacked.positions(1)));
-}
 
 // Pressed to a twentieth of its height: cells turn inside out for seconds. Without damping there it gains 40 %.
-TEST(Simulation, ACrushedBodyGainsNoEnergy) {
-    for (const MaterialModel model : {MaterialModel::fem, MaterialModel::springs, MaterialModel::meshfree}) {
-        Simulation crushed = simulation(free_space(), {actor(box(4, 4, 4, 0.05, material(model, 5e4)))},
-                                        {.mode = StepMode::explicit_steps});
-        Vectors flat = crushed.positions(0);
-        for (std::size_t i = 0; i < flat.size(); ++i) flat.y[i] *= 0.05f;
-        ASSERT_TRUE(crushed.set_positions(0, flat).ok());
-        const RunContext context(1);
-        const double before = crushed.energy(context).total();
-        for (int frame = 0; frame < 240; ++frame) {
-            const FrameReport report = crushed.advance(context).value();
-            if (frame == 0) {
-                EXPECT_LT(report.least_volume_ratio, 0.1f);
-            }
-            ASSERT_LT(crushed.energy(context).total(), 1.01 * before) << int(model) << ", frame " << frame;
-        }
-    }
-}
-
-TEST(Simulation, ReportsSayWhichBodyIsCrushedMost) {
-    const auto cube = box(3, 3, 3, 0.1, material(MaterialModel::fem));
-    Simulation both = simulation(free_space(), {actor(cube), actor(cube, {1, 0, 0})});
-    Vectors flat = both.positions(1);
-    for (std::size_t i = 0; i < flat.size(); ++i) flat.y[i] *= 0.08f;
-    ASSERT_TRUE(both.set_positions(1, flat).ok());
-    const FrameReport report = run(both, 1);
-    EXPECT_LT(report.least_volume_ratio, 0.1f);
-    EXPECT_EQ(report.most_crushed, 1u);
-}
-
-TEST(Simulation, CancelLeavesTheFrameUndone) {
-    const RunContext context(1);
-    Simulation one = simulation(with_ground(), {actor(box(3, 3, 3, 0.1, material(MaterialModel::fem)), {0, 0.5, 0})});
-    run(one, 5);
-    const std::string before = one.save();
-    context.cancel();
-    const Result<FrameReport> report = one.advance(context);
-    ASSERT_FALSE(report.ok());
-    EXPECT_EQ(report.error().code, ErrorCode::cancelled);
-    EXPECT_TRUE(before == one.save());
-}
 
 TEST(Simulation, RefusesWhatIsNotThere) {
     const auto body = box(2, 2, 2, 0.1, material(MaterialModel::fem));
@@ -705,6 +481,7 @@ TEST(Simulation, RefusesWhatIsNotThere) {
 }
 
 // A piston that strikes in the middle of a frame and is back at its end has gone nowhere, and yet it was there.
+
 TEST(Simulation, ObstaclesThatGoAndReturnWithinAFrameAreFelt) {
     World world = free_space();
     Obstacle piston;
@@ -744,6 +521,7 @@ TEST(Simulation, ReportsSayWhyAFrameWasLeftToDescent) {
 }
 
 // Wax that was thrown and flowed on its way: a hand at its end at rest pulls that end.
+
 TEST(Simulation, AHandPullsWaxThatHasFlowed) {
     Material wax = material(MaterialModel::meshfree, 2e5);
     wax.temperature = 400;
@@ -786,27 +564,6 @@ TEST(Simulation, AHandPullsWaxThatHasFlowed) {
 }
 
 // Const functions share no scratch.
-TEST_P(EachMaterial, ConstFunctionsMayRunAtTheSameTime) {
-    const auto body = box(8, 8, 8, 0.1, material(GetParam()));
-    Simulation one = simulation(with_ground(), {actor(body, {0, 0.02, 0})});
-    const std::size_t attachment = one.attach(0, std::vector<Vec3f>(50, Vec3f(0.3f, 0.3f, 0.3f)), RunContext(1));
-    run(one, 5);
-    const Simulation& still = one;
-    const auto look = [&] {
-        std::vector<Vec3f> points(50);
-        still.attached(attachment, points, {}, RunContext(1));
-        return std::pair(still.energy(RunContext(1)).elastic, points);
-    };
-    const auto expected = look();
-    std::vector<std::thread> threads;
-    std::array<int, 4> wrong = {};
-    for (int& count : wrong)
-        threads.emplace_back([&count, &look, &expected] {
-            for (int k = 0; k < 50; ++k) count += look() != expected;
-        });
-    for (std::thread& thread : threads) thread.join();
-    EXPECT_EQ(wrong, (std::array<int, 4>{}));
-}
 
 } // namespace
 } // namespace filigree

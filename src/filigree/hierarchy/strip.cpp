@@ -1,5 +1,6 @@
 #include "filigree/hierarchy/strip.h"
 
+#include "filigree/core/now_seconds.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/hierarchy/simplify_levels.h"
 #include "filigree/hierarchy/vertex_order.h"
@@ -8,20 +9,11 @@
 #include "filigree/mesh/surface.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 namespace filigree {
 
 namespace {
-
-class Stopwatch {
-public:
-    double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
-
-private:
-    std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 /// The driver's cells over its own vertices, and as triangles over the mesh's.
 struct Cells {
@@ -101,7 +93,7 @@ std::optional<Error> check_driver(const Mesh& mesh, const Mesh& driver) {
 
 Result<Stripped> strip_blend(Mesh mesh, const StripOptions& options, const RunContext& context) {
     Stripped result;
-    const Stopwatch simplify_time;
+    const double simplify_start = now_seconds();
     if (options.reorder) {
         result.model.source_order = order_by_place(mesh, context);
         mesh = with_vertex_order(std::move(mesh), result.model.source_order, context);
@@ -114,9 +106,9 @@ Result<Stripped> strip_blend(Mesh mesh, const StripOptions& options, const RunCo
     std::vector<Level>& levels = simplified.levels;
     result.report.simplify_error = simplified.error;
     result.report.forced_collapses = simplified.forced;
-    result.report.simplify_seconds = simplify_time.seconds();
+    result.report.simplify_seconds = now_seconds() - simplify_start;
 
-    const Stopwatch bind_time;
+    const double bind_start = now_seconds();
     Cells cells = make_cells(levels.front());
     const std::vector<Index> source = nearest_driver_vertices(*work, simplified, context);
     Result<Binding> binding = bind_to_driver(work->positions, work->surface, work->normals, cells.global, source,
@@ -124,21 +116,21 @@ Result<Stripped> strip_blend(Mesh mesh, const StripOptions& options, const RunCo
     if (!binding) return binding.error();
     result.report.across_gap = binding->across_gap.size();
     result.report.facing_away = binding->facing_away.size();
-    result.report.bind_seconds = bind_time.seconds();
+    result.report.bind_seconds = now_seconds() - bind_start;
 
-    const Stopwatch encode_time;
+    const double encode_start = now_seconds();
     result.model.detail =
         encode_blend(mesh.positions, levels.front().vertices, std::move(cells.local), *binding, options.precision);
     result.model.levels = std::move(levels);
     result.model.mesh = std::move(mesh);
     split_shared_normals(result.model.mesh);
-    result.report.encode_seconds = encode_time.seconds();
+    result.report.encode_seconds = now_seconds() - encode_start;
     return result;
 }
 
 Result<Stripped> strip_reference(Mesh mesh, const StripOptions& options, const RunContext& context) {
     Stripped result;
-    const Stopwatch time;
+    const double start = now_seconds();
     ReferenceOptions reference_options{.references = options.references};
     if (options.levels) reference_options.max_levels = *options.levels;
     if (options.base) { // the number of levels whose driver comes closest to the vertices asked for
@@ -163,7 +155,7 @@ Result<Stripped> strip_reference(Mesh mesh, const StripOptions& options, const R
     result.model.detail = std::move(*detail);
     result.model.mesh = std::move(mesh);
     split_shared_normals(result.model.mesh);
-    result.report.encode_seconds = time.seconds();
+    result.report.encode_seconds = now_seconds() - start;
     return result;
 }
 
@@ -192,7 +184,7 @@ std::optional<Error> check_options(const Mesh& mesh, const StripOptions& options
 
 Result<Stripped> strip_to_driver(Mesh mesh, const Mesh& driver, Precision precision, const RunContext& context) {
     if (std::optional<Error> error = check_driver(mesh, driver)) return *error;
-    const Stopwatch bind_time;
+    const double bind_start = now_seconds();
     Result<Surface> driver_surface = make_surface(driver, context);
     if (!driver_surface) return driver_surface.error();
     split_shared_normals(mesh);
@@ -221,7 +213,7 @@ Result<Stripped> strip_to_driver(Mesh mesh, const Mesh& driver, Precision precis
     Stripped result;
     result.report.across_gap = binding->across_gap.size();
     result.report.facing_away = binding->facing_away.size();
-    result.report.bind_seconds = bind_time.seconds();
+    result.report.bind_seconds = now_seconds() - bind_start;
     result.model.detail = encode_blend(mesh.positions, level.vertices, std::move(cells.local), *binding, precision);
     result.model.levels.push_back(std::move(level));
     result.model.mesh = std::move(mesh);

@@ -1,20 +1,20 @@
 // Wall-clock time of a block of code, added to a sum. Private to the layer.
 #pragma once
 
-#include <chrono>
+#include "filigree/core/now_seconds.h"
 
 namespace filigree {
 
 class Stopwatch {
 public:
     explicit Stopwatch(double& seconds) : seconds_(seconds) {}
-    ~Stopwatch() { seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+    ~Stopwatch() { seconds_ += now_seconds() - start_; }
     Stopwatch(const Stopwatch&) = delete;
     Stopwatch& operator=(const Stopwatch&) = delete;
 
 private:
     double& seconds_;
-    std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+    double start_ = now_seconds();
 };
 
 } // namespace filigree

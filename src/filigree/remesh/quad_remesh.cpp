@@ -1,6 +1,7 @@
 // Based on: [Lee 1998] (the parametrisation), and docs/remesh.md, which says where we differ and what was measured.
 #include "filigree/remesh/quad_remesh.h"
 
+#include "filigree/core/now_seconds.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/mesh/closest_point.h"
 #include "filigree/mesh/mesh_distance.h"
@@ -14,7 +15,6 @@
 #include "filigree/remesh/voxel_wrap.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 namespace filigree {
@@ -36,13 +36,12 @@ constexpr double kWantedJacobian = 0.2;    // below it, places are searched
 constexpr std::size_t kDistanceSamples = 100'000;
 constexpr double kVoxelsPerQuad = 0.7; // along a quad's side, of the wrap
 
-class Stopwatch {
+/// Seconds of each phase, added up over tries.
+class PhaseClock {
 public:
-    explicit Stopwatch(std::vector<PhaseSeconds>& seconds) : seconds_(seconds) {}
+    explicit PhaseClock(std::vector<PhaseSeconds>& seconds) : seconds_(seconds) {}
     void end(const char* phase) {
-        const auto now = std::chrono::steady_clock::now();
-        const double passed = std::chrono::duration<double>(now - last_).count();
-        last_ = now;
+        const double now = now_seconds(), passed = now - std::exchange(last_, now);
         const auto entry = std::ranges::find(seconds_, std::string_view(phase),
                                              [](const PhaseSeconds& s) { return std::string_view(s.phase); });
         if (entry == seconds_.end())
@@ -53,7 +52,7 @@ public:
 
 private:
     std::vector<PhaseSeconds>& seconds_;
-    std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+    double last_ = now_seconds();
 };
 
 double area_of(const ManifoldSurface& surface) {
@@ -467,7 +466,7 @@ private:
     const QuadRemeshOptions& options_;
     const RunContext& context_;
     QuadRemeshed result_;
-    Stopwatch watch_;
+    PhaseClock watch_;
     ManifoldSurface surface_, wrapped_;
     Mesh cleaned_; ///< surface_ as a mesh: what distances are measured from
     PatchLayout layout_;

@@ -4,12 +4,12 @@
 // is sorted, and `at or beyond` everywhere is all there is of tie-breaking.
 #include "filigree/sample/inside_scan.h"
 
+#include "filigree/core/now_seconds.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/sample/inside_scan_kernel.h"
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <cmath>
 #include <mutex>
 #include <string>
@@ -125,7 +125,7 @@ public:
         if (!report) return;
         report->crossings = total_.crossings;
         report->tally = total_.tally;
-        report->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+        report->seconds = now_seconds() - begin_;
     }
 
     static std::size_t merged_layers(const std::array<std::size_t, 3>& counts) {
@@ -308,7 +308,7 @@ private:
     std::size_t triangle_count_ = 0;
     bool is_empty_ = false;
     Piece total_;
-    std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+    double begin_ = now_seconds();
 };
 
 Result<Occupancy> scan_whole(const ScanMesh& mesh, const Lattice& lattice, const ScanOptions& options, int lanes,

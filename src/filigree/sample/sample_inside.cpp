@@ -1,15 +1,12 @@
 #include "filigree/sample/sample_inside.h"
 
-#include <chrono>
+#include "filigree/core/now_seconds.h"
+
 #include <string>
 
 namespace filigree {
 
 namespace {
-
-double now_seconds() {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 /// In the world; six decimals are enough to find the place.
 std::string place(const Vec3f& p, const Vec3d& origin) {

@@ -6,12 +6,12 @@
 #include "filigree/sample/winding_inside.h"
 
 #include "filigree/core/disjoint_sets.h"
+#include "filigree/core/now_seconds.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/sample/edge_balance.h"
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <cmath>
 
 namespace filigree {
@@ -186,11 +186,11 @@ Result<WindingSampler> WindingSampler::create(const ScanMesh& mesh, const Windin
 
 Result<Occupancy> WindingSampler::inside(const Lattice& lattice, const RunContext& context,
                                          WindingReport* report) const {
-    const auto start = std::chrono::steady_clock::now();
+    const double start = now_seconds();
     WindingReport found;
     found.open_edges = open_edges_;
     const auto finish = [&] {
-        found.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        found.seconds = now_seconds() - start;
         if (report) *report = found;
     };
     if (!cones_) {

@@ -1,12 +1,12 @@
 #include "filigree/scene/scene_run.h"
 
+#include "filigree/core/now_seconds.h"
 #include "filigree/core/text.h"
 #include "filigree/melting/composite_surface.h"
 #include "filigree/mesh/normals.h"
 #include "filigree/scene/saved_state.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <numbers>
 
@@ -17,10 +17,6 @@ namespace filigree {
 namespace {
 
 constexpr float kCrushed = 0.1f; ///< of a cell's volume, below which the user is told
-
-double now_seconds() {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 double percentile_95(std::vector<float>& values) {
     if (values.empty()) return 0;

@@ -1,0 +1,124 @@
+// Starts, steps and loads that would break most solvers.
+#include "filigree/physics/simulation.h"
+
+#include "filigree/core/random.h"
+#include "physics/simulation_scenes.h"
+#include "physics/test_bodies.h"
+
+#include <cmath>
+#include <limits>
+#include <tuple>
+
+namespace filigree {
+namespace {
+
+using namespace simulation_scenes;
+
+class HardStart : public testing::TestWithParam<MaterialModel> {};
+INSTANTIATE_TEST_SUITE_P(Simulation, HardStart, kModels, model_name);
+
+class BadStart : public testing::TestWithParam<std::tuple<MaterialModel, const char*>> {};
+
+INSTANTIATE_TEST_SUITE_P(Simulation, BadStart,
+                         testing::Combine(kModels,
+                                          testing::Values("inverted", "plane", "line", "point", "shrunk", "random")),
+                         [](const auto& start) {
+                             return std::string(std::array{"fem", "springs",
+                                                           "meshfree"}[std::size_t(std::get<0>(start.param))]) +
+                                    "_" + std::get<1>(start.param);
+                         });
+
+TEST_P(BadStart, ComesBackToRest) {
+    const auto [model, start] = GetParam();
+    Material rubber = material(model, 1e5);
+    rubber.damping = 2;
+    const auto body = box(4, 4, 4, 0.25, rubber);
+    Simulation wild = simulation(free_space(), {actor(body)});
+    Vectors positions = wild.positions(0);
+    const std::string kind = start;
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+        Vec3f p = positions[i];
+        if (kind == "inverted") p.y() = -p.y();
+        if (kind == "plane") p.y() = 0;
+        if (kind == "line") p.y() = p.z() = 0;
+        if (kind == "point") p.setZero();
+        if (kind == "shrunk") p *= 1e-3f;
+        if (kind == "random")
+            p = Vec3f(float(random_unit(7, 3 * i)), float(random_unit(7, 3 * i + 1)), float(random_unit(7, 3 * i + 2)));
+        positions.set(i, p);
+    }
+    ASSERT_TRUE(wild.set_positions(0, positions).ok());
+    FrameReport report;
+    const auto is_at_rest = [&] { return shape_error(wild) < 5e-3 && report.least_volume_ratio > 0.98f; };
+    for (int second = 0; second < 40 && (second < 2 || !is_at_rest()); ++second) report = run(wild, 60);
+    ASSERT_TRUE(all_finite(wild.positions(0)));
+    EXPECT_LT(shape_error(wild), 5e-3);
+    EXPECT_GT(report.least_volume_ratio, 0.98f);
+}
+
+TEST_P(HardStart, NeverNotFinite) {
+    for (const double scale : {10.0, 1000.0})
+        for (const double rate : {10.0, 60.0, 1000.0})
+            for (const double young : {1e2, 1e5, 1e9}) {
+                const auto body = box(3, 3, 3, 0.25, material(GetParam(), young));
+                Simulation wild = simulation(with_ground(), {actor(body, {0, 0.2, 0})}, {.frames_per_second = rate});
+                Vectors positions = wild.positions(0);
+                for (std::size_t i = 0; i < positions.size(); ++i) positions.set(i, float(scale) * positions[i]);
+                ASSERT_TRUE(wild.set_positions(0, positions).ok());
+                const FrameReport first = run(wild, 1);
+                if (scale == 1000) {
+                    EXPECT_GT(first.clamped_particles, 0u);
+                }
+                run(wild, 30);
+                EXPECT_TRUE(all_finite(wild.positions(0))) << scale << " " << rate << " " << young;
+                double furthest = 0;
+                for (std::size_t i = 0; i < positions.size(); ++i)
+                    furthest = std::max(furthest, double(wild.positions(0)[i].norm()));
+                EXPECT_LT(furthest, 2e3 * scale) << scale << " " << rate << " " << young;
+            }
+}
+
+TEST(HardStarts, AHeavyBodyOnALightOne) {
+    Material light = material(MaterialModel::fem, 1e5), heavy = light;
+    light.density = 100;
+    heavy.density = 1e5;
+    light.damping = heavy.damping = 1;
+    Simulation stacked = simulation(
+        with_ground(), {actor(box(4, 4, 4, 0.25, light)), actor(box(2, 2, 2, 0.25, heavy), {0.25, 1.05, 0.25})});
+    run(stacked, 120);
+    EXPECT_TRUE(all_finite(stacked.positions(0)));
+    EXPECT_TRUE(all_finite(stacked.positions(1)));
+}
+
+TEST(HardStarts, ACrushedBodyGainsNoEnergy) {
+    for (const MaterialModel model : {MaterialModel::fem, MaterialModel::springs, MaterialModel::meshfree}) {
+        Simulation crushed = simulation(free_space(), {actor(box(4, 4, 4, 0.05, material(model, 5e4)))},
+                                        {.mode = StepMode::explicit_steps});
+        Vectors flat = crushed.positions(0);
+        for (std::size_t i = 0; i < flat.size(); ++i) flat.y[i] *= 0.05f;
+        ASSERT_TRUE(crushed.set_positions(0, flat).ok());
+        const RunContext context(1);
+        const double before = crushed.energy(context).total();
+        for (int frame = 0; frame < 240; ++frame) {
+            const FrameReport report = crushed.advance(context).value();
+            if (frame == 0) {
+                EXPECT_LT(report.least_volume_ratio, 0.1f);
+            }
+            ASSERT_LT(crushed.energy(context).total(), 1.01 * before) << int(model) << ", frame " << frame;
+        }
+    }
+}
+
+TEST(HardStarts, ReportsSayWhichBodyIsCrushedMost) {
+    const auto cube = box(3, 3, 3, 0.1, material(MaterialModel::fem));
+    Simulation both = simulation(free_space(), {actor(cube), actor(cube, {1, 0, 0})});
+    Vectors flat = both.positions(1);
+    for (std::size_t i = 0; i < flat.size(); ++i) flat.y[i] *= 0.08f;
+    ASSERT_TRUE(both.set_positions(1, flat).ok());
+    const FrameReport report = run(both, 1);
+    EXPECT_LT(report.least_volume_ratio, 0.1f);
+    EXPECT_EQ(report.most_crushed, 1u);
+}
+
+} // namespace
+} // namespace filigree
