@@ -238,7 +238,7 @@ Raises
 UsageError
     `bits`.
 UnsuitableError
-    The reference code, or a driver made elsewhere.
+    The reference code, or a stream of a driver made elsewhere.
 MismatchError, UnwritableError, OutOfMemoryError, Cancelled
 
 Examples

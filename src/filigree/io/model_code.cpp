@@ -8,13 +8,21 @@
 #include "filigree/hierarchy/vertex_order.h"
 #include "filigree/mesh/mesh_distance.h"
 
+#include <ranges>
+
 namespace filigree {
 
 namespace {
 
-Level driver_of(std::string_view stream, const FileCode& code) {
+std::string stream_of(const SectionReader& in, std::string_view name, std::uint32_t index = 0) {
+    const std::vector<char> bytes = in.array<char>(name, index);
+    return {bytes.begin(), bytes.end()};
+}
+
+Level driver_of(const SectionReader& in, const FileCode& code) {
+    const std::size_t among = is_made_elsewhere(in) ? code.driver_vertices : code.vertices;
     std::optional<DriverFaces> driver =
-        decode_driver(stream, {code.driver_vertices, code.driver_faces, code.driver_corners, code.vertices});
+        decode_driver(stream_of(in, "cd.drv"), {code.driver_vertices, code.driver_faces, code.driver_corners, among});
     if (!driver) throw FileDamage{"has a damaged driver"};
     Level level;
     level.vertices = std::move(driver->vertices);
@@ -42,9 +50,36 @@ bool is_made_elsewhere(const Model& model) {
     return std::ranges::none_of(model.driver().vertices, [&](Index v) { return is_used[v]; });
 }
 
-std::string stream_of(const SectionReader& in, std::string_view name, std::uint32_t index = 0) {
-    const std::vector<char> bytes = in.array<char>(name, index);
-    return {bytes.begin(), bytes.end()};
+/// The mesh that was bound to a driver made elsewhere. None: the driver's vertices do not lie behind the mesh's own.
+std::optional<Mesh> without_driver(const Model& model) {
+    const std::vector<Index>& driver = model.driver().vertices;
+    const std::size_t own = model.mesh.vertex_count() - driver.size();
+    for (std::size_t i = 0; i < driver.size(); ++i)
+        if (driver[i] != own + i) return std::nullopt;
+    Mesh mesh = model.mesh;
+    mesh.positions.resize(own);
+    if (!mesh.normals.empty() && mesh.normals.per_vertex()) mesh.normals.values.resize(own);
+    if (!mesh.uvs.empty() && mesh.uvs.per_vertex()) mesh.uvs.values.resize(own);
+    if (!mesh.colors.empty()) mesh.colors.resize(own);
+    for (VertexScalar& scalar : mesh.scalars) scalar.values.resize(own);
+    return mesh;
+}
+
+/// A mesh and a driver that was made elsewhere, bound anew.
+Model bind_elsewhere(const SectionReader& in, Mesh mesh, const FileCode& code, const RunContext& context) {
+    const Level level = driver_of(in, code);
+    if (!std::ranges::equal(level.vertices, std::views::iota(Index{0}, Index(level.vertices.size()))))
+        throw FileDamage{"has a damaged driver"};
+    Mesh driver;
+    driver.origin = mesh.origin;
+    driver.positions = in.array<Vec3f>("cd.dpos");
+    driver.face_offsets = level.face_offsets;
+    driver.corners = level.corners;
+    if (!std::ranges::all_of(driver.positions, [](const Vec3f& p) { return p.allFinite(); }))
+        throw FileDamage{"has a damaged driver"};
+    Result<Stripped> bound = strip_to_driver(std::move(mesh), driver, static_cast<Precision>(code.precision), context);
+    if (!bound) throw bound.error();
+    return std::move(bound->model);
 }
 
 constexpr double kClipError = 6e-6;     // of the diagonal: restored vertices are 1e-5 off, finer than restoring is
@@ -144,20 +179,31 @@ Result<CodedModel> code_model(const Model& model, const PoseSequence& poses, con
     if (!detail)
         return Error{ErrorCode::unsuitable,
                      "The model has the reference code, which is not packed; strip the mesh with the blend code."};
-    if (is_made_elsewhere(model))
-        return Error{ErrorCode::unsuitable,
-                     "The model's driver was made elsewhere (strip --driver), and such models are not packed."};
+    const bool elsewhere = is_made_elsewhere(model);
+    if (elsewhere && options.levels)
+        return Error{ErrorCode::unsuitable, "The model's driver was made elsewhere (strip --driver), and streams need "
+                                            "one of the mesh's own vertices; the other profiles take it."};
+    std::optional<Mesh> own;
+    if (elsewhere && !(own = without_driver(model)))
+        return Error{ErrorCode::unsuitable, "The mesh's faces use none of the driver's vertices, and these do not "
+                                            "stand behind the mesh's own; --profile lossless takes such a model."};
+    const Mesh& source = own ? *own : model.mesh;
     CodedModel coded;
     MeshCodeReport report;
-    Result<CodedMesh> mesh = encode_mesh(model.mesh, options, &report, context);
+    Result<CodedMesh> mesh = encode_mesh(source, options, &report, context);
     if (!mesh) return mesh.error();
     coded.mesh = std::move(*mesh);
-    if (options.levels) coded.levels = levels_of(coded.mesh, model.mesh, context);
+    if (options.levels) coded.levels = levels_of(coded.mesh, source, context);
     const Level& driver = model.driver();
-    std::vector<Index> place(model.mesh.vertex_count());
-    for (Index i = 0; i < place.size(); ++i) place[options.keep_order ? i : report.vertex[i]] = i;
-    std::vector<Index> driver_places;
-    for (const Index v : driver.vertices) driver_places.push_back(place[v]);
+    std::vector<Index> place(elsewhere ? driver.vertices.size() : source.vertex_count());
+    for (Index i = 0; i < place.size(); ++i) place[options.keep_order || elsewhere ? i : report.vertex[i]] = i;
+    std::vector<Index> driver_places = place;
+    if (elsewhere) {
+        coded.driver_positions = driver_positions(model);
+    } else {
+        driver_places.clear();
+        for (const Index v : driver.vertices) driver_places.push_back(place[v]);
+    }
     coded.driver = encode_driver(driver.face_offsets, driver.corners, driver_places, place.size());
     coded.code = {.vertices = coded.mesh.vertices,
                   .faces = coded.mesh.faces,
@@ -174,7 +220,8 @@ Result<CodedModel> code_model(const Model& model, const PoseSequence& poses, con
     coded.report = {.rms = report.rms,
                     .largest = report.largest,
                     .bytes = {coded.mesh.connectivity.size(), coded.mesh.places.size(), coded.mesh.attributes.size(),
-                              coded.mesh.order.size(), coded.driver.size()}};
+                              coded.mesh.order.size(),
+                              coded.driver.size() + sizeof(Vec3f) * coded.driver_positions.size()}};
     if (!poses.empty()) code_clips(model, options.levels ? with_gradients(model, poses, context) : poses, coded);
     for (const CodedLevel& level : coded.mesh.levels.levels) {
         coded.report.bytes.levels += level.splits.size();
@@ -194,6 +241,7 @@ void write_model_code(SectionWriter& out, const CodedModel& coded) {
         out.bytes("cd.bpos", levels.places, 0);
     }
     out.bytes("cd.drv", coded.driver, 0);
+    if (!coded.driver_positions.empty()) out.array("cd.dpos", coded.driver_positions);
     if (!coded.clips.empty()) {
         out.value("pose.fps", coded.frames_per_second);
         out.value("cd.pose", coded.clip);
@@ -209,13 +257,15 @@ void write_model_code(SectionWriter& out, const CodedModel& coded) {
 }
 
 bool is_coded(const SectionReader& in) { return in.count("cd.par").first > 0; }
+bool is_made_elsewhere(const SectionReader& in) { return in.count("cd.dpos").first > 0; }
 
 FileCode read_file_code(const SectionReader& in) {
     if (in.count("cd.rev").first == 0 || in.value<std::uint32_t>("cd.rev") != kCodeRevision)
         throw FileDamage{"was packed by another version of filigree", "pack its source again"};
     const auto code = in.value<FileCode>("cd.par");
-    if (code.precision > 1 || code.bits > 16 || code.driver_vertices == 0 || code.driver_vertices > code.vertices ||
-        code.vertices >= kNoIndex)
+    const std::uint64_t most_driver = is_made_elsewhere(in) ? in.item_count<Vec3f>("cd.dpos") : code.vertices;
+    if (code.precision > 1 || code.bits > 16 || code.driver_vertices == 0 || code.driver_vertices > most_driver ||
+        (is_made_elsewhere(in) && code.driver_vertices != most_driver) || code.vertices >= kNoIndex)
         throw FileDamage{"has coded parts that make no sense"};
     return code;
 }
@@ -233,7 +283,7 @@ PoseSequence read_clips(const SectionReader& in) {
     if (clip.frames == 0) return poses;
     const FileDamage damage{"has damaged poses", "pack it again"};
     poses.frames_per_second = in.value<double>("pose.fps");
-    const Level driver = driver_of(stream_of(in, "cd.drv"), read_file_code(in));
+    const Level driver = driver_of(in, read_file_code(in));
     const ClipOrder order = clip_order(driver.face_offsets, driver.corners, driver.vertices.size());
     for (std::uint32_t k = 0; poses.frames.size() < clip.frames; ++k) {
         const std::optional<ClipFrames> frames = decode_clip(stream_of(in, "cd.clip", k), clip.numbers, order);
@@ -277,7 +327,9 @@ Coding coding_of(const SectionReader& in, const FileCode& code) {
     return {.options = coded_outline(in, code).options,
             .step = code.step,
             .bytes = {in.item_count<char>("cd.con"), in.item_count<char>("cd.pos"), in.item_count<char>("cd.att"),
-                      in.item_count<char>("cd.ord"), in.item_count<char>("cd.drv"), level_bytes, refinements, clips},
+                      in.item_count<char>("cd.ord"),
+                      in.item_count<char>("cd.drv") + sizeof(Vec3f) * in.item_count<Vec3f>("cd.dpos"), level_bytes,
+                      refinements, clips},
             .levels = std::move(levels)};
 }
 
@@ -311,7 +363,8 @@ Model read_model_code(const SectionReader& in, Mesh rest, const RunContext& cont
     Result<Mesh> mesh = decode_mesh(coded, context);
     if (!mesh && mesh.error().code == ErrorCode::cancelled) throw mesh.error();
     if (!mesh) throw FileDamage{"holds a coded mesh that is damaged", "pack it again"};
-    Level driver = driver_of(stream_of(in, "cd.drv"), code);
+    if (is_made_elsewhere(in)) return bind_elsewhere(in, std::move(*mesh), code, context);
+    Level driver = driver_of(in, code);
     if (code.keep_order && !std::ranges::is_sorted(driver.vertices)) throw FileDamage{"has a damaged driver"};
     if (!code.keep_order) *mesh = with_driver_first(std::move(*mesh), driver, context);
     Result<Model> model =

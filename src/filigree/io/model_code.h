@@ -40,6 +40,7 @@ struct CodedModel {
     FileCode code{};
     std::vector<FileLevel> levels; ///< of a stream
     std::string driver;
+    std::vector<Vec3f> driver_positions; ///< of a driver made elsewhere, relative to the mesh's origin; else empty
     FileClip clip{};
     double frames_per_second = 0;
     std::vector<std::string> clips; ///< blocks
@@ -53,6 +54,8 @@ Result<CodedModel> code_model(const Model& model, const PoseSequence& poses, con
 void write_model_code(SectionWriter& out, const CodedModel& coded);
 
 bool is_coded(const SectionReader& in);
+/// Whether the driver of a coded file has vertices of its own (strip --driver).
+bool is_made_elsewhere(const SectionReader& in);
 FileCode read_file_code(const SectionReader& in);
 /// The coded mesh without its streams.
 CodedMesh coded_outline(const SectionReader& in, const FileCode& code);

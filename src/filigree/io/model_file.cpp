@@ -394,8 +394,9 @@ ModelOutline read_outline_sections(const FileReader& file) {
     ModelOutline outline;
     if (is_coded(in)) {
         const FileCode code = read_file_code(in);
+        const std::uint64_t behind = is_made_elsewhere(in) ? code.driver_vertices : 0;
         outline.levels = {{code.driver_vertices, code.driver_faces, code.driver_corners},
-                          {code.vertices, code.faces, code.corners}};
+                          {code.vertices + behind, code.faces, code.corners}};
         outline.precision = static_cast<Precision>(code.precision);
         outline.coding = coding_of(in, code);
         read_frames(in, outline);

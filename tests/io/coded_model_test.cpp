@@ -1,0 +1,73 @@
+// Models packed in few bits and read again.
+#include "filigree/hierarchy/restore.h"
+#include "filigree/hierarchy/strip.h"
+#include "filigree/io/file.h"
+#include "filigree/io/model_file.h"
+#include "filigree/mesh/shapes.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+namespace filigree {
+namespace {
+
+const RunContext kContext(2);
+
+Model bound_elsewhere() {
+    const Mesh ball = make_wavy_sphere({.resolution = 8, .amplitude = 0});
+    return strip_to_driver(make_wavy_sphere({.resolution = 48}), ball, Precision::float32, kContext).value().model;
+}
+
+std::filesystem::path packed_path() {
+    return std::filesystem::temp_directory_path() /
+           ("filigree_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()) + ".fil");
+}
+
+Pose squeezed(const Model& model) {
+    Pose pose = rest_pose(model);
+    for (Vec3f& p : pose.positions) p.y() *= 0.5f + 0.2f * p.x();
+    return pose;
+}
+
+TEST(CodedModel, ADriverMadeElsewhereComesBack) {
+    const Model model = bound_elsewhere();
+    const std::filesystem::path path = packed_path();
+    for (const bool keep_order : {false, true}) {
+        const PoseSequence poses{24, {squeezed(model), rest_pose(model)}};
+        const Result<CodingReport> report =
+            write_coded_model(model, poses, {.bits = 14, .keep_order = keep_order}, path, kContext);
+        ASSERT_TRUE(report.ok()) << report.error().message;
+        EXPECT_LT(std::filesystem::file_size(path), sizeof(Vec3f) * model.mesh.vertex_count() / 2);
+        const ModelOutline outline = read_model_outline(FileReader::open(path).value(), "packed", kContext).value();
+        EXPECT_EQ(outline.levels.back().vertices, model.mesh.vertex_count());
+        const Model back = read_model(path, kContext).value();
+        EXPECT_EQ(back.mesh.vertex_count(), model.mesh.vertex_count());
+        EXPECT_EQ(back.mesh.face_count(), model.mesh.face_count());
+        EXPECT_EQ(driver_positions(back), driver_positions(model)) << "to the bit";
+        EXPECT_EQ(back.driver().vertices, model.driver().vertices);
+        EXPECT_EQ(read_poses(path, kContext).value().frames.size(), 2u);
+        if (!keep_order) continue;
+        const Pose pose = squeezed(model);
+        const auto restored = [&](const Model& of) {
+            return Restorer::create(of, {}, kContext).value().mesh(pose, kContext).value().positions;
+        };
+        const std::vector<Vec3f> expected = restored(model), found = restored(back);
+        double largest = 0;
+        for (std::size_t v = 0; v < expected.size(); ++v)
+            largest = std::max(largest, double((expected[v] - found[v]).norm()));
+        EXPECT_LT(largest, 2 * report->largest + 1e-4);
+    }
+    std::filesystem::remove(path);
+}
+
+TEST(CodedModel, AStreamOfADriverMadeElsewhereIsRefused) {
+    const std::filesystem::path path = packed_path();
+    const Result<CodingReport> report = write_coded_model(bound_elsewhere(), {}, {.levels = true}, path, kContext);
+    ASSERT_FALSE(report.ok());
+    EXPECT_EQ(report.error().code, ErrorCode::unsuitable);
+    EXPECT_FALSE(std::filesystem::exists(path));
+}
+
+} // namespace
+} // namespace filigree
