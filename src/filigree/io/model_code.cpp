@@ -82,7 +82,7 @@ Model bind_elsewhere(const SectionReader& in, Mesh mesh, const FileCode& code, c
     return std::move(bound->model);
 }
 
-constexpr double kClipError = 6e-6;     // of the diagonal: restored vertices are 1e-5 off, finer than restoring is
+constexpr double kClipError = 4.5e-6;   // of the diagonal: restored vertices are 1e-5 off, finer than restoring is
 constexpr double kGradientReach = 0.01; // of the diagonal: how far vertices lie from their driver, about
 constexpr std::size_t kClipNumbers = std::size_t{1} << 25; // in a block
 
