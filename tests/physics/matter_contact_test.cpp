@@ -41,13 +41,15 @@ struct Slope {
     std::vector<Actor> actors;
     Vec3d normal, down;
 
-    Slope(double the_degrees, bool is_body, double friction) : degrees(the_degrees), on_body(is_body) {
+    Slope(double the_degrees, bool is_body, double friction, const Material& matter = rubber(),
+          std::size_t cells_along = 60)
+        : degrees(the_degrees), on_body(is_body) {
         const double angle = degrees * std::numbers::pi / 180;
         normal = Vec3d(-std::sin(angle), std::cos(angle), 0);
         down = Vec3d(-std::cos(angle), -std::sin(angle), 0);
         world.body_friction = friction;
         if (on_body) {
-            actors.push_back(put(block(60, 3, 8, 0.05, rubber()), -0.075 * normal, degrees));
+            actors.push_back(put(block(cells_along, 3, 8, 0.05, matter), -0.075 * normal, degrees));
             Pin pin;
             for (Index i = 0; i < actors[0].body->particle_count(); ++i) pin.particles.push_back(i);
             world.pins.push_back(pin);
@@ -147,6 +149,33 @@ TEST(MatterContact, ABlockHoldsOnABodyAndSlidesBeyondItsAngle) {
             EXPECT_LT(speed, 1e-4) << degrees;
         else
             EXPECT_GT(speed, 0.1) << degrees;
+    }
+}
+
+// Two meshfree bodies touch by balls.
+TEST(MatterContact, MeshfreeBodiesHoldEachOtherAndSlideBeyondTheirAngle) {
+    Material jelly = rubber(1e6, 0.5);
+    jelly.model = MaterialModel::meshfree;
+    for (const double degrees : {10.0, 20.0, 40.0}) {
+        Slope slope(degrees, true, 0.5, jelly, 20);
+        const std::size_t body = slope.add(block(4, 4, 4, 0.05, jelly), 0.1, 0.2, 0);
+        Simulation resting = begin(slope.world, slope.actors);
+        const auto run = [](Simulation& one, int frames) {
+            for (int frame = 0; frame < frames; ++frame) ASSERT_TRUE(one.advance(kOneThread).ok());
+        };
+        run(resting, degrees < 26 ? 240 : 20);
+        const std::string saved = resting.save();
+        const Vec3d before = centre_of_mass(resting, body);
+        run(resting, 30);
+        const double speed = 2 * (centre_of_mass(resting, body) - before).norm();
+        if (degrees < 26)
+            EXPECT_LT(speed, 1e-4) << degrees;
+        else
+            EXPECT_GT(speed, 0.1) << degrees;
+        Simulation again = begin(slope.world, slope.actors);
+        ASSERT_TRUE(again.restore(saved).ok());
+        run(again, 30);
+        EXPECT_TRUE(again.save() == resting.save()) << degrees << ": anchors are saved";
     }
 }
 

@@ -6,6 +6,7 @@
 #include "filigree/physics/matter_contact.h"
 #include "filigree/physics/obstacle_motion.h"
 
+#include <array>
 #include <functional>
 #include <memory>
 
@@ -40,12 +41,7 @@ public:
     /// Before a frame of explicit steps, or after speeds have jumped. speed: m/s, of the fastest particle.
     void begin_frame(std::span<const BodyState> bodies, float speed);
     /// Positions have changed by dt times velocities. way: m, bound on how far anything has gone, with obstacles.
-    void travel(std::span<const BodyState> bodies, float dt, float way) {
-        near_way_ += way;
-        pairs_way_ += way;
-        near_speed_ = way / dt;
-        matter_.travel(bodies, dt);
-    }
+    void travel(std::span<const BodyState> bodies, float dt, float way);
     /// A body's particles were moved by so much, m, beside their velocities.
     void was_moved(std::size_t body, float way) {
         near_way_ += way;
@@ -147,10 +143,17 @@ public:
         float clear_until;
         Vec3f anchor;
     };
+    /// Two balls that friction holds together.
+    struct BallMemory {
+        Index first_body, first, second_body, second;
+        std::uint32_t slides;
+        Vec3f offset;
+    };
     /// All that contacts remember.
     struct Memory {
         std::vector<NearMemory> near; ///< ascending by body, obstacle and point
         float near_way = 0, near_until = -1;
+        std::vector<BallMemory> balls; ///< ascending
         MatterContacts::Memory matter;
     };
     Memory memory() const;
@@ -171,12 +174,18 @@ private:
         Index first_body, first, second_body, second;
         float clear_until; ///< pairs_way_ until which these cannot touch; both bodies travel
         PairContact law;
+        contact_law::Grasp grasp = {};
+        Vec3f offset = Vec3f::Zero(); ///< m, how far the first has gone beside the second since it landed, along both
+
+        std::array<Index, 4> key() const { return {first_body, first, second_body, second}; }
     };
     Blocks::Entry block_of(const Near& at, const BodyState& body, const ObstaclePoses& poses, float dt) const;
     Blocks::Entry block_of(const BodyState& body, Index point, const BodyState& other, Index other_point,
                            const PairContact& law, float dt) const;
     Vec3f obstacle_force(Near& at, const BodyState& body, const ObstaclePoses& poses, float dt) const;
     Vec3f pair_force(NearPair& pair, std::span<const BodyState> bodies, float dt) const;
+    static Vec3f relative_velocity(const NearPair& pair, std::span<const BodyState> bodies);
+    std::vector<NearPair> held_pairs() const; ///< those that friction holds, ascending
     void find_near(std::span<const BodyState> bodies, double time, float reach, const RunContext& context);
     void find_pairs(std::span<const BodyState> bodies, float reach, const RunContext& context);
 

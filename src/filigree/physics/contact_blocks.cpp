@@ -229,7 +229,8 @@ ContactReport Contacts::update_anchors(std::span<const BodyState> bodies, double
                 at.anchor = poses.to_own_axes(at.obstacle, place - offset * (limit / (grip * stretch)));
         }
     }
-    for (const NearPair& pair : pairs_) {
+    for (NearPair& pair : pairs_) {
+        pair.grasp = {}; // descent lets balls slide
         const BodyState &a = bodies[pair.first_body], &b = bodies[pair.second_body];
         if ((embedded_point(a.balls, pair.first, a.positions) - embedded_point(b.balls, pair.second, b.positions))
                 .norm() < a.ball_radius + b.ball_radius) {

@@ -83,23 +83,44 @@ Vec3f Contacts::obstacle_force(Near& at, const BodyState& body, const ObstaclePo
     return force;
 }
 
-/// The force on the pair's first ball; minus it is that on the second.
+Vec3f Contacts::relative_velocity(const NearPair& pair, std::span<const BodyState> bodies) {
+    const BodyState &a = bodies[pair.first_body], &b = bodies[pair.second_body];
+    return embedded_point(a.balls, pair.first, a.velocities) - embedded_point(b.balls, pair.second, b.velocities);
+}
+
+void Contacts::travel(std::span<const BodyState> bodies, float dt, float way) {
+    near_way_ += way;
+    pairs_way_ += way;
+    near_speed_ = way / dt;
+    for (NearPair& pair : pairs_)
+        if (pair.grasp.holds) pair.offset += dt * relative_velocity(pair, bodies);
+    matter_.travel(bodies, dt);
+}
+
+/// The force on the pair's first ball; minus it is that on the second. Lets friction's anchor begin, slide and end.
 Vec3f Contacts::pair_force(NearPair& pair, std::span<const BodyState> bodies, float dt) const {
-    if (pair.clear_until > pairs_way_) return Vec3f::Zero();
+    if (pair.clear_until > pairs_way_) {
+        pair.grasp = {};
+        return Vec3f::Zero();
+    }
     const BodyState &a = bodies[pair.first_body], &b = bodies[pair.second_body];
     const Vec3f between =
         embedded_point(a.balls, pair.first, a.positions) - embedded_point(b.balls, pair.second, b.positions);
     const float distance = between.norm(), depth = a.ball_radius + b.ball_radius - distance;
     pair.clear_until = pairs_way_ - depth / 2;
-    if (!(depth > 0 && distance > 0)) return Vec3f::Zero();
-    const Vec3f normal = between / distance;
-    const Vec3f velocity =
-        embedded_point(a.balls, pair.first, a.velocities) - embedded_point(b.balls, pair.second, b.velocities);
-    const float stiffness = pair_stiffness(a, pair.first, b, pair.second);
-    const float push =
-        stiffness * depth * unloading(pair.law.restitution, velocity.dot(normal), smooth_speed(world_, dt));
-    const Vec3f held = limited(-2 * stiffness * dt * along_surface(velocity, normal), float(pair.law.friction) * push);
-    return push * normal + held;
+    if (!(depth > 0 && distance > 0)) {
+        pair.grasp = {};
+        return Vec3f::Zero();
+    }
+    const Touch touch{between / distance,
+                      relative_velocity(pair, bodies),
+                      depth,
+                      pair_stiffness(a, pair.first, b, pair.second),
+                      float(pair.law.friction),
+                      float(pair.law.restitution),
+                      std::max(a.rest_squared_frequency, b.rest_squared_frequency)};
+    pair.offset = along_surface(pair.offset, touch.normal);
+    return touch_force(touch, pair.offset, pair.grasp, dt, smooth_speed(world_, dt));
 }
 
 ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, float dt, const RunContext& context) {

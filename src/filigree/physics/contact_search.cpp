@@ -64,7 +64,15 @@ void Contacts::find_near(std::span<const BodyState> bodies, double time, float r
     }
 }
 
+std::vector<Contacts::NearPair> Contacts::held_pairs() const {
+    std::vector<NearPair> held;
+    std::ranges::copy_if(pairs_, std::back_inserter(held), [](const NearPair& pair) { return pair.grasp.holds; });
+    std::ranges::sort(held, {}, &NearPair::key);
+    return held;
+}
+
 void Contacts::find_pairs(std::span<const BodyState> bodies, float reach, const RunContext& context) {
+    const std::vector<NearPair> held = held_pairs();
     pairs_.clear();
     if (std::ranges::none_of(bodies, &BodyState::has_balls)) return;
     std::vector<Box> boxes(bodies.size());
@@ -116,10 +124,19 @@ void Contacts::find_pairs(std::span<const BodyState> bodies, float reach, const 
                     }
             }
         }
+    for (NearPair& pair : pairs_) {
+        const auto old = std::ranges::lower_bound(held, pair.key(), {}, &NearPair::key);
+        if (old == held.end() || old->key() != pair.key()) continue;
+        pair.grasp = old->grasp;
+        pair.offset = old->offset;
+    }
 }
 
 Contacts::Memory Contacts::memory() const {
-    Memory memory{{}, near_way_, near_until_, matter_.memory()};
+    Memory memory{{}, near_way_, near_until_, {}, matter_.memory()};
+    for (const NearPair& pair : held_pairs())
+        memory.balls.push_back(
+            {pair.first_body, pair.first, pair.second_body, pair.second, pair.grasp.slides, pair.offset});
     for (Index b = 0; b < near_.size(); ++b)
         for (const Near& at : near_[b])
             memory.near.push_back({b, at.obstacle, at.point, Index(at.grasp.holds) + 2 * Index(at.grasp.slides),
@@ -133,6 +150,12 @@ bool Contacts::set_memory(const Memory& memory, std::span<const BodyState> bodie
                near.point < bodies[near.body].surface.size() && near.anchor.allFinite() &&
                std::isfinite(near.clear_until);
     };
+    const auto are_balls = [&](const BallMemory& pair) {
+        return pair.first_body < pair.second_body && pair.second_body < bodies.size() &&
+               pair.first < bodies[pair.first_body].balls.size() &&
+               pair.second < bodies[pair.second_body].balls.size() && pair.offset.allFinite();
+    };
+    if (!std::ranges::all_of(memory.balls, are_balls)) return false;
     if (!std::isfinite(memory.near_way) || !std::isfinite(memory.near_until)) return false;
     if (!std::ranges::all_of(memory.near, is_sound) || !matter_.is_sound(memory.matter, bodies)) return false;
     for (std::vector<Near>& near : near_) near.clear();
@@ -143,6 +166,17 @@ bool Contacts::set_memory(const Memory& memory, std::span<const BodyState> bodie
                                     0,
                                     {(near.flags & 1) != 0, (near.flags & 2) != 0},
                                     near.anchor});
+    pairs_.clear();
+    pairs_until_ = -1;
+    for (const BallMemory& pair : memory.balls)
+        pairs_.push_back({.first_body = pair.first_body,
+                          .first = pair.first,
+                          .second_body = pair.second_body,
+                          .second = pair.second,
+                          .clear_until = 0,
+                          .law = world_.contact_of(bodies[pair.first_body].actor, bodies[pair.second_body].actor),
+                          .grasp = {true, pair.slides != 0},
+                          .offset = pair.offset});
     near_way_ = memory.near_way;
     near_until_ = memory.near_until;
     matter_.set_memory(memory.matter, bodies);

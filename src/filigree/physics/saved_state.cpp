@@ -9,6 +9,7 @@ namespace {
 // The name of the format, its version last. 5: with bodies on the grid.
 constexpr std::uint64_t kMagic = 0x36455441'54534c46; // "FLSTATE6"
 static_assert(sizeof(Contacts::NearMemory) == 5 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
+static_assert(sizeof(Contacts::BallMemory) == 5 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
 static_assert(sizeof(MatterContacts::SideMemory) == 6 * sizeof(Index), "padding would be saved");
 static_assert(sizeof(MatterContacts::PairMemory) == 4 * sizeof(Index) + 3 * sizeof(Vec3f), "padding would be saved");
 static_assert(sizeof(LinkState) == 2 * sizeof(float) + sizeof(Vec3f), "padding would be saved");
@@ -75,6 +76,7 @@ void write_contacts(ByteWriter& writer, const Contacts::Memory& contacts) {
     writer.array(std::span(contacts.near));
     writer.value(contacts.near_way);
     writer.value(contacts.near_until);
+    writer.array(std::span(contacts.balls));
     writer.value(contacts.matter.way);
     writer.value(contacts.matter.until);
     writer.array(std::span(contacts.matter.sides));
@@ -87,6 +89,7 @@ Contacts::Memory read_contacts(ByteReader& reader) {
     contacts.near = reader.array<Contacts::NearMemory>();
     contacts.near_way = reader.value<float>();
     contacts.near_until = reader.value<float>();
+    contacts.balls = reader.array<Contacts::BallMemory>();
     contacts.matter.way = reader.value<float>();
     contacts.matter.until = reader.value<float>();
     contacts.matter.sides = reader.array<MatterContacts::SideMemory>();
