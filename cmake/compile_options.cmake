@@ -25,3 +25,7 @@ endif()
 
 # What xxHash says always has to be inlined is an error at -Og, the preset dev's.
 target_compile_definitions(filigree_options INTERFACE $<$<CONFIG:Debug>:XXH_NO_INLINE_HINTS=1>)
+if(FILIGREE_COVERAGE) # of the library's sources alone: to count in Eigen and the standard library is dear, and nobody asks
+  target_compile_options(filigree_options INTERFACE --coverage -fprofile-abs-path "-fprofile-filter-files=.*/src/filigree/.*")
+  target_link_options(filigree_options INTERFACE --coverage)
+endif()

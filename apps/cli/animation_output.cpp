@@ -1,7 +1,6 @@
 #include "animation_output.h"
 #include "restore_options.h"
 
-#include <charconv>
 #include <set>
 
 #include <fmt/format.h>
@@ -197,22 +196,8 @@ PoseStream poses_of(const std::string& poses, const PoseFileOptions& options, co
     return stream;
 }
 
-AnimationChunk chunk_of(const std::string& text) {
-    AnimationChunk chunk;
-    const auto number = [](std::string_view digits, std::size_t& value) {
-        const auto [end, failed] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-        return failed == std::errc() && end == digits.data() + digits.size();
-    };
-    const std::size_t slash = text.find('/');
-    const bool is_right = slash != std::string::npos && number(std::string_view(text).substr(0, slash), chunk.number) &&
-                          number(std::string_view(text).substr(slash + 1), chunk.count) && chunk.number >= 1 &&
-                          chunk.number <= chunk.count && chunk.count <= 1'000'000;
-    if (!is_right) refuse("--chunk must be K/N, the K-th of N chunks from 1 on, such as 3/40; '" + text + "' is not.");
-    return chunk;
-}
-
 ChunkReport write_chunk_output(const Model& model, const PoseStream& poses, const RestoreOptions& restore,
-                               const AnimationChunk& chunk, const std::string& path, Session& session) {
+                               const WorkChunk& chunk, const std::string& path, Session& session) {
     const Restorer restorer = require(Restorer::create(model, restore, session.context()));
     const Mesh rest = level_mesh(model, require(restored_level(model, restore)));
     session.begin_writing(path);

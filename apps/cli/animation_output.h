@@ -47,11 +47,9 @@ OptionList pose_file_options(PoseFileOptions& options);
 PoseStream poses_of(const std::string& poses, const PoseFileOptions& options, const Model& model,
                     const PoseSequence& own, const std::string& model_path, Session& session);
 
-/// "3/40" as the third of forty chunks. Refuses what is none.
-AnimationChunk chunk_of(const std::string& text);
 /// Restores one chunk of the frames into `path`, a .pc2 that other processes write too.
 ChunkReport write_chunk_output(const Model& model, const PoseStream& poses, const RestoreOptions& restore,
-                               const AnimationChunk& chunk, const std::string& path, Session& session);
+                               const WorkChunk& chunk, const std::string& path, Session& session);
 
 /// Restores the poses into `path`, a .pc2, while the model stays in its file. Reports as write_animation_output.
 void write_chunks_output(const ModelChunks& model, const PoseStream& poses, const RestoreOptions& restore,

@@ -95,7 +95,7 @@ void add(CLI::App& app, const Command& command, const OptionList& options, Sessi
     added->footer("Examples:\n" + command.examples);
     added->callback([by_name, options, run = command.run, &session] {
         for (const auto& [name, option] : by_name)
-            if (option->count() > 0) session.note_given(name);
+            if (option->count() > 0) session.note_given(name, option->results());
         session.begin();
         refuse_to_overwrite_inputs(options);
         run(session);

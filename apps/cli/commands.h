@@ -21,6 +21,7 @@ Command demo_command();
 Command render_command();
 Command sample_command();
 Command simulate_command();
+Command sweep_command();
 Command export_command();
 Command figures_command();
 
@@ -28,7 +29,7 @@ inline std::vector<Command> all_commands() {
     return {make_command(),     info_command(),    remesh_command(),   strip_command(),  level_command(),
             deform_command(),   restore_command(), compare_command(),  bench_command(),  demo_command(),
             render_command(),   sample_command(),  simulate_command(), export_command(), figures_command(),
-            fracture_command(), pack_command(),    unpack_command()};
+            fracture_command(), pack_command(),    unpack_command(),   sweep_command()};
 }
 
 } // namespace filigree::cli

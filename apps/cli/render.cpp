@@ -1,4 +1,4 @@
-#include "animation_output.h"
+#include "chunks.h"
 #include "commands.h"
 #include "rendering.h"
 

@@ -1,8 +1,17 @@
 // Films: what changes from frame to frame is the pose, the file or the camera.
-#include "animation_output.h"
+#include "chunks.h"
 #include "rendering.h"
 
+#include "filigree/io/file_batch.h"
+#include "filigree/io/file_error.h"
+#include "filigree/io/numbered_name.h"
 #include "filigree/present/film_frames.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <utility>
+
+#include <unistd.h>
 
 #include <fmt/format.h>
 
@@ -33,35 +42,18 @@ public:
     }
 
     void make() {
+        if (!options_.chunk.empty()) return make_chunk();
         const double start = now_seconds();
         const double rate = options_.frames_per_second.value_or(
             is_own_ && options_.frame == 0 && !options_.turntable ? subject_->poses.frames_per_second : 30);
-        std::size_t first = 0, end = frames_; // drawn here
-        if (!options_.chunk.empty()) {
-            const AnimationChunk chunk = chunk_of(options_.chunk);
-            first = (chunk.number - 1) * frames_ / chunk.count;
-            end = chunk.number * frames_ / chunk.count;
-        }
-        if (first == end) return report_none();
-        FilmWriter writer = require(FilmWriter::create(options_.output, size_.width, size_.height, rate, first + 1));
-        look_ahead();
-        show_first();
-        choose_camera();
-        shown_ = by_pose_ ? moments_ : 0;
+        FilmWriter writer = require(FilmWriter::create(options_.output, size_.width, size_.height, rate));
+        prepare();
         require(film_frames(
-            end - first, [&](std::size_t frame, const RunContext& quiet) { return draw(first + frame, quiet); },
+            frames_, [&](std::size_t frame, const RunContext& quiet) { return draw(frame, quiet); },
             std::span(&writer, 1), "filming", context()));
         session_.begin_writing(options_.output);
         require(writer.finish());
-        report(fmt::format("{} frames of ", end - first), size_, end - first, now_seconds() - start);
-    }
-
-    /// More chunks than frames.
-    void report_none() {
-        Report none;
-        none.say("No frames are left for this chunk.\n");
-        none.set("frames", 0);
-        session_.print(none);
+        report(fmt::format("{} frames of ", frames_), size_, frames_, now_seconds() - start);
     }
 
 private:
@@ -69,6 +61,65 @@ private:
     Pose pose_at(std::size_t moment) const {
         if (!is_own_) return read_pose(*subject_, options_.poses[moment]);
         return subject_->poses.frames[options_.frame > 0 ? options_.frame - 1 : moment];
+    }
+
+    /// Some of the numbered pictures, of which other processes draw the rest.
+    void make_chunk() {
+        const double start = now_seconds();
+        WorkChunk chunk = chunk_of(options_.chunk);
+        chunk.job = job();
+        const NumberedName name = *printf_numbered_name(options_.output);
+        SharedItems pictures{.path = options_.output, .what = "pictures", .names = {}, .phase = "filming"};
+        for (std::size_t frame = 0; frame < frames_; ++frame)
+            pictures.names.push_back(name.file(frame + 1).filename().string());
+        session_.begin_writing(options_.output);
+        bool is_prepared = false;
+        const auto picture = [&](std::size_t frame) -> Result<std::string> {
+            if (!std::exchange(is_prepared, true)) prepare();
+            const Result<Picture> drawn = draw(frame, session_.silent_context());
+            if (!drawn) return drawn.error();
+            return encode_png(*drawn);
+        };
+        const auto are_there = [&] {
+            std::error_code failed;
+            return std::ranges::all_of(pictures.names, [&](const std::string& name_of_one) {
+                return std::filesystem::exists(name.folder / name_of_one, failed);
+            });
+        };
+        const SharedItemsReport written = require(make_shared_items(
+            pictures, chunk, picture, [&](const auto& file) { return place(pictures.names, name.folder, file); },
+            are_there, context()));
+        report_chunk(options_.output, chunk, written, "pictures", now_seconds() - start, session_);
+    }
+
+    /// What the pictures are made of, as a line of text.
+    std::string job() const {
+        std::vector<std::filesystem::path> inputs(options_.files.begin(), options_.files.end());
+        inputs.insert(inputs.end(), options_.poses.begin(), options_.poses.end());
+        if (!options_.against.empty()) inputs.emplace_back(options_.against);
+        const std::string settings = session_.settings_but(
+            {"files", "--poses", "--against", "--output", "--chunk", "--threads", "--quiet", "--json"});
+        return require(hash_of_files(inputs)) + " " + hash_of_bytes(settings);
+    }
+
+    /// All of them or none; they stay where they are, too.
+    static Status place(const std::vector<std::string>& pictures, const std::filesystem::path& folder,
+                        const std::function<std::filesystem::path(std::size_t)>& file) {
+        Result<FileBatch> batch = FileBatch::create(folder);
+        if (!batch) return batch.error();
+        for (std::size_t k = 0; k < pictures.size(); ++k) {
+            if (Status free = batch->check_place(pictures[k]); !free) return free;
+            if (::link(file(k).c_str(), batch->path(pictures[k]).c_str()) != 0)
+                return cannot_write(folder / pictures[k], errno);
+        }
+        return batch->finish();
+    }
+
+    void prepare() {
+        look_ahead();
+        show_first();
+        choose_camera();
+        shown_ = by_pose_ ? moments_ : 0;
     }
 
     /// A first look at every moment, for a camera, a ground and a range of colours that hold for the whole film.

@@ -1,4 +1,5 @@
 #include "animation_output.h"
+#include "chunks.h"
 #include "commands.h"
 #include "pictures.h"
 #include "restore_options.h"
@@ -215,7 +216,7 @@ void read_animated(const RestoreArguments& options, Session& session, AnimatedMo
 }
 
 void restore_chunk(const RestoreArguments& options, Session& session) {
-    AnimationChunk chunk = chunk_of(options.chunk);
+    WorkChunk chunk = chunk_of(options.chunk);
     chunk.job = job_of(options);
     AnimatedModel model;
     read_animated(options, session, model);

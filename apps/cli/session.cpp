@@ -98,9 +98,20 @@ OptionList Session::common_options() {
 }
 
 std::string Session::first_given(const std::vector<std::string>& options) const {
-    for (const std::string& given : given_)
-        if (std::find(options.begin(), options.end(), given) != options.end()) return given;
+    for (const auto& [given, values] : given_)
+        if (std::ranges::find(options, given) != options.end()) return given;
     return "";
+}
+
+std::string Session::settings_but(const std::vector<std::string>& options) const {
+    std::string text;
+    for (const auto& [given, values] : given_) {
+        if (std::ranges::find(options, given) != options.end()) continue;
+        text += given;
+        for (const std::string& value : values) text += " '" + value + "'";
+        text += '\n';
+    }
+    return text;
 }
 
 void Session::begin() {

@@ -52,10 +52,14 @@ public:
 
     /// --json, --threads and --quiet.
     OptionList common_options();
-    /// Tells that an option was given, by its long name.
-    void note_given(const std::string& option) { given_.push_back(option); }
+    /// Tells that an option was given, by its long name, with what came behind it.
+    void note_given(const std::string& option, std::vector<std::string> values) {
+        given_.push_back({option, std::move(values)});
+    }
     /// The first of these options that was given, as the command's table orders them; empty: none was.
     std::string first_given(const std::vector<std::string>& options) const;
+    /// All options that were given, with their values, but these: what a result depends on beside its inputs.
+    std::string settings_but(const std::vector<std::string>& options) const;
 
     /// Makes the context when the options are known; from here on Ctrl-C and its like (SIGTERM, SIGHUP) cancel, and a
     /// reader that has gone away is an error like any other.
@@ -103,7 +107,8 @@ public:
 
 private:
     std::optional<RunContext> context_;
-    std::vector<std::string> warnings_, given_;
+    std::vector<std::string> warnings_;
+    std::vector<std::pair<std::string, std::vector<std::string>>> given_; ///< options with their values
     bool wrote_file_ = false;
     bool standard_output_taken_ = false; ///< by a mesh or a model
 };

@@ -24,8 +24,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kMoltenKeys = 10;        // a second of a GLB whose faces change in time
-constexpr std::size_t kFinerMoments = 20; // of a run that are compared with that of eight times the particles
+constexpr double kMoltenKeys = 10; // a second of a GLB whose faces change in time
 
 struct SimulateArguments {
     std::string scene, save, resume;

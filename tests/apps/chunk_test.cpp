@@ -1,4 +1,4 @@
-// A shot restored in chunks by many processes, some of which are killed: the same bytes as by one.
+// Works in chunks by many processes, some of which are killed: the same bytes as by one.
 #include "apps/program.h"
 
 #include "filigree/hierarchy/strip.h"
@@ -8,6 +8,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <functional>
+#include <map>
 
 using namespace filigree_test;
 using namespace filigree;
@@ -88,7 +91,7 @@ TEST_F(Chunks, KilledOnesAreRunAgain) {
 
 TEST_F(Chunks, JobsAreNotMixed) {
     ok(chunk("1/3"));
-    fails(8, chunk("2/4"), {"shot.pc2.plan", "another job"});
+    fails(8, chunk("2/4"), {"shot.pc2.chunks", "another job"});
     fails(8, {"restore", "moving.fil", "--frames", "-o", "shot.pc2", "--level", "1", "--chunk", "2/3"},
           {"another job"});
     for (const char* which : {"2/3", "3/3"}) ok(chunk(which));
@@ -108,4 +111,221 @@ TEST_F(Chunks, MoreChunksThanFramesAndOtherInputs) {
     fails(2, chunk("1/3", "shot.mdd"), {".pc2"});
     fails(2, {"restore", "moving.fil", "--frame", "1", "-o", "a.ply", "--chunk", "1/2"}, {"--chunk"});
     fails(6, chunk("1/3", "no/such/folder/shot.pc2"), {"cannot be written"});
+}
+
+namespace {
+
+/// Pictures and tables, whose items are files of their own.
+class ChunkedItems : public Program {
+protected:
+    void SetUp() override {
+        write("drop.toml",
+              "[simulation]\nframes = 3\n[[body]]\nname = \"cube\"\nshape = \"wavy-cube\"\nresolution = 8\n"
+              "particles = 60\ndriver = 40\ncentre = [0, 0.7, 0]\n[[obstacle]]\nshape = \"ground\"\n");
+        ok({"make", "bar", "-o", "bar.ply", "--resolution", "2"});
+        std::filesystem::create_directory(path("a"));
+        std::filesystem::create_directory(path("b"));
+    }
+    /// Its table is `folder`/t.csv, of 6 runs.
+    static std::vector<std::string> sweep(const std::string& folder, const std::string& chunk = "") {
+        return with_chunk({"sweep", "drop.toml", "-o", folder + "/t.csv", "--set", "body.young_modulus=1e5,2e5,3e5",
+                           "--set", "simulation.mode=explicit,descent", "--check"},
+                          chunk);
+    }
+    /// Its pictures are `folder`/p_1.png to p_5.png.
+    static std::vector<std::string> pictures(const std::string& folder, const std::string& chunk = "") {
+        return with_chunk({"render", "bar.ply", "-o", folder + "/p_%d.png", "--turntable", "--frames", "5", "--size",
+                           "32x32", "--passes", "1"},
+                          chunk);
+    }
+    bool has_opengl() const { return run(pictures("b")).code != 5; }
+
+    /// Every file in a folder, with a hash of its bytes, but for the plans.
+    std::map<std::string, std::size_t> all_in(const std::string& folder) const {
+        std::map<std::string, std::size_t> all;
+        for (const auto& entry : std::filesystem::recursive_directory_iterator(path(folder)))
+            if (entry.is_regular_file() && entry.path().extension() != ".plan")
+                all[std::filesystem::relative(entry.path(), path(folder)).string()] =
+                    std::hash<std::string>()(bytes_of(entry.path()));
+        return all;
+    }
+    /// Any of `folder`'s parts in any order, each twice.
+    void in_any_order(const std::function<std::vector<std::string>(const std::string&, const std::string&)>& words,
+                      std::size_t items) const {
+        ok(words("b", ""));
+        for (const char* which : {"3/4", "1/4", "4/4", "1/4", "3/4"}) {
+            EXPECT_FALSE(json(words("a", which))["is_whole"]);
+            for (const auto& [name, bytes] : all_in("a"))
+                EXPECT_NE(name.find(".chunks/"), std::string::npos) << name << ": in its place before all is there";
+        }
+        EXPECT_EQ(json(words("a", "1/4"))["made"], 0);
+        const Json last = json(words("a", "2/4"));
+        EXPECT_TRUE(last["is_whole"]);
+        EXPECT_EQ(last["done"], items);
+        EXPECT_EQ(all_in("a"), all_in("b"));
+        EXPECT_EQ(json(words("a", "2/4"))["made"], 0) << "it is finished";
+        EXPECT_EQ(all_in("a"), all_in("b"));
+    }
+
+private:
+    static std::vector<std::string> with_chunk(std::vector<std::string> words, const std::string& chunk) {
+        if (!chunk.empty()) words.insert(words.end(), {"--chunk", chunk});
+        return words;
+    }
+};
+
+} // namespace
+
+TEST_F(ChunkedItems, ASweepInAnyOrderIsTheSameTable) {
+    in_any_order(sweep, 6);
+    const std::string table = bytes_of(path("a/t.csv"));
+    EXPECT_EQ(std::ranges::count(table, '\n'), 7);
+    EXPECT_TRUE(table.starts_with("run,scene,body.young_modulus,simulation.mode,body,"));
+    EXPECT_NE(table.find("\n6,drop.toml,3e5,descent,cube,"), std::string::npos) << table;
+}
+
+TEST_F(ChunkedItems, PicturesInAnyOrderAreTheSame) {
+    if (!has_opengl()) GTEST_SKIP() << "no OpenGL";
+    in_any_order(pictures, 5);
+}
+
+TEST_F(ChunkedItems, WhatIsThereIsKeptWithOtherNumbersOfChunksToo) {
+    ok(sweep("b"));
+    EXPECT_EQ(json(sweep("a", "1/2"))["made"], 3);
+    EXPECT_EQ(json(sweep("a", "2/3"))["made"], 1) << "the fourth; the third was there";
+    EXPECT_EQ(json(sweep("a", "1/1"))["made"], 2);
+    EXPECT_EQ(all_in("a"), all_in("b"));
+}
+
+TEST_F(ChunkedItems, JobsAreNotMixedButMayFollow) {
+    ok(sweep("a", "1/3"));
+    std::vector<std::string> other = sweep("a", "2/3");
+    other[5] = "body.young_modulus=1e5,2e5,4e5";
+    fails(8, other, {"t.csv.chunks", "another job"});
+    write("drop.toml", bytes_of(path("drop.toml")) + "friction = 0.1\n");
+    fails(8, sweep("a", "2/3"), {"another job"});
+    std::filesystem::remove_all(path("a/t.csv.chunks"));
+    for (const char* which : {"1/3", "2/3", "3/3"}) ok(sweep("a", which));
+    ok(sweep("b"));
+    EXPECT_EQ(all_in("a"), all_in("b"));
+    write("drop.toml", bytes_of(path("drop.toml")) + "restitution = 0.1\n");
+    for (const char* which : {"1/3", "2/3", "3/3"}) ok(sweep("a", which));
+    ok(sweep("b"));
+    EXPECT_EQ(all_in("a"), all_in("b")) << "the older table is replaced";
+}
+
+TEST_F(ChunkedItems, ManyAtTheSameTime) {
+    ok(sweep("b"));
+    std::string line;
+    for (const char* which : {"1/3", "2/3", "3/3", "1/3", "2/3", "3/3"})
+        line += std::string("\"$0\" \"$@\" --quiet --chunk ") + which + " & ";
+    const Ran ran = run_shell("{ " + line + "wait; }", sweep("a"));
+    EXPECT_EQ(ran.code, 0);
+    EXPECT_EQ(ran.err, "");
+    EXPECT_EQ(all_in("a"), all_in("b"));
+}
+
+TEST_F(ChunkedItems, SweepsSayWhatIsWrongBeforeTheySimulate) {
+    const auto wrong = [](const std::string& set) {
+        return std::vector<std::string>{"sweep", "drop.toml", "-o", "a/t.csv", "--set", set};
+    };
+    fails(4, wrong("body.young_modulus=1e5,-1"), {"run 2 of the sweep", "young_modulus", "-1"});
+    fails(4, wrong("body.yung=1"), {"body.yung", "no such key"});
+    fails(4, wrong("body[2].density=900"), {"the scene has 1 [[body]]"});
+    fails(4, wrong("force.newtons=[1,2,3]"), {"the scene has no [[force]]"});
+    fails(4, wrong("body.young_modulus=\"soft"), {"no value"});
+    fails(2, wrong("young_modulus=1"), {"TABLE.KEY=VALUE"});
+    fails(2, wrong("body[0].density=1"), {"body[0]"});
+    fails(5, {"sweep", "drop.toml", "-o", "a/t.txt"}, {".csv"});
+    fails(3, {"sweep", "no.toml", "-o", "a/t.csv"}, {"no.toml"});
+    EXPECT_TRUE(all_in("a").empty());
+    ok(wrong("body.velocity=[0,1,0],[0,2,0]"));
+    EXPECT_NE(bytes_of(path("a/t.csv")).find("\n2,drop.toml,\"[0,2,0]\",cube"), std::string::npos);
+}
+
+/// A process is killed before each of its calls that change a file or a folder, one after the other.
+class KilledEverywhere : public ChunkedItems {
+protected:
+    void SetUp() override {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+        GTEST_SKIP() << "a sanitizer wants to be loaded first";
+#endif
+        ChunkedItems::SetUp();
+        const Ran made =
+            run_shell("cc -shared -fPIC -O1 -o shim.so \"$1\" -ldl", {FILIGREE_ROOT "/tests/torture/failing_calls.c"});
+        if (made.code != 0) GTEST_SKIP() << "no C compiler: " << made.err;
+    }
+
+    /// words: a command for a folder and a chunk; `older` is finished in a before, and not to be lost.
+    void kill_everywhere(const std::function<std::vector<std::string>(const std::string&, const std::string&)>& words,
+                         const std::vector<std::string>& older) {
+        ok(words("b", ""));
+        const auto whole = all_in("b");
+        ok(older);
+        const auto old = in_place("a");
+        ASSERT_NE(old, whole);
+        ok(words("a", "1/2"));
+        namespace fs = std::filesystem;
+        fs::copy(path("a"), path("begun"), fs::copy_options::recursive);
+        int struck = 0;
+        for (;; ++struck) {
+            fs::remove_all(path("a"));
+            fs::copy(path("begun"), path("a"), fs::copy_options::recursive);
+            const Ran ran = run_shell("FAILING_CALL=any FAILING_HOW=kill FAILING_NUMBER=" + std::to_string(struck + 1) +
+                                          " LD_PRELOAD=./shim.so exec \"$0\" \"$@\"",
+                                      words("a", "2/2"));
+            if (ran.code == 0) break;
+            ASSERT_EQ(ran.code, -1) << ran.err;
+            const auto shown = in_place("a");
+            const bool is_being_placed = has_batch("a"); // which the next run completes, see io/file_batch.h
+            EXPECT_TRUE(shown == old || shown == whole || is_being_placed) << "killed before call " << struck + 1;
+            ok(words("a", "2/2"));
+            ASSERT_EQ(all_in("a"), whole) << "killed before call " << struck + 1;
+        }
+        EXPECT_EQ(all_in("a"), whole);
+        EXPECT_GT(struck, 8);
+        std::printf("killed before each of %d calls\n", struck);
+    }
+
+private:
+    std::map<std::string, std::size_t> in_place(const std::string& folder) const {
+        std::map<std::string, std::size_t> all = all_in(folder);
+        std::erase_if(all, [](const auto& file) {
+            return file.first.find(".chunks") != std::string::npos || file.first.starts_with(".filigree");
+        });
+        return all;
+    }
+    bool has_batch(const std::string& folder) const {
+        return std::ranges::any_of(std::filesystem::directory_iterator(path(folder)), [](const auto& entry) {
+            return entry.path().filename().string().ends_with("-placing");
+        });
+    }
+};
+
+TEST_F(KilledEverywhere, ATableIsTheOldOrTheNew) {
+    std::vector<std::string> older = sweep("a", "1/1");
+    older[7] = "simulation.mode=descent,explicit";
+    kill_everywhere(sweep, older);
+}
+
+TEST_F(KilledEverywhere, PicturesAreTheOldOrTheNew) {
+    if (!has_opengl()) GTEST_SKIP() << "no OpenGL";
+    std::vector<std::string> older = pictures("a", "1/1");
+    older.insert(older.end(), {"--color", "#ff0000"});
+    kill_everywhere(pictures, older);
+}
+
+TEST_F(KilledEverywhere, AShotIsTheOldOrTheNew) {
+    ok({"make", "wavy-sphere", "-o", "ball.ply", "--resolution", "20"});
+    ok({"strip", "ball.ply", "-o", "ball.fil", "--base", "60"});
+    ok({"deform", "ball.fil", "-o", "moving.fil", "--bend", "50", "--frames", "4"});
+    const auto restore = [](const std::string& model) {
+        return [model](const std::string& folder, const std::string& chunk) {
+            std::vector<std::string> words = {"restore", model, "--frames", "-o", folder + "/shot.pc2"};
+            if (!chunk.empty()) words.insert(words.end(), {"--chunk", chunk});
+            return words;
+        };
+    };
+    ok({"deform", "ball.fil", "-o", "other.fil", "--bend", "20", "--frames", "4"}); // a shot of the same size
+    kill_everywhere(restore("moving.fil"), restore("other.fil")("a", "1/1"));
 }

@@ -11,8 +11,9 @@ using namespace filigree_test;
 
 namespace {
 
-const std::vector<std::string> kCommands = {"make",  "info", "strip",  "level",   "deform", "restore",  "compare",
-                                            "bench", "demo", "render", "figures", "sample", "simulate", "remesh"};
+const std::vector<std::string> kCommands = {"make",    "info",    "strip",    "level", "deform",
+                                            "restore", "compare", "bench",    "demo",  "render",
+                                            "figures", "sample",  "simulate", "sweep", "remesh"};
 
 std::vector<std::string> lines_of(const std::string& text) {
     std::vector<std::string> lines;

@@ -351,7 +351,7 @@ TEST_F(Render, FilmsInChunksAreTheSamePictures) {
     for (const char* number : {"1", "2", "3", "4", "5"})
         EXPECT_EQ(bytes_of(path(std::string("part_") + number + ".png")),
                   bytes_of(path(std::string("whole_") + number + ".png")));
-    EXPECT_EQ(json(quick("square.ply", "no_%d.png", {"--turntable", "--frames", "2", "--chunk", "1/3"}))["frames"], 0);
+    EXPECT_EQ(json(quick("square.ply", "no_%d.png", {"--turntable", "--frames", "2", "--chunk", "1/3"}))["count"], 0);
     refused(2, quick("square.ply", "x.mp4", {"--turntable", "--chunk", "1/2"}), {"--chunk"});
 }
 

@@ -107,7 +107,7 @@ TEST_F(ModelChunksTest, AreSharedByProcesses) {
     const Result<ModelChunks> chunks = open(model);
     for (std::size_t part = 1; part <= 2; ++part) {
         const auto report = write_restored_chunks(*chunks, stream_of(poses), {}, path("shared.pc2"),
-                                                  AnimationChunk{part, 2, "job"}, kContext);
+                                                  WorkChunk{part, 2, "job"}, kContext);
         ASSERT_TRUE(report.ok()) << report.error().message;
         EXPECT_EQ(report->is_whole, part == 2);
     }

@@ -36,6 +36,37 @@ TEST_F(SceneFileTest, RefusesWithLineAndSuggestion) {
               "3: 'size' in [[body]] must be a number, above 0, and is 0.");
 }
 
+TEST_F(SceneFileTest, ValuesTakeThePlaceOfWhatIsWritten) {
+    const std::string path = write(kDrop + "[[body]]\nshape = \"bar\"\n");
+    const auto with = [&](std::vector<SceneValue> values) { return read_scene(path, values); };
+    const auto said = [&](SceneValue value) {
+        const auto scene = with({value});
+        return scene ? "" : scene.error().message.substr(scene.error().message.find(".toml") + 5);
+    };
+    const SceneFile plain = read_scene(path).value();
+    const SceneFile scene = with({{"body", "young_modulus", 0, "2e4"},
+                                  {"body", "density", 2, "500"},
+                                  {"world", "gravity", 0, "[0, -1, 0]"},
+                                  {"body", "density", 2, "600"}})
+                                .value();
+    EXPECT_EQ(scene.bodies[0].material.young_modulus, 2e4);
+    EXPECT_EQ(scene.bodies[1].material.young_modulus, 2e4);
+    EXPECT_EQ(scene.bodies[0].material.density, plain.bodies[0].material.density);
+    EXPECT_EQ(scene.bodies[1].material.density, 600) << "the last one holds";
+    EXPECT_EQ(scene.gravity, Vec3d(0, -1, 0)) << "the file has no [world]";
+    EXPECT_NE(scene.content, plain.content);
+    EXPECT_EQ(with({{"body", "young_modulus", 1, "5e4"}}).value().content, plain.content) << "what it says already";
+    EXPECT_EQ(said({"body", "yung", 0, "1"}),
+              ": body.yung: a scene has no such key (docs/scenes.md lists what there is).");
+    EXPECT_EQ(said({"body", "density", 3, "1"}), ": body.density: the scene has 2 [[body]].");
+    EXPECT_EQ(said({"force", "newtons", 0, "1"}), ": force.newtons: the scene has no [[force]].");
+    EXPECT_EQ(said({"world", "gravity", 1, "1"}), ": world.gravity: there is one [world] alone, without a number.");
+    EXPECT_EQ(said({"body", "density", 0, "1\nother = 2"}),
+              ": body.density: '1\nother = 2' is no value that TOML knows.");
+    EXPECT_EQ(said({"body", "density", 0, "-1"}),
+              ": 'density' in [[body]] must be a number, above 0, to 1e+06, and is -1.");
+}
+
 TEST_F(SceneFileTest, ReadsWhatBreaks) {
     const std::string fracture = "[[fracture]]\npieces = 7\npattern = \"radial\"\nstrength = 2e3\nseed = 5\n";
     const SceneFile scene = this->scene(kDrop + fracture + "[[crack]]\ntime = 0.5\npieces = [2]\n");

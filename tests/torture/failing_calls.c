@@ -1,10 +1,13 @@
 /* Preloaded into a program: its n-th call of one function fails, and all before and after it work.
-   FAILING_CALL: write, fsync, rename, open or malloc. FAILING_NUMBER: n, from 1. FAILING_LOG: a file that is made when
-   the call failed. Files of the system and the pipes to the terminal do not count. */
+   FAILING_CALL: write, fsync, rename (and link), open, malloc; or any, for all that change files, folders too (these
+   cannot fail, only kill). FAILING_NUMBER: n, from 1. FAILING_LOG: a file that is made when the call failed.
+   FAILING_HOW=kill: the process is killed before that call. Files of the system and the pipes to the terminal do not
+   count. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stdatomic.h>
 #include <stdlib.h>
@@ -17,7 +20,7 @@
 static atomic_long calls;
 static const char* failing;
 static long number;
-static int is_ready;
+static int is_ready, kills;
 
 static void leave_a_mark(void) {
     const char* log = getenv("FAILING_LOG");
@@ -29,13 +32,16 @@ static void leave_a_mark(void) {
 __attribute__((constructor)) static void begin(void) {
     failing = getenv("FAILING_CALL");
     number = getenv("FAILING_NUMBER") ? atol(getenv("FAILING_NUMBER")) : 0;
+    kills = getenv("FAILING_HOW") && strcmp(getenv("FAILING_HOW"), "kill") == 0;
     is_ready = 1;
 }
 
 static int fails_now(const char* call) {
-    if (!is_ready || !failing || strcmp(failing, call) != 0) return 0;
+    if (!is_ready || !failing) return 0;
+    if (strcmp(failing, call) != 0 && (strcmp(failing, "any") != 0 || strcmp(call, "malloc") == 0)) return 0;
     if (atomic_fetch_add(&calls, 1) + 1 != number) return 0;
     leave_a_mark();
+    if (kills) kill(getpid(), SIGKILL);
     return 1;
 }
 static int is_a_file(int descriptor) {
@@ -76,6 +82,26 @@ int renameat(int a, const char* from, int b, const char* to) {
 int linkat(int a, const char* from, int b, const char* to, int flags) {
     if (fails_now("rename")) return errno = EIO, -1;
     return REAL(int, "linkat", int, const char*, int, const char*, int)(a, from, b, to, flags);
+}
+int link(const char* from, const char* to) {
+    if (fails_now("rename")) return errno = EIO, -1;
+    return REAL(int, "link", const char*, const char*)(from, to);
+}
+int mkdir(const char* path, mode_t mode) {
+    fails_now("folder");
+    return REAL(int, "mkdir", const char*, mode_t)(path, mode);
+}
+int rmdir(const char* path) {
+    fails_now("folder");
+    return REAL(int, "rmdir", const char*)(path);
+}
+int unlink(const char* path) {
+    fails_now("folder");
+    return REAL(int, "unlink", const char*)(path);
+}
+int unlinkat(int a, const char* path, int flags) {
+    fails_now("folder");
+    return REAL(int, "unlinkat", int, const char*, int)(a, path, flags);
 }
 int open(const char* path, int flags, ...) {
     va_list more;

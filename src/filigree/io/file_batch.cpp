@@ -157,7 +157,9 @@ Status place_rest(const fs::path& batch, const fs::path& folder) {
 /// The lock goes last, so that what a kill leaves of it can be told from a batch at work.
 void remove_batch(const fs::path& batch) {
     std::error_code ignored;
-    for (const char* part : {kNew, kOld, kBefore, kLock}) fs::remove_all(batch / part, ignored);
+    for (const std::string& part : names_in(batch)) // also what a kill left of writing kBefore
+        if (part != kLock) fs::remove_all(batch / part, ignored);
+    fs::remove(batch / kLock, ignored);
     fs::remove(batch, ignored);
 }
 

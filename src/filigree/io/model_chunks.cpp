@@ -269,7 +269,7 @@ Result<std::vector<std::string>> write_restored_chunks(const ModelChunks& model,
 
 Result<ChunkReport> write_restored_chunks(const ModelChunks& model, const PoseStream& poses,
                                           const RestoreOptions& options, const std::filesystem::path& path,
-                                          const AnimationChunk& chunk, const RunContext& context) {
+                                          const WorkChunk& chunk, const RunContext& context) {
     if (Status sound = check_chunk_output(options, path); !sound) return sound.error();
     return write_shared_pc2(
         poses.frames, model.vertex_count(), path, chunk,

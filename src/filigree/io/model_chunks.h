@@ -44,6 +44,6 @@ Result<std::vector<std::string>> write_restored_chunks(const ModelChunks& model,
 /// One part of the frames, as write_animation_chunk.
 Result<ChunkReport> write_restored_chunks(const ModelChunks& model, const PoseStream& poses,
                                           const RestoreOptions& options, const std::filesystem::path& path,
-                                          const AnimationChunk& chunk, const RunContext& context);
+                                          const WorkChunk& chunk, const RunContext& context);
 
 } // namespace filigree

@@ -5,6 +5,7 @@
 #include "filigree/core/run_context.h"
 #include "filigree/hierarchy/pose.h"
 #include "filigree/io/numbered_name.h"
+#include "filigree/io/shared_work.h"
 #include "filigree/mesh/mesh_animation.h"
 
 #include <filesystem>
@@ -61,13 +62,6 @@ Result<MeshAnimation> open_animation(const std::filesystem::path& path, const Me
 Result<std::vector<std::string>> write_animation(const MeshAnimation& animation, const std::filesystem::path& path,
                                                  const RunContext& context);
 
-/// One part of an animation that several processes write, on one machine or many.
-struct AnimationChunk {
-    std::size_t number = 1, count = 1; ///< 1 .. count
-    /// What the animation is made of, as a line of text: a hash of the inputs and the settings. Chunks of different
-    /// jobs are not mixed.
-    std::string job;
-};
 struct ChunkReport {
     std::size_t first_frame = 0, frames = 0; ///< of this chunk
     bool was_done = false;                   ///< before: nothing was written
@@ -82,10 +76,7 @@ struct ChunkReport {
 /// Errors: usage (a number beyond the count, a name that does not end in .pc2), mismatch (another job is at work
 /// there), unsuitable, unwritable, cancelled. Cost: the chunk's frames; memory one frame.
 Result<ChunkReport> write_animation_chunk(const MeshAnimation& animation, const std::filesystem::path& path,
-                                          const AnimationChunk& chunk, const RunContext& context);
-
-/// A hash of files' bytes, in this order, as 32 hexadecimal digits. Errors: as of read_file.
-Result<std::string> hash_of_files(std::span<const std::filesystem::path> paths);
+                                          const WorkChunk& chunk, const RunContext& context);
 
 /// Numbered meshes alone, from whoever makes them: `mesh` gives that of a frame, 0 .. frames - 1.
 Result<std::vector<std::string>> write_numbered_meshes(std::size_t frames,

@@ -3,16 +3,14 @@
 #include "filigree/io/file.h"
 #include "filigree/io/file_error.h"
 #include "filigree/io/point_cache_formats.h"
+#include "filigree/io/shared_work.h"
 #include "filigree/io/temporary_file.h"
 
+#include <algorithm>
 #include <cerrno>
 
 #include <fcntl.h>
-#include <sys/stat.h>
 #include <unistd.h>
-
-#define XXH_INLINE_ALL
-#include <xxhash.h>
 
 namespace filigree {
 
@@ -47,148 +45,129 @@ int write_at(int descriptor, std::uint64_t offset, std::string_view bytes) {
     return 0;
 }
 
-/// What the processes of one job share.
-class SharedFile {
+/// What the processes of one job share: the frames, and a mark for every chunk that is in them.
+class SharedFrames {
 public:
-    SharedFile(std::size_t frames, std::size_t points, const fs::path& path, const AnimationChunk& chunk,
-               std::string header)
-        : path_(path), folder_(path.string() + ".chunks"), plan_path_(path.string() + ".plan"),
-          frames_(folder_ / "frames"), header_(std::move(header)),
-          size_(header_.size() + std::uint64_t{frames} * points * sizeof(Vec3f)), count_(chunk.count) {
-        plan_ = "A point cache that filigree writes in chunks\njob " + chunk.job + "\nframes " +
-                std::to_string(frames) + "\nvertices " + std::to_string(points) + "\nchunks " +
-                std::to_string(chunk.count) + "\n";
+    SharedFrames(std::size_t frames, std::size_t points, const fs::path& path, const WorkChunk& chunk,
+                 std::string header)
+        : path_(path), header_(std::move(header)),
+          size_(header_.size() + std::uint64_t{frames} * points * sizeof(Vec3f)),
+          folder_(path,
+                  "A point cache that filigree writes in chunks\njob " + chunk.job + "\nframes " +
+                      std::to_string(frames) + "\nvertices " + std::to_string(points) + "\nchunks " +
+                      std::to_string(chunk.count) + "\n",
+                  [this] { return is_in_place(); }) {
+        for (std::size_t k = 1; k <= chunk.count; ++k) marks_.push_back("done-" + std::to_string(k));
     }
+    SharedFrames(const SharedFrames&) = delete;
+    SharedFrames& operator=(const SharedFrames&) = delete;
 
-    /// Whether the file was finished by this very job.
-    bool is_whole() const {
-        std::error_code failed;
-        return !fs::exists(folder_, failed) && is_our_plan() && fs::file_size(path_, failed) == size_ && !failed;
-    }
-
-    /// Makes what is not there yet. Errors: mismatch, unwritable.
-    Status begin() const {
-        std::error_code failed;
-        if (fs::exists(folder_, failed) && fs::exists(plan_path_, failed) && !is_our_plan())
-            return Error{ErrorCode::mismatch, plan_path_.string() +
-                                                  ": belongs to another job (another model, other poses, settings or "
-                                                  "number of chunks); let it end, delete it and " +
-                                                  folder_.string() + ", or write to another name."};
-        if (!is_our_plan())
-            if (Status written = write_file(plan_path_, plan_); !written) return written;
-        if (::mkdir(folder_.c_str(), 0777) != 0 && errno != EEXIST) return cannot_write(folder_, errno);
-        if (fs::exists(frames_, failed)) return Success{};
-        const fs::path temporary = temporary_path(folder_);
-        const Descriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
-        int wrong = file.get() < 0 ? errno : write_at(file.get(), 0, header_);
-        if (!wrong && ::ftruncate(file.get(), off_t(size_)) != 0) wrong = errno;
-        if (!wrong && ::fsync(file.get()) != 0) wrong = errno;
-        // Whoever comes second finds the first one's.
-        if (!wrong && ::link(temporary.c_str(), frames_.c_str()) != 0 && errno != EEXIST) wrong = errno;
-        ::unlink(temporary.c_str());
-        if (wrong) return cannot_write(frames_, wrong);
-        return Success{};
-    }
-
-    fs::path mark(std::size_t chunk) const { return folder_ / ("done-" + std::to_string(chunk)); }
-    bool is_done(std::size_t chunk) const {
-        std::error_code failed;
-        return fs::exists(mark(chunk), failed);
-    }
-    std::size_t done() const {
-        std::size_t count = 0;
-        for (std::size_t k = 1; k <= count_; ++k) count += is_done(k);
-        return count;
-    }
+    const SharedFolder& folder() const { return folder_; }
+    std::vector<bool> marks() const { return folder_.are_there(marks_); }
 
     /// Has `fill` write frames, and keeps them safe.
     Status write(const std::function<Status(const WriteAt&)>& fill) const {
-        const Descriptor file(::open(frames_.c_str(), O_WRONLY | O_CLOEXEC));
-        if (file.get() < 0) return cannot_write(frames_, errno);
+        const fs::path frames = folder_.file(kFrames);
+        if (Status made = folder_.add(kFrames, [&](const fs::path& empty) { return make_empty(empty); }); !made)
+            return made;
+        const Descriptor file(::open(frames.c_str(), O_WRONLY | O_CLOEXEC));
+        if (file.get() < 0) return cannot_write(frames, errno);
         const auto write_some = [&](std::uint64_t offset, std::string_view bytes) -> Status {
-            if (const int wrong = write_at(file.get(), offset, bytes)) return cannot_write(frames_, wrong);
+            if (const int wrong = write_at(file.get(), offset, bytes)) return cannot_write(frames, wrong);
             return Success{};
         };
         if (Status filled = fill(write_some); !filled) return filled;
-        if (::fsync(file.get()) != 0) return cannot_write(frames_, errno);
+        if (::fsync(file.get()) != 0) return cannot_write(frames, errno);
         return Success{};
     }
 
     Status mark_done(std::size_t chunk) const {
-        const Descriptor file(::open(mark(chunk).c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666));
-        if (file.get() < 0) return cannot_write(mark(chunk), errno);
-        sync_folder(folder_);
+        const fs::path mark = folder_.file(marks_[chunk - 1]);
+        const Descriptor file(::open(mark.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666));
+        if (file.get() < 0) return cannot_write(mark, errno);
+        sync_folder(mark.parent_path());
         return Success{};
     }
 
     /// All chunks are there: the file goes to its place. Another process may do the same at this moment.
     Status finish() const {
-        if (::rename(frames_.c_str(), path_.c_str()) != 0 && errno != ENOENT) return cannot_write(path_, errno);
+        const fs::path frames = folder_.file(kFrames);
+        if (::rename(frames.c_str(), path_.c_str()) != 0) {
+            if (errno != ENOENT) return cannot_write(path_, errno);
+            if (!is_in_place()) // one that was killed had put it there, and somebody took it away
+                return cannot_write(path_, frames.string() + " is gone; delete its folder, and run all chunks again");
+        }
         sync_folder(path_.parent_path());
-        std::error_code ignored; // what is left hinders nobody
-        for (std::size_t k = 1; k <= count_; ++k) fs::remove(mark(k), ignored);
-        fs::remove(folder_, ignored);
-        return Success{};
+        return folder_.end();
     }
 
 private:
-    bool is_our_plan() const {
-        const Result<std::string> there = read_file(plan_path_);
-        return there && *there == plan_;
+    static constexpr const char* kFrames = "frames";
+
+    bool is_in_place() const {
+        std::error_code failed;
+        return fs::file_size(path_, failed) == size_ && !failed;
+    }
+    Status make_empty(const fs::path& path) const {
+        const Descriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+        int wrong = file.get() < 0 ? errno : write_at(file.get(), 0, header_);
+        if (!wrong && ::ftruncate(file.get(), off_t(size_)) != 0) wrong = errno;
+        if (!wrong && ::fsync(file.get()) != 0) wrong = errno;
+        if (wrong) return cannot_write(path, wrong);
+        return Success{};
     }
 
-    fs::path path_, folder_, plan_path_, frames_;
-    std::string header_, plan_;
+    fs::path path_;
+    std::string header_;
     std::uint64_t size_;
-    std::size_t count_;
+    SharedFolder folder_;
+    std::vector<std::string> marks_;
 };
 
 } // namespace
 
 Result<ChunkReport>
-write_shared_pc2(std::size_t frames, std::size_t points, const fs::path& path, const AnimationChunk& chunk,
+write_shared_pc2(std::size_t frames, std::size_t points, const fs::path& path, const WorkChunk& chunk,
                  const std::function<Status(std::size_t first, std::size_t last, const WriteAt& write_at)>& fill) {
-    if (chunk.number < 1 || chunk.number > chunk.count)
-        return Error{ErrorCode::usage, "There is no chunk " + std::to_string(chunk.number) + " of " +
-                                           std::to_string(chunk.count) + "; they are counted from 1."};
+    if (Status right = check_chunk(chunk); !right) return right.error();
     if (lower_extension(path) != ".pc2")
         return Error{ErrorCode::usage,
                      path.string() + ": chunks are written of .pc2 alone, whose frames all have one size."};
     if (frames == 0) return Error{ErrorCode::unsuitable, path.string() + ": not written: there are no frames."};
     Result<std::string> header = pc2_header(frames, points, path);
     if (!header) return header.error();
-    const SharedFile file(frames, points, path, chunk, std::move(*header));
+    const SharedFrames shared(frames, points, path, chunk, std::move(*header));
     ChunkReport report;
-    report.first_frame = frames * (chunk.number - 1) / chunk.count;
-    report.frames = frames * chunk.number / chunk.count - report.first_frame;
+    report.first_frame = chunk.first_of(frames);
+    report.frames = chunk.end_of(frames) - report.first_frame;
     const auto whole = [&] {
         report.chunks_done = chunk.count;
         report.is_whole = true;
         return report;
     };
-    if (file.is_whole()) {
-        report.was_done = true;
-        return whole();
-    }
-    if (Status begun = file.begin(); !begun) return begun.error();
-    report.was_done = file.is_done(chunk.number);
+    const Result<bool> begun = shared.folder().begin();
+    if (!begun) return begun.error();
+    report.was_done = *begun || shared.marks()[chunk.number - 1];
+    if (*begun) return whole();
     if (!report.was_done) {
-        Status written = file.write([&](const WriteAt& write_at) {
+        Status written = shared.write([&](const WriteAt& write_at) {
             return fill(report.first_frame, report.first_frame + report.frames, write_at);
         });
-        if (written) written = file.mark_done(chunk.number);
-        if (!written && file.is_whole()) return whole(); // another process wrote the same chunk, and was the last
+        if (written) written = shared.mark_done(chunk.number);
+        // Another process wrote the same chunk, and was the last.
+        if (!written && shared.folder().is_finished()) return whole();
         if (!written) return written.error();
     }
-    report.chunks_done = file.done();
-    if (file.is_whole()) return whole();
+    const std::vector<bool> marks = shared.marks();
+    report.chunks_done = std::size_t(std::ranges::count(marks, true));
+    if (shared.folder().is_finished()) return whole();
     if (report.chunks_done < chunk.count) return report;
-    if (Status finished = file.finish(); !finished) return finished.error();
+    if (Status finished = shared.finish(); !finished && !shared.folder().is_finished()) return finished.error();
     return whole();
 }
 
-Result<ChunkReport> write_animation_chunk(const MeshAnimation& animation, const fs::path& path,
-                                          const AnimationChunk& chunk, const RunContext& context) {
+Result<ChunkReport> write_animation_chunk(const MeshAnimation& animation, const fs::path& path, const WorkChunk& chunk,
+                                          const RunContext& context) {
     const auto fill = [&](std::size_t first, std::size_t last, const WriteAt& write_at) -> Status {
         WorldFrames positions(animation, path);
         std::vector<Vec3f> points(animation.rest->vertex_count());
@@ -204,34 +183,6 @@ Result<ChunkReport> write_animation_chunk(const MeshAnimation& animation, const 
         return Success{};
     };
     return write_shared_pc2(animation.frames, animation.rest->vertex_count(), path, chunk, fill);
-}
-
-Result<std::string> hash_of_files(std::span<const fs::path> paths) {
-    XXH3_state_t* const state = XXH3_createState();
-    if (!state) return Error{ErrorCode::out_of_memory, "Not enough memory to hash a file."};
-    XXH3_128bits_reset(state);
-    const auto take = [&](const fs::path& path) -> Status {
-        const Result<FileReader> file = FileReader::open(path);
-        if (!file) return file.error();
-        std::string piece;
-        for (std::uint64_t offset = 0; offset < file->size(); offset += piece.size()) {
-            piece.resize(std::min<std::uint64_t>(std::uint64_t{1} << 20, file->size() - offset));
-            if (Status filled = file->read(offset, piece); !filled) return filled;
-            XXH3_128bits_update(state, piece.data(), piece.size());
-        }
-        return Success{};
-    };
-    Status taken = Success{};
-    for (const fs::path& path : paths)
-        if (taken) taken = take(path);
-    const XXH128_hash_t hash = XXH3_128bits_digest(state);
-    XXH3_freeState(state);
-    if (!taken) return taken.error();
-    constexpr char kDigits[] = "0123456789abcdef";
-    std::string text;
-    for (const XXH64_hash_t half : {hash.high64, hash.low64})
-        for (int shift = 60; shift >= 0; shift -= 4) text += kDigits[half >> shift & 15];
-    return text;
 }
 
 } // namespace filigree

@@ -38,7 +38,7 @@ Result<std::string> pc2_header(std::size_t frames, std::size_t points, const std
 using WriteAt = std::function<Status(std::uint64_t offset, std::string_view bytes)>;
 /// write_animation_chunk, whatever makes the frames: fill writes those from first to last - 1 into the file.
 Result<ChunkReport>
-write_shared_pc2(std::size_t frames, std::size_t points, const std::filesystem::path& path, const AnimationChunk& chunk,
+write_shared_pc2(std::size_t frames, std::size_t points, const std::filesystem::path& path, const WorkChunk& chunk,
                  const std::function<Status(std::size_t first, std::size_t last, const WriteAt& write_at)>& fill);
 Status write_mdd(const MeshAnimation& animation, const WorldPositions& positions, const std::filesystem::path& path,
                  const RunContext& context);

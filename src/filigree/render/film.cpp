@@ -265,8 +265,7 @@ public:
 
 class NumberedPictures : public FrameSink {
 public:
-    NumberedPictures(NumberedName name, FileBatch files, std::size_t first)
-        : name_(std::move(name)), files_(std::move(files)), next_(first) {}
+    NumberedPictures(NumberedName name, FileBatch files) : name_(std::move(name)), files_(std::move(files)) {}
 
     Status add(const Picture& frame) override {
         const fs::path target = name_.file(next_++), file = files_.path(target.filename().string());
@@ -280,7 +279,7 @@ public:
 private:
     NumberedName name_;
     FileBatch files_;
-    std::size_t next_;
+    std::size_t next_ = 1;
 };
 
 class EncodedFilm : public FrameSink {
@@ -352,8 +351,7 @@ FilmWriter::FilmWriter(FilmWriter&&) noexcept = default;
 FilmWriter& FilmWriter::operator=(FilmWriter&&) noexcept = default;
 FilmWriter::~FilmWriter() = default;
 
-Result<FilmWriter> FilmWriter::create(const fs::path& path, unsigned width, unsigned height, double frames_per_second,
-                                      std::size_t first) {
+Result<FilmWriter> FilmWriter::create(const fs::path& path, unsigned width, unsigned height, double frames_per_second) {
     const FilmKind kind = film_kind(path);
     if (kind == FilmKind::none)
         return Error{ErrorCode::usage, path.string() +
@@ -377,7 +375,7 @@ Result<FilmWriter> FilmWriter::create(const fs::path& path, unsigned width, unsi
     if (kind == FilmKind::numbered) {
         Result<FileBatch> files = FileBatch::create(path.parent_path());
         if (!files) return renamed(files.error(), path.parent_path().empty() ? "." : path.parent_path(), path);
-        content->sink = std::make_unique<NumberedPictures>(*printf_numbered_name(path), std::move(*files), first);
+        content->sink = std::make_unique<NumberedPictures>(*printf_numbered_name(path), std::move(*files));
     } else {
         Result<TemporaryFile> file = TemporaryFile::create(path);
         if (!file) return file.error();

@@ -22,9 +22,9 @@ public:
     /// .mp4 (H.264, yuv420p; odd sizes are padded by a row or column of the last pixel) and .gif (a palette of its own)
     /// need the program ffmpeg; numbered PNGs do not. A .gif is kept in memory (by ffmpeg) until its palette is known.
     /// Errors: usage (no film's name, no pixels, no such rate), unsupported (ffmpeg is missing: says what to install),
-    /// unwritable. first: the number of the first picture, of numbered ones.
+    /// unwritable.
     static Result<FilmWriter> create(const std::filesystem::path& path, unsigned width, unsigned height,
-                                     double frames_per_second, std::size_t first = 1);
+                                     double frames_per_second);
     FilmWriter(FilmWriter&&) noexcept;
     FilmWriter& operator=(FilmWriter&&) noexcept;
     ~FilmWriter();

@@ -41,6 +41,34 @@ public:
         }
     }
 
+    void set(const SceneValue& value) {
+        const auto wrong = [&](const std::string& what) {
+            throw BadResultAccess(
+                {ErrorCode::bad_file, fmt::format("{}: {}.{}: {}.", scene_.path, value.table, value.key, what)});
+        };
+        if (!find_key(value.table, value.key)) wrong("a scene has no such key (docs/scenes.md lists what there is)");
+        const toml::table spelled = parsed(value, wrong);
+        const auto put = [&](toml::table& table) { table.insert_or_assign(value.key, *spelled.get("value")); };
+        if (!is_list(value.table)) {
+            if (value.entry > 0)
+                wrong(fmt::format("there is one {} alone, without a number", shown_table(value.table)));
+            toml::node* const there = root_.get(value.table);
+            toml::table empty;
+            if (!there) put(*root_.insert_or_assign(value.table, std::move(empty)).first->second.as_table());
+            if (there && there->is_table()) put(*there->as_table());
+            return;
+        }
+        const toml::array* const entries = root_.get_as<toml::array>(value.table);
+        const std::size_t count = entries ? entries->size() : 0;
+        if (count == 0 || value.entry > count)
+            wrong(fmt::format("the scene has {} {}", count == 0 ? "no" : std::to_string(count),
+                              shown_table(value.table)));
+        for (std::size_t k = 0; k < count; ++k)
+            if (value.entry == 0 || value.entry == k + 1)
+                if (toml::table* const table = root_.get_as<toml::array>(value.table)->get_as<toml::table>(k))
+                    put(*table);
+    }
+
     SceneFile read() {
         check_tables();
         if (const toml::table* table = single("simulation")) read_simulation({scene_.path, "simulation", *table});
@@ -74,6 +102,18 @@ public:
     }
 
 private:
+    /// { value = ... }
+    template <class Wrong>
+    static toml::table parsed(const SceneValue& value, const Wrong& wrong) {
+        try {
+            toml::table table = toml::parse("value = " + value.value);
+            if (table.size() == 1 && table.contains("value")) return table;
+        } catch (const toml::parse_error&) {
+        }
+        wrong("'" + value.value + "' is no value that TOML knows");
+        return {};
+    }
+
     void check_tables() const {
         std::vector<std::string_view> tables;
         for (const KeyRule& rule : scene_keys())
@@ -420,9 +460,11 @@ private:
 
 } // namespace
 
-Result<SceneFile> read_scene(const std::string& path) {
+Result<SceneFile> read_scene(const std::string& path, std::span<const SceneValue> values) {
     try {
-        return SceneReader(path).read();
+        SceneReader reader(path);
+        for (const SceneValue& value : values) reader.set(value);
+        return reader.read();
     } catch (const BadResultAccess& failure) {
         return failure.error();
     }

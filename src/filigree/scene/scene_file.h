@@ -8,6 +8,7 @@
 #include "filigree/physics/simulation.h"
 
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -135,9 +136,17 @@ struct SceneFile {
     ScenePicture picture;
 };
 
+/// A value that takes the place of what a scene's file says, or of what holds without it.
+struct SceneValue {
+    std::string table, key;
+    std::size_t entry = 0; ///< of a list such as [[body]], from 1; 0: of all
+    std::string value;     ///< as TOML spells it
+};
+
 /// Reads and checks a scene; meshes are not opened. A mesh's name is seen from the scene's folder. Errors, with file
-/// and line: bad_file (not TOML, unknown keys with a suggestion, wrong types and ranges), not_found.
-Result<SceneFile> read_scene(const std::string& path);
+/// and line: bad_file (not TOML, unknown keys with a suggestion, wrong types and ranges), not_found. values: in this
+/// order; of those that are wrong no line is said.
+Result<SceneFile> read_scene(const std::string& path, std::span<const SceneValue> values = {});
 
 /// An error in a line of the scene: "scene.toml:12: what".
 Error scene_error(const SceneFile& scene, unsigned line, ErrorCode code, const std::string& what);

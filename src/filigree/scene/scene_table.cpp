@@ -50,7 +50,9 @@ std::string wanted_number(const char* kind, const KeyRule& rule) {
 Error error_at(const std::string& path, unsigned line, ErrorCode code, const std::string& what) {
     std::string sentence = what;
     while (!sentence.empty() && sentence.back() == '.') sentence.pop_back();
-    return {code, fmt::format("{}:{}: {}{}", path, line, sentence, sentence.ends_with('?') ? "" : ".")};
+    const std::string place =
+        line == 0 ? path : fmt::format("{}:{}", path, line); // 0: a value that came from elsewhere
+    return {code, fmt::format("{}: {}{}", place, sentence, sentence.ends_with('?') ? "" : ".")};
 }
 
 void fail_at(const std::string& path, unsigned line, const std::string& what, ErrorCode code) {

@@ -1,0 +1,189 @@
+#include "filigree/io/shared_work.h"
+
+#include "filigree/io/file.h"
+#include "filigree/io/file_error.h"
+#include "filigree/io/temporary_file.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <unordered_set>
+
+#include <sys/stat.h>
+#include <unistd.h>
+
+#define XXH_INLINE_ALL
+#include <xxhash.h>
+
+namespace filigree {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kPlanName = "plan";
+
+std::string hexadecimal(const XXH128_hash_t& hash) {
+    constexpr char kHexDigits[] = "0123456789abcdef";
+    std::string text;
+    for (const XXH64_hash_t half : {hash.high64, hash.low64})
+        for (int shift = 60; shift >= 0; shift -= 4) text += kHexDigits[half >> shift & 15];
+    return text;
+}
+
+} // namespace
+
+Status check_chunk(const WorkChunk& chunk) {
+    if (chunk.number >= 1 && chunk.number <= chunk.count) return Success{};
+    return Error{ErrorCode::usage, "There is no chunk " + std::to_string(chunk.number) + " of " +
+                                       std::to_string(chunk.count) + "; they are counted from 1."};
+}
+
+SharedFolder::SharedFolder(fs::path path, std::string plan, std::function<bool()> is_in_place)
+    : path_(std::move(path)), folder_(path_.string() + ".chunks"), aside_(folder_.string() + ".done"),
+      finished_(path_.string() + ".plan"), plan_(std::move(plan)), is_in_place_(std::move(is_in_place)) {}
+
+bool SharedFolder::has_plan(const fs::path& file) const {
+    const Result<std::string> there = read_file(file);
+    return there && *there == plan_;
+}
+
+bool SharedFolder::is_finished() const {
+    std::error_code failed;
+    return !fs::exists(folder_, failed) && has_plan(finished_) && is_in_place_();
+}
+
+Result<bool> SharedFolder::begin() const {
+    std::error_code ignored;
+    if (is_finished()) {
+        fs::remove_all(aside_, ignored); // of a process that was killed
+        return true;
+    }
+    if (::mkdir(folder_.c_str(), 0777) == 0) {
+        // It was there a moment ago, and is not because all is done.
+        if (has_plan(finished_) && is_in_place_()) return ::rmdir(folder_.c_str()), true;
+    } else if (errno != EEXIST) {
+        return cannot_write(folder_, errno);
+    }
+    const Status planned = add(kPlanName, [&](const fs::path& plan) { return write_file(plan, plan_); });
+    if (has_plan(file(kPlanName))) return false;
+    if (is_finished()) return true;
+    if (!planned) return planned.error();
+    return Error{ErrorCode::mismatch, folder_.string() +
+                                          ": holds parts of another job (other inputs, settings or number "
+                                          "of chunks); let it end, delete the folder, or write to "
+                                          "another name."};
+}
+
+Status SharedFolder::add(const std::string& name, const std::function<Status(const fs::path& file)>& make) const {
+    std::error_code failed;
+    if (fs::exists(file(name), failed)) return Success{};
+    const fs::path temporary = temporary_path(folder_);
+    Status made = make(temporary);
+    // Whoever comes second finds the first one's.
+    if (made && ::link(temporary.c_str(), file(name).c_str()) != 0 && errno != EEXIST)
+        made = cannot_write(file(name), errno);
+    ::unlink(temporary.c_str());
+    return made;
+}
+
+std::vector<bool> SharedFolder::are_there(std::span<const std::string> names) const {
+    std::unordered_set<std::string> found;
+    std::error_code failed;
+    for (fs::directory_iterator entry(folder_, failed); !failed && entry != fs::directory_iterator();
+         entry.increment(failed))
+        found.insert(entry->path().filename().string());
+    std::vector<bool> there;
+    for (const std::string& name : names) there.push_back(found.contains(name));
+    return there;
+}
+
+Status SharedFolder::end() const {
+    // By links, so that a kill leaves no file of ours under another name.
+    if (!has_plan(finished_)) {
+        ::unlink(finished_.c_str());
+        if (::link(file(kPlanName).c_str(), finished_.c_str()) != 0 && errno != EEXIST && errno != ENOENT)
+            return cannot_write(finished_, errno);
+    }
+    // Renamed first, so that nobody takes half of it for parts that are missing.
+    std::error_code ignored; // what is left hinders nobody
+    fs::remove_all(aside_, ignored);
+    if (::rename(folder_.c_str(), aside_.c_str()) != 0 && errno != ENOENT) return cannot_write(folder_, errno);
+    fs::remove_all(aside_, ignored);
+    sync_folder(path_.parent_path());
+    return Success{};
+}
+
+Result<SharedItemsReport>
+make_shared_items(const SharedItems& items, const WorkChunk& chunk,
+                  const std::function<Result<std::string>(std::size_t item)>& make,
+                  const std::function<Status(const std::function<fs::path(std::size_t item)>& file)>& place,
+                  const std::function<bool()>& is_in_place, const RunContext& context) {
+    if (Status right = check_chunk(chunk); !right) return right.error();
+    const SharedFolder folder(items.path,
+                              "Filigree's " + items.what + ", made in chunks\njob " + chunk.job + "\nitems " +
+                                  std::to_string(items.names.size()) + "\n",
+                              is_in_place);
+    SharedItemsReport report;
+    report.items = items.names.size();
+    report.first = chunk.first_of(items.names.size());
+    report.count = chunk.end_of(items.names.size()) - report.first;
+    const auto whole = [&] {
+        report.done = items.names.size();
+        report.is_whole = true;
+        return report;
+    };
+    const Result<bool> begun = folder.begin();
+    if (!begun) return begun.error();
+    if (*begun) return whole();
+
+    const std::vector<bool> before = folder.are_there(items.names);
+    for (std::size_t k = 0; k < report.count; ++k) {
+        context.report(items.phase, double(k) / double(report.count));
+        if (context.is_cancelled()) return cancelled_error();
+        if (before[report.first + k]) continue;
+        const Result<std::string> bytes = make(report.first + k);
+        if (!bytes) return bytes.error();
+        const Status written = write_file(folder.file(items.names[report.first + k]), *bytes);
+        if (!written && folder.is_finished()) return whole(); // another process made the same, and was the last
+        if (!written) return written.error();
+        ++report.made;
+    }
+    context.report(items.phase, 1);
+
+    const std::vector<bool> after = folder.are_there(items.names);
+    report.done = std::size_t(std::ranges::count(after, true));
+    if (folder.is_finished()) return whole();
+    if (report.done < items.names.size()) return report;
+    Status placed = place([&](std::size_t item) { return folder.file(items.names[item]); });
+    if (placed) placed = folder.end();
+    if (!placed && !folder.is_finished()) return placed.error();
+    return whole();
+}
+
+std::string hash_of_bytes(std::string_view bytes) { return hexadecimal(XXH3_128bits(bytes.data(), bytes.size())); }
+
+Result<std::string> hash_of_files(std::span<const fs::path> paths) {
+    XXH3_state_t* const state = XXH3_createState();
+    if (!state) return Error{ErrorCode::out_of_memory, "Not enough memory to hash a file."};
+    XXH3_128bits_reset(state);
+    const auto take = [&](const fs::path& path) -> Status {
+        const Result<FileReader> file = FileReader::open(path);
+        if (!file) return file.error();
+        std::string piece;
+        for (std::uint64_t offset = 0; offset < file->size(); offset += piece.size()) {
+            piece.resize(std::min<std::uint64_t>(std::uint64_t{1} << 20, file->size() - offset));
+            if (Status filled = file->read(offset, piece); !filled) return filled;
+            XXH3_128bits_update(state, piece.data(), piece.size());
+        }
+        return Success{};
+    };
+    Status taken = Success{};
+    for (const fs::path& path : paths)
+        if (taken) taken = take(path);
+    const XXH128_hash_t hash = XXH3_128bits_digest(state);
+    XXH3_freeState(state);
+    if (!taken) return taken.error();
+    return hexadecimal(hash);
+}
+
+} // namespace filigree
