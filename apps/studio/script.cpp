@@ -21,6 +21,7 @@
 #include <QWheelEvent>
 
 #include <cmath>
+#include <csignal>
 #include <functional>
 #include <map>
 
@@ -364,6 +365,7 @@ const std::map<QString, Script::Command>& Script::commands() {
 } // namespace
 
 void prepare_application() {
+    std::signal(SIGXFSZ, SIG_IGN); // a file that may not grow fails like a full disk, and is told of
     QCoreApplication::setApplicationName("filigree-studio");
     QCoreApplication::setOrganizationName("filigree");
     QCoreApplication::setApplicationVersion(FILIGREE_VERSION);
