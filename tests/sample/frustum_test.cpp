@@ -25,6 +25,14 @@ TEST(Frustum, PointsInsideAreThoseThatRaysFind) {
     EXPECT_EQ(frustum_points(frustum).error().code, ErrorCode::usage);
 }
 
+TEST(Frustum, MorePointsThanMemoryWouldHoldAreRefused) {
+    Frustum frustum{.eye = {0, 0, 4}, .target = {0, 0, 0}, .near = 2, .far = 6, .counts = {1 << 14, 1 << 14, 1}};
+    frustum.counts[2] = 2; // 2^29; a mutant of the bound escaped once
+    EXPECT_EQ(frustum_points(frustum).error().code, ErrorCode::usage);
+    frustum.counts = {(1 << 14) + 1, 1 << 14, 1}; // just above
+    EXPECT_EQ(frustum_points(frustum).error().code, ErrorCode::usage);
+}
+
 /// How far the box reaches along the view, from the eye.
 std::pair<double, double> depths(const Frustum& frustum, const Box& box) {
     const Vec3d forward = (frustum.target - frustum.eye).normalized();

@@ -1,68 +1,163 @@
 #!/usr/bin/python3
-"""Writes docs/reliability.md. Usage: reliability.py COUNTS PAGE ROOT"""
-import json, sys
+"""Writes docs/reliability.md. Usage: reliability.py COUNTS PAGE ROOT
+
+A section, or a row of the fuzzing table, of which COUNTS has nothing stays as it is on the page.
+"""
+import json
+import re
+import sys
 from collections import defaultdict
 from pathlib import Path
 
 counts, page, root = (Path(word) for word in sys.argv[1:4])
-lines = ['# Reliability', '',
-         'Written by `scripts/reliability` from what `scripts/fuzz`, `properties`, `torture`, `bounds` and `mutate` counted last; not by hand.', '']
+old = page.read_text() if page.exists() else ""
 
-executions = defaultdict(lambda: [0, 0, '', ''])
-if (counts / 'fuzz').exists():
-    for line in (counts / 'fuzz').read_text().splitlines():
+
+def old_section(title):
+    found = re.search(rf"^## {re.escape(title)}\n(.*?)(?=^## |\Z)", old, re.MULTILINE | re.DOTALL)
+    return found.group(1).strip().splitlines() if found else None
+
+
+def when_of(name):
+    file = counts / f"{name}.when"
+    return file.read_text().strip() if file.exists() else ""
+
+
+def told_by(name):
+    file = counts / f"{name}.json"
+    return json.loads(file.read_text()) if file.exists() else None
+
+
+def fuzzing():
+    if not (counts / "fuzz").exists():
+        return None
+    ran = defaultdict(lambda: [0, 0, "", ""])
+    for line in (counts / "fuzz").read_text().splitlines():
         name, runs, minutes, status, day, commit = line.split()
-        entry = executions[name]
+        entry = ran[name]
         entry[0] += int(runs)
         entry[1] += int(minutes)
-        entry[2:] = ['broke it' if status != '0' else 'none broke it', f'{day}, {commit}']
-    lines += ['## Fuzzing', '',
-              "libFuzzer with the address and undefined-behaviour sanitizers (`scripts/fuzz`). What broke a target lies in `tests/fuzz/crashes` and is replayed by `scripts/test`.", '',
-              '| target | inputs | minutes | in the last run | last run |', '|---|---|---|---|---|']
-    for name, (runs, minutes, said, when) in sorted(executions.items()):
-        kept = len(list((root / 'tests/fuzz/crashes' / name).glob('*')))
-        lines.append(f'| `{name}` | {runs:,} | {minutes} | {said}{f"; {kept} kept as tests" if kept else ""} | {when} |')
-    lines += [f'| all | {sum(entry[0] for entry in executions.values()):,} | | | |', '']
+        entry[2:] = ["broke it" if status != "0" else "none broke it", f"{day}, {commit}"]
+    rows = {}
+    for line in old_section("Fuzzing") or []:
+        row = re.match(r"\| `(\w+)` \| ([\d,]+) \|", line)
+        if row:
+            rows[row[1]] = (int(row[2].replace(",", "")), line)
+    for name, (runs, minutes, said, when) in ran.items():
+        kept = len(list((root / "tests/fuzz/crashes" / name).glob("*")))
+        kept_text = f"; {kept} kept as tests" if kept else ""
+        rows[name] = (runs, f"| `{name}` | {runs:,} | {minutes} | {said}{kept_text} | {when} |")
+    return ["libFuzzer with the address and undefined-behaviour sanitizers (`scripts/fuzz`). What broke a target lies in "
+            "`tests/fuzz/crashes` and is replayed by `scripts/test`.", "",
+            "| target | inputs | minutes | in the last run | last run |", "|---|---|---|---|---|",
+            *[line for _, (_, line) in sorted(rows.items())],
+            f"| all | {sum(runs for runs, _ in rows.values()):,} | | | |"]
 
-if (counts / 'properties').exists():
-    tries, when = (counts / 'properties').read_text().strip().split(maxsplit=1)
-    lines += ['## Properties', '',
-              f'What has to come out the same two ways on random meshes (`tests/properties`: threads, order, turned, file and memory, coded and plain, scan, rays and winding, pieces and whole, bodies): {int(tries):,} tries of each with `scripts/properties`, none failed. Last run: {when}.', '']
 
-if (counts / 'torture.json').exists():
-    told = json.loads((counts / 'torture.json').read_text())
-    when = (counts / 'torture.when').read_text().strip()
-    lines += ['## Torture of outputs', '',
-              'Twelve kinds of output under kills, failing calls (write, fsync, rename, open, malloc), full disks, file-size and memory limits, and two writers at once (`scripts/torture`). Afterwards the old file has to be there whole or the new one byte for byte, with nothing beside it.', '',
-              '| | |', '|---|---|',
-              f'| kills that struck before the end | {told["kills_struck"]} of {told["kills"]} |',
-              f'| failing calls that struck | {told["failures_struck"]} of {told["failures"]} |',
-              f'| limits, full disks, rival writers | {told["limits"]} |',
-              f'| wrong | {told["wrong"]} |',
-              f'| last run | {when} |', '']
-    lines += [f'- {sentence}' for sentence in told.get('sentences', [])]
+def properties():
+    if not (counts / "properties").exists():
+        return None
+    tries, when = (counts / "properties").read_text().strip().split(maxsplit=1)
+    return ["What has to come out the same two ways on random meshes (`tests/properties`: threads, order, turned, file and "
+            "memory, coded and plain, scan, rays and winding, pieces and whole, bodies): "
+            f"{int(tries):,} tries of each with `scripts/properties`, none failed. Last run: {when}."]
 
-if (counts / 'bounds.json').exists():
-    told = json.loads((counts / 'bounds.json').read_text())
-    when = (counts / 'bounds.when').read_text().strip()
-    lines += ['## Bounds', '',
-              f'Every command over {told["rungs"]} meshes from {told["first"]:,} vertices on, each twice the one before (`scripts/bounds`): processor seconds and memory of the largest, and the most that either grew at a step. 2.5 is the limit, and what is beyond it is in bold; steps below 0.3 s and 60 MiB are not judged (0).', '',
-              '| command | seconds | growth | MiB | growth |', '|---|---|---|---|---|']
-    def marked(growth):
-        return f'**{growth:.2f}**' if growth > 2.5 else f'{growth:.2f}'
-    for name, row in told['commands'].items():
-        lines.append(f'| {name} | {row["seconds"][-1]:.2f} | {marked(row["seconds_growth"])} | {row["mib"][-1]:.0f} | {marked(row["mib_growth"])} |')
-    lines += ['', f'Last run: {when}.', '']
 
-if (counts / 'mutants.json').exists():
-    told = json.loads((counts / 'mutants.json').read_text())
-    when = (counts / 'mutants.when').read_text().strip() if (counts / 'mutants.when').exists() else ''
-    lines += ['## Tests of the tests', '',
-              f'Small changes of hierarchy, sample, coding and fracture, one at a time (`scripts/mutate --count {told["made"]} --seed {told["seed"]}`): {told["caught"]} of {told["made"]} made a test fail. Last run: {when}.', '']
-    if told['escaped']:
-        lines += ['What escaped:', ''] + [f'- `{m["where"]}`: `{m["became"]}`' for m in told['escaped']] + ['']
+def torture():
+    told = told_by("torture")
+    if not told:
+        return None
+    return ["Twelve kinds of output under kills, failing calls (write, fsync, rename, open, malloc), full disks, file-size and "
+            "memory limits, and two writers at once (`scripts/torture`). Afterwards the old file has to be there whole or the "
+            "new one byte for byte, with nothing beside it.", "", "| | |", "|---|---|",
+            f"| kills that struck before the end | {told['kills_struck']} of {told['kills']} |",
+            f"| failing calls that struck | {told['failures_struck']} of {told['failures']} |",
+            f"| limits, full disks, rival writers | {told['limits']} |", f"| wrong | {told['wrong']} |",
+            f"| last run | {when_of('torture')} |",
+            *[""] * bool(told.get("sentences")), *[f"- {sentence}" for sentence in told.get("sentences", [])]]
 
-lines += ['## What nothing covers', '',
-          '- The studio is played by scripts, not by hours of random actions.',
-          '- No line coverage, no soak of a day.', '']
-page.write_text('\n'.join(lines))
+
+def bounds():
+    told = told_by("bounds")
+    if not told:
+        return None
+    marked = lambda growth: f"**{growth:.2f}**" if growth > 2.5 else f"{growth:.2f}"
+    return [f"Every command over {told['rungs']} meshes from {told['first']:,} vertices on, each twice the one before "
+            "(`scripts/bounds`): processor seconds and memory of the largest, and the most that either grew at a step. 2.5 is "
+            "the limit, and what is beyond it is in bold; steps below 0.3 s and 60 MiB are not judged (0).", "",
+            "| command | seconds | growth | MiB | growth |", "|---|---|---|---|---|",
+            *[f"| {name} | {row['seconds'][-1]:.2f} | {marked(row['seconds_growth'])} | {row['mib'][-1]:.0f} | "
+              f"{marked(row['mib_growth'])} |" for name, row in told["commands"].items()],
+            "", f"Last run: {when_of('bounds')}."]
+
+
+def mutants():
+    told = told_by("mutants")
+    if not told:
+        return None
+    escaped = ["", "What escaped:", "", *[f"- `{m['where']}`: `{m['became']}`" for m in told["escaped"]]]
+    return ["Small changes of hierarchy, sample, coding and fracture, one at a time (`scripts/mutate --count "
+            f"{told['made']} --seed {told['seed']}`): {told['caught']} of {told['made']} made a test fail. Last run: "
+            f"{when_of('mutants')}.", *(escaped if told["escaped"] else [])]
+
+
+def coverage():
+    told = told_by("coverage")
+    if not told:
+        return None
+    share = lambda part: f"{100 * part['covered'] / part['lines']:.1f} %"
+    whole = {key: sum(layer[key] for layer in told["layers"].values()) for key in ("covered", "lines")}
+    missed = told.get("without", [])
+    return ["Lines of the library that the tests of its layers and the fuzz targets' replay run, by gcov (`scripts/coverage`). "
+            "Tests of the programs, the studio and Python run more of them, and are not counted."
+            + (f" Not run this time: {', '.join(missed)}." if missed else ""), "",
+            "| layer | lines | run |", "|---|---|---|",
+            *[f"| `{name}` | {layer['lines']:,} | {share(layer)} |" for name, layer in sorted(told["layers"].items())],
+            f"| all | {whole['lines']:,} | {share(whole)} |", "",
+            f"Files below {told['least']} %: " + (", ".join(f"`{file['file']}` {share(file)}" for file in told["below"]) or "none")
+            + f". Last run: {when_of('coverage')}."]
+
+
+def long_life():
+    if not when_of("long_life"):
+        return None
+    lines = ["One process (`scripts/long-life`), memory in MiB after a tenth of the way and at the end. What comes again has to "
+             "have the bytes that it had.", "", "| | | compared with before | memory | at the end |", "|---|---|---|---|---|"]
+    what = {"rounds": "strip, pose, restore", "frames": "simulation"}
+    for line in (counts / "long_life").read_text().splitlines():
+        name, count, _, compared, _, warm, _, end = line.split()
+        lines.append(f"| {what[name]} | {int(count):,} {name} | {int(compared):,}, all the same | {warm} | {end} |")
+    return [*lines, "", f"Last run: {when_of('long_life')}."]
+
+
+def studio():
+    if not (counts / "studio").exists():
+        return None
+    lines = ["Random actions in one window after another; files damaged while they are open, full disks, saves that cannot be, "
+             "windows closed while they work (`scripts/soak-studio`).", "", "| build | | run |", "|---|---|---|"]
+    for line in (counts / "studio").read_text().splitlines():
+        preset, said, when = line.split("|")
+        lines.append(f"| {preset} | {said} | {when} |")
+    return lines
+
+
+def uncovered(sections):
+    studio_rows = "\n".join(sections.get("The studio") or [])
+    tries = re.search(r"of (\d+) made a test fail", "\n".join(sections.get("Tests of the tests") or []))
+    return [*["- The studio's hours of random actions were not under sanitizers."] * ("| asan |" not in studio_rows),
+            *["- No line coverage."] * (not sections.get("Line coverage")),
+            *["- Two hundred mutants were aimed at; see how many were tried."] * (not tries or int(tries[1]) < 200),
+            "- No soak of a day."]
+
+
+MAKERS = {"Fuzzing": fuzzing, "Properties": properties, "Line coverage": coverage, "Torture of outputs": torture,
+          "Bounds": bounds, "Long life": long_life, "The studio": studio, "Tests of the tests": mutants}
+sections = {title: make() or old_section(title) for title, make in MAKERS.items()}
+sections["What nothing covers"] = uncovered(sections)
+lines = ["# Reliability", "",
+         "Written by `scripts/reliability` from what `scripts/fuzz`, `properties`, `coverage`, `torture`, `bounds`, `long-life`, "
+         "`soak-studio` and `mutate` counted last; not by hand.", ""]
+for title, text in sections.items():
+    if text:
+        lines += [f"## {title}", "", *text, ""]
+page.write_text("\n".join(lines))
