@@ -169,6 +169,8 @@ TEST_F(FileBatches, WhatKilledOnesMadeIsRemovedByTheNext) {
     in_killed_process([&] {
         const Result<FileBatch> batch = FileBatch::create(folder_);
         add(*batch, "a", "new");
+        // Killed while it noted what it replaces, half way through that file.
+        std::ofstream(batch->path("a").parent_path().parent_path() / ".filigree-0123.tmp") << "half";
         ::kill(::getpid(), SIGKILL); // before its destructor clears up
     });
     EXPECT_EQ(files().size(), 2u);
