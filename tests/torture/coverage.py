@@ -55,7 +55,7 @@ def main():
         if ran and 100 * covered < LEAST * len(ran):
             below.append({"file": name, "covered": covered, "lines": len(ran)})
     told = {"layers": {name: {"covered": covered, "lines": lines} for name, (covered, lines) in layers.items()},
-            "without": (options.build / "not_ended").read_text().splitlines() if (options.build / "not_ended").exists() else [],
+            "without": (options.build / "not_run").read_text().splitlines() if (options.build / "not_run").exists() else [],
             "least": LEAST, "below": sorted(below, key=lambda file: file["covered"] / file["lines"])}
     for name, (covered, lines) in [*layers.items(), ("all", [sum(c) for c in zip(*layers.values())])]:
         print(f"{name:10} {covered:7} of {lines:7} lines, {100 * covered / lines:.1f} %")

@@ -101,6 +101,17 @@ def mutants():
             f"{when_of('mutants')}.", *(escaped if told["escaped"] else [])]
 
 
+def judged(section):
+    """What was found of mutants that escaped (judged_mutants.json), behind each."""
+    verdicts = json.loads((Path(__file__).parent / "judged_mutants.json").read_text())
+    lines = []
+    for line in section or []:
+        mutant = re.match(r"- `(.*?):\d+`: `(.*?)`", line)
+        verdict = mutant and verdicts.get(f"{mutant[1]}: {mutant[2]}")
+        lines.append(f"{mutant[0]}: {verdict}" if verdict else line)
+    return lines or None
+
+
 def coverage():
     told = told_by("coverage")
     if not told:
@@ -153,6 +164,7 @@ def uncovered(sections):
 MAKERS = {"Fuzzing": fuzzing, "Properties": properties, "Line coverage": coverage, "Torture of outputs": torture,
           "Bounds": bounds, "Long life": long_life, "The studio": studio, "Tests of the tests": mutants}
 sections = {title: make() or old_section(title) for title, make in MAKERS.items()}
+sections["Tests of the tests"] = judged(sections["Tests of the tests"])
 sections["What nothing covers"] = uncovered(sections)
 lines = ["# Reliability", "",
          "Written by `scripts/reliability` from what `scripts/fuzz`, `properties`, `coverage`, `torture`, `bounds`, `long-life`, "
