@@ -421,14 +421,17 @@ TEST_F(Simulate, TheManualShowsEveryKey) {
 }
 
 TEST_F(Simulate, KeysThatDoNothingForAModelAreRefused) {
-    for (const std::string key : {"yield_stress", "creep_time", "temperature", "melting_from", "melting_to",
-                                  "viscosity", "heating", "conductivity"}) {
-        const std::string models = key == "creep_time" ? "\"meshfree\"" : "\"meshfree\" or \"mpm\"";
-        const std::string needle = "'" + key + "' in [[body]] is for model = " + models + ", and this body's is \"";
+    for (const std::string key :
+         {"temperature", "melting_from", "melting_to", "viscosity", "heating", "conductivity"}) {
+        const std::string needle =
+            "'" + key + "' in [[body]] is for model = \"meshfree\" or \"mpm\", and this body's is \"";
         refused(kBody + key + " = 1\n", {"bad.toml:3: " + needle + "fem\"."});
         refused(kBody + "material = \"lattice\"\n" + key + " = 1\n", {"bad.toml:4: " + needle + "springs\"."});
         refused(kBody + "material = \"wax\"\nmodel = \"fem\"\n" + key + " = 1\n", {"bad.toml:5: " + needle});
     }
+    refused(kBody + "material = \"lattice\"\nyield_stress = 1\n", {"bad.toml:4:", "'yield_stress'", "is \"springs\""});
+    refused(kBody + "material = \"wax\"\ncreep_time = 1\n", {"bad.toml:4:", "'creep_time'", "is \"mpm\""});
+    refused(kBody + "[[fracture]]\nplastic_opening = 0.1\n", {"bad.toml:4:", "'plastic_opening'", "yield_stress"});
     for (const std::string key : {"specific_heat", "latent_heat"})
         refused(kBody + "material = \"clay\"\n" + key + " = 1\n", {"bad.toml:4:", "'" + key + "'", "\"mpm\""});
     refused(kBody + "bending = 0.1\n", {"bad.toml:3:", "'bending'", "\"springs\"", "\"fem\""});
@@ -440,6 +443,10 @@ TEST_F(Simulate, KeysThatDoNothingForAModelAreRefused) {
     // What a material brings along is left out without a word.
     write("fem.toml", kBody + "resolution = 4\nparticles = 100\nmaterial = \"wax\"\nmodel = \"fem\"\n");
     ok(words("fem.toml", {"--frames", "1", "--check"}));
+    write("clay.toml", kBody +
+                           "resolution = 4\nparticles = 100\nmaterial = \"clay\"\nmodel = \"fem\"\nyield_stress = 5e3\n"
+                           "creep_time = 0.01\n[[fracture]]\npieces = 3\nplastic_opening = 0.1\n");
+    ok(words("clay.toml", {"--frames", "1", "--check"}));
 }
 
 TEST_F(Simulate, IceMeltsAndSaysWhatItPassesThrough) {

@@ -72,8 +72,9 @@ bool is_of_springs(const Body& body) { return body.material.model == MaterialMod
 bool is_not_of_springs(const Body& body) { return !is_of_springs(body); }
 bool is_meshfree(const Body& body) { return body.material.model == MaterialModel::meshfree; }
 bool flows(const Body& body) { return is_meshfree(body) || body.material.model == MaterialModel::mpm; }
-bool is_plastic(const Body& body) { return flows(body) && body.material.is_plastic(); }
-bool creeps(const Body& body) { return is_meshfree(body) && body.material.is_plastic(); }
+bool may_yield(const Body& body) { return flows(body) || body.material.model == MaterialModel::fem; }
+bool is_plastic(const Body& body) { return may_yield(body) && body.material.is_plastic(); }
+bool creeps(const Body& body) { return is_plastic(body) && body.material.model != MaterialModel::mpm; }
 bool melts(const Body& body) { return flows(body) && body.material.melts(); }
 bool parts_and_joins(const Body& body) { return body.material.model == MaterialModel::mpm && body.material.melts(); }
 
@@ -220,7 +221,7 @@ void BodyPanel::add_advanced() {
         {.least = 0, .most = 0.2, .step = 0.01, .decimals = 2}, "Springs: share of the stiffness given to bending",
         is_of_springs);
     check(rows, settings.setting("body.plastic", "Keeps dents", "Stress beyond the yield stress stays as shape",
-                                 kPlastic, flows));
+                                 kPlastic, may_yield));
     add("body.yield", "Yield", material_field(&Material::yield_stress),
         {.least = 100, .most = 1e9, .decimals = 0, .unit = "Pa", .logarithmic = true, .thousands = true},
         "Stress from which shape is lost, pascals", is_plastic);

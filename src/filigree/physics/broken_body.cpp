@@ -194,10 +194,10 @@ private:
             if (cells_of[number].empty()) continue;
             result_.piece_of_number[number] = Index(result_.number_of_piece.size());
             result_.number_of_piece.push_back(number);
-            whole_cells_.push_back(std::move(cells_of[number]));
+            result_.cells_of_whole.push_back(std::move(cells_of[number]));
         }
         std::vector<std::shared_ptr<Body>> bodies;
-        for (std::size_t k = 0; k < whole_cells_.size(); ++k) {
+        for (std::size_t k = 0; k < result_.cells_of_whole.size(); ++k) {
             Result<Body> body = make_piece(k);
             if (!body) return body.error();
             bodies.push_back(std::make_shared<Body>(std::move(body).value()));
@@ -212,10 +212,10 @@ private:
         const Index number = result_.number_of_piece[k];
         const Cells& from = whole_.cells;
         std::vector<Cells::LatticeIndex> indices;
-        for (const Index c : whole_cells_[k]) indices.push_back(from.cells[c]);
+        for (const Index c : result_.cells_of_whole[k]) indices.push_back(from.cells[c]);
         Cells cells = lattice_cells(std::move(indices), from.spacing, from.origin); // keeps their order
-        for (std::size_t c = 0; c < whole_cells_[k].size(); ++c) {
-            const Index of_whole = whole_cells_[k][c];
+        for (std::size_t c = 0; c < result_.cells_of_whole[k].size(); ++c) {
+            const Index of_whole = result_.cells_of_whole[k][c];
             float own = 0, all = 0;
             for (const auto& [piece, samples] : shares_[of_whole]) {
                 all += samples;
@@ -290,7 +290,7 @@ private:
             std::vector<Index>& of_whole = result_.corners_of_whole.emplace_back(cells.corners.size(), kNoIndex);
             for (std::size_t c = 0; c < cells.cells.size(); ++c)
                 for (int n = 0; n < 8; ++n)
-                    of_whole[cells.cell_corners[c][n]] = whole_.cells.cell_corners[whole_cells_[k][c]][n];
+                    of_whole[cells.cell_corners[c][n]] = whole_.cells.cell_corners[result_.cells_of_whole[k][c]][n];
             for (Index corner = 0; corner < of_whole.size(); ++corner)
                 at_corner[of_whole[corner]].push_back({Index(k), corner});
         }
@@ -306,7 +306,7 @@ private:
             for (int side = 0; side < 2; ++side) {
                 Index& piece = facet.pieces[side];
                 piece = result_.piece_of_number[piece];
-                const std::vector<Index>& cells = whole_cells_[piece];
+                const std::vector<Index>& cells = result_.cells_of_whole[piece];
                 facet.cells[side] = Index(std::ranges::lower_bound(cells, facet.cell) - cells.begin());
             }
     }
@@ -428,7 +428,6 @@ private:
     std::vector<PieceGrid::Region> regions_;
     std::vector<std::vector<Triangle>> inner_triangles_; ///< of each region: those inside the body
     std::vector<std::vector<Index>> points_of_piece_;    ///< of the whole's surface, by number
-    std::vector<std::vector<Index>> whole_cells_;        ///< of each piece
 };
 
 } // namespace
@@ -443,7 +442,8 @@ Result<BrokenBody> break_body(std::shared_ptr<const Body> whole, Partition parti
     if (partition.count == 0 || !partition.piece_at)
         return Error{ErrorCode::usage, "A body breaks into one piece or more; the partition has none."};
     if (whole->material.model != MaterialModel::fem)
-        return Error{ErrorCode::unsuitable, "Only bodies of the model fem break."};
+        return Error{ErrorCode::unsuitable,
+                     "Only bodies of the model fem break; it yields before that where it has a yield stress."};
     Result<BrokenBody> broken = BodyBreaker(std::move(whole), std::move(partition), context).run();
     if (!broken || !report) return broken;
     *report = {.pieces = broken->pieces.size()};

@@ -47,6 +47,7 @@ struct BrokenBody {
     std::vector<Index> piece_of_number;               ///< of the partition's numbers: index in `pieces`, or kNoIndex
     std::vector<Index> number_of_piece;               ///< the way back
     std::vector<std::vector<Index>> corners_of_whole; ///< of each piece: its corners' corners of the whole
+    std::vector<std::vector<Index>> cells_of_whole;   ///< ... its cells' cells
     std::vector<Index> copy_offsets;                  ///< of each corner of the whole, into ...
     std::vector<CornerCopy> copies;                   ///< ... its copies, ascending by piece
     std::vector<CrackFacet> facets;

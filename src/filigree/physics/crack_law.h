@@ -17,6 +17,8 @@ inline constexpr float kShear = 2;
 /// the same load within 13 % for spacings of an eighth to a 64th of its width, and within 25 % for lattices turned by
 /// 15, 30 and 45 degrees (Fracture.ANotchedPlate...).
 inline constexpr double kFront = 0.5;
+/// Of the yield stress: what still pulls on matter that has opened too far for good. Less does not open it.
+inline constexpr double kTearing = 0.5;
 /// Of the squared frequency that the springs of cohesion may add where they are stiffest.
 inline constexpr float kCohesionShare = 0.25f;
 
@@ -40,9 +42,14 @@ inline float strength_of(const FractureMaterial& material, Index piece, Index ot
     return float(material.strength * std::pow(-std::log1p(-u), shape) / std::tgamma(1 + shape));
 }
 
+/// J/m^2 that a crack takes to grow: where matter yields first, that as well.
+inline double front_energy(const FractureMaterial& material, const Material& matter) {
+    const bool tears = matter.is_plastic() && std::isfinite(material.plastic_opening);
+    return material.energy + (tears ? matter.yield_stress * material.plastic_opening : 0);
+}
 /// Pa: of what is next to a crack. Where the lattice cannot resolve the stress there, energy decides.
-inline float strength_at_front(float strength, const FractureMaterial& material, double young_modulus, double spacing) {
-    return std::min(strength, float(kFront * std::sqrt(young_modulus * material.energy / spacing)));
+inline float strength_at_front(float strength, double front_energy, double young_modulus, double spacing) {
+    return std::min(strength, float(kFront * std::sqrt(young_modulus * front_energy / spacing)));
 }
 
 /// Two copies of a corner that have let go: traction falls from `pull` to nothing at the opening 2 G / |pull|.

@@ -3,6 +3,7 @@
 #include "filigree/core/disjoint_sets.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/physics/cell_kernel.h"
+#include "filigree/physics/plastic_cells.h"
 #include "filigree/physics/vertex_block.h"
 
 #include <algorithm>
@@ -33,7 +34,8 @@ Mat3f mean_gradient(const Vectors& x, const std::array<Index, 8>& corners, float
 
 Cracks::Cracks(std::shared_ptr<const Fracture> fracture, std::size_t whole, std::size_t first_piece)
     : fracture_(std::move(fracture)), whole_(whole), first_(first_piece),
-      young_modulus_(float(body().whole->material.young_modulus)), links_(body().links.size()),
+      young_modulus_(float(body().whole->material.young_modulus)),
+      front_energy_(front_energy(fracture_->material, body().whole->material)), links_(body().links.size()),
       broke_(body().pieces.size(), std::numeric_limits<double>::infinity()), beside_crack_(body().links.size(), 0) {
     for (const CrackLink& link : body().links)
         strengths_.push_back(strength_of(fracture_->material, body().number_of_piece[link.pieces[0]],
@@ -49,26 +51,34 @@ Cracks::Stress Cracks::stress(const CrackFacet& facet, std::span<const BodyState
     const auto spacing = float(whole.spacing());
     const cell_kernel::CellMaterial material = cell_kernel::cell_material(whole.material, whole.spacing());
     Stress sum{Vec3f::Zero(), Vec3f::Zero()};
-    const auto add = [&](const Mat3f& gradient, float share) {
+    const auto add = [&](Mat3f gradient, std::span<const PlasticCell> plastic, Index cell, float share) {
+        Vec3f normal = facet.normal;
+        if (!plastic.empty()) { // the elastic part, and the force by what the facet's area was at rest
+            sum.opened += share * plastic_opening(plastic[cell], normal, spacing);
+            gradient *= plastic[cell].inverse;
+            normal = plastic[cell].inverse.transpose() * normal;
+        }
         Mat3f cofactor;
         cofactor << gradient.col(1).cross(gradient.col(2)), gradient.col(2).cross(gradient.col(0)),
             gradient.col(0).cross(gradient.col(1));
         const float squares = gradient.squaredNorm(), volume = gradient.col(0).dot(cofactor.col(0));
-        const Vec3f along = cofactor * facet.normal;
-        sum.traction += share * (material.shear * (squares / (squares + 1)) * (gradient * facet.normal) +
+        const Vec3f along = cofactor * normal;
+        sum.traction += share * (material.shear * (squares / (squares + 1)) * (gradient * normal) +
                                  material.bulk * (volume - material.rest_ratio) * along);
         sum.normal += share * along;
     };
     if (!is_open_) {
-        add(mean_gradient(bodies[whole_].positions, whole.cells.cell_corners[facet.cell], spacing), 1);
+        add(mean_gradient(bodies[whole_].positions, whole.cells.cell_corners[facet.cell], spacing),
+            bodies[whole_].elasticity->plastic_cells(), facet.cell, 1);
     } else {
         std::array<float, 2> fractions;
         for (int side = 0; side < 2; ++side)
             fractions[side] = body().pieces[facet.pieces[side]]->cells.fraction[facet.cells[side]];
-        for (int side = 0; side < 2; ++side)
-            add(mean_gradient(state(bodies, facet.pieces[side]).positions,
-                              body().pieces[facet.pieces[side]]->cells.cell_corners[facet.cells[side]], spacing),
-                fractions[side] / (fractions[0] + fractions[1]));
+        for (int side = 0; side < 2; ++side) {
+            const BodyState& piece = state(bodies, facet.pieces[side]);
+            add(mean_gradient(piece.positions, piece.body->cells.cell_corners[facet.cells[side]], spacing),
+                piece.elasticity->plastic_cells(), facet.cells[side], fractions[side] / (fractions[0] + fractions[1]));
+        }
     }
     return sum;
 }
@@ -89,7 +99,13 @@ float Cracks::held_part(const CrackFacet& facet) const {
 
 float Cracks::strength(Index link) const {
     if (!beside_crack_[link]) return strengths_[link];
-    return strength_at_front(strengths_[link], fracture_->material, double(young_modulus_), body().whole->spacing());
+    return strength_at_front(strengths_[link], front_energy_, double(young_modulus_), body().whole->spacing());
+}
+
+/// m: how far matter may have opened there for good.
+float Cracks::most_opened(Index link) const {
+    const FractureMaterial& material = fracture_->material;
+    return float(material.plastic_opening) * (strengths_[link] / float(material.strength));
 }
 
 /// From the first piece's copy to the second's.
@@ -156,19 +172,22 @@ bool Cracks::open_links(std::span<const BodyState> bodies, double time, const Ru
             stresses[f].traction /= std::max(held_part(body().facets[f]), kLeastHeld);
         }
     });
+    const auto tearing = float(kTearing * body().whole->material.yield_stress);
     std::vector<Vec3f> pulls(links_.size(), Vec3f::Zero());
     parallel_for(context, links_.size(), kCrackGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t l = begin; l < end; ++l) {
             if (links_[l].phase != LinkState::tied) continue;
             Vec3f traction = Vec3f::Zero(), normal = Vec3f::Zero();
-            float area = 0;
+            float area = 0, opened = 0;
             for (const Index f : body().facets_of_link[l]) {
+                opened += body().facets[f].area * stresses[f].opened;
                 traction += body().facets[f].area * stresses[f].traction;
                 normal += body().facets[f].area * stresses[f].normal;
                 area += body().facets[f].area;
             }
             const Traction found = split_traction(traction / area, normal.stableNormalized());
-            if (found.size >= strength(Index(l))) pulls[l] = found.pull;
+            const bool tears = opened / area >= most_opened(Index(l)) && found.size >= tearing;
+            if (tears || found.size >= strength(Index(l))) pulls[l] = found.pull;
         }
     });
     bool any = false;
@@ -215,6 +234,7 @@ void Cracks::follow_whole(std::span<BodyState> bodies) const {
             to.positions.set(c, whole.positions[from[c]]);
             to.velocities.set(c, whole.velocities[from[c]]);
         }
+        to.elasticity->take_over(whole.elasticity->plastic_cells(), body().cells_of_whole[piece]);
     }
 }
 
@@ -519,6 +539,7 @@ bool Cracks::set_memory(const CrackMemory& memory, std::span<BodyState> bodies) 
 std::string check_fracture(const FractureMaterial& material) {
     if (!(material.strength > 0) || !std::isfinite(material.strength)) return "The strength must be above 0 Pa.";
     if (!(material.scatter >= 0 && material.scatter <= 1)) return "The scatter of the strength must be from 0 to 1.";
+    if (!(material.plastic_opening > 0)) return "The plastic opening must be above 0 m.";
     if (!(material.energy > 0) || !std::isfinite(material.energy)) return "The fracture energy must be above 0 J/m^2.";
     return "";
 }

@@ -82,12 +82,14 @@ public:
 private:
     struct Stress {
         Vec3f traction, normal; ///< Pa and unit, in the world, on the first piece
+        float opened = 0;       ///< m, for good
     };
     BodyState& state(std::span<BodyState> bodies, Index piece) const { return bodies[first_ + piece]; }
     const BodyState& state(std::span<const BodyState> bodies, Index piece) const { return bodies[first_ + piece]; }
     Stress stress(const CrackFacet& facet, std::span<const BodyState> bodies) const;
     float held_part(const CrackFacet& facet) const;
     float strength(Index link) const;
+    float most_opened(Index link) const;
     Vec3f between(Index link, std::span<const BodyState> bodies) const;
     float stiffest(Index link, std::span<const BodyState> bodies) const;
     void sweep_corner(Index corner, std::span<const PieceSweep> pieces, std::span<const BodyState> bodies) const;
@@ -103,6 +105,7 @@ private:
     std::shared_ptr<const Fracture> fracture_;
     std::size_t whole_, first_;
     float young_modulus_;
+    double front_energy_; ///< J/m^2
     bool is_open_ = false;
     std::vector<LinkState> links_;
     std::vector<double> broke_;                       ///< s, of each piece

@@ -2,6 +2,7 @@
 #include "filigree/physics/elasticity.h"
 
 #include "filigree/physics/body.h"
+#include "filigree/physics/plastic_cells.h"
 #include "filigree/physics/rigid_body.h"
 
 namespace filigree {
@@ -11,6 +12,8 @@ void Elasticity::add_block(Index, const Vectors&, Vec3f&, Symmetric3&) const {}
 void Elasticity::finish_substep(const Vectors&, float, const RunContext&) {}
 bool Elasticity::wants_renewal() const { return false; }
 void Elasticity::renew(const Vectors&, const RunContext&) {}
+std::span<const PlasticCell> Elasticity::plastic_cells() const { return {}; }
+void Elasticity::take_over(std::span<const PlasticCell>, std::span<const Index>) {}
 std::string Elasticity::state() const { return {}; }
 bool Elasticity::restore_state(std::string_view bytes) { return bytes.empty(); }
 
@@ -19,6 +22,7 @@ std::unique_ptr<Elasticity> make_elasticity(const Body& body, const RunContext& 
     if (model == MaterialModel::springs) return make_spring_elasticity(body, context);
     if (model == MaterialModel::meshfree) return make_meshfree_elasticity(body, context);
     if (model == MaterialModel::rigid) return make_rigid_elasticity(body);
+    if (body.material.is_plastic()) return make_plastic_elasticity(body, context);
     return make_cell_elasticity(body, context);
 }
 

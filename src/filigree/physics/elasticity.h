@@ -11,6 +11,7 @@
 namespace filigree {
 
 struct Body;
+struct PlasticCell;
 
 /// A symmetric 3x3 matrix.
 struct Symmetric3 {
@@ -97,6 +98,11 @@ public:
     /// finite leave everything as it is. Only for materials that flow.
     virtual void renew(const Vectors& positions, const RunContext& context);
 
+    /// fem that yields: what its cells remember; of other materials empty. A piece takes over that of `cells` of its
+    /// whole.
+    virtual std::span<const PlasticCell> plastic_cells() const;
+    virtual void take_over(std::span<const PlasticCell> of_whole, std::span<const Index> cells);
+
     /// Stored state as bytes, and back; empty for elastic materials. restore_state is false for bytes of another body.
     virtual std::string state() const;
     virtual bool restore_state(std::string_view bytes);
@@ -107,6 +113,7 @@ std::unique_ptr<Elasticity> make_elasticity(const Body& body, const RunContext& 
 
 // One a model, in the file of its name.
 std::unique_ptr<Elasticity> make_cell_elasticity(const Body& body, const RunContext& context);
+std::unique_ptr<Elasticity> make_plastic_elasticity(const Body& body, const RunContext& context);
 std::unique_ptr<Elasticity> make_spring_elasticity(const Body& body, const RunContext& context);
 std::unique_ptr<Elasticity> make_meshfree_elasticity(const Body& body, const RunContext& context);
 

@@ -13,6 +13,8 @@ struct FractureMaterial {
     double strength = 1e6; ///< Pa: the traction at which two pieces let go of each other, above 0
     double scatter = 0;    ///< 0 .. 1: relative standard deviation of the strengths of pairs of pieces (Weibull), about
     double energy = 10;    ///< J/m^2 of crack, above 0
+    /// m, above 0: of matter that yields, how far a layer a cell thick may have opened for good before it lets go
+    double plastic_opening = std::numeric_limits<double>::infinity();
     std::uint64_t seed = 0; ///< of the scatter
 };
 

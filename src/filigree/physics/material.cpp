@@ -33,9 +33,10 @@ std::string check_material(const Material& material) {
     if (!is_not_negative(material.conductivity)) return "The conductivity must be 0 m^2/s or more.";
     if (!is_positive(material.specific_heat)) return "The specific heat must be above 0 J/(kg K).";
     if (!is_not_negative(material.latent_heat)) return "The latent heat must be 0 J/kg or more.";
-    if (material.model != MaterialModel::meshfree && material.model != MaterialModel::mpm &&
-        (material.is_plastic() || material.melts()))
-        return "Only the models meshfree and mpm yield and melt; take one, or leave yield stress and melting out.";
+    const bool flows = material.model == MaterialModel::meshfree || material.model == MaterialModel::mpm;
+    if (material.melts() && !flows) return "Only the models meshfree and mpm melt; take one, or leave melting out.";
+    if (material.is_plastic() && !flows && material.model != MaterialModel::fem)
+        return "Only the models fem, meshfree and mpm yield; take one, or leave the yield stress out.";
     return "";
 }
 

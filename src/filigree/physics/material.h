@@ -21,7 +21,7 @@ struct Material {
     double internal_damping = 0; ///< s: stress a rate of strain adds, as a multiple of stiffness (Kelvin-Voigt)
     double bending = 0.05;       ///< springs: share of an axis spring's stiffness given to bending springs, 0 .. 0.2
 
-    // Plasticity and melting: meshfree and mpm.
+    // Plasticity: fem, meshfree and mpm. Melting: meshfree and mpm.
     static constexpr double kNever = std::numeric_limits<double>::infinity();
     double yield_stress = kNever; ///< Pa, of uniaxial stress (von Mises), above 0
     double creep_time = 0;        ///< s: stress beyond yield relaxes at this rate; 0: at once

@@ -45,7 +45,7 @@ void symmetric_eigen(const Mat3f& matrix, Vec3f& values, Mat3f& vectors) {
     }
 }
 
-bool flow(const Mat3f& elastic, const FlowLaw& law, Mat3f& R) {
+bool flow(const Mat3f& elastic, const FlowLaw& law, Mat3f& R, float* kept_part) {
     const Mat3f C = elastic.transpose() * elastic;
     if (!(C.squaredNorm() < 1e18f)) return false; // not finite, or beyond what floats can square again
 
@@ -53,8 +53,9 @@ bool flow(const Mat3f& elastic, const FlowLaw& law, Mat3f& R) {
     const float mean = C.trace() / 3;
     const float deviation = (C - mean * Mat3f::Identity()).norm();
     const float least = mean - deviation * 0.8165f; // of three numbers with this mean and deviation
-    if (law.relaxation == 0 && least > 0 && deviation < 2 * least * law.yield_strain &&
-        least > kLeastStretch * kLeastStretch)
+    const float yields_at =
+        law.beside > 0 ? std::sqrt(std::max(law.yield_strain * law.yield_strain - law.beside, 0.0f)) : law.yield_strain;
+    if (law.relaxation == 0 && least > 0 && deviation < 2 * least * yields_at && least > kLeastStretch * kLeastStretch)
         return false;
 
     Vec3f values;
@@ -67,10 +68,11 @@ bool flow(const Mat3f& elastic, const FlowLaw& law, Mat3f& R) {
     }
     const float volume = log_new.sum() / 3;
     Vec3f deviator = log_new - Vec3f::Constant(volume);
-    const float size = deviator.norm();
+    const float size = std::sqrt(deviator.squaredNorm() + law.beside);
     float kept = 1 - law.relaxation;
     if (size > law.yield_strain) kept *= 1 - law.yield_rate * (1 - law.yield_strain / size);
     if (kept == 1 && log_new == log_old) return false;
+    if (kept_part) *kept_part = kept;
     deviator *= kept;
     Vec3f ratio;
     for (int a = 0; a < 3; ++a) ratio[a] = std::exp(volume + deviator[a] - log_old[a]);

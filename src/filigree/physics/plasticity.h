@@ -9,6 +9,7 @@ struct FlowLaw {
     float yield_strain; ///< of |dev log s|: sqrt(2/3) yield stress / (2 mu); infinite: no yield
     float yield_rate;   ///< part of the excess that flows off: 1 - exp(-dt / creep time); 1 at once
     float relaxation;   ///< part of all deviatoric strain that flows off, of melts: 1 - exp(-dt mu / viscosity)
+    float beside = 0;   ///< squared strain that the gradient does not show, which yields along with it
 };
 
 /// Eigenvalues (not sorted) and unit eigenvectors (columns) of a symmetric matrix by Jacobi rotations; the same bytes
@@ -17,8 +18,9 @@ void symmetric_eigen(const Mat3f& matrix, Vec3f& values, Mat3f& vectors);
 
 /// The return map [Simo 1992]: with elastic stretches s of `elastic` (singular values) and e = log s, the deviatoric
 /// part of e shrinks as the law says. Returns R so that the elastic gradient becomes elastic * R; R is symmetric, with
-/// determinant 1, but where a stretch lies below kLeastStretch and is set to that. False: nothing flows.
-bool flow(const Mat3f& elastic, const FlowLaw& law, Mat3f& R);
+/// determinant 1, but where a stretch lies below kLeastStretch and is set to that. kept: the part of the deviatoric
+/// strain that stays. False: nothing flows.
+bool flow(const Mat3f& elastic, const FlowLaw& law, Mat3f& R, float* kept = nullptr);
 
 inline constexpr float kLeastStretch = 0.05f;
 

@@ -94,7 +94,9 @@ public:
     std::string reason(std::size_t number, const BodyState& state) const {
         const Body& body = *state.body;
         const MaterialModel model = body.material.model;
-        if (!may_be_rigid_[number] || (model != MaterialModel::fem && model != MaterialModel::springs)) return "";
+        if (!may_be_rigid_[number] || body.material.is_plastic() ||
+            (model != MaterialModel::fem && model != MaterialModel::springs))
+            return "";
         if (const std::size_t cells = body.cells.cells.size(); cells < kFewestElasticCells)
             return "it has only " + std::to_string(cells) + (cells == 1 ? " cell" : " cells");
         const double substeps = substeps_at_rest(state);

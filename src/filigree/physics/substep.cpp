@@ -152,7 +152,7 @@ Breaks break_bodies(SimulationState& state, double before, double now, const Run
 void finish_substep(SimulationState& state, float dt, const RunContext& context) {
     for (std::size_t b = 0; b < state.bodies.size(); ++b) {
         BodyState& body = state.bodies[b];
-        if (body.is_on_grid) continue;
+        if (body.is_on_grid || body.is_absent) continue;
         body.elasticity->finish_substep(body.positions, dt, context);
         if (body.elasticity->wants_renewal()) renew_neighbourhoods(body, state.attachments_of(b), context);
     }

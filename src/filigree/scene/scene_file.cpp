@@ -236,9 +236,12 @@ private:
         const bool is_mpm = model == MaterialModel::mpm;
         if (model != MaterialModel::meshfree && !is_mpm)
             for (const char* key :
-                 {"yield_stress", "temperature", "melting_from", "melting_to", "viscosity", "heating", "conductivity"})
+                 {"temperature", "melting_from", "melting_to", "viscosity", "heating", "conductivity"})
                 refuse(key, "\"meshfree\" or \"mpm\"");
-        if (model != MaterialModel::meshfree) refuse("creep_time", "\"meshfree\"");
+        if (model == MaterialModel::springs || model == MaterialModel::rigid)
+            refuse("yield_stress", "\"fem\", \"meshfree\" or \"mpm\"");
+        if (model != MaterialModel::meshfree && model != MaterialModel::fem)
+            refuse("creep_time", "\"fem\" or \"meshfree\"");
         if (!is_mpm)
             for (const char* key : {"specific_heat", "latent_heat"}) refuse(key, "\"mpm\"");
         if (is_mpm) refuse("internal_damping", "\"fem\", \"springs\" or \"meshfree\"");
@@ -263,9 +266,10 @@ private:
         material = named_materials()[std::size_t(found - names.begin())].material;
         material.model = static_cast<MaterialModel>(in.word("model", static_cast<int>(material.model)));
         refuse_other_models(in, material.model);
-        if (material.model != MaterialModel::meshfree &&
-            material.model != MaterialModel::mpm) // a flowing material as another model does not flow
-            material.yield_stress = material.melting_from = material.melting_to = Material::kNever;
+        const MaterialModel model = material.model; // as another, a material that yields or melts does not
+        if (model != MaterialModel::meshfree && model != MaterialModel::mpm)
+            material.melting_from = material.melting_to = Material::kNever;
+        if (model == MaterialModel::springs || model == MaterialModel::rigid) material.yield_stress = Material::kNever;
         in.set("density", material.density);
         in.set("young_modulus", material.young_modulus);
         in.set("poisson_ratio", material.poisson_ratio);
@@ -365,7 +369,9 @@ private:
         fracture.body = body_of(in);
         const Material& material = scene_.bodies[fracture.body].material;
         if (material.model != MaterialModel::fem)
-            in.fail(in.line(), "only bodies of model = \"fem\" break; this one's is another");
+            in.fail(
+                in.line(),
+                "only bodies of model = \"fem\" break; this one's is another (with fem, clay dents and tears as well)");
         for (const SceneFracture& other : scene_.fractures)
             if (other.body == fracture.body) in.fail(in.line(), "a body has one [[fracture]] at most");
         in.set_whole("pieces", fracture.pattern.pieces);
@@ -380,8 +386,13 @@ private:
         in.set("roughness", fracture.pattern.roughness);
         fracture.material.seed = 1;
         in.set_whole("seed", fracture.material.seed);
-        fracture.material.strength = 0.01 * material.young_modulus;
+        fracture.material.strength = material.is_plastic() ? 3 * material.yield_stress : 0.01 * material.young_modulus;
         in.set("strength", fracture.material.strength);
+        if (in.has("plastic_opening")) {
+            if (!material.is_plastic())
+                in.fail("plastic_opening", "'plastic_opening' in [[fracture]] is for a body with a yield_stress");
+            in.set("plastic_opening", fracture.material.plastic_opening);
+        }
         in.set("scatter", fracture.material.scatter);
         if (in.has("energy")) in.set("energy", fracture.energy.emplace());
         fracture.keep_closed = in.flag("keep_closed", false);
