@@ -18,7 +18,7 @@ struct FractureArguments {
     std::vector<double> at, grain;
     FractureOptions cut;
     double explode = 0;
-    std::size_t seed = 1, pieces = 20;
+    std::size_t seed = 1, pieces = 20, clump = 1;
     std::optional<double> edge;
 };
 
@@ -108,6 +108,7 @@ void run(FractureArguments options, Session& session) {
     if (!is_folder(options.output)) require(mesh_format(options.output));
     const Mesh mesh = session.read_mesh(options.input);
     options.pattern.pieces = static_cast<Index>(std::min<std::size_t>(options.pieces, kNoIndex));
+    options.pattern.clump = static_cast<Index>(options.clump);
     for (std::size_t k = 0; k + 2 < options.at.size(); k += 3)
         options.pattern.at.emplace_back(Vec3d(options.at[k], options.at[k + 1], options.at[k + 2]) - mesh.origin);
     if (!options.grain.empty()) options.pattern.grain = Vec3d(options.grain[0], options.grain[1], options.grain[2]);
@@ -156,9 +157,14 @@ Command fracture_command() {
                         {{"even", FracturePatternKind::even},
                          {"impact", FracturePatternKind::impact},
                          {"slabs", FracturePatternKind::slabs},
-                         {"radial", FracturePatternKind::radial}},
+                         {"radial", FracturePatternKind::radial},
+                         {"grains", FracturePatternKind::grains}},
                         "even (unset): pieces of about one size; impact: small ones around --at; slabs: long "
-                        "ones, as of wood; radial: rays and rings around --at, as of glass"),
+                        "ones, as of wood; radial: rays and rings around --at, as of glass; grains: small here and "
+                        "large there, as of stone"),
+                    Option("--clump", options->clump, "Cells that a piece is made of; with more, pieces are knobbly")
+                        .between(1, static_cast<int>(FracturePattern::kMostClump))
+                        .with_default(),
                     Option("--at", options->at, "A point that was hit, again for each further one (impact, radial)")
                         .values(3, 3)
                         .comma_separated()

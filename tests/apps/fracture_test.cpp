@@ -42,6 +42,18 @@ TEST_F(FractureCommand, ReportIsWhatInfoMeasures) {
     EXPECT_EQ(report.at("warnings"), Json::array());
 }
 
+TEST_F(FractureCommand, ClumpsAndGrains) {
+    make_cube();
+    const Json clumps = json({"fracture", "cube.obj", "-o", "broken.ply", "--pieces", "6", "--clump", "5"});
+    EXPECT_EQ(clumps.at("pieces"), 6);
+    EXPECT_EQ(clumps.at("open_edges"), 0);
+    EXPECT_LT(clumps.at("volume_error"), 1e-9);
+    const Json grains = json({"fracture", "cube.obj", "-o", "broken.ply", "--pieces", "40", "--pattern", "grains"});
+    const Json even = json({"fracture", "cube.obj", "-o", "broken.ply", "--pieces", "40"});
+    EXPECT_GT(grains.at("largest"), 1.3 * even.at("largest").get<double>());
+    fails(2, {"fracture", "cube.obj", "-o", "x.ply", "--clump", "0"}, {"--clump"});
+}
+
 TEST_F(FractureCommand, PiecesAreNamedInEveryFormat) {
     make_cube();
     for (const char* file : {"broken.obj", "broken.glb", "broken.ply", "broken.stl"})

@@ -112,6 +112,18 @@ std::vector<Vec3d> lattice_seeds(const Box& box, int side) {
     return seeds;
 }
 
+/// Cells made pieces together by chance, whether they touch or not.
+std::vector<Index> random_clumps(std::size_t cells, std::uint64_t seed) {
+    std::vector<Index> piece(cells), number(cells, kNoIndex);
+    Index pieces = 0;
+    for (std::size_t c = 0; c < cells; ++c) {
+        Index& of = number[random_bits(seed, c) % (1 + cells / 3)];
+        if (of == kNoIndex) of = pieces++;
+        piece[c] = of;
+    }
+    return piece;
+}
+
 /// Random closed meshes and seeds, among them lattices of seeds over boxes, where cracks run through vertices, along
 /// edges and in faces.
 void break_random_cases(std::uint64_t first, std::uint64_t count) {
@@ -161,6 +173,14 @@ void break_random_cases(std::uint64_t first, std::uint64_t count) {
         const FracturedMesh f = broken(mesh, seeds, pick(4, 3) == 0 ? 0.8 : 0, {.edge = pick(5, 2) ? 0.7 : 0.0}, 0.8);
         expect_sound(mesh, f);
         EXPECT_EQ(f.report.fan_facets, 0u);
+        if (pick(6, 4) == 0) {
+            const RunContext context(1);
+            FractureCells cells = FractureCells::create(seeds, {}, {.box = box}, context).value();
+            ASSERT_TRUE(cells.merge(random_clumps(seeds.size(), seed)).ok());
+            const FracturedMesh clumps = fracture(mesh, cells, {}, context).value();
+            expect_sound(mesh, clumps);
+            EXPECT_LE(clumps.pieces - clumps.report.islands, cells.pieces());
+        }
         if (::testing::Test::HasFailure()) return;
     }
 }
@@ -346,6 +366,92 @@ TEST(FracturePattern, EvenPiecesAreOfOneSize) {
     }
 }
 
+/// Volumes of pieces, ascending.
+std::vector<double> volumes_of(const FracturedMesh& f) {
+    std::vector<double> volumes;
+    for (Index piece = 0; piece < f.pieces; ++piece)
+        volumes.push_back(analyse_topology(piece_mesh(f, piece), RunContext(1)).volume);
+    std::sort(volumes.begin(), volumes.end());
+    return volumes;
+}
+
+TEST(FracturePattern, GrainsAreSmallHereAndLargeThere) {
+    const Mesh cube = box_mesh(Vec3d(-1, -1, -1), Vec3d(1, 1, 1));
+    const RunContext context(1);
+    const auto broken = [&](FracturePatternKind kind) {
+        return fracture(cube, make_fracture_cells(cube, {.kind = kind, .pieces = 100}, context).value(), {}, context)
+            .value();
+    };
+    const FracturedMesh grains = broken(FracturePatternKind::grains), even = broken(FracturePatternKind::even);
+    expect_sound(cube, grains);
+    EXPECT_EQ(grains.pieces, 100u);
+    const auto spread = [](const FracturedMesh& f) { // of the tenth largest and the tenth smallest
+        const std::vector<double> v = volumes_of(f);
+        return v[90] / v[9];
+    };
+    EXPECT_GT(spread(grains), 2.5 * spread(even));
+    EXPECT_LT(spread(grains), 60); // e^4
+    // Small ones have small neighbours: of a piece's two nearest, sizes go together.
+    std::vector<std::pair<Vec3d, double>> pieces;
+    for (Index piece = 0; piece < grains.pieces; ++piece) {
+        const Mesh mesh = piece_mesh(grains, piece);
+        pieces.emplace_back(bounds(mesh.positions).centre(), std::log(analyse_topology(mesh, context).volume));
+    }
+    double mean = 0, together = 0, apart = 0;
+    for (const auto& [centre, size] : pieces) mean += size / double(pieces.size());
+    for (const auto& [centre, size] : pieces) {
+        const auto* nearest = &pieces[0];
+        for (const auto& other : pieces)
+            if (other.first != centre &&
+                ((other.first - centre).norm() < (nearest->first - centre).norm() || nearest->first == centre))
+                nearest = &other;
+        together += (size - mean) * (nearest->second - mean);
+        apart += (size - mean) * (size - mean);
+    }
+    EXPECT_GT(together, 0.2 * apart);
+}
+
+TEST(FracturePattern, ClumpsAreCellsThatTouch) {
+    const RunContext context(1);
+    for (const double roughness : {0.0, 0.5})
+        for (const FracturePatternKind kind : {FracturePatternKind::even, FracturePatternKind::grains,
+                                               FracturePatternKind::slabs, FracturePatternKind::impact}) {
+            const Mesh cube = box_mesh(Vec3d(-1, -1, -1), Vec3d(1, 1, 1));
+            const FracturePattern pattern{.kind = kind, .pieces = 12, .clump = 5, .roughness = roughness};
+            const FractureCells cells = make_fracture_cells(cube, pattern, context).value();
+            EXPECT_EQ(cells.pieces(), 12u);
+            EXPECT_EQ(cells.count(), 60u);
+            std::vector<Index> cells_of(12, 0);
+            for (Index c = 0; c < cells.count(); ++c) ++cells_of[cells.piece_of(c)];
+            EXPECT_GE(*std::min_element(cells_of.begin(), cells_of.end()), 2u);
+            EXPECT_LE(*std::max_element(cells_of.begin(), cells_of.end()), 15u);
+            const FractureOptions all{.smallest = 0}; // where it was hit clumps are small
+            const FracturedMesh f = fracture(cube, cells, all, context).value();
+            EXPECT_EQ(f.pieces, 12u);
+            EXPECT_EQ(f.report.islands, 0u);
+            expect_sound(cube, f);
+            for (const auto& [i, j] : f.cells_of_crack) EXPECT_NE(cells.piece_of(i), cells.piece_of(j));
+            const FracturedMesh again =
+                fracture(cube, make_fracture_cells(cube, pattern, RunContext(2)).value(), all, RunContext(2)).value();
+            EXPECT_EQ(again.mesh.positions, f.mesh.positions);
+            EXPECT_EQ(again.mesh.corners, f.mesh.corners);
+        }
+}
+
+TEST(FracturePattern, ClumpsDoNotReachAcrossGaps) {
+    Mesh mesh = box_mesh(Vec3d(-1, -1, -1), Vec3d(-0.05, 1, 1));
+    append(mesh, box_mesh(Vec3d(0.05, -1, -1), Vec3d(1, 1, 1)), false);
+    const RunContext context(1);
+    const FractureCells cells = make_fracture_cells(mesh, {.pieces = 6, .clump = 8}, context).value();
+    const FracturedMesh f = fracture(mesh, cells, {}, context).value();
+    EXPECT_EQ(f.pieces, 6u + f.report.islands);
+    expect_sound(mesh, f);
+    for (Index piece = 0; piece < f.pieces; ++piece) {
+        const Box box = bounds(piece_mesh(f, piece).positions);
+        EXPECT_TRUE(box.max.x() < 0 || box.min.x() > 0) << piece;
+    }
+}
+
 TEST(FracturePattern, ImpactBreaksSmallWhereItHit) {
     const Mesh cube = box_mesh(Vec3d(-1, -1, -1), Vec3d(1, 1, 1));
     const RunContext context(1);
@@ -402,6 +508,9 @@ TEST(FracturePattern, RefusesWhatMakesNoSense) {
         return make_fracture_cells(cube, pattern, context).error().code;
     };
     EXPECT_EQ(code({.pieces = 0}), ErrorCode::usage);
+    EXPECT_EQ(code({.clump = 0}), ErrorCode::usage);
+    EXPECT_EQ(code({.clump = 101}), ErrorCode::usage);
+    EXPECT_EQ(code({.pieces = 50'000, .clump = 3}), ErrorCode::usage);
     EXPECT_EQ(code({.roughness = 1.5}), ErrorCode::usage);
     EXPECT_EQ(code({.at = {Vec3d(NAN, 0, 0)}}), ErrorCode::usage);
     EXPECT_EQ(code({.kind = FracturePatternKind::slabs, .grain = Vec3d::Zero()}), ErrorCode::usage);

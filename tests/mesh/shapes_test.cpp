@@ -135,6 +135,16 @@ TEST(WavyPlane, IsOpenAndHasUvs) {
               32);
 }
 
+TEST(WavyPlate, IsClosedAndEvenlyThick) {
+    const Mesh mesh =
+        make_wavy_plate({.resolution = 16, .frequency = 2, .amplitude = 0.05, .size = 2, .thickness = 0.125});
+    EXPECT_EQ(mesh.face_count(), 2u * 16 * 16 + 4 * 16 * 2);
+    const auto edges = directed_edges(mesh);
+    for (const auto& [edge, count] : edges) EXPECT_TRUE(edges.contains({edge.second, edge.first}));
+    EXPECT_NEAR(volume(mesh), 2 * 2 * 0.25, 1e-6); // waves of both sides are alike
+    EXPECT_EQ(bounds(mesh.positions).max, Vec3d(1, 1, double(0.125f + 0.1f)));
+}
+
 TEST(Bar, HasItsSize) {
     const Mesh mesh = make_bar({.resolution = 4, .size = 2, .length = 3});
     EXPECT_EQ(bounds(mesh.positions).max, Vec3d(3, 1, 1));

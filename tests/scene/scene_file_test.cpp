@@ -84,6 +84,15 @@ TEST_F(SceneFileTest, ReadsWhatBreaks) {
     EXPECT_TRUE(twice.fractures[0].keep_closed);
     EXPECT_NE(refusal(kDrop + "[[fracture]]\npattern = \"radial\"\nat = [[1, 2, 3], [0, 0, 1]]\n").find("at one point"),
               std::string::npos);
+    const std::string clay =
+        "[[body]]\nshape = \"bar\"\nmaterial = \"clay\"\nmodel = \"fem\"\nyield_stress = 5e3\n[[fracture]]\n";
+    const SceneFile tears =
+        this->scene(clay + "pattern = \"grains\"\nclump = 4\npieces = 10\nplastic_opening = 0.02\n");
+    EXPECT_EQ(tears.fractures[0].pattern.kind, FracturePatternKind::grains);
+    EXPECT_EQ(tears.fractures[0].pattern.clump, 4U);
+    EXPECT_EQ(tears.fractures[0].material.plastic_opening, 0.02);
+    EXPECT_EQ(tears.fractures[0].material.strength, 15e3);
+    EXPECT_NE(refusal(kDrop + "[[fracture]]\nplastic_opening = 0.02\n").find("yield_stress"), std::string::npos);
     ASSERT_EQ(scene.cracks.size(), 1U);
     EXPECT_EQ(scene.cracks[0].pieces, std::vector<Index>{2});
     EXPECT_NE(refusal("[[body]]\nshape = \"bar\"\nmaterial = \"clay\"\n[[fracture]]\n").find("only bodies"),

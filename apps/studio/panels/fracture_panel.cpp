@@ -36,11 +36,15 @@ void FracturePanel::add_pieces(const Actions& actions) {
     choice(rows,
            options.setting("fracture.pattern", "Pattern",
                            "Pieces of about one size; small ones around a corner that was hit; long ones, as of wood; "
-                           "rays and rings, as of glass",
+                           "rays and rings, as of glass; small here and large there, as of stone",
                            pattern_field(&FracturePattern::kind)),
-           {"Even", "Impact", "Slabs", "Radial"});
+           {"Even", "Impact", "Slabs", "Radial", "Grains"});
     number(rows, options.setting("fracture.pieces", "Pieces", "About so many", pattern_field(&FracturePattern::pieces)),
            {.least = 2, .most = kMostPieces, .decimals = 0, .logarithmic = true, .neutral = 20});
+    number(rows,
+           options.setting("fracture.clump", "Clump", "Cells that a piece is made of; with more, pieces are knobbly",
+                           pattern_field(&FracturePattern::clump)),
+           {.least = 1, .most = 20, .step = 1, .decimals = 0, .neutral = double(usual.pattern.clump)});
     number(rows,
            options.setting("fracture.roughness", "Roughness", "Of the cracks: 0 is planes",
                            pattern_field(&FracturePattern::roughness)),

@@ -102,7 +102,7 @@ void ModelPanel::add_shape() {
     const IsFor any = [](std::string_view) { return true; };
     const IsFor wavy = [](std::string_view name) { return name.starts_with("wavy") || name == "torus"; };
     const IsFor is_long = [](std::string_view name) { return name == "bar" || name == "cylinder"; };
-    const IsFor torus = [](std::string_view name) { return name == "torus"; };
+    const IsFor has_thickness = [](std::string_view name) { return name == "torus" || name == "wavy-plate"; };
     using Options = ShapeOptions;
     add("model.resolution", "Resolution", "Quads along a side", field(&Options::resolution),
         {.least = 3, .most = 512, .decimals = 0, .logarithmic = true, .neutral = 64}, any);
@@ -113,8 +113,9 @@ void ModelPanel::add_shape() {
         {.least = 0, .most = 20, .step = 0.1, .decimals = 1, .unit = "%", .neutral = 4}, wavy);
     add("model.length", "Length", "As a multiple of the side or diameter", field(&Options::length),
         {.least = 1, .most = 12, .step = 0.1, .decimals = 1, .unit = "×", .neutral = 4}, is_long);
-    add("model.thickness", "Thickness", "Of the tube, per cent of the ring's radius", field(&Options::thickness, 100),
-        {.least = 5, .most = 90, .step = 1, .decimals = 0, .unit = "%", .neutral = 30}, torus);
+    add("model.thickness", "Thickness", "Of the tube, per cent of the ring's radius; of a plate, of its side",
+        field(&Options::thickness, 100), {.least = 1, .most = 90, .step = 1, .decimals = 0, .unit = "%", .neutral = 30},
+        has_thickness);
     add("model.size", "Size", "Side or diameter, model units", field(&Options::size),
         {.least = 0.01, .most = 100, .decimals = 2, .unit = "units", .logarithmic = true, .neutral = 1}, any);
 }

@@ -601,6 +601,7 @@ def fracture(
     at: ArrayLike | None = None,
     grain: ArrayLike | None = None,
     stretch: float = 6.0,
+    clump: int = 1,
     roughness: float = 0.5,
     edge: float | None = None,
     smallest: float = 0.01,

@@ -32,20 +32,23 @@ py::dict said_of(const FracturedMesh& fractured) {
 using FracturedPtr = std::shared_ptr<const FracturedMesh>;
 
 FracturedPtr fracture_mesh(const py::object& given, std::size_t pieces, const std::string& kind, const py::object& at,
-                           const py::object& grain, double stretch, double roughness, std::optional<double> edge,
-                           double smallest, std::uint64_t seed, unsigned threads, const py::object& progress) {
+                           const py::object& grain, double stretch, std::size_t clump, double roughness,
+                           std::optional<double> edge, double smallest, std::uint64_t seed, unsigned threads,
+                           const py::object& progress) {
     const MeshPtr mesh = mesh_of(given);
     FracturePattern pattern;
     pattern.kind = value_of<FracturePatternKind>(kind, "pattern",
                                                  {{"even", FracturePatternKind::even},
                                                   {"impact", FracturePatternKind::impact},
                                                   {"slabs", FracturePatternKind::slabs},
-                                                  {"radial", FracturePatternKind::radial}});
+                                                  {"radial", FracturePatternKind::radial},
+                                                  {"grains", FracturePatternKind::grains}});
     pattern.pieces = static_cast<Index>(std::min<std::size_t>(pieces, kNoIndex));
     if (!at.is_none())
         for (const Vec3d& point : double_points_of(at, "at")) pattern.at.push_back(point - mesh->origin);
     pattern.grain = optional_vector_of(grain, "grain");
     pattern.stretch = stretch;
+    pattern.clump = static_cast<Index>(std::min<std::size_t>(clump, kNoIndex));
     pattern.roughness = roughness;
     if (edge && !(*edge >= 0)) refuse("edge has to be 0 or more.");
     if (!(smallest >= 0 && smallest <= 1)) refuse("smallest has to be from 0 to 1.");
@@ -116,16 +119,16 @@ All pieces in one mesh, each moved by `distance` times the way from the mesh's m
     m.def(
         "fracture",
         [](const py::object& mesh, std::size_t pieces, const std::string& pattern, const py::object& at,
-           const py::object& grain, double stretch, double roughness, std::optional<double> edge, double smallest,
-           std::uint64_t seed, unsigned threads, const py::object& progress) {
+           const py::object& grain, double stretch, std::size_t clump, double roughness, std::optional<double> edge,
+           double smallest, std::uint64_t seed, unsigned threads, const py::object& progress) {
             return std::const_pointer_cast<FracturedMesh>(fracture_mesh(
-                mesh, pieces, pattern, at, grain, stretch, roughness, edge, smallest, seed, threads, progress));
+                mesh, pieces, pattern, at, grain, stretch, clump, roughness, edge, smallest, seed, threads, progress));
         },
         py::arg("mesh"), py::arg("pieces") = 20, py::kw_only(), py::arg("pattern") = "even", py::arg("at") = py::none(),
-        py::arg("grain") = py::none(), py::arg("stretch") = 6.0, py::arg("roughness") = 0.5,
+        py::arg("grain") = py::none(), py::arg("stretch") = 6.0, py::arg("clump") = 1, py::arg("roughness") = 0.5,
         py::arg("edge") = py::none(), py::arg("smallest") = 0.01, py::arg("seed") = 1, py::arg("threads") = 0,
         py::arg("progress") = py::none(),
-        R"(fracture(mesh, pieces=20, *, pattern='even', at=None, grain=None, stretch=6.0, roughness=0.5, edge=None, smallest=0.01, seed=1, threads=0, progress=None)
+        R"(fracture(mesh, pieces=20, *, pattern='even', at=None, grain=None, stretch=6.0, clump=1, roughness=0.5, edge=None, smallest=0.01, seed=1, threads=0, progress=None)
 --
 
 Break a mesh into pieces.
@@ -137,13 +140,15 @@ pieces : int
     How many, 1 to 100,000.
 pattern : str
     'even', pieces of about one size; 'impact', small ones around `at`; 'slabs', long ones, as of wood; 'radial', rays and
-    rings around `at`, as of glass.
+    rings around `at`, as of glass; 'grains', small here and large there, as of stone.
 at : array_like, (k, 3), optional
     Points that were hit, world coordinates.
 grain : array_like, (3,), optional
     Slabs: along which pieces are longer; None: the longest axis.
 stretch : float
     Slabs: how many times longer, 1 to 100.
+clump : int
+    Cells that a piece is made of, 1 to 100; with more, pieces are knobbly and have hollows.
 roughness : float
     Of cracks, 0 (planes) to 1.
 edge : float, optional

@@ -391,7 +391,7 @@ A built-in shape.
 Parameters
 ----------
 shape : str
-    'wavy-cube', 'wavy-sphere', 'wavy-plane', 'bar', 'cylinder' or 'torus'.
+    'wavy-cube', 'wavy-sphere', 'wavy-plane', 'wavy-plate', 'bar', 'cylinder' or 'torus'.
 resolution : int
     Quads along a side, 1 to 8192.
 frequency, amplitude : float
@@ -401,7 +401,7 @@ size : float
 length : float
     Bar and cylinder: in sides or diameters.
 thickness : float
-    Torus: radius of the tube in radii of the ring.
+    Torus: radius of the tube in radii of the ring. Wavy plate: in sides.
 
 Raises
 ------

@@ -124,7 +124,7 @@ private:
     Index piece_of(Index vertex) const {
         const Index piece = fractured_.piece_of_vertex[vertex];
         if (piece != kNoIndex) return piece;
-        return cells_.cell_at(model_.mesh.positions[vertex].cast<double>()); // a loose vertex of the mesh
+        return cells_.piece_at(model_.mesh.positions[vertex].cast<double>()); // a loose vertex of the mesh
     }
 
     /// The unbroken driver's cell, of a piece's copies.
@@ -169,7 +169,9 @@ private:
         std::unordered_map<Index, std::vector<Index>> copies_at;                             // of a place inside
         for (std::size_t f = 0; f < fractured_.mesh.face_count(); ++f) {
             const Index crack = fractured_.crack_of_face[f];
-            if (crack == kNoIndex || fractured_.piece_of_face[f] != fractured_.cells_of_crack[crack][0]) continue;
+            if (crack == kNoIndex ||
+                fractured_.piece_of_face[f] != cells_.piece_of(fractured_.cells_of_crack[crack][0]))
+                continue;
             for (const Index v : fractured_.mesh.face(f)) vertices_of_crack[crack].push_back(v);
         }
         for (Index v = 0; v < fractured_.mesh.vertex_count(); ++v)
@@ -361,7 +363,7 @@ Result<BrokenModel> break_model(const Model& model, const FracturedMesh& fractur
 
 std::vector<std::uint8_t> open_cracks(const Model& broken, std::span<const Index> piece_of_driver,
                                       std::span<const std::uint8_t> driver_is_on_crack,
-                                      std::span<const std::array<Index, 2>> cells_of_crack,
+                                      std::span<const std::array<Index, 2>> pieces_of_crack,
                                       std::span<const Pose> frames, double apart) {
     const std::vector<Vec3f> rest = driver_positions(broken);
     std::map<std::array<float, 3>, std::vector<Index>> copies; // at one place
@@ -374,8 +376,8 @@ std::vector<std::uint8_t> open_cracks(const Model& broken, std::span<const Index
                 if (piece_of_driver[a] < piece_of_driver[b])
                     pairs[{piece_of_driver[a], piece_of_driver[b]}].push_back({a, b});
     std::vector<std::uint8_t> is_open;
-    for (const std::array<Index, 2>& cells : cells_of_crack) {
-        const auto found = pairs.find(cells);
+    for (const std::array<Index, 2>& pieces : pieces_of_crack) {
+        const auto found = pairs.find(pieces);
         const bool opened =
             found == pairs.end() || std::any_of(frames.begin(), frames.end(), [&](const Pose& pose) {
                 return std::any_of(found->second.begin(), found->second.end(), [&](const std::array<Index, 2>& pair) {

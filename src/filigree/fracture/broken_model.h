@@ -24,12 +24,12 @@ struct BrokenModel {
 Result<BrokenModel> break_model(const Model& model, const FracturedMesh& fractured, const FractureCells& cells,
                                 double crack_spacing, const RunContext& context);
 
-/// One 0 or 1 for each of FracturedMesh::cells_of_crack: whether the driver's points on it were ever further apart on
-/// its two sides than `apart`, in the poses' unit. A crack without such points counts as open. piece_of_driver,
-/// driver_is_on_crack: as in BrokenModel. Cost O(cracks + frames x driver).
+/// One 0 or 1 for each of FracturedMesh::cells_of_crack, by the pieces of its cells, ascending: whether the driver's
+/// points on it were ever further apart on its two sides than `apart`, in the poses' unit. A crack without such points
+/// counts as open. piece_of_driver, driver_is_on_crack: as in BrokenModel. Cost O(cracks + frames x driver).
 std::vector<std::uint8_t> open_cracks(const Model& broken, std::span<const Index> piece_of_driver,
                                       std::span<const std::uint8_t> driver_is_on_crack,
-                                      std::span<const std::array<Index, 2>> cells_of_crack,
+                                      std::span<const std::array<Index, 2>> pieces_of_crack,
                                       std::span<const Pose> frames, double apart);
 
 /// Takes away the faces of cracks that never opened. crack_of_face, is_open: of FracturedMesh and open_cracks. Vertices

@@ -157,13 +157,14 @@ private:
 
 } // namespace
 
-std::vector<CellTriangle> cell_triangles(const CutSurface& cut, const CrackSurfaces& facets) {
+std::vector<CellTriangle> cell_triangles(const CutSurface& cut, const CrackSurfaces& facets,
+                                         const FractureCells& cells) {
     std::vector<CellTriangle> all;
     all.reserve(cut.triangles.size() + 2 * facets.triangles.size() + 2 * cut.polygons.size());
     std::size_t polygon = 0;
     for (Index k = 0; k < cut.triangles.size(); ++k) {
         if (cut.cell_of_triangle[k] != kNoIndex) {
-            all.push_back({cut.triangles[k].vertices, cut.cell_of_triangle[k], kNoIndex, k, kNoIndex});
+            all.push_back({cut.triangles[k].vertices, cells.piece_of(cut.cell_of_triangle[k]), kNoIndex, k, kNoIndex});
             continue;
         }
         for (; polygon < cut.polygons.size() && cut.polygons[polygon].triangle == k; ++polygon) {
@@ -171,15 +172,15 @@ std::vector<CellTriangle> cell_triangles(const CutSurface& cut, const CrackSurfa
             const std::span<const Index> v(cut.polygon_vertices.data() + p.first, p.count);
             for (std::size_t c = 2; c < v.size(); ++c)
                 if (v[0] != v[c - 1] && v[c - 1] != v[c] && v[c] != v[0])
-                    all.push_back({{v[0], v[c - 1], v[c]}, p.cell, kNoIndex, k, kNoIndex});
+                    all.push_back({{v[0], v[c - 1], v[c]}, cells.piece_of(p.cell), kNoIndex, k, kNoIndex});
         }
     }
     for (Index f = 0; f < facets.facets.size(); ++f) {
         const CrackSurface& facet = facets.facets[f];
         for (Index k = 0; k < facet.count; ++k) {
             const Triangle& t = facets.triangles[facet.first + k];
-            all.push_back({t, facet.i, kNoIndex, kNoIndex, f});
-            all.push_back({{t[0], t[2], t[1]}, facet.j, kNoIndex, kNoIndex, f});
+            all.push_back({t, cells.piece_of(facet.i), kNoIndex, kNoIndex, f});
+            all.push_back({{t[0], t[2], t[1]}, cells.piece_of(facet.j), kNoIndex, kNoIndex, f});
         }
     }
     return all;

@@ -9,15 +9,16 @@ namespace filigree {
 
 /// A triangle of one cell's closed surface.
 struct CellTriangle {
-    Triangle vertices; ///< of CutSurface::vertices
-    Index cell;
+    Triangle vertices;                        ///< of CutSurface::vertices
+    Index cell;                               ///< FractureCells::piece_of: cells that are one piece count as one
     Index part = kNoIndex;                    ///< what hangs together in a cell
     Index uncut = kNoIndex, facet = kNoIndex; ///< one of CutSurface::triangles, or a facet
 };
 
 /// Everything that is in cells, the mesh's triangles first, then those on cracks: the two sides of each follow each
 /// other.
-std::vector<CellTriangle> cell_triangles(const CutSurface& cut, const CrackSurfaces& facets);
+std::vector<CellTriangle> cell_triangles(const CutSurface& cut, const CrackSurfaces& facets,
+                                         const FractureCells& cells);
 
 /// Which piece each part belongs to, and how it came to that.
 struct PartPieces {

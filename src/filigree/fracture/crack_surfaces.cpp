@@ -317,7 +317,7 @@ Result<CrackSurfaces> crack_surfaces(CutSurface& cut, const FractureCells& cells
             for (; segment != cut.segments.end() && segment->i == i && segment->j == face->neighbour; ++segment)
                 outline.push_back({segment->to, segment->from, 1});
             for (std::size_t k = 0; k < face->corners.size(); ++k) lines.append(i, *face, k, outline);
-            if (outline.empty()) continue;
+            if (outline.empty() || cells.piece_of(i) == cells.piece_of(face->neighbour)) continue;
             result.facets.push_back({i, face->neighbour, 0, 0, false});
             outlines.push_back(std::move(outline));
         }

@@ -23,10 +23,10 @@ struct FacetFrame {
 };
 FacetFrame facet_frame(const FractureCells& cells, Index i, Index j);
 
-/// All facets, with their vertices added to `cut`. Together with the cut surface they close every cell: all edges
-/// cancel. edge: the longest edges wanted inside facets, model units; 0: as few triangles as there can be. Where cracks
-/// are rough, points inside follow them, and finer bumps rise towards the middle. Cost: about 2 us a triangle, 4 where
-/// rough. Errors: cancelled.
+/// All facets between pieces, with their vertices added to `cut`. Together with the cut surface they close every piece:
+/// all edges cancel. edge: the longest edges wanted inside facets, model units; 0: as few triangles as there can be.
+/// Where cracks are rough, points inside follow them, and finer bumps rise towards the middle. Cost: about 2 us a
+/// triangle, 4 where rough. Errors: cancelled.
 Result<CrackSurfaces> crack_surfaces(CutSurface& cut, const FractureCells& cells, double edge,
                                      const RunContext& context);
 

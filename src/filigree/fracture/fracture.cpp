@@ -80,7 +80,7 @@ Result<FracturedMesh> fracture(const Mesh& mesh, const FractureCells& cells, con
     for (const CrackSurface& facet : facets->facets) report.fan_facets += facet.is_fan;
     context.report("putting pieces together", 0.8);
 
-    std::vector<CellTriangle> triangles = cell_triangles(*cut, *facets);
+    std::vector<CellTriangle> triangles = cell_triangles(*cut, *facets, cells);
     if (report.is_sheet) // what closed it is no matter: a cell that holds nothing else is no piece
         std::erase_if(triangles, [&](const CellTriangle& t) { return cut->triangles[t.uncut].source == kNoIndex; });
     const std::optional<double> smallest =

@@ -13,7 +13,8 @@ struct FractureOptions {
     std::optional<double> edge = {};
     /// Parts below this share of the mean volume become one with the neighbour that they share most with.
     double smallest = 0.01;
-    /// Each cell that holds matter is one piece and the piece has its number; islands and small parts stay with it.
+    /// Each cell that holds matter is one piece and the piece has FractureCells::piece_of's number; islands and small
+    /// parts stay with it.
     bool pieces_are_cells = false;
 };
 

@@ -1,5 +1,6 @@
 #include "filigree/fracture/fracture_cells.h"
 
+#include <algorithm>
 #include <cmath>
 #include <unordered_set>
 
@@ -70,6 +71,23 @@ Result<FractureCells> FractureCells::create(std::span<const Vec3d> seeds, std::s
         if (cells.first_ == kNoIndex && !cells.cells_[k].empty()) cells.first_ = k;
     }
     return cells;
+}
+
+Status FractureCells::merge(std::vector<Index> piece_of_cell) {
+    if (piece_of_cell.size() != count())
+        return Error{ErrorCode::usage, "Cells become pieces by one number for each of them."};
+    std::vector<bool> is_taken(count(), false);
+    Index pieces = 0;
+    for (const Index piece : piece_of_cell) {
+        if (piece >= count()) return Error{ErrorCode::usage, "There are no more pieces than cells."};
+        is_taken[piece] = true;
+        pieces = std::max(pieces, piece + 1);
+    }
+    if (std::find(is_taken.begin(), is_taken.begin() + pieces, false) != is_taken.begin() + pieces)
+        return Error{ErrorCode::usage, "Every piece has a cell."};
+    pieces_ = std::move(piece_of_cell);
+    piece_count_ = pieces;
+    return Success{};
 }
 
 Index FractureCells::cell_at(const GridPoint& point, Index near) const {

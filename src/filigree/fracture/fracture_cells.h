@@ -26,6 +26,15 @@ public:
     Index cell_at(const GridPoint& point, Index near = kNoIndex) const;
     GridPoint on_grid(const Vec3d& point) const;
 
+    /// Makes cells pieces together: the number of each cell's piece, every number from 0 on taken by a cell or more.
+    /// Until then each cell is a piece, with its own number. There are no cracks inside a piece. Errors: usage (not one
+    /// a cell, a number left out).
+    Status merge(std::vector<Index> piece_of_cell);
+    Index pieces() const { return pieces_.empty() ? count() : piece_count_; }
+    Index piece_of(Index cell) const { return pieces_.empty() ? cell : pieces_[cell]; }
+    Index piece_at(const Vec3d& point) const { return piece_of(cell_at(point)); }
+    std::span<const Index> neighbours(Index cell) const { return neighbours_[cell]; }
+
     const CrackWarp& warp() const { return warp_; }
     const GridSeeds& grid() const { return grid_; }
     const VoronoiCell& cell(Index seed) const { return cells_[seed]; }
@@ -38,8 +47,10 @@ private:
     CrackWarp warp_;
     GridSeeds grid_;
     std::vector<VoronoiCell> cells_;
-    IndexLists neighbours_; ///< of each cell, without ghosts
-    Index first_ = 0;       ///< a cell that is not empty
+    IndexLists neighbours_;     ///< of each cell, without ghosts
+    Index first_ = 0;           ///< a cell that is not empty
+    std::vector<Index> pieces_; ///< of each cell; empty: its own number
+    Index piece_count_ = 0;
 };
 
 } // namespace filigree

@@ -1,5 +1,6 @@
 #include "filigree/fracture/fracture_pattern.h"
 
+#include "filigree/core/disjoint_sets.h"
 #include "filigree/core/random.h"
 #include "filigree/mesh/triangulate.h"
 #include "filigree/sample/closure.h"
@@ -9,7 +10,10 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
+#include <set>
+#include <tuple>
 
 namespace filigree {
 
@@ -18,12 +22,15 @@ namespace {
 constexpr std::size_t kPointsOfPiece = 100, kFewestPoints = 4'000, kMostPoints = 1'000'000;
 constexpr double kMostUnbalanced = 0.25; ///< edges a triangle
 constexpr int kLloydRounds = 3;
-constexpr double kWavelength = 0.8; ///< of the coarsest bumps, beside a piece's size
+constexpr double kWavelength = 0.8;                          ///< of the coarsest bumps, beside a piece's size
+constexpr double kGrainWavelength = 2.5, kGrainContrast = 2; ///< of grains' density e^(contrast noise), in cells' sizes
+constexpr int kGrainRounds = 1;                              ///< of Lloyd's method: more would make them alike
 
 /// Points of the matter that breaks, and how much of it there is.
 struct Matter {
     std::vector<Vec3d> points;
-    double piece_size = 0; ///< of one piece, across
+    double piece_size = 0; ///< of one cell, across
+    double spacing = 0;    ///< of the points, about
 };
 
 /// Points of the surface, by area.
@@ -65,6 +72,7 @@ Result<Matter> matter_of(const Mesh& mesh, Index pieces, const RunContext& conte
         if (inside && inside->size() >= pieces) {
             matter.points = std::move(*inside);
             matter.piece_size = *spacing * std::cbrt(double(matter.points.size()) / pieces);
+            matter.spacing = *spacing;
             return matter;
         }
     }
@@ -72,6 +80,7 @@ Result<Matter> matter_of(const Mesh& mesh, Index pieces, const RunContext& conte
     double area = 0;
     matter.points = points_on_surface(mesh, count, context.seed, area);
     matter.piece_size = std::sqrt(area / pieces);
+    matter.spacing = 2 * std::sqrt(area / double(count)); // they are not evenly spread
     return matter;
 }
 
@@ -99,9 +108,9 @@ std::vector<Vec3d> draw(std::span<const Vec3d> points, std::span<const double> w
 }
 
 /// Moves each seed to the middle of its points, or, where that is another's or outside, to the point nearest to it.
-Status even_out(const Matter& matter, const CrackWarpOptions& warp, std::vector<Vec3d>& seeds,
+Status even_out(const Matter& matter, const CrackWarpOptions& warp, int rounds, std::vector<Vec3d>& seeds,
                 const RunContext& context) {
-    for (int round = 0; round < kLloydRounds; ++round) {
+    for (int round = 0; round < rounds; ++round) {
         const Result<FractureCells> cells = FractureCells::create(seeds, {}, warp, context);
         if (!cells) return cells.error();
         std::vector<Index> cell(matter.points.size());
@@ -144,8 +153,8 @@ std::vector<Vec3d> rings(const Vec3d& centre, const Vec3d& x, const Vec3d& y, do
     return seeds;
 }
 
-Result<std::vector<Vec3d>> radial_seeds(const Matter& matter, const FracturePattern& pattern, CrackWarpOptions warp,
-                                        const RunContext& context) {
+Result<std::vector<Vec3d>> radial_seeds(const Matter& matter, const FracturePattern& pattern, Index wanted_cells,
+                                        CrackWarpOptions warp, const RunContext& context) {
     const Mat3d axes = principal_axes(matter.points); // rays leave across the thinnest
     Vec3d mean = Vec3d::Zero();
     for (const Vec3d& p : matter.points) mean += p / double(matter.points.size());
@@ -159,7 +168,7 @@ Result<std::vector<Vec3d>> radial_seeds(const Matter& matter, const FracturePatt
     warp.roughness = 0;
     // Rings reach beyond the matter in places: as many seeds as it takes to have the pieces asked for.
     constexpr int kMostTries = 8;
-    double wanted = pattern.pieces;
+    double wanted = wanted_cells;
     for (int attempt = 0; attempt < kMostTries; ++attempt) {
         seeds = rings(centre, axes.col(1), axes.col(2), reach, static_cast<Index>(wanted), context.seed);
         const Result<FractureCells> cells = FractureCells::create(seeds, {}, warp, context);
@@ -167,11 +176,111 @@ Result<std::vector<Vec3d>> radial_seeds(const Matter& matter, const FracturePatt
         std::vector<bool> holds(seeds.size(), false);
         Index near = kNoIndex;
         for (const Vec3d& p : matter.points) holds[near = cells->cell_at(p, near)] = true;
-        const auto pieces = double(std::count(holds.begin(), holds.end(), true));
-        if (pieces >= pattern.pieces || wanted >= FractureCells::kMostSeeds) break;
-        wanted = std::min<double>(FractureCells::kMostSeeds, std::max(wanted + 1, wanted * pattern.pieces / pieces));
+        const auto held = double(std::count(holds.begin(), holds.end(), true));
+        if (held >= wanted_cells || wanted >= FractureCells::kMostSeeds) break;
+        wanted = std::min<double>(FractureCells::kMostSeeds, std::max(wanted + 1, wanted * wanted_cells / held));
     }
     return seeds;
+}
+
+/// How many grains there are by volume, a point.
+std::vector<double> grain_density(const Matter& matter, std::uint64_t seed) {
+    std::vector<double> density;
+    const double wavelength = kGrainWavelength * matter.piece_size;
+    for (const Vec3d& p : matter.points)
+        density.push_back(std::exp(kGrainContrast * value_noise(p / wavelength, seed, nullptr)[0]));
+    return density;
+}
+
+/// How many pairs of points, side by side in the matter, any two cells have between them.
+std::map<std::array<Index, 2>, std::size_t> contacts_of(const Matter& matter, std::span<const Index> cell) {
+    std::map<std::array<std::int64_t, 3>, std::vector<Index>> cubes;
+    for (Index k = 0; k < matter.points.size(); ++k) {
+        std::array<std::int64_t, 3> at;
+        for (int axis = 0; axis < 3; ++axis)
+            at[axis] = std::int64_t(std::floor(matter.points[k][axis] / matter.spacing));
+        cubes[at].push_back(k);
+    }
+    std::map<std::array<Index, 2>, std::size_t> contacts;
+    for (const auto& [at, points] : cubes)
+        for (int side = -1; side < 3; ++side) {
+            std::array<std::int64_t, 3> beside = at;
+            if (side >= 0) ++beside[side];
+            const auto others = cubes.find(beside);
+            if (others == cubes.end()) continue;
+            for (const Index a : points)
+                for (const Index b : others->second)
+                    if (cell[a] != cell[b]) ++contacts[{std::min(cell[a], cell[b]), std::max(cell[a], cell[b])}];
+        }
+    return contacts;
+}
+
+/// A piece for each cell: clumps of cells that touch in the matter, as many as are wanted.
+std::vector<Index> clumps(const Matter& matter, const FractureCells& cells, Index wanted, std::uint64_t seed) {
+    std::vector<Index> cell(matter.points.size());
+    std::vector<bool> holds(cells.count(), false);
+    Index near = kNoIndex;
+    for (Index k = 0; k < cell.size(); ++k) holds[cell[k] = near = cells.cell_at(matter.points[k], near)] = true;
+    std::vector<std::map<Index, std::size_t>> touching(cells.count());
+    for (const auto& [pair, count] : contacts_of(matter, cell)) {
+        touching[pair[0]][pair[1]] = count;
+        touching[pair[1]][pair[0]] = count;
+    }
+    DisjointSets sets(cells.count());
+    std::vector<Index> size(cells.count(), 1);
+    using Entry = std::tuple<Index, double, Index>; // cells, chance, clump
+    std::set<Entry> order;
+    const auto entry = [&](Index clump) { return Entry(size[clump], random_unit(seed + 2, clump), clump); };
+    Index left = 0;
+    for (Index c = 0; c < cells.count(); ++c)
+        if (holds[c]) {
+            order.insert(entry(c));
+            ++left;
+        }
+    while (left > wanted && !order.empty()) {
+        const Index clump = std::get<2>(*order.begin());
+        order.erase(order.begin());
+        Index best = kNoIndex;
+        for (const auto& [other, count] : touching[clump])
+            if (best == kNoIndex || std::pair(size[other], touching[clump][best]) < std::pair(size[best], count))
+                best = other;
+        if (best == kNoIndex) continue; // nothing touches it any more
+        order.erase(entry(best));
+        sets.join(clump, best);
+        const Index root = sets.root(clump), gone = root == clump ? best : clump;
+        size[root] += size[gone];
+        touching[root].erase(gone);
+        for (const auto& [other, count] : touching[gone]) {
+            touching[other].erase(gone);
+            if (other == root) continue;
+            touching[root][other] += count;
+            touching[other][root] = touching[root][other];
+        }
+        touching[gone].clear();
+        order.insert(entry(root));
+        --left;
+    }
+    // What holds next to nothing goes along with a neighbour.
+    for (bool any = true; any;) {
+        any = false;
+        for (Index c = 0; c < cells.count(); ++c) {
+            if (holds[c]) continue;
+            for (const Index other : cells.neighbours(c))
+                if (holds[other]) {
+                    sets.join(c, other);
+                    any = holds[c] = true;
+                    break;
+                }
+        }
+    }
+    std::vector<Index> piece(cells.count(), kNoIndex), of_cell;
+    Index pieces = 0;
+    for (Index c = 0; c < cells.count(); ++c) {
+        Index& number = piece[sets.root(c)];
+        if (number == kNoIndex) number = pieces++;
+        of_cell.push_back(number);
+    }
+    return of_cell;
 }
 
 } // namespace
@@ -181,6 +290,11 @@ Result<FractureCells> make_fracture_cells(const Mesh& mesh, const FracturePatter
         return Error{ErrorCode::unsuitable, "The mesh has no faces: there is nothing to break."};
     if (pattern.pieces < 1 || pattern.pieces > FractureCells::kMostSeeds)
         return Error{ErrorCode::usage, "A fracture has 1 to 100,000 pieces."};
+    if (pattern.clump < 1 || pattern.clump > FracturePattern::kMostClump)
+        return Error{ErrorCode::usage, "A piece is made of 1 to 100 cells."};
+    if (pattern.pieces > FractureCells::kMostSeeds / pattern.clump)
+        return Error{ErrorCode::usage, "Pieces times cells a piece are more than 100,000; ask for fewer of either."};
+    const Index count = pattern.pieces * pattern.clump; // of cells
     if (!(pattern.roughness >= 0 && pattern.roughness <= 1))
         return Error{ErrorCode::usage, "The roughness of cracks is 0 to 1."};
     if (!(pattern.stretch >= 1 && pattern.stretch <= 100))
@@ -189,7 +303,7 @@ Result<FractureCells> make_fracture_cells(const Mesh& mesh, const FracturePatter
         if (!p.allFinite()) return Error{ErrorCode::usage, "A point that was hit is not a finite point."};
 
     context.report("choosing where it breaks", 0);
-    const Result<Matter> matter = matter_of(mesh, pattern.pieces, context);
+    const Result<Matter> matter = matter_of(mesh, count, context);
     if (!matter) return matter.error();
     CrackWarpOptions warp{.box = bounds(mesh.positions),
                           .roughness = pattern.roughness,
@@ -206,7 +320,7 @@ Result<FractureCells> make_fracture_cells(const Mesh& mesh, const FracturePatter
 
     std::vector<Vec3d> seeds;
     if (pattern.kind == FracturePatternKind::radial) {
-        Result<std::vector<Vec3d>> radial = radial_seeds(*matter, pattern, warp, context);
+        Result<std::vector<Vec3d>> radial = radial_seeds(*matter, pattern, count, warp, context);
         if (!radial) return radial.error();
         seeds = std::move(*radial);
     } else if (pattern.kind == FracturePatternKind::impact) {
@@ -221,14 +335,21 @@ Result<FractureCells> make_fracture_cells(const Mesh& mesh, const FracturePatter
             for (const Vec3d& hit : hits) weight += std::pow((p - hit).squaredNorm() / (near * near) + 1, -2);
             weights.push_back(weight);
         }
-        seeds = draw(matter->points, weights, pattern.pieces, context.seed);
+        seeds = draw(matter->points, weights, count, context.seed);
     } else {
-        seeds = draw(matter->points, {}, pattern.pieces, context.seed);
+        const bool grains = pattern.kind == FracturePatternKind::grains;
+        seeds = draw(matter->points, grains ? grain_density(*matter, context.seed) : std::vector<double>(), count,
+                     context.seed);
         CrackWarpOptions plane = warp;
         plane.roughness = 0;
-        if (const Status done = even_out(*matter, plane, seeds, context); !done) return done.error();
+        if (const Status done = even_out(*matter, plane, grains ? kGrainRounds : kLloydRounds, seeds, context); !done)
+            return done.error();
     }
-    return FractureCells::create(seeds, {}, warp, context);
+    Result<FractureCells> cells = FractureCells::create(seeds, {}, warp, context);
+    if (!cells || pattern.clump == 1) return cells;
+    if (Status merged = cells->merge(clumps(*matter, *cells, pattern.pieces, context.seed)); !merged)
+        return merged.error();
+    return cells;
 }
 
 } // namespace filigree

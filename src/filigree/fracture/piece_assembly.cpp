@@ -275,7 +275,7 @@ private:
             const Vec3d p = cells_.warp().unstretched(cut_.vertices.plane(vertex));
             uv_.add(Vec2f(static_cast<float>(p.dot(frame_.x)), static_cast<float>(p.dot(frame_.y))));
             const Vec3f normal = inside_normals_[vertex];
-            normal_.add(triangle.cell == facet.i ? normal : Vec3f(-normal));
+            normal_.add(triangle.cell == cells_.piece_of(facet.i) ? normal : Vec3f(-normal));
         }
         out_.mesh.add_face(corners);
         label(kNoIndex, piece, triangle.facet);

@@ -167,6 +167,16 @@ Mesh make_wavy_sphere(const ShapeOptions& options) {
     });
 }
 
+Mesh make_wavy_plate(const ShapeOptions& options) {
+    const std::size_t n = options.resolution, through = scaled_count(options.resolution, options.thickness);
+    const std::vector<double> waves = wave(n, options.frequency);
+    return BoxSurface({n, n, through}).mesh([&](const Lattice& p) {
+        const double height = 0.5 * options.thickness * centred(p[2], through);
+        const double waved = height + options.amplitude * waves[p[0]] * waves[p[1]];
+        return Vec3d(options.size * Vec3d(0.5 * centred(p[0], n), 0.5 * centred(p[1], n), waved));
+    });
+}
+
 Mesh make_wavy_plane(const ShapeOptions& options) {
     const std::size_t n = options.resolution;
     const std::vector<double> waves = wave(n, options.frequency);
@@ -226,9 +236,13 @@ struct NamedShape {
     std::string_view name;
     Mesh (*make)(const ShapeOptions&);
 };
-constexpr NamedShape kShapes[] = {{"wavy-cube", make_wavy_cube},   {"wavy-sphere", make_wavy_sphere},
-                                  {"wavy-plane", make_wavy_plane}, {"bar", make_bar},
-                                  {"cylinder", make_cylinder},     {"torus", make_torus}};
+constexpr NamedShape kShapes[] = {{"wavy-cube", make_wavy_cube},
+                                  {"wavy-sphere", make_wavy_sphere},
+                                  {"wavy-plane", make_wavy_plane},
+                                  {"wavy-plate", make_wavy_plate},
+                                  {"bar", make_bar},
+                                  {"cylinder", make_cylinder},
+                                  {"torus", make_torus}};
 constexpr auto kShapeNames = [] {
     std::array<std::string_view, std::size(kShapes)> names;
     for (std::size_t i = 0; i < names.size(); ++i) names[i] = kShapes[i].name;

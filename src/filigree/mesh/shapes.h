@@ -15,7 +15,7 @@ struct ShapeOptions {
     double amplitude = 0.04;  ///< height of the waves as a fraction of the shape's side or radius
     double size = 1;          ///< side or diameter, model units
     double length = 4;        ///< bar, cylinder: length as a multiple of the side or diameter
-    double thickness = 0.3;   ///< torus: tube radius as a fraction of the ring's
+    double thickness = 0.3;   ///< torus: tube radius as a fraction of the ring's; wavy-plate: as a fraction of the side
     bool operator==(const ShapeOptions&) const = default;
 };
 
@@ -29,6 +29,9 @@ Mesh make_wavy_cube(const ShapeOptions& options);
 Mesh make_wavy_sphere(const ShapeOptions& options);
 /// The open square with waves in z; (n + 1)^2 vertices, with UVs.
 Mesh make_wavy_plane(const ShapeOptions& options);
+/// A closed square plate across z, both of its sides with the plane's waves; n x n quads a side, round(n thickness),
+/// one at least, through it.
+Mesh make_wavy_plate(const ShapeOptions& options);
 /// A closed box along x, `length` sides long; n quads across a side and round(n length) along.
 Mesh make_bar(const ShapeOptions& options);
 /// A closed cylinder along x: 4 n quads around, round(n length) along, caps of a square grid of n x n quads.
@@ -42,8 +45,8 @@ Mesh make_torus(const ShapeOptions& options);
 Mesh make_box(const Vec3d& centre, const Vec3d& size);
 Mesh make_ball(const Vec3d& centre, double radius);
 
-/// The shape called `name`: wavy-cube, wavy-sphere, wavy-plane, bar, cylinder or torus. Errors: usage, for an unknown
-/// name or an option outside its range.
+/// The shape called `name`: wavy-cube, wavy-sphere, wavy-plane, wavy-plate, bar, cylinder or torus. Errors: usage, for
+/// an unknown name or an option outside its range.
 Result<Mesh> make_shape(std::string_view name, const ShapeOptions& options);
 /// The names make_shape knows.
 std::span<const std::string_view> shape_names();

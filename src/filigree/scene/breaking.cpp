@@ -15,19 +15,21 @@ Result<ModelInPieces> cut_model(const Model& whole, const FractureCells& cells, 
     carried.driver = std::move(broken->piece_of_driver);
     carried.driver_is_on_crack = std::move(broken->driver_is_on_crack);
     carried.vertices = std::move(fractured->piece_of_vertex);
-    for (Index& piece : carried.vertices) piece = std::min(piece, cells.count() - 1); // of loose vertices: any
+    for (Index& piece : carried.vertices) piece = std::min(piece, cells.pieces() - 1); // of loose vertices: any
     carried.vertices.resize(result.model.mesh.vertex_count());
     for (std::size_t d = 0; d < carried.driver.size(); ++d)
         carried.vertices[result.model.driver().vertices[d]] = carried.driver[d];
     carried.crack_of_face = std::move(fractured->crack_of_face);
-    carried.cells_of_crack = std::move(fractured->cells_of_crack);
+    for (const auto& [i, j] : fractured->cells_of_crack)
+        carried.pieces_of_crack.push_back(
+            {std::min(cells.piece_of(i), cells.piece_of(j)), std::max(cells.piece_of(i), cells.piece_of(j))});
     return result;
 }
 
 Result<Fracture> make_fracture(std::shared_ptr<const Body> body, std::shared_ptr<const FractureCells> cells,
                                double scale, const FractureMaterial& material, const RunContext& context,
                                BrokenBodyReport* report) {
-    Partition partition{cells->count(), [cells, scale](const Vec3d& point) { return cells->cell_at(point / scale); }};
+    Partition partition{cells->pieces(), [cells, scale](const Vec3d& point) { return cells->piece_at(point / scale); }};
     Result<BrokenBody> broken = break_body(std::move(body), std::move(partition), context, report);
     if (!broken) return broken.error();
     return Fracture{std::make_shared<const BrokenBody>(std::move(*broken)), material, {}};

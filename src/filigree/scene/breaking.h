@@ -10,10 +10,10 @@ namespace filigree {
 
 /// Which piece carries what, of a body that breaks. Pieces are named by their cells.
 struct CarriedByPieces {
-    std::vector<Index> driver, vertices;              ///< the piece of each
-    std::vector<std::uint8_t> driver_is_on_crack;     ///< see BrokenModel
-    std::vector<Index> crack_of_face;                 ///< kNoIndex: a face of the surface
-    std::vector<std::array<Index, 2>> cells_of_crack; ///< ascending
+    std::vector<Index> driver, vertices;               ///< the piece of each
+    std::vector<std::uint8_t> driver_is_on_crack;      ///< see BrokenModel
+    std::vector<Index> crack_of_face;                  ///< kNoIndex: a face of the surface
+    std::vector<std::array<Index, 2>> pieces_of_crack; ///< ascending
 
     bool empty() const { return driver.empty(); }
 };

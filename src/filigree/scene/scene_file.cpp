@@ -375,6 +375,7 @@ private:
         for (const SceneFracture& other : scene_.fractures)
             if (other.body == fracture.body) in.fail(in.line(), "a body has one [[fracture]] at most");
         in.set_whole("pieces", fracture.pattern.pieces);
+        in.set_whole("clump", fracture.pattern.clump);
         fracture.pattern.kind = static_cast<FracturePatternKind>(in.word("pattern", 0));
         fracture.at = in.points("at");
         if (fracture.pattern.kind == FracturePatternKind::radial && fracture.at.size() > 1)

@@ -239,10 +239,10 @@ private:
         for (const SceneCrack& crack : scene_.cracks) {
             if (crack.body != from.body) continue;
             for (const Index piece : crack.pieces)
-                if (piece >= body.cells->count())
+                if (piece >= body.cells->pieces())
                     fail_in_scene(scene_, crack.line, ErrorCode::bad_file,
                                   fmt::format("there is no piece {} of '{}', which has {}", piece, body.name,
-                                              body.cells->count()));
+                                              body.cells->pieces()));
             const SceneRegion& region = crack.region;
             const bool everywhere = !region.box && !region.ball && region.vertices.empty();
             fracture->events.push_back(
@@ -405,7 +405,7 @@ std::vector<Vec3f> ReadyBody::in_metres(std::vector<Vec3f> points) const {
 void leave_out_closed_cracks(ReadyBody& body, std::span<const Pose> poses) {
     if (body.pieces.empty() || body.keeps_closed_cracks) return;
     const std::vector<std::uint8_t> is_open =
-        open_cracks(body.model, body.pieces.driver, body.pieces.driver_is_on_crack, body.pieces.cells_of_crack, poses,
+        open_cracks(body.model, body.pieces.driver, body.pieces.driver_is_on_crack, body.pieces.pieces_of_crack, poses,
                     kOpen * body.body->spacing());
     drop_closed_cracks(body.model.mesh, body.pieces.crack_of_face, is_open);
     std::erase_if(body.pieces.crack_of_face, [&](Index crack) { return crack != kNoIndex && !is_open[crack]; });
