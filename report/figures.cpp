@@ -2,7 +2,8 @@
 
 namespace filigree::report {
 
-// In the sources by subject: figures_geometry, figures_reference, figures_rendered, figures_scan, figures_surfels.
+// In the sources by subject: figures_broken, figures_geometry, figures_reference, figures_rendered, figures_scan,
+// figures_surfels.
 Figure draw_simple_triangle(FigureRenderer& renderer);     // 1.1
 Figure draw_wavy_cube(FigureRenderer& renderer);           // 2.1
 Figure draw_ray_and_triangle(FigureRenderer& renderer);    // 2.2
@@ -18,6 +19,7 @@ Figure draw_extreme_deformation(FigureRenderer& renderer); // 3.1
 Figure draw_border_rays(FigureRenderer& renderer);         // our own
 Figure draw_fidelity(FigureRenderer& renderer);            // our own
 Figure draw_surfels(FigureRenderer& renderer);             // our own
+Figure draw_broken_cube(FigureRenderer& renderer);         // our own: the cube that the report's player shoots
 Figure draw_remeshed_scan(FigureRenderer& renderer);       // our own: 2.9, 2.10 and 3.1 on a scan
 
 std::span<const FigureEntry> all_figures() {
@@ -38,6 +40,7 @@ std::span<const FigureEntry> all_figures() {
         {"border", draw_border_rays, "rays through vertices and edges, answered"},
         {"codes", draw_fidelity, "the codes and a wrap deformer compared"},
         {"surfels", draw_surfels, "surfels drawn to particles, and carried"},
+        {"broken", draw_broken_cube, "the cube broken by a fall: whole, cracked, apart"},
         {"scan", draw_remeshed_scan, "a scan as regular quads: levels, stretched, twisted"},
     };
     return kFigures;

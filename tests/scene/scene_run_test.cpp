@@ -88,7 +88,7 @@ TEST_F(SceneRunTest, PiecesAreRestoredWhereTheirParticlesCarryThem) {
     ASSERT_EQ(body.model.mesh.face_count(), body.pieces.crack_of_face.size());
     for (const Index crack : body.pieces.crack_of_face)
         if (crack != kNoIndex) {
-            EXPECT_EQ(body.pieces.cells_of_crack[crack][0], 0u);
+            EXPECT_EQ(body.pieces.pieces_of_crack[crack][0], 0u);
         }
     EXPECT_EQ(check_model(body.model), "");
 }
