@@ -5,9 +5,12 @@
 #include "restore_options.h"
 #include "web_page.h"
 
+#include "filigree/io/file.h"
+#include "filigree/io/gltf.h"
 #include "filigree/io/gltf_export.h"
 
 #include <filesystem>
+#include <string_view>
 
 #include <fmt/format.h>
 
@@ -16,6 +19,7 @@ namespace filigree::cli {
 namespace {
 
 namespace fs = std::filesystem;
+using namespace std::string_view_literals;
 
 struct ExportArguments {
     std::string input, output, poses;
@@ -95,6 +99,44 @@ void export_stream(const Model& model, const PoseSequence& own, const ExportArgu
     add_stream_marks(require(read_model_outline(file, options.output, session.silent_context())), report);
 }
 
+/// A name of a file that a GLB wants beside it; empty: none.
+std::string wanted_beside(std::string_view glb) {
+    const std::string_view document = glb.substr(0, glb.find("BIN\0"sv)); // the JSON chunk
+    for (std::size_t at = document.find("\"uri\""); at != document.npos; at = document.find("\"uri\"", at + 1)) {
+        const std::size_t begin = document.find('"', at + 5) + 1;
+        const std::string_view uri = document.substr(begin, document.find('"', begin) - begin);
+        if (!uri.starts_with("data:")) return std::string(uri);
+    }
+    return {};
+}
+
+/// A folder with a page that plays a GLB as it is, such as the key frames that `simulate` writes of what melts.
+void export_glb_page(const ExportArguments& options, const std::string& glb, Session& session, Report& report) {
+    if (!glb.starts_with("glTF")) {
+        session.parse_mesh(glb, options.input); // says what is wrong with a file that is nothing
+        refuse(ErrorCode::unsuitable, options.input + ": is a mesh, and the page shows a model or a GLB; 'filigree "
+                                                      "strip' makes a model of it.");
+    }
+    const std::string given =
+        session.first_given({"--poses", "--frame-rate", "--animation", "--rest", "--stream", "--bits", "--as",
+                             "--key-rate", "--interpolation", "--influences", "--full-precision", "--all-levels",
+                             "--no-normals", "--morph-normals", "--law", "--level", "--thin-shell"});
+    if (!given.empty()) refuse(given + " belongs to a model, and the page plays " + options.input + " as it is.");
+    if (const std::string beside = wanted_beside(glb); !beside.empty())
+        refuse(ErrorCode::unsuitable, options.input + ": needs the file '" + beside +
+                                          "' beside it, and the page shows a GLB that holds all of its parts.");
+    session.warn(require(GltfScene::read_view(glb, options.input, session.context())).warnings());
+    OutputFolder folder(options.output, options.input);
+    WebPage page(folder, fs::path(options.input).stem().string(), WebModel::glb);
+    session.begin_writing(options.output);
+    require(write_file(page.model_path(), glb));
+    page.write(session);
+    folder.keep();
+    const std::string index = (fs::path(options.output) / "index.html").string();
+    report.count("bytes", "bytes", glb.size());
+    report.add("page", index, "page", index);
+}
+
 /// A folder with a page that shows the model.
 void export_page(const Model& model, const PoseSequence& own, ExportArguments options, Session& session,
                  Report& report) {
@@ -125,20 +167,22 @@ void run(const ExportArguments& options, Session& session) {
         check_animation_path(options.output);
         check_not_input(options.output, {options.input, options.poses});
     }
-    const Session::Content content = session.read_any(options.input);
+    const FileReader file = session.open(options.input);
     Report report;
     report.set("output", options.output);
     const double start = now_seconds();
-    const auto* model = std::get_if<Model>(&content.value);
-    if (options.web && !model)
-        refuse(ErrorCode::unsuitable,
-               options.input + ": is a mesh, and the page shows a model; 'filigree strip' makes one.");
-    if (options.web)
-        export_page(*model, content.poses, options, session, report);
-    else if (model)
-        export_model(*model, content.poses, options, session, report);
-    else
-        convert_animation(std::get<Mesh>(content.value), options, session, report);
+    if (options.web && !is_model_file(file)) {
+        export_glb_page(options, require(file.read_all()), session, report);
+    } else {
+        const Session::Content content = session.read_any(file, options.input);
+        const auto* model = std::get_if<Model>(&content.value);
+        if (options.web)
+            export_page(*model, content.poses, options, session, report);
+        else if (model)
+            export_model(*model, content.poses, options, session, report);
+        else
+            convert_animation(std::get<Mesh>(content.value), options, session, report);
+    }
     const double seconds = now_seconds() - start;
     report.add("seconds", fmt::format("{:.3g}", seconds), "export_seconds", seconds);
     session.print(report);
@@ -165,7 +209,8 @@ Command export_command() {
                            .is_read()} +
             pose_file_options(options->pose_file) +
             OptionList{Option("--rest", options->at_rest, "The levels at rest, though the model has poses"),
-                       Option("--web", options->web, "A folder that shows the model in a browser, without a network"),
+                       Option("--web", options->web,
+                              "A folder that shows the model, or a GLB as it is, in a browser, without a network"),
                        Option("--stream", options->stream,
                               "The page's model coded, coarse to fine: it is seen and moves from its first bytes on"),
                        Option("--bits", options->bits, "Of a stream's positions, along the longest side of the box")
@@ -177,6 +222,7 @@ Command export_command() {
                     "  filigree export scan.fil --poses driver.pc2 -o scan.pc2\n"
                     "  filigree export scan.fil -o levels.glb\n"
                     "  filigree export bounce.fil -o page/ --web\n"
+                    "  filigree export ice.glb -o page/ --web\n"
                     "  filigree export bounce.fil -o page/ --web --stream",
         .run = [options](Session& session) { run(*options, session); }};
 }

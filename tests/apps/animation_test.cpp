@@ -160,6 +160,23 @@ TEST_F(Animation, ExportSaysWhatItsDocumentationPromises) {
         EXPECT_TRUE(rest.contains(key)) << key;
 }
 
+TEST_F(Animation, APageTakesAGlbAsItIs) {
+    ok({"export", "moving.fil", "-o", "m.glb"});
+    if (run({"export", "m.glb", "-o", "page/", "--web"}).code == 5) GTEST_SKIP() << "built without the page";
+    EXPECT_TRUE(bytes_of(path("page/model.glb")) == bytes_of(path("m.glb")));
+    EXPECT_TRUE(std::filesystem::exists(path("page/index.html")));
+    fails(2, {"export", "m.glb", "-o", "other/", "--web", "--key-rate", "9"}, {"--key-rate", "m.glb"});
+    fails(7, {"export", "mesh.ply", "-o", "other/", "--web"}, {"mesh.ply", "strip"});
+    std::string beside = bytes_of(path("m.glb"));
+    const std::string asset = "\"asset\":{", uri = "\"uri\":\"t.bin\",";
+    beside.replace(beside.find(asset) + asset.size() - 1, 1, "{" + uri); // its lengths do not matter for what is said
+    std::ofstream(path("beside.glb"), std::ios::binary) << beside;
+    fails(7, {"export", "beside.glb", "-o", "other/", "--web"}, {"beside.glb", "t.bin"});
+    std::filesystem::resize_file(path("m.glb"), 100);
+    fails(4, {"export", "m.glb", "-o", "other/", "--web"}, {"m.glb"});
+    EXPECT_FALSE(std::filesystem::exists(path("other")));
+}
+
 TEST_F(Animation, NormalsFarOffAreWarnedOf) {
     const auto stretched = [&](const std::vector<std::string>& more) {
         std::vector<std::string> words = {"deform", "moving.fil", "--stretch", "3", "--frames", "2", "-o", "s.glb"};

@@ -67,6 +67,29 @@ filigree('export', 'tube_moved.fil', '-o', 'tube_morph.glb', '--as', 'morph', '-
 writeFileSync(join(folder, 'fall.toml'), '[simulation]\nduration = 0.2\n\n[[body]]\nmesh = "tube.fil"\nmaterial = "rubber"\nparticles = 300\n');
 filigree('simulate', 'fall.toml', '-o', 'simulated.glb');
 
+// What melts: key frames whose faces change.
+writeFileSync(join(folder, 'melt.toml'), `[simulation]
+duration = 0.6
+
+[world]
+air_temperature = 450
+air_heat_transfer = 100
+heat_pace = 3000
+
+[[body]]
+shape = "wavy-cube"
+size = 0.2
+resolution = 12
+material = "wax"
+particles = 1000
+centre = [0, 0.12, 0]
+
+[[obstacle]]
+shape = "ground"
+`);
+filigree('simulate', 'melt.toml', '-o', 'melt.glb');
+filigree('export', 'melt.glb', '-o', 'melt_page', '--web');
+
 // Far from the origin, where 32-bit float is coarse.
 const far = lines.map((line) => line.replace(/^v (\S+) (\S+) (\S+)$/, (_, x, y, z) => `v ${Number(x) + 1e5} ${Number(y) - 2e5} ${Number(z) + 3e5}`));
 writeFileSync(join(folder, 'far.obj'), far.join('\n') + '\n');

@@ -1,5 +1,6 @@
 // Opens a page of `filigree export --web`, from disk and from a server, and uses it as a visitor would.
-// Usage: node page.mjs FOLDER [--pictures FOLDER]
+// Usage: node page.mjs FOLDER [--pictures FOLDER] [--key-frames]
+// --key-frames: of a film whose faces change.
 // Fails where anything is asked of the network, the browser complains, the model is not to be seen, or a control does
 // nothing.
 import { mkdirSync } from 'node:fs';
@@ -53,7 +54,7 @@ const on_page = {
 };
 
 /// Uses the page; returns what went wrong. thorough: every control, not only that the model is there and moves.
-async function visit(browser, url, { thorough, pictures }) {
+async function visit(browser, url, { thorough, pictures, key_frames }) {
     const { page, foreign, complaints } = await watched_page(browser, new URL('.', url).href);
     const wrong = [];
     const check = (holds, sentence) => { if (!holds) wrong.push(sentence); };
@@ -63,7 +64,8 @@ async function visit(browser, url, { thorough, pictures }) {
     if (failure) return [...complaints, failure];
 
     const model = await page.evaluate(() => ({
-        levels: filigree.model.levels.length, duration: filigree.model.duration, has_driver: Boolean(filigree.driver) }));
+        levels: filigree.model.levels.length, duration: filigree.model.duration, has_driver: Boolean(filigree.driver),
+        key_frames: filigree.model.key_frames.map(({ time, counts }) => ({ time, triangles: counts.triangles })) }));
     if (model.duration > 0) {
         await page.waitForFunction(() => filigree.time > 0, null, { timeout: 30000 });
         await page.click('#play');
@@ -96,6 +98,17 @@ async function visit(browser, url, { thorough, pictures }) {
         await page.keyboard.press('Space');
         await seek(0);
     }
+    check(model.key_frames.length > 2 === Boolean(key_frames), `has ${model.key_frames.length} key frames`);
+    check(new Set(model.key_frames.map(({ triangles }) => triangles)).size > 1 === Boolean(key_frames), 'the faces do not change');
+    for (const { time, triangles } of model.key_frames) { // each is drawn from its time on, and no other
+        await seek(time);
+        const now = await page.evaluate(() => ({
+            seen: filigree.model.key_frames.filter(({ node }) => node.visible).map((key) => key.time),
+            told: document.getElementById('summary').textContent }));
+        check(now.seen.length === 1 && now.seen[0] === time, `at ${time} s the key frames of ${now.seen} s are seen`);
+        check(now.told.startsWith(`${triangles.toLocaleString('en')} triangles`), `at ${time} s the page tells of ${now.told}`);
+    }
+    await seek(0);
     const triangles = [];
     for (let level = 0; level < model.levels && model.levels > 1; ++level) {
         await page.click(`#levels button:nth-child(${level + 1})`);
@@ -145,13 +158,13 @@ async function asks_elsewhere(browser, url) {
 }
 
 /// Everything there is to check of one folder; returns what went wrong.
-export async function check_page(folder, pictures) {
+export async function check_page(folder, pictures, key_frames = false) {
     const browser = await open_browser();
     const server = await serve(folder);
     const broken = await serve(folder, { '/model.glb': Buffer.from('no model') });
     try {
         const wrong = [
-            ...await visit(browser, pathToFileURL(join(resolve(folder), 'index.html')).href, { thorough: true, pictures }),
+            ...await visit(browser, pathToFileURL(join(resolve(folder), 'index.html')).href, { thorough: true, pictures, key_frames }),
             ...await visit(browser, `${server.url}/index.html`, { thorough: false }),
         ];
         for (const url of [pathToFileURL(join(resolve(folder), 'index.html')).href, `${server.url}/index.html`])
@@ -169,8 +182,8 @@ export async function check_page(folder, pictures) {
 }
 
 if (process.argv[1] === fileURLToPath(import.meta.url)) {
-    const { positionals, values } = parseArgs({ allowPositionals: true, options: { pictures: { type: 'string' } } });
+    const { positionals, values } = parseArgs({ allowPositionals: true, options: { pictures: { type: 'string' }, 'key-frames': { type: 'boolean' } } });
     if (positionals.length !== 1) fail('page.mjs: name the folder of the page');
-    const wrong = await check_page(positionals[0], values.pictures);
+    const wrong = await check_page(positionals[0], values.pictures, values['key-frames']);
     if (wrong.length > 0) fail(wrong.join('\n'));
 }

@@ -55,6 +55,10 @@ TEST(GlbMoments, OneKeyIsShownAtATime) {
     const Glb glb(read_file(path).value());
     ASSERT_EQ(glb.json["meshes"].size(), 4u);
     ASSERT_EQ(glb.json["scenes"][0]["nodes"].size(), 4u);
+    const Json& report = glb.json["asset"]["extras"]["filigree"];
+    EXPECT_EQ(report["export"], "key frames");
+    EXPECT_EQ(report["keys"], 4);
+    EXPECT_DOUBLE_EQ(report["seconds"].get<double>(), 7.0 / 24);
     for (std::size_t k = 0; k < 4; ++k) {
         const std::size_t frame = std::min<std::size_t>(3 * k, 7);
         const std::size_t position = glb.json["meshes"][k]["primitives"][0]["attributes"]["POSITION"];

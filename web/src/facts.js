@@ -26,7 +26,7 @@ export function small_text(value) {
 export function sizes_of(model) {
   const sizes = [{ name: 'This file', bytes: model.bytes }];
   const keys = model.report.keys ?? model.times.length;
-  if (!model.action || keys < 2) return sizes;
+  if (!model.action || keys < 2 || model.key_frames?.length > 0) return sizes; // a point cache has one set of faces
   const vertices = model.report.vertices ?? model.levels[0].vertices;
   const positions = vertices * keys * kBytesAPosition;
   sizes.push({ name: 'As a point cache', bytes: positions + kPointCacheHeader });
@@ -37,13 +37,13 @@ export function sizes_of(model) {
 
 /// [[name, value]] of everything the file tells.
 export function facts_of(model) {
-  const facts = [], report = model.report, finest = model.levels[0];
-  facts.push(['Vertices', count_text(report.vertices ?? finest.vertices)]);
-  facts.push(['Triangles', count_text(finest.triangles)]);
+  const facts = [], report = model.report, finest = model.levels[0], counts = model.shown_counts ?? finest;
+  facts.push(['Vertices', count_text(report.vertices ?? counts.vertices)]);
+  facts.push(['Triangles', count_text(counts.triangles)]);
   const joints = report.joints || finest.meshes.find((mesh) => mesh.isSkinnedMesh)?.skeleton.bones.length;
   if (joints) facts.push(['Joints', count_text(joints)]);
   if (model.action) {
-    facts.push(['Keys', count_text(report.keys ?? model.times.length)]);
+    facts.push([model.key_frames?.length > 0 ? 'Key frames' : 'Keys', count_text(report.keys ?? model.times.length)]);
     facts.push(['Seconds', String(Number(model.duration.toFixed(2)))]);
   }
   if (report.error_at_keys !== undefined) facts.push(['Largest error at keys', small_text(report.error_at_keys)]);

@@ -114,7 +114,9 @@ class Page {
   seek(seconds) {
     const { model } = this;
     this.time = Math.min(Math.max(seconds, 0), model.duration);
+    const before = model.shown_counts;
     model.seek(this.time);
+    if (model.shown_counts !== before) this.fill_facts(); // another key frame
     if (this.driver?.object.visible) this.driver.follow();
     element('scrub').value = this.time;
     element('scrub').style.setProperty('--played', `${(100 * this.time) / (model.duration || 1)}%`);
@@ -210,6 +212,7 @@ class Page {
       element('levels').append(button);
     }
     element('driver').disabled = !this.driver;
+    element('driver-label').hidden = this.model.key_frames?.length > 0; // a film whose faces change has none
     if (!this.driver) element('driver-label').title = 'This file has one level and no joints';
   }
 
@@ -229,6 +232,7 @@ class Page {
       bar.lastChild.style.setProperty('--share', `${(100 * bytes) / largest}%`);
       return bar;
     }));
+    element('sizes-section').hidden = sizes.length < 2;
     const ratio = sizes.length > 1 ? sizes[1].bytes / sizes[0].bytes : 0;
     element('sizes-note').textContent = ratio >= 1.05
       ? `${ratio >= 10 ? Math.round(ratio) : ratio.toFixed(1)} times smaller than every vertex at every key`
@@ -236,7 +240,7 @@ class Page {
     element('facts').replaceChildren(...facts_of(this.model).flatMap(([name, value]) => [text_in('dt', name), text_in('dd', value)]));
     const { is_stream, is_whole, bytes, bytes_read } = this.model;
     const size = is_stream && !is_whole ? `${size_text(bytes_read)} of ${size_text(bytes)}` : size_text(bytes);
-    element('summary').textContent = `${count_text(this.model.levels[0].triangles)} triangles, ${size}`;
+    element('summary').textContent = `${count_text((this.model.shown_counts ?? this.model.levels[0]).triangles)} triangles, ${size}`;
   }
 
   choose_clip(number) {

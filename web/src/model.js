@@ -41,6 +41,7 @@ export class Model {
     model.levels = await levels_of(gltf);
     if (model.levels.length === 0) throw new Error('model.glb has nothing to show: no mesh in its scene.');
     model.clips = gltf.animations;
+    model.key_frames = key_frames_of(gltf);
     model.mixer = new THREE.AnimationMixer(gltf.scene);
     gltf.scene.traverse((node) => {
       if (!node.isMesh && !node.isPoints) return;
@@ -68,6 +69,7 @@ export class Model {
     if (number < this.clips.length) {
       this.action = this.mixer.clipAction(this.clips[number]).play();
       for (const track of this.clips[number].tracks) if (track.times.length > this.times.length) this.times = track.times;
+      if (this.key_frames.length > 0) this.times = this.key_frames.map(({ time }) => time);
     }
     this.seek(0);
   }
@@ -79,8 +81,12 @@ export class Model {
       this.action.time = Math.min(Math.max(seconds, 0), this.duration);
       this.mixer.update(0);
     }
+    for (const { node } of this.key_frames) node.visible = node.scale.x > 0; // what is scaled to nothing takes time to draw
     this.scene.updateMatrixWorld(true);
   }
+
+  /// What is to be seen at the present moment: { vertices, triangles } of its key frame, or of the finest level.
+  get shown_counts() { return this.key_frames.find(({ node }) => node.visible)?.counts ?? this.levels[0]; }
 
   /// Shows one level: 0 is the finest here, as in the file.
   show_level(number) {
@@ -88,13 +94,19 @@ export class Model {
     this.levels.forEach((level, i) => level.nodes.forEach((node) => { node.visible = i === number; }));
   }
 
+  framing_moments() {
+    if (!this.action) return [0];
+    if (this.key_frames.length > 0) return this.times;
+    return Array.from({ length: kFramingMoments + 1 }, (_, i) => (this.duration * i) / kFramingMoments);
+  }
+
   /// The box of all moments, from some of the vertices, with some room.
   animated_box() {
     const box = new THREE.Box3(), p = new THREE.Vector3();
-    const moments = this.action ? kFramingMoments : 0;
-    for (let i = 0; i <= moments; ++i) {
-      this.seek((this.duration * i) / Math.max(moments, 1));
+    for (const moment of this.framing_moments()) {
+      this.seek(moment);
       for (const mesh of this.levels[0].meshes) {
+        if (!is_seen(mesh)) continue;
         const count = mesh.geometry.attributes.position.count, step = Math.max(1, Math.floor(count / kFramingVertices));
         for (let vertex = 0; vertex < count; vertex += step) {
           mesh.getVertexPosition(vertex, p);
@@ -106,6 +118,23 @@ export class Model {
     const room = 0.004 * box.getSize(p).length();
     return box.expandByScalar(room);
   }
+}
+
+/// [{ node, time, counts }] of a film whose faces change, by time: a node for each key, scaled to nothing but from its
+/// time to the next one's (write_glb_moments). Empty where the file is no such film.
+function key_frames_of({ animations, scene, parser }) {
+  if (parser.json.asset?.extras?.filigree?.export !== 'key frames' || animations.length !== 1) return [];
+  const keys = animations[0].tracks.filter(({ name }) => name.endsWith('.scale')).map(({ name, times, values }) => {
+    const node = THREE.PropertyBinding.findNode(scene, THREE.PropertyBinding.parseTrackName(name).nodeName);
+    const first = times.findIndex((_, i) => values[3 * i] > 0);
+    return { node, time: times[first], counts: node && level_of([node]) };
+  });
+  return keys.every(({ node, time }) => node && time !== undefined) ? keys.sort((a, b) => a.time - b.time) : [];
+}
+
+function is_seen(object) {
+  for (let at = object; at; at = at.parent) if (!at.visible) return false;
+  return true;
 }
 
 /// [{ nodes, meshes, vertices, triangles }], finest first. Coarser levels are nodes that MSFT_lod names, which three.js

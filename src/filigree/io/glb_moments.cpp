@@ -49,12 +49,15 @@ public:
         }
         if (!channels.empty())
             builder_.json["animations"].push_back({{"name", "keys"}, {"channels", channels}, {"samplers", samplers}});
+        builder_.json["asset"] = {{"extras", {{"filigree", report_json(end)}}}};
         builder_.json["scene"] = 0;
         builder_.json["scenes"].push_back({{"nodes", nodes_}});
         return builder_.write(path, context);
     }
 
 private:
+    Json report_json(double end) const { return {{"export", "key frames"}, {"keys", times_.size()}, {"seconds", end}}; }
+
     GlbBuilder builder_;
     GlbMaterials materials_;
     std::vector<std::size_t> nodes_;

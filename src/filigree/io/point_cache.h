@@ -109,8 +109,8 @@ Status write_usda_moments(std::size_t frames, double frames_per_second,
 
 /// The same as a .glb of key frames, which any viewer of glTF plays: about so many keys a second, each a node that is
 /// scaled to nothing but from its time to the next one's. The first and the last frame are among them. moment: as
-/// above. All keys are in memory. Errors: usage (keys_per_second), unsuitable, unwritable, unsupported (4 GiB),
-/// out_of_memory, cancelled, and what `moment` gives.
+/// above. asset.extras.filigree says {"export": "key frames", "keys", "seconds"}. All keys are in memory. Errors: usage
+/// (keys_per_second), unsuitable, unwritable, unsupported (4 GiB), out_of_memory, cancelled, and what `moment` gives.
 Status write_glb_moments(std::size_t frames, double frames_per_second, double keys_per_second,
                          const std::function<Result<MeshMoment>(std::size_t frame)>& moment,
                          const std::filesystem::path& path, const RunContext& context);
