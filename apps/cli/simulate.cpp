@@ -8,6 +8,7 @@
 #include "filigree/io/numbered_name.h"
 #include "filigree/io/point_cache.h"
 #include "filigree/present/scene_film.h"
+#include "filigree/present/textured_look.h"
 #include "filigree/scene/finer_check.h"
 #include "filigree/scene/melting_surface.h"
 #include "filigree/scene/scene_keys.h"
@@ -231,6 +232,16 @@ private:
         return ending == ".usda" || ending == ".glb";
     }
 
+    MeltingSurface melting_surface() {
+        const RunContext silent = session_.silent_context();
+        if (!looks_) {
+            std::vector<std::string> warnings;
+            looks_ = require(looks_of(ready_, warnings, silent));
+            session_.warn(warnings);
+        }
+        return require(MeltingSurface::create(ready_, *looks_, silent));
+    }
+
     /// What melts as one surface whose faces change in time: USD with velocities for motion blur, GLB as key frames.
     void write_melting(MeltingSurface& melting, const std::string& path) {
         const RunContext silent = session_.silent_context();
@@ -241,7 +252,11 @@ private:
         const auto moment = [&](std::size_t frame) -> Result<MeshMoment> {
             Result<CompositeSurface> surface = melting.frame(recording, frame, silent);
             if (!surface) return surface.error();
-            if (is_glb) return MeshMoment{with_origins(std::move(*surface), ready_.origin), {}};
+            if (is_glb) // where textures are multiplied with colours
+                return MeshMoment{with_materials_apart(with_origins(std::move(*surface), ready_.origin),
+                                                       std::vector<Vec3f>(melting.materials().size(), Vec3f::Ones()))
+                                      .mesh,
+                                  {}};
             Result<std::vector<Vec3f>> velocities = melting.velocities(*surface, recording, frame, rate, silent);
             if (!velocities) return velocities.error();
             return MeshMoment{with_origins(std::move(*surface), ready_.origin), std::move(*velocities)};
@@ -263,7 +278,7 @@ private:
     void write_animations() {
         for (const std::string& path : outputs_.animations) {
             MeltingSurface melting;
-            if (holds_moments(path)) melting = require(MeltingSurface::create(ready_, session_.silent_context()));
+            if (holds_moments(path)) melting = melting_surface();
             if (!melting.is_empty()) write_melting(melting, model_path(path, ready_.bodies.size(), melting.name()));
             for (std::size_t b = 0; b < ready_.bodies.size(); ++b) {
                 if (melting.has_body(b)) continue;
@@ -303,7 +318,7 @@ private:
         const RunContext silent = session_.silent_context();
         for (const std::string& path : outputs_.folders) {
             std::vector<NumberedMeshes> parts;
-            MeltingSurface melting = require(MeltingSurface::create(ready_, silent));
+            MeltingSurface melting = melting_surface();
             session_.warn(melting.warnings);
             if (!melting.is_empty())
                 parts.push_back({mesh_names(path, melting.name()), [&](std::size_t frame) {
@@ -328,6 +343,7 @@ private:
     std::vector<FilmWriter> films_;
     ReadyScene ready_;
     std::optional<SceneRun> run_;
+    std::optional<std::vector<BodyLook>> looks_;
     std::vector<FinerCheck> finer_; ///< one a body where that was asked for
     Report animation_rows_;
     Json animations_ = Json::array();

@@ -70,6 +70,7 @@ void DrawnObjects::follow_heat() {
                     float(material.melting_to) - kCelsius + kAround};
     if (melt_) {
         melt_is_colored_ = false;
+        for (const Index v : melt_copies_) colors.values.push_back(colors.values[v]);
         with_opengl_([&] {
             melt_is_colored_ = bool(melt_->set_scalars({colors.values, ColorMap::sequential, colors.range}));
         });

@@ -6,6 +6,7 @@
 #include "filigree/deform/carried_points.h"
 #include "filigree/mesh/ray_hit.h"
 #include "filigree/mesh/triangulate.h"
+#include "filigree/present/textured_look.h"
 
 #include <QElapsedTimer>
 
@@ -257,8 +258,12 @@ void DrawnObjects::follow_melt() {
     with_opengl_([this] {
         melt_.reset();
         if (!melt_of_) return;
-        Result<Drawable> drawable = Drawable::surface(*melt_of_, {}, RunContext());
+        DrawnSurface drawn = melt_as_drawn(*melt_of_, workbench_.state().source->materials.materials);
+        SurfaceOptions options;
+        options.materials = workbench_.state().source->materials.materials;
+        Result<Drawable> drawable = Drawable::surface(drawn.mesh, options, RunContext());
         if (drawable) melt_ = std::move(*drawable);
+        melt_copies_ = std::move(drawn.copied);
     });
     Q_EMIT changed(true);
 }

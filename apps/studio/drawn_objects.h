@@ -112,7 +112,8 @@ private:
 
     std::optional<Drawable> particles_, inside_, full_, melt_;
     std::shared_ptr<const Mesh> melt_of_;
-    bool melt_is_colored_ = false; ///< by heat
+    std::vector<Index> melt_copies_; ///< vertices that are drawn twice
+    bool melt_is_colored_ = false;   ///< by heat
     std::shared_ptr<const DroppedBody> particles_of_, surroundings_of_;
     std::uint64_t full_asked_ = 0; ///< which pose the full deformation is of, or will be; 0: none
     std::string full_error_;       ///< why it cannot be drawn

@@ -5,6 +5,9 @@
 #include "pieces.h"
 #include "pins.h"
 
+#include "filigree/present/textured_look.h"
+#include "filigree/render/renderer.h"
+
 #include <QCoreApplication>
 #include <QEventLoop>
 
@@ -35,7 +38,20 @@ std::size_t bytes_of(const Mesh& mesh) {
 Result<std::shared_ptr<const DroppedBody>> make_body_of(const State& state, const Vec3d& up,
                                                         const RunContext& context) {
     const auto breaking = state.source->pieces ? state.source->pieces->breaking : nullptr;
-    return make_dropped_body(state.model, breaking, state.body, pinned_vertices(state.handles), up, context);
+    BodyLook look;
+    const Material& material = state.body.material;
+    if (material.model == MaterialModel::mpm && material.melts()) {
+        constexpr double kPart = 0.5; // of the particles' spacing
+        const Vec3d size = bounds(state.model->mesh.positions).size();
+        const double spacing = std::cbrt(size.prod() / double(state.body.particles));
+        std::vector<std::string> warnings; // that were said when the mesh was opened
+        Result<BodyLook> found =
+            textured_look(state.model->mesh, state.source->path, kPart * std::max(spacing, 1e-6 * size.maxCoeff()),
+                          Appearance().color, warnings, context);
+        if (!found) return found.error();
+        look = std::move(*found);
+    }
+    return make_dropped_body(state.model, breaking, look, state.body, pinned_vertices(state.handles), up, context);
 }
 
 struct Playback::Worker {

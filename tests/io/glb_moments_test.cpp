@@ -78,6 +78,28 @@ TEST(GlbMoments, OneKeyIsShownAtATime) {
     std::filesystem::remove(path);
 }
 
+TEST(GlbMoments, FacesWithoutAMaterialMayComeLater) {
+    const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / "filigree_moments_skin.glb";
+    const auto skinned = [](std::size_t frame) -> Result<MeshMoment> {
+        MeshMoment now = moment(frame).value();
+        now.mesh.materials = {{"skin"}, std::vector<Index>(now.mesh.face_count(), 0)};
+        now.mesh.embedded_materials.resize(1);
+        now.mesh.embedded_materials[0].name = "skin";
+        if (frame == 2) now.mesh.materials.of_face[3] = kNoIndex;
+        return now;
+    };
+    ASSERT_TRUE(write_glb_moments(3, 24, 24, skinned, path, kContext).ok());
+    const Glb glb(read_file(path).value());
+    ASSERT_EQ(glb.json["materials"].size(), 2u);
+    EXPECT_EQ(glb.json["materials"][0]["name"], "skin");
+    EXPECT_EQ(glb.json["materials"][1]["name"], "none");
+    EXPECT_EQ(glb.json["meshes"][0]["primitives"].size(), 1u);
+    ASSERT_EQ(glb.json["meshes"][2]["primitives"].size(), 2u);
+    EXPECT_EQ(glb.json["meshes"][2]["primitives"][0]["material"], 0);
+    EXPECT_EQ(glb.json["meshes"][2]["primitives"][1]["material"], 1);
+    std::filesystem::remove(path);
+}
+
 TEST(GlbMoments, OneFrameStandsStillAndNoneIsRefused) {
     const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / "filigree_moment.glb";
     ASSERT_TRUE(write_glb_moments(1, 24, 8, moment, path, kContext).ok());

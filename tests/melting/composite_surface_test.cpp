@@ -124,6 +124,43 @@ TEST(CompositeSurface, ClosedManifoldAndOrientedWhateverMelts) {
     }
 }
 
+/// Pieces of faces have UVs between those of their corners: the same at a vertex for every face around it, where the
+/// mesh's own are, and all along the seam.
+TEST(CompositeSurface, UvsGoOnUpToTheSeam) {
+    for (const bool per_vertex : {true, false}) {
+        MeltingBody body = melting_ball();
+        for (const Vec3f& at : body.rest.positions) body.rest.uvs.values.push_back(at.head<2>());
+        if (!per_vertex) body.rest.uvs.corners = body.rest.corners;
+        body.rest.materials.names = {"skin"};
+        body.rest.materials.of_face.assign(body.rest.face_count(), 0);
+        body.restored = body.rest;
+        melt_above(body, 0.1f);
+        const CompositeSurface surface = body.surface().value();
+        const Mesh& mesh = surface.mesh;
+        EXPECT_EQ(check_mesh(mesh), "");
+        ASSERT_EQ(mesh.uvs.corners.size(), mesh.corner_count());
+        std::vector<Index> uv_of(mesh.vertex_count(), kNoIndex);
+        std::size_t pieces = 0;
+        double apart = 0;
+        for (std::size_t f = 0; f < mesh.face_count(); ++f)
+            for (Index c = mesh.face_offsets[f]; c < mesh.face_offsets[f + 1]; ++c) {
+                const Index uv = mesh.uvs.corners[c], v = mesh.corners[c];
+                ASSERT_EQ(uv == kNoIndex, mesh.materials.of_face[f] == kNoIndex) << "face " << f;
+                if (uv == kNoIndex) continue;
+                if (uv_of[v] == kNoIndex) uv_of[v] = uv;
+                EXPECT_EQ(uv_of[v], uv) << "vertex " << v;
+                if (surface.origin[v] != kNoIndex) {
+                    EXPECT_EQ(mesh.uvs.values[uv], Vec2f(body.rest.positions[surface.origin[v]].head<2>()));
+                    continue;
+                }
+                ++pieces;
+                apart += double((mesh.uvs.values[uv] - mesh.positions[v].head<2>()).norm());
+            }
+        EXPECT_GT(pieces, 500u);
+        EXPECT_LT(apart / double(pieces), 0.2 * double(kSpacing)); // they fade a little along the surface
+    }
+}
+
 /// Where the grid lies must not show: its shift by half a cell moves the surface by little.
 TEST(CompositeSurface, AnotherGridGivesTheSameSurface) {
     MeltingBody body = melting_ball();

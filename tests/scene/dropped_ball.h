@@ -26,7 +26,7 @@ inline DropOptions jelly() {
 }
 
 inline std::shared_ptr<const DroppedBody> dropped(const DropOptions& options, const Vec3d& up = Vec3d::UnitY()) {
-    return make_dropped_body(ball_model(), nullptr, options, {}, up, RunContext()).value();
+    return make_dropped_body(ball_model(), nullptr, {}, options, {}, up, RunContext()).value();
 }
 
 } // namespace filigree_test

@@ -57,7 +57,7 @@ TEST(DroppedBody, EveryObstacleIsBelowAndDrawn) {
 
 TEST(DroppedBody, HoldsParticlesNearPinnedVertices) {
     const auto model = ball_model();
-    const auto body = make_dropped_body(model, nullptr, jelly(), std::vector<Index>{0, 5}, kUp, kContext).value();
+    const auto body = make_dropped_body(model, nullptr, {}, jelly(), std::vector<Index>{0, 5}, kUp, kContext).value();
     ASSERT_EQ(body->world.pins.size(), 1u);
     EXPECT_GE(body->world.pins[0].particles.size(), 2u);
     EXPECT_TRUE(dropped(jelly())->world.pins.empty());
@@ -90,7 +90,7 @@ TEST(DroppedBody, MeltsInAboutTheTimeAsked) {
 TEST(DroppedBody, RefusesWhatHasNoVolumeInWords) {
     Model flat = *ball_model();
     for (Vec3f& p : flat.mesh.positions) p.setZero();
-    const auto body = make_dropped_body(std::make_shared<const Model>(flat), nullptr, jelly(), {}, kUp, kContext);
+    const auto body = make_dropped_body(std::make_shared<const Model>(flat), nullptr, {}, jelly(), {}, kUp, kContext);
     ASSERT_FALSE(body.ok());
     EXPECT_EQ(body.error().code, ErrorCode::unsuitable);
 }

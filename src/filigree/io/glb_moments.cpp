@@ -18,7 +18,14 @@ public:
     Status add(const Mesh& mesh, double time, const RunContext& context) {
         const Result<GlbParts> parts = make_glb_parts(mesh, {}, context);
         if (!parts) return parts.error();
-        if (times_.empty()) materials_ = add_glb_materials(builder_, *parts, {});
+        if (times_.empty()) {
+            const MeshMaterials found = find_glb_materials(mesh, {});
+            materials_ = add_glb_materials(builder_, *parts, found.materials);
+            has_plain_ = has_unlabelled_faces(*parts);
+        } else if (!has_plain_ && has_unlabelled_faces(*parts)) { // the first had none
+            materials_.none = add_glb_plain_material(builder_, *parts);
+            has_plain_ = true;
+        }
         const std::vector<std::size_t> below = add_glb_nodes(builder_, *parts, mesh, materials_);
         const double shown = times_.empty() ? 1 : 0; // where nothing plays, the first
         nodes_.push_back(builder_.json["nodes"].size());
@@ -60,6 +67,7 @@ private:
 
     GlbBuilder builder_;
     GlbMaterials materials_;
+    bool has_plain_ = false; ///< a material for faces without one
     std::vector<std::size_t> nodes_;
     std::vector<float> times_;
 };

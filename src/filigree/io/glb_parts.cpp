@@ -352,6 +352,8 @@ Json material_json(const MeshMaterial& material, std::optional<std::size_t> text
     return json;
 }
 
+} // namespace
+
 bool has_unlabelled_faces(const GlbParts& parts) {
     for (const GlbObject& object : parts.objects)
         for (const GlbPrimitive& primitive : object.primitives)
@@ -359,7 +361,15 @@ bool has_unlabelled_faces(const GlbParts& parts) {
     return false;
 }
 
-} // namespace
+std::size_t add_glb_plain_material(GlbBuilder& builder, const GlbParts& parts) {
+    MeshMaterial plain;
+    plain.name = "none";
+    if (parts.has_colors) plain.color = Vec3f::Ones(); // it is multiplied with theirs
+    Json json = material_json(plain, std::nullopt);
+    json["extras"] = {{"filigree", "none"}};
+    builder.json["materials"].push_back(std::move(json));
+    return builder.json["materials"].size() - 1;
+}
 
 Result<GlbParts> make_glb_parts(const Mesh& mesh, const GlbPartsOptions& options, const RunContext& context) {
     GlbParts parts;
@@ -413,15 +423,7 @@ GlbMaterials add_glb_materials(GlbBuilder& builder, const GlbParts& parts, std::
         if (!parts.uvs.empty()) texture = textures.add(material);
         builder.json["materials"].push_back(material_json(material, texture));
     }
-    if (has_unlabelled_faces(parts)) {
-        MeshMaterial plain;
-        plain.name = "none";
-        if (parts.has_colors) plain.color = Vec3f::Ones(); // it is multiplied with theirs
-        Json json = material_json(plain, std::nullopt);
-        json["extras"] = {{"filigree", "none"}};
-        added.none = builder.json["materials"].size();
-        builder.json["materials"].push_back(std::move(json));
-    }
+    if (has_unlabelled_faces(parts)) added.none = add_glb_plain_material(builder, parts);
     if (builder.json["materials"].empty()) builder.json.erase("materials");
     return added;
 }

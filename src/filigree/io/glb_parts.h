@@ -67,6 +67,11 @@ GlbBuilder::Json add_glb_attributes(GlbBuilder& builder, const GlbParts& parts, 
 /// that are not embedded are grey, and a warning says so. None where no face has one.
 MeshMaterials find_glb_materials(const Mesh& mesh, const std::filesystem::path& materials_beside);
 
+/// Whether some faces have no material.
+bool has_unlabelled_faces(const GlbParts& parts);
+/// Adds a material for faces that have none; returns its number.
+std::size_t add_glb_plain_material(GlbBuilder& builder, const GlbParts& parts);
+
 /// Adds these materials with their pictures, and one more for faces without a material, where there are some (glTF's
 /// own default is metal). Warns of pictures that cannot be embedded.
 struct GlbMaterials {

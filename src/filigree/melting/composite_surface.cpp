@@ -323,9 +323,40 @@ private:
         return found->second;
     }
 
-    void add_new_corner(Index vertex) {
+    /// A UV of a corner of a face's triangle, of a cut, or of what lies between such; kNoIndex: the face has none.
+    Index uv_at(Index v, Index face) {
+        if (restored_.uvs.empty()) return kNoIndex;
+        if (v < cells_->cut().first_cut()) {
+            const Index corner = corner_at(face, v);
+            if (corner == kNoIndex) return kNoIndex;
+            return restored_.uvs.per_vertex() ? restored_.corners[corner] : restored_.uvs.corners[corner];
+        }
+        const GridCut::Between& between = cells_->cut().between(v);
+        const Index from = uv_at(between.from, face), to = uv_at(between.to, face);
+        if (from == kNoIndex || to == kNoIndex) return kNoIndex;
+        for (const CutUv& known : cut_uvs_[v])
+            if (known.from == from && known.to == to) return known.uv; // of the other side of an edge
+        std::vector<Vec2f>& values = result_.mesh.uvs.values;
+        values.push_back(values[from] + between.part * (values[to] - values[from]));
+        cut_uvs_[v].push_back({from, to, Index(values.size() - 1)});
+        return Index(values.size() - 1);
+    }
+
+    /// In the middle of a triangle.
+    Index middle_uv(const Triangle& corners, Index face) {
+        Vec2f sum = Vec2f::Zero();
+        for (const Index v : corners) {
+            const Index uv = uv_at(v, face);
+            if (uv == kNoIndex) return kNoIndex;
+            sum += result_.mesh.uvs.values[uv];
+        }
+        result_.mesh.uvs.values.push_back(sum / 3);
+        return Index(result_.mesh.uvs.values.size() - 1);
+    }
+
+    void add_new_corner(Index vertex, Index uv = kNoIndex) {
         const std::size_t first_new = result_.origin.size() - new_normal_.size();
-        add_corner(vertex, kNoIndex, new_normal_[vertex - first_new]);
+        add_corner(vertex, uv, new_normal_[vertex - first_new]);
     }
 
     void end_face(Index source_face) {
@@ -379,7 +410,7 @@ private:
         if (v < cells_->cut().first_cut())
             add_old_corner(corner_at(face, v));
         else
-            add_new_corner(cut_vertex(v));
+            add_new_corner(cut_vertex(v), uv_at(v, face));
     }
 
     void keep_part(const Triangle& corners, Index face) {
@@ -408,11 +439,11 @@ private:
         const Vec3f middle = (cut.position(corners[0]) + cut.position(corners[1]) + cut.position(corners[2])) / 3;
         for (const Index v : outline)
             if (v >= cut.first_cut()) cut_vertex(v);
-        const Index centre = add_vertex(middle);
+        const Index centre = add_vertex(middle), centre_uv = middle_uv(corners, face);
         for (std::size_t k = 0; k < outline.size(); ++k) {
             add_piece_corner(outline[k], face);
             add_piece_corner(outline[(k + 1) % outline.size()], face);
-            add_new_corner(centre);
+            add_new_corner(centre, centre_uv);
             end_face(face);
             ++result_.seam_triangles;
         }
@@ -586,6 +617,10 @@ private:
     std::unordered_map<std::uint64_t, Index> faded_normals_; ///< by vertex and the restored mesh's normal
     std::unordered_set<Index> unknown_normals_;
     std::unordered_map<Index, Index> cut_at_; ///< of new vertices
+    struct CutUv {
+        Index from, to, uv;
+    };
+    std::unordered_map<Index, std::vector<CutUv>> cut_uvs_; ///< of cuts: one a pair of UVs that they lie between
     std::vector<std::array<Index, 2>> segments_;
     std::vector<Index> loop_, outline_;
     std::vector<bool> is_at_pieces_; ///< of cells: whether one that keeps its pieces touches it

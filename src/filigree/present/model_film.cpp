@@ -2,6 +2,7 @@
 
 #include "filigree/present/film_frames.h"
 #include "filigree/present/headless_renderer.h"
+#include "filigree/present/textured_look.h"
 
 #include <algorithm>
 #include <limits>
@@ -85,7 +86,10 @@ Result<std::size_t> film_model(const ModelFilm& film, const std::string& path, c
     const auto draw = [&](std::size_t frame, const RunContext&) -> Result<Picture> {
         scene.objects[0].drawable = &*model;
         if (!turns && frame < film.surfaces.size() && film.surfaces[frame]) {
-            Result<Drawable> drawable = Drawable::surface(*film.surfaces[frame], {}, quiet);
+            SurfaceOptions options;
+            options.materials = film.surface.materials;
+            Result<Drawable> drawable =
+                Drawable::surface(melt_as_drawn(*film.surfaces[frame], options.materials).mesh, options, quiet);
             if (!drawable) return drawable.error();
             melt = std::move(*drawable);
             scene.objects[0].drawable = &*melt;

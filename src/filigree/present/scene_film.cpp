@@ -2,6 +2,7 @@
 
 #include "filigree/hierarchy/restore.h"
 #include "filigree/present/film_frames.h"
+#include "filigree/present/textured_look.h"
 #include "filigree/render/surface_materials.h"
 #include "filigree/scene/melting_surface.h"
 
@@ -37,7 +38,7 @@ public:
         quiet_.progress = nullptr; // the bar tells of frames
         actors_.reserve(ready.bodies.size());
         for (const ReadyBody& body : ready.bodies) prepare(body);
-        if (!scene.picture.particles) melting_ = MeltingSurface::create(ready, quiet_).value();
+        if (!scene.picture.particles) prepare_melting();
         warnings.insert(warnings.end(), melting_.warnings.begin(), melting_.warnings.end());
         look_ahead();
         choose_ground();
@@ -50,7 +51,10 @@ public:
             if (!melting_.has_body(b)) shown.objects.push_back(body_at(b, number));
         if (!melting_.is_empty()) {
             const CompositeSurface surface = melting_.frame(recording_, number, quiet_).value();
-            melting_drawable_ = Drawable::surface(surface.mesh, {}, quiet_).value();
+            SurfaceOptions options;
+            options.materials = melting_materials_.materials;
+            melting_drawable_ =
+                Drawable::surface(melt_as_drawn(surface.mesh, options.materials).mesh, options, quiet_).value();
             shown.objects.push_back({&*melting_drawable_, {.own_colors = true}});
         }
         for (std::size_t k = 0; k < ready_.drawn.size() && scene_.picture.obstacles; ++k)
@@ -94,6 +98,12 @@ private:
         SurfaceOptions surface;
         surface.materials = shown.materials.materials;
         shown.drawable = Drawable::model(body.model, shown.restore, surface, quiet_).value();
+    }
+
+    void prepare_melting() {
+        const std::vector<BodyLook> looks = looks_of(ready_, warnings, quiet_).value();
+        melting_ = MeltingSurface::create(ready_, looks, quiet_).value();
+        melting_materials_ = decoded_materials(melting_.materials());
     }
 
     SceneObject body_at(std::size_t b, std::size_t frame) {
@@ -261,6 +271,7 @@ private:
     std::vector<ShownBody> actors_;
     std::vector<std::optional<Drawable>> obstacles_;
     MeltingSurface melting_;
+    SurfaceMaterials melting_materials_;
     std::optional<Drawable> melting_drawable_;
     Box box_; ///< of the bodies, in all frames
     double lowest_obstacle_ = std::numeric_limits<double>::infinity(), ground_level_ = 0;

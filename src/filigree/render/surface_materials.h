@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <span>
 
 namespace filigree {
 
@@ -14,6 +15,9 @@ struct SurfaceMaterials {
     std::vector<std::shared_ptr<Picture>> pictures; ///< that the materials point to
     std::vector<std::string> warnings;              ///< a sentence for whatever was missing
 };
+
+/// Of materials whose pictures are bytes, such as a mesh's embedded ones.
+SurfaceMaterials decoded_materials(std::span<const MeshMaterial> materials);
 
 /// As read_materials, with the pictures. Never fails: a mesh can be drawn without them.
 SurfaceMaterials load_surface_materials(const Mesh& mesh, const std::filesystem::path& mesh_path);

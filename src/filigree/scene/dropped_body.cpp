@@ -131,7 +131,7 @@ double heat_of_melting(const Material& material) {
 }
 
 /// The air, and the surface that parts and joins. A mesh that is open melts too, but neither parts nor joins.
-Status let_it_melt(const DropOptions& options, DroppedBody& dropped, const RunContext& context) {
+Status let_it_melt(const DropOptions& options, const BodyLook& look, DroppedBody& dropped, const RunContext& context) {
     constexpr double kWarmer = 60; // K
     constexpr double kSlower = 2;  // as the warmth has to get inside
     const Body& body = *dropped.body;
@@ -143,7 +143,7 @@ Status let_it_melt(const DropOptions& options, DroppedBody& dropped, const RunCo
     const double seconds =
         volume * body.material.density * heat_of_melting(body.material) / (kAirHeatTransfer * area * kWarmer);
     world.heat_pace = std::max(1.0, kSlower * seconds / options.melting_time);
-    Result<MeltingModel> melting = MeltingModel::create(dropped.model, body, dropped.scale, context);
+    Result<MeltingModel> melting = MeltingModel::create(dropped.model, body, dropped.scale, look, context);
     if (melting) {
         dropped.melting = std::make_shared<const MeltingModel>(std::move(*melting));
     } else if (melting.error().code == ErrorCode::unsuitable) {
@@ -181,8 +181,9 @@ HeatSource torch_at(const DroppedBody& dropped, const Vec3d& place, bool cools) 
 
 Result<std::shared_ptr<const DroppedBody>> make_dropped_body(std::shared_ptr<const Model> model,
                                                              std::shared_ptr<const BreakingModel> breaking,
-                                                             const DropOptions& options, std::span<const Index> pinned,
-                                                             const Vec3d& up, const RunContext& context) {
+                                                             const BodyLook& look, const DropOptions& options,
+                                                             std::span<const Index> pinned, const Vec3d& up,
+                                                             const RunContext& context) {
     const Box box = bounds(model->mesh.positions);
     const double longest = box.size().maxCoeff();
     if (!(longest > 0))
@@ -215,7 +216,7 @@ Result<std::shared_ptr<const DroppedBody>> make_dropped_body(std::shared_ptr<con
     DropBuilder(options, up, box, dropped->scale).build(*dropped);
     hold_pinned(pinned, *dropped);
     if (can_melt(*dropped))
-        if (const Status melts = let_it_melt(options, *dropped, context); !melts) return melts.error();
+        if (const Status melts = let_it_melt(options, look, *dropped, context); !melts) return melts.error();
     return std::shared_ptr<const DroppedBody>(std::move(dropped));
 }
 

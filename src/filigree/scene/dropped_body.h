@@ -58,13 +58,14 @@ struct DroppedBody {
 };
 
 /// The body starts where the mesh is, and the ground is put below it, so that nothing jumps when it is made. breaking:
-/// of a model in pieces; null: it does not break. pinned: vertices of the model's driver; the particles near them are
-/// held fast where they are. up: along an axis. Errors: unsuitable (a mesh without extent), and as of make_body and
-/// break_body. Cost: theirs.
+/// of a model in pieces; null: it does not break. look: of the model's mesh, for its melt; may be empty. pinned:
+/// vertices of the model's driver; the particles near them are held fast where they are. up: along an axis. Errors:
+/// unsuitable (a mesh without extent), and as of make_body and break_body. Cost: theirs.
 Result<std::shared_ptr<const DroppedBody>> make_dropped_body(std::shared_ptr<const Model> model,
                                                              std::shared_ptr<const BreakingModel> breaking,
-                                                             const DropOptions& options, std::span<const Index> pinned,
-                                                             const Vec3d& up, const RunContext& context);
+                                                             const BodyLook& look, const DropOptions& options,
+                                                             std::span<const Index> pinned, const Vec3d& up,
+                                                             const RunContext& context);
 
 /// Whether heat does anything to it: it is of mpm and melts.
 bool can_melt(const DroppedBody& dropped);

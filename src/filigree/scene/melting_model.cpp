@@ -5,7 +5,7 @@
 namespace filigree {
 
 Result<MeltingModel> MeltingModel::create(std::shared_ptr<const Model> model, const Body& body, double scale,
-                                          const RunContext& context) {
+                                          const BodyLook& look, const RunContext& context) {
     Result<CompositeMesher> mesher = CompositeMesher::create(model->mesh, context);
     if (!mesher) return mesher.error();
     Result<Restorer> restorer = Restorer::create(*model, {}, context);
@@ -16,7 +16,14 @@ Result<MeltingModel> MeltingModel::create(std::shared_ptr<const Model> model, co
     for (std::size_t p = 0; p < body.particle_count(); ++p) rest.push_back(Vec3f(body.rest[p]) / float(scale));
     const double spacing = body.spacing() / scale;
     melting.at_vertices_ = MatterAtPoints(mesh.positions, rest, spacing, context);
-    melting.particle_colors_ = matter_colors(mesh, mesh.positions, rest, spacing, context);
+    if (look.empty()) {
+        melting.particle_colors_ = matter_colors(mesh, mesh.positions, rest, spacing, context);
+    } else {
+        melting.vertex_colors_ = look.vertex_colors;
+        const MatterAtPoints seen(rest, look.places, spacing, context);
+        for (std::size_t p = 0; p < rest.size(); ++p)
+            melting.particle_colors_.push_back(seen.at<Vec4f>(p, look.place_colors, Vec4f::Ones()));
+    }
     if (context.is_cancelled()) return cancelled_error();
     return melting;
 }
@@ -27,8 +34,9 @@ Result<std::optional<Mesh>> MeltingModel::surface(const Pose& pose, const Matter
     for (std::size_t v = 0; v < renewal.size(); ++v) renewal[v] = at_vertices_.at<float>(v, matter.renewal, 0);
     const auto is_renewed = [](float value) { return value > CompositeMesher::kFadeBegin; };
     if (dead.empty() && std::none_of(renewal.begin(), renewal.end(), is_renewed)) return std::optional<Mesh>();
-    const Result<Mesh> restored = restorer_.mesh(pose, context);
+    Result<Mesh> restored = restorer_.mesh(pose, context);
     if (!restored) return restored.error();
+    if (!vertex_colors_.empty()) restored->colors = vertex_colors_;
     const Result<ParticleField> field = make_particle_field(matter, {}, context);
     if (!field) return field.error();
     Result<CompositeSurface> surface =

@@ -4,6 +4,7 @@
 #include "filigree/hierarchy/restore.h"
 #include "filigree/melting/composite_surface.h"
 #include "filigree/physics/body.h"
+#include "filigree/scene/body_look.h"
 #include "filigree/scene/matter_at_points.h"
 
 #include <memory>
@@ -14,10 +15,11 @@ namespace filigree {
 /// Never changes once made. What a moment is made of is in model units, relative to the model's origin.
 class MeltingModel {
 public:
-    /// body: of the model, `scale` metres a model unit. Errors: unsuitable (the mesh is not closed, or as
+    /// body: of the model, `scale` metres a model unit. look: of its mesh; empty: it has colours of its own, or none.
+    /// Errors: unsuitable (the mesh is not closed, or as
     /// Restorer::create), cancelled. Cost: welding, and O(vertices + particles).
     static Result<MeltingModel> create(std::shared_ptr<const Model> model, const Body& body, double scale,
-                                       const RunContext& context);
+                                       const BodyLook& look, const RunContext& context);
 
     /// The surface of a moment; none while nothing of it is renewed, as the restored mesh is it then. dead: as of
     /// CompositeMesher::make, of the moments before. Cost O(mesh + particles). Errors: as make's.
@@ -34,6 +36,7 @@ private:
     Restorer restorer_;
     CompositeMesher mesher_;
     MatterAtPoints at_vertices_;
+    std::vector<Vec4f> vertex_colors_; ///< by its look; none: the mesh's own
     std::vector<Vec4f> particle_colors_;
 };
 

@@ -18,39 +18,38 @@ std::vector<Vec3f> placed(std::vector<Vec3f> points, const Eigen::Isometry3d& pl
 
 Vec4f opaque(const Vec3f& color) { return {color[0], color[1], color[2], 1}; }
 
-/// Puts a mesh behind another: positions, faces, colours, and normals where the mesh has a normal a corner or vertex.
-void append(const Mesh& part, const Vec3f& color, const RunContext& context, Mesh& whole) {
-    const Index first = Index(whole.positions.size()), first_normal = Index(whole.normals.values.size());
-    whole.positions.insert(whole.positions.end(), part.positions.begin(), part.positions.end());
-    for (std::size_t f = 0; f < part.face_count(); ++f) {
-        for (const Index v : part.face(f)) whole.corners.push_back(first + v);
-        whole.face_offsets.push_back(Index(whole.corners.size()));
+/// Values that corners refer to, behind those of another mesh; corners without a value where there are none.
+template <class T>
+void append_values(const CornerAttribute<T>& part, const Mesh& part_mesh, CornerAttribute<T>& whole) {
+    const Index first = Index(whole.values.size());
+    whole.values.insert(whole.values.end(), part.values.begin(), part.values.end());
+    if (part.empty()) {
+        whole.corners.insert(whole.corners.end(), part_mesh.corner_count(), kNoIndex);
+        return;
     }
-    if (part.colors.empty())
-        whole.colors.insert(whole.colors.end(), part.positions.size(), opaque(color));
-    else
-        whole.colors.insert(whole.colors.end(), part.colors.begin(), part.colors.end());
-    std::vector<Vec3f> normals = part.normals.values;
-    if (normals.empty()) normals = vertex_normals(part, part.positions, context);
-    whole.normals.values.insert(whole.normals.values.end(), normals.begin(), normals.end());
-    const bool per_vertex = part.normals.empty() || part.normals.per_vertex();
-    for (const Index corner : per_vertex ? part.corners : part.normals.corners)
-        whole.normals.corners.push_back(first_normal + corner);
+    for (const Index value : part.per_vertex() ? part_mesh.corners : part.corners)
+        whole.corners.push_back(value == kNoIndex ? kNoIndex : first + value);
 }
 
 } // namespace
 
 Result<MeltingSurface> MeltingSurface::create(const ReadyScene& ready, const RunContext& context) {
+    return create(ready, {}, context);
+}
+
+Result<MeltingSurface> MeltingSurface::create(const ReadyScene& ready, std::span<const BodyLook> looks,
+                                              const RunContext& context) {
     MeltingSurface surface;
     surface.ready_ = &ready;
     for (std::size_t b = 0; b < ready.bodies.size(); ++b) {
         if (ready.bodies[b].body->material.model != MaterialModel::mpm) continue;
-        if (const Status added = surface.add(b, context); !added) return added.error();
+        const BodyLook* look = b < looks.size() && !looks[b].empty() ? &looks[b] : nullptr;
+        if (const Status added = surface.add(b, look, context); !added) return added.error();
     }
     return surface;
 }
 
-Status MeltingSurface::add(std::size_t b, const RunContext& context) {
+Status MeltingSurface::add(std::size_t b, const BodyLook* look, const RunContext& context) {
     const ReadyBody& body = ready_->bodies[b];
     Result<CompositeMesher> mesher = CompositeMesher::create(body.model.mesh, context);
     if (!mesher && mesher.error().code == ErrorCode::unsuitable) {
@@ -63,15 +62,33 @@ Status MeltingSurface::add(std::size_t b, const RunContext& context) {
     Result<Restorer> restorer = Restorer::create(body.model, {}, context);
     if (!restorer) return restorer.error();
     Result<Surfels> surfels = make_surfels(body.model.mesh, context);
+    if (look && surfels) { // vertices' colours go with them
+        Mesh colored = body.model.mesh;
+        colored.colors = look->vertex_colors;
+        surfels = make_surfels(colored, context);
+    }
     if (!surfels) return surfels.error();
     for (float& radius : surfels->rest_radius) radius *= float(body.body->scale);
     if (surfels->colors.empty()) surfels->colors.assign(surfels->size(), opaque(body.color));
     BodyPart& part = bodies_.emplace_back(
-        BodyPart{b, std::move(*restorer), body.in_metres(body.model.mesh.positions), std::move(*surfels), {}});
+        BodyPart{b, std::move(*restorer), body.in_metres(body.model.mesh.positions), std::move(*surfels), {}, {}});
+    has_uvs_ = has_uvs_ || !body.model.mesh.uvs.empty();
     std::vector<Vec3f> rest;
     for (std::size_t p = 0; p < body.body->particle_count(); ++p) rest.push_back(body.body->rest[p]);
     part.matter = MatterAtPoints(part.start, rest, body.body->spacing(), context);
-    const std::vector<Vec4f> colors = matter_colors(body.model.mesh, part.start, rest, body.body->spacing(), context);
+    std::vector<Vec4f> colors = matter_colors(body.model.mesh, part.start, rest, body.body->spacing(), context);
+    if (look) {
+        part.colors = look->vertex_colors;
+        part.has_look = true;
+        part.first_material = Index(materials_.size());
+        for (const MeshMaterial& material : look->materials) {
+            materials_.push_back(material);
+            if (ready_->bodies.size() > 1) materials_.back().name = body.name + ": " + material.name;
+        }
+        const MatterAtPoints seen(rest, body.in_metres(look->places), body.body->spacing(), context);
+        for (std::size_t p = 0; p < rest.size(); ++p)
+            colors.push_back(seen.at<Vec4f>(p, look->place_colors, opaque(body.color)));
+    }
     if (colors.empty())
         particle_colors_.insert(particle_colors_.end(), rest.size(), opaque(body.color));
     else
@@ -82,6 +99,29 @@ Status MeltingSurface::add(std::size_t b, const RunContext& context) {
     else
         mesher_.emplace(std::move(*mesher));
     return Success{};
+}
+
+/// Puts a body's mesh behind those before it: positions, faces, colours, normals, and what looks need.
+void MeltingSurface::append(const Mesh& part_mesh, const BodyPart& part, const RunContext& context, Mesh& whole) const {
+    const Index first = Index(whole.positions.size());
+    whole.positions.insert(whole.positions.end(), part_mesh.positions.begin(), part_mesh.positions.end());
+    for (std::size_t f = 0; f < part_mesh.face_count(); ++f) {
+        for (const Index v : part_mesh.face(f)) whole.corners.push_back(first + v);
+        whole.face_offsets.push_back(Index(whole.corners.size()));
+    }
+    const std::vector<Vec4f>& colors = part.has_look ? part.colors : part_mesh.colors;
+    if (colors.empty())
+        whole.colors.insert(whole.colors.end(), part_mesh.positions.size(), opaque(ready_->bodies[part.body].color));
+    else
+        whole.colors.insert(whole.colors.end(), colors.begin(), colors.end());
+    CornerAttribute<Vec3f> normals = part_mesh.normals;
+    if (normals.empty()) normals = {vertex_normals(part_mesh, part_mesh.positions, context), {}};
+    append_values(normals, part_mesh, whole.normals);
+    if (has_uvs_) append_values(part_mesh.uvs, part_mesh, whole.uvs);
+    for (std::size_t f = 0; f < part_mesh.face_count() && !materials_.empty(); ++f) {
+        const Index material = part.has_look ? part_mesh.materials.of_face[f] : kNoIndex;
+        whole.materials.of_face.push_back(material == kNoIndex ? kNoIndex : part.first_material + material);
+    }
 }
 
 /// How far the matter at a vertex is renewed.
@@ -98,6 +138,8 @@ Result<CompositeSurface> MeltingSurface::frame(const Recording& recording, std::
     if (frame == 0) dead_.clear();
     MatterParticles matter;
     Mesh restored;
+    for (const MeshMaterial& material : materials_) restored.materials.names.push_back(material.name);
+    restored.embedded_materials = materials_;
     std::vector<float> renewal;
     for (const BodyPart& part : bodies_) {
         const ReadyBody& body = ready_->bodies[part.body];
@@ -110,11 +152,11 @@ Result<CompositeSurface> MeltingSurface::frame(const Recording& recording, std::
             Mesh start = body.model.mesh;
             start.positions = placed(part.start, ready_->actors[part.body].placement);
             start.normals = {}; // of the mesh before it was turned
-            append(start, body.color, context, restored);
+            append(start, part, context, restored);
         } else {
             const Result<Mesh> now = part.restorer.mesh(recording.poses[part.body].frames[frame], context);
             if (!now) return now.error();
-            append(*now, body.color, context, restored);
+            append(*now, part, context, restored);
         }
         for (std::size_t v = 0; v < part.start.size(); ++v) renewal.push_back(renewal_at(part, v, own));
     }

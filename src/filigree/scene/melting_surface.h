@@ -4,6 +4,7 @@
 #include "filigree/hierarchy/restore.h"
 #include "filigree/melting/composite_surface.h"
 #include "filigree/mesh/surfels.h"
+#include "filigree/scene/body_look.h"
 #include "filigree/scene/matter_at_points.h"
 #include "filigree/scene/recording.h"
 #include "filigree/scene/world_setup.h"
@@ -16,12 +17,18 @@ public:
     /// Bodies whose mesh is open or not manifold are left out, as ever a mesh of one topology; `warnings` says so.
     /// ready has to outlive the surface. Cost: welding, and O(vertices). Errors: cancelled.
     static Result<MeltingSurface> create(const ReadyScene& ready, const RunContext& context);
+    /// looks: one a body of the scene. Kept parts keep their materials and UVs, and melt has the colours of what it
+    /// was.
+    static Result<MeltingSurface> create(const ReadyScene& ready, std::span<const BodyLook> looks,
+                                         const RunContext& context);
 
     /// Whether the scene has such bodies. Without them there is no frame to ask for.
     bool is_empty() const { return bodies_.empty(); }
     bool has_body(std::size_t body) const;
     /// The bodies' names, with + between.
     const std::string& name() const { return name_; }
+    /// Of all bodies, as the surfaces' materials have them; empty: none has any.
+    const std::vector<MeshMaterial>& materials() const { return materials_; }
 
     /// Metres, in the scene's frame; in the colours of the bodies or their meshes. The start is the bodies' own meshes,
     /// to the byte. Frames are made in order from the start on, as what died in one stays dead. Cost
@@ -44,18 +51,24 @@ private:
     struct BodyPart {
         std::size_t body;
         Restorer restorer;
-        std::vector<Vec3f> start; ///< m
-        Surfels surfels;          ///< at rest, model units; but colours and rest_radius, m
-        MatterAtPoints matter;    ///< at its vertices
+        std::vector<Vec3f> start;  ///< m
+        Surfels surfels;           ///< at rest, model units; but colours and rest_radius, m
+        MatterAtPoints matter;     ///< at its vertices
+        std::vector<Vec4f> colors; ///< of its vertices, by its look; none: the mesh's own, or the body's
+        Index first_material = 0;
+        bool has_look = false;
     };
 
-    Status add(std::size_t body, const RunContext& context);
+    Status add(std::size_t body, const BodyLook* look, const RunContext& context);
+    void append(const Mesh& part_mesh, const BodyPart& part, const RunContext& context, Mesh& whole) const;
     static float renewal_at(const BodyPart& part, std::size_t vertex, const MatterParticles& matter);
 
     const ReadyScene* ready_ = nullptr;
     std::vector<BodyPart> bodies_;
     std::string name_;
     std::vector<Vec4f> particle_colors_;
+    std::vector<MeshMaterial> materials_;
+    bool has_uvs_ = false;
     std::optional<CompositeMesher> mesher_;
     std::vector<std::uint8_t> dead_; ///< vertices, so far
 };

@@ -1,0 +1,30 @@
+// How a body looks that has materials and textures, so that what melts of it looks alike.
+#pragma once
+
+#include "filigree/mesh/mesh.h"
+
+#include <span>
+#include <vector>
+
+namespace filigree {
+
+/// All empty: of a body without materials, or with colours of its own, one a vertex. Colours are sRGB, RGBA, 0 to 1.
+struct BodyLook {
+    std::vector<MeshMaterial> materials; ///< one a name of the mesh's materials; pictures as bytes
+    std::vector<Vec4f> vertex_colors;    ///< one a vertex of the mesh: what is seen there
+    std::vector<Vec3f> places;           ///< all over the surface, model units
+    std::vector<Vec4f> place_colors;     ///< one a place: what is seen around it
+
+    bool empty() const { return materials.empty(); }
+};
+
+/// A surface of matter as programs draw it that multiply textures with colours: faces with a material have vertices of
+/// their own, of that material's colour here, where other faces had the same.
+struct DrawnSurface {
+    Mesh mesh;                 ///< the surface's vertices, and copies of some behind them, with all that they have
+    std::vector<Index> copied; ///< of each copy: which vertex
+};
+/// colors: one a name in surface.materials. Without materials or colours: the surface as it is. Cost O(size).
+DrawnSurface with_materials_apart(Mesh surface, std::span<const Vec3f> colors);
+
+} // namespace filigree
