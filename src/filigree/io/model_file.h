@@ -96,8 +96,8 @@ struct CodingReport {
 /// Writes a model in few bits (docs/coding.md): its mesh rounded and in an order of the code's own, its driver with the
 /// same vertices in the same order, so that poses fit as before. Poses are coded too: 1e-5 of the diagonal off (rms),
 /// gradients a thousandth. Levels between are dropped; vertices are bound to the
-/// driver anew when the file is read. Errors: as write_model, and as encode_mesh; unsuitable (the reference code; streams
-/// of a driver made elsewhere).
+/// driver anew when the file is read. Errors: as write_model, and as encode_mesh; unsuitable (the reference code;
+/// streams of a driver made elsewhere).
 Result<CodingReport> write_coded_model(const Model& model, const PoseSequence& poses, const MeshCodeOptions& options,
                                        const std::filesystem::path& path, const RunContext& context);
 struct LosslessReport {

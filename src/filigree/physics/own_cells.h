@@ -42,7 +42,7 @@ private:
     std::vector<Cluster> clusters_; ///< and one behind the last
     std::vector<Index> cells_, corners_, surface_points_;
     std::vector<std::uint32_t> far_near_; ///< of each cell: bits of the 3^3 clusters around that have cells far from it
-    float overhang_ = 0; ///< m that points may lie outside of their cells
+    float overhang_ = 0;                  ///< m that points may lie outside of their cells
 };
 
 } // namespace filigree
