@@ -118,10 +118,11 @@ def coverage():
         return None
     share = lambda part: f"{100 * part['covered'] / part['lines']:.1f} %"
     whole = {key: sum(layer[key] for layer in told["layers"].values()) for key in ("covered", "lines")}
-    missed = told.get("without", [])
+    missed = told["without"] and f" Not counted, as its tests did not run: {', '.join(told['without'])}."
+    in_part = told["in_part"] and f" Ran in part: {', '.join(told['in_part'])}."
     return ["Lines of the library that the tests of its layers and the fuzz targets' replay run, by gcov (`scripts/coverage`). "
             "Tests of the programs, the studio and Python run more of them, and are not counted."
-            + (f" Not run this time: {', '.join(missed)}." if missed else ""), "",
+            + (missed or "") + (in_part or ""), "",
             "| layer | lines | run |", "|---|---|---|",
             *[f"| `{name}` | {layer['lines']:,} | {share(layer)} |" for name, layer in sorted(told["layers"].items())],
             f"| all | {whole['lines']:,} | {share(whole)} |", "",
