@@ -50,7 +50,8 @@ TEST_F(FractureCommand, ClumpsAndGrains) {
     EXPECT_LT(clumps.at("volume_error"), 1e-9);
     const Json grains = json({"fracture", "cube.obj", "-o", "broken.ply", "--pieces", "40", "--pattern", "grains"});
     const Json even = json({"fracture", "cube.obj", "-o", "broken.ply", "--pieces", "40"});
-    EXPECT_GT(grains.at("largest"), 1.3 * even.at("largest").get<double>());
+    EXPECT_LT(grains.at("smallest"), 0.7 * even.at("smallest").get<double>());
+    EXPECT_GT(grains.at("largest"), even.at("largest").get<double>());
     fails(2, {"fracture", "cube.obj", "-o", "x.ply", "--clump", "0"}, {"--clump"});
 }
 
