@@ -3,6 +3,7 @@
 #include "filigree/core/parallel_for.h"
 #include "filigree/physics/byte_stream.h"
 #include "filigree/physics/mpm_contact.h"
+#include "filigree/physics/mpm_kernel.h"
 #include "filigree/physics/stopwatch.h"
 
 #include <Eigen/Cholesky>
@@ -69,7 +70,7 @@ void Bodies::advance(double from, double until, FrameReport& report, const RunCo
     double now = from;
     unsigned steps = 0;
     while (until - now > 1e-9 * (until - from) && !context.is_cancelled()) {
-        const double longest = std::max(double(longest_step()), (until - from) / kMostSteps);
+        const double longest = std::max(double(longest_step(context)), (until - from) / kMostSteps);
         const double left = until - now, count = std::max(kFewestSteps, std::ceil(left / longest));
         const auto dt = float(left / count);
         now = count <= 1 ? until : now + double(dt);
@@ -87,56 +88,30 @@ void Bodies::advance(double from, double until, FrameReport& report, const RunCo
         report.least_volume_ratio = std::min(report.least_volume_ratio, p.volume_ratio());
 }
 
-float Bodies::longest_step() const {
-    float squared_speed = 0;
-    for (const Particle& p : particles_)
-        squared_speed = std::max(squared_speed, p.v[0] * p.v[0] + p.v[1] * p.v[1] + p.v[2] * p.v[2]);
+float Bodies::longest_step(const RunContext& context) const {
+    constexpr std::size_t kGrain = 16384;
+    std::vector<float> fastest((particles_.size() + kGrain - 1) / kGrain, 0.0f); // squared
+    parallel_for(context, fastest.size(), 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t part = begin; part < end; ++part)
+            for (std::size_t i = part * kGrain; i < std::min(particles_.size(), (part + 1) * kGrain); ++i) {
+                const Particle& p = particles_[i];
+                fastest[part] = std::max(fastest[part], p.v[0] * p.v[0] + p.v[1] * p.v[1] + p.v[2] * p.v[2]);
+            }
+    });
+    const float squared_speed = *std::max_element(fastest.begin(), fastest.end());
     float step = kMostTravel * grid_.spacing() / std::sqrt(std::max(squared_speed, 1e-12f));
     for (const Matter& matter : matter_) step = std::min(step, matter.longest_step(grid_.spacing()));
     return step;
 }
 
 void Bodies::scatter(float dt, const RunContext& context) {
-    const float h = grid_.spacing(), moment = 4 / (h * h); // of the inverse moment of the weights
     for (const std::vector<std::uint32_t>& group : grid_.groups())
         parallel_for(context, group.size(), 1, [&](std::size_t begin, std::size_t end) {
             Node tile[kTileNodes];
             for (std::size_t g = begin; g < end; ++g) {
                 std::fill_n(tile, kTileNodes, Node{});
-                const Matter& matter = matter_[grid_.place(group[g]).body];
-                for (const std::uint32_t number : grid_.particles(group[g])) {
-                    const Particle& p = particles_[number];
-                    const Stencil at(p.x, h);
-                    float s[6];
-                    matter.stress(p, s);
-                    const float k = -dt * moment;
-                    const Float4 momentum = lanes(p.mass * p.v[0], p.mass * p.v[1], p.mass * p.v[2], p.mass);
-                    const Float4 slope[3] = {lanes(p.mass * p.c[0][0] + k * s[0], p.mass * p.c[0][1] + k * s[3],
-                                                   p.mass * p.c[0][2] + k * s[4], 0),
-                                             lanes(p.mass * p.c[1][0] + k * s[3], p.mass * p.c[1][1] + k * s[1],
-                                                   p.mass * p.c[1][2] + k * s[5], 0),
-                                             lanes(p.mass * p.c[2][0] + k * s[4], p.mass * p.c[2][1] + k * s[5],
-                                                   p.mass * p.c[2][2] + k * s[2], 0)};
-                    const Float4 contents =
-                        lanes(p.mass * matter.temperature(p.enthalpy()), 0, p.mass * p.melted, p.mass * p.renewal);
-                    const float flow = -dt * moment * p.volume * p.volume_ratio() * matter.heat_conductivity();
-                    const Float4 heat[3] = {lanes(0, flow * p.warming[0], 0, 0), lanes(0, flow * p.warming[1], 0, 0),
-                                            lanes(0, flow * p.warming[2], 0, 0)};
-                    Node* const first = tile + Grid::tile_index(at.base);
-                    for (int z = 0; z < 3; ++z)
-                        for (int y = 0; y < 3; ++y) {
-                            const float wy = at.weight[2][z] * at.weight[1][y];
-                            const float dy = at.first_way[1] + float(y) * h, dz = at.first_way[2] + float(z) * h;
-                            const Float4 row = momentum + slope[1] * dy + slope[2] * dz;
-                            const Float4 heat_row = contents + heat[1] * dy + heat[2] * dz;
-                            Node* const nodes = first + (z * kTileSide + y) * kTileSide;
-                            for (int x = 0; x < 3; ++x) {
-                                const float w = wy * at.weight[0][x], dx = at.first_way[0] + float(x) * h;
-                                nodes[x].motion += w * (row + slope[0] * dx);
-                                nodes[x].matter += w * (heat_row + heat[0] * dx);
-                            }
-                        }
-                }
+                scatter_particles(grid_.particles(group[g]), particles_.data(), matter_[grid_.place(group[g]).body],
+                                  grid_.spacing(), dt, tile);
                 grid_.add_tile(group[g], tile);
             }
         });
@@ -200,54 +175,37 @@ void Bodies::gather(float dt, double time, const RunContext& context) {
     for (const std::vector<std::uint32_t>& group : grid_.groups())
         parallel_for(context, group.size(), 1, [&](std::size_t begin, std::size_t end) {
             Node tile[kTileNodes];
+            std::vector<AtParticle> found;
+            std::vector<std::size_t> near; // obstacles
             for (std::size_t g = begin; g < end; ++g) {
                 grid_.read_tile(group[g], tile);
+                const std::span<const std::uint32_t> numbers = grid_.particles(group[g]);
                 const std::uint32_t field = grid_.place(group[g]).body;
                 const Matter& matter = matter_[field];
                 const float kept = std::exp(-dt * matter.damping());
-                for (const std::uint32_t number : grid_.particles(group[g])) {
-                    Particle& p = particles_[number];
-                    const Stencil at(p.x, h);
-                    Float4 motion = {}, slope[3] = {}, contents = {}, heat[3] = {};
-                    const Node* const first = tile + Grid::tile_index(at.base);
-                    for (int z = 0; z < 3; ++z)
-                        for (int y = 0; y < 3; ++y) {
-                            const float wy = at.weight[2][z] * at.weight[1][y];
-                            const float dy = at.first_way[1] + float(y) * h, dz = at.first_way[2] + float(z) * h;
-                            const Node* const nodes = first + (z * kTileSide + y) * kTileSide;
-                            Float4 row = {}, heat_row = {};
-                            for (int x = 0; x < 3; ++x) {
-                                const float w = wy * at.weight[0][x], dx = at.first_way[0] + float(x) * h;
-                                const Float4 part = w * nodes[x].motion, heat_part = w * nodes[x].matter;
-                                row += part;
-                                slope[0] += part * dx;
-                                heat_row += heat_part;
-                                heat[0] += heat_part * dx;
-                            }
-                            motion += row;
-                            slope[1] += row * dy;
-                            slope[2] += row * dz;
-                            contents += heat_row;
-                            heat[1] += heat_row * dy;
-                            heat[2] += heat_row * dz;
-                        }
-                    if (!std::isfinite(motion[0] + motion[1] + motion[2])) { // it stays, at rest
+                const float emptiness = moment / grid_mass_[field];
+                exchange.go_to(grid_.place(group[g]), poses, near);
+                found.resize(numbers.size());
+                gather_at_particles(numbers, particles_.data(), h, tile, found.data());
+                for (std::size_t i = 0; i < numbers.size(); ++i) {
+                    Particle& p = particles_[numbers[i]];
+                    const auto& [value, slope] = found[i];
+                    if (!std::isfinite(value[0] + value[1] + value[2])) { // it stays, at rest
                         for (int k = 0; k < 3; ++k) p.v[k] = p.c[k][0] = p.c[k][1] = p.c[k][2] = 0;
                         continue;
                     }
                     for (int k = 0; k < 3; ++k) {
-                        p.v[k] = kept * motion[k];
-                        p.x[k] += dt * motion[k];
+                        p.v[k] = kept * value[k];
+                        p.x[k] += dt * value[k];
                         for (int r = 0; r < 3; ++r) p.c[k][r] = moment * slope[k][r];
-                        p.warming[k] = moment * heat[k][0];
+                        p.warming[k] = moment * slope[k][4];
                     }
                     if (has_heat_) {
-                        p.enthalpy() += contents[1];
-                        const float scale = moment / grid_mass_[field];
-                        exchange.act(p, matter, scale * Vec3f(slope[0][3], slope[1][3], slope[2][3]), poses);
+                        p.enthalpy() += value[5];
+                        exchange.act(p, matter, emptiness * Vec3f(slope[0][3], slope[1][3], slope[2][3]), poses, near);
                     }
-                    matter.deform(p, dt);
                 }
+                matter.deform(numbers, particles_.data(), dt);
             }
         });
 }

@@ -58,7 +58,7 @@ private:
         std::uint32_t field;
     };
 
-    float longest_step() const; ///< s
+    float longest_step(const RunContext& context) const; ///< s
     void scatter(float dt, const RunContext& context);
     void update_nodes(float dt, double time, const RunContext& context);
     void hold_nodes();

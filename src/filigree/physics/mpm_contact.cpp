@@ -176,20 +176,33 @@ HeatExchange::HeatExchange(const World& world, double time, float dt, float grid
     }
 }
 
-void HeatExchange::act(Particle& p, const Matter& matter, const Vec3f& emptiness, const ObstaclePoses& poses) const {
+void HeatExchange::go_to(const BlockPlace& place, const ObstaclePoses& poses, std::vector<std::size_t>& near) const {
+    // Particles whose stencils begin in the block were within two cells of its middle along each axis, and have gone on
+    // for less than one since.
+    const float h = grid_spacing_, reach = (2 + 2 * std::sqrt(3.0f)) * h;
+    const Vec3f middle = h * (Vec3f(float(place.x), float(place.y), float(place.z)) * kBlockSide +
+                              Vec3f::Constant(0.5f * kBlockSide + 0.5f));
+    near.clear();
+    for (std::size_t o = 0; o < world_.obstacles.size(); ++o)
+        if (world_.obstacles[o].heat_transfer > 0 &&
+            distance_to(world_.obstacles[o], poses.at(o), middle).distance < reach)
+            near.push_back(o);
+}
+
+void HeatExchange::act(Particle& p, const Matter& matter, const Vec3f& emptiness, const ObstaclePoses& poses,
+                       std::span<const std::size_t> near) const {
     const Vec3f point(p.x[0], p.x[1], p.x[2]);
-    const float volume = p.volume * p.volume_ratio(), area = emptiness.norm() * volume;
+    const float volume = p.volume * p.volume_ratio(), empty = emptiness.norm(), area = empty * volume;
     const float temperature = matter.temperature(p.enthalpy()), heat_capacity = p.mass * matter.specific_heat();
     // Never beyond what is around it.
     const auto exchange = [&](float around, double transfer, float surface) {
         const float share = std::min(1.0f, float(transfer * world_.heat_pace) * surface * dt_ / heat_capacity);
         p.enthalpy() += share * matter.specific_heat() * (around - temperature);
     };
-    p.enthalpy() += matter.specific_heat() * matter.heating() * dt_ * std::min(1.0f, emptiness.norm() * grid_spacing_);
+    p.enthalpy() += matter.specific_heat() * matter.heating() * dt_ * std::min(1.0f, empty * grid_spacing_);
     if (world_.air_heat_transfer > 0) exchange(air_temperature_, world_.air_heat_transfer, area);
-    for (std::size_t o = 0; o < world_.obstacles.size(); ++o) {
+    for (const std::size_t o : near) {
         const Obstacle& obstacle = world_.obstacles[o];
-        if (!(obstacle.heat_transfer > 0)) continue;
         if (!(distance_to(obstacle, poses.at(o), point).distance < grid_spacing_)) continue;
         exchange(obstacle_temperature_[o], obstacle.heat_transfer, volume / grid_spacing_);
     }

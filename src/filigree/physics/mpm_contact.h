@@ -39,7 +39,11 @@ public:
     HeatExchange(const World& world, double time, float dt, float grid_spacing, std::span<const Particle> particles);
 
     /// emptiness: gradient of the share of space that is full, 1/m; its norm is the surface in a unit of volume.
-    void act(Particle& particle, const Matter& matter, const Vec3f& emptiness, const ObstaclePoses& poses) const;
+    /// near: as go_to has it.
+    void act(Particle& particle, const Matter& matter, const Vec3f& emptiness, const ObstaclePoses& poses,
+             std::span<const std::size_t> near) const;
+    /// Which obstacles may warm or cool particles of a block: all but those that are far.
+    void go_to(const BlockPlace& block, const ObstaclePoses& poses, std::vector<std::size_t>& near) const;
 
 private:
     const World& world_;

@@ -23,19 +23,6 @@ std::uint64_t mixed(const BlockPlace& p) {
 
 } // namespace
 
-Stencil::Stencil(const float point[3], float spacing) {
-    for (int axis = 0; axis < 3; ++axis) {
-        constexpr float kFarthest = float(kFarthestBlock * kBlockSide);
-        const float at = std::fmin(std::fmax(point[axis] / spacing, -kFarthest), kFarthest),
-                    first = std::floor(at - 0.5f), off = at - first;
-        base[axis] = int(first);
-        weight[axis][0] = 0.5f * (1.5f - off) * (1.5f - off);
-        weight[axis][1] = 0.75f - (off - 1) * (off - 1);
-        weight[axis][2] = 0.5f * (off - 0.5f) * (off - 0.5f);
-        first_way[axis] = -off * spacing;
-    }
-}
-
 BlockPlace Grid::block_of(const std::array<int, 3>& base, std::uint32_t body) {
     return {base[0] >> 2, base[1] >> 2, base[2] >> 2, body};
 }

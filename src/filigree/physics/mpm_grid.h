@@ -33,11 +33,27 @@ struct Stencil {
     std::array<int, 3> base;        ///< the first of three nodes along each axis
     float weight[3][3];             ///< [axis][node]
     std::array<float, 3> first_way; ///< m, from the point to the first node
-    Stencil(const float point[3], float spacing);
+    FILIGREE_INLINE Stencil(const float point[3], float spacing);
 };
 
 /// Places farther than this many blocks from the origin are brought nearer.
 inline constexpr int kFarthestBlock = 1 << 20;
+
+FILIGREE_INLINE Stencil::Stencil(const float point[3], float spacing) {
+    for (int axis = 0; axis < 3; ++axis) {
+        constexpr float kFarthest = float(kFarthestBlock * kBlockSide);
+        float at = point[axis] / spacing;
+        at = at > -kFarthest ? at : -kFarthest; // of what is no number, too
+        at = at < kFarthest ? at : kFarthest;
+        base[axis] = int(at - 0.5f);
+        base[axis] -= float(base[axis]) > at - 0.5f; // downwards, without a call
+        const float off = at - float(base[axis]);
+        weight[axis][0] = 0.5f * (1.5f - off) * (1.5f - off);
+        weight[axis][1] = 0.75f - (off - 1) * (off - 1);
+        weight[axis][2] = 0.5f * (off - 0.5f) * (off - 0.5f);
+        first_way[axis] = -off * spacing;
+    }
+}
 
 class Grid {
 public:

@@ -9,6 +9,9 @@
 #include "filigree/core/types.h"
 #include "filigree/physics/material.h"
 
+#include <cstdint>
+#include <span>
+
 namespace filigree::mpm {
 
 using Float4 = Lanes<4>::Float;
@@ -58,11 +61,17 @@ public:
 
     /// Volume times Kirchhoff stress (J/m^3 m^3) of the particle: xx, yy, zz, xy, xz, yz.
     void stress(const Particle& particle, float stress[6]) const;
-    /// What the particle remembers after a step dt in which c was the velocity's gradient.
-    void deform(Particle& particle, float dt) const;
+    /// What particles of these numbers remember after a step dt in which c was the velocity's gradient. width: what the
+    /// processor has, or less, for tests; every width gives the same bytes.
+    void deform(std::span<const std::uint32_t> numbers, Particle* particles, float dt,
+                VectorWidth width = widest_vectors()) const;
     double energy(const Particle& particle) const; ///< J, elastic
 
 private:
+    template <int N>
+    void deform_lanes(std::span<const std::uint32_t> numbers, Particle* particles, float dt) const;
+    void deform_wide(std::span<const std::uint32_t> numbers, Particle* particles, float dt) const;
+
     float density_, bulk_, shear_, yield_, viscosity_, damping_;
     float melting_from_, melting_to_, specific_heat_, latent_heat_, diffusivity_, heating_;
     bool melts_, has_heat_;
