@@ -359,10 +359,10 @@ void Playback::set_air_temperature(double kelvins) {
     if (has_body()) worker_->change([&] { worker_->air_temperature = kelvins; });
 }
 
-void Playback::hold_torch(const Vec3d& place, bool cools) {
+void Playback::hold_torch(const Vec3d& place, const Torch& torch) {
     if (!has_body() || !can_melt(*made_) || !place.allFinite()) return;
     has_torch_ = true;
-    worker_->change([&] { worker_->heat_sources = std::vector<HeatSource>{torch_at(*made_, place, cools)}; });
+    worker_->change([&] { worker_->heat_sources = std::vector<HeatSource>{torch_at(*made_, place, torch)}; });
     play();
 }
 

@@ -49,9 +49,9 @@ public:
 
     /// Of the air around a body that melts, from the next frame on.
     void set_air_temperature(double kelvins);
-    /// Warms (or cools) what is near a place, model units relative to the origin, until put_out_torch(). Plays, if it
+    /// Warms or cools what is near a place, model units relative to the origin, until put_out_torch(). Plays, if it
     /// did not. Of a body that melts.
-    void hold_torch(const Vec3d& place, bool cools);
+    void hold_torch(const Vec3d& place, const Torch& torch);
     void put_out_torch();
 
     /// The latest moment delivered; null without a body.

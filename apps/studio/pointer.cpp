@@ -37,7 +37,7 @@ Box Pointer::rest_box() const {
 
 double Pointer::grip() const {
     const auto body = settings().tool == Tool::torch ? workbench_.playback().made() : nullptr;
-    return body ? torch_radius(*body) : settings().grip * rest_box().diagonal();
+    return body ? torch_radius(*body, workbench_.view().torch(cools_)) : settings().grip * rest_box().diagonal();
 }
 
 // Buttons

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "filigree/render/camera.h"
+#include "filigree/scene/dropped_body.h"
 
 #include <QObject>
 
@@ -33,6 +34,7 @@ struct ViewSettings {
     UpAxis up = UpAxis::y;
     bool gizmos = false;              ///< handles of the warps in the view; on while the Deform panel is shown
     double grip = 0.06, reach = 0.45; ///< of a pull, fractions of the mesh's diagonal
+    double torch_size = Torch().size, torch_seconds = Torch().seconds;
 
     bool operator==(const ViewSettings&) const = default;
 };
@@ -51,6 +53,8 @@ public:
         std::forward<Edit>(edit)(next);
         set(next);
     }
+
+    Torch torch(bool cools) const { return {settings_.torch_size, settings_.torch_seconds, cools}; }
 
     const Camera& camera() const { return camera_; }
     void set_camera(const Camera& camera);

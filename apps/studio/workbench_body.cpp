@@ -86,7 +86,7 @@ void Workbench::hold_torch(const Vec3d& at, bool cools) {
     }
     impl_->replay.stop();
     show_last_frame();
-    playback_.hold_torch(at - made->model->mesh.origin, cools);
+    playback_.hold_torch(at - made->model->mesh.origin, view_.torch(cools));
 }
 
 void Workbench::put_out_torch() {

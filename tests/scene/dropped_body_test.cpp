@@ -83,6 +83,17 @@ TEST(DroppedBody, MeltsInAboutTheTimeAsked) {
     EXPECT_GT(liquid(), 0.6);
     EXPECT_LE(liquid(), 1.0);
 
+    // A torch twice as large has eight times the matter to melt; one that takes twice as long half the power.
+    const Torch small = {.size = 0.6, .seconds = 0.5}, large = {.size = 1.2, .seconds = 0.5, .cools = true};
+    const Torch slow = {.size = 0.6, .seconds = 1};
+    const Vec3d top(0, 1, 0);
+    EXPECT_NEAR(torch_radius(*body, large), 2 * torch_radius(*body, small), 1e-9);
+    const double power = torch_at(*body, top, small).power.at(0);
+    EXPECT_GT(power, 0);
+    EXPECT_NEAR(torch_at(*body, top, large).power.at(0), -8 * power, 1e-6 * power);
+    EXPECT_NEAR(torch_at(*body, top, slow).power.at(0), 0.5 * power, 1e-6 * power);
+    EXPECT_NEAR(torch_radius(*body, {.size = 1e-6}) * body->scale, 4 * body->body->spacing(), 1e-9);
+
     EXPECT_FALSE(can_melt(*dropped(jelly())));
     EXPECT_FALSE(dropped(jelly())->melting);
 }

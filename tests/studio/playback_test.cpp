@@ -167,7 +167,7 @@ TEST(Playback, ATorchMeltsWhatItIsHeldToAndTheSurfaceFollows) {
     EXPECT_NEAR(before, 293, 1);
 
     const Vec3d top = {0, 1, 0};
-    playback.hold_torch(top, false);
+    playback.hold_torch(top, {});
     EXPECT_TRUE(playback.is_playing());
     EXPECT_TRUE(QTest::qWaitFor([&] { return hottest() > float(state.body.material.melting_to); }, 60'000));
     ASSERT_NE(playback.moment()->surface, nullptr);

@@ -155,6 +155,18 @@ void BodyPanel::add_motion(const Actions& actions) {
     freeze_ = new ActionButton("body.freeze_button", actions.find("body.freeze"), {}, page());
     torch_ = new ActionButton("body.torch_button", actions.find("tool.torch"), {}, page());
     beside(rows, {melt_, freeze_, torch_});
+    const auto can_melt = [this](const ViewSettings&) { return workbench().can_melt(); };
+    number(rows,
+           view_settings().setting("body.torch_size", "Torch size",
+                                   "How far around the mouse the torch warms or cools, per cent of the body's longest "
+                                   "side; four particles at least",
+                                   field(&ViewSettings::torch_size, 100), can_melt),
+           {.least = 2, .most = 100, .decimals = 0, .unit = "%", .logarithmic = true, .neutral = 15});
+    number(rows,
+           view_settings().setting("body.torch_seconds", "Torch melts in",
+                                   "How long what the torch is held to takes to melt, seconds: less is hotter",
+                                   field(&ViewSettings::torch_seconds), can_melt),
+           {.least = 0.05, .most = 10, .decimals = 2, .unit = "s", .logarithmic = true});
     report_ = text(rows, "body.report", Tone::quiet);
     fit_driver_ = new ActionButton("body.fit", actions.find("body.fit_driver"), {}, page());
     beside(rows, {fit_driver_});

@@ -162,21 +162,21 @@ bool can_melt(const DroppedBody& dropped) {
     return material.model == MaterialModel::mpm && material.melts();
 }
 
-double torch_radius(const DroppedBody& dropped) {
-    constexpr double kPart = 0.15, kSpacings = 4; // of the body's size; less does not flow on its grid
+double torch_radius(const DroppedBody& dropped, const Torch& torch) {
+    constexpr double kSpacings = 4; // less does not flow on the body's grid
     const double longest = bounds(dropped.model->mesh.positions).size().maxCoeff();
-    return std::max(kPart * longest, kSpacings * dropped.body->spacing() / dropped.scale);
+    return std::max(torch.size * longest, kSpacings * dropped.body->spacing() / dropped.scale);
 }
 
-HeatSource torch_at(const DroppedBody& dropped, const Vec3d& place, bool cools) {
-    constexpr double kSeconds = 1.0 / 3;
+HeatSource torch_at(const DroppedBody& dropped, const Vec3d& place, const Torch& torch) {
     const Material& material = dropped.body->material;
-    const double radius = dropped.scale * torch_radius(dropped);
+    const double radius = dropped.scale * torch_radius(dropped, torch);
     const double mass = 2.0 / 3 * std::numbers::pi * radius * radius * radius * material.density; // of half a ball
-    HeatSource torch;
-    torch.ball = {dropped.scale * place, radius};
-    torch.power.constant = (cools ? -1 : 1) * mass * heat_of_melting(material) / (kSeconds * dropped.world.heat_pace);
-    return torch;
+    HeatSource source;
+    source.ball = {dropped.scale * place, radius};
+    source.power.constant =
+        (torch.cools ? -1 : 1) * mass * heat_of_melting(material) / (torch.seconds * dropped.world.heat_pace);
+    return source;
 }
 
 Result<std::shared_ptr<const DroppedBody>> make_dropped_body(std::shared_ptr<const Model> model,

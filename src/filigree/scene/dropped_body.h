@@ -72,11 +72,16 @@ bool can_melt(const DroppedBody& dropped);
 /// W/(m^2 K): between a dropped body and the air.
 inline constexpr double kAirHeatTransfer = 20;
 
-/// Something held to the surface of a dropped body that melts, at a place in model units relative to the model's
-/// origin: what is near it melts within a third of a second or, `cools`, freezes.
-HeatSource torch_at(const DroppedBody& dropped, const Vec3d& place, bool cools);
+/// Something held to the surface of a body that melts.
+struct Torch {
+    double size = 0.15;         ///< how far it reaches, of the mesh's longest side, above 0; four spacings at least
+    double seconds = 1.0 / 3.0; ///< above 0: what is near it melts in about that time
+    bool cools = false;         ///< it freezes instead
+};
+/// Held to a dropped body, at a place in model units relative to the model's origin.
+HeatSource torch_at(const DroppedBody& dropped, const Vec3d& place, const Torch& torch);
 /// How far it reaches, model units.
-double torch_radius(const DroppedBody& dropped);
+double torch_radius(const DroppedBody& dropped, const Torch& torch);
 
 /// Where the body starts, what it falls on and what stands around it, in the world. up: an axis.
 Box room_of(const DroppedBody& dropped, const Vec3d& up);
