@@ -16,7 +16,7 @@ namespace {
 /// The gallery's shatter.toml with z up: a wavy cube falls on its corner, turning.
 SceneFile thrown_cube() {
     SceneFile scene;
-    scene.frames = 75;
+    scene.frames = 40;
     scene.gravity = {0, 0, -9.81};
     SceneBody& cube = scene.bodies.emplace_back();
     cube.name = cube.shape = "wavy-cube";
@@ -32,7 +32,7 @@ SceneFile thrown_cube() {
     cube.spin = {0.7, 1.5, 0};
     SceneFracture& fracture = scene.fractures.emplace_back();
     fracture.pattern.pieces = 24;
-    fracture.pattern.roughness = 0.4;
+    fracture.pattern.roughness = 0.8;
     fracture.material = {.strength = 6e4, .scatter = 0.2, .seed = 1};
     fracture.energy = 100;
     scene.obstacles.emplace_back().shape = "ground";
@@ -78,8 +78,7 @@ Figure draw_broken_cube(FigureRenderer& renderer) {
             1e3 * (double(cracked) / scene.step.frames_per_second - last.first),
             double(scene.frames - cracked) / scene.step.frames_per_second, last.parts));
     const std::vector<Panel> panels = panels_in_rows(2, 2, kPanelHeight);
-    const Mesh* fallen[] = {&cracks, &apart, &driver};
-    const Mesh* thrown[] = {&whole};
+    const Mesh* in_pieces[] = {&apart, &driver};
     const Vec3d direction(0.62, -0.86, 0.52);
     const std::tuple<const char*, const char*, const Mesh*, std::size_t> parts[] = {
         {"i", "whole", &whole, whole.vertex_count()},
@@ -90,8 +89,9 @@ Figure draw_broken_cube(FigureRenderer& renderer) {
         const auto& [number, text, mesh, vertices] = parts[k];
         FigureRenderer::Look look = k == 3 ? with_edges(0.5f) : FigureRenderer::Look{};
         look.ground_level = k == 0 ? world_bounds(whole).min.z() - 0.15 : 0.0;
+        const Mesh* alone[] = {mesh};
         const Camera camera =
-            k == 0 ? common_camera(thrown, direction, panels[k]) : common_camera(fallen, direction, panels[k]);
+            k < 2 ? common_camera(alone, direction, panels[k]) : common_camera(in_pieces, direction, panels[k]);
         draw_mesh(page, panels[k], renderer, *mesh, look, camera);
         subcaption(page, panels[k], number, fmt::format("{}, {} vertices", text, with_commas(vertices)));
     }
