@@ -69,7 +69,7 @@ TEST_F(OptionTables, ManualPagesNameEveryOption) {
             EXPECT_NE(of_command.find("\\fB" + escaped + "\\fR"), std::string::npos) << name;
         }
     }
-    EXPECT_EQ(commands, 18u);
+    EXPECT_EQ(commands, 19u);
     fails(2, {"--man", "swim"}, {"swim"});
 }
 
