@@ -373,7 +373,7 @@ TEST_F(Simulate, WrongTypesAndRangesAreNamed) {
     refused(kBody + "centre = [1, 2, nan]\n", {"bad.toml:3:", "three numbers"});
     refused(kBody + "color = \"red\"\n", {"bad.toml:3:", "#rrggbb"});
     refused(kBody + "material = \"ruber\"\n", {"bad.toml:3:", "'rubber'?"});
-    refused(kBody + "yield_stress = 1e3\n", {"bad.toml:", "meshfree"});
+    refused(kBody + "model = \"springs\"\nyield_stress = 1e3\n", {"bad.toml:", "fem", "meshfree"});
     refused(kBody + "rotate = { axis = [0, 0, 0], degrees = 3 }\n", {"bad.toml:3:", "rotate.axis"});
     refused(kBody + "rotate = { axis = [0, 0, 1] }\n", {"bad.toml:3:", "axis and degrees"});
     refused(kBody + "name = \"a/b\"\n", {"bad.toml:3:", "letters"});
