@@ -31,14 +31,7 @@ Partition halves(const Vec3d& point, const Vec3d& normal) {
     return cells_of({point - 0.1 * normal.normalized(), point + 0.1 * normal.normalized()});
 }
 
-Material brittle() {
-    Material material;
-    material.density = 1000;
-    material.young_modulus = 1e6;
-    material.poisson_ratio = 0.2;
-    material.damping = 0;
-    return material;
-}
+Material brittle() { return undamped(0.2); }
 
 std::shared_ptr<Fracture> fracture_of(std::shared_ptr<const Body> whole, Partition partition, double strength,
                                       double energy) {

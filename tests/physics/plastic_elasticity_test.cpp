@@ -10,11 +10,7 @@ namespace {
 const RunContext kPlasticContext(2);
 
 Material clay() {
-    Material material;
-    material.density = 1000;
-    material.young_modulus = 1e6;
-    material.poisson_ratio = 0.3;
-    material.damping = 0;
+    Material material = undamped(0.3);
     material.yield_stress = 1e4; // a strain of 1 %
     return material;
 }

@@ -14,10 +14,7 @@ namespace {
 const RunContext kTearingContext(2);
 
 Material soft_clay() {
-    Material material;
-    material.density = 1000;
-    material.young_modulus = 1e6;
-    material.poisson_ratio = 0.3;
+    Material material = undamped(0.3);
     material.damping = 5;
     material.yield_stress = 1e4;
     material.creep_time = 0.02;

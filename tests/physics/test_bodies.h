@@ -12,6 +12,16 @@ inline std::shared_ptr<const Body> block(std::size_t nx, std::size_t ny, std::si
     return std::make_shared<Body>(make_body(box_cells(nx, ny, nz, spacing, -half), material));
 }
 
+/// 1,000 kg/m^3, 1e6 Pa, without damping.
+inline Material undamped(double poisson_ratio) {
+    Material material;
+    material.density = 1000;
+    material.young_modulus = 1e6;
+    material.poisson_ratio = poisson_ratio;
+    material.damping = 0;
+    return material;
+}
+
 inline Vec3d centre_of_mass(const Simulation& simulation, std::size_t body = 0) {
     Vec3d sum = Vec3d::Zero();
     double mass = 0;

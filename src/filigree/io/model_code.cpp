@@ -195,15 +195,12 @@ Result<CodedModel> code_model(const Model& model, const PoseSequence& poses, con
     coded.mesh = std::move(*mesh);
     if (options.levels) coded.levels = levels_of(coded.mesh, source, context);
     const Level& driver = model.driver();
+    if (elsewhere) coded.driver_positions = driver_positions(model);
+    // Which coded vertex each of the mesh's is, or each of the driver's own.
     std::vector<Index> place(elsewhere ? driver.vertices.size() : source.vertex_count());
     for (Index i = 0; i < place.size(); ++i) place[options.keep_order || elsewhere ? i : report.vertex[i]] = i;
-    std::vector<Index> driver_places = place;
-    if (elsewhere) {
-        coded.driver_positions = driver_positions(model);
-    } else {
-        driver_places.clear();
-        for (const Index v : driver.vertices) driver_places.push_back(place[v]);
-    }
+    std::vector<Index> driver_places;
+    for (const Index v : driver.vertices) driver_places.push_back(place[elsewhere ? v - driver.vertices.front() : v]);
     coded.driver = encode_driver(driver.face_offsets, driver.corners, driver_places, place.size());
     coded.code = {.vertices = coded.mesh.vertices,
                   .faces = coded.mesh.faces,

@@ -11,14 +11,8 @@ namespace {
 
 /// The energy of one cell, J, from its corners in doubles.
 double cell_energy(const cell_kernel::CellMaterial& m, const std::array<Vec3d, 8>& corners, double fraction) {
-    std::array<Vec3d, 8> X = corners; // the Walsh-Hadamard transform, in place
-    for (unsigned bit = 1; bit < 8; bit *= 2)
-        for (unsigned i = 0; i < 8; ++i)
-            if (!(i & bit)) {
-                const Vec3d low = X[i], high = X[i | bit];
-                X[i] = low + high;
-                X[i | bit] = high - low;
-            }
+    std::array<Vec3d, 8> X = corners;
+    cell_kernel::transform_corners(X);
     const double h = m.spacing, size = 4 * h;
     const double I =
         (X[1].squaredNorm() + X[2].squaredNorm() + X[4].squaredNorm() +

@@ -7,6 +7,18 @@
 
 namespace filigree::cell_kernel {
 
+/// The Walsh-Hadamard transform of a cell's corners, in place: X_m is the sum of all with the signs of m's bits.
+template <class Vector>
+void transform_corners(std::array<Vector, 8>& X) {
+    for (unsigned bit = 1; bit < 8; bit *= 2)
+        for (unsigned i = 0; i < 8; ++i)
+            if (!(i & bit)) {
+                const Vector low = X[i], high = X[i | bit];
+                X[i] = low + high;
+                X[i | bit] = high - low;
+            }
+}
+
 /// Energy of a cell of occupied volume V, stable where it is inverted or collapsed [Smith 2018]:
 ///     V (shear/2 (I - 3) + bulk/2 (J - rest_ratio)^2 - shear/2 log((I + 1) / 4)) less its value at rest.
 /// I is the mean of |F|^2 over the cell (an exact integral of the trilinear shape), J the determinant of its mean F:

@@ -175,7 +175,7 @@ private:
         float clear_until; ///< pairs_way_ until which these cannot touch; both bodies travel
         PairContact law;
         contact_law::Grasp grasp = {};
-        Vec3f offset = Vec3f::Zero(); ///< m, how far the first has gone beside the second since it landed, along both
+        Vec3f offset = Vec3f::Zero(); ///< m, along both: how far the first has slid from where it landed
 
         std::array<Index, 4> key() const { return {first_body, first, second_body, second}; }
     };

@@ -98,7 +98,8 @@ float Bodies::longest_step(const RunContext& context) const {
                 fastest[part] = std::max(fastest[part], p.v[0] * p.v[0] + p.v[1] * p.v[1] + p.v[2] * p.v[2]);
             }
     });
-    const float squared_speed = *std::max_element(fastest.begin(), fastest.end());
+    float squared_speed = 0;
+    for (const float squared : fastest) squared_speed = std::max(squared_speed, squared);
     float step = kMostTravel * grid_.spacing() / std::sqrt(std::max(squared_speed, 1e-12f));
     for (const Matter& matter : matter_) step = std::min(step, matter.longest_step(grid_.spacing()));
     return step;

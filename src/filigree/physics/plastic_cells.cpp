@@ -1,5 +1,6 @@
 #include "filigree/physics/plastic_cells.h"
 
+#include "filigree/physics/cell_kernel.h"
 #include "filigree/physics/crack_law.h"
 
 #include <Eigen/LU>
@@ -24,13 +25,7 @@ CellSums cell_sums(const Vectors& positions, const std::array<Index, 8>& corners
     CellSums X;
     const Vec3f base = positions[corners[0]]; // so that a body far away loses no digits
     for (int c = 0; c < 8; ++c) X[c] = positions[corners[c]] - base;
-    for (unsigned bit = 1; bit < 8; bit *= 2)
-        for (unsigned i = 0; i < 8; ++i)
-            if (!(i & bit)) {
-                const Vec3f low = X[i], high = X[i | bit];
-                X[i] = low + high;
-                X[i | bit] = high - low;
-            }
+    cell_kernel::transform_corners(X);
     return X;
 }
 

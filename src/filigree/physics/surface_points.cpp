@@ -14,8 +14,8 @@ namespace {
 constexpr double kSampleSpacing = 0.25; // cubes
 constexpr double kLeastArea = 0.05;     // of a cube's side: with less, a cube gets no point
 constexpr double kAgreeing = 0.5;       // length of the mean of unit normals: below, they do not say what is outwards
-constexpr int kBlock = 4;               // cubes
 constexpr double kSlant = 0.25;         // how far outwards counts against how far from the middle
+constexpr int kBlock = 4;               // cubes along a side of a block, in the order of points
 
 /// Calls visit(position, normal, area) for samples of all triangles: their corners, and where they are larger than the
 /// sampling, points inside. The areas add up to that of the surface.
