@@ -38,8 +38,11 @@ public:
         double frame;                     ///< s: for about so long what is found is to hold
     };
     void search(std::span<BodyState> bodies, const Search& search, const RunContext& context);
-    /// Before a frame of explicit steps, or after speeds have jumped. speed: m/s, of the fastest particle.
-    void begin_frame(std::span<const BodyState> bodies, float speed);
+    /// Before a frame of explicit steps.
+    void begin_frame(std::span<const BodyState> bodies) {
+        pairs_until_ = -1;
+        matter_.begin_frame(bodies);
+    }
     /// Positions have changed by dt times velocities. way: m, bound on how far anything has gone, with obstacles.
     void travel(std::span<const BodyState> bodies, float dt, float way);
     /// A body's particles were moved by so much, m, beside their velocities.
@@ -195,7 +198,6 @@ private:
     std::vector<NearPair> pairs_;
     float near_way_ = 0, pairs_way_ = 0;       ///< m that anything may have gone since they were found ...
     float near_until_ = -1, pairs_until_ = -1; ///< ... and may go before they hold no more
-    float near_speed_ = 0;                     ///< m/s, how fast near_way_ grows
     static constexpr std::uint8_t kOnObstacle = 1, kInMatter = MatterContacts::kTouched;
     std::vector<std::uint8_t> touched_; ///< of each body
     MatterContacts matter_;

@@ -42,14 +42,6 @@ std::vector<float> surface_stiffness(const Body& body, float rest_squared_freque
     return stiffness;
 }
 
-void Contacts::begin_frame(std::span<const BodyState> bodies, float speed) {
-    near_speed_ = speed;
-    for (std::vector<Near>& near : near_)
-        for (Near& at : near) at.clear_until = 0; // by speeds that may have changed
-    pairs_until_ = -1;
-    matter_.begin_frame(bodies);
-}
-
 /// The force on a surface point; lets friction's anchor begin, slide and end.
 Vec3f Contacts::obstacle_force(Near& at, const BodyState& body, const ObstaclePoses& poses, float dt) const {
     at.depth = 0;
@@ -60,16 +52,14 @@ Vec3f Contacts::obstacle_force(Near& at, const BodyState& body, const ObstaclePo
     const Obstacle& obstacle = world_.obstacles[at.obstacle];
     const Vec3f place = embedded_point(body.surface, at.point, body.positions);
     const DistanceField::Sample surface = distance_to(obstacle, poses.at(at.obstacle), place);
-    const Vec3f velocity = embedded_point(body.surface, at.point, body.velocities) - poses.velocity(at.obstacle, place);
+    at.clear_until = near_way_ + surface.distance;
     if (!(surface.distance < 0)) {
-        at.clear_until =
-            near_way_ + clearance(surface.distance, velocity.norm(), near_speed_, float(body.body->spacing()));
         at.grasp = {};
         return Vec3f::Zero();
     }
     at.depth = -surface.distance;
     const Touch touch{surface.normal,
-                      velocity,
+                      embedded_point(body.surface, at.point, body.velocities) - poses.velocity(at.obstacle, place),
                       at.depth,
                       body.surface_stiffness[at.point] * float(obstacle.stiffness),
                       float(obstacle.friction),
@@ -91,7 +81,6 @@ Vec3f Contacts::relative_velocity(const NearPair& pair, std::span<const BodyStat
 void Contacts::travel(std::span<const BodyState> bodies, float dt, float way) {
     near_way_ += way;
     pairs_way_ += way;
-    near_speed_ = way / dt;
     for (NearPair& pair : pairs_)
         if (pair.grasp.holds) pair.offset += dt * relative_velocity(pair, bodies);
     matter_.travel(bodies, dt);

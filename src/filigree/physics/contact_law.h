@@ -17,10 +17,6 @@ inline constexpr float kDeepest = 0.75f;            ///< spacings under a surfac
 inline constexpr float kDampingPart = 0.2f;
 inline constexpr float kSlidingPart = 0.25f; ///< of smooth_speed: a slower point may stick
 
-inline constexpr float kClearer = 0.8f; ///< part of a distance that is safe to go
-inline constexpr float kSlowest = 0.2f; ///< part of the fastest speed that a point may gain unasked
-inline constexpr float kLittle = 0.05f; ///< spacings outside within which a point is asked every time
-
 /// Part of the normal force that is left while a point moves away at `speed` (m/s): e^2 of it, so that a hard point
 /// leaves with e times the speed it came with. Smooth about zero, where resting points tremble.
 inline float unloading(double restitution, float speed, float smooth_speed) {
@@ -33,13 +29,6 @@ inline float smooth_speed(const World& world, float dt) { return 0.02f + 4 * dt 
 /// N/m between two balls; a third, as a ball may touch several.
 inline float pair_stiffness(const BodyState& a, Index point_of_a, const BodyState& b, Index point_of_b) {
     return std::min(a.surface_stiffness[point_of_a], b.surface_stiffness[point_of_b]) / 3;
-}
-
-/// m that everything may go, at up to `speed`, until a point so far outside might touch. What is near moves alike, so
-/// that the point's own speed beside what it might touch counts; it may gain a part of `speed` unasked.
-inline float clearance(float distance, float own_speed, float speed, float spacing) {
-    if (distance < kLittle * spacing) return 0; // later would be too late: the way in would cost no energy
-    return speed > 0 ? kClearer * distance * speed / (own_speed + kSlowest * speed) : distance;
 }
 
 inline Vec3f along_surface(const Vec3f& v, const Vec3f& normal) { return v - v.dot(normal) * normal; }

@@ -55,13 +55,13 @@ public:
 
     double run() {
         speed_ = most_particle_speed(bodies_);
-        if (meets_anything_) state_.contacts.begin_frame(bodies_, speed_);
+        if (meets_anything_) state_.contacts.begin_frame(bodies_);
         find_contacts();
         const float first_dt = float(state_.frame_seconds() / state_.options.most_substeps);
         find_forces(first_dt);
         if (repair_start(state_, elastic_, report_, context_)) {
             state_.contacts.begin_anew();
-            state_.contacts.begin_frame(bodies_, speed_);
+            state_.contacts.begin_frame(bodies_);
             find_contacts();
             find_forces(first_dt);
         }
@@ -78,7 +78,7 @@ public:
             const Breaks breaks = break_bodies(state_, before, now_, context_);
             if (breaks.contacts) {
                 place_rigid();
-                if (meets_anything_) state_.contacts.begin_frame(bodies_, speed_);
+                if (meets_anything_) state_.contacts.begin_frame(bodies_);
                 find_contacts();
             }
             if (breaks.forces || breaks.contacts) find_forces(dt);

@@ -11,6 +11,9 @@ using namespace contact_law;
 namespace {
 
 constexpr std::size_t kMatterForcesGrain = 128;
+constexpr float kClearer = 0.8f; ///< part of a distance that is safe to go
+constexpr float kSlowest = 0.2f; ///< of a side's speed: what its pairs may gain unasked
+constexpr float kLittle = 0.05f; ///< spacings until a point that is nowhere is asked again
 
 } // namespace
 
@@ -22,13 +25,15 @@ void MatterContacts::leave(Pair& pair, const Side& side, float clearance) const 
     pair.clear_until = side.way + clearance;
 }
 
-/// m that the side may go until a point that lies so far outside might touch.
+/// m that the side may go until a point that lies so far outside might touch. Neighbours move alike, so that the pair's
+/// own speed counts, and not the side's.
 float MatterContacts::clearance(const Pair& pair, const Side& side, float distance,
                                 std::span<const BodyState> bodies) const {
+    if (distance < kLittle * side.spacing) return 0; // later would be too late: the way in would cost no energy
     const BodyState &body = bodies[side.body], &other = bodies[side.other];
     const Vec3f velocity = embedded_point(body.surface, pair.point, body.velocities) -
                            matter_[side.other]->mean(pair.place, other.velocities);
-    return contact_law::clearance(distance, velocity.norm(), side.speed, side.spacing);
+    return kClearer * distance * side.speed / (velocity.norm() + kSlowest * side.speed);
 }
 
 /// Finds where a point lies in the other's matter. The surface's normal there if it touches; else the pair is left

@@ -50,7 +50,6 @@ OwnCells::OwnCells(const Matter& matter) : matter_(matter), points_(matter.body(
     }
     clusters_.push_back({{}, 0, Index(cells_.size()), Index(corners_.size()), Index(surface_points_.size())});
 
-    far_near_.assign(cells.cells.size(), 0);
     auto cluster = clusters_.begin();
     for (const auto& [at, members] : by_key) {
         for (int n = 0; n < 27; ++n) {
@@ -58,8 +57,7 @@ OwnCells::OwnCells(const Matter& matter) : matter_(matter), points_(matter.body(
             if (other == by_key.end()) continue;
             for (const Index cell : members)
                 if (std::ranges::any_of(other->second, [&](Index its) { return are_far(cell, its); }))
-                    far_near_[cell] |= 1u << n;
-            for (const Index cell : members) cluster->far_near |= far_near_[cell];
+                    cluster->far_near |= 1u << n;
         }
         ++cluster;
     }
@@ -182,36 +180,24 @@ void OwnCells::look_into(std::span<const std::pair<Index, Index>> near, std::spa
     struct Point {
         Vec3f place;
         Index number;
-        std::uint32_t far_near;
         float least;
     };
     std::vector<Point> points;
     std::vector<Point*> inside;
-    std::uint32_t neighbours_near = 0;
-    bool is_near_others = false;
-    for (const auto& [own, other] : near) {
-        const int n = neighbour(own, other);
-        is_near_others |= n < 0;
-        if (n >= 0) neighbours_near |= 1u << n;
-    }
-    for (Index k = clusters_[cluster].first_point; k < clusters_[cluster + 1].first_point; ++k) {
-        const Index number = surface_points_[k];
-        const std::uint32_t far_near = far_near_[matter_.cell_of_point(number)];
-        if (is_near_others || (far_near & neighbours_near))
-            points.push_back(
-                {embedded_point(points_, number, positions), number, far_near, std::numeric_limits<float>::infinity()});
-    }
+    for (Index k = clusters_[cluster].first_point; k < clusters_[cluster + 1].first_point; ++k)
+        points.push_back({embedded_point(points_, surface_points_[k], positions), surface_points_[k],
+                          std::numeric_limits<float>::infinity()});
     const auto is_within = [](const Vec3f& p, const Vec3f& low, const Vec3f& high) {
         return p.x() >= low.x() && p.x() <= high.x() && p.y() >= low.y() && p.y() <= high.y() && p.z() >= low.z() &&
                p.z() <= high.z();
     };
     for (const auto& [own, other] : near) {
-        const int n = neighbour(own, other);
+        const bool neighbours = neighbour(own, other) >= 0;
         const Vec3f around = Vec3f::Constant(reach);
         const Vec3f least = extents[other].low - around, most = extents[other].high + around;
         inside.clear();
         for (Point& point : points)
-            if ((n < 0 || (point.far_near >> n & 1)) && is_within(point.place, least, most)) inside.push_back(&point);
+            if (is_within(point.place, least, most)) inside.push_back(&point);
         if (inside.empty()) continue;
         for (Index c = clusters_[other].first_cell; c < clusters_[other + 1].first_cell; ++c) {
             const Index cell = cells_[c];
@@ -230,7 +216,7 @@ void OwnCells::look_into(std::span<const std::pair<Index, Index>> near, std::spa
                 if (!is_within(point->place, low, high)) continue;
                 const float away = (centre - point->place).squaredNorm();
                 if (away >= point->least) continue;
-                if (n >= 0 && !are_far(matter_.cell_of_point(point->number), cell)) continue;
+                if (neighbours && !are_far(matter_.cell_of_point(point->number), cell)) continue;
                 point->least = away;
                 found[point->number] = cell;
             }

@@ -24,7 +24,7 @@ private:
     using Key = std::array<int, 3>;
     struct Cluster {
         Key at;                 ///< lattice index of its cells, halved
-        std::uint32_t far_near; ///< what far_near_ has of any of its cells
+        std::uint32_t far_near; ///< bits of the 3^3 clusters around: some of their cells are far from some of this one
         Index first_cell, first_corner, first_point;
     };
     struct Extent {
@@ -41,8 +41,7 @@ private:
     const Embedding& points_;
     std::vector<Cluster> clusters_; ///< and one behind the last
     std::vector<Index> cells_, corners_, surface_points_;
-    std::vector<std::uint32_t> far_near_; ///< of each cell: bits of the 3^3 clusters around that have cells far from it
-    float overhang_ = 0;                  ///< m that points may lie outside of their cells
+    float overhang_ = 0; ///< m that points may lie outside of their cells
 };
 
 } // namespace filigree

@@ -15,7 +15,6 @@ constexpr double kSampleSpacing = 0.25; // cubes
 constexpr double kLeastArea = 0.05;     // of a cube's side: with less, a cube gets no point
 constexpr double kAgreeing = 0.5;       // length of the mean of unit normals: below, they do not say what is outwards
 constexpr double kSlant = 0.25;         // how far outwards counts against how far from the middle
-constexpr int kBlock = 4;               // cubes along a side of a block, in the order of points
 
 /// Calls visit(position, normal, area) for samples of all triangles: their corners, and where they are larger than the
 /// sampling, points inside. The areas add up to that of the surface.
@@ -118,10 +117,8 @@ SurfacePoints spread_on_surface(std::span<const Vec3f> positions, std::span<cons
         area += cube.area;
         if (cube.area >= kLeastArea * spacing * spacing) kept += cube.area;
     }
-    // Block by block, so that points that are near each other lie near each other in memory.
-    std::ranges::sort(cubes, {}, [](const Cube& cube) {
-        const auto [i, j, k] = cube.key;
-        return std::array{k / kBlock, j / kBlock, i / kBlock, k, j, i};
+    std::sort(cubes.begin(), cubes.end(), [](const Cube& a, const Cube& b) {
+        return std::tie(a.key[2], a.key[1], a.key[0]) < std::tie(b.key[2], b.key[1], b.key[0]);
     });
     SurfacePoints points;
     for (const Cube& cube : cubes) {
