@@ -10,7 +10,6 @@
 #include "filigree/io/gltf_export.h"
 
 #include <filesystem>
-#include <string_view>
 
 #include <fmt/format.h>
 
@@ -19,7 +18,6 @@ namespace filigree::cli {
 namespace {
 
 namespace fs = std::filesystem;
-using namespace std::string_view_literals;
 
 struct ExportArguments {
     std::string input, output, poses;
@@ -99,17 +97,6 @@ void export_stream(const Model& model, const PoseSequence& own, const ExportArgu
     add_stream_marks(require(read_model_outline(file, options.output, session.silent_context())), report);
 }
 
-/// A name of a file that a GLB wants beside it; empty: none.
-std::string wanted_beside(std::string_view glb) {
-    const std::string_view document = glb.substr(0, glb.find("BIN\0"sv)); // the JSON chunk
-    for (std::size_t at = document.find("\"uri\""); at != document.npos; at = document.find("\"uri\"", at + 1)) {
-        const std::size_t begin = document.find('"', at + 5) + 1;
-        const std::string_view uri = document.substr(begin, document.find('"', begin) - begin);
-        if (!uri.starts_with("data:")) return std::string(uri);
-    }
-    return {};
-}
-
 /// A folder with a page that plays a GLB as it is, such as the key frames that `simulate` writes of what melts.
 void export_glb_page(const ExportArguments& options, const std::string& glb, Session& session, Report& report) {
     if (!glb.starts_with("glTF")) {
@@ -122,10 +109,11 @@ void export_glb_page(const ExportArguments& options, const std::string& glb, Ses
                              "--key-rate", "--interpolation", "--influences", "--full-precision", "--all-levels",
                              "--no-normals", "--morph-normals", "--law", "--level", "--thin-shell"});
     if (!given.empty()) refuse(given + " belongs to a model, and the page plays " + options.input + " as it is.");
-    if (const std::string beside = wanted_beside(glb); !beside.empty())
-        refuse(ErrorCode::unsuitable, options.input + ": needs the file '" + beside +
+    const GltfScene scene = require(GltfScene::read_view(glb, options.input, session.context()));
+    if (!scene.files_beside().empty())
+        refuse(ErrorCode::unsuitable, options.input + ": needs the file '" + scene.files_beside().front() +
                                           "' beside it, and the page shows a GLB that holds all of its parts.");
-    session.warn(require(GltfScene::read_view(glb, options.input, session.context())).warnings());
+    session.warn(scene.warnings());
     OutputFolder folder(options.output, options.input);
     WebPage page(folder, fs::path(options.input).stem().string(), WebModel::glb);
     session.begin_writing(options.output);

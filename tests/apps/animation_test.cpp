@@ -8,6 +8,9 @@
 #include "filigree/io/point_cache.h"
 #include "filigree/mesh/shapes.h"
 
+#include <cstring>
+#include <fstream>
+
 #include <sys/stat.h>
 
 using namespace filigree_test;
@@ -45,6 +48,25 @@ protected:
 };
 
 } // namespace
+
+/// A GLB with a picture that is a file of its own.
+void with_picture_beside(const std::string& from, const std::string& picture, const std::string& to) {
+    constexpr std::size_t kHeader = 12, kChunk = 8;
+    const std::string glb = bytes_of(from);
+    std::uint32_t length = 0;
+    std::memcpy(&length, glb.data() + kHeader, sizeof length);
+    Json document = Json::parse(glb.substr(kHeader + kChunk, length));
+    document["images"].push_back({{"uri", picture}});
+    std::string text = document.dump();
+    text.resize((text.size() + 3) / 4 * 4, ' ');
+    const std::string rest = glb.substr(kHeader + kChunk + length);
+    const auto number = [](std::size_t value) {
+        const auto bits = std::uint32_t(value);
+        return std::string(reinterpret_cast<const char*>(&bits), sizeof bits);
+    };
+    std::ofstream(to, std::ios::binary) << glb.substr(0, 8) << number(kHeader + kChunk + text.size() + rest.size())
+                                        << number(text.size()) << "JSON" << text << rest;
+}
 
 TEST_F(Animation, PosesOfAnotherProgramAreRestoredAsOurOwn) {
     const Json own = json({"restore", "moving.fil", "--frames", "-o", "own.pc2"});
@@ -167,11 +189,8 @@ TEST_F(Animation, APageTakesAGlbAsItIs) {
     EXPECT_TRUE(std::filesystem::exists(path("page/index.html")));
     fails(2, {"export", "m.glb", "-o", "other/", "--web", "--key-rate", "9"}, {"--key-rate", "m.glb"});
     fails(7, {"export", "mesh.ply", "-o", "other/", "--web"}, {"mesh.ply", "strip"});
-    std::string beside = bytes_of(path("m.glb"));
-    const std::string asset = "\"asset\":{", uri = "\"uri\":\"t.bin\",";
-    beside.replace(beside.find(asset) + asset.size() - 1, 1, "{" + uri); // its lengths do not matter for what is said
-    std::ofstream(path("beside.glb"), std::ios::binary) << beside;
-    fails(7, {"export", "beside.glb", "-o", "other/", "--web"}, {"beside.glb", "t.bin"});
+    with_picture_beside(path("m.glb"), "t.png", path("beside.glb"));
+    fails(7, {"export", "beside.glb", "-o", "other/", "--web"}, {"beside.glb", "t.png"});
     std::filesystem::resize_file(path("m.glb"), 100);
     fails(4, {"export", "m.glb", "-o", "other/", "--web"}, {"m.glb"});
     EXPECT_FALSE(std::filesystem::exists(path("other")));

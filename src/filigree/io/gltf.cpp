@@ -95,6 +95,7 @@ Status read_scene(std::string_view bytes, gltf::Scene& scene, const RunContext& 
         place_rest(scene, context);
         if (context.is_cancelled()) return cancelled_error();
         read_export_report(scene);
+        scene.files_beside = scene.document->files_beside();
         shorten(scene.warnings);
     } catch (const gltf::Damage& damage) {
         if (damage.code == ErrorCode::cancelled) return cancelled_error();
@@ -140,6 +141,7 @@ Result<GltfScene> GltfScene::read_view(std::string_view bytes, const std::string
 const Mesh& GltfScene::mesh() const { return scene_->mesh; }
 const std::vector<std::string>& GltfScene::warnings() const { return scene_->warnings; }
 const std::vector<GltfAnimation>& GltfScene::animations() const { return scene_->summaries; }
+const std::vector<std::string>& GltfScene::files_beside() const { return scene_->files_beside; }
 const std::string& GltfScene::export_report() const { return scene_->export_report; }
 
 Status GltfScene::positions(std::size_t animation, double seconds, std::span<Vec3f> out,

@@ -49,6 +49,8 @@ public:
     const Mesh& mesh() const;
     const std::vector<std::string>& warnings() const;
     const std::vector<GltfAnimation>& animations() const;
+    /// Names of the files that buffers and pictures lie in, as the document has them.
+    const std::vector<std::string>& files_beside() const;
 
     /// What our own exports say about themselves: asset.extras.filigree as JSON text; empty where there is none.
     const std::string& export_report() const;

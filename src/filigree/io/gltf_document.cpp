@@ -375,6 +375,15 @@ void Document::charge(std::size_t elements, const std::string& path) {
     charged_ += elements;
 }
 
+std::vector<std::string> Document::files_beside() const {
+    std::vector<std::string> names;
+    for (const char* array : {"buffers", "images"})
+        for (std::size_t i = 0; i < count(array); ++i)
+            if (const Value uri = item(array, i)["uri"]; uri && !uri.text().starts_with("data:"))
+                names.push_back(uri.text());
+    return names;
+}
+
 std::filesystem::path Document::beside(const Value& uri, const std::string& name) const {
     namespace fs = std::filesystem;
     constexpr std::size_t kLongestName = 4096;

@@ -128,6 +128,9 @@ public:
     /// The bytes of an image (a URI or a buffer view): a PNG or JPEG file.
     std::string picture(std::size_t image);
 
+    /// What buffers and images name that is not in the file itself.
+    std::vector<std::string> files_beside() const;
+
     /// Counts what is read or made from the file. A file may repeat its parts, but not without end: Damage when that
     /// becomes far more than its bytes.
     void charge(std::size_t elements, const std::string& path);

@@ -114,7 +114,7 @@ struct Scene {
     std::vector<Animation> animations;
     std::vector<GltfAnimation> summaries; ///< of the animations
     Mesh mesh;
-    std::vector<std::string> warnings;
+    std::vector<std::string> warnings, files_beside;
     std::string export_report;
 };
 
