@@ -13,6 +13,7 @@ namespace {
 
 constexpr std::size_t kBodyStateGrain = 2048;
 constexpr float kMostFlow = 4; ///< stretch, and 1 over it: what flows is sheared without end, its detail is not
+constexpr double kLight = 0.3; ///< of what one full cell gives its corner
 constexpr float kTogether = 1; ///< spacings between two ways of placing a point; further, its particles came apart
 
 /// A gradient with its stretches within [1 / kMostFlow, kMostFlow].
@@ -56,6 +57,28 @@ const Cells* corners_of(const Body& body) {
 }
 
 } // namespace
+
+std::vector<std::uint8_t> light_particles(const Body& body) {
+    const double h = body.spacing();
+    const auto least = float(kLight * body.material.density * h * h * h / 8);
+    std::vector<std::uint8_t> light;
+    for (const float mass : body.mass) light.push_back(mass < least);
+    return light;
+}
+
+void find_light_corners(BodyState& state) {
+    const Body& body = *state.body;
+    const std::vector<std::uint8_t> light = light_particles(body);
+    std::vector<Index> heaviest(light.size(), kNoIndex);
+    for (const auto& corners : body.cells.cell_corners) {
+        const Index heavy = *std::ranges::max_element(corners, {}, [&](Index corner) { return body.mass[corner]; });
+        for (const Index corner : corners)
+            if (heaviest[corner] == kNoIndex || body.mass[heavy] > body.mass[heaviest[corner]])
+                heaviest[corner] = heavy;
+    }
+    for (Index i = 0; i < light.size(); ++i)
+        if (light[i] && heaviest[i] != i) state.light_corners.push_back({i, heaviest[i]});
+}
 
 PlacedPoints place_in_reference(const BodyState& state, std::span<const Vec3f> rest_points, const RunContext& context) {
     PlacedPoints placed{{rest_points.begin(), rest_points.end()}, {}};

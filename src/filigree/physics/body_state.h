@@ -39,6 +39,12 @@ struct BodyState {
     float pushed_way = 0; ///< m that particles were moved one by one, at most; a rigid body's pose has to follow
     bool sleeps() const { return is_absent || (rigid && rigid->sleeps); }
 
+    /// Of a piece: a light corner, of cells that are hardly filled, and the heaviest corner of those cells.
+    struct LightCorner {
+        Index particle, neighbour;
+    };
+    std::vector<LightCorner> light_corners;
+
     // Contact: points of the surface; meshfree bodies touch each other by balls just below them.
     Embedding surface, balls;             ///< in the elasticity's reference
     std::vector<float> surface_stiffness; ///< N/m
@@ -52,6 +58,11 @@ struct BodyState {
     std::vector<Mat3f> flow;
     bool has_flowed() const { return !flow.empty(); }
 };
+
+/// Of each corner, whether its cells are hardly filled. Such corners fly to and fro beside the rest at ten times its
+/// speed, and carry nothing.
+std::vector<std::uint8_t> light_particles(const Body& body);
+void find_light_corners(BodyState& state);
 
 /// Calls visit(body, number, particle) for a particle of a body, or of one that has broken for each of its copies; of
 /// one on the grid not at all.

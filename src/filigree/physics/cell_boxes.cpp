@@ -8,7 +8,7 @@ namespace filigree {
 
 namespace {
 
-constexpr float kBoxSize = 1.25f;                  ///< spacings
+constexpr float kBoxSize = 1, kUsualCell = 1.25f;  ///< spacings
 constexpr double kMostBoxes = 8, kFewBoxes = 4096; ///< a cell, and whatever their number
 
 } // namespace
@@ -29,11 +29,12 @@ CellBoxes::CellBoxes(const Matter& matter, const Vectors& positions, float reach
         }
         return;
     }
-    extents_.resize(cells.cells.size());
+    std::vector<Extent> extents(cells.cells.size());
     Vec3f high = Vec3f::Constant(-std::numeric_limits<float>::max());
     low_ = -high;
-    for (std::size_t c = 0; c < extents_.size(); ++c) {
-        Extent& extent = extents_[c];
+    for (Index c = 0; c < extents.size(); ++c) {
+        Extent& extent = extents[c];
+        extent.cell = c;
         const auto& corners = cells.cell_corners[c];
         extent.low = extent.high = extent.centre = positions[corners[0]];
         for (int k = 1; k < 8; ++k) {
@@ -48,32 +49,28 @@ CellBoxes::CellBoxes(const Matter& matter, const Vectors& positions, float reach
         low_ = low_.cwiseMin(extent.low);
         high = high.cwiseMax(extent.high);
     }
-    if (!(high - low_).allFinite()) {
-        extents_.clear(); // the frame is done again
-        return;
-    }
-    step_ = kBoxSize * float(matter.body().spacing());
-    const auto boxes = [&] { return ((high - low_) / step_).array().floor().cast<double>() + 1; };
-    while (boxes().prod() > kMostBoxes * double(extents_.size()) + kFewBoxes) step_ *= 1.25f;
+    if (!(high - low_).allFinite()) return; // the frame is done again
+    float step = kBoxSize * float(matter.body().spacing());
+    around_ = 0.5f * kUsualCell * float(matter.body().spacing()) + reach;
+    const auto boxes = [&] { return ((high - low_) / step).array().floor().cast<double>() + 1; };
+    while (boxes().prod() > kMostBoxes * double(extents.size()) + kFewBoxes) step *= 1.25f;
     for (int axis = 0; axis < 3; ++axis) counts_[axis] = int(boxes()[axis]);
+    boxes_a_metre_ = 1 / step;
 
     const auto each_box = [&](const Extent& extent, const auto& visit) {
-        std::array<int, 3> from, to;
-        for (int axis = 0; axis < 3; ++axis) {
-            from[axis] = int((extent.low[axis] - low_[axis]) / step_);
-            to[axis] = std::min(int((extent.high[axis] - low_[axis]) / step_), counts_[axis] - 1);
-        }
+        const Vec3f middle = 0.5f * (extent.low + extent.high);
+        const auto [from, to] = range((extent.low.array() + around_).cwiseMin(middle.array()),
+                                      (extent.high.array() - around_).cwiseMax(middle.array()));
         for (int k = from[2]; k <= to[2]; ++k)
             for (int j = from[1]; j <= to[1]; ++j)
                 for (int i = from[0]; i <= to[0]; ++i) visit((std::size_t(k) * counts_[1] + j) * counts_[0] + i);
     };
     offsets_.assign(std::size_t(counts_[0]) * counts_[1] * counts_[2] + 1, 0);
-    for (const Extent& extent : extents_) each_box(extent, [&](std::size_t box) { ++offsets_[box + 1]; });
+    for (const Extent& extent : extents) each_box(extent, [&](std::size_t box) { ++offsets_[box + 1]; });
     for (std::size_t box = 1; box < offsets_.size(); ++box) offsets_[box] += offsets_[box - 1];
-    entries_.resize(offsets_.back());
+    extents_.resize(offsets_.back());
     std::vector<Index> next(offsets_.begin(), offsets_.end() - 1);
-    for (Index c = 0; c < extents_.size(); ++c)
-        each_box(extents_[c], [&](std::size_t box) { entries_[next[box]++] = c; });
+    for (const Extent& extent : extents) each_box(extent, [&](std::size_t box) { extents_[next[box]++] = extent; });
 }
 
 Index CellBoxes::find_rigid(const Vec3f& point) const {
@@ -85,22 +82,22 @@ Index CellBoxes::find_rigid(const Vec3f& point) const {
 
 Index CellBoxes::find(const Vec3f& point) const {
     if (matter_.is_rigid()) return find_rigid(point);
-    std::size_t box = 0;
-    for (int axis = 2; axis >= 0; --axis) {
-        const float at = (point[axis] - low_[axis]) / step_;
-        if (!(at >= 0) || !(at < float(counts_[axis]))) return kNoIndex;
-        box = box * counts_[axis] + std::size_t(at);
-    }
+    if (extents_.empty()) return kNoIndex;
+    const auto [from, to] = range(point.array() - around_, point.array() + around_);
     Index found = kNoIndex;
     float least = std::numeric_limits<float>::infinity();
-    for (Index k = offsets_[box]; k < offsets_[box + 1]; ++k) {
-        const Extent& extent = extents_[entries_[k]];
-        if ((point.array() < extent.low.array()).any() || (point.array() > extent.high.array()).any()) continue;
-        const float away = (extent.centre - point).squaredNorm();
-        if (away >= least) continue;
-        least = away;
-        found = entries_[k];
-    }
+    for (int k = from[2]; k <= to[2]; ++k)
+        for (int j = from[1]; j <= to[1]; ++j) {
+            const std::size_t row = (std::size_t(k) * counts_[1] + j) * counts_[0];
+            for (Index e = offsets_[row + from[0]]; e < offsets_[row + to[0] + 1]; ++e) {
+                const Extent& extent = extents_[e];
+                if ((point.array() < extent.low.array()).any() || (point.array() > extent.high.array()).any()) continue;
+                const float away = (extent.centre - point).squaredNorm();
+                if (away >= least) continue;
+                least = away;
+                found = extent.cell;
+            }
+        }
     return found;
 }
 

@@ -3,9 +3,12 @@
 
 #include "filigree/physics/matter.h"
 
+#include <algorithm>
+
 namespace filigree {
 
-/// The cells of a body where they are now, sorted into the boxes of a grid.
+/// The cells of a body where they are now, sorted into the boxes of a grid: a cell into the box of its centre (a large
+/// one into several), so that few boxes around a point have all that may hold it.
 class CellBoxes {
 public:
     /// reach: m, that points may still move before they are looked for again.
@@ -16,6 +19,18 @@ public:
 
 private:
     Index find_rigid(const Vec3f& point) const;
+    struct Range {
+        std::array<int, 3> from, to; ///< both included
+    };
+    Range range(const Vec3f& low, const Vec3f& high) const { ///< of boxes
+        Range range;
+        for (int axis = 0; axis < 3; ++axis) {
+            const float last = float(counts_[axis] - 1);
+            range.from[axis] = int(std::clamp((low[axis] - low_[axis]) * boxes_a_metre_, 0.0f, last));
+            range.to[axis] = int(std::clamp((high[axis] - low_[axis]) * boxes_a_metre_, 0.0f, last));
+        }
+        return range;
+    }
 
     const Matter& matter_;
     Mat3f inverse_ = Mat3f::Zero(); ///< of a rigid body: from the world to its cell 0
@@ -23,14 +38,15 @@ private:
     Vec3f high_ = Vec3f::Zero(); ///< with low_ the box of its cells in those coordinates
     float reach_ = 0;
     Vec3f low_ = Vec3f::Zero();
-    float step_ = 1;
+    float boxes_a_metre_ = 1; ///< along an axis
+    float around_ = 0;        ///< m: how far from a point the boxes lie that have all of its cells
     std::array<int, 3> counts_{0, 0, 0};
     struct Extent {
-        Vec3f low, high, centre;
+        Vec3f low, high, centre; ///< the first two `reach` wider than the cell is
+        Index cell;
     };
     std::vector<Index> offsets_;
-    std::vector<Index> entries_;  ///< of each box: cells that reach into it
-    std::vector<Extent> extents_; ///< of each cell, `reach` wider than it is
+    std::vector<Extent> extents_; ///< of one box after the other
 };
 
 } // namespace filigree

@@ -43,6 +43,7 @@ Cracks::Cracks(std::shared_ptr<const Fracture> fracture, std::size_t whole, std:
     links_at_.assign(body().whole->rest.size() + 1, 0);
     for (const CrackLink& link : body().links) ++links_at_[link.corner + 1];
     for (std::size_t c = 1; c < links_at_.size(); ++c) links_at_[c] += links_at_[c - 1];
+    find_tied();
 }
 
 /// What the second piece pulls the first with in a cell.
@@ -166,17 +167,18 @@ bool Cracks::let_specks_go(double time) {
 /// Links that are pulled too hard.
 bool Cracks::open_links(std::span<const BodyState> bodies, double time, const RunContext& context) {
     std::vector<Stress> stresses(body().facets.size());
-    parallel_for(context, stresses.size(), kCrackGrain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t f = begin; f < end; ++f) {
+    parallel_for(context, facets_of_tied_.size(), kCrackGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k) {
+            const Index f = facets_of_tied_[k];
             stresses[f] = stress(body().facets[f], bodies);
             stresses[f].traction /= std::max(held_part(body().facets[f]), kLeastHeld);
         }
     });
     const auto tearing = float(kTearing * body().whole->material.yield_stress);
     std::vector<Vec3f> pulls(links_.size(), Vec3f::Zero());
-    parallel_for(context, links_.size(), kCrackGrain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t l = begin; l < end; ++l) {
-            if (links_[l].phase != LinkState::tied) continue;
+    parallel_for(context, tied_.size(), kCrackGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k) {
+            const Index l = tied_[k];
             Vec3f traction = Vec3f::Zero(), normal = Vec3f::Zero();
             float area = 0, opened = 0;
             for (const Index f : body().facets_of_link[l]) {
@@ -186,12 +188,12 @@ bool Cracks::open_links(std::span<const BodyState> bodies, double time, const Ru
                 area += body().facets[f].area;
             }
             const Traction found = split_traction(traction / area, normal.stableNormalized());
-            const bool tears = opened / area >= most_opened(Index(l)) && found.size >= tearing;
-            if (tears || found.size >= strength(Index(l))) pulls[l] = found.pull;
+            const bool tears = opened / area >= most_opened(l) && found.size >= tearing;
+            if (tears || found.size >= strength(l)) pulls[l] = found.pull;
         }
     });
     bool any = false;
-    for (Index l = 0; l < links_.size(); ++l) {
+    for (const Index l : tied_) {
         if (pulls[l].isZero(0) || !pulls[l].allFinite()) continue;
         let_go(l, pulls[l], time);
         any = true;
@@ -316,7 +318,21 @@ void Cracks::find_groups(std::span<BodyState> bodies) {
                 group_offsets_.push_back(Index(members_.size()));
         }
     }
+    find_tied();
     find_swept(bodies);
+}
+
+void Cracks::find_tied() {
+    tied_.clear();
+    facets_of_tied_.clear();
+    std::vector<std::uint8_t> is_felt(body().facets.size(), 0);
+    for (Index l = 0; l < links_.size(); ++l) {
+        if (links_[l].phase != LinkState::tied) continue;
+        tied_.push_back(l);
+        for (const Index f : body().facets_of_link[l]) is_felt[f] = 1;
+    }
+    for (Index f = 0; f < is_felt.size(); ++f)
+        if (is_felt[f]) facets_of_tied_.push_back(f);
 }
 
 /// Which copies descent moves together, and in what order.

@@ -100,6 +100,7 @@ private:
     void take_part(std::span<BodyState> bodies);
     void hide(BodyState& to, Index piece) const;
     void find_groups(std::span<BodyState> bodies);
+    void find_tied();
     void find_swept(std::span<const BodyState> bodies);
 
     std::shared_ptr<const Fracture> fracture_;
@@ -111,6 +112,7 @@ private:
     std::vector<double> broke_;                       ///< s, of each piece
     std::vector<std::uint8_t> beside_crack_;          ///< of each link
     std::vector<float> strengths_;                    ///< Pa, of each link away from cracks
+    std::vector<Index> tied_, facets_of_tied_;        ///< links, and what they feel
     std::vector<Index> group_of_copy_;                ///< numbers into BrokenBody::copies
     std::vector<Index> group_offsets_, members_;      ///< of the groups of two and more
     std::vector<std::vector<std::uint8_t>> left_out_; ///< of each piece

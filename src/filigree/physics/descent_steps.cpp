@@ -12,7 +12,6 @@ namespace filigree {
 
 namespace {
 
-constexpr double kMostParts = 16; ///< of a usual substep, where bodies meet fast
 constexpr float kWildStretch = 3; ///< a body stretched further is not predicted: sweeps begin where it is
 
 /// How a body at rest in itself would have moved in dt: the rotation about its centre.
@@ -305,10 +304,8 @@ private:
 
 void step_by_descent(SimulationState& state, double from, double until, FrameReport& report,
                      const RunContext& context) {
-    const double usual = state.frame_seconds() / state.options.descent_substeps;
     for (double now = from; now < until && !context.is_cancelled();) {
-        const double longest =
-            std::clamp(state.contacts.longest_step_from(state.bodies, until - now), usual / kMostParts, usual);
+        const double longest = state.descent_step(state.contacts.longest_step_from(state.bodies, until - now));
         const double steps = std::max(1.0, std::ceil((until - now) / longest - 1e-6));
         const double next = steps == 1 ? until : now + (until - now) / steps;
         if (!DescentStep(state, next, float(next - now), report, context).run()) return;

@@ -7,6 +7,7 @@
 #include "filigree/physics/stopwatch.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -22,6 +23,8 @@ constexpr double kShortestOpening = 0.25; ///< of the stable step: cracks that o
 /// (Simulation.ACrushedBodyGainsNoEnergy). So little internal damping takes it away again.
 constexpr float kCrushedVolume = 0.1f;     ///< of a cell, of its volume at rest
 constexpr float kCrushedDelay = 0.1f;      ///< substeps
+constexpr float kLightDelay = 0.5f;        ///< substeps: of a piece's light corners, which would swing for ever ...
+constexpr float kFreeWay = 0.05f;          ///< spacings a substep: ... as far as they move faster
 constexpr unsigned kExplicitLimit = 20000; ///< substeps a frame, whatever was asked for
 
 /// Where internal damping has forces computed: f(x + tau v) = f(x) - tau K v, Kelvin-Voigt to first order; of v less
@@ -32,10 +35,32 @@ Vectors positions_ahead(const BodyState& body, float delay, const RunContext& co
     const Vec3f turning = rigid.angular_velocity_of(rigid.angular).cast<float>(), centre = rigid.centre.cast<float>();
     Vectors ahead = body.positions;
     parallel_for(context, ahead.size(), kExplicitStepsGrain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i)
-            ahead.add(i, delay * (body.velocities[i] - drifting - turning.cross(body.positions[i] - centre)));
+        const auto move_axis = [&](float* to, const std::vector<float>& velocities, int axis) {
+            const int u = (axis + 1) % 3, w = (axis + 2) % 3;
+            constexpr std::array kAxes = {&Vectors::x, &Vectors::y, &Vectors::z};
+            const float *v = velocities.data(), *along_u = (body.positions.*kAxes[u]).data(),
+                        *along_w = (body.positions.*kAxes[w]).data();
+            for (std::size_t i = begin; i < end; ++i)
+                to[i] += delay * (v[i] - drifting[axis] -
+                                  (turning[u] * (along_w[i] - centre[w]) - turning[w] * (along_u[i] - centre[u])));
+        };
+        move_axis(ahead.x.data(), body.velocities.x, 0);
+        move_axis(ahead.y.data(), body.velocities.y, 1);
+        move_axis(ahead.z.data(), body.velocities.z, 2);
     });
     return ahead;
+}
+
+/// The same for light corners alone: of what they move in a substep beside the heaviest corner of their cells, all that
+/// is more than a part of a spacing.
+void damp_light_corners(const BodyState& body, float dt, Vectors& ahead) {
+    const float free_way = kFreeWay * float(body.body->spacing());
+    for (const auto& [particle, neighbour] : body.light_corners) {
+        const bool is_free = body.inverse_mass[particle] * body.body->mass[particle] > 0.99f; // neither pinned nor tied
+        const Vec3f way = dt * (body.velocities[particle] - body.velocities[neighbour]);
+        const float length = way.norm();
+        if (is_free && length > free_way) ahead.add(particle, kLightDelay * (1 - free_way / length) * way);
+    }
 }
 
 /// s, longest that is stable; 0 where no step is. A spring that is also damped along its own motion has
@@ -84,6 +109,7 @@ public:
             if (breaks.forces || breaks.contacts) find_forces(dt);
         }
         place_rigid();
+        if (meets_anything_) state_.contacts.end_frame(bodies_);
         return is_left() ? now_ : until_;
     }
 
@@ -93,11 +119,13 @@ private:
         const double fewest = std::ceil(kLeastSubsteps * remaining / state_.frame_seconds() - 1e-6);
         return stable_step_ > 0 ? std::max(fewest, std::ceil(remaining / stable_step_)) : kExplicitLimit + 1.0;
     }
-    /// A frame that was begun may take twice as many.
+    /// A frame that was begun may take twice as many. Where bodies meet fast descent takes more substeps as well.
     double steps_allowed() const {
-        const unsigned limit =
-            state_.options.mode == StepMode::automatic ? state_.options.most_substeps : kExplicitLimit;
-        return report_.substeps == 0 ? limit : 2.0 * limit - report_.substeps;
+        double limit = kExplicitLimit;
+        if (state_.options.mode == StepMode::automatic)
+            limit = state_.options.most_substeps * state_.frame_seconds() /
+                    (state_.options.descent_substeps * state_.descent_step(state_.contacts.longest_step()));
+        return report_.substeps == 0 ? limit : 2 * limit - report_.substeps;
     }
 
     /// Particles of rigid bodies as their poses have them after the last kick.
@@ -185,9 +213,13 @@ private:
             BodyState& body = bodies_[b];
             if (body.is_absent) continue;
             const float delay = delay_of(b, dt);
-            elastic_[b] = delay > 0
-                              ? body.elasticity->forces(positions_ahead(body, delay, context_), body.forces, context_)
-                              : body.elasticity->forces(body.positions, body.forces, context_);
+            if (delay > 0 || !body.light_corners.empty()) {
+                Vectors ahead = delay > 0 ? positions_ahead(body, delay, context_) : body.positions;
+                damp_light_corners(body, dt, ahead);
+                elastic_[b] = body.elasticity->forces(ahead, body.forces, context_);
+            } else {
+                elastic_[b] = body.elasticity->forces(body.positions, body.forces, context_);
+            }
             note_deformation(report_, b, elastic_[b]);
         }
     }

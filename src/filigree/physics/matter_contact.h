@@ -38,6 +38,8 @@ public:
     void begin_anew();
     /// Before a frame: speeds, and which bodies meet themselves, as positions and velocities are now.
     void begin_frame(std::span<const BodyState> bodies);
+    /// After a frame of explicit steps: what has moved since the last search, for the next frame and memory().
+    void end_frame(std::span<const BodyState> bodies);
     /// Positions have changed by dt times velocities. Cost O(particles).
     void travel(std::span<const BodyState> bodies, float dt);
     /// A body's particles were moved by so much, m, beside their velocities.
@@ -84,7 +86,7 @@ public:
     };
     struct SideMemory {
         Index body, other, pairs; ///< how many
-        float way, until, since;
+        float moved, until, since;
     };
     /// All that was found and what friction remembers.
     struct Memory {
@@ -117,18 +119,29 @@ private:
     /// Points of one body against the matter of another, or of its own.
     struct Side {
         Index body, other;
-        float way = 0;    ///< m, bound on what either has gone beside the other since the last search
-        float until = -1; ///< way until which the pairs hold
+        float way = 0;    ///< m, bound on what either has gone beside the other since the frame began, there and back
+        float moved = 0;  ///< m, bound on how far either is from where it was beside the other at the last search ...
+        float until = -1; ///< ... until which the pairs hold
         float since = std::numeric_limits<float>::max(); ///< s since the last search
         float speed = 0;                                 ///< m/s, the same bound's
         float spacing = 0;                               ///< m, the smaller of both
         PairContact law;
         std::vector<Pair> pairs;
     };
-    struct Speeds { ///< of a body's particles along each axis
+    struct Extremes { ///< of a body's particles along each axis
         Vec3f least = Vec3f::Zero(), most = Vec3f::Zero();
+        /// Bound on what particles of two bodies, or of one, have beside each other.
+        static float between(const Extremes& one, const Extremes& other) {
+            return (one.most - other.least).cwiseMax(other.most - one.least).norm();
+        }
     };
-    float relative_speed(Index a, Index b) const;
+    float relative_speed(Index a, Index b) const { return Extremes::between(speeds_[a], speeds_[b]); }
+    /// m: bound on how far two bodies are from where they were beside each other at the last search.
+    float moved(const Side& side) const {
+        return side.moved + Extremes::between(shifts_[side.body], shifts_[side.other]);
+    }
+    void count_from_here(std::span<const BodyState> bodies);
+    void find_shifts(std::span<const BodyState> bodies);
     Side make_side(Index body, Index other, std::span<const BodyState> bodies) const;
     static void take_pairs(Side& side, const BodyState& body, std::span<const Index> found);
     class Surroundings;
@@ -156,8 +169,17 @@ private:
     std::vector<std::vector<float>> per_area_;               ///< N/m^3 in each cell of each body
     std::vector<std::shared_ptr<const OwnCells>> own_cells_; ///< null: of bodies that do not meet themselves
     std::vector<std::uint8_t> recovers_;                     ///< of each body: 1 while it does not meet itself
-    std::vector<Speeds> speeds_;
-    std::vector<Side> sides_; ///< ascending by bodies
+    struct Followed {              ///< the particles of a body whose motion says when to search again
+        std::vector<float> counts; ///< of each particle, 1 or 0
+        Index heaviest = 0;
+    };
+    static Followed followed(const BodyState& body);
+    Extremes extremes(std::size_t body, const Vectors& values, const Vectors* from) const;
+    std::vector<Followed> followed_;
+    std::vector<Extremes> speeds_;
+    std::vector<Vectors> places_;  ///< of each body's particles, where its shifts are counted from
+    std::vector<Extremes> shifts_; ///< m
+    std::vector<Side> sides_;      ///< ascending by bodies
     float way_ = 0, sides_until_ = -1;
     std::vector<std::pair<Index, Index>> work_; ///< side and pair of each force
     std::vector<Vec3f> forces_;

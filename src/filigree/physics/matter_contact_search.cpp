@@ -15,9 +15,11 @@ namespace filigree {
 namespace {
 
 constexpr std::size_t kMatterSearchGrain = 512;
-constexpr float kLeastReach = 0.1f;      ///< spacings that anything may go between two searches; at most kMostReach
-constexpr float kOwnReach = 0.3f;        ///< the same of a body beside itself ...
-constexpr float kOwnSearches = 4;        ///< ... which is searched no more often than this in a frame
+constexpr float kLeastReach = 0.1f; ///< spacings that anything may go between two searches; at most kMostReach
+constexpr float kOwnReach = 0.3f;   ///< the same of a body beside itself ...
+constexpr float kOwnSearches = 4;   ///< ... which is searched no more often than this in a frame
+/// Of what another side may still move until it is searched; they share what a search finds out about bodies.
+constexpr float kSearchedAlong = 0.5f;
 constexpr float kLongestWay = 0.3f;      ///< spacings a substep that one body may go towards another
 constexpr float kCrushed = 0.05f;        ///< volume ratio below which a cell counts as crushed
 constexpr float kTooManyCrushed = 0.05f; ///< part of a body's cells
@@ -83,6 +85,48 @@ std::vector<Vec3f> surface_places(const Embedding& points, const Vectors& positi
 
 } // namespace
 
+MatterContacts::Followed MatterContacts::followed(const BodyState& body) {
+    const std::vector<float>& mass = body.body->mass;
+    Followed followed{std::vector<float>(mass.size(), 1), Index(std::ranges::max_element(mass) - mass.begin())};
+    if (body.rigid) return followed;
+    const std::vector<std::uint8_t> light = light_particles(*body.body);
+    for (std::size_t i = 0; i < light.size(); ++i) followed.counts[i] = light[i] ? 0.0f : 1.0f;
+    return followed;
+}
+
+/// Of particles that are followed: of their values, less `from` unless that is null.
+MatterContacts::Extremes MatterContacts::extremes(std::size_t body, const Vectors& values, const Vectors* from) const {
+    constexpr std::size_t kAtOnce = 16; // so that the compiler uses vectors
+    const auto& [counts, heaviest] = followed_[body];
+    Extremes found;
+    const auto take_axis = [&](int axis, const auto& value) {
+        const float usual = value(heaviest);
+        float least[kAtOnce], most[kAtOnce];
+        std::ranges::fill(least, usual);
+        std::ranges::fill(most, usual);
+        const auto take = [&](std::size_t i, std::size_t k) {
+            const float v = usual + counts[i] * (value(i) - usual);
+            least[k] = v < least[k] ? v : least[k];
+            most[k] = v > most[k] ? v : most[k];
+        };
+        const std::size_t count = counts.size(), whole = count - count % kAtOnce;
+        for (std::size_t i = 0; i < whole; i += kAtOnce)
+            for (std::size_t k = 0; k < kAtOnce; ++k) take(i + k, k);
+        for (std::size_t i = whole; i < count; ++i) take(i, 0);
+        found.least[axis] = *std::ranges::min_element(least);
+        found.most[axis] = *std::ranges::max_element(most);
+    };
+    constexpr std::array kAxes = {&Vectors::x, &Vectors::y, &Vectors::z};
+    for (int axis = 0; axis < 3; ++axis) {
+        const float* along = (values.*kAxes[axis]).data();
+        if (const float* less = from ? (from->*kAxes[axis]).data() : nullptr)
+            take_axis(axis, [=](std::size_t i) { return along[i] - less[i]; });
+        else
+            take_axis(axis, [=](std::size_t i) { return along[i]; });
+    }
+    return found;
+}
+
 void MatterContacts::begin(std::span<const BodyState> bodies) {
     std::map<const Body*, std::shared_ptr<const Matter>> known; // pieces of one kind share theirs
     std::map<const Matter*, std::shared_ptr<const OwnCells>> own_cells;
@@ -94,8 +138,11 @@ void MatterContacts::begin(std::span<const BodyState> bodies) {
         std::shared_ptr<const OwnCells>& own = own_cells[matter.get()];
         if (matter && within_bodies_ && !state.rigid && !own) own = std::make_shared<OwnCells>(*matter);
         own_cells_.push_back(own);
+        followed_.push_back(followed(state));
     }
     speeds_.resize(bodies.size());
+    places_.resize(bodies.size());
+    shifts_.resize(bodies.size());
     recovers_.assign(bodies.size(), 0);
 }
 
@@ -103,7 +150,7 @@ void MatterContacts::begin_anew() {
     sides_until_ = -1;
     way_ = 0;
     for (Side& side : sides_) {
-        side.way = 0;
+        side.way = side.moved = 0;
         side.until = -1;
         side.since = std::numeric_limits<float>::max();
         for (Pair& pair : side.pairs) pair.clear_until = 0;
@@ -112,9 +159,19 @@ void MatterContacts::begin_anew() {
 
 void MatterContacts::begin_frame(std::span<const BodyState> bodies) {
     travel(bodies, 0);
+    for (std::size_t b = 0; b < bodies.size(); ++b)
+        if (!bodies[b].is_absent) places_[b] = bodies[b].positions;
+    shifts_.assign(bodies.size(), {});
     find_recovering(bodies);
-    for (Side& side : sides_)
+    for (Side& side : sides_) {
+        side.way = 0;
         for (Pair& pair : side.pairs) pair.clear_until = 0; // by speeds that may have changed
+    }
+}
+
+void MatterContacts::end_frame(std::span<const BodyState> bodies) {
+    find_shifts(bodies);
+    count_from_here(bodies);
 }
 
 void MatterContacts::was_moved(std::size_t body, float way) {
@@ -123,37 +180,12 @@ void MatterContacts::was_moved(std::size_t body, float way) {
         if (side.body == body || side.other == body) side.way += way;
 }
 
-/// Bound on how fast particles of two bodies, or of one, move beside each other.
-float MatterContacts::relative_speed(Index a, Index b) const {
-    const Speeds &one = speeds_[a], &other = speeds_[b];
-    return (one.most - other.least).cwiseMax(other.most - one.least).norm();
-}
-
 void MatterContacts::travel(std::span<const BodyState> bodies, float dt) {
-    Speeds all;
+    Extremes all;
     bool is_first = true;
     for (std::size_t b = 0; b < bodies.size(); ++b) {
         if (bodies[b].is_absent) continue;
-        const Vectors& v = bodies[b].velocities;
-        const auto range = [&](const std::vector<float>& values, int axis) {
-            constexpr std::size_t kAtOnce = 16; // so that the compiler uses vectors
-            const std::size_t count = v.size(), whole = count - count % kAtOnce;
-            float least[kAtOnce], most[kAtOnce];
-            std::ranges::fill(least, values[0]);
-            std::ranges::fill(most, values[0]);
-            const auto take = [&](std::size_t i, std::size_t k) {
-                least[k] = values[i] < least[k] ? values[i] : least[k];
-                most[k] = values[i] > most[k] ? values[i] : most[k];
-            };
-            for (std::size_t i = 0; i < whole; i += kAtOnce)
-                for (std::size_t k = 0; k < kAtOnce; ++k) take(i + k, k);
-            for (std::size_t i = whole; i < count; ++i) take(i, 0);
-            speeds_[b].least[axis] = *std::ranges::min_element(least);
-            speeds_[b].most[axis] = *std::ranges::max_element(most);
-        };
-        range(v.x, 0);
-        range(v.y, 1);
-        range(v.z, 2);
+        speeds_[b] = extremes(b, bodies[b].velocities, nullptr);
         if (std::exchange(is_first, false)) all = speeds_[b];
         all.least = all.least.cwiseMin(speeds_[b].least);
         all.most = all.most.cwiseMax(speeds_[b].most);
@@ -164,6 +196,21 @@ void MatterContacts::travel(std::span<const BodyState> bodies, float dt) {
         side.way += dt * side.speed;
         side.since += dt;
     }
+}
+
+/// How far particles are from where they are counted from.
+void MatterContacts::find_shifts(std::span<const BodyState> bodies) {
+    for (std::size_t b = 0; b < bodies.size(); ++b) {
+        if (!bodies[b].is_absent && !bodies[b].sleeps()) shifts_[b] = extremes(b, bodies[b].positions, &places_[b]);
+    }
+}
+
+/// What has moved so far goes into the sides, and shifts are counted from here.
+void MatterContacts::count_from_here(std::span<const BodyState> bodies) {
+    for (Side& side : sides_) side.moved = moved(side);
+    for (std::size_t b = 0; b < bodies.size(); ++b)
+        if (!bodies[b].is_absent && !bodies[b].sleeps()) places_[b] = bodies[b].positions;
+    shifts_.assign(bodies.size(), {});
 }
 
 /// Which bodies are near each other: boxes swept along x.
@@ -234,7 +281,7 @@ void MatterContacts::take_pairs(Side& side, const BodyState& body, std::span<con
             pairs.push_back({.point = s, .place = {found[s]}, .grasp = {}, .anchor = {}});
     }
     for (Pair& pair : pairs) pair.clear_until -= side.way;
-    side.way = 0;
+    side.way = side.moved = 0;
     side.pairs = std::move(pairs);
 }
 
@@ -244,7 +291,7 @@ bool MatterContacts::wake_touched(std::span<BodyState> bodies) const {
     for (const Side& side : sides_)
         for (const auto& [sleeper, other] : {std::pair(side.body, side.other), std::pair(side.other, side.body)}) {
             if (!bodies[sleeper].sleeps() || bodies[other].sleeps()) continue;
-            const Speeds& speeds = speeds_[other];
+            const Extremes& speeds = speeds_[other];
             if (!(speeds.least.cwiseAbs().cwiseMax(speeds.most.cwiseAbs()).norm() > kWaking)) continue;
             if (std::ranges::none_of(side.pairs, [](const Pair& pair) { return pair.grasp.holds; })) continue;
             wake(bodies[sleeper]);
@@ -300,7 +347,7 @@ void MatterContacts::find_other_pairs(Side& side, Surroundings& around, float fr
     Box near = around.extent(side.other);
     if (!are_near(around.extent(side.body), near, far)) {
         side.pairs.clear();
-        side.way = 0;
+        side.way = side.moved = 0;
         return;
     }
     near.min.array() -= far;
@@ -323,17 +370,23 @@ bool MatterContacts::search(std::span<BodyState> bodies, double frame, const Run
     bool changed = way_ > sides_until_;
     if (changed) find_sides(bodies, frame);
     const bool woke = wake_touched(bodies);
-    Surroundings around(*this, bodies, context);
-    for (Side& side : sides_) {
-        if (!(side.way > side.until) || both_sleep(side, bodies)) continue;
-        const bool own = side.body == side.other;
-        if (own && side.since < float(frame) / kOwnSearches) continue;
-        side.since = 0;
+    find_shifts(bodies);
+    const auto is_due = [&](const Side& side, float part) {
+        if (!(moved(side) > part * side.until) || both_sleep(side, bodies)) return false;
+        return side.body != side.other || side.since >= float(frame) / kOwnSearches;
+    };
+    if (std::ranges::any_of(sides_, [&](const Side& side) { return is_due(side, 1); })) {
         changed = true;
-        if (own)
-            find_own_pairs(side, bodies[side.body], float(frame), context);
-        else
-            find_other_pairs(side, around, float(frame), context);
+        count_from_here(bodies);
+        Surroundings around(*this, bodies, context);
+        for (Side& side : sides_) {
+            if (!is_due(side, kSearchedAlong)) continue;
+            side.since = 0;
+            if (side.body == side.other)
+                find_own_pairs(side, bodies[side.body], float(frame), context);
+            else
+                find_other_pairs(side, around, float(frame), context);
+        }
     }
     if (changed || woke) list_work(bodies);
     return woke;
@@ -379,7 +432,7 @@ void MatterContacts::find_recovering(std::span<const BodyState> bodies) {
 MatterContacts::Memory MatterContacts::memory() const {
     Memory memory{way_, sides_until_, {}, {}, recovers_};
     for (const Side& side : sides_) {
-        memory.sides.push_back({side.body, side.other, Index(side.pairs.size()), side.way, side.until, side.since});
+        memory.sides.push_back({side.body, side.other, Index(side.pairs.size()), side.moved, side.until, side.since});
         for (const Pair& pair : side.pairs)
             memory.pairs.push_back({pair.point, pair.place.cell, pair.anchor.cell,
                                     Index(pair.grasp.holds) + 2 * Index(pair.grasp.slides) + 4 * Index(pair.tangled),
@@ -395,7 +448,7 @@ bool MatterContacts::is_sound(const Memory& memory, std::span<const BodyState> b
     const SideMemory* before = nullptr;
     for (const SideMemory& side : memory.sides) {
         if (side.body >= bodies.size() || side.other >= bodies.size() || !matter_[side.other]) return false;
-        if (!std::isfinite(side.way) || !std::isfinite(side.until) || !(side.since >= 0)) return false;
+        if (!std::isfinite(side.moved) || !std::isfinite(side.until) || !(side.since >= 0)) return false;
         if (before && std::pair(before->body, before->other) >= std::pair(side.body, side.other)) return false;
         before = &side;
         if (side.pairs > memory.pairs.size() - from) return false;
@@ -419,7 +472,7 @@ void MatterContacts::set_memory(const Memory& memory, std::span<const BodyState>
     auto from = memory.pairs.begin();
     for (const SideMemory& saved : memory.sides) {
         Side& side = sides_.emplace_back(make_side(saved.body, saved.other, bodies));
-        side.way = saved.way;
+        side.moved = saved.moved;
         side.until = saved.until;
         side.since = saved.since;
         for (Index k = 0; k < saved.pairs; ++k, ++from)

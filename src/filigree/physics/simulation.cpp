@@ -150,6 +150,7 @@ void begin_pieces(SimulationState& state, std::span<const Actor> actors, const R
             state.bodies.push_back(begin_body({piece, actors[a].placement}, a, false, context));
             state.bodies.back().is_absent = true;
             state.bodies.back().elasticity->prepare_blocks();
+            find_light_corners(state.bodies.back());
         }
         state.cracks.emplace_back(actors[a].fracture, a, first);
     }

@@ -40,6 +40,8 @@ struct SimulationState {
     double time() const { return double(frame) * frame_seconds(); }
     std::vector<Attachment*> attachments_of(std::size_t body);
     const Cracks* cracks_of(std::size_t body) const; ///< null: it does not break
+    /// s: a substep of descent, where bodies that meet could pass through each other in ones longer than `longest`.
+    double descent_step(double longest) const;
 };
 
 /// Steps by velocity Verlet as far as that goes. Returns the time reached: before `until` when steps became too many

@@ -14,6 +14,7 @@ namespace {
 constexpr float kMostStretch = 10; ///< a body stretched further starts scaled down ...
 constexpr double kReveals = 8;     ///< a frame: how often points of new cracks begin to touch others
 constexpr float kStretchAfter = 3; ///< ... to this
+constexpr double kMostParts = 16;  ///< of a usual substep of descent, where bodies meet fast
 
 void shake(BodyState& body, std::uint64_t seed) {
     const auto shift = [&](std::size_t number) {
@@ -60,6 +61,11 @@ void note_deformation(FrameReport& report, std::size_t body, const ElasticReport
 const Cracks* SimulationState::cracks_of(std::size_t body) const {
     const auto found = std::ranges::find(cracks, body, &Cracks::whole);
     return found == cracks.end() ? nullptr : &*found;
+}
+
+double SimulationState::descent_step(double longest) const {
+    const double usual = frame_seconds() / options.descent_substeps;
+    return std::clamp(longest, usual / kMostParts, usual);
 }
 
 float most_particle_speed(std::span<const BodyState> bodies) {
