@@ -27,7 +27,9 @@ enum class StepMode { automatic, explicit_steps, descent };
 struct StepOptions {
     double frames_per_second = 60;
     StepMode mode = StepMode::automatic;
-    unsigned most_substeps = 256; ///< a descent frame costs as much as some 120 explicit substeps
+    /// A descent frame costs as much as some 120 explicit substeps. Where bodies meet so fast that descent needs up to
+    /// 16 times as many of its own, explicit ones may be as many times more.
+    unsigned most_substeps = 256;
     unsigned descent_substeps = 4, descent_iterations = 8;
     bool contacts_between_bodies = true, contacts_within_bodies = true;
     /// Whether bodies of fem and springs become rigid that have fewer than kFewestElasticCells cells, or for which
