@@ -7,7 +7,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace filigree {
@@ -408,18 +410,34 @@ Index nearest_cell(const Body& body, const Vectors& positions, const Vec3f& poin
 TEST(CellBoxes, FindsWhatBruteForceFinds) {
     const Body body = make_body(fork(), rubber());
     const Matter matter(body);
-    const Vectors positions = bent(body);
     const float reach = 0.03f;
-    const CellBoxes boxes(matter, positions, reach);
-    std::size_t hits = 0;
-    for (std::uint64_t n = 0; n < 2000; ++n) {
-        const Vec3f point(float(1.6 * random_unit(2, 3 * n) - 0.6), float(1.6 * random_unit(2, 3 * n + 1) - 0.2),
-                          float(0.8 * random_unit(2, 3 * n + 2) - 0.4));
-        const Index best = nearest_cell(body, positions, point, reach, [](Index) { return true; });
-        EXPECT_EQ(boxes.find(point), best) << n;
-        hits += best != kNoIndex;
+    for (const float stretch : {1.0f, 4.0f}) { // as large cells as that lie in several boxes
+        Vectors positions = bent(body);
+        for (std::size_t i = 0; i < positions.size(); ++i) positions.y[i] *= 1 + (stretch - 1) * positions.y[i];
+        const CellBoxes boxes(matter, positions, reach);
+        std::size_t hits = 0;
+        for (std::uint64_t n = 0; n < 2000; ++n) {
+            const Vec3f point(float(1.6 * random_unit(2, 3 * n) - 0.6),
+                              stretch * float(1.6 * random_unit(2, 3 * n + 1) - 0.2),
+                              float(0.8 * random_unit(2, 3 * n + 2) - 0.4));
+            const Index best = nearest_cell(body, positions, point, reach, [](Index) { return true; });
+            EXPECT_EQ(boxes.find(point), best) << n;
+            hits += best != kNoIndex;
+        }
+        EXPECT_GT(hits, 200u);
+        EXPECT_EQ(boxes.find(Vec3f::Constant(std::numeric_limits<float>::quiet_NaN())), kNoIndex);
     }
-    EXPECT_GT(hits, 200u);
+}
+
+TEST(LightParticles, AreThoseOfHardlyFilledCells) {
+    Cells cells = box_cells(4, 4, 4, 0.1);
+    const auto count = [](const Body& body) { return std::ranges::count(light_particles(body), 1); };
+    EXPECT_EQ(count(bare_body(cells, rubber())), 0);
+    for (std::size_t c = 0; c < cells.cells.size(); ++c)
+        if (cells.cells[c][0] == 3) cells.fraction[c] = 0.01f;
+    EXPECT_EQ(count(bare_body(cells, rubber())), 25); // the outer side of the hardly filled layer
+    std::ranges::fill(cells.fraction, 0.01f);         // a sheet: no corner is lighter than the others
+    EXPECT_EQ(count(bare_body(cells, rubber())), 0);
 }
 
 // A fork whose arms are pressed together, and a long bar that is rolled up through itself.

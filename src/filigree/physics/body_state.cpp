@@ -6,6 +6,7 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <limits>
+#include <numeric>
 
 namespace filigree {
 
@@ -13,7 +14,7 @@ namespace {
 
 constexpr std::size_t kBodyStateGrain = 2048;
 constexpr float kMostFlow = 4; ///< stretch, and 1 over it: what flows is sheared without end, its detail is not
-constexpr double kLight = 0.3; ///< of what one full cell gives its corner
+constexpr double kLight = 0.3, kLightBeside = 0.2; ///< of what a full cell gives its corner, and of the mean
 constexpr float kTogether = 1; ///< spacings between two ways of placing a point; further, its particles came apart
 
 /// A gradient with its stretches within [1 / kMostFlow, kMostFlow].
@@ -59,10 +60,12 @@ const Cells* corners_of(const Body& body) {
 } // namespace
 
 std::vector<std::uint8_t> light_particles(const Body& body) {
-    const double h = body.spacing();
-    const auto least = float(kLight * body.material.density * h * h * h / 8);
+    const std::vector<float>& mass = body.mass;
+    const double h = body.spacing(), full = body.material.density * h * h * h / 8;
+    const double mean = std::accumulate(mass.begin(), mass.end(), 0.0) / double(mass.size()); // of a thin sheet: less
+    const auto least = float(std::min(kLight * full, kLightBeside * mean));
     std::vector<std::uint8_t> light;
-    for (const float mass : body.mass) light.push_back(mass < least);
+    for (const float m : mass) light.push_back(m < least);
     return light;
 }
 

@@ -82,7 +82,7 @@ Index CellBoxes::find_rigid(const Vec3f& point) const {
 
 Index CellBoxes::find(const Vec3f& point) const {
     if (matter_.is_rigid()) return find_rigid(point);
-    if (extents_.empty()) return kNoIndex;
+    if (extents_.empty() || !point.allFinite()) return kNoIndex;
     const auto [from, to] = range(point.array() - around_, point.array() + around_);
     Index found = kNoIndex;
     float least = std::numeric_limits<float>::infinity();
