@@ -25,7 +25,7 @@ if(FILIGREE_NODE AND bundler)
   if(FILIGREE_WASM_CLANG AND wasm_standard)
     set(decoder_sources ${web}/decoder/decoder.cpp)
     foreach(name coding/clip_code coding/closed_map coding/connectivity_code coding/driver_code coding/face_code
-                 coding/geometry_code coding/level_reader coding/symbols mesh/triangle_point)
+                 coding/geometry_code coding/level_reader coding/symbols coding/vertex_rings mesh/triangle_point)
       list(APPEND decoder_sources ${PROJECT_SOURCE_DIR}/src/filigree/${name}.cpp)
     endforeach()
     file(GLOB decoder_headers CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/filigree/coding/*.h)
@@ -33,7 +33,7 @@ if(FILIGREE_NODE AND bundler)
     add_custom_command(
       OUTPUT ${decoder}
       COMMAND ${FILIGREE_WASM_CLANG} --target=wasm32-wasi --sysroot=/usr -mexec-model=reactor -std=c++20 -O3
-              -fno-exceptions -fno-rtti -ffunction-sections -fdata-sections -DNDEBUG -I ${PROJECT_SOURCE_DIR}/src
+              -ffp-contract=off -fno-exceptions -fno-rtti -ffunction-sections -fdata-sections -DNDEBUG -I ${PROJECT_SOURCE_DIR}/src
               -nostdinc++ -isystem /usr/lib/llvm-16/include/wasm32-wasi/c++/v1 -isystem /usr/include/wasm32-wasi
               -isystem ${FILIGREE_EIGEN_FOLDER} ${decoder_sources} -o ${decoder} -L${wasm_library} -L/usr/lib/wasm32-wasi
               -Wl,--gc-sections -Wl,--strip-all

@@ -33,7 +33,7 @@ struct Stream {
     std::vector<std::vector<Index>> triangles_at; ///< of each of the driver's vertices
 
     std::vector<float> positions, shifted, matrices; ///< shifted: what matrices are for, see shift_rest
-    std::vector<std::int8_t> normals; ///< four a vertex, the last one nothing
+    std::vector<std::int8_t> normals;                ///< four a vertex, the last one nothing
     std::vector<Skin> skins;
     std::vector<Index> corners, near; ///< near: of each vertex, the driver's triangle that it follows
 };
@@ -103,8 +103,8 @@ void follow_driver(std::size_t v) {
     stream.skins.push_back(skin);
 }
 
-/// The blend code is a skin of a shifted rest shape, x = 2 p - m, where m is the point of the driver that p follows; its
-/// matrices are halved gradients (docs/exchange.md).
+/// The blend code is a skin of a shifted rest shape, x = 2 p - m, where m is the point of the driver that p follows;
+/// its matrices are halved gradients (docs/exchange.md).
 void shift_rest() {
     stream.shifted.resize(stream.positions.size());
     for (std::size_t v = 0; v < stream.skins.size(); ++v) {
@@ -117,7 +117,7 @@ void shift_rest() {
 }
 
 void make_normals() {
-    const std::size_t count = stream.levels->map().vertex_count();
+    const std::size_t count = stream.levels->vertex_count();
     std::vector<Vec3f> sums(count, Vec3f::Zero());
     for (std::size_t c = 0; c < stream.corners.size(); c += 3) {
         const Index a = stream.corners[c], b = stream.corners[c + 1], d = stream.corners[c + 2];
@@ -133,18 +133,21 @@ void make_normals() {
 }
 
 void make_arrays() {
-    const ClosedMap& map = stream.levels->map();
-    const auto places = stream.levels->places();
-    stream.positions.resize(3 * places.size());
-    for (std::size_t v = 0; v < places.size(); ++v)
+    const std::size_t count = stream.levels->vertex_count();
+    stream.positions.resize(3 * count);
+    for (Index v = 0; v < count; ++v) {
+        const FinePlace place = stream.levels->place(v);
         for (std::size_t k = 0; k < 3; ++k)
-            stream.positions[3 * v + k] = float(stream.low[k] + stream.step * places[v][k] / kFine);
+            stream.positions[3 * v + k] = float(stream.low[k] + stream.step * place[k] / kFine);
+    }
+    const std::vector<bool> closes_hole = stream.levels->closes_hole();
     stream.corners.clear();
-    for (const Triangle& t : map.triangles)
-        if (map.is_own(t)) stream.corners.insert(stream.corners.end(), t.begin(), t.end());
+    for (const Triangle& t : stream.levels->triangles())
+        if (!closes_hole[t[0]] && !closes_hole[t[1]] && !closes_hole[t[2]])
+            stream.corners.insert(stream.corners.end(), t.begin(), t.end());
     make_normals();
     if (stream.driver_triangles.empty()) return;
-    for (std::size_t v = stream.skins.size(); v < places.size(); ++v) follow_driver(v);
+    for (std::size_t v = stream.skins.size(); v < count; ++v) follow_driver(v);
     shift_rest();
 }
 
@@ -212,7 +215,7 @@ std::uint32_t EXPORTED(read_refinement)(std::uint32_t size, std::uint32_t is_las
     return 1;
 }
 
-std::uint32_t EXPORTED(vertex_count)() { return std::uint32_t(stream.levels->map().vertex_count()); }
+std::uint32_t EXPORTED(vertex_count)() { return std::uint32_t(stream.levels->vertex_count()); }
 std::uint32_t EXPORTED(corner_count)() { return std::uint32_t(stream.corners.size()); }
 std::uint32_t EXPORTED(frame_count)() { return std::uint32_t(stream.clip.empty() ? 0 : stream.clip.size() - 1); }
 /// Of a model that moves, the shifted rest shape.

@@ -88,6 +88,35 @@ void close_holes(ClosedSurface& surface) {
 
 } // namespace
 
+ClosedMap map_of(std::vector<Triangle> triangles, std::vector<bool> closes_hole) {
+    ClosedMap map{std::move(triangles), {}, std::move(closes_hole)};
+    const auto count = static_cast<Index>(3 * map.triangles.size());
+    map.opposite.assign(count, kNoIndex);
+    // Half-edges by their lower end: of those of a vertex, few, the ones to the same other end face each other.
+    const auto ends = [&](Index h) {
+        const Index from = map.origin(h), to = map.origin(ClosedMap::next(h));
+        return std::pair(std::min(from, to), std::max(from, to));
+    };
+    std::vector<Index> offsets(map.vertex_count() + 2, 0), sorted(count);
+    for (Index h = 0; h < count; ++h) ++offsets[ends(h).first + 2];
+    for (std::size_t v = 2; v < offsets.size(); ++v) offsets[v] += offsets[v - 1];
+    for (Index h = 0; h < count; ++h) sorted[offsets[ends(h).first + 1]++] = h;
+    for (std::size_t v = 0; v < map.vertex_count(); ++v) {
+        const auto low = sorted.begin() + offsets[v], high = sorted.begin() + offsets[v + 1];
+        std::sort(low, high, [&](Index a, Index b) {
+            const Index to_a = ends(a).second, to_b = ends(b).second;
+            return to_a != to_b ? to_a < to_b : a < b;
+        });
+        for (auto a = low; a != high; ++a)
+            for (auto b = a + 1; b != high && map.opposite[*a] == kNoIndex && ends(*b).second == ends(*a).second; ++b) {
+                if (map.opposite[*b] != kNoIndex || map.origin(*b) == map.origin(*a)) continue;
+                map.opposite[*a] = *b;
+                map.opposite[*b] = *a;
+            }
+    }
+    return map;
+}
+
 ClosedSurface make_closed_surface(std::span<const Triangle> triangles) {
     ClosedSurface surface;
     surface.map.opposite = pair_half_edges(triangles);

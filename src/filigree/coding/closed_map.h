@@ -24,6 +24,10 @@ struct ClosedMap {
     bool is_own(const Triangle& t) const { return !closes_hole[t[0]] && !closes_hole[t[1]] && !closes_hole[t[2]]; }
 };
 
+/// With the opposite of each half-edge, which is kNoIndex where none is left for it. Where several triangles share an
+/// edge they are paired in their order. Cost O(F).
+ClosedMap map_of(std::vector<Triangle> triangles, std::vector<bool> closes_hole);
+
 struct ClosedSurface {
     ClosedMap map;             ///< the mesh's triangles first, in their order
     std::vector<Index> source; ///< of each of the map's vertices the mesh's, kNoIndex where it closes a hole

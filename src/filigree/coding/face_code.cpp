@@ -271,8 +271,12 @@ std::optional<WalkedFaces> decode_faces(ClosedMap map, SymbolReader& in, std::si
     WalkedFaces walked;
     walked.map = std::move(map);
     std::vector<bool> cuts;
-    if (in.symbol(kPlain) == 0)
+    if (in.symbol(kPlain) == 0) {
+        if (walked.map.opposite.empty())
+            walked.map = map_of(std::move(walked.map.triangles), std::move(walked.map.closes_hole));
+        if (std::ranges::find(walked.map.opposite, kNoIndex) != walked.map.opposite.end()) return std::nullopt;
         cuts = code_cuts(walked.map, [&](unsigned context, Index) { return in.symbol(context) != 0; });
+    }
 
     std::vector<Index> copy_of(walked.map.vertex_count(), kNoIndex);
     const std::uint32_t copies = in.number(kCopies);

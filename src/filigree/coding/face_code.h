@@ -41,7 +41,8 @@ EncodedFaces encode_faces(std::span<const Index> face_offsets, std::span<const I
 EncodedFaces encode_faces(std::span<const Index> face_offsets, std::span<const Index> corners, std::size_t vertices,
                           SymbolWriter& out);
 
-/// The faces of a map that was read before. None: damaged, or more than so many vertices or corners.
+/// The faces of a map that was read before; its opposites are found where they are wanted and not there. None: damaged,
+/// or more than so many vertices or corners.
 std::optional<WalkedFaces> decode_faces(ClosedMap map, SymbolReader& in, std::size_t vertices, std::size_t corners);
 std::optional<WalkedFaces> decode_faces(SymbolReader& in, std::size_t vertices, std::size_t corners);
 

@@ -13,14 +13,14 @@ public:
 
     bool is_damaged() const { return in.is_damaged(); }
     bool splits(unsigned context, Index) { return in.symbol(context) != 0; }
-    std::size_t sector(unsigned context, const SplitRing&) { return std::size_t{in.number(context)} + 1; }
+    std::size_t sector(unsigned context, Index) { return std::size_t{in.number(context)} + 1; }
     std::size_t begin(unsigned context, const SplitRing& ring, std::size_t expected) {
         const auto size = std::int64_t(ring.size);
         const std::int64_t begin = std::int64_t(expected) + in.number_with_sign(context);
         return begin < -size ? ring.size : std::size_t((begin + 2 * size) % size);
     }
-    void did_split(Index, Index, Index, Index) {}
-    std::int32_t step(unsigned context, Index, const Wide&, const Wide&, std::int64_t) {
+    void did_split(Index) {}
+    std::int32_t step(unsigned context, Index, const Reals&, const Reals&, double) {
         return std::clamp(in.number_with_sign(context), -kFarthest, kFarthest);
     }
 };
@@ -34,7 +34,7 @@ public:
 
     SplitReader reader;
     LevelWalk<SplitReader> walk;
-    SymbolReader refinement{{}, kRefinementContexts};
+    SymbolReader refinement{{}, 0};
     std::size_t most_vertices;
     std::vector<std::size_t> level_ends; ///< vertices after the coarsest and each level
     std::size_t refined_levels = 0;
@@ -53,7 +53,7 @@ bool LevelReader::read_coarsest(std::string_view connectivity, std::string_view 
     std::vector<FinePlace> there = decode_geometry(walked->map, {1, 1}, 0, places_in);
     if (places_in.is_damaged()) return false;
     reading_->level_ends.push_back(walked->map.vertex_count());
-    reading_->walk.begin(std::move(walked->map), std::move(there));
+    reading_->walk.begin(walked->map, there);
     return true;
 }
 
@@ -61,7 +61,7 @@ bool LevelReader::read_level(std::string_view splits, std::uint32_t batches) {
     reading_->reader.in.read_next(splits);
     for (std::uint32_t k = 0; k < batches; ++k)
         if (!reading_->walk.run_batch(reading_->most_vertices)) return false;
-    reading_->level_ends.push_back(reading_->walk.map.vertex_count());
+    reading_->level_ends.push_back(reading_->walk.rings.vertex_count());
     return true;
 }
 
@@ -71,15 +71,21 @@ bool LevelReader::refine_level(std::string_view refinement) {
     r.refinement.read_next(refinement);
     const std::size_t begin = r.level_ends[r.refined_levels], count = r.level_ends[r.refined_levels + 1] - begin;
     if (r.walk.frames.size() < begin - r.level_ends[0] + count) return false;
-    refine(std::span(r.walk.frames).subspan(begin - r.level_ends[0], count),
-           std::span(r.walk.places).subspan(begin, count),
-           [&](std::size_t, std::size_t k, const Wide&) { return r.refinement.number_with_sign(unsigned(k)); });
+    refine(
+        std::span(r.walk.frames).subspan(begin - r.level_ends[0], count), r.walk.rings, begin,
+        [&](std::size_t, const std::array<Reals, 3>&) {
+            const std::uint32_t bits = r.refinement.bits(3 * kQuarterBits);
+            return std::array{std::int32_t(bits & 3) - 2, std::int32_t(bits >> 2 & 3) - 2, std::int32_t(bits >> 4) - 2};
+        });
     ++r.refined_levels;
     return !r.refinement.is_damaged();
 }
 
-const ClosedMap& LevelReader::map() const { return reading_->walk.map; }
-std::span<const FinePlace> LevelReader::places() const { return reading_->walk.places; }
+std::vector<Triangle> LevelReader::triangles() const { return reading_->walk.rings.triangles(); }
+std::vector<bool> LevelReader::closes_hole() const { return reading_->walk.rings.closes_hole(); }
+ClosedMap LevelReader::map() const { return map_of(triangles(), closes_hole()); }
+FinePlace LevelReader::place(Index vertex) const { return reading_->walk.rings.place(vertex); }
+std::size_t LevelReader::vertex_count() const { return reading_->walk.rings.vertex_count(); }
 std::span<const Index> LevelReader::parents() const { return reading_->walk.parents; }
 
 } // namespace filigree

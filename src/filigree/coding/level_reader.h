@@ -25,8 +25,12 @@ public:
     /// Makes the places of levels more precise, in their order, when all levels are read. The coarsest is precise.
     bool refine_level(std::string_view refinement);
 
-    const ClosedMap& map() const;
-    std::span<const FinePlace> places() const;
+    /// Those that close holes included. Cost O(size).
+    std::vector<Triangle> triangles() const;
+    std::vector<bool> closes_hole() const; ///< of each vertex
+    ClosedMap map() const;                 ///< of the same triangles. Cost O(size)
+    FinePlace place(Index vertex) const;
+    std::size_t vertex_count() const;
     /// Of each vertex, one that was there before it and is beside it; of the coarsest's, itself.
     std::span<const Index> parents() const;
 

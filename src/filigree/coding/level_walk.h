@@ -2,7 +2,8 @@
 #pragma once
 
 #include "filigree/coding/geometry_code.h"
-#include "filigree/coding/integer_frame.h"
+#include "filigree/coding/surface_frame.h"
+#include "filigree/coding/vertex_rings.h"
 
 #include <algorithm>
 #include <array>
@@ -13,32 +14,32 @@ namespace filigree {
 inline constexpr unsigned kDegrees = 10, kRingSizes = 12, kLevelSizeClasses = 16;
 inline constexpr unsigned kWhich = 0, kSector = kWhich + kDegrees, kBegin = kSector + kRingSizes,
                           kPlace = kBegin + kRingSizes, kLevelContexts = kPlace + 3 * kLevelSizeClasses;
-inline constexpr unsigned kRefinementContexts = 3;
-inline constexpr std::int32_t kRoughOne = 127;       // length of a rough frame's axes
-inline constexpr std::size_t kLongestSplitRing = 48; // of a vertex that may split
+inline constexpr unsigned kQuarterBits = 2;    // of refinements, along each axis
+inline constexpr std::int32_t kRoughOne = 127; // length of a rough frame's axes
 inline constexpr std::int32_t kUnknownSize = 256;
 
-/// The half-edges from a vertex, clockwise, and how it lies among its neighbours.
+/// The neighbours of a vertex, clockwise, and how it lies among them.
 struct SplitRing {
-    std::array<Index, kLongestSplitRing> half_edges, ends;
-    std::size_t size = 0;
-    std::size_t ahead = 0; ///< the neighbour farthest towards their middle: there the vertex that comes is expected
+    const Index* ends;
+    std::size_t size;
+    std::size_t ahead; ///< the neighbour farthest towards their middle: there the vertex that comes is expected
 };
 
 /// A frame for what is more precise than steps: the first axes, in bytes.
 struct RoughFrame {
     std::array<std::array<std::int8_t, 3>, 2> axes;
 
-    explicit RoughFrame(const Frame& frame) {
+    RoughFrame() = default;
+    explicit RoughFrame(const SurfaceFrame& frame) {
         for (std::size_t k = 0; k < 2; ++k)
-            for (std::size_t j = 0; j < 3; ++j) axes[k][j] = std::int8_t(divide(frame.axes[k][j] * kRoughOne, kOne));
+            for (std::size_t j = 0; j < 3; ++j) axes[k][j] = std::int8_t(to_fine(frame.axes[k][j] * kRoughOne));
     }
-    Wide axis(std::size_t k) const {
-        const Wide a{axes[0][0], axes[0][1], axes[0][2]}, b{axes[1][0], axes[1][1], axes[1][2]};
-        if (k < 2) return k == 0 ? a : b;
-        Wide third = cross(a, b);
-        for (std::int64_t& x : third) x = divide(x, kRoughOne);
-        return third;
+    /// All three, as long as a quarter of a step is.
+    std::array<Reals, 3> quarters() const {
+        constexpr double kQuarter = double(kFine) / kRoughOne;
+        const Reals a{double(axes[0][0]), double(axes[0][1]), double(axes[0][2])};
+        const Reals b{double(axes[1][0]), double(axes[1][1]), double(axes[1][2])};
+        return {a * kQuarter, b * kQuarter, cross(a, b) * (kQuarter / kRoughOne)};
     }
 };
 
@@ -47,174 +48,177 @@ template <class Coder>
 class LevelWalk {
 public:
     LevelWalk(Coder& with, GeometrySteps steps, bool is_refined)
-        : coder(with), steps_{steps.normal, steps.tangential, steps.tangential}, keeps_frames_(is_refined) {}
+        : coder(with), steps_{double(steps.normal * kFine), double(steps.tangential * kFine),
+                              double(steps.tangential * kFine)},
+          keeps_frames_(is_refined) {}
 
-    ClosedMap map;
-    std::vector<FinePlace> places;
+    VertexRings rings;
     std::vector<Index> parents;
     std::vector<RoughFrame> frames; ///< of each vertex but the coarsest's, where levels are refined
     Coder& coder;
 
-    void begin(ClosedMap coarsest, std::vector<FinePlace> coarsest_places) {
-        map = std::move(coarsest);
-        places = std::move(coarsest_places);
-        spokes_.assign(map.vertex_count(), kNoIndex);
-        sizes_.assign(map.vertex_count(), kUnknownSize);
-        degrees_.assign(map.vertex_count(), 0);
-        for (Index h = 0; h < map.opposite.size(); ++h) {
-            spokes_[map.origin(h)] = h;
-            ++degrees_[map.origin(h)];
-        }
-        for (Index v = 0; v < map.vertex_count(); ++v) parents.push_back(v);
+    void begin(const ClosedMap& coarsest, std::span<const FinePlace> coarsest_places) {
+        rings = VertexRings(coarsest, coarsest_places, kUnknownSize);
+        for (Index v = 0; v < rings.vertex_count(); ++v) parents.push_back(v);
+        order_ = parents;
     }
 
-    /// False: damaged.
+    /// Which vertices split, how, and where the new ones are: one after the other, for all of the batch. False:
+    /// damaged.
     bool run_batch(std::size_t most_vertices) {
-        const auto count = static_cast<Index>(map.vertex_count());
-        SplitRing ring;
-        for (Index u = 0; u < count; ++u) {
-            if (map.closes_hole[u] || degrees_[u] > kLongestSplitRing || degrees_[u] < 2) continue;
-            if (!coder.splits(which_context(u), u)) continue;
-            if (map.vertex_count() >= most_vertices) return false;
-            read_ring(u, ring);
-            const std::size_t size_class = std::min<std::size_t>(ring.size, kRingSizes + 1) - 2;
-            const std::size_t sector = coder.sector(kSector + unsigned(size_class), ring);
-            if (sector == 0 || sector >= ring.size) return false;
-            const std::size_t expected = (ring.ahead + ring.size - sector / 2) % ring.size;
-            const std::size_t begin = coder.begin(kBegin + unsigned(size_class), ring, expected);
-            if (begin >= ring.size || coder.is_damaged()) return false;
-            split(u, ring, begin, sector);
+        known_ = rings.vertex_count();
+        find_splits();
+        if (coder.is_damaged() || known_ + splitting_.size() > most_vertices) return false;
+        make_room();
+        around_.clear();
+        for (std::size_t i = 0; i < splitting_.size(); ++i) {
+            if (i + 2 * kAhead < splitting_.size()) {
+                rings.fetch(splitting_[i + 2 * kAhead]);
+                rings.fetch_ring(splitting_[i + kAhead]);
+            }
+            if (!split(splitting_[i], static_cast<Index>(known_ + i))) return false;
         }
+        if (coder.is_damaged()) return false;
+        const Index* ring = around_.data();
+        for (std::size_t i = 0; i < splitting_.size(); ++i) ring = place(static_cast<Index>(known_ + i), ring);
         return !coder.is_damaged();
     }
 
 private:
-    Wide at(Index v) const { return {places[v][0], places[v][1], places[v][2]}; }
+    static constexpr std::size_t kAhead = 6; // so many splits ahead memory is asked for
 
-    void read_ring(Index u, SplitRing& ring) const {
-        ring.size = 0;
-        Wide middle{};
-        std::array<Wide, kLongestSplitRing> arms;
-        const Wide from = at(u);
-        for (Index h = spokes_[u]; ring.size < degrees_[u]; h = map.turn_clockwise(h)) {
-            const Index end = map.origin(ClosedMap::next(h));
-            Wide& arm = arms[ring.size];
-            arm = map.closes_hole[end] ? Wide{} : at(end) - from;
-            for (std::size_t k = 0; k < 3; ++k) middle[k] += arm[k];
-            ring.half_edges[ring.size] = h;
-            ring.ends[ring.size++] = end;
+    void find_splits() {
+        order_before_.swap(order_);
+        order_.resize(2 * known_ + 2);
+        splitting_.resize(known_ + 1);
+        std::size_t count = 0, at = 0;
+        for (const Index u : order_before_) {
+            const std::uint32_t degree = rings.size(u);
+            const bool splits =
+                degree <= VertexRings::kLongest && degree >= 2 && coder.splits(which_context(degree), u);
+            order_[at] = splitting_[count] = u; // what does not split is overwritten: which it is cannot be guessed
+            order_[at + 1] = static_cast<Index>(known_ + count);
+            at += splits ? 2 : 1;
+            count += splits;
         }
-        std::int64_t farthest = dot(arms[0], middle);
-        ring.ahead = 0;
-        for (std::size_t k = 1; k < ring.size; ++k) {
-            const std::int64_t far = dot(arms[k], middle);
-            if (far > farthest) {
-                farthest = far;
-                ring.ahead = k;
+        order_.resize(at);
+        splitting_.resize(count);
+    }
+    static unsigned which_context(std::uint32_t degree) { return kWhich + std::clamp(degree, 3u, kDegrees + 2) - 3; }
+
+    /// For what splits bring.
+    void make_room() {
+        const std::size_t more = splitting_.size();
+        rings.add(more);
+        parents.insert(parents.end(), splitting_.begin(), splitting_.end());
+        if (keeps_frames_) frames.resize(frames.size() + more);
+    }
+
+    /// False: damaged.
+    bool split(Index u, Index v) {
+        if (!rings.is_kept(u)) return false;
+        const SplitRing ring = ring_of(u);
+        const std::size_t size_class = std::min<std::size_t>(ring.size, kRingSizes + 1) - 2;
+        const std::size_t sector = coder.sector(kSector + unsigned(size_class), u);
+        if (sector == 0 || sector >= ring.size) return false;
+        const std::size_t expected = (ring.ahead + ring.size - sector / 2) % ring.size;
+        const std::size_t begin = coder.begin(kBegin + unsigned(size_class), ring, expected);
+        if (begin >= ring.size) return false;
+        note_around(u, ring, begin, sector);
+        coder.did_split(v);
+        return rings.split(u, v, begin, sector);
+    }
+
+    SplitRing ring_of(Index u) const {
+        SplitRing ring{rings.ends(u), rings.size(u), 0};
+        std::array<FinePlace, VertexRings::kLongest> arms;
+        FinePlace middle{};
+        const FinePlace from = rings.place(u);
+        for (std::size_t i = 0; i < ring.size; ++i) {
+            const Index end = ring.ends[i];
+            const bool counts = end < known_ && !rings.closes_hole(end); // where what is new is comes later
+            for (std::size_t k = 0; k < 3; ++k) {
+                arms[i][k] = counts ? rings.place(end)[k] - from[k] : 0;
+                middle[k] += arms[i][k];
             }
         }
-    }
-
-    unsigned which_context(Index u) const { return kWhich + std::clamp(degrees_[u], 3u, kDegrees + 2) - 3; }
-
-    /// The `sector` triangles from the ring's half-edge `begin` on become the new vertex's.
-    void split(Index u, const SplitRing& ring, std::size_t begin, std::size_t sector) {
-        const auto v = static_cast<Index>(map.vertex_count());
-        const std::size_t end = (begin + sector) % ring.size;
-        const Index left = ring.ends[begin], right = ring.ends[end];
-        const Index out_left = ring.half_edges[begin], in_left = map.opposite[out_left];
-        const Index out_right = ring.half_edges[end], in_right = map.opposite[out_right];
-        for (std::size_t k = 1; k <= sector; ++k) {
-            const Index h = ring.half_edges[(begin + k) % ring.size];
-            map.triangles[h / 3][h % 3] = v;
+        std::int64_t farthest = along(arms[0], middle);
+        for (std::size_t i = 1; i < ring.size; ++i) {
+            const std::int64_t far = along(arms[i], middle);
+            ring.ahead = far > farthest ? i : ring.ahead;
+            farthest = std::max(far, farthest);
         }
-        const auto a = static_cast<Index>(3 * map.triangles.size()), b = a + 3;
-        map.triangles.push_back({u, v, left});
-        map.triangles.push_back({u, right, v});
-        map.opposite.resize(map.opposite.size() + 6);
-        glue(a, b + 2);
-        glue(a + 1, in_left);
-        glue(a + 2, out_left);
-        glue(b, in_right);
-        glue(b + 1, out_right);
-        spokes_[u] = a;
-        spokes_.push_back(b + 2);
-        degrees_[u] = static_cast<std::uint32_t>(ring.size - sector + 2);
-        degrees_.push_back(static_cast<std::uint32_t>(sector + 2));
-        ++degrees_[left];
-        ++degrees_[right];
-        map.closes_hole.push_back(false);
-        parents.push_back(u);
-        coder.did_split(u, v, a, b);
-        place(u, v, ring, begin, sector);
+        return ring;
     }
-    void glue(Index a, Index b) {
-        map.opposite[a] = b;
-        map.opposite[b] = a;
+    static std::int64_t along(const FinePlace& a, const FinePlace& b) {
+        return std::int64_t{a[0]} * b[0] + std::int64_t{a[1]} * b[1] + std::int64_t{a[2]} * b[2];
     }
 
-    /// Where the new vertex is: in the middle of its neighbours, and so many steps from there.
-    void place(Index u, Index v, const SplitRing& ring, std::size_t begin, std::size_t sector) {
-        std::array<Wide, kLongestSplitRing + 1> around;
-        std::size_t count = 0;
-        std::int64_t size = 0;
-        const auto meet = [&](Index w) {
-            if (map.closes_hole[w]) return;
-            around[count++] = at(w);
-            size += sizes_[w];
-        };
-        meet(u);
-        for (std::size_t k = 0; k <= sector; ++k) meet(ring.ends[(begin + k) % ring.size]);
-        Wide expected{}, normal{};
-        for (std::size_t i = 0; i < count; ++i)
-            for (std::size_t k = 0; k < 3; ++k) expected[k] += around[i][k];
-        for (std::int64_t& x : expected) x = divide(x, std::int64_t(count));
-        for (std::size_t i = 0; i < count; ++i) {
-            const Wide part = cross(around[i] - expected, around[(i + 1) % count] - expected);
-            for (std::size_t k = 0; k < 3; ++k) normal[k] += part[k];
+    /// For place(): how many neighbours the new vertex has that close no hole, and which.
+    void note_around(Index u, const SplitRing& ring, std::size_t begin, std::size_t sector) {
+        const std::size_t at = around_.size();
+        around_.resize(at + sector + 3);
+        Index* next = around_.data() + at + 1;
+        *next++ = u;
+        for (std::size_t k = 0, i = begin; k <= sector; ++k, i = i + 1 < ring.size ? i + 1 : 0) {
+            *next = ring.ends[i];
+            next += !rings.closes_hole(ring.ends[i]);
         }
-        const Frame frame(normal, expected - at(u));
-        if (keeps_frames_) frames.emplace_back(frame);
-
-        std::array<std::int32_t, 3> steps{};
-        std::int64_t so_far = size / std::int64_t(count), all = 0; // quarters of a step
-        Wide place = expected;
-        for (std::size_t k = 0; k < 3; ++k) {
-            const unsigned context =
-                kPlace + unsigned(k) * kLevelSizeClasses + size_class(std::uint32_t(so_far), kLevelSizeClasses);
-            steps[k] = coder.step(context, v, expected, frame.axes[k], std::int64_t{steps_[k]} * kFine);
-            const std::int64_t own = 4 * std::int64_t{std::abs(steps[k])};
-            so_far = k == 0 ? (3 * so_far + 2 * own) / 4 : (so_far + own) / 2;
-            all += own;
-            for (std::size_t j = 0; j < 3; ++j)
-                place[j] += divide_by_one(std::int64_t{steps[k]} * steps_[k] * kFine * frame.axes[k][j]);
-        }
-        for (std::int64_t& x : place) x = std::clamp<std::int64_t>(x, -kFarthest, kFarthest);
-        places.push_back({std::int32_t(place[0]), std::int32_t(place[1]), std::int32_t(place[2])});
-        sizes_.push_back(std::int32_t(std::min<std::int64_t>(all / 3, 1 << 20)));
+        around_[at] = static_cast<Index>(next - (around_.data() + at + 1));
+        around_.resize(std::size_t(next - around_.data()));
     }
 
-    std::array<std::int32_t, 3> steps_;
+    /// Where a new vertex is: in the middle of its neighbours, and so many steps from there. Returns the next ring.
+    const Index* place(Index v, const Index* ring) {
+        const std::size_t count = *ring++;
+        const FinePlace from = rings.place(ring[0]);
+        auto size = std::uint32_t(rings.difference(ring[0]));
+        Reals sum{}, normal{}, before{};
+        for (std::size_t i = 1; i < count; ++i) {
+            const FinePlace& p = rings.place(ring[i]);
+            const Reals arm = {double(p[0] - from[0]), double(p[1] - from[1]), double(p[2] - from[2])};
+            const Reals part = cross(before, arm);
+            for (std::size_t k = 0; k < 3; ++k) {
+                sum[k] += arm[k];
+                normal[k] += part[k];
+            }
+            before = arm;
+            size += std::uint32_t(rings.difference(ring[i]));
+        }
+        const Reals ahead = sum * kOneOf[count];
+        const Reals expected = {from[0] + ahead[0], from[1] + ahead[1], from[2] + ahead[2]};
+        const SurfaceFrame frame(normal, ahead);
+        if (keeps_frames_) frames[frames.size() - (known_ + splitting_.size() - v)] = RoughFrame(frame);
+        const SteppedPlace stepped = step_to_place<kLevelSizeClasses>(
+            expected, frame, steps_, size / std::uint32_t(count), [&](std::size_t k, unsigned size_class) {
+                const unsigned context = kPlace + unsigned(k) * kLevelSizeClasses + size_class;
+                return coder.step(context, v, expected, frame.axes[k], steps_[k]);
+            });
+        rings.place(v) = stepped.place;
+        rings.difference(v) = stepped.size;
+        return ring + count;
+    }
+
+    Reals steps_; ///< sizes along the frame's axes, in sixteenths
     bool keeps_frames_;
-    std::vector<Index> spokes_;          ///< a half-edge from each vertex
-    std::vector<std::int32_t> sizes_;    ///< of each vertex's difference, quarters of a step
-    std::vector<std::uint32_t> degrees_; ///< of each vertex
+    std::size_t known_ = 0; ///< vertices before the batch
+    /// Vertices, each behind the one that it came from: neighbours are near each other in it, and in what comes of it.
+    std::vector<Index> order_, order_before_;
+    std::vector<Index> splitting_, around_; ///< of the batch: what splits; the new vertices' neighbours, for place()
 };
 
-/// Makes places more precise by a quarter of what the levels' steps leave open, along each axis: two bits.
-/// `code(axis, place, along, size)` is which quarter, -2 to 1.
+/// Makes places from `begin` on more precise by a quarter of what the levels' steps leave open, along each axis: two
+/// bits. `code(vertex, axes)` is which quarters, -2 to 1.
 template <class Code>
-void refine(std::span<const RoughFrame> frames, std::span<FinePlace> places, const Code& code) {
-    for (std::size_t v = 0; v < places.size(); ++v) {
-        Wide shift{};
-        for (std::size_t k = 0; k < 3; ++k) {
-            const Wide axis = frames[v].axis(k);
-            const std::int64_t quarter = std::clamp<std::int64_t>(code(v, k, axis), -8, 7);
-            for (std::size_t j = 0; j < 3; ++j) shift[j] += (2 * quarter + 1) * axis[j];
-        }
-        for (std::size_t j = 0; j < 3; ++j)
-            places[v][j] = std::int32_t(std::clamp<std::int64_t>(places[v][j] + divide(shift[j] * kFine, 2 * kRoughOne),
-                                                                 -kFarthest, kFarthest));
+void refine(std::span<const RoughFrame> frames, VertexRings& rings, std::size_t begin, const Code& code) {
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+        const std::array<Reals, 3> axes = frames[i].quarters();
+        FinePlace& fine = rings.place(static_cast<Index>(begin + i));
+        const std::array<std::int32_t, 3> quarters = code(begin + i, axes);
+        Reals place = reals(fine);
+        for (std::size_t k = 0; k < 3; ++k)
+            for (std::size_t j = 0; j < 3; ++j) place[j] += (quarters[k] + 0.5) * axes[k][j];
+        fine = {to_fine(place[0]), to_fine(place[1]), to_fine(place[2])};
     }
 }
 

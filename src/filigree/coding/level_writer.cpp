@@ -16,25 +16,22 @@ public:
         : out(kLevelContexts), places_(places), collapse_of_(places.size(), nullptr),
           number_of_(places.size(), kNoIndex) {
         for (const Index v : coarsest.vertex) add_vertex(coarsening.vertex[v]);
-        for (const Index h : coarsest.half_edge) { // of the base, which is numbered by triangles
-            const Index first = coarsening.half_edge[h / 3];
-            half_edges.push_back(first + h % 3);
-        }
     }
 
     SymbolWriter out;
-    std::vector<Index> vertices, half_edges; ///< of the walk's, which they were
+    std::vector<Index> vertices; ///< of the walk's, which they were
 
     void begin_batch(std::span<const VertexCollapse> batch) {
         for (const VertexCollapse& c : batch) collapse_of_[c.onto] = &c;
     }
     bool is_damaged() const { return false; }
     bool splits(unsigned context, Index u) {
-        now_ = collapse_of_[vertices[u]];
-        out.symbol(context, now_ != nullptr);
-        return now_ != nullptr;
+        const bool splits = collapse_of_[vertices[u]] != nullptr;
+        out.symbol(context, splits);
+        return splits;
     }
-    std::size_t sector(unsigned context, const SplitRing&) {
+    std::size_t sector(unsigned context, Index u) {
+        now_ = std::exchange(collapse_of_[vertices[u]], nullptr);
         out.number(context, now_->triangles - 1);
         return now_->triangles;
     }
@@ -50,15 +47,9 @@ public:
         out.number_with_sign(context, further);
         return begin;
     }
-    void did_split(Index u, Index, Index, Index) {
-        collapse_of_[vertices[u]] = nullptr;
-        add_vertex(now_->vertex);
-        half_edges.push_back(now_->back);
-        half_edges.push_back(ClosedMap::next(now_->there));
-    }
-    std::int32_t step(unsigned context, Index v, const Wide& expected, const Wide& axis, std::int64_t size) {
-        const FinePlace& p = places_[vertices[v]];
-        const auto steps = std::int32_t(divide(dot(Wide{p[0], p[1], p[2]} - expected, axis), size * kOne));
+    void did_split(Index) { add_vertex(now_->vertex); }
+    std::int32_t step(unsigned context, Index v, const Reals& expected, const Reals& axis, double size) {
+        const std::int32_t steps = nearest_step(places_[vertices[v]], expected, axis, size);
         out.number_with_sign(context, steps);
         return steps;
     }
@@ -76,16 +67,36 @@ private:
 };
 
 std::string code_refinement(std::span<const FinePlace> exact, std::span<const Index> vertices,
-                            std::span<const RoughFrame> frames, std::span<FinePlace> read, SymbolWriter& out) {
-    refine(frames, read, [&](std::size_t v, std::size_t k, const Wide& axis) {
-        const FinePlace &p = exact[vertices[v]], &q = read[v];
-        const std::int64_t along = dot({p[0] - q[0], p[1] - q[1], p[2] - q[2]}, axis);
-        const std::int64_t quarter = divide(2 * along - kFine * kRoughOne, 2 * kFine * kRoughOne);
-        const auto chosen = std::int32_t(std::clamp<std::int64_t>(quarter, -8, 7));
-        out.number_with_sign(unsigned(k), chosen);
-        return chosen;
+                            std::span<const RoughFrame> frames, std::size_t begin, VertexRings& rings,
+                            SymbolWriter& out) {
+    refine(frames, rings, begin, [&](std::size_t v, const std::array<Reals, 3>& axes) {
+        const Reals left = reals(exact[vertices[v]]) - reals(rings.place(static_cast<Index>(v)));
+        std::array<std::int32_t, 3> quarters{};
+        for (std::size_t k = 0; k < 3; ++k) {
+            const double along = dot(left, axes[k]) / dot(axes[k], axes[k]);
+            quarters[k] = std::clamp(to_fine(along - 0.5), -2, 1);
+            out.bits(std::uint32_t(quarters[k] + 2), kQuarterBits);
+        }
+        return quarters;
     });
     return out.finish();
+}
+
+/// Of each of the walk's triangles the source's half-edge from its first corner to its second.
+std::vector<Index> find_half_edges(std::span<const Triangle> triangles, std::span<const Index> vertices,
+                                   const ClosedMap& map) {
+    std::vector<Index> spokes(map.vertex_count(), kNoIndex), found;
+    std::vector<bool> is_taken(map.triangles.size(), false);
+    for (Index h = 0; h < map.opposite.size(); ++h) spokes[map.origin(h)] = h;
+    for (const Triangle& t : triangles) {
+        const Index to = vertices[t[1]], third = vertices[t[2]];
+        Index h = spokes[vertices[t[0]]];
+        while (is_taken[h / 3] || map.origin(ClosedMap::next(h)) != to || map.origin(ClosedMap::previous(h)) != third)
+            h = map.turn_clockwise(h);
+        is_taken[h / 3] = true;
+        found.push_back(h);
+    }
+    return found;
 }
 
 } // namespace
@@ -104,35 +115,37 @@ EncodedLevels encode_levels(const ClosedMap& map, std::span<const FinePlace> pla
     LevelWalk<SplitWriter> walk(writer, options.steps, options.is_refined);
     walk.begin(coarsest.map, encode_geometry(coarsest.map, places_there, {1, 1}, 0, base_places));
     code.places = base_places.finish();
-    code.vertices = static_cast<std::uint32_t>(walk.map.vertex_count());
-    code.triangles = static_cast<std::uint32_t>(walk.map.triangles.size());
+    code.vertices = static_cast<std::uint32_t>(walk.rings.vertex_count());
+    code.triangles = static_cast<std::uint32_t>(coarsest.map.triangles.size());
 
-    std::size_t begin = walk.map.vertex_count(); // of the level
+    std::size_t begin = walk.rings.vertex_count(); // of the level
     CodedLevel level;
     for (std::size_t i = coarsening.batches.size(); i-- > 0 && !context.is_cancelled();) {
         writer.begin_batch(coarsening.batches[i]);
         walk.run_batch(kNoIndex);
         ++level.batches;
-        if (i > 0 && walk.map.vertex_count() < 2 * begin) continue;
-        begin = walk.map.vertex_count();
+        if (i > 0 && walk.rings.vertex_count() < 2 * begin) continue;
+        begin = walk.rings.vertex_count();
         level.vertices = static_cast<std::uint32_t>(begin);
-        level.triangles = static_cast<std::uint32_t>(walk.map.triangles.size());
+        level.triangles = static_cast<std::uint32_t>(code.triangles + 2 * (begin - code.vertices));
         level.splits = writer.out.finish();
         code.levels.push_back(std::exchange(level, {}));
     }
     if (options.is_refined) {
-        SymbolWriter out(kRefinementContexts);
+        SymbolWriter out(0);
         std::size_t from = code.vertices;
         for (CodedLevel& coded : code.levels) {
             const std::size_t count = coded.vertices - from;
-            coded.refinement = code_refinement(places, std::span(writer.vertices).subspan(from, count),
-                                               std::span(walk.frames).subspan(from - code.vertices, count),
-                                               std::span(walk.places).subspan(from, count), out);
+            coded.refinement =
+                code_refinement(places, writer.vertices, std::span(walk.frames).subspan(from - code.vertices, count),
+                                from, walk.rings, out);
             from = coded.vertices;
         }
     }
-    encoded.read = std::move(walk.places);
-    encoded.walked = {std::move(walk.map), std::move(writer.vertices), std::move(writer.half_edges)};
+    for (Index v = 0; v < walk.rings.vertex_count(); ++v) encoded.read.push_back(walk.rings.place(v));
+    encoded.walked.map = map_of(walk.rings.triangles(), walk.rings.closes_hole());
+    encoded.walked.half_edge = find_half_edges(encoded.walked.map.triangles, writer.vertices, map);
+    encoded.walked.vertex = std::move(writer.vertices);
     return encoded;
 }
 

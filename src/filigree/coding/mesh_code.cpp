@@ -269,8 +269,9 @@ CodedShape decode_shape(const CodedMesh& coded, SymbolReader& faces_in, SymbolRe
     std::vector<FinePlace> places;
     if (coded.options.levels) {
         const LevelReader levels = decode_levels(coded, context);
-        places.assign(levels.places().begin(), levels.places().end());
-        walked = decode_faces(levels.map(), faces_in, coded.vertices, coded.corners);
+        places.reserve(levels.vertex_count());
+        for (Index v = 0; v < levels.vertex_count(); ++v) places.push_back(levels.place(v));
+        walked = decode_faces({levels.triangles(), {}, levels.closes_hole()}, faces_in, coded.vertices, coded.corners);
     } else
         walked = decode_faces(faces_in, coded.vertices, coded.corners);
     if (!walked || context.is_cancelled()) throw Damage();
@@ -324,17 +325,17 @@ LevelCodeOptions level_options(const MeshCodeOptions& options) {
 }
 
 Mesh mesh_of_levels(const LevelReader& levels, const CodedMesh& coded) {
-    const ClosedMap& map = levels.map();
+    const std::vector<bool> closes_hole = levels.closes_hole();
     Mesh mesh;
     mesh.origin = coded.rest.origin;
-    std::vector<Index> number(map.vertex_count(), kNoIndex);
-    for (std::size_t v = 0; v < map.vertex_count(); ++v) {
-        if (map.closes_hole[v]) continue;
+    std::vector<Index> number(closes_hole.size(), kNoIndex);
+    for (Index v = 0; v < number.size(); ++v) {
+        if (closes_hole[v]) continue;
         number[v] = static_cast<Index>(mesh.vertex_count());
-        mesh.positions.push_back(position_of(levels.places()[v], coded));
+        mesh.positions.push_back(position_of(levels.place(v), coded));
     }
-    for (const Triangle& t : map.triangles) {
-        if (!map.is_own(t)) continue;
+    for (const Triangle& t : levels.triangles()) {
+        if (std::ranges::any_of(t, [&](Index v) { return closes_hole[v]; })) continue;
         for (const Index v : t) mesh.corners.push_back(number[v]);
         mesh.face_offsets.push_back(static_cast<Index>(mesh.corners.size()));
     }

@@ -8,16 +8,24 @@ namespace filigree {
 
 namespace {
 
-constexpr std::uint32_t kLowestState = 1u << 16; // states are kLowestState to 2^32 - 1, words of 16 bits go in and out
-
 // Numbers as symbols: 0 to 15 themselves, then two a power of two with the other bits behind; the last one for the
 // rest.
 constexpr unsigned kDirect = 16, kWholeNumber = SymbolModel::kSymbols - 1;
 constexpr unsigned kLargestExponent = 26;
 static_assert(kDirect + (kLargestExponent - 4) * 2 + 1 < kWholeNumber);
 
+constexpr std::array<NumberSymbol, SymbolModel::kSymbols> number_symbols() {
+    std::array<NumberSymbol, SymbolModel::kSymbols> symbols{};
+    for (unsigned s = 0; s < kDirect; ++s) symbols[s] = {s, 0};
+    for (unsigned s = kDirect; s < kWholeNumber; ++s) { // there are none above the largest exponent: damage
+        const unsigned exponent = std::min((s - kDirect) / 2 + 4, kLargestExponent);
+        symbols[s] = {(2 + (s - kDirect) % 2) << (exponent - 1), exponent - 1};
+    }
+    symbols[kWholeNumber] = {0, 32};
+    return symbols;
+}
+
 std::uint32_t without_sign(std::int32_t value) { return (std::uint32_t(value) << 1) ^ (value < 0 ? 0xffffffffu : 0u); }
-std::int32_t with_sign(std::uint32_t value) { return std::int32_t(value >> 1) ^ -std::int32_t(value & 1); }
 
 void put_u32(std::string& bytes, std::uint32_t value) {
     for (unsigned k = 0; k < 4; ++k) bytes.push_back(char(value >> (8 * k)));
@@ -30,27 +38,30 @@ std::uint32_t get_u32(std::string_view bytes, std::size_t at) {
 
 } // namespace
 
+constinit const std::array<NumberSymbol, SymbolModel::kSymbols> kNumberSymbols = number_symbols();
+
 SymbolModel::SymbolModel() {
     for (unsigned s = 0; s < kSymbols; ++s) counts_[s] = 1 + (24u >> (s / 6));
+    starts_[kSymbols] = kShares;
     update();
     pause_ = until_update_ = 4;
 }
 
 void SymbolModel::update() {
-    std::uint64_t total = 0;
+    std::uint32_t total = 0;
     for (const std::uint32_t count : counts_) total += count;
-    // One share for each, the others by their counts.
+    // One share for each, the others by their counts, rounded down: the half keeps what comes out whole from the
+    // rounding of the quotient.
+    const double one = 1.0 / total;
     std::uint64_t before = 0;
     for (unsigned s = 0; s < kSymbols; ++s) {
-        starts_[s] = std::uint16_t(s + before * (kShares - kSymbols) / total);
+        starts_[s] = std::uint16_t(s + std::uint32_t((double(before * (kShares - kSymbols)) + 0.5) * one));
         before += counts_[s];
     }
-    starts_[kSymbols] = std::uint16_t(kShares);
-    unsigned symbol = 0;
-    for (unsigned k = 0; k < first_.size(); ++k) {
-        while (starts_[symbol + 1] <= k << kCoarse) ++symbol;
-        first_[k] = std::uint8_t(symbol);
-    }
+    unsigned cell = 0;
+    for (unsigned s = 0; s < kSymbols; ++s)
+        for (const unsigned end = unsigned(starts_[s + 1] + (1 << kCoarse) - 1) >> kCoarse; cell < end; ++cell)
+            first_[cell] = std::uint8_t(s);
     constexpr std::uint64_t kMostCounts = std::uint64_t{kStep} << 15; // what came long ago counts less
     if (total > kMostCounts)
         for (std::uint32_t& count : counts_) count = count / 2 + 1;
@@ -119,7 +130,7 @@ void SymbolReader::read_next(std::string_view stream) {
     pending_ = pending_count_ = 0;
     is_damaged_ = false;
     size_ = stream.size();
-    words_ = bits_ = {};
+    word_ = words_end_ = bit_ = bits_end_ = nullptr;
     constexpr std::size_t kHead = 20;
     if (stream.size() < kHead || get_u32(stream, 0) > (stream.size() - kHead) / 2) {
         is_damaged_ = true;
@@ -128,55 +139,22 @@ void SymbolReader::read_next(std::string_view stream) {
     }
     const std::size_t words = get_u32(stream, 0);
     for (std::size_t k = 0; k < 4; ++k) states_[k] = get_u32(stream, 4 + 4 * k);
-    words_ = stream.substr(kHead, 2 * words);
-    bits_ = stream.substr(kHead + 2 * words);
+    word_ = stream.data() + kHead;
+    words_end_ = bit_ = word_ + 2 * words;
+    bits_end_ = stream.data() + stream.size();
 }
 
-unsigned SymbolReader::symbol(unsigned context) {
-    SymbolModel& model = models_[context];
-    std::uint32_t& state = states_[turn_++ % 4];
-    const std::uint32_t place = state & (SymbolModel::kShares - 1);
-    const unsigned symbol = model.at(place);
-    state = model.share(symbol) * (state >> SymbolModel::kShareBits) + place - model.start(symbol);
-    if (state < kLowestState) {
-        std::uint32_t word = 0;
-        if (words_.size() >= 2) {
-            word = std::uint8_t(words_[0]) | std::uint32_t(std::uint8_t(words_[1])) << 8;
-            words_.remove_prefix(2);
-        } else
-            is_damaged_ = true;
-        state = state << 16 | word;
-    }
-    model.count(symbol);
-    return symbol;
-}
-
-std::uint32_t SymbolReader::bits(unsigned count) {
+/// Byte by byte, where fewer than eight are left.
+void SymbolReader::fetch_last_bits(unsigned count) {
     while (pending_count_ < count) {
-        if (bits_.empty()) {
+        if (bit_ == bits_end_) {
             is_damaged_ = true;
             pending_count_ += 32;
-            break;
+            return;
         }
-        pending_ |= std::uint64_t(std::uint8_t(bits_[0])) << pending_count_;
-        bits_.remove_prefix(1);
+        pending_ |= std::uint64_t(std::uint8_t(*bit_++)) << pending_count_;
         pending_count_ += 8;
     }
-    const auto value = std::uint32_t(pending_ & ((std::uint64_t{1} << count) - 1));
-    pending_ >>= count;
-    pending_count_ -= count;
-    return value;
 }
-
-std::uint32_t SymbolReader::number(unsigned context) {
-    const unsigned symbol = this->symbol(context);
-    if (symbol < kDirect) return symbol;
-    if (symbol == kWholeNumber) return bits(32);
-    const unsigned exponent = std::min((symbol - kDirect) / 2 + 4, kLargestExponent);
-    const std::uint32_t high = 2 + (symbol - kDirect) % 2;
-    return high << (exponent - 1) | bits(exponent - 1);
-}
-
-std::int32_t SymbolReader::number_with_sign(unsigned context) { return with_sign(number(context)); }
 
 } // namespace filigree

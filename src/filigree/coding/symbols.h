@@ -6,8 +6,10 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace filigree {
@@ -88,14 +90,71 @@ public:
     std::size_t size() const { return size_; } ///< of the stream, bytes
 
 private:
+    void fetch_last_bits(unsigned count);
+
     std::size_t size_ = 0;
     std::vector<SymbolModel> models_;
     std::array<std::uint32_t, 4> states_{};
     unsigned turn_ = 0;
-    std::string_view words_, bits_;
+    const char *word_ = nullptr, *words_end_ = nullptr; ///< what is left of the words
+    const char *bit_ = nullptr, *bits_end_ = nullptr;   ///< and of the bytes of plain bits
     std::uint64_t pending_ = 0;
     unsigned pending_count_ = 0;
     bool is_damaged_ = false;
 };
+
+// What decoding does a hundred million times a minute stands here, to be compiled into its loops. Symbols cannot be
+// guessed, and neither can branches that depend on them: so there are none but at the streams' ends.
+
+/// States are this to 2^32 - 1; words of 16 bits go in and out.
+inline constexpr std::uint32_t kLowestState = 1u << 16;
+
+inline unsigned SymbolReader::symbol(unsigned context) {
+    SymbolModel& model = models_[context];
+    std::uint32_t& state = states_[turn_++ % 4];
+    const std::uint32_t place = state & (SymbolModel::kShares - 1);
+    const unsigned symbol = model.at(place);
+    const std::uint32_t next = model.share(symbol) * (state >> SymbolModel::kShareBits) + place - model.start(symbol);
+    const bool wants_word = next < kLowestState;
+    std::uint16_t word = 0;
+    if (word_ != words_end_) {
+        std::memcpy(&word, word_, sizeof word);
+        word_ += wants_word ? sizeof word : 0;
+    } else
+        is_damaged_ |= wants_word;
+    state = wants_word ? next << 16 | word : next;
+    model.count(symbol);
+    return symbol;
+}
+
+inline std::uint32_t SymbolReader::bits(unsigned count) {
+    std::uint64_t more = 0;
+    if (bits_end_ - bit_ >= std::ptrdiff_t(sizeof more)) { // as many whole bytes as there is room for
+        std::memcpy(&more, bit_, sizeof more);
+        pending_ |= more << pending_count_;
+        bit_ += (63 - pending_count_) / 8;
+        pending_count_ |= 56;
+    } else
+        fetch_last_bits(count);
+    const auto value = std::uint32_t(pending_ & ((std::uint64_t{1} << count) - 1));
+    pending_ >>= count;
+    pending_count_ -= count;
+    return value;
+}
+
+/// What a symbol of a number stands for: `first` and what `bits` plain bits add to it.
+struct NumberSymbol {
+    std::uint32_t first, bits;
+};
+extern const std::array<NumberSymbol, SymbolModel::kSymbols> kNumberSymbols;
+
+inline std::uint32_t SymbolReader::number(unsigned context) {
+    const auto [first, count] = kNumberSymbols[symbol(context)];
+    return first | bits(count);
+}
+inline std::int32_t SymbolReader::number_with_sign(unsigned context) {
+    const std::uint32_t value = number(context);
+    return std::int32_t(value >> 1) ^ -std::int32_t(value & 1);
+}
 
 } // namespace filigree

@@ -9,7 +9,7 @@
 namespace filigree {
 
 /// The section "cd.rev": raised when streams come to mean something else.
-inline constexpr std::uint32_t kCodeRevision = 1;
+inline constexpr std::uint32_t kCodeRevision = 2;
 
 /// The section "cd.par".
 struct FileCode {
