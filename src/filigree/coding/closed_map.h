@@ -18,7 +18,8 @@ struct ClosedMap {
     std::size_t vertex_count() const { return closes_hole.size(); }
     static Index next(Index half_edge) { return half_edge % 3 == 2 ? half_edge - 2 : half_edge + 1; }
     static Index previous(Index half_edge) { return half_edge % 3 == 0 ? half_edge + 2 : half_edge - 1; }
-    Index origin(Index half_edge) const { return triangles[half_edge / 3][half_edge % 3]; }
+    /// Corners lie one after the other, a triangle behind the other: no division is needed.
+    Index origin(Index half_edge) const { return triangles.data()->data()[half_edge]; }
     /// The next one from the same vertex, clockwise.
     Index turn_clockwise(Index half_edge) const { return next(opposite[half_edge]); }
     bool is_own(const Triangle& t) const { return !closes_hole[t[0]] && !closes_hole[t[1]] && !closes_hole[t[2]]; }

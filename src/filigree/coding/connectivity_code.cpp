@@ -32,23 +32,24 @@ public:
     bool run() {
         while (guide_.has_more())
             if (!begin_part() || !fill_part()) return false;
+        map.opposite.resize(3 * map.triangles.size());
         return !guide_.is_damaged();
     }
 
     ClosedMap map;
 
 private:
-    Index add_vertex(std::uint32_t degree, bool closes_hole) {
+    Index add_vertex(bool closes_hole) {
         map.closes_hole.push_back(closes_hole);
-        degrees_.push_back(degree);
         return static_cast<Index>(map.closes_hole.size() - 1);
     }
 
     /// The half-edge from a to b is its first.
     Index add_triangle(Index a, Index b, Index c) {
+        const std::size_t first = 3 * map.triangles.size();
         map.triangles.push_back({a, b, c});
-        map.opposite.insert(map.opposite.end(), 3, kNoIndex);
-        return static_cast<Index>(3 * (map.triangles.size() - 1));
+        if (first == map.opposite.size()) map.opposite.resize(2 * first + 3 * kFirstTriangles, kNoIndex);
+        return static_cast<Index>(first);
     }
     void glue(Index a, Index b) {
         map.opposite[a] = b;
@@ -85,7 +86,7 @@ private:
         for (std::size_t k = 0; k < 3; ++k) {
             degree[k] = guide_.first_degree(k);
             if (degree[k] < 2) return false;
-            v[k] = add_vertex(degree[k], guide_.is_hole());
+            v[k] = add_vertex(guide_.is_hole());
         }
         if (map.triangles.size() >= most_triangles_) return false;
         const Index t = add_triangle(v[0], v[1], v[2]);
@@ -146,7 +147,7 @@ private:
         Index x, out, in; // the third corner; its nodes towards and from
         if (degree != kJoin) {
             if (degree < 2) return false;
-            const Index vertex = add_vertex(degree, guide_.is_hole());
+            const Index vertex = add_vertex(guide_.is_hole());
             x = add_third(p, n, vertex);
             out = in = add_node(vertex, x + 1, degree - 2);
             put_in_turn(out);
@@ -175,11 +176,10 @@ private:
         return t;
     }
 
-    static constexpr std::size_t kTurns = 8;
+    static constexpr std::size_t kTurns = 8, kFirstTriangles = 64;
     Guide& guide_;
     std::size_t most_triangles_;
     std::vector<Node> nodes_;
-    std::vector<std::uint32_t> degrees_;
     std::array<std::vector<Index>, kTurns> turns_;
 };
 

@@ -79,8 +79,7 @@ public:
             if (!split(splitting_[i], static_cast<Index>(known_ + i))) return false;
         }
         if (coder.is_damaged()) return false;
-        const Index* ring = around_.data();
-        for (std::size_t i = 0; i < splitting_.size(); ++i) ring = place(static_cast<Index>(known_ + i), ring);
+        place_new();
         return !coder.is_damaged();
     }
 
@@ -166,6 +165,20 @@ private:
         }
         around_[at] = static_cast<Index>(next - (around_.data() + at + 1));
         around_.resize(std::size_t(next - around_.data()));
+    }
+
+    void place_new() {
+        const Index *ring = around_.data(), *asked = ring, *const end = ring + around_.size();
+        for (std::size_t i = 0; i < splitting_.size() + kAhead; ++i) {
+            if (asked != end) asked = ask_for(asked);
+            if (i >= kAhead) ring = place(static_cast<Index>(known_ + i - kAhead), ring);
+        }
+    }
+    /// Asks for memory that place() of this ring wants. Returns the next ring.
+    const Index* ask_for(const Index* ring) const {
+        const std::size_t count = *ring++;
+        for (std::size_t i = 0; i < count; ++i) rings.fetch(ring[i]);
+        return ring + count;
     }
 
     /// Where a new vertex is: in the middle of its neighbours, and so many steps from there. Returns the next ring.

@@ -52,8 +52,8 @@ void VertexRings::set(Index v, Index first, const Index* others, std::size_t cou
     }
     vertices_[v].ring[0] = free_.back();
     free_.pop_back();
-    ends(v)[0] = first;
-    std::copy_n(others, count, ends(v) + 1);
+    own_ends(v)[0] = first;
+    std::copy_n(others, count, own_ends(v) + 1);
 }
 
 bool VertexRings::split(Index u, Index v, std::size_t begin, std::size_t sector) {
@@ -85,7 +85,7 @@ std::size_t VertexRings::find(Index v, Index end) const {
 
 bool VertexRings::replace(Index v, Index end, Index by) {
     if (!is_kept(v)) return true;
-    Index& found = ends(v)[find(v, end)];
+    Index& found = own_ends(v)[find(v, end)];
     if (found != end) return false;
     found = by;
     return true;

@@ -8,7 +8,6 @@
 #include <array>
 #include <cstdint>
 #include <span>
-#include <utility>
 
 namespace filigree {
 
@@ -16,7 +15,7 @@ namespace filigree {
 /// and those with more neighbours than kLongest, which never have fewer again.
 class VertexRings {
 public:
-    static constexpr std::uint32_t kLongest = 48;
+    static constexpr std::uint32_t kLongest = 56;
 
     VertexRings() = default;
     /// map: every half-edge has its opposite.
@@ -65,7 +64,7 @@ private:
     };
 
     bool is_lowest_kept(Index v, Index other) const { return other > v || !is_kept(other); }
-    Index* ends(Index v) { return const_cast<Index*>(std::as_const(*this).ends(v)); }
+    Index* own_ends(Index v) { return const_cast<Index*>(ends(v)); }
     void set(Index v, Index first, const Index* others, std::size_t count);
     std::size_t find(Index v, Index end) const;
     bool replace(Index v, Index end, Index by);
