@@ -1,5 +1,5 @@
 // Where the vertices of a map are: each is predicted from triangles that are known, best known first, and the
-// difference is coded in the frame of the surface there, where its normal part is small. Integers alone.
+// difference is coded in the frame of the surface there, where its normal part is small. Every machine reads the same.
 #pragma once
 
 #include "filigree/coding/closed_map.h"

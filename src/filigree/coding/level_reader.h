@@ -10,8 +10,8 @@
 
 namespace filigree {
 
-/// Takes the streams of CodedLevels one after the other: the coarsest, levels, refinements. Integers alone; memory is
-/// what has been read.
+/// Takes the streams of CodedLevels one after the other: the coarsest, levels, refinements. Every machine reads the
+/// same; memory is what has been read.
 class LevelReader {
 public:
     LevelReader(GeometrySteps steps, bool is_refined, std::size_t most_vertices);
