@@ -92,9 +92,6 @@ private:
 
 Bond bond_at(const SurfacePoint& point) { return {point.triangle, point.barycentric[1], point.barycentric[2]}; }
 
-/// How well a vertex could be bound; see Binding.
-enum class BondKind : std::uint8_t { good, away, gap };
-
 std::vector<Index> nearest_driver_vertices(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
                                            std::span<const Triangle> cells) {
     std::vector<bool> in_driver(positions.size(), false);
@@ -104,14 +101,15 @@ std::vector<Index> nearest_driver_vertices(std::span<const Vec3f> positions, std
 }
 
 /// Bonds of the representatives by a walk from their source, the nearest driver vertex, or from the cell of the vertex
-/// they were removed beside; without either, a gap.
-void walk_to_bonds(std::span<const Vec3f> positions, const Surface& surface, std::span<const Vec3f> normals,
-                   std::span<const Triangle> cells, std::span<const Index> source, const RemovedVertices& removed,
-                   std::span<Bond> bonds, std::span<BondKind> kinds, const RunContext& context) {
-    const IndexLists around = triangles_at_vertices(cells, positions.size());
+/// they were removed beside; without either, a gap. corners: what cells are over.
+void walk_to_bonds(std::span<const Vec3f> corners, std::span<const Triangle> cells, std::span<const Vec3f> positions,
+                   std::span<const Vec3f> normals, std::span<const Index> representative, std::span<const Index> source,
+                   const RemovedVertices& removed, std::span<Bond> bonds, std::span<BondKind> kinds,
+                   const RunContext& context) {
+    const IndexLists around = triangles_at_vertices(cells, corners.size());
     std::vector<CellShape> shapes;
     for (const Triangle& cell : cells)
-        shapes.push_back(cell_shape(positions[cell[0]], positions[cell[1]], positions[cell[2]]));
+        shapes.push_back(cell_shape(corners[cell[0]], corners[cell[1]], corners[cell[2]]));
     const auto start_of = [&](Index v) -> std::span<const Index> {
         const Index beside = removed.empty() ? kNoIndex : removed.nearest_left[v];
         if (beside != kNoIndex && bonds[beside].cell != kNoIndex) return cells[bonds[beside].cell];
@@ -121,9 +119,9 @@ void walk_to_bonds(std::span<const Vec3f> positions, const Surface& surface, std
     const auto walk_round = [&](std::uint8_t round) {
         parallel_for(context, positions.size(), 1 << 14, [&](std::size_t begin, std::size_t end) {
             if (context.is_cancelled()) return;
-            Walk walk(positions, cells, around, shapes);
+            Walk walk(corners, cells, around, shapes);
             for (std::size_t v = begin; v < end; ++v) {
-                if (surface.representative[v] != v) continue;
+                if (representative[v] != v) continue;
                 if (!removed.empty() && removed.removed[v] != round) continue;
                 const std::span<const Index> start = start_of(Index(v));
                 if (start.empty()) {
@@ -141,11 +139,12 @@ void walk_to_bonds(std::span<const Vec3f> positions, const Surface& surface, std
 }
 
 /// Bonds of the gaps: the closest cell that faces the same way, else the closest.
-void bond_across_gaps(std::span<const Vec3f> positions, std::span<const Vec3f> normals, std::span<const Triangle> cells,
-                      std::span<const BondKind> kinds, std::span<Bond> bonds, const RunContext& context) {
+void bond_across_gaps(std::span<const Vec3f> corners, std::span<const Triangle> cells, std::span<const Vec3f> positions,
+                      std::span<const Vec3f> normals, std::span<const BondKind> kinds, std::span<Bond> bonds,
+                      const RunContext& context) {
     if (std::find(kinds.begin(), kinds.end(), BondKind::gap) == kinds.end()) return;
     std::optional<ClosestPointTree> built; // Embree builds on the threads of the arena it is called in
-    context.execute([&] { built.emplace(positions, cells); });
+    context.execute([&] { built.emplace(corners, cells); });
     const ClosestPointTree& tree = *built;
     parallel_for(context, positions.size(), 1 << 12, [&](std::size_t begin, std::size_t end) {
         if (context.is_cancelled()) return;
@@ -180,20 +179,35 @@ Result<Binding> bind_to_driver(std::span<const Vec3f> positions, const Surface& 
                                std::span<const Triangle> cells, std::span<const Index> source,
                                const RemovedVertices& removed, const RunContext& context) {
     if (std::optional<Error> error = check_size(surface, cells)) return *error;
-    Binding binding;
-    binding.bonds.resize(positions.size());
-    std::vector<BondKind> kinds(positions.size(), BondKind::good);
-    walk_to_bonds(positions, surface, normals, cells, source, removed, binding.bonds, kinds, context);
+    PlaceBonds bound =
+        bind_places(positions, cells, positions, normals, surface.representative, source, removed, context);
     if (context.is_cancelled()) return cancelled_error();
-    bond_across_gaps(positions, normals, cells, kinds, binding.bonds, context);
-    if (context.is_cancelled()) return cancelled_error();
-    for (Index v = 0; v < positions.size(); ++v) {
-        const Index r = surface.representative[v];
-        binding.bonds[v] = binding.bonds[r];
-        if (kinds[r] == BondKind::gap) binding.across_gap.push_back(v);
-        if (kinds[r] == BondKind::away) binding.facing_away.push_back(v);
-    }
+    Binding binding = binding_of(std::move(bound), surface.representative);
     context.report("bind", 1);
+    return binding;
+}
+
+PlaceBonds bind_places(std::span<const Vec3f> corners, std::span<const Triangle> cells,
+                       std::span<const Vec3f> positions, std::span<const Vec3f> normals,
+                       std::span<const Index> representative, std::span<const Index> source,
+                       const RemovedVertices& removed, const RunContext& context) {
+    PlaceBonds bound{.bonds = std::vector<Bond>(positions.size()),
+                     .kinds = std::vector<BondKind>(positions.size(), BondKind::good)};
+    walk_to_bonds(corners, cells, positions, normals, representative, source, removed, bound.bonds, bound.kinds,
+                  context);
+    if (context.is_cancelled()) return bound;
+    bond_across_gaps(corners, cells, positions, normals, bound.kinds, bound.bonds, context);
+    return bound;
+}
+
+Binding binding_of(PlaceBonds bound, std::span<const Index> representative) {
+    Binding binding{.bonds = std::move(bound.bonds), .across_gap = {}, .facing_away = {}};
+    for (Index v = 0; v < representative.size(); ++v) {
+        const Index r = representative[v];
+        binding.bonds[v] = binding.bonds[r];
+        if (bound.kinds[r] == BondKind::gap) binding.across_gap.push_back(v);
+        if (bound.kinds[r] == BondKind::away) binding.facing_away.push_back(v);
+    }
     return binding;
 }
 

@@ -7,6 +7,8 @@
 
 #include <algorithm>
 #include <array>
+#include <numeric>
+#include <utility>
 
 #include <meshoptimizer.h>
 
@@ -108,14 +110,6 @@ private:
     std::array<std::array<std::uint32_t, kLattice>, 3> spread_{};
 };
 
-/// How many triangles are at each vertex, at most kMany.
-std::vector<std::uint8_t> count_triangles(std::span<const Triangle> triangles, std::size_t vertices) {
-    std::vector<std::uint8_t> counts(vertices, 0);
-    for (const Triangle& t : triangles)
-        for (const Index v : t) counts[v] = std::uint8_t(counts[v] + (counts[v] < kMany));
-    return counts;
-}
-
 /// Numbers of a cluster's own for the vertices of its triangles, in the order in which they come.
 class LocalVertices {
 public:
@@ -141,73 +135,69 @@ private:
     std::vector<Index> table_; ///< of local numbers
 };
 
-/// One cluster of a round.
-class Cluster {
+/// How many of the cluster's triangles are at each of its vertices.
+std::vector<Index> triangles_here(const ClusterMesh& mesh) {
+    std::vector<Index> here(mesh.vertices.size(), 0);
+    for (const Triangle& t : mesh.triangles)
+        for (const Index v : t) ++here[v];
+    return here;
+}
+
+/// Marks vertices that triangles elsewhere use too, and those of small parts.
+void find_locked(ClusterMesh& mesh, std::span<const std::uint8_t> triangle_counts) {
+    const std::size_t count = mesh.vertices.size();
+    const std::vector<Index> here = triangles_here(mesh);
+    DisjointSets parts(count);
+    for (const Triangle& t : mesh.triangles) {
+        parts.join(t[0], t[1]);
+        parts.join(t[1], t[2]);
+    }
+    mesh.locked.assign(count, 0);
+    std::vector<Index> part_sizes(count, 0);
+    std::vector<std::uint8_t> goes_on(count, 0); // elsewhere
+    for (Index v = 0; v < count; ++v) {
+        const std::uint8_t everywhere = triangle_counts[mesh.vertices[v]];
+        mesh.locked[v] = everywhere == kMany || here[v] < everywhere;
+        const Index part = parts.root(v);
+        ++part_sizes[part];
+        goes_on[part] |= mesh.locked[v];
+    }
+    for (Index v = 0; v < count; ++v) {
+        const Index part = parts.root(v);
+        if (!goes_on[part] && part_sizes[part] < ClusterSimplifier::kSmallPart) mesh.locked[v] = 1;
+    }
+}
+
+/// Takes a cluster down.
+class Reduction {
 public:
-    Cluster(std::span<const Vec3f> positions, std::span<const Triangle> all, std::span<const Index> own,
-            std::span<const std::uint8_t> triangle_counts)
-        : vertices_(own.size()) {
-        for (const Index t : own) {
-            Triangle& triangle = triangles_.emplace_back();
-            for (std::size_t k = 0; k < 3; ++k) triangle[k] = vertices_.local(all[t][k]);
-        }
-        for (const Index v : vertices_.global) positions_.push_back(positions[v]);
-        find_locked(triangle_counts);
+    explicit Reduction(const ClusterMesh& mesh) : mesh_(mesh), free_count_(mesh.free_count()) {
+        for (const Index triangles : triangles_here(mesh))
+            largest_fan_ = std::max<std::size_t>(largest_fan_, triangles);
     }
 
-    std::size_t free_count() const { return vertices_.global.size() - locked_count_; }
-    std::size_t locked_count() const { return locked_count_; }
-
-    /// Takes it down to `share` of its free vertices. Returns what is left, over the mesh's vertices, and its error.
-    std::vector<Triangle> simplify(double share, double max_error, double& error, std::vector<Index>& nearest_left) {
-        std::vector<Triangle> left = triangles_;
-        if (largest_fan_ <= kLargestFan && free_count() > 0) collapse(share, max_error, error, left);
-        find_nearest_left(left, nearest_left);
-        for (Triangle& t : left)
-            for (Index& v : t) v = vertices_.global[v];
-        return left;
+    ReducedCluster reduce(double share, double max_error) {
+        ReducedCluster result;
+        result.triangles = mesh_.triangles;
+        if (largest_fan_ <= kLargestFan && free_count_ > 0) collapse(share, max_error, result.error, result.triangles);
+        find_followed(result);
+        for (Triangle& t : result.triangles)
+            for (Index& v : t) v = mesh_.vertices[v];
+        return result;
     }
 
 private:
-    /// Vertices that triangles elsewhere use too, and those of small parts.
-    void find_locked(std::span<const std::uint8_t> triangle_counts) {
-        const std::size_t count = vertices_.global.size();
-        std::vector<Index> here(count, 0);
-        DisjointSets parts(count);
-        for (const Triangle& t : triangles_) {
-            for (const Index v : t) ++here[v];
-            parts.join(t[0], t[1]);
-            parts.join(t[1], t[2]);
-        }
-        locked_.assign(count, 0);
-        std::vector<Index> part_sizes(count, 0);
-        std::vector<std::uint8_t> goes_on(count, 0); // elsewhere
-        for (Index v = 0; v < count; ++v) {
-            largest_fan_ = std::max<std::size_t>(largest_fan_, here[v]);
-            const std::uint8_t everywhere = triangle_counts[vertices_.global[v]];
-            locked_[v] = everywhere == kMany || here[v] < everywhere;
-            const Index part = parts.root(v);
-            ++part_sizes[part];
-            goes_on[part] |= locked_[v];
-        }
-        for (Index v = 0; v < count; ++v) {
-            const Index part = parts.root(v);
-            if (!goes_on[part] && part_sizes[part] < ClusterSimplifier::kSmallPart) locked_[v] = 1;
-            locked_count_ += locked_[v];
-        }
-    }
-
     /// meshoptimizer 0.18 locks vertices of which there are three at one place; those it is given twice more are in no
     /// triangle.
     void collapse(double share, double max_error, double& error, std::vector<Triangle>& left) {
-        const std::size_t count = vertices_.global.size();
-        std::vector<Vec3f> places = positions_;
+        const std::size_t count = mesh_.vertices.size();
+        std::vector<Vec3f> places = mesh_.positions;
         for (Index v = 0; v < count; ++v)
-            if (locked_[v]) places.insert(places.end(), 2, positions_[v]);
+            if (mesh_.locked[v]) places.insert(places.end(), 2, mesh_.positions[v]);
         const double longest = bounds(places).size().maxCoeff();
         if (!(longest > 0)) return;
         const auto limit = static_cast<float>(std::min(max_error / longest, 1e6));
-        const double wanted = share * double(free_count()) + double(locked_count_);
+        const double wanted = share * double(free_count_) + double(locked_count());
         std::size_t now = count;
         std::vector<Triangle> out(left.size());
         constexpr double kNear = 1.02;
@@ -227,14 +217,14 @@ private:
     /// How many triangles belong to so many vertices, as of a disk: two a vertex, one less for each on its border. Of
     /// those the locked ones stay.
     std::size_t triangles_of(std::size_t triangles, std::size_t vertices, double wanted) const {
-        const double share = wanted / double(vertices), locked = double(locked_count_);
+        const double share = wanted / double(vertices), locked = double(locked_count());
         const double open = std::max(0.0, 2 * double(vertices) - double(triangles) - locked); // the mesh's own border
         const double by_share = share * double(triangles);
         return static_cast<std::size_t>(std::clamp(2 * wanted - share * open - locked, 0.5 * by_share, by_share));
     }
 
     std::size_t used(std::span<const Triangle> left) {
-        is_used_.assign(vertices_.global.size(), false);
+        is_used_.assign(mesh_.vertices.size(), false);
         std::size_t count = 0;
         for (const Triangle& t : left)
             for (const Index v : t) {
@@ -244,33 +234,91 @@ private:
         return count;
     }
 
-    void find_nearest_left(std::span<const Triangle> left, std::vector<Index>& nearest_left) {
-        if (used(left) == vertices_.global.size()) return;
+    void find_followed(ReducedCluster& result) {
+        if (used(result.triangles) == mesh_.vertices.size()) return;
+        const std::size_t count = mesh_.vertices.size();
         const std::vector<Index> nearest =
-            nearest_sources(positions_, triangles_, triangles_at_vertices(triangles_, positions_.size()), is_used_);
-        for (Index v = 0; v < nearest.size(); ++v)
-            if (!locked_[v] && !is_used_[v] && nearest[v] != kNoIndex)
-                nearest_left[vertices_.global[v]] = vertices_.global[nearest[v]];
+            nearest_sources(mesh_.positions, mesh_.triangles, triangles_at_vertices(mesh_.triangles, count), is_used_);
+        for (Index v = 0; v < count; ++v) {
+            if (is_used_[v]) continue;
+            if (!mesh_.locked[v] && nearest[v] != kNoIndex)
+                result.followed.push_back({mesh_.vertices[v], mesh_.vertices[nearest[v]]});
+            else
+                result.dropped.push_back(mesh_.vertices[v]);
+        }
     }
 
-    LocalVertices vertices_;
-    std::vector<Triangle> triangles_;
-    std::vector<Vec3f> positions_;
-    std::vector<std::uint8_t> locked_;
+    std::size_t locked_count() const { return mesh_.vertices.size() - free_count_; }
+
+    const ClusterMesh& mesh_;
     std::vector<bool> is_used_;
-    std::size_t locked_count_ = 0, largest_fan_ = 0;
+    std::size_t free_count_ = 0, largest_fan_ = 0;
 };
 
-/// Vertices that stayed in their clusters and are in none of what is left: they follow a neighbour.
+} // namespace
+
+std::size_t ClusterMesh::free_count() const { return std::size_t(std::ranges::count(locked, 0)); }
+
+ReducedCluster reduce_cluster(const ClusterMesh& cluster, double share, double max_error) {
+    return Reduction(cluster).reduce(share, max_error);
+}
+
+struct ClusterRound::Content {
+    std::span<const Vec3f> positions;
+    std::span<const Triangle> triangles;
+    std::vector<std::uint8_t> triangle_counts;
+    Partition::Clusters clusters;
+};
+
+ClusterRound::ClusterRound(std::span<const Vec3f> positions, std::span<const Triangle> triangles, unsigned round,
+                           const RunContext& context)
+    : content_(std::make_unique<Content>(Content{positions, triangles, count_triangles(triangles, positions.size()),
+                                                 Partition(positions, triangles, round).clusters(context)})) {}
+ClusterRound::~ClusterRound() = default;
+
+std::size_t ClusterRound::size() const { return content_->clusters.size(); }
+
+std::span<const std::uint8_t> ClusterRound::triangle_counts() const { return content_->triangle_counts; }
+
+ClusterMesh ClusterRound::cluster(std::size_t number) const {
+    const std::span<const Index> own = content_->clusters[number];
+    ClusterMesh mesh;
+    LocalVertices local(own.size());
+    mesh.triangles.reserve(own.size());
+    for (const Index t : own) {
+        Triangle& triangle = mesh.triangles.emplace_back();
+        for (std::size_t k = 0; k < 3; ++k) triangle[k] = local.local(content_->triangles[t][k]);
+    }
+    mesh.vertices = std::move(local.global);
+    mesh.positions.reserve(mesh.vertices.size());
+    for (const Index v : mesh.vertices) mesh.positions.push_back(content_->positions[v]);
+    find_locked(mesh, content_->triangle_counts);
+    return mesh;
+}
+
+std::optional<double> ClusterRound::share_left(std::size_t free_vertices, std::size_t target) const {
+    for (std::size_t c = 0; c < size(); ++c)
+        if (content_->clusters[c].size() > kMostClusterTriangles) return std::nullopt;
+    // How many vertices stay whatever is done; one in several clusters counts once.
+    const std::size_t locked = used_vertices(content_->triangle_counts) - free_vertices;
+    if (2 * locked > target || free_vertices == 0) return std::nullopt;
+    return double(target - locked) / double(free_vertices);
+}
+
+std::vector<std::uint8_t> count_triangles(std::span<const Triangle> triangles, std::size_t vertices) {
+    std::vector<std::uint8_t> counts(vertices, 0);
+    for (const Triangle& t : triangles)
+        for (const Index v : t) counts[v] = std::uint8_t(counts[v] + (counts[v] < kMany));
+    return counts;
+}
+
+std::size_t used_vertices(std::span<const std::uint8_t> triangle_counts) {
+    return triangle_counts.size() - std::size_t(std::ranges::count(triangle_counts, 0));
+}
+
 void follow_neighbours(std::span<const Vec3f> positions, std::span<const Triangle> before,
-                       std::span<const std::uint8_t> counts_before, std::span<const std::uint8_t> counts_left,
-                       std::vector<Index>& nearest_left) {
-    const auto is_lost = [&](Index v) {
-        return counts_before[v] > 0 && counts_left[v] == 0 && nearest_left[v] == kNoIndex;
-    };
-    bool is_any = false;
-    for (Index v = 0; v < counts_before.size() && !is_any; ++v) is_any = is_lost(v);
-    if (!is_any) return;
+                       std::span<const std::uint8_t> counts_left, std::vector<Index>& nearest_left) {
+    const auto is_lost = [&](Index v) { return counts_left[v] == 0 && nearest_left[v] == kNoIndex; };
     std::vector<std::pair<Index, Index>> found; // lost, and where to: of all neighbours the nearest
     for (const Triangle& t : before)
         for (const Index v : t)
@@ -288,53 +336,48 @@ void follow_neighbours(std::span<const Vec3f> positions, std::span<const Triangl
     for (std::size_t i = found.size(); i-- > 0;) nearest_left[found[i].first] = found[i].second;
 }
 
-} // namespace
-
 std::optional<Simplified> ClusterSimplifier::simplify(std::span<const Triangle> triangles, std::size_t target,
                                                       double max_error, const RunContext& context) {
     if (removed_.empty()) {
         removed_.nearest_left.assign(positions_.size(), kNoIndex);
         removed_.removed.assign(positions_.size(), 0);
     }
-    const std::vector<std::uint8_t> counts = count_triangles(triangles, positions_.size());
-    const std::size_t vertices = counts.size() - std::size_t(std::ranges::count(counts, 0));
-    const Partition::Clusters clusters = Partition(positions_, triangles, round_).clusters(context);
-    for (std::size_t c = 0; c < clusters.size(); ++c)
-        if (clusters[c].size() > kMostClusterTriangles) return std::nullopt;
-
-    // How many vertices stay whatever is done; one in several clusters counts once.
+    const ClusterRound clusters(positions_, triangles, round_, context);
     std::vector<std::size_t> free(clusters.size());
     parallel_for(context, clusters.size(), 1, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t c = begin; c < end && !context.is_cancelled(); ++c)
-            free[c] = Cluster(positions_, triangles, clusters[c], counts).free_count();
+        for (std::size_t c = begin; c < end && !context.is_cancelled(); ++c) free[c] = clusters.cluster(c).free_count();
     });
-    std::size_t free_vertices = 0;
-    for (const std::size_t count : free) free_vertices += count;
-    const std::size_t locked = vertices - free_vertices;
-    if (2 * locked > target || free_vertices == 0) return std::nullopt;
-    const double share = double(target - locked) / double(free_vertices);
+    const std::optional<double> share =
+        clusters.share_left(std::accumulate(free.begin(), free.end(), std::size_t{0}), target);
+    if (!share) return std::nullopt;
 
-    std::vector<std::vector<Triangle>> left(clusters.size());
-    std::vector<double> errors(clusters.size(), 0);
+    std::vector<ReducedCluster> left(clusters.size());
     parallel_for(context, clusters.size(), 1, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t c = begin; c < end && !context.is_cancelled(); ++c)
-            left[c] = Cluster(positions_, triangles, clusters[c], counts)
-                          .simplify(share, max_error, errors[c], removed_.nearest_left);
+        for (std::size_t c = begin; c < end && !context.is_cancelled(); ++c) {
+            left[c] = reduce_cluster(clusters.cluster(c), *share, max_error);
+            for (const auto& [vertex, to] : std::exchange(left[c].followed, {})) removed_.nearest_left[vertex] = to;
+        }
     });
     if (context.is_cancelled()) return std::nullopt;
 
     Simplified result;
     std::size_t total = 0;
-    for (const std::vector<Triangle>& part : left) total += part.size();
-    result.triangles.reserve(total);
-    for (std::vector<Triangle>& part : left) {
-        result.triangles.insert(result.triangles.end(), part.begin(), part.end());
-        part = {};
+    for (const ReducedCluster& part : left) {
+        total += part.triangles.size();
+        result.error = std::max(result.error, part.error);
     }
-    for (const double error : errors) result.error = std::max(result.error, error);
+    result.triangles.reserve(total);
+    for (ReducedCluster& part : left) {
+        result.triangles.insert(result.triangles.end(), part.triangles.begin(), part.triangles.end());
+        part.triangles = {};
+    }
+    const std::span<const std::uint8_t> counts = clusters.triangle_counts();
     const std::vector<std::uint8_t> counts_left = count_triangles(result.triangles, positions_.size());
-    result.vertex_count = counts_left.size() - std::size_t(std::ranges::count(counts_left, 0));
-    follow_neighbours(positions_, triangles, counts, counts_left, removed_.nearest_left);
+    result.vertex_count = used_vertices(counts_left);
+    const bool has_lost = std::ranges::any_of(left, [&](const ReducedCluster& part) {
+        return std::ranges::any_of(part.dropped, [&](Index v) { return counts_left[v] == 0; });
+    });
+    if (has_lost) follow_neighbours(positions_, triangles, counts_left, removed_.nearest_left);
     removed_.rounds = ++round_;
     for (std::size_t v = 0; v < counts.size(); ++v)
         if (counts[v] > 0 && counts_left[v] == 0) removed_.removed[v] = round_;

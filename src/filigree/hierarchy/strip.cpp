@@ -22,13 +22,7 @@ struct Cells {
 };
 
 Cells make_cells(const Level& driver) {
-    Cells cells;
-    for (std::size_t f = 0; f < driver.face_count(); ++f) {
-        const Index* c = &driver.corners[driver.face_offsets[f]];
-        cells.local.push_back({c[0], c[1], c[2]});
-    }
-    if (cells.local.empty()) // points: each is a cell of its own
-        for (Index i = 0; i < driver.vertices.size(); ++i) cells.local.push_back({i, i, i});
+    Cells cells{.local = driver_cells(driver), .global = {}};
     for (const Triangle& cell : cells.local)
         cells.global.push_back({driver.vertices[cell[0]], driver.vertices[cell[1]], driver.vertices[cell[2]]});
     return cells;
@@ -159,7 +153,9 @@ Result<Stripped> strip_reference(Mesh mesh, const StripOptions& options, const R
     return result;
 }
 
-std::optional<Error> check_options(const Mesh& mesh, const StripOptions& options) {
+} // namespace
+
+std::optional<Error> check_strip(const Mesh& mesh, const StripOptions& options) {
     if (int(options.base.has_value()) + int(options.levels.has_value()) + int(options.error.has_value()) > 1)
         return Error{ErrorCode::usage,
                      "Give at most one of base, levels and error: each says how coarse the driver is."};
@@ -179,8 +175,6 @@ std::optional<Error> check_options(const Mesh& mesh, const StripOptions& options
     if (mesh.vertex_count() == 0) return Error{ErrorCode::unsuitable, "The mesh has no vertices: nothing to strip."};
     return std::nullopt;
 }
-
-} // namespace
 
 Result<Stripped> strip_to_driver(Mesh mesh, const Mesh& driver, Precision precision, const RunContext& context) {
     if (std::optional<Error> error = check_driver(mesh, driver)) return *error;
@@ -239,7 +233,7 @@ Result<Model> bind_to_own_driver(Mesh mesh, Level driver, Precision precision, c
 }
 
 Result<Stripped> strip(Mesh mesh, const StripOptions& options, const RunContext& context) {
-    if (std::optional<Error> error = check_options(mesh, options)) return *error;
+    if (std::optional<Error> error = check_strip(mesh, options)) return *error;
     return options.code == DetailCode::blend ? strip_blend(std::move(mesh), options, context)
                                              : strip_reference(std::move(mesh), options, context);
 }

@@ -50,6 +50,9 @@ struct Stripped {
 /// Cost O(F): about 2.5 processor seconds a million vertices. Same bytes for any number of threads.
 Result<Stripped> strip(Mesh mesh, const StripOptions& options, const RunContext& context);
 
+/// The errors of strip that are known before any work: usage, unsuitable (no vertices).
+std::optional<Error> check_strip(const Mesh& mesh, const StripOptions& options);
+
 /// Takes the detail off a mesh down to a driver that somebody else made: any mesh near it, of vertices of its own. Its
 /// vertices are the driver's, all of them and in their order, so poses are arrays of that mesh's positions.
 /// Restored meshes have them too, without faces, behind the mesh's own vertices. Each vertex is bound to the driver's
