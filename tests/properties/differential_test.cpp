@@ -4,7 +4,9 @@
 #include "filigree/fracture/fracture.h"
 #include "filigree/hierarchy/restore.h"
 #include "filigree/hierarchy/strip.h"
+#include "filigree/io/file.h"
 #include "filigree/io/model_file.h"
+#include "filigree/io/shared_strip.h"
 #include "filigree/mesh/mesh_distance.h"
 #include "filigree/mesh/shapes.h"
 #include "filigree/physics/simulation.h"
@@ -13,8 +15,11 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include <filesystem>
 #include <numeric>
 #include <random>
+
+#include <unistd.h>
 
 using namespace filigree;
 
@@ -93,6 +98,26 @@ RC_GTEST_PROP(Differential, StripIsTheSameForAnyNumberOfThreads, ()) {
     const auto a = strip(mesh, options, kOne), b = strip(mesh, options, kMany);
     RC_ASSERT(a.ok() == b.ok());
     if (a) RC_ASSERT(write_model(a->model) == write_model(b->model));
+}
+
+RC_GTEST_PROP(Differential, AStripInTasksIsTheStripInOne, ()) {
+    const Mesh mesh = any_surface();
+    const StripOptions options{.base = *gen::inRange<std::size_t>(8, 200),
+                               .one_piece = *gen::element<std::size_t>(100, 1'000'000)};
+    const std::filesystem::path folder =
+        std::filesystem::temp_directory_path() / ("filigree-tasks-" + std::to_string(::getpid()));
+    std::filesystem::remove_all(folder);
+    std::filesystem::create_directory(folder);
+    const SharedStrip shared{.path = folder / "model.fil",
+                             .options = options,
+                             .read = [&]() -> Result<Mesh> { return mesh; },
+                             .bound_together = *gen::inRange<std::size_t>(50, 3'000)};
+    const auto tasks = strip_in_chunks(shared, {.number = 2, .count = 3, .job = ""}, kMany);
+    const auto one = strip(mesh, options, kOne);
+    const auto bytes = read_file(shared.path);
+    std::filesystem::remove_all(folder);
+    RC_ASSERT(tasks.ok() == one.ok());
+    if (one) RC_ASSERT(bytes.ok() && *bytes == write_model(one->model));
 }
 
 RC_GTEST_PROP(Differential, AnAffinePoseGivesTheMeshMovedAlike, ()) {
