@@ -410,9 +410,11 @@ private:
     }
 
     Status place(const fs::path& whole) const {
-        std::error_code failed;
+        std::error_code failed, ignored;
         fs::rename(whole, strip_.path, failed);
-        if (failed) return cannot_write(strip_.path, failed.value());
+        // Without locks another process may have written it too, and was quicker.
+        const bool is_placed = failed == std::errc::no_such_file_or_directory && fs::exists(strip_.path, ignored);
+        if (failed && !is_placed) return cannot_write(strip_.path, failed.value());
         sync_folder(strip_.path.parent_path());
         return folder_.end();
     }
