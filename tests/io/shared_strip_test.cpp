@@ -6,6 +6,8 @@
 #include "filigree/mesh/shapes.h"
 
 #include <algorithm>
+#include <array>
+#include <chrono>
 #include <gtest/gtest.h>
 #include <random>
 #include <thread>
