@@ -273,6 +273,20 @@ TEST(Fracture, AThrownCubeBreaksAndItsPiecesLieOnTheGround) {
     EXPECT_LT(simulation.energy(context).kinetic, 4); // of 216 J
 }
 
+/// A crack leaves cells that are hardly filled; their light corners must not set the pace.
+TEST(Fracture, PiecesMoveInHardlyShorterSteps) {
+    Simulation simulation = thrown_cube(StepMode::automatic);
+    const unsigned unbroken = simulation.advance(context).value().substeps;
+    unsigned substeps = 0;
+    for (int frame = 1; frame < 60; ++frame) {
+        const FrameReport report = simulation.advance(context).value();
+        EXPECT_EQ(report.why_descent, DescentCause::none) << frame;
+        if (frame >= 20) substeps += report.substeps;
+    }
+    EXPECT_GT(simulation.fracture(0).parts, 3u);
+    EXPECT_LT(substeps, 2 * 40 * unbroken);
+}
+
 TEST(Fracture, StiffPiecesKeepTogetherInDescent) {
     Simulation simulation = thrown_cube(StepMode::descent, 1e9, false);
     const double start = simulation.energy(context).kinetic;

@@ -31,13 +31,7 @@ void add_corner_block(const cell_kernel::CellMaterial& m, const std::array<Vec3f
     const Vec3f base = corners[0];
     std::array<Vec3f, 8> X;
     for (int c = 0; c < 8; ++c) X[c] = corners[c] - base; // so that a body far away loses no digits
-    for (unsigned bit = 1; bit < 8; bit *= 2)
-        for (unsigned i = 0; i < 8; ++i)
-            if (!(i & bit)) {
-                const Vec3f low = X[i], high = X[i | bit];
-                X[i] = low + high;
-                X[i | bit] = high - low;
-            }
+    cell_kernel::transform_corners(X);
     const float size = 4 * m.spacing, volume = fraction * m.spacing * m.spacing * m.spacing;
     constexpr float kShare[8] = {0, 1, 1, 2.0f / 3, 1, 2.0f / 3, 2.0f / 3, 1.0f / 3};
     const auto sign = [&](int sum) { // of the corner in a sum

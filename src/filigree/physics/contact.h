@@ -43,7 +43,7 @@ public:
         pairs_until_ = -1;
         matter_.begin_frame(bodies);
     }
-    /// After it.
+    /// After a frame of explicit steps.
     void end_frame(std::span<const BodyState> bodies) { matter_.end_frame(bodies); }
     /// Positions have changed by dt times velocities. way: m, bound on how far anything has gone, with obstacles.
     void travel(std::span<const BodyState> bodies, float dt, float way);

@@ -7,7 +7,6 @@
 #include "filigree/physics/stopwatch.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
@@ -37,9 +36,8 @@ Vectors positions_ahead(const BodyState& body, float delay, const RunContext& co
     parallel_for(context, ahead.size(), kExplicitStepsGrain, [&](std::size_t begin, std::size_t end) {
         const auto move_axis = [&](float* to, const std::vector<float>& velocities, int axis) {
             const int u = (axis + 1) % 3, w = (axis + 2) % 3;
-            constexpr std::array kAxes = {&Vectors::x, &Vectors::y, &Vectors::z};
-            const float *v = velocities.data(), *along_u = (body.positions.*kAxes[u]).data(),
-                        *along_w = (body.positions.*kAxes[w]).data();
+            const float *v = velocities.data(), *along_u = (body.positions.*kVectorAxes[u]).data(),
+                        *along_w = (body.positions.*kVectorAxes[w]).data();
             for (std::size_t i = begin; i < end; ++i)
                 to[i] += delay * (v[i] - drifting[axis] -
                                   (turning[u] * (along_w[i] - centre[w]) - turning[w] * (along_u[i] - centre[u])));

@@ -119,7 +119,7 @@ private:
     /// Points of one body against the matter of another, or of its own.
     struct Side {
         Index body, other;
-        float way = 0;    ///< m, bound on what either has gone beside the other since the frame began, there and back
+        float way = 0;    ///< m, bound on how far either has gone beside the other, there and back, since way was 0
         float moved = 0;  ///< m, bound on how far either is from where it was beside the other at the last search ...
         float until = -1; ///< ... until which the pairs hold
         float since = std::numeric_limits<float>::max(); ///< s since the last search

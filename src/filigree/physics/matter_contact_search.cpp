@@ -116,10 +116,9 @@ MatterContacts::Extremes MatterContacts::extremes(std::size_t body, const Vector
         found.least[axis] = *std::ranges::min_element(least);
         found.most[axis] = *std::ranges::max_element(most);
     };
-    constexpr std::array kAxes = {&Vectors::x, &Vectors::y, &Vectors::z};
     for (int axis = 0; axis < 3; ++axis) {
-        const float* along = (values.*kAxes[axis]).data();
-        if (const float* less = from ? (from->*kAxes[axis]).data() : nullptr)
+        const float* along = (values.*kVectorAxes[axis]).data();
+        if (const float* less = from ? (from->*kVectorAxes[axis]).data() : nullptr)
             take_axis(axis, [=](std::size_t i) { return along[i] - less[i]; });
         else
             take_axis(axis, [=](std::size_t i) { return along[i]; });

@@ -29,4 +29,6 @@ struct Vectors {
     std::vector<float> x, y, z;
 };
 
+inline constexpr std::array kVectorAxes = {&Vectors::x, &Vectors::y, &Vectors::z};
+
 } // namespace filigree
