@@ -500,7 +500,8 @@ TEST_F(Simulate, TheManualsDefaultsAreTheLibrarys) {
 }
 
 TEST_F(Simulate, TheExamplesRun) {
-    for (const char* const name : {"bounce", "bar_sag", "press", "melt", "collide", "wall", "slope", "fold", "heap"}) {
+    for (const char* const name :
+         {"bounce", "bar_sag", "press", "melt", "collide", "wall", "slope", "fold", "heap", "shatter", "glass"}) {
         SCOPED_TRACE(name);
         const std::string scene = FILIGREE_ROOT "/examples/scenes/" + std::string(name) + ".toml";
         const Json json = this->json({"simulate", scene, "--frames", "2", "-o", "out.fil"});

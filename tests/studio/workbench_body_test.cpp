@@ -242,9 +242,7 @@ TEST_F(WorkbenchTest, PlayAndPauseAgainAreOneStep) {
 
 TEST_F(WorkbenchTest, WhatABodyDoesNotTakeIsTold) {
     make_small_shape();
-    Warps warps;
-    warps.bend = 30;
-    bench.set_warps(warps);
+    bend(30);
     bench.make_body();
     bench.wait_until_idle();
     ASSERT_EQ(notes.size(), 2u);

@@ -67,9 +67,7 @@ TEST_F(WorkbenchTest, APullFollowsTheMouseThroughTheWarp) {
 }
 
 TEST_F(WorkbenchTest, AnUndoInTheMiddleOfAPullEndsIt) {
-    Warps warps;
-    warps.bend = 20;
-    bench.set_warps(warps);
+    bend(20);
     pull_top({0, 0.3, 0});
     undo_stack().undo();
     EXPECT_FALSE(bench.is_pulling());
@@ -147,9 +145,7 @@ TEST_F(WorkbenchTest, EveryVertexFollowsWhenWanted) {
 }
 
 TEST_F(WorkbenchTest, ACancelledPullLeavesTheHistoryAlone) {
-    Warps warps;
-    warps.bend = 20;
-    bench.set_warps(warps);
+    bend(20);
     undo_stack().undo();
     const State before = state();
     pull_top(Vec3d(0, 0.3, 0));

@@ -93,9 +93,7 @@ TEST_F(WorkbenchTest, AChangeDuringTheSaveIsNotSaved) {
 }
 
 TEST_F(WorkbenchTest, MeshesAreSavedAsShown) {
-    Warps warps;
-    warps.bend = 80;
-    bench.set_warps(warps);
+    bend(80);
     bench.set_level(2);
     bench.save_mesh(path("bent.ply"));
     bench.save_driver(path("driver.ply"));
@@ -179,9 +177,7 @@ TEST_F(WorkbenchTest, ALargeStreamIsLookedAtAndWarpedBeforeAllOfItIsRead) {
     QObject::connect(&bench, &Workbench::told, &bench, [&](const QString& sentence, bool) {
         if (!sentence.startsWith("A first look at ball.fil")) return;
         first = state().source->mesh.vertex_count();
-        Warps warps;
-        warps.bend = 30;
-        bench.set_warps(warps);
+        bend(30);
     });
     bench.open(path("ball.fil"));
     bench.wait_until_idle();
@@ -262,9 +258,7 @@ TEST_F(WorkbenchTest, OpeningIsNeitherDroppedNorDoesItDropChanges) {
     EXPECT_EQ(state().source->name, "a.ply");
 
     bench.open(path("a.ply"));
-    Warps warps;
-    warps.bend = 30;
-    bench.set_warps(warps);
+    bend(30);
     bench.wait_until_idle();
     EXPECT_EQ(state().warps.bend, 30);
     ASSERT_EQ(errors.size(), 2u);
@@ -286,9 +280,7 @@ TEST_F(WorkbenchTest, ADocumentIsSavedOnlyWhenTheFileHoldsItAll) {
     EXPECT_TRUE(bench.document().is_modified());
     EXPECT_EQ(notes.back(), "Saved a.fil, without the pins and the law.");
     bench.unpin_all();
-    Warps warps;
-    warps.bend = 30;
-    bench.set_warps(warps);
+    bend(30);
     simulate(2);
     bench.save_model(path("a.fil"));
     bench.wait_until_idle();

@@ -27,6 +27,11 @@ protected:
     const State& state() const { return bench.state(); }
     QUndoStack& undo_stack() { return bench.document().undo_stack(); }
 
+    void bend(double degrees) {
+        Warps warps;
+        warps.bend = degrees;
+        bench.set_warps(warps);
+    }
     /// A shape with so few vertices that bodies are made and moved in no time.
     void make_small_shape() {
         Shape shape = *state().shape;

@@ -30,9 +30,7 @@ TEST_F(WorkbenchTest, FrequencyIsASliderThatIsOneStep) {
     shape.options.resolution = 16;
     bench.make_shape(shape);
     bench.wait_until_idle();
-    Warps warps;
-    warps.bend = 40;
-    bench.set_warps(warps);
+    bend(40);
     for (int k = 6; k < 10; ++k) {
         shape.options.frequency = k;
         bench.make_shape(shape, "frequency");
@@ -105,9 +103,7 @@ TEST_F(WorkbenchTest, TheReferenceCodeWorksOnRegularQuads) {
     bench.set_strip({.code = DetailCode::reference});
     bench.wait_until_idle();
     EXPECT_EQ(state().model->code(), DetailCode::reference);
-    Warps warps;
-    warps.bend = 45;
-    bench.set_warps(warps);
+    bend(45);
     bench.save_mesh(path("bent.obj"));
     bench.wait_until_idle();
     EXPECT_TRUE(errors.empty());
