@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -102,6 +103,8 @@ private:
     unsigned pending_count_ = 0;
     bool is_damaged_ = false;
 };
+
+static_assert(std::endian::native == std::endian::little, "words and plain bits are copied as the stream has them");
 
 // What decoding does a hundred million times a minute stands here, to be compiled into its loops. Symbols cannot be
 // guessed, and neither can branches that depend on them: so there are none but at the streams' ends.
