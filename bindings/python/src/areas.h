@@ -20,6 +20,7 @@ void add_sampling(py::module_& m);
 void add_remeshing(py::module_& m);
 void add_fracturing(py::module_& m);
 void add_bodies(py::module_& m);
+void add_world(py::module_& m);
 void add_simulation(py::module_& m);
 void add_scenes(py::module_& m);
 void add_exporting(py::module_& m);

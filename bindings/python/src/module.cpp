@@ -12,7 +12,7 @@ PYBIND11_MODULE(_core, m) {
     m.attr("__name__") = "filigree"; // so that classes and functions are of the package, as pickles and messages say
     for (const auto add : {add_errors, add_meshes, add_poses, add_models, add_files, add_restoring, add_warps,
                            add_handles, add_comparing, add_sampling, add_remeshing, add_fracturing, add_bodies,
-                           add_simulation, add_scenes, add_exporting, add_pictures})
+                           add_world, add_simulation, add_scenes, add_exporting, add_pictures})
         add(m);
     m.attr("__name__") = "filigree._core";
     py::module_::import("atexit").attr("register")(py::cpp_function(&join_left_work));
