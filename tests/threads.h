@@ -1,9 +1,11 @@
-// For tests that compare numbers of threads.
+// Threads that tests run on.
 #pragma once
 
 #include "filigree/core/run_context.h"
 
 #include <gtest/gtest.h>
+
+inline const filigree::RunContext kOneThread(1), kTwoThreads(2), kAllThreads;
 
 /// Leaves the test where there is one processor: contexts have no more threads than that, so it would compare one
 /// thread with one thread.

@@ -1,5 +1,6 @@
 // Animations in and out, as a user makes them: restore --poses and --frames, deform --frames, simulate.
 #include "apps/program.h"
+#include "threads.h"
 
 #include "filigree/hierarchy/restore.h"
 #include "filigree/hierarchy/strip.h"
@@ -18,20 +19,18 @@ using namespace filigree;
 
 namespace {
 
-const RunContext kContext(1);
-
 class Animation : public Program {
 protected:
     void SetUp() override {
-        model_ = strip(make_wavy_cube({.resolution = 8, .frequency = 1}), {}, kContext).value().model;
+        model_ = strip(make_wavy_cube({.resolution = 8, .frequency = 1}), {}, kOneThread).value().model;
         poses_.frames_per_second = 25;
         for (int k = 0; k < 3; ++k) {
             Pose& pose = poses_.frames.emplace_back();
             for (const Vec3f& p : driver_positions(model_))
                 pose.positions.emplace_back(p.x() + float(k) * p.y(), p.y(), p.z());
         }
-        EXPECT_TRUE(write_model(model_, poses_, path("moving.fil"), kContext).ok());
-        EXPECT_TRUE(write_mesh(model_.mesh, path("mesh.ply"), {}, kContext).ok());
+        EXPECT_TRUE(write_model(model_, poses_, path("moving.fil"), kOneThread).ok());
+        EXPECT_TRUE(write_mesh(model_.mesh, path("mesh.ply"), {}, kOneThread).ok());
         driver_ = level_mesh(model_, 0);
         const MeshAnimation driver{&driver_, 3, 25, [this](std::size_t frame, std::span<Vec3f> positions) -> Status {
                                        const std::vector<Vec3f>& moved = poses_.frames[frame].positions;
@@ -39,7 +38,7 @@ protected:
                                        return Success{};
                                    }};
         for (const char* name : {"driver.pc2", "driver.mdd", "driver/"})
-            EXPECT_TRUE(write_animation(driver, path(name), kContext).ok());
+            EXPECT_TRUE(write_animation(driver, path(name), kOneThread).ok());
     }
 
     Model model_;
@@ -78,12 +77,12 @@ TEST_F(Animation, PosesOfAnotherProgramAreRestoredAsOurOwn) {
         ok({"restore", "moving.fil", "--poses", poses, "-o", "back.pc2"});
         EXPECT_TRUE(bytes_of(path("back.pc2")) == bytes_of(path("own.pc2"))) << poses;
     }
-    const auto back = open_animation(path("own.pc2"), model_.mesh, {}, kContext);
+    const auto back = open_animation(path("own.pc2"), model_.mesh, {}, kOneThread);
     ASSERT_TRUE(back.ok());
     std::vector<Vec3f> positions(model_.mesh.vertex_count());
     ASSERT_TRUE(back->positions(2, positions).ok());
-    const Restorer restorer = Restorer::create(model_, {}, kContext).value();
-    EXPECT_TRUE(positions == restorer.positions(poses_.frames[2], kContext).value());
+    const Restorer restorer = Restorer::create(model_, {}, kOneThread).value();
+    EXPECT_TRUE(positions == restorer.positions(poses_.frames[2], kOneThread).value());
 }
 
 TEST_F(Animation, EveryOutputIsWritten) {
@@ -109,7 +108,7 @@ TEST_F(Animation, DeformMakesFramesFromRestToFull) {
         EXPECT_EQ(deform("moving.fil", out)["through_driver"], true) << out;
     EXPECT_EQ(deform("mesh.ply", "m.mdd")["through_driver"], false);
     EXPECT_EQ(deform("mesh.ply", "m.glb")["as"], "morph");
-    const Result<PoseSequence> poses = read_poses(path("d.fil"), kContext);
+    const Result<PoseSequence> poses = read_poses(path("d.fil"), kOneThread);
     ASSERT_TRUE(poses.ok());
     ASSERT_EQ(poses->frames.size(), 3u);
     EXPECT_FALSE(poses->frames[0].gradients.empty());
@@ -117,11 +116,11 @@ TEST_F(Animation, DeformMakesFramesFromRestToFull) {
         EXPECT_LT((poses->frames[0].positions[v] - driver_.positions[v]).norm(), 1e-6f); // the rest shape
     // the last frame is what deform alone makes
     ok({"deform", "mesh.ply", "-o", "full.ply", "--bend", "60", "--stretch", "2"});
-    const auto frames = open_animation(path("m.mdd"), model_.mesh, {}, kContext);
+    const auto frames = open_animation(path("m.mdd"), model_.mesh, {}, kOneThread);
     ASSERT_TRUE(frames.ok());
     std::vector<Vec3f> last(model_.mesh.vertex_count());
     ASSERT_TRUE(frames->positions(2, last).ok());
-    EXPECT_TRUE(last == read_mesh(path("full.ply"), kContext)->mesh.positions);
+    EXPECT_TRUE(last == read_mesh(path("full.ply"), kOneThread)->mesh.positions);
 }
 
 TEST_F(Animation, SimulationsLeaveAsCachesAndSkins) {

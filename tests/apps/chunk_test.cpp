@@ -1,5 +1,6 @@
 // Works in chunks by many processes, some of which are killed: the same bytes as by one.
 #include "apps/program.h"
+#include "threads.h"
 
 #include "filigree/hierarchy/strip.h"
 #include "filigree/io/model_file.h"
@@ -17,20 +18,19 @@ using namespace filigree;
 
 namespace {
 
-const RunContext kContext(1);
 constexpr std::size_t kFrames = 40;
 
 class Chunks : public Program {
 protected:
     void SetUp() override {
-        const Model model = strip(make_wavy_sphere({.resolution = 120}), {}, kContext).value().model;
+        const Model model = strip(make_wavy_sphere({.resolution = 120}), {}, kOneThread).value().model;
         PoseSequence poses;
         for (std::size_t k = 0; k < kFrames; ++k) {
             Pose& pose = poses.frames.emplace_back();
             for (const Vec3f& p : driver_positions(model))
                 pose.positions.emplace_back(p.x() + 0.3f * std::sin(0.2f * float(k) + p.y()), p.y(), p.z());
         }
-        ASSERT_TRUE(write_model(model, poses, path("moving.fil"), kContext));
+        ASSERT_TRUE(write_model(model, poses, path("moving.fil"), kOneThread));
         ok({"restore", "moving.fil", "--frames", "-o", "serial.pc2"});
         serial_ = bytes_of(path("serial.pc2"));
     }
@@ -332,15 +332,15 @@ TEST_F(KilledEverywhere, AShotIsTheOldOrTheNew) {
 }
 
 TEST_F(KilledEverywhere, AModelIsTheOldOrTheNew) {
-    ok({"make", "wavy-cube", "-o", "cube.ply", "--resolution", "45"});
+    ok({"make", "wavy-cube", "-o", "cube.ply", "--resolution", "24"});
     const auto strip = [](const std::string& folder, const std::string& chunk) {
         std::vector<std::string> words = {"strip",  "cube.ply", "-o",          folder + "/cube.fil",
-                                          "--base", "100",      "--one-piece", "2000"};
+                                          "--base", "60",       "--one-piece", "600"};
         if (!chunk.empty()) words.insert(words.end(), {"--chunk", chunk});
         return words;
     };
     std::vector<std::string> older = strip("a", "1/1");
-    older[5] = "90";
+    older[5] = "50";
     kill_everywhere(strip, older, false); // one process makes all that others have not
 }
 

@@ -1,5 +1,6 @@
 // filigree fracture: pieces as one mesh or as files, and the report about them.
 #include "apps/program.h"
+#include "threads.h"
 
 #include "filigree/io/model_file.h"
 #include "filigree/io/point_cache.h"
@@ -9,8 +10,6 @@ using namespace filigree_test;
 
 namespace {
 
-const RunContext kContext;
-
 class FractureCommand : public Program {
 protected:
     /// In triangles: the volume of quads that are not flat depends on how they are cut.
@@ -19,7 +18,7 @@ protected:
         ok({"deform", "cube.stl", "-o", "cube.obj", "--stretch", "1.2", "--quiet"});
     }
     std::vector<std::vector<Vec3f>> frames_of(const std::string& cache, const Mesh& mesh) const {
-        const MeshAnimation animation = open_animation(path(cache), mesh, {}, kContext).value();
+        const MeshAnimation animation = open_animation(path(cache), mesh, {}, kAllThreads).value();
         std::vector<std::vector<Vec3f>> frames(animation.frames, std::vector<Vec3f>(mesh.vertex_count()));
         for (std::size_t f = 0; f < frames.size(); ++f) EXPECT_TRUE(animation.positions(f, frames[f]).ok());
         return frames;
@@ -103,7 +102,7 @@ TEST_F(FractureCommand, AFilmOfPiecesIsTheSameInACacheASkinAndMorphTargets) {
                        "[[obstacle]]\nshape = \"ground\"\n");
     const Json report = json({"simulate", "fall.toml", "-o", "fall.fil", "-o", "fall.pc2"});
     EXPECT_GT(report.at("bodies").at(0).at("fracture").at("parts"), 1);
-    const Mesh mesh = read_model(bytes_of(path("fall.fil")), "fall.fil", kContext).value().mesh;
+    const Mesh mesh = read_model(bytes_of(path("fall.fil")), "fall.fil", kAllThreads).value().mesh;
     ok({"export", "fall.fil", "-o", "skin.glb", "--full-precision", "--quiet"});
     ok({"export", "fall.fil", "-o", "morph.glb", "--as", "morph", "--quiet"});
     const std::vector<std::vector<Vec3f>> cache = frames_of("fall.pc2", mesh);

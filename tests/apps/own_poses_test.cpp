@@ -1,5 +1,6 @@
 // Models that hold poses, in info, restore and render.
 #include "apps/program.h"
+#include "threads.h"
 
 #include "filigree/hierarchy/restore.h"
 #include "filigree/hierarchy/strip.h"
@@ -15,12 +16,10 @@ using namespace filigree;
 
 namespace {
 
-const RunContext kContext(1);
-
 class OwnPoses : public Program {
 protected:
     void SetUp() override {
-        model_ = strip(make_wavy_cube({.resolution = 8, .frequency = 1}), {}, kContext).value().model;
+        model_ = strip(make_wavy_cube({.resolution = 8, .frequency = 1}), {}, kOneThread).value().model;
         poses_.frames_per_second = 25;
         for (int k = 0; k < 4; ++k) { // turns and grows, far up
             const Mat3f gradient =
@@ -31,8 +30,8 @@ protected:
                 pose.positions.push_back(gradient * p + Vec3f(0, float(k), 0));
             pose.gradients.assign(pose.positions.size(), gradient);
         }
-        ASSERT_TRUE(write_model(model_, poses_, path("moving.fil"), kContext).ok());
-        ASSERT_TRUE(write_model(model_, path("still.fil"), kContext).ok());
+        ASSERT_TRUE(write_model(model_, poses_, path("moving.fil"), kOneThread).ok());
+        ASSERT_TRUE(write_model(model_, path("still.fil"), kOneThread).ok());
     }
     static std::vector<std::string> quick(const std::string& input, const std::string& output,
                                           const std::vector<std::string>& more = {}) {
@@ -61,9 +60,9 @@ TEST_F(OwnPoses, InfoTellsOfThem) {
 TEST_F(OwnPoses, AreRestoredOneByOne) {
     const Json one = json({"restore", "moving.fil", "--frame", "3", "-o", "third.ply"});
     EXPECT_EQ(one["from"], "positions and gradients");
-    const Mesh third = read_mesh(path("third.ply"), kContext).value().mesh;
-    const Restorer restorer = Restorer::create(model_, {}, kContext).value();
-    EXPECT_EQ(third.positions, restorer.positions(poses_.frames[2], kContext).value());
+    const Mesh third = read_mesh(path("third.ply"), kOneThread).value().mesh;
+    const Restorer restorer = Restorer::create(model_, {}, kOneThread).value();
+    EXPECT_EQ(third.positions, restorer.positions(poses_.frames[2], kOneThread).value());
     fails(2, {"restore", "moving.fil", "--frame", "5", "-o", "x.ply"}, {"moving.fil", "1 to 4", "5"});
     fails(2, {"restore", "moving.fil", "--frame", "0", "-o", "x.ply"}, {"--frame"});
     fails(7, {"restore", "still.fil", "--frame", "1", "-o", "x.ply"}, {"still.fil", "no poses", "filigree simulate"});

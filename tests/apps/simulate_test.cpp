@@ -1,5 +1,6 @@
 // filigree simulate, as a user runs it: scenes, their mistakes, outputs, stopping and going on.
 #include "apps/program.h"
+#include "threads.h"
 
 #include "filigree/io/mesh_file.h"
 #include "filigree/io/model_file.h"
@@ -10,8 +11,6 @@ using namespace filigree_test;
 using namespace filigree;
 
 namespace {
-
-const RunContext kContext(1);
 
 /// A small cube above the ground.
 const std::string kDrop = "[simulation]\nframes = 6\n[[body]]\nname = \"cube\"\nshape = \"wavy-cube\"\nresolution = 8\n"
@@ -39,7 +38,7 @@ protected:
         for (const std::string& needle : needles) EXPECT_NE(ran.err.find(needle), std::string::npos) << needle;
         EXPECT_FALSE(std::filesystem::exists(path("x.fil")));
     }
-    PoseSequence poses(const std::string& name) const { return read_poses(path(name), kContext).value(); }
+    PoseSequence poses(const std::string& name) const { return read_poses(path(name), kOneThread).value(); }
     bool has_opengl() const {
         ok({"make", "bar", "-o", "bar.ply", "--resolution", "2"});
         return run({"render", "bar.ply", "-o", "bar.png", "--size", "32x32", "--passes", "1"}).code != 5;
@@ -93,7 +92,7 @@ TEST_F(Simulate, ACubeFallsAndItsPosesPlay) {
     EXPECT_GT(bounds(all.frames[6].positions).centre().x(), 0.02);
 
     ok({"restore", "drop.fil", "--frame", "7", "-o", "last.ply"});
-    EXPECT_EQ(read_mesh(path("last.ply"), kContext)->mesh.vertex_count(), 386u);
+    EXPECT_EQ(read_mesh(path("last.ply"), kOneThread)->mesh.vertex_count(), 386u);
     if (has_opengl()) {
         EXPECT_EQ(this->json({"render", "drop.fil", "-o", "f_%d.png", "--size", "64x48", "--passes", "1"})["frames"],
                   7);
@@ -269,7 +268,7 @@ TEST_F(Simulate, AModelIsABodyAndScaleMakesMetres) {
     EXPECT_EQ(moved.frames[0].positions.size(), 80u);
     EXPECT_NEAR(moved.frames[0].gradients[0].determinant(), 1e-6, 1e-8);
     ok({"restore", "moved.fil", "--frame", "1", "-o", "start.ply"});
-    const Box box = world_bounds(read_mesh(path("start.ply"), kContext)->mesh);
+    const Box box = world_bounds(read_mesh(path("start.ply"), kOneThread)->mesh);
     EXPECT_NEAR(box.centre().y(), 3, 1e-3);
     EXPECT_NEAR(box.size().x(), 1.06, 0.03);
 }
@@ -337,8 +336,8 @@ TEST_F(Simulate, FarFromTheOriginItMovesAsNearIt) {
     for (const std::string name : {"near", "far"}) ok({"restore", name + ".fil", "--frame", "21", "-o", name + ".ply"});
     const Vec3d offset(131072, 0, 0);
     for (const std::string file : {".ply", "/cube_0021.ply"}) {
-        const Mesh near = read_mesh(path("near" + file), kContext)->mesh,
-                   far = read_mesh(path("far" + file), kContext)->mesh;
+        const Mesh near = read_mesh(path("near" + file), kOneThread)->mesh,
+                   far = read_mesh(path("far" + file), kOneThread)->mesh;
         ASSERT_EQ(near.vertex_count(), far.vertex_count());
         for (std::size_t v = 0; v < near.vertex_count(); ++v)
             ASSERT_LT((near.world_position(v) + offset - far.world_position(v)).norm(), 1e-3) << file << " " << v;

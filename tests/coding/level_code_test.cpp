@@ -4,6 +4,7 @@
 #include "filigree/coding/mesh_levels.h"
 #include "filigree/mesh/mesh_distance.h"
 #include "filigree/mesh/shapes.h"
+#include "threads.h"
 
 #include <array>
 #include <gtest/gtest.h>
@@ -13,10 +14,8 @@ using namespace filigree;
 
 namespace {
 
-const RunContext kContext(2);
-
 CodedMesh stream_of(const Mesh& mesh, bool surface = false) {
-    return encode_mesh(mesh, {.surface = surface, .levels = true}, nullptr, kContext).value();
+    return encode_mesh(mesh, {.surface = surface, .levels = true}, nullptr, kTwoThreads).value();
 }
 
 LevelReader reader_of(const CodedMesh& code) {
@@ -58,7 +57,7 @@ TEST(LevelCode, EveryLevelIsNearer) {
         ASSERT_TRUE(reader.read_coarsest(code.levels.connectivity, code.levels.places));
         EXPECT_LE(reader.map().vertex_count(), 520u);
         const auto error = [&] {
-            return mesh_distance(mesh_of_levels(reader, code), mesh, 20'000, kContext)->surfaces->rms_distance;
+            return mesh_distance(mesh_of_levels(reader, code), mesh, 20'000, kTwoThreads)->surfaces->rms_distance;
         };
         double before = error();
         ASSERT_GE(code.levels.levels.size(), 2u);
@@ -103,7 +102,7 @@ TEST(LevelCode, ABatchCanBeTakenBackInAnyOrder) {
         const Vec3f p = mesh.positions[v] * 1000;
         places.push_back({int(p[0]), int(p[1]), int(p[2])});
     }
-    const Coarsening coarsening = coarsen(surface.map, places, 100, kContext);
+    const Coarsening coarsening = coarsen(surface.map, places, 100, kTwoThreads);
     std::size_t vertices = coarsening.vertex.size();
     for (const auto& batch : coarsening.batches) {
         std::vector<bool> went(surface.source.size()), took(surface.source.size());
@@ -132,7 +131,7 @@ TEST(LevelCode, DamageIsNamedOrHarmless) {
     const CodedMesh code = stream_of(mesh);
     std::mt19937 random(3);
     const auto try_it = [&](const CodedMesh& damaged) {
-        const Result<Mesh> read = decode_mesh(damaged, kContext);
+        const Result<Mesh> read = decode_mesh(damaged, kTwoThreads);
         if (read)
             EXPECT_EQ(check_mesh(*read), "");
         else
@@ -148,9 +147,9 @@ TEST(LevelCode, DamageIsNamedOrHarmless) {
             }
             CodedMesh cut = code;
             (cut.levels.levels[k].*part).resize(bytes.size() / 2);
-            EXPECT_FALSE(decode_mesh(cut, kContext).ok());
+            EXPECT_FALSE(decode_mesh(cut, kTwoThreads).ok());
         }
     CodedMesh longer = code;
     longer.levels.levels[0].batches = 1u << 30;
-    EXPECT_FALSE(decode_mesh(longer, kContext).ok());
+    EXPECT_FALSE(decode_mesh(longer, kTwoThreads).ok());
 }

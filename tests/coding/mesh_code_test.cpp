@@ -5,6 +5,7 @@
 #include "filigree/io/mesh_file.h"
 #include "filigree/mesh/shapes.h"
 #include "io/corpus.h"
+#include "threads.h"
 
 #include <cmath>
 #include <gtest/gtest.h>
@@ -16,8 +17,6 @@ using namespace filigree;
 using namespace filigree_test;
 
 namespace {
-
-const RunContext kContext(1);
 
 /// A face by its vertices, beginning with the lowest: the same whatever corner was first.
 std::vector<Index> turned(std::vector<Index> face) {
@@ -43,8 +42,8 @@ struct Coded {
 
 Coded coded(const Mesh& mesh, const MeshCodeOptions& options = {}) {
     Coded result;
-    result.code = encode_mesh(mesh, options, &result.report, kContext).value();
-    result.mesh = decode_mesh(result.code, kContext).value();
+    result.code = encode_mesh(mesh, options, &result.report, kOneThread).value();
+    result.mesh = decode_mesh(result.code, kOneThread).value();
     return result;
 }
 
@@ -241,8 +240,8 @@ TEST(MeshCode, PointsAndTinyMeshes) {
     Mesh one;
     one.positions.emplace_back(1e9f, -3, 0);
     expect_same_surface(one, {});
-    EXPECT_EQ(encode_mesh(Mesh(), {}, nullptr, kContext).error().code, ErrorCode::unsuitable);
-    EXPECT_EQ(encode_mesh(one, {.bits = 9}, nullptr, kContext).error().code, ErrorCode::usage);
+    EXPECT_EQ(encode_mesh(Mesh(), {}, nullptr, kOneThread).error().code, ErrorCode::unsuitable);
+    EXPECT_EQ(encode_mesh(one, {.bits = 9}, nullptr, kOneThread).error().code, ErrorCode::usage);
 }
 
 TEST(MeshCode, FewBits) {
@@ -258,7 +257,7 @@ TEST(MeshCode, FewBits) {
     EXPECT_LT(odd_quads, 0.3);
     const std::filesystem::path koala = corpus_folder() / "good/koala_100k.obj";
     if (!std::filesystem::exists(koala)) GTEST_SKIP() << "no corpus";
-    const auto [connectivity, places] = bits(read_mesh(koala, kContext).value().mesh, 12);
+    const auto [connectivity, places] = bits(read_mesh(koala, kOneThread).value().mesh, 12);
     EXPECT_LT(connectivity, 2.2);           // Draco: 2.3
     EXPECT_LT(connectivity + places, 15.0); // Draco at its best: 17.1
 }
@@ -271,7 +270,7 @@ void expect_damage_named(const Mesh& mesh) {
             for (const int by : {1, 128, 255}) {
                 CodedMesh damaged = code;
                 (damaged.*part)[at] = char((damaged.*part)[at] ^ by);
-                const Result<Mesh> read = decode_mesh(damaged, kContext);
+                const Result<Mesh> read = decode_mesh(damaged, kOneThread);
                 if (read)
                     ASSERT_EQ(check_mesh(*read), "");
                 else
@@ -280,7 +279,7 @@ void expect_damage_named(const Mesh& mesh) {
         for (std::size_t length = 0; length < (code.*part).size(); length += 3) {
             CodedMesh cut = code;
             (cut.*part).resize(length);
-            EXPECT_FALSE(decode_mesh(cut, kContext).ok());
+            EXPECT_FALSE(decode_mesh(cut, kOneThread).ok());
         }
     }
     for (std::uint64_t CodedMesh::*count : {&CodedMesh::vertices, &CodedMesh::faces, &CodedMesh::corners})
@@ -288,7 +287,7 @@ void expect_damage_named(const Mesh& mesh) {
              {std::uint64_t{0}, code.*count + 1, std::uint64_t{1} << 31, ~std::uint64_t{0}}) {
             CodedMesh damaged = code;
             damaged.*count = wrong;
-            EXPECT_FALSE(decode_mesh(damaged, kContext).ok());
+            EXPECT_FALSE(decode_mesh(damaged, kOneThread).ok());
         }
 }
 
@@ -300,7 +299,7 @@ TEST(MeshCode, EveryDamagedByteIsNamedOrHarmless) {
 TEST(MeshCode, CorpusComesBack) {
     std::size_t tried = 0;
     for (const CorpusRow& row : read_corpus()) {
-        const Result<MeshFile> file = read_mesh(row.path, kContext);
+        const Result<MeshFile> file = read_mesh(row.path, kOneThread);
         if (!file || file->mesh.vertex_count() == 0 || file->mesh.corner_count() > 300'000) continue;
         SCOPED_TRACE(row.file);
         expect_same_in_order(file->mesh);

@@ -2,13 +2,12 @@
 
 #include "filigree/deform/restored_error.h"
 #include "filigree/mesh/shapes.h"
+#include "threads.h"
 
 #include <gtest/gtest.h>
 
 namespace filigree {
 namespace {
-
-const RunContext kOneThread(1);
 
 TEST(Fidelity, FallsWithEveryFinerDriver) {
     for (const Mesh& mesh :
@@ -54,9 +53,9 @@ TEST(Fidelity, OfAReferenceModelHasNoUseForGradients) {
     EXPECT_EQ(measured.positions, measured.gradients);
 }
 
-using Warps = std::vector<std::unique_ptr<SpaceWarp>>;
+using WarpList = std::vector<std::unique_ptr<SpaceWarp>>;
 
-double largest_error(const Model& model, const Warps& warps, PoseSource source) {
+double largest_error(const Model& model, const WarpList& warps, PoseSource source) {
     double largest = 0;
     for (const auto& warp : warps) {
         Pose pose = warp_pose(*warp, model, kOneThread);
@@ -71,7 +70,7 @@ double largest_error(const Model& model, const Warps& warps, PoseSource source) 
 /// Warps of other axes, angles and seeds than those of the family.
 double error_of_others(const Model& model) {
     const Box box = world_bounds(model.mesh);
-    Warps others;
+    WarpList others;
     others.push_back(make_bend(box, Axis::y, 120));
     others.push_back(make_twist(box, Axis::z, 150));
     others.push_back(make_taper(box, Axis::y, 0.6));
@@ -105,7 +104,7 @@ TEST(Fidelity, MeshesSmallerThanTheFirstDriverAreStrippedToo) {
 /// Ten warps that are nowhere more curved than the family's: along every axis, over a shorter side less.
 double error_of_others_along_all_axes(const Model& model, PoseSource source) {
     const Box box = world_bounds(model.mesh);
-    Warps others;
+    WarpList others;
     for (const Axis axis : {Axis::x, Axis::y, Axis::z}) {
         const double part = box.size()[static_cast<int>(axis)] / box.size().maxCoeff();
         others.push_back(make_bend(box, axis, 160 * part));

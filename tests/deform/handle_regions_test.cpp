@@ -2,14 +2,13 @@
 
 #include "filigree/hierarchy/strip.h"
 #include "filigree/mesh/shapes.h"
+#include "threads.h"
 
 #include <cmath>
 #include <gtest/gtest.h>
 
 namespace filigree {
 namespace {
-
-const RunContext kContext;
 
 /// A bar along x, 4 long, whose ends are taken: one stays, the other goes 1 along y.
 std::vector<HandleRegion> ends(double move) {
@@ -18,12 +17,12 @@ std::vector<HandleRegion> ends(double move) {
 }
 
 Error refusal(const Mesh& mesh, const std::vector<HandleRegion>& handles) {
-    return move_by_handles(mesh, handles, kContext).error();
+    return move_by_handles(mesh, handles, kAllThreads).error();
 }
 
 TEST(HandleRegions, EndsGoWhereTheyAreSent) {
     const Mesh bar = make_bar({.resolution = 4});
-    const Mesh moved = move_by_handles(bar, ends(1), kContext).value();
+    const Mesh moved = move_by_handles(bar, ends(1), kAllThreads).value();
     for (Index v = 0; v < bar.vertex_count(); ++v) {
         const Vec3f way = moved.positions[v] - bar.positions[v];
         const float x = bar.positions[v].x();
@@ -49,9 +48,9 @@ TEST(HandleRegions, ARegionTurnsAboutItsMiddleOrTheCentreGiven) {
     const Mesh bar = make_bar({.resolution = 4});
     std::vector<HandleRegion> handles = ends(0);
     handles[1].rotation = Eigen::AngleAxisd(0.5, Vec3d::UnitX());
-    const Mesh turned = move_by_handles(bar, handles, kContext).value();
+    const Mesh turned = move_by_handles(bar, handles, kAllThreads).value();
     handles[1].centre = Vec3d(0, 1, 0);
-    const Mesh swung = move_by_handles(bar, handles, kContext).value();
+    const Mesh swung = move_by_handles(bar, handles, kAllThreads).value();
     for (Index v = 0; v < bar.vertex_count(); ++v) {
         if (bar.positions[v].x() < 1.9f) continue;
         const Vec3d p = bar.positions[v].cast<double>();
@@ -63,8 +62,8 @@ TEST(HandleRegions, ARegionTurnsAboutItsMiddleOrTheCentreGiven) {
 
 TEST(HandleRegions, TheDriverFollowsTheSameHandles) {
     const Mesh bar = make_bar({.resolution = 8});
-    const Model model = strip(bar, {.base = 100}, kContext).value().model;
-    const Pose pose = pose_by_handles(model, ends(1), kContext).value();
+    const Model model = strip(bar, {.base = 100}, kAllThreads).value().model;
+    const Pose pose = pose_by_handles(model, ends(1), kAllThreads).value();
     const std::vector<Vec3f> rest = driver_positions(model);
     ASSERT_EQ(pose.positions.size(), rest.size());
     for (Index v = 0; v < rest.size(); ++v)
@@ -76,7 +75,7 @@ TEST(HandleRegions, VerticesAtOnePlaceMoveAsOne) {
     seam.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
     seam.add_face(std::array<Index, 3>{0, 1, 2});
     seam.add_face(std::array<Index, 3>{3, 4, 5});
-    const Mesh moved = move_by_handles(seam, {{{.vertices = {1}, .move = Vec3d(0, 0, 1)}}}, kContext).value();
+    const Mesh moved = move_by_handles(seam, {{{.vertices = {1}, .move = Vec3d(0, 0, 1)}}}, kAllThreads).value();
     EXPECT_EQ(moved.positions[1], moved.positions[3]);
     const Error apart = refusal(seam, {{.vertices = {1}}, {.vertices = {3}, .move = Vec3d(0, 0, 1)}});
     EXPECT_EQ(apart.code, ErrorCode::usage);

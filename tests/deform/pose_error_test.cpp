@@ -5,14 +5,13 @@
 #include "filigree/deform/space_warp.h"
 #include "filigree/hierarchy/strip.h"
 #include "filigree/mesh/shapes.h"
+#include "threads.h"
 
 #include <algorithm>
 #include <gtest/gtest.h>
 
 namespace filigree {
 namespace {
-
-const RunContext kOneThread(1);
 
 Model stripped(Mesh mesh, std::size_t base) {
     StripOptions options;

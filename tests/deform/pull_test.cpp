@@ -3,6 +3,7 @@
 #include "filigree/hierarchy/restore.h"
 #include "filigree/hierarchy/strip.h"
 #include "filigree/mesh/shapes.h"
+#include "threads.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,11 +12,10 @@
 namespace filigree {
 namespace {
 
-const RunContext kContext;
 constexpr double kTolerance = 1e-5;
 
 Model cube_model(std::size_t base = 200, DetailCode code = DetailCode::blend) {
-    return strip(make_wavy_cube({.resolution = 24}), {.code = code, .base = base}, kContext).value().model;
+    return strip(make_wavy_cube({.resolution = 24}), {.code = code, .base = base}, kAllThreads).value().model;
 }
 
 bool has(const std::vector<Index>& ascending, Index v) {
@@ -25,7 +25,7 @@ bool has(const std::vector<Index>& ascending, Index v) {
 /// Steps until the pull has arrived.
 Pose pulled(PullSolver& solver, const Vec3f& way) {
     Pose pose;
-    do pose = solver.step(way, kTolerance, kContext).value();
+    do pose = solver.step(way, kTolerance, kAllThreads).value();
     while (!solver.has_arrived(kTolerance));
     return pose;
 }
@@ -77,7 +77,7 @@ TEST(PullSolver, BringsTheGripThereAndHoldsTheRest) {
     const Model model = cube_model();
     const std::vector<Vec3f> rest = driver_positions(model);
     const PullRegion region = pull_region(model, {}, rest[0], 0.2, 0.7);
-    PullSolver solver = PullSolver::create(model, nullptr, region, {}, kContext).value();
+    PullSolver solver = PullSolver::create(model, nullptr, region, {}, kAllThreads).value();
     EXPECT_FALSE(solver.has_arrived(kTolerance));
     const Vec3f way(0, 0.3f, 0);
     const Pose pose = pulled(solver, way);
@@ -91,9 +91,9 @@ TEST(PullSolver, BringsTheGrabbedVertexThereByMovingTheGripFurther) {
     const auto grabbed = static_cast<Index>(model.mesh.vertex_count() / 3);
     const Vec3f from = model.mesh.positions[grabbed], way(0, 0.3f, 0.1f);
     const PullRegion region = pull_region(model, {}, from, 0.1, 0.6, grabbed);
-    PullSolver solver = PullSolver::create(model, nullptr, region, grabbed, kContext).value();
+    PullSolver solver = PullSolver::create(model, nullptr, region, grabbed, kAllThreads).value();
     const Pose pose = pulled(solver, way);
-    const std::vector<Vec3f> restored = Restorer::create(model, {}, kContext)->positions(pose, kContext).value();
+    const std::vector<Vec3f> restored = Restorer::create(model, {}, kAllThreads)->positions(pose, kAllThreads).value();
     EXPECT_LT((restored[grabbed] - from - way).norm(), 1e-3f);
     const std::vector<Vec3f> rest = driver_positions(model);
     for (const Index v : region.grip) EXPECT_LT((pose.positions[v] - rest[v] - solver.applied()).norm(), 1e-5f);
@@ -103,10 +103,10 @@ TEST(PullSolver, TheNextPullStartsFromTheShapeThatTheLastLeft) {
     const Model model = cube_model();
     const std::vector<Vec3f> rest = driver_positions(model);
     PullSolver first =
-        PullSolver::create(model, nullptr, pull_region(model, {}, rest[0], 0.2, 0.7), {}, kContext).value();
+        PullSolver::create(model, nullptr, pull_region(model, {}, rest[0], 0.2, 0.7), {}, kAllThreads).value();
     const Pose once = pulled(first, Vec3f(0.1f, 0.3f, 0));
     PullSolver second =
-        PullSolver::create(model, &once, pull_region(model, {}, rest[40], 0.2, 0.7), {}, kContext).value();
+        PullSolver::create(model, &once, pull_region(model, {}, rest[40], 0.2, 0.7), {}, kAllThreads).value();
     const Pose twice = pulled(second, Vec3f::Zero());
     EXPECT_LT(rms(twice.positions, once.positions), 1e-4);
     for (std::size_t v = 0; v < rest.size(); ++v) EXPECT_LT((twice.gradients[v] - once.gradients[v]).norm(), 1e-2f);
@@ -114,13 +114,13 @@ TEST(PullSolver, TheNextPullStartsFromTheShapeThatTheLastLeft) {
 
 TEST(PullEveryVertex, DoesWhatTheDriverDid) {
     const Model model = cube_model(600);
-    EXPECT_EQ(pull_every_vertex(model, {}, kContext).value(), model.mesh.positions);
+    EXPECT_EQ(pull_every_vertex(model, {}, kAllThreads).value(), model.mesh.positions);
     const Vec3f centre = driver_positions(model)[0];
     Pull pull{pull_region(model, {}, centre, 0.2, 0.7), centre, 0.2, 0.7, Vec3f(-0.1f, 0.25f, 0.1f)};
-    PullSolver solver = PullSolver::create(model, nullptr, pull.region, {}, kContext).value();
+    PullSolver solver = PullSolver::create(model, nullptr, pull.region, {}, kAllThreads).value();
     const Pose pose = pulled(solver, pull.move);
-    const std::vector<Vec3f> restored = Restorer::create(model, {}, kContext)->positions(pose, kContext).value();
-    const std::vector<Vec3f> all = pull_every_vertex(model, std::span(&pull, 1), kContext).value();
+    const std::vector<Vec3f> restored = Restorer::create(model, {}, kAllThreads)->positions(pose, kAllThreads).value();
+    const std::vector<Vec3f> all = pull_every_vertex(model, std::span(&pull, 1), kAllThreads).value();
     EXPECT_GT(rms(all, model.mesh.positions), 0.05);
     EXPECT_LT(rms(all, restored), 0.03);
     const RunContext cancelled;

@@ -5,16 +5,16 @@
 namespace filigree {
 namespace {
 
-const Box kBox{Vec3d(-1, -2, -1), Vec3d(1, 2, 1)};
+const Box kTallBox{Vec3d(-1, -2, -1), Vec3d(1, 2, 1)};
 const Vec3d kPoint(0.4, 1.3, -0.7);
 
 TEST(WarpSteps, AreDoneOneAfterTheOtherOverOneBox) {
     const std::vector<WarpStep> steps = {{WarpKind::bend, 60}, {WarpKind::stretch, 1.5}, {WarpKind::random, 0.1}};
-    const Vec3d bent = make_bend(kBox, Axis::y, 60)->position(kPoint);
-    const Vec3d stretched = make_stretch(kBox, Axis::y, 1.5)->position(bent);
-    const Vec3d all = make_smooth_random(kBox, 0.1, 7)->position(stretched);
-    EXPECT_EQ(make_warp(steps, kBox, Axis::y, 7)->position(kPoint), all);
-    EXPECT_EQ(make_warp(std::vector<WarpStep>(), kBox, Axis::y)->position(kPoint), kPoint);
+    const Vec3d bent = make_bend(kTallBox, Axis::y, 60)->position(kPoint);
+    const Vec3d stretched = make_stretch(kTallBox, Axis::y, 1.5)->position(bent);
+    const Vec3d all = make_smooth_random(kTallBox, 0.1, 7)->position(stretched);
+    EXPECT_EQ(make_warp(steps, kTallBox, Axis::y, 7)->position(kPoint), all);
+    EXPECT_EQ(make_warp(std::vector<WarpStep>(), kTallBox, Axis::y)->position(kPoint), kPoint);
 }
 
 TEST(WarpSteps, PartsGoFromNothingToAll) {
@@ -22,7 +22,7 @@ TEST(WarpSteps, PartsGoFromNothingToAll) {
          {WarpKind::stretch, WarpKind::squeeze, WarpKind::bend, WarpKind::twist, WarpKind::taper, WarpKind::random}) {
         const WarpStep step{kind, 0.7};
         const WarpStep nothing = step.part(0);
-        EXPECT_LT((make_warp(std::span(&nothing, 1), kBox, Axis::x)->position(kPoint) - kPoint).norm(), 1e-12);
+        EXPECT_LT((make_warp(std::span(&nothing, 1), kTallBox, Axis::x)->position(kPoint) - kPoint).norm(), 1e-12);
         EXPECT_EQ(step.part(1).amount, 0.7);
     }
     EXPECT_EQ((WarpStep{WarpKind::bend, 90}).part(0.5).amount, 45);
@@ -30,7 +30,7 @@ TEST(WarpSteps, PartsGoFromNothingToAll) {
 }
 
 TEST(Warps, AreStepsInAFixedOrder) {
-    EXPECT_EQ(make_warp(Warps(), kBox), nullptr);
+    EXPECT_EQ(make_warp(Warps(), kTallBox), nullptr);
     EXPECT_EQ(make_warp(Warps{.bend = 30}, Box()), nullptr);
     const Warps warps{.axis = Axis::z, .stretch = 1.2, .squeeze = 0.9, .bend = 30, .twist = 20, .taper = 0.8};
     const std::vector<WarpStep> steps = {{WarpKind::stretch, 1.2},
@@ -38,7 +38,7 @@ TEST(Warps, AreStepsInAFixedOrder) {
                                          {WarpKind::bend, 30},
                                          {WarpKind::twist, 20},
                                          {WarpKind::taper, 0.8}};
-    EXPECT_EQ(make_warp(warps, kBox)->position(kPoint), make_warp(steps, kBox, Axis::z)->position(kPoint));
+    EXPECT_EQ(make_warp(warps, kTallBox)->position(kPoint), make_warp(steps, kTallBox, Axis::z)->position(kPoint));
 }
 
 } // namespace

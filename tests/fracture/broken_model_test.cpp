@@ -5,6 +5,7 @@
 #include "filigree/hierarchy/restore.h"
 #include "filigree/hierarchy/strip.h"
 #include "filigree/mesh/shapes.h"
+#include "threads.h"
 
 #include <cstring>
 #include <gtest/gtest.h>
@@ -12,8 +13,6 @@
 
 namespace filigree {
 namespace {
-
-const RunContext kContext(1);
 
 struct Case {
     Model model;
@@ -24,10 +23,10 @@ struct Case {
 
 Case broken_ball(double roughness = 0.5) {
     const Mesh mesh = make_wavy_sphere({.resolution = 32});
-    Model model = strip(mesh, {.base = 400}, kContext).value().model;
-    FractureCells cells = make_fracture_cells(mesh, {.pieces = 12, .roughness = roughness}, kContext).value();
-    FracturedMesh fractured = fracture(mesh, cells, {.pieces_are_cells = true}, kContext).value();
-    BrokenModel broken = break_model(model, fractured, cells, 0.08, kContext).value();
+    Model model = strip(mesh, {.base = 400}, kOneThread).value().model;
+    FractureCells cells = make_fracture_cells(mesh, {.pieces = 12, .roughness = roughness}, kOneThread).value();
+    FracturedMesh fractured = fracture(mesh, cells, {.pieces_are_cells = true}, kOneThread).value();
+    BrokenModel broken = break_model(model, fractured, cells, 0.08, kOneThread).value();
     return {std::move(model), std::move(cells), std::move(fractured), std::move(broken)};
 }
 
@@ -37,10 +36,10 @@ TEST(BrokenModel, IsAModel) {
     EXPECT_EQ(check_mesh(ball.broken.model.mesh), "");
     EXPECT_EQ(ball.broken.piece_of_driver.size(), ball.broken.model.driver().vertices.size());
     // At rest everything is where it was.
-    const Restorer restorer = Restorer::create(ball.broken.model, {}, kContext).value();
+    const Restorer restorer = Restorer::create(ball.broken.model, {}, kOneThread).value();
     Pose rest = rest_pose(ball.broken.model);
     rest.gradients.assign(rest.positions.size(), Mat3f::Identity());
-    const std::vector<Vec3f> restored = restorer.positions(rest, kContext).value();
+    const std::vector<Vec3f> restored = restorer.positions(rest, kOneThread).value();
     for (std::size_t v = 0; v < restored.size(); ++v)
         EXPECT_LT((restored[v] - ball.broken.model.mesh.positions[v]).norm(), 1e-6f);
 }
@@ -48,11 +47,12 @@ TEST(BrokenModel, IsAModel) {
 TEST(BrokenModel, MovesAsTheUnbrokenOneUntilPiecesPart) {
     const Case ball = broken_ball();
     const std::unique_ptr<SpaceWarp> twist = make_twist(world_bounds(ball.model.mesh), Axis::z, 60);
-    const Pose whole = warp_pose(*twist, ball.model, kContext), pose = warp_pose(*twist, ball.broken.model, kContext);
+    const Pose whole = warp_pose(*twist, ball.model, kOneThread),
+               pose = warp_pose(*twist, ball.broken.model, kOneThread);
     const std::vector<Vec3f> before =
-        Restorer::create(ball.model, {}, kContext).value().positions(whole, kContext).value();
+        Restorer::create(ball.model, {}, kOneThread).value().positions(whole, kOneThread).value();
     const std::vector<Vec3f> after =
-        Restorer::create(ball.broken.model, {}, kContext).value().positions(pose, kContext).value();
+        Restorer::create(ball.broken.model, {}, kOneThread).value().positions(pose, kOneThread).value();
     EXPECT_EQ(std::memcmp(before.data(), after.data(), before.size() * sizeof(Vec3f)), 0);
     // Copies in several pieces are in one place, to the bit; points on cracks are where the warp takes them.
     std::map<Index, Vec3f> at;
@@ -78,7 +78,7 @@ TEST(BrokenModel, EveryPieceMovesByItself) {
     const auto shift = [](Index piece) { return Vec3f(float(piece), float(2 * piece), 0); };
     for (std::size_t d = 0; d < pose.positions.size(); ++d) pose.positions[d] += shift(ball.broken.piece_of_driver[d]);
     const std::vector<Vec3f> moved =
-        Restorer::create(ball.broken.model, {}, kContext).value().positions(pose, kContext).value();
+        Restorer::create(ball.broken.model, {}, kOneThread).value().positions(pose, kOneThread).value();
     for (std::size_t v = 0; v < ball.fractured.mesh.vertex_count(); ++v)
         EXPECT_LT((moved[v] - ball.fractured.mesh.positions[v] - shift(ball.fractured.piece_of_vertex[v])).norm(),
                   1e-5f);
@@ -117,11 +117,12 @@ TEST(BrokenModel, CracksOpenWhereCopiesPart) {
 TEST(BrokenModel, RefusesOtherMeshesAndCodes) {
     const Case ball = broken_ball(0);
     const Mesh other = make_wavy_cube({.resolution = 8});
-    EXPECT_EQ(
-        break_model(strip(other, {}, kContext).value().model, ball.fractured, ball.cells, 0.1, kContext).error().code,
-        ErrorCode::unsuitable);
-    EXPECT_EQ(break_model(strip(other, {.code = DetailCode::reference}, kContext).value().model, ball.fractured,
-                          ball.cells, 0.1, kContext)
+    EXPECT_EQ(break_model(strip(other, {}, kOneThread).value().model, ball.fractured, ball.cells, 0.1, kOneThread)
+                  .error()
+                  .code,
+              ErrorCode::unsuitable);
+    EXPECT_EQ(break_model(strip(other, {.code = DetailCode::reference}, kOneThread).value().model, ball.fractured,
+                          ball.cells, 0.1, kOneThread)
                   .error()
                   .code,
               ErrorCode::unsuitable);

@@ -12,8 +12,6 @@
 namespace filigree {
 namespace {
 
-const RunContext kOneThread(1);
-
 struct Bound {
     Surface surface;
     std::vector<Triangle> cells;

@@ -1,5 +1,6 @@
 // The kernel against the formula it comes from, in double and written out plainly.
 #include "filigree/hierarchy/blend_kernel.h"
+#include "hierarchy/stripping.h"
 #include "threads.h"
 
 #include <Eigen/LU>
@@ -12,8 +13,6 @@ namespace filigree {
 namespace {
 
 using namespace blend_kernel;
-
-const RunContext kOneThread(1);
 
 /// Random records and transforms, and all that the plain formula needs.
 struct Scene {
@@ -127,9 +126,7 @@ Restored restored(const Scene& scene, int lanes, bool in_order, const RunContext
     return out;
 }
 
-bool same_bytes(std::span<const Vec3f> a, std::span<const Vec3f> b) {
-    return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size_bytes()) == 0;
-}
+using filigree_test::same_bytes;
 
 std::vector<Index> every_length() {
     std::vector<Index> lengths(kMaxRun);

@@ -7,6 +7,7 @@
 #include "filigree/mesh/shapes.h"
 #include "filigree/mesh/topology.h"
 #include "filigree/mesh/triangulate.h"
+#include "threads.h"
 
 #include <algorithm>
 #include <cmath>
@@ -15,8 +16,6 @@
 
 namespace filigree {
 namespace {
-
-const RunContext kContext;
 
 Mesh over_triangles(const Mesh& mesh, std::span<const Triangle> triangles) {
     Mesh result;
@@ -48,13 +47,13 @@ TEST(ClusterSimplify, RoundsReachTheirTargetsAndStayClosed) {
     ClusterSimplifier clusters(cube().positions);
     std::vector<Triangle> triangles = cube_triangles();
     for (const std::size_t target : {96'000u, 24'000u}) {
-        const std::optional<Simplified> left = clusters.simplify(triangles, target, 1e6, kContext);
+        const std::optional<Simplified> left = clusters.simplify(triangles, target, 1e6, kAllThreads);
         ASSERT_TRUE(left);
         EXPECT_NEAR(double(left->vertex_count), double(target), 0.02 * double(target));
         EXPECT_GT(left->error, 0);
         const Mesh mesh = over_triangles(cube(), left->triangles);
         EXPECT_EQ(mesh.vertex_count(), left->vertex_count);
-        const TopologyReport topology = analyse_topology(mesh, kContext);
+        const TopologyReport topology = analyse_topology(mesh, kAllThreads);
         EXPECT_TRUE(topology.is_closed());
         // meshoptimizer makes some, in one piece too.
         EXPECT_LT(topology.nonmanifold_edges.count, left->vertex_count / 1000);
@@ -82,7 +81,7 @@ TEST(ClusterSimplify, EveryRemovedVertexHangsNearOneThatIsLeft) {
     std::vector<bool> is_there(cube().vertex_count(), true);
     std::vector<Triangle> triangles = cube_triangles();
     for (const std::size_t target : {96'000u, 24'000u}) {
-        triangles = clusters.simplify(triangles, target, 1e6, kContext).value().triangles;
+        triangles = clusters.simplify(triangles, target, 1e6, kAllThreads).value().triangles;
         is_there.assign(is_there.size(), false);
         for (const Triangle& t : triangles)
             for (const Index v : t) is_there[v] = true;
@@ -110,10 +109,10 @@ TEST(ClusterSimplify, BordersOfClustersDoNotStay) {
     ClusterSimplifier clusters(cube().positions);
     std::vector<Triangle> triangles = cube_triangles();
     for (const std::size_t target : {96'000u, 24'000u, 6'000u})
-        triangles = clusters.simplify(triangles, target, 1e6, kContext).value().triangles;
+        triangles = clusters.simplify(triangles, target, 1e6, kAllThreads).value().triangles;
     const Mesh level = over_triangles(cube(), triangles);
     const Mesh one = over_triangles(
-        cube(), simplify(cube().positions, cube_triangles(), {.target_vertices = 6'000}, kContext).triangles);
+        cube(), simplify(cube().positions, cube_triangles(), {.target_vertices = 6'000}, kAllThreads).triangles);
     const auto short_edges = [](const Mesh& mesh) {
         std::vector<float> lengths;
         for (std::size_t f = 0; f < mesh.face_count(); ++f)
@@ -124,8 +123,8 @@ TEST(ClusterSimplify, BordersOfClustersDoNotStay) {
         return double(std::ranges::lower_bound(lengths, tenth) - lengths.begin()) / double(lengths.size());
     };
     EXPECT_LT(short_edges(level), 0.03); // in one piece 0.002
-    const double far = mesh_distance(cube(), level, 0, kContext)->surfaces->rms_a_to_b;
-    const double one_far = mesh_distance(cube(), one, 0, kContext)->surfaces->rms_a_to_b;
+    const double far = mesh_distance(cube(), level, 0, kAllThreads)->surfaces->rms_a_to_b;
+    const double one_far = mesh_distance(cube(), one, 0, kAllThreads)->surfaces->rms_a_to_b;
     EXPECT_LT(far, 1.15 * one_far);
 }
 
@@ -133,10 +132,10 @@ TEST(ClusterSimplify, OpenBordersArePartOfIt) {
     const Mesh plane = make_wavy_plane({.resolution = 600});
     const std::vector<Triangle> triangles = triangulate(plane).triangles;
     ClusterSimplifier clusters(plane.positions);
-    const Simplified left = clusters.simplify(triangles, plane.vertex_count() / 4, 1e6, kContext).value();
+    const Simplified left = clusters.simplify(triangles, plane.vertex_count() / 4, 1e6, kAllThreads).value();
     EXPECT_NEAR(double(left.vertex_count), double(plane.vertex_count()) / 4, 0.02 * double(plane.vertex_count()));
-    const std::size_t before = analyse_topology(plane, kContext).open_edges.count;
-    const std::size_t after = analyse_topology(over_triangles(plane, left.triangles), kContext).open_edges.count;
+    const std::size_t before = analyse_topology(plane, kAllThreads).open_edges.count;
+    const std::size_t after = analyse_topology(over_triangles(plane, left.triangles), kAllThreads).open_edges.count;
     EXPECT_LT(after, before / 2) << "the mesh's own border is simplified too";
     EXPECT_GT(after, before / 16);
 }
@@ -156,7 +155,7 @@ TEST(ClusterSimplify, SmallPartsStay) {
         }
     }
     ClusterSimplifier clusters(mesh.positions);
-    const Simplified left = clusters.simplify(triangulate(mesh).triangles, 110'000, 1e6, kContext).value();
+    const Simplified left = clusters.simplify(triangulate(mesh).triangles, 110'000, 1e6, kAllThreads).value();
     std::vector<bool> is_there(mesh.vertex_count(), false);
     for (const Triangle& t : left.triangles)
         for (const Index v : t) is_there[v] = true;
@@ -172,21 +171,21 @@ TEST(ClusterSimplify, SaysWhereOnePieceHasTo) {
         dust.positions.insert(dust.positions.end(), {at, at + Vec3f(1e-3f, 0, 0), at + Vec3f(0, 1e-3f, 0)});
         dust.add_face(std::array{3 * k, 3 * k + 1, 3 * k + 2});
     }
-    EXPECT_FALSE(ClusterSimplifier(dust.positions).simplify(triangulate(dust).triangles, 75'000, 1e6, kContext));
+    EXPECT_FALSE(ClusterSimplifier(dust.positions).simplify(triangulate(dust).triangles, 75'000, 1e6, kAllThreads));
     // Cancelled.
     const RunContext cancelled;
     cancelled.cancel();
     EXPECT_FALSE(ClusterSimplifier(cube().positions).simplify(cube_triangles(), 96'000, 1e6, cancelled));
     // Such a mesh is stripped all the same.
-    const Stripped stripped = strip(dust, {.base = 1000, .one_piece = 100'000}, kContext).value();
+    const Stripped stripped = strip(dust, {.base = 1000, .one_piece = 100'000}, kAllThreads).value();
     EXPECT_EQ(check_model(stripped.model), "");
 }
 
 TEST(ClusterSimplify, AModelMadeSoIsAsGood) {
     StripOptions options{.base = 1000, .one_piece = 100'000};
-    const Stripped clusters = strip(cube(), options, kContext).value();
+    const Stripped clusters = strip(cube(), options, kAllThreads).value();
     options.one_piece = StripOptions().one_piece;
-    const Stripped one = strip(cube(), options, kContext).value();
+    const Stripped one = strip(cube(), options, kAllThreads).value();
     ASSERT_EQ(check_model(clusters.model), "");
     ASSERT_EQ(clusters.model.finest_level(), one.model.finest_level());
     EXPECT_EQ(clusters.report.across_gap, 0u);
@@ -205,8 +204,8 @@ TEST(ClusterSimplify, AModelMadeSoIsAsGood) {
             pose.gradients.emplace_back();
             pose.positions.push_back(twisted(p, pose.gradients.back()));
         }
-        const Restorer restorer = Restorer::create(model, {}, kContext).value();
-        const std::vector<Vec3f> restored = restorer.positions(pose, kContext).value();
+        const Restorer restorer = Restorer::create(model, {}, kAllThreads).value();
+        const std::vector<Vec3f> restored = restorer.positions(pose, kAllThreads).value();
         double sum = 0;
         Mat3f unused;
         for (std::size_t v = 0; v < restored.size(); ++v)

@@ -11,7 +11,6 @@
 namespace filigree {
 namespace {
 
-const RunContext kOneThread(1);
 constexpr NormalColumn kColumns[] = {NormalColumn::fitted, NormalColumn::shell};
 constexpr HeightLaw kLaws[] = {HeightLaw::keep, HeightLaw::inverse, HeightLaw::proportional, HeightLaw::volume};
 
@@ -157,7 +156,7 @@ TEST(GradientFit, NoThreadChangesAByte) {
     EXPECT_EQ(GradientFit(mesh, NormalColumn::fitted, two).fit(moved, HeightLaw::keep, two), one);
 }
 
-const Mat3d kTurn = Eigen::AngleAxisd(1.1, Vec3d(0.3, 1, -0.4).normalized()).toRotationMatrix();
+const Mat3d kRotation = Eigen::AngleAxisd(1.1, Vec3d(0.3, 1, -0.4).normalized()).toRotationMatrix();
 
 /// Stretched, sheared and turned.
 const Mat3d kAffine = (Mat3d() << 1.4, 0.3, -0.2, 0.1, 0.7, 0.4, -0.5, 0.2, 1.1).finished();
@@ -187,12 +186,12 @@ TEST(GradientFit, APlateAnEighthOfAnEdgeThickIsSolid) {
 TEST(GradientFit, ASheetTurnsWithItsPlaneAndKeepsTheLaw) {
     const Mesh sheet = make_wavy_plane({.resolution = 10, .amplitude = 0});
     const GradientFit fit(sheet, NormalColumn::fitted, kOneThread);
-    const auto turned = mapped(sheet.positions, [](const Vec3d& p) { return Vec3d(kTurn * p); });
-    const auto twice = mapped(sheet.positions, [](const Vec3d& p) { return Vec3d(2 * kTurn * p); });
+    const auto turned = mapped(sheet.positions, [](const Vec3d& p) { return Vec3d(kRotation * p); });
+    const auto twice = mapped(sheet.positions, [](const Vec3d& p) { return Vec3d(2 * kRotation * p); });
     const double heights[] = {1, 0.5, 2, 0.25}; // keep, inverse, proportional, volume
     for (const HeightLaw law : kLaws) {
-        EXPECT_LT(largest_error(fit.fit(turned, law, kOneThread), kTurn), 1e-5);
-        const Mat3d expected = kTurn * Vec3d(2, 2, heights[static_cast<int>(law)]).asDiagonal();
+        EXPECT_LT(largest_error(fit.fit(turned, law, kOneThread), kRotation), 1e-5);
+        const Mat3d expected = kRotation * Vec3d(2, 2, heights[static_cast<int>(law)]).asDiagonal();
         EXPECT_LT(largest_error(fit.fit(twice, law, kOneThread), expected), 1e-4) << height_law_name(law);
     }
 }
@@ -232,11 +231,11 @@ TEST(GradientFit, PartsThatTouchSlideOnEachOther) {
     const Mesh both = side_by_side(lower, upper);
     std::vector<Vec3f> moved = both.positions;
     for (std::size_t v = lower.vertex_count(); v < moved.size(); ++v)
-        moved[v] = (kTurn * moved[v].cast<double>() + Vec3d(0.4, 0, 0)).cast<float>();
+        moved[v] = (kRotation * moved[v].cast<double>() + Vec3d(0.4, 0, 0)).cast<float>();
     const std::vector<Mat3f> a =
         GradientFit(both, NormalColumn::fitted, kOneThread).fit(moved, HeightLaw::keep, kOneThread);
     EXPECT_LT(largest_error(std::span(a).first(lower.vertex_count()), Mat3d::Identity()), 1e-4);
-    EXPECT_LT(largest_error(std::span(a).subspan(lower.vertex_count()), kTurn), 1e-4);
+    EXPECT_LT(largest_error(std::span(a).subspan(lower.vertex_count()), kRotation), 1e-4);
 }
 
 TEST(GradientFit, DoubledVerticesCountOnce) {
@@ -268,10 +267,10 @@ TEST(GradientFit, PointsWithoutFacesHaveGradientsToo) {
     Mesh line;
     for (int k = 0; k < 20; ++k) line.positions.emplace_back(0.1f * float(k), 0.05f * float(k), 0.0f);
     const GradientFit fit(line, NormalColumn::fitted, kOneThread);
-    const auto moved = mapped(line.positions, [](const Vec3d& p) { return Vec3d(2 * kTurn * p); });
+    const auto moved = mapped(line.positions, [](const Vec3d& p) { return Vec3d(2 * kRotation * p); });
     const Vec3d along = (line.positions[1] - line.positions[0]).cast<double>().normalized();
     for (const Mat3f& a : fit.fit(moved, HeightLaw::proportional, kOneThread)) {
-        EXPECT_LT((a.cast<double>() * along - 2 * kTurn * along).norm(), 1e-4);
+        EXPECT_LT((a.cast<double>() * along - 2 * kRotation * along).norm(), 1e-4);
         EXPECT_LT((a.transpose() * a - 4 * Mat3f::Identity()).norm(), 1e-3); // turned and scaled, in every direction
     }
 }

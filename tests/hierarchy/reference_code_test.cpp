@@ -1,5 +1,6 @@
 #include "filigree/hierarchy/reference_code.h"
 #include "filigree/mesh/shapes.h"
+#include "hierarchy/stripping.h"
 #include "threads.h"
 
 #include <Eigen/Geometry>
@@ -11,7 +12,7 @@
 namespace filigree {
 namespace {
 
-const RunContext kOneThread(1);
+using filigree_test::same_bytes;
 
 ReferenceDetail encoded(const Mesh& mesh, unsigned references = 3, unsigned max_levels = 16) {
     auto detail = encode_reference(mesh, {.references = references, .max_levels = max_levels}, kOneThread);
@@ -28,14 +29,14 @@ std::vector<Vec3f> restored(const ReferenceDetail& detail, HeightLaw law, std::s
 }
 
 template <class Map>
-std::vector<Vec3f> mapped(std::span<const Vec3f> positions, const Map& map) {
+std::vector<Vec3f> transformed(std::span<const Vec3f> positions, const Map& map) {
     std::vector<Vec3f> result;
     for (const Vec3f& p : positions) result.push_back(map(p));
     return result;
 }
 
 /// Largest distance as a fraction of b's diagonal.
-double distance(std::span<const Vec3f> a, std::span<const Vec3f> b) {
+double largest_distance(std::span<const Vec3f> a, std::span<const Vec3f> b) {
     EXPECT_EQ(a.size(), b.size());
     double largest = 0;
     for (std::size_t i = 0; i < a.size(); ++i) {
@@ -43,10 +44,6 @@ double distance(std::span<const Vec3f> a, std::span<const Vec3f> b) {
         if (!(d <= largest)) largest = d; // keeps NaN
     }
     return largest / bounds(b).diagonal();
-}
-
-bool same_bytes(std::span<const Vec3f> a, std::span<const Vec3f> b) {
-    return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size_bytes()) == 0;
 }
 
 /// A quad of the unit square, once subdivided, and one of its five new points moved. Vertex 3 j + i is at (i, j) / 2.
@@ -86,7 +83,7 @@ TEST(ReferenceCode, FourReferencesMeasureFromTheMean) {
 TEST(ReferenceCode, LawsOnAStretchedQuad) {
     const Mesh mesh = one_level(4, {0, 0, 0.125f});
     const ReferenceDetail detail = encoded(mesh);
-    const auto driver = mapped(detail.rest_driver, [](const Vec3f& p) { return Vec3f(2 * p.x(), p.y(), p.z()); });
+    const auto driver = transformed(detail.rest_driver, [](const Vec3f& p) { return Vec3f(2 * p.x(), p.y(), p.z()); });
     const std::pair<HeightLaw, float> expected[] = {{HeightLaw::keep, 1.0f},
                                                     {HeightLaw::inverse, 0.5f},
                                                     {HeightLaw::proportional, std::sqrt(2.0f)},
@@ -103,7 +100,7 @@ TEST(ReferenceCode, LawsAreBounded) {
     const Mesh mesh = one_level(4, {0, 0, 0.125f});
     const ReferenceDetail detail = encoded(mesh);
     const auto height = [&](HeightLaw law, float scale) {
-        const auto driver = mapped(detail.rest_driver, [&](const Vec3f& p) { return Vec3f(scale * p); });
+        const auto driver = transformed(detail.rest_driver, [&](const Vec3f& p) { return Vec3f(scale * p); });
         return restored(detail, law, driver)[4].z() / 0.125f;
     };
     for (const HeightLaw law : {HeightLaw::inverse, HeightLaw::volume}) {
@@ -124,7 +121,7 @@ TEST(ReferenceCode, RoundTrip) {
                  {HeightLaw::keep, HeightLaw::inverse, HeightLaw::proportional, HeightLaw::volume}) {
                 const ReferenceDetail detail = encoded(meshes[m], references);
                 EXPECT_EQ(detail.records.size() + detail.rest_driver.size(), meshes[m].vertex_count());
-                EXPECT_LE(distance(restored(detail, law, detail.rest_driver), meshes[m].positions), 2e-7)
+                EXPECT_LE(largest_distance(restored(detail, law, detail.rest_driver), meshes[m].positions), 2e-7)
                     << m << ' ' << references << ' ' << height_law_name(law);
             }
 }
@@ -134,7 +131,8 @@ TEST(ReferenceCode, RoundTripAtSixMillionPoints) {
     const ReferenceDetail detail = encoded(mesh);
     EXPECT_EQ(detail.patches.levels, 10u);
     for (const HeightLaw law : {HeightLaw::keep, HeightLaw::inverse})
-        EXPECT_LE(distance(restored(detail, law, detail.rest_driver), mesh.positions), 2e-7) << height_law_name(law);
+        EXPECT_LE(largest_distance(restored(detail, law, detail.rest_driver), mesh.positions), 2e-7)
+            << height_law_name(law);
 }
 
 /// Points in no order: every coordinate of every level is anything, so float rounds everywhere.
@@ -151,7 +149,7 @@ TEST(ReferenceCode, RoundTripOfRoughMeshes) {
         const Mesh mesh = rough_cube(32, roughness);
         for (const unsigned references : {3u, 4u, 6u}) {
             const ReferenceDetail detail = encoded(mesh, references);
-            EXPECT_LE(distance(restored(detail, HeightLaw::keep, detail.rest_driver), mesh.positions), 2e-7)
+            EXPECT_LE(largest_distance(restored(detail, HeightLaw::keep, detail.rest_driver), mesh.positions), 2e-7)
                 << roughness << ' ' << references << " loose: " << detail.loose.size();
         }
     }
@@ -165,9 +163,9 @@ TEST(ReferenceCode, RigidMotionIsExact) {
             for (const HeightLaw law :
                  {HeightLaw::keep, HeightLaw::inverse, HeightLaw::proportional, HeightLaw::volume}) {
                 const ReferenceDetail detail = encoded(mesh, references);
-                EXPECT_LE(
-                    distance(restored(detail, law, mapped(detail.rest_driver, move)), mapped(mesh.positions, move)),
-                    1e-6);
+                EXPECT_LE(largest_distance(restored(detail, law, transformed(detail.rest_driver, move)),
+                                           transformed(mesh.positions, move)),
+                          1e-6);
             }
 }
 
@@ -176,8 +174,8 @@ TEST(ReferenceCode, UniformScaleIsExactWhenProportional) {
     const ReferenceDetail detail = encoded(mesh);
     for (const float scale : {0.01f, 0.3f, 1.7f, 50.0f}) {
         const auto grow = [&](const Vec3f& p) { return Vec3f(scale * p); };
-        EXPECT_LE(distance(restored(detail, HeightLaw::proportional, mapped(detail.rest_driver, grow)),
-                           mapped(mesh.positions, grow)),
+        EXPECT_LE(largest_distance(restored(detail, HeightLaw::proportional, transformed(detail.rest_driver, grow)),
+                                   transformed(mesh.positions, grow)),
                   1e-6);
     }
 }
@@ -189,7 +187,7 @@ TEST(ReferenceCode, WorksAtAnySize) {
             Mesh scaled = mesh;
             for (Vec3f& p : scaled.positions) p *= size;
             const ReferenceDetail detail = encoded(scaled);
-            EXPECT_LE(distance(restored(detail, law, detail.rest_driver), scaled.positions), 2e-7) << size;
+            EXPECT_LE(largest_distance(restored(detail, law, detail.rest_driver), scaled.positions), 2e-7) << size;
         }
 }
 
@@ -212,7 +210,7 @@ TEST(ReferenceCode, NoSpikesWhenTheDriverCollapses) {
         for (const HeightLaw law : {HeightLaw::keep, HeightLaw::inverse, HeightLaw::proportional, HeightLaw::volume}) {
             const ReferenceDetail detail = encoded(mesh, references);
             for (const auto& [name, map] : collapses) {
-                const auto driver = mapped(detail.rest_driver, map);
+                const auto driver = transformed(detail.rest_driver, map);
                 const auto positions = restored(detail, law, driver);
                 const Vec3d centre = bounds(driver).centre();
                 double furthest = 0;
@@ -242,11 +240,11 @@ TEST(ReferenceCode, DegenerateRestShapesAreLoose) {
         for (const unsigned references : {3u, 4u, 6u}) {
             const ReferenceDetail detail = encoded(mesh, references);
             EXPECT_FALSE(detail.loose.empty());
-            EXPECT_LE(distance(restored(detail, HeightLaw::keep, detail.rest_driver), mesh.positions), 2e-7);
+            EXPECT_LE(largest_distance(restored(detail, HeightLaw::keep, detail.rest_driver), mesh.positions), 2e-7);
             // Heights here are as large as the mesh, and so is what rounding the law's factor does to them.
-            EXPECT_LE(distance(restored(detail, HeightLaw::inverse, detail.rest_driver), mesh.positions), 1e-6);
-            const auto open =
-                mapped(detail.rest_driver, [](const Vec3f& p) { return Vec3f(p.x(), 1000 * p.y(), p.x() * p.x()); });
+            EXPECT_LE(largest_distance(restored(detail, HeightLaw::inverse, detail.rest_driver), mesh.positions), 1e-6);
+            const auto open = transformed(detail.rest_driver,
+                                          [](const Vec3f& p) { return Vec3f(p.x(), 1000 * p.y(), p.x() * p.x()); });
             for (const Vec3f& p : restored(detail, HeightLaw::inverse, open)) ASSERT_TRUE(p.allFinite());
         }
     }
@@ -288,7 +286,7 @@ TEST(ReferenceCode, GridsAreWhatRestoreGives) {
           rough_cube(16, 0.2f), make_wavy_cube({.resolution = 640})}) {
         const ReferenceDetail detail = encoded(mesh);
         const ReferenceRestorer restorer(detail, HeightLaw::inverse, kOneThread);
-        auto driver = mapped(detail.rest_driver, [](const Vec3f& p) {
+        auto driver = transformed(detail.rest_driver, [](const Vec3f& p) {
             return Vec3f(p.x() + 0.3f * p.y() * p.y(), 1.5f * p.y(), p.z() - 0.2f * p.x());
         });
         for (unsigned level = 0; level <= detail.patches.levels; ++level) {
@@ -316,7 +314,8 @@ TEST(ReferenceCode, SameBytesForAnyThreadCount) {
     const auto three_detail = encode_reference(mesh, {.references = 6, .max_levels = 16}, three);
     ASSERT_TRUE(three_detail.ok());
     EXPECT_TRUE(same_bytes(one_detail.records, three_detail->records));
-    const auto driver = mapped(one_detail.rest_driver, [](const Vec3f& p) { return Vec3f(2 * p.x(), p.y(), p.z()); });
+    const auto driver =
+        transformed(one_detail.rest_driver, [](const Vec3f& p) { return Vec3f(2 * p.x(), p.y(), p.z()); });
     EXPECT_TRUE(same_bytes(restored(one_detail, HeightLaw::inverse, driver),
                            restored(one_detail, HeightLaw::inverse, driver, three)));
 }

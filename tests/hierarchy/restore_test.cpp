@@ -18,11 +18,6 @@ namespace {
 const Mat3d kTurn = Eigen::AngleAxisd(0.7, Vec3d(1, 2, -1).normalized()).toRotationMatrix();
 const Vec3d kShift(0.3, -0.2, 0.5);
 
-Pose without_gradients(Pose pose) {
-    pose.gradients.clear();
-    return pose;
-}
-
 std::vector<Mesh> some_shapes() {
     return {make_wavy_cube({.resolution = 24}), make_wavy_sphere({.resolution = 24}), make_torus({.resolution = 24}),
             make_wavy_plane({.resolution = 32})};

@@ -5,6 +5,7 @@
 #include "filigree/mesh/shapes.h"
 #include "filigree/mesh/topology.h"
 #include "filigree/mesh/triangulate.h"
+#include "threads.h"
 
 #include <cmath>
 #include <ctime>
@@ -15,8 +16,6 @@
 
 namespace filigree {
 namespace {
-
-const RunContext kOneThread(1);
 
 Mesh triangle_mesh(std::span<const Vec3f> positions, std::span<const Triangle> triangles) {
     Mesh mesh;

@@ -5,6 +5,7 @@
 #include "filigree/hierarchy/restore.h"
 #include "filigree/hierarchy/strip.h"
 #include "filigree/mesh/shapes.h"
+#include "threads.h"
 
 #include <gtest/gtest.h>
 #include <random>
@@ -13,10 +14,8 @@
 namespace filigree {
 namespace {
 
-const RunContext kContext;
-
 const Model& wavy_model() {
-    static const Model model = strip(make_wavy_cube({.resolution = 24}), {.base = 150}, kContext).value().model;
+    static const Model model = strip(make_wavy_cube({.resolution = 24}), {.base = 150}, kAllThreads).value().model;
     return model;
 }
 
@@ -27,7 +26,7 @@ Pose make_pose(const Model& model, double bend, double stretch) {
     warps.push_back(make_stretch(box, Axis::x, stretch));
     warps.push_back(make_bend(box, Axis::z, bend));
     warps.push_back(make_twist(box, Axis::y, 120));
-    return warp_pose(*make_chain(std::move(warps)), driver_positions(model), Vec3d::Zero(), kContext);
+    return warp_pose(*make_chain(std::move(warps)), driver_positions(model), Vec3d::Zero(), kAllThreads);
 }
 
 /// Linear-blend skinning as the glTF specification has it, in double.
@@ -74,9 +73,9 @@ TEST_P(SkinCase, PlaysWhatWeRestore) {
     const Model& model = wavy_model();
     const double diagonal = bounds(model.mesh.positions).diagonal();
     const Skin skin = make_skin(model, model.finest_level(), influences, exact).value();
-    const Restorer restorer = Restorer::create(model, {}, kContext).value();
+    const Restorer restorer = Restorer::create(model, {}, kAllThreads).value();
     for (const Pose& pose : {rest_with_gradients(model), make_pose(model, 90, 1.7), make_pose(model, -150, 0.4)}) {
-        const std::vector<Vec3f> restored = restorer.positions(pose, kContext).value();
+        const std::vector<Vec3f> restored = restorer.positions(pose, kAllThreads).value();
         EXPECT_LT(largest_distance(play(skin, pose), restored), tolerance * diagonal);
     }
 }
@@ -140,7 +139,7 @@ TEST(Skin, OfACoarserLevelHasItsVertices) {
 
 TEST(Skin, OfTheReferenceCodeIsRefused) {
     const Model model =
-        strip(make_wavy_cube({.resolution = 16}), {.code = DetailCode::reference}, kContext).value().model;
+        strip(make_wavy_cube({.resolution = 16}), {.code = DetailCode::reference}, kAllThreads).value().model;
     const Result<Skin> skin = make_skin(model, model.finest_level(), 3, true);
     ASSERT_FALSE(skin.ok());
     EXPECT_EQ(skin.error().code, ErrorCode::unsuitable);

@@ -6,6 +6,8 @@
 
 #include <numbers>
 
+namespace strip_to_driver_test {
+
 using namespace filigree_test;
 
 namespace {
@@ -155,3 +157,5 @@ TEST(StripToDriver, NothingIsRefusedWithASentence) {
     cancelled.cancel();
     EXPECT_EQ(code(mesh, mesh, cancelled), ErrorCode::cancelled);
 }
+
+} // namespace strip_to_driver_test

@@ -3,17 +3,17 @@
 
 #include "filigree/hierarchy/restore.h"
 #include "filigree/hierarchy/strip.h"
+#include "threads.h"
 
 #include <algorithm>
 #include <cstring>
 #include <functional>
 #include <gtest/gtest.h>
+#include <numeric>
 
 namespace filigree_test {
 
 using namespace filigree;
-
-inline const RunContext kOneThread(1);
 
 inline Stripped stripped(Mesh mesh, const StripOptions& options = {}, const RunContext& context = kOneThread) {
     Result<Stripped> result = strip(std::move(mesh), options, context);
@@ -34,6 +34,16 @@ inline std::vector<Vec3f> restored(const Model& model, const Pose& pose, const R
     Result<std::vector<Vec3f>> positions = restorer_of(model, options).positions(pose, context);
     EXPECT_TRUE(positions.ok()) << (positions.ok() ? "" : positions.error().message);
     return positions.ok() ? std::move(*positions) : std::vector<Vec3f>{};
+}
+
+inline std::vector<Index> all_vertices(const Model& model) {
+    std::vector<Index> all(model.mesh.vertex_count());
+    std::iota(all.begin(), all.end(), Index{0});
+    return all;
+}
+inline Pose without_gradients(Pose pose) {
+    pose.gradients.clear();
+    return pose;
 }
 
 /// A deformation: where a point goes, and its gradient there.

@@ -4,6 +4,7 @@
 #include "filigree/io/file.h"
 #include "filigree/io/model_file.h"
 #include "filigree/mesh/shapes.h"
+#include "threads.h"
 
 #include <gtest/gtest.h>
 
@@ -12,11 +13,9 @@
 namespace filigree {
 namespace {
 
-const RunContext kContext(2);
-
 Model bound_elsewhere() {
     const Mesh ball = make_wavy_sphere({.resolution = 8, .amplitude = 0});
-    return strip_to_driver(make_wavy_sphere({.resolution = 48}), ball, Precision::float32, kContext).value().model;
+    return strip_to_driver(make_wavy_sphere({.resolution = 48}), ball, Precision::float32, kTwoThreads).value().model;
 }
 
 std::filesystem::path packed_path() {
@@ -36,21 +35,21 @@ TEST(CodedModel, ADriverMadeElsewhereComesBack) {
     for (const bool keep_order : {false, true}) {
         const PoseSequence poses{24, {squeezed(model), rest_pose(model)}};
         const Result<CodingReport> report =
-            write_coded_model(model, poses, {.bits = 14, .keep_order = keep_order}, path, kContext);
+            write_coded_model(model, poses, {.bits = 14, .keep_order = keep_order}, path, kTwoThreads);
         ASSERT_TRUE(report.ok()) << report.error().message;
         EXPECT_LT(std::filesystem::file_size(path), sizeof(Vec3f) * model.mesh.vertex_count() / 2);
-        const ModelOutline outline = read_model_outline(FileReader::open(path).value(), "packed", kContext).value();
+        const ModelOutline outline = read_model_outline(FileReader::open(path).value(), "packed", kTwoThreads).value();
         EXPECT_EQ(outline.levels.back().vertices, model.mesh.vertex_count());
-        const Model back = read_model(path, kContext).value();
+        const Model back = read_model(path, kTwoThreads).value();
         EXPECT_EQ(back.mesh.vertex_count(), model.mesh.vertex_count());
         EXPECT_EQ(back.mesh.face_count(), model.mesh.face_count());
         EXPECT_EQ(driver_positions(back), driver_positions(model)) << "to the bit";
         EXPECT_EQ(back.driver().vertices, model.driver().vertices);
-        EXPECT_EQ(read_poses(path, kContext).value().frames.size(), 2u);
+        EXPECT_EQ(read_poses(path, kTwoThreads).value().frames.size(), 2u);
         if (!keep_order) continue;
         const Pose pose = squeezed(model);
         const auto restored = [&](const Model& of) {
-            return Restorer::create(of, {}, kContext).value().mesh(pose, kContext).value().positions;
+            return Restorer::create(of, {}, kTwoThreads).value().mesh(pose, kTwoThreads).value().positions;
         };
         const std::vector<Vec3f> expected = restored(model), found = restored(back);
         double largest = 0;
@@ -63,7 +62,7 @@ TEST(CodedModel, ADriverMadeElsewhereComesBack) {
 
 TEST(CodedModel, AStreamOfADriverMadeElsewhereIsRefused) {
     const std::filesystem::path path = packed_path();
-    const Result<CodingReport> report = write_coded_model(bound_elsewhere(), {}, {.levels = true}, path, kContext);
+    const Result<CodingReport> report = write_coded_model(bound_elsewhere(), {}, {.levels = true}, path, kTwoThreads);
     ASSERT_FALSE(report.ok());
     EXPECT_EQ(report.error().code, ErrorCode::unsuitable);
     EXPECT_FALSE(std::filesystem::exists(path));

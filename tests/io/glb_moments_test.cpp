@@ -2,6 +2,7 @@
 #include "filigree/io/file.h"
 #include "filigree/io/point_cache.h"
 #include "filigree/mesh/shapes.h"
+#include "threads.h"
 
 #include <cstring>
 #include <gtest/gtest.h>
@@ -11,17 +12,16 @@ namespace filigree {
 namespace {
 
 using Json = nlohmann::json;
-const RunContext kContext(1);
 
 Result<MeshMoment> moment(std::size_t frame) {
     return MeshMoment{make_wavy_sphere({.resolution = unsigned(2 + frame)}), {}};
 }
 
-struct Glb {
+struct MomentsGlb {
     Json json;
     std::string data;
 
-    explicit Glb(const std::string& bytes) {
+    explicit MomentsGlb(const std::string& bytes) {
         std::uint32_t length = 0;
         std::memcpy(&length, bytes.data() + 12, 4);
         json = Json::parse(bytes.substr(20, length));
@@ -38,7 +38,7 @@ struct Glb {
 };
 
 /// The scale of key k's node at a time, by steps.
-float scale_at(const Glb& glb, std::size_t k, float time) {
+float scale_at(const MomentsGlb& glb, std::size_t k, float time) {
     const Json& animation = glb.json["animations"][0];
     const Json& sampler = animation["samplers"][animation["channels"][k]["sampler"].get<std::size_t>()];
     const std::vector<float> times = glb.floats(sampler["input"]), values = glb.floats(sampler["output"]);
@@ -51,8 +51,8 @@ float scale_at(const Glb& glb, std::size_t k, float time) {
 
 TEST(GlbMoments, OneKeyIsShownAtATime) {
     const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / "filigree_moments.glb";
-    ASSERT_TRUE(write_glb_moments(8, 24, 8, moment, path, kContext).ok()); // frames 0, 3, 6 and the last
-    const Glb glb(read_file(path).value());
+    ASSERT_TRUE(write_glb_moments(8, 24, 8, moment, path, kOneThread).ok()); // frames 0, 3, 6 and the last
+    const MomentsGlb glb(read_file(path).value());
     ASSERT_EQ(glb.json["meshes"].size(), 4u);
     ASSERT_EQ(glb.json["scenes"][0]["nodes"].size(), 4u);
     const Json& report = glb.json["asset"]["extras"]["filigree"];
@@ -88,8 +88,8 @@ TEST(GlbMoments, FacesWithoutAMaterialMayComeLater) {
         if (frame == 2) now.mesh.materials.of_face[3] = kNoIndex;
         return now;
     };
-    ASSERT_TRUE(write_glb_moments(3, 24, 24, skinned, path, kContext).ok());
-    const Glb glb(read_file(path).value());
+    ASSERT_TRUE(write_glb_moments(3, 24, 24, skinned, path, kOneThread).ok());
+    const MomentsGlb glb(read_file(path).value());
     ASSERT_EQ(glb.json["materials"].size(), 2u);
     EXPECT_EQ(glb.json["materials"][0]["name"], "skin");
     EXPECT_EQ(glb.json["materials"][1]["name"], "none");
@@ -102,11 +102,11 @@ TEST(GlbMoments, FacesWithoutAMaterialMayComeLater) {
 
 TEST(GlbMoments, OneFrameStandsStillAndNoneIsRefused) {
     const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / "filigree_moment.glb";
-    ASSERT_TRUE(write_glb_moments(1, 24, 8, moment, path, kContext).ok());
-    EXPECT_FALSE(Glb(read_file(path).value()).json.contains("animations"));
+    ASSERT_TRUE(write_glb_moments(1, 24, 8, moment, path, kOneThread).ok());
+    EXPECT_FALSE(MomentsGlb(read_file(path).value()).json.contains("animations"));
     std::filesystem::remove(path);
-    EXPECT_EQ(write_glb_moments(0, 24, 8, moment, path, kContext).error().code, ErrorCode::unsuitable);
-    EXPECT_EQ(write_glb_moments(4, 24, 0, moment, path, kContext).error().code, ErrorCode::usage);
+    EXPECT_EQ(write_glb_moments(0, 24, 8, moment, path, kOneThread).error().code, ErrorCode::unsuitable);
+    EXPECT_EQ(write_glb_moments(4, 24, 0, moment, path, kOneThread).error().code, ErrorCode::usage);
     const RunContext cancelled(1);
     cancelled.cancel();
     EXPECT_EQ(write_glb_moments(4, 24, 8, moment, path, cancelled).error().code, ErrorCode::cancelled);

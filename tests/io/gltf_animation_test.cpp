@@ -12,7 +12,7 @@ using namespace filigree_test;
 
 namespace {
 
-GltfScene read(const std::string& bytes) {
+GltfScene scene_of(const std::string& bytes) {
     Result<GltfScene> scene = GltfScene::read(bytes, "a.gltf", RunContext(1));
     if (!scene) throw std::runtime_error(scene.error().message); // fails the test with the sentence
     return *std::move(scene);
@@ -25,18 +25,12 @@ std::vector<Vec3f> positions_at(const GltfScene& scene, double seconds, std::siz
     return positions;
 }
 
-void expect_near(const Vec3f& a, const Vec3d& b, double tolerance = 1e-6) {
-    EXPECT_LE((a.cast<double>() - b).norm(), tolerance) << a.transpose() << " and " << b.transpose();
-}
-
-const std::vector<float> kTriangle = {0, 0, 0, 1, 0, 0, 0, 1, 0};
-
 /// A triangle in node 0 that one channel moves, and its mesh.
 GltfScene moved(GltfText file, const std::string& path, const std::string& sampler, const std::string& node = "",
                 const std::string& mesh = R"({"primitives":[{"attributes":{"POSITION":0}}]})") {
-    return read(file.text(R"("nodes":[{"mesh":0)" + node + R"(}],"meshes":[)" + mesh +
-                          R"(],"animations":[{"name":"move","channels":[{"sampler":0,"target":{"node":0,"path":")" +
-                          path + R"("}}],"samplers":[{"input":1,"output":2,)" + sampler + "}]}]"));
+    return scene_of(file.text(R"("nodes":[{"mesh":0)" + node + R"(}],"meshes":[)" + mesh +
+                              R"(],"animations":[{"name":"move","channels":[{"sampler":0,"target":{"node":0,"path":")" +
+                              path + R"("}}],"samplers":[{"input":1,"output":2,)" + sampler + "}]}]"));
 }
 
 GltfText keys(const std::vector<float>& times, const std::vector<float>& values, const std::string& type) {
@@ -126,7 +120,7 @@ TEST(GltfAnimation, SkinsLeaveTheirNodesTransformOutAndMayHaveEightInfluences) {
     file.add<std::uint16_t>({7, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}, 5123, "VEC4"); // of weight 0: joint 7 is not there
     file.add({0, 0, 0, 0, 0.8f, 0, 0, 0, 1, 0, 0, 0}, "VEC4");
     file.add({1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -1, 0, 0, 1}, "MAT4");
-    const GltfScene scene = read(file.text(
+    const GltfScene scene = scene_of(file.text(
         R"("nodes":[{"mesh":0,"skin":0,"translation":[99,0,0]},{"translation":[0,0,10]},{"scale":[2,2,2],"children":[1]}],
         "skins":[{"joints":[1,2],"inverseBindMatrices":5}],
         "meshes":[{"primitives":[{"attributes":{"POSITION":0,"JOINTS_0":1,"WEIGHTS_0":2,"JOINTS_1":3,"WEIGHTS_1":4}}]}])"));
@@ -141,7 +135,7 @@ TEST(GltfAnimation, WeightsAreTakenAsTheyAreWithAWarning) {
     file.add(kTriangle, "VEC3");
     file.add<std::uint8_t>({0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}, 5121, "VEC4");
     file.add({0.5f, 0, 0, 0, 0.5f, 0, 0, 0, 1, 0, 0, 0}, "VEC4");
-    const GltfScene scene = read(file.text(R"("nodes":[{"mesh":0,"skin":0},{}],"skins":[{"joints":[1]}],
+    const GltfScene scene = scene_of(file.text(R"("nodes":[{"mesh":0,"skin":0},{}],"skins":[{"joints":[1]}],
         "meshes":[{"primitives":[{"attributes":{"POSITION":0,"JOINTS_0":1,"WEIGHTS_0":2}}]}])"));
     expect_near(scene.mesh().positions[1], {0.5, 0, 0});
     ASSERT_EQ(scene.warnings().size(), 1u);
@@ -163,7 +157,7 @@ TEST(GltfAnimation, NormalsFollow) {
 
 TEST(GltfAnimation, OtherThingsThanNodesAreLeftOut) {
     GltfText file = keys({0, 1}, {0, 1}, "SCALAR");
-    const GltfScene scene = read(file.text(R"("extensionsUsed":["KHR_animation_pointer"],"nodes":[{"mesh":0}],
+    const GltfScene scene = scene_of(file.text(R"("extensionsUsed":["KHR_animation_pointer"],"nodes":[{"mesh":0}],
         "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"animations":[{"samplers":[{"input":1,"output":2}],
         "channels":[{"sampler":0,"target":{"path":"pointer"}}]}])"));
     ASSERT_EQ(scene.warnings().size(), 1u);
@@ -172,7 +166,7 @@ TEST(GltfAnimation, OtherThingsThanNodesAreLeftOut) {
 
 TEST(GltfAnimation, PlacesBeyondFloatAreAnError) {
     GltfText file = keys({0, 1}, {1, 1, 1, 3e38f, 3e38f, 3e38f}, "VEC3");
-    const GltfScene scene = read(file.text(R"("nodes":[{"children":[1]},{"mesh":0,"scale":[10,10,10]}],
+    const GltfScene scene = scene_of(file.text(R"("nodes":[{"children":[1]},{"mesh":0,"scale":[10,10,10]}],
         "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"animations":[{"samplers":[{"input":1,"output":2}],
         "channels":[{"sampler":0,"target":{"node":0,"path":"scale"}}]}])"));
     std::vector<Vec3f> positions(3);
@@ -273,7 +267,7 @@ TEST(GltfAnimation, NodesThatNothingShowsCostNoWeights) {
     file.add(kTriangle, "VEC3");
     const std::string mesh = R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"targets":[)" + targets +
                              R"(]}],"weights":[)" + weights + R"(]}],"nodes":[)" + nodes + "]";
-    const GltfScene scene = read(file.text(R"("scenes":[{"nodes":[0]}],)" + mesh));
+    const GltfScene scene = scene_of(file.text(R"("scenes":[{"nodes":[0]}],)" + mesh));
     expect_near(scene.mesh().positions[1], {1.5, 0, 0});
     // Without a scene all of them are shown: refused before it takes memory.
     const Result<GltfScene> all = GltfScene::read(file.text(mesh), "a.gltf", RunContext(1));

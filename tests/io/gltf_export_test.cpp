@@ -8,6 +8,7 @@
 #include "filigree/io/gltf.h"
 #include "filigree/io/point_cache.h"
 #include "filigree/mesh/shapes.h"
+#include "threads.h"
 
 #include <cstring>
 #include <filesystem>
@@ -20,10 +21,8 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-const RunContext kContext;
-
 const Model& wavy_model() {
-    static const Model model = strip(make_wavy_cube({.resolution = 16}), {.base = 100}, kContext).value().model;
+    static const Model model = strip(make_wavy_cube({.resolution = 16}), {.base = 100}, kAllThreads).value().model;
     return model;
 }
 
@@ -38,7 +37,7 @@ PoseSequence make_poses(const Model& model, std::size_t frames, double frames_pe
         warps.push_back(make_bend(box, Axis::z, 90 * t));
         warps.push_back(make_twist(box, Axis::x, 60 * t));
         poses.frames.push_back(
-            warp_pose(*make_chain(std::move(warps)), driver_positions(model), model.mesh.origin, kContext));
+            warp_pose(*make_chain(std::move(warps)), driver_positions(model), model.mesh.origin, kAllThreads));
     }
     return poses;
 }
@@ -61,7 +60,7 @@ protected:
         return json::parse(bytes.substr(20, length));
     }
     ExportReport skin(const Model& model, const PoseSequence& poses, const SkinOptions& options = {}) {
-        const Result<ExportReport> report = write_skin_glb(model, stream_of(poses), options, file(), kContext);
+        const Result<ExportReport> report = write_skin_glb(model, stream_of(poses), options, file(), kAllThreads);
         EXPECT_TRUE(report.ok()) << (report.ok() ? "" : report.error().message);
         return report.ok() ? *report : ExportReport{};
     }
@@ -72,11 +71,11 @@ private:
 
 /// Largest distance of a file's animation from the restore at one moment, as a fraction of the diagonal.
 double distance(const fs::path& path, const Model& model, const Pose& pose, double seconds) {
-    const GltfScene scene = GltfScene::read(path, kContext).value();
+    const GltfScene scene = GltfScene::read(path, kAllThreads).value();
     std::vector<Vec3f> played(scene.mesh().vertex_count());
-    EXPECT_TRUE(scene.positions(0, seconds, played, kContext).ok());
-    const Restorer restorer = Restorer::create(model, {}, kContext).value();
-    const std::vector<Vec3f> restored = restorer.positions(pose, kContext).value();
+    EXPECT_TRUE(scene.positions(0, seconds, played, kAllThreads).ok());
+    const Restorer restorer = Restorer::create(model, {}, kAllThreads).value();
+    const std::vector<Vec3f> restored = restorer.positions(pose, kAllThreads).value();
     double largest = 0;
     for (std::size_t v = 0; v < restored.size(); ++v)
         largest = std::max<double>(largest, (played[v] - restored[v]).norm());
@@ -102,7 +101,7 @@ TEST_F(GltfExport, SkinPlaysWhatWeRestore) {
 
 TEST_F(GltfExport, SkinAtRestIsTheMesh) {
     skin(wavy_model(), make_poses(wavy_model(), 5, 24));
-    const GltfScene scene = GltfScene::read(file(), kContext).value();
+    const GltfScene scene = GltfScene::read(file(), kAllThreads).value();
     ASSERT_EQ(scene.mesh().vertex_count(), wavy_model().mesh.vertex_count());
     for (std::size_t v = 0; v < scene.mesh().vertex_count(); ++v)
         ASSERT_LT((scene.mesh().positions[v] - wavy_model().mesh.positions[v]).norm(), 3e-7) << v;
@@ -175,7 +174,7 @@ TEST_F(GltfExport, JointsFulfilBlendersRule) {
 
 TEST_F(GltfExport, JointNumbersAreAsSmallAsTheyCanBe) {
     for (const std::size_t base : {200u, 400u}) {
-        const Model model = strip(make_wavy_cube({.resolution = 16}), {.base = base}, kContext).value().model;
+        const Model model = strip(make_wavy_cube({.resolution = 16}), {.base = base}, kAllThreads).value().model;
         skin(model, make_poses(model, 2, 24));
         const json doc = document(file());
         const std::size_t joints = doc["meshes"][0]["primitives"][0]["attributes"]["JOINTS_0"];
@@ -227,7 +226,7 @@ TEST_F(GltfExport, ACoarserLevelCanBeTheFinest) {
 TEST_F(GltfExport, FarFromTheOriginKeepsItsDigits) {
     Mesh mesh = make_wavy_cube({.resolution = 12});
     mesh.origin = Vec3d(500000, 4100000, 30);
-    const Model model = strip(std::move(mesh), {.base = 80}, kContext).value().model;
+    const Model model = strip(std::move(mesh), {.base = 80}, kAllThreads).value().model;
     const PoseSequence poses = make_poses(model, 3, 24);
     const ExportReport report = skin(model, poses);
     EXPECT_LT(report.error_at_keys, 1e-5);
@@ -246,7 +245,7 @@ TEST_F(GltfExport, TellsHowFarNormalsMayBeOff) {
 
 TEST_F(GltfExport, SaysAboutItselfWhatItMeasured) {
     const ExportReport report = skin(wavy_model(), make_poses(wavy_model(), 4, 24));
-    const json stored = json::parse(GltfScene::read(file(), kContext).value().export_report());
+    const json stored = json::parse(GltfScene::read(file(), kAllThreads).value().export_report());
     EXPECT_EQ(stored["error_at_keys"], report.error_at_keys);
     EXPECT_EQ(stored["error_between_keys"], report.error_between_keys);
     EXPECT_EQ(stored["joints"], report.joints);
@@ -255,7 +254,7 @@ TEST_F(GltfExport, SaysAboutItselfWhatItMeasured) {
 TEST_F(GltfExport, RefusesWhatItCannotWrite) {
     const Model& model = wavy_model();
     const auto refused = [&](const PoseSequence& poses, const SkinOptions& options) {
-        const Result<ExportReport> report = write_skin_glb(model, stream_of(poses), options, file(), kContext);
+        const Result<ExportReport> report = write_skin_glb(model, stream_of(poses), options, file(), kAllThreads);
         EXPECT_FALSE(report.ok());
         EXPECT_FALSE(fs::exists(file()));
         return report.ok() ? ErrorCode{} : report.error().code;
@@ -280,7 +279,7 @@ TEST_F(GltfExport, ADriverThatLeftAsAnAnimationComesBackAsPoses) {
     const PoseSequence poses = make_poses(model, 7, 24);
     skin(model, poses, {.restore = {.level = 0}, .full_precision = true});
     const Result<PoseStream> back =
-        open_poses(file(), model.driver().vertices.size(), model.mesh.origin, {.frames_per_second = 24}, kContext);
+        open_poses(file(), model.driver().vertices.size(), model.mesh.origin, {.frames_per_second = 24}, kAllThreads);
     ASSERT_TRUE(back.ok()) << back.error().message;
     ASSERT_EQ(back->frames, 7u);
     for (const std::size_t frame : {0u, 3u, 6u}) {
@@ -288,7 +287,7 @@ TEST_F(GltfExport, ADriverThatLeftAsAnAnimationComesBackAsPoses) {
         for (std::size_t i = 0; i < pose.positions.size(); ++i)
             ASSERT_LT((pose.positions[i] - poses.frames[frame].positions[i]).norm(), 1e-6);
     }
-    const Result<PoseStream> other = open_poses(file(), 3, Vec3d::Zero(), {}, kContext);
+    const Result<PoseStream> other = open_poses(file(), 3, Vec3d::Zero(), {}, kAllThreads);
     ASSERT_FALSE(other.ok());
     EXPECT_EQ(other.error().code, ErrorCode::mismatch);
 }
@@ -296,12 +295,12 @@ TEST_F(GltfExport, ADriverThatLeftAsAnAnimationComesBackAsPoses) {
 TEST_F(GltfExport, MorphTargetsHoldEveryFrame) {
     const Mesh& mesh = wavy_model().mesh;
     const PoseSequence poses = make_poses(wavy_model(), 5, 24);
-    const Restorer restorer = Restorer::create(wavy_model(), {}, kContext).value();
+    const Restorer restorer = Restorer::create(wavy_model(), {}, kAllThreads).value();
     const MeshAnimation animation{&mesh, 5, 24, [&](std::size_t frame, std::span<Vec3f> out) {
-                                      return restorer.positions(poses.frames[frame], out, kContext);
+                                      return restorer.positions(poses.frames[frame], out, kAllThreads);
                                   }};
     for (const bool normals : {false, true}) {
-        const ExportReport report = write_morph_glb(animation, {.morph_normals = normals}, file(), kContext).value();
+        const ExportReport report = write_morph_glb(animation, {.morph_normals = normals}, file(), kAllThreads).value();
         EXPECT_LT(report.error_at_keys, 2e-7);
         EXPECT_EQ(report.bytes, fs::file_size(file()));
         for (const std::size_t frame : {0u, 3u, 4u})
@@ -318,7 +317,7 @@ TEST_F(GltfExport, MorphTargetsOfTooManyBytesAreRefusedBeforeTheWork) {
                                       asked = true;
                                       return Success{};
                                   }};
-    EXPECT_EQ(write_morph_glb(animation, {}, file(), kContext).error().code, ErrorCode::unsupported);
+    EXPECT_EQ(write_morph_glb(animation, {}, file(), kAllThreads).error().code, ErrorCode::unsupported);
     EXPECT_FALSE(asked);
     EXPECT_FALSE(fs::exists(file()));
 }

@@ -14,6 +14,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+namespace gltf_refusal_test {
+
 using namespace filigree;
 using namespace filigree_test;
 
@@ -21,7 +23,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::vector<float> kTriangle = {0, 0, 0, 1, 0, 0, 0, 1, 0};
 const std::string kTriangleMesh = R"("nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}])";
 
 Error error_of(const std::string& bytes) {
@@ -331,3 +332,5 @@ TEST(GltfRefusal, OtherJsonTypes) {
     expect_refused(triangle().text(R"("nodes":[{"mesh":0}],"meshes":[{"primitives":[]}])"),
                    "meshes[0].primitives: has no primitives");
 }
+
+} // namespace gltf_refusal_test

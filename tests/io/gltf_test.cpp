@@ -12,6 +12,8 @@
 #include <bit>
 #include <cmath>
 
+namespace gltf_test {
+
 using namespace filigree;
 using namespace filigree_test;
 
@@ -35,12 +37,6 @@ std::vector<std::string> warnings_of(const std::string& bytes) {
 }
 
 std::vector<Index> faces(const Mesh& mesh) { return mesh.corners; }
-
-void expect_near(const Vec3d& a, const Vec3d& b, double tolerance = 1e-6) {
-    EXPECT_LE((a - b).norm(), tolerance) << a.transpose() << " and " << b.transpose();
-}
-
-const std::vector<float> kTriangle = {0, 0, 0, 1, 0, 0, 0, 1, 0};
 
 /// The triangle, with whatever JSON its nodes are.
 std::string triangle_with(const std::string& nodes) {
@@ -329,3 +325,5 @@ TEST(Gltf, TheExportReportIsHandedOut) {
     ASSERT_TRUE(scene.ok());
     EXPECT_EQ(scene->export_report(), R"({"error":0.5})");
 }
+
+} // namespace gltf_test

@@ -1,6 +1,10 @@
 // Small glTF files put together by hand: numbers become accessors over one buffer, everything else is JSON.
 #pragma once
 
+#include "filigree/core/types.h"
+
+#include <gtest/gtest.h>
+
 #include <cstdint>
 #include <cstring>
 #include <string>
@@ -8,6 +12,13 @@
 #include <vector>
 
 namespace filigree_test {
+
+inline const std::vector<float> kTriangle = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+
+template <class Vector>
+void expect_near(const Vector& a, const filigree::Vec3d& b, double tolerance = 1e-6) {
+    EXPECT_LE((a.template cast<double>() - b).norm(), tolerance) << a.transpose() << " and " << b.transpose();
+}
 
 inline std::string base64(std::string_view bytes) {
     static constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";

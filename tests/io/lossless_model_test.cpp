@@ -1,6 +1,7 @@
 // Lossless model files: byte for byte the plain file, whatever the model; parts of it are read as from a plain one.
 #include "corpus.h"
 #include "sample_meshes.h"
+#include "threads.h"
 
 #include "filigree/hierarchy/restore.h"
 #include "filigree/hierarchy/strip.h"
@@ -17,8 +18,6 @@ using namespace filigree;
 
 namespace {
 
-const RunContext kContext(2);
-
 PoseSequence bending(const Model& model, std::size_t frames, bool with_gradients) {
     PoseSequence poses{24, {}};
     for (std::size_t t = 0; t < frames; ++t) {
@@ -33,7 +32,7 @@ PoseSequence bending(const Model& model, std::size_t frames, bool with_gradients
 std::string lossless_file(const Model& model, const PoseSequence& poses, std::uint64_t* plain = nullptr) {
     std::string name = (std::filesystem::temp_directory_path() / "filigree-lossless-XXXXXX").string();
     const std::filesystem::path folder = ::mkdtemp(name.data()), path = folder / "it.fil";
-    const LosslessReport report = write_lossless_model(model, poses, path, kContext).value();
+    const LosslessReport report = write_lossless_model(model, poses, path, kTwoThreads).value();
     if (plain) *plain = report.plain;
     std::string bytes = read_file(path).value();
     std::filesystem::remove_all(folder);
@@ -45,9 +44,9 @@ std::size_t expect_same(const Model& model, const PoseSequence& poses) {
     std::uint64_t plain_bytes = 0;
     const std::string coded = lossless_file(model, poses, &plain_bytes), plain = write_model(model, poses);
     EXPECT_EQ(plain_bytes, plain.size());
-    const Result<Model> read = read_model(coded, "it", kContext);
+    const Result<Model> read = read_model(coded, "it", kTwoThreads);
     EXPECT_TRUE(read.ok()) << (read ? "" : read.error().message);
-    EXPECT_TRUE(read && write_model(*read, read_poses(coded, "it", kContext).value()) == plain);
+    EXPECT_TRUE(read && write_model(*read, read_poses(coded, "it", kTwoThreads).value()) == plain);
     return coded.size();
 }
 
@@ -55,32 +54,32 @@ std::size_t expect_same(const Model& model, const PoseSequence& poses) {
 
 TEST(LosslessModel, EveryKindComesBackByteForByte) {
     const Mesh sphere = make_wavy_sphere({.resolution = 12}), cube = make_wavy_cube({.resolution = 8});
-    const Model model = strip(sphere, {.base = 40}, kContext)->model;
+    const Model model = strip(sphere, {.base = 40}, kTwoThreads)->model;
     expect_same(model, {});
     expect_same(model, bending(model, 70, true));
     expect_same(model, bending(model, 3, false));
-    expect_same(strip(sphere, {.base = 40, .precision = Precision::int16}, kContext)->model, {});
-    expect_same(strip(cube, {.base = 30, .reorder = true}, kContext)->model, {});
-    expect_same(strip(cube, {.code = DetailCode::reference}, kContext)->model, {});
+    expect_same(strip(sphere, {.base = 40, .precision = Precision::int16}, kTwoThreads)->model, {});
+    expect_same(strip(cube, {.base = 30, .reorder = true}, kTwoThreads)->model, {});
+    expect_same(strip(cube, {.code = DetailCode::reference}, kTwoThreads)->model, {});
     for (const Mesh& mesh : {filigree_test::make_vertex_attribute_mesh(), filigree_test::make_corner_attribute_mesh(),
                              filigree_test::make_far_mesh()})
-        expect_same(strip(mesh, {.base = 3}, kContext)->model, {});
+        expect_same(strip(mesh, {.base = 3}, kTwoThreads)->model, {});
 }
 
 TEST(LosslessModel, SeveralChunksAndSmaller) {
     const Mesh mesh = make_wavy_cube({.resolution = 220}); // 290,402 vertices
-    const Model model = strip(mesh, {.base = 500}, kContext)->model;
+    const Model model = strip(mesh, {.base = 500}, kTwoThreads)->model;
     const PoseSequence poses = bending(model, 2, true);
     const std::size_t bytes = expect_same(model, poses);
     EXPECT_LT(double(bytes), 0.45 * double(write_model(model, poses).size()));
 }
 
 TEST(LosslessModel, PartsAreReadAsFromAPlainFile) {
-    const Model model = strip(make_wavy_sphere({.resolution = 30}), {.base = 100}, kContext)->model;
+    const Model model = strip(make_wavy_sphere({.resolution = 30}), {.base = 100}, kTwoThreads)->model;
     const PoseSequence poses = bending(model, 40, true);
     const std::string coded = lossless_file(model, poses), plain = write_model(model, poses);
     const FileReader one(coded), other(plain);
-    const ModelOutline outline = read_model_outline(one, "it", kContext).value();
+    const ModelOutline outline = read_model_outline(one, "it", kTwoThreads).value();
     ASSERT_TRUE(outline.lossless.has_value());
     EXPECT_GT(outline.lossless->places, 0u);
     EXPECT_GT(outline.lossless->clips, 0u);
@@ -88,12 +87,12 @@ TEST(LosslessModel, PartsAreReadAsFromAPlainFile) {
     EXPECT_EQ(outline.frames, 40u);
     ASSERT_EQ(outline.levels.size(), model.levels.size() + 1);
     for (unsigned k = 0; k < outline.levels.size(); ++k) {
-        const Mesh a = read_model_level(one, k, "it", kContext).value();
-        const Mesh b = read_model_level(other, k, "it", kContext).value();
+        const Mesh a = read_model_level(one, k, "it", kTwoThreads).value();
+        const Mesh b = read_model_level(other, k, "it", kTwoThreads).value();
         EXPECT_EQ(a.positions, b.positions);
         EXPECT_EQ(a.corners, b.corners);
     }
-    const ModelChunks chunks = ModelChunks::open(FileReader(coded), "it", kContext).value();
+    const ModelChunks chunks = ModelChunks::open(FileReader(coded), "it", kTwoThreads).value();
     EXPECT_EQ(chunks.vertex_count(), model.mesh.vertex_count());
     EXPECT_TRUE(chunks.restorer(0).ok());
     const SectionReader in(one); // any frame, in any order
@@ -103,13 +102,13 @@ TEST(LosslessModel, PartsAreReadAsFromAPlainFile) {
 }
 
 TEST(LosslessModel, EveryChangedByteIsNamed) {
-    const Model model = strip(filigree_test::make_corner_attribute_mesh(), {.base = 3}, kContext)->model;
+    const Model model = strip(filigree_test::make_corner_attribute_mesh(), {.base = 3}, kTwoThreads)->model;
     const std::string coded = lossless_file(model, bending(model, 2, false)), plain = write_model(model);
     std::size_t named = 0;
     for (std::size_t at = 0; at < coded.size(); ++at) {
         std::string damaged = coded;
         damaged[at] = char(damaged[at] ^ 0x41);
-        const Result<Model> read = read_model(damaged, "it", kContext);
+        const Result<Model> read = read_model(damaged, "it", kTwoThreads);
         if (!read) {
             ++named;
             EXPECT_FALSE(read.error().message.empty());
@@ -117,7 +116,7 @@ TEST(LosslessModel, EveryChangedByteIsNamed) {
             EXPECT_TRUE(write_model(*read) == plain) << at; // bytes between sections, and poses
     }
     EXPECT_GT(named, coded.size() / 2);
-    EXPECT_FALSE(read_model(coded.substr(0, coded.size() - 1), "it", kContext).ok());
+    EXPECT_FALSE(read_model(coded.substr(0, coded.size() - 1), "it", kTwoThreads).ok());
 }
 
 TEST(LosslessModel, GoodMeshesOfTheCorpus) {
@@ -126,10 +125,10 @@ TEST(LosslessModel, GoodMeshesOfTheCorpus) {
     std::size_t tried = 0;
     for (const filigree_test::CorpusRow& row : rows) {
         if (!row.file.starts_with("good/")) continue;
-        Result<MeshFile> mesh = read_mesh(row.path, kContext);
+        Result<MeshFile> mesh = read_mesh(row.path, kTwoThreads);
         if (!mesh) continue;
         SCOPED_TRACE(row.file);
-        const auto stripped = strip(std::move(mesh->mesh), {}, kContext);
+        const auto stripped = strip(std::move(mesh->mesh), {}, kTwoThreads);
         if (!stripped) continue;
         expect_same(stripped->model, bending(stripped->model, 3, true));
         ++tried;

@@ -1,6 +1,7 @@
 #include "filigree/io/file.h"
 #include "filigree/io/mesh_file.h"
 #include "io/sample_meshes.h"
+#include "threads.h"
 
 #include <gtest/gtest.h>
 
@@ -15,8 +16,6 @@ using namespace filigree_test;
 
 namespace {
 
-const RunContext kContext(1);
-
 std::string to_bytes(const Mesh& mesh, MeshFormat format, const WriteMeshOptions& options = {}) {
     std::string bytes;
     EXPECT_TRUE(write_mesh(mesh, format, bytes, options, RunContext()).ok());
@@ -24,7 +23,7 @@ std::string to_bytes(const Mesh& mesh, MeshFormat format, const WriteMeshOptions
 }
 
 MeshFile from_bytes(const std::string& bytes, const std::string& name) {
-    Result<MeshFile> file = read_mesh(bytes, name, kContext);
+    Result<MeshFile> file = read_mesh(bytes, name, kOneThread);
     EXPECT_TRUE(file.ok()) << (file.ok() ? "" : file.error().message);
     if (!file.ok()) return {};
     EXPECT_EQ(check_mesh(file->mesh), "");
@@ -32,7 +31,7 @@ MeshFile from_bytes(const std::string& bytes, const std::string& name) {
 }
 
 std::string error_of(const std::string& bytes, const std::string& name) {
-    const Result<MeshFile> file = read_mesh(bytes, name, kContext);
+    const Result<MeshFile> file = read_mesh(bytes, name, kOneThread);
     EXPECT_FALSE(file.ok()) << name;
     return file.ok() ? "" : file.error().message;
 }
@@ -66,7 +65,7 @@ TEST(MeshFile, WhatNumbersCannotHoldIsNotWritten) {
     mesh.positions[0].x() = std::numeric_limits<float>::infinity();
     const std::filesystem::path path = std::filesystem::temp_directory_path() / "filigree_too_far.ply";
     std::filesystem::remove(path);
-    const auto written = write_mesh(mesh, path, {}, kContext);
+    const auto written = write_mesh(mesh, path, {}, kOneThread);
     ASSERT_FALSE(written);
     EXPECT_EQ(written.error().code, ErrorCode::unsuitable);
     EXPECT_EQ(
@@ -220,13 +219,13 @@ TEST(MeshFile, EndingsNameFormatsInAnyCase) {
 
 TEST(MeshFile, FilesOnDiskComeBack) {
     const auto path = std::filesystem::temp_directory_path() / ("filigree_mesh_" + std::to_string(::getpid()) + ".PLY");
-    ASSERT_TRUE(write_mesh(make_plain_mesh(), path, {}, kContext).ok());
-    expect_same_surface(read_mesh(path, kContext)->mesh, make_plain_mesh());
-    ASSERT_TRUE(write_mesh(make_plain_mesh(), path, {.format = MeshFormat::off}, kContext).ok());
+    ASSERT_TRUE(write_mesh(make_plain_mesh(), path, {}, kOneThread).ok());
+    expect_same_surface(read_mesh(path, kOneThread)->mesh, make_plain_mesh());
+    ASSERT_TRUE(write_mesh(make_plain_mesh(), path, {.format = MeshFormat::off}, kOneThread).ok());
     EXPECT_EQ(read_file(path)->substr(0, 3), "OFF");
     std::filesystem::remove(path);
-    EXPECT_EQ(read_mesh(path, kContext).error().code, ErrorCode::not_found);
-    EXPECT_EQ(write_mesh(make_plain_mesh(), "-", {}, kContext).error().code, ErrorCode::unsupported);
+    EXPECT_EQ(read_mesh(path, kOneThread).error().code, ErrorCode::not_found);
+    EXPECT_EQ(write_mesh(make_plain_mesh(), "-", {}, kOneThread).error().code, ErrorCode::unsupported);
 }
 
 TEST(MeshFile, CancelStopsReadingAndWriting) {

@@ -4,6 +4,7 @@
 #include "filigree/hierarchy/strip.h"
 #include "filigree/io/model_file.h"
 #include "filigree/mesh/shapes.h"
+#include "threads.h"
 
 #include <gtest/gtest.h>
 
@@ -16,12 +17,10 @@ namespace fs = std::filesystem;
 
 namespace {
 
-const RunContext kContext(2);
-
 Model model_of(Precision precision, const Vec3d& origin = Vec3d::Zero()) {
     Mesh mesh = make_wavy_cube({.resolution = 220}); // two chunks
     mesh.origin = origin;
-    return std::move(strip(mesh, {.base = 200, .precision = precision}, kContext)->model);
+    return std::move(strip(mesh, {.base = 200, .precision = precision}, kTwoThreads)->model);
 }
 
 PoseSequence bent_poses(const Model& model, bool with_gradients) {
@@ -53,18 +52,18 @@ protected:
     ~ModelChunksTest() override { fs::remove_all(folder_); }
 
     Result<ModelChunks> open(const Model& model, const PoseSequence& poses = {}) {
-        EXPECT_TRUE(write_model(model, poses, path("m.fil"), kContext).ok());
-        return ModelChunks::open(*FileReader::open(path("m.fil")), "m.fil", kContext);
+        EXPECT_TRUE(write_model(model, poses, path("m.fil"), kTwoThreads).ok());
+        return ModelChunks::open(*FileReader::open(path("m.fil")), "m.fil", kTwoThreads);
     }
     /// By way of the whole mesh.
     std::string whole(const PoseSequence& poses, const RestoreOptions& options = {}) {
-        const Model model = *read_model(path("m.fil"), kContext);
-        const Restorer restorer = *Restorer::create(model, options, kContext);
+        const Model model = *read_model(path("m.fil"), kTwoThreads);
+        const Restorer restorer = *Restorer::create(model, options, kTwoThreads);
         const MeshAnimation animation{&model.mesh, poses.frames.size(), 24,
                                       [&](std::size_t frame, std::span<Vec3f> out) {
-                                          return restorer.positions(poses.frames[frame], out, kContext);
+                                          return restorer.positions(poses.frames[frame], out, kTwoThreads);
                                       }};
-        EXPECT_TRUE(write_animation(animation, path("whole.pc2"), kContext).ok());
+        EXPECT_TRUE(write_animation(animation, path("whole.pc2"), kTwoThreads).ok());
         return bytes_of(path("whole.pc2"));
     }
     fs::path path(const std::string& name) const { return folder_ / name; }
@@ -81,7 +80,7 @@ TEST_F(ModelChunksTest, RestoreTheSameBytesAsTheWhole) {
             ASSERT_TRUE(chunks.ok()) << chunks.error().message;
             EXPECT_EQ(chunks->count(), 2u);
             EXPECT_EQ(chunks->vertex_count(), model.mesh.vertex_count());
-            const Mesh rest = read_model(path("m.fil"), kContext)->mesh; // int16 records round positions
+            const Mesh rest = read_model(path("m.fil"), kTwoThreads)->mesh; // int16 records round positions
             for (std::size_t k = 0; k < 2; ++k) {
                 const Box box = chunks->box(k);
                 Box own;
@@ -93,7 +92,7 @@ TEST_F(ModelChunksTest, RestoreTheSameBytesAsTheWhole) {
             for (const RestoreOptions& options :
                  {RestoreOptions{}, RestoreOptions{.law = HeightLaw::keep, .thin_shell = true}}) {
                 const auto written =
-                    write_restored_chunks(*chunks, stream_of(poses), options, path("chunks.pc2"), kContext);
+                    write_restored_chunks(*chunks, stream_of(poses), options, path("chunks.pc2"), kTwoThreads);
                 ASSERT_TRUE(written.ok()) << written.error().message;
                 EXPECT_TRUE(written->empty());
                 EXPECT_TRUE(bytes_of(path("chunks.pc2")) == whole(poses, options));
@@ -107,7 +106,7 @@ TEST_F(ModelChunksTest, AreSharedByProcesses) {
     const Result<ModelChunks> chunks = open(model);
     for (std::size_t part = 1; part <= 2; ++part) {
         const auto report = write_restored_chunks(*chunks, stream_of(poses), {}, path("shared.pc2"),
-                                                  WorkChunk{part, 2, "job"}, kContext);
+                                                  WorkChunk{part, 2, "job"}, kTwoThreads);
         ASSERT_TRUE(report.ok()) << report.error().message;
         EXPECT_EQ(report->is_whole, part == 2);
     }
@@ -117,7 +116,7 @@ TEST_F(ModelChunksTest, AreSharedByProcesses) {
 TEST_F(ModelChunksTest, FarFromTheOriginLostDigitsAreSaid) {
     const Model model = model_of(Precision::float32, {1e6, 0, 0});
     const PoseSequence poses = bent_poses(model, false);
-    const auto written = write_restored_chunks(*open(model), stream_of(poses), {}, path("chunks.pc2"), kContext);
+    const auto written = write_restored_chunks(*open(model), stream_of(poses), {}, path("chunks.pc2"), kTwoThreads);
     ASSERT_TRUE(written.ok());
     EXPECT_EQ(written->size(), 1u);
     EXPECT_TRUE(bytes_of(path("chunks.pc2")) == whole(poses));
@@ -133,26 +132,27 @@ TEST_F(ModelChunksTest, DamageIsSeenWhereItIsRead) {
     ASSERT_NE(at, std::string::npos);
     bytes[at] ^= 1;
     ASSERT_TRUE(write_file(path("m.fil"), bytes).ok());
-    const Result<ModelChunks> chunks = ModelChunks::open(*FileReader::open(path("m.fil")), "m.fil", kContext);
+    const Result<ModelChunks> chunks = ModelChunks::open(*FileReader::open(path("m.fil")), "m.fil", kTwoThreads);
     ASSERT_TRUE(chunks.ok());
     EXPECT_TRUE(chunks->restorer(0).ok());
     EXPECT_EQ(chunks->restorer(1).error().code, ErrorCode::bad_file);
-    const auto written = write_restored_chunks(*chunks, stream_of(poses), {}, path("c.pc2"), kContext);
+    const auto written = write_restored_chunks(*chunks, stream_of(poses), {}, path("c.pc2"), kTwoThreads);
     EXPECT_EQ(written.error().code, ErrorCode::bad_file);
     EXPECT_NE(written.error().message.find("mesh.pos"), std::string::npos) << written.error().message;
     EXPECT_FALSE(fs::exists(path("c.pc2")));
 }
 
 TEST_F(ModelChunksTest, WhatHasNoneIsRefused) {
-    const Stripped reference = *strip(make_wavy_cube({.resolution = 8}), {.code = DetailCode::reference}, kContext);
+    const Stripped reference = *strip(make_wavy_cube({.resolution = 8}), {.code = DetailCode::reference}, kTwoThreads);
     EXPECT_EQ(open(reference.model).error().code, ErrorCode::unsuitable);
-    const auto old = ModelChunks::open(*FileReader::open(FILIGREE_ROOT "/tests/io/version_1/float.fil"), "a", kContext);
+    const auto old =
+        ModelChunks::open(*FileReader::open(FILIGREE_ROOT "/tests/io/version_1/float.fil"), "a", kTwoThreads);
     EXPECT_EQ(old.error().code, ErrorCode::unsuitable);
     const Model model = model_of(Precision::float32);
     const Result<ModelChunks> chunks = open(model);
     const PoseSequence poses = bent_poses(model, false);
     const auto code = [&](const PoseSequence& given, const RestoreOptions& options, const char* name) {
-        return write_restored_chunks(*chunks, stream_of(given), options, path(name), kContext).error().code;
+        return write_restored_chunks(*chunks, stream_of(given), options, path(name), kTwoThreads).error().code;
     };
     EXPECT_EQ(code(poses, {.level = 1}, "a.pc2"), ErrorCode::usage);
     EXPECT_EQ(code(poses, {}, "a.mdd"), ErrorCode::usage);

@@ -6,6 +6,7 @@
 #include "filigree/io/file.h"
 #include "filigree/mesh/shapes.h"
 #include "io/sample_meshes.h"
+#include "threads.h"
 
 #include <gtest/gtest.h>
 
@@ -19,16 +20,16 @@
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
+namespace model_file_test {
+
 using namespace filigree;
 using namespace filigree_test;
 namespace fs = std::filesystem;
 
 namespace {
 
-const RunContext kContext(1);
-
 Model stripped(Mesh mesh, const StripOptions& options = {}) {
-    Result<Stripped> result = strip(std::move(mesh), options, kContext);
+    Result<Stripped> result = strip(std::move(mesh), options, kOneThread);
     EXPECT_TRUE(result.ok()) << (result.ok() ? "" : result.error().message);
     return result.ok() ? std::move(result->model) : Model{};
 }
@@ -53,15 +54,15 @@ std::vector<Model> small_models() {
 std::vector<Vec3f> bent(const Model& model) {
     Pose pose = rest_pose(model);
     for (Vec3f& p : pose.positions) p += Vec3f(0.1f * p.y() * p.y(), 0.2f * p.x(), 0.3f * p.x() * p.y());
-    const Result<Restorer> restorer = Restorer::create(model, {}, kContext);
-    return *restorer->positions(pose, kContext);
+    const Result<Restorer> restorer = Restorer::create(model, {}, kOneThread);
+    return *restorer->positions(pose, kOneThread);
 }
 
 bool same_bytes(std::span<const Vec3f> a, std::span<const Vec3f> b) {
     return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size_bytes()) == 0;
 }
 
-Result<Model> read(const std::string& bytes) { return read_model(bytes, "a.fil", kContext); }
+Result<Model> read(const std::string& bytes) { return read_model(bytes, "a.fil", kOneThread); }
 
 std::string error_of(const std::string& bytes) {
     const Result<Model> model = read(bytes);
@@ -82,9 +83,9 @@ void expect_sound_or_refused(const std::string& bytes) {
     }
     ASSERT_EQ(check_model(*model), "");
     for (unsigned level = 0; level <= model->finest_level(); ++level) {
-        const Result<Restorer> restorer = Restorer::create(*model, {.level = level}, kContext);
+        const Result<Restorer> restorer = Restorer::create(*model, {.level = level}, kOneThread);
         ASSERT_TRUE(restorer.ok());
-        ASSERT_TRUE(restorer->mesh(rest_pose(*model), kContext).ok());
+        ASSERT_TRUE(restorer->mesh(rest_pose(*model), kOneThread).ok());
     }
     std::ignore = write_model(*model);
 }
@@ -368,10 +369,10 @@ TEST(ModelFile, ADriverSectionInAFloatModelIsNoReasonToReadPastItsEnd) {
 /// What is read in part is sound or refused, like the whole.
 void expect_sound_parts(const std::string& bytes) {
     const FileReader file{std::string_view(bytes)};
-    const Result<ModelOutline> outline = read_model_outline(file, "a.fil", kContext);
+    const Result<ModelOutline> outline = read_model_outline(file, "a.fil", kOneThread);
     if (!outline) return;
     for (unsigned k = 0; k < outline->levels.size(); ++k) {
-        const Result<Mesh> level = read_model_level(file, k, "a.fil", kContext);
+        const Result<Mesh> level = read_model_level(file, k, "a.fil", kOneThread);
         EXPECT_EQ(level ? check_mesh(*level) : "", "");
     }
 }
@@ -439,13 +440,13 @@ TEST(ModelFile, ManyChunksComeBack) {
         EXPECT_EQ(write_model(*model), bytes);
         const FileReader file{std::string_view(bytes)};
         for (unsigned k = 0; k <= model->finest_level(); ++k)
-            EXPECT_TRUE(same_mesh(*read_model_level(file, k, "a.fil", kContext), level_mesh(*model, k))) << k;
+            EXPECT_TRUE(same_mesh(*read_model_level(file, k, "a.fil", kOneThread), level_mesh(*model, k))) << k;
     }
 }
 
 TEST(ModelFile, VersionOneIsRead) {
     const auto model_of = [](const std::string& name) {
-        Result<Model> model = read_model(FILIGREE_ROOT "/tests/io/version_1/" + name, kContext);
+        Result<Model> model = read_model(FILIGREE_ROOT "/tests/io/version_1/" + name, kOneThread);
         EXPECT_TRUE(model.ok()) << model.error().message;
         return std::move(*model);
     };
@@ -455,12 +456,12 @@ TEST(ModelFile, VersionOneIsRead) {
         ASSERT_EQ(model.mesh.vertex_count(), plane.vertex_count());
         EXPECT_EQ(model.driver().vertices.size(), 9u);
         const std::vector<Vec3f> restored =
-            *Restorer::create(model, {}, kContext)->positions(rest_pose(model), kContext);
+            *Restorer::create(model, {}, kOneThread)->positions(rest_pose(model), kOneThread);
         for (std::size_t v = 0; v < restored.size(); ++v)
             EXPECT_LT((restored[v] - plane.positions[v]).norm(), 2e-5f) << name << ' ' << v;
         const FileReader file = *FileReader::open(FILIGREE_ROOT "/tests/io/version_1/" + std::string(name));
-        EXPECT_TRUE(same_mesh(*read_model_level(file, 0, name, kContext), level_mesh(model, 0)));
-        EXPECT_EQ(read_model_outline(file, name, kContext)->levels[0].vertices, 9u);
+        EXPECT_TRUE(same_mesh(*read_model_level(file, 0, name, kOneThread), level_mesh(model, 0)));
+        EXPECT_EQ(read_model_outline(file, name, kOneThread)->levels[0].vertices, 9u);
         // written anew it is of today's version, and the same
         const Model again = *read(write_model(model));
         EXPECT_TRUE(same_detail(std::get<BlendDetail>(model.detail), std::get<BlendDetail>(again.detail)));
@@ -474,11 +475,11 @@ TEST(ModelFile, ALevelIsReadAlone) {
         const Model model = *read(bytes); // int16 records round positions
         const FileReader file{std::string_view(bytes)};
         for (unsigned k = 0; k <= model.finest_level(); ++k) {
-            const Result<Mesh> level = read_model_level(file, k, "a.fil", kContext);
+            const Result<Mesh> level = read_model_level(file, k, "a.fil", kOneThread);
             ASSERT_TRUE(level.ok()) << level.error().message;
             EXPECT_TRUE(same_mesh(*level, level_mesh(model, k))) << k;
         }
-        EXPECT_EQ(read_model_level(file, model.finest_level() + 1, "a.fil", kContext).error().code, ErrorCode::usage);
+        EXPECT_EQ(read_model_level(file, model.finest_level() + 1, "a.fil", kOneThread).error().code, ErrorCode::usage);
     }
 }
 
@@ -487,7 +488,7 @@ TEST(ModelFile, AnOutlineSaysWhatTheModelIs) {
         PoseSequence poses{25, {}};
         if (model.code() == DetailCode::blend) poses.frames.assign(3, rest_pose(model));
         const std::string bytes = write_model(model, poses);
-        const Result<ModelOutline> outline = read_model_outline(FileReader(bytes), "a.fil", kContext);
+        const Result<ModelOutline> outline = read_model_outline(FileReader(bytes), "a.fil", kOneThread);
         ASSERT_TRUE(outline.ok()) << outline.error().message;
         EXPECT_EQ(outline->code, model.code());
         ASSERT_EQ(outline->levels.size(), model.finest_level() + 1);
@@ -516,7 +517,7 @@ TEST(ModelFile, AnOutlineReadsNothingElse) {
     ASSERT_NE(positions, std::string::npos);
     bytes[positions + 7] ^= 1; // seen by who reads all of it
     EXPECT_FALSE(read(bytes).ok());
-    EXPECT_TRUE(read_model_outline(FileReader(bytes), "a.fil", kContext).ok());
+    EXPECT_TRUE(read_model_outline(FileReader(bytes), "a.fil", kOneThread).ok());
 }
 
 TEST(ModelFile, WritingFailsWithoutHarm) {
@@ -525,7 +526,7 @@ TEST(ModelFile, WritingFailsWithoutHarm) {
     const Model model = small_models()[0];
     ASSERT_TRUE(write_file(folder / "a.fil", "old").ok());
     for (const fs::path& path : {folder / "missing" / "a.fil", folder}) {
-        const Status status = write_model(model, path, kContext);
+        const Status status = write_model(model, path, kOneThread);
         ASSERT_FALSE(status.ok());
         EXPECT_EQ(status.error().code, ErrorCode::unwritable);
     }
@@ -533,13 +534,13 @@ TEST(ModelFile, WritingFailsWithoutHarm) {
     cancelled.cancel();
     EXPECT_EQ(write_model(model, folder / "a.fil", cancelled).error().code, ErrorCode::cancelled);
     EXPECT_EQ(*read_file(folder / "a.fil"), "old");
-    EXPECT_EQ(read_model(folder / "a.fil", kContext).error().code, ErrorCode::bad_file);
-    EXPECT_EQ(read_model(folder / "missing.fil", kContext).error().code, ErrorCode::not_found);
+    EXPECT_EQ(read_model(folder / "a.fil", kOneThread).error().code, ErrorCode::bad_file);
+    EXPECT_EQ(read_model(folder / "missing.fil", kOneThread).error().code, ErrorCode::not_found);
 
-    ASSERT_TRUE(write_model(model, folder / "a.fil", kContext).ok());
+    ASSERT_TRUE(write_model(model, folder / "a.fil", kOneThread).ok());
     EXPECT_EQ(*read_file(folder / "a.fil"), write_model(model));
     EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 1); // nothing temporary stays
-    ASSERT_TRUE(read_model(folder / "a.fil", kContext).ok());
+    ASSERT_TRUE(read_model(folder / "a.fil", kOneThread).ok());
     fs::remove_all(folder);
 }
 
@@ -597,3 +598,5 @@ TEST(ModelFile, MaterialsAreNotTrusted) {
     names.set("mat.nam", 5, '+'); // two names become one
     EXPECT_NE(error_of(names.bytes()).find("number of materials"), std::string::npos);
 }
+
+} // namespace model_file_test

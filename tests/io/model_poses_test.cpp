@@ -3,6 +3,7 @@
 
 #include "filigree/hierarchy/strip.h"
 #include "filigree/mesh/shapes.h"
+#include "threads.h"
 
 #include <gtest/gtest.h>
 
@@ -13,13 +14,13 @@
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
+namespace model_poses_test {
+
 using namespace filigree;
 
 namespace {
 
-const RunContext kContext(1);
-
-Model small_model() { return strip(make_wavy_plane({.resolution = 6}), {.base = 9}, kContext).value().model; }
+Model small_model() { return strip(make_wavy_plane({.resolution = 6}), {.base = 9}, kOneThread).value().model; }
 
 PoseSequence moving(const Model& model, bool gradients, std::size_t frames = 3) {
     PoseSequence poses{24, {}};
@@ -35,7 +36,7 @@ PoseSequence moving(const Model& model, bool gradients, std::size_t frames = 3) 
 }
 
 std::string error_of(const std::string& bytes) {
-    const Result<PoseSequence> poses = read_poses(bytes, "a.fil", kContext);
+    const Result<PoseSequence> poses = read_poses(bytes, "a.fil", kOneThread);
     EXPECT_FALSE(poses.ok());
     if (poses.ok()) return "";
     EXPECT_EQ(poses.error().code, ErrorCode::bad_file);
@@ -77,7 +78,7 @@ TEST(ModelPoses, ComeBackToTheBit) {
     for (const bool gradients : {true, false}) {
         const PoseSequence poses = moving(model, gradients);
         const std::string bytes = write_model(model, poses);
-        const Result<PoseSequence> back = read_poses(bytes, "a.fil", kContext);
+        const Result<PoseSequence> back = read_poses(bytes, "a.fil", kOneThread);
         ASSERT_TRUE(back.ok()) << back.error().message;
         EXPECT_EQ(back->frames_per_second, 24);
         ASSERT_EQ(back->frames.size(), poses.frames.size());
@@ -85,7 +86,7 @@ TEST(ModelPoses, ComeBackToTheBit) {
             EXPECT_EQ(back->frames[k].positions, poses.frames[k].positions);
             EXPECT_EQ(back->frames[k].gradients, poses.frames[k].gradients);
         }
-        const Result<Model> same = read_model(bytes, "a.fil", kContext); // as readers that know no poses do
+        const Result<Model> same = read_model(bytes, "a.fil", kOneThread); // as readers that know no poses do
         ASSERT_TRUE(same.ok()) << same.error().message;
         EXPECT_EQ(write_model(*same), write_model(model));
     }
@@ -105,7 +106,7 @@ TEST(ModelPoses, GradientsLieRowByRow) {
 
 TEST(ModelPoses, AModelAtRestHasNone) {
     const Model model = small_model();
-    const Result<PoseSequence> none = read_poses(write_model(model), "a.fil", kContext);
+    const Result<PoseSequence> none = read_poses(write_model(model), "a.fil", kOneThread);
     ASSERT_TRUE(none.ok());
     EXPECT_TRUE(none->empty());
     EXPECT_EQ(write_model(model, PoseSequence()), write_model(model));
@@ -119,7 +120,7 @@ TEST(ModelPoses, EveryCutAndEveryFlippedBitIsSeenOrHarmless) {
     for (std::size_t at = 0; at < bytes.size(); ++at) {
         std::string damaged = bytes;
         damaged[at] = static_cast<char>(damaged[at] ^ (1 << at % 8));
-        const Result<PoseSequence> back = read_poses(damaged, "a.fil", kContext);
+        const Result<PoseSequence> back = read_poses(damaged, "a.fil", kOneThread);
         if (!back.ok()) continue; // else the bit is padding, or belongs to the mesh
         ASSERT_EQ(write_model(model, *back), bytes) << at;
     }
@@ -154,7 +155,7 @@ TEST(ModelPoses, PosesOfAnotherModelAreNotWritten) {
     const std::filesystem::path path =
         std::filesystem::temp_directory_path() / ("filigree-poses-" + std::to_string(::getpid()) + ".fil");
     const auto refused = [&](const PoseSequence& poses) {
-        const Status status = write_model(model, poses, path, kContext);
+        const Status status = write_model(model, poses, path, kOneThread);
         EXPECT_FALSE(status.ok());
         EXPECT_FALSE(std::filesystem::exists(path));
         return status.ok() ? ErrorCode::usage : status.error().code;
@@ -171,8 +172,10 @@ TEST(ModelPoses, PosesOfAnotherModelAreNotWritten) {
     poses = moving(model, false);
     poses.frames_per_second = 0;
     EXPECT_EQ(refused(poses), ErrorCode::mismatch);
-    ASSERT_TRUE(write_model(model, moving(model, true), path, kContext).ok());
-    EXPECT_EQ(read_poses(path, kContext)->frames.size(), 3u);
+    ASSERT_TRUE(write_model(model, moving(model, true), path, kOneThread).ok());
+    EXPECT_EQ(read_poses(path, kOneThread)->frames.size(), 3u);
     std::filesystem::remove(path);
-    EXPECT_EQ(read_poses(path, kContext).error().code, ErrorCode::not_found);
+    EXPECT_EQ(read_poses(path, kOneThread).error().code, ErrorCode::not_found);
 }
+
+} // namespace model_poses_test

@@ -3,17 +3,18 @@
 
 #include "filigree/hierarchy/strip.h"
 #include "filigree/mesh/shapes.h"
+#include "threads.h"
 
 #include <cstdlib>
 #include <gtest/gtest.h>
+
+namespace model_stream_test {
 
 using namespace filigree;
 
 namespace {
 
-const RunContext kContext(2);
-
-Model wavy_model() { return strip(make_wavy_sphere({.resolution = 40}), {.base = 200}, kContext)->model; }
+Model wavy_model() { return strip(make_wavy_sphere({.resolution = 40}), {.base = 200}, kTwoThreads)->model; }
 
 /// The driver turned and drawn out, with gradients.
 PoseSequence turning(const Model& model, std::size_t frames) {
@@ -32,7 +33,7 @@ PoseSequence turning(const Model& model, std::size_t frames) {
 std::string stream_of(const Model& model, const PoseSequence& poses) {
     std::string name = (std::filesystem::temp_directory_path() / "filigree-stream-XXXXXX").string();
     const std::filesystem::path folder = ::mkdtemp(name.data()), path = folder / "stream.fil";
-    write_coded_model(model, poses, {.levels = true}, path, kContext).value();
+    write_coded_model(model, poses, {.levels = true}, path, kTwoThreads).value();
     std::string bytes = read_file(path).value();
     std::filesystem::remove_all(folder);
     return bytes;
@@ -43,7 +44,7 @@ std::string stream_of(const Model& model, const PoseSequence& poses) {
 TEST(ModelStream, BetterWithEveryLevel) {
     const Model model = wavy_model();
     const std::string bytes = stream_of(model, {});
-    const ModelOutline outline = read_model_outline(FileReader(bytes), "it", kContext).value();
+    const ModelOutline outline = read_model_outline(FileReader(bytes), "it", kTwoThreads).value();
     const std::vector<CodedLevelMark>& marks = outline.coding->levels;
     ASSERT_GE(marks.size(), 4u);
     EXPECT_LT(marks[0].bytes, bytes.size() / 4);
@@ -70,10 +71,10 @@ TEST(ModelStream, TheWholeFileIsAModelWithItsPoses) {
     const Model model = wavy_model();
     const PoseSequence poses = turning(model, 300); // more than a block
     const std::string bytes = stream_of(model, poses);
-    const Model back = read_model(bytes, "it", kContext).value();
+    const Model back = read_model(bytes, "it", kTwoThreads).value();
     EXPECT_EQ(back.mesh.face_count(), model.mesh.face_count());
     EXPECT_EQ(back.driver().vertices.size(), model.driver().vertices.size());
-    const PoseSequence read = read_poses(bytes, "it", kContext).value();
+    const PoseSequence read = read_poses(bytes, "it", kTwoThreads).value();
     ASSERT_EQ(read.frames.size(), poses.frames.size());
     EXPECT_EQ(read.frames_per_second, 30);
     const float diagonal = float(world_bounds(model.mesh).diagonal());
@@ -82,7 +83,7 @@ TEST(ModelStream, TheWholeFileIsAModelWithItsPoses) {
             ASSERT_LT((read.frames[t].positions[v] - poses.frames[t].positions[v]).norm(), 1e-4f * diagonal);
             ASSERT_LT((read.frames[t].gradients[v] - poses.frames[t].gradients[v]).norm(), 1e-2f);
         }
-    const ModelOutline outline = read_model_outline(FileReader(bytes), "it", kContext).value();
+    const ModelOutline outline = read_model_outline(FileReader(bytes), "it", kTwoThreads).value();
     EXPECT_EQ(outline.frames, 300u);
     EXPECT_TRUE(outline.has_gradients);
 }
@@ -105,3 +106,5 @@ TEST(ModelStream, OtherFilesAndDamageAreNamed) {
             EXPECT_EQ(fed.error().code, ErrorCode::bad_file) << fed.error().message;
     }
 }
+
+} // namespace model_stream_test

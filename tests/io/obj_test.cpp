@@ -2,34 +2,36 @@
 
 #include <gtest/gtest.h>
 
+namespace obj_test {
+
 using namespace filigree;
 
 namespace {
 
 Result<MeshFile> read(const std::string& text) { return read_mesh(text, "cow.obj", RunContext(1)); }
 
-const std::string kTriangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+const std::string kTriangleText = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
 
 } // namespace
 
 TEST(Obj, IndicesCountFromOneOrBackwards) {
-    const auto file = read(kTriangle + "f -3 -2 -1\nv 5 5 5\nf 1 2 -1\n");
+    const auto file = read(kTriangleText + "f -3 -2 -1\nv 5 5 5\nf 1 2 -1\n");
     EXPECT_EQ(file->mesh.corners, (std::vector<Index>{0, 1, 2, 0, 1, 3}));
 }
 
 TEST(Obj, VerticesMayComeAfterTheFaces) {
-    EXPECT_EQ(read("f 1 2 3\n" + kTriangle)->mesh.corners, (std::vector<Index>{0, 1, 2}));
+    EXPECT_EQ(read("f 1 2 3\n" + kTriangleText)->mesh.corners, (std::vector<Index>{0, 1, 2}));
 }
 
 TEST(Obj, ValuesInVertexOrderAreOneAVertex) {
-    const auto file = read(kTriangle + "vn 0 0 1\nvn 0 1 0\nvn 1 0 0\nf 1//1 2//2 3//3\n");
+    const auto file = read(kTriangleText + "vn 0 0 1\nvn 0 1 0\nvn 1 0 0\nf 1//1 2//2 3//3\n");
     EXPECT_TRUE(file->mesh.normals.per_vertex());
     EXPECT_EQ(file->mesh.normals.values.size(), 3u);
 }
 
 TEST(Obj, LabelsLastUntilTheNext) {
     const auto file =
-        read(kTriangle +
+        read(kTriangleText +
              "f 1 2 3\ng a b\nusemtl x\nf 1 2 3\ns 2\nf 1 2 3\ng\nusemtl y\ns off\nf 1 2 3\nusemtl x\nf 1 2 3\n");
     const Mesh& mesh = file->mesh;
     EXPECT_EQ(mesh.groups.names, (std::vector<std::string>{"a b"}));
@@ -49,14 +51,14 @@ TEST(Obj, ColorsMayBePartialOrBytes) {
 }
 
 TEST(Obj, ShortFacesLinesAndPointsAreCounted) {
-    const auto file = read(kTriangle + "f 1 2\nf 1\nf\nl 1 2 3\np 1\nf 1 2 3\ncurv 1 2\n");
+    const auto file = read(kTriangleText + "f 1 2\nf 1\nf\nl 1 2 3\np 1\nf 1 2 3\ncurv 1 2\n");
     EXPECT_EQ(file->mesh.face_count(), 1u);
     ASSERT_EQ(file->warnings.size(), 3u);
     EXPECT_EQ(file->warnings[0].substr(0, 1), "3");
     EXPECT_EQ(file->warnings[1].substr(0, 1), "2");
 }
 
-TEST(Obj, RepeatedCornersStay) { EXPECT_EQ(read(kTriangle + "f 1 1 1\n")->mesh.face_count(), 1u); }
+TEST(Obj, RepeatedCornersStay) { EXPECT_EQ(read(kTriangleText + "f 1 1 1\n")->mesh.face_count(), 1u); }
 
 TEST(Obj, ErrorsNameTheLine) {
     const std::vector<std::pair<std::string, std::string>> cases = {
@@ -67,14 +69,14 @@ TEST(Obj, ErrorsNameTheLine) {
         {"v nan 0 0\n", "finite"},
         {"v 1e400 0 0\n", "finite"},
         {"v 1e39 0 0\n", "finite"},
-        {kTriangle + "f 1 2 4\nf 1 2 3\n", ":4:"},
-        {kTriangle + "f 1 2 0\n", ":4:"},
-        {kTriangle + "f 1 2 -4\n", ":4:"},
-        {kTriangle + "\n\nf 1 2 18446744073709551617\n", ":6:"},
-        {kTriangle + "f 1 2 3.5\n", ":4:"},
-        {kTriangle + "vt 0 0\nf 1/1 2/1 3/2\n", "UV 2"},
-        {kTriangle + "f 1 \\\n2 \\\n9\n", ":6:"},
-        {kTriangle + "\x01\x02 3\n", ":4:"},
+        {kTriangleText + "f 1 2 4\nf 1 2 3\n", ":4:"},
+        {kTriangleText + "f 1 2 0\n", ":4:"},
+        {kTriangleText + "f 1 2 -4\n", ":4:"},
+        {kTriangleText + "\n\nf 1 2 18446744073709551617\n", ":6:"},
+        {kTriangleText + "f 1 2 3.5\n", ":4:"},
+        {kTriangleText + "vt 0 0\nf 1/1 2/1 3/2\n", "UV 2"},
+        {kTriangleText + "f 1 \\\n2 \\\n9\n", ":6:"},
+        {kTriangleText + "\x01\x02 3\n", ":4:"},
     };
     for (const auto& [text, part] : cases) {
         const auto file = read(text);
@@ -94,22 +96,22 @@ TEST(Obj, WeightsOfVerticesAreLeftOutWithAWarning) {
 
 TEST(Obj, NormalsAndUvsThatTheFileLacksAreLeftOut) {
     for (const std::string face : {"f 1//1 2//2 3//3\n", "f 1//7 2//7 3//7\n", "f -3//-3 -2//-2 -1//-1\n"}) {
-        const auto file = read(kTriangle + face);
+        const auto file = read(kTriangleText + face);
         ASSERT_TRUE(file.ok()) << file.error().message;
         EXPECT_TRUE(file->mesh.normals.empty());
         EXPECT_EQ(file->mesh.corners, (std::vector<Index>{0, 1, 2}));
         ASSERT_EQ(file->warnings.size(), 1u);
         EXPECT_EQ(file->warnings[0], "The faces refer to normals, but the file has none; left out.");
     }
-    const auto uvs = read(kTriangle + "vn 0 0 1\nf 1/1/1 2/2/1 3/3/1\n");
+    const auto uvs = read(kTriangleText + "vn 0 0 1\nf 1/1/1 2/2/1 3/3/1\n");
     ASSERT_TRUE(uvs.ok());
     EXPECT_TRUE(uvs->mesh.uvs.empty());
     EXPECT_EQ(uvs->mesh.normals.values.size(), 1u);
     ASSERT_EQ(uvs->warnings.size(), 1u);
     EXPECT_EQ(uvs->warnings[0], "The faces refer to UVs, but the file has none; left out.");
     // where it has some, one that is not there is damage
-    EXPECT_NE(read(kTriangle + "vn 0 0 1\nf 1//1 2//2 3//1\n").error().message.find("normal 2"), std::string::npos);
-    const auto early = read(kTriangle + "f 1//-1 2//-1 3//-1\nvn 0 0 1\n");
+    EXPECT_NE(read(kTriangleText + "vn 0 0 1\nf 1//1 2//2 3//1\n").error().message.find("normal 2"), std::string::npos);
+    const auto early = read(kTriangleText + "f 1//-1 2//-1 3//-1\nvn 0 0 1\n");
     ASSERT_FALSE(early.ok());
     EXPECT_NE(early.error().message.find("cow.obj:4: a corner refers to an element before the first"),
               std::string::npos)
@@ -118,12 +120,14 @@ TEST(Obj, NormalsAndUvsThatTheFileLacksAreLeftOut) {
 
 TEST(Obj, ACtrlZAtTheEndIsLeftOut) {
     for (const std::string end : {"\x1a", "\n\x1a", "\r\n\x1a\r\n", "\n\x1a\x1a\n"}) {
-        const auto file = read(kTriangle + "f 1 2 3" + end);
+        const auto file = read(kTriangleText + "f 1 2 3" + end);
         ASSERT_TRUE(file.ok()) << file.error().message;
         EXPECT_EQ(file->mesh.face_count(), 1u);
         ASSERT_EQ(file->warnings.size(), 1u);
         EXPECT_NE(file->warnings[0].find("Ctrl-Z"), std::string::npos);
     }
-    EXPECT_FALSE(read(kTriangle + "\x1a\nf 1 2 3\n").ok()); // in the middle it is damage
-    EXPECT_TRUE(read(kTriangle + "f 1 2 3\n\n \n")->warnings.empty());
+    EXPECT_FALSE(read(kTriangleText + "\x1a\nf 1 2 3\n").ok()); // in the middle it is damage
+    EXPECT_TRUE(read(kTriangleText + "f 1 2 3\n\n \n")->warnings.empty());
 }
+
+} // namespace obj_test

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+namespace ply_test {
+
 using namespace filigree;
 
 namespace {
@@ -181,3 +183,5 @@ TEST(Ply, AZeroByteInANameDoesNotReachOtherFiles) {
     ASSERT_EQ(file->warnings.size(), 1u);
     EXPECT_NE(file->warnings[0].find("zero byte"), std::string::npos);
 }
+
+} // namespace ply_test

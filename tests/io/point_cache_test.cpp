@@ -7,6 +7,7 @@
 #include "filigree/io/model_file.h"
 #include "filigree/mesh/shapes.h"
 #include "io/sample_meshes.h"
+#include "threads.h"
 
 #include <gtest/gtest.h>
 
@@ -22,8 +23,6 @@ using namespace filigree;
 namespace fs = std::filesystem;
 
 namespace {
-
-const RunContext kContext(1);
 
 /// Frame k of anything: no two numbers alike, and some that only 32 bits hold.
 Vec3f moved(const Vec3f& p, std::size_t frame, std::size_t vertex) {
@@ -78,7 +77,7 @@ protected:
     void refuses(const std::string& file, std::size_t points, ErrorCode code, const std::vector<std::string>& words,
                  const PoseFileOptions& options = {}) const {
         SCOPED_TRACE(file);
-        const auto poses = open_poses(file, points, Vec3d::Zero(), options, kContext);
+        const auto poses = open_poses(file, points, Vec3d::Zero(), options, kOneThread);
         ASSERT_FALSE(poses.ok());
         says(poses.error(), code, words);
     }
@@ -118,11 +117,11 @@ TEST_F(PointCache, Pc2IsWhatItsDescriptionSays) {
                                       positions[1] = Vec3f(4, 5, 6);
                                       return Success{};
                                   }};
-    ASSERT_TRUE(write_animation(animation, path("a.pc2"), kContext).ok());
+    ASSERT_TRUE(write_animation(animation, path("a.pc2"), kOneThread).ok());
     const std::string expected = std::string("POINTCACHE2\0", 12) + little({1, 2}) + floats({0, 1}) + little({2}) +
                                  floats({1, 2, 3, 4, 5, 6, 2, 4, 6, 4, 5, 6});
     EXPECT_TRUE(*read_file(path("a.pc2")) == expected);
-    ASSERT_TRUE(write_animation(animation, path("a.mdd"), kContext).ok());
+    ASSERT_TRUE(write_animation(animation, path("a.mdd"), kOneThread).ok());
     const std::string big =
         turned(little({2, 2}) + floats({0, 1.0f / 60}) + floats({1, 2, 3, 4, 5, 6, 2, 4, 6, 4, 5, 6}));
     EXPECT_TRUE(*read_file(path("a.mdd")) == big);
@@ -132,14 +131,14 @@ TEST_F(PointCache, EveryFormatComesBackToTheBit) {
     constexpr std::size_t kFrames = 12;
     for (const char* name : {"a.pc2", "a.mdd", "folder/", "n_####.ply", "n_%d.obj", "deeper/still/n_##.off"}) {
         SCOPED_TRACE(name);
-        ASSERT_TRUE(write_animation(moving(mesh_, kFrames, 25), path(name), kContext).ok());
-        const auto back = open_animation(path(name), mesh_, {.frames_per_second = 25}, kContext);
+        ASSERT_TRUE(write_animation(moving(mesh_, kFrames, 25), path(name), kOneThread).ok());
+        const auto back = open_animation(path(name), mesh_, {.frames_per_second = 25}, kOneThread);
         ASSERT_TRUE(back.ok()) << back.error().message;
         EXPECT_EQ(back->frames, kFrames);
         EXPECT_EQ(back->frames_per_second, 25);
         for (const std::size_t frame : {11, 0, 5, 5}) // any order, and again
             EXPECT_TRUE(frame_of(*back, frame) == frame_of(moving(mesh_, kFrames), frame));
-        const auto poses = open_poses(path(name), mesh_.vertex_count(), mesh_.origin, {}, kContext);
+        const auto poses = open_poses(path(name), mesh_.vertex_count(), mesh_.origin, {}, kOneThread);
         ASSERT_TRUE(poses.ok());
         const Result<Pose> pose = poses->pose(3);
         ASSERT_TRUE(pose.ok());
@@ -153,15 +152,15 @@ TEST_F(PointCache, EveryFormatComesBackToTheBit) {
 TEST_F(PointCache, RatesAreTheFilesOrTheOptions) {
     const auto rate = [&](const std::string& name, std::optional<double> option) {
         const auto poses =
-            open_poses(path(name), mesh_.vertex_count(), mesh_.origin, {.frames_per_second = option}, kContext);
+            open_poses(path(name), mesh_.vertex_count(), mesh_.origin, {.frames_per_second = option}, kOneThread);
         return poses.ok() ? poses->frames_per_second : -1;
     };
-    ASSERT_TRUE(write_animation(moving(mesh_, 700, 30), path("a.mdd"), kContext).ok());
+    ASSERT_TRUE(write_animation(moving(mesh_, 700, 30), path("a.mdd"), kOneThread).ok());
     EXPECT_EQ(rate("a.mdd", {}), 30); // not 29.99999
     EXPECT_EQ(rate("a.mdd", 24), 24);
-    ASSERT_TRUE(write_animation(moving(mesh_, 40, 23.976), path("b.mdd"), kContext).ok());
+    ASSERT_TRUE(write_animation(moving(mesh_, 40, 23.976), path("b.mdd"), kOneThread).ok());
     EXPECT_NEAR(rate("b.mdd", {}), 23.976, 1e-4);
-    ASSERT_TRUE(write_animation(moving(mesh_, 3, 30), path("a.pc2"), kContext).ok());
+    ASSERT_TRUE(write_animation(moving(mesh_, 3, 30), path("a.pc2"), kOneThread).ok());
     EXPECT_EQ(rate("a.pc2", {}), 60);
     EXPECT_EQ(rate("a.pc2", 24), 24);
     std::string every_other = *read_file(path("a.pc2"));
@@ -179,7 +178,7 @@ TEST_F(PointCache, DamagedPc2IsRefused) {
         return magic + little({version, points}) + floats({start, rate}) + little({frames});
     };
     const std::string frame = floats({1, 2, 3, 4, 5, 6});
-    ASSERT_TRUE(open_poses(put("a.pc2", header(1, 2, -5, 0.5f, 1) + frame), 2, Vec3d::Zero(), {}, kContext).ok());
+    ASSERT_TRUE(open_poses(put("a.pc2", header(1, 2, -5, 0.5f, 1) + frame), 2, Vec3d::Zero(), {}, kOneThread).ok());
     const auto bad = [&](const std::string& bytes, const std::vector<std::string>& words,
                          ErrorCode code = ErrorCode::bad_file) { refuses(put("a.pc2", bytes), 2, code, words); };
     bad("", {"too short"});
@@ -209,7 +208,7 @@ TEST_F(PointCache, DamagedMddIsRefused) {
         refuses(put("a.mdd", turned(bytes)), 2, code, words);
     };
     ASSERT_TRUE(
-        open_poses(put("a.mdd", turned(little({1, 2}) + floats({0}) + frame)), 2, Vec3d::Zero(), {}, kContext).ok());
+        open_poses(put("a.mdd", turned(little({1, 2}) + floats({0}) + frame)), 2, Vec3d::Zero(), {}, kOneThread).ok());
     bad("", {"too short"});
     bad(little({1}), {"too short"});
     bad(little({0, 2}), {"0 frames"});
@@ -223,11 +222,11 @@ TEST_F(PointCache, DamagedMddIsRefused) {
     bad(little({3, 2}) + floats({0, 1, 5}) + frame + frame + frame, {"evenly"}, ErrorCode::unsupported);
     bad(little({2, 2}) + floats({1, 0}) + frame + frame, {"evenly"}, ErrorCode::unsupported);
     const auto forced = open_poses(put("a.mdd", turned(little({2, 2}) + floats({1, 0}) + frame + frame)), 2,
-                                   Vec3d::Zero(), {.frames_per_second = 10}, kContext);
+                                   Vec3d::Zero(), {.frames_per_second = 10}, kOneThread);
     ASSERT_TRUE(forced.ok());
     EXPECT_EQ(forced->frames_per_second, 10);
     const auto unsaid = open_poses(put("a.mdd", turned(little({2, 2}) + floats({0, 0}) + frame + frame)), 2,
-                                   Vec3d::Zero(), {}, kContext);
+                                   Vec3d::Zero(), {}, kOneThread);
     ASSERT_TRUE(unsaid.ok());
     EXPECT_EQ(unsaid->frames_per_second, 60);
 }
@@ -235,7 +234,7 @@ TEST_F(PointCache, DamagedMddIsRefused) {
 TEST_F(PointCache, NumbersThatAreNotFiniteAreFoundWhenTheirFrameIs) {
     const std::string good = floats({1, 2, 3, 4, 5, 6}), bad = floats({1, 2, 3, 4, INFINITY, 6});
     put("a.pc2", std::string("POINTCACHE2\0", 12) + little({1, 2}) + floats({0, 1}) + little({2}) + good + bad);
-    const auto poses = open_poses(path("a.pc2"), 2, Vec3d::Zero(), {}, kContext);
+    const auto poses = open_poses(path("a.pc2"), 2, Vec3d::Zero(), {}, kOneThread);
     ASSERT_TRUE(poses.ok());
     EXPECT_TRUE(poses->pose(0).ok());
     ASSERT_FALSE(poses->pose(1).ok());
@@ -258,18 +257,18 @@ TEST_F(PointCache, OnlyFilesAreOpened) {
 }
 
 TEST_F(PointCache, NumberedMeshesMustBeWhole) {
-    ASSERT_TRUE(write_animation(moving(mesh_, 4), path("n/m_####.ply"), kContext).ok());
+    ASSERT_TRUE(write_animation(moving(mesh_, 4), path("n/m_####.ply"), kOneThread).ok());
     const std::size_t points = mesh_.vertex_count();
-    ASSERT_TRUE(open_poses(path("n"), points, Vec3d::Zero(), {}, kContext).ok());
+    ASSERT_TRUE(open_poses(path("n"), points, Vec3d::Zero(), {}, kOneThread).ok());
     // others in the folder: no mesh, no number, hidden
     put("n/notes_1.txt", "x"), put("n/rest.ply", "x"), put("n/.m_0009.ply", "x"), put("n/m_0009b.ply", "x");
-    EXPECT_EQ(open_poses(path("n"), points, Vec3d::Zero(), {}, kContext)->frames, 4u);
+    EXPECT_EQ(open_poses(path("n"), points, Vec3d::Zero(), {}, kOneThread)->frames, 4u);
 
     refuses(path("n"), points + 1, ErrorCode::mismatch, {"m_0001.ply", "8 vertices", "has 9"});
     put("n/other_0001.ply", "x");
     refuses(path("n"), points, ErrorCode::usage, {"m_####.ply", "other_####.ply", "name one"});
-    EXPECT_TRUE(open_poses(path("n/m_####.ply"), points, Vec3d::Zero(), {}, kContext).ok());
-    EXPECT_TRUE(open_poses(path("n/m_%04d.ply"), points, Vec3d::Zero(), {}, kContext).ok());
+    EXPECT_TRUE(open_poses(path("n/m_####.ply"), points, Vec3d::Zero(), {}, kOneThread).ok());
+    EXPECT_TRUE(open_poses(path("n/m_%04d.ply"), points, Vec3d::Zero(), {}, kOneThread).ok());
     refuses(path("n/x_####.ply"), points, ErrorCode::not_found, {"x_0001.ply"});
     refuses(path("missing/"), points, ErrorCode::not_found, {"missing"});
     put("n/m_3.ply", "x");
@@ -291,8 +290,8 @@ TEST_F(PointCache, NumberedPlyGivesGradients) {
         if (frame != 2) add_gradients(moved, pose);
         return moved;
     };
-    ASSERT_TRUE(write_numbered_meshes(3, with_gradients, path("g/"), kContext).ok());
-    const auto poses = open_poses(path("g"), mesh.vertex_count(), Vec3d::Zero(), {}, kContext);
+    ASSERT_TRUE(write_numbered_meshes(3, with_gradients, path("g/"), kOneThread).ok());
+    const auto poses = open_poses(path("g"), mesh.vertex_count(), Vec3d::Zero(), {}, kOneThread);
     ASSERT_TRUE(poses.ok());
     EXPECT_TRUE(poses->pose(1)->gradients == pose.gradients);
     says(poses->pose(2).error(), ErrorCode::mismatch, {"g_0003.ply", "no gradients"});
@@ -308,19 +307,19 @@ TEST_F(PointCache, NumberedMeshesOfOneFolderComeTogetherOrNotAtAll) {
     };
     const std::vector<NumberedMeshes> parts = {{{path("both"), "a#1_", ".ply"}, frame_of},
                                                {{path("both"), "b_", ".ply"}, frame_of}};
-    ASSERT_TRUE(write_numbered_meshes(3, parts, kContext).ok());
+    ASSERT_TRUE(write_numbered_meshes(3, parts, kOneThread).ok());
     EXPECT_TRUE(fs::exists(path("both/a#1_0003.ply"))); // the name is known: no '#' stands for a number
     EXPECT_TRUE(fs::exists(path("both/b_0003.ply")));
     const std::string before = read_file(path("both/a#1_0002.ply")).value();
     broken = 2;
-    says(write_numbered_meshes(3, parts, kContext).error(), ErrorCode::unsuitable, {"a#1_0003.ply"});
+    says(write_numbered_meshes(3, parts, kOneThread).error(), ErrorCode::unsuitable, {"a#1_0003.ply"});
     EXPECT_EQ(read_file(path("both/a#1_0002.ply")).value(), before);
 }
 
 TEST_F(PointCache, NumberedMeshesKeepAttributes) {
     const Mesh rest = filigree_test::make_corner_attribute_mesh();
-    ASSERT_TRUE(write_animation(moving(rest, 2), path("n_####.obj"), kContext).ok());
-    const Result<MeshFile> second = read_mesh(path("n_0002.obj"), kContext);
+    ASSERT_TRUE(write_animation(moving(rest, 2), path("n_####.obj"), kOneThread).ok());
+    const Result<MeshFile> second = read_mesh(path("n_0002.obj"), kOneThread);
     ASSERT_TRUE(second.ok());
     EXPECT_TRUE(second->mesh.uvs.corners == rest.uvs.corners);
     EXPECT_EQ(second->mesh.materials.names.size(), 2u);
@@ -329,17 +328,17 @@ TEST_F(PointCache, NumberedMeshesKeepAttributes) {
 }
 
 TEST_F(PointCache, ModelsPosesAreAnAnimationToo) {
-    const Model model = strip(make_wavy_plane({.resolution = 6}), {.base = 9}, kContext).value().model;
+    const Model model = strip(make_wavy_plane({.resolution = 6}), {.base = 9}, kOneThread).value().model;
     PoseSequence poses{24, {}};
     poses.frames.resize(2);
     for (Pose& pose : poses.frames) {
         pose.positions = driver_positions(model);
         pose.gradients.assign(pose.positions.size(), Mat3f::Identity());
     }
-    ASSERT_TRUE(write_model(model, poses, path("m.fil"), kContext).ok());
-    ASSERT_TRUE(write_model(model, path("still.fil"), kContext).ok());
+    ASSERT_TRUE(write_model(model, poses, path("m.fil"), kOneThread).ok());
+    ASSERT_TRUE(write_model(model, path("still.fil"), kOneThread).ok());
     const std::size_t points = poses.frames[0].positions.size();
-    const auto stream = open_poses(path("m.fil"), points, Vec3d::Zero(), {}, kContext);
+    const auto stream = open_poses(path("m.fil"), points, Vec3d::Zero(), {}, kOneThread);
     ASSERT_TRUE(stream.ok());
     EXPECT_EQ(stream->frames_per_second, 24);
     EXPECT_EQ(stream->frames, 2u);
@@ -356,14 +355,14 @@ TEST_F(PointCache, FilesAreInTheWorld) {
                                   std::copy(rest.positions.begin(), rest.positions.end(), positions.begin());
                                   return Success{};
                               }};
-    EXPECT_TRUE(write_animation(still, path("a.pc2"), kContext)->empty());
+    EXPECT_TRUE(write_animation(still, path("a.pc2"), kOneThread)->empty());
     float x = 0;
     std::memcpy(&x, read_file(path("a.pc2"))->data() + 32, 4);
     EXPECT_EQ(x, 1000 + rest.positions[0].x());
-    EXPECT_TRUE(frame_of(*open_animation(path("a.pc2"), rest, {}, kContext), 0) == rest.positions);
+    EXPECT_TRUE(frame_of(*open_animation(path("a.pc2"), rest, {}, kOneThread), 0) == rest.positions);
     rest.origin = {4e6, 0, 0};
     rest.positions[3].x() = 0.1f;
-    const auto warnings = write_animation(still, path("a.pc2"), kContext);
+    const auto warnings = write_animation(still, path("a.pc2"), kOneThread);
     ASSERT_EQ(warnings->size(), 1u);
     EXPECT_NE((*warnings)[0].find("far from the world's origin"), std::string::npos);
 }
@@ -371,10 +370,10 @@ TEST_F(PointCache, FilesAreInTheWorld) {
 TEST_F(PointCache, WhatFailsLeavesNothing) {
     for (const char* name : {"a.pc2", "a.mdd", "a.usda", "n_####.ply", "folder/", "new/er/n_####.ply"}) {
         SCOPED_TRACE(name);
-        const auto nan = write_animation(moving(mesh_, 4, 60, 2), path(name), kContext);
+        const auto nan = write_animation(moving(mesh_, 4, 60, 2), path(name), kOneThread);
         ASSERT_FALSE(nan.ok());
         says(nan.error(), ErrorCode::unsuitable, {"not written"});
-        EXPECT_FALSE(write_animation(moving(mesh_, 0), path(name), kContext).ok());
+        EXPECT_FALSE(write_animation(moving(mesh_, 0), path(name), kOneThread).ok());
         const RunContext cancelled(1);
         MeshAnimation stops = moving(mesh_, 4);
         stops.positions = [&, inner = stops.positions](std::size_t frame, std::span<Vec3f> positions) {
@@ -389,18 +388,18 @@ TEST_F(PointCache, WhatFailsLeavesNothing) {
     }
     // and what was there stays
     put("a.pc2", "old");
-    EXPECT_FALSE(write_animation(moving(mesh_, 4, 60, 2), path("a.pc2"), kContext).ok());
+    EXPECT_FALSE(write_animation(moving(mesh_, 4, 60, 2), path("a.pc2"), kOneThread).ok());
     EXPECT_EQ(*read_file(path("a.pc2")), "old");
     put("n_0001.ply", "old");
-    EXPECT_FALSE(write_animation(moving(mesh_, 4, 60, 2), path("n_####.ply"), kContext).ok());
+    EXPECT_FALSE(write_animation(moving(mesh_, 4, 60, 2), path("n_####.ply"), kOneThread).ok());
     EXPECT_EQ(*read_file(path("n_0001.ply")), "old");
-    EXPECT_FALSE(write_animation(moving(mesh_, 1), path("missing/a.pc2"), kContext).ok());
+    EXPECT_FALSE(write_animation(moving(mesh_, 1), path("missing/a.pc2"), kOneThread).ok());
     EXPECT_EQ(files(), 2u);
 }
 
 TEST_F(PointCache, PipesInASequenceAreRefused) {
-    ASSERT_TRUE(write_animation(moving(mesh_, 3), path("n/m_####.ply"), kContext).ok());
-    const auto poses = open_poses(path("n"), mesh_.vertex_count(), Vec3d::Zero(), {}, kContext);
+    ASSERT_TRUE(write_animation(moving(mesh_, 3), path("n/m_####.ply"), kOneThread).ok());
+    const auto poses = open_poses(path("n"), mesh_.vertex_count(), Vec3d::Zero(), {}, kOneThread);
     ASSERT_TRUE(poses.ok());
     fs::remove(path("n/m_0002.ply"));
     ASSERT_EQ(::mkfifo(path("n/m_0002.ply").c_str(), 0600), 0);
@@ -414,7 +413,7 @@ TEST_F(PointCache, NumberedMeshesReplaceFilesAllOrNone) {
     put("n_0001.ply", "old"), put("n_0002.ply", "old");
     fs::permissions(path("n_0001.ply"), fs::perms(0640));
     const auto refused = [&](const std::vector<std::string>& words) {
-        const auto written = write_animation(moving(mesh_, 3), path("n_####.ply"), kContext);
+        const auto written = write_animation(moving(mesh_, 3), path("n_####.ply"), kOneThread);
         ASSERT_FALSE(written.ok());
         says(written.error(), ErrorCode::unwritable, words);
         EXPECT_EQ(*read_file(path("n_0001.ply")), "old");
@@ -433,11 +432,11 @@ TEST_F(PointCache, NumberedMeshesReplaceFilesAllOrNone) {
         if (frame == 2) fs::remove(path("n_0002.ply")), fs::create_directory(path("n_0002.ply"));
         return inner(frame, positions);
     };
-    EXPECT_FALSE(write_animation(late, path("n_####.ply"), kContext).ok());
+    EXPECT_FALSE(write_animation(late, path("n_####.ply"), kOneThread).ok());
     EXPECT_EQ(*read_file(path("n_0001.ply")), "old");
     EXPECT_EQ(files(), 2u);
     fs::remove(path("n_0002.ply"));
-    ASSERT_TRUE(write_animation(moving(mesh_, 3), path("n_####.ply"), kContext).ok());
+    ASSERT_TRUE(write_animation(moving(mesh_, 3), path("n_####.ply"), kOneThread).ok());
     EXPECT_EQ(fs::status(path("n_0001.ply")).permissions(), fs::perms(0640));
     EXPECT_EQ(files(), 3u);
 }
@@ -446,8 +445,8 @@ TEST_F(PointCache, ManyTimesOfAnMddAreWrittenInPieces) {
     constexpr std::size_t kFrames = 40'000; // more than a piece holds
     Mesh rest;
     rest.positions = {{1, 2, 3}};
-    ASSERT_TRUE(write_animation(moving(rest, kFrames, 50), path("a.mdd"), kContext).ok());
-    const auto back = open_animation(path("a.mdd"), rest, {}, kContext);
+    ASSERT_TRUE(write_animation(moving(rest, kFrames, 50), path("a.mdd"), kOneThread).ok());
+    const auto back = open_animation(path("a.mdd"), rest, {}, kOneThread);
     ASSERT_TRUE(back.ok()) << back.error().message;
     EXPECT_EQ(back->frames, kFrames);
     EXPECT_EQ(back->frames_per_second, 50);
@@ -455,29 +454,29 @@ TEST_F(PointCache, ManyTimesOfAnMddAreWrittenInPieces) {
 }
 
 TEST_F(PointCache, LongerSequencesFromBeforeAreTold) {
-    ASSERT_TRUE(write_animation(moving(mesh_, 5), path("n_####.ply"), kContext)->size() <= 1);
-    const auto warnings = write_animation(moving(mesh_, 2), path("n_####.ply"), kContext);
+    ASSERT_TRUE(write_animation(moving(mesh_, 5), path("n_####.ply"), kOneThread)->size() <= 1);
+    const auto warnings = write_animation(moving(mesh_, 2), path("n_####.ply"), kOneThread);
     ASSERT_TRUE(warnings.ok());
     ASSERT_FALSE(warnings->empty());
     EXPECT_NE(warnings->back().find("3 more of n_####.ply"), std::string::npos) << warnings->back();
 }
 
 TEST_F(PointCache, ASequenceHalfInItsPlacesIsNotReadUntilItIsWrittenAgain) {
-    ASSERT_TRUE(write_animation(moving(mesh_, 4), path("n/m_####.ply"), kContext).ok());
-    ASSERT_TRUE(write_animation(moving(mesh_, 4), path("n/other_####.ply"), kContext).ok());
+    ASSERT_TRUE(write_animation(moving(mesh_, 4), path("n/m_####.ply"), kOneThread).ok());
+    ASSERT_TRUE(write_animation(moving(mesh_, 4), path("n/other_####.ply"), kOneThread).ok());
     const std::string old = *read_file(path("n/m_0003.ply"));
     // a writer that was killed when frames 3 and 4 were still to come
     const fs::path batch = path("n/.filigree-0123456789abcdef-placing");
     fs::create_directories(batch / "new");
     for (const char* name : {"m_0003.ply", "m_0004.ply"}) ASSERT_TRUE(write_file(batch / "new" / name, "new").ok());
-    const auto half = open_poses(path("n/m_####.ply"), mesh_.vertex_count(), Vec3d::Zero(), {}, kContext);
+    const auto half = open_poses(path("n/m_####.ply"), mesh_.vertex_count(), Vec3d::Zero(), {}, kOneThread);
     ASSERT_FALSE(half.ok());
     says(half.error(), ErrorCode::bad_file, {"m_0001.ply", "2 files", "write the sequence again", batch.string()});
-    EXPECT_TRUE(open_poses(path("n/other_####.ply"), mesh_.vertex_count(), Vec3d::Zero(), {}, kContext).ok());
+    EXPECT_TRUE(open_poses(path("n/other_####.ply"), mesh_.vertex_count(), Vec3d::Zero(), {}, kOneThread).ok());
     EXPECT_EQ(*read_file(path("n/m_0003.ply")), old);
     ASSERT_TRUE(write_file(batch / "lock", "").ok()); // as the writer made it
-    ASSERT_TRUE(write_animation(moving(mesh_, 4), path("n/m_####.ply"), kContext).ok());
-    EXPECT_TRUE(open_poses(path("n/m_####.ply"), mesh_.vertex_count(), Vec3d::Zero(), {}, kContext).ok());
+    ASSERT_TRUE(write_animation(moving(mesh_, 4), path("n/m_####.ply"), kOneThread).ok());
+    EXPECT_TRUE(open_poses(path("n/m_####.ply"), mesh_.vertex_count(), Vec3d::Zero(), {}, kOneThread).ok());
     EXPECT_FALSE(fs::exists(batch));
 }
 
@@ -487,7 +486,7 @@ TEST_F(PointCache, SequencesOfManyThreadsDoNotDisturbEachOther) {
     for (const char* name : {"n/a_####.ply", "n/b_####.ply", "n/c_####.ply", "n/d_####.ply"})
         threads.emplace_back([&, name] {
             for (int round = 0; round < 4; ++round)
-                if (!write_animation(moving(mesh_, 6), path(name), kContext).ok()) ++failures;
+                if (!write_animation(moving(mesh_, 6), path(name), kOneThread).ok()) ++failures;
         });
     for (std::thread& thread : threads) thread.join();
     EXPECT_EQ(failures, 0);

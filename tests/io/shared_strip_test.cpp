@@ -4,6 +4,7 @@
 #include "filigree/io/file.h"
 #include "filigree/io/model_file.h"
 #include "filigree/mesh/shapes.h"
+#include "threads.h"
 
 #include <algorithm>
 #include <array>
@@ -18,14 +19,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const RunContext kContext(2);
-
-/// Some 384,000 vertices: 6 clusters, then 1.
+/// Some 97,000 vertices: 6 clusters, then 1.
 const Mesh& cube() {
-    static const Mesh mesh = make_wavy_cube({.resolution = 253});
+    static const Mesh mesh = make_wavy_cube({.resolution = 127});
     return mesh;
 }
-constexpr StripOptions kClusters{.base = 1000, .one_piece = 30'000};
+constexpr StripOptions kClusters{.base = 1000, .one_piece = 7'500};
 
 /// Adds a mesh behind another.
 void append(Mesh& mesh, const Mesh& other, float scale, const Vec3f& shift) {
@@ -47,7 +46,7 @@ protected:
     ~SharedStrips() override { fs::remove_all(root_); }
 
     static SharedStripReport ok(const SharedStrip& strip, std::size_t number, std::size_t count,
-                                const RunContext& context = kContext) {
+                                const RunContext& context = kTwoThreads) {
         const Result<SharedStripReport> report =
             strip_in_chunks(strip, {.number = number, .count = count, .job = "job"}, context);
         EXPECT_TRUE(report.ok()) << (report.ok() ? "" : report.error().message);
@@ -57,14 +56,14 @@ protected:
         return {.path = root_ / "model.fil",
                 .options = options,
                 .read = [&mesh]() -> Result<Mesh> { return mesh; },
-                .bound_together = 30'000};
+                .bound_together = 7'500};
     }
     std::string bytes() const {
         const Result<std::string> file = read_file(root_ / "model.fil");
         return file ? *file : "";
     }
     static std::string serial(const Mesh& mesh, const StripOptions& options) {
-        return write_model(strip(mesh, options, kContext).value().model);
+        return write_model(strip(mesh, options, kTwoThreads).value().model);
     }
     bool is_tidy() const {
         return std::distance(fs::directory_iterator(root_), fs::directory_iterator()) == 2;
@@ -97,8 +96,8 @@ TEST_F(SharedStrips, AnyNumberOfProcessesInAnyOrderGiveTheBytesOfOne) {
         EXPECT_TRUE(is_tidy());
         std::size_t made = 0;
         for (const SharedStripReport& report : reports) made += report.made;
-        // 6 and 1 clusters, 13 parts that are bound, mesh, 2 cuts and joins, finish, model: none twice
-        EXPECT_EQ(made, 27u);
+        // 6 and 1 clusters, 9 parts that are bound, mesh, 2 cuts and joins, finish, model: none twice
+        EXPECT_EQ(made, 23u);
         EXPECT_EQ(ok(strip, 1, count).tasks, 0u) << "it is finished";
         fs::remove_all(root_);
         fs::create_directory(root_);
@@ -132,13 +131,13 @@ TEST_F(SharedStrips, EverySettingIsTheSame) {
     expect_same(cube(), options);
 }
 
-TEST_F(SharedStrips, ByLevels) { expect_same(cube(), {.levels = 2, .one_piece = 200'000}); }
+TEST_F(SharedStrips, ByLevels) { expect_same(cube(), {.levels = 2, .one_piece = 50'000}); }
 
 /// The error is used up while there are clusters.
 TEST_F(SharedStrips, ByErrorInClusters) {
     expect_same(make_wavy_cube({.resolution = 90}), {.error = 1e-6, .one_piece = 1'000});
 }
-TEST_F(SharedStrips, ByError) { expect_same(cube(), {.error = 5e-3, .one_piece = 30'000}); }
+TEST_F(SharedStrips, ByError) { expect_same(cube(), {.error = 5e-3, .one_piece = 7'500}); }
 
 TEST_F(SharedStrips, InOnePiece) { expect_same(make_wavy_sphere({.resolution = 60}), {}); }
 TEST_F(SharedStrips, WithLongestEdges) { expect_same(make_wavy_sphere({.resolution = 60}), {.max_edge = 0.1}); }
@@ -201,23 +200,23 @@ TEST_F(SharedStrips, WhatIsWrongIsSaid) {
     const Mesh ball = make_wavy_sphere({.resolution = 20}), none;
     SharedStrip strip = strip_of(ball, {.code = DetailCode::reference});
     const WorkChunk chunk{.number = 1, .count = 2, .job = "job"};
-    EXPECT_EQ(strip_in_chunks(strip, chunk, kContext).error().code, ErrorCode::usage);
+    EXPECT_EQ(strip_in_chunks(strip, chunk, kTwoThreads).error().code, ErrorCode::usage);
     strip.options = {};
-    EXPECT_EQ(strip_in_chunks(strip, {.number = 3, .count = 2, .job = ""}, kContext).error().code, ErrorCode::usage);
-    EXPECT_EQ(strip_in_chunks(strip_of(none, {}), chunk, kContext).error().code, ErrorCode::unsuitable);
+    EXPECT_EQ(strip_in_chunks(strip, {.number = 3, .count = 2, .job = ""}, kTwoThreads).error().code, ErrorCode::usage);
+    EXPECT_EQ(strip_in_chunks(strip_of(none, {}), chunk, kTwoThreads).error().code, ErrorCode::unsuitable);
     fs::remove_all(root_ / "model.fil.chunks");
     // Another mesh under the same name, half way.
     std::size_t calls = 0;
     strip.read = [&]() -> Result<Mesh> { return calls++ == 0 ? ball : make_wavy_sphere({.resolution = 21}); };
-    const Result<SharedStripReport> changed = strip_in_chunks(strip, chunk, kContext);
+    const Result<SharedStripReport> changed = strip_in_chunks(strip, chunk, kTwoThreads);
     ASSERT_FALSE(changed);
     EXPECT_EQ(changed.error().code, ErrorCode::mismatch);
     EXPECT_NE(changed.error().message.find("has changed"), std::string::npos);
-    EXPECT_EQ(strip_in_chunks(strip, {.number = 1, .count = 2, .job = "other"}, kContext).error().code,
+    EXPECT_EQ(strip_in_chunks(strip, {.number = 1, .count = 2, .job = "other"}, kTwoThreads).error().code,
               ErrorCode::mismatch);
     strip.read = [] { return Result<Mesh>(Error{ErrorCode::not_found, "gone"}); };
     fs::remove_all(root_ / "model.fil.chunks");
-    EXPECT_EQ(strip_in_chunks(strip, chunk, kContext).error().message, "gone");
+    EXPECT_EQ(strip_in_chunks(strip, chunk, kTwoThreads).error().message, "gone");
 }
 
 } // namespace

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+namespace stl_test {
+
 using namespace filigree;
 
 namespace {
@@ -63,3 +65,5 @@ TEST(Stl, ErrorsNameThePlace) {
         EXPECT_NE(file.error().message.find(part), std::string::npos) << file.error().message << " for " << part;
     }
 }
+
+} // namespace stl_test

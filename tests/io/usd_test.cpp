@@ -2,6 +2,7 @@
 #include "filigree/io/file.h"
 #include "filigree/io/point_cache.h"
 #include "filigree/mesh/shapes.h"
+#include "threads.h"
 
 #include <cstdlib>
 #include <filesystem>
@@ -9,8 +10,6 @@
 
 namespace filigree {
 namespace {
-
-const RunContext kContext;
 
 /// The numbers of the first "[...]" after `label`, whatever brackets and commas stand between them.
 std::vector<float> numbers_after(const std::string& text, const std::string& label) {
@@ -59,7 +58,7 @@ TEST(Usd, HoldsEveryFrameToTheBit) {
                                       return Success{};
                                   }};
     const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / "filigree_usd_test.usda";
-    ASSERT_TRUE(write_animation(animation, path, kContext).ok());
+    ASSERT_TRUE(write_animation(animation, path, kAllThreads).ok());
     const std::string text = read_file(path).value();
     std::filesystem::remove(path);
 
@@ -102,7 +101,7 @@ TEST(Usd, FacesMayChangeInTime) {
     };
     const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / "filigree_usd_moments.usda";
     std::vector<std::string> warnings;
-    ASSERT_TRUE(write_usda_moments(2, 24, moment, path, warnings, kContext).ok());
+    ASSERT_TRUE(write_usda_moments(2, 24, moment, path, warnings, kAllThreads).ok());
     const std::string text = read_file(path).value();
     EXPECT_EQ(std::count(text.begin(), text.end(), '{'), std::count(text.begin(), text.end(), '}'));
     const auto sample = [&](const std::string& attribute, std::size_t frame) {
@@ -122,7 +121,7 @@ TEST(Usd, FacesMayChangeInTime) {
 
     // Whole or not at all, and nothing beside it.
     const auto fails = [&](std::size_t frames, const std::function<Result<MeshMoment>(std::size_t)>& given) {
-        return write_usda_moments(frames, 24, given, path, warnings, kContext).error().code;
+        return write_usda_moments(frames, 24, given, path, warnings, kAllThreads).error().code;
     };
     EXPECT_EQ(fails(0, moment), ErrorCode::unsuitable);
     EXPECT_EQ(fails(3,

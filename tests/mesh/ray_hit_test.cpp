@@ -3,6 +3,7 @@
 #include "filigree/mesh/shapes.h"
 #include "filigree/mesh/triangulate.h"
 #include "filigree/mesh/vertex_cache.h"
+#include "threads.h"
 
 #include <gtest/gtest.h>
 
@@ -13,8 +14,6 @@
 using namespace filigree;
 
 namespace {
-
-const RunContext kOneThread(1);
 
 std::optional<RayHit> hit(const std::vector<Vec3f>& positions, const std::vector<Triangle>& triangles,
                           const Vec3d& origin, const Vec3d& direction) {

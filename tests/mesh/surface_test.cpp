@@ -1,12 +1,11 @@
 // What algorithms see of a mesh: welded, triangles alone, none that repeats a vertex.
 #include "filigree/mesh/surface.h"
+#include "threads.h"
 
 #include <gtest/gtest.h>
 
 namespace filigree {
 namespace {
-
-const RunContext kOneThread(1);
 
 /// Two quads side by side that share no vertex; a triangle with two corners at one place; one that begins at -0, 0, 0.
 /// Vertex 9 is in no face.

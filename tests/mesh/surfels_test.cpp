@@ -3,14 +3,13 @@
 #include "filigree/mesh/normals.h"
 #include "filigree/mesh/shapes.h"
 #include "filigree/mesh/triangulate.h"
+#include "threads.h"
 
 #include <gtest/gtest.h>
 #include <random>
 
 namespace filigree {
 namespace {
-
-const RunContext kOneThread(1);
 
 Mesh scaled(Mesh mesh, const Mat3f& by) {
     for (Vec3f& p : mesh.positions) p = by * p;

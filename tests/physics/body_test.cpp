@@ -13,8 +13,6 @@
 namespace filigree {
 namespace {
 
-const RunContext kContext;
-
 Material of(MaterialModel model, double density = 1000) {
     Material material;
     material.model = model;
@@ -56,7 +54,7 @@ TEST(Body, ASphereHasItsMassAndSurface) {
     const Mesh sphere = make_wavy_sphere({.resolution = 40, .amplitude = 0});
     for (const MaterialModel model : {MaterialModel::fem, MaterialModel::meshfree}) {
         BodyReport report;
-        const auto body = make_body(sphere, of(model), {.scale = 2, .cells = {.count = 8000}}, kContext, &report);
+        const auto body = make_body(sphere, of(model), {.scale = 2, .cells = {.count = 8000}}, kAllThreads, &report);
         ASSERT_TRUE(body) << body.error().message;
         EXPECT_NEAR(double(body->particle_count()) / 8000, 1, 0.16);
         EXPECT_NEAR(sum(body->mass) / (1000 * pi / 6 * 8), 1, 0.015);
@@ -77,7 +75,7 @@ TEST(Body, ASphereHasItsMassAndSurface) {
 
 TEST(Body, TheSurfaceOfABoxHasItsEdgesAndCorners) {
     const Mesh bar = make_bar({.resolution = 4, .size = 0.2, .length = 2});
-    const auto body = make_body(bar, of(MaterialModel::fem), {.cells = {.spacing = 0.05}}, kContext);
+    const auto body = make_body(bar, of(MaterialModel::fem), {.cells = {.spacing = 0.05}}, kAllThreads);
     ASSERT_TRUE(body) << body.error().message;
     int corners = 0;
     for (const Vec3f& point : body->surface.points.rest)
@@ -89,7 +87,7 @@ TEST(Body, TheSurfaceOfABoxHasItsEdgesAndCorners) {
 TEST(Body, SurfacePointsFollowTheParticles) {
     const Mesh cube = make_wavy_cube({.resolution = 24});
     for (const MaterialModel model : {MaterialModel::fem, MaterialModel::meshfree}) {
-        const auto body = make_body(cube, of(model), {.cells = {.count = 2000}}, kContext);
+        const auto body = make_body(cube, of(model), {.cells = {.count = 2000}}, kAllThreads);
         ASSERT_TRUE(body) << body.error().message;
         const Embedding& points = body->surface.points;
         for (std::size_t p = 0; p < points.size(); ++p) {
@@ -108,8 +106,8 @@ TEST(Body, SurfacePointsFollowTheParticles) {
 TEST(Body, KoalaHasItsMassAndSurface) {
     const auto path = filigree_test::corpus_folder() / "good/koala_100k.obj";
     if (!std::filesystem::exists(path)) GTEST_SKIP() << "no corpus";
-    const Mesh koala = read_mesh(path, kContext)->mesh;
-    const WeldedTriangles welded = weld_triangles(koala, kContext).value();
+    const Mesh koala = read_mesh(path, kAllThreads)->mesh;
+    const WeldedTriangles welded = weld_triangles(koala, kAllThreads).value();
     double volume = 0, area = 0;
     for (const Triangle& t : welded.triangles) {
         const Vec3d a = koala.positions[t[0]].cast<double>(), b = koala.positions[t[1]].cast<double>(),
@@ -117,10 +115,10 @@ TEST(Body, KoalaHasItsMassAndSurface) {
         volume += a.dot(b.cross(c)) / 6;
         area += (b - a).cross(c - a).norm() / 2;
     }
-    const auto fine = make_body(koala, of(MaterialModel::fem), {.cells = {.count = 20000}}, kContext);
+    const auto fine = make_body(koala, of(MaterialModel::fem), {.cells = {.count = 20000}}, kAllThreads);
     ASSERT_TRUE(fine) << fine.error().message;
     EXPECT_NEAR(sum(fine->mass) / (1000 * volume), 1, 0.01);
-    const auto body = make_body(koala, of(MaterialModel::meshfree), {}, kContext);
+    const auto body = make_body(koala, of(MaterialModel::meshfree), {}, kAllThreads);
     ASSERT_TRUE(body) << body.error().message;
     EXPECT_NEAR(sum(body->mass) / (1000 * volume), 1, 0.01);
     EXPECT_NEAR(sum(body->surface.areas) / area, 1, 0.001);
@@ -155,7 +153,7 @@ TEST(Body, ThreadsDoNotMatter) {
 TEST(Body, ThinPartsAreSaid) {
     const Mesh plate = make_wavy_plane({.resolution = 8, .amplitude = 0});
     BodyReport report;
-    const auto body = make_body(plate, of(MaterialModel::meshfree), {.cells = {.spacing = 0.1}}, kContext, &report);
+    const auto body = make_body(plate, of(MaterialModel::meshfree), {.cells = {.spacing = 0.1}}, kAllThreads, &report);
     ASSERT_TRUE(body) << body.error().message;
     EXPECT_EQ(report.split_cells, 100u);
     EXPECT_EQ(body->particle_count(), 800u);
@@ -169,10 +167,10 @@ TEST(Body, PartsOneCellThickAreNoSheets) {
 
 TEST(Body, BadMaterialsAndScalesAreRefused) {
     const Mesh cube = make_wavy_cube({.resolution = 4});
-    EXPECT_EQ(make_body(cube, of(MaterialModel::fem, -1), {}, kContext).error().code, ErrorCode::usage);
-    EXPECT_EQ(make_body(cube, {}, {.scale = 0, .cells = {}}, kContext).error().code, ErrorCode::usage);
-    EXPECT_EQ(make_body(cube, {}, {.cells = {.spacing = -1}}, kContext).error().code, ErrorCode::usage);
-    EXPECT_EQ(make_body(Mesh{}, {}, {}, kContext).error().code, ErrorCode::unsuitable);
+    EXPECT_EQ(make_body(cube, of(MaterialModel::fem, -1), {}, kAllThreads).error().code, ErrorCode::usage);
+    EXPECT_EQ(make_body(cube, {}, {.scale = 0, .cells = {}}, kAllThreads).error().code, ErrorCode::usage);
+    EXPECT_EQ(make_body(cube, {}, {.cells = {.spacing = -1}}, kAllThreads).error().code, ErrorCode::usage);
+    EXPECT_EQ(make_body(Mesh{}, {}, {}, kAllThreads).error().code, ErrorCode::unsuitable);
 }
 
 } // namespace

@@ -2,6 +2,7 @@
 #include "filigree/physics/body.h"
 #include "filigree/physics/cell_kernel.h"
 #include "filigree/physics/vertex_block.h"
+#include "threads.h"
 
 #include <Eigen/Eigenvalues>
 #include <gtest/gtest.h>
@@ -12,8 +13,6 @@
 
 namespace filigree {
 namespace {
-
-const RunContext kContext(1);
 
 using Lattice = std::vector<Cells::LatticeIndex>;
 
@@ -151,7 +150,7 @@ Eigen::Matrix3Xd matrix(const Vectors& v) {
 
 Vectors forces_of(const Body& body, const Vectors& positions, ElasticReport* report = nullptr) {
     Vectors forces(positions.size());
-    const ElasticReport found = make_cell_elasticity(body, kContext)->forces(positions, forces, kContext);
+    const ElasticReport found = make_cell_elasticity(body, kOneThread)->forces(positions, forces, kOneThread);
     if (report) *report = found;
     return forces;
 }
@@ -163,7 +162,7 @@ TEST(CellElasticity, EnergyAndForcesAreThoseOfThePlainFormulas) {
             Eigen::Matrix3Xd gradient;
             const double energy = plain_energy(body, matrix(x), gradient);
             const double largest = gradient.cwiseAbs().maxCoeff();
-            EXPECT_NEAR(make_cell_elasticity(body, kContext)->energy(x, kContext), energy, 1e-6 * std::abs(energy))
+            EXPECT_NEAR(make_cell_elasticity(body, kOneThread)->energy(x, kOneThread), energy, 1e-6 * std::abs(energy))
                 << state.name;
             EXPECT_LT((matrix(forces_of(body, x)) + gradient).cwiseAbs().maxCoeff(), 1e-5 * largest) << state.name;
         }
@@ -172,7 +171,7 @@ TEST(CellElasticity, EnergyAndForcesAreThoseOfThePlainFormulas) {
 TEST(CellElasticity, ForcesAreMinusTheDerivativeOfTheEnergy) {
     for (const Body& body : bodies())
         for (const State& state : states()) {
-            const auto elasticity = make_cell_elasticity(body, kContext);
+            const auto elasticity = make_cell_elasticity(body, kOneThread);
             const float h = float(body.spacing());
             Vectors x = shaken(mapped(body.rest, state.map), state.shake * h);
             const Eigen::Matrix3Xd forces = matrix(forces_of(body, x));
@@ -181,9 +180,9 @@ TEST(CellElasticity, ForcesAreMinusTheDerivativeOfTheEnergy) {
                     float& p = (axis == 0 ? x.x : axis == 1 ? x.y : x.z)[corner];
                     const float middle = p, step = 2e-3f * h;
                     p = middle + step;
-                    const double after = elasticity->energy(x, kContext), high = p;
+                    const double after = elasticity->energy(x, kOneThread), high = p;
                     p = middle - step;
-                    const double before = elasticity->energy(x, kContext), low = p;
+                    const double before = elasticity->energy(x, kOneThread), low = p;
                     p = middle;
                     EXPECT_NEAR(forces(axis, corner), -(after - before) / (high - low),
                                 1e-4 * forces.cwiseAbs().maxCoeff())
@@ -221,7 +220,7 @@ TEST(CellElasticity, ARigidMotionCostsNothing) {
         EXPECT_LT(matrix(forces_of(body, x, &report)).cwiseAbs().maxCoeff(), 2e-5 * unit); // an ulp of 3 m is 2e-7
         EXPECT_NEAR(report.least_volume_ratio, 1, 2e-5);
         EXPECT_NEAR(report.most_stretch, 1, 2e-5);
-        EXPECT_NEAR(make_cell_elasticity(body, kContext)->energy(body.rest, kContext), 0, 1e-9 * unit);
+        EXPECT_NEAR(make_cell_elasticity(body, kOneThread)->energy(body.rest, kOneThread), 0, 1e-9 * unit);
     }
 }
 
@@ -308,12 +307,12 @@ TEST(CellElasticity, RateBoundsTheLargestEigenvalue) {
 TEST(CellElasticity, ExplicitStepsWithinTheBoundAreStable) {
     const Body body = make_body(box_cells(5, 4, 3, 0.1), {});
     for (const State& state : states()) {
-        const auto elasticity = make_cell_elasticity(body, kContext);
+        const auto elasticity = make_cell_elasticity(body, kOneThread);
         Vectors x = shaken(mapped(body.rest, state.map), state.shake * 0.1f), v(x.size()), forces(x.size());
-        const double start = elasticity->energy(x, kContext);
+        const double start = elasticity->energy(x, kOneThread);
         double most = 0, time = 0;
         for (int step = 0; step < 2000 && time < 1; ++step) {
-            const float dt = 1.9f / std::sqrt(elasticity->forces(x, forces, kContext).squared_frequency);
+            const float dt = 1.9f / std::sqrt(elasticity->forces(x, forces, kOneThread).squared_frequency);
             ASSERT_TRUE(std::isfinite(dt) && dt > 0) << state.name;
             double kinetic = 0;
             for (std::size_t i = 0; i < x.size(); ++i) {
@@ -321,7 +320,7 @@ TEST(CellElasticity, ExplicitStepsWithinTheBoundAreStable) {
                 x.add(i, dt * v[i]);
                 kinetic += 0.5 * body.mass[i] * v[i].squaredNorm();
             }
-            most = std::max(most, kinetic + elasticity->energy(x, kContext));
+            most = std::max(most, kinetic + elasticity->energy(x, kOneThread));
             time += dt;
         }
         // Velocities are half a step behind positions, so the sum swings; but what is unstable grows without bound.
@@ -339,7 +338,7 @@ struct Problem {
     }
     Descent descent(const BlockTerms* external = nullptr) const { return {target, inertia, fixed, touched, external}; }
     double potential(Elasticity& elasticity, const Vectors& x) const {
-        double sum = elasticity.energy(x, kContext);
+        double sum = elasticity.energy(x, kOneThread);
         for (std::size_t i = 0; i < x.size(); ++i)
             sum += 0.5 * inertia[i] * (x[i].cast<double>() - target[i].cast<double>()).squaredNorm();
         return sum;
@@ -347,7 +346,7 @@ struct Problem {
     /// Largest force that is left, N.
     double residual(Elasticity& elasticity, const Vectors& x, std::size_t only = kNoIndex) const {
         Vectors forces(x.size());
-        elasticity.forces(x, forces, kContext);
+        elasticity.forces(x, forces, kOneThread);
         double most = 0;
         for (std::size_t i = 0; i < x.size(); ++i)
             if (only == kNoIndex || i == only)
@@ -359,7 +358,7 @@ struct Problem {
 TEST(CellSweep, SolvesAVertexAlone) {
     for (const Body& body : bodies())
         for (const State& state : states()) {
-            const auto elasticity = make_cell_elasticity(body, kContext);
+            const auto elasticity = make_cell_elasticity(body, kOneThread);
             for (std::size_t vertex = 0; vertex < body.rest.size(); vertex += 1 + body.rest.size() / 12) {
                 Vectors x = shaken(mapped(body.rest, state.map), state.shake * 0.1f);
                 Problem problem(body, 1.0 / 60);
@@ -368,13 +367,13 @@ TEST(CellSweep, SolvesAVertexAlone) {
                 const Vectors start = x;
                 const double before = problem.potential(*elasticity, x),
                              force = problem.residual(*elasticity, x, vertex);
-                elasticity->sweep(x, problem.descent(), kContext);
+                elasticity->sweep(x, problem.descent(), kOneThread);
                 // A collapsed cell is as good as soft, so what comes out of it may go too far at first.
                 if (state.name != "shrunk") {
                     EXPECT_LE(problem.potential(*elasticity, x), before * (1 + 1e-7)) << state.name;
                 }
                 // Quadratic but for the logarithm: Newton's method is done after a few.
-                for (int i = 0; i < 4; ++i) elasticity->sweep(x, problem.descent(), kContext);
+                for (int i = 0; i < 4; ++i) elasticity->sweep(x, problem.descent(), kOneThread);
                 EXPECT_LT(problem.residual(*elasticity, x, vertex), 1e-4 * force + 0.02) << state.name;
                 for (std::size_t i = 0; i < x.size(); ++i) EXPECT_TRUE(i == vertex || x[i] == start[i]) << i;
             }
@@ -385,14 +384,14 @@ TEST(CellSweep, NeverRaisesThePotential) {
     for (const Body& body : bodies())
         for (const State& state : states())
             for (const double dt : {1e-3, 1.0 / 60, 0.1}) {
-                const auto elasticity = make_cell_elasticity(body, kContext);
+                const auto elasticity = make_cell_elasticity(body, kOneThread);
                 Vectors x = shaken(mapped(body.rest, state.map), state.shake * 0.1f);
                 Problem problem(body, dt);
                 problem.target = x;
                 double before = problem.potential(*elasticity, x);
                 const double first = before;
                 for (int i = 0; i < 30; ++i) {
-                    elasticity->sweep(x, problem.descent(), kContext);
+                    elasticity->sweep(x, problem.descent(), kOneThread);
                     const double after = problem.potential(*elasticity, x);
                     EXPECT_LE(after, before + 1e-6 * first) << state.name << ", dt " << dt << ", sweep " << i;
                     before = after;
@@ -403,14 +402,14 @@ TEST(CellSweep, NeverRaisesThePotential) {
 
 TEST(CellSweep, ConvergesToTheMinimum) {
     const Body body = make_body(with_random_fractions(box_cells(4, 3, 5, 0.1)), {});
-    const auto elasticity = make_cell_elasticity(body, kContext);
+    const auto elasticity = make_cell_elasticity(body, kOneThread);
     Problem problem(body, 1.0 / 60);
     problem.target = shaken(body.rest, 0.05f);
     for (std::size_t i = 0; i < 9; ++i) problem.fixed[i] = 1;
     Vectors x = body.rest;
-    for (int i = 0; i < 200; ++i) elasticity->sweep(x, problem.descent(), kContext);
+    for (int i = 0; i < 200; ++i) elasticity->sweep(x, problem.descent(), kOneThread);
     Vectors forces(x.size());
-    elasticity->forces(x, forces, kContext);
+    elasticity->forces(x, forces, kOneThread);
     for (std::size_t i = 0; i < x.size(); ++i) {
         if (problem.fixed[i]) continue;
         const Vec3f inertia = problem.inertia[i] * (problem.target[i] - x[i]);
@@ -429,14 +428,14 @@ public:
 
 TEST(CellSweep, AsksForExternalTermsWhereTouched) {
     const Body body = make_body(box_cells(1, 1, 1, 0.1), {});
-    const auto elasticity = make_cell_elasticity(body, kContext);
+    const auto elasticity = make_cell_elasticity(body, kOneThread);
     Problem problem(body, 1.0 / 60);
     problem.touched[3] = 1;
     const Tether tether;
     Vectors x = body.rest;
-    for (int i = 0; i < 300; ++i) elasticity->sweep(x, problem.descent(&tether), kContext);
+    for (int i = 0; i < 300; ++i) elasticity->sweep(x, problem.descent(&tether), kOneThread);
     Vectors forces(x.size());
-    elasticity->forces(x, forces, kContext);
+    elasticity->forces(x, forces, kOneThread);
     for (std::size_t i = 0; i < x.size(); ++i) {
         const Vec3f inner = forces[i] + problem.inertia[i] * (problem.target[i] - x[i]);
         EXPECT_LT((inner - (i == 3 ? Vec3f(500.0f * x[i]) : Vec3f(Vec3f::Zero()))).norm(), 1e-3) << i;
@@ -459,7 +458,7 @@ TEST(CellKernel, SameBytesForAnyLanesAndThreads) {
             Vectors expected_forces, expected_positions;
             ElasticReport expected;
             for (const int lanes : cell_kernel::lane_counts())
-                for (const RunContext* context : {&kContext, &two}) {
+                for (const RunContext* context : {&kOneThread, &two}) {
                     Vectors forces(start.size()), positions = start;
                     cell_kernel::Sums sums;
                     const ElasticReport report = cell_kernel::forces(plan, start, forces, sums, lanes, *context);
@@ -528,7 +527,7 @@ double sag_over_theory(int length, int across, double poisson_ratio) {
     const double side = 0.2, h = side / across, E = 1e6, density = 1000, gravity = 0.5;
     const Material material{.density = density, .young_modulus = E, .poisson_ratio = poisson_ratio};
     const Body body = make_body(box_cells(length, across, across, h), material);
-    const auto elasticity = make_cell_elasticity(body, kContext);
+    const auto elasticity = make_cell_elasticity(body, kOneThread);
     const double L = length * h, inertia = std::pow(side, 4) / 12, weight = density * gravity * side * side;
     const double G = E / (2 * (1 + poisson_ratio));
     const double kappa = 10 * (1 + poisson_ratio) / (12 + 11 * poisson_ratio);
@@ -538,12 +537,12 @@ double sag_over_theory(int length, int across, double poisson_ratio) {
     const double frequency = 3.516 * std::sqrt(E * inertia / (density * side * side)) / (L * L);
     float dt = 0;
     const int steps_per_swing = [&] {
-        dt = 1.8f / std::sqrt(elasticity->forces(x, forces, kContext).squared_frequency);
+        dt = 1.8f / std::sqrt(elasticity->forces(x, forces, kOneThread).squared_frequency);
         return static_cast<int>(2 * 3.14159 / (frequency * dt));
     }();
     const float keep = std::exp(-2.0f * float(frequency) * dt);
     for (int step = 0; step < 3 * steps_per_swing; ++step) {
-        elasticity->forces(x, forces, kContext);
+        elasticity->forces(x, forces, kOneThread);
         for (std::size_t i = 0; i < x.size(); ++i) {
             if (body.cells.corners[i][0] == 0) continue;
             const Vec3f force = forces[i] - Vec3f(0, 0, body.mass[i] * float(gravity));
@@ -570,11 +569,11 @@ TEST(CellElasticity, ABarSagsAsTheorySays) {
 
 TEST(CellElasticity, GradientsAreRelativeToRest) {
     const Body body = make_body(box_cells(3, 3, 3, 0.1), {});
-    const auto elasticity = make_cell_elasticity(body, kContext);
+    const auto elasticity = make_cell_elasticity(body, kOneThread);
     Mat3d map;
     map << 1.1, 0.2, 0, -0.3, 0.9, 0.1, 0, 0.2, 1.3;
     std::vector<Mat3f> gradients(body.rest.size());
-    elasticity->gradients(mapped(body.rest, map), gradients, kContext);
+    elasticity->gradients(mapped(body.rest, map), gradients, kOneThread);
     for (const Mat3f& gradient : gradients) EXPECT_LT((gradient.cast<double>() - map).norm(), 1e-5);
     EXPECT_EQ(&elasticity->reference(), &body.rest);
     EXPECT_FALSE(elasticity->wants_renewal());

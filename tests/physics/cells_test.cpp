@@ -13,8 +13,6 @@
 namespace filigree {
 namespace {
 
-const RunContext kContext;
-
 void append(Mesh& mesh, const Mesh& other, const Vec3f& offset) {
     const auto first = Index(mesh.vertex_count());
     for (const Vec3f& p : other.positions) mesh.positions.push_back(p + offset);
@@ -108,14 +106,14 @@ TEST(Cells, GradientsOfAnAffineMotionAreItsMatrix) {
         positions.set(c, matrix * Vec3f(corner[0] * 0.1f, corner[1] * 0.1f, corner[2] * 0.1f) + Vec3f(1, 2, 3));
     }
     std::vector<Mat3f> gradients(cells.corners.size());
-    corner_gradients(cells, positions, gradients, kContext);
+    corner_gradients(cells, positions, gradients, kAllThreads);
     for (const Mat3f& gradient : gradients) EXPECT_LT((gradient - matrix).cwiseAbs().maxCoeff(), 2e-5f);
 }
 
 TEST(Cells, ABarIsFilledExactly) {
     const Mesh bar = make_bar({.resolution = 8, .size = 0.2, .length = 5});
     CellReport report;
-    const auto cells = make_cells(bar, 1, {.spacing = 0.05}, kContext, &report);
+    const auto cells = make_cells(bar, 1, {.spacing = 0.05}, kAllThreads, &report);
     ASSERT_TRUE(cells) << cells.error().message;
     EXPECT_EQ(cells->cells.size(), 20u * 4 * 4);
     EXPECT_EQ(cells->corners.size(), 21u * 5 * 5);
@@ -127,7 +125,7 @@ TEST(Cells, ABarIsFilledExactly) {
     EXPECT_LT((cells->centroid[0] - Vec3f(-0.475f, -0.075f, -0.075f)).norm(), 1e-6f);
     // The same in millimetres.
     const Mesh large = make_bar({.resolution = 8, .size = 200, .length = 5});
-    EXPECT_EQ(make_cells(large, 1e-3, {.spacing = 0.05}, kContext)->cells, cells->cells);
+    EXPECT_EQ(make_cells(large, 1e-3, {.spacing = 0.05}, kAllThreads)->cells, cells->cells);
 }
 
 TEST(Cells, SpacingComesFromTheCountAndFitsTheShortestSide) {
@@ -135,29 +133,29 @@ TEST(Cells, SpacingComesFromTheCountAndFitsTheShortestSide) {
     const Mesh sphere = make_wavy_sphere({.resolution = 24});
     for (const std::size_t count : {600u, 3000u, 20000u}) {
         for (const Mesh* mesh : {&bar, &sphere}) {
-            const auto cells = make_cells(*mesh, 2, {.count = count}, kContext);
+            const auto cells = make_cells(*mesh, 2, {.count = count}, kAllThreads);
             ASSERT_TRUE(cells) << cells.error().message;
             EXPECT_NEAR(double(cells->cells.size()) / double(count), 1, 0.16);
         }
-        const auto cells = make_cells(bar, 2, {.count = count}, kContext);
+        const auto cells = make_cells(bar, 2, {.count = count}, kAllThreads);
         const double across = 0.4 / cells->spacing;
         EXPECT_NEAR(across, std::round(across), 1e-5);
     }
-    EXPECT_EQ(make_cells(sphere, 1, {.count = 1}, kContext)->cells.size(), 1u);
+    EXPECT_EQ(make_cells(sphere, 1, {.count = 1}, kAllThreads)->cells.size(), 1u);
 }
 
 TEST(Cells, VolumeIsTheMeshsOwn) {
     CellReport report;
     const double pi = 3.14159265358979;
     const Mesh sphere = make_wavy_sphere({.resolution = 64, .amplitude = 0});
-    ASSERT_TRUE(make_cells(sphere, 3, {.count = 30000}, kContext, &report));
+    ASSERT_TRUE(make_cells(sphere, 3, {.count = 30000}, kAllThreads, &report));
     EXPECT_NEAR(report.volume / (27 * pi / 6), 1, 0.01);
 }
 
 TEST(Cells, AThinSheetIsCoveredWithoutHoles) {
     const Mesh plane = make_wavy_plane({.resolution = 3, .amplitude = 0}); // triangles much larger than cells
     CellReport report;
-    const auto cells = make_cells(plane, 1, {.spacing = 0.05}, kContext, &report);
+    const auto cells = make_cells(plane, 1, {.spacing = 0.05}, kAllThreads, &report);
     ASSERT_TRUE(cells) << cells.error().message;
     EXPECT_EQ(cells->cells.size(), 400u);
     EXPECT_EQ(report.thin_cells, 400u);
@@ -168,7 +166,7 @@ TEST(Cells, SmallLoosePartsAreLeftOut) {
     append(mesh, make_wavy_cube({.resolution = 2, .amplitude = 0, .size = 0.1}), Vec3f(3, 0, 0));
     append(mesh, make_wavy_cube({.resolution = 2, .amplitude = 0, .size = 0.6}), Vec3f(0, 3, 0));
     CellReport report;
-    const auto cells = make_cells(mesh, 1, {.spacing = 0.1}, kContext, &report);
+    const auto cells = make_cells(mesh, 1, {.spacing = 0.1}, kAllThreads, &report);
     ASSERT_TRUE(cells) << cells.error().message;
     EXPECT_EQ(report.loose_parts, 1u);
     EXPECT_FALSE(is_covered(*cells, Vec3d(3, 0, 0)));
@@ -182,11 +180,11 @@ TEST(Cells, EveryVertexOfTheCorpusLiesInACell) {
         if (name != "koala_100k.obj" && name != "plane_holes.obj" && name != "sword_quad_dominant.obj" &&
             name != "mountain_open.obj" && name != "penguin.obj" && name != "featuretype.STL")
             continue;
-        const auto read = read_mesh(row.path, kContext);
+        const auto read = read_mesh(row.path, kAllThreads);
         ASSERT_TRUE(read) << read.error().message;
         ++meshes;
         CellReport report;
-        const auto cells = make_cells(read->mesh, 1, {.count = 1500}, kContext, &report);
+        const auto cells = make_cells(read->mesh, 1, {.count = 1500}, kAllThreads, &report);
         ASSERT_TRUE(cells) << name << ": " << cells.error().message;
         EXPECT_EQ(report.loose_parts, 0u) << name;
         EXPECT_EQ(uncovered_vertices(read->mesh, *cells), 0u) << name;
@@ -217,7 +215,7 @@ TEST(Cells, ThreadsDoNotMatter) {
 TEST(Cells, BadRequestsAreRefused) {
     const Mesh cube = make_wavy_cube({.resolution = 4});
     const auto code = [&](const Mesh& mesh, double scale, const CellOptions& options) {
-        const auto cells = make_cells(mesh, scale, options, kContext);
+        const auto cells = make_cells(mesh, scale, options, kAllThreads);
         return cells ? ErrorCode{} : cells.error().code;
     };
     const double nan = std::numeric_limits<double>::quiet_NaN();

@@ -13,8 +13,6 @@
 namespace filigree {
 namespace {
 
-const RunContext kContext;
-
 Vec3f random_point(const Box& box, std::size_t n) {
     const Vec3d unit(random_unit(1, n), random_unit(2, n), random_unit(3, n));
     return (box.min + unit.cwiseProduct(box.size())).cast<float>();
@@ -22,7 +20,7 @@ Vec3f random_point(const Box& box, std::size_t n) {
 
 TEST(DistanceField, ASphereIsRound) {
     const Mesh sphere = make_wavy_sphere({.resolution = 96, .amplitude = 0});
-    const auto field = DistanceField::create(sphere, 4, 0, kContext); // radius 2, spacing 1/16
+    const auto field = DistanceField::create(sphere, 4, 0, kAllThreads); // radius 2, spacing 1/16
     ASSERT_TRUE(field) << field.error().message;
     for (std::size_t n = 0; n < 5000; ++n) {
         const Vec3f point = random_point(field->box(), n);
@@ -45,7 +43,7 @@ double box_distance(const Vec3d& p, const Vec3d& half) {
 TEST(DistanceField, ABoxIsRightWithinAFractionOfTheSpacing) {
     const Mesh bar = make_bar({.resolution = 2, .size = 1, .length = 2}); // two large triangles a side
     const double spacing = 0.05;
-    const auto field = DistanceField::create(bar, 1, spacing, kContext);
+    const auto field = DistanceField::create(bar, 1, spacing, kAllThreads);
     ASSERT_TRUE(field) << field.error().message;
     for (std::size_t n = 0; n < 5000; ++n) {
         const Vec3f point = random_point(field->box(), n);
@@ -58,7 +56,7 @@ TEST(DistanceField, ABoxIsRightWithinAFractionOfTheSpacing) {
 }
 
 TEST(DistanceField, OutsideTheGridPointsAreFar) {
-    const auto field = DistanceField::create(make_wavy_cube({.resolution = 8, .amplitude = 0}), 1, 0, kContext);
+    const auto field = DistanceField::create(make_wavy_cube({.resolution = 8, .amplitude = 0}), 1, 0, kAllThreads);
     ASSERT_TRUE(field) << field.error().message;
     const DistanceField::Sample sample = field->at({0, 10, 0});
     EXPECT_NEAR(sample.distance, 9.5, 0.05);
@@ -72,7 +70,7 @@ TEST(DistanceField, OutsideTheGridPointsAreFar) {
 }
 
 TEST(DistanceField, NormalsAreAlwaysUnit) {
-    const auto field = DistanceField::create(make_wavy_cube({.resolution = 8, .amplitude = 0}), 1, 0.125, kContext);
+    const auto field = DistanceField::create(make_wavy_cube({.resolution = 8, .amplitude = 0}), 1, 0.125, kAllThreads);
     ASSERT_TRUE(field) << field.error().message;
     const float nan = std::numeric_limits<float>::quiet_NaN(), infinity = std::numeric_limits<float>::infinity();
     for (const Vec3f& point : {Vec3f(0, 0, 0), Vec3f(0.5f, 0.5f, 0.5f), Vec3f(nan, 0, 0), Vec3f(0, infinity, 0),
@@ -83,12 +81,12 @@ TEST(DistanceField, NormalsAreAlwaysUnit) {
 TEST(DistanceField, KoalaAgreesWithClosestPointsAndInsideTest) {
     const auto path = filigree_test::corpus_folder() / "good/koala_100k.obj";
     if (!std::filesystem::exists(path)) GTEST_SKIP() << "no corpus";
-    const Mesh koala = read_mesh(path, kContext)->mesh;
-    const auto field = DistanceField::create(koala, 1, 0, kContext);
+    const Mesh koala = read_mesh(path, kAllThreads)->mesh;
+    const auto field = DistanceField::create(koala, 1, 0, kAllThreads);
     ASSERT_TRUE(field) << field.error().message;
-    const WeldedTriangles welded = weld_triangles(koala, kContext).value();
+    const WeldedTriangles welded = weld_triangles(koala, kAllThreads).value();
     const ClosestPointTree tree(koala.positions, welded.triangles);
-    const InsideTest inside = InsideTest::create(koala, {}, kContext).value();
+    const InsideTest inside = InsideTest::create(koala, {}, kAllThreads).value();
     const double spacing = bounds(koala.positions).size().maxCoeff() / 64;
     for (std::size_t n = 0; n < 5000; ++n) {
         const Vec3f point = random_point(field->box(), n);
@@ -115,7 +113,7 @@ TEST(DistanceField, ThreadsDoNotMatter) {
 TEST(DistanceField, BadRequestsAreRefused) {
     const Mesh cube = make_wavy_cube({.resolution = 4});
     const auto code = [&](const Mesh& mesh, double scale, double spacing) {
-        const auto field = DistanceField::create(mesh, scale, spacing, kContext);
+        const auto field = DistanceField::create(mesh, scale, spacing, kAllThreads);
         return field ? ErrorCode{} : field.error().code;
     };
     EXPECT_EQ(code(cube, 0, 0), ErrorCode::usage);

@@ -14,8 +14,6 @@
 namespace filigree {
 namespace {
 
-const RunContext kContext;
-
 /// Random points of the box that the particles fill, and `beyond` further out.
 std::vector<Vec3f> random_points(const Vec3f& low, const Vec3f& high, float beyond, std::size_t count) {
     std::vector<Vec3f> points(count);
@@ -50,7 +48,7 @@ TEST(Embedding, WeightsReproduceLinearFunctions) {
         const Body body = block(model, 10);
         const auto points = random_points(Vec3f::Zero(), Vec3f::Ones(), 0, 3000);
         EmbeddingReport report;
-        const Embedding embedding = embed(points, body.rest, body.spacing(), kContext, &report);
+        const Embedding embedding = embed(points, body.rest, body.spacing(), kAllThreads, &report);
         EXPECT_EQ(embedding.rest, points);
         EXPECT_EQ(report.far_points, 0u);
         EXPECT_GE(report.least_weight, -0.5f);
@@ -61,15 +59,16 @@ TEST(Embedding, WeightsReproduceLinearFunctions) {
 TEST(Embedding, InCellsWeightsAreTrilinearInsideAndLinearBeyond) {
     const Body body = block(MaterialModel::fem, 10);
     const auto inside = random_points(Vec3f::Zero(), Vec3f::Ones(), 0, 2000);
-    const Embedding embedding = embed_in_cells(inside, body.cells, kContext);
+    const Embedding embedding = embed_in_cells(inside, body.cells, kAllThreads);
     for (const float weight : embedding.weights) ASSERT_GE(weight, -1e-5f);
     const std::vector<Vec3f> damaged = {Vec3f::Constant(std::numeric_limits<float>::quiet_NaN()),
                                         Vec3f::Constant(1e30f)};
-    for (const float weight : embed_in_cells(damaged, body.cells, kContext).weights) EXPECT_TRUE(std::isfinite(weight));
+    for (const float weight : embed_in_cells(damaged, body.cells, kAllThreads).weights)
+        EXPECT_TRUE(std::isfinite(weight));
     for (const float beyond : {0.0f, 0.05f, 3.0f})
         expect_linear_precision(
-            embed_in_cells(random_points(Vec3f::Zero(), Vec3f::Ones(), beyond, 2000), body.cells, kContext), body.rest,
-            2e-6 * (1 + 10 * beyond));
+            embed_in_cells(random_points(Vec3f::Zero(), Vec3f::Ones(), beyond, 2000), body.cells, kAllThreads),
+            body.rest, 2e-6 * (1 + 10 * beyond));
 }
 
 /// The largest distance of embedded points from where an affine motion takes them, over the diagonal of where the
@@ -85,7 +84,7 @@ double affine_error(const Embedding& embedding, const Body& body, const Mat3f& m
     const std::vector<Mat3f> gradients(positions.size(), matrix);
     std::vector<Vec3f> points(embedding.size());
     std::vector<Mat3f> found(embedding.size());
-    move_embedded(embedding, body.rest, positions, gradients, points, found, kContext);
+    move_embedded(embedding, body.rest, positions, gradients, points, found, kAllThreads);
     double worst = 0;
     for (std::size_t p = 0; p < points.size(); ++p) {
         const Vec3d wanted = matrix.cast<double>() * embedding.rest[p].cast<double>() + move.cast<double>();
@@ -103,11 +102,11 @@ TEST(Embedding, AffineMotionIsFollowedToRounding) {
     for (const MaterialModel model : {MaterialModel::fem, MaterialModel::meshfree}) {
         const Body body = block(model, 12, Vec3d(-0.5, -0.5, -0.5));
         const auto points = random_points(Vec3f::Constant(-0.5f), Vec3f::Constant(0.5f), 0.03f, 2000);
-        std::vector<Embedding> embeddings = {embed(points, body.rest, body.spacing(), kContext)};
-        embeddings.push_back(embed_to_follow(points, body.rest, body.spacing(), nullptr, kContext));
+        std::vector<Embedding> embeddings = {embed(points, body.rest, body.spacing(), kAllThreads)};
+        embeddings.push_back(embed_to_follow(points, body.rest, body.spacing(), nullptr, kAllThreads));
         if (model == MaterialModel::fem) {
-            embeddings.push_back(embed_in_cells(points, body.cells, kContext));
-            embeddings.push_back(embed_to_follow(points, body.rest, body.spacing(), &body.cells, kContext));
+            embeddings.push_back(embed_in_cells(points, body.cells, kAllThreads));
+            embeddings.push_back(embed_to_follow(points, body.rest, body.spacing(), &body.cells, kAllThreads));
         }
         for (const Embedding& embedding : embeddings)
             for (const Mat3f& matrix : {turn, Mat3f(3 * turn), Mat3f(turn * shear), Mat3f(turn * stretch * shear)})
@@ -125,7 +124,7 @@ std::vector<Vec3f> shaken(const Embedding& embedding, const Vectors& rest, float
     }
     const std::vector<Mat3f> gradients(rest.size(), Mat3f::Identity());
     std::vector<Vec3f> points(embedding.size());
-    move_embedded(embedding, rest, positions, gradients, points, {}, kContext);
+    move_embedded(embedding, rest, positions, gradients, points, {}, kAllThreads);
     for (std::size_t p = 0; p < points.size(); ++p) points[p] -= embedding.rest[p];
     return points;
 }
@@ -144,11 +143,11 @@ TEST(Embedding, WhatFollowsDoesNotJumpOrOvershoot) {
     std::vector<Vec3f> points; // along a path that leaves the body near one of its edges
     for (int i = 0; i <= 4000; ++i)
         points.push_back(Vec3f(0.48f, 0.9f, 0.93f) + float(i) / 4000 * Vec3f(0.02f, 0.15f, 0.1f));
-    const Embedding following = embed_to_follow(points, body.rest, body.spacing(), nullptr, kContext);
+    const Embedding following = embed_to_follow(points, body.rest, body.spacing(), nullptr, kAllThreads);
     for (const float weight : following.weights) ASSERT_GE(weight, -0.05f - 1e-6f);
     const float reach = 0.1f * spacing;
     const auto ours = shaken(following, body.rest, reach),
-               linear = shaken(embed(points, body.rest, body.spacing(), kContext), body.rest, reach);
+               linear = shaken(embed(points, body.rest, body.spacing(), kAllThreads), body.rest, reach);
     EXPECT_LT(largest_jump(ours), 2e-3f * reach);
     EXPECT_GT(largest_jump(linear), 5e-2f * reach);
     for (const Vec3f& move : ours) ASSERT_LT(move.norm(), std::numbers::sqrt3_v<float> * reach);
@@ -165,15 +164,15 @@ TEST(Embedding, WhatFollowsIsNotCarriedAcrossAGap) {
     const auto carried_by_upper = [&](const Embedding& embedding) {
         return std::ranges::count_if(embedding.particles, [&](Index i) { return body.rest[i].z() > 0.25f; });
     };
-    EXPECT_GT(carried_by_upper(embed(points, body.rest, body.spacing(), kContext)), 1000);
-    EXPECT_EQ(carried_by_upper(embed_to_follow(points, body.rest, body.spacing(), &body.cells, kContext)), 0);
+    EXPECT_GT(carried_by_upper(embed(points, body.rest, body.spacing(), kAllThreads)), 1000);
+    EXPECT_EQ(carried_by_upper(embed_to_follow(points, body.rest, body.spacing(), &body.cells, kAllThreads)), 0);
 }
 
 TEST(Embedding, FarPointsGoAlongWithTheNearestParticles) {
     const Body body = block(MaterialModel::meshfree, 8);
     const std::vector<Vec3f> points = {{3, 0.5f, 0.5f}, {-20, -20, -20}, {0.5f, 1.4f, 0.5f}};
     EmbeddingReport report;
-    const Embedding embedding = embed(points, body.rest, body.spacing(), kContext, &report);
+    const Embedding embedding = embed(points, body.rest, body.spacing(), kAllThreads, &report);
     EXPECT_EQ(report.far_points, 3u);
     for (std::size_t p = 0; p < points.size(); ++p) {
         double sum = 0;
@@ -189,29 +188,29 @@ TEST(Embedding, ParticlesInAPlaneOrAloneCarryToo) {
     Vectors plane(25), one(1);
     for (std::size_t n = 0; n < 25; ++n) plane.set(n, Vec3f(float(n % 5), float(n / 5), 0));
     const std::vector<Vec3f> points = {{2.2f, 1.7f, 0.3f}};
-    const Embedding in_plane = embed(points, plane, 1, kContext);
+    const Embedding in_plane = embed(points, plane, 1, kAllThreads);
     Vec3f at = Vec3f::Zero();
     for (Index n = 0; n < in_plane.offsets[1]; ++n) at += in_plane.weights[n] * plane[in_plane.particles[n]];
     EXPECT_LT((at - Vec3f(2.2f, 1.7f, 0)).norm(), 1e-5f);
 
-    const Embedding by_one = embed(points, one, 1, kContext);
+    const Embedding by_one = embed(points, one, 1, kAllThreads);
     ASSERT_EQ(by_one.weights, std::vector<float>{1});
     std::vector<Vec3f> moved(1);
     const std::vector<Mat3f> doubled = {2 * Mat3f::Identity()};
-    move_embedded(by_one, one, one, doubled, moved, {}, kContext);
+    move_embedded(by_one, one, one, doubled, moved, {}, kAllThreads);
     EXPECT_LT((moved[0] - 2 * points[0]).norm(), 1e-6f);
 
     // What is no number is carried by something, and carries nothing.
     const float nan = std::numeric_limits<float>::quiet_NaN();
     Vectors damaged = plane;
     damaged.set(7, Vec3f(nan, 0, 0));
-    const Embedding mended = embed(std::vector<Vec3f>{{nan, 0, 0}, {2, 1, 0}}, damaged, 1, kContext);
+    const Embedding mended = embed(std::vector<Vec3f>{{nan, 0, 0}, {2, 1, 0}}, damaged, 1, kAllThreads);
     EXPECT_EQ(mended.offsets[1], 1u);
     EXPECT_GT(mended.offsets[2], 3u);
     for (const float weight : mended.weights) EXPECT_TRUE(std::isfinite(weight));
 
-    EXPECT_EQ(embed({}, one, 1, kContext).size(), 0u);
-    EXPECT_EQ(embed(points, Vectors(), 1, kContext).offsets, (std::vector<Index>{0, 0}));
+    EXPECT_EQ(embed({}, one, 1, kAllThreads).size(), 0u);
+    EXPECT_EQ(embed(points, Vectors(), 1, kAllThreads).offsets, (std::vector<Index>{0, 0}));
 }
 
 /// RMS distance, over the diagonal, of points on the lattice's outer layer from where a smooth motion takes them.
@@ -221,12 +220,12 @@ double smooth_error(const std::function<Vec3d(const Vec3d&)>& motion) {
     std::vector<Mat3f> gradients(body.rest.size());
     for (std::size_t i = 0; i < body.rest.size(); ++i)
         positions.set(i, motion(body.rest[i].cast<double>()).cast<float>());
-    corner_gradients(body.cells, positions, gradients, kContext);
+    corner_gradients(body.cells, positions, gradients, kAllThreads);
     std::vector<Vec3f> points = random_points(Vec3f::Zero(), Vec3f::Ones(), 0, 2000);
     for (std::size_t p = 0; p < points.size(); ++p) points[p][int(p % 3)] = p / 3 % 2 ? 1.0f : 0.0f;
     std::vector<Vec3f> moved(points.size());
-    const Embedding embedding = embed(points, body.rest, body.spacing(), kContext);
-    move_embedded(embedding, body.rest, positions, gradients, moved, {}, kContext);
+    const Embedding embedding = embed(points, body.rest, body.spacing(), kAllThreads);
+    move_embedded(embedding, body.rest, positions, gradients, moved, {}, kAllThreads);
     double sum = 0;
     for (std::size_t p = 0; p < points.size(); ++p)
         sum += (moved[p].cast<double>() - motion(points[p].cast<double>())).squaredNorm();

@@ -4,6 +4,7 @@
 #include "filigree/physics/cell_boxes.h"
 #include "filigree/physics/own_cells.h"
 #include "physics/test_bodies.h"
+#include "threads.h"
 
 #include <gtest/gtest.h>
 
@@ -14,8 +15,6 @@
 
 namespace filigree {
 namespace {
-
-const RunContext kOneThread(1);
 
 Material rubber(double young_modulus = 1e6, double damping = 0) {
     Material material;

@@ -1,16 +1,14 @@
 // Bodies of the model mpm against what theory says of them.
 #include "filigree/physics/named_materials.h"
 #include "filigree/physics/simulation.h"
+#include "threads.h"
 
 #include <gtest/gtest.h>
 
 #include <numbers>
 
-using namespace filigree;
-
+namespace filigree::mpm_test {
 namespace {
-
-const RunContext kContext;
 
 Material elastic(double young = 1e5) {
     Material material;
@@ -36,11 +34,11 @@ Eigen::Isometry3d at(double x, double y, double z) {
 Simulation begin(World world, std::vector<Actor> actors, double frames_per_second = 60) {
     StepOptions options;
     options.frames_per_second = frames_per_second;
-    return Simulation::create(std::move(world), std::move(actors), options, kContext).value();
+    return Simulation::create(std::move(world), std::move(actors), options, kAllThreads).value();
 }
 
 void run(Simulation& simulation, int frames) {
-    for (int f = 0; f < frames; ++f) simulation.advance(kContext).value();
+    for (int f = 0; f < frames; ++f) simulation.advance(kAllThreads).value();
 }
 
 World no_gravity() {
@@ -90,12 +88,12 @@ TEST(Mpm, KeepsMomentumAndGainsNoEnergy) {
     actor.spin = {0, 2, 3};
     Simulation simulation = begin(no_gravity(), {actor});
     const Momentum before = simulation.momentum();
-    const double energy = simulation.energy(kContext).total();
+    const double energy = simulation.energy(kAllThreads).total();
     run(simulation, 30);
     const Momentum after = simulation.momentum();
     EXPECT_LT((after.linear - before.linear).norm(), 1e-5 * before.linear.norm());
     EXPECT_LT((after.angular - before.angular).norm(), 2e-3 * before.angular.norm());
-    EXPECT_LT(simulation.energy(kContext).total(), 1.01 * energy);
+    EXPECT_LT(simulation.energy(kAllThreads).total(), 1.01 * energy);
 }
 
 /// A bar held at its left end sags: Euler and Bernoulli's beam, and Timoshenko's shear.
@@ -264,7 +262,7 @@ TEST(Mpm, MeltsFlowsAndFreezesInTheShapeItHas) {
     world.air_temperature = {{0, 2, 2.001}, {420, 420, 60}, 0};
     Simulation simulation = begin(std::move(world), {{box(8, 8, 8, 0.02, wax)}});
     const std::size_t points =
-        simulation.attach(0, std::vector<Vec3f>{{0.08f, 0.08f, 0.08f}, {0.01f, 0.15f, 0.01f}}, kContext);
+        simulation.attach(0, std::vector<Vec3f>{{0.08f, 0.08f, 0.08f}, {0.01f, 0.15f, 0.01f}}, kAllThreads);
     std::vector<float> renewal(2);
     simulation.renewal(points, renewal);
     EXPECT_EQ(renewal, std::vector<float>({0, 0}));
@@ -324,3 +322,5 @@ TEST(Mpm, HostileStartsStayBounded) {
                 ASSERT_TRUE(simulation.positions(b)[i].allFinite() && simulation.velocities(b)[i].norm() < 1e5f);
     }
 }
+
+} // namespace filigree::mpm_test

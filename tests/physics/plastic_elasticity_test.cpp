@@ -3,11 +3,10 @@
 #include "filigree/mesh/shapes.h"
 #include "filigree/physics/plastic_cells.h"
 #include "test_bodies.h"
+#include "threads.h"
 
 namespace filigree {
 namespace {
-
-const RunContext kPlasticContext(2);
 
 Material clay() {
     Material material = undamped(0.3);
@@ -47,20 +46,20 @@ TEST(PlasticElasticity, IsFemUntilItYields) {
     elastic.yield_stress = Material::kNever;
     plastic.yield_stress = 1e12;
     const Body first = make_body(checks::uneven_cells(0.1), elastic), second = make_body(first.cells, plastic);
-    const auto fem = make_elasticity(first, kPlasticContext), yields = make_elasticity(second, kPlasticContext);
+    const auto fem = make_elasticity(first, kTwoThreads), yields = make_elasticity(second, kTwoThreads);
     for (const checks::Start& state : checks::states(first)) {
-        yields->finish_substep(state.positions, 0.01f, kPlasticContext);
+        yields->finish_substep(state.positions, 0.01f, kTwoThreads);
         Vectors wanted(first.particle_count()), found(first.particle_count());
-        const ElasticReport a = fem->forces(state.positions, wanted, kPlasticContext);
-        const ElasticReport b = yields->forces(state.positions, found, kPlasticContext);
+        const ElasticReport a = fem->forces(state.positions, wanted, kTwoThreads);
+        const ElasticReport b = yields->forces(state.positions, found, kTwoThreads);
         float most = 0;
         for (std::size_t i = 0; i < wanted.size(); ++i) most = std::max(most, wanted[i].norm());
         for (std::size_t i = 0; i < wanted.size(); ++i)
             EXPECT_LT((wanted[i] - found[i]).norm(), 1e-5f * most) << state.name;
         EXPECT_NEAR(a.squared_frequency, b.squared_frequency, 1e-4f * a.squared_frequency) << state.name;
         EXPECT_NEAR(a.least_volume_ratio, b.least_volume_ratio, 1e-4f) << state.name;
-        const double energy = fem->energy(state.positions, kPlasticContext);
-        EXPECT_NEAR(yields->energy(state.positions, kPlasticContext), energy, 1e-4 * energy) << state.name;
+        const double energy = fem->energy(state.positions, kTwoThreads);
+        EXPECT_NEAR(yields->energy(state.positions, kTwoThreads), energy, 1e-4 * energy) << state.name;
     }
 }
 
@@ -68,7 +67,7 @@ TEST(PlasticElasticity, ABarYieldsAtItsStressAndStaysLonger) {
     Material material = clay();
     material.poisson_ratio = 0; // so that the stress is the same everywhere
     const Body body = make_body(box_cells(6, 2, 2, 0.1), material);
-    const auto elasticity = make_elasticity(body, kPlasticContext);
+    const auto elasticity = make_elasticity(body, kTwoThreads);
     const auto pulled = [&](float stretch) {
         const float across = 1 / std::sqrt(stretch); // keeps its volume
         return checks::moved(body.rest, [&](std::size_t, const Vec3f& p) {
@@ -76,16 +75,16 @@ TEST(PlasticElasticity, ABarYieldsAtItsStressAndStaysLonger) {
         });
     };
     for (int step = 0; step <= 300; ++step)
-        elasticity->finish_substep(pulled(1 + 0.001f * float(step)), 0.001f, kPlasticContext);
+        elasticity->finish_substep(pulled(1 + 0.001f * float(step)), 0.001f, kTwoThreads);
     // Hencky's strain at the yield point: yield stress / (2 mu) times sqrt(2/3), of its deviator.
-    const double energy = elasticity->energy(pulled(1.3f), kPlasticContext), volume = 6 * 2 * 2 * 1e-3;
+    const double energy = elasticity->energy(pulled(1.3f), kTwoThreads), volume = 6 * 2 * 2 * 1e-3;
     const double strain = 1e4 * std::sqrt(2 / 3.) / (2 * 0.5e6);          // mu = E / 2
     EXPECT_NEAR(energy, 0.5e6 * strain * strain * volume, 0.03 * energy); // mu |dev e|^2
     // Where it is at rest now.
     double least = 1e9;
     float at = 0;
     for (float stretch = 1.25f; stretch < 1.31f; stretch += 0.0005f)
-        if (const double e = elasticity->energy(pulled(stretch), kPlasticContext); e < least) {
+        if (const double e = elasticity->energy(pulled(stretch), kTwoThreads); e < least) {
             least = e;
             at = stretch;
         }
@@ -95,15 +94,15 @@ TEST(PlasticElasticity, ABarYieldsAtItsStressAndStaysLonger) {
 
 TEST(PlasticElasticity, BendingYieldsToo) {
     const Body body = make_body(box_cells(8, 1, 1, 0.1), clay()); // one cell across: it bends by that alone
-    const auto elasticity = make_elasticity(body, kPlasticContext);
+    const auto elasticity = make_elasticity(body, kTwoThreads);
     const float radius = 0.5f; // a strain of 10 % on its outside
     const Vectors bent = checks::moved(body.rest, [&](std::size_t, const Vec3f& p) {
         const float angle = p.x() / radius, r = radius + p.y();
         return Vec3f(r * std::sin(angle), r * std::cos(angle) - radius, p.z());
     });
-    const double before = elasticity->energy(bent, kPlasticContext);
-    for (int step = 0; step < 5; ++step) elasticity->finish_substep(bent, 0.001f, kPlasticContext);
-    EXPECT_LT(elasticity->energy(bent, kPlasticContext), 0.1 * before);
+    const double before = elasticity->energy(bent, kTwoThreads);
+    for (int step = 0; step < 5; ++step) elasticity->finish_substep(bent, 0.001f, kTwoThreads);
+    EXPECT_LT(elasticity->energy(bent, kTwoThreads), 0.1 * before);
 }
 
 TEST(PlasticElasticity, CreepsAtItsRate) {
@@ -111,11 +110,11 @@ TEST(PlasticElasticity, CreepsAtItsRate) {
     material.creep_time = 0.1;
     const Body body = make_body(box_cells(2, 2, 2, 0.1), material);
     const auto excess = [&](int steps) {
-        const auto elasticity = make_elasticity(body, kPlasticContext);
+        const auto elasticity = make_elasticity(body, kTwoThreads);
         const Vectors sheared = checks::moved(
             body.rest, [](std::size_t, const Vec3f& p) { return Vec3f(p.x() + 0.1f * p.y(), p.y(), p.z()); });
-        for (int step = 0; step < steps; ++step) elasticity->finish_substep(sheared, 0.001f, kPlasticContext);
-        const double mu = 1e6 / 2.6, strain = std::sqrt(elasticity->energy(sheared, kPlasticContext) / (mu * 8e-3));
+        for (int step = 0; step < steps; ++step) elasticity->finish_substep(sheared, 0.001f, kTwoThreads);
+        const double mu = 1e6 / 2.6, strain = std::sqrt(elasticity->energy(sheared, kTwoThreads) / (mu * 8e-3));
         return strain - std::sqrt(2 / 3.) * 1e4 / (2 * mu);
     };
     EXPECT_NEAR(excess(100) / excess(0), std::exp(-1), 0.02);
@@ -150,8 +149,7 @@ TEST(PlasticElasticity, AFreeBodyKeepsItsMomentumAndStaysLonger) {
         const auto body = block(6, 4, 4, 0.1, material);
         Simulation simulation =
             Simulation::create(world, {{.body = body}},
-                               {.frames_per_second = 100, .mode = mode, .contacts_within_bodies = false},
-                               kPlasticContext)
+                               {.frames_per_second = 100, .mode = mode, .contacts_within_bodies = false}, kTwoThreads)
                 .value();
         Vectors velocities(body->rest.size());
         for (std::size_t i = 0; i < velocities.size(); ++i) {
@@ -160,13 +158,13 @@ TEST(PlasticElasticity, AFreeBodyKeepsItsMomentumAndStaysLonger) {
         }
         ASSERT_TRUE(simulation.set_velocities(0, velocities).ok());
         const Momentum before = simulation.momentum();
-        const double start = simulation.energy(kPlasticContext).total();
-        for (int frame = 0; frame < 60; ++frame) ASSERT_TRUE(simulation.advance(kPlasticContext).ok());
+        const double start = simulation.energy(kTwoThreads).total();
+        for (int frame = 0; frame < 60; ++frame) ASSERT_TRUE(simulation.advance(kTwoThreads).ok());
         const Momentum after = simulation.momentum();
         const double size = before.linear.norm(), exact = mode == StepMode::descent ? 1e-4 : 1e-6;
         EXPECT_LT((after.linear - before.linear).norm(), exact * size);
         EXPECT_LT((after.angular - before.angular).norm(), 20 * exact * size * 0.6);
-        EXPECT_LT(simulation.energy(kPlasticContext).total(), start);
+        EXPECT_LT(simulation.energy(kTwoThreads).total(), start);
         // Longer than it was, for good: what is elastic is a hundredth. The block does not turn.
         const auto length = [](const Vectors& x) {
             const auto [least, most] = std::minmax_element(x.x.begin(), x.x.begin() + std::ptrdiff_t(x.size()));
@@ -178,14 +176,14 @@ TEST(PlasticElasticity, AFreeBodyKeepsItsMomentumAndStaysLonger) {
 
 TEST(PlasticElasticity, SavedAndRestored) {
     const Body body = make_body(box_cells(3, 3, 3, 0.1), clay());
-    const auto first = kneaded(body, kPlasticContext), second = make_elasticity(body, kPlasticContext);
+    const auto first = kneaded(body, kTwoThreads), second = make_elasticity(body, kTwoThreads);
     EXPECT_FALSE(second->restore_state(""));
     EXPECT_FALSE(second->restore_state(first->state().substr(4)));
     ASSERT_TRUE(second->restore_state(first->state()));
     EXPECT_EQ(second->state(), first->state());
     Vectors a(body.particle_count()), b(body.particle_count());
-    first->forces(body.rest, a, kPlasticContext);
-    second->forces(body.rest, b, kPlasticContext);
+    first->forces(body.rest, a, kTwoThreads);
+    second->forces(body.rest, b, kTwoThreads);
     EXPECT_TRUE(checks::same_bytes(a, b));
 }
 

@@ -3,6 +3,7 @@
 // scripts/soak-contact), FILIGREE_FIRST for others.
 #include "filigree/core/random.h"
 #include "physics/test_bodies.h"
+#include "threads.h"
 
 #include <gtest/gtest.h>
 
@@ -10,8 +11,6 @@
 
 namespace filigree {
 namespace {
-
-const RunContext kOneThread(1);
 
 class Dice {
 public:

@@ -1,5 +1,6 @@
 #include "filigree/physics/rigid_body.h"
 #include "physics/test_bodies.h"
+#include "threads.h"
 
 #include <gtest/gtest.h>
 
@@ -7,10 +8,8 @@
 #include <limits>
 #include <numbers>
 
-namespace filigree {
+namespace filigree::rigid_body_test {
 namespace {
-
-const RunContext kOneThread(1);
 
 Material stone(double damping = 0) {
     Material material;
@@ -248,4 +247,4 @@ TEST(AutomaticRigid, WhatIsFarTooStiffIsRigidAndTheRestStaysExplicit) {
 }
 
 } // namespace
-} // namespace filigree
+} // namespace filigree::rigid_body_test

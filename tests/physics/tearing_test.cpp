@@ -2,6 +2,7 @@
 #include "filigree/core/random.h"
 #include "filigree/physics/simulation.h"
 #include "test_bodies.h"
+#include "threads.h"
 
 #include <gtest/gtest.h>
 
@@ -10,8 +11,6 @@
 
 namespace filigree {
 namespace {
-
-const RunContext kTearingContext(2);
 
 Material soft_clay() {
     Material material = undamped(0.3);
@@ -32,7 +31,7 @@ std::shared_ptr<Fracture> tearing(std::shared_ptr<const Body> whole, std::vector
                         }};
     auto fracture = std::make_shared<Fracture>();
     fracture->body =
-        std::make_shared<const BrokenBody>(break_body(std::move(whole), std::move(partition), kTearingContext).value());
+        std::make_shared<const BrokenBody>(break_body(std::move(whole), std::move(partition), kTwoThreads).value());
     fracture->material.strength = 1e5; // not reached
     fracture->material.energy = 5;
     fracture->material.plastic_opening = opening;
@@ -79,19 +78,19 @@ TEST(Tearing, ABarStretchesAndTearsAtItsPlasticOpening) {
             }
             Simulation simulation =
                 Simulation::create(world, {{.body = bar, .fracture = fracture}},
-                                   {.frames_per_second = 200, .contacts_within_bodies = false}, kTearingContext)
+                                   {.frames_per_second = 200, .contacts_within_bodies = false}, kTwoThreads)
                     .value();
             double opened = 0, time = 0, pulled = 0;
             while (simulation.fracture(0).broken_area == 0 && time < 8) {
                 opened = layer_distance(*bar, simulation.positions(0), 0, spacing) - spacing; // the crack's layer
-                pulled = 2 * std::sqrt(1e6 * simulation.energy(kTearingContext).elastic / (1.2 * 0.09) / 2);
-                ASSERT_TRUE(simulation.advance(kTearingContext).ok());
+                pulled = 2 * std::sqrt(1e6 * simulation.energy(kTwoThreads).elastic / (1.2 * 0.09) / 2);
+                ASSERT_TRUE(simulation.advance(kTwoThreads).ok());
                 time = simulation.time();
             }
             EXPECT_NEAR(opened, opening + 0.01 * spacing, 0.05 * opening); // and what is elastic
             EXPECT_NEAR(pulled, 1e4, 2e3);
             while (simulation.fracture(0).parts == 1 && time < 10) {
-                ASSERT_TRUE(simulation.advance(kTearingContext).ok());
+                ASSERT_TRUE(simulation.advance(kTwoThreads).ok());
                 time = simulation.time();
             }
             EXPECT_EQ(simulation.fracture(0).parts, 2u);
@@ -116,18 +115,18 @@ TEST(Tearing, MomentumIsKept) {
                             .mode = StepMode::explicit_steps,
                             .contacts_between_bodies = false,
                             .contacts_within_bodies = false},
-                           kTearingContext)
+                           kTwoThreads)
             .value();
     ASSERT_TRUE(simulation.set_velocities(0, velocities).ok());
     const Momentum before = simulation.momentum();
-    const double start = simulation.energy(kTearingContext).total();
-    for (int frame = 0; frame < 40; ++frame) ASSERT_TRUE(simulation.advance(kTearingContext).ok());
+    const double start = simulation.energy(kTwoThreads).total();
+    for (int frame = 0; frame < 40; ++frame) ASSERT_TRUE(simulation.advance(kTwoThreads).ok());
     EXPECT_EQ(simulation.fracture(0).parts, 2u);
     const Momentum after = simulation.momentum();
     const double size = before.linear.norm();
     EXPECT_LT((after.linear - before.linear).norm(), 1e-6 * size);
     EXPECT_LT((after.angular - before.angular).norm(), 1e-5 * size * 0.5);
-    EXPECT_LT(simulation.energy(kTearingContext).total(), start);
+    EXPECT_LT(simulation.energy(kTwoThreads).total(), start);
 }
 
 World tearing_ground() {
@@ -143,16 +142,15 @@ Simulation thrown_clay(StepMode mode, double opening, bool breaks = true) {
     Actor actor{.body = body, .velocity = {0, -9, 0}, .spin = {1, 0, 2}};
     if (breaks) actor.fracture = tearing(body, seeds_in(0.15), opening);
     actor.placement.rotate(Eigen::AngleAxisd(0.5, Vec3d(1, 0, 1).normalized()));
-    return Simulation::create(tearing_ground(), {actor}, {.frames_per_second = 60, .mode = mode}, kTearingContext)
-        .value();
+    return Simulation::create(tearing_ground(), {actor}, {.frames_per_second = 60, .mode = mode}, kTwoThreads).value();
 }
 
 TEST(Tearing, WhatIsNeverReachedChangesNothing) {
     for (const StepMode mode : {StepMode::explicit_steps, StepMode::descent}) {
         Simulation with = thrown_clay(mode, 1), without = thrown_clay(mode, 1, false);
         for (int frame = 0; frame < 20; ++frame) {
-            ASSERT_TRUE(with.advance(kTearingContext).ok());
-            ASSERT_TRUE(without.advance(kTearingContext).ok());
+            ASSERT_TRUE(with.advance(kTwoThreads).ok());
+            ASSERT_TRUE(without.advance(kTwoThreads).ok());
         }
         EXPECT_EQ(with.positions(0).x, without.positions(0).x);
         EXPECT_EQ(with.positions(0).y, without.positions(0).y);
@@ -165,7 +163,7 @@ TEST(Tearing, SavedInTheMiddleAndOnOtherThreads) {
         Simulation first = thrown_clay(mode, 0.004);
         std::string middle;
         for (int frame = 0; frame < 24; ++frame) {
-            ASSERT_TRUE(first.advance(kTearingContext).ok());
+            ASSERT_TRUE(first.advance(kTwoThreads).ok());
             if (first.fracture(0).broken_area > 0 && middle.empty()) middle = first.save();
         }
         ASSERT_FALSE(middle.empty());

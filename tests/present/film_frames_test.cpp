@@ -2,6 +2,7 @@
 
 #include "filigree/hierarchy/strip.h"
 #include "filigree/mesh/shapes.h"
+#include "threads.h"
 
 #include <gtest/gtest.h>
 
@@ -11,8 +12,6 @@ namespace filigree {
 namespace {
 
 namespace fs = std::filesystem;
-
-const RunContext kContext(1);
 
 class FilmFrames : public testing::Test {
 protected:
@@ -69,7 +68,7 @@ TEST_F(FilmFrames, StopsAtAnErrorAndWhenCancelled) {
         if (frame == 1) return Error{ErrorCode::out_of_memory, "no room"};
         return blank();
     };
-    EXPECT_EQ(film_frames(3, fails, writers, "filming", kContext).error().code, ErrorCode::out_of_memory);
+    EXPECT_EQ(film_frames(3, fails, writers, "filming", kOneThread).error().code, ErrorCode::out_of_memory);
     RunContext context(1);
     const auto cancels = [&](std::size_t, const RunContext& quiet) -> Result<Picture> {
         quiet.cancel();
@@ -82,7 +81,7 @@ TEST_F(FilmFrames, StopsAtAnErrorAndWhenCancelled) {
 TEST(LevelWithin, IsTheFinestThatFits) {
     StripOptions options;
     options.levels = 3;
-    const Model model = strip(make_wavy_cube({.resolution = 24}), options, kContext)->model;
+    const Model model = strip(make_wavy_cube({.resolution = 24}), options, kOneThread)->model;
     const auto triangles = [&](unsigned level) {
         const Mesh mesh = level_mesh(model, level);
         return mesh.corner_count() - 2 * mesh.face_count();

@@ -2,18 +2,17 @@
 
 #include "filigree/hierarchy/strip.h"
 #include "filigree/mesh/shapes.h"
+#include "threads.h"
 
 #include <gtest/gtest.h>
 
 namespace filigree {
 namespace {
 
-const RunContext kContext;
-
 std::shared_ptr<const Model> cube_model() {
     Mesh cube = make_wavy_cube({.resolution = 16});
     cube.origin = Vec3d(100, 0, 0);
-    return std::make_shared<const Model>(strip(cube, {.base = 100}, kContext).value().model);
+    return std::make_shared<const Model>(strip(cube, {.base = 100}, kAllThreads).value().model);
 }
 
 TEST(LevelFacts, CountWhatALevelHas) {
@@ -29,8 +28,8 @@ TEST(LevelFacts, CountWhatALevelHas) {
 
 TEST(LevelDeviations, ShrinkTowardsTheFinest) {
     const Mesh ball = make_wavy_sphere({.resolution = 24, .amplitude = 0});
-    const Model model = strip(ball, {.base = 60}, kContext).value().model;
-    const auto deviations = level_deviations(model, kContext).value();
+    const Model model = strip(ball, {.base = 60}, kAllThreads).value().model;
+    const auto deviations = level_deviations(model, kAllThreads).value();
     ASSERT_EQ(deviations.size(), model.finest_level());
     ASSERT_GE(deviations.size(), 2u);
     for (std::size_t level = 0; level < deviations.size(); ++level) {
@@ -45,8 +44,8 @@ TEST(LevelDeviations, ShrinkTowardsTheFinest) {
 
 TEST(LevelShape, IsPickedWhereTheRayMeetsIt) {
     const auto model = cube_model();
-    const auto shape = LevelShape::make(model, {}, 0, kContext).value();
-    const std::vector<Vec3f> positions = shape->positions({driver_positions(*model), {}, {}}, kContext);
+    const auto shape = LevelShape::make(model, {}, 0, kAllThreads).value();
+    const std::vector<Vec3f> positions = shape->positions({driver_positions(*model), {}, {}}, kAllThreads);
     ASSERT_EQ(positions.size(), shape->vertex_count());
     const Camera::Ray ray{Vec3d(100, 0, 9), Vec3d(0, 0, -1)};
     const std::optional<Picked> front = shape->pick(positions, ray, {});

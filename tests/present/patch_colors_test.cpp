@@ -3,6 +3,7 @@
 
 #include "filigree/mesh/shapes.h"
 #include "filigree/present/patch_drawing.h"
+#include "threads.h"
 
 #include <gtest/gtest.h>
 
@@ -11,11 +12,9 @@
 namespace filigree {
 namespace {
 
-const RunContext kContext(1);
-
 TEST(PatchColors, NeighboursDiffer) {
     const Mesh mesh = make_wavy_cube({.resolution = 32});
-    const RegularPatches patches = find_regular_patches(mesh, 3, kContext).value();
+    const RegularPatches patches = find_regular_patches(mesh, 3, kOneThread).value();
     ASSERT_GT(patches.patch_count(), 6U);
     const std::vector<Index> colors = choose_patch_colors(patches);
     ASSERT_EQ(colors.size(), patches.patch_count());
@@ -33,8 +32,8 @@ TEST(PatchColors, NeighboursDiffer) {
 
 TEST(PatchColors, LabelsAndDrawingHaveTheSame) {
     const Mesh mesh = make_wavy_cube({.resolution = 16});
-    const RegularPatches patches = find_regular_patches(mesh, 4, kContext).value();
-    const FaceLabels labels = patch_labels(mesh, 4, kContext).value();
+    const RegularPatches patches = find_regular_patches(mesh, 4, kOneThread).value();
+    const FaceLabels labels = patch_labels(mesh, 4, kOneThread).value();
     const Mesh drawn = colored_patches(mesh, patches);
     EXPECT_EQ(drawn.face_count(), mesh.face_count());
     std::multiset<Index> in_labels(labels.of_face.begin(), labels.of_face.end()), in_drawing;
@@ -48,7 +47,7 @@ TEST(PatchColors, LabelsAndDrawingHaveTheSame) {
 
 TEST(PatchColors, RibbonsLieAlongEveryBorder) {
     const Mesh mesh = make_wavy_cube({.resolution = 8});
-    const RegularPatches patches = find_regular_patches(mesh, 2, kContext).value();
+    const RegularPatches patches = find_regular_patches(mesh, 2, kOneThread).value();
     const Mesh ribbons = border_ribbons(mesh, patches, 0.001);
     EXPECT_EQ(ribbons.face_count(), patches.patch_count() * 4 * patches.side());
 }

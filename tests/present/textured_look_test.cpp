@@ -8,6 +8,7 @@
 #include "filigree/render/picture.h"
 #include "filigree/scene/melting_surface.h"
 #include "filigree/scene/scene_run.h"
+#include "threads.h"
 
 #include <filesystem>
 #include <fstream>
@@ -17,7 +18,6 @@
 namespace filigree {
 namespace {
 
-const RunContext kOneThread(1);
 const Vec3f kGrey(0.5f, 0.5f, 0.5f);
 
 /// Left half red, right half black and white by columns of texels.

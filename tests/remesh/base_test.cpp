@@ -74,7 +74,7 @@ TEST(BaseTriangles, ReachTheCount) {
         for (const std::size_t wanted : {200, 600, 3000}) { // the last refines all of these first
             const Prepared on(mesh, wanted / 2);
             SurfaceMap map = on.map();
-            ASSERT_TRUE(make_base_triangles(map, {.triangles = wanted}, kSingle).ok());
+            ASSERT_TRUE(make_base_triangles(map, {.triangles = wanted}, kOneThread).ok());
             ASSERT_NO_FATAL_FAILURE(expect_sound(map, on));
             ASSERT_NO_FATAL_FAILURE(expect_continuous(map, on));
             EXPECT_LE(map.triangle_count(), wanted) << wanted;
@@ -88,7 +88,7 @@ TEST(BaseTriangles, KeepEveryCorner) {
     for (const Mesh& mesh : {plain_cube(), machined_part(), ridged_sheet()}) {
         const Prepared on(mesh, 50);
         SurfaceMap map = on.map();
-        ASSERT_TRUE(make_base_triangles(map, {.triangles = 100}, kSingle).ok());
+        ASSERT_TRUE(make_base_triangles(map, {.triangles = 100}, kOneThread).ok());
         for (Index v = 0; v < on.kinds.size(); ++v)
             if (on.kinds[v] == VertexKind::corner) {
                 ASSERT_FALSE(map.is_vertex_removed(v));
@@ -103,7 +103,7 @@ TEST(BaseTriangles, KeepTheTopologyHoweverFewAreWanted) {
          {ring, bumpy_torus(), ridged_sheet(), machined_part(), make_wavy_sphere({.resolution = 24})}) {
         const Prepared on(mesh, 4, 180);
         SurfaceMap map = on.map();
-        ASSERT_TRUE(make_base_triangles(map, {.triangles = 4}, kSingle).ok());
+        ASSERT_TRUE(make_base_triangles(map, {.triangles = 4}, kOneThread).ok());
         ASSERT_NO_FATAL_FAILURE(expect_sound(map, on));
         EXPECT_LT(map.triangle_count(), 200u);
     }
@@ -112,7 +112,7 @@ TEST(BaseTriangles, KeepTheTopologyHoweverFewAreWanted) {
 TEST(BaseTriangles, StandForAboutTheirOwnArea) {
     const Prepared on(make_wavy_sphere({.resolution = 48, .frequency = 3, .amplitude = 0.1}), 250);
     SurfaceMap map = on.map();
-    ASSERT_TRUE(make_base_triangles(map, {.triangles = 500}, kSingle).ok());
+    ASSERT_TRUE(make_base_triangles(map, {.triangles = 500}, kOneThread).ok());
     double covered = 0, area = 0;
     for (Index s = 0; s < map.slot_count(); ++s) {
         if (map.is_removed(s)) continue;
@@ -128,13 +128,13 @@ TEST(BaseTriangles, EdgeCases) {
     // one triangle: its three corners stay
     const Prepared triangle(triangle_mesh({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}));
     SurfaceMap map = triangle.map();
-    ASSERT_TRUE(make_base_triangles(map, {.triangles = 1}, kSingle).ok());
+    ASSERT_TRUE(make_base_triangles(map, {.triangles = 1}, kOneThread).ok());
     ASSERT_NO_FATAL_FAILURE(expect_sound(map, triangle));
     // a tetrahedron of which fewer than four triangles are wanted
     const Prepared four(
         triangle_mesh({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}}));
     SurfaceMap small = four.map();
-    ASSERT_TRUE(make_base_triangles(small, {.triangles = 2}, kSingle).ok());
+    ASSERT_TRUE(make_base_triangles(small, {.triangles = 2}, kOneThread).ok());
     ASSERT_NO_FATAL_FAILURE(expect_sound(small, four));
     EXPECT_GE(small.triangle_count(), 4u);
 }
@@ -155,8 +155,8 @@ TEST(BaseQuads, CoverEveryTriangleOnce) {
             for (const std::size_t triangles : {120, 121, 700}) {
                 const Prepared on(mesh, triangles / 2);
                 SurfaceMap map = on.map();
-                ASSERT_TRUE(make_base_triangles(map, {.triangles = triangles}, kSingle).ok());
-                const auto base = make_base_quads(map, halve, kSingle);
+                ASSERT_TRUE(make_base_triangles(map, {.triangles = triangles}, kOneThread).ok());
+                const auto base = make_base_quads(map, halve, kOneThread);
                 ASSERT_TRUE(base.ok());
                 ASSERT_NO_FATAL_FAILURE(expect_sound(map, on));
                 ASSERT_NO_FATAL_FAILURE(expect_patches(map, *base, on));
@@ -177,7 +177,7 @@ TEST(BaseQuads, OfTrianglesThatCannotAllBePaired) {
     // one triangle alone: three quads around its middle
     const Prepared one(triangle_mesh({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}));
     SurfaceMap map = one.map();
-    const auto base = make_base_quads(map, false, kSingle);
+    const auto base = make_base_quads(map, false, kOneThread);
     ASSERT_TRUE(base.ok());
     EXPECT_TRUE(base->halved || base->quads.size() * 2 == map.triangle_count());
     ASSERT_NO_FATAL_FAILURE(expect_patches(map, *base, one));
@@ -187,8 +187,8 @@ TEST(BaseQuads, HaveNoStraightCornersOnCurves) {
     // beside a straight curve, a vertex has two quads at least
     const Prepared on(ridged_sheet(), 60);
     SurfaceMap map = on.map();
-    ASSERT_TRUE(make_base_triangles(map, {.triangles = 120}, kSingle).ok());
-    const auto base = make_base_quads(map, false, kSingle);
+    ASSERT_TRUE(make_base_triangles(map, {.triangles = 120}, kOneThread).ok());
+    const auto base = make_base_quads(map, false, kOneThread);
     ASSERT_TRUE(base.ok());
     for (const BaseQuad& quad : base->quads)
         for (std::size_t k = 0; k < 4; ++k)

@@ -14,11 +14,6 @@ namespace {
 
 constexpr double kEverything = 1e30; // a loop limit
 
-ManifoldSurface manifold(const Mesh& mesh) {
-    CleanReport report;
-    return *make_manifold(mesh, report, RunContext(1));
-}
-
 /// Closes handles and checks what must be true whatever the surface and the limit.
 CleanReport close(ManifoldSurface& surface, double longest_loop, const RunContext& context = RunContext(1)) {
     const ManifoldSurface before = surface;

@@ -6,11 +6,6 @@
 namespace filigree_test {
 namespace {
 
-ManifoldSurface manifold(const Mesh& mesh) {
-    CleanReport report;
-    return *make_manifold(mesh, report, RunContext(1));
-}
-
 TEST(HalfEdges, EveryHalfEdgeIsThereOnceBesideItsEdgesOthers) {
     std::mt19937 random(2);
     std::vector<Triangle> triangles;

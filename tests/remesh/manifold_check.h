@@ -17,6 +17,11 @@ namespace filigree_test {
 
 using namespace filigree;
 
+inline ManifoldSurface manifold(const Mesh& mesh) {
+    CleanReport report;
+    return *make_manifold(mesh, report, RunContext(1));
+}
+
 /// The sets that `count` things fall into when those that `join` names are joined.
 inline std::size_t set_count(std::size_t count,
                              const std::function<void(const std::function<void(std::size_t, std::size_t)>&)>& joins) {

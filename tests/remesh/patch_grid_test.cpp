@@ -24,7 +24,7 @@ void expect_grid(const PatchGrid& grid, const Prepared& on, unsigned levels) {
     const Mesh mesh = grid_mesh(grid, Vec3d(1, 2, 3));
     ASSERT_EQ(check_mesh(mesh), "");
     EXPECT_EQ(mesh.origin, Vec3d(1, 2, 3));
-    const TopologyReport report = analyse_topology(mesh, kSingle);
+    const TopologyReport report = analyse_topology(mesh, kOneThread);
     EXPECT_EQ(report.quads, report.faces);
     EXPECT_EQ(report.unused_vertices.count, 0u);
     EXPECT_TRUE(report.is_manifold());
@@ -33,7 +33,7 @@ void expect_grid(const PatchGrid& grid, const Prepared& on, unsigned levels) {
     EXPECT_EQ(report.components, on.topology().components);
     EXPECT_EQ(report.open_edges.count > 0, on.topology().border_edges > 0);
     EXPECT_EQ(topology_of_quads(mesh).border_loops, on.topology().border_loops);
-    const auto found = find_regular_patches(mesh, 8, kSingle);
+    const auto found = find_regular_patches(mesh, 8, kOneThread);
     ASSERT_TRUE(found.ok());
     EXPECT_GE(found->levels, levels);
 
@@ -55,7 +55,7 @@ TEST(PatchGrid, SharesVerticesAndKeepsTopologyAndCurves) {
     for (const Mesh& mesh : {bumpy_torus(), ridged_sheet(), plain_cube(), machined_part()})
         for (const unsigned levels : {1u, 3u}) {
             const Prepared on(mesh, 60);
-            const PatchGrid grid = sampled_grid(on, 60, levels, kSingle);
+            const PatchGrid grid = sampled_grid(on, 60, levels, kOneThread);
             ASSERT_NO_FATAL_FAILURE(expect_grid(grid, on, levels));
         }
 }
@@ -63,8 +63,8 @@ TEST(PatchGrid, SharesVerticesAndKeepsTopologyAndCurves) {
 TEST(PatchGrid, HalvingKeepsWhatIsThere) {
     for (const Mesh& mesh : {bumpy_torus(), ridged_sheet(), plain_cube(), machined_part()}) {
         const Prepared on(mesh, 60);
-        const PatchGrid coarse = sampled_grid(on, 60, 2, kSingle);
-        const PatchGrid fine = halve_grid(coarse, on.walk(), kSingle);
+        const PatchGrid coarse = sampled_grid(on, 60, 2, kOneThread);
+        const PatchGrid fine = halve_grid(coarse, on.walk(), kOneThread);
         ASSERT_NO_FATAL_FAILURE(expect_grid(fine, on, 3));
         EXPECT_EQ(fine.patches.base, coarse.patches.base);
         EXPECT_EQ(fine.features, coarse.features);
@@ -82,7 +82,7 @@ TEST(PatchGrid, HalvingKeepsWhatIsThere) {
 
 TEST(PatchGrid, OfAPlaneLiesInIt) {
     const Prepared on(make_wavy_plane({.resolution = 20, .amplitude = 0}), 30);
-    const PatchGrid grid = halve_grid(sampled_grid(on, 30, 3, kSingle), on.walk(), kSingle);
+    const PatchGrid grid = halve_grid(sampled_grid(on, 30, 3, kOneThread), on.walk(), kOneThread);
     double area = 0;
     for (const auto& [a, b, c, d] : grid.quads())
         area += 0.5 * (grid.positions[c] - grid.positions[a]).cross(grid.positions[d] - grid.positions[b]).z();
@@ -93,9 +93,9 @@ TEST(PatchGrid, OfAPlaneLiesInIt) {
 TEST(PatchGrid, SameForAnyNumberOfThreads) {
     FILIGREE_NEEDS_TWO_THREADS();
     const Prepared on(machined_part(), 60);
-    const PatchGrid one = sampled_grid(on, 60, 3, kSingle), two = sampled_grid(on, 60, 3, RunContext(2));
+    const PatchGrid one = sampled_grid(on, 60, 3, kOneThread), two = sampled_grid(on, 60, 3, RunContext(2));
     EXPECT_EQ(one.positions, two.positions);
-    EXPECT_EQ(halve_grid(one, on.walk(), kSingle).positions, halve_grid(one, on.walk(), RunContext(2)).positions);
+    EXPECT_EQ(halve_grid(one, on.walk(), kOneThread).positions, halve_grid(one, on.walk(), RunContext(2)).positions);
 }
 
 } // namespace

@@ -7,6 +7,7 @@
 #include "filigree/remesh/half_edges.h"
 #include "filigree/remesh/patch_grid.h"
 #include "io/corpus.h"
+#include "threads.h"
 
 #include <algorithm>
 #include <cmath>
@@ -19,8 +20,6 @@
 namespace filigree_test {
 
 using namespace filigree;
-
-inline const RunContext kSingle(1);
 
 inline double area_of(const ManifoldSurface& surface) {
     double area = 0;
@@ -43,7 +42,7 @@ struct Prepared {
     /// patches: about how many will be wanted.
     explicit Prepared(const Mesh& mesh, std::size_t patches = 100, double angle_deg = 40) {
         CleanReport report;
-        auto manifold = make_manifold(mesh, report, kSingle);
+        auto manifold = make_manifold(mesh, report, kOneThread);
         EXPECT_TRUE(manifold.ok());
         surface = std::move(*manifold);
         twins = opposite_half_edges(surface.triangles, surface.positions.size());

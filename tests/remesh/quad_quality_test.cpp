@@ -11,8 +11,6 @@
 namespace filigree {
 namespace {
 
-const RunContext kOneThread(1);
-
 double jacobian(const std::array<Vec3d, 4>& q) { return scaled_jacobian(q[0], q[1], q[2], q[3]); }
 
 Mesh single_quad(const std::array<Vec3f, 4>& corners) {

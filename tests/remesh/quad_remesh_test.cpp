@@ -36,13 +36,13 @@ void expect_sources(const QuadRemeshed& quads, const Mesh& input, std::size_t al
 void expect_promises(const QuadRemeshed& quads, const Mesh& input, const QuadRemeshOptions& options) {
     const QuadRemeshReport& report = quads.report;
     ASSERT_EQ(check_mesh(quads.mesh), "");
-    const TopologyReport topology = analyse_topology(quads.mesh, kSingle);
+    const TopologyReport topology = analyse_topology(quads.mesh, kOneThread);
     EXPECT_EQ(topology.quads, topology.faces);
     EXPECT_EQ(topology.unused_vertices.count, 0u);
     EXPECT_TRUE(topology.is_manifold());
     EXPECT_TRUE(topology.is_oriented());
 
-    const QuadQuality quality = measure_quads(quads.mesh, kSingle);
+    const QuadQuality quality = measure_quads(quads.mesh, kOneThread);
     EXPECT_EQ(quality.inverted, 0u);
     EXPECT_GT(quality.min_scaled_jacobian, 0);
     EXPECT_EQ(quality.quads, report.quality.quads);
@@ -54,7 +54,7 @@ void expect_promises(const QuadRemeshed& quads, const Mesh& input, const QuadRem
     EXPECT_EQ(topology_of_quads(quads.mesh).border_loops, report.input.border_loops);
     if (!report.wrapped) {
         CleanReport clean; // what the clean-up alone makes of it
-        auto surface = make_manifold(input, clean, kSingle);
+        auto surface = make_manifold(input, clean, kOneThread);
         ASSERT_TRUE(surface.ok());
         const SurfaceTopology before = surface_topology(*surface);
         EXPECT_EQ(report.input.components + report.clean.removed_components, before.components);
@@ -69,7 +69,7 @@ void expect_promises(const QuadRemeshed& quads, const Mesh& input, const QuadRem
     EXPECT_EQ(report.patches, quads.patches.patch_count());
     EXPECT_EQ(report.levels, quads.patches.levels);
     EXPECT_EQ(topology.faces, report.patches << (2 * report.levels));
-    const auto found = find_regular_patches(quads.mesh, 8, kSingle);
+    const auto found = find_regular_patches(quads.mesh, 8, kOneThread);
     ASSERT_TRUE(found.ok());
     EXPECT_GE(found->levels, report.levels);
     EXPECT_EQ(quads.patches.grid.size(), report.patches * (quads.patches.side() + 1) * (quads.patches.side() + 1));
@@ -79,7 +79,7 @@ void expect_promises(const QuadRemeshed& quads, const Mesh& input, const QuadRem
 
     EXPECT_LE(report.to_input.max, report.max_distance);
     EXPECT_LE(report.from_input.max, report.max_distance_from_input);
-    const auto distance = mesh_distance(quads.mesh, input, 20'000, kSingle);
+    const auto distance = mesh_distance(quads.mesh, input, 20'000, kOneThread);
     ASSERT_TRUE(distance.ok());
     // input->quads only where no part of the input was taken away; the samples are others than the gate's
     EXPECT_LE(distance->relative(distance->surfaces->max_a_to_b), 1.1 * report.max_distance + 1e-6);
@@ -169,7 +169,7 @@ TEST(QuadRemesh, KeepsItsPromisesOnTheGoodCorpus) {
     std::size_t remeshed_files = 0;
     for (const CorpusRow& row : rows) {
         if (!row.file.starts_with("good/")) continue;
-        const auto input = read_mesh(row.path, kSingle);
+        const auto input = read_mesh(row.path, kOneThread);
         if (!input.ok() || input->mesh.face_count() == 0) continue;
         SCOPED_TRACE(row.file);
         const QuadRemeshOptions options{.quads = 5000};
@@ -223,7 +223,7 @@ TEST(QuadRemesh, KeepsWhatSticksOutOfScans) {
         if (row.file != "good/fish.obj" && row.file != "good/koala_100k.obj" && row.file != "good/penguin.obj")
             continue;
         SCOPED_TRACE(row.file);
-        const auto input = read_mesh(row.path, kSingle);
+        const auto input = read_mesh(row.path, kOneThread);
         ASSERT_TRUE(input.ok());
         const QuadRemeshed result = remeshed(input->mesh, {.quads = 20'000});
         EXPECT_LE(result.report.from_input.max, 4e-3); // the fish lost 6.1e-3 of its fins
@@ -275,7 +275,7 @@ TEST(QuadRemesh, KeepsTheCornersAndEdgesOfACube) {
     EXPECT_EQ(quads.report.feature_edges, 12u);
     EXPECT_LT(quads.report.to_input.max, 1e-6);
     EXPECT_LT(quads.report.from_input.max, 1e-6);
-    EXPECT_NEAR(analyse_topology(quads.mesh, kSingle).area, 6, 1e-4);
+    EXPECT_NEAR(analyse_topology(quads.mesh, kOneThread).area, 6, 1e-4);
 }
 
 TEST(QuadRemesh, KeepsTheEdgesOfAMachinedPart) {
@@ -344,7 +344,7 @@ TEST(QuadRemesh, TinyMeshes) {
 TEST(QuadRemesh, NothingWithAnAreaIsUnsuitable) {
     for (const Mesh& mesh : {Mesh{}, triangle_mesh({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}, {{0, 1, 2}}),
                              triangle_mesh({{0, 0, 0}, {0, 0, 0}, {0, 0, 0}}, {{0, 1, 2}})}) {
-        const auto quads = quad_remesh(mesh, {}, kSingle);
+        const auto quads = quad_remesh(mesh, {}, kOneThread);
         ASSERT_FALSE(quads.ok());
         EXPECT_EQ(quads.error().code, ErrorCode::unsuitable);
         EXPECT_FALSE(quads.error().message.empty());
@@ -362,7 +362,7 @@ TEST(QuadRemesh, DegenerateTrianglesAmongGoodOnes) {
         mesh.add_face(Triangle{a, a, b});
     }
     // the needles are parts of their own, on cut edges; without an area they are no reason to refuse
-    const auto quads = quad_remesh(mesh, {.quads = 1000}, kSingle);
+    const auto quads = quad_remesh(mesh, {.quads = 1000}, kOneThread);
     ASSERT_TRUE(quads.ok()) << quads.error().message;
     EXPECT_EQ(quads->report.output.components, 1u);
     EXPECT_EQ(quads->report.quality.inverted, 0u);
@@ -372,7 +372,7 @@ TEST(QuadRemesh, DegenerateTrianglesAmongGoodOnes) {
 TEST(QuadRemesh, OptionsOutOfRangeAreUsage) {
     const Mesh cube = plain_cube();
     const auto is_usage = [&](const QuadRemeshOptions& options) {
-        const auto quads = quad_remesh(cube, options, kSingle);
+        const auto quads = quad_remesh(cube, options, kOneThread);
         return !quads.ok() && quads.error().code == ErrorCode::usage && !quads.error().message.empty();
     };
     constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
@@ -389,7 +389,7 @@ TEST(QuadRemesh, OptionsOutOfRangeAreUsage) {
 TEST(QuadRemesh, LevelsAndAnglesAtTheirEnds) {
     const Mesh ball = make_wavy_sphere({.resolution = 16, .frequency = 3, .amplitude = 0.1});
     // 8 levels on six patches are far more than six quads
-    const auto refused = quad_remesh(ball, {.quads = 6, .levels = 8}, kSingle);
+    const auto refused = quad_remesh(ball, {.quads = 6, .levels = 8}, kOneThread);
     ASSERT_FALSE(refused.ok());
     EXPECT_EQ(refused.error().code, ErrorCode::unsuitable);
     EXPECT_EQ(remeshed(plain_cube(), {.quads = 24, .levels = 1}).report.levels, 1u);
@@ -412,11 +412,11 @@ TEST(QuadRemesh, ManyComponents) {
     EXPECT_EQ(quads.report.output.components, 120u);
     EXPECT_EQ(quads.report.output.euler, 240);
     // fewer quads than they need: a reason that says how many are
-    const auto refused = quad_remesh(balls, {.quads = 500, .levels = 2, .small_parts = SmallParts::keep}, kSingle);
+    const auto refused = quad_remesh(balls, {.quads = 500, .levels = 2, .small_parts = SmallParts::keep}, kOneThread);
     ASSERT_FALSE(refused.ok());
     EXPECT_EQ(refused.error().code, ErrorCode::unsuitable);
     EXPECT_NE(refused.error().message.find("120 separate parts"), std::string::npos);
-    const auto one = quad_remesh(plain_cube(), {.quads = 6}, kSingle);
+    const auto one = quad_remesh(plain_cube(), {.quads = 6}, kOneThread);
     ASSERT_FALSE(one.ok());
     EXPECT_EQ(one.error().message.find("parts"), std::string::npos);
 }
@@ -435,13 +435,13 @@ TEST(QuadRemesh, SmallPartsGoOrStay) {
 
 TEST(QuadRemesh, TinyHandlesGoOrStay) {
     const Mesh mesh = ball_with_handles();
-    ASSERT_EQ(analyse_topology(mesh, kSingle).euler, 2 - 2 * 3);
-    ASSERT_TRUE(analyse_topology(mesh, kSingle).is_closed());
+    ASSERT_EQ(analyse_topology(mesh, kOneThread).euler, 2 - 2 * 3);
+    ASSERT_TRUE(analyse_topology(mesh, kOneThread).is_closed());
     const QuadRemeshed removed = remeshed(mesh, {.quads = 3000});
     EXPECT_EQ(removed.report.clean.closed_handles, 3u);
     EXPECT_EQ(removed.report.output.euler, 2);
     const auto kept =
-        quad_remesh(mesh, {.quads = 20'000, .small_parts = SmallParts::keep, .wrap = WrapUse::never}, kSingle);
+        quad_remesh(mesh, {.quads = 20'000, .small_parts = SmallParts::keep, .wrap = WrapUse::never}, kOneThread);
     ASSERT_TRUE(kept.ok()) << kept.error().message;
     EXPECT_EQ(kept->report.clean.closed_handles, 0u);
     EXPECT_EQ(kept->report.output.euler, -4);
@@ -453,7 +453,7 @@ TEST(QuadRemesh, WrapsWhenAskedTo) {
     const QuadRemeshed quads = remeshed(torus, {.quads = 3000, .wrap = WrapUse::always, .max_distance = 0.05});
     EXPECT_TRUE(quads.report.wrapped);
     EXPECT_EQ(quads.report.output.euler, 0);
-    EXPECT_TRUE(analyse_topology(quads.mesh, kSingle).is_closed());
+    EXPECT_TRUE(analyse_topology(quads.mesh, kOneThread).is_closed());
     ASSERT_EQ(quads.source.size(), quads.mesh.vertex_count());
     for (const CornerPoint& source : quads.source)
         for (const Index corner : source.corners) ASSERT_LT(corner, torus.corner_count());
@@ -461,7 +461,7 @@ TEST(QuadRemesh, WrapsWhenAskedTo) {
 
 TEST(QuadRemesh, RefusesWhatIsTooFarAway) {
     const auto quads =
-        quad_remesh(bumpy_torus(), {.quads = 1000, .wrap = WrapUse::never, .max_distance = 1e-9}, kSingle);
+        quad_remesh(bumpy_torus(), {.quads = 1000, .wrap = WrapUse::never, .max_distance = 1e-9}, kOneThread);
     ASSERT_FALSE(quads.ok());
     EXPECT_EQ(quads.error().code, ErrorCode::unsuitable);
     EXPECT_NE(quads.error().message.find("diagonal"), std::string::npos);

@@ -9,7 +9,7 @@ namespace {
 
 using namespace filigree_test;
 
-QuadQuality quality(const PatchGrid& grid) { return measure_quads(grid_mesh(grid, Vec3d::Zero()), kSingle); }
+QuadQuality quality(const PatchGrid& grid) { return measure_quads(grid_mesh(grid, Vec3d::Zero()), kOneThread); }
 
 /// Every vertex on the surface, curve vertices on curves, corners where they were.
 void expect_in_place(const PatchGrid& grid, const PatchGrid& before, const Prepared& on) {
@@ -29,21 +29,21 @@ void expect_in_place(const PatchGrid& grid, const PatchGrid& before, const Prepa
     }
 }
 
-std::vector<Mesh> shapes() {
+std::vector<Mesh> waved_shapes() {
     return {bumpy_torus(), ridged_sheet(), plain_cube(), machined_part(),
             make_wavy_sphere({.resolution = 24, .frequency = 3, .amplitude = 0.1})};
 }
 
 TEST(Relax, StaysOnTheSurfaceAndMakesNoQuadWorse) {
-    for (const Mesh& mesh : shapes()) {
+    for (const Mesh& mesh : waved_shapes()) {
         const Prepared on(mesh, 80);
         const SurfaceWalk walk = on.walk();
-        PatchGrid grid = sampled_grid(on, 80, 3, kSingle);
+        PatchGrid grid = sampled_grid(on, 80, 3, kOneThread);
         const PatchGrid before = grid;
         double least = quality(grid).min_scaled_jacobian;
         const double mean = quality(grid).mean_scaled_jacobian;
         for (int sweep = 0; sweep < 6; ++sweep) {
-            relax(grid, walk, 1, kSingle);
+            relax(grid, walk, 1, kOneThread);
             const double now = quality(grid).min_scaled_jacobian;
             EXPECT_GE(now, std::min(least, 0.5) - 1e-4); // rounded once, at first
             least = now;
@@ -56,10 +56,10 @@ TEST(Relax, StaysOnTheSurfaceAndMakesNoQuadWorse) {
 TEST(Relax, LeavesSquaresAsTheyAre) {
     // a grid of squares is at rest: each vertex is its neighbours' mean
     const Prepared on(make_wavy_plane({.resolution = 2, .amplitude = 0}));
-    PatchGrid grid = sampled_grid(on, 4, 3, kSingle);
-    relax(grid, on.walk(), 60, kSingle);
+    PatchGrid grid = sampled_grid(on, 4, 3, kOneThread);
+    relax(grid, on.walk(), 60, kOneThread);
     const PatchGrid before = grid;
-    relax(grid, on.walk(), 5, kSingle);
+    relax(grid, on.walk(), 5, kOneThread);
     for (Index v = 0; v < grid.positions.size(); ++v) EXPECT_LT((grid.positions[v] - before.positions[v]).norm(), 5e-3);
 }
 
@@ -67,11 +67,11 @@ TEST(Relax, SameForAnyNumberOfThreads) {
     FILIGREE_NEEDS_TWO_THREADS();
     for (const Mesh& mesh : {bumpy_torus(), machined_part()}) {
         const Prepared on(mesh, 80);
-        PatchGrid one = sampled_grid(on, 80, 4, kSingle), two = one;
-        relax(one, on.walk(), 5, kSingle);
+        PatchGrid one = sampled_grid(on, 80, 4, kOneThread), two = one;
+        relax(one, on.walk(), 5, kOneThread);
         relax(two, on.walk(), 5, RunContext(2));
         EXPECT_EQ(one.positions, two.positions);
-        untangle(one, on.walk(), 0.3, kSingle);
+        untangle(one, on.walk(), 0.3, kOneThread);
         untangle(two, on.walk(), 0.3, RunContext(2));
         EXPECT_EQ(one.positions, two.positions);
     }
@@ -97,12 +97,12 @@ TEST(Untangle, LeavesNoneInverted) {
         for (unsigned seed = 0; seed < 8; ++seed) {
             const Prepared on(mesh, 80);
             const SurfaceWalk walk = on.walk();
-            PatchGrid grid = sampled_grid(on, 80, 3, kSingle);
-            relax(grid, walk, 10, kSingle);
+            PatchGrid grid = sampled_grid(on, 80, 3, kOneThread);
+            relax(grid, walk, 10, kOneThread);
             ASSERT_EQ(quality(grid).inverted, 0u);
             EXPECT_GT(tangle(grid, walk, seed, static_cast<Index>(grid.quads().size() / 4)), 2u);
             const PatchGrid before = grid;
-            const Untangled untangled = untangle(grid, walk, 0.2, kSingle);
+            const Untangled untangled = untangle(grid, walk, 0.2, kOneThread);
             EXPECT_EQ(untangled.inverted, 0u) << mesh.face_count() << " faces, seed " << seed;
             EXPECT_EQ(quality(grid).inverted, 0u);
             if (untangled.off_surface == 0) {
@@ -113,11 +113,11 @@ TEST(Untangle, LeavesNoneInverted) {
 
 TEST(Untangle, TouchesNothingThatIsGood) {
     const Prepared on(bumpy_torus(), 80);
-    PatchGrid grid = sampled_grid(on, 80, 3, kSingle);
-    relax(grid, on.walk(), 20, kSingle);
+    PatchGrid grid = sampled_grid(on, 80, 3, kOneThread);
+    relax(grid, on.walk(), 20, kOneThread);
     ASSERT_GT(quality(grid).min_scaled_jacobian, 0.1);
     const PatchGrid before = grid;
-    const Untangled untangled = untangle(grid, on.walk(), 0.1, kSingle);
+    const Untangled untangled = untangle(grid, on.walk(), 0.1, kOneThread);
     EXPECT_EQ(untangled.inverted, 0u);
     EXPECT_EQ(untangled.off_surface, 0u);
     EXPECT_EQ(grid.positions, before.positions);
@@ -125,11 +125,11 @@ TEST(Untangle, TouchesNothingThatIsGood) {
 
 TEST(Untangle, TriesNothingWhereTooMuchIsTangled) {
     const Prepared on(bumpy_torus(), 80);
-    PatchGrid grid = sampled_grid(on, 80, 3, kSingle);
+    PatchGrid grid = sampled_grid(on, 80, 3, kOneThread);
     const std::size_t tangled = tangle(grid, on.walk(), 0, 3);
     EXPECT_GT(tangled, grid.quads().size() / 5);
     const PatchGrid before = grid;
-    EXPECT_EQ(untangle(grid, on.walk(), 0.2, kSingle).inverted, tangled);
+    EXPECT_EQ(untangle(grid, on.walk(), 0.2, kOneThread).inverted, tangled);
     EXPECT_EQ(grid.positions, before.positions);
 }
 
@@ -137,12 +137,12 @@ TEST(Untangle, SaysWhatItCannotMend) {
     // corners stay, and here all four are one point
     const Prepared on(triangle_mesh({{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}), 1);
     SurfaceMap map = on.map();
-    const auto base = make_base_quads(map, false, kSingle);
+    const auto base = make_base_quads(map, false, kOneThread);
     ASSERT_TRUE(base.ok());
-    PatchGrid grid = sample_patches(map, *base, on.walk(), 1, kSingle);
+    PatchGrid grid = sample_patches(map, *base, on.walk(), 1, kOneThread);
     for (Vec3d& p : grid.positions) p = Vec3d::Zero();
     for (VertexKind& kind : grid.kinds) kind = VertexKind::corner;
-    EXPECT_EQ(untangle(grid, on.walk(), 0.2, kSingle).inverted, grid.quads().size());
+    EXPECT_EQ(untangle(grid, on.walk(), 0.2, kOneThread).inverted, grid.quads().size());
 }
 
 } // namespace

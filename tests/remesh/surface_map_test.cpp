@@ -239,9 +239,9 @@ TEST(SurfaceMap, ReachesEveryPlaceOnce) {
 TEST(SurfaceMap, OfAScanMadeCoarse) {
     const std::filesystem::path file = corpus_file("good/koala_100k.obj");
     if (file.empty()) GTEST_SKIP() << "no corpus";
-    const Prepared on(read_mesh(file, kSingle)->mesh, 1000);
+    const Prepared on(read_mesh(file, kOneThread)->mesh, 1000);
     SurfaceMap map = on.map();
-    ASSERT_TRUE(make_base_triangles(map, {.triangles = 2000}, kSingle).ok());
+    ASSERT_TRUE(make_base_triangles(map, {.triangles = 2000}, kOneThread).ok());
     ASSERT_NO_FATAL_FAILURE(expect_sound(map, on));
     EXPECT_NEAR(image_of(map, 16).area, area_of(on.surface), 0.05 * area_of(on.surface));
     RandomChanges(map, 1).make(4000, 10);

@@ -53,12 +53,12 @@ TEST(Tips, AreNotOnCurves) {
 TEST(Tips, AreHeldThroughRelaxingAndHalving) {
     const Prepared on(bumpy_torus(), 80);
     const SurfaceWalk walk = on.walk();
-    PatchGrid grid = sampled_grid(on, 80, 2, kSingle);
+    PatchGrid grid = sampled_grid(on, 80, 2, kOneThread);
     const std::vector<Index> tips = {10, 11, 300};
     ASSERT_EQ(hold_tips(on.surface, on.twins, tips, 0.01, grid), tips.size());
-    relax(grid, walk, 10, kSingle);
-    grid = halve_grid(grid, walk, kSingle);
-    relax(grid, walk, 4, kSingle);
+    relax(grid, walk, 10, kOneThread);
+    grid = halve_grid(grid, walk, kOneThread);
+    relax(grid, walk, 4, kOneThread);
     EXPECT_EQ(std::ranges::count_if(grid.held, [](float leash) { return leash > 0; }), std::ptrdiff_t(tips.size()));
     for (const Index tip : tips) {
         double nearest = std::numeric_limits<double>::infinity();
@@ -71,11 +71,11 @@ TEST(Tips, AreHeldThroughRelaxingAndHalving) {
 TEST(Tips, UntanglingKeepsThemOnTheirLeash) {
     const Prepared on(bumpy_torus(), 80);
     const SurfaceWalk walk = on.walk();
-    PatchGrid grid = sampled_grid(on, 80, 3, kSingle);
+    PatchGrid grid = sampled_grid(on, 80, 3, kOneThread);
     ASSERT_EQ(hold_tips(on.surface, on.twins, std::vector<Index>{10, 300}, 0.02, grid), 2u);
-    relax(grid, walk, 20, kSingle);
+    relax(grid, walk, 20, kOneThread);
     const PatchGrid before = grid;
-    EXPECT_EQ(untangle(grid, walk, 0.9, kSingle).inverted, 0u); // nearly all quads are to be mended
+    EXPECT_EQ(untangle(grid, walk, 0.9, kOneThread).inverted, 0u); // nearly all quads are to be mended
     for (std::size_t v = 0; v < grid.positions.size(); ++v)
         if (before.held[v] > 0) {
             EXPECT_LE((grid.positions[v] - before.positions[v]).norm(), 0.02 * (1 + 1e-6));
@@ -84,7 +84,7 @@ TEST(Tips, UntanglingKeepsThemOnTheirLeash) {
 
 TEST(Tips, FindNoVertexWhereAllAreHeld) {
     const Prepared on(bumpy_torus(), 80);
-    PatchGrid grid = sampled_grid(on, 80, 1, kSingle);
+    PatchGrid grid = sampled_grid(on, 80, 1, kOneThread);
     grid.held.assign(grid.held.size(), 0.01f);
     EXPECT_EQ(hold_tips(on.surface, on.twins, std::vector<Index>{10}, 0.01, grid), 0u);
 }

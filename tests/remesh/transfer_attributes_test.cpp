@@ -16,8 +16,6 @@
 namespace filigree {
 namespace {
 
-const RunContext kOneThread(1);
-
 /// The closest point of `from` for each vertex of `to`.
 std::vector<CornerPoint> points_on(const Mesh& from, const Mesh& to) {
     const Triangulation cut = triangulate(from);

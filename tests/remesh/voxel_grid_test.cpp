@@ -8,7 +8,6 @@
 namespace filigree {
 namespace {
 
-const RunContext kOneThread(1);
 constexpr VoxelIndex kSize = {131, 9, 11}; // rows of three words, the last one with three voxels
 
 template <class Visit>

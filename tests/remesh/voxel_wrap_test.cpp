@@ -16,8 +16,6 @@
 namespace filigree {
 namespace {
 
-const RunContext kOneThread(1);
-
 std::vector<Vec3d> positions_of(const Mesh& mesh) {
     std::vector<Vec3d> positions;
     for (const Vec3f& p : mesh.positions) positions.push_back(p.cast<double>());

@@ -2,6 +2,7 @@
 #include "filigree/render/draw_arrays.h"
 
 #include "filigree/mesh/shapes.h"
+#include "threads.h"
 
 #include <algorithm>
 #include <bit>
@@ -14,8 +15,6 @@
 using namespace filigree;
 
 namespace {
-
-const RunContext kOneThread(1);
 
 DrawArrays draw_arrays(const Mesh& mesh, const SurfaceOptions& options = {}) {
     EXPECT_EQ(check_mesh(mesh), "");

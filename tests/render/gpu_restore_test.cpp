@@ -13,6 +13,8 @@
 #include <numbers>
 #include <numeric>
 
+namespace gpu_restore_test {
+
 using namespace filigree_test;
 
 namespace {
@@ -36,12 +38,6 @@ private:
 Mesh with_normals(Mesh mesh) {
     mesh.normals.values = vertex_normals(mesh, mesh.positions, kOneThread);
     return mesh;
-}
-
-std::vector<Index> all_vertices(const Model& model) {
-    std::vector<Index> all(model.mesh.vertex_count());
-    std::iota(all.begin(), all.end(), Index{0});
-    return all;
 }
 
 GpuRestorer gpu_restorer(const Model& model, std::span<const Index> vertices, std::span<const Vec3f> normals,
@@ -88,11 +84,6 @@ std::unique_ptr<SpaceWarp> bend_and_twist(const Model& model) {
 
 Pose bent_and_twisted(const Model& model) {
     return warp_pose(*bend_and_twist(model), driver_positions(model), Vec3d::Zero(), kOneThread);
-}
-
-Pose without_gradients(Pose pose) {
-    pose.gradients.clear();
-    return pose;
 }
 
 Pose mirrored(const Model& model) {
@@ -311,3 +302,5 @@ TEST_F(GpuRestore, CanBeCancelled) {
     EXPECT_EQ(restorer.set_pose(rest_pose(model), cancelled).error().code, ErrorCode::cancelled);
     EXPECT_EQ(GpuRestorer::create(model, all_vertices(model), {}, {}, cancelled).error().code, ErrorCode::cancelled);
 }
+
+} // namespace gpu_restore_test

@@ -13,12 +13,6 @@ using namespace filigree_test;
 
 namespace {
 
-std::vector<Index> all_vertices(const Model& model) {
-    std::vector<Index> all(model.mesh.vertex_count());
-    std::iota(all.begin(), all.end(), Index{0});
-    return all;
-}
-
 /// The largest distance by which a point is outside a box, and by which the box reaches beyond the points' own box.
 struct Fit {
     double outside = 0, slack = 0;
@@ -33,11 +27,6 @@ Fit fit_at(const Model& model, const Pose& pose, const RestoreOptions& options =
     const PoseBox box(model, all_vertices(model));
     const Restorer restorer = restorer_of(model, options);
     return fit(box.at(pose.positions, restorer.gradients(pose, kOneThread).value()), restored(model, pose, options));
-}
-
-Pose without_gradients(Pose pose) {
-    pose.gradients.clear();
-    return pose;
 }
 
 Deformation bend_and_twist(double bend_deg, double twist_deg) {

@@ -2,10 +2,9 @@
 #pragma once
 
 #include "filigree/sample/sample_inside.h"
+#include "threads.h"
 
 namespace filigree {
-
-inline const RunContext kContext;
 
 inline Lattice lattice_over(const Mesh& mesh, double spacing) {
     return make_lattice(bounds(mesh.positions), {.spacing = spacing}).value();

@@ -2,25 +2,24 @@
 
 #include "filigree/mesh/shapes.h"
 #include "filigree/sample/edge_balance.h"
+#include "threads.h"
 
 #include <gtest/gtest.h>
 
 namespace filigree {
 namespace {
 
-const RunContext kContext;
-
 TEST(Closure, KnowsOpenEdgesAndTurnedFaces) {
     Mesh cube = make_wavy_cube({.resolution = 2, .amplitude = 0});
-    EXPECT_TRUE(weld_triangles(cube, kContext)->closure.is_closed());
-    EXPECT_TRUE(weld_triangles(cube, kContext)->closure.is_oriented());
+    EXPECT_TRUE(weld_triangles(cube, kAllThreads)->closure.is_closed());
+    EXPECT_TRUE(weld_triangles(cube, kAllThreads)->closure.is_oriented());
     std::swap(cube.corners[1], cube.corners[3]); // the first quad, turned round
-    const Closure turned = weld_triangles(cube, kContext)->closure;
+    const Closure turned = weld_triangles(cube, kAllThreads)->closure;
     EXPECT_TRUE(turned.is_closed());
     EXPECT_EQ(turned.unbalanced, 4u);
     cube.corners.erase(cube.corners.begin(), cube.corners.begin() + 4);
     cube.face_offsets.pop_back();
-    const Closure open = weld_triangles(cube, kContext)->closure;
+    const Closure open = weld_triangles(cube, kAllThreads)->closure;
     EXPECT_EQ(open.open_edges, 4u);
     EXPECT_EQ(open.unbalanced, 4u);
     EXPECT_NEAR((open.first_open[0] - open.first_open[1]).norm(), bounds(cube.positions).size().x() / 2, 1e-6);
@@ -37,7 +36,7 @@ TEST(Closure, VerticesAtOnePlaceAreOne) {
         }
         apart.add_face(face);
     }
-    EXPECT_TRUE(weld_triangles(apart, kContext)->closure.is_closed());
+    EXPECT_TRUE(weld_triangles(apart, kAllThreads)->closure.is_closed());
     const RunContext cancelled;
     cancelled.cancel();
     EXPECT_EQ(weld_triangles(apart, cancelled).error().code, ErrorCode::cancelled);

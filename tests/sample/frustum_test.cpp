@@ -16,9 +16,9 @@ TEST(Frustum, PointsInsideAreThoseThatRaysFind) {
     ASSERT_EQ(points.size(), 8000u);
     InsideOptions options = by(InsideMethod::rays);
     options.eye = frustum.eye;
-    const auto from_eye = InsideTest::create(cube, options, kContext)->contains(points, kContext).value();
+    const auto from_eye = InsideTest::create(cube, options, kAllThreads)->contains(points, kAllThreads).value();
     const auto from_elsewhere =
-        InsideTest::create(cube, by(InsideMethod::rays), kContext)->contains(points, kContext).value();
+        InsideTest::create(cube, by(InsideMethod::rays), kAllThreads)->contains(points, kAllThreads).value();
     EXPECT_EQ(from_eye, from_elsewhere);
     EXPECT_GT(std::count(from_eye.begin(), from_eye.end(), 1), 200);
     frustum.near = 6;

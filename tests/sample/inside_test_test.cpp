@@ -13,8 +13,8 @@ TEST(InsideTest, SinglePointsGetTheLatticesAnswers) {
     const Mesh open = without_faces(mesh, mesh.face_count() - 2);
     for (const Mesh* m : {&mesh, &open}) {
         const Lattice lattice = lattice_over(*m, 0.13);
-        const Occupancy occupancy = sample_inside(*m, lattice, {}, kContext).value();
-        const InsideTest test = InsideTest::create(*m, {}, kContext).value();
+        const Occupancy occupancy = sample_inside(*m, lattice, {}, kAllThreads).value();
+        const InsideTest test = InsideTest::create(*m, {}, kAllThreads).value();
         std::vector<Vec3d> points;
         std::size_t different = 0;
         const auto [nx, ny, nz] = lattice.counts();
@@ -25,7 +25,7 @@ TEST(InsideTest, SinglePointsGetTheLatticesAnswers) {
                     different += test.contains(points.back()) != occupancy.contains(i, j, k);
                 }
         EXPECT_LE(different, m == &mesh ? 0 : points.size() / 200); // winding numbers are right to 0.01
-        const auto many = test.contains(points, kContext).value();
+        const auto many = test.contains(points, kAllThreads).value();
         for (std::size_t p = 0; p < points.size(); ++p) ASSERT_EQ(many[p] != 0, test.contains(points[p]));
     }
 }
@@ -35,18 +35,18 @@ TEST(InsideTest, PointsInsideAreThoseThatItContains) {
     const Lattice lattice = lattice_over(mesh, 0.13);
     const auto [nx, ny, nz] = lattice.counts();
     std::vector<Vec3d> points, expected;
-    const InsideTest test = InsideTest::create(mesh, by(InsideMethod::rays), kContext).value();
+    const InsideTest test = InsideTest::create(mesh, by(InsideMethod::rays), kAllThreads).value();
     for (std::size_t i = 0; i < nx * ny * nz; ++i) {
         points.push_back(lattice.point(i % nx, i / nx % ny, i / nx / ny));
         if (test.contains(points.back())) expected.push_back(points.back());
     }
     InsideReport report;
-    EXPECT_EQ(points_inside(mesh, points, {}, kContext, &report).value(), expected);
+    EXPECT_EQ(points_inside(mesh, points, {}, kAllThreads, &report).value(), expected);
     EXPECT_EQ(report.used, InsideMethod::rays);
-    EXPECT_EQ(points_inside(mesh, points, by(InsideMethod::winding), kContext, &report).value().size(),
+    EXPECT_EQ(points_inside(mesh, points, by(InsideMethod::winding), kAllThreads, &report).value().size(),
               expected.size());
     EXPECT_EQ(report.used, InsideMethod::winding);
-    EXPECT_EQ(points_inside(without_faces(mesh, 3), points, {}, kContext).error().code, ErrorCode::unsuitable);
+    EXPECT_EQ(points_inside(without_faces(mesh, 3), points, {}, kAllThreads).error().code, ErrorCode::unsuitable);
 }
 
 TEST(InsideTest, CancelledIsNoAnswer) {

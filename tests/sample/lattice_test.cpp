@@ -8,7 +8,7 @@
 namespace filigree {
 namespace {
 
-Box box(const Vec3d& min, const Vec3d& max) {
+Box box_of(const Vec3d& min, const Vec3d& max) {
     Box result;
     result.extend(min);
     result.extend(max);
@@ -24,7 +24,7 @@ void expect_error(const Result<Lattice>& result, ErrorCode code, const std::stri
 }
 
 TEST(Lattice, LiesInTheMiddleOfTheBoxsCells) {
-    const auto lattice = make_lattice(box({0, -1, 2}, {4, 1, 5}), {.spacing = 0.5});
+    const auto lattice = make_lattice(box_of({0, -1, 2}, {4, 1, 5}), {.spacing = 0.5});
     ASSERT_TRUE(lattice.ok());
     EXPECT_EQ(lattice->counts(), (std::array<std::size_t, 3>{8, 4, 6}));
     EXPECT_EQ(lattice->point(0, 0, 0), Vec3d(0.25, -0.75, 2.25));
@@ -34,7 +34,7 @@ TEST(Lattice, LiesInTheMiddleOfTheBoxsCells) {
 }
 
 TEST(Lattice, WithAnOriginHasAllItsPointsInTheClosedBox) {
-    const auto lattice = make_lattice(box({0, 0, 0}, {1, 1, 1}), {.spacing = 0.25, .origin = Vec3d(0, 10.125, -3)});
+    const auto lattice = make_lattice(box_of({0, 0, 0}, {1, 1, 1}), {.spacing = 0.25, .origin = Vec3d(0, 10.125, -3)});
     ASSERT_TRUE(lattice.ok());
     EXPECT_EQ(lattice->coordinates[0], (std::vector<double>{0, 0.25, 0.5, 0.75, 1}));
     EXPECT_EQ(lattice->coordinates[1], (std::vector<double>{0.125, 0.375, 0.625, 0.875}));
@@ -44,7 +44,7 @@ TEST(Lattice, WithAnOriginHasAllItsPointsInTheClosedBox) {
 TEST(Lattice, IsOnADyadicGridCloseToWhatWasAsked) {
     for (const double spacing : {0.1, 1.0 / 3, 0.7310585, 1e-3}) {
         const Vec3d origin(0.123456789, -17.3, 4e-5);
-        const auto lattice = make_lattice(box({-1, -1.5, -1.25}, {1, 1, 1}), {.spacing = spacing, .origin = origin});
+        const auto lattice = make_lattice(box_of({-1, -1.5, -1.25}, {1, 1, 1}), {.spacing = spacing, .origin = origin});
         ASSERT_TRUE(lattice.ok());
         EXPECT_NE(lattice->spacing, spacing);
         EXPECT_NEAR(lattice->spacing, spacing, 0x1p-24 * spacing);
@@ -64,7 +64,7 @@ TEST(Lattice, IsOnADyadicGridCloseToWhatWasAsked) {
 TEST(Lattice, MissesNoPointAtTheBoxsEnds) {
     for (int n = 1; n < 300; ++n) {
         const double spacing = 1.0 / n; // most of them have no finite binary expansion
-        const auto lattice = make_lattice(box({-1, 0, 0}, {1, 1, 1}), {.spacing = spacing, .origin = Vec3d::Zero()});
+        const auto lattice = make_lattice(box_of({-1, 0, 0}, {1, 1, 1}), {.spacing = spacing, .origin = Vec3d::Zero()});
         ASSERT_TRUE(lattice.ok());
         for (int axis = 0; axis < 3; ++axis) {
             const auto& x = lattice->coordinates[axis];
@@ -78,41 +78,41 @@ TEST(Lattice, MissesNoPointAtTheBoxsEnds) {
 }
 
 TEST(Lattice, OfAThinBoxHasOneLayerInTheMiddle) {
-    const auto lattice = make_lattice(box({0, 0, 3}, {4, 4, 3.5}), {.spacing = 1});
+    const auto lattice = make_lattice(box_of({0, 0, 3}, {4, 4, 3.5}), {.spacing = 1});
     ASSERT_TRUE(lattice.ok());
     EXPECT_EQ(lattice->coordinates[2], std::vector<double>{3.25});
-    const auto flat = make_lattice(box({0, 0, 3}, {4, 4, 3}), {.spacing = 1});
+    const auto flat = make_lattice(box_of({0, 0, 3}, {4, 4, 3}), {.spacing = 1});
     ASSERT_TRUE(flat.ok());
     EXPECT_EQ(flat->coordinates[2], std::vector<double>{3});
 }
 
 TEST(Lattice, RefusesWhatMakesNoSense) {
-    const Box unit = box({0, 0, 0}, {1, 1, 1});
+    const Box unit = box_of({0, 0, 0}, {1, 1, 1});
     constexpr double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
     for (const double spacing : {0.0, -1.0, nan, infinity, -infinity})
         expect_error(make_lattice(unit, {.spacing = spacing}), ErrorCode::usage, "spacing");
     expect_error(make_lattice(unit, {.spacing = 0.1, .origin = Vec3d(0, nan, 0)}), ErrorCode::usage, "origin");
     expect_error(make_lattice(Box(), {.spacing = 0.1}), ErrorCode::usage, "extent");
-    expect_error(make_lattice(box({1, 1, 1}, {1, 1, 1}), {.spacing = 0.1}), ErrorCode::usage, "extent");
+    expect_error(make_lattice(box_of({1, 1, 1}, {1, 1, 1}), {.spacing = 0.1}), ErrorCode::usage, "extent");
     expect_error(make_lattice(unit, {.spacing = 1.5}), ErrorCode::usage, "larger than the box");
-    expect_error(make_lattice(box({0, 0, 0.1}, {4, 4, 0.2}), {.spacing = 1, .origin = Vec3d::Zero()}),
+    expect_error(make_lattice(box_of({0, 0, 0.1}, {4, 4, 0.2}), {.spacing = 1, .origin = Vec3d::Zero()}),
                  ErrorCode::unsuitable, "along z");
 }
 
 TEST(Lattice, SaysWhichSpacingWouldDo) {
-    const Box unit = box({0, 0, 0}, {1, 2, 1});
+    const Box unit = box_of({0, 0, 0}, {1, 2, 1});
     expect_error(make_lattice(unit, {.spacing = 1.0 / 65000}), ErrorCode::unsuitable, "65534");
     expect_error(make_lattice(unit, {.spacing = 1e-6}), ErrorCode::unsuitable, "at least 3.052");
     EXPECT_TRUE(make_lattice(unit, {.spacing = 3.053e-05}).ok());
     expect_error(make_lattice(unit, {.spacing = 1e-12}), ErrorCode::unsuitable, "resolution");
-    const Box far = box({1e6, 0, 0}, {1e6 + 1, 1, 1});
+    const Box far = box_of({1e6, 0, 0}, {1e6 + 1, 1, 1});
     expect_error(make_lattice(far, {.spacing = 0.1}), ErrorCode::unsuitable, "nearer to the origin");
     EXPECT_TRUE(make_lattice(far, {.spacing = 0.25}).ok());
     expect_error(make_lattice(unit, {.spacing = 0.1, .origin = Vec3d(1e9, 0, 0)}), ErrorCode::unsuitable, "resolution");
 }
 
 TEST(Occupancy, CountsAndListsItsPoints) {
-    const auto lattice = make_lattice(box({0, 0, 0}, {70, 2, 2}), {.spacing = 1});
+    const auto lattice = make_lattice(box_of({0, 0, 0}, {70, 2, 2}), {.spacing = 1});
     ASSERT_TRUE(lattice.ok());
     Occupancy occupancy{lattice->counts(), 2, std::vector<std::uint64_t>(8)};
     const std::vector<std::array<std::uint16_t, 3>> points = {{0, 0, 0}, {63, 0, 0}, {64, 0, 0}, {69, 1, 0}, {5, 0, 1}};
@@ -130,7 +130,7 @@ TEST(Occupancy, CountsAndListsItsPoints) {
 }
 
 TEST(Occupancy, IsEmptyAtFirstAndKeepsToTheMemoryAllowed) {
-    const Lattice lattice = make_lattice(box({0, 0, 0}, {70, 3, 2}), {.spacing = 1}).value();
+    const Lattice lattice = make_lattice(box_of({0, 0, 0}, {70, 3, 2}), {.spacing = 1}).value();
     const Occupancy empty = make_occupancy(lattice).value();
     EXPECT_EQ(empty.counts, lattice.counts());
     EXPECT_EQ(empty.words_per_row, 2u);
@@ -143,7 +143,7 @@ TEST(Occupancy, IsEmptyAtFirstAndKeepsToTheMemoryAllowed) {
 }
 
 TEST(Occupancy, VisitsPointsInsideInOrder) {
-    Occupancy occupancy = make_occupancy(make_lattice(box({0, 0, 0}, {70, 3, 2}), {.spacing = 1}).value()).value();
+    Occupancy occupancy = make_occupancy(make_lattice(box_of({0, 0, 0}, {70, 3, 2}), {.spacing = 1}).value()).value();
     occupancy.bits[1] = 1 | 32;      // i = 64 and 69 of row (0, 0)
     occupancy.bits[10] = 1ull << 63; // i = 63 of row (2, 1)
     std::vector<std::array<std::size_t, 3>> visited;

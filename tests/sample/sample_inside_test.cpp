@@ -11,11 +11,11 @@ namespace {
 TEST(SampleInside, AutomaticTakesScanForClosedAndWindingForOpen) {
     const Mesh cube = make_wavy_cube({.resolution = 16});
     InsideReport report;
-    ASSERT_TRUE(sample_inside(cube, lattice_over(cube, 0.05), {}, kContext, &report));
+    ASSERT_TRUE(sample_inside(cube, lattice_over(cube, 0.05), {}, kAllThreads, &report));
     EXPECT_EQ(report.used, InsideMethod::scan);
     EXPECT_GT(report.scan.crossings, 0u);
     const Mesh open = without_faces(cube, cube.face_count() - 3);
-    ASSERT_TRUE(sample_inside(open, lattice_over(open, 0.05), {}, kContext, &report));
+    ASSERT_TRUE(sample_inside(open, lattice_over(open, 0.05), {}, kAllThreads, &report));
     EXPECT_EQ(report.used, InsideMethod::winding);
     EXPECT_GT(report.closure.open_edges, 0u);
 }
@@ -24,9 +24,9 @@ TEST(SampleInside, ThreeWaysAgreeOnClosedMeshes) {
     for (const Mesh& mesh :
          {make_wavy_cube({.resolution = 20}), make_wavy_sphere({.resolution = 12}), make_torus({.resolution = 12})}) {
         const Lattice lattice = lattice_over(mesh, bounds(mesh.positions).diagonal() / 31);
-        const Occupancy scan = sample_inside(mesh, lattice, by(InsideMethod::scan), kContext).value();
-        const Occupancy rays = sample_inside(mesh, lattice, by(InsideMethod::rays), kContext).value();
-        const Occupancy winding = sample_inside(mesh, lattice, by(InsideMethod::winding), kContext).value();
+        const Occupancy scan = sample_inside(mesh, lattice, by(InsideMethod::scan), kAllThreads).value();
+        const Occupancy rays = sample_inside(mesh, lattice, by(InsideMethod::rays), kAllThreads).value();
+        const Occupancy winding = sample_inside(mesh, lattice, by(InsideMethod::winding), kAllThreads).value();
         EXPECT_GT(scan.count(), 500u);
         EXPECT_EQ(scan.bits, rays.bits);
         EXPECT_EQ(scan.bits, winding.bits);
@@ -37,7 +37,7 @@ TEST(SampleInside, AnOpenMeshIsNotScanned) {
     const Mesh cube = make_wavy_cube({.resolution = 8});
     const Mesh open = without_faces(cube, cube.face_count() - 1);
     for (InsideMethod method : {InsideMethod::scan, InsideMethod::rays}) {
-        const auto refused = sample_inside(open, lattice_over(open, 0.1), by(method), kContext);
+        const auto refused = sample_inside(open, lattice_over(open, 0.1), by(method), kAllThreads);
         ASSERT_FALSE(refused);
         EXPECT_EQ(refused.error().code, ErrorCode::unsuitable);
         EXPECT_NE(refused.error().message.find("4 open edges"), std::string::npos) << refused.error().message;
@@ -49,13 +49,13 @@ TEST(SampleInside, ASmallHoleChangesLittle) {
     const Mesh cube = make_wavy_cube({.resolution = 24});
     const Mesh open = without_faces(cube, cube.face_count() - 4);
     const Lattice lattice = lattice_over(cube, 0.04);
-    const double closed = double(sample_inside(cube, lattice, {}, kContext)->count());
-    const double with_hole = double(sample_inside(open, lattice, {}, kContext)->count());
+    const double closed = double(sample_inside(cube, lattice, {}, kAllThreads)->count());
+    const double with_hole = double(sample_inside(open, lattice, {}, kAllThreads)->count());
     EXPECT_NEAR(with_hole / closed, 1, 0.01);
 }
 
 TEST(SampleInside, EmptyMeshIsRefused) {
-    const auto refused = sample_inside(Mesh{}, Lattice{}, {}, kContext);
+    const auto refused = sample_inside(Mesh{}, Lattice{}, {}, kAllThreads);
     ASSERT_FALSE(refused);
     EXPECT_EQ(refused.error().code, ErrorCode::unsuitable);
 }
@@ -65,11 +65,11 @@ TEST(SampleInside, OnePreparationServesManyLattices) {
     const Mesh open = without_faces(cube, cube.face_count() - 3);
     for (const InsideMethod method : {InsideMethod::scan, InsideMethod::rays, InsideMethod::winding}) {
         const Mesh& mesh = method == InsideMethod::winding ? open : cube;
-        const InsideSampler sampler = InsideSampler::create(mesh, by(method), kContext).value();
+        const InsideSampler sampler = InsideSampler::create(mesh, by(method), kAllThreads).value();
         EXPECT_EQ(sampler.used(), method);
         for (const double spacing : {0.21, 0.11, 0.21})
-            EXPECT_EQ(sampler.inside(lattice_over(mesh, spacing), kContext)->bits,
-                      sample_inside(mesh, lattice_over(mesh, spacing), by(method), kContext)->bits);
+            EXPECT_EQ(sampler.inside(lattice_over(mesh, spacing), kAllThreads)->bits,
+                      sample_inside(mesh, lattice_over(mesh, spacing), by(method), kAllThreads)->bits);
     }
 }
 
@@ -79,8 +79,8 @@ TEST(SampleInside, AllMethodsKeepToTheMemoryAllowed) {
     for (const InsideMethod method : {InsideMethod::scan, InsideMethod::rays, InsideMethod::winding}) {
         InsideOptions options = by(method);
         options.most_bytes = 1000;
-        const auto refused =
-            sample_inside(method == InsideMethod::winding ? open : cube, lattice_over(cube, 0.05), options, kContext);
+        const auto refused = sample_inside(method == InsideMethod::winding ? open : cube, lattice_over(cube, 0.05),
+                                           options, kAllThreads);
         ASSERT_FALSE(refused);
         EXPECT_EQ(refused.error().code, ErrorCode::unsuitable);
         EXPECT_NE(refused.error().message.find("larger spacing"), std::string::npos) << refused.error().message;

@@ -14,12 +14,12 @@ namespace {
 TEST(SpacingForCount, IsRightToAFewPercent) {
     const Mesh torus = make_torus({.resolution = 32});
     for (std::size_t wanted : {500u, 20'000u, 300'000u}) {
-        const double spacing = spacing_for_count(torus, wanted, {}, kContext).value();
-        const double found = double(sample_inside(torus, lattice_over(torus, spacing), {}, kContext)->count());
+        const double spacing = spacing_for_count(torus, wanted, {}, kAllThreads).value();
+        const double found = double(sample_inside(torus, lattice_over(torus, spacing), {}, kAllThreads)->count());
         EXPECT_NEAR(found / double(wanted), 1, 0.05) << wanted;
     }
     EXPECT_FALSE(spacing_for_count(make_wavy_plane({.resolution = 8, .amplitude = 0}), 100, by(InsideMethod::winding),
-                                   kContext));
+                                   kAllThreads));
 }
 
 Mesh box_of(const Vec3f& size) {
@@ -35,12 +35,12 @@ TEST(SpacingForCount, FlatBoxesAndNeedlesGetTheirCount) {
          {Vec3f(1, 1, 1e-5f), Vec3f(1, 0.2f, 1e-5f), Vec3f(1e30f, 1e27f, 1e29f), Vec3f(1e-20f, 2e-20f, 3e-20f)})
         for (const std::size_t wanted : {1u, 700u, 20'000u}) {
             const Mesh box = box_of(size);
-            const auto spacing = spacing_for_count(box, wanted, {}, kContext);
+            const auto spacing = spacing_for_count(box, wanted, {}, kAllThreads);
             ASSERT_TRUE(spacing) << spacing.error().message;
-            const double found = double(sample_inside(box, lattice_over(box, *spacing), {}, kContext)->count());
+            const double found = double(sample_inside(box, lattice_over(box, *spacing), {}, kAllThreads)->count());
             EXPECT_NEAR(found / double(wanted), 1, wanted == 1 ? 7 : 0.1) << size.transpose() << ", " << wanted;
         }
-    EXPECT_EQ(spacing_for_count(box_of({1, 1e-6f, 1e-6f}), 1'000'000, {}, kContext).error().code,
+    EXPECT_EQ(spacing_for_count(box_of({1, 1e-6f, 1e-6f}), 1'000'000, {}, kAllThreads).error().code,
               ErrorCode::unsuitable);
 }
 

@@ -16,10 +16,10 @@ namespace {
 TEST(SpreadInside, JitteredPointsStayInTheirCellsAndInside) {
     const Mesh mesh = make_wavy_cube({.resolution = 24});
     const Lattice lattice = lattice_over(mesh, 0.06);
-    const auto regular = spread_inside(mesh, lattice, Pattern::lattice, {}, kContext).value();
-    const auto jittered = spread_inside(mesh, lattice, Pattern::jitter, {}, kContext).value();
+    const auto regular = spread_inside(mesh, lattice, Pattern::lattice, {}, kAllThreads).value();
+    const auto jittered = spread_inside(mesh, lattice, Pattern::jitter, {}, kAllThreads).value();
     ASSERT_EQ(regular.size(), jittered.size());
-    const InsideTest test = InsideTest::create(mesh, {}, kContext).value();
+    const InsideTest test = InsideTest::create(mesh, {}, kAllThreads).value();
     std::size_t moved = 0;
     for (std::size_t p = 0; p < regular.size(); ++p) {
         EXPECT_LE((jittered[p] - regular[p]).cwiseAbs().maxCoeff(), lattice.spacing / 2);
@@ -36,13 +36,13 @@ TEST(SpreadInside, JitteredPointsStayInTheirCellsAndInside) {
 TEST(SpreadInside, PoissonPointsKeepTheirDistanceAndFillTheBody) {
     const Mesh mesh = make_wavy_sphere({.resolution = 16});
     const Lattice lattice = lattice_over(mesh, 0.1);
-    const auto points = spread_inside(mesh, lattice, Pattern::poisson, {}, kContext).value();
-    const InsideTest test = InsideTest::create(mesh, {}, kContext).value();
+    const auto points = spread_inside(mesh, lattice, Pattern::poisson, {}, kAllThreads).value();
+    const InsideTest test = InsideTest::create(mesh, {}, kAllThreads).value();
     for (std::size_t p = 0; p < points.size(); ++p) {
         EXPECT_TRUE(test.contains(points[p]));
         for (std::size_t q = 0; q < p; ++q) ASSERT_GE((points[p] - points[q]).norm(), 0.8 * lattice.spacing);
     }
-    const auto regular = spread_inside(mesh, lattice, Pattern::lattice, {}, kContext).value();
+    const auto regular = spread_inside(mesh, lattice, Pattern::lattice, {}, kAllThreads).value();
     EXPECT_GT(points.size(), regular.size() * 7 / 10);
     for (const Vec3d& p : regular) { // no hole is left that a point would fit into
         double nearest = 1e9;
@@ -53,16 +53,16 @@ TEST(SpreadInside, PoissonPointsKeepTheirDistanceAndFillTheBody) {
 
 /// What poisson means, plainly: all darts at once, in their order.
 std::vector<Vec3d> plain_poisson(const Mesh& mesh, const Lattice& lattice) {
-    const Occupancy occupancy = sample_inside(mesh, lattice, {}, kContext).value();
-    const InsideTest test = InsideTest::create(mesh, {}, kContext).value();
+    const Occupancy occupancy = sample_inside(mesh, lattice, {}, kAllThreads).value();
+    const InsideTest test = InsideTest::create(mesh, {}, kAllThreads).value();
     std::vector<std::pair<double, Vec3d>> darts;
     std::uint64_t number = 0;
     for_each_inside(occupancy, [&](std::size_t i, std::size_t j, std::size_t k) {
         for (int d = 0; d < 8; ++d, ++number) {
             Vec3d place = lattice.point(i, j, k);
             for (int axis = 0; axis < 3; ++axis)
-                place[axis] += lattice.spacing * (random_unit(kContext.seed, 4 * number + axis) - 0.5) * 1.5;
-            if (test.contains(place)) darts.emplace_back(random_unit(kContext.seed + 1, number), place);
+                place[axis] += lattice.spacing * (random_unit(kAllThreads.seed, 4 * number + axis) - 0.5) * 1.5;
+            if (test.contains(place)) darts.emplace_back(random_unit(kAllThreads.seed + 1, number), place);
         }
     });
     std::ranges::sort(darts, {}, [](const auto& dart) { return dart.first; });
@@ -89,7 +89,7 @@ TEST(SpreadInside, PoissonInPassesIsPoissonAtOnce) {
     const double side = bounds(box.positions).size().x();
     for (const double along : {20.0, 65.0}) { // the second takes two passes
         const Lattice lattice = lattice_over(box, side / along);
-        EXPECT_EQ(spread_inside(box, lattice, Pattern::poisson, {}, kContext).value(), plain_poisson(box, lattice));
+        EXPECT_EQ(spread_inside(box, lattice, Pattern::poisson, {}, kAllThreads).value(), plain_poisson(box, lattice));
     }
 }
 

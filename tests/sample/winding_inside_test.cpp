@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace filigree {
+namespace filigree::winding_inside_test {
 namespace {
 
 Lattice lattice_over(const TriangleSurface& surface, double spacing, std::optional<Vec3d> origin = {}) {
@@ -158,4 +158,4 @@ TEST(WindingInside, CanBeCancelledAndRefusesWhatDoesNotFit) {
 }
 
 } // namespace
-} // namespace filigree
+} // namespace filigree::winding_inside_test

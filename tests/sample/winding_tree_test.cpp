@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace filigree {
+namespace filigree::winding_tree_test {
 namespace {
 
 TEST(WindingTree, KnowsTheSolidAngleOfAnOctant) {
@@ -96,4 +96,4 @@ TEST(WindingTree, CancelledIsNoTree) {
 }
 
 } // namespace
-} // namespace filigree
+} // namespace filigree::winding_tree_test

@@ -4,13 +4,12 @@
 #include "filigree/io/model_file.h"
 #include "filigree/scene/finer_check.h"
 #include "scene/scenes.h"
+#include "threads.h"
 
 #include <cmath>
 
 namespace filigree {
 namespace {
-
-const RunContext kContext(1);
 
 Body body_of(const Mesh& mesh, std::size_t particles, MaterialModel model = MaterialModel::fem, double scale = 1) {
     Material material;
@@ -18,10 +17,10 @@ Body body_of(const Mesh& mesh, std::size_t particles, MaterialModel model = Mate
     BodyOptions options;
     options.scale = scale;
     options.cells.count = particles;
-    return make_body(mesh, material, options, kContext).value();
+    return make_body(mesh, material, options, kOneThread).value();
 }
 
-Model stripped(const Mesh& mesh, const StripOptions& options) { return strip(mesh, options, kContext).value().model; }
+Model stripped(const Mesh& mesh, const StripOptions& options) { return strip(mesh, options, kOneThread).value().model; }
 
 TEST(BodyDriver, EdgesAreAboutASpacingAlsoOnFlatParts) {
     for (const std::string_view shape : {"bar", "wavy-cube", "torus"})
@@ -115,8 +114,8 @@ class BodyDriverScene : public filigree_test::Scenes {};
 TEST_F(BodyDriverScene, AModelsOwnDriverIsJudged) {
     const auto warnings = [&](const StripOptions& options) {
         const auto path = std::filesystem::path(write("")).parent_path() / "cube.fil";
-        EXPECT_TRUE(write_model(stripped(*make_shape("wavy-cube", {.resolution = 40}), options), path, kContext));
-        return set_up(scene("[[body]]\nmesh = \"cube.fil\"\nparticles = 2000\n"), kContext).value().warnings;
+        EXPECT_TRUE(write_model(stripped(*make_shape("wavy-cube", {.resolution = 40}), options), path, kOneThread));
+        return set_up(scene("[[body]]\nmesh = \"cube.fil\"\nparticles = 2000\n"), kOneThread).value().warnings;
     };
     EXPECT_TRUE(warnings({.base = 1600, .max_edge = 0.05}).empty());
     const std::vector<std::string> coarse = warnings({.base = 100});
@@ -135,18 +134,18 @@ class BodyTruth : public filigree_test::Scenes, public testing::WithParamInterfa
 
 TEST_P(BodyTruth, RestoredIsAsNearToItAsEveryVertexAttached) {
     const SceneFile file = scene(GetParam().scene);
-    const ReadyScene ready = set_up(file, kContext).value();
+    const ReadyScene ready = set_up(file, kOneThread).value();
     const ReadyBody& body = ready.bodies[0];
     EXPECT_GT(body.driver.carried, 0.7);
-    SceneRun run = SceneRun::create(file, ready, true, kContext).value();
-    ASSERT_TRUE(run.advance_to(file.frames, kContext));
+    SceneRun run = SceneRun::create(file, ready, true, kOneThread).value();
+    ASSERT_TRUE(run.advance_to(file.frames, kOneThread));
     const CheckTotals& check = run.recording().checks[0];
     const double mean = check.rms_sum / double(file.frames);
     EXPECT_LT(mean, GetParam().most_rms);
     EXPECT_LT(check.p95_sum / double(file.frames), GetParam().most_normals);
     EXPECT_LT(check.worst_max, GetParam().most_worst);
 
-    const FinerCheck finer = check_against_finer(file, ready, file.frames, 6, kContext).value()[0];
+    const FinerCheck finer = check_against_finer(file, ready, file.frames, 6, kOneThread).value()[0];
     EXPECT_GT(finer.particles, 5 * body.body->particle_count());
     EXPECT_LE(finer.restored.rms, GetParam().most_ratio * finer.attached.rms);
     EXPECT_GT(finer.attached.rms, 0);

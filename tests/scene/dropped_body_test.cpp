@@ -1,4 +1,5 @@
 #include "scene/dropped_ball.h"
+#include "threads.h"
 
 #include "filigree/physics/named_materials.h"
 #include "filigree/physics/simulation.h"
@@ -12,7 +13,6 @@ using namespace filigree_test;
 
 namespace {
 
-const RunContext kContext;
 const Vec3d kUp = Vec3d::UnitY();
 
 TEST(DroppedBody, StandsWhereTheMeshIsAboveTheGround) {
@@ -57,7 +57,8 @@ TEST(DroppedBody, EveryObstacleIsBelowAndDrawn) {
 
 TEST(DroppedBody, HoldsParticlesNearPinnedVertices) {
     const auto model = ball_model();
-    const auto body = make_dropped_body(model, nullptr, {}, jelly(), std::vector<Index>{0, 5}, kUp, kContext).value();
+    const auto body =
+        make_dropped_body(model, nullptr, {}, jelly(), std::vector<Index>{0, 5}, kUp, kAllThreads).value();
     ASSERT_EQ(body->world.pins.size(), 1u);
     EXPECT_GE(body->world.pins[0].particles.size(), 2u);
     EXPECT_TRUE(dropped(jelly())->world.pins.empty());
@@ -72,14 +73,14 @@ TEST(DroppedBody, MeltsInAboutTheTimeAsked) {
     const auto body = dropped(options);
     ASSERT_TRUE(can_melt(*body));
     ASSERT_TRUE(body->melting);
-    Simulation simulation = Simulation::create(body->world, {Actor{body->body}}, {}, kContext).value();
+    Simulation simulation = Simulation::create(body->world, {Actor{body->body}}, {}, kAllThreads).value();
     const auto liquid = [&] {
         const std::vector<float> parts = simulation.matter(0).liquid;
         return std::accumulate(parts.begin(), parts.end(), 0.0) / double(parts.size());
     };
-    for (int frame = 0; frame < 15; ++frame) ASSERT_TRUE(simulation.advance(kContext));
+    for (int frame = 0; frame < 15; ++frame) ASSERT_TRUE(simulation.advance(kAllThreads));
     EXPECT_LT(liquid(), 0.3);
-    for (int frame = 15; frame < 60; ++frame) ASSERT_TRUE(simulation.advance(kContext));
+    for (int frame = 15; frame < 60; ++frame) ASSERT_TRUE(simulation.advance(kAllThreads));
     EXPECT_GT(liquid(), 0.6);
     EXPECT_LE(liquid(), 1.0);
 
@@ -101,7 +102,8 @@ TEST(DroppedBody, MeltsInAboutTheTimeAsked) {
 TEST(DroppedBody, RefusesWhatHasNoVolumeInWords) {
     Model flat = *ball_model();
     for (Vec3f& p : flat.mesh.positions) p.setZero();
-    const auto body = make_dropped_body(std::make_shared<const Model>(flat), nullptr, {}, jelly(), {}, kUp, kContext);
+    const auto body =
+        make_dropped_body(std::make_shared<const Model>(flat), nullptr, {}, jelly(), {}, kUp, kAllThreads);
     ASSERT_FALSE(body.ok());
     EXPECT_EQ(body.error().code, ErrorCode::unsuitable);
 }

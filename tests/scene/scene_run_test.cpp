@@ -1,12 +1,11 @@
 #include "scene/scenes.h"
+#include "threads.h"
 
 #include "filigree/scene/particles_near.h"
 #include "filigree/scene/saved_state.h"
 
 namespace filigree {
 namespace {
-
-const RunContext kContext(1);
 
 class SceneRunTest : public filigree_test::Scenes {
 protected:
@@ -19,12 +18,12 @@ protected:
     std::unique_ptr<Made> made(const std::string& text = filigree_test::kDrop, bool checks = false) const {
         auto made = std::make_unique<Made>();
         made->scene = scene(text);
-        made->ready = set_up(made->scene, kContext).value();
-        made->run.emplace(SceneRun::create(made->scene, made->ready, checks, kContext).value());
+        made->ready = set_up(made->scene, kOneThread).value();
+        made->run.emplace(SceneRun::create(made->scene, made->ready, checks, kOneThread).value());
         return made;
     }
     static std::string state_after(Made& made, std::uint64_t frame) {
-        EXPECT_TRUE(made.run->advance_to(frame, kContext));
+        EXPECT_TRUE(made.run->advance_to(frame, kOneThread));
         return made.run->save();
     }
 };
@@ -56,11 +55,12 @@ TEST_F(SceneRunTest, BodiesBreakAndGoOnFromTheMiddle) {
     EXPECT_EQ(state_after(*resumed, 6), state_after(*through, 6));
     // Until it broke, the motion is that of a body that cannot break, and nothing shows.
     const auto whole = made();
-    ASSERT_TRUE(whole->run->advance_to(2, kContext));
+    ASSERT_TRUE(whole->run->advance_to(2, kOneThread));
     const auto begun = made(text);
-    ASSERT_TRUE(begun->run->advance_to(2, kContext));
+    ASSERT_TRUE(begun->run->advance_to(2, kOneThread));
     EXPECT_EQ(begun->run->energy().total(), whole->run->energy().total());
-    const Mesh unbroken = whole->run->mesh(0, 2, kContext).value(), before = through->run->mesh(0, 2, kContext).value();
+    const Mesh unbroken = whole->run->mesh(0, 2, kOneThread).value(),
+               before = through->run->mesh(0, 2, kOneThread).value();
     ASSERT_GT(before.vertex_count(), unbroken.vertex_count());
     for (std::size_t v = 0; v < unbroken.vertex_count(); ++v)
         EXPECT_LT((unbroken.positions[v] - before.positions[v]).norm(), 1e-6f);
@@ -71,9 +71,9 @@ TEST_F(SceneRunTest, PiecesAreRestoredWhereTheirParticlesCarryThem) {
         made(filigree_test::kDrop + "[[fracture]]\npieces = 4\nstrength = 1e9\nenergy = 1e6\nroughness = 0.5\n"
                                     "[[crack]]\ntime = 0.03\npieces = [0]\n",
              true);
-    ASSERT_TRUE(run->run->advance_to(6, kContext));
+    ASSERT_TRUE(run->run->advance_to(6, kOneThread));
     const auto whole = made(filigree_test::kDrop, true);
-    ASSERT_TRUE(whole->run->advance_to(6, kContext));
+    ASSERT_TRUE(whole->run->advance_to(6, kOneThread));
     EXPECT_LT(run->run->recording().checks[0].worst_rms, 1.5 * whole->run->recording().checks[0].worst_rms);
     // Only the cracks around the piece that came off are left.
     ReadyBody& body = run->ready.bodies[0];
@@ -130,7 +130,7 @@ TEST_F(SceneRunTest, CancelledLeavesWholeFrames) {
 
 TEST_F(SceneRunTest, ChecksFindTheRestoredMeshNear) {
     const auto run = made(filigree_test::kDrop, true);
-    ASSERT_TRUE(run->run->advance_to(3, kContext));
+    ASSERT_TRUE(run->run->advance_to(3, kOneThread));
     ASSERT_EQ(run->run->recording().checks.size(), 1U);
     const CheckTotals& check = run->run->recording().checks[0];
     EXPECT_GT(check.worst_rms, 0);
@@ -142,7 +142,7 @@ TEST_F(SceneRunTest, ChecksFindTheRestoredMeshNear) {
 TEST_F(SceneRunTest, BodiesThatStartInsideSomethingAreDoubted) {
     const auto run = made("[[body]]\nshape = \"wavy-cube\"\nresolution = 8\nparticles = 200\ndriver = 60\n"
                           "[[obstacle]]\nshape = \"ground\"\n");
-    ASSERT_TRUE(run->run->advance_to(5, kContext));
+    ASSERT_TRUE(run->run->advance_to(5, kOneThread));
     std::string said;
     for (const std::string& sentence : run->run->warnings()) said += sentence;
     EXPECT_NE(said.find("the energy grew by"), std::string::npos) << said;
@@ -150,7 +150,7 @@ TEST_F(SceneRunTest, BodiesThatStartInsideSomethingAreDoubted) {
 
 TEST_F(SceneRunTest, PinsFindTheirParticles) {
     const auto pinned = [&](const std::string& region) {
-        return set_up(scene(filigree_test::kDrop + "[[pin]]\n" + region + "\n"), kContext);
+        return set_up(scene(filigree_test::kDrop + "[[pin]]\n" + region + "\n"), kOneThread);
     };
     const Result<ReadyScene> all = pinned("");
     const std::size_t count = all->bodies[0].body->particle_count();

@@ -1,6 +1,7 @@
 // Random actions on one mesh after another, while files are damaged, disks are full and the window closes at any
 // moment. FILIGREE_SOAK_MINUTES: how long (scripts/soak-studio; unset: three rounds). FILIGREE_SEED: the first round.
 #include "monkey.h"
+#include "threads.h"
 
 #include "filigree/hierarchy/strip.h"
 #include "filigree/io/mesh_file.h"
@@ -26,8 +27,6 @@ using namespace filigree::studio;
 namespace {
 
 namespace fs = std::filesystem;
-
-const RunContext kContext(1);
 
 std::string bytes_in(const fs::path& path) {
     std::ifstream file(path, std::ios::binary);
@@ -59,11 +58,11 @@ protected:
         Mesh dirty = make_wavy_cube({.resolution = 10});
         dirty.positions.push_back({5, 5, 5}); // in no face
         dirty.positions[3] = dirty.positions[4];
-        (void)write_mesh(dirty, at("dirty.obj"), {}, kContext).value();
-        (void)write_mesh(make_wavy_sphere({.resolution = 40}), at("ball.ply"), {}, kContext).value();
-        (void)write_mesh(make_wavy_plane({.resolution = 30}), at("plane.obj"), {}, kContext).value();
-        const Model torus = strip(make_torus({.resolution = 40}), {.base = 120}, kContext).value().model;
-        (void)write_model(torus, at("torus.fil"), kContext).value();
+        (void)write_mesh(dirty, at("dirty.obj"), {}, kOneThread).value();
+        (void)write_mesh(make_wavy_sphere({.resolution = 40}), at("ball.ply"), {}, kOneThread).value();
+        (void)write_mesh(make_wavy_plane({.resolution = 30}), at("plane.obj"), {}, kOneThread).value();
+        const Model torus = strip(make_torus({.resolution = 40}), {.base = 120}, kOneThread).value().model;
+        (void)write_model(torus, at("torus.fil"), kOneThread).value();
         for (const char* name : kFiles) originals_.push_back(bytes_in(at(name)));
     }
     fs::path at(const std::string& name) const { return fs::path(folder_.path().toStdString()) / name; }
@@ -141,7 +140,7 @@ protected:
             workbench.wait_until_idle();
         }
         const std::string there = bytes_in(path);
-        EXPECT_TRUE(there == originals_.back() || read_model(there, "saved.fil", kContext))
+        EXPECT_TRUE(there == originals_.back() || read_model(there, "saved.fil", kOneThread))
             << done_.join(", ").toStdString();
         return "save on a full disk";
     }

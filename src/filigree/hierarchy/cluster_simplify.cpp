@@ -18,8 +18,9 @@ namespace {
 
 constexpr std::size_t kClusterTriangles = std::size_t{1} << 17; // about; half as many double the borders
 constexpr std::size_t kMostClusterTriangles = 8 * kClusterTriangles;
-constexpr std::size_t kStripe = std::size_t{1} << 20; // triangles that are sorted at a time
-constexpr std::size_t kLargestFan = 4096;             // triangles at a vertex; more take meshoptimizer quadratic time
+constexpr std::size_t kStripe = std::size_t{1} << 20;  // triangles that are sorted at a time
+constexpr std::size_t kCounted = std::size_t{1} << 20; // triangles for which a count of all places, 8 MiB, is worth it
+constexpr std::size_t kLargestFan = 4096;              // triangles at a vertex; more take meshoptimizer quadratic time
 constexpr std::uint32_t kLatticeBits = 7, kLattice = 1u << kLatticeBits; // places an axis that are counted
 constexpr std::uint8_t kMany = 255;                                      // triangles at a vertex, or more
 
@@ -83,10 +84,10 @@ private:
 
     /// Runs of places that hold about kClusterTriangles together.
     std::vector<Index> cluster_of_place(const RunContext& context) const {
-        constexpr std::size_t kParts = 16; // a count each, then added
-        std::vector<std::vector<Index>> counts(kParts);
-        const std::size_t part = (triangles_.size() + kParts - 1) / kParts;
-        parallel_for(context, kParts, 1, [&](std::size_t begin, std::size_t end) {
+        const std::size_t parts = std::clamp<std::size_t>(triangles_.size() / kCounted, 1, 16); // counted, then added
+        std::vector<std::vector<Index>> counts(parts);
+        const std::size_t part = (triangles_.size() + parts - 1) / parts;
+        parallel_for(context, parts, 1, [&](std::size_t begin, std::size_t end) {
             for (std::size_t p = begin; p < end; ++p) {
                 counts[p].assign(std::size_t{1} << (3 * kLatticeBits), 0);
                 for (std::size_t t = p * part; t < std::min(triangles_.size(), (p + 1) * part); ++t)

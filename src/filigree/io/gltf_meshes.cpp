@@ -279,7 +279,6 @@ private:
         if (mesh_.corners.size() + 3 * triangles >= kNoIndex - 1)
             primitive.fail("gives the scene more corners than 32-bit indices can count.", ErrorCode::unsupported);
         if (mode == kTriangles && indices.size() % 3 != 0) ++cut_triangles_;
-        mesh_.corners.reserve(mesh_.corners.size() + 3 * triangles);
         for (std::size_t t = 0; t < triangles; ++t) {
             Triangle triangle;
             if (mode == kTriangles)
