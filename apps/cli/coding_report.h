@@ -16,4 +16,9 @@ void add_coding_shares(const CodedBytes& parts, std::size_t vertices, std::optio
 /// Which level of a stream is whole at which byte, and how far it is off. Nothing for other files.
 void add_stream_marks(const ModelOutline& model, Report& report);
 
+/// What `pack` and `export` warn of where CodingReport says so.
+inline constexpr const char* kLevelsLackAttributes =
+    "The mesh has so many seams that its levels cannot have its texture, colours and materials: these come back when "
+    "all of the stream is read, and a page shows none.";
+
 } // namespace filigree::cli

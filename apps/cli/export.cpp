@@ -8,6 +8,7 @@
 #include "filigree/io/file.h"
 #include "filigree/io/gltf.h"
 #include "filigree/io/gltf_export.h"
+#include "filigree/io/material_file.h"
 
 #include <filesystem>
 
@@ -72,6 +73,18 @@ void export_model(const Model& model, const PoseSequence& own, const ExportArgum
                            report);
 }
 
+/// What a page can show of the materials beside a model: PNG and JPEG, in the file.
+std::vector<MeshMaterial> page_materials(const Mesh& mesh, const std::string& input, Session& session) {
+    MeshMaterials found = read_materials_and_pictures(mesh, input);
+    for (MeshMaterial& material : found.materials) {
+        if (!material.picture_bytes || !picture_extension(*material.picture_bytes).empty()) continue;
+        found.warnings.push_back("The texture of " + material.name + " is neither PNG nor JPEG and was left out.");
+        material.picture_bytes = nullptr;
+    }
+    session.warn(found.warnings);
+    return std::move(found.materials);
+}
+
 /// The model as a coded file that comes level by level, with its poses.
 void export_stream(const Model& model, const PoseSequence& own, const ExportArguments& options, Session& session,
                    Report& report) {
@@ -85,9 +98,16 @@ void export_stream(const Model& model, const PoseSequence& own, const ExportArgu
         poses.frames_per_second = from.frames_per_second;
         for (std::size_t frame = 0; frame < from.frames; ++frame) poses.frames.push_back(require(from.pose(frame)));
     }
+    std::optional<Model> embedding; // where materials lie beside the model, one that has them inside
+    if (!model.mesh.materials.empty()) {
+        embedding = model;
+        embedding->mesh.embedded_materials = page_materials(model.mesh, options.input, session);
+        embedding->mesh.material_files.clear();
+    }
     session.begin_writing(options.output);
-    const CodingReport coding = require(
-        write_coded_model(model, poses, {.bits = options.bits, .levels = true}, options.output, session.context()));
+    const CodingReport coding =
+        require(write_coded_model(embedding ? *embedding : model, poses, {.bits = options.bits, .levels = true},
+                                  options.output, session.context()));
     const auto bytes = fs::file_size(options.output);
     report.set("vertices", model.mesh.vertex_count());
     report.count("frames", "frames", poses.frames.size());
@@ -95,6 +115,7 @@ void export_stream(const Model& model, const PoseSequence& own, const ExportArgu
     add_coding_shares(coding.bytes, model.mesh.vertex_count(), bytes, report);
     const FileReader file = require(FileReader::open(options.output));
     add_stream_marks(require(read_model_outline(file, options.output, session.silent_context())), report);
+    if (coding.lacks_level_attributes) session.warn(kLevelsLackAttributes);
 }
 
 /// A folder with a page that plays a GLB as it is, such as the key frames that `simulate` writes of what melts.

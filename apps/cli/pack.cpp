@@ -115,6 +115,7 @@ void run(PackArguments options, Session& session) {
         require(write_coded_model(model, poses, options.code, options.output, session.context()));
     Report report;
     report_coding(model, coding, options, now_seconds() - start, report);
+    if (coding.lacks_level_attributes) session.warn(kLevelsLackAttributes);
     if (options.output != "-") report_surface(model, options, session, report);
     session.print(report);
 }

@@ -102,7 +102,7 @@ TEST(LevelCode, ABatchCanBeTakenBackInAnyOrder) {
         const Vec3f p = mesh.positions[v] * 1000;
         places.push_back({int(p[0]), int(p[1]), int(p[2])});
     }
-    const Coarsening coarsening = coarsen(surface.map, places, 100, kTwoThreads);
+    const Coarsening coarsening = coarsen(surface.map, places, {}, 100, kTwoThreads);
     std::size_t vertices = coarsening.vertex.size();
     for (const auto& batch : coarsening.batches) {
         std::vector<bool> went(surface.source.size()), took(surface.source.size());

@@ -3,6 +3,7 @@
 import { execFileSync } from 'node:child_process';
 import { existsSync, mkdirSync, rmSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
+import { deflateSync } from 'node:zlib';
 import { root } from './tools.mjs';
 
 const [program, folder] = process.argv.slice(2);
@@ -11,6 +12,23 @@ const kFrames = 9, kRate = 12;
 rmSync(folder, { recursive: true, force: true });
 mkdirSync(join(folder, 'poses'), { recursive: true });
 const filigree = (...words) => execFileSync(program, [...words, '--quiet'], { cwd: folder, stdio: ['ignore', 'ignore', 'inherit'] });
+
+/// A picture of one row.
+function png_of_columns(colors) {
+    const number = (value) => { const bytes = Buffer.alloc(4); bytes.writeUInt32BE(value >>> 0); return bytes; };
+    const checked = (kind, bytes) => {
+        const all = Buffer.concat([Buffer.from(kind), bytes]);
+        let crc = 0xffffffff;
+        for (const byte of all) {
+            crc ^= byte;
+            for (let bit = 0; bit < 8; ++bit) crc = crc & 1 ? (crc >>> 1) ^ 0xedb88320 : crc >>> 1;
+        }
+        return Buffer.concat([number(bytes.length), all, number(~crc)]);
+    };
+    return Buffer.concat([Buffer.from('\x89PNG\r\n\x1a\n', 'latin1'),
+        checked('IHDR', Buffer.concat([number(colors.length), number(1), Buffer.from([8, 2, 0, 0, 0])])),
+        checked('IDAT', deflateSync(Buffer.from([0, ...colors.flat()]))), checked('IEND', Buffer.alloc(0))]);
+}
 
 // A cube that is squeezed, bent and twisted more and more, and comes half the way back.
 filigree('make', 'wavy-cube', '-o', 'cube.ply', '--resolution', '24');
@@ -37,27 +55,37 @@ filigree('restore', 'stream_page/model.fil', '--frame', String(kFrames), '-o', '
 filigree('export', ...moving, '-o', 'compressed.glb', '--compress');
 
 // Two objects, two materials and a UV seam: a tube of which each half is an object, its texture's ends at one edge.
-const kAround = 24, kRings = 16;
-const lines = ['mtllib tube.mtl'];
-for (let ring = 0; ring <= kRings; ++ring)
-    for (let i = 0; i < kAround; ++i) {
-        const angle = (2 * Math.PI * i) / kAround;
-        lines.push(`v ${0.3 * Math.cos(angle)} ${(2 * ring) / kRings} ${0.3 * Math.sin(angle)}`);
+function tube(around, rings, library) {
+    const lines = [`mtllib ${library}`];
+    for (let ring = 0; ring <= rings; ++ring)
+        for (let i = 0; i < around; ++i) {
+            const angle = (2 * Math.PI * i) / around;
+            lines.push(`v ${0.3 * Math.cos(angle)} ${(2 * ring) / rings} ${0.3 * Math.sin(angle)}`);
+        }
+    for (let ring = 0; ring <= rings; ++ring)
+        for (let i = 0; i <= around; ++i) lines.push(`vt ${i / around} ${ring / rings}`);
+    for (let ring = 0; ring < rings; ++ring) {
+        if (ring === 0) lines.push('o lower', 'usemtl red');
+        if (ring === rings / 2) lines.push('o upper', 'usemtl blue');
+        for (let i = 0; i < around; ++i) {
+            const corner = (up, along) => `${(ring + up) * around + ((i + along) % around) + 1}/${(ring + up) * (around + 1) + i + along + 1}`;
+            lines.push(`f ${corner(0, 0)} ${corner(1, 0)} ${corner(1, 1)}`, `f ${corner(0, 0)} ${corner(1, 1)} ${corner(0, 1)}`);
+        }
     }
-for (let ring = 0; ring <= kRings; ++ring)
-    for (let i = 0; i <= kAround; ++i) lines.push(`vt ${i / kAround} ${ring / kRings}`);
-for (let ring = 0; ring < kRings; ++ring) {
-    if (ring === 0) lines.push('o lower', 'usemtl red');
-    if (ring === kRings / 2) lines.push('o upper', 'usemtl blue');
-    for (let i = 0; i < kAround; ++i) {
-        const corner = (up, along) => `${(ring + up) * kAround + ((i + along) % kAround) + 1}/${(ring + up) * (kAround + 1) + i + along + 1}`;
-        lines.push(`f ${corner(0, 0)} ${corner(1, 0)} ${corner(1, 1)}`, `f ${corner(0, 0)} ${corner(1, 1)} ${corner(0, 1)}`);
-    }
+    return lines.join('\n') + '\n';
 }
-writeFileSync(join(folder, 'tube.obj'), lines.join('\n') + '\n');
+writeFileSync(join(folder, 'tube.obj'), tube(24, 16, 'tube.mtl'));
 writeFileSync(join(folder, 'tube.mtl'), 'newmtl red\nKd 0.8 0.1 0.1\nnewmtl blue\nKd 0.1 0.2 0.8\n');
 filigree('deform', 'tube.obj', '-o', 'tube_bent.glb', '--bend', '60');
 filigree('strip', 'tube.obj', '-o', 'tube.fil', '--base', '60');
+// A finer one, with a picture on its lower half: yellow, and green on the left of what is seen from the front.
+const kYellow = [250, 220, 0], kGreen = [0, 160, 0];
+writeFileSync(join(folder, 'stripes.png'), png_of_columns(Array.from({ length: 16 }, (_, i) => (i < 3 || i > 7 ? kYellow : kGreen))));
+writeFileSync(join(folder, 'painted.mtl'), 'newmtl red\nKd 1 1 1\nmap_Kd stripes.png\nnewmtl blue\nKd 0.05 0.1 0.9\n');
+writeFileSync(join(folder, 'painted.obj'), tube(96, 64, 'painted.mtl'));
+filigree('strip', 'painted.obj', '-o', 'painted.fil', '--base', '60');
+filigree('deform', 'painted.fil', '-o', 'painted_moved.fil', '--bend', '20', '--frames', '5');
+filigree('export', 'painted_moved.fil', '-o', 'painted_page', '--web', '--stream');
 filigree('export', 'tube.fil', '-o', 'tube.glb');
 filigree('deform', 'tube.fil', '-o', 'tube_moved.fil', '--bend', '60', '--frames', '5');
 filigree('export', 'tube_moved.fil', '-o', 'tube_skin.glb');
@@ -91,7 +119,7 @@ filigree('simulate', 'melt.toml', '-o', 'melt.glb');
 filigree('export', 'melt.glb', '-o', 'melt_page', '--web');
 
 // Far from the origin, where 32-bit float is coarse.
-const far = lines.map((line) => line.replace(/^v (\S+) (\S+) (\S+)$/, (_, x, y, z) => `v ${Number(x) + 1e5} ${Number(y) - 2e5} ${Number(z) + 3e5}`));
+const far = tube(24, 16, 'tube.mtl').trimEnd().split('\n').map((line) => line.replace(/^v (\S+) (\S+) (\S+)$/, (_, x, y, z) => `v ${Number(x) + 1e5} ${Number(y) - 2e5} ${Number(z) + 3e5}`));
 writeFileSync(join(folder, 'far.obj'), far.join('\n') + '\n');
 filigree('strip', 'far.obj', '-o', 'far.fil', '--base', '60');
 filigree('deform', 'far.fil', '-o', 'far_moved.fil', '--bend', '60', '--frames', '5');

@@ -82,6 +82,14 @@ std::vector<std::string> seeds() {
     const Mesh cube = make_wavy_cube({.resolution = 4});
     all.push_back(write_model(strip(cube, {.code = DetailCode::reference}, kContext).value().model));
     all.push_back(write_model(strip(cube, {.base = 20, .reorder = true}, kContext).value().model));
+    Mesh painted = mesh; // two materials, a texture and colours, in levels
+    painted.materials.names = {"a", "b"};
+    for (std::size_t f = 0; f < mesh.face_count(); ++f) painted.materials.of_face.push_back(f < mesh.face_count() / 2);
+    for (const Vec3f& p : mesh.positions) {
+        painted.uvs.values.emplace_back(p[0], p[1]);
+        painted.colors.emplace_back(0.5f, std::abs(p[2]), 0.0f, 1.0f);
+    }
+    all.push_back(coded_file(strip(painted, {.base = 12}, kContext).value().model, {.levels = true}));
     return all;
 }
 

@@ -5,6 +5,7 @@
 #include "filigree/mesh/shapes.h"
 #include "threads.h"
 
+#include <algorithm>
 #include <cstdlib>
 #include <gtest/gtest.h>
 
@@ -86,6 +87,42 @@ TEST(ModelStream, TheWholeFileIsAModelWithItsPoses) {
     const ModelOutline outline = read_model_outline(FileReader(bytes), "it", kTwoThreads).value();
     EXPECT_EQ(outline.frames, 300u);
     EXPECT_TRUE(outline.has_gradients);
+}
+
+TEST(ModelStream, LevelsHaveTexturesMaterialsAndColours) {
+    Mesh mesh = make_wavy_sphere({.resolution = 40});
+    mesh.materials.names = {"front", "back"};
+    for (std::size_t f = 0; f < mesh.face_count(); ++f)
+        mesh.materials.of_face.push_back(mesh.positions[mesh.face(f)[0]][2] < 0);
+    for (const Vec3f& p : mesh.positions) {
+        mesh.uvs.values.emplace_back(p[0], p[1]);
+        mesh.colors.emplace_back(0.5f, 0.25f, std::clamp(p[2], 0.0f, 1.0f), 1.0f);
+    }
+    for (MeshMaterial& material : mesh.embedded_materials = {{.name = "front"}, {.name = "back"}})
+        material.picture_bytes = std::make_shared<const std::string>(5000, 'p');
+    const Model model = strip(mesh, {.base = 200}, kContext)->model;
+    const std::string bytes = stream_of(model, {});
+    ModelStream stream("it");
+    for (const char byte : bytes) {
+        ASSERT_TRUE(stream.feed(std::string_view(&byte, 1)).ok());
+        if (stream.level_count() == 1) break;
+    }
+    ASSERT_EQ(stream.level_count(), 1u);
+    EXPECT_LT(stream.mesh().vertex_count(), mesh.vertex_count() / 4);
+    const Mesh first = stream.mesh();
+    ASSERT_EQ(check_mesh(first), "");
+    EXPECT_EQ(first.materials.names, mesh.materials.names);
+    ASSERT_EQ(first.uvs.corners.size(), first.corner_count());
+    for (std::size_t c = 0; c < first.corner_count(); ++c) {
+        const Vec3f& p = first.positions[first.corners[c]];
+        ASSERT_LT((first.uvs.values[first.uvs.corners[c]] - p.head<2>()).norm(), 2e-3f);
+        ASSERT_NEAR(first.colors[first.corners[c]][2], std::clamp(p[2], 0.0f, 1.0f), 5e-3f);
+    }
+    const Model back = read_model(bytes, "it", kContext).value();
+    EXPECT_EQ(std::ranges::count(back.mesh.materials.of_face, 1u), std::ranges::count(mesh.materials.of_face, 1u));
+    ASSERT_EQ(back.mesh.uvs.values.size(), mesh.vertex_count());
+    ASSERT_EQ(back.mesh.embedded_materials.size(), 2u);
+    EXPECT_EQ(back.mesh.embedded_materials[1].picture_bytes->size(), 5000u);
 }
 
 TEST(ModelStream, OtherFilesAndDamageAreNamed) {

@@ -36,6 +36,13 @@ struct Stream {
     std::vector<std::int8_t> normals;                ///< four a vertex, the last one nothing
     std::vector<Skin> skins;
     std::vector<Index> corners, near; ///< near: of each vertex, the driver's triangle that it follows
+
+    // Where there are attributes, a vertex that is drawn is a wedge: all of the above once more, a wedge each.
+    std::vector<float> wedge_positions, uvs;
+    std::vector<std::int8_t> wedge_normals;
+    std::vector<Skin> wedge_skins;
+    std::vector<std::uint8_t> colors;  ///< four a wedge
+    std::vector<Index> groups;         ///< a material, and how many corners have it, from the first on
 };
 
 std::vector<char> input;
@@ -132,6 +139,51 @@ void make_normals() {
     }
 }
 
+bool has_wedges() { return !stream.levels->outline().empty(); }
+
+/// Corners name wedges, and come material by material; one that is not there stands last.
+void sort_by_material(std::span<const Index> wedge_at) {
+    const std::span<const Wedge> wedges = stream.levels->wedges();
+    std::vector<std::pair<Index, Index>> triangles; // material, first corner
+    for (Index c = 0; c < wedge_at.size(); c += 3)
+        if (wedge_at[c] != kNoIndex && wedge_at[c + 1] != kNoIndex && wedge_at[c + 2] != kNoIndex)
+            triangles.emplace_back(wedges[wedge_at[c]].material, c);
+    if (!std::ranges::is_sorted(triangles)) std::ranges::sort(triangles);
+    stream.corners.clear();
+    stream.groups.clear();
+    for (const auto& [material, c] : triangles) {
+        if (stream.groups.empty() || stream.groups[stream.groups.size() - 2] != material)
+            stream.groups.insert(stream.groups.end(), {material, 0});
+        stream.groups.back() += 3;
+        stream.corners.insert(stream.corners.end(), {wedge_at[c], wedge_at[c + 1], wedge_at[c + 2]});
+    }
+}
+
+/// What vertices have, for each of their wedges.
+void spread_over_wedges(std::span<const float> positions) {
+    const std::span<const Wedge> wedges = stream.levels->wedges();
+    const AttributeOutline& outline = stream.levels->outline();
+    const auto spread = [&](auto from, auto& to, std::size_t numbers) {
+        to.clear();
+        to.reserve(numbers * wedges.size());
+        for (const Wedge& wedge : wedges)
+            to.insert(to.end(), from.begin() + std::ptrdiff_t(numbers * wedge.vertex),
+                      from.begin() + std::ptrdiff_t(numbers * (wedge.vertex + 1)));
+    };
+    spread(positions, stream.wedge_positions, 3);
+    spread(std::span<const std::int8_t>(stream.normals), stream.wedge_normals, 4);
+    if (!stream.skins.empty()) spread(std::span<const Skin>(stream.skins), stream.wedge_skins, 1);
+    stream.uvs.clear();
+    stream.colors.clear();
+    for (const Wedge& wedge : wedges) {
+        const Vec2f uv = outline.uv(wedge);
+        if (outline.has_uvs) stream.uvs.insert(stream.uvs.end(), uv.data(), uv.data() + 2);
+        if (!outline.has_colors) continue;
+        const ByteColor& color = stream.levels->colors()[wedge.vertex];
+        stream.colors.insert(stream.colors.end(), color.begin(), color.end());
+    }
+}
+
 void make_arrays() {
     const std::size_t count = stream.levels->vertex_count();
     stream.positions.resize(3 * count);
@@ -142,13 +194,18 @@ void make_arrays() {
     }
     const std::vector<bool> closes_hole = stream.levels->closes_hole();
     stream.corners.clear();
-    for (const Triangle& t : stream.levels->triangles())
+    const std::vector<Triangle> triangles = stream.levels->triangles();
+    for (const Triangle& t : triangles)
         if (!closes_hole[t[0]] && !closes_hole[t[1]] && !closes_hole[t[2]])
             stream.corners.insert(stream.corners.end(), t.begin(), t.end());
     make_normals();
-    if (stream.driver_triangles.empty()) return;
-    for (std::size_t v = stream.skins.size(); v < count; ++v) follow_driver(v);
-    shift_rest();
+    if (!stream.driver_triangles.empty()) {
+        for (std::size_t v = stream.skins.size(); v < count; ++v) follow_driver(v);
+        shift_rest();
+    }
+    if (!has_wedges()) return;
+    sort_by_material(stream.levels->corner_wedges(triangles));
+    spread_over_wedges(stream.driver_triangles.empty() ? stream.positions : stream.shifted);
 }
 
 } // namespace
@@ -198,8 +255,11 @@ std::uint32_t EXPORTED(read_clip)(std::uint32_t size, std::uint32_t numbers) {
     return 1;
 }
 
-std::uint32_t EXPORTED(read_coarsest)(std::uint32_t connectivity, std::uint32_t places) {
-    if (!stream.levels->read_coarsest(part(0, connectivity), part(connectivity, places))) return 0;
+/// attributes: 0 bytes where levels have none.
+std::uint32_t EXPORTED(read_coarsest)(std::uint32_t connectivity, std::uint32_t places, std::uint32_t attributes) {
+    if (!stream.levels->read_coarsest(part(0, connectivity), part(connectivity, places),
+                                      part(connectivity + places, attributes)))
+        return 0;
     make_arrays();
     return 1;
 }
@@ -215,16 +275,28 @@ std::uint32_t EXPORTED(read_refinement)(std::uint32_t size, std::uint32_t is_las
     return 1;
 }
 
-std::uint32_t EXPORTED(vertex_count)() { return std::uint32_t(stream.levels->vertex_count()); }
+std::uint32_t EXPORTED(surface_vertex_count)() { return std::uint32_t(stream.levels->vertex_count()); }
+/// Those that are drawn: where there are attributes, one for each wedge.
+std::uint32_t EXPORTED(vertex_count)() {
+    return std::uint32_t(has_wedges() ? stream.levels->wedges().size() : stream.levels->vertex_count());
+}
 std::uint32_t EXPORTED(corner_count)() { return std::uint32_t(stream.corners.size()); }
 std::uint32_t EXPORTED(frame_count)() { return std::uint32_t(stream.clip.empty() ? 0 : stream.clip.size() - 1); }
 /// Of a model that moves, the shifted rest shape.
 const float* EXPORTED(positions)() {
+    if (has_wedges()) return stream.wedge_positions.data();
     return stream.driver_triangles.empty() ? stream.positions.data() : stream.shifted.data();
 }
-const std::int8_t* EXPORTED(normals)() { return stream.normals.data(); }
+const std::int8_t* EXPORTED(normals)() { return (has_wedges() ? stream.wedge_normals : stream.normals).data(); }
 const Index* EXPORTED(corners)() { return stream.corners.data(); }
-const Skin* EXPORTED(skins)() { return stream.skins.data(); }
+const Skin* EXPORTED(skins)() { return (has_wedges() ? stream.wedge_skins : stream.skins).data(); }
+/// Two a vertex, or none: nullptr.
+const float* EXPORTED(uvs)() { return stream.uvs.empty() ? nullptr : stream.uvs.data(); }
+/// Four bytes a vertex, sRGB, or none: nullptr.
+const std::uint8_t* EXPORTED(colors)() { return stream.colors.empty() ? nullptr : stream.colors.data(); }
+/// Of each run of corners its material and its length.
+std::uint32_t EXPORTED(group_count)() { return std::uint32_t(stream.groups.size() / 2); }
+const Index* EXPORTED(groups)() { return stream.groups.data(); }
 std::uint32_t EXPORTED(driver_triangle_count)() { return std::uint32_t(stream.driver_triangles.size()); }
 const Index* EXPORTED(driver_triangles)() { return stream.driver_triangles.data()->data(); }
 

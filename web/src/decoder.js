@@ -41,6 +41,7 @@ export class Decoder {
 
   array(type, call, length) { return new type(this.calls.memory.buffer, this.calls[call]() >>> 0, length); }
 
+  get surface_vertex_count() { return this.calls.surface_vertex_count(); }
   get vertex_count() { return this.calls.vertex_count(); }
   get frame_count() { return this.calls.frame_count(); }
   get positions() { return this.array(Float32Array, 'positions', 3 * this.vertex_count); }
@@ -48,6 +49,16 @@ export class Decoder {
   get corners() { return this.array(Uint32Array, 'corners', this.calls.corner_count()); }
   /// Of each vertex four joints and four weights.
   get skins() { return this.array(Uint16Array, 'skins', 8 * this.vertex_count); }
+  /// Two texture coordinates a vertex, and four bytes of colour; null where there are none.
+  get uvs() { return this.calls.uvs() ? this.array(Float32Array, 'uvs', 2 * this.vertex_count) : null; }
+  get colors() { return this.calls.colors() ? this.array(Uint8Array, 'colors', 4 * this.vertex_count) : null; }
+  /// [{ material, start, count }] of corners; none where there are no attributes.
+  get groups() {
+    const numbers = this.array(Uint32Array, 'groups', 2 * this.calls.group_count()), groups = [];
+    for (let k = 0, start = 0; k < numbers.length; start += numbers[k + 1], k += 2)
+      groups.push({ material: numbers[k], start, count: numbers[k + 1] });
+    return groups;
+  }
   get driver_triangles() { return this.array(Uint32Array, 'driver_triangles', 3 * this.calls.driver_triangle_count()); }
 
   driver_rest(driver_vertices) { return this.array(Float32Array, 'driver_rest', 3 * driver_vertices); }

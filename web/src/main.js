@@ -41,8 +41,12 @@ class Page {
 
   // ---- a model that comes level by level
 
+  receive() {
+    return Promise.all([this.receive_levels(), this.model.materials.read_pictures(() => this.draw())]);
+  }
+
   /// Takes levels as they come, but none that would not be seen; goes on when the view comes nearer.
-  async receive() {
+  async receive_levels() {
     const { model } = this;
     while (!model.is_whole) {
       if (model.chooses && !model.choose_level(this.stage.camera, this.stage.height).wants_more)

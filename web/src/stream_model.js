@@ -2,6 +2,7 @@
 import * as THREE from 'three';
 import { Decoder } from './decoder.js';
 import { StreamFile } from './stream_file.js';
+import { StreamMaterials } from './stream_materials.js';
 
 const kFramingMoments = 32;
 const kSeen = 0.05; // pixels (rms, and the light shows slopes): a smaller error is not seen
@@ -39,6 +40,15 @@ class DrivenMesh extends THREE.SkinnedMesh {
   }
 }
 
+/// sRGB bytes as linear numbers, which shaders mix.
+function linear_colors(bytes) {
+  const linear = Uint16Array.from({ length: 256 }, (_, byte) => {
+    const c = byte / 255;
+    return Math.round(65535 * (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4));
+  });
+  return Uint16Array.from(bytes, (byte, k) => k % 4 === 3 ? 257 * byte : linear[byte]);
+}
+
 export class StreamModel {
   static async load() {
     const model = new StreamModel();
@@ -69,7 +79,7 @@ export class StreamModel {
     this.arrived = 0;
     this.arrivals = []; // when each level was there, seconds of the page's clock
     this.chooses = true;
-    this.material = new THREE.MeshStandardMaterial({ color: 0xb9a58c, metalness: 0, roughness: 0.62, side: THREE.DoubleSide, shadowSide: THREE.DoubleSide });
+    this.materials = await StreamMaterials.load(file);
     this.times = [];
     this.clips = [];
     if (!file.has('cd.pose')) return;
@@ -99,7 +109,7 @@ export class StreamModel {
   get bytes() { return this.file.bytes; }
   get bytes_read() { return this.arrived > 0 ? this.ends[this.arrived - 1] : 0; }
   get ends() {
-    return this.table.map(({ batches }, k) => k === 0 ? this.file.end_of('cd.bpos')
+    return this.table.map(({ batches }, k) => k === 0 ? this.file.end_of(this.file.has('cd.batt') ? 'cd.batt' : 'cd.bpos')
       : batches > 0 ? this.file.end_of('cd.lev', k) : this.file.end_of('cd.ref', k - 1));
   }
   get report() { return { vertices: this.counts.vertices, joints: this.skeleton ? this.counts.driver : 0 }; }
@@ -126,7 +136,7 @@ export class StreamModel {
     geometry.setAttribute('skinIndex', new THREE.BufferAttribute(joints, 4));
     geometry.setAttribute('skinWeight', new THREE.BufferAttribute(weights, 4, true));
     geometry.setIndex(new THREE.BufferAttribute(this.decoder.driver_triangles.slice(), 1));
-    const mesh = new DrivenMesh(geometry, this.material);
+    const mesh = new DrivenMesh(geometry, this.materials.plain);
     mesh.bind(this.skeleton, new THREE.Matrix4());
     return mesh;
   }
@@ -136,7 +146,7 @@ export class StreamModel {
     if (this.is_whole) return false;
     const { file, decoder } = this, k = this.arrived, { batches, error } = this.table[k];
     if (k === 0)
-      decoder.read('read_coarsest', [await file.section('cd.bcon'), await file.section('cd.bpos')]);
+      decoder.read('read_coarsest', [await file.section('cd.bcon'), await file.section('cd.bpos'), await file.section('cd.batt')]);
     else if (batches > 0)
       decoder.read('read_level', [await file.section('cd.lev', k)], batches);
     else
@@ -166,16 +176,22 @@ export class StreamModel {
       shared.skinIndex = new THREE.InterleavedBufferAttribute(skins, 4, 0, false);
       shared.skinWeight = new THREE.InterleavedBufferAttribute(skins, 4, 4, true);
     }
+    if (decoder.uvs) shared.uv = new THREE.BufferAttribute(decoder.uvs.slice(), 2);
+    if (decoder.colors) {
+      shared.color = new THREE.BufferAttribute(linear_colors(decoder.colors), 4, true);
+      this.materials.color_by_vertices();
+    }
     const geometry = new THREE.BufferGeometry(), corners = decoder.corners.slice();
     geometry.setIndex(new THREE.BufferAttribute(corners, 1));
-    const mesh = this.skeleton ? new DrivenMesh(geometry, this.material) : new THREE.Mesh(geometry, this.material);
+    const material = this.materials.of(decoder.groups, geometry);
+    const mesh = this.skeleton ? new DrivenMesh(geometry, material) : new THREE.Mesh(geometry, material);
     if (this.skeleton) mesh.bind(this.skeleton, new THREE.Matrix4());
     mesh.frustumCulled = false;
     mesh.boundingSphere = new THREE.Sphere(); // three.js would ask every vertex where it is
     mesh.castShadow = mesh.receiveShadow = true;
     mesh.visible = false;
     this.scene.add(mesh);
-    this.levels.unshift({ nodes: [mesh], meshes: [mesh], vertices: decoder.vertex_count, triangles: corners.length / 3, error });
+    this.levels.unshift({ nodes: [mesh], meshes: [mesh], vertices: decoder.surface_vertex_count, triangles: corners.length / 3, error });
     // Vertices of coarser levels are the first ones: all levels share one set, the finest's.
     for (const level of this.levels)
       for (const { geometry: theirs } of level.meshes) {

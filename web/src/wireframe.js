@@ -18,8 +18,10 @@ export class Wireframe {
   follow_level() {
     for (const copy of this.copies.values()) copy.visible = false;
     for (const mesh of this.model.levels[this.model.level].meshes) {
-      mesh.material.polygonOffset = this.is_shown; // the surface steps back behind its edges
-      mesh.material.polygonOffsetFactor = mesh.material.polygonOffsetUnits = 1;
+      for (const material of [mesh.material].flat()) { // the surface steps back behind its edges
+        material.polygonOffset = this.is_shown;
+        material.polygonOffsetFactor = material.polygonOffsetUnits = 1;
+      }
       if (this.is_shown) this.copy(mesh).visible = true;
     }
   }

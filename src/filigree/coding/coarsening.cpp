@@ -35,8 +35,9 @@ struct PricedCollapse {
 
 class Coarsener {
 public:
-    Coarsener(ClosedMap map, std::span<const FinePlace> places)
-        : map_(std::move(map)), is_alive_(map_.triangles.size(), true), spoke_(map_.vertex_count(), kNoIndex),
+    Coarsener(ClosedMap map, std::span<const FinePlace> places, const SurfaceAttributes& attributes)
+        : map_(std::move(map)), wedges_(attributes.wedges), wedge_at_(attributes.wedge_at),
+          is_alive_(map_.triangles.size(), true), spoke_(map_.vertex_count(), kNoIndex),
           quadrics_(map_.vertex_count()) {
         points_.reserve(places.size());
         for (const FinePlace& p : places) points_.emplace_back(p[0], p[1], p[2]);
@@ -44,6 +45,9 @@ public:
         for (Index v = 0; v < map_.vertex_count(); ++v)
             if (!map_.closes_hole[v]) left_.push_back(v);
         for (Index t = 0; t < map_.triangles.size(); ++t) add_planes(t);
+        for (Index h = 0; h < wedge_at_.size(); ++h) // where a seam lies shows as much as where a border does
+            if (wedge_at_[h] != kNoIndex && wedge_at_[map_.opposite[h]] != kNoIndex && attributes.is_seam(map_, h))
+                add_border(map_.opposite[h]);
     }
 
     Coarsening run(std::size_t fewest, const RunContext& context) {
@@ -146,8 +150,43 @@ private:
         std::size_t common = 0;
         for (std::size_t i = 0; i < ring.size; ++i) common += other.has(ring.ends[i]);
         const Index left = ring.ends[(to + ring.size - 1) % ring.size], right = ring.ends[(to + 1) % ring.size];
-        return common == 2 && other.has(left) && other.has(right) && is_longer_than(left, 3) &&
-               is_longer_than(right, 3);
+        if (common != 2 || !other.has(left) || !other.has(right) || !is_longer_than(left, 3) ||
+            !is_longer_than(right, 3))
+            return false;
+        CollapsedWedges at_left, at_right;
+        return wedge_at_.empty() || collapse_wedges(ring, to, at_left, at_right);
+    }
+
+    /// What a collapse does to wedges. False: some would have nowhere to go, or could not be told from each other
+    /// later.
+    bool collapse_wedges(const Ring& ring, std::size_t to, CollapsedWedges& at_left, CollapsedWedges& at_right) const {
+        const Index there = ring.half_edges[to], back = map_.opposite[there];
+        const Index left_moves = map_.opposite[ClosedMap::next(back)], // from the left neighbour to the vertex
+            left_stays = map_.opposite[ClosedMap::previous(back)],
+                    right_moves = map_.opposite[ClosedMap::previous(there)],
+                    right_stays = map_.opposite[ClosedMap::next(there)];
+        const auto side = [&](Index own, Index onto, Index third, std::array<Index, 2> moved,
+                              std::array<Index, 2> stayed,
+                              CollapsedWedges& wedges) { // corners of the triangle; then those of the ones beside it
+            wedges = {wedge_at_[own], wedge_at_[onto]};
+            if (wedges.own == kNoIndex) return true;
+            wedges.moves = wedge_at_[moved[0]] == wedges.own && wedge_at_[moved[1]] == wedge_at_[third];
+            const Wedge &a = wedges_[wedges.own], &b = wedges_[wedges.onto];
+            return a.material == b.material && a.has_uv == b.has_uv &&
+                   (wedges.moves || (wedge_at_[stayed[0]] == wedges.onto && wedge_at_[stayed[1]] == wedge_at_[third]));
+        };
+        if (!side(ClosedMap::next(back), back, ClosedMap::previous(back), {ClosedMap::next(left_moves), left_moves},
+                  {left_stays, ClosedMap::next(left_stays)}, at_left) ||
+            !side(there, ClosedMap::next(there), ClosedMap::previous(there),
+                  {right_moves, ClosedMap::next(right_moves)}, {ClosedMap::next(right_stays), right_stays}, at_right))
+            return false;
+        if (at_left.own == kNoIndex && at_right.own == kNoIndex) return false;
+        if (at_left.own != kNoIndex && at_right.own != kNoIndex &&
+            (at_left.own == at_right.own) != (at_left.onto == at_right.onto))
+            return false;
+        return std::all_of(ring.half_edges.begin(), ring.half_edges.begin() + ring.size, [&](Index h) {
+            return wedge_at_[h] == kNoIndex || wedge_at_[h] == at_left.own || wedge_at_[h] == at_right.own;
+        });
     }
 
     std::vector<VertexCollapse> next_batch(std::size_t fewest, const RunContext& context) {
@@ -190,13 +229,20 @@ private:
     VertexCollapse collapse(Index vertex, const Ring& ring, std::size_t to) {
         const Index there = ring.half_edges[to], back = map_.opposite[there];
         const Index onto = ring.ends[to];
-        const VertexCollapse made{vertex,
-                                  onto,
-                                  map_.origin(ClosedMap::previous(back)),
-                                  map_.origin(ClosedMap::previous(there)),
-                                  static_cast<Index>(ring.size - 2),
-                                  there,
-                                  back};
+        VertexCollapse made{vertex,
+                            onto,
+                            map_.origin(ClosedMap::previous(back)),
+                            map_.origin(ClosedMap::previous(there)),
+                            static_cast<Index>(ring.size - 2),
+                            there,
+                            back};
+        if (!wedge_at_.empty()) {
+            collapse_wedges(ring, to, made.at_left, made.at_right);
+            for (std::size_t k = 0; k < ring.size; ++k) {
+                Index& wedge = wedge_at_[ring.half_edges[k]];
+                if (wedge != kNoIndex) wedge = wedge == made.at_left.own ? made.at_left.onto : made.at_right.onto;
+            }
+        }
         for (std::size_t k = 0; k < ring.size; ++k)
             map_.triangles[ring.half_edges[k] / 3][ring.half_edges[k] % 3] = onto;
         const Index right_in = map_.opposite[ClosedMap::next(there)],
@@ -239,13 +285,16 @@ private:
             for (Index k = 0; k < 3; ++k) {
                 const Index other = map_.opposite[first + k];
                 base.opposite.push_back(3 * number_of[other / 3] + other % 3);
+                if (!wedge_at_.empty()) coarsening.wedge_at.push_back(wedge_at_[first + k]);
             }
         }
     }
 
     ClosedMap map_;
-    std::vector<bool> is_alive_; ///< of each triangle
-    std::vector<Index> spoke_;   ///< a half-edge from each vertex; kNoIndex where it went
+    std::span<const Wedge> wedges_;
+    std::vector<Index> wedge_at_; ///< of each half-edge, where there are attributes
+    std::vector<bool> is_alive_;  ///< of each triangle
+    std::vector<Index> spoke_;    ///< a half-edge from each vertex; kNoIndex where it went
     std::vector<Vec3d> points_;
     std::vector<Quadric> quadrics_;
     std::vector<Index> left_; ///< vertices that are left
@@ -253,8 +302,9 @@ private:
 
 } // namespace
 
-Coarsening coarsen(ClosedMap map, std::span<const FinePlace> places, std::size_t fewest, const RunContext& context) {
-    return Coarsener(std::move(map), places).run(fewest, context);
+Coarsening coarsen(ClosedMap map, std::span<const FinePlace> places, const SurfaceAttributes& attributes,
+                   std::size_t fewest, const RunContext& context) {
+    return Coarsener(std::move(map), places, attributes).run(fewest, context);
 }
 
 } // namespace filigree

@@ -13,8 +13,8 @@ struct CodedLevel {
 };
 
 struct CodedLevels {
-    std::uint32_t vertices = 0, triangles = 0; ///< the coarsest's
-    std::string connectivity = {}, places = {};
+    std::uint32_t vertices = 0, triangles = 0;                   ///< the coarsest's
+    std::string connectivity = {}, places = {}, attributes = {}; ///< attributes: where levels have any
     std::vector<CodedLevel> levels = {}; ///< each about twice as many vertices as the one before
 };
 

@@ -81,11 +81,11 @@ ClosedSurface surface_of(const FaceSpans& faces, std::vector<bool>& is_odd, FanT
 class Polygons {
 public:
     /// cuts: of each half-edge, both sides; empty: none. False: that is no set of polygons.
-    static bool assemble(const ClosedMap& map, const std::vector<bool>& cuts, WalkedFaces& walked,
-                         std::vector<Index>* first_half_edges) {
-        if (cuts.empty()) return triangles(map, walked, first_half_edges);
+    static bool assemble(const ClosedMap& map, const std::vector<bool>& cuts, WalkedFaces& walked) {
+        if (cuts.empty()) return triangles(map, walked);
         std::vector<bool> is_done(map.triangles.size(), false);
         walked.corners.reserve(3 * map.triangles.size());
+        walked.half_edges.reserve(3 * map.triangles.size());
         walked.face_offsets.reserve(map.triangles.size() + 1);
         for (Index t = 0; t < map.triangles.size(); ++t) {
             if (is_done[t] || !map.is_own(map.triangles[t])) continue;
@@ -99,6 +99,7 @@ public:
             for (Index h = start;;) {
                 is_done[h / 3] = true;
                 walked.corners.push_back(walked.number[map.origin(h)]);
+                walked.half_edges.push_back(h);
                 if (walked.corners.size() - begin > 3 * map.triangles.size()) return false;
                 for (h = ClosedMap::next(h); cuts[h]; h = ClosedMap::next(map.opposite[h])) {
                     is_done[map.opposite[h] / 3] = true;
@@ -108,21 +109,21 @@ public:
             }
             if (walked.corners.size() - begin < 3) return false;
             walked.face_offsets.push_back(static_cast<Index>(walked.corners.size()));
-            if (first_half_edges) first_half_edges->push_back(start);
         }
         return true;
     }
 
 private:
-    static bool triangles(const ClosedMap& map, WalkedFaces& walked, std::vector<Index>* first_half_edges) {
+    static bool triangles(const ClosedMap& map, WalkedFaces& walked) {
         walked.corners.reserve(3 * map.triangles.size());
+        walked.half_edges.reserve(3 * map.triangles.size());
         walked.face_offsets.reserve(map.triangles.size() + 1);
         for (Index t = 0; t < map.triangles.size(); ++t) {
             const Triangle& triangle = map.triangles[t];
             if (!map.is_own(triangle)) continue;
             for (const Index v : triangle) walked.corners.push_back(walked.number[v]);
+            walked.half_edges.insert(walked.half_edges.end(), {3 * t, 3 * t + 1, 3 * t + 2});
             walked.face_offsets.push_back(static_cast<Index>(walked.corners.size()));
-            if (first_half_edges) first_half_edges->push_back(3 * t);
         }
         return true;
     }
@@ -177,7 +178,9 @@ std::vector<std::size_t> WalkedFaces::first_with_number() const {
 
 EncodedFaces encode_faces(std::span<const Index> face_offsets, std::span<const Index> corners, std::size_t vertices,
                           SymbolWriter& out) {
-    const MapCode in_one_piece = [&](const ClosedSurface& surface) { return encode_connectivity(surface.map, out); };
+    const MapCode in_one_piece = [&](const ClosedSurface& surface, const FaceCorner&) {
+        return encode_connectivity(surface.map, out);
+    };
     return encode_faces(face_offsets, corners, vertices, in_one_piece, out);
 }
 
@@ -192,7 +195,8 @@ EncodedFaces encode_faces(std::span<const Index> face_offsets, std::span<const I
     }
     FanTriangles fans;
     const ClosedSurface surface = surface_of(faces, is_odd, fans);
-    WalkedMap walk = code_map(surface);
+    WalkedMap walk = code_map(
+        surface, [&](Index half_edge) { return face_offsets[fans.face[half_edge / 3]] + fans.corner(half_edge); });
 
     EncodedFaces encoded;
     WalkedFaces& walked = encoded.walked;
@@ -238,10 +242,9 @@ EncodedFaces encode_faces(std::span<const Index> face_offsets, std::span<const I
             encoded.vertex.push_back(v);
         }
 
-    std::vector<Index> first_half_edges;
-    Polygons::assemble(walk.map, cuts, walked, &first_half_edges);
-    for (const Index h : first_half_edges) {
-        const Index source = source_of(h);
+    Polygons::assemble(walk.map, cuts, walked);
+    for (std::size_t f = 0; f + 1 < walked.face_offsets.size(); ++f) {
+        const Index source = source_of(walked.half_edges[walked.face_offsets[f]]);
         encoded.face.push_back(fans.face[source / 3]);
         encoded.first_corner.push_back(fans.corner(source));
     }
@@ -291,7 +294,7 @@ std::optional<WalkedFaces> decode_faces(ClosedMap map, SymbolReader& in, std::si
         if (copy_of[w] != kNoIndex && copy_of[w] >= walked.met) return std::nullopt;
         walked.number[w] = copy_of[w] != kNoIndex ? copy_of[w] : static_cast<Index>(walked.met++);
     }
-    if (walked.met > vertices || !Polygons::assemble(walked.map, cuts, walked, nullptr)) return std::nullopt;
+    if (walked.met > vertices || !Polygons::assemble(walked.map, cuts, walked)) return std::nullopt;
     const std::uint32_t odd_faces = in.number(kOddFaces);
     for (std::uint32_t f = 0; f < odd_faces; ++f) {
         const std::uint32_t size = in.number(kOddSize);

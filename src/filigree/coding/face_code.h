@@ -15,8 +15,9 @@ inline constexpr unsigned kFaceContexts = kConnectivityContexts + 16;
 struct WalkedFaces {
     std::vector<Index> face_offsets = {0}, corners;
     ClosedMap map;
-    std::vector<Index> number; ///< of each of the map's vertices; kNoIndex where it closes a hole
-    std::size_t met = 0;       ///< vertices; those of odd faces alone and those of no face are not met
+    std::vector<Index> number;     ///< of each of the map's vertices; kNoIndex where it closes a hole
+    std::size_t met = 0;           ///< vertices; those of odd faces alone and those of no face are not met
+    std::vector<Index> half_edges; ///< of each corner but those of odd faces, which come last: the map's from there
 
     /// Of each number the first of the map's vertices that has it.
     std::vector<std::size_t> first_with_number() const;
@@ -30,8 +31,11 @@ struct EncodedFaces {
     std::vector<Index> first_corner; ///< and which of its corners is first now
 };
 
+/// Of a half-edge of a face's own triangle, which of all faces' corners it begins at.
+using FaceCorner = std::function<Index(Index)>;
+
 /// Writes a surface's map, and says in which order a reader will have it.
-using MapCode = std::function<WalkedMap(const ClosedSurface&)>;
+using MapCode = std::function<WalkedMap(const ClosedSurface&, const FaceCorner&)>;
 
 /// Writes faces: their map by `code_map`, the rest to `out`. Corners that name a vertex twice, and what does not lie in
 /// a surface, are written one by one. Cost O(F log F).

@@ -9,6 +9,7 @@ namespace {
 
 class SplitReader {
 public:
+    static constexpr bool writes = false;
     SymbolReader in{{}, kLevelContexts};
 
     bool is_damaged() const { return in.is_damaged(); }
@@ -23,6 +24,18 @@ public:
     std::int32_t step(unsigned context, Index, const Reals&, const Reals&, double) {
         return std::clamp(in.number_with_sign(context), -kFarthest, kFarthest);
     }
+    bool moves(unsigned context, Index, bool) { return in.symbol(context) != 0; }
+    std::int32_t number_with_sign(unsigned context, std::int32_t) { return in.number_with_sign(context); }
+};
+
+/// Of the coarsest level.
+struct BaseReader {
+    SymbolReader in;
+
+    bool is_damaged() const { return in.is_damaged(); }
+    std::uint32_t bits(std::uint32_t, unsigned count) { return in.bits(count); }
+    std::uint32_t number(unsigned context, std::uint32_t) { return in.number(context); }
+    std::int32_t number_with_sign(unsigned context, std::int32_t) { return in.number_with_sign(context); }
 };
 
 } // namespace
@@ -46,7 +59,7 @@ LevelReader::~LevelReader() = default;
 LevelReader::LevelReader(LevelReader&&) noexcept = default;
 LevelReader& LevelReader::operator=(LevelReader&&) noexcept = default;
 
-bool LevelReader::read_coarsest(std::string_view connectivity, std::string_view places) {
+bool LevelReader::read_coarsest(std::string_view connectivity, std::string_view places, std::string_view attributes) {
     SymbolReader in(connectivity, kConnectivityContexts), places_in(places, kGeometryContexts);
     std::optional<WalkedMap> walked = decode_connectivity(in, 2 * reading_->most_vertices);
     if (!walked || walked->map.vertex_count() > reading_->most_vertices) return false;
@@ -54,7 +67,9 @@ bool LevelReader::read_coarsest(std::string_view connectivity, std::string_view 
     if (places_in.is_damaged()) return false;
     reading_->level_ends.push_back(walked->map.vertex_count());
     reading_->walk.begin(walked->map, there);
-    return true;
+    if (attributes.empty()) return true;
+    BaseReader base{SymbolReader(attributes, kBaseContexts)};
+    return reading_->walk.wedges.begin(walked->map, base);
 }
 
 bool LevelReader::read_level(std::string_view splits, std::uint32_t batches) {
@@ -87,5 +102,11 @@ ClosedMap LevelReader::map() const { return map_of(triangles(), closes_hole()); 
 FinePlace LevelReader::place(Index vertex) const { return reading_->walk.rings.place(vertex); }
 std::size_t LevelReader::vertex_count() const { return reading_->walk.rings.vertex_count(); }
 std::span<const Index> LevelReader::parents() const { return reading_->walk.parents; }
+const AttributeOutline& LevelReader::outline() const { return reading_->walk.wedges.outline; }
+std::span<const Wedge> LevelReader::wedges() const { return reading_->walk.wedges.wedges; }
+std::span<const ByteColor> LevelReader::colors() const { return reading_->walk.wedges.colors; }
+std::vector<Index> LevelReader::corner_wedges(std::span<const Triangle> triangles) const {
+    return reading_->walk.wedges.of_corners(triangles, reading_->walk.rings);
+}
 
 } // namespace filigree

@@ -4,6 +4,7 @@
 
 #include "filigree/coding/closed_map.h"
 #include "filigree/coding/geometry_code.h"
+#include "filigree/coding/wedge.h"
 
 #include <memory>
 #include <string_view>
@@ -20,7 +21,8 @@ public:
     LevelReader& operator=(LevelReader&&) noexcept;
 
     /// False, of each: it is damaged, and so is what this reader holds.
-    bool read_coarsest(std::string_view connectivity, std::string_view places);
+    /// attributes: empty where levels have none.
+    bool read_coarsest(std::string_view connectivity, std::string_view places, std::string_view attributes = {});
     bool read_level(std::string_view splits, std::uint32_t batches);
     /// Makes the places of levels more precise, in their order, when all levels are read. The coarsest is precise.
     bool refine_level(std::string_view refinement);
@@ -33,6 +35,12 @@ public:
     std::size_t vertex_count() const;
     /// Of each vertex, one that was there before it and is beside it; of the coarsest's, itself.
     std::span<const Index> parents() const;
+
+    const AttributeOutline& outline() const;   ///< of attributes; empty where levels have none
+    std::span<const Wedge> wedges() const;     ///< those of coarser levels first
+    std::span<const ByteColor> colors() const; ///< of each vertex, or none
+    /// Of each corner of triangles(): its wedge; kNoIndex beside holes.
+    std::vector<Index> corner_wedges(std::span<const Triangle> triangles) const;
 
 private:
     class Reading;

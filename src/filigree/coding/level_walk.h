@@ -2,6 +2,7 @@
 #pragma once
 
 #include "filigree/coding/geometry_code.h"
+#include "filigree/coding/level_wedges.h"
 #include "filigree/coding/surface_frame.h"
 #include "filigree/coding/vertex_rings.h"
 
@@ -13,7 +14,8 @@ namespace filigree {
 // Contexts. Whether a vertex splits, and how, goes with its degree.
 inline constexpr unsigned kDegrees = 10, kRingSizes = 12, kLevelSizeClasses = 16;
 inline constexpr unsigned kWhich = 0, kSector = kWhich + kDegrees, kBegin = kSector + kRingSizes,
-                          kPlace = kBegin + kRingSizes, kLevelContexts = kPlace + 3 * kLevelSizeClasses;
+                          kPlace = kBegin + kRingSizes, kFirstOfWedges = kPlace + 3 * kLevelSizeClasses,
+                          kLevelContexts = kFirstOfWedges + kSplitContexts;
 inline constexpr unsigned kQuarterBits = 2;    // of refinements, along each axis
 inline constexpr std::int32_t kRoughOne = 127; // length of a rough frame's axes
 inline constexpr std::int32_t kUnknownSize = 256;
@@ -56,6 +58,7 @@ public:
     std::vector<Index> parents;
     std::vector<RoughFrame> frames; ///< of each vertex but the coarsest's, where levels are refined
     Coder& coder;
+    LevelWedges<Coder> wedges{coder, kFirstOfWedges}; ///< none where the surface has no attributes
 
     void begin(const ClosedMap& coarsest, std::span<const FinePlace> coarsest_places) {
         rings = VertexRings(coarsest, coarsest_places, kUnknownSize);
@@ -80,6 +83,7 @@ public:
         }
         if (coder.is_damaged()) return false;
         place_new();
+        if (wedges.has_any() && !wedges.run_batch(rings, static_cast<Index>(known_))) return false;
         return !coder.is_damaged();
     }
 
@@ -124,6 +128,7 @@ private:
         const std::size_t begin = coder.begin(kBegin + unsigned(size_class), ring, expected);
         if (begin >= ring.size) return false;
         note_around(u, ring, begin, sector);
+        if (wedges.has_any()) wedges.note_split(u, ring.ends, ring.size, begin, sector);
         coder.did_split(v);
         return rings.split(u, v, begin, sector);
     }

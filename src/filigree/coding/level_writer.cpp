@@ -9,12 +9,17 @@ namespace filigree {
 
 namespace {
 
+constexpr double kDenseSeams = 0.25; // of the vertices, that the coarsest level has: it is none
+
 /// Looks into a coarsening, and writes how to take it back.
 class SplitWriter {
 public:
-    SplitWriter(const Coarsening& coarsening, std::span<const FinePlace> places, const WalkedMap& coarsest)
-        : out(kLevelContexts), places_(places), collapse_of_(places.size(), nullptr),
-          number_of_(places.size(), kNoIndex) {
+    static constexpr bool writes = true;
+
+    SplitWriter(const Coarsening& coarsening, std::span<const FinePlace> places, const SurfaceAttributes& attributes,
+                const WalkedMap& coarsest)
+        : out(kLevelContexts), places_(places), attributes_(attributes), collapse_of_(places.size(), nullptr),
+          number_of_(places.size(), kNoIndex), came_by_(coarsest.vertex.size(), nullptr) {
         for (const Index v : coarsest.vertex) add_vertex(coarsening.vertex[v]);
     }
 
@@ -47,11 +52,33 @@ public:
         out.number_with_sign(context, further);
         return begin;
     }
-    void did_split(Index) { add_vertex(now_->vertex); }
+    void did_split(Index) {
+        add_vertex(now_->vertex);
+        if (!attributes_.empty()) came_by_.push_back(now_);
+    }
     std::int32_t step(unsigned context, Index v, const Reals& expected, const Reals& axis, double size) {
         const std::int32_t steps = nearest_step(places_[vertices[v]], expected, axis, size);
         out.number_with_sign(context, steps);
         return steps;
+    }
+
+    // What LevelWedges asks.
+    Index source(Index wedge) const { return wedge_sources_[wedge]; }
+    void add_wedge(Index source) { wedge_sources_.push_back(source); }
+    const Wedge& source_wedge(Index source) const { return attributes_.wedges[source]; }
+    const ByteColor& source_color(Index v) const { return attributes_.colors[vertices[v]]; }
+    Index child(Index v, Index parent) const {
+        const VertexCollapse& c = *came_by_[v];
+        return c.at_left.onto == source(parent) ? c.at_left.own : c.at_right.own;
+    }
+    bool moves(unsigned context, Index v, bool is_left) {
+        const bool moves = (is_left ? came_by_[v]->at_left : came_by_[v]->at_right).moves;
+        out.symbol(context, moves);
+        return moves;
+    }
+    std::int32_t number_with_sign(unsigned context, std::int32_t number) {
+        out.number_with_sign(context, number);
+        return number;
     }
 
 private:
@@ -61,9 +88,38 @@ private:
     }
 
     std::span<const FinePlace> places_;
+    const SurfaceAttributes& attributes_;
     std::vector<const VertexCollapse*> collapse_of_; ///< of each vertex, what goes onto it in this batch
     std::vector<Index> number_of_;
+    std::vector<const VertexCollapse*> came_by_; ///< of each of the walk's, where there are attributes
+    std::vector<Index> wedge_sources_;           ///< of each of the walk's wedges, which one it was
     const VertexCollapse* now_ = nullptr;
+};
+
+/// Of the coarsest level.
+struct BaseWriter {
+    SymbolWriter out{kBaseContexts};
+    const Coarsening& coarsening;
+    const WalkedMap& coarsest;
+
+    bool is_damaged() const { return false; }
+    Index wedge_at(Index half_edge) const {
+        Index source = coarsest.half_edge[half_edge / 3];
+        for (Index k = 0; k < half_edge % 3; ++k) source = ClosedMap::next(source);
+        return coarsening.wedge_at[source];
+    }
+    std::uint32_t bits(std::uint32_t value, unsigned count) {
+        out.bits(value, count);
+        return value;
+    }
+    std::uint32_t number(unsigned context, std::uint32_t number) {
+        out.number(context, number);
+        return number;
+    }
+    std::int32_t number_with_sign(unsigned context, std::int32_t number) {
+        out.number_with_sign(context, number);
+        return number;
+    }
 };
 
 std::string code_refinement(std::span<const FinePlace> exact, std::span<const Index> vertices,
@@ -101,20 +157,30 @@ std::vector<Index> find_half_edges(std::span<const Triangle> triangles, std::spa
 
 } // namespace
 
-EncodedLevels encode_levels(const ClosedMap& map, std::span<const FinePlace> places, const LevelCodeOptions& options,
+EncodedLevels encode_levels(const ClosedMap& map, std::span<const FinePlace> places,
+                            const SurfaceAttributes& attributes, const LevelCodeOptions& options,
                             const RunContext& context) {
-    const Coarsening coarsening = coarsen(map, places, options.fewest, context);
+    const Coarsening coarsening = coarsen(map, places, attributes, options.fewest, context);
+    const double most = std::max(4 * double(options.fewest), kDenseSeams * double(map.vertex_count()));
+    if (!attributes.empty() && double(coarsening.vertex.size()) > most && !context.is_cancelled())
+        return encode_levels(map, places, {}, options, context);
     EncodedLevels encoded;
     CodedLevels& code = encoded.code;
     SymbolWriter connectivity(kConnectivityContexts), base_places(kGeometryContexts);
     const WalkedMap coarsest = encode_connectivity(coarsening.base, connectivity);
     code.connectivity = connectivity.finish();
-    SplitWriter writer(coarsening, places, coarsest);
+    SplitWriter writer(coarsening, places, attributes, coarsest);
     std::vector<FinePlace> places_there;
     for (const Index v : writer.vertices) places_there.push_back(places[v]);
     LevelWalk<SplitWriter> walk(writer, options.steps, options.is_refined);
     walk.begin(coarsest.map, encode_geometry(coarsest.map, places_there, {1, 1}, 0, base_places));
     code.places = base_places.finish();
+    if (!attributes.empty()) {
+        BaseWriter base{.coarsening = coarsening, .coarsest = coarsest};
+        walk.wedges.outline = attributes.outline;
+        walk.wedges.begin(coarsest.map, base);
+        code.attributes = base.out.finish();
+    }
     code.vertices = static_cast<std::uint32_t>(walk.rings.vertex_count());
     code.triangles = static_cast<std::uint32_t>(coarsest.map.triangles.size());
 
@@ -122,7 +188,8 @@ EncodedLevels encode_levels(const ClosedMap& map, std::span<const FinePlace> pla
     CodedLevel level;
     for (std::size_t i = coarsening.batches.size(); i-- > 0 && !context.is_cancelled();) {
         writer.begin_batch(coarsening.batches[i]);
-        walk.run_batch(kNoIndex);
+        if (!walk.run_batch(kNoIndex)) // two triangles of three same vertices: which has which wedge cannot be said
+            return encode_levels(map, places, {}, options, context);
         ++level.batches;
         if (i > 0 && walk.rings.vertex_count() < 2 * begin) continue;
         begin = walk.rings.vertex_count();

@@ -4,6 +4,7 @@
 #include "filigree/coding/coded_levels.h"
 #include "filigree/coding/connectivity_code.h"
 #include "filigree/coding/geometry_code.h"
+#include "filigree/coding/level_attributes.h"
 #include "filigree/core/run_context.h"
 
 namespace filigree {
@@ -20,8 +21,10 @@ struct EncodedLevels {
     std::vector<FinePlace> read = {}; ///< its places
 };
 
+/// attributes: of the map. Where seams are so dense that the coarsest level would not be coarse, levels go without.
 /// Cost O(V log V), about 3 processor seconds a million vertices.
-EncodedLevels encode_levels(const ClosedMap& map, std::span<const FinePlace> places, const LevelCodeOptions& options,
+EncodedLevels encode_levels(const ClosedMap& map, std::span<const FinePlace> places,
+                            const SurfaceAttributes& attributes, const LevelCodeOptions& options,
                             const RunContext& context);
 
 } // namespace filigree

@@ -15,6 +15,7 @@ namespace filigree {
 namespace {
 
 constexpr unsigned kLoosePlace = std::max(kGeometryContexts, kRegularContexts), kPlaceContexts = kLoosePlace + 3;
+constexpr unsigned kAllAttributeContexts = kAttributeContexts + kRestContexts;
 constexpr unsigned kVertexOrder = 0, kFaceOrder = 1, kFirstCorner = 2, kOrderContexts = 3;
 
 struct Damage {};
@@ -58,6 +59,7 @@ struct OrderedMesh {
     Mesh mesh;
     std::vector<FinePlace> places; ///< as they will be read
     std::vector<Index> vertex, face, first_corner;
+    LevelValues in_levels; ///< which attributes are: outline and counts alone
 };
 
 template <class T>
@@ -205,12 +207,14 @@ OrderedMesh encode_shape(const Mesh& mesh, CodedMesh& coded, const RunContext& c
     SymbolWriter faces_out(kFaceContexts), places_out(kPlaceContexts);
     faces_out.bits(false, 1);
     EncodedLevels levels;
-    const MapCode code_map = [&](const ClosedSurface& surface) {
+    SurfaceAttributes attributes;
+    const MapCode code_map = [&](const ClosedSurface& surface, const FaceCorner& corner_of) {
         if (!coded.options.levels) return encode_connectivity(surface.map, faces_out);
         std::vector<FinePlace> places(surface.source.size());
         for (std::size_t v = 0; v < places.size(); ++v)
             if (surface.source[v] != kNoIndex) places[v] = fine_place(mesh.positions[surface.source[v]], coded);
-        levels = encode_levels(surface.map, places, level_options(coded.options), context);
+        attributes = surface_attributes(mesh, surface, corner_of);
+        levels = encode_levels(surface.map, places, attributes, level_options(coded.options), context);
         return std::move(levels.walked);
     };
     EncodedFaces faces = encode_faces(mesh.face_offsets, mesh.corners, mesh.vertex_count(), code_map, faces_out);
@@ -219,6 +223,9 @@ OrderedMesh encode_shape(const Mesh& mesh, CodedMesh& coded, const RunContext& c
     OrderedMesh ordered;
     if (context.is_cancelled()) return ordered;
     const WalkedFaces& walked = faces.walked;
+    if (!coded.levels.attributes.empty())
+        ordered.in_levels = {
+            .outline = attributes.outline, .met = walked.met, .walked_corners = walked.half_edges.size()};
     ordered.vertex = std::move(faces.vertex);
     ordered.face = std::move(faces.face);
     ordered.first_corner = std::move(faces.first_corner);
@@ -254,7 +261,7 @@ OrderedMesh encode_shape(const Mesh& mesh, CodedMesh& coded, const RunContext& c
 LevelReader decode_levels(const CodedMesh& coded, const RunContext& context) {
     const LevelCodeOptions options = level_options(coded.options);
     LevelReader reader(options.steps, options.is_refined, most_triangles(coded.corners));
-    if (!reader.read_coarsest(coded.levels.connectivity, coded.levels.places)) throw Damage();
+    if (!reader.read_coarsest(coded.levels.connectivity, coded.levels.places, coded.levels.attributes)) throw Damage();
     for (const CodedLevel& level : coded.levels.levels)
         if (context.is_cancelled() || !reader.read_level(level.splits, level.batches)) throw Damage();
     for (const CodedLevel& level : coded.levels.levels)
@@ -262,21 +269,26 @@ LevelReader decode_levels(const CodedMesh& coded, const RunContext& context) {
     return reader;
 }
 
-/// Of any mesh, as encode_shape wrote it. Throws Damage.
-CodedShape decode_shape(const CodedMesh& coded, SymbolReader& faces_in, SymbolReader& places_in,
+/// Of any mesh, as encode_shape wrote it; and those of its attributes that its levels have. Throws Damage.
+CodedShape decode_shape(const CodedMesh& coded, SymbolReader& faces_in, SymbolReader& places_in, LevelValues& in_levels,
                         const RunContext& context) {
     std::optional<WalkedFaces> walked;
+    std::optional<LevelReader> levels;
+    std::vector<Index> wedge_at;
     std::vector<FinePlace> places;
     if (coded.options.levels) {
-        const LevelReader levels = decode_levels(coded, context);
-        places.reserve(levels.vertex_count());
-        for (Index v = 0; v < levels.vertex_count(); ++v) places.push_back(levels.place(v));
-        walked = decode_faces({levels.triangles(), {}, levels.closes_hole()}, faces_in, coded.vertices, coded.corners);
+        levels.emplace(decode_levels(coded, context));
+        places.reserve(levels->vertex_count());
+        for (Index v = 0; v < levels->vertex_count(); ++v) places.push_back(levels->place(v));
+        std::vector<Triangle> triangles = levels->triangles();
+        if (!levels->outline().empty()) wedge_at = levels->corner_wedges(triangles);
+        walked =
+            decode_faces({std::move(triangles), {}, levels->closes_hole()}, faces_in, coded.vertices, coded.corners);
     } else
         walked = decode_faces(faces_in, coded.vertices, coded.corners);
     if (!walked || context.is_cancelled()) throw Damage();
     if (!coded.options.levels) places = decode_geometry(walked->map, steps_of(coded.options), 0, places_in);
-    CodedShape shape{std::move(walked->face_offsets), std::move(walked->corners), {}};
+    CodedShape shape;
     for (const std::size_t w : walked->first_with_number()) shape.places.push_back(places[w]);
     FinePlace place{};
     while (shape.places.size() < coded.vertices) {
@@ -288,6 +300,11 @@ CodedShape decode_shape(const CodedMesh& coded, SymbolReader& faces_in, SymbolRe
         if (places_in.is_damaged()) throw Damage();
         shape.places.push_back(place);
     }
+    if (levels && !levels->outline().empty())
+        in_levels = level_values({levels->outline(), levels->wedges(), std::move(wedge_at), levels->colors()}, *walked,
+                                 shape.places.size());
+    shape.face_offsets = std::move(walked->face_offsets);
+    shape.corners = std::move(walked->corners);
     return shape;
 }
 
@@ -297,10 +314,11 @@ Mesh decode(const CodedMesh& coded, const RunContext& context) {
         throw Damage();
     SymbolReader faces_in(coded.connectivity, kFaceContexts), places_in(coded.places, kPlaceContexts);
     std::optional<CodedShape> shape;
+    LevelValues in_levels;
     if (faces_in.bits(1) != 0)
         shape = decode_regular(faces_in, places_in, steps_of(coded.options), coded.vertices, coded.corners);
     else
-        shape = decode_shape(coded, faces_in, places_in, context);
+        shape = decode_shape(coded, faces_in, places_in, in_levels, context);
     if (!shape) throw Damage();
     Mesh mesh = coded.rest;
     mesh.face_offsets = std::move(shape->face_offsets);
@@ -309,8 +327,14 @@ Mesh decode(const CodedMesh& coded, const RunContext& context) {
     if (places_in.is_damaged() || mesh.face_count() != coded.faces ||
         std::ranges::any_of(mesh.corners, [&](Index v) { return v >= coded.vertices; }))
         throw Damage();
-    SymbolReader attributes_in(coded.attributes, kAttributeContexts);
+    SymbolReader attributes_in(coded.attributes, kAllAttributeContexts);
+    if (!decode_rest(in_levels, kAttributeContexts, attributes_in)) throw Damage();
     if (!decode_attributes(mesh, shape->places, attributes_in)) throw Damage();
+    if (in_levels.outline.has_uvs) mesh.uvs = std::move(in_levels.uvs);
+    if (in_levels.outline.has_colors) {
+        mesh.colors = std::move(in_levels.colors);
+        mesh.colors_have_alpha = in_levels.outline.has_alpha;
+    }
     if (coded.options.keep_order) mesh = put_back(mesh, coded.order);
     return mesh;
 }
@@ -326,6 +350,10 @@ LevelCodeOptions level_options(const MeshCodeOptions& options) {
 
 Mesh mesh_of_levels(const LevelReader& levels, const CodedMesh& coded) {
     const std::vector<bool> closes_hole = levels.closes_hole();
+    const std::vector<Triangle> triangles = levels.triangles();
+    const AttributeOutline& outline = levels.outline();
+    const std::span<const Wedge> wedges = levels.wedges();
+    const std::vector<Index> wedge_at = outline.empty() ? std::vector<Index>() : levels.corner_wedges(triangles);
     Mesh mesh;
     mesh.origin = coded.rest.origin;
     std::vector<Index> number(closes_hole.size(), kNoIndex);
@@ -333,12 +361,29 @@ Mesh mesh_of_levels(const LevelReader& levels, const CodedMesh& coded) {
         if (closes_hole[v]) continue;
         number[v] = static_cast<Index>(mesh.vertex_count());
         mesh.positions.push_back(position_of(levels.place(v), coded));
+        if (outline.has_colors) mesh.colors.push_back(AttributeOutline::color(levels.colors()[v]));
     }
-    for (const Triangle& t : levels.triangles()) {
-        if (std::ranges::any_of(t, [&](Index v) { return closes_hole[v]; })) continue;
-        for (const Index v : t) mesh.corners.push_back(number[v]);
+    mesh.colors_have_alpha = outline.has_colors && outline.has_alpha;
+    mesh.materials.names = outline.has_materials ? coded.rest.materials.names : std::vector<std::string>();
+    mesh.embedded_materials = outline.has_materials ? coded.rest.embedded_materials : std::vector<MeshMaterial>();
+    mesh.material_files = coded.rest.material_files;
+    const auto wedge_of = [&](std::size_t corner) {
+        return wedge_at[corner] != kNoIndex ? wedges[wedge_at[corner]] : Wedge();
+    };
+    for (std::size_t t = 0; t < triangles.size(); ++t) {
+        if (std::ranges::any_of(triangles[t], [&](Index v) { return closes_hole[v]; })) continue;
+        for (std::size_t k = 0; k < 3; ++k) {
+            mesh.corners.push_back(number[triangles[t][k]]);
+            if (outline.has_uvs)
+                mesh.uvs.corners.push_back(wedge_of(3 * t + k).has_uv ? wedge_at[3 * t + k] : kNoIndex);
+        }
         mesh.face_offsets.push_back(static_cast<Index>(mesh.corners.size()));
+        if (mesh.materials.names.empty()) continue;
+        const Index material = wedge_of(3 * t).material;
+        mesh.materials.of_face.push_back(material < mesh.materials.names.size() ? material : kNoIndex);
     }
+    for (const Wedge& wedge : wedges)
+        if (outline.has_uvs) mesh.uvs.values.push_back(outline.uv(wedge));
     return mesh;
 }
 
@@ -380,7 +425,10 @@ Result<CodedMesh> encode_mesh(const Mesh& mesh, const MeshCodeOptions& options, 
         report->rms = std::sqrt(squares / double(mesh.vertex_count()));
         report->largest = std::sqrt(largest);
     }
-    SymbolWriter attributes_out(kAttributeContexts);
+    SymbolWriter attributes_out(kAllAttributeContexts);
+    encode_rest(moved, ordered->in_levels, kAttributeContexts, attributes_out);
+    if (ordered->in_levels.outline.has_uvs) moved.uvs = {};
+    if (ordered->in_levels.outline.has_colors) moved.colors = {};
     encode_attributes(moved, ordered->places, attributes_out);
     coded.attributes = attributes_out.finish();
     if (options.keep_order) coded.order = write_order(*ordered);

@@ -10,7 +10,8 @@ namespace filigree {
 /// How a mesh's levels are coded: steps four times as long first, then quarters of them, unless they are long already.
 LevelCodeOptions level_options(const MeshCodeOptions& options);
 
-/// What a reader of levels has so far, as triangles. No normals, no attributes; copies of vertices where sheets meet.
+/// What a reader of levels has so far, as triangles: texture coordinates, materials and colours where levels have any,
+/// no normals. Copies of vertices where sheets meet.
 Mesh mesh_of_levels(const LevelReader& levels, const CodedMesh& coded);
 
 } // namespace filigree

@@ -366,6 +366,24 @@ MeshMaterials read_materials(const Mesh& mesh, const fs::path& mesh_path) {
     return MaterialReader(mesh, mesh_path).read();
 }
 
+MeshMaterials read_materials_and_pictures(const Mesh& mesh, const fs::path& mesh_path) {
+    MeshMaterials found = read_materials(mesh, mesh_path);
+    std::map<fs::path, std::shared_ptr<const std::string>> known;
+    for (MeshMaterial& material : found.materials) {
+        if (material.picture_bytes || material.picture.empty()) continue;
+        const auto [picture, is_new] = known.try_emplace(material.picture, nullptr);
+        if (is_new) {
+            if (Result<std::string> bytes = read_file(material.picture))
+                picture->second = std::make_shared<const std::string>(std::move(*bytes));
+            else
+                found.warnings.push_back(bytes.error().message);
+        }
+        material.picture_bytes = picture->second;
+        material.picture.clear();
+    }
+    return found;
+}
+
 std::vector<std::string> obj_material_names(const Mesh& mesh) {
     std::vector<std::string> names;
     std::unordered_set<std::string> taken;

@@ -20,6 +20,8 @@ struct MeshMaterials {
     std::vector<std::string> warnings;
 };
 MeshMaterials read_materials(const Mesh& mesh, const std::filesystem::path& mesh_path);
+/// The same with pictures as bytes; those that cannot be read are left out, with a sentence.
+MeshMaterials read_materials_and_pictures(const Mesh& mesh, const std::filesystem::path& mesh_path);
 
 /// mesh.materials.names as an OBJ can hold them: on one line, without blanks around them, none empty, none twice.
 std::vector<std::string> obj_material_names(const Mesh& mesh);

@@ -159,7 +159,7 @@ std::vector<FileLevel> levels_of(const CodedMesh& coded, const Mesh& mesh, const
         levels.push_back({vertices, triangles, batches, error});
     };
     const CodedLevels& code = coded.levels;
-    reader.read_coarsest(code.connectivity, code.places);
+    reader.read_coarsest(code.connectivity, code.places, code.attributes);
     add(code.vertices, code.triangles, 0);
     for (const CodedLevel& level : code.levels) {
         reader.read_level(level.splits, level.batches);
@@ -225,17 +225,21 @@ Result<CodedModel> code_model(const Model& model, const PoseSequence& poses, con
         coded.report.bytes.refinements += level.refinement.size();
     }
     coded.report.bytes.levels += coded.mesh.levels.connectivity.size() + coded.mesh.levels.places.size();
+    coded.report.bytes.attributes += coded.mesh.levels.attributes.size();
+    coded.report.lacks_level_attributes = options.levels && coded.mesh.levels.attributes.empty() &&
+                                          (!source.uvs.empty() || !source.colors.empty() || !source.materials.empty());
     return coded;
 }
 
 void write_model_code(SectionWriter& out, const CodedModel& coded) {
-    out.value("cd.rev", kCodeRevision);
+    out.value("cd.rev", coded.mesh.levels.attributes.empty() ? kCodeRevision : kRevisionWithAttributes);
     out.value("cd.par", coded.code);
     out.array("cd.stm", coded.levels);
     const CodedLevels& levels = coded.mesh.levels;
     if (!coded.levels.empty()) { // what is wanted first comes first
         out.bytes("cd.bcon", levels.connectivity, 0);
         out.bytes("cd.bpos", levels.places, 0);
+        if (!levels.attributes.empty()) out.bytes("cd.batt", levels.attributes, 0);
     }
     out.bytes("cd.drv", coded.driver, 0);
     if (!coded.driver_positions.empty()) out.array("cd.dpos", coded.driver_positions);
@@ -245,6 +249,10 @@ void write_model_code(SectionWriter& out, const CodedModel& coded) {
     }
     for (std::uint32_t k = 0; k < coded.clips.size(); ++k) out.bytes("cd.clip", coded.clips[k], k);
     for (std::uint32_t k = 0; k < levels.levels.size(); ++k) out.bytes("cd.lev", levels.levels[k].splits, k + 1);
+}
+
+void write_end_of_code(SectionWriter& out, const CodedModel& coded) {
+    const CodedLevels& levels = coded.mesh.levels;
     for (std::uint32_t k = 0; k < levels.levels.size(); ++k)
         if (!levels.levels[k].refinement.empty()) out.bytes("cd.ref", levels.levels[k].refinement, k + 1);
     out.bytes("cd.con", coded.mesh.connectivity, 0);
@@ -257,7 +265,8 @@ bool is_coded(const SectionReader& in) { return in.count("cd.par").first > 0; }
 bool is_made_elsewhere(const SectionReader& in) { return in.count("cd.dpos").first > 0; }
 
 FileCode read_file_code(const SectionReader& in) {
-    if (in.count("cd.rev").first == 0 || in.value<std::uint32_t>("cd.rev") != kCodeRevision)
+    const auto revision = in.count("cd.rev").first == 0 ? 0 : in.value<std::uint32_t>("cd.rev");
+    if (revision != kCodeRevision && revision != kRevisionWithAttributes)
         throw FileDamage{"was packed by another version of filigree", "pack its source again"};
     const auto code = in.value<FileCode>("cd.par");
     const std::uint64_t most_driver = is_made_elsewhere(in) ? in.item_count<Vec3f>("cd.dpos") : code.vertices;
@@ -311,19 +320,20 @@ Coding coding_of(const SectionReader& in, const FileCode& code) {
     std::vector<CodedLevelMark> levels;
     std::uint64_t level_bytes = in.item_count<char>("cd.bcon") + in.item_count<char>("cd.bpos"), refinements = 0;
     std::uint64_t clips = 0;
+    const std::uint64_t attributes = in.item_count<char>("cd.att") + in.item_count<char>("cd.batt");
     for (std::uint32_t k = 0; k < in.count("cd.clip").first; ++k) clips += in.item_count<char>("cd.clip", k);
     for (std::uint32_t k = 0; k < table.size(); ++k) {
         level_bytes += in.item_count<char>("cd.lev", k);
         refinements += in.item_count<char>("cd.ref", k);
         const bool is_refinement = k > 0 && table[k].batches == 0;
-        const std::uint64_t end = k == 0          ? in.end_of("cd.bpos")
+        const std::uint64_t end = k == 0          ? std::max(in.end_of("cd.bpos"), in.end_of("cd.batt"))
                                   : is_refinement ? in.end_of("cd.ref", k - 1)
                                                   : in.end_of("cd.lev", k);
         levels.push_back({table[k].vertices, table[k].error, end});
     }
     return {.options = coded_outline(in, code).options,
             .step = code.step,
-            .bytes = {in.item_count<char>("cd.con"), in.item_count<char>("cd.pos"), in.item_count<char>("cd.att"),
+            .bytes = {in.item_count<char>("cd.con"), in.item_count<char>("cd.pos"), attributes,
                       in.item_count<char>("cd.ord"),
                       in.item_count<char>("cd.drv") + sizeof(Vec3f) * in.item_count<Vec3f>("cd.dpos"), level_bytes,
                       refinements, clips},
@@ -339,6 +349,7 @@ CodedLevels read_levels(const SectionReader& in) {
     levels.triangles = table[0].triangles;
     levels.connectivity = stream_of(in, "cd.bcon");
     levels.places = stream_of(in, "cd.bpos");
+    levels.attributes = stream_of(in, "cd.batt");
     for (std::uint32_t k = 1; k < table.size() && table[k].batches > 0; ++k)
         levels.levels.push_back({.batches = table[k].batches,
                                  .vertices = table[k].vertices,

@@ -9,7 +9,7 @@
 namespace filigree {
 
 /// The section "cd.rev": raised when streams come to mean something else.
-inline constexpr std::uint32_t kCodeRevision = 2;
+inline constexpr std::uint32_t kCodeRevision = 2, kRevisionWithAttributes = 3; ///< the latter where levels have any
 
 /// The section "cd.par".
 struct FileCode {
@@ -50,8 +50,10 @@ struct CodedModel {
 /// Errors: as write_coded_model.
 Result<CodedModel> code_model(const Model& model, const PoseSequence& poses, const MeshCodeOptions& options,
                               const RunContext& context);
-/// Refers to `coded`, which has to outlive the writer.
+/// All but pictures and what comes behind them: refinements, and what all of a stream needs. Each refers to `coded`,
+/// which has to outlive the writer.
 void write_model_code(SectionWriter& out, const CodedModel& coded);
+void write_end_of_code(SectionWriter& out, const CodedModel& coded);
 
 bool is_coded(const SectionReader& in);
 /// Whether the driver of a coded file has vertices of its own (strip --driver).

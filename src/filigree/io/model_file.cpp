@@ -47,16 +47,23 @@ struct FileMaterial {
 };
 static_assert(sizeof(FileMaterial) == 32);
 
+/// Each once, in the order in which materials have them.
+std::vector<const std::string*> pictures_of(const std::vector<MeshMaterial>& materials) {
+    std::vector<const std::string*> pictures;
+    for (const MeshMaterial& m : materials)
+        if (m.picture_bytes && !m.picture_bytes->empty() &&
+            std::find(pictures.begin(), pictures.end(), m.picture_bytes.get()) == pictures.end())
+            pictures.push_back(m.picture_bytes.get());
+    return pictures;
+}
+
 void write_material_sections(SectionWriter& out, const std::vector<MeshMaterial>& materials) {
     std::vector<FileMaterial> records;
-    std::vector<const std::string*> pictures;
+    const std::vector<const std::string*> pictures = pictures_of(materials);
     for (const MeshMaterial& m : materials) {
-        std::uint32_t picture = kNoIndex;
-        if (m.picture_bytes && !m.picture_bytes->empty()) {
-            const auto known = std::find(pictures.begin(), pictures.end(), m.picture_bytes.get());
-            picture = static_cast<std::uint32_t>(known - pictures.begin());
-            if (known == pictures.end()) pictures.push_back(m.picture_bytes.get());
-        }
+        const auto found = std::find(pictures.begin(), pictures.end(), m.picture_bytes.get());
+        const std::uint32_t picture =
+            found == pictures.end() ? kNoIndex : static_cast<std::uint32_t>(found - pictures.begin());
         records.push_back({{m.color[0], m.color[1], m.color[2]},
                            m.opacity,
                            m.metallic,
@@ -65,10 +72,14 @@ void write_material_sections(SectionWriter& out, const std::vector<MeshMaterial>
                            picture});
     }
     out.array("mat.emb", std::move(records));
+}
+
+void write_pictures(SectionWriter& out, const std::vector<MeshMaterial>& materials) {
+    const std::vector<const std::string*> pictures = pictures_of(materials);
     for (std::uint32_t i = 0; i < pictures.size(); ++i) out.bytes("mat.pic", *pictures[i], i);
 }
 
-void write_mesh_sections(SectionWriter& out, const Mesh& mesh, bool with_positions) {
+void write_mesh_sections(SectionWriter& out, const Mesh& mesh, bool with_positions, bool with_pictures = true) {
     if (with_positions)
         for (std::uint32_t k = 0; k < chunk_count(mesh.vertex_count()); ++k) {
             const std::size_t begin = k * kChunkVertices, count = std::min(kChunkVertices, mesh.vertex_count() - begin);
@@ -91,6 +102,7 @@ void write_mesh_sections(SectionWriter& out, const Mesh& mesh, bool with_positio
     write_labels(out, "grp", mesh.groups);
     write_labels(out, "mat", mesh.materials);
     write_material_sections(out, mesh.embedded_materials);
+    if (with_pictures) write_pictures(out, mesh.embedded_materials);
     out.array("smooth", mesh.smoothing);
     out.strings("mtllib", mesh.material_files);
 }
@@ -574,9 +586,11 @@ Result<CodingReport> write_coded_model(const Model& model, const PoseSequence& p
         if (!coded) return coded.error();
         context.report("code", 1);
         SectionWriter out;
-        write_mesh_sections(out, coded->mesh.rest, false);
+        write_mesh_sections(out, coded->mesh.rest, false, false);
         if (options.keep_order) out.array("mesh.ord", model.source_order);
         write_model_code(out, *coded);
+        write_pictures(out, coded->mesh.rest.embedded_materials); // a stream's shape is there first
+        write_end_of_code(out, *coded);
         if (const Status status = write_file(path, out.finish()); !status) return status.error();
         return coded->report;
     } catch (const Error& error) {

@@ -92,6 +92,8 @@ std::string write_model(const Model& model, const PoseSequence& poses);
 struct CodingReport {
     double rms = 0, largest = 0; ///< of the vertices
     CodedBytes bytes;
+    /// A stream's texture coordinates, colours and materials come with its last byte: seams are too dense for levels.
+    bool lacks_level_attributes = false;
 };
 /// Writes a model in few bits (docs/coding.md): its mesh rounded and in an order of the code's own, its driver with the
 /// same vertices in the same order, so that poses fit as before. Poses are coded too: 1e-5 of the diagonal off (rms),

@@ -140,21 +140,6 @@ Vec4f seen(const Vec3f& linear) {
     return {color[0], color[1], color[2], 1};
 }
 
-/// Pictures of files as their bytes; those that cannot be read are left out, as load_surface_materials warned of them.
-std::vector<MeshMaterial> with_bytes(std::vector<MeshMaterial> materials) {
-    std::map<std::filesystem::path, std::shared_ptr<const std::string>> known;
-    for (MeshMaterial& material : materials) {
-        if (material.picture_bytes || material.picture.empty()) continue;
-        const auto [found, is_new] = known.try_emplace(material.picture, nullptr);
-        if (is_new)
-            if (Result<std::string> bytes = read_file(material.picture))
-                found->second = std::make_shared<const std::string>(std::move(*bytes));
-        material.picture_bytes = found->second;
-        material.picture.clear();
-    }
-    return materials;
-}
-
 } // namespace
 
 Result<BodyLook> textured_look(const Mesh& mesh, const std::string& mesh_path, double spacing, const Vec3f& plain,
@@ -163,7 +148,7 @@ Result<BodyLook> textured_look(const Mesh& mesh, const std::string& mesh_path, d
     if (mesh.materials.empty() || !mesh.colors.empty()) return look;
     const SurfaceMaterials loaded = load_surface_materials(mesh, mesh_path);
     warnings.insert(warnings.end(), loaded.warnings.begin(), loaded.warnings.end());
-    look.materials = with_bytes(read_materials(mesh, mesh_path).materials);
+    look.materials = read_materials_and_pictures(mesh, mesh_path).materials; // load_surface_materials warned
     const Result<Triangulation> triangles = triangulate(mesh, context);
     if (!triangles) return triangles.error();
     TriangleLook triangle(mesh, plain, loaded);
