@@ -51,6 +51,10 @@ filigree('export', ...moving, '-o', 'skin_flat.glb', '--no-normals', '--key-rate
 filigree('export', ...moving, '-o', 'morph.glb', '--as', 'morph', '--morph-normals');
 filigree('export', ...moving, '-o', 'page', '--web');
 filigree('export', ...moving, '-o', 'stream_page', '--web', '--stream');
+filigree('make', 'wavy-sphere', '-o', 'sphere.ply', '--resolution', '48');
+filigree('strip', 'sphere.ply', '-o', 'sphere.fil', '--base', '150');
+filigree('deform', 'sphere.fil', '-o', 'sphere_moved.fil', '--twist', '60', '--frames', '5');
+filigree('export', 'sphere_moved.fil', '-o', 'near_page', '--web', '--stream');
 filigree('restore', 'stream_page/model.fil', '--frame', String(kFrames), '-o', 'stream_last.obj');
 filigree('export', ...moving, '-o', 'compressed.glb', '--compress');
 

@@ -45,9 +45,10 @@ async function visit(browser, url, name) {
     check(await page.evaluate(() => filigree.model.materials.all.some(({ map }) => map)), 'no material has a picture');
     await page.evaluate(() => { if (filigree.is_playing) filigree.toggle_play(); filigree.seek(0); filigree.pick_level(0); });
     await page.waitForFunction(() => filigree.model.is_whole && filigree.model.levels.length === filigree.model.table.length, null, { timeout: 240000 });
-    for (const level of ['coarsest', 'finest']) {
+    for (const level of ['coarsest', 'finest', 'auto']) {
         await page.evaluate((level) => {
-            filigree.pick_level(level === 'finest' ? 0 : filigree.model.levels.length - 1);
+            if (level === 'auto') filigree.choose_again();
+            else filigree.pick_level(level === 'finest' ? 0 : filigree.model.levels.length - 1);
         }, level);
         await page.waitForTimeout(300);
         if (options.pictures) await page.screenshot({ path: join(options.pictures, `${name}-${level}.png`) });

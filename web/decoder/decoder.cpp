@@ -21,6 +21,11 @@ struct Skin {
     std::array<std::uint16_t, 4> weights; ///< shares of 65535
 };
 
+/// Corners of triangles with one material that lie in one region, or on the borders of several: kNoIndex.
+struct Run {
+    Index material, region, corners;
+};
+
 struct Stream {
     std::unique_ptr<LevelReader> levels;
     std::array<double, 3> low{};
@@ -41,8 +46,17 @@ struct Stream {
     std::vector<float> wedge_positions, uvs;
     std::vector<std::int8_t> wedge_normals;
     std::vector<Skin> wedge_skins;
-    std::vector<std::uint8_t> colors;  ///< four a wedge
-    std::vector<Index> groups;         ///< a material, and how many corners have it, from the first on
+    std::vector<std::uint8_t> colors; ///< four a wedge
+
+    // A region is what came out of one of the coarsest level's vertices.
+    std::vector<Index> region_of; ///< of each of the surface's vertices
+    std::vector<std::uint8_t> level_of;
+    unsigned level_count = 0;
+    std::vector<float> reaches; ///< of each region: how far its vertices lie from its first one
+    std::vector<Run> runs;      ///< of corners, one behind the other
+    std::vector<Index> parents; ///< of vertices that are drawn
+    std::vector<std::uint8_t> drawn_levels;
+    std::vector<Index> drawn_regions;
 };
 
 std::vector<char> input;
@@ -123,13 +137,14 @@ void shift_rest() {
     }
 }
 
-void make_normals() {
+void make_normals(std::span<const Triangle> triangles) {
     const std::size_t count = stream.levels->vertex_count();
+    const std::vector<bool> closes_hole = stream.levels->closes_hole();
     std::vector<Vec3f> sums(count, Vec3f::Zero());
-    for (std::size_t c = 0; c < stream.corners.size(); c += 3) {
-        const Index a = stream.corners[c], b = stream.corners[c + 1], d = stream.corners[c + 2];
-        const Vec3f normal = (position(b) - position(a)).cross(position(d) - position(a));
-        for (const Index v : {a, b, d}) sums[v] += normal;
+    for (const auto& [a, b, c] : triangles) {
+        if (closes_hole[a] || closes_hole[b] || closes_hole[c]) continue;
+        const Vec3f normal = (position(b) - position(a)).cross(position(c) - position(a));
+        for (const Index v : {a, b, c}) sums[v] += normal;
     }
     stream.normals.assign(4 * count, 0);
     for (std::size_t v = 0; v < count; ++v) {
@@ -141,21 +156,63 @@ void make_normals() {
 
 bool has_wedges() { return !stream.levels->outline().empty(); }
 
-/// Corners name wedges, and come material by material; one that is not there stands last.
-void sort_by_material(std::span<const Index> wedge_at) {
+/// Regions of vertices that are new, and how far they reach.
+void grow_regions() {
+    const std::span<const Index> parents = stream.levels->parents();
+    const auto level = std::uint8_t(stream.level_count);
+    for (auto v = static_cast<Index>(stream.region_of.size()); v < parents.size(); ++v) {
+        stream.region_of.push_back(parents[v] == v ? v : stream.region_of[parents[v]]);
+        stream.level_of.push_back(level);
+    }
+    if (stream.reaches.empty()) stream.reaches.resize(parents.size());
+    for (Index v = 0; v < parents.size(); ++v) {
+        float& reach = stream.reaches[stream.region_of[v]];
+        reach = std::max(reach, (position(v) - position(stream.region_of[v])).norm());
+    }
+    ++stream.level_count;
+}
+
+/// Triangles material by material, those of none last, and there region by region, those on borders last.
+void sort_triangles(std::span<const Triangle> triangles) {
+    const std::vector<bool> closes_hole = stream.levels->closes_hole();
+    const std::vector<Index> wedge_at = has_wedges() ? stream.levels->corner_wedges(triangles) : std::vector<Index>();
     const std::span<const Wedge> wedges = stream.levels->wedges();
-    std::vector<std::pair<Index, Index>> triangles; // material, first corner
-    for (Index c = 0; c < wedge_at.size(); c += 3)
-        if (wedge_at[c] != kNoIndex && wedge_at[c + 1] != kNoIndex && wedge_at[c + 2] != kNoIndex)
-            triangles.emplace_back(wedges[wedge_at[c]].material, c);
-    if (!std::ranges::is_sorted(triangles)) std::ranges::sort(triangles);
+    struct Sorted {
+        Index material, region, triangle;
+        auto operator<=>(const Sorted&) const = default;
+    };
+    std::vector<Sorted> order;
+    order.reserve(triangles.size());
+    for (Index t = 0; t < triangles.size(); ++t) {
+        const Triangle& corners = triangles[t];
+        if (closes_hole[corners[0]] || closes_hole[corners[1]] || closes_hole[corners[2]]) continue;
+        if (has_wedges() && std::ranges::count(wedge_at.begin() + 3 * t, wedge_at.begin() + 3 * t + 3, kNoIndex) > 0) continue;
+        const Index region = stream.region_of[corners[0]];
+        const bool is_inside = stream.region_of[corners[1]] == region && stream.region_of[corners[2]] == region;
+        order.push_back({has_wedges() ? wedges[wedge_at[3 * t]].material : kNoIndex, is_inside ? region : kNoIndex, t});
+    }
+    std::ranges::sort(order);
     stream.corners.clear();
-    stream.groups.clear();
-    for (const auto& [material, c] : triangles) {
-        if (stream.groups.empty() || stream.groups[stream.groups.size() - 2] != material)
-            stream.groups.insert(stream.groups.end(), {material, 0});
-        stream.groups.back() += 3;
-        stream.corners.insert(stream.corners.end(), {wedge_at[c], wedge_at[c + 1], wedge_at[c + 2]});
+    stream.runs.clear();
+    for (const Sorted& next : order) {
+        if (stream.runs.empty() || stream.runs.back().material != next.material || stream.runs.back().region != next.region)
+            stream.runs.push_back({next.material, next.region, 0});
+        stream.runs.back().corners += 3;
+        for (Index k = 0; k < 3; ++k)
+            stream.corners.push_back(has_wedges() ? wedge_at[3 * next.triangle + k] : triangles[next.triangle][k]);
+    }
+}
+
+/// How coarser levels come out of vertices that are drawn.
+void note_parents() {
+    const std::span<const Wedge> wedges = stream.levels->wedges();
+    const std::span<const Index> parents = stream.levels->parents();
+    const std::size_t count = has_wedges() ? wedges.size() : parents.size();
+    for (std::size_t i = stream.parents.size(); i < count; ++i) {
+        const Index v = has_wedges() ? wedges[i].vertex : Index(i);
+        stream.parents.push_back(has_wedges() ? wedges[i].parent : parents[i]);
+        stream.drawn_levels.push_back(stream.level_of[v]);
+        stream.drawn_regions.push_back(stream.region_of[v]);
     }
 }
 
@@ -192,20 +249,16 @@ void make_arrays() {
         for (std::size_t k = 0; k < 3; ++k)
             stream.positions[3 * v + k] = float(stream.low[k] + stream.step * place[k] / kFine);
     }
-    const std::vector<bool> closes_hole = stream.levels->closes_hole();
-    stream.corners.clear();
     const std::vector<Triangle> triangles = stream.levels->triangles();
-    for (const Triangle& t : triangles)
-        if (!closes_hole[t[0]] && !closes_hole[t[1]] && !closes_hole[t[2]])
-            stream.corners.insert(stream.corners.end(), t.begin(), t.end());
-    make_normals();
+    make_normals(triangles);
+    grow_regions();
+    note_parents();
+    sort_triangles(triangles);
     if (!stream.driver_triangles.empty()) {
         for (std::size_t v = stream.skins.size(); v < count; ++v) follow_driver(v);
         shift_rest();
     }
-    if (!has_wedges()) return;
-    sort_by_material(stream.levels->corner_wedges(triangles));
-    spread_over_wedges(stream.driver_triangles.empty() ? stream.positions : stream.shifted);
+    if (has_wedges()) spread_over_wedges(stream.driver_triangles.empty() ? stream.positions : stream.shifted);
 }
 
 } // namespace
@@ -294,9 +347,15 @@ const Skin* EXPORTED(skins)() { return (has_wedges() ? stream.wedge_skins : stre
 const float* EXPORTED(uvs)() { return stream.uvs.empty() ? nullptr : stream.uvs.data(); }
 /// Four bytes a vertex, sRGB, or none: nullptr.
 const std::uint8_t* EXPORTED(colors)() { return stream.colors.empty() ? nullptr : stream.colors.data(); }
-/// Of each run of corners its material and its length.
-std::uint32_t EXPORTED(group_count)() { return std::uint32_t(stream.groups.size() / 2); }
-const Index* EXPORTED(groups)() { return stream.groups.data(); }
+std::uint32_t EXPORTED(run_count)() { return std::uint32_t(stream.runs.size()); }
+const Run* EXPORTED(runs)() { return stream.runs.data(); }
+/// Of each vertex the one of a coarser level that it came from, or itself; and its level and region.
+const Index* EXPORTED(parents)() { return stream.parents.data(); }
+const std::uint8_t* EXPORTED(levels)() { return stream.drawn_levels.data(); }
+const Index* EXPORTED(regions)() { return stream.drawn_regions.data(); }
+/// Of each region, of which each has the surface's vertex of its number as its first.
+std::uint32_t EXPORTED(region_count)() { return std::uint32_t(stream.reaches.size()); }
+const float* EXPORTED(reaches)() { return stream.reaches.data(); }
 std::uint32_t EXPORTED(driver_triangle_count)() { return std::uint32_t(stream.driver_triangles.size()); }
 const Index* EXPORTED(driver_triangles)() { return stream.driver_triangles.data()->data(); }
 

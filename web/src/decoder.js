@@ -52,13 +52,12 @@ export class Decoder {
   /// Two texture coordinates a vertex, and four bytes of colour; null where there are none.
   get uvs() { return this.calls.uvs() ? this.array(Float32Array, 'uvs', 2 * this.vertex_count) : null; }
   get colors() { return this.calls.colors() ? this.array(Uint8Array, 'colors', 4 * this.vertex_count) : null; }
-  /// [{ material, start, count }] of corners; none where there are no attributes.
-  get groups() {
-    const numbers = this.array(Uint32Array, 'groups', 2 * this.calls.group_count()), groups = [];
-    for (let k = 0, start = 0; k < numbers.length; start += numbers[k + 1], k += 2)
-      groups.push({ material: numbers[k], start, count: numbers[k + 1] });
-    return groups;
-  }
+  /// Runs of corners, one behind the other: of each its material, its region and its length.
+  get runs() { return this.array(Uint32Array, 'runs', 3 * this.calls.run_count()); }
+  get parents() { return this.array(Uint32Array, 'parents', this.vertex_count); }
+  get levels() { return this.array(Uint8Array, 'levels', this.vertex_count); }
+  get regions() { return this.array(Uint32Array, 'regions', this.vertex_count); }
+  get reaches() { return this.array(Float32Array, 'reaches', this.calls.region_count()); }
   get driver_triangles() { return this.array(Uint32Array, 'driver_triangles', 3 * this.calls.driver_triangle_count()); }
 
   driver_rest(driver_vertices) { return this.array(Float32Array, 'driver_rest', 3 * driver_vertices); }

@@ -49,13 +49,13 @@ class Page {
   async receive_levels() {
     const { model } = this;
     while (!model.is_whole) {
-      if (model.chooses && !model.choose_level(this.stage.camera, this.stage.height).wants_more)
+      if (model.chooses && !this.choose_near())
         await new Promise((resolve) => { this.wake = resolve; });
       else {
         await model.next_level();
         this.fill_levels();
         this.fill_facts();
-        if (model.chooses) this.choose_level();
+        if (model.chooses) this.choose_near();
         else this.show_level(model.level);
         this.draw();
       }
@@ -63,10 +63,16 @@ class Page {
     }
   }
 
-  choose_level() {
-    const { number, wants_more } = this.model.choose_level(this.stage.camera, this.stage.height);
+  /// Draws fine triangles where they are near. Returns whether a level that has not come would be seen.
+  choose_near() {
+    const { model } = this, { changed, wants_more, is_soon } = model.choose_near(this.stage.camera, this.stage.height);
     if (wants_more) this.wake?.();
-    if (number !== this.model.level || !this.model.levels[number].nodes[0].visible) this.show_level(number);
+    if (is_soon) this.later ??= setTimeout(() => { this.later = undefined; this.draw(); }, 100);
+    if (!changed) return wants_more;
+    this.wireframe.follow_level();
+    this.mark_level();
+    element('level-note').textContent = `${count_text(model.near_triangles)} triangles, ${count_text(model.levels[0].triangles)} in the finest level`;
+    return wants_more;
   }
 
   // ---- drawing
@@ -81,7 +87,7 @@ class Page {
       this.advance(passed * this.speed);
     }
     this.last_drawn = now;
-    if (this.model.chooses) this.choose_level();
+    if (this.model.chooses) this.choose_near();
     if (this.stage.draw() || this.is_playing) this.draw();
   }
 
@@ -161,15 +167,20 @@ class Page {
     this.model.show_level(number);
     this.wireframe.follow_level();
     const { vertices, triangles } = levels[number];
-    for (const button of element('levels').children) {
-      const chosen = button.dataset.level === undefined ? this.model.chooses
-        : !this.model.chooses && Number(button.dataset.level) === number;
-      button.setAttribute('aria-checked', chosen);
-      button.tabIndex = chosen ? 0 : -1;
-    }
+    this.mark_level();
     const counts = `${count_text(vertices)} vertices, ${count_text(triangles)} triangles`;
     element('level-note').textContent = number === levels.length - 1 && number > 0 && !this.model.is_stream ? `The driver: ${counts}` : counts;
     this.draw();
+  }
+
+  /// The button of what is shown.
+  mark_level() {
+    for (const button of element('levels').children) {
+      const chosen = button.dataset.level === undefined ? this.model.chooses
+        : !this.model.chooses && Number(button.dataset.level) === this.model.level;
+      button.setAttribute('aria-checked', chosen);
+      button.tabIndex = chosen ? 0 : -1;
+    }
   }
 
   /// The user's choice.
@@ -178,6 +189,12 @@ class Page {
     this.model.chooses = false;
     this.wake?.();
     this.show_level(number);
+  }
+
+  choose_again() {
+    this.model.chooses = true;
+    this.choose_near();
+    this.draw();
   }
 
   show_driver(shown) {
@@ -201,9 +218,9 @@ class Page {
     element('levels').replaceChildren();
     if (this.model.is_stream) {
       const button = text_in('button', 'Auto');
-      button.title = 'The level whose error is smaller than a pixel';
+      button.title = 'Fine where it is near, so that errors are smaller than a pixel';
       button.setAttribute('role', 'radio');
-      button.onclick = () => { this.model.chooses = true; this.choose_level(); this.show_level(this.model.level); };
+      button.onclick = () => this.choose_again();
       element('levels').append(button);
     }
     for (let number = levels.length - 1; number >= 0; --number) {

@@ -31,7 +31,7 @@ export class StreamMaterials {
 
   /// Of a mesh whose corners come in such groups, for its geometry; the file's numbers may be anything.
   of(groups, geometry) {
-    if (groups.length === 0) return this.plain;
+    if (this.all.length === 1) return this.plain;
     for (const { material, start, count } of groups)
       geometry.addGroup(start, count, Math.min(material, this.all.length - 1));
     return this.all;

@@ -1,11 +1,12 @@
 // A model that comes level by level, and moves from its first level on.
 import * as THREE from 'three';
 import { Decoder } from './decoder.js';
+import { NearLevels } from './near_levels.js';
 import { StreamFile } from './stream_file.js';
 import { StreamMaterials } from './stream_materials.js';
 
 const kFramingMoments = 32;
-const kSeen = 0.05; // pixels (rms, and the light shows slopes): a smaller error is not seen
+const kPause = 120; // milliseconds between two choices of what is drawn: memory is moved
 
 /// Matrices of the driver's vertices as a skeleton's: there are no bones.
 class DriverSkeleton extends THREE.Skeleton {
@@ -30,11 +31,13 @@ class DrivenMesh extends THREE.SkinnedMesh {
   /// Where a vertex is in the present pose.
   getVertexPosition(vertex, target) {
     const { position, skinIndex, skinWeight } = this.geometry.attributes, at = this.skeleton.boneMatrices;
-    const p = new THREE.Vector3().fromBufferAttribute(position, vertex), q = new THREE.Vector3();
+    const x = position.getX(vertex), y = position.getY(vertex), z = position.getZ(vertex);
     target.set(0, 0, 0);
     for (let k = 0; k < 3; ++k) {
-      const matrix = new THREE.Matrix4().fromArray(at, 16 * skinIndex.getComponent(vertex, k));
-      target.addScaledVector(q.copy(p).applyMatrix4(matrix), skinWeight.getComponent(vertex, k));
+      const m = 16 * skinIndex.getComponent(vertex, k), weight = skinWeight.getComponent(vertex, k);
+      target.x += weight * (at[m] * x + at[m + 4] * y + at[m + 8] * z + at[m + 12]);
+      target.y += weight * (at[m + 1] * x + at[m + 5] * y + at[m + 9] * z + at[m + 13]);
+      target.z += weight * (at[m + 2] * x + at[m + 6] * y + at[m + 10] * z + at[m + 14]);
     }
     return target;
   }
@@ -47,6 +50,16 @@ function linear_colors(bytes) {
     return Math.round(65535 * (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4));
   });
   return Uint16Array.from(bytes, (byte, k) => k % 4 === 3 ? 257 * byte : linear[byte]);
+}
+
+/// Runs of corners by their materials alone.
+function groups_of(runs) {
+  const groups = [];
+  for (let k = 0, start = 0; k < runs.length; start += runs[k + 2], k += 3) {
+    if (groups.at(-1)?.material !== runs[k]) groups.push({ material: runs[k], start, count: 0 });
+    groups.at(-1).count += runs[k + 2];
+  }
+  return groups;
 }
 
 export class StreamModel {
@@ -78,7 +91,8 @@ export class StreamModel {
     this.levels = [];
     this.arrived = 0;
     this.arrivals = []; // when each level was there, seconds of the page's clock
-    this.chooses = true;
+    this.chooses = true; // what is near is drawn fine; else one level is drawn
+    this.near = new NearLevels();
     this.materials = await StreamMaterials.load(file);
     this.times = [];
     this.clips = [];
@@ -153,7 +167,7 @@ export class StreamModel {
       for (let level = 1; level < k; ++level)
         decoder.read('read_refinement', [await file.section('cd.ref', level)], level === k - 1 ? 1 : 0);
     ++this.arrived;
-    this.add_level(error);
+    this.add_level(error, k === 0 || batches > 0);
     this.arrivals.push({ seconds: performance.now() / 1000, error });
     if (this.is_whole) await this.free_decoder();
     return true;
@@ -165,7 +179,7 @@ export class StreamModel {
     if (this.skeleton) await this.read_poses();
   }
 
-  add_level(error) {
+  add_level(error, has_triangles) {
     const { decoder } = this;
     const shared = {
       position: new THREE.BufferAttribute(decoder.positions.slice(), 3),
@@ -181,37 +195,69 @@ export class StreamModel {
       shared.color = new THREE.BufferAttribute(linear_colors(decoder.colors), 4, true);
       this.materials.color_by_vertices();
     }
-    const geometry = new THREE.BufferGeometry(), corners = decoder.corners.slice();
-    geometry.setIndex(new THREE.BufferAttribute(corners, 1));
-    const material = this.materials.of(decoder.groups, geometry);
-    const mesh = this.skeleton ? new DrivenMesh(geometry, material) : new THREE.Mesh(geometry, material);
+    const corners = has_triangles ? decoder.corners.slice() : this.levels[0].meshes[0].geometry.index.array;
+    this.near.add(decoder, corners, error, has_triangles);
+    const mesh = this.mesh(new THREE.BufferGeometry().setIndex(new THREE.BufferAttribute(corners, 1)));
+    mesh.material = this.materials.of(groups_of(decoder.runs), mesh.geometry);
+    this.levels.unshift({ nodes: [mesh], meshes: [mesh], vertices: decoder.surface_vertex_count, triangles: corners.length / 3, error });
+    this.near_mesh ??= this.mesh(new THREE.BufferGeometry());
+    // Vertices of coarser levels are the first ones: all levels share one set, the finest's.
+    for (const { geometry } of [this.near_mesh, ...this.levels.flatMap(({ meshes }) => meshes)]) {
+      geometry.dispose();
+      for (const [name, attribute] of Object.entries(shared)) geometry.setAttribute(name, attribute);
+    }
+    this.near_mesh.geometry.setIndex(new THREE.BufferAttribute(new Uint32Array(corners.length), 1));
+    this.near_choice = undefined;
+    if (this.level !== undefined) this.level += 1;
+  }
+
+  mesh(geometry) {
+    const mesh = this.skeleton ? new DrivenMesh(geometry, this.materials.plain) : new THREE.Mesh(geometry, this.materials.plain);
     if (this.skeleton) mesh.bind(this.skeleton, new THREE.Matrix4());
     mesh.frustumCulled = false;
     mesh.boundingSphere = new THREE.Sphere(); // three.js would ask every vertex where it is
     mesh.castShadow = mesh.receiveShadow = true;
     mesh.visible = false;
     this.scene.add(mesh);
-    this.levels.unshift({ nodes: [mesh], meshes: [mesh], vertices: decoder.surface_vertex_count, triangles: corners.length / 3, error });
-    // Vertices of coarser levels are the first ones: all levels share one set, the finest's.
-    for (const level of this.levels)
-      for (const { geometry: theirs } of level.meshes) {
-        theirs.dispose();
-        for (const [name, attribute] of Object.entries(shared)) theirs.setAttribute(name, attribute);
-      }
-    if (this.level !== undefined) this.level += 1;
+    return mesh;
   }
 
   show_level(number) {
     this.level = number;
+    this.near_mesh.visible = false;
+    this.near_choice = undefined;
     this.levels.forEach((level, i) => level.nodes.forEach((node) => { node.visible = i === number; }));
   }
+  get shown_meshes() { return this.chooses ? [this.near_mesh] : this.levels[this.level].meshes; }
 
-  /// The coarsest level whose error is not seen, and whether an even finer one that has not come would be.
-  choose_level(camera, height) {
-    const nearest = this.box.distanceToPoint(camera.position);
-    const pixel = (2 * Math.tan((camera.fov / 2) * (Math.PI / 180)) * Math.max(nearest, camera.near)) / height;
-    const number = this.levels.findLastIndex(({ error }) => error <= kSeen * pixel);
-    return { number: Math.max(number, 0), wants_more: number < 0 && !this.is_whole };
+  /// Puts fine triangles where they are near. Returns whether others are drawn than before, whether a level that has not
+  /// come would be seen, and whether it was too soon to choose.
+  choose_near(camera, height) {
+    const now = performance.now(), is_soon = this.near_choice && now - this.near_choice.time < kPause;
+    if (is_soon) return { ...this.near_choice, changed: false, is_soon };
+    const { changed, finest, wants_more } = this.near.choose(camera, height, (vertex, point) => this.place(vertex, point));
+    const { geometry } = this.near_mesh, is_changed = changed || !this.near_mesh.visible;
+    if (changed) {
+      const groups = this.near.assemble(geometry.index.array), { start, count } = groups.at(-1) ?? { start: 0, count: 0 };
+      geometry.clearGroups();
+      this.near_mesh.material = this.materials.of(groups, geometry);
+      geometry.setDrawRange(0, start + count);
+      geometry.index.clearUpdateRanges();
+      geometry.index.addUpdateRange(0, start + count);
+      geometry.index.needsUpdate = true;
+    }
+    if (is_changed) for (const { nodes } of this.levels) for (const node of nodes) node.visible = false;
+    this.near_mesh.visible = true;
+    this.level = this.levels.length - 1 - finest;
+    this.near_choice = { time: now, wants_more: wants_more && !this.is_whole };
+    return { ...this.near_choice, changed: is_changed };
+  }
+  get near_triangles() { return this.near_mesh.geometry.drawRange.count / 3; }
+
+  /// Where a vertex is in the present pose.
+  place(vertex, point) {
+    const { position } = this.near_mesh.geometry.attributes;
+    return this.skeleton ? this.near_mesh.getVertexPosition(vertex, point) : point.fromBufferAttribute(position, vertex);
   }
 
   /// The box of all moments, from the coarsest level's vertices, with some room.
