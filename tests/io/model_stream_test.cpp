@@ -112,6 +112,7 @@ TEST(ModelStream, LevelsHaveTexturesMaterialsAndColours) {
     const Mesh first = stream.mesh();
     ASSERT_EQ(check_mesh(first), "");
     EXPECT_EQ(first.materials.names, mesh.materials.names);
+    EXPECT_EQ(first.embedded_materials.size(), 2u) << "their pictures come later";
     ASSERT_EQ(first.uvs.corners.size(), first.corner_count());
     for (std::size_t c = 0; c < first.corner_count(); ++c) {
         const Vec3f& p = first.positions[first.corners[c]];

@@ -194,33 +194,6 @@ void read_faces(const SectionReader& in, const std::string& name, std::uint32_t 
     for (std::size_t f = 0; f < offsets.size(); ++f) offsets[f] = static_cast<Index>(f * size[0]);
 }
 
-std::vector<MeshMaterial> read_material_sections(const SectionReader& in, const std::vector<std::string>& names) {
-    const std::vector<FileMaterial> records = in.array<FileMaterial>("mat.emb");
-    if (records.empty()) return {};
-    if (records.size() != names.size()) throw FileDamage{"has another number of materials than of their names"};
-    std::map<std::uint32_t, std::shared_ptr<const std::string>> pictures;
-    std::vector<MeshMaterial> materials;
-    for (std::size_t i = 0; i < records.size(); ++i) {
-        const FileMaterial& record = records[i];
-        MeshMaterial& material = materials.emplace_back();
-        material.name = names[i];
-        material.color = {record.color[0], record.color[1], record.color[2]};
-        material.opacity = record.opacity;
-        material.metallic = record.metallic;
-        material.roughness = record.roughness;
-        material.double_sided = record.double_sided != 0;
-        if (record.picture == kNoIndex) continue;
-        std::shared_ptr<const std::string>& picture = pictures[record.picture];
-        if (!picture) {
-            const std::vector<char> bytes = in.array<char>("mat.pic", record.picture);
-            if (bytes.empty()) throw FileDamage{"lacks the picture of a material"};
-            picture = std::make_shared<const std::string>(bytes.begin(), bytes.end());
-        }
-        material.picture_bytes = picture;
-    }
-    return materials;
-}
-
 Mesh read_mesh_sections(const SectionReader& in) {
     Mesh mesh;
     mesh.positions = in.all<Vec3f>("mesh.pos");
@@ -236,7 +209,7 @@ Mesh read_mesh_sections(const SectionReader& in) {
     mesh.objects = read_labels(in, "obj");
     mesh.groups = read_labels(in, "grp");
     mesh.materials = read_labels(in, "mat");
-    mesh.embedded_materials = read_material_sections(in, mesh.materials.names);
+    mesh.embedded_materials = read_embedded_materials(in, mesh.materials.names, true);
     mesh.smoothing = in.array<Index>("smooth");
     mesh.material_files = in.strings("mtllib");
     return mesh;
@@ -510,6 +483,34 @@ auto guarded(const FileReader& file, const std::string& name, const RunContext& 
 }
 
 } // namespace
+
+std::vector<MeshMaterial> read_embedded_materials(const SectionReader& in, const std::vector<std::string>& names,
+                                                  bool with_pictures) {
+    const std::vector<FileMaterial> records = in.array<FileMaterial>("mat.emb");
+    if (records.empty()) return {};
+    if (records.size() != names.size()) throw FileDamage{"has another number of materials than of their names"};
+    std::map<std::uint32_t, std::shared_ptr<const std::string>> pictures;
+    std::vector<MeshMaterial> materials;
+    for (std::size_t i = 0; i < records.size(); ++i) {
+        const FileMaterial& record = records[i];
+        MeshMaterial& material = materials.emplace_back();
+        material.name = names[i];
+        material.color = {record.color[0], record.color[1], record.color[2]};
+        material.opacity = record.opacity;
+        material.metallic = record.metallic;
+        material.roughness = record.roughness;
+        material.double_sided = record.double_sided != 0;
+        if (record.picture == kNoIndex || !with_pictures) continue;
+        std::shared_ptr<const std::string>& picture = pictures[record.picture];
+        if (!picture) {
+            const std::vector<char> bytes = in.array<char>("mat.pic", record.picture);
+            if (bytes.empty()) throw FileDamage{"lacks the picture of a material"};
+            picture = std::make_shared<const std::string>(bytes.begin(), bytes.end());
+        }
+        material.picture_bytes = picture;
+    }
+    return materials;
+}
 
 bool is_model_file(std::string_view bytes) {
     return bytes.starts_with(std::string_view(kModelMagic, sizeof kModelMagic));

@@ -357,4 +357,8 @@ private:
     std::unique_ptr<Lossless> lossless_;  ///< of a lossless file, whose plain sections these are
 };
 
+/// The materials inside a file; pictures can be left out, as where they have not come yet. Throws FileDamage.
+std::vector<MeshMaterial> read_embedded_materials(const SectionReader& in, const std::vector<std::string>& names,
+                                                  bool with_pictures);
+
 } // namespace filigree

@@ -44,11 +44,13 @@ private:
         if (in.count("cd.stm").first == 0)
             throw Error{ErrorCode::unsuitable, name + ": is no stream; filigree pack --profile stream makes one."};
         const std::uint64_t stated = std::max({in.end_of("cd.rev"), in.end_of("cd.par"), in.end_of("cd.stm")});
-        if (bytes.size() < std::max({stated, in.end_of("mesh.org"), in.end_of("mat.nam"), in.end_of("mtllib")}))
+        if (bytes.size() <
+            std::max({stated, in.end_of("mesh.org"), in.end_of("mat.nam"), in.end_of("mat.emb"), in.end_of("mtllib")}))
             return false;
         const FileCode code = read_file_code(in);
         outline = coded_outline(in, code);
         outline.rest.materials.names = in.strings("mat.nam");
+        outline.rest.embedded_materials = read_embedded_materials(in, outline.rest.materials.names, false);
         outline.rest.material_files = in.strings("mtllib");
         const LevelCodeOptions options = level_options(outline.options);
         reader.emplace(options.steps, options.is_refined, most_triangles(code.corners));

@@ -26,8 +26,8 @@ public:
     std::size_t level_count() const;
     /// rms distance from the whole mesh's surface, model units; infinity before the coarsest is there.
     double error() const;
-    /// Levels as triangles, with texture coordinates, colours and materials' names where they have any, without normals
-    /// and pictures; empty before the coarsest is there. Cost O(size).
+    /// Levels as triangles, with texture coordinates, colours and materials where they have any, without normals and
+    /// pictures; empty before the coarsest is there. Cost O(size).
     Mesh mesh() const;
     /// Bytes of the file until the next level is whole: what to ask a server for next. The file's size when all levels
     /// are there, 0 before its table is.
