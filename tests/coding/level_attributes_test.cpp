@@ -2,6 +2,7 @@
 // stay seams, and the whole is what was written.
 #include "filigree/coding/mesh_levels.h"
 #include "filigree/mesh/shapes.h"
+#include "threads.h"
 
 #include <gtest/gtest.h>
 #include <numbers>
@@ -11,7 +12,6 @@ using namespace filigree;
 
 namespace {
 
-const RunContext kContext(2);
 constexpr Index kAround = 60, kRings = 50;
 constexpr float kMiddle = 25;
 
@@ -40,7 +40,7 @@ Mesh tube(bool has_colors = true) {
 }
 
 CodedMesh stream_of(const Mesh& mesh) {
-    return encode_mesh(mesh, {.keep_order = true, .levels = true}, nullptr, kContext).value();
+    return encode_mesh(mesh, {.keep_order = true, .levels = true}, nullptr, kTwoThreads).value();
 }
 
 LevelReader reader_of(const CodedMesh& code) {
@@ -75,7 +75,7 @@ void expect_same_attributes(const Mesh& mesh, const Mesh& read) {
 void expect_round_trip(const Mesh& mesh) {
     const CodedMesh code = stream_of(mesh);
     EXPECT_FALSE(code.levels.attributes.empty());
-    expect_same_attributes(mesh, decode_mesh(code, kContext).value());
+    expect_same_attributes(mesh, decode_mesh(code, kTwoThreads).value());
 }
 
 } // namespace
@@ -148,7 +148,7 @@ TEST(LevelAttributes, SeamsEverywhereLeaveTheLevelsWithout) {
     const CodedMesh code = stream_of(mesh);
     EXPECT_TRUE(code.levels.attributes.empty());
     EXPECT_LT(code.levels.vertices, 600u);
-    expect_same_attributes(mesh, decode_mesh(code, kContext).value());
+    expect_same_attributes(mesh, decode_mesh(code, kTwoThreads).value());
 }
 
 TEST(LevelAttributes, AMeshWithoutAnyIsCodedWithoutThem) {
@@ -159,7 +159,7 @@ TEST(LevelAttributes, DamageIsNamedOrHarmless) {
     const CodedMesh code = stream_of(tube());
     std::mt19937 random(5);
     const auto try_it = [&](const CodedMesh& damaged) {
-        const Result<Mesh> read = decode_mesh(damaged, kContext);
+        const Result<Mesh> read = decode_mesh(damaged, kTwoThreads);
         if (read)
             EXPECT_EQ(check_mesh(*read), "");
         else
@@ -185,7 +185,7 @@ TEST(LevelAttributes, DamageIsNamedOrHarmless) {
     for (const std::size_t size : {std::size_t{1}, code.levels.attributes.size() / 2}) {
         CodedMesh cut = code;
         cut.levels.attributes.resize(size);
-        EXPECT_FALSE(decode_mesh(cut, kContext).ok());
+        EXPECT_FALSE(decode_mesh(cut, kTwoThreads).ok());
     }
     CodedMesh other = code; // of another mesh
     other.levels.attributes = stream_of(tube(false)).levels.attributes;

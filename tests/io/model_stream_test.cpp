@@ -100,7 +100,7 @@ TEST(ModelStream, LevelsHaveTexturesMaterialsAndColours) {
     }
     for (MeshMaterial& material : mesh.embedded_materials = {{.name = "front"}, {.name = "back"}})
         material.picture_bytes = std::make_shared<const std::string>(5000, 'p');
-    const Model model = strip(mesh, {.base = 200}, kContext)->model;
+    const Model model = strip(mesh, {.base = 200}, kTwoThreads)->model;
     const std::string bytes = stream_of(model, {});
     ModelStream stream("it");
     for (const char byte : bytes) {
@@ -119,7 +119,7 @@ TEST(ModelStream, LevelsHaveTexturesMaterialsAndColours) {
         ASSERT_LT((first.uvs.values[first.uvs.corners[c]] - p.head<2>()).norm(), 2e-3f);
         ASSERT_NEAR(first.colors[first.corners[c]][2], std::clamp(p[2], 0.0f, 1.0f), 5e-3f);
     }
-    const Model back = read_model(bytes, "it", kContext).value();
+    const Model back = read_model(bytes, "it", kTwoThreads).value();
     EXPECT_EQ(std::ranges::count(back.mesh.materials.of_face, 1u), std::ranges::count(mesh.materials.of_face, 1u));
     ASSERT_EQ(back.mesh.uvs.values.size(), mesh.vertex_count());
     ASSERT_EQ(back.mesh.embedded_materials.size(), 2u);
