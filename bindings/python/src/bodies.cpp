@@ -82,7 +82,7 @@ PyBody make_one(const py::object& given, const py::object& material, std::size_t
     return made;
 }
 
-py::dict said_of(const PyBody& self) {
+py::dict body_report(const PyBody& self) {
     const BodyReport& report = self.report;
     py::dict said;
     said["cells"] = report.cells.cells;
@@ -215,7 +215,7 @@ Examples
         .def_property_readonly(
             "volume", [](const py::object& self) { return view(self.cast<const PyBody&>().body->volume, self); },
             "Of each particle, m^3, float32 (p,), read-only.")
-        .def_property_readonly("report", &said_of, "What it took: counts, 'volume' (m^3), 'mass' (kg), 'warning'.")
+        .def_property_readonly("report", &body_report, "What it took: counts, 'volume' (m^3), 'mass' (kg), 'warning'.")
         .def(
             "particles_near",
             [](const PyBody& self, const py::object& points) {

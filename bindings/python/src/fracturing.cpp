@@ -8,7 +8,7 @@ namespace filigree::python {
 
 namespace {
 
-py::dict said_of(const FracturedMesh& fractured) {
+py::dict fracture_report(const FracturedMesh& fractured) {
     const CutReport& report = fractured.report;
     py::dict said;
     said["pieces"] = fractured.pieces;
@@ -88,7 +88,8 @@ Vertices of the mesh that was broken come first, in their order and to the bit; 
                             Shape{static_cast<py::ssize_t>(inside.size())}, self);
             },
             "Whether each face lies on a crack, bool (m,), read-only.")
-        .def_property_readonly("report", &said_of, "The counts and volumes of `filigree fracture --json`, dict.")
+        .def_property_readonly("report", &fracture_report,
+                               "The counts and volumes of `filigree fracture --json`, dict.")
         .def(
             "piece",
             [](const FracturedMesh& self, Index piece) {

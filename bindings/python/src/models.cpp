@@ -7,7 +7,7 @@ namespace filigree::python {
 
 namespace {
 
-py::bytes bytes_of(const PyModel& model) {
+py::bytes model_bytes(const PyModel& model) {
     const std::string bytes = without_interpreter([&] { return write_model(*model.model); });
     return py::bytes(bytes);
 }
@@ -156,7 +156,7 @@ Raises
 UsageError
     No such level.
 )")
-        .def("tobytes", &bytes_of, R"(tobytes(self)
+        .def("tobytes", &model_bytes, R"(tobytes(self)
 --
 
 The bytes of the model's file (.fil); the same model gives the same bytes.
@@ -199,7 +199,7 @@ dict
                  return "<filigree.Model: " + std::to_string(self.model->mesh.vertex_count()) +
                         " vertices on a driver of " + std::to_string(self.model->driver().vertices.size()) + ">";
              })
-        .def(py::pickle([](const PyModel& self) { return bytes_of(self); },
+        .def(py::pickle([](const PyModel& self) { return model_bytes(self); },
                         [](const py::bytes& bytes) { return model_of_bytes(bytes, "pickle"); }));
 
     m.def(

@@ -40,7 +40,7 @@ py::object ghosts_view(const py::object& self) {
     return pose.ghosts.empty() ? py::object(py::none()) : view(pose.ghosts, self);
 }
 
-py::tuple state_of(const Pose& pose) {
+py::tuple pose_state(const Pose& pose) {
     return py::make_tuple(take(std::vector(pose.positions)), take(std::vector(pose.gradients)),
                           take(std::vector(pose.ghosts)));
 }
@@ -123,7 +123,7 @@ Examples
                  return "<filigree.Pose: " + std::to_string(pose.positions.size()) + " vertices" +
                         (pose.gradients.empty() ? "" : " with gradients") + ">";
              })
-        .def(py::pickle(&state_of, &pose_of_state));
+        .def(py::pickle(&pose_state, &pose_of_state));
 
     py::class_<PoseSequence>(m, "PoseSequence", R"(Poses of one driver, moment after moment.
 
@@ -161,7 +161,7 @@ Examples
         .def(py::pickle(
             [](const PoseSequence& poses) {
                 py::list frames;
-                for (const Pose& pose : poses.frames) frames.append(state_of(pose));
+                for (const Pose& pose : poses.frames) frames.append(pose_state(pose));
                 return py::make_tuple(poses.frames_per_second, frames);
             },
             [](const py::tuple& state) {
