@@ -3,6 +3,7 @@
 #include "filigree/mesh/shapes.h"
 #include "filigree/physics/simulation.h"
 #include "test_bodies.h"
+#include "threads.h"
 
 #include <gtest/gtest.h>
 
@@ -12,8 +13,6 @@
 
 namespace filigree {
 namespace {
-
-const RunContext context(2);
 
 /// Voronoi cells of points.
 Partition cells_of(std::vector<Vec3d> seeds) {
@@ -37,7 +36,7 @@ std::shared_ptr<Fracture> fracture_of(std::shared_ptr<const Body> whole, Partiti
                                       double energy) {
     auto fracture = std::make_shared<Fracture>();
     fracture->body =
-        std::make_shared<const BrokenBody>(break_body(std::move(whole), std::move(partition), context).value());
+        std::make_shared<const BrokenBody>(break_body(std::move(whole), std::move(partition), kTwoThreads).value());
     fracture->material.strength = strength;
     fracture->material.energy = energy;
     return fracture;
@@ -52,7 +51,7 @@ World empty_world() {
 TEST(BrokenBody, PiecesAreTheWhole) {
     const auto whole = block(6, 5, 4, 0.1, brittle());
     BrokenBodyReport report;
-    const BrokenBody broken = break_body(whole, halves({0.013, 0, 0}, {1, 0.3, 0.2}), context, &report).value();
+    const BrokenBody broken = break_body(whole, halves({0.013, 0, 0}, {1, 0.3, 0.2}), kTwoThreads, &report).value();
     ASSERT_EQ(broken.pieces.size(), 2u);
     // Masses of the copies add up to each corner's.
     for (Index corner = 0; corner < whole->mass.size(); ++corner) {
@@ -77,9 +76,9 @@ TEST(BrokenBody, PiecesAreTheWhole) {
     for (std::size_t k = 0; k < 2; ++k) {
         Vectors own(broken.pieces[k]->rest.size());
         for (std::size_t c = 0; c < own.size(); ++c) own.set(c, positions[broken.corners_of_whole[k][c]]);
-        sum += make_elasticity(*broken.pieces[k], context)->energy(own, context);
+        sum += make_elasticity(*broken.pieces[k], kTwoThreads)->energy(own, kTwoThreads);
     }
-    const double energy = make_elasticity(*whole, context)->energy(positions, context);
+    const double energy = make_elasticity(*whole, kTwoThreads)->energy(positions, kTwoThreads);
     EXPECT_NEAR(sum, energy, 1e-5 * energy);
 }
 
@@ -115,12 +114,13 @@ TEST(Fracture, ABarBreaksAtItsStrength) {
     for (const double place : {0.0, 0.03, 0.05}) {
         PulledBar bar(block(16, 3, 3, 0.1, material), 0.02);
         const auto fracture = fracture_of(bar.body, halves({place, 0, 0}, {1, 0, 0}), strength, 5);
-        Simulation simulation = Simulation::create(bar.world, {{.body = bar.body, .fracture = fracture}},
-                                                   {.frames_per_second = 200, .contacts_within_bodies = false}, context)
-                                    .value();
+        Simulation simulation =
+            Simulation::create(bar.world, {{.body = bar.body, .fracture = fracture}},
+                               {.frames_per_second = 200, .contacts_within_bodies = false}, kTwoThreads)
+                .value();
         double time = 0;
         while (simulation.fracture(0).parts == 1 && time < 2) {
-            ASSERT_TRUE(simulation.advance(context).ok());
+            ASSERT_TRUE(simulation.advance(kTwoThreads).ok());
             time = simulation.time();
         }
         const double stress = 1e6 * 0.02 * simulation.fracture(0).first / bar.length;
@@ -145,7 +145,7 @@ struct FlyingBlock {
                                               .mode = mode,
                                               .contacts_between_bodies = false,
                                               .contacts_within_bodies = false},
-                                             context)
+                                             kTwoThreads)
                               .value();
         EXPECT_TRUE(made.set_velocities(0, velocities).ok());
         return made;
@@ -157,16 +157,16 @@ TEST(Fracture, EnergyAndMomentum) {
         const FlyingBlock block(2);
         Simulation simulation =
             block.simulation(fracture_of(block.body, halves({0.02, 0, 0}, {1, 0.2, 0.1}), 1e4, energy));
-        const Energy start = simulation.energy(context);
+        const Energy start = simulation.energy(kTwoThreads);
         const Momentum before = simulation.momentum();
         for (int frame = 0; frame < 40; ++frame) {
-            ASSERT_TRUE(simulation.advance(context).ok());
+            ASSERT_TRUE(simulation.advance(kTwoThreads).ok());
         }
         const FractureReport report = simulation.fracture(0);
         EXPECT_EQ(report.parts, 2u);
         EXPECT_NEAR(report.broken_area, report.crack_area, 1e-6);
         EXPECT_NEAR(report.dissipated, energy * report.crack_area, 0.01 * energy * report.crack_area);
-        const double lost = start.total() - simulation.energy(context).total();
+        const double lost = start.total() - simulation.energy(kTwoThreads).total();
         EXPECT_NEAR(lost, energy * report.crack_area, 0.1 * energy * report.crack_area);
         const Momentum after = simulation.momentum();
         const double size = before.linear.norm();
@@ -198,9 +198,9 @@ TEST(Fracture, WhatIsNeverReachedChangesNothing) {
         const auto last = [&](std::shared_ptr<const Fracture> breaks) {
             Simulation simulation =
                 Simulation::create(ground_world(), {{.body = body, .velocity = {0, -2, 0}, .fracture = breaks}},
-                                   {.frames_per_second = 60, .mode = mode}, context)
+                                   {.frames_per_second = 60, .mode = mode}, kTwoThreads)
                     .value();
-            for (int frame = 0; frame < 30; ++frame) EXPECT_TRUE(simulation.advance(context).ok());
+            for (int frame = 0; frame < 30; ++frame) EXPECT_TRUE(simulation.advance(kTwoThreads).ok());
             return simulation.positions(0);
         };
         const Vectors with = last(fracture), without = last(nullptr);
@@ -219,20 +219,20 @@ TEST(Fracture, CopiesCoincideUntilTheirPiecesPart) {
     for (int n = 0; n < 60; ++n) points.push_back({-0.45f + 0.015f * float(n), 0.1f * std::sin(float(n)), 0.05f});
     std::vector<std::size_t> of_piece;
     for (Index piece = 0; piece < 3; ++piece)
-        of_piece.push_back(simulation.attach(0, points, std::vector<Index>(points.size(), piece), context));
+        of_piece.push_back(simulation.attach(0, points, std::vector<Index>(points.size(), piece), kTwoThreads));
     const auto places = [&](std::size_t piece) {
         std::vector<Vec3f> moved(points.size());
         std::vector<Mat3f> gradients(points.size());
-        simulation.attached(of_piece[piece], moved, gradients, context);
+        simulation.attached(of_piece[piece], moved, gradients, kTwoThreads);
         for (const Mat3f& gradient : gradients)
             for (int column = 0; column < 3; ++column) moved.push_back(gradient.col(column));
         return moved;
     };
-    for (int frame = 0; frame < 4; ++frame) ASSERT_TRUE(simulation.advance(context).ok());
+    for (int frame = 0; frame < 4; ++frame) ASSERT_TRUE(simulation.advance(kTwoThreads).ok());
     EXPECT_EQ(simulation.fracture(0).parts, 1u);
     EXPECT_EQ(places(0), places(1));
     EXPECT_EQ(places(0), places(2));
-    for (int frame = 0; frame < 12; ++frame) ASSERT_TRUE(simulation.advance(context).ok());
+    for (int frame = 0; frame < 12; ++frame) ASSERT_TRUE(simulation.advance(kTwoThreads).ok());
     EXPECT_EQ(simulation.fracture(0).parts, 2u);
     EXPECT_NEAR(simulation.fracture(0).first, 0.05, 0.01);
     const std::vector<Vec3f> first = places(0), middle = places(1), last = places(2);
@@ -253,33 +253,34 @@ Simulation thrown_cube(StepMode mode, double young_modulus = 1e6, bool pieces_to
     Actor actor{.body = body, .velocity = {0, -4, 0}, .spin = {1, 0, 2}, .fracture = fracture};
     actor.placement.rotate(Eigen::AngleAxisd(0.5, Vec3d(1, 0, 1).normalized()));
     return Simulation::create(ground_world(), {actor},
-                              {.frames_per_second = 60, .mode = mode, .contacts_between_bodies = pieces_touch}, context)
+                              {.frames_per_second = 60, .mode = mode, .contacts_between_bodies = pieces_touch},
+                              kTwoThreads)
         .value();
 }
 
 TEST(Fracture, AThrownCubeBreaksAndItsPiecesLieOnTheGround) {
     Simulation simulation = thrown_cube(StepMode::explicit_steps);
-    double least = 1e9, start = simulation.energy(context).total();
+    double least = 1e9, start = simulation.energy(kTwoThreads).total();
     for (int frame = 0; frame < 150; ++frame) {
-        ASSERT_TRUE(simulation.advance(context).ok());
-        const double energy = simulation.energy(context).total();
+        ASSERT_TRUE(simulation.advance(kTwoThreads).ok());
+        const double energy = simulation.energy(kTwoThreads).total();
         EXPECT_LT(energy, start + 2) << frame; // J, of 216 that it has at first
         start = std::min(start, energy);
         for (std::size_t i = 0; i < simulation.positions(0).size(); ++i)
             least = std::min(least, double(simulation.positions(0)[i].y()));
     }
     EXPECT_GT(simulation.fracture(0).parts, 3u);
-    EXPECT_GT(least, -0.63);                          // the ground is at -0.6
-    EXPECT_LT(simulation.energy(context).kinetic, 4); // of 216 J
+    EXPECT_GT(least, -0.63);                              // the ground is at -0.6
+    EXPECT_LT(simulation.energy(kTwoThreads).kinetic, 4); // of 216 J
 }
 
 /// A crack leaves cells that are hardly filled; their light corners must not set the pace.
 TEST(Fracture, PiecesMoveInHardlyShorterSteps) {
     Simulation simulation = thrown_cube(StepMode::automatic);
-    const unsigned unbroken = simulation.advance(context).value().substeps;
+    const unsigned unbroken = simulation.advance(kTwoThreads).value().substeps;
     unsigned substeps = 0;
     for (int frame = 1; frame < 60; ++frame) {
-        const FrameReport report = simulation.advance(context).value();
+        const FrameReport report = simulation.advance(kTwoThreads).value();
         EXPECT_EQ(report.why_descent, DescentCause::none) << frame;
         if (frame >= 20) substeps += report.substeps;
     }
@@ -289,10 +290,10 @@ TEST(Fracture, PiecesMoveInHardlyShorterSteps) {
 
 TEST(Fracture, StiffPiecesKeepTogetherInDescent) {
     Simulation simulation = thrown_cube(StepMode::descent, 1e9, false);
-    const double start = simulation.energy(context).kinetic;
-    for (int frame = 0; frame < 20; ++frame) ASSERT_TRUE(simulation.advance(context).ok());
+    const double start = simulation.energy(kTwoThreads).kinetic;
+    for (int frame = 0; frame < 20; ++frame) ASSERT_TRUE(simulation.advance(kTwoThreads).ok());
     EXPECT_GT(simulation.fracture(0).broken_area, 0);
-    EXPECT_LT(simulation.energy(context).kinetic, start);
+    EXPECT_LT(simulation.energy(kTwoThreads).kinetic, start);
 }
 
 TEST(Fracture, SavedInTheMiddleOfABreak) {
@@ -301,7 +302,7 @@ TEST(Fracture, SavedInTheMiddleOfABreak) {
         std::string middle;
         std::size_t broken_parts = 0;
         for (int frame = 0; frame < 24; ++frame) {
-            ASSERT_TRUE(first.advance(context).ok());
+            ASSERT_TRUE(first.advance(kTwoThreads).ok());
             if (first.fracture(0).broken_area > 0 && middle.empty()) {
                 middle = first.save();
                 broken_parts = first.fracture(0).parts;
@@ -335,12 +336,13 @@ TEST(Fracture, AHandPullsAPieceOff) {
     hand.target.values = {{0.5, 0, 0}, {1.5, 0.2, 0}};
     world.hands.push_back(hand);
     Simulation simulation =
-        Simulation::create(world, {{.body = body, .fracture = fracture}}, {.frames_per_second = 60}, context).value();
-    const std::size_t tip = simulation.attach(0, std::vector<Vec3f>{{0.5f, 0, 0}, {-0.4f, 0, 0}}, context);
-    for (int frame = 0; frame < 120; ++frame) ASSERT_TRUE(simulation.advance(context).ok());
+        Simulation::create(world, {{.body = body, .fracture = fracture}}, {.frames_per_second = 60}, kTwoThreads)
+            .value();
+    const std::size_t tip = simulation.attach(0, std::vector<Vec3f>{{0.5f, 0, 0}, {-0.4f, 0, 0}}, kTwoThreads);
+    for (int frame = 0; frame < 120; ++frame) ASSERT_TRUE(simulation.advance(kTwoThreads).ok());
     EXPECT_EQ(simulation.fracture(0).parts, 2u);
     std::vector<Vec3f> points(2);
-    simulation.attached(tip, points, {}, context);
+    simulation.attached(tip, points, {}, kTwoThreads);
     EXPECT_NEAR(points[0].x(), 1.5f, 0.05f);
     EXPECT_NEAR(points[1].x(), -0.4f, 0.01f);
 }
@@ -356,16 +358,16 @@ TEST(Fracture, DescentBreaksToo) {
             Simulation::create(
                 empty_world(),
                 {{.body = body, .fracture = fracture_of(body, halves({0.02, 0, 0}, {1, 0.2, 0.1}), 1e4, 5)}},
-                {.frames_per_second = 200, .mode = StepMode::descent, .contacts_within_bodies = false}, context)
+                {.frames_per_second = 200, .mode = StepMode::descent, .contacts_within_bodies = false}, kTwoThreads)
                 .value();
         ASSERT_TRUE(simulation.set_velocities(0, block.velocities).ok());
         const Momentum before = simulation.momentum();
-        const double start = simulation.energy(context).total();
+        const double start = simulation.energy(kTwoThreads).total();
         for (int frame = 0; frame < 60; ++frame) {
-            ASSERT_TRUE(simulation.advance(context).ok());
+            ASSERT_TRUE(simulation.advance(kTwoThreads).ok());
         }
         EXPECT_EQ(simulation.fracture(0).parts, 2u);
-        EXPECT_LT(simulation.energy(context).total(), start);
+        EXPECT_LT(simulation.energy(kTwoThreads).total(), start);
         EXPECT_NEAR(simulation.fracture(0).dissipated, 5 * simulation.fracture(0).crack_area, 0.01);
         EXPECT_LT((simulation.momentum().linear - before.linear).norm(), 1e-4 * before.linear.norm());
     }
@@ -382,7 +384,7 @@ double notched_strength(double spacing, double degrees, double offset, double en
     material.damping = 10;
     BodyOptions options;
     options.cells.spacing = spacing;
-    const auto body = std::make_shared<const Body>(make_body(mesh, material, options, context).value());
+    const auto body = std::make_shared<const Body>(make_body(mesh, material, options, kTwoThreads).value());
     const auto fracture = fracture_of(body, halves(offset * spacing * along, along), 1e9, energy);
     FractureEvent notch;
     World world = empty_world();
@@ -404,13 +406,13 @@ double notched_strength(double spacing, double degrees, double offset, double en
                                                 .mode = StepMode::explicit_steps,
                                                 .contacts_between_bodies = false,
                                                 .contacts_within_bodies = false},
-                                               context)
+                                               kTwoThreads)
                                 .value();
     double most = 0;
     while (simulation.fracture(0).parts == 1 && simulation.time() < 4) {
-        EXPECT_TRUE(simulation.advance(context).ok());
+        EXPECT_TRUE(simulation.advance(kTwoThreads).ok());
         if (simulation.time() > 0.2)
-            most = std::max(most, 2 * simulation.energy(context).elastic / (speed * simulation.time() * thickness));
+            most = std::max(most, 2 * simulation.energy(kTwoThreads).elastic / (speed * simulation.time() * thickness));
     }
     EXPECT_EQ(simulation.fracture(0).parts, 2u);
     return most;
@@ -468,14 +470,14 @@ TEST(Fracture, AHeldBodyIsHitByAnother) {
         flying.placement.translate(Vec3d(-0.6, 0.2, 0.02));
         Simulation simulation =
             Simulation::create(world, {{.body = target, .fracture = fracture}, flying},
-                               {.frames_per_second = 60, .mode = mode, .automatic_rigid = false}, context)
+                               {.frames_per_second = 60, .mode = mode, .automatic_rigid = false}, kTwoThreads)
                 .value();
-        const double start = simulation.energy(context).total();
-        for (int frame = 0; frame < 40; ++frame) ASSERT_TRUE(simulation.advance(context).ok());
+        const double start = simulation.energy(kTwoThreads).total();
+        for (int frame = 0; frame < 40; ++frame) ASSERT_TRUE(simulation.advance(kTwoThreads).ok());
         EXPECT_GT(simulation.fracture(0).parts, 1u);
         EXPECT_GT(simulation.fracture(0).first, 0.01);
         const double work = 3 * 5; // J: of the force, over 5 m at most
-        EXPECT_LT(simulation.energy(context).total(), start + work);
+        EXPECT_LT(simulation.energy(kTwoThreads).total(), start + work);
         double highest = 0;
         for (std::size_t i = 0; i < target->rest.size(); ++i) {
             ASSERT_TRUE(simulation.positions(0)[i].allFinite());
