@@ -1,11 +1,9 @@
-"""Ctrl-C, callbacks, threads, processes, pickles, leaks."""
+"""Ctrl-C, callbacks, threads, processes, pickles."""
 
 import copy
-import gc
 import multiprocessing
 import os
 import pickle
-import resource
 import signal
 import threading
 import time
@@ -154,77 +152,3 @@ def test_pickled_meshes_keep_everything(tmp_path):
         filigree.Mesh.__new__(filigree.Mesh).__setstate__((2,))
     with pytest.raises(filigree.BadFileError):
         filigree.Model.frombytes(b"no model")
-
-
-def test_nothing_leaks(tmp_path):
-    """Each call a thousand times after it was warm: memory stays."""
-    mesh = filigree.make("wavy-cube", resolution=4)
-    box = filigree.make("bar", resolution=1, length=1)
-    model = filigree.strip(mesh)
-    restorer = filigree.Restorer(model)
-    rest = model.driver.vertices
-    bend = filigree.bend(mesh, "x", 30)
-    body = filigree.Body(mesh, "jelly", particles=30)
-    simulation = filigree.Simulation([body], mode="descent", descent_substeps=1, descent_iterations=1)
-    driver = simulation.attach(0, model)
-    solver = filigree.HandleSolver(mesh, [0, 1])
-    inside = filigree.InsideTest(mesh)
-    points = mesh.vertices[:5] * 0.5
-    file, model_file = str(tmp_path / "mesh.ply"), str(tmp_path / "model.fil")
-
-    def refused():
-        try:
-            restorer.positions(rest[:-1])
-        except filigree.MismatchError:
-            pass
-
-    calls = [
-        lambda: filigree.Mesh(numpy.array(mesh.vertices), numpy.array(mesh.faces)).triangles,
-        lambda: filigree.strip(mesh, progress=lambda phase, fraction: None),
-        lambda: filigree.Restorer(model).positions(rest),
-        lambda: restorer.mesh(rest).normals,
-        lambda: restorer.gradients(rest),
-        lambda: filigree.PoseSequence([rest] * 3)[1].positions,
-        lambda: bend(model).gradients,
-        lambda: bend(mesh),
-        lambda: solver.solve(mesh.vertices[:2], iterations=2),
-        lambda: inside.contains(points),
-        lambda: filigree.sample(mesh, spacing=0.2),
-        lambda: filigree.info(mesh),
-        lambda: filigree.compare(mesh, mesh, samples=10),
-        lambda: (simulation.step(), driver.pose(), simulation.positions(0)),
-        lambda: simulation.restore(simulation.save()),
-        lambda: filigree.Body(box, "jelly", particles=8),
-        lambda: pickle.loads(pickle.dumps((model, mesh, restorer))),
-        lambda: (filigree.write_mesh(mesh, file), filigree.read_mesh(file)),
-        lambda: (filigree.write_model(model, model_file), filigree.read_model(model_file)),
-        lambda: filigree.fracture(box, 2, roughness=0).mesh,
-        refused,
-    ]
-
-    def kilobytes():
-        gc.collect()
-        return int(open("/proc/self/statm").read().split()[1]) * resource.getpagesize() // 1024
-
-    for call in calls:
-        for _ in range(100):
-            call()
-        for _ in range(12):  # an allocator's habits end, a leak does not
-            before = kilobytes()
-            for _ in range(1000):
-                call()
-            grown = kilobytes() - before
-            if grown < 1000:
-                break
-        assert grown < 1000, calls.index(call)
-
-
-def test_restoring_into_an_array_allocates_nothing_of_its_size(model, pose):
-    big = filigree.strip(filigree.make("wavy-cube", resolution=200), base=1000)
-    restorer = filigree.Restorer(big)
-    out = numpy.empty((len(restorer), 3), "f4")
-    restorer.positions(big.driver.vertices, out=out)
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    for _ in range(50):
-        restorer.positions(big.driver.vertices, out=out)
-    assert (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 < out.nbytes / 4
