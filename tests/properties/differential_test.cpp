@@ -11,6 +11,7 @@
 #include "filigree/mesh/shapes.h"
 #include "filigree/physics/simulation.h"
 #include "filigree/sample/sample_inside.h"
+#include "threads.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
@@ -26,8 +27,6 @@ using namespace filigree;
 namespace {
 
 namespace gen = rc::gen;
-
-const RunContext kOne(1), kMany(2);
 
 std::mt19937 any_random() { return std::mt19937(*gen::noShrink(gen::arbitrary<unsigned>())); }
 
@@ -95,7 +94,7 @@ RC_GTEST_PROP(Differential, StripIsTheSameForAnyNumberOfThreads, ()) {
     const Mesh mesh = any_surface();
     const StripOptions options{.base = *gen::inRange<std::size_t>(8, 200),
                                .one_piece = *gen::element<std::size_t>(100, 1'000'000)};
-    const auto a = strip(mesh, options, kOne), b = strip(mesh, options, kMany);
+    const auto a = strip(mesh, options, kOneThread), b = strip(mesh, options, kTwoThreads);
     RC_ASSERT(a.ok() == b.ok());
     if (a) RC_ASSERT(write_model(a->model) == write_model(b->model));
 }
@@ -112,8 +111,8 @@ RC_GTEST_PROP(Differential, AStripInTasksIsTheStripInOne, ()) {
                              .options = options,
                              .read = [&]() -> Result<Mesh> { return mesh; },
                              .bound_together = *gen::inRange<std::size_t>(50, 3'000)};
-    const auto tasks = strip_in_chunks(shared, {.number = 2, .count = 3, .job = ""}, kMany);
-    const auto one = strip(mesh, options, kOne);
+    const auto tasks = strip_in_chunks(shared, {.number = 2, .count = 3, .job = ""}, kTwoThreads);
+    const auto one = strip(mesh, options, kOneThread);
     const auto bytes = read_file(shared.path);
     std::filesystem::remove_all(folder);
     RC_ASSERT(tasks.ok() == one.ok());
@@ -122,26 +121,26 @@ RC_GTEST_PROP(Differential, AStripInTasksIsTheStripInOne, ()) {
 
 RC_GTEST_PROP(Differential, AnAffinePoseGivesTheMeshMovedAlike, ()) {
     const Mesh mesh = any_surface();
-    const auto stripped = strip(mesh, {.base = *gen::inRange<std::size_t>(20, 300)}, kOne);
+    const auto stripped = strip(mesh, {.base = *gen::inRange<std::size_t>(20, 300)}, kOneThread);
     RC_PRE(stripped.ok());
     const Mat3f affine = any_affine();
     const Vec3f shift(0.3f, -2, 0.1f);
     Pose pose = rest_pose(stripped->model);
     for (Vec3f& p : pose.positions) p = affine * p + shift;
     pose.gradients.assign(pose.positions.size(), affine);
-    const auto restorer = Restorer::create(stripped->model, {}, kOne);
+    const auto restorer = Restorer::create(stripped->model, {}, kOneThread);
     RC_ASSERT(restorer.ok());
-    const auto one = restorer->positions(pose, kOne), many = restorer->positions(pose, kMany);
+    const auto one = restorer->positions(pose, kOneThread), many = restorer->positions(pose, kTwoThreads);
     RC_ASSERT(one.ok() && many.ok() && *one == *many);
     for (std::size_t v = 0; v < mesh.vertex_count(); ++v)
         RC_ASSERT(((*one)[v] - (affine * mesh.positions[v] + shift)).norm() < 2e-5f * (1 + largest_coordinate(mesh)));
 }
 
 RC_GTEST_PROP(Differential, AModelsFileHoldsTheModel, ()) {
-    const auto stripped = strip(any_surface(), {.base = 60}, kOne);
+    const auto stripped = strip(any_surface(), {.base = 60}, kOneThread);
     RC_PRE(stripped.ok());
     const std::string bytes = write_model(stripped->model);
-    const auto read = read_model(FileReader(std::string_view(bytes)), "file", kOne);
+    const auto read = read_model(FileReader(std::string_view(bytes)), "file", kOneThread);
     RC_ASSERT(read.ok());
     RC_ASSERT(write_model(*read) == bytes);
 }
@@ -149,7 +148,7 @@ RC_GTEST_PROP(Differential, AModelsFileHoldsTheModel, ()) {
 RC_GTEST_PROP(Differential, DistanceDoesNotDependOnOrderOrPlace, ()) {
     const Mesh mesh = any_surface();
     const Renumbered other = renumbered(mesh);
-    const auto self = mesh_distance(mesh, other.mesh, 500, kOne);
+    const auto self = mesh_distance(mesh, other.mesh, 500, kOneThread);
     RC_ASSERT(self.ok() && self->surfaces);
     RC_ASSERT(self->surfaces->hausdorff < 2e-6 * self->diagonal);
     const Mesh sphere = make_wavy_sphere({.resolution = 8});
@@ -157,7 +156,8 @@ RC_GTEST_PROP(Differential, DistanceDoesNotDependOnOrderOrPlace, ()) {
     Mesh turned = mesh, turned_sphere = sphere;
     for (Vec3f& p : turned.positions) p = turn * p;
     for (Vec3f& p : turned_sphere.positions) p = turn * p;
-    const auto before = mesh_distance(mesh, sphere, 0, kOne), after = mesh_distance(turned, turned_sphere, 0, kMany);
+    const auto before = mesh_distance(mesh, sphere, 0, kOneThread),
+               after = mesh_distance(turned, turned_sphere, 0, kTwoThreads);
     RC_ASSERT(before.ok() && after.ok());
     RC_ASSERT(std::abs(before->surfaces->hausdorff - after->surfaces->hausdorff) < 1e-5 * before->diagonal);
 }
@@ -166,9 +166,9 @@ RC_GTEST_PROP(Differential, ScanRaysAndWindingFindTheSamePoints, ()) {
     const Mesh mesh = any_surface(false);
     const auto lattice = make_lattice(bounds(mesh.positions), {.spacing = *gen::element(0.07, 0.11, 0.2)});
     RC_ASSERT(lattice.ok());
-    const auto scan = sample_inside(mesh, *lattice, {.method = InsideMethod::scan}, kOne),
-               rays = sample_inside(mesh, *lattice, {.method = InsideMethod::rays}, kMany),
-               winding = sample_inside(mesh, *lattice, {.method = InsideMethod::winding}, kOne);
+    const auto scan = sample_inside(mesh, *lattice, {.method = InsideMethod::scan}, kOneThread),
+               rays = sample_inside(mesh, *lattice, {.method = InsideMethod::rays}, kTwoThreads),
+               winding = sample_inside(mesh, *lattice, {.method = InsideMethod::winding}, kOneThread);
     RC_ASSERT(scan.ok() && rays.ok() && winding.ok());
     RC_ASSERT(scan->bits == rays->bits);
     std::size_t different = 0; // at the surface itself a sum of angles is a half give or take
@@ -182,10 +182,11 @@ RC_GTEST_PROP(Differential, ACodedMeshIsThePlainOneWithinItsStep, ()) {
     const MeshCodeOptions options{
         .bits = *gen::inRange(10u, 17u), .keep_order = *gen::arbitrary<bool>(), .levels = *gen::arbitrary<bool>()};
     MeshCodeReport report;
-    const auto coded = encode_mesh(mesh, options, &report, kOne), again = encode_mesh(mesh, options, nullptr, kMany);
+    const auto coded = encode_mesh(mesh, options, &report, kOneThread),
+               again = encode_mesh(mesh, options, nullptr, kTwoThreads);
     RC_ASSERT(coded.ok() && again.ok());
     RC_ASSERT(coded->places == again->places && coded->connectivity == again->connectivity);
-    const auto read = decode_mesh(*coded, kOne);
+    const auto read = decode_mesh(*coded, kOneThread);
     RC_ASSERT(read.ok());
     if (options.keep_order) RC_ASSERT(read->corners == mesh.corners);
     for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
@@ -201,9 +202,9 @@ RC_GTEST_PROP(Differential, PiecesAddUpToTheMesh, ()) {
     std::vector<Vec3d> points(2 + random() % 8);
     for (Vec3d& p : points)
         for (int k = 0; k < 3; ++k) p[k] = box.min[k] + box.size()[k] * float(random() % 1000) / 1000;
-    const auto cells = FractureCells::create(points, {}, {}, kOne);
+    const auto cells = FractureCells::create(points, {}, {}, kOneThread);
     RC_PRE(cells.ok());
-    const auto one = fracture(mesh, *cells, {}, kOne), many = fracture(mesh, *cells, {}, kMany);
+    const auto one = fracture(mesh, *cells, {}, kOneThread), many = fracture(mesh, *cells, {}, kTwoThreads);
     RC_ASSERT(one.ok() && many.ok());
     RC_ASSERT(one->mesh.positions == many->mesh.positions && one->mesh.corners == many->mesh.corners);
     RC_ASSERT(one->report.volume_error < 1e-5);
@@ -214,10 +215,10 @@ RC_GTEST_PROP(Differential, BodiesMoveAlikeForAnyNumberOfThreads, ()) {
     Material material;
     material.model = *gen::element(MaterialModel::fem, MaterialModel::springs, MaterialModel::meshfree,
                                    MaterialModel::rigid, MaterialModel::mpm);
-    const auto body = make_body(mesh, material, {.scale = 0.1, .cells = {.count = 150}}, kOne);
+    const auto body = make_body(mesh, material, {.scale = 0.1, .cells = {.count = 150}}, kOneThread);
     RC_PRE(body.ok());
     std::array<Vectors, 2> ends;
-    for (const RunContext* context : {&kOne, &kMany}) {
+    for (const RunContext* context : {&kOneThread, &kTwoThreads}) {
         World world;
         world.obstacles.push_back({HalfSpace{{0, -0.15, 0}, {0, 1, 0}}, {}});
         Actor actor{std::make_shared<const Body>(*body)};
@@ -225,7 +226,7 @@ RC_GTEST_PROP(Differential, BodiesMoveAlikeForAnyNumberOfThreads, ()) {
         auto simulation = Simulation::create(world, {actor}, {}, *context);
         RC_ASSERT(simulation.ok());
         for (int frame = 0; frame < 4; ++frame) RC_ASSERT(simulation->advance(*context).ok());
-        ends[context == &kMany] = simulation->positions(0);
+        ends[context == &kTwoThreads] = simulation->positions(0);
     }
     for (std::size_t k = 0; k < ends[0].size(); ++k) RC_ASSERT(Vec3f(ends[0][k]) == Vec3f(ends[1][k]));
 }

@@ -3,7 +3,7 @@
 
 Usage: mutate.py TREE [--count N] [--seed S] [--json FILE]
 TREE is a checkout that may be changed, with build/release configured. Changes are of arithmetic, comparisons, logic and
-constants in the layers below. One that does not compile is passed over. About a minute and a half each on two cores.
+constants in the layers below. One that does not compile is passed over.
 """
 import argparse
 import json

@@ -88,6 +88,8 @@ export class Model {
   /// What is to be seen at the present moment: { vertices, triangles } of its key frame, or of the finest level.
   get shown_counts() { return this.key_frames.find(({ node }) => node.visible)?.counts ?? this.levels[0]; }
 
+  get shown_meshes() { return this.levels[this.level].meshes; }
+
   /// Shows one level: 0 is the finest here, as in the file.
   show_level(number) {
     this.level = number;

@@ -17,7 +17,7 @@ export class Wireframe {
   /// Edges of the present level, none of the others.
   follow_level() {
     for (const copy of this.copies.values()) copy.visible = false;
-    for (const mesh of this.model.shown_meshes ?? this.model.levels[this.model.level].meshes) {
+    for (const mesh of this.model.shown_meshes) {
       for (const material of [mesh.material].flat()) { // the surface steps back behind its edges
         material.polygonOffset = this.is_shown;
         material.polygonOffsetFactor = material.polygonOffsetUnits = 1;

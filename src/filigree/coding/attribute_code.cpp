@@ -1,6 +1,7 @@
 #include "filigree/coding/attribute_code.h"
 
 #include "filigree/coding/integer_frame.h"
+#include "filigree/coding/wedge.h"
 #include "filigree/mesh/incidence.h"
 
 #include <bit>
@@ -19,7 +20,7 @@ constexpr unsigned kSizes = 12, kCount = 0, kPlainValue = kCount + 1, kKind = kP
                    kAttributeEnd = kNormal + 3 * 2 * kSizes;
 static_assert(kAttributeEnd <= kAttributeContexts);
 
-constexpr unsigned kUvBits = 12, kPlainBits = 10;
+constexpr unsigned kPlainBits = 10;
 constexpr double kGuessBits = 4;          // what it takes to expect a normal from something else than the last one
 constexpr std::int64_t kOctahedron = 352; // steps from the middle of an octahedron's square to its border
 
@@ -500,7 +501,7 @@ private:
         for (std::size_t v = 0; v < count; ++v)
             for (int k = 0; k < 3 + int(has_alpha != 0); ++k) {
                 std::int32_t& step = steps[v][std::size_t(k)];
-                step = static_cast<std::int32_t>(std::lround(std::clamp(mesh_.colors[v][k], 0.0f, 1.0f) * 255));
+                step = color_byte(mesh_.colors[v][k]);
                 const Index near = neighbour[v];
                 code_.difference(kColorStep + unsigned(k), step, near != kNoIndex ? steps[near][std::size_t(k)] : 0);
                 mesh_.colors[v][k] = float(step) / 255;

@@ -12,8 +12,8 @@ namespace filigree {
 /// What happened to the wedges at a collapse, on one side of its edge: the vertex's went onto the neighbour's.
 struct CollapsedWedges {
     Index own = kNoIndex, onto = kNoIndex; ///< kNoIndex where a hole lies there
-    bool moves =
-        false; ///< whether the triangle between agrees with the one that goes over, else with the one that stays
+    /// Whether the triangle between agrees with the one that goes over, else with the one that stays.
+    bool moves = false;
 };
 
 /// A vertex that went onto its neighbour, and what taking it back needs.

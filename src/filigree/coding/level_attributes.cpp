@@ -10,7 +10,6 @@ namespace filigree {
 
 namespace {
 
-constexpr unsigned kLevelUvBits = 12;
 constexpr unsigned kRestHasUv = 0, kRestUv = 1, kRestColor = 3;
 static_assert(kRestColor + 4 == kRestContexts);
 
@@ -23,8 +22,7 @@ std::array<std::int32_t, 2> uv_steps(const Vec2f& uv, const AttributeOutline& ou
 
 ByteColor byte_color(const Vec4f& color) {
     ByteColor bytes{};
-    for (int k = 0; k < 4; ++k)
-        bytes[std::size_t(k)] = static_cast<std::uint8_t>(std::lround(std::clamp(color[k], 0.0f, 1.0f) * 255));
+    for (int k = 0; k < 4; ++k) bytes[std::size_t(k)] = color_byte(color[k]);
     return bytes;
 }
 
@@ -40,7 +38,7 @@ AttributeOutline outline_of(const Mesh& mesh) {
         outline.uv_low = outline.uv_low.cwiseMin(uv);
         high = high.cwiseMax(uv);
     }
-    outline.uv_step = std::max((high - outline.uv_low).maxCoeff(), 1e-30f) / float((1u << kLevelUvBits) - 1);
+    outline.uv_step = std::max((high - outline.uv_low).maxCoeff(), 1e-30f) / float((1u << kUvBits) - 1);
     return outline;
 }
 
@@ -58,8 +56,8 @@ SurfaceAttributes surface_attributes(const Mesh& mesh, const ClosedSurface& surf
     std::vector<Index> face_of;
     for (std::size_t f = 0; f < mesh.face_count() && outline.has_materials; ++f)
         face_of.insert(face_of.end(), mesh.face_size(f), static_cast<Index>(f));
-    std::vector<Index> newest(map.vertex_count(), kNoIndex),
-        before; // wedges of each vertex, from one to the one before
+    // Wedges of each vertex, from one to the one before.
+    std::vector<Index> newest(map.vertex_count(), kNoIndex), before;
     made.wedge_at.assign(map.opposite.size(), kNoIndex);
     for (Index h = 0; h < map.opposite.size(); ++h) {
         if (!map.is_own(map.triangles[h / 3])) continue;

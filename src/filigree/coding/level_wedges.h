@@ -333,12 +333,14 @@ private:
                 for (RingCorner& corner : ring(around[k])) corner.end = corner.end == u ? v : corner.end;
         if (has_several(left)) {
             WedgeRing& there = ring(left);
-            const std::size_t i = (place_of(there, around[1], u) + 1) % there.size();
-            there.insert(there.begin() + std::ptrdiff_t(i), {v, l.at_third});
+            const std::size_t i = place_of(there, around[1], u);
+            if (i == there.size()) return false; // a damaged ring has a neighbour twice
+            there.insert(there.begin() + std::ptrdiff_t((i + 1) % there.size()), {v, l.at_third});
         }
         if (has_several(right)) {
             WedgeRing& there = ring(right);
             const std::size_t i = place_of(there, u, around[sector - 1]);
+            if (i == there.size()) return false;
             const Index moved = there[i].wedge;
             there[i].wedge = r.at_third;
             there.insert(there.begin() + std::ptrdiff_t(i) + 1, {v, moved});

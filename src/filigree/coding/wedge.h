@@ -3,7 +3,9 @@
 
 #include "filigree/core/types.h"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 
 namespace filigree {
@@ -17,7 +19,14 @@ struct Wedge {
     std::array<std::int32_t, 2> uv{}; ///< steps
 };
 
+inline constexpr unsigned kUvBits = 12; ///< of texture coordinates, along the longer side of their box
+
 using ByteColor = std::array<std::uint8_t, 4>;
+
+/// A channel of 0 to 1 as a byte; what is outside is moved to the nearer end.
+inline std::uint8_t color_byte(float channel) {
+    return static_cast<std::uint8_t>(std::lround(std::clamp(channel, 0.0f, 1.0f) * 255));
+}
 
 /// What wedges and colours mean.
 struct AttributeOutline {
