@@ -1,4 +1,5 @@
 #include "filigree/io/file.h"
+#include "filigree/io/temporary_file.h"
 
 #include <gtest/gtest.h>
 
@@ -185,6 +186,28 @@ TEST_F(File, LeftoversHinderNobodyAndAKillLeavesNone) {
     if (unnamed < 0) GTEST_SKIP() << "the file system has no files without a name";
     ::close(unnamed);
     EXPECT_EQ(files_in_folder(), 301u);
+}
+
+TEST_F(File, WhatAKilledWriterLeftGoesWithTheNextWriting) {
+    fs::path left, beside, again;
+    const int alive = create_beside(folder_ / "a", left);
+    ASSERT_GE(alive, 0);
+    ASSERT_TRUE(write(folder_ / "a", "one").ok()); // its owner lives
+    EXPECT_TRUE(fs::exists(left));
+    const int other = create_beside(folder_ / "a", beside);
+    EXPECT_NE(beside, left);
+    ::close(alive);
+    ASSERT_TRUE(write(folder_ / "b", "another file").ok());
+    EXPECT_TRUE(fs::exists(left));
+    ASSERT_TRUE(write(folder_ / "a", "two").ok());
+    EXPECT_FALSE(fs::exists(left));
+    EXPECT_TRUE(fs::exists(beside));
+    const int next = create_beside(folder_ / "a", again);
+    EXPECT_EQ(again, left);
+    EXPECT_EQ(fs::file_size(again), 0u);
+    ::close(other);
+    ::close(next);
+    EXPECT_EQ(*read_file(folder_ / "a"), "two");
 }
 
 TEST_F(File, ManyThreadsWriteOneFile) {

@@ -1,6 +1,7 @@
 /* Preloaded into a program: its n-th call of one function fails, and all before and after it work.
    FAILING_CALL: write, fsync, rename (and link), open, malloc; or any, for all that change files, folders too (these
-   cannot fail, only kill). FAILING_NUMBER: n, from 1. FAILING_LOG: a file that is made when the call failed.
+   cannot fail, only kill). FAILING_NUMBER: n, from 1. FAILING_LOG: a file that is made when the call failed; where n is
+   0, how many calls there were is written there.
    FAILING_HOW=kill: the process is killed before that call. Files of the system and the pipes to the terminal do not
    count. */
 #define _GNU_SOURCE
@@ -10,6 +11,7 @@
 #include <signal.h>
 #include <stdarg.h>
 #include <stdatomic.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -22,11 +24,10 @@ static const char* failing;
 static long number;
 static int is_ready, kills;
 
-static void leave_a_mark(void) {
+static int make_log(void) {
     const char* log = getenv("FAILING_LOG");
     int (*real_open)(const char*, int, ...) = (int (*)(const char*, int, ...))dlsym(RTLD_NEXT, "open");
-    const int file = log && real_open ? real_open(log, O_CREAT | O_WRONLY, 0644) : -1;
-    if (file >= 0) close(file);
+    return log && real_open ? real_open(log, O_CREAT | O_WRONLY, 0644) : -1;
 }
 
 __attribute__((constructor)) static void begin(void) {
@@ -36,11 +37,19 @@ __attribute__((constructor)) static void begin(void) {
     is_ready = 1;
 }
 
+__attribute__((destructor)) static void end(void) {
+    if (!failing || number != 0) return;
+    is_ready = 0;
+    const int log = make_log();
+    if (log >= 0) dprintf(log, "%ld", atomic_load(&calls)), close(log);
+}
+
 static int fails_now(const char* call) {
     if (!is_ready || !failing) return 0;
     if (strcmp(failing, call) != 0 && (strcmp(failing, "any") != 0 || strcmp(call, "malloc") == 0)) return 0;
     if (atomic_fetch_add(&calls, 1) + 1 != number) return 0;
-    leave_a_mark();
+    const int log = make_log();
+    if (log >= 0) close(log);
     if (kills) kill(getpid(), SIGKILL);
     return 1;
 }

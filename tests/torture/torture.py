@@ -3,10 +3,12 @@
 
 Usage: torture.py PROGRAM [--kills N] [--failures N] [--json FILE] [--only NAME]
 
-Of each kind of output: kills at moments spread over the whole run, the n-th write, fsync, rename, open and malloc
+Of each kind of output: a kill before every call that changes a file or a folder; N kills at moments spread over the
+whole run, half of them by the clock, half where it asks for memory; the n-th write, fsync, rename, open and malloc
 failing, full disks, file-size limits, little memory, folders that may not be written, links that lead nowhere, closed
 pipes, two writers at once. After each the old file has to be there whole, or the new one, byte for byte; no temporary
-file may stay after a failure; the exit code is one of the documented ones, and standard error has one sentence.
+file may stay after a failure, nor after the run that follows a kill; the exit code is one of the documented ones, and
+standard error has one sentence.
 """
 import argparse, json, os, random, resource, shutil, signal, subprocess, sys, tempfile, time
 from pathlib import Path
@@ -116,25 +118,47 @@ class Torture:
 
     # ---- the ways
 
-    def kill(self, output, moment):
+    def kill_by_clock(self, output, moment):
         folder = self.prepare(output)
         process = subprocess.Popen(output.command(self.program, folder), cwd=self.home, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
         time.sleep(moment)
         struck = process.poll() is None
         process.send_signal(signal.SIGKILL)
         process.communicate()
+        self.judge_killed(output, folder, f'killed after {moment:.4f} s', struck)
+
+    def kill_at_call(self, output, call, number):
+        folder = self.prepare(output)
+        environment, log = self.shimmed(call, number, FAILING_HOW='kill')
+        self.run(output, folder, env=environment)
+        self.judge_killed(output, folder, f'killed before call {number} of {call}', log.exists())
+        return log.exists()
+
+    def judge_killed(self, output, folder, how, struck):
         self.counts['kills'] += 1
         self.counts['kills_struck'] += struck
-        self.judge(output, folder, f'killed after {moment:.4f} s', None, b'', was_killed=True)
+        self.judge(output, folder, how, None, b'', was_killed=True)
         if struck: # and the next run puts it right
             code, errors = self.run(output, folder)
-            if code != 0 or any(self.state(folder).get(name) != bytes for name, bytes in self.reference[output.name].items()):
-                self.say(output, f'the run after a kill at {moment:.4f} s', f'exit code {code}')
+            self.judge(output, folder, f'the run after it was {how}', code, errors)
+            if code != 0:
+                self.say(output, f'the run after it was {how}', f'exit code {code}')
+
+    def shimmed(self, call, number, **more):
+        """The environment in which the n-th call is struck, and the file that tells that it was."""
+        log = self.home / 'failed'
+        log.unlink(missing_ok=True)
+        names = dict(LD_PRELOAD=str(self.shim), FAILING_CALL=call, FAILING_NUMBER=str(number), FAILING_LOG=str(log))
+        return {**os.environ, **names, **more}, log
+
+    def count_calls(self, output, call):
+        environment, log = self.shimmed(call, 0)
+        self.run(output, self.prepare(output), env=environment)
+        return int(log.read_text())
 
     def fail_call(self, output, call, number):
-        folder, log = self.prepare(output), self.home / 'failed'
-        log.unlink(missing_ok=True)
-        environment = dict(os.environ, LD_PRELOAD=str(self.shim), FAILING_CALL=call, FAILING_NUMBER=str(number), FAILING_LOG=str(log))
+        folder = self.prepare(output)
+        environment, log = self.shimmed(call, number)
         code, errors = self.run(output, folder, env=environment)
         self.counts['failures'] += 1
         self.counts['failures_struck'] += log.exists()
@@ -185,8 +209,14 @@ class Torture:
             self.make_reference(output)
             size = sum(len(bytes) for bytes in self.reference[output.name].values())
             before = dict(self.counts)
-            for k in range(self.options.kills):
-                self.kill(output, self.seconds * (0.3 + 0.75 * (k + random.random()) / self.options.kills))
+            number = 1
+            while self.kill_at_call(output, 'any', number):
+                number += 1
+            half = self.options.kills // 2
+            asked = self.count_calls(output, 'malloc')
+            for k in range(half):
+                self.kill_by_clock(output, self.seconds * (0.3 + 0.75 * (k + random.random()) / half))
+                self.kill_at_call(output, 'malloc', 1 + int(asked * (k + random.random()) / half))
             for call in ('write', 'fsync', 'rename', 'open', 'malloc'):
                 for k in range(self.options.failures):
                     number = k + 1 if k < self.options.failures // 2 else random.randint(1, 400)

@@ -85,9 +85,6 @@ Result<std::string> read_whole(int descriptor, const fs::path& path) {
     return in_memory(path, [&] { return read_descriptor(descriptor, path); });
 }
 
-/// Where a descriptor's file can be linked from.
-std::string name_of(int descriptor) { return "/proc/self/fd/" + std::to_string(descriptor); }
-
 /// 0 or the error number.
 int write_piece(int descriptor, std::string_view piece) {
     while (!piece.empty()) {
@@ -103,15 +100,10 @@ int write_piece(int descriptor, std::string_view piece) {
 /// the file system has none, or one could not be given a name later.
 int open_unnamed(const fs::path& folder) {
     const int descriptor = ::open(folder.empty() ? "." : folder.c_str(), O_WRONLY | O_TMPFILE | O_CLOEXEC, 0666);
-    if (descriptor < 0 || ::access(name_of(descriptor).c_str(), F_OK) == 0) return descriptor;
+    if (descriptor < 0 || ::access(("/proc/self/fd/" + std::to_string(descriptor)).c_str(), F_OK) == 0)
+        return descriptor;
     ::close(descriptor);
     return -1;
-}
-
-/// A new file under a temporary name.
-int open_temporary(const fs::path& folder, fs::path& temporary) {
-    temporary = temporary_path(folder);
-    return ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
 }
 
 } // namespace
@@ -218,22 +210,18 @@ struct FileWriter::OpenFile {
         const bool replaces = is_unnamed || !temporary.empty();
         if (permissions && ::fchmod(descriptor.get(), *permissions) != 0) return errno;
         if (replaces && ::fsync(descriptor.get()) != 0) return errno;
-        if (is_unnamed)
-            if (const int failed = give_name()) return failed;
+        if (is_unnamed) {
+            fs::path name;
+            if (const int failed = name_beside(target, descriptor.get(), name)) return failed;
+            temporary = name;
+        }
+        // Another descriptor keeps the lock until the name is gone; what closing tells has to be known before.
+        const FileDescriptor lock(::fcntl(descriptor.get(), F_DUPFD_CLOEXEC, 0));
         if (!descriptor.close()) return errno;
         if (!replaces) return 0;
         if (::rename(temporary.c_str(), target.c_str()) != 0) return errno;
         temporary.clear();
         sync_folder(target.parent_path());
-        return 0;
-    }
-
-private:
-    int give_name() {
-        const fs::path name = temporary_path(target.parent_path());
-        if (::linkat(AT_FDCWD, name_of(descriptor.get()).c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW) != 0)
-            return errno;
-        temporary = name;
         return 0;
     }
 };
@@ -263,11 +251,10 @@ Result<FileWriter> FileWriter::create(const fs::path& path) {
         if (exists && ::access(target.c_str(), W_OK) != 0) return cannot_write(path, errno); // read-only: hands off
         if (!target.has_filename()) return cannot_write(path, ENOENT);
         if (exists) file->permissions = existing.st_mode & 07777;
-        const fs::path folder = target.parent_path();
-        file->descriptor.reset(open_unnamed(folder));
+        file->descriptor.reset(open_unnamed(target.parent_path()));
         file->is_unnamed = file->descriptor.is_open();
         fs::path temporary;
-        if (!file->is_unnamed) file->descriptor.reset(open_temporary(folder, temporary));
+        if (!file->is_unnamed) file->descriptor.reset(create_beside(target, temporary));
         if (!file->is_unnamed && file->descriptor.is_open()) file->temporary = temporary;
     }
     if (!file->descriptor.is_open()) return cannot_write(path, errno);

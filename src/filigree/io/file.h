@@ -45,8 +45,9 @@ private:
 /// renamed. On any error, or when the process dies, `path` is as it was. "-" is standard output. Only a device or pipe
 /// is written in place: it cannot be replaced, and keeps what it got before an error. Symbolic links are followed, and
 /// the permissions of an existing file are kept. Errors: unwritable.
-/// The temporary file has no name until it is whole, so a process that is killed leaves nothing. On file systems
-/// without such files (NFS, FAT) it leaves ".filigree-X.tmp", X random: it hinders nobody and may be deleted.
+/// The temporary file has no name until it is whole, so a process that is killed leaves nothing; but for a moment
+/// before the rename, and on file systems without such files (NFS, FAT). It then leaves ".filigree-X.tmp", which the
+/// next writing of the same file removes.
 Status write_file(const std::filesystem::path& path, std::span<const std::string_view> pieces);
 /// The same of one piece.
 Status write_file(const std::filesystem::path& path, std::string_view bytes);

@@ -10,6 +10,8 @@
 #include <fstream>
 #include <memory>
 
+#include <unistd.h>
+
 namespace filigree {
 
 namespace {
@@ -216,10 +218,12 @@ private:
 class WaitingText {
 public:
     explicit WaitingText(const std::filesystem::path& folder) {
-        const std::filesystem::path path = temporary_path(folder);
+        std::filesystem::path path;
+        const int descriptor = create_beside(folder / "usd", path);
+        if (descriptor < 0) return; // status() tells of it
         file_.open(path, std::ios::in | std::ios::out | std::ios::trunc | std::ios::binary);
-        std::error_code ignored;
-        std::filesystem::remove(path, ignored); // it goes when it is closed
+        ::unlink(path.c_str()); // it goes when it is closed
+        ::close(descriptor);
     }
 
     UsdText text{[this](std::string_view bytes) {

@@ -45,6 +45,27 @@ std::string number_text(double number) {
     return std::string(text, std::to_chars(text, text + sizeof text, number).ptr);
 }
 
+/// Closes what it holds.
+class Descriptor {
+public:
+    explicit Descriptor(int descriptor = -1) : descriptor_(descriptor) {}
+    Descriptor(Descriptor&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
+    Descriptor& operator=(Descriptor&& other) noexcept {
+        std::swap(descriptor_, other.descriptor_);
+        return *this;
+    }
+    ~Descriptor() { close(); }
+
+    int get() const { return descriptor_; }
+    bool is_open() const { return descriptor_ >= 0; }
+    void close() {
+        if (is_open()) ::close(std::exchange(descriptor_, -1));
+    }
+
+private:
+    int descriptor_;
+};
+
 /// The bytes of ffmpeg's film beside its place: gone at the end, unless it is put there.
 class TemporaryFile {
 public:
@@ -53,17 +74,18 @@ public:
         fs::path real = follow_links(target);
         std::error_code ignored;
         if (fs::is_symlink(real, ignored)) return cannot_write(target, ELOOP);
-        fs::path path = temporary_path(real.parent_path());
-        const int descriptor = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-        if (descriptor < 0) return cannot_write(target, errno);
-        ::close(descriptor);
-        return TemporaryFile(std::move(path), std::move(real));
+        fs::path path;
+        Descriptor owner(create_beside(real, path));
+        if (!owner.is_open()) return cannot_write(target, errno);
+        return TemporaryFile(std::move(path), std::move(real), std::move(owner));
     }
     TemporaryFile(TemporaryFile&& other) noexcept
-        : path_(std::exchange(other.path_, {})), real_target_(std::move(other.real_target_)) {}
+        : path_(std::exchange(other.path_, {})), real_target_(std::move(other.real_target_)),
+          owner_(std::move(other.owner_)) {}
     TemporaryFile& operator=(TemporaryFile&& other) noexcept {
         std::swap(path_, other.path_);
         std::swap(real_target_, other.real_target_);
+        owner_ = std::move(other.owner_);
         return *this;
     }
     ~TemporaryFile() {
@@ -84,29 +106,10 @@ public:
     }
 
 private:
-    TemporaryFile(fs::path path, fs::path real_target) : path_(std::move(path)), real_target_(std::move(real_target)) {}
+    TemporaryFile(fs::path path, fs::path real_target, Descriptor owner)
+        : path_(std::move(path)), real_target_(std::move(real_target)), owner_(std::move(owner)) {}
     fs::path path_, real_target_;
-};
-
-/// Closes what it holds.
-class Descriptor {
-public:
-    explicit Descriptor(int descriptor = -1) : descriptor_(descriptor) {}
-    Descriptor(Descriptor&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
-    Descriptor& operator=(Descriptor&& other) noexcept {
-        std::swap(descriptor_, other.descriptor_);
-        return *this;
-    }
-    ~Descriptor() { close(); }
-
-    int get() const { return descriptor_; }
-    bool is_open() const { return descriptor_ >= 0; }
-    void close() {
-        if (is_open()) ::close(std::exchange(descriptor_, -1));
-    }
-
-private:
-    int descriptor_;
+    Descriptor owner_; ///< tells other writers that the file is ours
 };
 
 /// A child process that reads what we send and whose complaints we hear. Killed when it goes away unfinished.
