@@ -100,7 +100,7 @@ bool is_in_file(const void* array) {
     return begin && array >= begin && array < begin + kRoom;
 }
 
-void* allocate(std::size_t bytes, std::size_t alignment) {
+[[maybe_unused]] void* allocate(std::size_t bytes, std::size_t alignment) {
     const std::int64_t limit = memory_limit.load(std::memory_order_relaxed);
     if (limit > 0 && bytes >= kLarge && alignment <= kPage &&
         large_bytes.load(std::memory_order_relaxed) + std::int64_t(bytes) > limit) {
@@ -116,7 +116,7 @@ void* allocate(std::size_t bytes, std::size_t alignment) {
     return array;
 }
 
-void deallocate(void* array) {
+[[maybe_unused]] void deallocate(void* array) {
     if (!array) return;
     if (memory_limit.load(std::memory_order_relaxed) > 0) {
         if (is_in_file(array)) return free_in_file(static_cast<char*>(array));

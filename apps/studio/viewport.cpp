@@ -249,7 +249,7 @@ void Viewport::finish_drawing() {
         c.drawn.background().finish_all();
         if (c.drawn.shown()) c.level_for(false);
     } while (c.drawn.background().is_busy());
-    c.change.advance(c.now() + LevelChange::kSeconds);
+    c.change.set(c.change.to());
     if (!c.begin_passes()) return;
     makeCurrent();
     while (c.drawing.add_pass()) {

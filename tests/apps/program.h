@@ -58,8 +58,9 @@ protected:
         return names;
     }
 
-    /// Runs `filigree` in the folder. input: a file for standard input. interrupt_after: seconds until `signal`.
-    /// A program that takes longer than a minute is killed, and its code is -1.
+    /// Runs `filigree` in the folder. input: a file for standard input. interrupt_after: seconds until `signal`, from
+    /// when the program listens to it.
+    /// A program that takes longer than kMostSeconds is killed, and its code is -1.
     Ran run(const std::vector<std::string>& arguments, const std::string& input = "/dev/null",
             double interrupt_after = -1, int signal = SIGINT) const {
         return run_shell("exec \"$0\" \"$@\"", arguments, input, interrupt_after, signal);
@@ -87,10 +88,13 @@ protected:
         EXPECT_EQ(posix_spawn(&child, "/bin/sh", &streams, nullptr, argv.data(), environ), 0);
         posix_spawn_file_actions_destroy(&streams);
         int status = 0;
-        bool interrupted = interrupt_after < 0;
+        bool interrupted = interrupt_after < 0, listens = false;
+        double listens_from = 0;
         while (::waitpid(child, &status, WNOHANG) == 0) {
-            if (!interrupted && seconds() > interrupt_after) interrupted = ::kill(child, signal) == 0;
-            if (seconds() > 60) ::kill(child, SIGKILL);
+            if (!interrupted && !listens && (listens = catches(child, signal))) listens_from = seconds();
+            if (!interrupted && listens && seconds() > listens_from + interrupt_after)
+                interrupted = ::kill(child, signal) == 0;
+            if (seconds() > kMostSeconds) ::kill(child, SIGKILL);
             std::this_thread::sleep_for(std::chrono::milliseconds(2));
         }
         return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, seconds(), bytes_of(out), bytes_of(err)};
@@ -119,6 +123,23 @@ protected:
     }
 
 private:
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+    static constexpr double kMostSeconds = 600;
+#else
+    static constexpr double kMostSeconds = 60;
+#endif
+
+    static bool catches(pid_t process, int signal) {
+        std::ifstream status("/proc/" + std::to_string(process) + "/status");
+        for (std::string word; status >> word;) {
+            if (word != "SigCgt:") continue;
+            std::uint64_t caught = 0;
+            status >> std::hex >> caught;
+            return caught >> (signal - 1) & 1;
+        }
+        return false;
+    }
+
     std::filesystem::path folder_;
 };
 

@@ -98,8 +98,11 @@ TEST(ModelStream, LevelsHaveTexturesMaterialsAndColours) {
         mesh.uvs.values.emplace_back(p[0], p[1]);
         mesh.colors.emplace_back(0.5f, 0.25f, std::clamp(p[2], 0.0f, 1.0f), 1.0f);
     }
-    for (MeshMaterial& material : mesh.embedded_materials = {{.name = "front"}, {.name = "back"}})
+    for (const char* name : {"front", "back"}) {
+        MeshMaterial& material = mesh.embedded_materials.emplace_back();
+        material.name = name;
         material.picture_bytes = std::make_shared<const std::string>(5000, 'p');
+    }
     const Model model = strip(mesh, {.base = 200}, kTwoThreads)->model;
     const std::string bytes = stream_of(model, {});
     ModelStream stream("it");

@@ -162,7 +162,8 @@ TEST_F(SharedStrips, ScrapsAndLooseVertices) {
 /// Vertices on borders of clusters that no cluster keeps.
 TEST_F(SharedStrips, Holes) {
     const Mesh whole = make_wavy_cube({.resolution = 200});
-    Mesh mesh{.positions = whole.positions};
+    Mesh mesh;
+    mesh.positions = whole.positions;
     std::mt19937 random(3);
     for (std::size_t f = 0; f < whole.face_count(); ++f)
         if (random() % 100 >= 42) mesh.add_face(whole.face(f));

@@ -111,6 +111,15 @@ TEST(LevelChange, MeltsFromOneToTheOther) {
     EXPECT_EQ(change.part(), 1.0);
 }
 
+TEST(LevelChange, MeltsWhereAPictureTakesLongerThanTheChangeToo) {
+    LevelChange change;
+    change.set(3);
+    change.start(2, 0.0);
+    EXPECT_TRUE(change.advance(10));
+    EXPECT_EQ(change.part(), LevelChange::kMostStep);
+    EXPECT_FALSE(change.advance(20));
+}
+
 TEST(LevelChange, TurnsBackWhereItIs) {
     LevelChange change;
     change.set(3);

@@ -117,6 +117,7 @@ Camera fit_camera(std::span<const CameraPoints> points, const Vec3d& direction, 
     const Mat3d axes = basis_of(direction, up);
     const std::optional<Vec3d> reference = reference_point(points);
     for (const CameraPoints& part : points) {
+        if (part.positions.empty()) continue;
         const Vec3d offset = axes.transpose() * (part.origin - *reference);
         for (const Vec3f& position : part.positions)
             reach.extend(axes.transpose() * position.cast<double>() + offset, part.radius);

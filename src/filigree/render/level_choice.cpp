@@ -73,7 +73,12 @@ void LevelChange::set(unsigned level) {
 
 bool LevelChange::advance(double now) {
     if (!from_) return false;
+    const double next = part_ + kMostStep;
     part_ = std::clamp((now - started_) / kSeconds, 0.0, 1.0);
+    if (part_ > next) {
+        part_ = next;
+        started_ = now - part_ * kSeconds;
+    }
     if (part_ >= 1) from_.reset();
     return from_.has_value();
 }

@@ -53,6 +53,7 @@ unsigned level_to_keep_up(std::span<const LevelFacts> levels, unsigned finest, u
 class LevelChange {
 public:
     static constexpr double kSeconds = 0.3;
+    static constexpr double kMostStep = 0.5; ///< of `part` from picture to picture: slow ones melt too, and take longer
 
     /// Starts at `now` (seconds of any clock) from what is shown most at the moment. To the level shown: nothing.
     void start(unsigned to, double now);
