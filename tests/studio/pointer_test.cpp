@@ -77,6 +77,11 @@ TEST(Pointer, ADragOnTheShapePullsIt) {
 
 /// With the settings that the window starts with: what was grabbed is where the pointer is.
 TEST(Pointer, WhatIsGrabbedStaysUnderThePointer) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+    constexpr double kMost = 8; // pixels: letting go ends by the clock, with less solved
+#else
+    constexpr double kMost = 2;
+#endif
     Stand stand("wavy-cube", 64);
     stand.window.resize(600, 480);
     ASSERT_TRUE(stand.is_ready());
@@ -90,7 +95,7 @@ TEST(Pointer, WhatIsGrabbedStaysUnderThePointer) {
                 stand.drag(at, at + way);
                 stand.workbench.wait_until_idle();
                 const QPointF after = stand.viewport->place_of(stand.place_of_vertex(grabbed->vertex));
-                EXPECT_LT(distance(after - before, way), 2)
+                EXPECT_LT(distance(after - before, way), kMost)
                     << name.toStdString() << " " << from.x() << " " << from.y() << ": " << (after - before).x() << " "
                     << (after - before).y();
                 stand.workbench.document().undo_stack().undo();
