@@ -59,7 +59,7 @@ protected:
     }
 
     /// Runs `filigree` in the folder. input: a file for standard input. interrupt_after: seconds until `signal`, from
-    /// when the program listens to it.
+    /// when the program listens to signals, which is when its work begins.
     /// A program that takes longer than kMostSeconds is killed, and its code is -1.
     Ran run(const std::vector<std::string>& arguments, const std::string& input = "/dev/null",
             double interrupt_after = -1, int signal = SIGINT) const {
@@ -91,7 +91,8 @@ protected:
         bool interrupted = interrupt_after < 0, listens = false;
         double listens_from = 0;
         while (::waitpid(child, &status, WNOHANG) == 0) {
-            if (!interrupted && !listens && (listens = catches(child, signal))) listens_from = seconds();
+            if (!interrupted && !listens && (listens = catches(child, signal == SIGKILL ? SIGINT : signal)))
+                listens_from = seconds();
             if (!interrupted && listens && seconds() > listens_from + interrupt_after)
                 interrupted = ::kill(child, signal) == 0;
             if (seconds() > kMostSeconds) ::kill(child, SIGKILL);
