@@ -67,9 +67,11 @@ def torture():
     told = told_by("torture")
     if not told:
         return None
-    return ["Twelve kinds of output under kills, failing calls (write, fsync, rename, open, malloc), full disks, file-size and "
-            "memory limits, and two writers at once (`scripts/torture`). Afterwards the old file has to be there whole or the "
-            "new one byte for byte, with nothing beside it.", "", "| | |", "|---|---|",
+    return ["Outputs of every kind under kills (before every call that changes a file, where memory is asked for, and by the "
+            "clock), failing calls (write, fsync, rename, open, malloc), full disks, file-size and memory limits, and two "
+            "writers at once (`scripts/torture`). Afterwards the old file has to be there whole or the new one byte for byte, "
+            "and after the next run nothing beside it.", "", "| | |", "|---|---|",
+            f"| outputs | {', '.join(f'`{name}`' for name in told.get('outputs', []))} |",
             f"| kills that struck before the end | {told['kills_struck']} of {told['kills']} |",
             f"| failing calls that struck | {told['failures_struck']} of {told['failures']} |",
             f"| limits, full disks, rival writers | {told['limits']} |", f"| wrong | {told['wrong']} |",

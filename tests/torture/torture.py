@@ -48,7 +48,7 @@ class Torture:
         self.program, self.options = program, options
         self.home = Path(tempfile.mkdtemp(prefix='filigree-torture-'))
         self.counts = {'kills': 0, 'kills_struck': 0, 'failures': 0, 'failures_struck': 0, 'limits': 0}
-        self.wrong = []
+        self.wrong, self.outputs = [], []
         self.shim = self.home / 'failing_calls.so'
         here = Path(__file__).parent
         subprocess.run(['cc', '-shared', '-fPIC', '-O1', '-o', self.shim, here / 'failing_calls.c', '-ldl'], check=True)
@@ -200,6 +200,14 @@ class Torture:
         self.counts['limits'] += 1
         return True
 
+    def write_report(self, output):
+        """After every output, so that a run which is stopped leaves what it found."""
+        self.counts['wrong'] = len(self.wrong)
+        self.outputs.append(output.name)
+        if self.options.json:
+            report = {**self.counts, 'outputs': self.outputs, 'sentences': self.wrong}
+            Path(self.options.json).write_text(json.dumps(report, indent=1))
+
     def all(self):
         self.reference = {}
         random.seed(1)
@@ -231,11 +239,9 @@ class Torture:
             self.two_writers(output)
             struck = self.counts['kills_struck'] - before['kills_struck'], self.counts['failures_struck'] - before['failures_struck']
             print(f'{output.name}: {struck[0]} kills and {struck[1]} failures struck', flush=True)
+            self.write_report(output)
         shutil.rmtree(self.home, ignore_errors=True)
-        self.counts['wrong'] = len(self.wrong)
         print(json.dumps(self.counts))
-        if self.options.json:
-            Path(self.options.json).write_text(json.dumps({**self.counts, 'sentences': self.wrong}, indent=1))
         return 1 if self.wrong else 0
 
 
