@@ -36,6 +36,16 @@ void bound_stretches(std::span<Mat3f> gradients, const RunContext& context) {
     });
 }
 
+Index nearest_particle(const Embedding& points, std::size_t point, const Vectors& rest) {
+    Index nearest = points.particles[points.offsets[point]];
+    for (Index k = points.offsets[point]; k < points.offsets[point + 1]; ++k) {
+        const Index j = points.particles[k];
+        if ((rest[j] - points.rest[point]).squaredNorm() < (rest[nearest] - points.rest[point]).squaredNorm())
+            nearest = j;
+    }
+    return nearest;
+}
+
 std::vector<Vec3f> places_of(const Embedding& points, const Vectors& positions) {
     std::vector<Vec3f> places(points.size());
     for (std::size_t i = 0; i < places.size(); ++i) places[i] = embedded_point(points, i, positions);

@@ -45,7 +45,7 @@ struct BodyState {
     };
     std::vector<LightCorner> light_corners;
 
-    // Contact: points of the surface; meshfree bodies touch each other and themselves by balls just below them.
+    // Contact: points of the surface; meshfree bodies touch each other by balls just below them.
     Embedding surface, balls;             ///< in the elasticity's reference
     std::vector<float> surface_stiffness; ///< N/m
     float ball_radius = 0;                ///< m

@@ -24,8 +24,8 @@ class Contacts {
 public:
     /// bodies: fixed in number from here on.
     Contacts(const World& world, std::size_t bodies, bool between_bodies, bool within_bodies)
-        : world_(world), between_bodies_(between_bodies), within_bodies_(within_bodies), near_(bodies),
-          touched_(bodies, 0), matter_(world, between_bodies, within_bodies) {}
+        : world_(world), between_bodies_(between_bodies), near_(bodies), touched_(bodies, 0),
+          matter_(world, between_bodies, within_bodies) {}
     /// Once, when all bodies are there.
     void begin(std::span<const BodyState> bodies) { matter_.begin(bodies); }
 
@@ -174,7 +174,7 @@ private:
         contact_law::Grasp grasp;
         Vec3f anchor = Vec3f::Zero();
     };
-    /// Two balls near each other, of different bodies or of far parts of one.
+    /// Two balls of different bodies near each other.
     struct NearPair {
         Index first_body, first, second_body, second;
         float clear_until; ///< pairs_way_ until which these cannot touch; both bodies travel
@@ -193,10 +193,9 @@ private:
     std::vector<NearPair> held_pairs() const; ///< those that friction holds, ascending
     void find_near(std::span<const BodyState> bodies, double time, float reach, const RunContext& context);
     void find_pairs(std::span<const BodyState> bodies, float reach, const RunContext& context);
-    class Balls;
 
     const World& world_;
-    bool between_bodies_, within_bodies_;
+    bool between_bodies_;
     std::vector<std::vector<Near>> near_; ///< by body, ascending by obstacle and point
     std::vector<NearPair> pairs_;
     float near_way_ = 0, pairs_way_ = 0;       ///< m that anything may have gone since they were found ...

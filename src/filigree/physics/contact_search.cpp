@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 
 namespace filigree {
 
@@ -23,7 +22,7 @@ void Contacts::search(std::span<BodyState> bodies, const Search& search, const R
         near_way_ = 0;
         near_until_ = search.obstacle_reach;
     }
-    if (pairs_way_ > pairs_until_ && ((between_bodies_ && bodies.size() > 1) || within_bodies_)) {
+    if (pairs_way_ > pairs_until_ && between_bodies_ && bodies.size() > 1) {
         find_pairs(bodies, search.pair_reach, context);
         pairs_way_ = 0;
         pairs_until_ = search.pair_reach;
@@ -72,59 +71,33 @@ std::vector<Contacts::NearPair> Contacts::held_pairs() const {
     return held;
 }
 
-/// Where the balls of one body are, and which of them are the same piece of matter.
-class Contacts::Balls {
-public:
-    Balls(const BodyState& body, const RunContext& context) : body_(body), places_(body.balls.size()) {
-        parallel_for(context, places_.size(), kContactSearchGrain, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t s = begin; s < end; ++s) places_[s] = embedded_point(body.balls, s, body.positions);
-        });
-    }
-
-    const std::vector<Vec3f>& places() const { return places_; }
-
-    /// Whether one is reached from the other in two steps between neighbours; so what has flowed together is.
-    bool are_together(Index s, Index t) {
-        const float near = float(body_.body->spacing());
-        if ((body_.balls.rest[s] - body_.balls.rest[t]).squaredNorm() < near * near) return true;
-        if (particles_.empty())
-            for (Index ball = 0; ball < places_.size(); ++ball)
-                particles_.push_back(nearest_particle(body_.balls, ball, body_.elasticity->reference()));
-        const Index from = particles_[s], to = particles_[t];
-        const auto is_neighbour = [&](Index particle) {
-            return std::ranges::binary_search(body_.elasticity->neighbours(particle), to);
-        };
-        return from == to || is_neighbour(from) ||
-               std::ranges::any_of(body_.elasticity->neighbours(from), is_neighbour);
-    }
-
-private:
-    const BodyState& body_;
-    std::vector<Vec3f> places_;
-    std::vector<Index> particles_; ///< the nearest to each ball
-};
-
 void Contacts::find_pairs(std::span<const BodyState> bodies, float reach, const RunContext& context) {
     const std::vector<NearPair> held = held_pairs();
     pairs_.clear();
-    std::vector<Index> with_balls;
-    for (Index b = 0; b < bodies.size(); ++b)
-        if (bodies[b].has_balls()) with_balls.push_back(b);
-    std::map<Index, Balls> known;
-    const auto balls_of = [&](Index b) -> Balls& { return known.try_emplace(b, bodies[b], context).first->second; };
+    if (std::ranges::none_of(bodies, &BodyState::has_balls)) return;
     std::vector<Box> boxes(bodies.size());
-    for (const Index b : with_balls)
+    for (std::size_t b = 0; b < bodies.size(); ++b)
         for (std::size_t i = 0; i < bodies[b].positions.size(); ++i)
             boxes[b].extend(bodies[b].positions[i].cast<double>());
-    for (const Index a : with_balls)
-        for (const Index b : with_balls) {
-            if (b < a || !(a == b ? within_bodies_ : between_bodies_)) continue;
+    std::vector<std::vector<Vec3f>> balls(bodies.size());
+    const auto find_balls = [&](std::size_t b) {
+        if (!balls[b].empty()) return;
+        balls[b].resize(bodies[b].balls.size());
+        parallel_for(context, balls[b].size(), kContactSearchGrain, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t s = begin; s < end; ++s)
+                balls[b][s] = embedded_point(bodies[b].balls, s, bodies[b].positions);
+        });
+    };
+    for (std::size_t a = 0; a < bodies.size(); ++a)
+        for (std::size_t b = a + 1; b < bodies.size(); ++b) {
+            if (!bodies[a].has_balls() || !bodies[b].has_balls()) continue;
             const PairContact law = world_.contact_of(bodies[a].actor, bodies[b].actor);
             const float far = bodies[a].ball_radius + bodies[b].ball_radius + 2 * reach;
             const Vec3d low = boxes[a].min.cwiseMax(boxes[b].min) - Vec3d::Constant(double(far));
             const Vec3d high = boxes[a].max.cwiseMin(boxes[b].max) + Vec3d::Constant(double(far));
             if (!(low.array() <= high.array()).all()) continue;
-            Balls &of_a = balls_of(a), &of_b = balls_of(b);
+            find_balls(a);
+            find_balls(b);
             const auto is_common = [&](const Vec3f& p) {
                 return (p.cast<double>().array() >= low.array()).all() &&
                        (p.cast<double>().array() <= high.array()).all();
@@ -135,22 +108,19 @@ void Contacts::find_pairs(std::span<const BodyState> bodies, float reach, const 
                 return Key{int(q.x()), int(q.y()), int(q.z())};
             };
             std::vector<std::pair<Key, Index>> grid;
-            for (Index t = 0; t < of_b.places().size(); ++t)
-                if (is_common(of_b.places()[t])) grid.emplace_back(key_of(of_b.places()[t]), t);
+            for (Index t = 0; t < balls[b].size(); ++t)
+                if (is_common(balls[b][t])) grid.emplace_back(key_of(balls[b][t]), t);
             std::ranges::sort(grid);
-            for (Index s = 0; s < of_a.places().size(); ++s) {
-                const Vec3f& place = of_a.places()[s];
-                if (!is_common(place)) continue;
-                const auto take = [&](Index t) {
-                    const float gap = (of_b.places()[t] - place).norm() - far + 2 * reach;
-                    if (!(gap < 2 * reach) || (a == b && (t <= s || of_a.are_together(s, t)))) return;
-                    pairs_.push_back({a, s, b, t, gap / 2, law});
-                };
-                const Key key = key_of(place);
+            for (Index s = 0; s < balls[a].size(); ++s) {
+                if (!is_common(balls[a][s])) continue;
+                const Key key = key_of(balls[a][s]);
                 for (int i = key[0] - 1; i <= key[0] + 1; ++i)
                     for (int j = key[1] - 1; j <= key[1] + 1; ++j) {
                         auto at = std::ranges::lower_bound(grid, std::pair(Key{i, j, key[2] - 1}, Index{0}));
-                        for (; at != grid.end() && at->first <= Key{i, j, key[2] + 1}; ++at) take(at->second);
+                        for (; at != grid.end() && at->first <= Key{i, j, key[2] + 1}; ++at)
+                            if (const float gap = (balls[b][at->second] - balls[a][s]).norm() - far + 2 * reach;
+                                gap < 2 * reach)
+                                pairs_.push_back({Index(a), s, Index(b), at->second, gap / 2, law});
                     }
             }
         }
@@ -181,8 +151,8 @@ bool Contacts::set_memory(const Memory& memory, std::span<const BodyState> bodie
                std::isfinite(near.clear_until);
     };
     const auto are_balls = [&](const BallMemory& pair) {
-        return std::pair(pair.first_body, pair.first) < std::pair(pair.second_body, pair.second) &&
-               pair.second_body < bodies.size() && pair.first < bodies[pair.first_body].balls.size() &&
+        return pair.first_body < pair.second_body && pair.second_body < bodies.size() &&
+               pair.first < bodies[pair.first_body].balls.size() &&
                pair.second < bodies[pair.second_body].balls.size() && pair.offset.allFinite();
     };
     if (!std::ranges::all_of(memory.balls, are_balls)) return false;

@@ -98,9 +98,6 @@ public:
     /// finite leave everything as it is. Only for materials that flow.
     virtual void renew(const Vectors& positions, const RunContext& context);
 
-    /// meshfree: the particles that one feels, ascending; of other materials empty.
-    virtual std::span<const Index> neighbours(Index particle) const;
-
     /// fem that yields: what its cells remember; of other materials empty. A piece takes over that of `cells` of its
     /// whole.
     virtual std::span<const PlasticCell> plastic_cells() const;

@@ -384,16 +384,6 @@ Float4 load(const float* from) {
 
 } // namespace
 
-Index nearest_particle(const Embedding& embedding, std::size_t point, const Vectors& rest) {
-    Index nearest = embedding.particles[embedding.offsets[point]];
-    for (Index k = embedding.offsets[point]; k < embedding.offsets[point + 1]; ++k) {
-        const Index j = embedding.particles[k];
-        if ((rest[j] - embedding.rest[point]).squaredNorm() < (rest[nearest] - embedding.rest[point]).squaredNorm())
-            nearest = j;
-    }
-    return nearest;
-}
-
 void move_embedded(const Embedding& embedding, const Vectors& rest, const Vectors& positions,
                    std::span<const Mat3f> particle_gradients, std::span<Vec3f> points, std::span<Mat3f> gradients,
                    const RunContext& context) {

@@ -43,9 +43,6 @@ Embedding embed_to_follow(std::span<const Vec3f> points, const Vectors& rest, do
 /// corners of cells.
 Embedding embed_in_cells(std::span<const Vec3f> points, const Cells& cells, const RunContext& context);
 
-/// Of the particles that carry a point, the nearest at rest.
-Index nearest_particle(const Embedding& embedding, std::size_t point, const Vectors& rest);
-
 /// Where the points went, and the deformation gradients there, by the Hermite form of docs/bodies.md:
 ///     A = sum w F_j,   c' = sum w (x_j + 1/2 (F_j + A) (c - X_j)).
 /// An affine motion of the particles is followed exactly. `gradients` may be empty: not wanted. Cost O(weights).

@@ -149,11 +149,6 @@ public:
         wants_renewal_ = flow_.move_matter(neighbours_, position_.data(), dt, context);
     }
 
-    std::span<const Index> neighbours(Index i) const override {
-        return std::span(neighbours_.neighbours)
-            .subspan(neighbours_.offsets[i], neighbours_.offsets[i + 1] - neighbours_.offsets[i]);
-    }
-
     bool wants_renewal() const override { return wants_renewal_; }
 
     void renew(const Vectors& positions, const RunContext& context) override {
@@ -281,7 +276,11 @@ private:
     void find_colors() {
         const std::size_t n = body_.particle_count();
         std::vector<std::uint32_t> color(n, kNoIndex), seen;
-        for (Index i = 0; i < n; ++i) {
+        const auto neighbours = [&](std::size_t i) {
+            return std::span(neighbours_.neighbours)
+                .subspan(neighbours_.offsets[i], neighbours_.offsets[i + 1] - neighbours_.offsets[i]);
+        };
+        for (std::size_t i = 0; i < n; ++i) {
             const auto mark = [&](Index j) {
                 if (color[j] != kNoIndex) seen[color[j]] = std::uint32_t(i + 1);
             };

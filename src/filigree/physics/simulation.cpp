@@ -43,7 +43,7 @@ BodyState place_body(const Actor& actor, std::size_t number) {
     return state;
 }
 
-BodyState begin_body(const Actor& actor, std::size_t number, bool has_balls, const RunContext& context) {
+BodyState begin_body(const Actor& actor, std::size_t number, bool meets_bodies, const RunContext& context) {
     BodyState state = place_body(actor, number);
     const Body& body = *actor.body;
     const std::size_t count = body.particle_count();
@@ -62,7 +62,7 @@ BodyState begin_body(const Actor& actor, std::size_t number, bool has_balls, con
         state.surface_stiffness = surface_stiffness(body, state.rest_squared_frequency);
     }
     state.ball_radius = kBallRadius * float(body.spacing());
-    embed_surface_at_rest(state, has_balls && body.material.model == MaterialModel::meshfree, context);
+    embed_surface_at_rest(state, meets_bodies && body.material.model == MaterialModel::meshfree, context);
     return state;
 }
 
@@ -122,7 +122,6 @@ private:
 
 void begin_bodies(SimulationState& state, std::vector<Actor>& actors, const RunContext& context) {
     AutomaticRigid automatic(state.world, state.options, actors);
-    const bool have_balls = actors.size() > 1 || state.options.contacts_within_bodies;
     for (Actor& actor : actors) {
         const std::size_t number = state.bodies.size();
         if (state.grid->has(number)) {
@@ -130,11 +129,11 @@ void begin_bodies(SimulationState& state, std::vector<Actor>& actors, const RunC
             state.why_rigid.emplace_back();
             continue;
         }
-        BodyState body = begin_body(actor, number, have_balls, context);
+        BodyState body = begin_body(actor, number, actors.size() > 1, context);
         state.why_rigid.push_back(automatic.reason(number, body));
         if (!state.why_rigid.back().empty()) {
             actor.body = automatic.rigid(actor.body);
-            body = begin_body(actor, number, have_balls, context);
+            body = begin_body(actor, number, actors.size() > 1, context);
         }
         state.bodies.push_back(std::move(body));
     }
