@@ -127,7 +127,7 @@ private:
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
     static constexpr double kMostSeconds = 600;
 #else
-    static constexpr double kMostSeconds = 60;
+    static constexpr double kMostSeconds = 180;
 #endif
 
     static bool catches(pid_t process, int signal) {
