@@ -247,9 +247,7 @@ TEST_F(ChunkedItems, SweepsSayWhatIsWrongBeforeTheySimulate) {
 class KilledEverywhere : public ChunkedItems {
 protected:
     void SetUp() override {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-        GTEST_SKIP() << "a sanitizer wants to be loaded first";
-#endif
+        if (kSanitized) GTEST_SKIP() << "a sanitizer wants to be loaded first";
         ChunkedItems::SetUp();
         const Ran made =
             run_shell("cc -shared -fPIC -O1 -o shim.so \"$1\" -ldl", {FILIGREE_ROOT "/tests/torture/failing_calls.c"});
@@ -394,9 +392,7 @@ TEST_F(ChunkedStrip, ManyAtTheSameTimeOfWhichSomeAreKilled) {
 
 /// Some file systems have none: tasks are made twice then.
 TEST_F(ChunkedStrip, WithoutLocksTheBytesAreTheSame) {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-    GTEST_SKIP() << "a sanitizer wants to be loaded first";
-#endif
+    if (kSanitized) GTEST_SKIP() << "a sanitizer wants to be loaded first";
     const Ran built =
         run_shell("cc -shared -fPIC -o locks.so \"$1\" -ldl", {FILIGREE_ROOT "/tests/torture/no_locks.c"});
     if (built.code != 0) GTEST_SKIP() << "no C compiler: " << built.err;

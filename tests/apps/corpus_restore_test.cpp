@@ -1,5 +1,6 @@
 // Every mesh that can be read can be stripped, and comes back from the unmoved driver.
 #include "io/corpus.h"
+#include "sanitized.h"
 
 #include "filigree/hierarchy/restore.h"
 #include "filigree/hierarchy/strip.h"
@@ -18,12 +19,8 @@ using namespace filigree_test;
 
 namespace {
 
-constexpr double kRoundTrip = 1e-6; // of the diagonal
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr double kLimit = 200; // seconds; sanitizers take a few times as long
-#else
-constexpr double kLimit = 20; // seconds a file
-#endif
+constexpr double kRoundTrip = 1e-6;              // of the diagonal
+constexpr double kLimit = kSanitized ? 200 : 20; // seconds a file
 
 const std::set<int> kDocumentedCodes = {3, 4, 5}; // what a file that cannot be read may be told
 

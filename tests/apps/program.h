@@ -1,6 +1,8 @@
 // Runs the command line as a user does, in a folder of the test's own.
 #pragma once
 
+#include "sanitized.h"
+
 #include <chrono>
 #include <csignal>
 #include <filesystem>
@@ -124,11 +126,7 @@ protected:
     }
 
 private:
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-    static constexpr double kMostSeconds = 600;
-#else
-    static constexpr double kMostSeconds = 180;
-#endif
+    static constexpr double kMostSeconds = kSanitized ? 600 : 180;
 
     static bool catches(pid_t process, int signal) {
         std::ifstream status("/proc/" + std::to_string(process) + "/status");

@@ -3,6 +3,7 @@
 
 #include "overlay.h"
 
+#include "sanitized.h"
 #include "studio/materials.h"
 
 #include "filigree/io/mesh_file.h"
@@ -77,11 +78,8 @@ TEST(Pointer, ADragOnTheShapePullsIt) {
 
 /// With the settings that the window starts with: what was grabbed is where the pointer is.
 TEST(Pointer, WhatIsGrabbedStaysUnderThePointer) {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-    constexpr double kMost = 8; // pixels: letting go ends by the clock, with less solved
-#else
-    constexpr double kMost = 2;
-#endif
+    constexpr double kMost =
+        kSanitized ? 8 : 2; // pixels; letting go ends by the clock, under a sanitizer with less solved
     Stand stand("wavy-cube", 64);
     stand.window.resize(600, 480);
     ASSERT_TRUE(stand.is_ready());

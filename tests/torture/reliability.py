@@ -67,16 +67,21 @@ def torture():
     told = told_by("torture")
     if not told:
         return None
-    return ["Outputs of every kind under kills (before every call that changes a file, where memory is asked for, and by the "
-            "clock), failing calls (write, fsync, rename, open, malloc), full disks, file-size and memory limits, and two "
-            "writers at once (`scripts/torture`). Afterwards the old file has to be there whole or the new one byte for byte, "
-            "and after the next run nothing beside it.", "", "| | |", "|---|---|",
-            f"| outputs | {', '.join(f'`{name}`' for name in told.get('outputs', []))} |",
-            f"| kills that struck before the end | {told['kills_struck']} of {told['kills']} |",
-            f"| failing calls that struck | {told['failures_struck']} of {told['failures']} |",
-            f"| limits, full disks, rival writers | {told['limits']} |", f"| wrong | {told['wrong']} |",
+    sentences = [sentence for output in told.values() for sentence in output["sentences"]]
+
+    def all_of(count):
+        return f"{sum(output[count] for output in told.values()):,}"
+
+    return ["Outputs under kills (before every call that changes a file, where memory is asked for, and by the clock), failing "
+            "calls (write, fsync, rename, open, malloc), full disks, file-size and memory limits, and two writers at once "
+            "(`scripts/torture`). Afterwards the old file has to be there whole or the new one byte for byte, and after the next "
+            "run nothing beside it.", "", "| | |", "|---|---|",
+            f"| outputs | {', '.join(f'`{name}`' for name in told)} |",
+            f"| kills that struck before the end | {all_of('kills_struck')} of {all_of('kills')} |",
+            f"| failing calls that struck | {all_of('failures_struck')} of {all_of('failures')} |",
+            f"| limits, full disks, rival writers | {all_of('limits')} |", f"| wrong | {len(sentences)} |",
             f"| last run | {when_of('torture')} |",
-            *[""] * bool(told.get("sentences")), *[f"- {sentence}" for sentence in told.get("sentences", [])]]
+            *[""] * bool(sentences), *[f"- {sentence}" for sentence in sentences]]
 
 
 def bounds():

@@ -48,7 +48,7 @@ class Torture:
         self.program, self.options = program, options
         self.home = Path(tempfile.mkdtemp(prefix='filigree-torture-'))
         self.counts = {'kills': 0, 'kills_struck': 0, 'failures': 0, 'failures_struck': 0, 'limits': 0}
-        self.wrong, self.outputs = [], []
+        self.wrong = []
         self.shim = self.home / 'failing_calls.so'
         here = Path(__file__).parent
         subprocess.run(['cc', '-shared', '-fPIC', '-O1', '-o', self.shim, here / 'failing_calls.c', '-ldl'], check=True)
@@ -200,13 +200,14 @@ class Torture:
         self.counts['limits'] += 1
         return True
 
-    def write_report(self, output):
-        """After every output, so that a run which is stopped leaves what it found."""
-        self.counts['wrong'] = len(self.wrong)
-        self.outputs.append(output.name)
-        if self.options.json:
-            report = {**self.counts, 'outputs': self.outputs, 'sentences': self.wrong}
-            Path(self.options.json).write_text(json.dumps(report, indent=1))
+    def write_report(self, output, counts, wrong):
+        """After every output, into the report that is there: a run that is stopped, or of one output, keeps the others."""
+        if not self.options.json:
+            return
+        file = Path(self.options.json)
+        report = json.loads(file.read_text()) if file.exists() else {}
+        report[output.name] = {**counts, 'sentences': wrong}
+        file.write_text(json.dumps(report, indent=1))
 
     def all(self):
         self.reference = {}
@@ -216,7 +217,7 @@ class Torture:
                 continue
             self.make_reference(output)
             size = sum(len(bytes) for bytes in self.reference[output.name].values())
-            before = dict(self.counts)
+            before, wrong_before = dict(self.counts), len(self.wrong)
             number = 1
             while self.kill_at_call(output, 'any', number):
                 number += 1
@@ -237,11 +238,11 @@ class Torture:
             for memory in (150, 200, 300): # less does not load the program
                 self.limit(output, f'{memory} MB of memory', lambda: resource.setrlimit(resource.RLIMIT_AS, (memory << 20, memory << 20)))
             self.two_writers(output)
-            struck = self.counts['kills_struck'] - before['kills_struck'], self.counts['failures_struck'] - before['failures_struck']
-            print(f'{output.name}: {struck[0]} kills and {struck[1]} failures struck', flush=True)
-            self.write_report(output)
+            counts = {name: count - before[name] for name, count in self.counts.items()}
+            print(f'{output.name}: {counts["kills_struck"]} kills and {counts["failures_struck"]} failures struck', flush=True)
+            self.write_report(output, counts, self.wrong[wrong_before:])
         shutil.rmtree(self.home, ignore_errors=True)
-        print(json.dumps(self.counts))
+        print(json.dumps({**self.counts, 'wrong': len(self.wrong)}))
         return 1 if self.wrong else 0
 
 

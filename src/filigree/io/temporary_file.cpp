@@ -3,6 +3,7 @@
 #include <cerrno>
 #include <functional>
 #include <random>
+#include <string>
 #include <system_error>
 
 #include <fcntl.h>
@@ -31,14 +32,12 @@ fs::path path_of_bits(const fs::path& folder, std::uint64_t bits, std::string_vi
     return folder / name.append(suffix);
 }
 
-constexpr std::string_view kTemporary = ".tmp";
-
 /// Removes a file of this user's that nobody has locked. While the lock is ours nobody else takes the name away.
 void remove_if_left(const fs::path& file) {
     const int descriptor = ::open(file.c_str(), O_WRONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
     if (descriptor < 0) return;
-    struct stat here {
-    }, named{};
+    struct stat here {};
+    struct stat named {};
     if (::flock(descriptor, LOCK_EX | LOCK_NB) == 0 && ::fstat(descriptor, &here) == 0 && S_ISREG(here.st_mode) &&
         here.st_uid == ::geteuid() && ::lstat(file.c_str(), &named) == 0 && here.st_dev == named.st_dev &&
         here.st_ino == named.st_ino)
@@ -49,7 +48,7 @@ void remove_if_left(const fs::path& file) {
 /// make: 0, or the error number; EEXIST where another name is to be tried.
 int make_beside(const fs::path& target, const std::function<int(const fs::path&)>& make, fs::path& name) {
     const fs::path folder = target.parent_path();
-    name = path_of_bits(folder, std::hash<std::string>()(target.filename().string()), kTemporary);
+    name = path_of_bits(folder, std::hash<std::string>()(target.filename().string()), kTemporarySuffix);
     remove_if_left(name);
     const int failed = make(name);
     if (failed != EEXIST) return failed;

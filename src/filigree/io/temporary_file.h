@@ -2,14 +2,15 @@
 #pragma once
 
 #include <filesystem>
-#include <string>
 #include <string_view>
 
 namespace filigree {
 
+inline constexpr std::string_view kTemporarySuffix = ".tmp";
+
 /// A name in `folder` that no other process or thread makes: ".filigree-" and 16 random hexadecimal digits, before
 /// `suffix`. Numbers of processes would not do: in containers they are often the same.
-std::filesystem::path temporary_path(const std::filesystem::path& folder, std::string_view suffix = ".tmp");
+std::filesystem::path temporary_path(const std::filesystem::path& folder, std::string_view suffix = kTemporarySuffix);
 
 /// A new file beside `target`, for writing, and its name. The name is one that belongs to `target` unless another
 /// process has taken it; what a killed process left under that one is removed first. Until the descriptor is closed the

@@ -220,7 +220,10 @@ public:
     explicit WaitingText(const std::filesystem::path& folder) {
         std::filesystem::path path;
         const int descriptor = create_beside(folder / "usd", path);
-        if (descriptor < 0) return; // status() tells of it
+        if (descriptor < 0) {
+            file_.setstate(std::ios::failbit); // status() tells of it
+            return;
+        }
         file_.open(path, std::ios::in | std::ios::out | std::ios::trunc | std::ios::binary);
         ::unlink(path.c_str()); // it goes when it is closed
         ::close(descriptor);
