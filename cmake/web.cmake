@@ -28,6 +28,11 @@ if(FILIGREE_NODE AND bundler)
                  coding/geometry_code coding/level_reader coding/symbols coding/vertex_rings mesh/triangle_point)
       list(APPEND decoder_sources ${PROJECT_SOURCE_DIR}/src/filigree/${name}.cpp)
     endforeach()
+    # As one source: the headers are read once.
+    list(TRANSFORM decoder_sources REPLACE "(.+)" "#include \"\\1\"\n" OUTPUT_VARIABLE decoder_lines)
+    string(JOIN "" decoder_lines ${decoder_lines})
+    set(whole_decoder ${CMAKE_CURRENT_BINARY_DIR}/web/decoder.cpp)
+    file(CONFIGURE OUTPUT ${whole_decoder} CONTENT "${decoder_lines}" @ONLY)
     file(GLOB decoder_headers CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/filigree/coding/*.h)
     find_path(FILIGREE_EIGEN_FOLDER Eigen/Core PATH_SUFFIXES eigen3)
     add_custom_command(
@@ -35,7 +40,7 @@ if(FILIGREE_NODE AND bundler)
       COMMAND ${FILIGREE_WASM_CLANG} --target=wasm32-wasi --sysroot=/usr -mexec-model=reactor -std=c++20 -O3
               -ffp-contract=off -fno-exceptions -fno-rtti -ffunction-sections -fdata-sections -DNDEBUG -I ${PROJECT_SOURCE_DIR}/src
               -nostdinc++ -isystem /usr/lib/llvm-16/include/wasm32-wasi/c++/v1 -isystem /usr/include/wasm32-wasi
-              -isystem ${FILIGREE_EIGEN_FOLDER} ${decoder_sources} -o ${decoder} -L${wasm_library} -L/usr/lib/wasm32-wasi
+              -isystem ${FILIGREE_EIGEN_FOLDER} ${whole_decoder} -o ${decoder} -L${wasm_library} -L/usr/lib/wasm32-wasi
               -Wl,--gc-sections -Wl,--strip-all
       DEPENDS ${decoder_sources} ${decoder_headers}
       COMMENT "Compiling the web page's decoder" VERBATIM)
