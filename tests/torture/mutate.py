@@ -1,22 +1,31 @@
 #!/usr/bin/env python3
 """Tests of the tests: makes one small change of the library at a time, and sees whether a test fails.
 
-Usage: mutate.py TREE [--count N] [--seed S] [--json FILE]
-TREE is a checkout that may be changed, with build/release configured. Changes are of arithmetic, comparisons, logic and
-constants in the layers below. One that does not compile is passed over.
+Usage: mutate.py RELEASE SINGLE WORK [--count N] [--seed S] [--jobs N] [--json FILE]
+RELEASE is a build whose tests pass; SINGLE is configured to compile one source at a time; WORK is for files of its own.
+The tree is left as it is: a changed copy of one source is compiled and linked into a library beside the release's, which
+its tests then load. Changes are of arithmetic, comparisons, logic and constants in the layers below. One that does not
+compile is passed over.
 """
 import argparse
+import concurrent.futures
 import json
+import os
 import pathlib
 import random
 import re
+import resource
+import shlex
+import shutil
 import subprocess
 import sys
+import threading
+import time
 
 LAYERS = {  # and the tests that judge them, quick ones first
-    "hierarchy": ["hierarchy_test", "properties_test"],
-    "sample": ["sample_test", "properties_test"],
-    "coding": ["coding_test", "properties_test"],
+    "hierarchy": ["properties_test", "hierarchy_test"],
+    "sample": ["properties_test", "sample_test"],
+    "coding": ["properties_test", "coding_test"],
     "fracture": ["fracture_test"],
 }
 CHANGES = [
@@ -25,12 +34,13 @@ CHANGES = [
     (r"std::min\(", "std::max("), (r"std::max\(", "std::min("), (r"\+\+", "--"), (r"\b1\b", "2"), (r"\b0\b", "1"),
 ]
 NO_CODE = re.compile(r"^\s*(//|#|\*|using|template|namespace|static_assert|struct|class|enum)|Error\{|\"|report\(|reserve\(")
+MOST_MEMORY = 8 << 30  # a change may ask for all there is
 
 
-def sites(tree):
-    found = []
+def sites(root):
+    found = {layer: [] for layer in LAYERS}
     for layer in LAYERS:
-        for path in sorted((tree / "src/filigree" / layer).glob("*.cpp")):
+        for path in sorted((root / "src/filigree" / layer).glob("*.cpp")):
             for number, line in enumerate(path.read_text().splitlines()):
                 code = line.split("//")[0]
                 if NO_CODE.search(code):
@@ -38,58 +48,130 @@ def sites(tree):
                 for pattern, text in CHANGES:
                     if "template" in code or (" < " in pattern and "<" in code.replace(" < ", "")):
                         continue
-                    found += [(layer, path, number, m.start(), m.end(), text) for m in re.finditer(pattern, code)]
+                    found[layer] += [(path, number, m.start(), m.end(), text) for m in re.finditer(pattern, code)]
     return found
 
 
-def is_caught(tree, tests):
-    """None: it does not compile."""
-    build = tree / "build/release"
-    if subprocess.run(["cmake", "--build", build, "--target", *tests], capture_output=True).returncode != 0:
-        return None
-    for test in tests:
-        try:
-            done = subprocess.run([build / "bin" / test, "--gtest_fail_fast", "--gtest_brief=1"], cwd=tree,
-                                  capture_output=True, timeout=400)
-        except subprocess.TimeoutExpired:
-            return "does not end"
-        if done.returncode != 0:
-            return test
-    return ""
+def run(words, **how):
+    return subprocess.run([str(word) for word in words], capture_output=True, **how)
+
+
+class Library:
+    """Links the release's library with one source replaced."""
+
+    def __init__(self, release, single):
+        self.release, self.single = release, single
+        self.commands = {entry["file"]: entry["command"] for entry in json.loads((single / "compile_commands.json").read_text())}
+        objects = [self.object_of(file) for file in self.commands if self.layer_of(file) in LAYERS]
+        subprocess.run(["cmake", "--build", str(single), "--target", *objects], check=True, stdout=subprocess.DEVNULL)
+        made = run(["ninja", "-C", release, "-t", "commands", "src/filigree/libfiligree.so.0.1.0"], text=True, check=True)
+        link = next(line for line in made.stdout.splitlines() if " -shared " in line).split("&&")[1]
+        words = shlex.split(link)
+        of_layers = re.compile("|".join(f"unity_{layer}_" for layer in LAYERS))
+        words = [word for word in words if not of_layers.search(word)]
+        self.output = words.index("-o") + 1
+        self.link = words
+        self.objects = {name: single / name for name in objects}
+
+    def layer_of(self, file):
+        return pathlib.Path(file).parent.name if "/src/filigree/" in file else None
+
+    def object_of(self, file):
+        return re.search(r"-o (\S+)", self.commands[file])[1]
+
+    def make(self, folder, path, text):
+        """False: it does not compile."""
+        changed, made = folder / path.name, folder / "changed.o"
+        changed.write_text(text)
+        command = self.commands[str(path)].replace(f"-c {path}", f"-c {changed} -I{path.parent} -w")
+        command = command.replace(f"-o {self.object_of(str(path))}", f"-o {made}")
+        if run(shlex.split(command), cwd=self.single).returncode != 0:
+            return False
+        objects = [made if name == self.object_of(str(path)) else place for name, place in self.objects.items()]
+        words = list(self.link)
+        words[self.output] = folder / "libfiligree.so.0"
+        run([*words, *objects], cwd=self.release, check=True)
+        return True
+
+
+def fails(release, test, folder, seconds):
+    """None: it passes."""
+    where = folder / "run"
+    shutil.rmtree(where, ignore_errors=True)
+    where.mkdir()
+    try:
+        done = run([release / "bin" / test, "--gtest_fail_fast", "--gtest_brief=1"], cwd=where, timeout=seconds,
+                   env={**os.environ, "LD_LIBRARY_PATH": str(folder), "TMPDIR": str(where)},
+                   preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY)))
+    except subprocess.TimeoutExpired:
+        return f"{test} does not end"
+    return test if done.returncode != 0 else None
 
 
 def main():
     parser = argparse.ArgumentParser()
-    parser.add_argument("tree", type=pathlib.Path)
+    for name in ("release", "single", "work"):
+        parser.add_argument(name, type=lambda text: pathlib.Path(text).resolve())
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--json", type=pathlib.Path)
     options = parser.parse_args()
-    tree = options.tree.resolve()
+    root = pathlib.Path(__file__).resolve().parents[2]
+    library = Library(options.release, options.single)
+    by_layer = sites(root)
     choice = random.Random(options.seed)
-    by_layer = {layer: [site for site in sites(tree) if site[0] == layer] for layer in LAYERS}
     told = {"seed": options.seed, "made": 0, "caught": 0, "escaped": []}
-    while told["made"] < options.count:
-        layer, path, number, begin, end, text = choice.choice(by_layer[list(LAYERS)[told["made"] % len(LAYERS)]])
-        whole = path.read_text()
-        lines = whole.splitlines(keepends=True)
-        was = lines[number]
-        lines[number] = was[:begin] + text + was[end:]
-        path.write_text("".join(lines))
-        try:
-            by = is_caught(tree, LAYERS[layer])
-        finally:
-            path.write_text(whole)
-        if by is None:
-            continue
-        told["made"] += 1
-        told["caught"] += by != ""
-        where = f"{path.relative_to(tree)}:{number + 1}"
-        if by == "":
-            told["escaped"].append({"where": where, "was": was.strip(), "became": lines[number].strip()})
-        print(f"mutate: {told['made']:3}  {where}: {lines[number].strip()}\n             {by or 'ESCAPED'}", flush=True)
-        if options.json:
-            options.json.write_text(json.dumps(told, indent=1))
+    lock = threading.Lock()
+    tried = 0
+
+    # As many at a time as later, unchanged: how long each test takes, and that it passes like this.
+    def unchanged(number, test):
+        folder = options.work / f"unchanged-{number}"
+        folder.mkdir(parents=True, exist_ok=True)
+        path = next(iter(by_layer["hierarchy"]))[0]
+        assert library.make(folder, path, path.read_text())
+        begin = time.monotonic()
+        if by := fails(options.release, test, folder, 1200):
+            sys.exit(f"mutate: nothing is changed and {by} fails")
+        return test, time.monotonic() - begin
+
+    tests = sorted({test for of_layer in LAYERS.values() for test in of_layer})
+    with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
+        seconds = dict(pool.map(unchanged, range(len(tests)), tests))
+    print("mutate: unchanged: " + ", ".join(f"{test} {taken:.0f} s" for test, taken in seconds.items()), flush=True)
+
+    def try_changes(worker):
+        nonlocal tried
+        folder = options.work / f"worker-{worker}"
+        folder.mkdir(parents=True, exist_ok=True)
+        while True:
+            with lock:
+                if tried >= options.count:
+                    return
+                layer = list(LAYERS)[tried % len(LAYERS)]
+                path, number, begin, end, text = choice.choice(by_layer[layer])
+                tried += 1
+            lines = path.read_text().splitlines(keepends=True)
+            was = lines[number]
+            lines[number] = was[:begin] + text + was[end:]
+            if not library.make(folder, path, "".join(lines)):
+                with lock:
+                    tried -= 1
+                continue
+            by = next((by for test in LAYERS[layer] if (by := fails(options.release, test, folder, 20 + 4 * seconds[test]))), None)
+            where = f"{path.relative_to(root)}:{number + 1}"
+            with lock:
+                told["made"] += 1
+                told["caught"] += by is not None
+                if by is None:
+                    told["escaped"].append({"where": where, "was": was.strip(), "became": lines[number].strip()})
+                print(f"mutate: {told['made']:3}  {where}: {lines[number].strip()}\n             {by or 'ESCAPED'}", flush=True)
+                if options.json:
+                    options.json.write_text(json.dumps(told, indent=1))
+
+    with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
+        list(pool.map(try_changes, range(options.jobs)))
     print(f"mutate: {told['caught']} of {told['made']} were caught")
 
 
