@@ -1,4 +1,5 @@
 #include "filigree/io/file.h"
+#include "filigree/io/file_descriptor.h"
 #include "filigree/io/file_error.h"
 #include "filigree/io/large_memory.h"
 #include "filigree/io/temporary_file.h"
@@ -21,29 +22,6 @@ namespace filigree {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Closes what it holds.
-class FileDescriptor {
-public:
-    explicit FileDescriptor(int descriptor) : descriptor_(descriptor) {}
-    ~FileDescriptor() { close(); }
-    FileDescriptor(const FileDescriptor&) = delete;
-    FileDescriptor& operator=(const FileDescriptor&) = delete;
-
-    bool is_open() const { return descriptor_ >= 0; }
-    int get() const { return descriptor_; }
-    void reset(int descriptor) {
-        close();
-        descriptor_ = descriptor;
-    }
-    bool close() {
-        const int descriptor = std::exchange(descriptor_, -1);
-        return descriptor < 0 || ::close(descriptor) == 0;
-    }
-
-private:
-    int descriptor_;
-};
 
 /// What `read` gives, or that there is no room for it.
 template <class Read>
@@ -117,7 +95,7 @@ Result<std::string> read_file(const fs::path& path) {
 
 struct FileReader::OpenFile {
     fs::path path;
-    FileDescriptor descriptor{-1}; ///< of a file that can be read anywhere; else the bytes are all here
+    FileDescriptor descriptor; ///< of a file that can be read anywhere; else the bytes are all here
     std::string kept;
     std::string_view bytes;
     std::uint64_t size = 0;
@@ -140,7 +118,7 @@ Result<FileReader> FileReader::open(const fs::path& path) {
     file->path = path;
     struct stat status {};
     if (path != "-") {
-        file->descriptor.reset(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+        file->descriptor = FileDescriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
         if (!file->descriptor.is_open() || ::fstat(file->descriptor.get(), &status) != 0)
             return cannot_read(path, errno);
         file->size = static_cast<std::uint64_t>(status.st_size);
@@ -195,7 +173,7 @@ struct FileWriter::OpenFile {
     fs::path target;    ///< where that leads
     fs::path temporary; ///< the name it has until then; empty: none, or written in place
     bool is_unnamed = false;
-    FileDescriptor descriptor{-1};
+    FileDescriptor descriptor;
     bool is_standard_output = false;
     std::optional<mode_t> permissions; ///< of the file that is replaced
 
@@ -246,15 +224,15 @@ Result<FileWriter> FileWriter::create(const fs::path& path) {
     const bool exists = ::stat(target.c_str(), &existing) == 0;
     if (exists && S_ISDIR(existing.st_mode)) return cannot_write(path, EISDIR);
     if (exists && !S_ISREG(existing.st_mode)) { // a device or pipe stays what it is
-        file->descriptor.reset(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
+        file->descriptor = FileDescriptor(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
     } else {
         if (exists && ::access(target.c_str(), W_OK) != 0) return cannot_write(path, errno); // read-only: hands off
         if (!target.has_filename()) return cannot_write(path, ENOENT);
         if (exists) file->permissions = existing.st_mode & 07777;
-        file->descriptor.reset(open_unnamed(target.parent_path()));
+        file->descriptor = FileDescriptor(open_unnamed(target.parent_path()));
         file->is_unnamed = file->descriptor.is_open();
         fs::path temporary;
-        if (!file->is_unnamed) file->descriptor.reset(create_beside(target, temporary));
+        if (!file->is_unnamed) file->descriptor = FileDescriptor(create_beside(target, temporary));
         if (!file->is_unnamed && file->descriptor.is_open()) file->temporary = temporary;
     }
     if (!file->descriptor.is_open()) return cannot_write(path, errno);

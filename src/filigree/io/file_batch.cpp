@@ -1,6 +1,7 @@
 #include "filigree/io/file_batch.h"
 
 #include "filigree/io/file.h"
+#include "filigree/io/file_descriptor.h"
 #include "filigree/io/file_error.h"
 #include "filigree/io/temporary_file.h"
 
@@ -51,25 +52,20 @@ class Lock {
 public:
     /// flags: for open.
     Lock(const fs::path& file, int flags) : descriptor_(::open(file.c_str(), O_RDWR | O_CLOEXEC | flags, 0600)) {
-        if (descriptor_ < 0) return;
+        if (!descriptor_.is_open()) return;
         struct stat status {};
-        const bool is_locked = ::flock(descriptor_, LOCK_EX | LOCK_NB) == 0;
+        const bool is_locked = ::flock(descriptor_.get(), LOCK_EX | LOCK_NB) == 0;
         is_lost_ = !is_locked && errno == EWOULDBLOCK;
-        if (::fstat(descriptor_, &status) == 0 && status.st_nlink == 0) is_lost_ = true; // removed before we had it
+        if (::fstat(descriptor_.get(), &status) == 0 && status.st_nlink == 0) is_lost_ = true; // removed before we had it
         is_held_ = is_locked && !is_lost_;
     }
-    ~Lock() {
-        if (descriptor_ >= 0) ::close(descriptor_);
-    }
-    Lock(const Lock&) = delete;
-    Lock& operator=(const Lock&) = delete;
-    bool is_there() const { return descriptor_ >= 0; }
+    bool is_there() const { return descriptor_.is_open(); }
     bool is_held() const { return is_held_; }
     /// Another has it. (Neither held nor lost: the file system has no locks.)
     bool is_lost() const { return is_lost_; }
 
 private:
-    int descriptor_;
+    FileDescriptor descriptor_;
     bool is_held_ = false, is_lost_ = false;
 };
 

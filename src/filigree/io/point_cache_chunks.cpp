@@ -1,6 +1,7 @@
 // A PC2's frames all have one size, so processes that know nothing of each other can write them into one file.
 #include "filigree/io/extension.h"
 #include "filigree/io/file.h"
+#include "filigree/io/file_descriptor.h"
 #include "filigree/io/file_error.h"
 #include "filigree/io/point_cache_formats.h"
 #include "filigree/io/shared_work.h"
@@ -17,21 +18,6 @@ namespace filigree {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Closes itself; -1: not open.
-class Descriptor {
-public:
-    explicit Descriptor(int descriptor) : descriptor_(descriptor) {}
-    ~Descriptor() {
-        if (descriptor_ >= 0) ::close(descriptor_);
-    }
-    Descriptor(const Descriptor&) = delete;
-    Descriptor& operator=(const Descriptor&) = delete;
-    int get() const { return descriptor_; }
-
-private:
-    int descriptor_;
-};
 
 /// 0 or the error number.
 int write_at(int descriptor, std::uint64_t offset, std::string_view bytes) {
@@ -70,8 +56,8 @@ public:
         const fs::path frames = folder_.file(kFrames);
         if (Status made = folder_.add(kFrames, [&](const fs::path& empty) { return make_empty(empty); }); !made)
             return made;
-        const Descriptor file(::open(frames.c_str(), O_WRONLY | O_CLOEXEC));
-        if (file.get() < 0) return cannot_write(frames, errno);
+        const FileDescriptor file(::open(frames.c_str(), O_WRONLY | O_CLOEXEC));
+        if (!file.is_open()) return cannot_write(frames, errno);
         const auto write_some = [&](std::uint64_t offset, std::string_view bytes) -> Status {
             if (const int wrong = write_at(file.get(), offset, bytes)) return cannot_write(frames, wrong);
             return Success{};
@@ -83,8 +69,8 @@ public:
 
     Status mark_done(std::size_t chunk) const {
         const fs::path mark = folder_.file(marks_[chunk - 1]);
-        const Descriptor file(::open(mark.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666));
-        if (file.get() < 0) return cannot_write(mark, errno);
+        const FileDescriptor file(::open(mark.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666));
+        if (!file.is_open()) return cannot_write(mark, errno);
         sync_folder(mark.parent_path());
         return Success{};
     }
@@ -109,8 +95,8 @@ private:
         return fs::file_size(path_, failed) == size_ && !failed;
     }
     Status make_empty(const fs::path& path) const {
-        const Descriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
-        int wrong = file.get() < 0 ? errno : write_at(file.get(), 0, header_);
+        const FileDescriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+        int wrong = !file.is_open() ? errno : write_at(file.get(), 0, header_);
         if (!wrong && ::ftruncate(file.get(), off_t(size_)) != 0) wrong = errno;
         if (!wrong && ::fsync(file.get()) != 0) wrong = errno;
         if (wrong) return cannot_write(path, wrong);

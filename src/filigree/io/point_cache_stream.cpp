@@ -1,6 +1,7 @@
 // PC2 (PointCache 2) and MDD (Motion Designer): a header, then positions frame after frame. PC2 is little-endian, as we
 // are; MDD is big-endian and has a time for each frame.
 #include "filigree/io/file.h"
+#include "filigree/io/file_descriptor.h"
 #include "filigree/io/point_cache_formats.h"
 
 #include <algorithm>
@@ -32,9 +33,9 @@ public:
         auto file = std::make_shared<RandomFile>();
         file->name_ = path.string();
         // a pipe would wait here for its writer
-        file->descriptor_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+        file->descriptor_ = FileDescriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
         struct stat status {};
-        if (file->descriptor_ < 0 || ::fstat(file->descriptor_, &status) != 0)
+        if (!file->descriptor_.is_open() || ::fstat(file->descriptor_.get(), &status) != 0)
             return Error{ErrorCode::not_found,
                          file->name_ + ": cannot be read: " +
                              (errno == ENOENT ? "there is no such file or folder." : "it cannot be opened.")};
@@ -47,20 +48,13 @@ public:
         file->size_ = static_cast<std::uint64_t>(status.st_size);
         return std::shared_ptr<const RandomFile>(std::move(file));
     }
-    RandomFile() = default;
-    ~RandomFile() {
-        if (descriptor_ >= 0) ::close(descriptor_);
-    }
-    RandomFile(const RandomFile&) = delete;
-    RandomFile& operator=(const RandomFile&) = delete;
-
     const std::string& name() const { return name_; }
     std::uint64_t size() const { return size_; }
     Error error(const std::string& cause) const { return {ErrorCode::bad_file, name_ + ": " + cause}; }
 
     Status read(std::uint64_t offset, void* to, std::size_t bytes) const {
         for (char* out = static_cast<char*>(to); bytes > 0;) {
-            const ssize_t got = ::pread(descriptor_, out, bytes, static_cast<off_t>(offset));
+            const ssize_t got = ::pread(descriptor_.get(), out, bytes, static_cast<off_t>(offset));
             if (got < 0 && errno == EINTR) continue;
             if (got < 0) return Error{ErrorCode::not_found, name_ + ": cannot be read: the device failed."};
             if (got == 0) return error("ends too early; it was cut off, or changed while it was read.");
@@ -73,7 +67,7 @@ public:
 
 private:
     std::string name_;
-    int descriptor_ = -1;
+    FileDescriptor descriptor_;
     std::uint64_t size_ = 0;
 };
 

@@ -2,6 +2,7 @@
 
 #include "filigree/core/now_seconds.h"
 #include "filigree/core/parallel_for.h"
+#include "filigree/io/file_descriptor.h"
 
 #include <algorithm>
 #include <atomic>
@@ -26,12 +27,6 @@ class Claims {
 public:
     explicit Claims(const std::filesystem::path& file)
         : descriptor_(::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666)) {}
-    ~Claims() {
-        if (descriptor_ >= 0) ::close(descriptor_);
-    }
-    Claims(const Claims&) = delete;
-    Claims& operator=(const Claims&) = delete;
-
     /// False: another process is at it.
     bool take(const std::string& task) const { return set(task, F_WRLCK) || (errno != EAGAIN && errno != EACCES); }
     void release(const std::string& task) const { set(task, F_UNLCK); }
@@ -43,10 +38,10 @@ private:
         lock.l_whence = SEEK_SET;
         lock.l_start = off_t(XXH3_64bits(task.data(), task.size()) >> 2);
         lock.l_len = 1;
-        return ::fcntl(descriptor_, F_OFD_SETLK, &lock) == 0;
+        return ::fcntl(descriptor_.get(), F_OFD_SETLK, &lock) == 0;
     }
 
-    int descriptor_;
+    FileDescriptor descriptor_;
 };
 
 constexpr double kShortestWait = 0.01, kLongestWait = 0.25; // seconds

@@ -17,8 +17,9 @@ constexpr double kLargestAngle = 0.92 * std::numbers::pi; // no triangle takes h
 constexpr double kSmallestRadius = 1e-3;                  // of the largest in a star
 constexpr double kSmallestHeight = 1e-3;                  // of an edge's length, when it is unfolded
 
-double cross(const Vec2f& a, const Vec2f& b) { return double(a.x()) * b.y() - double(a.y()) * b.x(); }
-double doubled_area(const Vec2f& a, const Vec2f& b, const Vec2f& c) { return cross(b - a, c - a); }
+/// Of the triangle of the origin, a and b.
+double doubled_area(const Vec2f& a, const Vec2f& b) { return double(a.x()) * b.y() - double(a.y()) * b.x(); }
+double doubled_area(const Vec2f& a, const Vec2f& b, const Vec2f& c) { return doubled_area(b - a, c - a); }
 
 /// Scales the angles to a sum of `turn`; none may reach half a turn.
 void scale_angles(std::span<double> angles, double turn) {
@@ -339,7 +340,7 @@ TrianglePoint SurfaceMap::locate(const Star& star, const Vec2f& place) const {
     TrianglePoint found;
     for (std::size_t i = 0; i < star.triangle_count(); ++i) {
         const Vec2f &a = star.flat[i], &b = star.flat[star.next(i)];
-        const double whole = cross(a, b), at_a = cross(place, b), at_b = cross(a, place);
+        const double whole = doubled_area(a, b), at_a = doubled_area(place, b), at_b = doubled_area(a, place);
         const Vec3d weights = Vec3d(whole - at_a - at_b, at_a, at_b) / whole;
         if (weights.minCoeff() <= best) continue;
         best = weights.minCoeff();

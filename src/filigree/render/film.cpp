@@ -3,6 +3,7 @@
 #include "filigree/io/extension.h"
 #include "filigree/io/file.h"
 #include "filigree/io/file_batch.h"
+#include "filigree/io/file_descriptor.h"
 #include "filigree/io/file_error.h"
 #include "filigree/io/numbered_name.h"
 #include "filigree/io/temporary_file.h"
@@ -45,27 +46,6 @@ std::string number_text(double number) {
     return std::string(text, std::to_chars(text, text + sizeof text, number).ptr);
 }
 
-/// Closes what it holds.
-class Descriptor {
-public:
-    explicit Descriptor(int descriptor = -1) : descriptor_(descriptor) {}
-    Descriptor(Descriptor&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
-    Descriptor& operator=(Descriptor&& other) noexcept {
-        std::swap(descriptor_, other.descriptor_);
-        return *this;
-    }
-    ~Descriptor() { close(); }
-
-    int get() const { return descriptor_; }
-    bool is_open() const { return descriptor_ >= 0; }
-    void close() {
-        if (is_open()) ::close(std::exchange(descriptor_, -1));
-    }
-
-private:
-    int descriptor_;
-};
-
 /// The bytes of ffmpeg's film beside its place: gone at the end, unless it is put there.
 class TemporaryFile {
 public:
@@ -75,7 +55,7 @@ public:
         std::error_code ignored;
         if (fs::is_symlink(real, ignored)) return cannot_write(target, ELOOP);
         fs::path path;
-        Descriptor owner(create_beside(real, path));
+        FileDescriptor owner(create_beside(real, path));
         if (!owner.is_open()) return cannot_write(target, errno);
         return TemporaryFile(std::move(path), std::move(real), std::move(owner));
     }
@@ -106,10 +86,10 @@ public:
     }
 
 private:
-    TemporaryFile(fs::path path, fs::path real_target, Descriptor owner)
+    TemporaryFile(fs::path path, fs::path real_target, FileDescriptor owner)
         : path_(std::move(path)), real_target_(std::move(real_target)), owner_(std::move(owner)) {}
     fs::path path_, real_target_;
-    Descriptor owner_; ///< tells other writers that the file is ours
+    FileDescriptor owner_; ///< tells other writers that the file is ours
 };
 
 /// A child process that reads what we send and whose complaints we hear. Killed when it goes away unfinished.
@@ -120,11 +100,11 @@ public:
         int input[2], errors[2];
         // A socket, not a pipe: sending to a process that has ended is an error then, and never a signal.
         if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, input) != 0) return errno;
-        input_ = Descriptor(input[0]);
-        const Descriptor child_input(input[1]);
+        input_ = FileDescriptor(input[0]);
+        const FileDescriptor child_input(input[1]);
         if (::pipe2(errors, O_CLOEXEC) != 0) return errno;
-        errors_ = Descriptor(errors[0]);
-        const Descriptor child_errors(errors[1]);
+        errors_ = FileDescriptor(errors[0]);
+        const FileDescriptor child_errors(errors[1]);
 
         std::vector<char*> arguments;
         for (std::string& word : words) arguments.push_back(word.data());
@@ -191,7 +171,10 @@ private:
         char bytes[4096];
         const ssize_t got = ::read(errors_.get(), bytes, sizeof bytes);
         if (got < 0 && errno == EINTR) return;
-        if (got <= 0) return errors_.close();
+        if (got <= 0) {
+            errors_.close();
+            return;
+        }
         complaint_.append(bytes, std::min(static_cast<std::size_t>(got), kMostKept - complaint_.size()));
     }
 
@@ -204,7 +187,7 @@ private:
     }
 
     pid_t child_ = -1;
-    Descriptor input_, errors_;
+    FileDescriptor input_, errors_;
     std::string complaint_;
 };
 
@@ -312,7 +295,7 @@ public:
 
     Status finish() override {
         if (!ffmpeg_.finish()) return failure();
-        const Descriptor film(::open(file_.path().c_str(), O_RDONLY | O_CLOEXEC));
+        const FileDescriptor film(::open(file_.path().c_str(), O_RDONLY | O_CLOEXEC));
         if (!film.is_open() || ::fsync(film.get()) != 0) return cannot_write(target_, "the disk failed");
         if (const int failed = file_.put_in_place()) return cannot_write(target_, failed);
         return Success{};
