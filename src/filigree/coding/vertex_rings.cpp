@@ -17,7 +17,7 @@ VertexRings::VertexRings(const ClosedMap& map, std::span<const FinePlace> places
         vertices_[v].place = places[v];
         vertices_[v].difference = difference;
         if (map.closes_hole[v] || degrees[v] > kLongest) {
-            sizes_[v] = map.closes_hole[v] ? kHole : kTooLong;
+            sizes_[v] = std::uint8_t(map.closes_hole[v] ? kHole : kTooLong);
             continue;
         }
         LongRing ring;
