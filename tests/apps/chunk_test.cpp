@@ -243,8 +243,8 @@ TEST_F(ChunkedItems, SweepsSayWhatIsWrongBeforeTheySimulate) {
     EXPECT_NE(bytes_of(path("a/t.csv")).find("\n2,drop.toml,\"[0,2,0]\",cube"), std::string::npos);
 }
 
-/// A process is killed before its calls that change a file or a folder: before every fifth where they are many, and before
-/// each of them with FILIGREE_EVERY_CALL in the environment (a minute more).
+/// A process is killed before its calls that change a file or a folder: before every fifth where they are many, and
+/// before each of them with FILIGREE_EVERY_CALL in the environment (a minute more).
 class KilledEverywhere : public ChunkedItems {
 protected:
     static constexpr int kMany = 5;

@@ -56,7 +56,8 @@ public:
         struct stat status {};
         const bool is_locked = ::flock(descriptor_.get(), LOCK_EX | LOCK_NB) == 0;
         is_lost_ = !is_locked && errno == EWOULDBLOCK;
-        if (::fstat(descriptor_.get(), &status) == 0 && status.st_nlink == 0) is_lost_ = true; // removed before we had it
+        if (::fstat(descriptor_.get(), &status) == 0 && status.st_nlink == 0)
+            is_lost_ = true; // removed before we had it
         is_held_ = is_locked && !is_lost_;
     }
     bool is_there() const { return descriptor_.is_open(); }

@@ -4,20 +4,18 @@ namespace filigree::meshfree {
 
 namespace {
 
-using Lanes = StressLanes;
-
-FILIGREE_INLINE Lanes greater(Lanes a, Lanes b) { return a > b ? a : b; }
-FILIGREE_INLINE Lanes square_root(Lanes x) { // x >= 0
+FILIGREE_INLINE StressLanes greater(StressLanes a, StressLanes b) { return a > b ? a : b; }
+FILIGREE_INLINE StressLanes square_root(StressLanes x) { // x >= 0
     typedef std::int32_t Ints __attribute__((vector_size(4 * kStressBlock)));
     x += 1e-30f;
-    Lanes y = (Lanes)(0x5f3759df - ((Ints)x >> 1));
+    StressLanes y = (StressLanes)(0x5f3759df - ((Ints)x >> 1));
     for (int step = 0; step < 3; ++step) y = y * (1.5f - 0.5f * x * y * y);
     return x * y;
 }
 
 /// Matrices of kStressBlock particles, [row][column].
 struct LaneMatrix {
-    Lanes m[3][3];
+    StressLanes m[3][3];
 };
 FILIGREE_INLINE LaneMatrix product(const LaneMatrix& a, const LaneMatrix& b) {
     LaneMatrix r;
@@ -34,17 +32,17 @@ FILIGREE_INLINE LaneMatrix cofactor(const LaneMatrix& a) {
     return r;
 }
 /// A bound of the largest eigenvalue of A^T A: of numbers with mean m and variance v none is above m + sqrt(2 v).
-FILIGREE_INLINE Lanes largest_square(const LaneMatrix& a) {
-    Lanes diagonal[3], off = {};
+FILIGREE_INLINE StressLanes largest_square(const LaneMatrix& a) {
+    StressLanes diagonal[3], off = {};
     for (int i = 0; i < 3; ++i) {
         diagonal[i] = a.m[0][i] * a.m[0][i] + a.m[1][i] * a.m[1][i] + a.m[2][i] * a.m[2][i];
         const int j = (i + 1) % 3;
-        const Lanes o = a.m[0][i] * a.m[0][j] + a.m[1][i] * a.m[1][j] + a.m[2][i] * a.m[2][j];
+        const StressLanes o = a.m[0][i] * a.m[0][j] + a.m[1][i] * a.m[1][j] + a.m[2][i] * a.m[2][j];
         off += o * o;
     }
-    const Lanes mean = (diagonal[0] + diagonal[1] + diagonal[2]) * (1 / 3.f);
-    Lanes spread = 2 * off;
-    for (const Lanes& d : diagonal) spread += (d - mean) * (d - mean);
+    const StressLanes mean = (diagonal[0] + diagonal[1] + diagonal[2]) * (1 / 3.f);
+    StressLanes spread = 2 * off;
+    for (const StressLanes& d : diagonal) spread += (d - mean) * (d - mean);
     return mean + square_root(spread * (2 / 3.f));
 }
 
@@ -52,7 +50,7 @@ FILIGREE_INLINE Lanes largest_square(const LaneMatrix& a) {
 FILIGREE_INLINE BlockResult stress_block(const BlockArrays& arrays, std::size_t first, std::size_t count,
                                          Columns* gradients) {
     LaneMatrix F{}, D{}, M{};
-    Lanes volume = {}, mu = {}, L = {}, g0 = {}, z = {};
+    StressLanes volume = {}, mu = {}, L = {}, g0 = {}, z = {};
     for (std::size_t l = 0; l < count; ++l) {
         const std::size_t i = first + l;
         for (int a = 0; a < 3; ++a)
@@ -72,12 +70,12 @@ FILIGREE_INLINE BlockResult stress_block(const BlockArrays& arrays, std::size_t 
     }
     const LaneMatrix Fe = arrays.stored ? product(F, D) : F;
     const LaneMatrix cof = cofactor(Fe);
-    const Lanes J = Fe.m[0][0] * cof.m[0][0] + Fe.m[0][1] * cof.m[0][1] + Fe.m[0][2] * cof.m[0][2];
-    Lanes I = {};
+    const StressLanes J = Fe.m[0][0] * cof.m[0][0] + Fe.m[0][1] * cof.m[0][1] + Fe.m[0][2] * cof.m[0][2];
+    StressLanes I = {};
     for (int r = 0; r < 3; ++r)
         for (int a = 0; a < 3; ++a) I += Fe.m[r][a] * Fe.m[r][a];
-    const Lanes inverse = 1 / (I + 1);
-    const Lanes shear = mu * (1 - inverse), pressure = L * (J - g0);
+    const StressLanes inverse = 1 / (I + 1);
+    const StressLanes shear = mu * (1 - inverse), pressure = L * (J - g0);
     LaneMatrix P;
     for (int r = 0; r < 3; ++r)
         for (int a = 0; a < 3; ++a) P.m[r][a] = volume * (shear * Fe.m[r][a] + pressure * cof.m[r][a]);
@@ -98,10 +96,10 @@ FILIGREE_INLINE BlockResult stress_block(const BlockArrays& arrays, std::size_t 
 
     // For changes v g^T: shear (g.g') I and pressure [F (g x g')] are a rotation's parts, so the larger counts; then
     // L (cof g)(cof g')^T, and what the logarithm adds.
-    const Lanes zero = {};
-    const Lanes stretch = largest_square(Fe);
-    const Lanes size = pressure > zero ? pressure : -pressure;
-    Lanes stiffness =
+    const StressLanes zero = {};
+    const StressLanes stretch = largest_square(Fe);
+    const StressLanes size = pressure > zero ? pressure : -pressure;
+    StressLanes stiffness =
         greater(shear, size * square_root(stretch)) + L * largest_square(cof) + 2 * mu * inverse * inverse * stretch;
     if (arrays.stored) stiffness *= largest_square(D);
     return {stiffness, J, I};
