@@ -15,7 +15,7 @@ std::vector<std::string> paths_of(const Option& option) {
 }
 
 /// Whether both are names of one file; a terminal or a pipe may be read and written.
-bool is_one_file(const std::filesystem::path& a, const std::filesystem::path& b) {
+bool is_one_regular_file(const std::filesystem::path& a, const std::filesystem::path& b) {
     std::error_code failed;
     return std::filesystem::is_regular_file(a, failed) && std::filesystem::equivalent(a, b, failed) && !failed;
 }
@@ -29,7 +29,7 @@ void refuse_to_overwrite_inputs(const OptionList& options) {
         for (const Option& input : options)
             for (const std::string& read : paths_of(input))
                 for (const std::string& written : paths_of(output))
-                    if (input.file == Option::File::read && is_one_file(read, written))
+                    if (input.file == Option::File::read && is_one_regular_file(read, written))
                         refuse(written +
                                ": is the input and would be overwritten; choose "
                                "another place with " +
