@@ -1,5 +1,6 @@
 // What is drawn while the document is another already.
 #include "drawn_objects.h"
+#include "studio/patience.h"
 #include "viewport.h"
 
 #include <QOffscreenSurface>
@@ -15,8 +16,6 @@ using namespace filigree;
 using namespace filigree::studio;
 
 namespace {
-
-constexpr int kPatience = 20'000; // ms
 
 TEST(DrawnObjects, AModelWithMoreLevelsThanTheOneDrawn) {
     Workbench workbench;

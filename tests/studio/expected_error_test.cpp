@@ -1,5 +1,6 @@
 // What the pose shown is expected to be off by, followed while it moves.
 #include "expected_error.h"
+#include "studio/patience.h"
 
 #include "workbench.h"
 
@@ -13,8 +14,6 @@
 
 namespace filigree::studio {
 namespace {
-
-constexpr int kPatience = 20'000; // ms
 
 struct ExpectedErrorTest : testing::Test {
     Workbench bench;

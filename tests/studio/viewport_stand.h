@@ -1,6 +1,7 @@
 // A viewport in a window, and a mouse for it.
 #pragma once
 
+#include "studio/patience.h"
 #include "viewport.h"
 
 #include <QApplication>
@@ -13,8 +14,6 @@
 #include <functional>
 
 namespace filigree::studio {
-
-inline constexpr int kPatience = 20'000; // ms
 
 /// A viewport with a bumpy ball, shown and drawn.
 struct Stand {
