@@ -22,11 +22,12 @@ import sys
 import threading
 import time
 
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 LAYERS = {  # and the tests that judge them, quick ones first
-    "hierarchy": ["properties_test", "hierarchy_test"],
-    "sample": ["properties_test", "sample_test"],
-    "coding": ["properties_test", "coding_test"],
-    "fracture": ["fracture_test"],
+    "hierarchy": ["properties_test", "same_bytes", "hierarchy_test"],
+    "sample": ["properties_test", "same_bytes", "sample_test"],
+    "coding": ["properties_test", "same_bytes", "coding_test"],
+    "fracture": ["same_bytes", "fracture_test"],
 }
 CHANGES = [
     (r" \+ ", " - "), (r" - ", " + "), (r" \* ", " + "), (r" / ", " * "), (r" < ", " <= "), (r" <= ", " < "),
@@ -37,10 +38,10 @@ NO_CODE = re.compile(r"^\s*(//|#|\*|using|template|namespace|static_assert|struc
 MOST_MEMORY = 8 << 30  # a change may ask for all there is
 
 
-def sites(root):
+def sites():
     found = {layer: [] for layer in LAYERS}
     for layer in LAYERS:
-        for path in sorted((root / "src/filigree" / layer).glob("*.cpp")):
+        for path in sorted((ROOT / "src/filigree" / layer).glob("*.cpp")):
             for number, line in enumerate(path.read_text().splitlines()):
                 code = line.split("//")[0]
                 if NO_CODE.search(code):
@@ -50,6 +51,12 @@ def sites(root):
                         continue
                     found[layer] += [(path, number, m.start(), m.end(), text) for m in re.finditer(pattern, code)]
     return found
+
+
+def command_of(test, release):
+    if test == "same_bytes":
+        return [ROOT / "tests/apps/same_bytes", release / "bin/filigree"]
+    return [release / "bin" / test, "--gtest_fail_fast", "--gtest_brief=1"]
 
 
 def run(words, **how):
@@ -100,7 +107,7 @@ def fails(release, test, folder, seconds):
     shutil.rmtree(where, ignore_errors=True)
     where.mkdir()
     try:
-        done = run([release / "bin" / test, "--gtest_fail_fast", "--gtest_brief=1"], cwd=where, timeout=seconds,
+        done = run(command_of(test, release), cwd=where, timeout=seconds,
                    env={**os.environ, "LD_LIBRARY_PATH": str(folder), "TMPDIR": str(where)},
                    preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY)))
     except subprocess.TimeoutExpired:
@@ -117,9 +124,8 @@ def main():
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--json", type=pathlib.Path)
     options = parser.parse_args()
-    root = pathlib.Path(__file__).resolve().parents[2]
     library = Library(options.release, options.single)
-    by_layer = sites(root)
+    by_layer = sites()
     choice = random.Random(options.seed)
     told = {"seed": options.seed, "made": 0, "caught": 0, "escaped": []}
     lock = threading.Lock()
@@ -160,7 +166,7 @@ def main():
                     tried -= 1
                 continue
             by = next((by for test in LAYERS[layer] if (by := fails(options.release, test, folder, 20 + 4 * seconds[test]))), None)
-            where = f"{path.relative_to(root)}:{number + 1}"
+            where = f"{path.relative_to(ROOT)}:{number + 1}"
             with lock:
                 told["made"] += 1
                 told["caught"] += by is not None
