@@ -54,6 +54,8 @@ TEST(BrokenModel, MovesAsTheUnbrokenOneUntilPiecesPart) {
     const std::vector<Vec3f> after =
         Restorer::create(ball.broken.model, {}, kOneThread).value().positions(pose, kOneThread).value();
     EXPECT_EQ(std::memcmp(before.data(), after.data(), before.size() * sizeof(Vec3f)), 0);
+    for (std::size_t d = 0; d < pose.positions.size(); ++d)
+        EXPECT_LT((after[ball.broken.model.driver().vertices[d]] - pose.positions[d]).norm(), 1e-5f);
     // Copies in several pieces are in one place, to the bit; points on cracks are where the warp takes them.
     std::map<Index, Vec3f> at;
     double worst_old = 0, worst_surface = 0, worst_inside = 0;
