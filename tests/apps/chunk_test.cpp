@@ -243,12 +243,9 @@ TEST_F(ChunkedItems, SweepsSayWhatIsWrongBeforeTheySimulate) {
     EXPECT_NE(bytes_of(path("a/t.csv")).find("\n2,drop.toml,\"[0,2,0]\",cube"), std::string::npos);
 }
 
-/// A process is killed before its calls that change a file or a folder: before every fifth where they are many, and
-/// before each of them with FILIGREE_EVERY_CALL in the environment (a minute more).
+/// A process is killed before each of its calls that change a file or a folder, one after the other.
 class KilledEverywhere : public ChunkedItems {
 protected:
-    static constexpr int kMany = 5;
-
     void SetUp() override {
         if (kSanitized) GTEST_SKIP() << "a sanitizer wants to be loaded first";
         ChunkedItems::SetUp();
@@ -258,10 +255,9 @@ protected:
     }
 
     /// words: a command for a folder and a chunk; `older` is finished in a before, and not to be lost. has_begun: the
-    /// other half is there already. stride: from one call to the next that is struck.
+    /// other half is there already.
     void kill_everywhere(const std::function<std::vector<std::string>(const std::string&, const std::string&)>& words,
-                         const std::vector<std::string>& older, bool has_begun = true, int stride = 1) {
-        if (std::getenv("FILIGREE_EVERY_CALL")) stride = 1;
+                         const std::vector<std::string>& older, bool has_begun = true) {
         ok(words("b", ""));
         const auto whole = all_in("b");
         ok(older);
@@ -271,23 +267,23 @@ protected:
         namespace fs = std::filesystem;
         fs::copy(path("a"), path("begun"), fs::copy_options::recursive);
         int struck = 0;
-        for (int call = 1;; call += stride, ++struck) {
+        for (;; ++struck) {
             fs::remove_all(path("a"));
             fs::copy(path("begun"), path("a"), fs::copy_options::recursive);
-            const Ran ran = run_shell("FAILING_CALL=any FAILING_HOW=kill FAILING_NUMBER=" + std::to_string(call) +
+            const Ran ran = run_shell("FAILING_CALL=any FAILING_HOW=kill FAILING_NUMBER=" + std::to_string(struck + 1) +
                                           " LD_PRELOAD=./shim.so exec \"$0\" \"$@\"",
                                       words("a", "2/2"));
             if (ran.code == 0) break;
             ASSERT_EQ(ran.code, -1) << ran.err;
             const auto shown = in_place("a");
             const bool is_being_placed = has_batch("a"); // which the next run completes, see io/file_batch.h
-            EXPECT_TRUE(shown == old || shown == whole || is_being_placed) << "killed before call " << call;
+            EXPECT_TRUE(shown == old || shown == whole || is_being_placed) << "killed before call " << struck + 1;
             ok(words("a", "2/2"));
-            ASSERT_EQ(all_in("a"), whole) << "killed before call " << call;
+            ASSERT_EQ(all_in("a"), whole) << "killed before call " << struck + 1;
         }
         EXPECT_EQ(all_in("a"), whole);
         EXPECT_GT(struck, 8);
-        std::printf("killed before %d calls\n", struck);
+        std::printf("killed before each of %d calls\n", struck);
     }
 
 private:
@@ -315,7 +311,7 @@ TEST_F(KilledEverywhere, PicturesAreTheOldOrTheNew) {
     if (!has_opengl()) GTEST_SKIP() << "no OpenGL";
     std::vector<std::string> older = pictures("a", "1/1");
     older.insert(older.end(), {"--color", "#ff0000"});
-    kill_everywhere(pictures, older, true, kMany);
+    kill_everywhere(pictures, older);
 }
 
 TEST_F(KilledEverywhere, AShotIsTheOldOrTheNew) {
@@ -343,7 +339,7 @@ TEST_F(KilledEverywhere, AModelIsTheOldOrTheNew) {
     };
     std::vector<std::string> older = strip("a", "1/1");
     older[5] = "50";
-    kill_everywhere(strip, older, false, kMany); // one process makes all that others have not
+    kill_everywhere(strip, older, false); // one process makes all that others have not
 }
 
 namespace {

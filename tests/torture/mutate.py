@@ -135,7 +135,7 @@ def main():
     def unchanged(number, test):
         folder = options.work / f"unchanged-{number}"
         folder.mkdir(parents=True, exist_ok=True)
-        path = next(iter(by_layer["hierarchy"]))[0]
+        path = by_layer["hierarchy"][0][0]
         assert library.make(folder, path, path.read_text())
         begin = time.monotonic()
         if by := fails(options.release, test, folder, 1200):

@@ -96,7 +96,7 @@ private:
     }
     Status make_empty(const fs::path& path) const {
         const FileDescriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
-        int wrong = !file.is_open() ? errno : write_at(file.get(), 0, header_);
+        int wrong = file.is_open() ? write_at(file.get(), 0, header_) : errno;
         if (!wrong && ::ftruncate(file.get(), off_t(size_)) != 0) wrong = errno;
         if (!wrong && ::fsync(file.get()) != 0) wrong = errno;
         if (wrong) return cannot_write(path, wrong);

@@ -48,6 +48,7 @@ public:
         file->size_ = static_cast<std::uint64_t>(status.st_size);
         return std::shared_ptr<const RandomFile>(std::move(file));
     }
+
     const std::string& name() const { return name_; }
     std::uint64_t size() const { return size_; }
     Error error(const std::string& cause) const { return {ErrorCode::bad_file, name_ + ": " + cause}; }

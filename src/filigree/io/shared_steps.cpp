@@ -27,6 +27,7 @@ class Claims {
 public:
     explicit Claims(const std::filesystem::path& file)
         : descriptor_(::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666)) {}
+
     /// False: another process is at it.
     bool take(const std::string& task) const { return set(task, F_WRLCK) || (errno != EAGAIN && errno != EACCES); }
     void release(const std::string& task) const { set(task, F_UNLCK); }
