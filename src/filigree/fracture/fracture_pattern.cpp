@@ -1,5 +1,6 @@
 #include "filigree/fracture/fracture_pattern.h"
 
+#include "filigree/core/dense_solve.h"
 #include "filigree/core/random.h"
 #include "filigree/fracture/cell_clumps.h"
 #include "filigree/mesh/triangulate.h"
@@ -7,7 +8,6 @@
 #include "filigree/sample/spacing_for_count.h"
 #include "filigree/sample/spread_inside.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -88,7 +88,7 @@ Mat3d principal_axes(std::span<const Vec3d> points) {
     mean /= double(points.size());
     Mat3d spread = Mat3d::Zero();
     for (const Vec3d& p : points) spread += (p - mean) * (p - mean).transpose();
-    return Eigen::SelfAdjointEigenSolver<Mat3d>(spread).eigenvectors();
+    return symmetric_eigen(spread).vectors;
 }
 
 /// `count` of the points, those with large weights first and the rest by chance [Efraimidis 2006].

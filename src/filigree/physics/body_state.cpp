@@ -1,9 +1,9 @@
 #include "filigree/physics/body_state.h"
 
+#include "filigree/core/dense_solve.h"
 #include "filigree/core/parallel_for.h"
 
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <limits>
 #include <numeric>
@@ -24,10 +24,10 @@ Mat3f bounded_stretch(const Mat3f& gradient) {
     const float squared = gradient.squaredNorm();
     if (squared < kMostFlow * kMostFlow && 2 * std::abs(gradient.determinant()) * kMostFlow > 1.0001f * squared)
         return gradient;
-    const Eigen::JacobiSVD<Mat3f> svd(gradient, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    const Vec3f& stretch = svd.singularValues();
+    const SingularValues<float> svd = singular_values(gradient);
+    const Vec3f& stretch = svd.s;
     if (stretch.maxCoeff() <= kMostFlow && stretch.minCoeff() >= 1 / kMostFlow) return gradient;
-    return svd.matrixU() * stretch.cwiseMax(1 / kMostFlow).cwiseMin(kMostFlow).asDiagonal() * svd.matrixV().transpose();
+    return svd.u * stretch.cwiseMax(1 / kMostFlow).cwiseMin(kMostFlow).asDiagonal() * svd.v.transpose();
 }
 
 void bound_stretches(std::span<Mat3f> gradients, const RunContext& context) {

@@ -4,9 +4,9 @@
 //   particle with too few.
 #include "filigree/physics/mls_neighbours.h"
 
+#include "filigree/core/dense_solve.h"
 #include "filigree/core/parallel_for.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -117,8 +117,7 @@ bool look_within(float radius, std::size_t i, const NeighbourGrid& grid, Surroun
         sum += weight;
     });
     if (found.size() < kEnough || !(sum > 0)) return false;
-    const Eigen::SelfAdjointEigenSolver<Mat3f> eigen(moment / sum, Eigen::EigenvaluesOnly);
-    return eigen.eigenvalues()[0] >= kLeastMomentSpread * around.spacing * around.spacing;
+    return symmetric_eigenvalues(moment / sum)[0] >= kLeastMomentSpread * around.spacing * around.spacing;
 }
 
 Surroundings find_surroundings(const Vectors& positions, std::span<const float> volume, float spacing,
@@ -180,11 +179,11 @@ struct InverseMoment {
 
 InverseMoment invert(const PairSums& sums, float spacing, std::size_t neighbour_count) {
     const float unit = sums.weight * spacing * spacing; // the mean square: eigenvalues then compare with spreads
-    const Eigen::SelfAdjointEigenSolver<Mat3f> eigen(sums.weight > 0 ? Mat3f(sums.moment / unit) : Mat3f::Zero());
+    const auto [values, vectors] = symmetric_eigen(sums.weight > 0 ? Mat3f(sums.moment / unit) : Mat3f::Zero());
     InverseMoment result;
     for (int a = 0; a < 3; ++a) {
-        const Vec3f axis = eigen.eigenvectors().col(a);
-        const float value = eigen.eigenvalues()[a];
+        const Vec3f axis = vectors.col(a);
+        const float value = values[a];
         if (value >= kNoSpread && neighbour_count >= 3)
             result.inverse += axis * axis.transpose() / (value * sums.weight * spacing * spacing);
         else

@@ -9,7 +9,7 @@
 namespace filigree {
 
 /// A cell as its eight corners have it: sums X_m of their positions with the signs of a Walsh-Hadamard transform
-/// (cell_kernel.cpp). X_1, X_2, X_4 over 4 h are the columns of its mean gradient; X_3, X_5, X_6, X_7 bend it.
+/// (cell_lanes.h). X_1, X_2, X_4 over 4 h are the columns of its mean gradient; X_3, X_5, X_6, X_7 bend it.
 using CellSums = std::array<Vec3f, 8>;
 CellSums cell_sums(const Vectors& positions, const std::array<Index, 8>& corners);
 inline constexpr std::array<int, 3> kLinearSums = {1, 2, 4};

@@ -1,4 +1,4 @@
-// The fem material that yields: whole cells as in cell_kernel.cpp, one after the other, each with the shape in which it
+// The fem material that yields: whole cells as in cell_lanes.h, one after the other, each with the shape in which it
 // is at rest. With D the inverse of a cell's plastic gradient and b its bending at rest, the energy is that of
 //     Xe = [X_1 X_2 X_4] D  and  Xe_k = X_k - [X_1 X_2 X_4] b_k,  k = 3, 5, 6, 7,
 // so volume is as elastic as before, and turning a cell costs nothing. Once a substep strain beyond the yield stress

@@ -5,7 +5,6 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 
@@ -25,10 +24,10 @@ Mat3d turned(const RigidPose& pose, const Mat3d& at_rest) {
 
 /// Rotation nearest to the moment of places times places at rest [Kabsch 1976].
 Mat3d nearest_rotation(const Mat3d& moment) {
-    const Eigen::JacobiSVD<Mat3d> svd(moment, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    const SingularValues<double> svd = singular_values(moment);
     Vec3d sign = Vec3d::Ones();
-    sign[2] = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
-    return svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
+    sign[2] = (svd.u * svd.v.transpose()).determinant() < 0 ? -1 : 1;
+    return svd.u * sign.asDiagonal() * svd.v.transpose();
 }
 
 Vec3d centre_of(const Vectors& positions, std::span<const float> mass) {
