@@ -9,7 +9,8 @@ const kTypes = { '.html': 'text/html', '.js': 'text/javascript', '.css': 'text/c
 
 /// Opens Chromium; ends the script as skipped where there is none.
 export async function open_browser() {
-    const places = [process.env.CHROMIUM, '/usr/bin/chromium', '/usr/bin/chromium-browser', '/usr/bin/google-chrome'];
+    const places = [process.env.CHROMIUM, '/usr/bin/chromium-headless-shell', '/usr/bin/chromium', '/usr/bin/chromium-browser',
+        '/usr/bin/google-chrome'];
     const program = places.find((place) => place && existsSync(place));
     if (!program) skip('chromium is not installed; run scripts/setup');
     const { chromium } = require('playwright-core');

@@ -53,6 +53,17 @@ const on_page = {
     },
 };
 
+/// Whether the page would fetch a picture from elsewhere, as a model may ask it to.
+async function asks_elsewhere(page) {
+    return page.evaluate(() => Promise.race([
+        new Promise((refused) => {
+            document.addEventListener('securitypolicyviolation', () => refused(false));
+            fetch('http://127.0.0.1:9/picture.png').catch(() => {});
+        }),
+        new Promise((timeout) => setTimeout(() => timeout(true), 5000)),
+    ]));
+}
+
 /// Uses the page; returns what went wrong. thorough: every control, not only that the model is there and moves.
 async function visit(browser, url, { thorough, pictures, key_frames }) {
     const { page, foreign, complaints } = await watched_page(browser, new URL('.', url).href);
@@ -71,12 +82,14 @@ async function visit(browser, url, { thorough, pictures, key_frames }) {
         await page.click('#play');
         check(!(await page.evaluate(() => filigree.is_playing)), 'the button does not pause');
     }
-    if (!thorough) {
+    const leave = async () => {
         check(foreign.length === 0, `asks for ${foreign.join(' ')}`);
         check(complaints.length === 0, `the browser says: ${complaints.join('; ')}`);
+        check(!(await asks_elsewhere(page)), `${url} asks other machines for what a model names`);
         await page.close();
         return wrong;
-    }
+    };
+    if (!thorough) return leave();
     const seek = (seconds) => page.evaluate((time) => filigree.seek(time), seconds);
     await seek(0);
     const start = await on_page.picture(page);
@@ -134,27 +147,8 @@ async function visit(browser, url, { thorough, pictures, key_frames }) {
         await on_page.picture(page);
         await page.screenshot({ path: join(pictures, 'page_dark_phone.png') });
     }
-    check(foreign.length === 0, `asks for ${foreign.join(' ')}`);
-    check(complaints.length === 0, `the browser says: ${complaints.join('; ')}`);
     console.log(`${url}: ${covered} pixels of model; triangles drawn by level: ${triangles.join(' ') || 'one level'}`);
-    await page.close();
-    return wrong;
-}
-
-/// Whether the page would fetch a picture from elsewhere, as a model may ask it to.
-async function asks_elsewhere(browser, url) {
-    const { page } = await watched_page(browser, url);
-    await page.goto(url);
-    await on_page.ready(page);
-    const asked = await page.evaluate(() => Promise.race([
-        new Promise((refused) => {
-            document.addEventListener('securitypolicyviolation', () => refused(false));
-            fetch('http://127.0.0.1:9/picture.png').catch(() => {});
-        }),
-        new Promise((timeout) => setTimeout(() => timeout(true), 5000)),
-    ]));
-    await page.close();
-    return asked;
+    return leave();
 }
 
 /// Everything there is to check of one folder; returns what went wrong.
@@ -167,8 +161,6 @@ export async function check_page(folder, pictures, key_frames = false) {
             ...await visit(browser, pathToFileURL(join(resolve(folder), 'index.html')).href, { thorough: true, pictures, key_frames }),
             ...await visit(browser, `${server.url}/index.html`, { thorough: false }),
         ];
-        for (const url of [pathToFileURL(join(resolve(folder), 'index.html')).href, `${server.url}/index.html`])
-            if (await asks_elsewhere(browser, url)) wrong.push(`${url} asks other machines for what a model names`);
         const { page } = await watched_page(browser, broken.url);
         await page.goto(`${broken.url}/index.html`);
         await on_page.ready(page);
