@@ -1,4 +1,5 @@
 // Lossless model files: byte for byte the plain file, whatever the model; parts of it are read as from a plain one.
+#include "coded_size.h"
 #include "corpus.h"
 #include "sample_meshes.h"
 #include "threads.h"
@@ -9,6 +10,7 @@
 #include "filigree/io/model_chunks.h"
 #include "filigree/io/model_file.h"
 #include "filigree/io/model_sections.h"
+#include "filigree/mesh/normals.h"
 #include "filigree/mesh/shapes.h"
 
 #include <cstdlib>
@@ -72,6 +74,25 @@ TEST(LosslessModel, SeveralChunksAndSmaller) {
     const PoseSequence poses = bending(model, 2, true);
     const std::size_t bytes = expect_same(model, poses);
     EXPECT_LT(double(bytes), 0.45 * double(write_model(model, poses).size()));
+}
+
+TEST(LosslessModel, SizesStay) {
+    Mesh mesh = make_wavy_sphere({.resolution = 60});
+    const auto size_of = [&](const StripOptions& options, std::size_t frames = 0) {
+        const Model model = strip(mesh, options, kTwoThreads)->model;
+        return expect_same(model, bending(model, frames, true));
+    };
+    expect_coded_size(size_of({.base = 100}), 278016, "places and details");
+    expect_coded_size(size_of({.base = 100}, 20), 299992, "with 20 poses");
+    expect_coded_size(size_of({.base = 100, .precision = Precision::int16}), 184488, "details of 16 bits");
+    expect_coded_size(size_of({.base = 100, .reorder = true}), 343296, "in the order of places");
+    expect_coded_size(size_of({.code = DetailCode::reference}), 377480, "detail against three references");
+    mesh.normals.values = vertex_normals(mesh, mesh.positions, kTwoThreads);
+    for (const Vec3f& p : mesh.positions) {
+        mesh.uvs.values.emplace_back(0.5f + 0.4f * p.x(), 0.5f + 0.4f * p.y() * p.z());
+        mesh.colors.emplace_back(0.5f + 0.3f * p.x(), 0.5f + 0.3f * p.y(), p.z() > 0 ? 0.9f : 0.2f, 1.0f);
+    }
+    expect_coded_size(size_of({.base = 100}), 566296, "with normals, texture coordinates and colours");
 }
 
 TEST(LosslessModel, PartsAreReadAsFromAPlainFile) {

@@ -59,7 +59,7 @@ std::vector<Vec3f> bent(const Model& model) {
 }
 
 bool same_bytes(std::span<const Vec3f> a, std::span<const Vec3f> b) {
-    return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size_bytes()) == 0;
+    return std::ranges::equal(std::as_bytes(a), std::as_bytes(b));
 }
 
 Result<Model> read(const std::string& bytes) { return read_model(bytes, "a.fil", kOneThread); }

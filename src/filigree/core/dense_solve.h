@@ -26,7 +26,7 @@ template <class Scalar>
 struct SingularValues {
     Eigen::Matrix<Scalar, 3, 3> u, v;
     Eigen::Matrix<Scalar, 3, 1> s;
-    bool converged = true; ///< false: the matrix is not finite, and nothing above holds
+    bool converged = true; ///< false: the matrix is not finite; u and v are the identity then, s is 0
 };
 SingularValues<float> singular_values(const Mat3f& matrix);
 SingularValues<double> singular_values(const Mat3d& matrix);

@@ -25,9 +25,8 @@ Mat3f bounded_stretch(const Mat3f& gradient) {
     if (squared < kMostFlow * kMostFlow && 2 * std::abs(gradient.determinant()) * kMostFlow > 1.0001f * squared)
         return gradient;
     const SingularValues<float> svd = singular_values(gradient);
-    const Vec3f& stretch = svd.s;
-    if (stretch.maxCoeff() <= kMostFlow && stretch.minCoeff() >= 1 / kMostFlow) return gradient;
-    return svd.u * stretch.cwiseMax(1 / kMostFlow).cwiseMin(kMostFlow).asDiagonal() * svd.v.transpose();
+    if (svd.s.maxCoeff() <= kMostFlow && svd.s.minCoeff() >= 1 / kMostFlow) return gradient;
+    return svd.u * svd.s.cwiseMax(1 / kMostFlow).cwiseMin(kMostFlow).asDiagonal() * svd.v.transpose();
 }
 
 void bound_stretches(std::span<Mat3f> gradients, const RunContext& context) {

@@ -1,9 +1,12 @@
 // Based on: Smith, de Goes, Kim, Stable neo-Hookean flesh simulation, 2018 (the energy). Elastic forces of whole cells:
 // what two cells beside each other along x add to a corner meets in a register.
 #include "filigree/core/parallel_for.h"
+#include "filigree/physics/cell_kernel.h"
 #include "filigree/physics/cell_lanes.h"
 
+#include <algorithm>
 #include <cassert>
+#include <limits>
 
 namespace filigree::cell_kernel {
 

@@ -1,6 +1,9 @@
 #include "filigree/physics/cell_kernel.h"
 
+#include "filigree/core/lanes.h"
 #include "filigree/physics/cell_lanes.h"
+
+#include <algorithm>
 
 namespace filigree::cell_kernel {
 

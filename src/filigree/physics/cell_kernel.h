@@ -66,7 +66,8 @@ struct Plan {
 };
 Plan make_plan(const Body& body);
 
-/// Where slabs add up forces: the even ones in one array, the odd ones in the other.
+/// Where slabs add up forces: the even ones in one array, the odd ones in the other. kPadding floats lie between
+/// layers.
 struct Sums {
     std::array<Vectors, 2> of_parity;
 };

@@ -1,4 +1,4 @@
-// Lattice cells in lanes. A cell's eight corners give eight sums X_m with the signs of a Walsh-Hadamard transform
+// Ours: lattice cells in lanes. A cell's eight corners give eight sums X_m with the signs of a Walsh-Hadamard transform
 // (m = 1, 2, 4: the edges' sums along x, y, z; the others bend the cell), in which
 //     I = sum kappa_m |X_m|^2 / (4h)^2,  kappa = 1 for m = 1, 2, 4;  2/3 for 3, 5, 6;  1/3 for 7
 //     J = det(X_1, X_2, X_4) / (4h)^3
@@ -15,7 +15,7 @@
 
 namespace filigree::cell_kernel {
 
-constexpr std::size_t kPadding = 16; ///< floats that may be read or written past an array's end: one register
+inline constexpr std::size_t kPadding = 16; ///< floats behind what a loop needs: it reads and writes whole registers
 
 template <int N>
 struct CellLanes : Lanes<N> {

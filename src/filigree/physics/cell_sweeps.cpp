@@ -1,9 +1,11 @@
 // Based on: Chen et al., Vertex block descent, 2024. Sweeps over the corners of whole cells, every second corner of a
 // row at a time.
 #include "filigree/core/parallel_for.h"
+#include "filigree/physics/cell_kernel.h"
 #include "filigree/physics/cell_lanes.h"
 #include "filigree/physics/vertex_block.h"
 
+#include <algorithm>
 #include <cassert>
 
 namespace filigree::cell_kernel {
