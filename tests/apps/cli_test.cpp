@@ -330,7 +330,7 @@ TEST_F(Cli, InterruptLeavesNothing) {
         const Ran ran = run(arguments, "/dev/null", 0.25, signal);
         SCOPED_TRACE(testing::PrintToString(arguments));
         EXPECT_EQ(ran.code, 130);
-        EXPECT_LT(ran.seconds, 0.25 + 3); // a second on an idle machine
+        EXPECT_LT(ran.seconds, 10); // a second on an idle machine, three beside heavy tests on a slow one
         EXPECT_EQ(ran.err, "filigree: Cancelled; nothing was written.\n");
         EXPECT_EQ(files().size(), before.size());
     }
