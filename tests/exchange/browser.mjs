@@ -13,6 +13,7 @@ export async function open_browser() {
         '/usr/bin/google-chrome'];
     const program = places.find((place) => place && existsSync(place));
     if (!program) skip('chromium is not installed; run scripts/setup');
+    if (Number.parseInt(process.versions.node) < 20) skip(`playwright needs node 20 or later; this is ${process.versions.node}`);
     const { chromium } = require('playwright-core');
     return chromium.launch({
         executablePath: program,
