@@ -1,3 +1,4 @@
+// What the loops of cell_forces.cpp and cell_sweeps.cpp want to know of a body.
 #include "filigree/physics/cell_kernel.h"
 
 #include "filigree/core/lanes.h"
