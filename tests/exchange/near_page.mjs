@@ -39,7 +39,7 @@ const browser = await open_browser();
 const server = await serve(folder);
 const wrong = [], measured = [];
 try {
-    const page = await browser.newPage({ viewport: { width: 900, height: 600 } });
+    const page = await browser.newPage({ viewport: { width: 480, height: 320 } });
     page.on('console', (message) => { if (message.type() === 'error') wrong.push(message.text()); });
     page.on('pageerror', (error) => wrong.push(error.message));
     await page.goto(`${server.url}/index.html`);

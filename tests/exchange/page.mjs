@@ -11,7 +11,7 @@ import { open_browser, serve } from './browser.mjs';
 import { fail } from './tools.mjs';
 
 /// A page that is watched: what it asks for and what the browser complains of.
-async function watched_page(browser, base, size = { width: 800, height: 500 }) {
+async function watched_page(browser, base, size = { width: 660, height: 360 }) {
     const page = await browser.newPage({ viewport: size });
     const foreign = [], complaints = [];
     page.on('request', (request) => {

@@ -16,7 +16,7 @@ const { values: options, positionals: [folder] } = parseArgs({
 if (options.pictures) mkdirSync(options.pictures, { recursive: true });
 
 async function visit(browser, url, name) {
-    const page = await browser.newPage({ viewport: { width: 900, height: 600 } });
+    const page = await browser.newPage({ viewport: { width: 480, height: 320 } });
     const complaints = [], wrong = [];
     page.on('console', (message) => { if (message.type() === 'error') complaints.push(message.text()); });
     page.on('pageerror', (error) => complaints.push(error.message));

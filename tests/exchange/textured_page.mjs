@@ -16,7 +16,7 @@ const { values: options, positionals: [folder] } = parseArgs({
 if (options.pictures) mkdirSync(options.pictures, { recursive: true });
 const wrong = [];
 
-/// In the page: how many pixels have which colour, and where they are in the mean, from the left.
+/// In the page: the share of the pixels that has a colour, and where they are in the mean, from the left: 0 to 1.
 function look() {
     const { stage } = window.filigree, gl = stage.renderer.getContext();
     const width = gl.drawingBufferWidth, height = gl.drawingBufferHeight, pixels = new Uint8Array(4 * width * height);
@@ -30,11 +30,12 @@ function look() {
         ++found[name][0];
         found[name][1] += (i / 4) % width;
     }
-    return Object.fromEntries(Object.entries(found).map(([name, [count, sum]]) => [name, { count, from_left: sum / count }]));
+    return Object.fromEntries(Object.entries(found).map(([name, [count, sum]]) => [name,
+        { share: count / (width * height), from_left: sum / count / width }]));
 }
 
 async function visit(browser, url, name) {
-    const page = await browser.newPage({ viewport: { width: 900, height: 600 } });
+    const page = await browser.newPage({ viewport: { width: 660, height: 360 } });
     const check = (holds, sentence) => { if (!holds) wrong.push(`${name}: ${sentence}`); };
     page.on('console', (message) => { if (message.type() === 'error') wrong.push(`${name}: ${message.text()}`); });
     page.on('pageerror', (error) => wrong.push(`${name}: ${error.message}`));
@@ -54,8 +55,8 @@ async function visit(browser, url, name) {
         if (options.pictures) await page.screenshot({ path: join(options.pictures, `${name}-${level}.png`) });
         if (options.any) continue;
         const { yellow, green, blue } = await page.evaluate(look);
-        for (const [color, { count }] of Object.entries({ yellow, green, blue })) check(count > 2000, `${level}: ${count} pixels are ${color}`);
-        check(yellow.from_left > green.from_left + 30, `${level}: the stripes are not where they belong`);
+        for (const [color, { share }] of Object.entries({ yellow, green, blue })) check(share > 0.004, `${level}: ${100 * share} % of the pixels are ${color}`);
+        check(yellow.from_left > green.from_left + 0.04, `${level}: the stripes are not where they belong`);
     }
     await page.close();
 }

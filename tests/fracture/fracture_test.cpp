@@ -1,5 +1,6 @@
 #include "filigree/fracture/fracture.h"
 
+#include "cases.h"
 #include "filigree/core/random.h"
 #include "filigree/fracture/fracture_pattern.h"
 #include "filigree/mesh/normals.h"
@@ -126,8 +127,9 @@ std::vector<Index> random_clumps(std::size_t cells, std::uint64_t seed) {
 
 /// Random closed meshes and seeds, among them lattices of seeds over boxes, where cracks run through vertices, along
 /// edges and in faces.
-void break_random_cases(std::uint64_t first, std::uint64_t count) {
-    for (std::uint64_t seed = first; seed < first + count; ++seed) {
+TEST(Fracture, RandomCases) {
+    const std::uint64_t count = all_cases() ? 10'000 : 2'500;
+    for (std::uint64_t seed = 0; seed < count; ++seed) {
         SCOPED_TRACE(seed);
         const auto pick = [&](std::uint64_t which, std::uint64_t below) {
             return random_bits(seed, 1000 + which) % below;
@@ -184,11 +186,6 @@ void break_random_cases(std::uint64_t first, std::uint64_t count) {
         if (::testing::Test::HasFailure()) return;
     }
 }
-
-TEST(Fracture, RandomCasesPart1) { break_random_cases(0, 2'500); }
-TEST(Fracture, RandomCasesPart2) { break_random_cases(2'500, 2'500); }
-TEST(Fracture, RandomCasesPart3) { break_random_cases(5'000, 2'500); }
-TEST(Fracture, RandomCasesPart4) { break_random_cases(7'500, 2'500); }
 
 TEST(Fracture, CubeInHalvesIsTwoBoxes) {
     const Mesh cube = box_mesh(Vec3d(-1, -1, -1), Vec3d(1, 1, 1));

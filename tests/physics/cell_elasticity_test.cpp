@@ -1,10 +1,10 @@
 // The fem material against a plain double version of its formulas, and against theory.
+#include "filigree/core/dense_solve.h"
 #include "filigree/physics/body.h"
 #include "filigree/physics/cell_kernel.h"
 #include "filigree/physics/vertex_block.h"
 #include "threads.h"
 
-#include <Eigen/Eigenvalues>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -269,9 +269,7 @@ double largest_rate(const Body& body, const Eigen::Matrix3Xd& x) {
     K /= 2 * step;
     for (Eigen::Index i = 0; i < n; ++i)
         for (Eigen::Index j = 0; j < n; ++j) K(i, j) /= std::sqrt(double(body.mass[i / 3]) * body.mass[j / 3]);
-    return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(0.5 * (K + K.transpose()), Eigen::EigenvaluesOnly)
-        .eigenvalues()
-        .maxCoeff();
+    return symmetric_eigen(Eigen::MatrixXd(0.5 * (K + K.transpose()))).values.maxCoeff();
 }
 
 TEST(CellElasticity, RateBoundsTheLargestEigenvalue) {

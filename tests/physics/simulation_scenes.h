@@ -1,6 +1,7 @@
 // Small scenes, and how the tests of the stepper run them.
 #pragma once
 
+#include "filigree/core/dense_solve.h"
 #include "filigree/physics/simulation.h"
 
 #include <gtest/gtest.h>
@@ -70,16 +71,21 @@ inline bool all_finite(const Vectors& values) {
 /// Largest distance of a particle from the rigid motion that fits the body's start best.
 inline double shape_error(const Simulation& simulation, std::size_t body = 0) {
     const Vectors &rest = simulation.body(body).rest, &now = simulation.positions(body);
-    Eigen::Matrix3Xd from(3, rest.size()), to(3, rest.size());
+    Vec3d from = Vec3d::Zero(), to = Vec3d::Zero(); // the means
     for (std::size_t i = 0; i < rest.size(); ++i) {
-        from.col(i) = rest[i].cast<double>();
-        to.col(i) = now[i].cast<double>();
+        from += rest[i].cast<double>() / double(rest.size());
+        to += now[i].cast<double>() / double(rest.size());
     }
-    const Eigen::Matrix4d motion = Eigen::umeyama(from, to, false);
-    return ((motion.topLeftCorner<3, 3>() * from).colwise() + motion.topRightCorner<3, 1>() - to)
-        .colwise()
-        .norm()
-        .maxCoeff();
+    Mat3d covariance = Mat3d::Zero();
+    for (std::size_t i = 0; i < rest.size(); ++i)
+        covariance += (now[i].cast<double>() - to) * (rest[i].cast<double>() - from).transpose();
+    const auto [u, v, s, converged] = singular_values(covariance);
+    const Vec3d handed(1, 1, u.determinant() * v.determinant() < 0 ? -1 : 1); // never a reflection
+    const Mat3d turn = u * handed.asDiagonal() * v.transpose();
+    double largest = 0;
+    for (std::size_t i = 0; i < rest.size(); ++i)
+        largest = std::max(largest, (turn * (rest[i].cast<double>() - from) - (now[i].cast<double>() - to)).norm());
+    return largest;
 }
 
 inline const auto kModels = testing::Values(MaterialModel::fem, MaterialModel::springs, MaterialModel::meshfree);

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/QR>
+#include <Eigen/LU>
 #include <limits>
 #include <vector>
 
@@ -60,9 +60,9 @@ inline double open_share(const filigree::Mesh& mesh, const filigree::Surfels& su
     for (std::size_t i = 0; i < surfels.size(); ++i) {
         Eigen::Matrix<double, 3, 2> axes;
         axes << surfels.u[i].cast<double>(), surfels.v[i].cast<double>();
+        const Eigen::Matrix<double, 2, 3> into = (axes.transpose() * axes).inverse() * axes.transpose();
         for (const filigree::Index v : polygons.face(i))
-            in_face[v] =
-                axes.colPivHouseholderQr().solve((polygons.positions[v] - surfels.positions[i]).cast<double>());
+            in_face[v] = into * (polygons.positions[v] - surfels.positions[i]).cast<double>();
         radius += double(surfels.rest_radius[i]) / double(surfels.size());
     }
     const std::vector<double> wanted = depths(mesh, {}, camera, width, height);

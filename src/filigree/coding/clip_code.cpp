@@ -1,8 +1,7 @@
 #include "filigree/coding/clip_code.h"
 
 #include "filigree/coding/symbols.h"
-
-#include <Eigen/Eigenvalues>
+#include "filigree/core/dense_solve.h"
 
 #include <algorithm>
 #include <bit>
@@ -65,13 +64,13 @@ std::string encode_clip(const ClipFrames& frames, std::span<const double> weight
     for (Eigen::Index t = 0; t < count; ++t)
         for (Eigen::Index i = 0; i < numbers; ++i)
             values(i, t) = double(frames[std::size_t(t)][std::size_t(i)]) * weights[std::size_t(i) % weights.size()];
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solved(values.transpose() * values);
+    const auto [eigenvalues, eigenvectors] = symmetric_eigen(Eigen::MatrixXd(values.transpose() * values));
 
     // Half of the error's square is for curves that are left out, half for rounding. Eigenvalues ascend.
     const double allowed = error * error * double(numbers) * double(count) / 2;
     Eigen::Index left_out = 0;
     for (double lost = 0; left_out < count; ++left_out) {
-        lost += std::max(0.0, solved.eigenvalues()[left_out]);
+        lost += std::max(0.0, eigenvalues[left_out]);
         if (lost > allowed) break;
     }
     const auto curve_count = std::size_t(count - left_out);
@@ -89,7 +88,7 @@ std::string encode_clip(const ClipFrames& frames, std::span<const double> weight
         std::int32_t before = 0, slope = 0;
         for (Eigen::Index t = 0; t < count; ++t) {
             const auto entry =
-                std::int32_t(std::lround(solved.eigenvectors()(t, count - 1 - Eigen::Index(c)) * kCurveOne));
+                std::int32_t(std::lround(eigenvectors(t, count - 1 - Eigen::Index(c)) * kCurveOne));
             out.number_with_sign(kCurveEntry + (t > 0), entry - before - slope);
             slope = t > 0 ? entry - before : 0;
             before = entry;
@@ -99,7 +98,7 @@ std::string encode_clip(const ClipFrames& frames, std::span<const double> weight
     Eigen::MatrixXd coefficients = values * curves;
     if (curve_count > 0) {
         const Eigen::MatrixXd gram = curves.transpose() * curves;
-        coefficients = gram.ldlt().solve(coefficients.transpose()).transpose();
+        coefficients = solve_semidefinite(gram, coefficients.transpose()).transpose();
     }
     for (std::size_t c = 0; c < curve_count; ++c) {
         const auto steps = [&](std::size_t v, std::size_t k) {

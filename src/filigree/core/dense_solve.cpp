@@ -28,6 +28,7 @@ SingularValues<typename Matrix::Scalar> decompose(const Matrix& matrix) {
 SymmetricEigen<float, 3> symmetric_eigen(const Mat3f& matrix) { return eigen_of(matrix); }
 SymmetricEigen<double, 3> symmetric_eigen(const Mat3d& matrix) { return eigen_of(matrix); }
 SymmetricEigen<double, 4> symmetric_eigen(const Eigen::Matrix4d& matrix) { return eigen_of(matrix); }
+SymmetricEigen<double, Eigen::Dynamic> symmetric_eigen(const Eigen::MatrixXd& matrix) { return eigen_of(matrix); }
 
 Vec3f symmetric_eigenvalues(const Mat3f& matrix) {
     return Eigen::SelfAdjointEigenSolver<Mat3f>(matrix, Eigen::EigenvaluesOnly).eigenvalues();
@@ -43,6 +44,10 @@ Vec3d singular_values_only(const Mat3d& matrix) {
 }
 
 Vec3d solve_semidefinite(const Mat3d& matrix, const Vec3d& right) { return matrix.ldlt().solve(right); }
+
+Eigen::MatrixXd solve_semidefinite(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& right) {
+    return matrix.ldlt().solve(right);
+}
 
 Eigen::MatrixXd solve_general(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& right) {
     return matrix.partialPivLu().solve(right);

@@ -1,4 +1,4 @@
-// Decompositions of small matrices. Eigen's are templates that take seconds to compile; here each is compiled once, for
+// Decompositions of matrices, most of them small. Eigen's are templates that take seconds to compile; here each is compiled once, for
 // the whole library.
 #pragma once
 
@@ -18,6 +18,7 @@ struct SymmetricEigen {
 SymmetricEigen<float, 3> symmetric_eigen(const Mat3f& matrix);
 SymmetricEigen<double, 3> symmetric_eigen(const Mat3d& matrix);
 SymmetricEigen<double, 4> symmetric_eigen(const Eigen::Matrix4d& matrix);
+SymmetricEigen<double, Eigen::Dynamic> symmetric_eigen(const Eigen::MatrixXd& matrix);
 /// The eigenvalues alone, which is twice as fast; they may differ from the above in their last bits.
 Vec3f symmetric_eigenvalues(const Mat3f& matrix);
 
@@ -42,6 +43,7 @@ inline Mat3d cofactor(const Mat3d& a) {
 
 /// x with matrix x = right, for a symmetric positive semi-definite matrix, of which the lower triangle is read.
 Vec3d solve_semidefinite(const Mat3d& matrix, const Vec3d& right);
+Eigen::MatrixXd solve_semidefinite(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& right);
 /// x with matrix x = right, for any square matrix that is not singular.
 Eigen::MatrixXd solve_general(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& right);
 
