@@ -1,2 +1,2 @@
-// Does nothing: the headers that are precompiled for all tests need a program to belong to.
+// Does nothing: the headers that tests, replays and examples share belong to a program, see CMakeLists.txt.
 int main() {}

@@ -24,15 +24,16 @@ napoleon_google_docstring = False
 napoleon_use_rtype = False
 
 # Sphinx before 7.3 works out the id of a declaration at every look at it: 70 % of its time here.
-from sphinx.domains.cpp import ASTDeclaration
+import sphinx
 
-_work_out_newest_id = ASTDeclaration.get_newest_id
+if sphinx.version_info < (7, 3):
+    from sphinx.domains.cpp import ASTDeclaration
 
+    _work_out_newest_id = ASTDeclaration.get_newest_id
 
-def _newest_id(declaration):
-    if getattr(declaration, "filigree_newest_id", None) is None:
-        declaration.filigree_newest_id = _work_out_newest_id(declaration)
-    return declaration.filigree_newest_id
+    def _newest_id(declaration):
+        if getattr(declaration, "filigree_newest_id", None) is None:
+            declaration.filigree_newest_id = _work_out_newest_id(declaration)
+        return declaration.filigree_newest_id
 
-
-ASTDeclaration.get_newest_id = _newest_id
+    ASTDeclaration.get_newest_id = _newest_id

@@ -23,6 +23,12 @@ TEST(DenseSolve, EigenvaluesAscendAndComeBackAsTheMatrix) {
         EXPECT_LE(eigen.values[0], eigen.values[1]);
         EXPECT_LE(eigen.values[1], eigen.values[2]);
         EXPECT_LT((eigen.vectors * eigen.values.asDiagonal() * eigen.vectors.transpose() - matrix).norm(), 1e-12);
+        const SymmetricEigen<double, Eigen::Dynamic> of_any_size = symmetric_eigen(Eigen::MatrixXd(matrix));
+        EXPECT_LT((Vec3d(of_any_size.values) - eigen.values).norm(), 1e-12);
+        EXPECT_LT(
+            (Mat3d(of_any_size.vectors) * eigen.values.asDiagonal() * Mat3d(of_any_size.vectors).transpose() - matrix)
+                .norm(),
+            1e-12);
         const Vec3f alone = symmetric_eigenvalues(Mat3f(matrix.cast<float>()));
         EXPECT_LT((alone.cast<double>() - eigen.values).norm(), 1e-5);
     }
@@ -56,6 +62,8 @@ TEST(DenseSolve, SolvesWhatItIsGiven) {
     const Mat3d half = numbers(5), definite = half * half.transpose() + Mat3d::Identity();
     const Vec3d right(1, -2, 3);
     EXPECT_LT((definite * solve_semidefinite(definite, right) - right).norm(), 1e-12);
+    const Eigen::MatrixXd solved = solve_semidefinite(Eigen::MatrixXd(definite), Eigen::MatrixXd(right));
+    EXPECT_LT((definite * Vec3d(solved) - right).norm(), 1e-12);
 
     Eigen::MatrixXd saddle = Eigen::MatrixXd::Zero(4, 4); // nothing on the diagonal: rows have to be exchanged
     saddle << 0, 1, 0, 2, 3, 0, 1, 0, 0, 0, 0, 1, 1, 0, 5, 0;

@@ -1,7 +1,7 @@
 // Opens a page of `filigree export --web --stream` near a part of its model: fine triangles are drawn there alone, and
 // the picture is that of the finest level.
-// Usage: node near_page.mjs FOLDER [--pictures FOLDER] [--away SHARE] [--json FILE]
-// --away: of the eye from the nearest vertex, of the model's size (0.08 unless said). --json: what was measured.
+// Usage: node near_page.mjs FOLDER [--pictures FOLDER] [--away SHARE] [--size WIDTHxHEIGHT] [--json FILE]
+// --away: of the eye from the nearest vertex, of the model's size (0.08 unless said). --size: of the page (480x320). --json: what was measured.
 import { mkdirSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { parseArgs } from 'node:util';
@@ -10,7 +10,7 @@ import { fail } from './tools.mjs';
 
 const { values: options, positionals: [folder] } = parseArgs({
     allowPositionals: true,
-    options: { pictures: { type: 'string' }, away: { type: 'string' }, json: { type: 'string' } },
+    options: { pictures: { type: 'string' }, away: { type: 'string' }, size: { type: 'string' }, json: { type: 'string' } },
 });
 if (options.pictures) mkdirSync(options.pictures, { recursive: true });
 
@@ -39,7 +39,8 @@ const browser = await open_browser();
 const server = await serve(folder);
 const wrong = [], measured = [];
 try {
-    const page = await browser.newPage({ viewport: { width: 480, height: 320 } });
+    const [width, height] = (options.size ?? '480x320').split('x').map(Number);
+    const page = await browser.newPage({ viewport: { width, height } });
     page.on('console', (message) => { if (message.type() === 'error') wrong.push(message.text()); });
     page.on('pageerror', (error) => wrong.push(error.message));
     await page.goto(`${server.url}/index.html`);

@@ -2,10 +2,12 @@
 
 #include "filigree/mesh/shapes.h"
 #include "filigree/mesh/triangulate.h"
+#include "sanitized.h"
 
 #include <Eigen/Geometry>
 #include <cmath>
 #include <gtest/gtest.h>
+#include <malloc.h>
 #include <random>
 
 namespace filigree {
@@ -191,6 +193,15 @@ TEST(ClosestPointTree, OfNothingOrOnePoint) {
     ClosestPointTree moved = std::move(point);
     EXPECT_EQ(moved.closest({5, 5, 7}).distance, 2);
     EXPECT_EQ(moved.closest({5, 5, 7}).triangle, 0u);
+}
+
+TEST(ClosestPointTree, KeepsNoCopyOfThePositions) {
+    if (kSanitized) GTEST_SKIP() << "a sanitizer has its own memory";
+    const std::vector<Vec3f> positions(2'000'000, Vec3f(1, 2, 3)); // 24 MB, which malloc maps by themselves
+    const std::vector<Triangle> triangles = {{0, 1, 2}};
+    const std::size_t before = mallinfo2().hblkhd;
+    const ClosestPointTree tree(positions, triangles);
+    EXPECT_LT(mallinfo2().hblkhd, before + sizeof(Vec3f) * positions.size() / 2);
 }
 
 } // namespace

@@ -6,7 +6,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
+#include <limits>
 
 namespace filigree::simulation_scenes {
 
@@ -82,7 +84,7 @@ inline double shape_error(const Simulation& simulation, std::size_t body = 0) {
     const auto [u, v, s, converged] = singular_values(covariance);
     const Vec3d handed(1, 1, u.determinant() * v.determinant() < 0 ? -1 : 1); // never a reflection
     const Mat3d turn = u * handed.asDiagonal() * v.transpose();
-    double largest = 0;
+    double largest = converged ? 0 : std::numeric_limits<double>::infinity(); // where something is not finite
     for (std::size_t i = 0; i < rest.size(); ++i)
         largest = std::max(largest, (turn * (rest[i].cast<double>() - from) - (now[i].cast<double>() - to)).norm());
     return largest;

@@ -1,5 +1,7 @@
 // Random actions on one mesh after another, while files are damaged, disks are full and the window closes at any
-// moment. FILIGREE_SOAK_MINUTES: how long (scripts/soak-studio; unset: one round). FILIGREE_SEED: the first round.
+// moment. FILIGREE_SOAK_MINUTES: how long (scripts/soak-studio; unset: one round, three with FILIGREE_ALL_CASES).
+// FILIGREE_SEED: the first round.
+#include "cases.h"
 #include "monkey.h"
 #include "threads.h"
 
@@ -197,7 +199,9 @@ TEST_F(StudioSoak, ThreadsSurviveIt) {
     time.start();
     unsigned rounds = 0;
     long actions = 0;
-    const auto goes_on = [&] { return minutes ? double(time.elapsed()) < 60e3 * std::atof(minutes) : rounds < 1; };
+    const auto goes_on = [&] {
+        return minutes ? double(time.elapsed()) < 60e3 * std::atof(minutes) : rounds < (all_cases() ? 3u : 1u);
+    };
     for (; goes_on() && !HasFailure(); ++rounds) actions += round(seed + rounds);
     std::printf("soak: %u windows, %ld actions, %.1f minutes, %s\n", rounds, actions, double(time.elapsed()) / 60e3,
                 HasFailure() ? "broken" : "whole");

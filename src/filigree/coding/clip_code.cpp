@@ -87,8 +87,7 @@ std::string encode_clip(const ClipFrames& frames, std::span<const double> weight
     for (std::size_t c = 0; c < curve_count; ++c) {
         std::int32_t before = 0, slope = 0;
         for (Eigen::Index t = 0; t < count; ++t) {
-            const auto entry =
-                std::int32_t(std::lround(eigenvectors(t, count - 1 - Eigen::Index(c)) * kCurveOne));
+            const auto entry = std::int32_t(std::lround(eigenvectors(t, count - 1 - Eigen::Index(c)) * kCurveOne));
             out.number_with_sign(kCurveEntry + (t > 0), entry - before - slope);
             slope = t > 0 ? entry - before : 0;
             before = entry;

@@ -1,5 +1,5 @@
-// Decompositions of matrices, most of them small. Eigen's are templates that take seconds to compile; here each is compiled once, for
-// the whole library.
+// Decompositions of matrices, most of them small. Eigen's are templates that take seconds to compile; here each is
+// compiled once, for the whole library.
 #pragma once
 
 #include "filigree/core/types.h"

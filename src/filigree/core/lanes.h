@@ -58,6 +58,32 @@ FILIGREE_DOUBLE_LANE_TYPES(8)
 #undef FILIGREE_LANE_TYPES
 #undef FILIGREE_DOUBLE_LANE_TYPES
 
+/// A vector of three; F: one float, or a register of them, for a vector a lane.
+template <class F>
+struct LaneVector {
+    F x, y, z;
+};
+template <class F>
+FILIGREE_INLINE LaneVector<F> operator+(const LaneVector<F>& a, const LaneVector<F>& b) {
+    return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+template <class F>
+FILIGREE_INLINE LaneVector<F> operator-(const LaneVector<F>& a, const LaneVector<F>& b) {
+    return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+template <class F, class S>
+FILIGREE_INLINE LaneVector<F> operator*(S s, const LaneVector<F>& a) {
+    return {s * a.x, s * a.y, s * a.z};
+}
+template <class F>
+FILIGREE_INLINE LaneVector<F> cross(const LaneVector<F>& a, const LaneVector<F>& b) {
+    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+template <class F>
+FILIGREE_INLINE F dot(const LaneVector<F>& a, const LaneVector<F>& b) {
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+
 /// Reads and writes of N floats.
 template <int N>
 struct Lanes : LaneTypes<N> {

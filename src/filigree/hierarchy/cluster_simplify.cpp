@@ -370,7 +370,7 @@ std::optional<Simplified> ClusterSimplifier::simplify(std::span<const Triangle> 
     result.triangles.reserve(total);
     for (ReducedCluster& part : left) {
         result.triangles.insert(result.triangles.end(), part.triangles.begin(), part.triangles.end());
-        part.triangles = {};
+        part.triangles = std::vector<Triangle>(); // {} would keep the memory
     }
     const std::span<const std::uint8_t> counts = clusters.triangle_counts();
     const std::vector<std::uint8_t> counts_left = count_triangles(result.triangles, positions_.size());

@@ -16,31 +16,8 @@ namespace filigree::reference {
 
 inline constexpr std::size_t kLanes = 16;
 
-// Inlined into every clone of the loops, and so compiled for each processor.
 template <class F>
-struct Point {
-    F x, y, z;
-};
-template <class F>
-FILIGREE_INLINE Point<F> operator+(const Point<F>& a, const Point<F>& b) {
-    return {a.x + b.x, a.y + b.y, a.z + b.z};
-}
-template <class F>
-FILIGREE_INLINE Point<F> operator-(const Point<F>& a, const Point<F>& b) {
-    return {a.x - b.x, a.y - b.y, a.z - b.z};
-}
-template <class F, class S>
-FILIGREE_INLINE Point<F> operator*(S s, const Point<F>& a) {
-    return {s * a.x, s * a.y, s * a.z};
-}
-template <class F>
-FILIGREE_INLINE Point<F> cross(const Point<F>& a, const Point<F>& b) {
-    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-template <class F>
-FILIGREE_INLINE F dot(const Point<F>& a, const Point<F>& b) {
-    return a.x * b.x + a.y * b.y + a.z * b.z;
-}
+using Point = LaneVector<F>;
 
 /// Squares below this are taken for it: degenerate references then give a zero normal, not a division by zero.
 /// Positions are scaled to about one before they come here.

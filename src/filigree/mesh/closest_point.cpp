@@ -77,7 +77,7 @@ struct ClosestPointTree::Tree {
         for (const Vec3f& p : positions) local_positions.push_back(to_local(p.cast<double>()).cast<float>());
         make_leaves(kind);
         build();
-        local_positions = {};
+        local_positions = std::vector<Vec3f>(); // {} would keep the memory
     }
     ~Tree() {
         if (scene) rtcReleaseScene(scene);

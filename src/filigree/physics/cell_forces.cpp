@@ -32,8 +32,8 @@ FILIGREE_INLINE typename LaneTypes<N>::Float stiffness_bound(const Factors& f, c
                                                              typename LaneTypes<N>::Float I,
                                                              typename LaneTypes<N>::Float inverse_I1) {
     using Float = typename LaneTypes<N>::Float;
-    const Float c2 = ((dot<N>(shape.cofactor[0], shape.cofactor[0]) + dot<N>(shape.cofactor[1], shape.cofactor[1])) +
-                      dot<N>(shape.cofactor[2], shape.cofactor[2])) *
+    const Float c2 = ((dot(shape.cofactor[0], shape.cofactor[0]) + dot(shape.cofactor[1], shape.cofactor[1])) +
+                      dot(shape.cofactor[2], shape.cofactor[2])) *
                      (f.inverse_size2 * f.inverse_size2);
     const Float a = (2 * f.shear_ratio) * inverse_I1 * inverse_I1;
     const Float q = shape.J - f.rest_ratio;
@@ -76,13 +76,13 @@ FILIGREE_INLINE void add_forces(const Factors& f, const Vectors& positions, cons
     const Float volume = share * (shape.J - f.rest_ratio) * f.volume_force;
     const Float bent = linear * (2.0f / 3.0f), last = linear * (1.0f / 3.0f);
     Vectors3<N> P[8]; // derivatives of the energy by X
-    P[1] = times<N>(s.X[1], linear) + times<N>(shape.cofactor[0], volume);
-    P[2] = times<N>(s.X[2], linear) + times<N>(shape.cofactor[1], volume);
-    P[4] = times<N>(s.X[4], linear) + times<N>(shape.cofactor[2], volume);
-    P[3] = times<N>(s.X[3], bent);
-    P[5] = times<N>(s.X[5], bent);
-    P[6] = times<N>(s.X[6], bent);
-    P[7] = times<N>(s.X[7], last);
+    P[1] = linear * s.X[1] + volume * shape.cofactor[0];
+    P[2] = linear * s.X[2] + volume * shape.cofactor[1];
+    P[4] = linear * s.X[4] + volume * shape.cofactor[2];
+    P[3] = bent * s.X[3];
+    P[5] = bent * s.X[5];
+    P[6] = bent * s.X[6];
+    P[7] = last * s.X[7];
 
     if constexpr (Tail) {
         const Int mask = L::first(count);
@@ -97,8 +97,8 @@ FILIGREE_INLINE void add_forces(const Factors& f, const Vectors& positions, cons
     }
 
     // Along x: corner i has the left force of cell i and the right one of cell i - 1.
-    const Vectors3<N> right[4] = {times<N>(P[1], Float{} - 1.0f), Vectors3<N>{} - (P[2] + P[3]),
-                                  Vectors3<N>{} - (P[4] + P[5]), Vectors3<N>{} - (P[6] + P[7])};
+    const Vectors3<N> right[4] = {(Float{} - 1.0f) * P[1], Vectors3<N>{} - (P[2] + P[3]), Vectors3<N>{} - (P[4] + P[5]),
+                                  Vectors3<N>{} - (P[6] + P[7])};
     const Vectors3<N> left[4] = {P[1], P[3] - P[2], P[5] - P[4], P[7] - P[6]};
     Vectors3<N> sum[4];
     for (int u = 0; u < 4; ++u) {

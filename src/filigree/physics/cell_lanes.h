@@ -95,29 +95,7 @@ private:
 
 /// A vector a lane.
 template <int N>
-struct Vectors3 {
-    typename LaneTypes<N>::Float x, y, z;
-};
-template <int N>
-FILIGREE_INLINE Vectors3<N> operator+(const Vectors3<N>& a, const Vectors3<N>& b) {
-    return {a.x + b.x, a.y + b.y, a.z + b.z};
-}
-template <int N>
-FILIGREE_INLINE Vectors3<N> operator-(const Vectors3<N>& a, const Vectors3<N>& b) {
-    return {a.x - b.x, a.y - b.y, a.z - b.z};
-}
-template <int N>
-FILIGREE_INLINE Vectors3<N> times(const Vectors3<N>& a, typename LaneTypes<N>::Float s) {
-    return {a.x * s, a.y * s, a.z * s};
-}
-template <int N>
-FILIGREE_INLINE typename LaneTypes<N>::Float dot(const Vectors3<N>& a, const Vectors3<N>& b) {
-    return (a.x * b.x + a.y * b.y) + a.z * b.z;
-}
-template <int N>
-FILIGREE_INLINE Vectors3<N> cross(const Vectors3<N>& a, const Vectors3<N>& b) {
-    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
+using Vectors3 = LaneVector<typename LaneTypes<N>::Float>;
 
 /// Sums X_1 ... X_7 of N cells along one axis from their four rows. Corners are subtracted before anything is added,
 /// so a body far from the origin loses no more than its positions already have.
@@ -167,15 +145,15 @@ template <int N>
 FILIGREE_INLINE CellShape<N> shape_of(const CellSums<N>& sums, float inverse_size) {
     const auto* X = sums.X;
     CellShape<N> shape;
-    shape.cofactor[0] = cross<N>(X[2], X[4]);
-    shape.cofactor[1] = cross<N>(X[4], X[1]);
-    shape.cofactor[2] = cross<N>(X[1], X[2]);
+    shape.cofactor[0] = cross(X[2], X[4]);
+    shape.cofactor[1] = cross(X[4], X[1]);
+    shape.cofactor[2] = cross(X[1], X[2]);
     const float inverse2 = inverse_size * inverse_size;
-    shape.I_linear = ((dot<N>(X[1], X[1]) + dot<N>(X[2], X[2])) + dot<N>(X[4], X[4])) * inverse2;
-    shape.I_bent = (((dot<N>(X[3], X[3]) + dot<N>(X[5], X[5])) + dot<N>(X[6], X[6])) * (2.0f / 3.0f) +
-                    dot<N>(X[7], X[7]) * (1.0f / 3.0f)) *
-                   inverse2;
-    shape.J = dot<N>(X[1], shape.cofactor[0]) * (inverse2 * inverse_size);
+    shape.I_linear = ((dot(X[1], X[1]) + dot(X[2], X[2])) + dot(X[4], X[4])) * inverse2;
+    shape.I_bent =
+        (((dot(X[3], X[3]) + dot(X[5], X[5])) + dot(X[6], X[6])) * (2.0f / 3.0f) + dot(X[7], X[7]) * (1.0f / 3.0f)) *
+        inverse2;
+    shape.J = dot(X[1], shape.cofactor[0]) * (inverse2 * inverse_size);
     return shape;
 }
 

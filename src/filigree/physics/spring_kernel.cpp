@@ -91,14 +91,8 @@ FILIGREE_INLINE void spring_forces(const ForceJob& job, std::size_t begin, std::
 }
 
 template <class Float>
-struct LaneVector {
-    Float x, y, z;
-    FILIGREE_INLINE LaneVector operator-(const LaneVector& b) const { return {x - b.x, y - b.y, z - b.z}; }
-    FILIGREE_INLINE LaneVector operator+(const LaneVector& b) const { return {x + b.x, y + b.y, z + b.z}; }
-};
-template <class Float>
 FILIGREE_INLINE Float determinant(const LaneVector<Float>& a, const LaneVector<Float>& b, const LaneVector<Float>& c) {
-    return (a.y * b.z - a.z * b.y) * c.x + (a.z * b.x - a.x * b.z) * c.y + (a.x * b.y - a.y * b.x) * c.z;
+    return dot(cross(a, b), c);
 }
 
 template <int N>

@@ -120,7 +120,7 @@ Status GpuRestorer::Content::upload() {
     if (Status status = keep(blocks, make_storage(packed.blocks)); !status) return status;
     if (Status status = keep(transforms, make_storage(at_rest)); !status) return status;
     packed = {};
-    at_rest = {};
+    at_rest = std::vector<blend_kernel::VertexTransform>(); // {} would keep the memory
     return Success{};
 }
 
