@@ -67,13 +67,7 @@ public:
         return Success{};
     }
 
-    Status mark_done(std::size_t chunk) const {
-        const fs::path mark = folder_.file(marks_[chunk - 1]);
-        const FileDescriptor file(::open(mark.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666));
-        if (!file.is_open()) return cannot_write(mark, errno);
-        sync_folder(mark.parent_path());
-        return Success{};
-    }
+    Status mark_done(std::size_t chunk) const { return folder_.mark(marks_[chunk - 1]); }
 
     /// All chunks are there: the file goes to its place. Another process may do the same at this moment.
     Status finish() const {

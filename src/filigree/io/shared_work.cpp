@@ -48,8 +48,9 @@ bool SharedFolder::has_plan(const fs::path& file) const {
 }
 
 bool SharedFolder::is_finished() const {
+    // A folder without a plan is of somebody who finds out in begin() that all is done.
     std::error_code failed;
-    return !fs::exists(folder_, failed) && has_plan(finished_) && is_in_place_();
+    return !fs::exists(file(kPlanName), failed) && has_plan(finished_) && is_in_place_();
 }
 
 Result<bool> SharedFolder::begin() const {
@@ -63,6 +64,8 @@ Result<bool> SharedFolder::begin() const {
         if (has_plan(finished_) && is_in_place_()) return ::rmdir(folder_.c_str()), true;
     } else if (errno != EEXIST) {
         return cannot_write(folder_, errno);
+    } else if (is_finished()) {
+        return true;
     }
     const Status planned = add(kPlanName, [&](const fs::path& plan) { return write_file(plan, plan_); });
     if (has_plan(file(kPlanName))) return false;
@@ -84,6 +87,13 @@ Status SharedFolder::add(const std::string& name, const std::function<Status(con
         made = cannot_write(file(name), errno);
     ::unlink(temporary.c_str());
     return made;
+}
+
+Status SharedFolder::mark(const std::string& name) const {
+    if (::link(file(kPlanName).c_str(), file(name).c_str()) != 0 && errno != EEXIST)
+        return cannot_write(file(name), errno);
+    sync_folder(folder_);
+    return Success{};
 }
 
 std::vector<bool> SharedFolder::are_there(std::span<const std::string> names) const {

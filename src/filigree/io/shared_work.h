@@ -44,6 +44,9 @@ public:
     Result<bool> begin() const;
     /// Puts a whole file into the folder, unless it is there. Errors: unwritable.
     Status add(const std::string& name, const std::function<Status(const std::filesystem::path& file)>& make) const;
+    /// Puts a file into the folder of which the name says all, unless it is there. Errors: unwritable, also where the
+    /// folder is this work's no more, as others finished it.
+    Status mark(const std::string& name) const;
     std::filesystem::path file(const std::string& name) const { return folder_ / name; }
     /// Which of these files are there.
     std::vector<bool> are_there(std::span<const std::string> names) const;
