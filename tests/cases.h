@@ -3,6 +3,6 @@
 
 #include <cstdlib>
 
-/// Whether everything is wanted: all random cases, kills and actions, large meshes, the slow scene. Unless
-/// FILIGREE_ALL_CASES is set (scripts/check cases does), a part of each.
+/// Whether all random cases, kills, actions, large meshes and slow scenes are tried (FILIGREE_ALL_CASES is set, as
+/// scripts/check cases does), or a part of them.
 inline bool all_cases() { return std::getenv("FILIGREE_ALL_CASES") != nullptr; }

@@ -23,7 +23,7 @@ napoleon_numpy_docstring = True
 napoleon_google_docstring = False
 napoleon_use_rtype = False
 
-# Sphinx before 7.3 works out the id of a declaration at every look at it: 70 % of its time here.
+# Sphinx before 7.3 works out the id of a declaration at every look at it, which was most of its time here.
 import sphinx
 
 if sphinx.version_info < (7, 3):

@@ -1,7 +1,8 @@
 // Opens a page of `filigree export --web --stream` near a part of its model: fine triangles are drawn there alone, and
 // the picture is that of the finest level.
 // Usage: node near_page.mjs FOLDER [--pictures FOLDER] [--away SHARE] [--size WIDTHxHEIGHT] [--json FILE]
-// --away: of the eye from the nearest vertex, of the model's size (0.08 unless said). --size: of the page (480x320). --json: what was measured.
+// --away: of the eye from the nearest vertex, of the model's size (0.08 unless said). --size: of the page (480x320
+// unless said). --json: what was measured.
 import { mkdirSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { parseArgs } from 'node:util';

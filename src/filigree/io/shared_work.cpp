@@ -59,12 +59,10 @@ Result<bool> SharedFolder::begin() const {
         fs::remove_all(aside_, ignored); // of a process that was killed
         return true;
     }
-    if (::mkdir(folder_.c_str(), 0777) == 0) {
-        // It was there a moment ago, and is not because all is done.
-        if (has_plan(finished_) && is_in_place_()) return ::rmdir(folder_.c_str()), true;
-    } else if (errno != EEXIST) {
-        return cannot_write(folder_, errno);
-    } else if (is_finished()) {
+    const bool is_new = ::mkdir(folder_.c_str(), 0777) == 0;
+    if (!is_new && errno != EEXIST) return cannot_write(folder_, errno);
+    if (is_finished()) { // by others, since we asked
+        if (is_new) ::rmdir(folder_.c_str());
         return true;
     }
     const Status planned = add(kPlanName, [&](const fs::path& plan) { return write_file(plan, plan_); });
