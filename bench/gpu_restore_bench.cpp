@@ -130,8 +130,8 @@ void BM_gpu_restore(benchmark::State& state) {
 }
 BENCHMARK(BM_gpu_restore)
     ->ArgNames({"resolution", "int16", "captured"})
-    ->ArgsProduct({{264, 707}, {0, 1}, {0, 1}})
-    ->MinTime(1)
+    ->ArgsProduct({{264, 707, 1291}, {0, 1}, {0, 1}})
+    ->Iterations(20)
     ->UseManualTime()
     ->Unit(benchmark::kMillisecond);
 

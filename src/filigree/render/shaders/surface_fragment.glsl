@@ -18,11 +18,17 @@ layout(location = 0) out vec4 result;
 const vec3 kNoValue = vec3(0.2);
 
 void main() {
+    // What compares pixels beside each other (derivatives, pictures in several sizes) comes before any pixel is
+    // discarded; after that it is undefined, and GPUs differ from the software renderer.
+    vec3 facing = cross(dFdx(surface.position), dFdy(surface.position));
+#ifndef PLAIN
+    vec4 texel = vec4(1.0);
+    if (has_picture) texel = texture(picture, surface.uv);
+#endif
 #ifdef COVERED
     if (!is_covered()) discard;
 #endif
     vec3 view = to_viewer(surface.position);
-    vec3 facing = cross(dFdx(surface.position), dFdy(surface.position));
     float size = length(facing);
     facing = size > 0.0 ? facing / size : view;
     if (dot(facing, view) < 0.0) facing = -facing;
@@ -35,7 +41,6 @@ void main() {
 #ifndef PLAIN
     if (has_colors) albedo = surface.color.rgb;
     if (has_picture) {
-        vec4 texel = texture(picture, surface.uv);
         if (texel.a < 0.5) discard;
         albedo *= texel.rgb;
     }
