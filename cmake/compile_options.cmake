@@ -23,7 +23,8 @@ if(FILIGREE_SANITIZE)
   target_link_options(filigree_options INTERFACE -fsanitize=${FILIGREE_SANITIZE})
 endif()
 
-# For programs and the report, which say what is to be done: what takes time is in the libraries, and -O1 compiles sooner.
+# For scenes, what shows them, programs and the report, which say what is to be done: what takes time is below them, and
+# -O1 compiles sooner.
 # Not with static libraries: the linker would keep the programs' copies of templates.
 add_library(filigree_thin_options INTERFACE)
 target_link_libraries(filigree_thin_options INTERFACE filigree_options)

@@ -47,6 +47,7 @@ set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libfiligree-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEVELOPMENT_DESCRIPTION "${PROJECT_DESCRIPTION}: headers, and what CMake and pkg-config need")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "libeigen3-dev, libtbb-dev")
+set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SHLIBDEPS OFF) # no program in it, and CPack would start two processes a header
 set(CPACK_COMPONENT_DEVELOPMENT_DEPENDS library)
 
 if(TARGET filigree_python)

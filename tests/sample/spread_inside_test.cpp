@@ -8,7 +8,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <map>
 
 namespace filigree {
 namespace {
@@ -67,18 +66,20 @@ std::vector<Vec3d> plain_poisson(const Mesh& mesh, const Lattice& lattice) {
     });
     std::ranges::sort(darts, {}, [](const auto& dart) { return dart.first; });
     const double least = 0.8 * lattice.spacing;
-    std::map<std::array<int, 3>, std::vector<Vec3d>> cells;
+    const Vec3d corner = bounds(mesh.positions).min.cast<double>().array() - 2 * least;
+    const auto side = static_cast<int>(bounds(mesh.positions).size().maxCoeff() / least) + 5;
+    std::vector<std::vector<Vec3d>> cells(std::size_t(side) * side * side);
     std::vector<Vec3d> kept;
     for (const auto& [order, place] : darts) {
-        const Vec3d at = (place / least).array().floor();
+        const Eigen::Array3i at = ((place - corner) / least).array().cast<int>();
+        const auto near = [&](int n) -> std::vector<Vec3d>& {
+            return cells[((at[2] + n / 9 - 1) * side + at[1] + n / 3 % 3 - 1) * side + at[0] + n % 3 - 1];
+        };
         bool is_free = true;
         for (int n = 0; n < 27 && is_free; ++n)
-            if (const auto near =
-                    cells.find({int(at[0]) + n % 3 - 1, int(at[1]) + n / 3 % 3 - 1, int(at[2]) + n / 9 - 1});
-                near != cells.end())
-                for (const Vec3d& p : near->second) is_free = is_free && (p - place).squaredNorm() >= least * least;
+            for (const Vec3d& p : near(n)) is_free = is_free && (p - place).squaredNorm() >= least * least;
         if (!is_free) continue;
-        cells[{int(at[0]), int(at[1]), int(at[2])}].push_back(place);
+        near(13).push_back(place);
         kept.push_back(place);
     }
     return kept;

@@ -8,8 +8,13 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <embree3/rtcore.h>
 #include <new>
+
+#if __has_include(<embree4/rtcore.h>)
+#include <embree4/rtcore.h>
+#else
+#include <embree3/rtcore.h>
+#endif
 
 namespace filigree {
 namespace {

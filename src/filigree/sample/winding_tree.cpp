@@ -346,19 +346,23 @@ Winding winding_and_distance_plain(const Tree& tree, const Vec3d& point) {
     return winding_of<false, true>(tree, point);
 }
 
-/// The tree's answer, with the distance or without.
-WindingFunction winding_function(bool with_distance) {
+/// What the tree answers, by the widest vectors. A struct of its own: GCC 13 and 14 crash where a class with a linkage
+/// has such pointers as members, and several sources are compiled as one.
+struct Answers {
+    WindingFunction number = winding_plain, number_and_distance = winding_and_distance_plain;
+};
+Answers widest_answers() {
 #if defined(FILIGREE_HAS_WIDTHS)
-    if (widest_vectors() >= VectorWidth::bytes32) return with_distance ? winding_and_distance_avx2 : winding_avx2;
+    if (widest_vectors() >= VectorWidth::bytes32) return {winding_avx2, winding_and_distance_avx2};
 #endif
-    return with_distance ? winding_and_distance_plain : winding_plain;
+    return {};
 }
 
 } // namespace
 
 struct WindingTree::Content {
     Tree tree;
-    WindingFunction ask = winding_function(false), ask_with_distance = winding_function(true);
+    Answers answers = widest_answers();
 };
 
 WindingTree::WindingTree(std::unique_ptr<Content> content) : content_(std::move(content)) {}
@@ -376,10 +380,10 @@ Result<WindingTree> WindingTree::create(std::span<const Vec3f> positions, std::s
 double WindingTree::inverse_half_size() const { return content_->tree.inverse_half_size; }
 
 WindingTree::NumberAndDistance WindingTree::winding_and_distance(const Vec3d& point) const {
-    return content_->ask_with_distance(content_->tree, point);
+    return content_->answers.number_and_distance(content_->tree, point);
 }
 
-double WindingTree::winding(const Vec3d& point) const { return content_->ask(content_->tree, point).number; }
+double WindingTree::winding(const Vec3d& point) const { return content_->answers.number(content_->tree, point).number; }
 
 Result<std::vector<float>> WindingTree::winding(std::span<const Vec3d> points, const RunContext& context) const {
     constexpr std::size_t kPiece = 1024, kBetweenLooks = 64, kBetweenReports = std::size_t{1} << 18;
