@@ -53,6 +53,14 @@ struct TextureTraits {
     }
     static void free(GLuint name) { glDeleteTextures(1, &name); }
 };
+struct SamplerTraits {
+    static GLuint make() {
+        GLuint name = 0;
+        glGenSamplers(1, &name);
+        return name;
+    }
+    static void free(GLuint name) { glDeleteSamplers(1, &name); }
+};
 struct FramebufferTraits {
     static GLuint make() {
         GLuint name = 0;
@@ -88,6 +96,7 @@ struct ShaderTraits {
 
 using Buffer = Object<BufferTraits>;
 using Texture = Object<TextureTraits>;
+using Sampler = Object<SamplerTraits>;
 using Framebuffer = Object<FramebufferTraits>;
 using Renderbuffer = Object<RenderbufferTraits>;
 using VertexArray = Object<VertexArrayTraits>;

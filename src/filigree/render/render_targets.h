@@ -19,6 +19,9 @@ struct ShadowMap {
     explicit ShadowMap(int side);
 };
 
+/// Looks at a shadow map's nearest place alone, not at the four around: quicker, for what looks many times.
+Sampler make_nearest_shadow_sampler();
+
 /// A colour and a depth of several samples a pixel.
 struct Multisampled {
     Renderbuffer color, depth;

@@ -85,6 +85,7 @@ Result<Renderer> Renderer::create() {
     content->add = link(shaders::cover_vertex, shaders::add_fragment);
     content->show = link(shaders::cover_vertex, shaders::show_fragment);
     content->nothing = gl::VertexArray::make();
+    content->ground_sampler = gl::make_nearest_shadow_sampler();
     Result<gl::Buffer> buffer = gl::make_buffer(nullptr, sizeof(FrameBlock));
     if (!buffer) return buffer.error();
     content->frame_buffer = std::move(buffer).value();
@@ -313,8 +314,8 @@ bool Renderer::add_pass() {
     glBindTexture(GL_TEXTURE_2D, c.key_map->depth.name());
     glActiveTexture(GL_TEXTURE1);
     glBindTexture(GL_TEXTURE_2D, c.sky_map->depth.name());
-    if (c.shows_ground) c.draw_ground();
     c.draw_objects(Content::Target::light);
+    if (c.shows_ground) c.draw_ground();
 
     if (targets.samples > 1) targets.multisampled.resolve_to(targets.pass, w, h);
     glBindFramebuffer(GL_FRAMEBUFFER, targets.total.name());

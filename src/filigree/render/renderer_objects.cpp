@@ -161,6 +161,7 @@ void Renderer::Content::draw_points(const SceneObject& object, Target target) {
     glDrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, static_cast<GLsizei>(drawable.point_count));
 }
 
+/// Last, and behind everything, so that its many looks at the shadows are spent only where it shows.
 void Renderer::Content::draw_ground() {
     const auto [right, forward] = tangents(up_vector(scene.up));
     const Vec3f a = (kGroundSide * right).cast<float>(), b = (kGroundSide * forward).cast<float>();
@@ -168,9 +169,13 @@ void Renderer::Content::draw_ground() {
     glUniform3fv(ground.uniform("ground_right"), 1, a.data());
     glUniform3fv(ground.uniform("ground_forward"), 1, b.data());
     glBindVertexArray(nothing.name());
-    glDisable(GL_DEPTH_TEST);
+    for (const GLuint unit : {0u, 1u}) glBindSampler(unit, ground_sampler.name());
+    glDepthRange(1, 1);
+    glDepthFunc(GL_LEQUAL);
     glDrawArrays(GL_TRIANGLE_STRIP, 0, 4);
-    glEnable(GL_DEPTH_TEST);
+    glDepthFunc(GL_LESS);
+    glDepthRange(0, 1);
+    for (const GLuint unit : {0u, 1u}) glBindSampler(unit, 0);
 }
 
 } // namespace filigree
