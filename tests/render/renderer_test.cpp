@@ -149,7 +149,7 @@ TEST_F(Rendered, TheToleranceIsTightForLightAndShadow) {
     const Vec3d other = (0.72 * right + 0.72 * up - 0.42 * front).normalized();
     const auto with_plate = [&](const Vec3d& direction) {
         Mesh plate = square();
-        const Eigen::Quaterniond turn = Eigen::Quaterniond::FromTwoVectors(Vec3d::UnitZ(), direction);
+        const Eigen::AngleAxisd turn(std::acos(direction.z()), Vec3d::UnitZ().cross(direction).normalized());
         for (Vec3f& p : plate.positions) p = (turn * (1.7 * p.cast<double>()) + 4 * direction).cast<float>();
         const Drawable drawn = surface(plate);
         Scene shaded = scene_of(cube);

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <Eigen/QR>
 #include <Eigen/SVD>
 
 namespace filigree {
@@ -47,6 +48,15 @@ Vec3d solve_semidefinite(const Mat3d& matrix, const Vec3d& right) { return matri
 
 Eigen::MatrixXd solve_semidefinite(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& right) {
     return matrix.ldlt().solve(right);
+}
+
+Eigen::MatrixX3d least_squares(const Eigen::MatrixXd& matrix, const Eigen::MatrixX3d& right) {
+    return matrix.completeOrthogonalDecomposition().solve(right);
+}
+
+Eigen::MatrixXd orthogonal_complement(const Eigen::MatrixXd& matrix) {
+    const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> split(matrix);
+    return Eigen::MatrixXd(split.householderQ()).rightCols(matrix.rows() - split.rank());
 }
 
 Eigen::MatrixXd solve_general(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& right) {

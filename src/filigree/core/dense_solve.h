@@ -44,6 +44,10 @@ inline Mat3d cofactor(const Mat3d& a) {
 /// x with matrix x = right, for a symmetric positive semi-definite matrix, of which the lower triangle is read.
 Vec3d solve_semidefinite(const Mat3d& matrix, const Vec3d& right);
 Eigen::MatrixXd solve_semidefinite(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& right);
+/// The least x of those with the least |matrix x - right|, column by column, for any matrix.
+Eigen::MatrixX3d least_squares(const Eigen::MatrixXd& matrix, const Eigen::MatrixX3d& right);
+/// An orthonormal basis, as columns, of all that is orthogonal to the columns of matrix. No columns: there is nothing.
+Eigen::MatrixXd orthogonal_complement(const Eigen::MatrixXd& matrix);
 /// x with matrix x = right, for any square matrix that is not singular.
 Eigen::MatrixXd solve_general(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& right);
 

@@ -11,7 +11,6 @@
 #include "filigree/mesh/normals.h"
 
 #include <Eigen/Geometry>
-#include <Eigen/QR>
 #include <array>
 #include <cassert>
 #include <cmath>
@@ -151,15 +150,11 @@ void RbfWarp::solve(std::span<const Vec3d> centres, std::span<const Vec3d> displ
         for (Eigen::Index j = 0; j < n; ++j) kernel(i, j) = std::pow((u.row(i) - u.row(j)).norm(), 3);
     affine << u, Eigen::VectorXd::Ones(n);
 
-    const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> split(affine);
-    const Eigen::MatrixXd q = split.householderQ();
+    const Eigen::MatrixXd z = orthogonal_complement(affine);
     Eigen::MatrixX3d weights = Eigen::MatrixX3d::Zero(n, 3);
-    if (split.rank() < n) { // else so few centres that an affine map does it
-        const auto z = q.rightCols(n - split.rank());
-        const Eigen::MatrixXd inner = z.transpose() * kernel * z;
-        weights = z * inner.completeOrthogonalDecomposition().solve(z.transpose() * d);
-    }
-    const Eigen::MatrixX3d coefficients = split.solve(d - kernel * weights);
+    if (z.cols() > 0) // else so few centres that an affine map does it
+        weights = z * least_squares(z.transpose() * kernel * z, z.transpose() * d);
+    const Eigen::MatrixX3d coefficients = least_squares(affine, d - kernel * weights);
     linear_ = coefficients.topRows(3).transpose();
     constant_ = coefficients.row(3).transpose();
 

@@ -1,6 +1,6 @@
 #include "filigree/deform/unwarp.h"
 
-#include <Eigen/LU>
+#include <Eigen/LU> // inverse
 
 namespace filigree {
 
@@ -10,9 +10,8 @@ Vec3d unwarped(const SpaceWarp& warp, const Vec3d& place, const Vec3d& guess) {
     Warped now = warp.warp(point);
     double distance = (place - now.position).norm();
     for (int step = 0; step < kSteps; ++step) {
-        const Eigen::FullPivLU<Mat3d> gradient(now.gradient);
-        if (!gradient.isInvertible()) break;
-        Vec3d way = gradient.solve(place - now.position);
+        Vec3d way = now.gradient.inverse() * (place - now.position);
+        if (!way.allFinite()) break;
         bool is_nearer = false;
         for (int halving = 0; halving < kHalvings && !is_nearer; ++halving, way *= 0.5) {
             const Warped next = warp.warp(point + way);

@@ -29,12 +29,27 @@ Mat3d with_law(const Mat3d& a, const Vec3d& n, HeightLaw law) {
     return a + (column - a * n) * n.transpose();
 }
 
+/// The least rotation that takes the unit vector a to the unit vector b, by half its angle. Eigen's own way has a
+/// decomposition in it that takes seconds to compile.
+Mat3d least_rotation(const Vec3d& a, const Vec3d& b) {
+    const double cosine = a.dot(b);
+    if (cosine < -1 + 1e-12) { // a half turn about any axis across
+        const Vec3d axis = a.unitOrthogonal();
+        return 2 * axis * axis.transpose() - Mat3d::Identity();
+    }
+    const double w = std::sqrt((1 + cosine) / 2);
+    Eigen::Quaterniond turn;
+    turn.w() = w;
+    turn.vec() = a.cross(b) / (2 * w);
+    return turn.toRotationMatrix();
+}
+
 /// a with what it does across the unit vector t replaced by the least rotation that takes t to a t, scaled like a t.
 Mat3d turned_with_line(const Mat3d& a, const Vec3d& t) {
     const Vec3d moved = a * t;
     const double stretch = moved.norm();
     if (!(stretch > 0)) return moved * t.transpose();
-    const Mat3d turn = Eigen::Quaterniond::FromTwoVectors(t, moved).toRotationMatrix();
+    const Mat3d turn = least_rotation(t, moved / stretch);
     return moved * t.transpose() + stretch * turn * (Mat3d::Identity() - t * t.transpose());
 }
 

@@ -1,11 +1,11 @@
 #include "filigree/physics/rigid_state.h"
 
-#include <Eigen/Cholesky>
+#include "filigree/core/dense_solve.h"
 
 namespace filigree {
 
 Vec3d RigidState::angular_velocity_of(const Vec3d& momentum) const {
-    return (inertia + 1e-12 * inertia.trace() * Mat3d::Identity()).ldlt().solve(momentum);
+    return solve_semidefinite(Mat3d(inertia + 1e-12 * inertia.trace() * Mat3d::Identity()), momentum);
 }
 
 namespace {
