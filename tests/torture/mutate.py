@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """Tests of the tests: makes one small change of the library at a time, and sees whether a test fails.
 
-Usage: mutate.py RELEASE SINGLE WORK [--count N] [--seed S] [--jobs N] [--json FILE]
+Usage: mutate.py RELEASE SINGLE WORK [--count N] [--seed S] [--add] [--jobs N] [--json FILE]
 RELEASE is a build whose tests pass; SINGLE is configured to compile one source at a time; WORK is for files of its own.
 The tree is left as it is: a changed copy of one source is compiled and linked into a library beside the release's, which
 its tests then load. Changes are of arithmetic, comparisons, logic and constants in the layers below. One that does not
-compile is passed over.
+compile is passed over. --add counts on from what FILE holds, of other seeds.
 """
 import argparse
 import concurrent.futures
@@ -121,13 +121,20 @@ def main():
         parser.add_argument(name, type=lambda text: pathlib.Path(text).resolve())
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--add", action="store_true")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--json", type=pathlib.Path)
     options = parser.parse_args()
     library = Library(options.release, options.single)
     by_layer = sites()
     choice = random.Random(options.seed)
-    told = {"seed": options.seed, "made": 0, "caught": 0, "escaped": []}
+    told = {"seeds": {}, "made": 0, "caught": 0, "escaped": []}
+    if options.add and options.json and options.json.exists():
+        told = json.loads(options.json.read_text())
+    seed = str(options.seed)
+    if seed in told["seeds"]:
+        sys.exit(f"mutate: changes of seed {seed} are counted already; take another seed")
+    told["seeds"][seed] = 0
     lock = threading.Lock()
     tried = 0
 
@@ -169,6 +176,7 @@ def main():
             where = f"{path.relative_to(ROOT)}:{number + 1}"
             with lock:
                 told["made"] += 1
+                told["seeds"][seed] += 1
                 told["caught"] += by is not None
                 if by is None:
                     told["escaped"].append({"where": where, "was": was.strip(), "became": lines[number].strip()})

@@ -103,9 +103,10 @@ def mutants():
     if not told:
         return None
     escaped = ["", "What escaped:", "", *[f"- `{m['where']}`: `{m['became']}`" for m in told["escaped"]]]
-    return ["Small changes of hierarchy, sample, coding and fracture, one at a time (`scripts/mutate --count "
-            f"{told['made']} --seed {told['seed']}`): {told['caught']} of {told['made']} made a test fail. Last run: "
-            f"{when_of('mutants')}.", *(escaped if told["escaped"] else [])]
+    runs = ", ".join(f"{made} of seed {seed}" for seed, made in told["seeds"].items())
+    return [f"Small changes of hierarchy, sample, coding and fracture, one at a time (`scripts/mutate`; {runs}): "
+            f"{told['caught']} of {told['made']} made a test fail. Last run: {when_of('mutants')}.",
+            *(escaped if told["escaped"] else [])]
 
 
 def judged(section):
