@@ -18,7 +18,7 @@ constexpr unsigned kFilmWidth = 640, kFilmHeight = 480, kFilmFrames = 30, kFilmP
 constexpr std::size_t kMostFilmTriangles = 150'000;
 
 /// From where a lean is seen from the side: bends go from an axis towards the next.
-Camera camera_for(std::span<const CameraPoints> points, UpAxis up, double aspect) {
+Camera camera_around(std::span<const CameraPoints> points, UpAxis up, double aspect) {
     const Vec3d direction =
         view_direction(View::side, up) + 0.45 * view_direction(View::front, up) + 0.5 * up_vector(up);
     return fit_camera(points, direction, up_vector(up), aspect, 30, 0.08);
@@ -31,8 +31,8 @@ void draw_demo(const DemoScene& scene, HeadlessRenderer& renderer, const std::st
     const double aspect = double(kPanelWidth) / kPanelHeight;
     const CameraPoints before{scene.mesh.positions, scene.mesh.origin},
         after{scene.restored.positions, scene.restored.origin};
-    const Camera at_rest = camera_for(std::span(&before, 1), scene.up, aspect),
-                 moved = camera_for(std::span(&after, 1), scene.up, aspect);
+    const Camera at_rest = camera_around(std::span(&before, 1), scene.up, aspect),
+                 moved = camera_around(std::span(&after, 1), scene.up, aspect);
     const HeatMap errors = heat_map(scene.error.vertices->per_vertex, scene.error.diagonal);
 
     constexpr double kGap = 8, kCaption = 40, kLegend = 130;
@@ -88,7 +88,7 @@ void film_demo(const DemoScene& scene, const std::function<Pose(double)>& pose_a
     FilmExtent extent;
     for (int k = 0; k <= 4; ++k) extent.add(require(restorer.positions(pose_at(k / 4.0), context)), scene.mesh.origin);
     const CameraPoints points = extent.points();
-    const Camera camera = camera_for(std::span(&points, 1), scene.up, double(kFilmWidth) / kFilmHeight);
+    const Camera camera = camera_around(std::span(&points, 1), scene.up, double(kFilmWidth) / kFilmHeight);
 
     std::vector<Picture> frames; // the way there; back it is the same
     const auto draw = [&](std::size_t f, const RunContext& quiet) -> Result<Picture> {
