@@ -8,8 +8,6 @@
 #include "filigree/mesh/triangulate.h"
 #include "filigree/present/textured_look.h"
 
-#include <QElapsedTimer>
-
 #include <algorithm>
 #include <limits>
 #include <utility>
@@ -22,8 +20,6 @@ const Vec3f kDriverEdges(0.85f, 0.33f, 0.10f), kObstacles(0.62f, 0.65f, 0.70f), 
     kInsidePoints(0.20f, 0.45f, 0.78f);
 
 constexpr float kSeenThrough = 0.4f; // of a surface whose inside is shown uncut
-
-double milliseconds(const QElapsedTimer& timer) { return 1e-6 * static_cast<double>(timer.nsecsElapsed()); }
 
 /// The finest mesh with its vertices elsewhere, and nothing that would no longer be true.
 Mesh moved_mesh(const Mesh& mesh, std::span<const Vec3f> positions) {

@@ -9,6 +9,7 @@
 #include "filigree/mesh/defect_edges.h"
 #include "filigree/present/patch_surface.h"
 
+#include <QElapsedTimer>
 #include <QPalette>
 
 #include <functional>
@@ -17,6 +18,8 @@ namespace filigree::studio {
 
 /// What a tile of the picture is of: the whole picture, or one of the three of the split view.
 enum class TileShows { driver, restored, full };
+
+inline double milliseconds(const QElapsedTimer& timer) { return 1e-6 * static_cast<double>(timer.nsecsElapsed()); }
 
 class DrawnObjects : public QObject {
     Q_OBJECT

@@ -39,7 +39,7 @@ std::vector<Vec3f> ways_of(const std::vector<Vec3f>& places, std::span<const Ind
     return ways;
 }
 
-QString row(const QString& name, const QString& value) {
+QString value_row(const QString& name, const QString& value) {
     return QStringLiteral("<tr><td>%1</td><td align='right'>%2</td></tr>").arg(name, value);
 }
 
@@ -110,11 +110,12 @@ QString pieces_table(const MadePieces& pieces) {
     const CutReport& report = pieces.report;
     const double median = report.median > 0 ? report.median : 1;
     return QStringLiteral("<table width='100%' cellspacing='0' cellpadding='1'>") +
-           row("Pieces", with_commas(report.cells)) +
-           row("Smallest, of the median", number_text(report.smallest / median, 2)) +
-           row("Largest, of the median", number_text(report.largest / median, 2)) +
-           row("Inner faces", with_commas(report.inside_faces)) + row("Open edges", with_commas(report.open_edges)) +
-           row("Seconds", number_text(pieces.seconds, 2)) + QStringLiteral("</table>");
+           value_row("Pieces", with_commas(report.cells)) +
+           value_row("Smallest, of the median", number_text(report.smallest / median, 2)) +
+           value_row("Largest, of the median", number_text(report.largest / median, 2)) +
+           value_row("Inner faces", with_commas(report.inside_faces)) +
+           value_row("Open edges", with_commas(report.open_edges)) +
+           value_row("Seconds", number_text(pieces.seconds, 2)) + QStringLiteral("</table>");
 }
 
 } // namespace filigree::studio

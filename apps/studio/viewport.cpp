@@ -27,8 +27,6 @@ bool is_software_renderer(const std::string& name) {
                                [&](const char* software) { return name.find(software) != std::string::npos; });
 }
 
-double milliseconds(const QElapsedTimer& timer) { return 1e-6 * static_cast<double>(timer.nsecsElapsed()); }
-
 } // namespace
 
 struct Viewport::Impl {

@@ -22,8 +22,6 @@ using namespace filigree::studio;
 
 namespace {
 
-double distance(const QPointF& a, const QPointF& b) { return std::hypot(a.x() - b.x(), a.y() - b.y()); }
-
 TEST(Pointer, PicksWhatItProjects) {
     Stand stand("wavy-sphere", 24);
     ASSERT_TRUE(stand.is_ready());

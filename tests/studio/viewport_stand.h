@@ -10,10 +10,13 @@
 #include <QVBoxLayout>
 #include <QWheelEvent>
 
+#include <cmath>
 #include <cstdlib>
 #include <functional>
 
 namespace filigree::studio {
+
+inline double distance(const QPointF& a, const QPointF& b) { return std::hypot(a.x() - b.x(), a.y() - b.y()); }
 
 /// A viewport with a bumpy ball, shown and drawn.
 struct Stand {

@@ -20,8 +20,6 @@ using namespace filigree::studio;
 
 namespace {
 
-double distance(const QPointF& a, const QPointF& b) { return std::hypot(a.x() - b.x(), a.y() - b.y()); }
-
 /// The mean difference of two pictures' colours, 0 to 255, within a rectangle.
 double difference(const QImage& a, const QImage& b, const QRect& within) {
     double sum = 0;
