@@ -143,7 +143,10 @@ protected:
                            "32x32", "--passes", "1"},
                           chunk);
     }
-    bool has_opengl() const { return run(pictures("b")).code != 5; }
+    bool has_opengl() const {
+        std::filesystem::create_directory(path("tried"));
+        return run(pictures_of("1", "tried", "")).code != 5;
+    }
 
     /// Every file in a folder, with a hash of its bytes, but for the plans.
     std::map<std::string, std::size_t> all_in(const std::string& folder) const {
