@@ -175,6 +175,17 @@ TEST(MeshCode, NormalsOfAnyLength) { // of vertices and of corners
     }
 }
 
+TEST(MeshCode, NormalsOfAnyDirection) { // also those that look into the surface
+    Mesh mesh = make_wavy_sphere({.resolution = 16});
+    std::mt19937 random(6);
+    std::normal_distribution<float> any;
+    for (std::size_t v = 0; v < mesh.vertex_count(); ++v)
+        mesh.normals.values.push_back(Vec3f(any(random), any(random), any(random)).normalized());
+    const Coded out = coded(mesh, {.keep_order = true});
+    for (std::size_t v = 0; v < mesh.vertex_count(); ++v)
+        ASSERT_LT((out.mesh.normals.values[v] - mesh.normals.values[v]).norm(), 6.1e-3f) << v; // as in Attributes
+}
+
 /// Vertices, faces and first corners in any order.
 Mesh shuffled(const Mesh& mesh, unsigned seed) {
     std::mt19937 random(seed);

@@ -92,6 +92,19 @@ TEST(CrackWarp, DoesNotFold) {
     EXPECT_GT(least, 0);
 }
 
+TEST(CrackWarp, FineBumpsGoOnBelowTheMap) {
+    const CrackWarp warp({.box = unit_box(), .roughness = 1, .wavelength = 0.2});
+    const double shortest = warp.finest_wavelength() / 8;
+    double highest = 0;
+    for (const Vec3d& p : random_points(2'000, 13)) {
+        highest = std::max(highest, std::abs(warp.fine_height(p, shortest)));
+        EXPECT_EQ(warp.fine_height(p, warp.finest_wavelength()), 0); // the map has those
+    }
+    EXPECT_LE(highest, warp.fine_reach(shortest));
+    EXPECT_GT(highest, 0.3 * warp.fine_reach(shortest));
+    EXPECT_EQ(warp.fine_reach(warp.finest_wavelength()), 0);
+}
+
 /// Each side of a face between two cells, as the four cells at every corner.
 void expect_one_diagram(const FractureCells& cells) {
     std::map<std::pair<Index, Index>, std::vector<std::array<Index, 4>>> sides;

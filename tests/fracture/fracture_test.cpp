@@ -326,6 +326,7 @@ TEST(Fracture, IslandsArePiecesAndSplintersAreNot) {
     EXPECT_EQ(whole.report.inside_faces, 0u);
     expect_sound(cube, whole);
     EXPECT_EQ(broken(cube, corner, 0, {.smallest = 0}).pieces, 2u);
+    EXPECT_EQ(broken(cube, std::vector{corner[1], corner[0]}, 0).pieces, 1u); // whichever comes first
 }
 
 TEST(Fracture, ThreadsDoNotMatter) {
