@@ -326,7 +326,7 @@ TEST(Fracture, IslandsArePiecesAndSplintersAreNot) {
     EXPECT_EQ(whole.report.inside_faces, 0u);
     expect_sound(cube, whole);
     EXPECT_EQ(broken(cube, corner, 0, {.smallest = 0}).pieces, 2u);
-    // Whichever face it is of, so also where it is the first of all parts.
+    // Whichever corner is cut off, so also one that is the first of all parts.
     for (int k = 0; k < 8; ++k) {
         const Vec3d way(k & 1 ? 1 : -1, k & 2 ? 1 : -1, k & 4 ? 1 : -1), middle(0.5, 0.5, 0.5);
         EXPECT_EQ(broken(cube, std::vector<Vec3d>{middle + 0.45 * way, middle + 0.498 * way}, 0).pieces, 1u);

@@ -7,6 +7,7 @@
 #include "threads.h"
 
 #include <gtest/gtest.h>
+#include <numbers>
 
 namespace filigree {
 namespace {
@@ -273,6 +274,24 @@ TEST(GradientFit, PointsWithoutFacesHaveGradientsToo) {
         EXPECT_LT((a.cast<double>() * along - 2 * kRotation * along).norm(), 1e-4);
         EXPECT_LT((a.transpose() * a - 4 * Mat3f::Identity()).norm(), 1e-3); // turned and scaled, in every direction
     }
+}
+
+TEST(GradientFit, LinesTurnByAnyAngle) {
+    for (const Vec3d& way :
+         {Vec3d(0.1, 0.05, 0), Vec3d(0.03, -0.07, 0.11), Vec3d(-0.2, 0.013, 0.007), Vec3d(0, 0, 0.1)})
+        for (const double degrees : {0.0, 90.0, 179.0, 179.9, 179.98, 179.99, 180.0}) {
+            SCOPED_TRACE(std::to_string(degrees) + " degrees");
+            Mesh line;
+            for (int k = 0; k < 20; ++k) line.positions.push_back((k * way).cast<float>());
+            const GradientFit fit(line, NormalColumn::fitted, kOneThread);
+            const Eigen::AngleAxisd turn(degrees * std::numbers::pi / 180, way.unitOrthogonal());
+            const auto moved = mapped(line.positions, [&](const Vec3d& p) { return Vec3d(turn * p); });
+            for (const Mat3f& a : fit.fit(moved, HeightLaw::proportional, kOneThread)) {
+                ASSERT_LT((a.cast<double>() * way - turn * way).norm(), 1e-4 * way.norm());
+                ASSERT_LT((a.transpose() * a - Mat3f::Identity()).norm(), 1e-3); // a rotation
+                ASSERT_GT(a.determinant(), 0);
+            }
+        }
 }
 
 } // namespace

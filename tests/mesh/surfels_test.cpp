@@ -22,7 +22,7 @@ bool meets(const Surfels& surfels, std::size_t i, const Vec3f& point, const Vec3
     if (to.norm() > 3 * std::max(u.norm(), v.norm())) return false;
     Mat3f matrix;
     matrix << u, v, -way;
-    const Vec3f at = matrix.inverse() * to; // not a number where they are parallel
+    const Vec3f at = matrix.inverse() * to; // not finite where the line lies in the disc
     return at[0] * at[0] + at[1] * at[1] <= 1 + 1e-3f && (matrix * at - to).norm() < 1e-3f * to.norm() + 1e-6f;
 }
 

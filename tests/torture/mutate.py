@@ -125,7 +125,6 @@ def main():
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--json", type=pathlib.Path)
     options = parser.parse_args()
-    library = Library(options.release, options.single)
     by_layer = sites()
     choice = random.Random(options.seed)
     told = {"seeds": {}, "made": 0, "caught": 0, "escaped": []}
@@ -135,6 +134,7 @@ def main():
     if seed in told["seeds"]:
         sys.exit(f"mutate: changes of seed {seed} are counted already; take another seed")
     told["seeds"][seed] = 0
+    library = Library(options.release, options.single)
     lock = threading.Lock()
     tried = 0
 

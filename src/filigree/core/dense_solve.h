@@ -46,7 +46,8 @@ Vec3d solve_semidefinite(const Mat3d& matrix, const Vec3d& right);
 Eigen::MatrixXd solve_semidefinite(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& right);
 /// The least x of those with the least |matrix x - right|, column by column, for any matrix.
 Eigen::MatrixX3d least_squares(const Eigen::MatrixXd& matrix, const Eigen::MatrixX3d& right);
-/// An orthonormal basis, as columns, of all that is orthogonal to the columns of matrix. No columns: there is nothing.
+/// An orthonormal basis, as columns, of all that is orthogonal to the columns of matrix. It has no columns where
+/// nothing is.
 Eigen::MatrixXd orthogonal_complement(const Eigen::MatrixXd& matrix);
 /// x with matrix x = right, for any square matrix that is not singular.
 Eigen::MatrixXd solve_general(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& right);

@@ -29,8 +29,8 @@ Mat3d with_law(const Mat3d& a, const Vec3d& n, HeightLaw law) {
     return a + (column - a * n) * n.transpose();
 }
 
-/// The least rotation that takes the unit vector a to the unit vector b, by half its angle. Eigen's own way has a
-/// decomposition in it that takes seconds to compile.
+/// The least rotation that takes the unit vector a to the unit vector b, by half its angle: they are of length 1 to the
+/// last bits, or turns by nearly 180 degrees go wrong. Eigen's own way takes ten seconds to compile.
 Mat3d least_rotation(const Vec3d& a, const Vec3d& b) {
     const double cosine = a.dot(b);
     if (cosine < -1 + 1e-12) { // a half turn about any axis across
@@ -49,7 +49,7 @@ Mat3d turned_with_line(const Mat3d& a, const Vec3d& t) {
     const Vec3d moved = a * t;
     const double stretch = moved.norm();
     if (!(stretch > 0)) return moved * t.transpose();
-    const Mat3d turn = least_rotation(t, moved / stretch);
+    const Mat3d turn = least_rotation(t.normalized(), moved / stretch);
     return moved * t.transpose() + stretch * turn * (Mat3d::Identity() - t * t.transpose());
 }
 

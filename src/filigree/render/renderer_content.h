@@ -39,7 +39,7 @@ struct Renderer::Content {
     gl::Buffer frame_buffer;
     gl::VertexArray nothing; ///< for shaders that need no input
     std::optional<gl::ShadowMap> key_map, sky_map;
-    gl::Sampler ground_sampler; ///< of both, where they fall on the ground
+    gl::Sampler ground_sampler; ///< of both maps, for the ground
     GLint largest = 0, most_samples = 0;
     bool is_software = false;
 
