@@ -37,53 +37,15 @@ private:
     GLuint name_ = 0;
 };
 
-struct BufferTraits {
+/// Of names that OpenGL gives out and takes back by the number; epoxy has its functions as variables.
+template <auto* kMake, auto* kFree>
+struct NumberedTraits {
     static GLuint make() {
         GLuint name = 0;
-        glGenBuffers(1, &name);
+        (*kMake)(1, &name);
         return name;
     }
-    static void free(GLuint name) { glDeleteBuffers(1, &name); }
-};
-struct TextureTraits {
-    static GLuint make() {
-        GLuint name = 0;
-        glGenTextures(1, &name);
-        return name;
-    }
-    static void free(GLuint name) { glDeleteTextures(1, &name); }
-};
-struct SamplerTraits {
-    static GLuint make() {
-        GLuint name = 0;
-        glGenSamplers(1, &name);
-        return name;
-    }
-    static void free(GLuint name) { glDeleteSamplers(1, &name); }
-};
-struct FramebufferTraits {
-    static GLuint make() {
-        GLuint name = 0;
-        glGenFramebuffers(1, &name);
-        return name;
-    }
-    static void free(GLuint name) { glDeleteFramebuffers(1, &name); }
-};
-struct RenderbufferTraits {
-    static GLuint make() {
-        GLuint name = 0;
-        glGenRenderbuffers(1, &name);
-        return name;
-    }
-    static void free(GLuint name) { glDeleteRenderbuffers(1, &name); }
-};
-struct VertexArrayTraits {
-    static GLuint make() {
-        GLuint name = 0;
-        glGenVertexArrays(1, &name);
-        return name;
-    }
-    static void free(GLuint name) { glDeleteVertexArrays(1, &name); }
+    static void free(GLuint name) { (*kFree)(1, &name); }
 };
 struct ProgramTraits {
     static GLuint make() { return glCreateProgram(); }
@@ -94,12 +56,12 @@ struct ShaderTraits {
     static void free(GLuint name) { glDeleteShader(name); }
 };
 
-using Buffer = Object<BufferTraits>;
-using Texture = Object<TextureTraits>;
-using Sampler = Object<SamplerTraits>;
-using Framebuffer = Object<FramebufferTraits>;
-using Renderbuffer = Object<RenderbufferTraits>;
-using VertexArray = Object<VertexArrayTraits>;
+using Buffer = Object<NumberedTraits<&glGenBuffers, &glDeleteBuffers>>;
+using Texture = Object<NumberedTraits<&glGenTextures, &glDeleteTextures>>;
+using Sampler = Object<NumberedTraits<&glGenSamplers, &glDeleteSamplers>>;
+using Framebuffer = Object<NumberedTraits<&glGenFramebuffers, &glDeleteFramebuffers>>;
+using Renderbuffer = Object<NumberedTraits<&glGenRenderbuffers, &glDeleteRenderbuffers>>;
+using VertexArray = Object<NumberedTraits<&glGenVertexArrays, &glDeleteVertexArrays>>;
 using Shader = Object<ShaderTraits>;
 
 /// A linked program; uniforms by name.
