@@ -24,18 +24,19 @@ class Contacts {
 public:
     /// bodies: fixed in number from here on.
     Contacts(const World& world, std::size_t bodies, bool between_bodies, bool within_bodies)
-        : world_(world), between_bodies_(between_bodies), near_(bodies), touched_(bodies, 0),
-          matter_(world, between_bodies, within_bodies) {}
+        : world_(world), between_bodies_(between_bodies), within_bodies_(within_bodies), near_(bodies),
+          touched_(bodies, 0), matter_(world, between_bodies, within_bodies) {}
     /// Once, when all bodies are there.
-    void begin(std::span<const BodyState> bodies) { matter_.begin(bodies); }
+    void begin(std::span<const BodyState> bodies);
 
     /// Finds what might touch before anything has moved by the reaches, unless what was found last still holds: surface
     /// points near obstacles and near cells of other bodies or far parts of their own, and pairs of balls of meshfree
-    /// bodies.
+    /// bodies or of far parts of one.
     struct Search {
-        double time;                      ///< s
-        float obstacle_reach, pair_reach; ///< m
-        double frame;                     ///< s: for about so long what is found is to hold
+        double time;          ///< s
+        float obstacle_reach; ///< m
+        float pair_reach;     ///< m, beside each other
+        double frame;         ///< s: for about so long what is found is to hold
     };
     void search(std::span<BodyState> bodies, const Search& search, const RunContext& context);
     /// Before a frame of explicit steps.
@@ -50,7 +51,7 @@ public:
     /// A body's particles were moved by so much, m, beside their velocities.
     void was_moved(std::size_t body, float way) {
         near_way_ += way;
-        pairs_way_ += way;
+        pairs_way_ += 2 * way;
         matter_.was_moved(body, way);
     }
     /// s: in longer steps something could pass through something.
@@ -102,10 +103,15 @@ public:
             Vec3f anchor = Vec3f::Zero(); ///< world
             float friction = 0, unloading = 1;
             const MatterContacts::Frame* frame = nullptr; ///< or a point and the matter around it; `place` is its way
-            const BodyState* other = nullptr;             ///< or a ball of another body
+            const BodyState* other = nullptr;             ///< or a ball, of another body or of far matter of the same
+            const Embedding* other_embedding = nullptr;
             Index other_point = 0;
-            float reach = 0;                                          ///< sum of the balls' radii
-            Vec3f target = Vec3f::Zero();                             ///< neither: a pull to here
+            float reach = 0;              ///< sum of the balls' radii
+            bool rubs = false;            ///< not a push but friction, between the surface's points over two balls
+            Vec3f normal = Vec3f::Zero(); ///< of what rubs
+            Vec3f target = Vec3f::Zero(); ///< of what rubs, where friction wants the point beside the other; of none of
+                                          ///< these, where a pull wants it
+            float limit = 0;              ///< N, most friction
             Vec3f place = Vec3f::Zero(), other_place = Vec3f::Zero(); ///< of the points, by update_places
         };
         template <class Visit>
@@ -129,7 +135,8 @@ public:
         return matter_.frames(bodies, dt);
     }
     /// After a descent substep: anchors begin, slide and end as positions say.
-    ContactReport update_anchors(std::span<const BodyState> bodies, double time);
+    /// start: each body's positions before the substep.
+    ContactReport update_anchors(std::span<const BodyState> bodies, std::span<const Vectors> start, double time);
 
     /// What the last add_forces may have added to the squared frequency of a body, in parts of that at rest. Two bodies
     /// that push each other swing by the sum of what each feels.
@@ -174,31 +181,42 @@ private:
         contact_law::Grasp grasp;
         Vec3f anchor = Vec3f::Zero();
     };
-    /// Two balls of different bodies near each other.
+    /// Two balls near each other, of different bodies or of far parts of one.
     struct NearPair {
         Index first_body, first, second_body, second;
-        float clear_until; ///< pairs_way_ until which these cannot touch; both bodies travel
+        float clear_until; ///< pairs_way_ until which these cannot touch
         PairContact law;
         contact_law::Grasp grasp = {};
         Vec3f offset = Vec3f::Zero(); ///< m, along both: how far the first has slid from where it landed
 
         std::array<Index, 4> key() const { return {first_body, first, second_body, second}; }
     };
+    /// On the first of a pair. Friction acts between the surface points over the balls, which lie by each other where
+    /// these touch, so that it hardly turns what it holds.
+    struct PairForce {
+        Vec3f push = Vec3f::Zero(), friction = Vec3f::Zero();
+    };
     Blocks::Entry block_of(const Near& at, const BodyState& body, const ObstaclePoses& poses, float dt) const;
-    Blocks::Entry block_of(const BodyState& body, Index point, const BodyState& other, Index other_point,
-                           const PairContact& law, float dt) const;
+    void add_blocks_of(const NearPair& pair, std::span<const BodyState> bodies, bool of_first, float dt,
+                       std::vector<Blocks::Entry>& entries) const;
     Vec3f obstacle_force(Near& at, const BodyState& body, const ObstaclePoses& poses, float dt) const;
-    Vec3f pair_force(NearPair& pair, std::span<const BodyState> bodies, float dt) const;
-    static Vec3f relative_velocity(const NearPair& pair, std::span<const BodyState> bodies);
+    PairForce pair_force(NearPair& pair, std::span<const BodyState> bodies, float dt) const;
+    /// From the second's point to the first's, balls or surface points over them; of positions, or of velocities.
+    static Vec3f between(const NearPair& pair, std::span<const BodyState> bodies, Embedding BodyState::*points,
+                         const Vectors& of_first, const Vectors& of_second);
     std::vector<NearPair> held_pairs() const; ///< those that friction holds, ascending
     void find_near(std::span<const BodyState> bodies, double time, float reach, const RunContext& context);
     void find_pairs(std::span<const BodyState> bodies, float reach, const RunContext& context);
+    void find_own_pairs(const BodyState& body, Index number, const Vectors& balls, float reach);
 
     const World& world_;
-    bool between_bodies_;
+    bool between_bodies_, within_bodies_;
     std::vector<std::vector<Near>> near_; ///< by body, ascending by obstacle and point
     std::vector<NearPair> pairs_;
-    float near_way_ = 0, pairs_way_ = 0;       ///< m that anything may have gone since they were found ...
+    struct OwnBalls;                                         ///< of a body whose balls meet each other
+    std::vector<std::shared_ptr<const OwnBalls>> own_balls_; ///< null: of the others
+    float near_way_ = 0;                       ///< m that anything may have gone since they were found ...
+    float pairs_way_ = 0;                      ///< ... and balls beside each other ...
     float near_until_ = -1, pairs_until_ = -1; ///< ... and may go before they hold no more
     static constexpr std::uint8_t kOnObstacle = 1, kInMatter = MatterContacts::kTouched;
     std::vector<std::uint8_t> touched_; ///< of each body

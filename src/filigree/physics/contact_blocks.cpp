@@ -49,7 +49,7 @@ void Contacts::Blocks::update_places(std::span<const BodyState> bodies, const Ve
         }
         entry.place = embedded_point(*entry.embedding, entry.point, positions);
         if (entry.other)
-            entry.other_place = embedded_point(entry.other->balls, entry.other_point, entry.other->positions);
+            entry.other_place = embedded_point(*entry.other_embedding, entry.other_point, entry.other->positions);
     }
 }
 
@@ -72,6 +72,12 @@ void Contacts::Blocks::add(Index particle, const Vectors& positions, Vec3f& forc
             force -= weight * grip * offset;
             block.add_scaled_identity(squared * grip);
             block.add_outer(frame.normal, -squared * grip);
+        } else if (entry.rubs) {
+            const Vec3f offset = along_surface(place - entry.other_place - entry.target, entry.normal);
+            const float grip = sliding_grip(stiffness, offset.norm(), entry.limit);
+            force -= weight * grip * offset;
+            block.add_scaled_identity(squared * grip);
+            block.add_outer(entry.normal, -squared * grip);
         } else if (entry.other) {
             const Vec3f between = place - entry.other_place;
             const float distance = between.norm();
@@ -99,8 +105,8 @@ void Contacts::Blocks::add(Index particle, const Vectors& positions, Vec3f& forc
 }
 
 bool Contacts::Blocks::holds() const {
-    return std::ranges::any_of(entries_,
-                               [](const Entry& entry) { return entry.frame ? entry.frame->holds : entry.anchored; });
+    return std::ranges::any_of(
+        entries_, [](const Entry& entry) { return entry.frame ? entry.frame->holds : entry.anchored || entry.rubs; });
 }
 
 void Contacts::Blocks::add_pull(const Embedding& points, std::size_t point, const Vec3f& target, float stiffness) {
@@ -150,22 +156,36 @@ Contacts::Blocks::Entry Contacts::block_of(const Near& at, const BodyState& body
     return entry;
 }
 
-/// A ball of `body` against one of another body.
-Contacts::Blocks::Entry Contacts::block_of(const BodyState& body, Index point, const BodyState& other,
-                                           Index other_point, const PairContact& law, float dt) const {
-    const Vec3f velocity =
-        embedded_point(body.balls, point, body.velocities) - embedded_point(other.balls, other_point, other.velocities);
-    const Vec3f between =
-        embedded_point(body.balls, point, body.positions) - embedded_point(other.balls, other_point, other.positions);
-    Blocks::Entry entry;
-    entry.embedding = &body.balls;
-    entry.point = point;
-    entry.stiffness = pair_stiffness(body, point, other, other_point);
-    entry.other = &other;
-    entry.other_point = other_point;
-    entry.reach = body.ball_radius + other.ball_radius;
-    entry.unloading = unloading(law.restitution, velocity.dot(between.stableNormalized()), smooth_speed(world_, dt));
-    return entry;
+/// A pair as one of its two sees it: its push, and where friction holds it, by how deep it is as the substep begins,
+/// also that.
+void Contacts::add_blocks_of(const NearPair& pair, std::span<const BodyState> bodies, bool of_first, float dt,
+                             std::vector<Blocks::Entry>& entries) const {
+    const BodyState &a = bodies[pair.first_body], &b = bodies[pair.second_body];
+    const Vec3f apart = between(pair, bodies, &BodyState::balls, a.positions, b.positions);
+    const Vec3f normal = apart.stableNormalized();
+    const float closing = between(pair, bodies, &BodyState::balls, a.velocities, b.velocities).dot(normal);
+    const BodyState &body = of_first ? a : b, &other = of_first ? b : a;
+    Blocks::Entry push;
+    push.embedding = &body.balls;
+    push.point = of_first ? pair.first : pair.second;
+    push.stiffness = pair_stiffness(a, pair.first, b, pair.second);
+    push.other = &other;
+    push.other_embedding = &other.balls;
+    push.other_point = of_first ? pair.second : pair.first;
+    push.reach = a.ball_radius + b.ball_radius;
+    push.unloading = unloading(pair.law.restitution, closing, smooth_speed(world_, dt));
+    entries.push_back(push);
+    const float depth = push.reach - apart.norm();
+    if (!pair.grasp.holds || !(depth > 0)) return;
+    Blocks::Entry friction = push;
+    friction.embedding = &body.surface;
+    friction.other_embedding = &other.surface;
+    friction.rubs = true;
+    friction.normal = normal;
+    friction.target = between(pair, bodies, &BodyState::surface, a.positions, b.positions) - pair.offset;
+    if (!of_first) friction.target = -friction.target;
+    friction.limit = float(pair.law.friction) * push.unloading * push.stiffness * depth;
+    entries.push_back(friction);
 }
 
 Contacts::Blocks Contacts::blocks(std::span<const BodyState> bodies, std::size_t b, double time, float dt,
@@ -183,10 +203,8 @@ Contacts::Blocks Contacts::blocks(std::span<const BodyState> bodies, std::size_t
         blocks.entries_.back().motion = blocks.motions_[at.obstacle].get();
     }
     for (const NearPair& pair : pairs_) {
-        if (pair.first_body == b)
-            blocks.entries_.push_back(block_of(body, pair.first, bodies[pair.second_body], pair.second, pair.law, dt));
-        if (pair.second_body == b)
-            blocks.entries_.push_back(block_of(body, pair.second, bodies[pair.first_body], pair.first, pair.law, dt));
+        if (pair.first_body == b) add_blocks_of(pair, bodies, true, dt, blocks.entries_);
+        if (pair.second_body == b) add_blocks_of(pair, bodies, false, dt, blocks.entries_);
     }
     for (const MatterContacts::Frame& frame : frames) {
         if (frame.body != b && frame.other != b) continue;
@@ -201,7 +219,7 @@ Contacts::Blocks Contacts::blocks(std::span<const BodyState> bodies, std::size_t
     return blocks;
 }
 
-ContactReport Contacts::update_anchors(std::span<const BodyState> bodies, double time) {
+ContactReport Contacts::update_anchors(std::span<const BodyState> bodies, std::span<const Vectors> start, double time) {
     ContactReport report;
     const ObstaclePoses poses(world_, time);
     std::ranges::fill(touched_, std::uint8_t{0});
@@ -230,14 +248,24 @@ ContactReport Contacts::update_anchors(std::span<const BodyState> bodies, double
         }
     }
     for (NearPair& pair : pairs_) {
-        pair.grasp = {}; // descent lets balls slide
         const BodyState &a = bodies[pair.first_body], &b = bodies[pair.second_body];
-        if ((embedded_point(a.balls, pair.first, a.positions) - embedded_point(b.balls, pair.second, b.positions))
-                .norm() < a.ball_radius + b.ball_radius) {
-            touched_[pair.first_body] |= kInMatter;
-            touched_[pair.second_body] |= kInMatter;
-            ++report.contacts;
+        const Vec3f apart = between(pair, bodies, &BodyState::balls, a.positions, b.positions);
+        const float depth = a.ball_radius + b.ball_radius - apart.norm();
+        if (!(depth > 0)) {
+            pair.grasp = {};
+            continue;
         }
+        touched_[pair.first_body] |= kInMatter;
+        touched_[pair.second_body] |= kInMatter;
+        ++report.contacts;
+        if (pair.grasp.holds)
+            pair.offset += between(pair, bodies, &BodyState::surface, a.positions, b.positions) -
+                           between(pair, bodies, &BodyState::surface, start[pair.first_body], start[pair.second_body]);
+        else
+            pair.offset.setZero();
+        pair.grasp = {true, false};
+        pair.offset = limited(along_surface(pair.offset, apart.stableNormalized()),
+                              float(pair.law.friction) * depth / kTangentialStiffness);
     }
     const ContactReport inside = matter_.update_anchors(bodies, touched_);
     report.contacts += inside.contacts;

@@ -73,43 +73,50 @@ Vec3f Contacts::obstacle_force(Near& at, const BodyState& body, const ObstaclePo
     return force;
 }
 
-Vec3f Contacts::relative_velocity(const NearPair& pair, std::span<const BodyState> bodies) {
-    const BodyState &a = bodies[pair.first_body], &b = bodies[pair.second_body];
-    return embedded_point(a.balls, pair.first, a.velocities) - embedded_point(b.balls, pair.second, b.velocities);
+Vec3f Contacts::between(const NearPair& pair, std::span<const BodyState> bodies, Embedding BodyState::*points,
+                        const Vectors& of_first, const Vectors& of_second) {
+    return embedded_point(bodies[pair.first_body].*points, pair.first, of_first) -
+           embedded_point(bodies[pair.second_body].*points, pair.second, of_second);
 }
 
 void Contacts::travel(std::span<const BodyState> bodies, float dt, float way) {
     near_way_ += way;
-    pairs_way_ += way;
     for (NearPair& pair : pairs_)
-        if (pair.grasp.holds) pair.offset += dt * relative_velocity(pair, bodies);
+        if (pair.grasp.holds)
+            pair.offset += dt * between(pair, bodies, &BodyState::surface, bodies[pair.first_body].velocities,
+                                        bodies[pair.second_body].velocities);
     matter_.travel(bodies, dt);
+    pairs_way_ += dt * matter_.relative_speed_of_all([&](std::size_t b) { return bodies[b].has_balls(); });
 }
 
-/// The force on the pair's first ball; minus it is that on the second. Lets friction's anchor begin, slide and end.
-Vec3f Contacts::pair_force(NearPair& pair, std::span<const BodyState> bodies, float dt) const {
+/// Lets friction's anchor begin, slide and end.
+Contacts::PairForce Contacts::pair_force(NearPair& pair, std::span<const BodyState> bodies, float dt) const {
     if (pair.clear_until > pairs_way_) {
         pair.grasp = {};
-        return Vec3f::Zero();
+        return {};
     }
     const BodyState &a = bodies[pair.first_body], &b = bodies[pair.second_body];
-    const Vec3f between =
-        embedded_point(a.balls, pair.first, a.positions) - embedded_point(b.balls, pair.second, b.positions);
-    const float distance = between.norm(), depth = a.ball_radius + b.ball_radius - distance;
-    pair.clear_until = pairs_way_ - depth / 2;
+    const Vec3f apart = between(pair, bodies, &BodyState::balls, a.positions, b.positions);
+    const float distance = apart.norm(), depth = a.ball_radius + b.ball_radius - distance;
+    pair.clear_until = pairs_way_ - depth;
     if (!(depth > 0 && distance > 0)) {
         pair.grasp = {};
-        return Vec3f::Zero();
+        return {};
     }
-    const Touch touch{between / distance,
-                      relative_velocity(pair, bodies),
+    const Vec3f normal = apart / distance;
+    const Vec3f closing = between(pair, bodies, &BodyState::balls, a.velocities, b.velocities);
+    const Vec3f slip = between(pair, bodies, &BodyState::surface, a.velocities, b.velocities);
+    const Touch touch{normal,
+                      closing.dot(normal) * normal + along_surface(slip, normal),
                       depth,
                       pair_stiffness(a, pair.first, b, pair.second),
                       float(pair.law.friction),
                       float(pair.law.restitution),
                       std::max(a.rest_squared_frequency, b.rest_squared_frequency)};
-    pair.offset = along_surface(pair.offset, touch.normal);
-    return touch_force(touch, pair.offset, pair.grasp, dt, smooth_speed(world_, dt));
+    pair.offset = along_surface(pair.offset, normal);
+    const Vec3f force = touch_force(touch, pair.offset, pair.grasp, dt, smooth_speed(world_, dt));
+    const Vec3f push = force.dot(normal) * normal;
+    return {push, force - push};
 }
 
 ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, float dt, const RunContext& context) {
@@ -133,15 +140,19 @@ ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, flo
             report.deepest = std::max(report.deepest, near[k].depth);
         }
     }
-    forces.assign(pairs_.size(), Vec3f::Zero());
+    std::vector<PairForce> pair_forces(pairs_.size());
     parallel_for(context, pairs_.size(), kContactForcesGrain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t k = begin; k < end; ++k) forces[k] = pair_force(pairs_[k], bodies, dt);
+        for (std::size_t k = begin; k < end; ++k) pair_forces[k] = pair_force(pairs_[k], bodies, dt);
     });
     for (std::size_t k = 0; k < pairs_.size(); ++k) {
-        if (forces[k].isZero(0)) continue;
+        const auto& [push, friction] = pair_forces[k];
+        if (push.isZero(0) && friction.isZero(0)) continue;
         const NearPair& pair = pairs_[k];
-        add_to_particles(bodies[pair.first_body].balls, pair.first, forces[k], bodies[pair.first_body].forces);
-        add_to_particles(bodies[pair.second_body].balls, pair.second, -forces[k], bodies[pair.second_body].forces);
+        BodyState &first = bodies[pair.first_body], &second = bodies[pair.second_body];
+        add_to_particles(first.balls, pair.first, push, first.forces);
+        add_to_particles(first.surface, pair.first, friction, first.forces);
+        add_to_particles(second.balls, pair.second, -push, second.forces);
+        add_to_particles(second.surface, pair.second, -friction, second.forces);
         touched_[pair.first_body] |= kInMatter;
         touched_[pair.second_body] |= kInMatter;
         ++report.contacts;

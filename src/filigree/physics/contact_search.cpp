@@ -2,6 +2,8 @@
 #include "filigree/physics/contact.h"
 
 #include "filigree/core/parallel_for.h"
+#include "filigree/physics/own_cells.h"
+#include "filigree/physics/point_grid.h"
 
 #include <algorithm>
 #include <array>
@@ -12,8 +14,32 @@ namespace filigree {
 namespace {
 
 constexpr std::size_t kContactSearchGrain = 256;
+constexpr float kJoined = 2.5f; ///< spacings: what flowed together to less of its own body does not push itself
+
+Vectors places_of_balls(const BodyState& body, const RunContext& context) {
+    Vectors balls(body.balls.size());
+    parallel_for(context, balls.size(), kContactSearchGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t s = begin; s < end; ++s) balls.set(s, embedded_point(body.balls, s, body.positions));
+    });
+    return balls;
+}
 
 } // namespace
+
+struct Contacts::OwnBalls {
+    explicit OwnBalls(const Body& body) : matter(body), cells(matter) {}
+
+    Matter matter;
+    OwnCells cells;
+};
+
+void Contacts::begin(std::span<const BodyState> bodies) {
+    matter_.begin(bodies);
+    for (const BodyState& body : bodies) {
+        const bool meets_itself = within_bodies_ && body.has_balls();
+        own_balls_.push_back(meets_itself ? std::make_shared<const OwnBalls>(*body.body) : nullptr);
+    }
+}
 
 void Contacts::search(std::span<BodyState> bodies, const Search& search, const RunContext& context) {
     if (matter_.search(bodies, search.frame, context)) near_until_ = -1; // what woke has nothing near yet
@@ -22,7 +48,7 @@ void Contacts::search(std::span<BodyState> bodies, const Search& search, const R
         near_way_ = 0;
         near_until_ = search.obstacle_reach;
     }
-    if (pairs_way_ > pairs_until_ && between_bodies_ && bodies.size() > 1) {
+    if (pairs_way_ > pairs_until_) {
         find_pairs(bodies, search.pair_reach, context);
         pairs_way_ = 0;
         pairs_until_ = search.pair_reach;
@@ -74,61 +100,55 @@ std::vector<Contacts::NearPair> Contacts::held_pairs() const {
 void Contacts::find_pairs(std::span<const BodyState> bodies, float reach, const RunContext& context) {
     const std::vector<NearPair> held = held_pairs();
     pairs_.clear();
-    if (std::ranges::none_of(bodies, &BodyState::has_balls)) return;
+    std::vector<Index> order;
     std::vector<Box> boxes(bodies.size());
-    for (std::size_t b = 0; b < bodies.size(); ++b)
+    for (Index b = 0; b < bodies.size(); ++b) {
+        if (!bodies[b].has_balls()) continue;
         for (std::size_t i = 0; i < bodies[b].positions.size(); ++i)
             boxes[b].extend(bodies[b].positions[i].cast<double>());
-    std::vector<std::vector<Vec3f>> balls(bodies.size());
-    const auto find_balls = [&](std::size_t b) {
-        if (!balls[b].empty()) return;
-        balls[b].resize(bodies[b].balls.size());
-        parallel_for(context, balls[b].size(), kContactSearchGrain, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t s = begin; s < end; ++s)
-                balls[b][s] = embedded_point(bodies[b].balls, s, bodies[b].positions);
-        });
+        if (boxes[b].size().allFinite()) order.push_back(b); // else the frame is done again
+    }
+    std::vector<Vectors> balls(bodies.size());
+    const auto balls_of = [&](Index b) -> const Vectors& {
+        if (balls[b].size() == 0) balls[b] = places_of_balls(bodies[b], context);
+        return balls[b];
     };
-    for (std::size_t a = 0; a < bodies.size(); ++a)
-        for (std::size_t b = a + 1; b < bodies.size(); ++b) {
-            if (!bodies[a].has_balls() || !bodies[b].has_balls()) continue;
-            const PairContact law = world_.contact_of(bodies[a].actor, bodies[b].actor);
-            const float far = bodies[a].ball_radius + bodies[b].ball_radius + 2 * reach;
-            const Vec3d low = boxes[a].min.cwiseMax(boxes[b].min) - Vec3d::Constant(double(far));
-            const Vec3d high = boxes[a].max.cwiseMin(boxes[b].max) + Vec3d::Constant(double(far));
+    for (auto a = order.begin(); a != order.end(); ++a) {
+        if (own_balls_[*a]) find_own_pairs(bodies[*a], *a, balls_of(*a), reach);
+        for (auto b = a + 1; between_bodies_ && b != order.end(); ++b) {
+            const float touch = bodies[*a].ball_radius + bodies[*b].ball_radius, far = touch + reach;
+            const Vec3d low = boxes[*a].min.cwiseMax(boxes[*b].min) - Vec3d::Constant(double(far));
+            const Vec3d high = boxes[*a].max.cwiseMin(boxes[*b].max) + Vec3d::Constant(double(far));
             if (!(low.array() <= high.array()).all()) continue;
-            find_balls(a);
-            find_balls(b);
-            const auto is_common = [&](const Vec3f& p) {
-                return (p.cast<double>().array() >= low.array()).all() &&
-                       (p.cast<double>().array() <= high.array()).all();
-            };
-            using Key = std::array<int, 3>;
-            const auto key_of = [&](const Vec3f& p) {
-                const Vec3d q = (p.cast<double>() - low) / double(far);
-                return Key{int(q.x()), int(q.y()), int(q.z())};
-            };
-            std::vector<std::pair<Key, Index>> grid;
-            for (Index t = 0; t < balls[b].size(); ++t)
-                if (is_common(balls[b][t])) grid.emplace_back(key_of(balls[b][t]), t);
-            std::ranges::sort(grid);
-            for (Index s = 0; s < balls[a].size(); ++s) {
-                if (!is_common(balls[a][s])) continue;
-                const Key key = key_of(balls[a][s]);
-                for (int i = key[0] - 1; i <= key[0] + 1; ++i)
-                    for (int j = key[1] - 1; j <= key[1] + 1; ++j) {
-                        auto at = std::ranges::lower_bound(grid, std::pair(Key{i, j, key[2] - 1}, Index{0}));
-                        for (; at != grid.end() && at->first <= Key{i, j, key[2] + 1}; ++at)
-                            if (const float gap = (balls[b][at->second] - balls[a][s]).norm() - far + 2 * reach;
-                                gap < 2 * reach)
-                                pairs_.push_back({Index(a), s, Index(b), at->second, gap / 2, law});
-                    }
+            const PairContact law = world_.contact_of(bodies[*a].actor, bodies[*b].actor);
+            const Vectors &own = balls_of(*a), &others = balls_of(*b);
+            const PointGrid grid(others, far);
+            for (Index s = 0; s < own.size(); ++s) {
+                const Vec3f at = own[s];
+                if (!(at.cast<double>().array() >= low.array()).all()) continue;
+                if (!(at.cast<double>().array() <= high.array()).all()) continue;
+                grid.near(at, far, [&](Index t) {
+                    const float gap = (others[t] - at).norm() - touch;
+                    if (gap < reach) pairs_.push_back({*a, s, *b, t, gap, law});
+                });
             }
         }
+    }
     for (NearPair& pair : pairs_) {
         const auto old = std::ranges::lower_bound(held, pair.key(), {}, &NearPair::key);
         if (old == held.end() || old->key() != pair.key()) continue;
         pair.grasp = old->grasp;
         pair.offset = old->offset;
+    }
+}
+
+/// What flowed together where neighbourhoods were last renewed is one piece of matter, and does not push itself.
+void Contacts::find_own_pairs(const BodyState& body, Index number, const Vectors& balls, float reach) {
+    const PairContact law = world_.contact_of(body.actor, body.actor);
+    const float touch = 2 * body.ball_radius, joined = kJoined * float(body.body->spacing());
+    for (const auto& [s, t] : own_balls_[number]->cells.near_points(balls, touch + reach)) {
+        if (body.has_flowed() && (body.balls.rest[s] - body.balls.rest[t]).norm() < joined) continue;
+        pairs_.push_back({number, s, number, t, (balls[t] - balls[s]).norm() - touch, law});
     }
 }
 
@@ -151,8 +171,8 @@ bool Contacts::set_memory(const Memory& memory, std::span<const BodyState> bodie
                std::isfinite(near.clear_until);
     };
     const auto are_balls = [&](const BallMemory& pair) {
-        return pair.first_body < pair.second_body && pair.second_body < bodies.size() &&
-               pair.first < bodies[pair.first_body].balls.size() &&
+        return std::pair(pair.first_body, pair.first) < std::pair(pair.second_body, pair.second) &&
+               pair.second_body < bodies.size() && pair.first < bodies[pair.first_body].balls.size() &&
                pair.second < bodies[pair.second_body].balls.size() && pair.offset.allFinite();
     };
     if (!std::ranges::all_of(memory.balls, are_balls)) return false;

@@ -56,7 +56,7 @@ private:
         state_.contacts.search(bodies_,
                                {.time = now_,
                                 .obstacle_reach = std::clamp(way, 0.25f * spacing, 8 * spacing),
-                                .pair_reach = std::clamp(way, 0.25f * spacing, 0.75f * spacing),
+                                .pair_reach = std::clamp(2 * way, 0.5f * spacing, 1.5f * spacing),
                                 .frame = double(dt_)},
                                context_);
         frames_ = state_.contacts.matter_frames(bodies_, dt_);
@@ -200,7 +200,7 @@ private:
     void finish() {
         {
             const Stopwatch watch(report_.contact_seconds);
-            const ContactReport touching = state_.contacts.update_anchors(bodies_, now_);
+            const ContactReport touching = state_.contacts.update_anchors(bodies_, start_, now_);
             report_.contacts = touching.contacts;
             report_.deepest_contact = std::max(report_.deepest_contact, double(touching.deepest));
             report_.deepest_in_matter = std::max(report_.deepest_in_matter, double(touching.deepest_in_matter));

@@ -107,6 +107,19 @@ bool Matter::are_together(Index a, Index b) const {
     return together_[a][n / 64] >> (n % 64) & 1;
 }
 
+bool Matter::are_in_three_steps(Index a, Index b) const {
+    if (are_together(a, b)) return true;
+    const auto &from = body_.cells.cells[a], &to = body_.cells.cells[b];
+    int apart = 0;
+    for (int axis = 0; axis < 3; ++axis) apart = std::max(apart, std::abs(int(from[axis]) - int(to[axis])));
+    if (apart != 3) return false;
+    for (int n = 0; n < 27; ++n) {
+        const Index between = cell_at(to[0] + n % 3 - 1, to[1] + n / 3 % 3 - 1, to[2] + n / 9 - 1);
+        if (between != kNoIndex && are_together(a, between)) return true;
+    }
+    return false;
+}
+
 Matter::Weights Matter::weights(const Place& place) const {
     const Vec3f& t = place.local;
     if (is_rigid()) return {1 - t.sum(), t[0], t[1], 0, t[2], 0, 0, 0};

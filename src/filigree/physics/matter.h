@@ -13,7 +13,8 @@ namespace filigree {
 /// [Fisher 2001, McAdams 2011].
 class Matter {
 public:
-    /// body: not meshfree, so that its particles are the corners of its cells; outlives this.
+    /// body: outlives this. Of a meshfree one, whose particles are not the corners of its cells, only the cells at rest
+    /// are asked for: are_together, are_in_three_steps, cell_at, cell_of_point, rest_position.
     explicit Matter(const Body& body);
     /// A rigid body is one cell that goes on as far as one likes.
     bool is_rigid() const { return body_.material.model == MaterialModel::rigid; }
@@ -51,6 +52,8 @@ public:
     Vec3f rest_position(const Place& place) const; ///< m
     /// Whether two cells are the same piece of matter: one is reached from the other in two steps between neighbours.
     bool are_together(Index a, Index b) const;
+    /// The same, or one is three cells from the other and reached in three steps.
+    bool are_in_three_steps(Index a, Index b) const;
     Index cell_at(int i, int j, int k) const; ///< kNoIndex where there is none
     Index cell_of_point(std::size_t surface_point) const { return cell_of_point_[surface_point]; }
     const Body& body() const { return body_; }

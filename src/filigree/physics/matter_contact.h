@@ -42,6 +42,14 @@ public:
     void end_frame(std::span<const BodyState> bodies);
     /// Positions have changed by dt times velocities. Cost O(particles).
     void travel(std::span<const BodyState> bodies, float dt);
+    /// m/s: bound on what particles of bodies that `counts` have beside each other, as of the last travel.
+    template <class Counts>
+    float relative_speed_of_all(const Counts& counts) const {
+        std::optional<Extremes> all;
+        for (std::size_t b = 0; b < speeds_.size(); ++b)
+            if (counts(b)) all = all ? all->with(speeds_[b]) : speeds_[b];
+        return all ? Extremes::between(*all, *all) : 0;
+    }
     /// A body's particles were moved by so much, m, beside their velocities.
     void was_moved(std::size_t body, float way);
     /// Finds which points might touch which cells, as far as what was found last does not hold any more. Sleeping
@@ -134,6 +142,7 @@ private:
         static float between(const Extremes& one, const Extremes& other) {
             return (one.most - other.least).cwiseMax(other.most - one.least).norm();
         }
+        Extremes with(const Extremes& other) const { return {least.cwiseMin(other.least), most.cwiseMax(other.most)}; }
     };
     float relative_speed(Index a, Index b) const { return Extremes::between(speeds_[a], speeds_[b]); }
     /// m: bound on how far two bodies are from where they were beside each other at the last search.

@@ -180,16 +180,9 @@ void MatterContacts::was_moved(std::size_t body, float way) {
 }
 
 void MatterContacts::travel(std::span<const BodyState> bodies, float dt) {
-    Extremes all;
-    bool is_first = true;
-    for (std::size_t b = 0; b < bodies.size(); ++b) {
-        if (bodies[b].is_absent) continue;
-        speeds_[b] = extremes(b, bodies[b].velocities, nullptr);
-        if (std::exchange(is_first, false)) all = speeds_[b];
-        all.least = all.least.cwiseMin(speeds_[b].least);
-        all.most = all.most.cwiseMax(speeds_[b].most);
-    }
-    way_ += dt * (all.most - all.least).norm();
+    for (std::size_t b = 0; b < bodies.size(); ++b)
+        if (!bodies[b].is_absent) speeds_[b] = extremes(b, bodies[b].velocities, nullptr);
+    way_ += dt * relative_speed_of_all([&](std::size_t b) { return !bodies[b].is_absent; });
     for (Side& side : sides_) {
         side.speed = relative_speed(side.body, side.other);
         side.way += dt * side.speed;

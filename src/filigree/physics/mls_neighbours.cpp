@@ -6,6 +6,7 @@
 
 #include "filigree/core/dense_solve.h"
 #include "filigree/core/parallel_for.h"
+#include "filigree/physics/point_grid.h"
 
 #include <algorithm>
 #include <array>
@@ -21,62 +22,6 @@ constexpr std::size_t kEnough = 8;          // neighbours
 constexpr float kLeastMomentSpread = 0.03f; // spacings^2: weighted mean square of offsets in the direction of the least
 constexpr float kNoSpread = 0.03f;          // below it there is no gradient in that direction
 constexpr std::size_t kMlsNeighboursGrain = 256;
-
-/// Particles sorted by the boxes of a grid.
-class NeighbourGrid {
-public:
-    NeighbourGrid(const Vectors& positions, float box_size)
-        : positions_(positions), inverse_size_(1 / double(box_size)) {
-        const std::size_t n = positions.size();
-        least_ = Vec3d::Constant(std::numeric_limits<double>::infinity());
-        for (std::size_t i = 0; i < n; ++i) least_ = least_.cwiseMin(positions[i].cast<double>());
-        sorted_.resize(n);
-        for (std::size_t i = 0; i < n; ++i) {
-            const auto at = box_of(positions[i]);
-            sorted_[i] = {key(at[0], at[1], at[2]), Index(i)};
-        }
-        std::sort(sorted_.begin(), sorted_.end());
-    }
-
-    /// Calls visit(index) for all particles in boxes within `radius` of a point, and some more.
-    template <class Visit>
-    void near(const Vec3f& point, float radius, const Visit& visit) const {
-        const auto low = box_of(point - Vec3f::Constant(radius)), high = box_of(point + Vec3f::Constant(radius));
-        for (std::int64_t k = low[2]; k <= high[2]; ++k)
-            for (std::int64_t j = low[1]; j <= high[1]; ++j) {
-                const Entry first{key(low[0], j, k), 0};
-                const std::uint64_t last = key(high[0], j, k);
-                for (auto e = std::lower_bound(sorted_.begin(), sorted_.end(), first);
-                     e != sorted_.end() && e->key <= last; ++e)
-                    visit(e->particle);
-            }
-    }
-
-private:
-    static constexpr std::int64_t kMostBoxes = (std::int64_t{1} << 21) - 1;
-    struct Entry {
-        std::uint64_t key;
-        Index particle;
-        auto operator<=>(const Entry&) const = default;
-    };
-
-    std::array<std::int64_t, 3> box_of(const Vec3f& point) const {
-        std::array<std::int64_t, 3> box;
-        for (int a = 0; a < 3; ++a) {
-            const double at = std::floor((double(point[a]) - least_[a]) * inverse_size_);
-            box[std::size_t(a)] = std::int64_t(std::clamp(at, 0.0, double(kMostBoxes)));
-        }
-        return box;
-    }
-    static std::uint64_t key(std::int64_t i, std::int64_t j, std::int64_t k) {
-        return (std::uint64_t(k) << 42) | (std::uint64_t(j) << 21) | std::uint64_t(i);
-    }
-
-    const Vectors& positions_;
-    double inverse_size_;
-    Vec3d least_;
-    std::vector<Entry> sorted_;
-};
 
 float kernel(float squared, float radius) {
     const float t = 1 - squared / (radius * radius);
@@ -102,7 +47,7 @@ struct Surroundings {
 };
 
 /// Neighbours of one particle within `radius`. Whether they are enough and spread in all directions.
-bool look_within(float radius, std::size_t i, const NeighbourGrid& grid, Surroundings& around) {
+bool look_within(float radius, std::size_t i, const PointGrid& grid, Surroundings& around) {
     std::vector<Index>& found = around.found[i];
     found.clear();
     Mat3f moment = Mat3f::Zero();
@@ -124,7 +69,7 @@ Surroundings find_surroundings(const Vectors& positions, std::span<const float> 
                                const RunContext& context) {
     const std::size_t n = positions.size();
     Surroundings around{positions, volume, spacing, std::vector<std::vector<Index>>(n), std::vector<float>(n)};
-    const NeighbourGrid grid(positions, kSupportRadius * spacing);
+    const PointGrid grid(positions, kSupportRadius * spacing);
     parallel_for(context, n, kMlsNeighboursGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             float radius = kSupportRadius * spacing;

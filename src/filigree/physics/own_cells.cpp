@@ -15,12 +15,6 @@ constexpr std::size_t kOwnCellsGrain = 16;
 constexpr float kClusterBoxSize = 2.5f;                          ///< spacings
 constexpr double kMostClusterBoxes = 8, kFewClusterBoxes = 4096; ///< a cluster, and whatever their number
 
-int chebyshev(const Cells::LatticeIndex& a, const Cells::LatticeIndex& b) {
-    int most = 0;
-    for (int axis = 0; axis < 3; ++axis) most = std::max(most, std::abs(int(a[axis]) - int(b[axis])));
-    return most;
-}
-
 } // namespace
 
 OwnCells::OwnCells(const Matter& matter) : matter_(matter), points_(matter.body().surface.points) {
@@ -71,44 +65,42 @@ int OwnCells::neighbour(Index a, Index b) const {
 }
 
 bool OwnCells::are_far(Index cell, Index other) const {
-    const Cells& cells = matter_.body().cells;
-    const auto &from = cells.cells[cell], &to = cells.cells[other];
-    if (matter_.are_together(cell, other)) return false;
+    const auto &from = matter_.body().cells.cells[cell], &to = matter_.body().cells.cells[other];
     const bool neighbours = std::abs(from[0] / 2 - to[0] / 2) <= 1 && std::abs(from[1] / 2 - to[1] / 2) <= 1 &&
                             std::abs(from[2] / 2 - to[2] / 2) <= 1;
-    if (!neighbours || chebyshev(from, to) != 3) return true;
-    for (int n = 0; n < 27; ++n) {
-        const Index between = matter_.cell_at(to[0] + n % 3 - 1, to[1] + n / 3 % 3 - 1, to[2] + n / 9 - 1);
-        if (between != kNoIndex && matter_.are_together(cell, between)) return false;
+    return !(neighbours ? matter_.are_in_three_steps(cell, other) : matter_.are_together(cell, other));
+}
+
+OwnCells::Extent OwnCells::extent_of(std::span<const Index> members, const Vectors& places) {
+    Extent extent{.low = {}, .high = {}, .centre = {}, .radius = -1};
+    if (members.empty()) return extent;
+    extent.low = extent.high = places[members[0]];
+    for (const Index member : members) {
+        const Vec3f p = places[member];
+        extent.low = extent.low.cwiseMin(p);
+        extent.high = extent.high.cwiseMax(p);
     }
-    return true;
+    extent.centre = 0.5f * (extent.low + extent.high);
+    float squared = 0;
+    for (const Index member : members) squared = std::max(squared, (places[member] - extent.centre).squaredNorm());
+    extent.radius = std::sqrt(squared);
+    return extent;
 }
 
 std::vector<OwnCells::Extent> OwnCells::extents(const Vectors& positions) const {
     std::vector<Extent> extents(clusters_.size() - 1);
-    for (std::size_t k = 0; k < extents.size(); ++k) {
-        Extent& extent = extents[k];
-        const std::span corners(&corners_[clusters_[k].first_corner],
-                                clusters_[k + 1].first_corner - clusters_[k].first_corner);
-        extent.low = extent.high = positions[corners[0]];
-        for (const Index corner : corners) {
-            const Vec3f p = positions[corner];
-            extent.low = extent.low.cwiseMin(p);
-            extent.high = extent.high.cwiseMax(p);
-        }
-        extent.centre = 0.5f * (extent.low + extent.high);
-        float squared = 0;
-        for (const Index corner : corners)
-            squared = std::max(squared, (positions[corner] - extent.centre).squaredNorm());
-        extent.radius = std::sqrt(squared);
-    }
+    for (std::size_t k = 0; k < extents.size(); ++k)
+        extents[k] = extent_of(std::span(corners_).subspan(clusters_[k].first_corner,
+                                                           clusters_[k + 1].first_corner - clusters_[k].first_corner),
+                               positions);
     return extents;
 }
 
 /// Pairs of clusters that come within `around` of each other and have cells that are far; ascending, both ways round.
 std::vector<std::pair<Index, Index>> OwnCells::near_clusters(std::span<const Extent> extents, float around) const {
-    Vec3f low = extents[0].low, high = extents[0].high;
+    Vec3f low = Vec3f::Constant(std::numeric_limits<float>::infinity()), high = -low;
     for (const Extent& extent : extents) {
+        if (extent.radius < 0) continue;
         low = low.cwiseMin(extent.low);
         high = high.cwiseMax(extent.high);
     }
@@ -122,6 +114,7 @@ std::vector<std::pair<Index, Index>> OwnCells::near_clusters(std::span<const Ext
     while (boxes().prod() > kMostClusterBoxes * double(extents.size()) + kFewClusterBoxes) step *= 1.25f;
     const Eigen::Array3i counts = boxes().cast<int>();
     const auto each_box = [&](const Extent& extent, const auto& visit) {
+        if (extent.radius < 0) return;
         Eigen::Array3i from, to;
         for (int axis = 0; axis < 3; ++axis) {
             from[axis] = int((extent.low[axis] - half - low[axis]) / step);
@@ -237,6 +230,28 @@ std::vector<Index> OwnCells::find(const Vectors& positions, float reach, const R
         for (std::size_t k = begin; k < end; ++k)
             look_into(std::span(near).subspan(starts[k], starts[k + 1] - starts[k]), around, positions, reach, found);
     });
+    return found;
+}
+
+std::vector<std::pair<Index, Index>> OwnCells::near_points(const Vectors& places, float far) const {
+    std::vector<std::pair<Index, Index>> found;
+    if (clusters_.size() < 2 || points_.size() == 0) return found;
+    std::vector<Extent> extents(clusters_.size() - 1);
+    for (Index k = 0; k < extents.size(); ++k) extents[k] = extent_of(points_of(k), places);
+    std::vector<Index> inside;
+    for (const auto& [cluster, other] : near_clusters(extents, far)) {
+        if (cluster > other) continue;
+        const Eigen::Array3f low = extents[other].low.array() - far, high = extents[other].high.array() + far;
+        inside.clear();
+        for (const Index s : points_of(cluster))
+            if ((places[s].array() >= low).all() && (places[s].array() <= high).all()) inside.push_back(s);
+        for (const Index s : inside)
+            for (const Index t : points_of(other)) {
+                if ((cluster == other && t <= s) || (places[t] - places[s]).squaredNorm() >= far * far) continue;
+                if (!matter_.are_in_three_steps(matter_.cell_of_point(s), matter_.cell_of_point(t)))
+                    found.emplace_back(std::min(s, t), std::max(s, t));
+            }
+    }
     return found;
 }
 

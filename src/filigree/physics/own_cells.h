@@ -20,6 +20,11 @@ public:
 
     bool are_far(Index cell, Index other) const;
 
+    /// Pairs of surface points, the smaller number first, that have come nearer to each other than `far` (m) and lie in
+    /// cells of which neither is reached from the other in three steps. places: of all points, or of balls under them.
+    /// Cost O(points), and points squared where far clusters are near each other.
+    std::vector<std::pair<Index, Index>> near_points(const Vectors& places, float far) const;
+
 private:
     using Key = std::array<int, 3>;
     struct Cluster {
@@ -29,8 +34,13 @@ private:
     };
     struct Extent {
         Vec3f low, high, centre;
-        float radius;
+        float radius; ///< below 0: of nothing
     };
+    static Extent extent_of(std::span<const Index> members, const Vectors& places);
+    std::span<const Index> points_of(Index cluster) const {
+        return {&surface_points_[0] + clusters_[cluster].first_point,
+                clusters_[cluster + 1].first_point - clusters_[cluster].first_point};
+    }
     int neighbour(Index a, Index b) const;
     std::vector<Extent> extents(const Vectors& positions) const;
     std::vector<std::pair<Index, Index>> near_clusters(std::span<const Extent> extents, float around) const;

@@ -43,7 +43,7 @@ BodyState place_body(const Actor& actor, std::size_t number) {
     return state;
 }
 
-BodyState begin_body(const Actor& actor, std::size_t number, bool meets_bodies, const RunContext& context) {
+BodyState begin_body(const Actor& actor, std::size_t number, bool with_balls, const RunContext& context) {
     BodyState state = place_body(actor, number);
     const Body& body = *actor.body;
     const std::size_t count = body.particle_count();
@@ -62,7 +62,7 @@ BodyState begin_body(const Actor& actor, std::size_t number, bool meets_bodies, 
         state.surface_stiffness = surface_stiffness(body, state.rest_squared_frequency);
     }
     state.ball_radius = kBallRadius * float(body.spacing());
-    embed_surface_at_rest(state, meets_bodies && body.material.model == MaterialModel::meshfree, context);
+    embed_surface_at_rest(state, with_balls && body.material.model == MaterialModel::meshfree, context);
     return state;
 }
 
@@ -122,6 +122,8 @@ private:
 
 void begin_bodies(SimulationState& state, std::vector<Actor>& actors, const RunContext& context) {
     AutomaticRigid automatic(state.world, state.options, actors);
+    const bool with_balls =
+        state.options.contacts_within_bodies || (state.options.contacts_between_bodies && actors.size() > 1);
     for (Actor& actor : actors) {
         const std::size_t number = state.bodies.size();
         if (state.grid->has(number)) {
@@ -129,11 +131,11 @@ void begin_bodies(SimulationState& state, std::vector<Actor>& actors, const RunC
             state.why_rigid.emplace_back();
             continue;
         }
-        BodyState body = begin_body(actor, number, actors.size() > 1, context);
+        BodyState body = begin_body(actor, number, with_balls, context);
         state.why_rigid.push_back(automatic.reason(number, body));
         if (!state.why_rigid.back().empty()) {
             actor.body = automatic.rigid(actor.body);
-            body = begin_body(actor, number, actors.size() > 1, context);
+            body = begin_body(actor, number, with_balls, context);
         }
         state.bodies.push_back(std::move(body));
     }
