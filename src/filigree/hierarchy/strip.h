@@ -22,7 +22,7 @@ struct StripOptions {
     unsigned references = 3;                  ///< reference code only: 3, 4 or 6
     /// Larger levels are simplified in clusters on all threads, in time that grows as the mesh does, and those from so
     /// many vertices on in one piece. Blend code without max_edge only.
-    std::size_t one_piece = 1'200'000;
+    std::size_t one_piece = 600'000;
     /// The mesh's vertices are put in order_by_place() first, and Model::source_order says where they were: for meshes
     /// whose order is hopeless, which restore slowly. Blend code only.
     bool reorder = false;

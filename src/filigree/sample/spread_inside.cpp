@@ -5,6 +5,7 @@
 #include "filigree/sample/inside_test.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 
@@ -18,7 +19,8 @@ constexpr double kDartReach = 1.5;       // spacings: the side of the cube aroun
 constexpr double kApart = 0.8;           // spacings between points
 constexpr double kDartsAtOnce = 1 << 21; // about; they take 60 bytes each
 constexpr double kMostPasses = 16;       // over all darts, so that making them again stays cheap
-constexpr std::size_t kBetweenLooks = 1 << 14; // darts from one look at `cancel` to the next
+constexpr std::size_t kBucketsAhead = 16, kPointsAhead = 8; // darts
+constexpr std::size_t kBetweenLooks = 1 << 14;              // darts from one look at `cancel` to the next
 
 std::vector<Vec3d> lattice_points(const Lattice& lattice, const Occupancy& occupancy) {
     std::vector<Vec3d> points;
@@ -49,30 +51,57 @@ Result<std::vector<Vec3d>> jitter(std::vector<Vec3d> points, double spacing, con
 class SpacedPoints {
 public:
     SpacedPoints(const Vec3d& corner, double distance, std::size_t expected)
-        : corner_(corner), distance_(distance), mask_(std::bit_ceil(std::max<std::size_t>(expected, 16)) - 1),
-          last_(mask_ + 1, kNoIndex) {}
+        : corner_(corner), distance_(distance),
+          mask_(std::bit_ceil(std::max<std::size_t>(expected, kBlockCells)) / kBlockCells - 1),
+          last_((mask_ + 1) * kBlockCells, kNoIndex) {}
 
     /// Takes the point unless one is too near. point: nowhere below the corner.
     void add(const Vec3d& point) {
-        const Cell cell = ((point - corner_) / distance_).cast<std::int64_t>();
-        for (std::int64_t n = 0; n < 27; ++n)
-            if (has_near(cell + Cell(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1), point)) return;
+        const Vec3d place = (point - corner_) / distance_;
+        const Cell cell = place.cast<std::int64_t>();
+        const Vec3d above = place - cell.cast<double>(), below = Vec3d::Ones() - above; // cells to the planes around
+        for (const Step& step : kSteps) {
+            double squared = 0;
+            for (int axis = 0; axis < 3; ++axis) {
+                if (step[axis] < 0) squared += above[axis] * above[axis];
+                if (step[axis] > 0) squared += below[axis] * below[axis];
+            }
+            if (squared < 1 && has_near(cell + Cell(step[0], step[1], step[2]), point)) return;
+        }
         Index& last = last_[bucket(cell)];
         before_.push_back(last);
         last = static_cast<Index>(points_.size());
         points_.push_back(point);
     }
 
+    /// Darts fall anywhere: what a later one will look at is on its way while earlier ones are added.
+    void fetch_bucket(const Vec3d& point) const { __builtin_prefetch(&last_[bucket(cell_of(point))]); }
+    void fetch_point(const Vec3d& point) const { ///< some darts after fetch_bucket
+        const Index last = last_[bucket(cell_of(point))];
+        if (last != kNoIndex) __builtin_prefetch(&points_[last]);
+    }
+
     std::vector<Vec3d> take() { return std::move(points_); }
 
 private:
     using Cell = Eigen::Matrix<std::int64_t, 3, 1>;
+    Cell cell_of(const Vec3d& point) const { return ((point - corner_) / distance_).cast<std::int64_t>(); }
+    using Step = std::array<int, 3>;
+    /// To a cell itself and to its neighbours, the nearest first: what is too near is found soonest there.
+    static constexpr std::array<Step, 27> kSteps = [] {
+        std::array<Step, 27> steps;
+        for (int n = 0; n < 27; ++n) steps[n] = {n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1};
+        std::ranges::sort(steps, {}, [](const Step& s) { return s[0] * s[0] + s[1] * s[1] + s[2] * s[2]; });
+        return steps;
+    }();
+    static constexpr std::size_t kBlockCells = 64; ///< 4^3, side by side in memory
 
     std::size_t bucket(const Cell& cell) const {
-        std::uint64_t hash = std::uint64_t(cell[0]) * 0x9E3779B97F4A7C15u;
-        hash = (hash ^ (hash >> 29) ^ std::uint64_t(cell[1])) * 0xBF58476D1CE4E5B9u;
-        hash = (hash ^ (hash >> 29) ^ std::uint64_t(cell[2])) * 0x94D049BB133111EBu;
-        return (hash ^ (hash >> 32)) & mask_;
+        std::uint64_t hash = std::uint64_t(cell[0] >> 2) * 0x9E3779B97F4A7C15u;
+        hash = (hash ^ (hash >> 29) ^ std::uint64_t(cell[1] >> 2)) * 0xBF58476D1CE4E5B9u;
+        hash = (hash ^ (hash >> 29) ^ std::uint64_t(cell[2] >> 2)) * 0x94D049BB133111EBu;
+        const std::uint64_t block = (hash ^ (hash >> 32)) & mask_;
+        return block * kBlockCells + std::size_t((cell[0] & 3) | (cell[1] & 3) << 2 | (cell[2] & 3) << 4);
     }
     /// Cells that share a bucket do not matter: what is too near is too near from any cell.
     bool has_near(const Cell& cell, const Vec3d& point) const {
@@ -83,7 +112,7 @@ private:
 
     Vec3d corner_;
     double distance_;
-    std::size_t mask_;
+    std::size_t mask_; ///< of blocks
     std::vector<Vec3d> points_;
     std::vector<Index> last_;   ///< of each bucket: its last point
     std::vector<Index> before_; ///< of each point: the one before it in its bucket
@@ -131,9 +160,13 @@ Result<std::vector<Vec3d>> throw_darts(const Lattice& lattice, const Occupancy& 
         for (std::size_t d = 0; d < darts.places.size(); ++d)
             if ((*inside)[d]) thrown.emplace_back(darts.orders[d], d);
         std::ranges::sort(thrown);
-        for (std::size_t t = 0; t < thrown.size(); ++t) {
+        std::vector<Vec3d> places(thrown.size());
+        for (std::size_t t = 0; t < thrown.size(); ++t) places[t] = darts.places[thrown[t].second];
+        for (std::size_t t = 0; t < places.size(); ++t) {
             if (t % kBetweenLooks == 0 && context.is_cancelled()) return cancelled_error();
-            points.add(darts.places[thrown[t].second]);
+            if (t + kBucketsAhead < places.size()) points.fetch_bucket(places[t + kBucketsAhead]);
+            if (t + kPointsAhead < places.size()) points.fetch_point(places[t + kPointsAhead]);
+            points.add(places[t]);
         }
     }
     if (context.is_cancelled()) return cancelled_error();
