@@ -46,7 +46,6 @@ struct AddCheck {
     void operator()(Option::IntegerRange range) const { option.check(CLI::Range(range.least, range.most)); }
     void operator()(Option::Range range) const { option.check(CLI::Range(range.least, range.most)); }
     void operator()(const Option::Words& words) const { option.check(CLI::IsMember(words.words)); }
-    void operator()(const Option::Numbers& numbers) const { option.check(CLI::IsMember(numbers.numbers)); }
 };
 
 /// Adds an option by what it writes to.

@@ -207,12 +207,11 @@ Command deform_command() {
             .text = "Deform a mesh (every vertex) or a model (its driver, then restore); options apply in the order "
                     "given",
             .options =
-                OptionList{Option("file", options->input, "Mesh or model").is_read().required(),
-                           Option("-o,--output", options->output,
+                OptionList{
+                    Option("file", options->input, "Mesh or model").is_read().required(),
+                    output_option(options->output,
                                   "Mesh file to write; with --frames an animation: .glb, .pc2, .mdd, .usda, a folder "
-                                  "(NAME/), NAME_####.ply, or for a model .fil, the model with these poses")
-                               .is_written()
-                               .required()} +
+                                  "(NAME/), NAME_####.ply, or for a model .fil, the model with these poses")} +
                 warp_options(options->steps) +
                 OptionList{
                     Option("--seed", options->seed, "Seed of --random").whole_from(0).with_default(),

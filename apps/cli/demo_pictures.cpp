@@ -39,11 +39,7 @@ void draw_demo(const DemoScene& scene, HeadlessRenderer& renderer, const std::st
     Page page(5 * kPanelWidth + 4 * kGap + kLegend, kPanelHeight + kCaption);
     unsigned panel = 0;
     const auto add = [&](const Drawable& drawable, const Camera& camera, bool edges, const std::string& caption) {
-        Scene shown;
-        shown.up = scene.up;
-        Appearance look;
-        look.edges = edges;
-        shown.objects.push_back({&drawable, look});
+        const Scene shown{.objects = {{&drawable, {.edges = edges}}}, .up = scene.up};
         const Picture picture = require(
             renderer.picture(shown, camera, {.width = kPanelWidth, .height = kPanelHeight, .passes = 16}, context));
         const Point corner(panel++ * (kPanelWidth + kGap), 0);
@@ -55,9 +51,7 @@ void draw_demo(const DemoScene& scene, HeadlessRenderer& renderer, const std::st
         add(mesh, at_rest, false, fmt::format("mesh: {} vertices", with_commas(scene.mesh.vertex_count())));
     }
     {
-        RestoreOptions driver;
-        driver.level = 0;
-        Drawable drawable = require(Drawable::model(scene.model, driver, {}, context));
+        Drawable drawable = require(Drawable::model(scene.model, {.level = 0}, {}, context));
         add(drawable, at_rest, true, fmt::format("driver: {}", with_commas(scene.model.driver().vertices.size())));
         require(drawable.set_pose(scene.pose, context));
         add(drawable, moved, true, "driver, deformed");
@@ -79,8 +73,7 @@ void film_demo(const DemoScene& scene, const std::function<Pose(double)>& pose_a
                const std::string& path, Session& session) {
     const RunContext& context = session.context();
     FilmWriter writer = require(FilmWriter::create(path, kFilmWidth, kFilmHeight, 30));
-    RestoreOptions restore;
-    restore.level = level_within(scene.model, kMostFilmTriangles);
+    const RestoreOptions restore{.level = level_within(scene.model, kMostFilmTriangles)};
     Drawable drawable = require(Drawable::model(scene.model, restore, {}, context));
 
     // One camera and one ground for the whole way: a few moments say where it leads.
@@ -96,11 +89,10 @@ void film_demo(const DemoScene& scene, const std::function<Pose(double)>& pose_a
         const double t =
             0.5 - 0.5 * std::cos(std::numbers::pi * double(f) / (kFilmFrames - 1)); // starts and ends slowly
         require(drawable.set_pose(pose_at(t), context));
-        Scene shown;
-        shown.up = scene.up;
-        shown.objects.push_back({&drawable, {}});
-        shown.fixed_ground = true;
-        shown.ground_level = extent.ground_level(scene.up);
+        const Scene shown{.objects = {{&drawable}},
+                          .up = scene.up,
+                          .ground_level = extent.ground_level(scene.up),
+                          .fixed_ground = true};
         frames.push_back(require(renderer.picture(
             shown, camera, {.width = kFilmWidth, .height = kFilmHeight, .passes = kFilmPasses}, quiet)));
         return frames.back();

@@ -205,17 +205,16 @@ Command export_command() {
         .name = "export",
         .text = "Write a model, moving or at rest, for other programs",
         .options =
-            OptionList{Option("file", options->input, "Model, or a mesh that moves (animated glTF, or with --poses)")
-                           .is_read()
-                           .required(),
-                       Option("-o,--output", options->output,
-                              "GLB (a skin, or levels at rest), .pc2, .mdd, .usda, a folder (NAME/) or NAME_####.ply")
-                           .is_written()
-                           .required(),
-                       Option("--poses", options->poses,
-                              "What moves the driver (or the mesh): .pc2, .mdd, numbered meshes, an animated glTF, a "
-                              "model; unset: the file's own poses")
-                           .is_read()} +
+            OptionList{
+                Option("file", options->input, "Model, or a mesh that moves (animated glTF, or with --poses)")
+                    .is_read()
+                    .required(),
+                output_option(options->output,
+                              "GLB (a skin, or levels at rest), .pc2, .mdd, .usda, a folder (NAME/) or NAME_####.ply"),
+                Option("--poses", options->poses,
+                       "What moves the driver (or the mesh): .pc2, .mdd, numbered meshes, an animated glTF, a "
+                       "model; unset: the file's own poses")
+                    .is_read()} +
             pose_file_options(options->pose_file) +
             OptionList{Option("--rest", options->at_rest, "The levels at rest, though the model has poses"),
                        Option("--web", options->web,

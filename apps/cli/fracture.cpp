@@ -1,6 +1,5 @@
 #include "commands.h"
 #include "output_folder.h"
-#include "pictures.h"
 #include "session.h"
 
 #include "filigree/fracture/fracture.h"
@@ -18,8 +17,7 @@ struct FractureArguments {
     std::vector<double> at, grain;
     FractureOptions cut;
     double explode = 0;
-    std::size_t seed = 1, pieces = 20, clump = 1;
-    std::optional<double> edge;
+    std::size_t seed = 1;
 };
 
 bool is_folder(const std::string& output) { return output.ends_with('/'); }
@@ -107,12 +105,9 @@ void write_folder(const FracturedMesh& fractured, const Mesh& input, const Fract
 void run(FractureArguments options, Session& session) {
     if (!is_folder(options.output)) require(mesh_format(options.output));
     const Mesh mesh = session.read_mesh(options.input);
-    options.pattern.pieces = static_cast<Index>(std::min<std::size_t>(options.pieces, kNoIndex));
-    options.pattern.clump = static_cast<Index>(options.clump);
     for (std::size_t k = 0; k + 2 < options.at.size(); k += 3)
         options.pattern.at.emplace_back(Vec3d(options.at[k], options.at[k + 1], options.at[k + 2]) - mesh.origin);
     if (!options.grain.empty()) options.pattern.grain = Vec3d(options.grain[0], options.grain[1], options.grain[2]);
-    options.cut.edge = options.edge;
     RunContext context = session.context();
     context.seed = options.seed;
     const double start = now_seconds();
@@ -145,11 +140,8 @@ Command fracture_command() {
         .name = "fracture",
         .text = "Break a mesh into pieces",
         .options = {Option("mesh", options->input, "Mesh file").required().is_read(),
-                    Option("-o,--output", options->output,
-                           "Mesh file to write, or a folder (\"pieces/\") for a file a piece")
-                        .required()
-                        .is_written(),
-                    Option("--pieces", options->pieces, "How many")
+                    output_option(options->output, "Mesh file to write, or a folder (\"pieces/\") for a file a piece"),
+                    Option("--pieces", pattern.pieces, "How many")
                         .between(1, static_cast<int>(FractureCells::kMostSeeds))
                         .with_default(),
                     choice<FracturePatternKind>(
@@ -162,7 +154,7 @@ Command fracture_command() {
                         "even (unset): pieces of about one size; impact: small ones around --at; slabs: long "
                         "ones, as of wood; radial: rays and rings around --at, as of glass; grains: small here and "
                         "large there, as of stone"),
-                    Option("--clump", options->clump, "Cells that a piece is made of; with more, pieces are knobbly")
+                    Option("--clump", pattern.clump, "Cells that a piece is made of; with more, pieces are knobbly")
                         .between(1, static_cast<int>(FracturePattern::kMostClump))
                         .with_default(),
                     Option("--at", options->at, "A point that was hit, again for each further one (impact, radial)")
@@ -175,7 +167,7 @@ Command fracture_command() {
                         .comma_separated()
                         .named("X,Y,Z"),
                     Option("--roughness", pattern.roughness, "Of cracks; 0: planes").between(0.0, 1.0).with_default(),
-                    Option("--edge", options->edge,
+                    Option("--edge", options->cut.edge,
                            "Longest edges wanted on cracks, model units (unset: a twentieth of a piece, a sixth for "
                            "planes; 0: none but "
                            "the outlines')")

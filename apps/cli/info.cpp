@@ -165,8 +165,7 @@ void describe_code(const ModelOutline& model, Report& report) {
     }
     if (model.code == DetailCode::reference) {
         report.add("references", std::to_string(model.references), "references", model.references);
-        report.count("patches", "patches", model.patches);
-        return;
+        return report.count("patches", "patches", model.patches);
     }
     const bool int16 = model.precision == Precision::int16;
     report.add("precision", int16 ? "int16, 10 bytes a vertex" : "float, 20 bytes a vertex", "precision",
@@ -189,11 +188,9 @@ bool is_judged_quickly(const ModelOutline& model) {
 /// What the driver is good for.
 void describe_fidelity(const Model& model, Session& session, Report& report) {
     const DriverFidelity fidelity = require(driver_fidelity(model, session.context()));
-    if (model.code() == DetailCode::reference) {
-        report.add("fidelity", fmt::format("{:.2g} of the diagonal", fidelity.positions), "fidelity",
-                   {{"positions", fidelity.positions}});
-        return;
-    }
+    if (model.code() == DetailCode::reference)
+        return report.add("fidelity", fmt::format("{:.2g} of the diagonal", fidelity.positions), "fidelity",
+                          {{"positions", fidelity.positions}});
     report.add("fidelity",
                fmt::format("{:.2g} of the diagonal from positions, {:.2g} with gradients", fidelity.positions,
                            fidelity.gradients),

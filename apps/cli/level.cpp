@@ -42,7 +42,7 @@ Command level_command() {
             .text = "Write one level of a model as a mesh; level 0 is the driver",
             .options = {Option("model", options->model, "Model file").is_read().required(),
                         Option("level", options->level, "Level, 0 the coarsest").required(),
-                        Option("-o,--output", options->output, "Mesh file to write").is_written().required(),
+                        output_option(options->output, "Mesh file to write"),
                         Option("--ghosts", options->ghosts,
                                "Also write the driver's ghost points: moved along with it, they tell restore how "
                                "space deforms")

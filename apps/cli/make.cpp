@@ -33,7 +33,7 @@ Command make_command() {
         .options = {Option("shape", options->shape, "The shape")
                         .required()
                         .one_of(std::vector<std::string>(shape_names().begin(), shape_names().end())),
-                    Option("-o,--output", options->output, "Mesh file to write").required(),
+                    output_option(options->output, "Mesh file to write"),
                     Option("--resolution", size.resolution, "Quads along a side").with_default(),
                     Option("--frequency", size.frequency, "Waves along a side").with_default(),
                     Option("--amplitude", size.amplitude, "Height of the waves, fraction of the side").with_default(),

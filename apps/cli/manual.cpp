@@ -78,11 +78,6 @@ struct CheckText {
         for (const std::string& word : words.words) list += (list.empty() ? "" : ", ") + word;
         return "One of " + list + ".";
     }
-    std::string operator()(const Option::Numbers& numbers) const {
-        std::string list;
-        for (const int number : numbers.numbers) list += (list.empty() ? "" : ", ") + std::to_string(number);
-        return "One of " + list + ".";
-    }
     template <class T>
     std::string operator()(const T&) const {
         return "";

@@ -39,11 +39,8 @@ struct Option {
     struct Words {
         std::vector<std::string> words;
     };
-    struct Numbers {
-        std::vector<int> numbers;
-    };
     /// What a value must be. Numbers are read by the same rules in every locale.
-    using Check = std::variant<Any, Finite, AboveZero, WholeFrom, IntegerRange, Range, Words, Numbers>;
+    using Check = std::variant<Any, Finite, AboveZero, WholeFrom, IntegerRange, Range, Words>;
 
     /// What the value is the name of. No command writes over a file that it reads.
     enum class File { none, read, written };
@@ -83,7 +80,6 @@ struct Option {
     Option between(int least, int most) const { return with(&Option::check, IntegerRange{least, most}); }
     Option between(double least, double most) const { return with(&Option::check, Range{least, most}); }
     Option one_of(std::vector<std::string> words) const { return with(&Option::check, Words{std::move(words)}); }
-    Option one_of(std::vector<int> numbers) const { return with(&Option::check, Numbers{std::move(numbers)}); }
     Option values(int least, int most) const {
         return with(&Option::least_values, least).with(&Option::most_values, most);
     }
@@ -101,6 +97,11 @@ private:
         return changed;
     }
 };
+
+/// "-o" of a command that has to be told where to write.
+inline Option output_option(std::string& target, std::string text) {
+    return Option("-o,--output", target, std::move(text)).is_written().required();
+}
 
 /// An option that is one of a few words, each of which stands for a value of `target` (a T or an optional T).
 template <class T, class Target>

@@ -177,7 +177,7 @@ Command pack_command() {
         .name = "pack",
         .text = "Code a mesh or a model in few bits: a model file that every command reads",
         .options = {Option("input", options->input, "Mesh or model").is_read().required(),
-                    Option("-o,--output", options->output, "Model file to write (.fil)").is_written().required(),
+                    output_option(options->output, "Model file to write (.fil)"),
                     choice<Profile>(
                         "--profile", options->profile,
                         {{"compact", Profile::compact}, {"stream", Profile::stream}, {"lossless", Profile::lossless}},
@@ -204,9 +204,7 @@ Command unpack_command() {
     return {.name = "unpack",
             .text = "Write a coded model as a plain one, which reads at once",
             .options = {Option("model", options->input, "Coded model").is_read().required(),
-                        Option("-o,--output", options->output, "Model file to write (.fil), or a mesh with --bytes")
-                            .is_written()
-                            .required(),
+                        output_option(options->output, "Model file to write (.fil), or a mesh with --bytes"),
                         Option("--bytes", options->bytes,
                                "Write the mesh that so many of a stream's first bytes give; the file may end there")},
             .examples = "  filigree unpack small.fil -o plain.fil\n"

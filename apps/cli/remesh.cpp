@@ -231,7 +231,7 @@ Command remesh_command() {
         .text = "Turn any mesh into quads: patches of a regular grid",
         .options =
             OptionList{Option("mesh", options->input, "Mesh").is_read().required(),
-                       Option("-o,--output", options->output, "Quads to write").is_written().required()} +
+                       output_option(options->output, "Quads to write")} +
             remesh_options(options->remesh) +
             OptionList{
                 Option("--no-attributes", options->no_attributes, "Leave UVs, colours, normals and labels behind"),

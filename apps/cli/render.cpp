@@ -176,10 +176,8 @@ Command render_command() {
                                          "side, or one after the other in a film")
                                       .is_read()
                                       .required(),
-                                  Option("-o,--output", options->output,
-                                         "Picture (.png, .svg, .pdf) or film (.mp4, .gif, frame_%04d.png)")
-                                      .is_written()
-                                      .required()} +
+                                  output_option(options->output,
+                                                "Picture (.png, .svg, .pdf) or film (.mp4, .gif, frame_%04d.png)")} +
                        camera_options(*options) + look_options(*options) + scalar_options(*options) +
                        page_options(*options) + film_options(*options) + restore_options(options->restore),
             .examples = "  filigree render scan.ply -o scan.png\n"

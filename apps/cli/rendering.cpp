@@ -9,17 +9,12 @@ namespace filigree::cli {
 namespace {
 
 Background parse_background(const std::string& text) {
-    Background background;
-    if (text.empty()) return background;
-    if (text == "transparent") {
-        background.transparent = true;
-        return background;
-    }
+    if (text.empty()) return {};
+    if (text == "transparent") return {.transparent = true};
     const std::size_t comma = text.find(',');
-    background.top = parse_color(text.substr(0, comma), "--background");
-    background.bottom =
-        comma == std::string::npos ? background.top : parse_color(text.substr(comma + 1), "--background");
-    return background;
+    const Vec3f top = parse_color(text.substr(0, comma), "--background");
+    if (comma == std::string::npos) return {.top = top, .bottom = top};
+    return {.top = top, .bottom = parse_color(text.substr(comma + 1), "--background")};
 }
 
 } // namespace
@@ -126,10 +121,9 @@ void Rendering::upload_surfels(Subject& subject) {
     std::vector<float> scalars;
     for (std::size_t f = 0; f < polygons.face_count() && !subject.scalars.empty(); ++f)
         scalars.insert(scalars.end(), polygons.face_size(f), subject.scalars[surfels.corners[f][0]]);
-    SurfaceOptions surface;
-    surface.scalars = {scalars, options_.map, range_};
-    subject.drawable = require(Drawable::surface(polygons, surface, context()));
+    subject.drawable = require(Drawable::surface(polygons, {.scalars = {scalars, options_.map, range_}}, context()));
 }
+
 void Rendering::upload(Subject& subject) {
     ScalarColors scalars{subject.scalars, options_.map, range_};
     if (subject.surfels) {
@@ -139,10 +133,8 @@ void Rendering::upload(Subject& subject) {
         PointOptions points{radius, scalars, subject.mesh.colors};
         subject.drawable = require(Drawable::points(subject.mesh.positions, subject.mesh.origin, points, context()));
     } else {
-        SurfaceOptions surface;
-        surface.shading = options_.shading;
-        surface.scalars = scalars;
-        surface.materials = subject.materials.materials;
+        const SurfaceOptions surface{
+            .shading = options_.shading, .scalars = scalars, .materials = subject.materials.materials};
         subject.drawable = subject.model
                                ? require(Drawable::model(*subject.model, options_.restore, surface, context()))
                                : require(Drawable::surface(subject.mesh, surface, context()));

@@ -287,12 +287,10 @@ Command restore_command() {
                            "Or an animation of the driver: .pc2, .mdd, a folder of numbered meshes or NAME_####.ply, "
                            "an animated .glb, another .fil's poses")} +
                 pose_file_options(options->poses_file) +
-                OptionList{Option("-o,--output", options->output,
-                                  "Mesh to write; an animation: .pc2, .mdd, .glb, .usda, a folder for NAME_0001.ply "
-                                  "and so on, or NAME_####.obj")
-                               .is_written()
-                               .required()} +
-                OptionList{Option("--chunk", options->chunk,
+                OptionList{output_option(options->output,
+                                         "Mesh to write; an animation: .pc2, .mdd, .glb, .usda, a folder for "
+                                         "NAME_0001.ply and so on, or NAME_####.obj"),
+                           Option("--chunk", options->chunk,
                                   "K/N: the K-th of N parts of the frames alone, into a .pc2 that other processes "
                                   "write too, on any machine"),
                            Option("--surfels", options->as_surfels,

@@ -38,22 +38,18 @@ void draw_points(const Mesh& mesh, const std::vector<Vec3f>& points, double spac
     const RunContext& context = session.context();
     HeadlessRenderer renderer = require(HeadlessRenderer::create());
     const Drawable surface = require(Drawable::surface(mesh, {}, context));
-    Scene scene;
     const Vec3d direction = view_direction(View::iso, up), axis = up_vector(up);
-    Appearance cut;
-    cut.color = {0.80f, 0.22f, 0.18f};
-    cut.own_colors = false;
     const Vec3d towards = (direction - axis * axis.dot(direction)).normalized();
-    cut.clip = ClipPlane{towards, towards.dot(surface.box().centre())};
-    scene.objects.push_back({&surface, cut});
+    Scene scene{.objects = {{&surface,
+                             {.color = {0.80f, 0.22f, 0.18f},
+                              .own_colors = false,
+                              .clip = ClipPlane{towards, towards.dot(surface.box().centre())}}}},
+                .up = up};
     std::optional<Drawable> balls;
     if (!points.empty()) {
         balls = require(Drawable::points(points, mesh.origin, {.radius = static_cast<float>(0.32 * spacing)}, context));
-        Appearance blue;
-        blue.color = {0.20f, 0.42f, 0.80f};
-        scene.objects.push_back({&*balls, blue});
+        scene.objects.push_back({&*balls, {.color = {0.20f, 0.42f, 0.80f}}});
     }
-    scene.up = up;
     write_picture_of(scene, camera_for(mesh, View::iso, up, 4.0 / 3), {.width = 1280, .height = 960}, path, renderer,
                      session);
 }
@@ -213,9 +209,7 @@ Command sample_command() {
     return {.name = "sample",
             .text = "Fill a mesh with points: those of a regular lattice that are inside",
             .options = OptionList{Option("mesh", options->input, "Mesh").is_read().required(),
-                                  Option("-o,--output", options->output, "Points, as a mesh file without faces")
-                                      .is_written()
-                                      .required()} +
+                                  output_option(options->output, "Points, as a mesh file without faces")} +
                        point_options(*options) + inside_options(*options) +
                        OptionList{Option("--picture", options->picture,
                                          "Also draw the points, and the surface cut open (.png)")

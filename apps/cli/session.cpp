@@ -4,7 +4,6 @@
 #include "filigree/io/model_file.h"
 
 #include <algorithm>
-#include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <filesystem>

@@ -14,7 +14,6 @@
 #include "filigree/io/model_file.h"
 #include "filigree/mesh/mesh_distance.h"
 
-#include <functional>
 #include <optional>
 #include <string>
 #include <variant>

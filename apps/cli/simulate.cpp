@@ -1,6 +1,5 @@
 #include "animation_output.h"
 #include "commands.h"
-#include "pictures.h"
 #include "simulate_report.h"
 
 #include "filigree/io/extension.h"

@@ -174,7 +174,7 @@ Command strip_command() {
             .text = "Take the detail off a mesh: make a model with a light driver",
             .options =
                 {Option("mesh", options->input, "Mesh to strip").is_read().required(),
-                 Option("-o,--output", options->output, "Model file to write (.fil)").is_written().required(),
+                 output_option(options->output, "Model file to write (.fil)"),
                  Option("--base", strip.base, "Vertices of the driver (unset: 1,000, fewer for small meshes)")
                      .whole_from(3)
                      .excludes({"--levels", "--error", "--fidelity"}),
@@ -223,7 +223,7 @@ Command strip_command() {
                         "K/N: be the K-th of N processes, on any machines, that make the model together")
                      .excludes({"--driver", "--fidelity"}),
                  Option("--references", strip.references, "Of the reference code: coarse points that a point refers to")
-                     .one_of({3, 4, 6})
+                     .one_of({"3", "4", "6"})
                      .with_default()},
             .examples = "  filigree strip scan.ply -o scan.fil\n"
                         "  filigree strip scan.ply -o scan.fil --base 5000 --precision int16\n"

@@ -55,13 +55,9 @@ std::vector<std::string> parts_of(std::string_view list) {
 
 /// A word is a text, without its quotes too.
 std::string spelled_value(const std::string& value) {
-    const bool is_word = !value.empty() &&
-                         std::ranges::all_of(value,
-                                             [](char c) {
-                                                 return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
-                                                        (c >= '0' && c <= '9') || c == '_' || c == '-';
-                                             }) &&
-                         !(value[0] >= '0' && value[0] <= '9') && value[0] != '-';
+    constexpr std::string_view kBegin = "ABCDEFGHIJKLMNOPQRSTUVWXYZ_abcdefghijklmnopqrstuvwxyz";
+    constexpr std::string_view kGoOn = "0123456789-ABCDEFGHIJKLMNOPQRSTUVWXYZ_abcdefghijklmnopqrstuvwxyz";
+    const bool is_word = value.find_first_of(kBegin) == 0 && value.find_first_not_of(kGoOn) == std::string::npos;
     const bool means_itself = value == "true" || value == "false" || value == "inf" || value == "nan";
     return is_word && !means_itself ? '"' + value + '"' : value;
 }
@@ -293,7 +289,7 @@ Command sweep_command() {
                     Option("scenes", options->scenes, "Scenes (.toml), see docs/scenes.md; before the options")
                         .is_read()
                         .required(),
-                    Option("-o,--output", options->output, "The table (.csv)").is_written().required(),
+                    output_option(options->output, "The table (.csv)"),
                     Option("--set", options->sets,
                            "TABLE.KEY=VALUE,VALUE: a run with each; may come several times, then with all "
                            "combinations. TABLE[N].KEY: of the N-th alone")

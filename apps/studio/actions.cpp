@@ -2,8 +2,10 @@
 
 #include "file_dialogs.h"
 #include "icons.h"
+#include "panels/panels.h"
 #include "pins.h"
 #include "window.h"
+#include "words.h"
 
 #include <QActionGroup>
 #include <QApplication>
@@ -24,7 +26,7 @@ const QString kAll = QStringLiteral("All files (*)");
 /// A row of a menu.
 struct Command {
     QString name = {}, text = {}, tip = {}; ///< no name: a separator
-    const char* keys = "";                  ///< "": no shortcut
+    QString keys = {};                      ///< "": no shortcut
     std::function<void()> run = {};
     std::function<bool()> can = {}; ///< unset: always
     std::optional<Icon> icon = {};
@@ -59,33 +61,16 @@ struct Actions::Impl {
     std::vector<ActionMenu> menus;
     std::map<std::string, QActionGroup*> groups;
 
-    std::vector<Command> file_menu();
-    std::vector<Command> edit_menu();
-    std::vector<Command> look_menu(); ///< the upper part of the view's menu
-    std::vector<Command> view_menu();
-    std::vector<Command> body_menu();
-    std::vector<Command> help_menu();
-
-    void add_menu(const char* name, const QString& title, const std::vector<Command>& commands);
-    QAction* add(const Command& command);
-    void refresh();
-    void name_step(const char* name, const QString& verb, const QString& step);
-
-    void open();
-    void save_as();
-    void save();
-    void save_to(const FileQuestion& question, void (Workbench::*write)(const std::string&));
-    void export_film();
-    void export_meshes();
-    QString proposal(const QString& ending) const;
-    void cancel();
-    void show_about();
-
     // Conditions of commands.
     std::function<bool()> has_model = [this] { return workbench.state().model != nullptr; };
     std::function<bool()> has_recording = [this] { return workbench.frame_count() > 1; };
     std::function<bool()> is_at_rest = [this] { return has_model() && !workbench.is_playing(); };
-    bool can_remove_detail() const;
+    bool can_remove_detail() const {
+        const State& state = workbench.state();
+        return state.model && state.level() > 0 &&
+               level_counts(*state.model, state.level() - 1).vertices <
+                   level_counts(*state.model, state.level()).vertices;
+    }
 
     const ViewSettings& view() const { return workbench.view().settings(); }
     /// A field of the view settings that is on or off.
@@ -123,349 +108,346 @@ struct Actions::Impl {
         command.group = "themes";
         return command;
     }
-    Command panel(const char* name, const QString& title, const char* keys) {
-        Command command{QStringLiteral("panel.") + name, title + " panel", "Shows the panel " + title, keys,
-                        [this, name] { window.show_panel(name); }};
-        command.is_on = [this, name] { return window.panel() == QLatin1String(name); };
+    Command panel(std::size_t number) {
+        const QString name = kPanels[number], title = shape_title(kPanels[number]);
+        Command command{"panel." + name, title + " panel", "Shows the panel " + title,
+                        QString("Ctrl+%1").arg(number + 1), [this, name] { window.show_panel(name); }};
+        command.is_on = [this, name] { return window.panel() == name; };
         command.group = "panels";
         return command;
     }
-};
 
-std::vector<Command> Actions::Impl::file_menu() {
-    return {
-        {"file.open",
-         "&Open…",
-         "Opens a mesh (OBJ, PLY, STL, OFF) or a model (FIL)",
-         "Ctrl+O",
-         [this] { open(); },
-         {},
-         Icon::open},
-        kSeparator,
-        {"file.save", "&Save", "Saves the model with its deformation and recording", "Ctrl+S", [this] { save(); },
-         has_model, Icon::save},
-        {"file.save_as", "Save &as…", "Saves the model under another name", "Ctrl+Shift+S", [this] { save_as(); },
-         has_model},
-        kSeparator,
-        {"file.save_mesh", "Save &mesh…", "Saves the mesh at the level shown, as it is deformed now", "Ctrl+E",
-         [this] {
-             save_to({"file.save_mesh", "Save the mesh", {kMeshes, kAll}, "obj", proposal("_deformed.obj")},
-                     &Workbench::save_mesh);
-         },
-         has_model, Icon::meshes},
-        {"file.save_driver", "Save &driver…", "Saves the driver as it is posed now, for another program to move", "",
-         [this] {
-             save_to({"file.save_driver",
-                      "Save the driver",
-                      {"Meshes (*.ply *.obj)", kAll},
-                      "ply",
-                      proposal("_driver.ply")},
-                     &Workbench::save_driver);
-         },
-         has_model},
-        kSeparator,
-        {"file.export_film", "Export &film…", "Writes the recording as a film, seen as now (MP4, GIF or numbered PNGs)",
-         "Ctrl+Shift+E", [this] { export_film(); }, has_recording, Icon::film},
-        {"file.export_meshes", "Export mes&hes…", "Writes a mesh for each frame of the recording", "",
-         [this] { export_meshes(); }, has_recording, Icon::meshes},
-        kSeparator,
-        {"file.quit", "&Quit", "Leaves; asks about unsaved changes first", "Ctrl+Q", [this] { window.close(); }},
-    };
-}
-
-std::vector<Command> Actions::Impl::edit_menu() {
-    QUndoStack& history = workbench.document().undo_stack();
-    return {
-        {"edit.undo", "&Undo", "Undo", "Ctrl+Z", [&history] { history.undo(); },
-         [&history] { return history.canUndo(); }, Icon::undo},
-        {"edit.redo", "&Redo", "Redo", "Ctrl+Shift+Z", [&history] { history.redo(); },
-         [&history] { return history.canRedo(); }, Icon::redo},
-        kSeparator,
-        {"quads.make", "Make &quads", "Makes the mesh regular quads in patches, as the Quads panel says", "Q",
-         [this] {
-             window.show_panel("quads");
-             workbench.make_quads();
-         },
-         [this] { return has_model() && workbench.state().source->topology.faces > 0; }},
-        {"fracture.cut", "Cut p&ieces", "Cuts the mesh where it would break, as the Fracture panel says", "X",
-         [this] {
-             window.show_panel("fracture");
-             workbench.cut_pieces();
-         },
-         [this] { return has_model() && workbench.state().source->topology.faces > 0; }},
-        {"fracture.whole", "Make &whole", "The mesh as it was before it was cut", "Shift+X",
-         [this] { workbench.make_whole(); }, [this] { return has_model() && workbench.state().source->pieces; }},
-        {"detail.remove", "&Remove detail", "One level coarser", "PgDown", [this] { workbench.remove_detail(); },
-         [this] { return can_remove_detail(); }, Icon::minus},
-        {"detail.add", "&Add detail", "One level finer", "PgUp", [this] { workbench.add_detail(); },
-         [this] { return has_model() && workbench.state().level() < workbench.state().model->finest_level(); },
-         Icon::plus},
-        kSeparator,
-        {"deform.open", "De&form", "The deformations: stretch, squeeze, bend, twist, taper, and pulling by hand", "F",
-         [this] {
-             workbench.set_mode(Mode::deform);
-             window.show_panel("deform");
-         },
-         has_model, Icon::deform},
-        {"edit.reset_deformation", "Reset &deformation", "Back to the shape at rest: no sliders, pulls or pins",
-         "Ctrl+R", [this] { workbench.reset_deformation(); },
-         [this] {
-             const State& state = workbench.state();
-             return !state.warps.none() || !state.handles.empty() || state.handle_pose;
-         },
-         Icon::reset},
-        {"edit.unpin_all", "Unp&in all", "Takes out all pins", "Ctrl+Shift+P", [this] { workbench.unpin_all(); },
-         [this] { return has_pins(workbench.state().handles); }},
-        kSeparator,
-        view_choice("tools", "tool.pull", "&Pull", "Drag the surface to pull it", "P", &ViewSettings::tool, Tool::pull,
-                    Icon::pull),
-        view_choice("tools", "tool.pin", "Pi&n", "Click or paint the surface to pin it; with Ctrl to take pins out",
-                    "N", &ViewSettings::tool, Tool::pin, Icon::pin),
-        view_choice("tools", "tool.turn", "&Turn", "Drag anywhere to turn the view", "T", &ViewSettings::tool,
-                    Tool::turn, Icon::turn),
-        view_choice("tools", "tool.torch", "&Torch",
-                    "Hold the mouse on a body that melts to warm it; with Ctrl to cool", "H", &ViewSettings::tool,
-                    Tool::torch, Icon::torch),
-        kSeparator,
-        {"edit.cancel", "&Cancel", "Stops the work that runs, or lets go of a pull as if it had not been", "Esc",
-         [this] { cancel(); }, [this] { return workbench.jobs().is_busy() || workbench.is_pulling(); }},
-    };
-}
-
-std::vector<Command> Actions::Impl::look_menu() {
-    using V = ViewSettings;
-    return {
-        look("view.front", "&Front", "Looks from the front", "1", View::front),
-        look("view.side", "&Side", "Looks from the right", "2", View::side),
-        look("view.top", "&Top", "Looks from above", "3", View::top),
-        look("view.iso", "&Corner", "Looks from the front, the right and above", "4", View::iso),
-        {"view.show_all", "Show &all", "The whole object, as large as it fits", "0", [this] { viewport.show_all(); },
-         has_model, Icon::show_all},
-        kSeparator,
-        view_choice("styles", "view.shaded", "S&haded", "The surface alone", "S", &V::style, SurfaceStyle::shaded),
-        view_choice("styles", "view.edges", "Shaded with &edges", "The surface and the edges of its faces", "E",
-                    &V::style, SurfaceStyle::edges),
-        view_choice("styles", "view.wireframe", "&Wireframe", "The edges of the faces alone", "W", &V::style,
-                    SurfaceStyle::wireframe),
-        kSeparator,
-        view_choice("colors", "view.color_own", "&Own colours", "The mesh's own colours", "Shift+1", &V::coloring,
-                    Coloring::own),
-        view_choice("colors", "view.color_error", "E&rror as colours",
-                    "How far each vertex is from the full deformation", "Shift+2", &V::coloring, Coloring::error),
-        view_choice("colors", "view.color_levels", "&Levels as colours", "The level at which each vertex is added",
-                    "Shift+3", &V::coloring, Coloring::levels),
-        view_choice("colors", "view.color_patches", "Patc&hes as colours",
-                    "The patches of regular quads, each in a colour unlike its neighbours'", "Shift+4", &V::coloring,
-                    Coloring::patches),
-        view_choice("colors", "view.color_expected", "E&xpected error as colours",
-                    "Where the pose is more curved than the driver can follow", "Shift+5", &V::coloring,
-                    Coloring::expected_error),
-        view_choice("colors", "view.color_pieces", "Pi&eces as colours", "Each piece of a mesh that breaks", "Shift+6",
-                    &V::coloring, Coloring::pieces),
-        view_choice("colors", "view.color_heat", "&Heat as colours", "How warm a body that melts is", "Shift+7",
-                    &V::coloring, Coloring::heat),
-        {"view.measure_error", "M&easure error", "Measures what is shown against the full deformation", "Ctrl+M",
-         [this] { workbench.measure_error(); }, has_model},
-        kSeparator,
-    };
-}
-
-std::vector<Command> Actions::Impl::view_menu() {
-    using V = ViewSettings;
-    return {
-        view_switch("view.split", "S&plit view", "Driver, restored mesh and full deformation side by side", "V",
-                    &V::split),
-        view_switch("view.driver", "&Driver over the mesh", "The driver's edges over the mesh", "D", &V::driver),
-        view_switch("view.defects", "Defec&ts", "Marks open and non-manifold edges", "Shift+D", &V::defects),
-        view_switch("view.inside_points", "&Inside points", "Points inside the mesh at rest", "I", &V::inside_points),
-        view_switch("view.clip", "Clip pla&ne", "Cuts the mesh open", "C", &V::clip),
-        view_switch("view.ground", "&Ground", "The ground with the object's shadow", "G", &V::ground),
-        kSeparator,
-        view_switch("view.level_by_distance", "Level by &distance", "The level shown follows the size on the screen",
-                    "L", &V::level_by_distance),
-        view_switch("view.keep_up", "Coarser while &moving", "A coarser level while things move, where drawing is slow",
-                    "M", &V::keep_up),
-        kSeparator,
-        panel("model", "Model", "Ctrl+1"),
-        panel("quads", "Quads", "Ctrl+2"),
-        panel("detail", "Detail", "Ctrl+3"),
-        panel("deform", "Deform", "Ctrl+4"),
-        panel("body", "Body", "Ctrl+5"),
-        panel("fracture", "Fracture", "Ctrl+6"),
-        panel("view", "View", "Ctrl+7"),
-        kSeparator,
-        theme("view.system_theme", "Theme of the s&ystem", "Light or dark, as the desktop is", Theme::system),
-        theme("view.light_theme", "Light theme", "Dark text on light ground", Theme::light),
-        theme("view.dark_theme", "Dark theme", "Light text on dark ground", Theme::dark),
-    };
-}
-
-std::vector<Command> Actions::Impl::body_menu() {
-    return {
-        {"body.make", "&Make body", "Fills the mesh with particles and drops it on the ground", "Ctrl+B",
-         [this] { workbench.make_body(); }, has_model},
-        {"body.fit_driver", "&Fit driver", "Takes a driver as fine as the body's particles, and makes the body again",
-         "", [this] { workbench.fit_driver(); }, [this] { return workbench.playback().has_body(); }},
-        {"body.animate", "A&nimate", "Drops the mesh on the ground as a soft body and plays", "A",
-         [this] {
-             workbench.animate();
-             window.show_panel("body");
-         },
-         has_model, Icon::animate},
-        kSeparator,
-        {"body.play", "&Play", "Moves the body; makes it where there is none", "Space", [this] { workbench.play(); },
-         is_at_rest, Icon::play},
-        {"body.pause", "P&ause", "Stops where it is", "Space", [this] { workbench.pause(); },
-         [this] { return workbench.is_playing(); }, Icon::pause},
-        {"body.step", "&Step", "One frame on", "Right", [this] { workbench.step(); }, is_at_rest, Icon::step},
-        {"body.back", "Step &back", "One frame back in the recording", "Left",
-         [this] { workbench.go_to_frame(workbench.frame() - 1); },
-         [this] { return workbench.frame_count() > 0 && workbench.frame() > 0 && !workbench.is_playing(); }},
-        {"body.reset", "&Reset", "Back to the start; empties the recording", "Home", [this] { workbench.reset(); },
-         [this] { return workbench.playback().has_body() || has_recording(); }, Icon::reset},
-        kSeparator,
-        {"body.melt", "&Melt", "Puts a body that melts into warm air, and plays", "Ctrl+Shift+M",
-         [this] { workbench.melt(); }, [this] { return has_model() && workbench.can_melt(); }},
-        {"body.freeze", "Free&ze", "Puts a body that melts into cold air, and plays", "Ctrl+Shift+F",
-         [this] { workbench.freeze(); }, [this] { return has_model() && workbench.can_melt(); }},
-        kSeparator,
-        view_switch("view.particles", "&Particles", "The particles of the body instead of its surface", "B",
-                    &ViewSettings::particles, [this] { return workbench.playback().has_body(); }),
-    };
-}
-
-std::vector<Command> Actions::Impl::help_menu() {
-    return {
-        {"help.shortcuts", "&Shortcuts and mouse", "All keys and what the mouse does", "F1",
-         [this] { window.show_help(); }},
-        {"help.about", "&About Filigree", "What this program is", "", [this] { show_about(); }},
-    };
-}
-
-void Actions::Impl::add_menu(const char* name, const QString& title, const std::vector<Command>& commands) {
-    ActionMenu menu{name, title, {}};
-    for (const Command& command : commands) menu.actions.push_back(command.name.isEmpty() ? nullptr : add(command));
-    menus.push_back(std::move(menu));
-}
-
-QAction* Actions::Impl::add(const Command& command) {
-    auto* action = new QAction(command.text, &actions);
-    action->setObjectName(command.name);
-    if (*command.keys) action->setShortcut(QKeySequence(command.keys, QKeySequence::PortableText));
-    describe(action, command.tip);
-    if (command.icon) action->setIcon(icon(*command.icon));
-    action->setCheckable(bool(command.is_on));
-    if (*command.group) {
-        QActionGroup*& group = groups[command.group];
-        if (!group) group = new QActionGroup(&actions);
-        group->addAction(action);
+    std::vector<Command> file_menu() {
+        return {
+            {"file.open",
+             "&Open…",
+             "Opens a mesh (OBJ, PLY, STL, OFF) or a model (FIL)",
+             "Ctrl+O",
+             [this] { open(); },
+             {},
+             Icon::open},
+            kSeparator,
+            {"file.save", "&Save", "Saves the model with its deformation and recording", "Ctrl+S", [this] { save(); },
+             has_model, Icon::save},
+            {"file.save_as", "Save &as…", "Saves the model under another name", "Ctrl+Shift+S", [this] { save_as(); },
+             has_model},
+            kSeparator,
+            {"file.save_mesh", "Save &mesh…", "Saves the mesh at the level shown, as it is deformed now", "Ctrl+E",
+             [this] {
+                 save_to({"file.save_mesh", "Save the mesh", {kMeshes, kAll}, "obj", proposal("_deformed.obj")},
+                         &Workbench::save_mesh);
+             },
+             has_model, Icon::meshes},
+            {"file.save_driver", "Save &driver…", "Saves the driver as it is posed now, for another program to move",
+             "",
+             [this] {
+                 save_to({"file.save_driver",
+                          "Save the driver",
+                          {"Meshes (*.ply *.obj)", kAll},
+                          "ply",
+                          proposal("_driver.ply")},
+                         &Workbench::save_driver);
+             },
+             has_model},
+            kSeparator,
+            {"file.export_film", "Export &film…",
+             "Writes the recording as a film, seen as now (MP4, GIF or numbered PNGs)", "Ctrl+Shift+E",
+             [this] { export_film(); }, has_recording, Icon::film},
+            {"file.export_meshes", "Export mes&hes…", "Writes a mesh for each frame of the recording", "",
+             [this] { export_meshes(); }, has_recording, Icon::meshes},
+            kSeparator,
+            {"file.quit", "&Quit", "Leaves; asks about unsaved changes first", "Ctrl+Q", [this] { window.close(); }},
+        };
     }
-    QObject::connect(action, &QAction::triggered, &window, [this, run = command.run] {
-        run();
-        refresh();
-    });
-    window.addAction(action);
-    entries.push_back({action, command.can, command.is_on});
-    return action;
-}
 
-void Actions::Impl::refresh() {
-    for (const Entry& entry : entries) {
-        if (entry.can) entry.action->setEnabled(entry.can());
-        if (entry.is_on) entry.action->setChecked(entry.is_on());
+    std::vector<Command> edit_menu() {
+        QUndoStack& history = workbench.document().undo_stack();
+        return {
+            {"edit.undo", "&Undo", "Undo", "Ctrl+Z", [&history] { history.undo(); },
+             [&history] { return history.canUndo(); }, Icon::undo},
+            {"edit.redo", "&Redo", "Redo", "Ctrl+Shift+Z", [&history] { history.redo(); },
+             [&history] { return history.canRedo(); }, Icon::redo},
+            kSeparator,
+            {"quads.make", "Make &quads", "Makes the mesh regular quads in patches, as the Quads panel says", "Q",
+             [this] {
+                 window.show_panel("quads");
+                 workbench.make_quads();
+             },
+             [this] { return has_model() && workbench.state().source->topology.faces > 0; }},
+            {"fracture.cut", "Cut p&ieces", "Cuts the mesh where it would break, as the Fracture panel says", "X",
+             [this] {
+                 window.show_panel("fracture");
+                 workbench.cut_pieces();
+             },
+             [this] { return has_model() && workbench.state().source->topology.faces > 0; }},
+            {"fracture.whole", "Make &whole", "The mesh as it was before it was cut", "Shift+X",
+             [this] { workbench.make_whole(); }, [this] { return has_model() && workbench.state().source->pieces; }},
+            {"detail.remove", "&Remove detail", "One level coarser", "PgDown", [this] { workbench.remove_detail(); },
+             [this] { return can_remove_detail(); }, Icon::minus},
+            {"detail.add", "&Add detail", "One level finer", "PgUp", [this] { workbench.add_detail(); },
+             [this] { return has_model() && workbench.state().level() < workbench.state().model->finest_level(); },
+             Icon::plus},
+            kSeparator,
+            {"deform.open", "De&form", "The deformations: stretch, squeeze, bend, twist, taper, and pulling by hand",
+             "F",
+             [this] {
+                 workbench.set_mode(Mode::deform);
+                 window.show_panel("deform");
+             },
+             has_model, Icon::deform},
+            {"edit.reset_deformation", "Reset &deformation", "Back to the shape at rest: no sliders, pulls or pins",
+             "Ctrl+R", [this] { workbench.reset_deformation(); },
+             [this] {
+                 const State& state = workbench.state();
+                 return !state.warps.none() || !state.handles.empty() || state.handle_pose;
+             },
+             Icon::reset},
+            {"edit.unpin_all", "Unp&in all", "Takes out all pins", "Ctrl+Shift+P", [this] { workbench.unpin_all(); },
+             [this] { return has_pins(workbench.state().handles); }},
+            kSeparator,
+            view_choice("tools", "tool.pull", "&Pull", "Drag the surface to pull it", "P", &ViewSettings::tool,
+                        Tool::pull, Icon::pull),
+            view_choice("tools", "tool.pin", "Pi&n", "Click or paint the surface to pin it; with Ctrl to take pins out",
+                        "N", &ViewSettings::tool, Tool::pin, Icon::pin),
+            view_choice("tools", "tool.turn", "&Turn", "Drag anywhere to turn the view", "T", &ViewSettings::tool,
+                        Tool::turn, Icon::turn),
+            view_choice("tools", "tool.torch", "&Torch",
+                        "Hold the mouse on a body that melts to warm it; with Ctrl to cool", "H", &ViewSettings::tool,
+                        Tool::torch, Icon::torch),
+            kSeparator,
+            {"edit.cancel", "&Cancel", "Stops the work that runs, or lets go of a pull as if it had not been", "Esc",
+             [this] { cancel(); }, [this] { return workbench.jobs().is_busy() || workbench.is_pulling(); }},
+        };
     }
-    QUndoStack& history = workbench.document().undo_stack();
-    actions.find("file.save")->setText(window.file_path().isEmpty() ? "&Save…" : "&Save");
-    name_step("edit.undo", "&Undo", history.undoText());
-    name_step("edit.redo", "&Redo", history.redoText());
-}
 
-void Actions::Impl::name_step(const char* name, const QString& verb, const QString& step) {
-    QAction* action = actions.find(QLatin1String(name));
-    const QString text = step.isEmpty() ? verb : verb + ' ' + step;
-    if (action->text() == text) return;
-    action->setText(text);
-    describe(action, QString(text).remove('&'));
-}
+    /// The upper part of the view's menu.
+    std::vector<Command> look_menu() {
+        using V = ViewSettings;
+        return {
+            look("view.front", "&Front", "Looks from the front", "1", View::front),
+            look("view.side", "&Side", "Looks from the right", "2", View::side),
+            look("view.top", "&Top", "Looks from above", "3", View::top),
+            look("view.iso", "&Corner", "Looks from the front, the right and above", "4", View::iso),
+            {"view.show_all", "Show &all", "The whole object, as large as it fits", "0",
+             [this] { viewport.show_all(); }, has_model, Icon::show_all},
+            kSeparator,
+            view_choice("styles", "view.shaded", "S&haded", "The surface alone", "S", &V::style, SurfaceStyle::shaded),
+            view_choice("styles", "view.edges", "Shaded with &edges", "The surface and the edges of its faces", "E",
+                        &V::style, SurfaceStyle::edges),
+            view_choice("styles", "view.wireframe", "&Wireframe", "The edges of the faces alone", "W", &V::style,
+                        SurfaceStyle::wireframe),
+            kSeparator,
+            view_choice("colors", "view.color_own", "&Own colours", "The mesh's own colours", "Shift+1", &V::coloring,
+                        Coloring::own),
+            view_choice("colors", "view.color_error", "E&rror as colours",
+                        "How far each vertex is from the full deformation", "Shift+2", &V::coloring, Coloring::error),
+            view_choice("colors", "view.color_levels", "&Levels as colours", "The level at which each vertex is added",
+                        "Shift+3", &V::coloring, Coloring::levels),
+            view_choice("colors", "view.color_patches", "Patc&hes as colours",
+                        "The patches of regular quads, each in a colour unlike its neighbours'", "Shift+4",
+                        &V::coloring, Coloring::patches),
+            view_choice("colors", "view.color_expected", "E&xpected error as colours",
+                        "Where the pose is more curved than the driver can follow", "Shift+5", &V::coloring,
+                        Coloring::expected_error),
+            view_choice("colors", "view.color_pieces", "Pi&eces as colours", "Each piece of a mesh that breaks",
+                        "Shift+6", &V::coloring, Coloring::pieces),
+            view_choice("colors", "view.color_heat", "&Heat as colours", "How warm a body that melts is", "Shift+7",
+                        &V::coloring, Coloring::heat),
+            {"view.measure_error", "M&easure error", "Measures what is shown against the full deformation", "Ctrl+M",
+             [this] { workbench.measure_error(); }, has_model},
+            kSeparator,
+        };
+    }
 
-bool Actions::Impl::can_remove_detail() const {
-    const State& state = workbench.state();
-    return state.model && state.level() > 0 &&
-           level_counts(*state.model, state.level() - 1).vertices < level_counts(*state.model, state.level()).vertices;
-}
+    std::vector<Command> view_menu() {
+        using V = ViewSettings;
+        std::vector<Command> menu = {
+            view_switch("view.split", "S&plit view", "Driver, restored mesh and full deformation side by side", "V",
+                        &V::split),
+            view_switch("view.driver", "&Driver over the mesh", "The driver's edges over the mesh", "D", &V::driver),
+            view_switch("view.defects", "Defec&ts", "Marks open and non-manifold edges", "Shift+D", &V::defects),
+            view_switch("view.inside_points", "&Inside points", "Points inside the mesh at rest", "I",
+                        &V::inside_points),
+            view_switch("view.clip", "Clip pla&ne", "Cuts the mesh open", "C", &V::clip),
+            view_switch("view.ground", "&Ground", "The ground with the object's shadow", "G", &V::ground),
+            kSeparator,
+            view_switch("view.level_by_distance", "Level by &distance",
+                        "The level shown follows the size on the screen", "L", &V::level_by_distance),
+            view_switch("view.keep_up", "Coarser while &moving",
+                        "A coarser level while things move, where drawing is slow", "M", &V::keep_up),
+            kSeparator,
+        };
+        for (std::size_t k = 0; k < kPanels.size(); ++k) menu.push_back(panel(k));
+        menu.push_back(kSeparator);
+        menu.push_back(
+            theme("view.system_theme", "Theme of the s&ystem", "Light or dark, as the desktop is", Theme::system));
+        menu.push_back(theme("view.light_theme", "Light theme", "Dark text on light ground", Theme::light));
+        menu.push_back(theme("view.dark_theme", "Dark theme", "Light text on dark ground", Theme::dark));
+        return menu;
+    }
 
-// Files
+    std::vector<Command> body_menu() {
+        return {
+            {"body.make", "&Make body", "Fills the mesh with particles and drops it on the ground", "Ctrl+B",
+             [this] { workbench.make_body(); }, has_model},
+            {"body.fit_driver", "&Fit driver",
+             "Takes a driver as fine as the body's particles, and makes the body again", "",
+             [this] { workbench.fit_driver(); }, [this] { return workbench.playback().has_body(); }},
+            {"body.animate", "A&nimate", "Drops the mesh on the ground as a soft body and plays", "A",
+             [this] {
+                 workbench.animate();
+                 window.show_panel("body");
+             },
+             has_model, Icon::animate},
+            kSeparator,
+            {"body.play", "&Play", "Moves the body; makes it where there is none", "Space",
+             [this] { workbench.play(); }, is_at_rest, Icon::play},
+            {"body.pause", "P&ause", "Stops where it is", "Space", [this] { workbench.pause(); },
+             [this] { return workbench.is_playing(); }, Icon::pause},
+            {"body.step", "&Step", "One frame on", "Right", [this] { workbench.step(); }, is_at_rest, Icon::step},
+            {"body.back", "Step &back", "One frame back in the recording", "Left",
+             [this] { workbench.go_to_frame(workbench.frame() - 1); },
+             [this] { return workbench.frame_count() > 0 && workbench.frame() > 0 && !workbench.is_playing(); }},
+            {"body.reset", "&Reset", "Back to the start; empties the recording", "Home", [this] { workbench.reset(); },
+             [this] { return workbench.playback().has_body() || has_recording(); }, Icon::reset},
+            kSeparator,
+            {"body.melt", "&Melt", "Puts a body that melts into warm air, and plays", "Ctrl+Shift+M",
+             [this] { workbench.melt(); }, [this] { return has_model() && workbench.can_melt(); }},
+            {"body.freeze", "Free&ze", "Puts a body that melts into cold air, and plays", "Ctrl+Shift+F",
+             [this] { workbench.freeze(); }, [this] { return has_model() && workbench.can_melt(); }},
+            kSeparator,
+            view_switch("view.particles", "&Particles", "The particles of the body instead of its surface", "B",
+                        &ViewSettings::particles, [this] { return workbench.playback().has_body(); }),
+        };
+    }
 
-/// The document's name with another ending, to begin with.
-QString Actions::Impl::proposal(const QString& ending) const {
-    const auto& source = workbench.state().source;
-    const QString name = source ? QFileInfo(QString::fromStdString(source->name)).completeBaseName() : QString();
-    return (name.isEmpty() ? QStringLiteral("model") : name) + ending;
-}
+    std::vector<Command> help_menu() {
+        return {
+            {"help.shortcuts", "&Shortcuts and mouse", "All keys and what the mouse does", "F1",
+             [this] { window.show_help(); }},
+            {"help.about", "&About Filigree", "What this program is", "", [this] { show_about(); }},
+        };
+    }
 
-void Actions::Impl::open() {
-    dialogs.ask({"file.open", "Open a mesh or a model", {kOpenable, kAll}},
-                [this](const QString& path) { window.open_file(path); });
-}
+    void add_menu(const char* name, const QString& title, const std::vector<Command>& commands) {
+        ActionMenu menu{name, title, {}};
+        for (const Command& command : commands) menu.actions.push_back(command.name.isEmpty() ? nullptr : add(command));
+        menus.push_back(std::move(menu));
+    }
 
-void Actions::Impl::save_as() {
-    dialogs.ask({"file.save_as", "Save the model", {kModels, kAll}, "fil", proposal(".fil")},
-                [this](const QString& path) { window.save_file(path); });
-}
+    QAction* add(const Command& command) {
+        auto* action = new QAction(command.text, &actions);
+        action->setObjectName(command.name);
+        if (!command.keys.isEmpty()) action->setShortcut(QKeySequence(command.keys, QKeySequence::PortableText));
+        describe(action, command.tip);
+        if (command.icon) action->setIcon(icon(*command.icon));
+        action->setCheckable(bool(command.is_on));
+        if (*command.group) {
+            QActionGroup*& group = groups[command.group];
+            if (!group) group = new QActionGroup(&actions);
+            group->addAction(action);
+        }
+        QObject::connect(action, &QAction::triggered, &window, [this, run = command.run] {
+            run();
+            refresh();
+        });
+        window.addAction(action);
+        entries.push_back({action, command.can, command.is_on});
+        return action;
+    }
 
-void Actions::Impl::save() { window.file_path().isEmpty() ? save_as() : window.save_file(window.file_path()); }
+    void refresh() {
+        for (const Entry& entry : entries) {
+            if (entry.can) entry.action->setEnabled(entry.can());
+            if (entry.is_on) entry.action->setChecked(entry.is_on());
+        }
+        QUndoStack& history = workbench.document().undo_stack();
+        actions.find("file.save")->setText(window.file_path().isEmpty() ? "&Save…" : "&Save");
+        name_step("edit.undo", "&Undo", history.undoText());
+        name_step("edit.redo", "&Redo", history.redoText());
+    }
 
-void Actions::Impl::save_to(const FileQuestion& question, void (Workbench::*write)(const std::string&)) {
-    dialogs.ask(question,
-                [this, write](const QString& path) { window.write([&] { (workbench.*write)(path.toStdString()); }); });
-}
+    void name_step(const char* name, const QString& verb, const QString& step) {
+        QAction* action = actions.find(QLatin1String(name));
+        const QString text = step.isEmpty() ? verb : verb + ' ' + step;
+        if (action->text() == text) return;
+        action->setText(text);
+        describe(action, QString(text).remove('&'));
+    }
 
-void Actions::Impl::export_film() {
-    dialogs.ask({"file.export_film",
-                 "Export a film",
-                 {"Films (*.mp4 *.gif)", "Numbered pictures (*.png)", kAll},
-                 "mp4",
-                 proposal(".mp4")},
-                [this](const QString& path) {
-                    const auto write = [this](const std::string& to) {
-                        window.write([&] { workbench.export_film(to, {}); });
-                    };
-                    if (path.endsWith(QStringLiteral(".png"), Qt::CaseInsensitive))
-                        dialogs.ask_to_replace(path, workbench.frame_count(), write);
-                    else
-                        write(path.toStdString());
-                });
-}
+    /// The document's name with another ending, to begin with.
+    QString proposal(const QString& ending) const {
+        const auto& source = workbench.state().source;
+        const QString name = source ? QFileInfo(QString::fromStdString(source->name)).completeBaseName() : QString();
+        return (name.isEmpty() ? QStringLiteral("model") : name) + ending;
+    }
 
-void Actions::Impl::export_meshes() {
-    dialogs.ask({"file.export_meshes", "Export a mesh for each frame", {kMeshes, kAll}, "obj", proposal("_%04d.obj")},
-                [this](const QString& path) {
-                    dialogs.ask_to_replace(path, workbench.frame_count(), [this](const std::string& to) {
-                        window.write([&] { workbench.export_meshes(to); });
+    void open() {
+        dialogs.ask({"file.open", "Open a mesh or a model", {kOpenable, kAll}},
+                    [this](const QString& path) { window.open_file(path); });
+    }
+
+    void save_as() {
+        dialogs.ask({"file.save_as", "Save the model", {kModels, kAll}, "fil", proposal(".fil")},
+                    [this](const QString& path) { window.save_file(path); });
+    }
+
+    void save() { window.file_path().isEmpty() ? save_as() : window.save_file(window.file_path()); }
+
+    void save_to(const FileQuestion& question, void (Workbench::*write)(const std::string&)) {
+        dialogs.ask(question, [this, write](const QString& path) {
+            window.write([&] { (workbench.*write)(path.toStdString()); });
+        });
+    }
+
+    void export_film() {
+        dialogs.ask({"file.export_film",
+                     "Export a film",
+                     {"Films (*.mp4 *.gif)", "Numbered pictures (*.png)", kAll},
+                     "mp4",
+                     proposal(".mp4")},
+                    [this](const QString& path) {
+                        const auto write = [this](const std::string& to) {
+                            window.write([&] { workbench.export_film(to, {}); });
+                        };
+                        if (path.endsWith(QStringLiteral(".png"), Qt::CaseInsensitive))
+                            dialogs.ask_to_replace(path, workbench.frame_count(), write);
+                        else
+                            write(path.toStdString());
                     });
+    }
+
+    void export_meshes() {
+        dialogs.ask(
+            {"file.export_meshes", "Export a mesh for each frame", {kMeshes, kAll}, "obj", proposal("_%04d.obj")},
+            [this](const QString& path) {
+                dialogs.ask_to_replace(path, workbench.frame_count(), [this](const std::string& to) {
+                    window.write([&] { workbench.export_meshes(to); });
                 });
-}
+            });
+    }
 
-void Actions::Impl::cancel() {
-    if (!workbench.is_pulling()) return workbench.jobs().cancel();
-    QKeyEvent escape(QEvent::KeyPress, Qt::Key_Escape, Qt::NoModifier);
-    QCoreApplication::sendEvent(&viewport, &escape); // it holds what is dragged
-    workbench.cancel_pull();
-}
+    void cancel() {
+        if (!workbench.is_pulling()) return workbench.jobs().cancel();
+        QKeyEvent escape(QEvent::KeyPress, Qt::Key_Escape, Qt::NoModifier);
+        QCoreApplication::sendEvent(&viewport, &escape); // it holds what is dragged
+        workbench.cancel_pull();
+    }
 
-void Actions::Impl::show_about() {
-    const std::string& renderer = viewport.timings().renderer;
-    auto* box = new QMessageBox(&window);
-    box->setObjectName("help.about.dialog");
-    box->setAttribute(Qt::WA_DeleteOnClose);
-    box->setWindowTitle("About Filigree");
-    box->setIconPixmap(icon(Icon::logo).pixmap(48));
-    box->setText("<b>Filigree " + QApplication::applicationVersion() + "</b>");
-    box->setInformativeText("Takes detail off a mesh, lets anything move what is left, puts the detail back.\n\n"
-                            "Drawn by " +
-                            QString::fromStdString(renderer.empty() ? "OpenGL" : renderer) + ".");
-    box->open();
-}
+    void show_about() {
+        const std::string& renderer = viewport.timings().renderer;
+        auto* box = new QMessageBox(&window);
+        box->setObjectName("help.about.dialog");
+        box->setAttribute(Qt::WA_DeleteOnClose);
+        box->setWindowTitle("About Filigree");
+        box->setIconPixmap(icon(Icon::logo).pixmap(48));
+        box->setText("<b>Filigree " + QApplication::applicationVersion() + "</b>");
+        box->setInformativeText("Takes detail off a mesh, lets anything move what is left, puts the detail back.\n\n"
+                                "Drawn by " +
+                                QString::fromStdString(renderer.empty() ? "OpenGL" : renderer) + ".");
+        box->open();
+    }
+};
 
 Actions::Actions(Workbench& workbench, Viewport& viewport, MainWindow& window)
     : impl_(new Impl(*this, workbench, viewport, window)) {

@@ -1,4 +1,4 @@
-#include "change_names.h"
+#include "document.h"
 
 #include "words.h"
 

@@ -4,6 +4,17 @@
 
 namespace filigree::studio {
 
+std::shared_ptr<Source> source_of(Mesh mesh, const std::string& path, const std::string& name,
+                                  const RunContext& context) {
+    auto source = std::make_shared<Source>();
+    source->mesh = std::move(mesh);
+    source->path = path;
+    source->name = name;
+    source->topology = analyse_topology(source->mesh, context);
+    source->materials = load_surface_materials(source->mesh, path);
+    return source;
+}
+
 bool is_same_body(BodySettings a, const BodySettings& b) {
     a.air_temperature = b.air_temperature;
     return a == b;

@@ -36,6 +36,11 @@ struct Source {
     std::shared_ptr<const MadePieces> pieces; ///< how they were cut, when the mesh is in pieces; null: it is whole
 };
 
+/// A source of a mesh and a name for it, with what is to be known of it. path: "" for a built-in shape. Warnings are
+/// the caller's, also those of the materials.
+std::shared_ptr<Source> source_of(Mesh mesh, const std::string& path, const std::string& name,
+                                  const RunContext& context);
+
 /// A built-in shape and its settings.
 struct Shape {
     std::string name = "wavy-cube"; ///< one of shape_names()
@@ -104,6 +109,12 @@ struct State {
     bool operator==(const State&) const = default;
 };
 
+/// What the history calls a change: "Bend", "Frequency 7", "Gravity off".
+QString name_of_change(const Warps& before, const Warps& after);
+QString name_of_change(const Shape& before, const Shape& after);
+QString name_of_change(const StripOptions& before, const StripOptions& after);
+QString name_of_change(const BodySettings& before, const BodySettings& after);
+
 /// The state and its history. Lives in the main thread.
 class Document : public QObject {
     Q_OBJECT
@@ -112,7 +123,6 @@ public:
 
     const State& state() const { return state_; }
     QUndoStack& undo_stack() { return undo_stack_; }
-    const QUndoStack& undo_stack() const { return undo_stack_; }
 
     /// The next state, as a step with that name in the history ("Bend"). Steps in a row with one `merge` key that is
     /// not empty become one (a slider that is dragged), until end_merge().

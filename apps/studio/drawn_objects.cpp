@@ -78,12 +78,9 @@ void DrawnObjects::stop() {
     next_.reset();
     particles_.reset();
     inside_.reset();
-    full_.reset();
-    full_asked_ = 0;
+    drop_posed_extras();
     melt_.reset();
     melt_of_ = nullptr;
-    patches_.reset();
-    patches_of_ = nullptr;
     obstacles_.clear();
     particles_of_ = surroundings_of_ = nullptr;
     defects_of_ = nullptr;
@@ -255,9 +252,8 @@ void DrawnObjects::follow_melt() {
         melt_.reset();
         if (!melt_of_) return;
         DrawnSurface drawn = melt_as_drawn(*melt_of_, workbench_.state().source->materials.materials);
-        SurfaceOptions options;
-        options.materials = workbench_.state().source->materials.materials;
-        Result<Drawable> drawable = Drawable::surface(drawn.mesh, options, RunContext());
+        Result<Drawable> drawable =
+            Drawable::surface(drawn.mesh, {.materials = workbench_.state().source->materials.materials}, RunContext());
         if (drawable) melt_ = std::move(*drawable);
         melt_copies_ = std::move(drawn.copied);
     });
@@ -297,9 +293,8 @@ void DrawnObjects::follow_full() {
         "The picture", "full",
         [model = shown_->shared_model(), source = workbench_.state().source,
          positions = std::vector(workbench_.full().begin(), workbench_.full().end())](const RunContext& context) {
-            SurfaceOptions options;
-            options.materials = source->materials.materials;
-            return DrawData::surface(moved_mesh(model->mesh, positions), options, context);
+            return DrawData::surface(moved_mesh(model->mesh, positions), {.materials = source->materials.materials},
+                                     context);
         },
         [this, fail, stamp = pose_stamp_](DrawData data) {
             if (stamp != full_asked_) return; // of another moment
@@ -491,16 +486,14 @@ void DrawnObjects::add_restored(Scene& scene, unsigned level, std::optional<unsi
     const bool sees_inside = inside_ && !settings_.clip;
     if (from) add_level(scene, *from, look, static_cast<float>(-part));
     add_level(scene, level, look, from ? static_cast<float>(part) : sees_inside ? kSeenThrough : 1.0f);
-    if (settings_.driver && level > 0) {
-        Appearance driver;
-        driver.surface = false;
-        driver.edges = true;
-        driver.edge_color = kDriverEdges;
-        driver.edge_width = 1.6f;
-        driver.own_colors = false;
-        driver.clip = look.clip;
-        add_level(scene, 0, driver);
-    }
+    if (settings_.driver && level > 0)
+        add_level(scene, 0,
+                  {.own_colors = false,
+                   .surface = false,
+                   .edges = true,
+                   .edge_color = kDriverEdges,
+                   .edge_width = 1.6f,
+                   .clip = look.clip});
     if (inside_) scene.objects.push_back({&*inside_, {.color = kInsidePoints, .clip = look.clip}});
 }
 

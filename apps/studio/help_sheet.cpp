@@ -1,8 +1,10 @@
-#include "help_sheet.h"
+#include "panels/panels.h"
 
+#include "actions.h"
 #include "controls.h"
 
 #include <QBoxLayout>
+#include <QDialog>
 #include <QDialogButtonBox>
 #include <QPushButton>
 #include <QScrollArea>
@@ -45,59 +47,64 @@ QString row(const QString& key, const QString& text) {
            "</b></td><td style='padding: 1px 0'>" + text.toHtmlEscaped() + "</td></tr>";
 }
 
+class HelpSheet : public QDialog {
+public:
+    HelpSheet(const Actions& actions, QWidget* parent) : QDialog(parent) {
+        setObjectName("help.sheet");
+        setWindowTitle("Shortcuts and mouse");
+        auto* columns = new QHBoxLayout;
+        columns->setSpacing(32);
+        std::array<QVBoxLayout*, 3> column = {new QVBoxLayout, new QVBoxLayout, new QVBoxLayout};
+        for (QVBoxLayout* one : column) {
+            one->setSpacing(16);
+            columns->addLayout(one);
+        }
+        const auto add = [&](std::size_t place, const QString& title, const QString& rows) {
+            auto* label =
+                new QLabel("<h4 style='margin: 0'>" + title + "</h4><table cellspacing='0'>" + rows + "</table>", this);
+            label->setObjectName("help.sheet." + title.section(' ', 0, 0).toLower());
+            label->setTextFormat(Qt::RichText);
+            label->setTextInteractionFlags(Qt::TextSelectableByMouse);
+            label->setSizePolicy(QSizePolicy::Preferred, QSizePolicy::Fixed);
+            column[place]->addWidget(label);
+        };
+
+        QString mouse;
+        for (const Gesture& gesture : kGestures) mouse += row(gesture.mouse, gesture.does);
+        add(0, "Mouse", mouse);
+        for (const Group& group : kGroups) {
+            QString rows;
+            for (const QAction* action : actions.all()) {
+                const QString menu = action->objectName().section('.', 0, 0) + ' ';
+                if (action->shortcut().isEmpty() || !QString(group.menus).split(' ').contains(menu.trimmed())) continue;
+                QString text = action->text().remove('&').remove(QChar(0x2026));
+                if (menu == "edit " && text.startsWith("Undo")) text = "Undo"; // without the step's name
+                if (menu == "edit " && text.startsWith("Redo")) text = "Redo";
+                rows += row(action->shortcut().toString(QKeySequence::NativeText), text);
+            }
+            add(group.column, group.title, rows);
+        }
+        for (QVBoxLayout* one : column) one->addStretch(1);
+
+        auto* page = new QWidget;
+        page->setLayout(columns);
+        auto* scroll = new QScrollArea(this);
+        scroll->setFrameShape(QFrame::NoFrame);
+        scroll->setWidget(page);
+        scroll->setWidgetResizable(true);
+        auto* buttons = new QDialogButtonBox(QDialogButtonBox::Close, this);
+        buttons->button(QDialogButtonBox::Close)->setIcon(QIcon());
+        connect(buttons, &QDialogButtonBox::rejected, this, &QDialog::reject);
+        auto* layout = new QVBoxLayout(this);
+        layout->addWidget(scroll);
+        layout->addWidget(buttons);
+        const QSize wanted = page->sizeHint() + QSize(40, 70);
+        resize(wanted.boundedTo(QSize(1100, 720)));
+    }
+};
+
 } // namespace
 
-HelpSheet::HelpSheet(const Actions& actions, QWidget* parent) : QDialog(parent) {
-    setObjectName("help.sheet");
-    setWindowTitle("Shortcuts and mouse");
-    auto* columns = new QHBoxLayout;
-    columns->setSpacing(32);
-    std::array<QVBoxLayout*, 3> column = {new QVBoxLayout, new QVBoxLayout, new QVBoxLayout};
-    for (QVBoxLayout* one : column) {
-        one->setSpacing(16);
-        columns->addLayout(one);
-    }
-    const auto add = [&](std::size_t place, const QString& title, const QString& rows) {
-        auto* label =
-            new QLabel("<h4 style='margin: 0'>" + title + "</h4><table cellspacing='0'>" + rows + "</table>", this);
-        label->setObjectName("help.sheet." + title.section(' ', 0, 0).toLower());
-        label->setTextFormat(Qt::RichText);
-        label->setTextInteractionFlags(Qt::TextSelectableByMouse);
-        label->setSizePolicy(QSizePolicy::Preferred, QSizePolicy::Fixed);
-        column[place]->addWidget(label);
-    };
-
-    QString mouse;
-    for (const Gesture& gesture : kGestures) mouse += row(gesture.mouse, gesture.does);
-    add(0, "Mouse", mouse);
-    for (const Group& group : kGroups) {
-        QString rows;
-        for (const QAction* action : actions.all()) {
-            const QString menu = action->objectName().section('.', 0, 0) + ' ';
-            if (action->shortcut().isEmpty() || !QString(group.menus).split(' ').contains(menu.trimmed())) continue;
-            QString text = action->text().remove('&').remove(QChar(0x2026));
-            if (menu == "edit " && text.startsWith("Undo")) text = "Undo"; // without the step's name
-            if (menu == "edit " && text.startsWith("Redo")) text = "Redo";
-            rows += row(action->shortcut().toString(QKeySequence::NativeText), text);
-        }
-        add(group.column, group.title, rows);
-    }
-    for (QVBoxLayout* one : column) one->addStretch(1);
-
-    auto* page = new QWidget;
-    page->setLayout(columns);
-    auto* scroll = new QScrollArea(this);
-    scroll->setFrameShape(QFrame::NoFrame);
-    scroll->setWidget(page);
-    scroll->setWidgetResizable(true);
-    auto* buttons = new QDialogButtonBox(QDialogButtonBox::Close, this);
-    buttons->button(QDialogButtonBox::Close)->setIcon(QIcon());
-    connect(buttons, &QDialogButtonBox::rejected, this, &QDialog::reject);
-    auto* layout = new QVBoxLayout(this);
-    layout->addWidget(scroll);
-    layout->addWidget(buttons);
-    const QSize wanted = page->sizeHint() + QSize(40, 70);
-    resize(wanted.boundedTo(QSize(1100, 720)));
-}
+QDialog* make_help_sheet(const Actions& actions, QWidget* parent) { return new HelpSheet(actions, parent); }
 
 } // namespace filigree::studio

@@ -1,10 +1,11 @@
 // The program filigree-studio.
+#include "panels/panels.h"
 #include "script.h"
+#include "words.h"
 
 #include <QApplication>
 #include <QCommandLineParser>
 #include <QOpenGLContext>
-#include <QSurfaceFormat>
 #include <QTimer>
 
 #include <algorithm>
@@ -42,6 +43,9 @@ Result<unsigned> parse_frames(const QString& text) {
                  "--frames: '" + text.toStdString() + "' is no number of frames; write one from 0 to 100000."};
 }
 
+/// "model, quads, ... and view".
+QString panel_names() { return listed({kPanels.begin(), kPanels.end()}); }
+
 struct Options {
     QString file, screenshot, panel, script;
     QSize size = {1280, 800};
@@ -60,7 +64,7 @@ Result<Options> parse(const QApplication& application) {
     parser.addOptions({
         {"screenshot", "Show the window, save it as a PNG, leave.", "PNG"},
         {"size", "Size of the window, pixels.", "WxH"},
-        {"panel", "Open with this panel: model, quads, detail, deform, body, fracture or view.", "NAME"},
+        {"panel", "Open with this panel: " + panel_names().replace(" and ", " or ") + '.', "NAME"},
         {"frames", "Simulate so many frames first.", "N"},
         {"names", "Print what scripts can name, leave."},
         {"script", "Run a script of actions (docs/studio.md), leave.", "FILE"},
@@ -145,8 +149,8 @@ int main(int argc, char** argv) {
     MainWindow window(!options->leaves());
     if (options->leaves() || options->sizes) window.resize(options->size);
     if (!options->panel.isEmpty() && !window.show_panel(options->panel))
-        return fail({ErrorCode::usage, "--panel: there is no panel '" + options->panel.toStdString() +
-                                           "'; there are model, quads, detail, deform, body, fracture and view."});
+        return fail({ErrorCode::usage, "--panel: there is no panel '" + options->panel.toStdString() + "'; there are " +
+                                           panel_names().toStdString() + '.'});
     if (options->names) {
         std::fputs(script_names(window).c_str(), stdout);
         return 0;

@@ -3,7 +3,6 @@
 #include "theme.h"
 
 #include <QPainter>
-#include <QPainterPath>
 
 #include <algorithm>
 #include <array>
@@ -22,20 +21,9 @@ const QColor kWarning(217, 138, 20), kPin(226, 74, 51), kOpen(235, 94, 40), kNon
     kOpposed(20, 110, 220), kFlat(150, 110, 0);
 const std::array<QColor, 3> kAxes = {QColor(214, 69, 65), QColor(76, 160, 72), QColor(62, 116, 214)};
 
-QColor gizmo_color(GizmoPart part) {
-    switch (part) {
-    case GizmoPart::stretch:
-        return {217, 95, 48};
-    case GizmoPart::squeeze:
-        return {44, 127, 184};
-    case GizmoPart::bend:
-        return {49, 150, 84};
-    case GizmoPart::twist:
-        return {136, 86, 167};
-    default:
-        return {196, 138, 20};
-    }
-}
+/// One each, as GizmoPart has them: of stretch, squeeze, bend, twist and taper.
+const std::array<QColor, 5> kGizmos = {QColor(217, 95, 48), QColor(44, 127, 184), QColor(49, 150, 84),
+                                       QColor(136, 86, 167), QColor(196, 138, 20)};
 
 /// The painter of one picture, with what the theme says.
 class Sheet {
@@ -183,14 +171,10 @@ public:
         }
     }
 
-    void pins(const std::vector<OverlayContent::Dot>& pins) {
-        for (const OverlayContent::Dot& pin : pins) {
-            QColor color = kPin;
-            if (pin.faces_away) color.setAlphaF(0.3f);
-            painter_.setPen(pin.faces_away ? QPen(Qt::NoPen) : QPen(QColor(255, 255, 255, 200), 1));
-            painter_.setBrush(color);
-            painter_.drawEllipse(pin.at, 3.5, 3.5);
-        }
+    void pins(const std::vector<QPointF>& pins) {
+        painter_.setPen(QPen(QColor(255, 255, 255, 200), 1));
+        painter_.setBrush(kPin);
+        for (const QPointF& pin : pins) painter_.drawEllipse(pin, 3.5, 3.5);
     }
 
     void hover(const QPointF& at, double radius) {
@@ -218,7 +202,7 @@ public:
     }
 
     void knob(const OverlayContent::Knob& knob) {
-        const QColor color = gizmo_color(knob.part);
+        const QColor color = kGizmos.at(std::size_t(knob.part));
         const double width = knob.is_hot ? 3 : 2;
         const QColor halo = is_dark_ ? QColor(0, 0, 0, 120) : QColor(255, 255, 255, 170);
         painter_.setBrush(Qt::NoBrush);

@@ -40,12 +40,7 @@ struct OverlayContent {
     std::array<QPointF, 3> triad = {};      ///< where x, y and z point on screen, unit vectors foreshortened
     std::array<double, 3> triad_depth = {}; ///< larger: nearer
     bool shows_triad = false;
-    struct Dot {
-        QPointF at;
-        bool faces_away = false;
-        bool operator==(const Dot&) const = default;
-    };
-    std::vector<Dot> pins;
+    std::vector<QPointF> pins;
     std::optional<QPointF> hover; ///< the middle of what would be grabbed
     double hover_radius = 0;
     std::optional<QLineF> pull; ///< from the point held to the pointer

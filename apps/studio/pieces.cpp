@@ -39,10 +39,6 @@ std::vector<Vec3f> ways_of(const std::vector<Vec3f>& places, std::span<const Ind
     return ways;
 }
 
-QString value_row(const QString& name, const QString& value) {
-    return QStringLiteral("<tr><td>%1</td><td align='right'>%2</td></tr>").arg(name, value);
-}
-
 } // namespace
 
 std::shared_ptr<const Source> whole_source(std::shared_ptr<const Source> source) {
@@ -81,12 +77,7 @@ Result<State> state_in_pieces(State state, const PieceOptions& options, const Ru
     pieces->breaking = std::move(breaking);
     pieces->input = state.source;
     pieces->shape = state.shape;
-    auto source = std::make_shared<Source>();
-    source->mesh = cut->model.mesh;
-    source->path = pieces->input->path;
-    source->name = pieces->input->name + kInPieces;
-    source->topology = analyse_topology(source->mesh, context);
-    source->materials = load_surface_materials(source->mesh, source->path);
+    auto source = source_of(cut->model.mesh, pieces->input->path, pieces->input->name + kInPieces, context);
     pieces->seconds = 1e-3 * milliseconds_since(begin);
     source->pieces = std::move(pieces);
     state.source = std::move(source);
@@ -109,13 +100,12 @@ QString pieces_summary(const MadePieces& pieces) {
 QString pieces_table(const MadePieces& pieces) {
     const CutReport& report = pieces.report;
     const double median = report.median > 0 ? report.median : 1;
-    return QStringLiteral("<table width='100%' cellspacing='0' cellpadding='1'>") +
-           value_row("Pieces", with_commas(report.cells)) +
-           value_row("Smallest, of the median", number_text(report.smallest / median, 2)) +
-           value_row("Largest, of the median", number_text(report.largest / median, 2)) +
-           value_row("Inner faces", with_commas(report.inside_faces)) +
-           value_row("Open edges", with_commas(report.open_edges)) +
-           value_row("Seconds", number_text(pieces.seconds, 2)) + QStringLiteral("</table>");
+    return rich_table({{"Pieces", with_commas(report.cells)},
+                       {"Smallest, of the median", number_text(report.smallest / median, 2)},
+                       {"Largest, of the median", number_text(report.largest / median, 2)},
+                       {"Inner faces", with_commas(report.inside_faces)},
+                       {"Open edges", with_commas(report.open_edges)},
+                       {"Seconds", number_text(pieces.seconds, 2)}});
 }
 
 } // namespace filigree::studio

@@ -16,8 +16,7 @@ std::vector<Index> pinned_vertices(std::span<const Handle> handles) {
 
 std::size_t pin(std::vector<Handle>& handles, std::span<const Index> vertices, std::span<const Vec3f> driver) {
     VertexSet pinned(driver.size(), pinned_vertices(handles));
-    Handle pins;
-    pins.pinned = true;
+    Handle pins{.pinned = true};
     for (const Index v : vertices)
         if (pinned.add(v)) pins.vertices.push_back(v);
     std::sort(pins.vertices.begin(), pins.vertices.end());

@@ -121,13 +121,11 @@ void Pointer::move(const QMouseEvent& event) {
 void Pointer::release() {
     const Drag was = std::exchange(drag_, Drag::none);
     if (was == Drag::pull) workbench_.end_pull();
-    if (was == Drag::torch) workbench_.put_out_torch();
-    if (was == Drag::gizmo) workbench_.document().end_merge();
     if (was == Drag::paint) {
         const std::vector<Index> painted = painted_.members();
         unpins_ ? workbench_.unpin(painted) : workbench_.pin(painted);
     }
-    end_drag();
+    end_drag(was);
     hover_at_ = last_;
     update_hover();
 }
@@ -136,13 +134,9 @@ bool Pointer::escape() {
     const Drag was = std::exchange(drag_, Drag::none);
     if (was == Drag::none) return false;
     if (was == Drag::pull) workbench_.cancel_pull();
-    if (was == Drag::torch) workbench_.put_out_torch();
-    if (was == Drag::gizmo) {
-        QUndoStack& history = workbench_.document().undo_stack();
-        workbench_.document().end_merge();
-        if (history.index() > pressed_step_) history.undo();
-    }
-    end_drag();
+    end_drag(was);
+    QUndoStack& history = workbench_.document().undo_stack();
+    if (was == Drag::gizmo && history.index() > pressed_step_) history.undo();
     show_cursor();
     Q_EMIT changed();
     return true;
@@ -153,14 +147,14 @@ void Pointer::drop() {
     if (drag_ == Drag::none || drag_ == Drag::orbit || drag_ == Drag::pan) return;
     const Drag was = std::exchange(drag_, Drag::none);
     if (was == Drag::pull) workbench_.cancel_pull();
-    if (was == Drag::torch) workbench_.put_out_torch();
-    if (was == Drag::gizmo) workbench_.document().end_merge();
-    end_drag();
+    end_drag(was);
     hover_.reset();
     show_cursor();
 }
 
-void Pointer::end_drag() {
+void Pointer::end_drag(Drag was) {
+    if (was == Drag::torch) workbench_.put_out_torch();
+    if (was == Drag::gizmo) workbench_.document().end_merge();
     painted_ = VertexSet(0);
     gizmo_.reset();
     held_.reset();

@@ -52,7 +52,7 @@ private:
 
     void press_left(const QMouseEvent& event);
     void drop();
-    void end_drag();
+    void end_drag(Drag was);
     void paint_pins(const QPointF& point);
     void hold_torch(const QPointF& point);
     void update_hover();

@@ -1,6 +1,5 @@
 #include "quads.h"
 
-#include "controls.h"
 #include "words.h"
 
 #include <chrono>
@@ -16,16 +15,6 @@ double share(std::size_t part, std::size_t whole) { return double(part) / double
 QString grid_text(const QuadRemeshReport& report) {
     const std::size_t side = std::size_t{1} << report.levels;
     return QStringLiteral("%1 × %1").arg(with_commas(side));
-}
-
-QString row(std::initializer_list<QString> cells) {
-    QString text = QStringLiteral("<tr>");
-    const char* align = "left";
-    for (const QString& cell : cells) {
-        text += QStringLiteral("<td align='%1'>%2</td>").arg(QLatin1String(align), cell);
-        align = "right";
-    }
-    return text + QStringLiteral("</tr>");
 }
 
 QString percent(double fraction) { return number_text(100 * fraction, 2) + QStringLiteral(" %"); }
@@ -50,15 +39,9 @@ Result<std::shared_ptr<const Source>> make_quads_of(std::shared_ptr<const Source
     if (!remeshed && remeshed.error().code == ErrorCode::cancelled) return remeshed.error();
     if (!remeshed) return Error{remeshed.error().code, "No quads can be made of this: " + remeshed.error().message};
     auto quads = std::make_shared<MadeQuads>();
-    quads->options = options;
     quads->report = std::move(remeshed->report);
     quads->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    auto source = std::make_shared<Source>();
-    source->mesh = std::move(remeshed->mesh);
-    source->path = input->path;
-    source->name = input->name + kAsQuads;
-    source->topology = analyse_topology(source->mesh, context);
-    source->materials = load_surface_materials(source->mesh, input->path);
+    auto source = source_of(std::move(remeshed->mesh), input->path, input->name + kAsQuads, context);
     source->warnings = source->materials.warnings;
     quads->input = std::move(input);
     source->quads = std::move(quads);
@@ -76,22 +59,17 @@ QString quads_summary(const Source& source) {
 QString quads_table(const MadeQuads& quads) {
     const QuadRemeshReport& report = quads.report;
     const QuadQuality& quality = report.quality;
-    const auto table = [](const QString& rows) {
-        return QStringLiteral("<table width='100%' cellspacing='0' cellpadding='1'>") + rows +
-               QStringLiteral("</table>");
-    };
-    const QString counts = row({"Quads", with_commas(quality.quads)}) +
-                           row({"Patches", with_commas(report.patches) + QStringLiteral(" of ") + grid_text(report)}) +
-                           row({"Irregular vertices", with_commas(quality.irregular_vertices)}) +
-                           row({"… a patch", number_text(share(quality.irregular_vertices, report.patches), 2)}) +
-                           row({"Scaled Jacobian, least", number_text(quality.min_scaled_jacobian, 2)}) +
-                           row({"… 1 % are below", number_text(quality.low_scaled_jacobian, 2)}) +
-                           row({"… mean", number_text(quality.mean_scaled_jacobian, 3)}) +
-                           row({"Seconds", number_text(quads.seconds, 2)});
-    const QString distances = row({"<b>Of the diagonal</b>", "RMS", "max"}) +
-                              row({"Quads to mesh", percent(report.to_input.rms), percent(report.to_input.max)}) +
-                              row({"Mesh to quads", percent(report.from_input.rms), percent(report.from_input.max)});
-    return table(counts) + table(distances);
+    return rich_table({{"Quads", with_commas(quality.quads)},
+                       {"Patches", with_commas(report.patches) + QStringLiteral(" of ") + grid_text(report)},
+                       {"Irregular vertices", with_commas(quality.irregular_vertices)},
+                       {"… a patch", number_text(share(quality.irregular_vertices, report.patches), 2)},
+                       {"Scaled Jacobian, least", number_text(quality.min_scaled_jacobian, 2)},
+                       {"… 1 % are below", number_text(quality.low_scaled_jacobian, 2)},
+                       {"… mean", number_text(quality.mean_scaled_jacobian, 3)},
+                       {"Seconds", number_text(quads.seconds, 2)}}) +
+           rich_table({{"<b>Of the diagonal</b>", "RMS", "max"},
+                       {"Quads to mesh", percent(report.to_input.rms), percent(report.to_input.max)},
+                       {"Mesh to quads", percent(report.from_input.rms), percent(report.from_input.max)}});
 }
 
 QString quads_remarks(const MadeQuads& quads) {

@@ -11,7 +11,6 @@ namespace filigree::studio {
 
 /// How the quads of a source came about.
 struct MadeQuads {
-    QuadRemeshOptions options;
     QuadRemeshReport report;
     double seconds = 0;                  ///< of all of it
     std::shared_ptr<const Source> input; ///< the mesh before; other quads are made of it, not of these

@@ -41,10 +41,9 @@ void ShownModel::ask(unsigned level, bool is_urgent, Jobs& background,
             if (!shape) return shape.error();
             Prepared prepared{std::move(*shape), {}};
             if (prepared.shape->triangles().empty()) return prepared;
-            SurfaceOptions options;
-            options.materials = source->materials.materials;
             restore.level = level;
-            Result<DrawData> data = DrawData::model(*model, restore, options, where, context);
+            Result<DrawData> data =
+                DrawData::model(*model, restore, {.materials = source->materials.materials}, where, context);
             if (!data) return data.error();
             prepared.data.emplace(std::move(*data));
             return prepared;
@@ -107,10 +106,7 @@ bool ShownModel::set_pose(ShownLevel& level, const Pose& pose, std::uint64_t sta
 void ShownModel::set_colors(ShownLevel& level, const VertexColors& colors, std::uint64_t stamp) {
     if (level.colors == stamp || level.is_points) return;
     level.colors = stamp;
-    if (colors.values.size() != model_->mesh.vertex_count()) {
-        (void)level.drawable.set_scalars({});
-        return;
-    }
+    if (colors.values.size() != model_->mesh.vertex_count()) return (void)level.drawable.set_scalars({});
     std::vector<float> values(level.shape->vertex_count());
     for (Index v = 0; v < values.size(); ++v) values[v] = colors.values[level.shape->finest_vertex(v)];
     (void)level.drawable.set_scalars({values, colors.map, colors.range});

@@ -40,15 +40,10 @@ QPalette palette_of(const Shades& s) {
     return palette;
 }
 
-QPalette light_palette() {
-    return palette_of(
-        {"#f1f2f4", "#ffffff", "#f7f8f9", "#f8f9fa", "#1c2026", "#8b919a", "#c3c8cf", "#2667c9", "#1d56ad"});
-}
-
-QPalette dark_palette() {
-    return palette_of(
-        {"#2b2e34", "#1a1c1f", "#2c3036", "#363a41", "#e4e7eb", "#7f868f", "#191b1f", "#3574d6", "#8ab4f8"});
-}
+const Shades kLight = {"#f1f2f4", "#ffffff", "#f7f8f9", "#f8f9fa", "#1c2026",
+                       "#8b919a", "#c3c8cf", "#2667c9", "#1d56ad"};
+const Shades kDark = {"#2b2e34", "#1a1c1f", "#2c3036", "#363a41", "#e4e7eb",
+                      "#7f868f", "#191b1f", "#3574d6", "#8ab4f8"};
 
 } // namespace
 
@@ -66,7 +61,7 @@ void apply_theme(Theme theme) {
     QApplication::setPalette(QPalette()); // the desktop's, to see what it is
     const QPalette desktop = QApplication::palette();
     const bool dark = theme == Theme::dark || (theme == Theme::system && is_dark(desktop));
-    QPalette palette = dark ? dark_palette() : light_palette();
+    QPalette palette = palette_of(dark ? kDark : kLight);
     if (theme == Theme::system && desktop.color(QPalette::Highlight).saturation() > 100) {
         const QColor highlight = desktop.color(QPalette::Highlight);
         if (highlight.lightness() < 150) palette.setColor(QPalette::Active, QPalette::Highlight, highlight);

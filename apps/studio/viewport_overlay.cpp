@@ -100,7 +100,7 @@ private:
         if (workbench_.mode() != Mode::deform) return;
         const std::vector<Vec3f>& driver = drawn_.pose().positions;
         for (const Index vertex : pointer_.shown_pins())
-            if (vertex < driver.size()) content.pins.push_back({place(driver[vertex]), false});
+            if (vertex < driver.size()) content.pins.push_back(place(driver[vertex]));
     }
 
     /// The circle that a pull would take hold of, and the line from a body to the mouse that pulls it.

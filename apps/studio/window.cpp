@@ -1,21 +1,13 @@
 #include "window.h"
 
 #include "controls.h"
-#include "help_sheet.h"
 #include "icons.h"
 #include "message_bar.h"
-#include "panels/body_panel.h"
-#include "panels/deform_panel.h"
-#include "panels/detail_panel.h"
-#include "panels/fracture_panel.h"
-#include "panels/model_panel.h"
-#include "panels/overview.h"
-#include "panels/quads_panel.h"
-#include "panels/view_panel.h"
-#include "status_bar.h"
-#include "timeline.h"
+#include "panels/panels.h"
+#include "words.h"
 
 #include <QApplication>
+#include <QBoxLayout>
 #include <QCloseEvent>
 #include <QDragEnterEvent>
 #include <QDropEvent>
@@ -41,7 +33,6 @@ namespace {
 
 constexpr qsizetype kRecentFiles = 10;
 constexpr int kColumnWidth = 356; // device-independent pixels, at the start
-constexpr std::array<const char*, 7> kPanels = {"model", "quads", "detail", "deform", "body", "fracture", "view"};
 
 /// Whether a widget needs a key for itself that is a shortcut of the window as well.
 bool keeps_key(const QWidget* widget, int key) {
@@ -55,6 +46,9 @@ bool keeps_key(const QWidget* widget, int key) {
     return false;
 }
 
+/// Shows the body's advanced settings while it is checked.
+QAbstractButton* advanced_fold(const MainWindow& window) { return window.findChild<QAbstractButton*>("body.advanced"); }
+
 } // namespace
 
 struct MainWindow::Impl {
@@ -66,27 +60,221 @@ struct MainWindow::Impl {
     QSplitter* splitter = nullptr;
     QTabBar* tabs = nullptr;
     QStackedWidget* panels = nullptr;
-    BodyPanel* body = nullptr;
     QMenu* recent_menu = nullptr;
-    QPointer<HelpSheet> help;
+    QPointer<QDialog> help;
     Theme theme = Theme::system;
     QStringList recent;
     QString file_path;
     bool is_writing = false;            ///< files that were asked for are still to come
     QPointer<QProgressDialog> farewell; ///< the window is to close once they are there
 
-    void add_menus(MainWindow& window);
-    void add_toolbar(MainWindow& window);
-    QWidget* make_middle(MainWindow& window);
-    QWidget* make_column(MainWindow& window);
-    void follow_files(MainWindow& window);
-    bool save_now(MainWindow& window, const QString& path);
-    void wait_for_files(MainWindow& window);
-    void show_title(MainWindow& window);
-    void show_recent(MainWindow& window);
-    void add_recent(MainWindow& window, const QString& path);
-    void read_settings(MainWindow& window);
-    void write_settings(const MainWindow& window);
+    void add_menus(MainWindow& window) {
+        recent_menu = new QMenu("Open &recent", &window);
+        recent_menu->setObjectName("file.open_recent");
+        for (const ActionMenu& menu : actions->menus()) {
+            QMenu* shown = window.menuBar()->addMenu(menu.title);
+            shown->setObjectName(menu.name);
+            for (QAction* action : menu.actions) {
+                if (!action)
+                    shown->addSeparator();
+                else
+                    shown->addAction(action);
+                if (action == actions->find("file.open")) shown->addMenu(recent_menu);
+            }
+        }
+    }
+
+    void add_toolbar(MainWindow& window) {
+        auto* bar = new QToolBar("Tools", &window);
+        bar->setObjectName("toolbar");
+        bar->setMovable(false);
+        bar->setFloatable(false);
+        bar->setIconSize(QSize(20, 20));
+        for (const char* name :
+             {"tool.pull", "tool.pin", "tool.turn", "tool.torch", "", "view.show_all", "", "edit.undo", "edit.redo"}) {
+            if (*name)
+                bar->addAction(actions->find(name));
+            else
+                bar->addSeparator();
+            if (auto* button =
+                    *name ? qobject_cast<QToolButton*>(bar->widgetForAction(actions->find(name))) : nullptr) {
+                button->setObjectName(QStringLiteral("toolbar.") + name);
+                button->setFocusPolicy(Qt::TabFocus);
+                button->setAccessibleName(actions->find(name)->text().remove('&'));
+            }
+        }
+        window.addToolBar(Qt::LeftToolBarArea, bar);
+    }
+
+    QWidget* make_middle(MainWindow& window) {
+        auto* middle = new QWidget(&window);
+        middle->setObjectName("middle");
+        auto* picture = new QWidget(middle);
+        picture->setObjectName("picture");
+        auto* over = new QVBoxLayout(picture);
+        over->setContentsMargins(0, 0, 0, 0);
+        over->addWidget(viewport);
+        messages = new MessageBar(picture);
+        connect(messages, &MessageBar::covers, viewport, &Viewport::set_covered);
+        auto* column = new QVBoxLayout(middle);
+        column->setContentsMargins(0, 0, 0, 0);
+        column->setSpacing(0);
+        column->addWidget(picture, 1);
+        column->addWidget(make_timeline(*workbench, *actions, middle));
+        return middle;
+    }
+
+    QWidget* make_column(MainWindow& window) {
+        auto* column = new QWidget(&window);
+        column->setObjectName("column");
+        tabs = new QTabBar(column);
+        tabs->setObjectName("panels");
+        tabs->setAccessibleName("Panels");
+        tabs->setExpanding(true);
+        tabs->setDrawBase(true);
+        tabs->setUsesScrollButtons(false);
+        tabs->setFocusPolicy(Qt::TabFocus);
+        panels = new QStackedWidget(column);
+        panels->setObjectName("panels.pages");
+        const std::array<std::pair<QWidget*, const char*>, kPanels.size()> pages = {{
+            {make_model_panel(*workbench, *actions, recent_menu), "The mesh: open, shapes, defects, save"},
+            {make_quads_panel(*workbench, *actions), "Regular quads of any mesh, in patches"},
+            {make_detail_panel(*workbench), "Levels, the driver and how detail is stored"},
+            {make_deform_panel(*workbench, *actions), "Pull by hand or deform by numbers"},
+            {make_body_panel(*workbench, *actions), "A body that falls, bounces and can be pulled"},
+            {make_fracture_panel(*workbench, *actions), "Where the mesh breaks, and how hard that is"},
+            {make_view_panel(*workbench, *viewport, window), "How the mesh is shown"},
+        }};
+        for (std::size_t k = 0; k < pages.size(); ++k) {
+            panels->addWidget(pages[k].first);
+            tabs->addTab(shape_title(kPanels[k]));
+            tabs->setTabToolTip(int(k), QLatin1String(pages[k].second) + QStringLiteral(" (Ctrl+%1)").arg(k + 1));
+        }
+        connect(tabs, &QTabBar::currentChanged, &window, [this, &window](int index) {
+            panels->setCurrentIndex(index);
+            Q_EMIT window.panel_changed();
+        });
+        auto* layout = new QVBoxLayout(column);
+        layout->setContentsMargins(0, 0, 0, 0);
+        layout->setSpacing(0);
+        layout->addWidget(make_overview(*workbench, *actions, column));
+        layout->addWidget(tabs);
+        layout->addWidget(panels, 1);
+        column->setMinimumWidth(std::max(290, tabs->sizeHint().width())); // no tab is cut off
+        return column;
+    }
+
+    void follow_files(MainWindow& window) {
+        connect(workbench.get(), &Workbench::opened, &window, [this, &window] {
+            const auto& source = workbench->state().source;
+            const QString path = source ? QString::fromStdString(source->path) : QString();
+            file_path = path.endsWith(".fil", Qt::CaseInsensitive) ? path : QString();
+            if (!path.isEmpty()) add_recent(window, path);
+            show_title(window);
+            Q_EMIT window.files_changed();
+        });
+        connect(&workbench->document(), &Document::changed, &window, [this, &window] { show_title(window); });
+        connect(&workbench->document().undo_stack(), &QUndoStack::cleanChanged, &window,
+                [this, &window](bool clean) { window.setWindowModified(!clean); });
+        connect(workbench.get(), &Workbench::saved, &window, [this, &window](const std::string& path) {
+            file_path = QString::fromStdString(path);
+            add_recent(window, file_path);
+            show_title(window);
+            Q_EMIT window.files_changed();
+        });
+        connect(&workbench->jobs(), &Jobs::failed, &window, [this] { // the window stays, to tell of it
+            if (farewell) std::exchange(farewell, {})->deleteLater();
+        });
+        connect(&workbench->jobs(), &Jobs::finished, &window, [this, &window] {
+            if (workbench->jobs().is_busy()) return;
+            is_writing = false;
+            if (!farewell) return;
+            std::exchange(farewell, {})->deleteLater();
+            QTimer::singleShot(0, &window, &QWidget::close);
+        });
+    }
+
+    void wait_for_files(MainWindow& window) {
+        if (farewell) return;
+        auto* dialog = new QProgressDialog(&window);
+        farewell = dialog;
+        dialog->setObjectName("farewell");
+        dialog->setWindowTitle("Filigree");
+        dialog->setWindowModality(Qt::WindowModal);
+        dialog->setMinimumDuration(0);
+        dialog->setRange(0, 1000);
+        dialog->setAutoClose(false);
+        dialog->setAutoReset(false);
+        dialog->setCancelButtonText("Close without it");
+        const auto show = [this, dialog] {
+            dialog->setLabelText(workbench->jobs().title() + QStringLiteral(" – the window closes when it is done."));
+            dialog->setValue(int(1000 * workbench->jobs().fraction()));
+        };
+        show();
+        connect(&workbench->jobs(), &Jobs::progressed, dialog, show);
+        connect(&workbench->jobs(), &Jobs::started, dialog, show);
+        connect(dialog, &QProgressDialog::canceled, &window, [this] { workbench->jobs().cancel(); });
+        dialog->show();
+    }
+
+    void show_title(MainWindow& window) {
+        const auto& source = workbench->state().source;
+        const QString name = !file_path.isEmpty() ? QFileInfo(file_path).fileName()
+                             : source             ? QString::fromStdString(source->name)
+                                                  : QString();
+        window.setWindowTitle(name.isEmpty() ? QStringLiteral("Filigree") : name + QStringLiteral("[*] – Filigree"));
+        window.setWindowModified(workbench->document().is_modified());
+    }
+
+    void add_recent(MainWindow& window, const QString& path) {
+        const QString whole = QFileInfo(path).absoluteFilePath();
+        recent.removeAll(whole);
+        recent.prepend(whole);
+        if (recent.size() > kRecentFiles) recent.resize(kRecentFiles);
+        if (keep_settings) QSettings().setValue("files/recent", recent);
+        show_recent(window);
+    }
+
+    void show_recent(MainWindow& window) {
+        recent_menu->clear();
+        recent_menu->setEnabled(!recent.isEmpty());
+        for (const QString& path : recent) {
+            QAction* action = recent_menu->addAction(QFileInfo(path).fileName().replace('&', "&&"));
+            action->setToolTip(path);
+            action->setStatusTip(path);
+            connect(action, &QAction::triggered, &window, [&window, path] { window.open_file(path); });
+        }
+        recent_menu->setToolTipsVisible(true);
+    }
+
+    /// The document is in the file, as far as a model file holds it, and was not changed meanwhile.
+    bool save_now(MainWindow& window, const QString& path) {
+        bool is_written = false;
+        const auto heard = connect(workbench.get(), &Workbench::saved, &window, [&] { is_written = true; });
+        const std::uint64_t id = workbench->document().state_id();
+        window.save_file(path);
+        workbench->jobs().wait_until_idle();
+        disconnect(heard);
+        return is_written && workbench->document().state_id() == id;
+    }
+
+    void read_settings(MainWindow& window) {
+        const QSettings settings;
+        recent = settings.value("files/recent").toStringList();
+        window.restoreGeometry(settings.value("window/geometry").toByteArray());
+        splitter->restoreState(settings.value("window/splitter").toByteArray());
+        window.show_panel(settings.value("window/panel", "model").toString());
+        advanced_fold(window)->setChecked(settings.value("window/advanced", false).toBool());
+    }
+
+    void write_settings(const MainWindow& window) {
+        QSettings settings;
+        settings.setValue("window/geometry", window.saveGeometry());
+        settings.setValue("window/splitter", splitter->saveState());
+        settings.setValue("window/panel", window.panel());
+        settings.setValue("window/advanced", advanced_fold(window)->isChecked());
+        settings.setValue("window/theme", int(theme));
+    }
 };
 
 MainWindow::MainWindow(bool keep_settings, QWidget* parent) : QMainWindow(parent), impl_(new Impl) {
@@ -115,7 +303,7 @@ MainWindow::MainWindow(bool keep_settings, QWidget* parent) : QMainWindow(parent
     content.splitter->setStretchFactor(0, 1);
     content.splitter->setStretchFactor(1, 0);
     setCentralWidget(content.splitter);
-    setStatusBar(new StatusBar(*content.workbench, *content.viewport, *content.actions, this));
+    setStatusBar(make_status_bar(*content.workbench, *content.viewport, *content.actions, this));
     content.follow_files(*this);
 
     connect(content.workbench.get(), &Workbench::told, this, &MainWindow::show_message);
@@ -144,104 +332,6 @@ Workbench& MainWindow::workbench() { return *impl_->workbench; }
 Viewport& MainWindow::viewport() { return *impl_->viewport; }
 Actions& MainWindow::actions() { return *impl_->actions; }
 
-void MainWindow::Impl::add_menus(MainWindow& window) {
-    recent_menu = new QMenu("Open &recent", &window);
-    recent_menu->setObjectName("file.open_recent");
-    for (const ActionMenu& menu : actions->menus()) {
-        QMenu* shown = window.menuBar()->addMenu(menu.title);
-        shown->setObjectName(menu.name);
-        for (QAction* action : menu.actions) {
-            if (!action)
-                shown->addSeparator();
-            else
-                shown->addAction(action);
-            if (action == actions->find("file.open")) shown->addMenu(recent_menu);
-        }
-    }
-}
-
-void MainWindow::Impl::add_toolbar(MainWindow& window) {
-    auto* bar = new QToolBar("Tools", &window);
-    bar->setObjectName("toolbar");
-    bar->setMovable(false);
-    bar->setFloatable(false);
-    bar->setIconSize(QSize(20, 20));
-    for (const char* name :
-         {"tool.pull", "tool.pin", "tool.turn", "tool.torch", "", "view.show_all", "", "edit.undo", "edit.redo"}) {
-        if (*name)
-            bar->addAction(actions->find(name));
-        else
-            bar->addSeparator();
-        if (auto* button = *name ? qobject_cast<QToolButton*>(bar->widgetForAction(actions->find(name))) : nullptr) {
-            button->setObjectName(QStringLiteral("toolbar.") + name);
-            button->setFocusPolicy(Qt::TabFocus);
-            button->setAccessibleName(actions->find(name)->text().remove('&'));
-        }
-    }
-    window.addToolBar(Qt::LeftToolBarArea, bar);
-}
-
-QWidget* MainWindow::Impl::make_middle(MainWindow& window) {
-    auto* middle = new QWidget(&window);
-    middle->setObjectName("middle");
-    auto* picture = new QWidget(middle);
-    picture->setObjectName("picture");
-    auto* over = new QVBoxLayout(picture);
-    over->setContentsMargins(0, 0, 0, 0);
-    over->addWidget(viewport);
-    messages = new MessageBar(picture);
-    connect(messages, &MessageBar::covers, viewport, &Viewport::set_covered);
-    auto* column = new QVBoxLayout(middle);
-    column->setContentsMargins(0, 0, 0, 0);
-    column->setSpacing(0);
-    column->addWidget(picture, 1);
-    column->addWidget(new Timeline(*workbench, *actions, middle));
-    return middle;
-}
-
-QWidget* MainWindow::Impl::make_column(MainWindow& window) {
-    auto* column = new QWidget(&window);
-    column->setObjectName("column");
-    tabs = new QTabBar(column);
-    tabs->setObjectName("panels");
-    tabs->setAccessibleName("Panels");
-    tabs->setExpanding(true);
-    tabs->setDrawBase(true);
-    tabs->setUsesScrollButtons(false);
-    tabs->setFocusPolicy(Qt::TabFocus);
-    panels = new QStackedWidget(column);
-    panels->setObjectName("panels.pages");
-    body = new BodyPanel(*workbench, *actions);
-    const std::array<std::pair<Panel*, const char*>, 7> pages = {{
-        {new ModelPanel(*workbench, *actions, recent_menu), "The mesh: open, shapes, defects, save"},
-        {new QuadsPanel(*workbench, *actions), "Regular quads of any mesh, in patches"},
-        {new DetailPanel(*workbench), "Levels, the driver and how detail is stored"},
-        {new DeformPanel(*workbench, *actions), "Pull by hand or deform by numbers"},
-        {body, "A body that falls, bounces and can be pulled"},
-        {new FracturePanel(*workbench, *actions), "Where the mesh breaks, and how hard that is"},
-        {new ViewPanel(*workbench, *viewport, window), "How the mesh is shown"},
-    }};
-    for (std::size_t k = 0; k < pages.size(); ++k) {
-        panels->addWidget(pages[k].first);
-        QString title = QLatin1String(kPanels[k]);
-        title[0] = title[0].toUpper();
-        tabs->addTab(title);
-        tabs->setTabToolTip(int(k), QLatin1String(pages[k].second) + QStringLiteral(" (Ctrl+%1)").arg(k + 1));
-    }
-    connect(tabs, &QTabBar::currentChanged, &window, [this, &window](int index) {
-        panels->setCurrentIndex(index);
-        Q_EMIT window.panel_changed();
-    });
-    auto* layout = new QVBoxLayout(column);
-    layout->setContentsMargins(0, 0, 0, 0);
-    layout->setSpacing(0);
-    layout->addWidget(new Overview(*workbench, *actions, column));
-    layout->addWidget(tabs);
-    layout->addWidget(panels, 1);
-    column->setMinimumWidth(std::max(290, tabs->sizeHint().width())); // no tab is cut off
-    return column;
-}
-
 bool MainWindow::show_panel(const QString& name) {
     for (std::size_t k = 0; k < kPanels.size(); ++k)
         if (name == QLatin1String(kPanels[k])) {
@@ -256,89 +346,6 @@ QString MainWindow::panel() const {
 }
 
 // Files
-
-void MainWindow::Impl::follow_files(MainWindow& window) {
-    connect(workbench.get(), &Workbench::opened, &window, [this, &window] {
-        const auto& source = workbench->state().source;
-        const QString path = source ? QString::fromStdString(source->path) : QString();
-        file_path = path.endsWith(".fil", Qt::CaseInsensitive) ? path : QString();
-        if (!path.isEmpty()) add_recent(window, path);
-        show_title(window);
-        Q_EMIT window.files_changed();
-    });
-    connect(&workbench->document(), &Document::changed, &window, [this, &window] { show_title(window); });
-    connect(&workbench->document().undo_stack(), &QUndoStack::cleanChanged, &window,
-            [this, &window](bool clean) { window.setWindowModified(!clean); });
-    connect(workbench.get(), &Workbench::saved, &window, [this, &window](const std::string& path) {
-        file_path = QString::fromStdString(path);
-        add_recent(window, file_path);
-        show_title(window);
-        Q_EMIT window.files_changed();
-    });
-    connect(&workbench->jobs(), &Jobs::failed, &window, [this] { // the window stays, to tell of it
-        if (farewell) std::exchange(farewell, {})->deleteLater();
-    });
-    connect(&workbench->jobs(), &Jobs::finished, &window, [this, &window] {
-        if (workbench->jobs().is_busy()) return;
-        is_writing = false;
-        if (!farewell) return;
-        std::exchange(farewell, {})->deleteLater();
-        QTimer::singleShot(0, &window, &QWidget::close);
-    });
-}
-
-void MainWindow::Impl::wait_for_files(MainWindow& window) {
-    if (farewell) return;
-    auto* dialog = new QProgressDialog(&window);
-    farewell = dialog;
-    dialog->setObjectName("farewell");
-    dialog->setWindowTitle("Filigree");
-    dialog->setWindowModality(Qt::WindowModal);
-    dialog->setMinimumDuration(0);
-    dialog->setRange(0, 1000);
-    dialog->setAutoClose(false);
-    dialog->setAutoReset(false);
-    dialog->setCancelButtonText("Close without it");
-    const auto show = [this, dialog] {
-        dialog->setLabelText(workbench->jobs().title() + QStringLiteral(" – the window closes when it is done."));
-        dialog->setValue(int(1000 * workbench->jobs().fraction()));
-    };
-    show();
-    connect(&workbench->jobs(), &Jobs::progressed, dialog, show);
-    connect(&workbench->jobs(), &Jobs::started, dialog, show);
-    connect(dialog, &QProgressDialog::canceled, &window, [this] { workbench->jobs().cancel(); });
-    dialog->show();
-}
-
-void MainWindow::Impl::show_title(MainWindow& window) {
-    const auto& source = workbench->state().source;
-    const QString name = !file_path.isEmpty() ? QFileInfo(file_path).fileName()
-                         : source             ? QString::fromStdString(source->name)
-                                              : QString();
-    window.setWindowTitle(name.isEmpty() ? QStringLiteral("Filigree") : name + QStringLiteral("[*] – Filigree"));
-    window.setWindowModified(workbench->document().is_modified());
-}
-
-void MainWindow::Impl::add_recent(MainWindow& window, const QString& path) {
-    const QString whole = QFileInfo(path).absoluteFilePath();
-    recent.removeAll(whole);
-    recent.prepend(whole);
-    if (recent.size() > kRecentFiles) recent.resize(kRecentFiles);
-    if (keep_settings) QSettings().setValue("files/recent", recent);
-    show_recent(window);
-}
-
-void MainWindow::Impl::show_recent(MainWindow& window) {
-    recent_menu->clear();
-    recent_menu->setEnabled(!recent.isEmpty());
-    for (const QString& path : recent) {
-        QAction* action = recent_menu->addAction(QFileInfo(path).fileName().replace('&', "&&"));
-        action->setToolTip(path);
-        action->setStatusTip(path);
-        connect(action, &QAction::triggered, &window, [&window, path] { window.open_file(path); });
-    }
-    recent_menu->setToolTipsVisible(true);
-}
 
 QString MainWindow::file_path() const { return impl_->file_path; }
 QStringList MainWindow::recent_files() const { return impl_->recent; }
@@ -388,27 +395,12 @@ bool MainWindow::may_discard() {
     return impl_->save_now(*this, path);
 }
 
-/// The document is in the file, as far as a model file holds it, and was not changed meanwhile.
-bool MainWindow::Impl::save_now(MainWindow& window, const QString& path) {
-    bool is_written = false;
-    const auto heard = connect(workbench.get(), &Workbench::saved, &window, [&] { is_written = true; });
-    const std::uint64_t id = workbench->document().state_id();
-    window.save_file(path);
-    workbench->jobs().wait_until_idle();
-    disconnect(heard);
-    return is_written && workbench->document().state_id() == id;
-}
-
 void MainWindow::closeEvent(QCloseEvent* event) {
     if (impl_->is_writing) {
         impl_->wait_for_files(*this);
-        event->ignore();
-        return;
+        return event->ignore();
     }
-    if (!may_discard()) {
-        event->ignore();
-        return;
-    }
+    if (!may_discard()) return event->ignore();
     impl_->workbench->jobs().cancel();
     if (impl_->keep_settings) impl_->write_settings(*this);
     event->accept();
@@ -445,7 +437,7 @@ void MainWindow::set_theme(Theme theme) {
 }
 
 void MainWindow::show_help() {
-    if (!impl_->help) impl_->help = new HelpSheet(*impl_->actions, this);
+    if (!impl_->help) impl_->help = make_help_sheet(*impl_->actions, this);
     impl_->help->setAttribute(Qt::WA_DeleteOnClose);
     impl_->help->show();
     impl_->help->raise();
@@ -467,24 +459,6 @@ bool MainWindow::eventFilter(QObject* object, QEvent* event) {
         }
     }
     return QMainWindow::eventFilter(object, event);
-}
-
-void MainWindow::Impl::read_settings(MainWindow& window) {
-    const QSettings settings;
-    recent = settings.value("files/recent").toStringList();
-    window.restoreGeometry(settings.value("window/geometry").toByteArray());
-    splitter->restoreState(settings.value("window/splitter").toByteArray());
-    window.show_panel(settings.value("window/panel", "model").toString());
-    body->set_unfolded(settings.value("window/advanced", false).toBool());
-}
-
-void MainWindow::Impl::write_settings(const MainWindow& window) {
-    QSettings settings;
-    settings.setValue("window/geometry", window.saveGeometry());
-    settings.setValue("window/splitter", splitter->saveState());
-    settings.setValue("window/panel", window.panel());
-    settings.setValue("window/advanced", body->is_unfolded());
-    settings.setValue("window/theme", int(theme));
 }
 
 } // namespace filigree::studio

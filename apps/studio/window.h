@@ -20,7 +20,7 @@ public:
     Viewport& viewport();
     Actions& actions();
 
-    /// "model", "quads", "detail", "deform", "body", "fracture", "view"; false: there is none of that name.
+    /// One of kPanels (panels/panels.h); false: there is none of that name.
     bool show_panel(const QString& name);
     /// Opens a file as the dialog would: asks first when there are unsaved changes.
     void open_file(const QString& path);

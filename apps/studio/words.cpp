@@ -21,6 +21,17 @@ QString listed(const std::vector<QString>& things) {
     return text;
 }
 
+QString rich_table(const std::vector<std::vector<QString>>& rows) {
+    QString text = QStringLiteral("<table width='100%' cellspacing='0' cellpadding='1'>");
+    for (const std::vector<QString>& row : rows) {
+        text += "<tr>";
+        for (std::size_t k = 0; k < row.size(); ++k)
+            text += (k == 0 ? "<td align='left'>" : "<td align='right'>") + row[k] + "</td>";
+        text += "</tr>";
+    }
+    return text + "</table>";
+}
+
 QString file_name(const std::string& path) {
     return QString::fromStdString(std::filesystem::path(path).filename().string());
 }

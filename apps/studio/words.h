@@ -19,6 +19,8 @@ QString file_name(const std::string& path);
 std::string about_file(const std::string& path, const std::string& sentence);
 /// "a", "a and b", "a, b and c".
 QString listed(const std::vector<QString>& things);
+/// Rows of cells (rich text) over the whole width: the first of a row at the left, the others at the right.
+QString rich_table(const std::vector<std::vector<QString>>& rows);
 /// What a built-in shape is called: "Wavy cube".
 QString shape_title(const std::string& name);
 

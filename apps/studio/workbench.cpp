@@ -146,8 +146,7 @@ void Workbench::forget_measuring() {
 void Workbench::find_full() {
     if (mode_ == Mode::body) {
         if (is_live_frame()) full_ = playback_.moment()->full;
-        full_is_new();
-        return;
+        return full_is_new();
     }
     if (is_pulling_ || is_apart() || state().pose_from_file ||
         (state().handle_pose && state().model->mesh.vertex_count() > kMostPulledUnasked))
@@ -185,26 +184,20 @@ void Workbench::want_every_vertex(bool wanted) {
 }
 
 void Workbench::measure_error() {
-    if (melt_surface()) {
-        Q_EMIT told("What has melted has no error: its surface is made of the particles. filigree simulate --check "
-                    "measures the parts that are left.",
-                    false);
-        return;
-    }
+    if (melt_surface())
+        return Q_EMIT told("What has melted has no error: its surface is made of the particles. filigree simulate "
+                           "--check measures the parts that are left.",
+                           false);
     if (mode_ == Mode::body && (!is_live_frame() || playback_.moment()->full.empty())) {
-        if (is_live_frame()) {
-            impl_->measures_next = true;
-            want_every_vertex(true); // another look at this moment, with every vertex
-        } else {
-            Q_EMIT told("The error of a recorded moment is only known while its body is there: press Play, then pause.",
-                        false);
-        }
-        return;
+        if (!is_live_frame())
+            return Q_EMIT told("The error of a recorded moment is only known while its body is there: press Play, then "
+                               "pause.",
+                               false);
+        impl_->measures_next = true;
+        return want_every_vertex(true); // another look at this moment, with every vertex
     }
-    if (is_apart()) {
-        Q_EMIT told("Pieces that are shown apart have no error: set Apart to 0 in the Fracture panel.", false);
-        return;
-    }
+    if (is_apart())
+        return Q_EMIT told("Pieces that are shown apart have no error: set Apart to 0 in the Fracture panel.", false);
     const std::uint64_t number = impl_->pose_number;
     std::vector<Vec3f> full = mode_ == Mode::body ? playback_.moment()->full : full_;
     struct Measured {

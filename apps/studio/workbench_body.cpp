@@ -1,7 +1,6 @@
 // The body, what it does, and the recording of that.
 #include "workbench_impl.h"
 
-#include "change_names.h"
 #include "pins.h"
 #include "words.h"
 

@@ -1,7 +1,6 @@
 // Deforming by numbers and by hand.
 #include "workbench_impl.h"
 
-#include "change_names.h"
 #include "pins.h"
 #include "words.h"
 
@@ -67,36 +66,25 @@ void Workbench::begin_pull(Index vertex, const Vec3d& at) {
     if (vertex >= mesh.vertex_count() || !at.allFinite()) return;
     const Vec3f rest = mesh.positions[vertex];
     if (mode_ == Mode::body) {
-        if (!playback_.has_body()) {
-            Q_EMIT told("A recording cannot be pulled: make the body first.", false);
-            return;
-        }
-        if (playback_.made()->body->material.model == MaterialModel::mpm) {
-            Q_EMIT told("Bodies of the grid method cannot be pulled: hold the torch to them (H).", false);
-            return;
-        }
+        if (!playback_.has_body()) return Q_EMIT told("A recording cannot be pulled: make the body first.", false);
+        if (playback_.made()->body->material.model == MaterialModel::mpm)
+            return Q_EMIT told("Bodies of the grid method cannot be pulled: hold the torch to them (H).", false);
         impl_->replay.stop();
         show_last_frame();
         is_pulling_ = true;
         impl_->pulls_body = true;
-        playback_.grab(rest, at - mesh.origin);
-        return;
+        return playback_.grab(rest, at - mesh.origin);
     }
-    if (state().source->pieces) {
-        Q_EMIT told("What is in pieces is pulled as a body: make one (the Body panel), then pull it until it breaks.",
-                    false);
-        return;
-    }
+    if (state().source->pieces)
+        return Q_EMIT told("What is in pieces is pulled as a body: make one (the Body panel), then pull it until it "
+                           "breaks.",
+                           false);
     const double diagonal = bounds(mesh.positions).diagonal();
-    Handle pull;
-    pull.centre = rest;
-    pull.grip = view_.settings().grip * diagonal;
-    pull.reach = std::max(view_.settings().reach, view_.settings().grip) * diagonal;
+    Handle pull{.centre = rest,
+                .grip = view_.settings().grip * diagonal,
+                .reach = std::max(view_.settings().reach, view_.settings().grip) * diagonal};
     PullRegion region = pull_region(state(), rest, pull.grip, pull.reach, vertex);
-    if (region.grip.empty()) {
-        Q_EMIT told("Everything here is pinned: unpin something to pull it.", false);
-        return;
-    }
+    if (region.grip.empty()) return Q_EMIT told("Everything here is pinned: unpin something to pull it.", false);
     pull.vertices = std::move(region.grip);
     pull.held = std::move(region.held);
     impl_->warp = make_warp(state().warps, world_bounds(mesh));
@@ -131,8 +119,7 @@ void Workbench::end_pull() {
     if (!is_pulling_) return;
     if (impl_->pulls_body) {
         is_pulling_ = false;
-        playback_.let_go();
-        return;
+        return playback_.let_go();
     }
     std::shared_ptr<const Pose> pose = drag_.finish();
     if (!std::exchange(is_pulling_, false)) return; // it failed, and that was told

@@ -34,9 +34,7 @@ Result<State> read_state(const std::string& path, const RunContext& context) {
     const Result<std::string> bytes = read_file(path);
     if (!bytes) return bytes.error();
     State state;
-    auto source = std::make_shared<Source>();
-    source->path = path;
-    source->name = file_name(path).toStdString();
+    MeshFile file; // of a model: its mesh alone
     if (is_model_file(*bytes)) {
         Result<Model> model = read_model(*bytes, path, context);
         if (!model) return model.error();
@@ -58,16 +56,15 @@ Result<State> read_state(const std::string& path, const RunContext& context) {
             recording->follow(*poses);
             state.recording = std::move(recording);
         }
-        source->mesh = state.model->mesh;
+        file.mesh = state.model->mesh;
     } else {
-        Result<MeshFile> file = read_mesh(*bytes, path, context);
-        if (!file) return file.error();
-        source->mesh = std::move(file->mesh);
-        source->warnings = std::move(file->warnings);
+        Result<MeshFile> read = read_mesh(*bytes, path, context);
+        if (!read) return read.error();
+        file = std::move(*read);
     }
     if (context.is_cancelled()) return cancelled_error();
-    source->topology = analyse_topology(source->mesh, context);
-    source->materials = load_surface_materials(source->mesh, path);
+    auto source = source_of(std::move(file.mesh), path, file_name(path).toStdString(), context);
+    source->warnings = std::move(file.warnings);
     source->warnings.insert(source->warnings.end(), source->materials.warnings.begin(),
                             source->materials.warnings.end());
     state.source = std::move(source);
@@ -100,20 +97,16 @@ Result<std::optional<State>> first_look(const std::string& path, const BodySetti
     context.report("reading", 0);
     const Result<FileReader> file = FileReader::open(path);
     ModelStream stream(path);
-    auto source = std::make_shared<Source>();
+    Mesh mesh;
     std::size_t levels = 0;
-    for (std::uint64_t offset = 0; file && source->mesh.vertex_count() < kFirstLook && feed(stream, *file, offset);) {
+    for (std::uint64_t offset = 0; file && mesh.vertex_count() < kFirstLook && feed(stream, *file, offset);) {
         if (context.is_cancelled()) return cancelled_error();
-        if (std::exchange(levels, stream.level_count()) != stream.level_count()) source->mesh = stream.mesh();
+        if (std::exchange(levels, stream.level_count()) != stream.level_count()) mesh = stream.mesh();
     }
-    if (source->mesh.face_count() == 0) return std::optional<State>();
-    source->path = path;
-    source->name = file_name(path).toStdString();
-    source->topology = analyse_topology(source->mesh, context);
-    source->materials = load_surface_materials(source->mesh, path);
+    if (mesh.face_count() == 0) return std::optional<State>();
     State state;
     state.body = body;
-    state.source = std::move(source);
+    state.source = source_of(std::move(mesh), path, file_name(path).toStdString(), context);
     Result<State> stripped = stripped_state(std::move(state), context);
     if (!stripped && stripped.error().code == ErrorCode::cancelled) return stripped.error();
     return stripped ? std::optional<State>(std::move(*stripped)) : std::nullopt;
@@ -233,10 +226,9 @@ void Workbench::open_whole(const std::string& path, std::shared_ptr<const Source
             pause();
             const State& now = this->state();
             const bool is_warped_look = look && now.source == look && now.handles.empty() && !now.recording;
-            if (document_.state_id() != id && !is_warped_look) {
-                Q_EMIT told("The document was changed while " + file_name(path) + " was read; open it again.", true);
-                return;
-            }
+            if (document_.state_id() != id && !is_warped_look)
+                return Q_EMIT told("The document was changed while " + file_name(path) + " was read; open it again.",
+                                   true);
             if (is_warped_look) state.warps = now.warps;
             const QString text = summary(state);
             const bool has_motion = state.recording != nullptr;
@@ -329,17 +321,12 @@ void Workbench::save_driver(const std::string& path) {
 
 void Workbench::export_meshes(const std::string& pattern) {
     const std::optional<NumberedName> name = printf_numbered_name(pattern);
-    if (!name) {
-        Q_EMIT told(QString::fromStdString(pattern) + ": needs one place for the frame's number, such as %04d in "
-                                                      "frame_%04d.obj.",
-                    true);
-        return;
-    }
+    if (!name)
+        return Q_EMIT told(QString::fromStdString(pattern) + ": needs one place for the frame's number, such as %04d "
+                                                             "in frame_%04d.obj.",
+                           true);
     commit_recording();
-    if (!state().recording) {
-        Q_EMIT told("There is nothing recorded yet: press Play first.", true);
-        return;
-    }
+    if (!state().recording) return Q_EMIT told("There is nothing recorded yet: press Play first.", true);
     save("Exporting meshes", pattern, [state = state(), name = *name](const RunContext& context) {
         return write_frames(state, *state.recording, name, context);
     });

@@ -1,7 +1,6 @@
 // Shapes, quads, levels and the detail code.
 #include "workbench_impl.h"
 
-#include "change_names.h"
 #include "pieces.h"
 #include "quads.h"
 #include "words.h"
@@ -39,11 +38,7 @@ Result<State> stripped_state(State state, const RunContext& context) {
 Result<State> state_of_shape(State state, const Shape& shape, const RunContext& context) {
     Result<Mesh> mesh = filigree::make_shape(shape.name, shape.options);
     if (!mesh) return mesh.error();
-    auto source = std::make_shared<Source>();
-    source->mesh = std::move(*mesh);
-    source->name = shape_title(shape.name).toStdString();
-    source->topology = analyse_topology(source->mesh, context);
-    state.source = std::move(source);
+    state.source = source_of(std::move(*mesh), "", shape_title(shape.name).toStdString(), context);
     state.shape = shape;
     return stripped_state(std::move(state), context);
 }

@@ -1,73 +1,85 @@
-#include "panels/deform_panel.h"
+#include "panels/panels.h"
 
 #include "actions.h"
+#include "panel.h"
 #include "pins.h"
 
 namespace filigree::studio {
+namespace {
 
-DeformPanel::DeformPanel(Workbench& workbench, const Actions& actions, QWidget* parent)
-    : Panel("deform", workbench, parent), pins_(new Text("deform.pins", Tone::quiet, page())) {
-    const auto button = [&](const char* name, const char* action, const QString& text = {}) {
-        return new ActionButton(name, actions.find(action), text, page());
-    };
-    QGridLayout* rows = section("By hand");
-    text(rows, "deform.hint", Tone::quiet)->setText("Drag the surface to pull it; pins hold it.");
-    beside(rows,
-           {button("deform.pull", "tool.pull"), button("deform.pin", "tool.pin"), button("deform.turn", "tool.turn")});
-    const auto view = view_settings();
-    NumberSpec spec = {.least = 1, .most = 50, .decimals = 1, .unit = "%", .logarithmic = true, .neutral = 6};
-    number(rows,
-           view.setting("deform.grip", "Grip",
-                        "How far around the mouse the surface is held, per cent of the mesh's diagonal",
-                        field(&ViewSettings::grip, 100)),
-           spec);
-    spec.least = 5;
-    spec.most = 200;
-    spec.neutral = 45;
-    number(
-        rows,
-        view.setting("deform.reach", "Reach",
-                     "How far around the mouse the surface follows; beyond it stays. Per cent of the mesh's diagonal",
-                     field(&ViewSettings::reach, 100)),
-        spec);
-    pins_->setToolTip("Vertices of the driver that are held");
-    beside(rows, {pins_, button("deform.unpin_all", "edit.unpin_all")})->setStretch(1, 0);
+class DeformPanel : public Panel {
+public:
+    DeformPanel(Workbench& workbench, const Actions& actions)
+        : Panel("deform", workbench), pins_(new Text("deform.pins", Tone::quiet, page())) {
+        const auto button = [&](const char* name, const char* action, const QString& text = {}) {
+            return new ActionButton(name, actions.find(action), text, page());
+        };
+        QGridLayout* rows = section("By hand");
+        text(rows, "deform.hint", Tone::quiet)->setText("Drag the surface to pull it; pins hold it.");
+        beside(rows, {button("deform.pull", "tool.pull"), button("deform.pin", "tool.pin"),
+                      button("deform.turn", "tool.turn")});
+        const auto view = view_settings();
+        NumberSpec spec = {.least = 1, .most = 50, .decimals = 1, .unit = "%", .logarithmic = true, .neutral = 6};
+        number(rows,
+               view.setting("deform.grip", "Grip",
+                            "How far around the mouse the surface is held, per cent of the mesh's diagonal",
+                            field(&ViewSettings::grip, 100)),
+               spec);
+        spec.least = 5;
+        spec.most = 200;
+        spec.neutral = 45;
+        number(rows,
+               view.setting(
+                   "deform.reach", "Reach",
+                   "How far around the mouse the surface follows; beyond it stays. Per cent of the mesh's diagonal",
+                   field(&ViewSettings::reach, 100)),
+               spec);
+        pins_->setToolTip("Vertices of the driver that are held");
+        beside(rows, {pins_, button("deform.unpin_all", "edit.unpin_all")})->setStretch(1, 0);
 
-    rows = section("By numbers");
-    const OptionsAccess<Warps> warps = {
-        [this] { return state().warps; },
-        [this](const Warps& to, const std::string& merge) { this->workbench().set_warps(to, merge); }};
-    choice(rows, warps.setting("deform.axis", "Axis", "The axis that all five go along", field(&Warps::axis)),
-           {"x", "y", "z"});
-    const NumberSpec factor = {.least = Warps::kLeastFactor,
-                               .most = Warps::kMostFactor,
-                               .decimals = 2,
-                               .unit = "×",
-                               .logarithmic = true,
-                               .digits = 3,
-                               .neutral = 1};
-    const auto angle = [](double most, double step) {
-        return NumberSpec{.least = -most, .most = most, .step = step, .decimals = 0, .unit = "°", .neutral = 0};
-    };
-    const auto add = [&](const char* name, const char* label, double Warps::*member, const NumberSpec& how,
-                         const char* tooltip) {
-        number(rows, warps.setting(name, label, tooltip, field(member)), how);
-    };
-    add("deform.stretch", "Stretch", &Warps::stretch, factor, "Longer along the axis; a factor");
-    add("deform.squeeze", "Squeeze", &Warps::squeeze, factor,
-        "Longer along the axis and thinner across, the volume stays; a factor");
-    add("deform.bend", "Bend", &Warps::bend, angle(Warps::kMostBend, 1), "Into an arc from end to end, degrees");
-    add("deform.twist", "Twist", &Warps::twist, angle(Warps::kMostTwist, 5),
-        "Turned about the axis from end to end, degrees");
-    add("deform.taper", "Taper", &Warps::taper, factor, "Size of the far end, as a factor of the near end's");
-    beside(rows, {button("deform.reset", "edit.reset_deformation", "Reset all")});
-    refresh();
-}
+        rows = section("By numbers");
+        const OptionsAccess<Warps> warps = {
+            [this] { return state().warps; },
+            [this](const Warps& to, const std::string& merge) { this->workbench().set_warps(to, merge); }};
+        choice(rows, warps.setting("deform.axis", "Axis", "The axis that all five go along", field(&Warps::axis)),
+               {"x", "y", "z"});
+        const NumberSpec factor = {.least = Warps::kLeastFactor,
+                                   .most = Warps::kMostFactor,
+                                   .decimals = 2,
+                                   .unit = "×",
+                                   .logarithmic = true,
+                                   .digits = 3,
+                                   .neutral = 1};
+        const auto angle = [](double most, double step) {
+            return NumberSpec{.least = -most, .most = most, .step = step, .decimals = 0, .unit = "°", .neutral = 0};
+        };
+        const auto add = [&](const char* name, const char* label, double Warps::*member, const NumberSpec& how,
+                             const char* tooltip) {
+            number(rows, warps.setting(name, label, tooltip, field(member)), how);
+        };
+        add("deform.stretch", "Stretch", &Warps::stretch, factor, "Longer along the axis; a factor");
+        add("deform.squeeze", "Squeeze", &Warps::squeeze, factor,
+            "Longer along the axis and thinner across, the volume stays; a factor");
+        add("deform.bend", "Bend", &Warps::bend, angle(Warps::kMostBend, 1), "Into an arc from end to end, degrees");
+        add("deform.twist", "Twist", &Warps::twist, angle(Warps::kMostTwist, 5),
+            "Turned about the axis from end to end, degrees");
+        add("deform.taper", "Taper", &Warps::taper, factor, "Size of the far end, as a factor of the near end's");
+        beside(rows, {button("deform.reset", "edit.reset_deformation", "Reset all")});
+        refresh();
+    }
 
-void DeformPanel::refresh() {
-    Panel::refresh();
-    const std::size_t pinned = pinned_vertices(state().handles).size();
-    pins_->setText(pinned == 0 ? QStringLiteral("No pins") : counted(pinned, "vertex pinned", "vertices pinned"));
-}
+private:
+    void refresh() override {
+        Panel::refresh();
+        const std::size_t pinned = pinned_vertices(state().handles).size();
+        pins_->setText(pinned == 0 ? QStringLiteral("No pins") : counted(pinned, "vertex pinned", "vertices pinned"));
+    }
+
+    Text* pins_;
+};
+
+} // namespace
+
+QWidget* make_deform_panel(Workbench& workbench, const Actions& actions) { return new DeformPanel(workbench, actions); }
 
 } // namespace filigree::studio

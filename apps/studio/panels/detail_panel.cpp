@@ -1,4 +1,6 @@
-#include "panels/detail_panel.h"
+#include "panels/panels.h"
+
+#include "panel.h"
 
 #include <array>
 
@@ -27,127 +29,137 @@ const Field<StripOptions> kHalfSize = {
 bool is_blend(const StripOptions& options) { return options.code == DetailCode::blend; }
 bool is_reference(const StripOptions& options) { return !is_blend(options); }
 
+class DetailPanel : public Panel {
+public:
+    explicit DetailPanel(Workbench& workbench) : Panel("detail", workbench) {
+        QGridLayout* rows = section("Levels");
+        level_ = number(rows,
+                        {"detail.level",
+                         "Level",
+                         "The level shown: 0 is the driver, the last the whole mesh",
+                         [this] { return state().level(); },
+                         [this](double level) { this->workbench().set_level(unsigned(level), "detail.level"); },
+                         {},
+                         [this] { return state().model->finest_level() > 0; }},
+                        {.least = 0, .most = 1, .step = 1, .decimals = 0});
+        levels_ = text(rows, "detail.levels");
+        levels_->setTextFormat(Qt::RichText);
+        add_driver();
+        add_law();
+        report_ = text(section("Report"), "detail.report", Tone::quiet);
+        refresh();
+    }
+
+private:
+    void add_driver() {
+        QGridLayout* rows = section("Driver");
+        const OptionsAccess<StripOptions> options = {
+            [this] { return workbench().wanted_strip(); },
+            [this](const StripOptions& to, const std::string& merge) { workbench().set_strip(to, merge); }};
+        const Field<StripOptions> size = {[this](const StripOptions& of) {
+                                              return double(of.base.value_or(state().model->driver().vertices.size()));
+                                          },
+                                          [](StripOptions& of, double count) {
+                                              of.levels.reset();
+                                              of.error.reset();
+                                              of.base = std::size_t(count);
+                                          }};
+        driver_ =
+            number(rows,
+                   options.setting("detail.driver", "Size", "About so many vertices move; all others follow", size, {},
+                                   is_blend),
+                   {.least = kLeastDriver, .most = 20000, .decimals = 0, .unit = "vertices", .logarithmic = true});
+        choice(rows,
+               options.setting(
+                   "detail.code", "Code",
+                   "How detail is stored. Blend: three driver vertices and an offset. Reference: the report's, "
+                   "for regular quads.",
+                   kCode),
+               {"Blend (any mesh)", "Reference (the report's)"});
+        choice(rows,
+               options.setting("detail.references", "References",
+                               "How many vertices of the coarser level a vertex is stored by", kReferenceChoice,
+                               is_reference),
+               {"3 vertices", "4 vertices", "6 vertices"});
+        choice(
+            rows,
+            options.setting("detail.precision", "Precision", "Of what is stored for each vertex", kHalfSize, is_blend),
+            {"32 bit (20 bytes a vertex)", "16 bit (10 bytes a vertex)"});
+    }
+
+    void add_law() {
+        QGridLayout* rows = section("Returning detail");
+        choice(
+            rows,
+            {"detail.law", "Height",
+             "How the height of detail follows its surroundings. Automatic: proportional for the blend code, inverse "
+             "for the reference code. Keep: as at rest. Inverse: lower where stretched. Proportional: as the "
+             "surroundings grow. Volume: what is between stays as much.",
+             [this] { return state().restore.law ? 1.0 + int(*state().restore.law) : 0.0; },
+             [this](double index) {
+                 workbench().set_law(index > 0 ? std::optional(HeightLaw(int(index) - 1)) : std::nullopt);
+             }},
+            {"Automatic", "Keep", "Inverse (the report's)", "Proportional", "Volume"});
+        check(rows, {"detail.thin_shell",
+                     "Thin shell",
+                     "Bumps keep their shape (cloth, skin) instead of stretching with the body; blend code",
+                     [this] { return state().restore.thin_shell; },
+                     [this](double thin) { workbench().set_thin_shell(thin != 0); },
+                     {},
+                     [this] { return state().model->code() == DetailCode::blend; }});
+    }
+
+    void refresh() override {
+        page()->setEnabled(state().model != nullptr);
+        if (!state().model) return;
+        const Model& model = *state().model;
+        level_->set_range(0, model.finest_level());
+        driver_->set_range(kLeastDriver, double(std::max(model.mesh.vertex_count(), kLeastDriver)));
+        Panel::refresh();
+        levels_->setText(levels());
+        report_->setText(report());
+    }
+
+    QString levels() const {
+        const Model& model = *state().model;
+        std::vector<std::vector<QString>> rows;
+        for (unsigned level = model.finest_level() + 1; level-- > 0;) {
+            const QString name = level == 0                      ? QStringLiteral("0, the driver")
+                                 : level == model.finest_level() ? QStringLiteral("%1, the mesh").arg(level)
+                                                                 : QString::number(level);
+            const LevelCounts counts = level_counts(model, level);
+            rows.push_back({name, with_commas(counts.vertices) + " vertices", with_commas(counts.faces) + " faces"});
+            if (level == state().level())
+                for (QString& cell : rows.back()) cell = "<b>" + cell + "</b>";
+        }
+        return rich_table(rows);
+    }
+
+    QString report() const {
+        const StripReport& report = state().strip_report;
+        const std::size_t all = state().model->mesh.vertex_count(), moved = state().model->driver().vertices.size();
+        const double seconds = report.simplify_seconds + report.bind_seconds + report.encode_seconds;
+        QStringList lines;
+        lines << QStringLiteral("%1 move %2, one in %3.")
+                     .arg(counted(moved, "vertex", "vertices"), with_commas(all),
+                          number_text(double(all) / double(std::max<std::size_t>(1, moved))));
+        if (seconds > 0) lines << QStringLiteral("Stripped in %1 s.").arg(number_text(seconds, 2));
+        const auto add = [&](std::size_t count, const char* one, const char* many, const char* rest) {
+            if (count > 0) lines << counted(count, one, many) + rest;
+        };
+        add(report.welded_vertices, "vertex lies", "vertices lie", " at the place of another.");
+        add(report.across_gap, "vertex is", "vertices are", " bound across a gap to another part.");
+        add(report.facing_away, "vertex is", "vertices are", " bound to a face that looks away.");
+        add(report.forced_collapses, "edge", "edges", " had to go against the mesh's topology.");
+        return lines.join('\n');
+    }
+
+    NumberControl *level_, *driver_ = nullptr;
+    Text *levels_, *report_;
+};
+
 } // namespace
 
-DetailPanel::DetailPanel(Workbench& workbench, QWidget* parent) : Panel("detail", workbench, parent) {
-    QGridLayout* rows = section("Levels");
-    level_ = number(rows,
-                    {"detail.level",
-                     "Level",
-                     "The level shown: 0 is the driver, the last the whole mesh",
-                     [this] { return state().level(); },
-                     [this](double level) { this->workbench().set_level(unsigned(level), "detail.level"); },
-                     {},
-                     [this] { return state().model->finest_level() > 0; }},
-                    {.least = 0, .most = 1, .step = 1, .decimals = 0});
-    levels_ = text(rows, "detail.levels");
-    levels_->setTextFormat(Qt::RichText);
-    add_driver();
-    add_law();
-    report_ = text(section("Report"), "detail.report", Tone::quiet);
-    refresh();
-}
-
-void DetailPanel::add_driver() {
-    QGridLayout* rows = section("Driver");
-    const OptionsAccess<StripOptions> options = {
-        [this] { return workbench().wanted_strip(); },
-        [this](const StripOptions& to, const std::string& merge) { workbench().set_strip(to, merge); }};
-    const Field<StripOptions> size = {
-        [this](const StripOptions& of) { return double(of.base.value_or(state().model->driver().vertices.size())); },
-        [](StripOptions& of, double count) {
-            of.levels.reset();
-            of.error.reset();
-            of.base = std::size_t(count);
-        }};
-    driver_ = number(
-        rows,
-        options.setting("detail.driver", "Size", "About so many vertices move; all others follow", size, {}, is_blend),
-        {.least = kLeastDriver, .most = 20000, .decimals = 0, .unit = "vertices", .logarithmic = true});
-    choice(rows,
-           options.setting("detail.code", "Code",
-                           "How detail is stored. Blend: three driver vertices and an offset. Reference: the report's, "
-                           "for regular quads.",
-                           kCode),
-           {"Blend (any mesh)", "Reference (the report's)"});
-    choice(rows,
-           options.setting("detail.references", "References",
-                           "How many vertices of the coarser level a vertex is stored by", kReferenceChoice,
-                           is_reference),
-           {"3 vertices", "4 vertices", "6 vertices"});
-    choice(rows,
-           options.setting("detail.precision", "Precision", "Of what is stored for each vertex", kHalfSize, is_blend),
-           {"32 bit (20 bytes a vertex)", "16 bit (10 bytes a vertex)"});
-}
-
-void DetailPanel::add_law() {
-    QGridLayout* rows = section("Returning detail");
-    choice(rows,
-           {"detail.law", "Height",
-            "How the height of detail follows its surroundings. Automatic: proportional for the blend code, inverse "
-            "for the reference code. Keep: as at rest. Inverse: lower where stretched. Proportional: as the "
-            "surroundings grow. Volume: what is between stays as much.",
-            [this] { return state().restore.law ? 1.0 + int(*state().restore.law) : 0.0; },
-            [this](double index) {
-                workbench().set_law(index > 0 ? std::optional(HeightLaw(int(index) - 1)) : std::nullopt);
-            }},
-           {"Automatic", "Keep", "Inverse (the report's)", "Proportional", "Volume"});
-    check(rows, {"detail.thin_shell",
-                 "Thin shell",
-                 "Bumps keep their shape (cloth, skin) instead of stretching with the body; blend code",
-                 [this] { return state().restore.thin_shell; },
-                 [this](double thin) { workbench().set_thin_shell(thin != 0); },
-                 {},
-                 [this] { return state().model->code() == DetailCode::blend; }});
-}
-
-void DetailPanel::refresh() {
-    page()->setEnabled(state().model != nullptr);
-    if (!state().model) return;
-    const Model& model = *state().model;
-    level_->set_range(0, model.finest_level());
-    driver_->set_range(kLeastDriver, double(std::max(model.mesh.vertex_count(), kLeastDriver)));
-    Panel::refresh();
-    levels_->setText(levels());
-    report_->setText(report());
-}
-
-QString DetailPanel::levels() const {
-    const Model& model = *state().model;
-    QString table = QStringLiteral("<table width='100%' cellspacing='0' cellpadding='1'>");
-    for (unsigned level = model.finest_level() + 1; level-- > 0;) {
-        const QString name = level == 0                      ? QStringLiteral("0, the driver")
-                             : level == model.finest_level() ? QStringLiteral("%1, the mesh").arg(level)
-                                                             : QString::number(level);
-        const bool shown = level == state().level();
-        const auto cell = [shown](const QString& content, const char* align) {
-            return QStringLiteral("<td align='%1'>%2</td>")
-                .arg(QLatin1String(align), shown ? "<b>" + content + "</b>" : content);
-        };
-        const LevelCounts counts = level_counts(model, level);
-        table += "<tr>" + cell(name, "left") + cell(with_commas(counts.vertices) + " vertices", "right") +
-                 cell(with_commas(counts.faces) + " faces", "right") + "</tr>";
-    }
-    return table + "</table>";
-}
-
-QString DetailPanel::report() const {
-    const StripReport& report = state().strip_report;
-    const std::size_t all = state().model->mesh.vertex_count(), moved = state().model->driver().vertices.size();
-    const double seconds = report.simplify_seconds + report.bind_seconds + report.encode_seconds;
-    QStringList lines;
-    lines << QStringLiteral("%1 move %2, one in %3.")
-                 .arg(counted(moved, "vertex", "vertices"), with_commas(all),
-                      number_text(double(all) / double(std::max<std::size_t>(1, moved))));
-    if (seconds > 0) lines << QStringLiteral("Stripped in %1 s.").arg(number_text(seconds, 2));
-    const auto add = [&](std::size_t count, const char* one, const char* many, const char* rest) {
-        if (count > 0) lines << counted(count, one, many) + rest;
-    };
-    add(report.welded_vertices, "vertex lies", "vertices lie", " at the place of another.");
-    add(report.across_gap, "vertex is", "vertices are", " bound across a gap to another part.");
-    add(report.facing_away, "vertex is", "vertices are", " bound to a face that looks away.");
-    add(report.forced_collapses, "edge", "edges", " had to go against the mesh's topology.");
-    return lines.join('\n');
-}
+QWidget* make_detail_panel(Workbench& workbench) { return new DetailPanel(workbench); }
 
 } // namespace filigree::studio
