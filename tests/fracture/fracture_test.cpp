@@ -333,6 +333,20 @@ TEST(Fracture, IslandsArePiecesAndSplintersAreNot) {
     }
 }
 
+// Slabs of 3, 6 and 91 parts in a hundred: the first two together are still too small.
+TEST(Fracture, SplintersThatJoinAreOneSplinter) {
+    const Mesh cube = box_mesh(Vec3d(0, 0, 0), Vec3d(1, 1, 1));
+    std::vector<double> along = {0.01, 0.05, 0.13};
+    do {
+        std::vector<Vec3d> seeds;
+        for (const double x : along) seeds.emplace_back(x, 0.5, 0.5);
+        const FracturedMesh whole = broken(cube, seeds, 0, {.smallest = 0.3});
+        EXPECT_EQ(whole.pieces, 1u);
+        EXPECT_EQ(whole.report.joined, 2u);
+        EXPECT_EQ(broken(cube, seeds, 0, {.smallest = 0.25}).pieces, 2u);
+    } while (std::ranges::next_permutation(along).found);
+}
+
 TEST(Fracture, ThreadsDoNotMatter) {
     const Mesh mesh = make_wavy_sphere({.resolution = 48});
     const auto run = [&](unsigned threads) {
