@@ -90,7 +90,7 @@ def bounds():
         return None
     marked = lambda growth: f"**{growth:.2f}**" if growth > 2.5 else f"{growth:.2f}"
     return [f"Every command over {told['rungs']} meshes from {told['first']:,} vertices on, each twice the one before "
-            "(`scripts/bounds`): processor seconds and memory of the largest, and the most that either grew at a step. 2.5 is "
+            "(`scripts/bounds`): processor seconds (of a machine as fast as in the middle of the run) and memory of the largest, and the most that either grew at a step. 2.5 is "
             "the limit, and what is beyond it is in bold; steps below 0.3 s and 60 MiB are not judged (0).", "",
             "| command | seconds | growth | MiB | growth |", "|---|---|---|---|---|",
             *[f"| {name} | {row['seconds'][-1]:.2f} | {marked(row['seconds_growth'])} | {row['mib'][-1]:.0f} | "
