@@ -78,6 +78,42 @@ TEST_P(HardStart, NeverNotFinite) {
             }
 }
 
+// Larger bodies than BadStart's: what looks for contacts must bear them too.
+TEST_P(HardStart, ParticlesWithoutNumbersAreLeftToTheStepper) {
+    for (const StepMode mode : {StepMode::explicit_steps, StepMode::descent})
+        for (const std::size_t bodies : {1, 2}) {
+            const auto body = box(10, 10, 10, 0.1, material(GetParam(), 1e5));
+            Actor beside = actor(body);
+            beside.placement = Eigen::Translation3d(0, 1.05, 0);
+            std::vector<Actor> actors = {actor(body)};
+            if (bodies == 2) actors.push_back(beside);
+            for (const std::size_t lost : {std::size_t{0}, std::size_t{555}}) {
+                Simulation wild = Simulation::create(free_space(), actors, {.mode = mode}, RunContext(1)).value();
+                Vectors positions = wild.positions(0);
+                positions.x[lost] = std::numeric_limits<float>::quiet_NaN();
+                ASSERT_TRUE(wild.set_positions(0, positions).ok());
+                const auto report = wild.advance(RunContext(1));
+                EXPECT_TRUE(!report || all_finite(wild.positions(0)));
+            }
+        }
+}
+
+TEST(HardStarts, ACrushedMeshfreeBodyDoesNotMeetAllOfItself) {
+    for (const StepMode mode : {StepMode::descent, StepMode::automatic})
+        for (const bool is_mixed : {false, true}) {
+            const auto body = box(12, 12, 12, 0.1, material(MaterialModel::meshfree, 1e5));
+            Simulation wild = Simulation::create(free_space(), {actor(body)}, {.mode = mode}, RunContext(1)).value();
+            Vectors positions = wild.positions(0);
+            for (std::size_t i = 0; i < positions.size(); ++i)
+                positions.set(i, is_mixed ? Vec3f(float(random_unit(7, 3 * i)), float(random_unit(7, 3 * i + 1)),
+                                                  float(random_unit(7, 3 * i + 2)))
+                                          : Vec3f(0.01f * positions[i]));
+            ASSERT_TRUE(wild.set_positions(0, positions).ok());
+            ASSERT_TRUE(wild.advance(RunContext(1)).ok()); // in a second; with all pairs of points in minutes
+            EXPECT_TRUE(all_finite(wild.positions(0)));
+        }
+}
+
 TEST(HardStarts, AHeavyBodyOnALightOne) {
     Material light = material(MaterialModel::fem, 1e5), heavy = light;
     light.density = 100;

@@ -171,4 +171,16 @@ void embed_surface_at_rest(BodyState& state, bool with_balls, const RunContext& 
                                                                  : embed_in_cells(points, body.cells, context);
 }
 
+Box box_of(const Vectors& positions) {
+    Vec3f low = positions[0], high = low;
+    for (std::size_t i = 1; i < positions.size(); ++i) {
+        low = low.cwiseMin(positions[i]);
+        high = high.cwiseMax(positions[i]);
+    }
+    Box box;
+    box.extend(low.cast<double>());
+    box.extend(high.cast<double>());
+    return box;
+}
+
 } // namespace filigree

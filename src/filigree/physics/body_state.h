@@ -105,6 +105,8 @@ void renew_neighbourhoods(BodyState& state, std::span<Attachment* const> attachm
 /// The surface's points and balls as they are on a body that has not flowed.
 void embed_surface_at_rest(BodyState& state, bool with_balls, const RunContext& context);
 
+Box box_of(const Vectors& positions); ///< at least one, all finite
+
 /// Where an embedded point is, by its weights alone.
 inline Vec3f embedded_point(const Embedding& embedding, std::size_t point, const Vectors& values) {
     Vec3f sum = Vec3f::Zero();

@@ -8,13 +8,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 
 namespace filigree {
 
 namespace {
 
 constexpr std::size_t kContactSearchGrain = 256;
-constexpr float kJoined = 2.5f; ///< spacings: what flowed together to less of its own body does not push itself
 
 Vectors places_of_balls(const BodyState& body, const RunContext& context) {
     Vectors balls(body.balls.size());
@@ -22,6 +22,15 @@ Vectors places_of_balls(const BodyState& body, const RunContext& context) {
         for (std::size_t s = begin; s < end; ++s) balls.set(s, embedded_point(body.balls, s, body.positions));
     });
     return balls;
+}
+
+std::vector<Index> within(const Vectors& points, const Vec3d& low, const Vec3d& high) {
+    std::vector<Index> found;
+    for (Index i = 0; i < points.size(); ++i) {
+        const Eigen::Array3d at = points[i].cast<double>().array();
+        if ((at >= low.array()).all() && (at <= high.array()).all()) found.push_back(i);
+    }
+    return found;
 }
 
 } // namespace
@@ -35,9 +44,11 @@ struct Contacts::OwnBalls {
 
 void Contacts::begin(std::span<const BodyState> bodies) {
     matter_.begin(bodies);
+    std::map<const Body*, std::shared_ptr<const OwnBalls>> known;
     for (const BodyState& body : bodies) {
-        const bool meets_itself = within_bodies_ && body.has_balls();
-        own_balls_.push_back(meets_itself ? std::make_shared<const OwnBalls>(*body.body) : nullptr);
+        std::shared_ptr<const OwnBalls>& own = known[body.body.get()];
+        if (!own && within_bodies_ && body.has_balls()) own = std::make_shared<const OwnBalls>(*body.body);
+        own_balls_.push_back(own);
     }
 }
 
@@ -103,10 +114,9 @@ void Contacts::find_pairs(std::span<const BodyState> bodies, float reach, const 
     std::vector<Index> order;
     std::vector<Box> boxes(bodies.size());
     for (Index b = 0; b < bodies.size(); ++b) {
-        if (!bodies[b].has_balls()) continue;
-        for (std::size_t i = 0; i < bodies[b].positions.size(); ++i)
-            boxes[b].extend(bodies[b].positions[i].cast<double>());
-        if (boxes[b].size().allFinite()) order.push_back(b); // else the frame is done again
+        if (!bodies[b].has_balls() || !is_finite(bodies[b].positions)) continue; // or the frame is done again
+        boxes[b] = box_of(bodies[b].positions);
+        order.push_back(b);
     }
     std::vector<Vectors> balls(bodies.size());
     const auto balls_of = [&](Index b) -> const Vectors& {
@@ -122,16 +132,15 @@ void Contacts::find_pairs(std::span<const BodyState> bodies, float reach, const 
             if (!(low.array() <= high.array()).all()) continue;
             const PairContact law = world_.contact_of(bodies[*a].actor, bodies[*b].actor);
             const Vectors &own = balls_of(*a), &others = balls_of(*b);
-            const PointGrid grid(others, far);
-            for (Index s = 0; s < own.size(); ++s) {
-                const Vec3f at = own[s];
-                if (!(at.cast<double>().array() >= low.array()).all()) continue;
-                if (!(at.cast<double>().array() <= high.array()).all()) continue;
-                grid.near(at, far, [&](Index t) {
-                    const float gap = (others[t] - at).norm() - touch;
-                    if (gap < reach) pairs_.push_back({*a, s, *b, t, gap, law});
+            const std::vector<Index> near = within(own, low, high), near_others = within(others, low, high);
+            Vectors places(near_others.size());
+            for (std::size_t k = 0; k < near_others.size(); ++k) places.set(k, others[near_others[k]]);
+            const PointGrid grid(places, far);
+            for (const Index s : near)
+                grid.near(own[s], far, [&](Index k) {
+                    const float gap = (places[k] - own[s]).norm() - touch;
+                    if (gap < reach) pairs_.push_back({*a, s, *b, near_others[k], gap, law});
                 });
-            }
         }
     }
     for (NearPair& pair : pairs_) {
@@ -142,14 +151,13 @@ void Contacts::find_pairs(std::span<const BodyState> bodies, float reach, const 
     }
 }
 
-/// What flowed together where neighbourhoods were last renewed is one piece of matter, and does not push itself.
+/// Once matter has flowed, cells at rest do not say any more what belongs together, and it does not meet itself.
 void Contacts::find_own_pairs(const BodyState& body, Index number, const Vectors& balls, float reach) {
+    if (body.has_flowed()) return;
     const PairContact law = world_.contact_of(body.actor, body.actor);
-    const float touch = 2 * body.ball_radius, joined = kJoined * float(body.body->spacing());
-    for (const auto& [s, t] : own_balls_[number]->cells.near_points(balls, touch + reach)) {
-        if (body.has_flowed() && (body.balls.rest[s] - body.balls.rest[t]).norm() < joined) continue;
+    const float touch = 2 * body.ball_radius;
+    for (const auto& [s, t] : own_balls_[number]->cells.near_points(balls, touch + reach))
         pairs_.push_back({number, s, number, t, (balls[t] - balls[s]).norm() - touch, law});
-    }
 }
 
 Contacts::Memory Contacts::memory() const {

@@ -26,18 +26,6 @@ constexpr float kTooManyCrushed = 0.05f; ///< part of a body's cells
 constexpr Index kAskedCells = 7;         ///< one of so many is asked
 constexpr float kWaking = 0.02f;         ///< m/s of what touches a sleeper
 
-Box box_of(const Vectors& positions) {
-    Vec3f low = positions[0], high = low;
-    for (std::size_t i = 1; i < positions.size(); ++i) {
-        low = low.cwiseMin(positions[i]);
-        high = high.cwiseMax(positions[i]);
-    }
-    Box box;
-    box.extend(low.cast<double>());
-    box.extend(high.cast<double>());
-    return box;
-}
-
 bool are_near(const Box& a, const Box& b, double distance) {
     return (a.min.array() - distance <= b.max.array()).all() && (b.min.array() - distance <= a.max.array()).all();
 }
@@ -88,7 +76,7 @@ std::vector<Vec3f> surface_places(const Embedding& points, const Vectors& positi
 MatterContacts::Followed MatterContacts::followed(const BodyState& body) {
     const std::vector<float>& mass = body.body->mass;
     Followed followed{std::vector<float>(mass.size(), 1), Index(std::ranges::max_element(mass) - mass.begin())};
-    if (body.rigid) return followed;
+    if (body.rigid || body.has_balls()) return followed; // those are light beside the corners of cells alone
     const std::vector<std::uint8_t> light = light_particles(*body.body);
     for (std::size_t i = 0; i < light.size(); ++i) followed.counts[i] = light[i] ? 0.0f : 1.0f;
     return followed;
@@ -212,8 +200,8 @@ void MatterContacts::find_sides(std::span<const BodyState> bodies, double frame)
     std::vector<Index> order;
     for (Index b = 0; b < bodies.size(); ++b) {
         if (bodies[b].is_absent) continue;
+        if (!is_finite(bodies[b].positions)) continue; // the frame is done again
         boxes[b] = box_of(bodies[b].positions);
-        if (!boxes[b].size().allFinite()) continue;
         order.push_back(b);
         spacing = std::max(spacing, float(bodies[b].body->spacing()));
         speed = std::max(speed, relative_speed(b, order.front()));

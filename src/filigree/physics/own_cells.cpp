@@ -14,6 +14,8 @@ namespace {
 constexpr std::size_t kOwnCellsGrain = 16;
 constexpr float kClusterBoxSize = 2.5f;                          ///< spacings
 constexpr double kMostClusterBoxes = 8, kFewClusterBoxes = 4096; ///< a cluster, and whatever their number
+constexpr double kTangledClusters = 512;   ///< boxes, and near clusters, a cluster of a body crushed or mixed
+constexpr std::size_t kTangledPoints = 16; ///< near points a point of such a body
 
 } // namespace
 
@@ -97,15 +99,17 @@ std::vector<OwnCells::Extent> OwnCells::extents(const Vectors& positions) const 
 }
 
 /// Pairs of clusters that come within `around` of each other and have cells that are far; ascending, both ways round.
-std::vector<std::pair<Index, Index>> OwnCells::near_clusters(std::span<const Extent> extents, float around) const {
+/// None where there are more than `most` boxes or pairs.
+std::vector<std::pair<Index, Index>> OwnCells::near_clusters(std::span<const Extent> extents, float around,
+                                                             double most) const {
     Vec3f low = Vec3f::Constant(std::numeric_limits<float>::infinity()), high = -low;
     for (const Extent& extent : extents) {
         if (extent.radius < 0) continue;
+        if (!(extent.high - extent.low).allFinite()) return {}; // the frame is done again
         low = low.cwiseMin(extent.low);
         high = high.cwiseMax(extent.high);
     }
-    std::vector<std::pair<Index, Index>> near;
-    if (!(high - low).allFinite()) return near; // the frame is done again
+    if (!(high - low).allFinite()) return {};
     const float half = 0.5f * around;
     low.array() -= half;
     high.array() += half;
@@ -113,17 +117,29 @@ std::vector<std::pair<Index, Index>> OwnCells::near_clusters(std::span<const Ext
     const auto boxes = [&] { return ((high - low) / step).array().floor().cast<double>() + 1; };
     while (boxes().prod() > kMostClusterBoxes * double(extents.size()) + kFewClusterBoxes) step *= 1.25f;
     const Eigen::Array3i counts = boxes().cast<int>();
-    const auto each_box = [&](const Extent& extent, const auto& visit) {
-        if (extent.radius < 0) return;
+    const auto boxes_of = [&](const Extent& extent) {
         Eigen::Array3i from, to;
         for (int axis = 0; axis < 3; ++axis) {
             from[axis] = int((extent.low[axis] - half - low[axis]) / step);
             to[axis] = std::min(int((extent.high[axis] + half - low[axis]) / step), counts[axis] - 1);
         }
+        return std::pair(from, to);
+    };
+    const auto each_box = [&](const Extent& extent, const auto& visit) {
+        if (extent.radius < 0) return;
+        const auto [from, to] = boxes_of(extent);
         for (int k = from[2]; k <= to[2]; ++k)
             for (int j = from[1]; j <= to[1]; ++j)
                 for (int i = from[0]; i <= to[0]; ++i) visit((std::size_t(k) * counts[1] + j) * counts[0] + i);
     };
+    double in_boxes = 0;
+    for (const Extent& extent : extents) {
+        if (extent.radius < 0) continue;
+        const auto [from, to] = boxes_of(extent);
+        in_boxes += (to - from + 1).cast<double>().prod();
+    }
+    if (in_boxes > most) return {};
+    std::vector<std::pair<Index, Index>> near;
     std::vector<Index> offsets(std::size_t(counts.cast<double>().prod()) + 1, 0);
     for (const Extent& extent : extents) each_box(extent, [&](std::size_t box) { ++offsets[box + 1]; });
     for (std::size_t box = 1; box < offsets.size(); ++box) offsets[box] += offsets[box - 1];
@@ -154,12 +170,14 @@ std::vector<std::pair<Index, Index>> OwnCells::near_clusters(std::span<const Ext
             const Index c = entries[k];
             balls.push_back({extents[c].centre, extents[c].radius, clusters_[c].at, c, clusters_[c].far_near});
         }
-        for (std::size_t p = 0; p < balls.size(); ++p)
+        for (std::size_t p = 0; p < balls.size(); ++p) {
+            if (double(near.size()) > most) return {};
             for (std::size_t q = p; q < balls.size(); ++q) {
                 if (!come_near(balls[p], balls[q])) continue;
                 near.emplace_back(balls[p].cluster, balls[q].cluster);
                 if (p != q) near.emplace_back(balls[q].cluster, balls[p].cluster);
             }
+        }
     }
     std::ranges::sort(near);
     near.erase(std::ranges::unique(near).begin(), near.end());
@@ -221,7 +239,8 @@ std::vector<Index> OwnCells::find(const Vectors& positions, float reach, const R
     std::vector<Index> found(points_.size(), kNoIndex);
     if (clusters_.size() < 2) return found;
     const std::vector<Extent> around = extents(positions);
-    const auto near = near_clusters(around, reach + 2 * overhang_); // twice: matter that is stretched
+    const auto near = near_clusters(around, reach + 2 * overhang_, // twice: matter that is stretched
+                                    std::numeric_limits<double>::infinity());
     std::vector<std::size_t> starts;
     for (std::size_t k = 0; k < near.size(); ++k)
         if (k == 0 || near[k].first != near[k - 1].first) starts.push_back(k);
@@ -239,8 +258,9 @@ std::vector<std::pair<Index, Index>> OwnCells::near_points(const Vectors& places
     std::vector<Extent> extents(clusters_.size() - 1);
     for (Index k = 0; k < extents.size(); ++k) extents[k] = extent_of(points_of(k), places);
     std::vector<Index> inside;
-    for (const auto& [cluster, other] : near_clusters(extents, far)) {
+    for (const auto& [cluster, other] : near_clusters(extents, far, kTangledClusters * double(extents.size()))) {
         if (cluster > other) continue;
+        if (found.size() > kTangledPoints * points_.size()) return {};
         const Eigen::Array3f low = extents[other].low.array() - far, high = extents[other].high.array() + far;
         inside.clear();
         for (const Index s : points_of(cluster))

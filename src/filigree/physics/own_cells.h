@@ -21,8 +21,9 @@ public:
     bool are_far(Index cell, Index other) const;
 
     /// Pairs of surface points, the smaller number first, that have come nearer to each other than `far` (m) and lie in
-    /// cells of which neither is reached from the other in three steps. places: of all points, or of balls under them.
-    /// Cost O(points), and points squared where far clusters are near each other.
+    /// cells of which neither is reached from the other in three steps; none where the body is crushed or mixed, so
+    /// that everything is near everything. places: of all points, or of balls under them. Cost O(points), and points
+    /// squared where far clusters are near each other.
     std::vector<std::pair<Index, Index>> near_points(const Vectors& places, float far) const;
 
 private:
@@ -43,7 +44,8 @@ private:
     }
     int neighbour(Index a, Index b) const;
     std::vector<Extent> extents(const Vectors& positions) const;
-    std::vector<std::pair<Index, Index>> near_clusters(std::span<const Extent> extents, float around) const;
+    std::vector<std::pair<Index, Index>> near_clusters(std::span<const Extent> extents, float around,
+                                                       double most) const;
     void look_into(std::span<const std::pair<Index, Index>> near, std::span<const Extent> extents,
                    const Vectors& positions, float reach, std::vector<Index>& found) const;
 

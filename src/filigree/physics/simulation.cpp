@@ -191,12 +191,6 @@ std::vector<Grip> make_grips(std::span<const Hand> hands, const SimulationState&
     return grips;
 }
 
-bool is_finite(const Vectors& values) {
-    float sum = 0; // one NaN or infinity makes the sum so
-    for (std::size_t i = 0; i < values.size(); ++i) sum += 0 * values.x[i] + 0 * values.y[i] + 0 * values.z[i];
-    return sum == 0;
-}
-
 bool is_finite(const SimulationState& state) {
     return std::ranges::all_of(
         state.bodies, [](const BodyState& body) { return is_finite(body.positions) && is_finite(body.velocities); });

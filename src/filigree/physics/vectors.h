@@ -29,6 +29,13 @@ struct Vectors {
     std::vector<float> x, y, z;
 };
 
+/// Whether all are numbers.
+inline bool is_finite(const Vectors& values) {
+    float sum = 0; // one NaN or infinity makes the sum so
+    for (std::size_t i = 0; i < values.size(); ++i) sum += 0 * values.x[i] + 0 * values.y[i] + 0 * values.z[i];
+    return sum == 0;
+}
+
 inline constexpr std::array kVectorAxes = {&Vectors::x, &Vectors::y, &Vectors::z};
 
 } // namespace filigree
