@@ -109,7 +109,7 @@ struct Actions::Impl {
         return command;
     }
     Command panel(std::size_t number) {
-        const QString name = kPanels[number], title = shape_title(kPanels[number]);
+        const QString name = kPanels[number], title = title_of(kPanels[number]);
         Command command{"panel." + name, title + " panel", "Shows the panel " + title,
                         QString("Ctrl+%1").arg(number + 1), [this, name] { window.show_panel(name); }};
         command.is_on = [this, name] { return window.panel() == name; };

@@ -35,12 +35,12 @@ QString name_of_change(const Warps& before, const Warps& after) {
 }
 
 QString name_of_change(const Shape& before, const Shape& after) {
-    if (before.name != after.name) return shape_title(after.name);
+    if (before.name != after.name) return title_of(after.name);
     const ShapeOptions &a = before.options, &b = after.options;
     return name_of({{a.frequency != b.frequency, QString("Frequency %1").arg(b.frequency)},
                     {a.resolution != b.resolution, QString("Resolution %1").arg(b.resolution)},
                     {a.amplitude != b.amplitude, QString("Amplitude %1").arg(b.amplitude)}},
-                   shape_title(after.name));
+                   title_of(after.name));
 }
 
 QString name_of_change(const StripOptions& before, const StripOptions& after) {

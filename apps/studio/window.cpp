@@ -147,7 +147,7 @@ struct MainWindow::Impl {
         }};
         for (std::size_t k = 0; k < pages.size(); ++k) {
             panels->addWidget(pages[k].first);
-            tabs->addTab(shape_title(kPanels[k]));
+            tabs->addTab(title_of(kPanels[k]));
             tabs->setTabToolTip(int(k), QLatin1String(pages[k].second) + QStringLiteral(" (Ctrl+%1)").arg(k + 1));
         }
         connect(tabs, &QTabBar::currentChanged, &window, [this, &window](int index) {

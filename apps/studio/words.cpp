@@ -41,7 +41,7 @@ std::string about_file(const std::string& path, const std::string& sentence) {
     return name.empty() || sentence.find(name) != std::string::npos ? sentence : name + ": " + sentence;
 }
 
-QString shape_title(const std::string& name) {
+QString title_of(const std::string& name) {
     QString title = QString::fromStdString(name).replace('-', ' ');
     if (!title.isEmpty()) title[0] = title[0].toUpper();
     return title;

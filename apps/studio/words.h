@@ -21,7 +21,7 @@ std::string about_file(const std::string& path, const std::string& sentence);
 QString listed(const std::vector<QString>& things);
 /// Rows of cells (rich text) over the whole width: the first of a row at the left, the others at the right.
 QString rich_table(const std::vector<std::vector<QString>>& rows);
-/// What a built-in shape is called: "Wavy cube".
-QString shape_title(const std::string& name);
+/// What a shape, material or panel is called, from its name: "wavy-cube" is "Wavy cube".
+QString title_of(const std::string& name);
 
 } // namespace filigree::studio

@@ -38,7 +38,7 @@ Result<State> stripped_state(State state, const RunContext& context) {
 Result<State> state_of_shape(State state, const Shape& shape, const RunContext& context) {
     Result<Mesh> mesh = filigree::make_shape(shape.name, shape.options);
     if (!mesh) return mesh.error();
-    state.source = source_of(std::move(*mesh), "", shape_title(shape.name).toStdString(), context);
+    state.source = source_of(std::move(*mesh), "", title_of(shape.name).toStdString(), context);
     state.shape = shape;
     return stripped_state(std::move(state), context);
 }
@@ -56,7 +56,7 @@ void Workbench::make_shape(const Shape& shape, const std::string& merge) {
     const bool is_another = !wanted_shape() || wanted_shape()->name != shape.name;
     const StripOptions strip = is_another ? StripOptions() : wanted_strip();
     if (state().shape == shape && strip == state().strip) return jobs_.drop(kModelTopic); // back again
-    make_model("Making the " + shape_title(shape.name).toLower(), shape, strip, merge);
+    make_model("Making the " + title_of(shape.name).toLower(), shape, strip, merge);
 }
 
 void Workbench::set_strip(const StripOptions& options, const std::string& merge) {

@@ -105,7 +105,7 @@ private:
         QGridLayout* rows = section("Material");
         const auto settings = body();
         QStringList names;
-        for (const NamedMaterial& named : named_materials()) names << shape_title(std::string(named.name));
+        for (const NamedMaterial& named : named_materials()) names << title_of(std::string(named.name));
         choice(rows, settings.setting("body.preset", "Preset", "Materials to begin with", kPreset), names << "Custom");
         sentence_ = text(rows, "body.sentence", Tone::quiet);
         number(rows,
@@ -286,7 +286,7 @@ private:
         const auto materials = named_materials();
         const auto named = std::ranges::find(materials, state().body.preset, &NamedMaterial::name);
         if (named == materials.end()) return "Changed by hand.";
-        return shape_title(std::string(named->name)) + ": " + QString::fromStdString(std::string(named->text)) + '.';
+        return title_of(std::string(named->name)) + ": " + QString::fromStdString(std::string(named->text)) + '.';
     }
 
     QString report() const {

@@ -79,7 +79,7 @@ private:
             [this] { return workbench().wanted_shape().value_or(studio::Shape{}); },
             [this](const studio::Shape& to, const std::string& merge) { workbench().make_shape(to, merge); }};
         QStringList titles;
-        for (const std::string_view name : shape_names()) titles << shape_title(std::string(name));
+        for (const std::string_view name : shape_names()) titles << title_of(std::string(name));
         choice(rows,
                {"model.shape", "Shape", "A shape to try things with, made anew at once",
                 [this] {

@@ -109,8 +109,7 @@ public:
             float reach = 0;              ///< sum of the balls' radii
             bool rubs = false;            ///< not a push but friction, between the surface's points over two balls
             Vec3f normal = Vec3f::Zero(); ///< of what rubs
-            Vec3f target = Vec3f::Zero(); ///< of what rubs, where friction wants the point beside the other; of none of
-                                          ///< these, where a pull wants it
+            Vec3f target = Vec3f::Zero(); ///< of what rubs: from the other's point; else of a pull: in the world
             float limit = 0;              ///< N, most friction
             Vec3f place = Vec3f::Zero(), other_place = Vec3f::Zero(); ///< of the points, by update_places
         };

@@ -6,7 +6,7 @@ namespace filigree {
 
 namespace {
 
-// The name of the format, its version last. 6: with balls that friction holds.
+// The name of the format, its version last. 7: friction holds the surface points over balls, not their centres.
 constexpr std::uint64_t kMagic = 0x37455441'54534c46; // "FLSTATE7"
 static_assert(sizeof(Contacts::NearMemory) == 5 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
 static_assert(sizeof(Contacts::BallMemory) == 5 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");

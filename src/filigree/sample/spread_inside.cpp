@@ -85,7 +85,6 @@ public:
 
 private:
     using Cell = Eigen::Matrix<std::int64_t, 3, 1>;
-    Cell cell_of(const Vec3d& point) const { return ((point - corner_) / distance_).cast<std::int64_t>(); }
     using Step = std::array<int, 3>;
     /// To a cell itself and to its neighbours, the nearest first: what is too near is found soonest there.
     static constexpr std::array<Step, 27> kSteps = [] {
@@ -96,6 +95,7 @@ private:
     }();
     static constexpr std::size_t kBlockCells = 64; ///< 4^3, side by side in memory
 
+    Cell cell_of(const Vec3d& point) const { return ((point - corner_) / distance_).cast<std::int64_t>(); }
     std::size_t bucket(const Cell& cell) const {
         std::uint64_t hash = std::uint64_t(cell[0] >> 2) * 0x9E3779B97F4A7C15u;
         hash = (hash ^ (hash >> 29) ^ std::uint64_t(cell[1] >> 2)) * 0xBF58476D1CE4E5B9u;
