@@ -1,4 +1,4 @@
-// What contacts cost: a frame of bodies that meet, with the part of it that contacts take. One thread.
+// What contacts cost: a frame of bodies that meet, with the part of it that contacts take. One thread, unless said.
 #include "heap.h"
 
 #include "filigree/io/mesh_file.h"
@@ -12,7 +12,7 @@ namespace {
 
 using namespace filigree;
 
-const RunContext kOneThread(1);
+const RunContext kOneThread(1), kTwoThreads(2);
 
 World ground() {
     World world;
@@ -28,10 +28,10 @@ Actor put(std::shared_ptr<const Body> body, const Vec3d& at) {
 
 /// Frames from..until of a scene, over and over.
 void run(benchmark::State& state, const World& world, const std::vector<Actor>& actors, int from, int until,
-         bool within_bodies = true) {
+         bool within_bodies = true, const RunContext& context = kOneThread) {
     Simulation simulation =
-        Simulation::create(world, actors, {.contacts_within_bodies = within_bodies}, kOneThread).value();
-    for (int frame = 0; frame < from; ++frame) (void)simulation.advance(kOneThread).value();
+        Simulation::create(world, actors, {.contacts_within_bodies = within_bodies}, context).value();
+    for (int frame = 0; frame < from; ++frame) (void)simulation.advance(context).value();
     const std::string start = simulation.save();
     double contact = 0, deepest = 0, substeps = 0;
     std::size_t frames = 0;
@@ -41,7 +41,7 @@ void run(benchmark::State& state, const World& world, const std::vector<Actor>& 
             (void)simulation.restore(start);
             state.ResumeTiming();
         }
-        const FrameReport report = simulation.advance(kOneThread).value();
+        const FrameReport report = simulation.advance(context).value();
         contact += report.contact_seconds;
         substeps += report.substeps;
         deepest = std::max(deepest, report.deepest_in_matter);
@@ -52,11 +52,11 @@ void run(benchmark::State& state, const World& world, const std::vector<Actor>& 
     state.counters["deepest_spacings"] = deepest / actors[0].body->spacing();
 }
 
-/// 0: the heap's pieces fall, 1: they lie.
+/// 0: the heap's pieces fall, 1: they lie; and threads.
 void heap(benchmark::State& state) {
     const bench::Heap heap = bench::make_heap();
     const int from = state.range(0) ? bench::kHeapRests : 0;
-    run(state, heap.world, heap.actors, from, from + 60);
+    run(state, heap.world, heap.actors, from, from + 60, true, state.range(1) == 2 ? kTwoThreads : kOneThread);
 }
 
 /// A mesh of 1 m, FILIGREE_SCAN, that falls 0.3 m; 0 or 1: whether it meets itself.
@@ -88,7 +88,7 @@ void stack(benchmark::State& state) {
     run(state, ground(), actors, 120, 180);
 }
 
-BENCHMARK(heap)->Arg(0)->Arg(1)->Iterations(60)->Unit(benchmark::kMillisecond);
+BENCHMARK(heap)->Args({0, 1})->Args({1, 1})->Args({0, 2})->Iterations(60)->Unit(benchmark::kMillisecond);
 BENCHMARK(scan)->Arg(0)->Arg(1)->Iterations(90)->Unit(benchmark::kMillisecond);
 BENCHMARK(stack)->Iterations(60)->Unit(benchmark::kMillisecond);
 

@@ -3,6 +3,7 @@
 #include "filigree/core/random.h"
 #include "filigree/physics/cell_boxes.h"
 #include "filigree/physics/own_cells.h"
+#include "filigree/physics/rigid_body.h"
 #include "physics/test_bodies.h"
 #include "threads.h"
 
@@ -401,7 +402,7 @@ TEST(Matter, FindsThePlaceOfAPoint) {
             {float(random_unit(1, 4 * n + 1)), float(random_unit(1, 4 * n + 2)), float(random_unit(1, 4 * n + 3))}};
         const Vec3f point = matter.mean(truth, positions);
         const CellBoxes boxes(matter, positions, 0.01f);
-        Matter::Place found{boxes.find(point)};
+        Matter::Place found{boxes.find(point).cell};
         ASSERT_NE(found.cell, kNoIndex);
         Mat3f inverse;
         ASSERT_TRUE(matter.locate(positions, point, found, inverse));
@@ -417,7 +418,7 @@ TEST(Matter, KnowsDepthAndDirectionInABodyThatTurnedAndStretched) {
     for (std::size_t i = 0; i < positions.size(); ++i)
         positions.set(i, turn * Vec3f(1.5f * positions.x[i], positions.y[i], positions.z[i]));
     const Vec3f point = turn * Vec3f(0.4f, 0, 0);
-    Matter::Place place{CellBoxes(matter, positions, 0).find(point)};
+    Matter::Place place{CellBoxes(matter, positions, 0).find(point).cell};
     Mat3f inverse;
     ASSERT_TRUE(matter.locate(positions, point, place, inverse));
     const auto depth = matter.depth(place, inverse, Vec3f::Zero());
@@ -434,6 +435,47 @@ TEST(Matter, CellsAcrossAGapAreNotTogether) {
     EXPECT_FALSE(matter.are_together(cell(2, 10), cell(4, 10)));
     EXPECT_TRUE(matter.are_together(cell(2, 3), cell(4, 3))) << "over the foot";
     EXPECT_FALSE(matter.are_together(cell(0, 10), cell(0, 7)));
+}
+
+TEST(CellBoxes, AGapIsNeverMoreThanTheDistanceOfAnyPoint) {
+    const Body body = as_rigid(make_body(fork(), rubber()));
+    const Matter matter(body);
+    const auto turned_and_moved = [&](std::uint64_t seed, const Vec3f& by) {
+        const Vec3d axis(random_unit(seed, 1) - 0.5, random_unit(seed, 2) - 0.5, random_unit(seed, 3) - 0.5);
+        const Mat3f turn =
+            Eigen::AngleAxisd(6 * random_unit(seed, 4), axis.normalized()).toRotationMatrix().cast<float>();
+        Vectors positions = body.rest;
+        for (std::size_t i = 0; i < positions.size(); ++i) positions.set(i, turn * body.rest[i] + by);
+        return positions;
+    };
+    const float spacing = float(body.spacing());
+    std::size_t apart = 0;
+    for (std::uint64_t seed = 0; seed < 60; ++seed) {
+        const Vectors one = turned_and_moved(2 * seed, Vec3f::Zero());
+        const Vectors other = turned_and_moved(2 * seed + 1, {float(2 * random_unit(seed, 9)), 0.3f, -0.2f});
+        const CellBoxes boxes(matter, one, 0.5f * spacing), others(matter, other, 0.5f * spacing);
+        const TurnedBox around = others.rigid_box();
+        const Mat3f into = around.half_axes.inverse();
+        float nearest = std::numeric_limits<float>::infinity(); // of a point of the other to a cell of the one
+        for (std::size_t s = 0; s < body.surface.points.size(); ++s) {
+            const Vec3f point = embedded_point(body.surface.points, s, other);
+            EXPECT_LT((into * (point - around.centre)).cwiseAbs().maxCoeff(), 1 + 1e-4f);
+            for (const auto& corners : body.cells.cell_corners) {
+                const Vec3f first = one[corners[0]];
+                Vec3f beyond;
+                for (int axis = 0; axis < 3; ++axis) {
+                    const Vec3f along = (one[corners[1 << axis]] - first).normalized();
+                    const float at = along.dot(point - first);
+                    beyond[axis] = std::max({0.0f, -at, at - spacing});
+                }
+                nearest = std::min(nearest, beyond.norm());
+            }
+        }
+        const float gap = boxes.gap_of_rigid(around);
+        EXPECT_LE(gap, nearest + 1e-5f) << seed;
+        apart += gap > 0.5f * nearest && gap > 0;
+    }
+    EXPECT_GT(apart, 15u);
 }
 
 /// The cell that holds a point or the nearest within reach, of those that count.
@@ -472,11 +514,11 @@ TEST(CellBoxes, FindsWhatBruteForceFinds) {
                               stretch * float(1.6 * random_unit(2, 3 * n + 1) - 0.2),
                               float(0.8 * random_unit(2, 3 * n + 2) - 0.4));
             const Index best = nearest_cell(body, positions, point, reach, [](Index) { return true; });
-            EXPECT_EQ(boxes.find(point), best) << n;
+            EXPECT_EQ(boxes.find(point).cell, best) << n;
             hits += best != kNoIndex;
         }
         EXPECT_GT(hits, 200u);
-        EXPECT_EQ(boxes.find(Vec3f::Constant(std::numeric_limits<float>::quiet_NaN())), kNoIndex);
+        EXPECT_EQ(boxes.find(Vec3f::Constant(std::numeric_limits<float>::quiet_NaN())).cell, kNoIndex);
     }
 }
 

@@ -21,11 +21,10 @@ CellBoxes::CellBoxes(const Matter& matter, const Vectors& positions, float reach
         reach_ = reach;
         for (int axis = 0; axis < 3; ++axis)
             for (const auto& cell : cells.cells) counts_[axis] = std::max(counts_[axis], cell[axis] + 1);
-        const auto around = float(reach / matter.body().spacing());
         const auto& first = cells.cells[0]; // local coordinates are counted from it
         for (int axis = 0; axis < 3; ++axis) {
-            low_[axis] = -around - float(first[axis]);
-            high_[axis] = around + float(counts_[axis] - first[axis]);
+            low_[axis] = -float(first[axis]);
+            high_[axis] = float(counts_[axis] - first[axis]);
         }
         return;
     }
@@ -73,18 +72,33 @@ CellBoxes::CellBoxes(const Matter& matter, const Vectors& positions, float reach
     for (const Extent& extent : extents) each_box(extent, [&](std::size_t box) { extents_[next[box]++] = extent; });
 }
 
-Index CellBoxes::find_rigid(const Vec3f& point) const {
+CellBoxes::Near CellBoxes::find_rigid(const Vec3f& point) const {
     const Vec3f local = inverse_ * (point - corner_);
-    if ((local.array() < low_.array()).any() || (local.array() > high_.array()).any()) return kNoIndex;
+    const float around = reach_ / float(matter_.body().spacing());
+    if ((local.array() < low_.array() - around).any() || (local.array() > high_.array() + around).any()) return {};
     const Vec3f rest = matter_.rest_position({0, local});
-    return matter_.body().field->at(rest).distance - matter_.body().field_radius < reach_ ? 0 : kNoIndex;
+    const float distance = matter_.body().field->at(rest).distance - matter_.body().field_radius;
+    return {distance < reach_ ? 0 : kNoIndex, std::max(0.0f, distance)};
 }
 
-Index CellBoxes::find(const Vec3f& point) const {
+TurnedBox CellBoxes::rigid_box() const {
+    const auto spacing = float(matter_.body().spacing());
+    const Mat3f axes = spacing * spacing * inverse_.transpose(); // of a cell
+    return {corner_ + axes * (0.5f * (low_ + high_)), axes * (0.5f * (high_ - low_)).asDiagonal()};
+}
+
+float CellBoxes::gap_of_rigid(const TurnedBox& box) const {
+    const Vec3f centre = inverse_ * (box.centre - corner_),
+                half = (inverse_ * box.half_axes).cwiseAbs().rowwise().sum();
+    const Vec3f gap = (low_ - centre - half).cwiseMax(centre - half - high_).cwiseMax(0);
+    return gap.norm() * float(matter_.body().spacing());
+}
+
+CellBoxes::Near CellBoxes::find(const Vec3f& point) const {
     if (matter_.is_rigid()) return find_rigid(point);
-    if (extents_.empty() || !point.allFinite()) return kNoIndex;
+    if (extents_.empty() || !point.allFinite()) return {};
     const auto [from, to] = range(point.array() - around_, point.array() + around_);
-    Index found = kNoIndex;
+    Near found;
     float least = std::numeric_limits<float>::infinity();
     for (int k = from[2]; k <= to[2]; ++k)
         for (int j = from[1]; j <= to[1]; ++j) {
@@ -95,7 +109,7 @@ Index CellBoxes::find(const Vec3f& point) const {
                 const float away = (extent.centre - point).squaredNorm();
                 if (away >= least) continue;
                 least = away;
-                found = extent.cell;
+                found.cell = extent.cell;
             }
         }
     return found;

@@ -7,6 +7,15 @@
 
 namespace filigree {
 
+/// A box about any axes.
+struct TurnedBox {
+    Vec3f centre;
+    Mat3f half_axes; ///< columns: from the centre to the middles of three sides
+};
+inline TurnedBox turned_box(const Box& box) {
+    return {box.centre().cast<float>(), (0.5 * box.size()).cast<float>().asDiagonal()};
+}
+
 /// The cells of a body where they are now, sorted into the boxes of a grid: a cell into the box of its centre (a large
 /// one into several), so that few boxes around a point have all that may hold it.
 class CellBoxes {
@@ -14,11 +23,18 @@ public:
     /// reach: m, that points may still move before they are looked for again.
     CellBoxes(const Matter& matter, const Vectors& positions, float reach);
 
-    /// The cell that holds the point, or the nearest within reach; kNoIndex where there is none.
-    Index find(const Vec3f& point) const;
+    struct Near {
+        Index cell = kNoIndex; ///< that holds the point, or the nearest within reach; kNoIndex: there is none
+        float gap = 0;         ///< m that the point is outside of a rigid body; of others unknown, 0
+    };
+    Near find(const Vec3f& point) const;
+
+    TurnedBox rigid_box() const; ///< all cells of a rigid body
+    /// m: the box is no nearer to the cells of a rigid body.
+    float gap_of_rigid(const TurnedBox& box) const;
 
 private:
-    Index find_rigid(const Vec3f& point) const;
+    Near find_rigid(const Vec3f& point) const;
     struct Range {
         std::array<int, 3> from, to; ///< both included
     };
@@ -35,9 +51,9 @@ private:
     const Matter& matter_;
     Mat3f inverse_ = Mat3f::Zero(); ///< of a rigid body: from the world to its cell 0
     Vec3f corner_ = Vec3f::Zero();
-    Vec3f high_ = Vec3f::Zero(); ///< with low_ the box of its cells in those coordinates
+    Vec3f low_ = Vec3f::Zero();  ///< of all boxes, m; of a rigid body: of all cells in those coordinates
+    Vec3f high_ = Vec3f::Zero(); ///< the same, of a rigid body
     float reach_ = 0;
-    Vec3f low_ = Vec3f::Zero();
     float boxes_a_metre_ = 1; ///< along an axis
     float around_ = 0;        ///< m: how far from a point the boxes lie that have all of its cells
     std::array<int, 3> counts_{0, 0, 0};

@@ -25,7 +25,7 @@ public:
     /// bodies: fixed in number from here on.
     Contacts(const World& world, std::size_t bodies, bool between_bodies, bool within_bodies)
         : world_(world), between_bodies_(between_bodies), within_bodies_(within_bodies), near_(bodies),
-          touched_(bodies, 0), matter_(world, between_bodies, within_bodies) {}
+          near_clear_until_(bodies, 0), touched_(bodies, 0), matter_(world, between_bodies, within_bodies) {}
     /// Once, when all bodies are there.
     void begin(std::span<const BodyState> bodies);
 
@@ -198,6 +198,8 @@ private:
     Blocks::Entry block_of(const Near& at, const BodyState& body, const ObstaclePoses& poses, float dt) const;
     void add_blocks_of(const NearPair& pair, std::span<const BodyState> bodies, bool of_first, float dt,
                        std::vector<Blocks::Entry>& entries) const;
+    ContactReport add_obstacle_forces(BodyState& body, std::size_t b, const ObstaclePoses& poses, float dt,
+                                      std::vector<Vec3f>& forces, const RunContext& context);
     Vec3f obstacle_force(Near& at, const BodyState& body, const ObstaclePoses& poses, float dt) const;
     PairForce pair_force(NearPair& pair, std::span<const BodyState> bodies, float dt) const;
     /// From the second's point to the first's, balls or surface points over them; of positions, or of velocities.
@@ -211,6 +213,7 @@ private:
     const World& world_;
     bool between_bodies_, within_bodies_;
     std::vector<std::vector<Near>> near_; ///< by body, ascending by obstacle and point
+    std::vector<float> near_clear_until_; ///< of each body: near_way_ until which none of these can touch
     std::vector<NearPair> pairs_;
     struct OwnBalls;                                         ///< of a body whose balls meet each other
     std::vector<std::shared_ptr<const OwnBalls>> own_balls_; ///< null: of the others

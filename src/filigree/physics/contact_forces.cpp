@@ -5,6 +5,7 @@
 #include "filigree/physics/contact_law.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace filigree {
 
@@ -12,7 +13,7 @@ using namespace contact_law;
 
 namespace {
 
-constexpr std::size_t kContactForcesGrain = 256;
+constexpr std::size_t kContactForcesGrain = 256, kObstacleForcesGrain = 16; // bodies
 constexpr double kStiffness = 4; ///< times the stiffness of a spacing of material under the point
 
 } // namespace
@@ -119,26 +120,42 @@ Contacts::PairForce Contacts::pair_force(NearPair& pair, std::span<const BodySta
     return {push, force - push};
 }
 
+/// forces: room.
+ContactReport Contacts::add_obstacle_forces(BodyState& body, std::size_t b, const ObstaclePoses& poses, float dt,
+                                            std::vector<Vec3f>& forces, const RunContext& context) {
+    ContactReport report;
+    std::vector<Near>& near = near_[b];
+    forces.assign(near.size(), Vec3f::Zero());
+    parallel_for(context, near.size(), kContactForcesGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k) forces[k] = obstacle_force(near[k], body, poses, dt);
+    });
+    near_clear_until_[b] = std::numeric_limits<float>::infinity();
+    for (std::size_t k = 0; k < near.size(); ++k) {
+        near_clear_until_[b] = std::min(near_clear_until_[b], near[k].clear_until);
+        if (!(near[k].depth > 0)) continue;
+        add_to_particles(body.surface, near[k].point, forces[k], body.forces);
+        touched_[b] |= kOnObstacle;
+        ++report.contacts;
+        report.deepest = std::max(report.deepest, near[k].depth);
+    }
+    return report;
+}
+
 ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, float dt, const RunContext& context) {
     ContactReport report;
     const ObstaclePoses poses(world_, time);
-    std::vector<Vec3f> forces;
-    std::ranges::fill(touched_, std::uint8_t{0});
-    for (std::size_t b = 0; b < bodies.size(); ++b) {
-        BodyState& body = bodies[b];
-        std::vector<Near>& near = near_[b];
-        if (body.sleeps()) continue;
-        forces.assign(near.size(), Vec3f::Zero());
-        parallel_for(context, near.size(), kContactForcesGrain, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t k = begin; k < end; ++k) forces[k] = obstacle_force(near[k], body, poses, dt);
-        });
-        for (std::size_t k = 0; k < near.size(); ++k) {
-            if (!(near[k].depth > 0)) continue;
-            add_to_particles(body.surface, near[k].point, forces[k], body.forces);
-            touched_[b] |= kOnObstacle;
-            ++report.contacts;
-            report.deepest = std::max(report.deepest, near[k].depth);
+    std::vector<ContactReport> reports(bodies.size());
+    parallel_for(context, bodies.size(), kObstacleForcesGrain, [&](std::size_t begin, std::size_t end) {
+        std::vector<Vec3f> forces;
+        for (std::size_t b = begin; b < end; ++b) {
+            touched_[b] = 0;
+            if (!bodies[b].sleeps() && !(near_clear_until_[b] > near_way_))
+                reports[b] = add_obstacle_forces(bodies[b], b, poses, dt, forces, context);
         }
+    });
+    for (const ContactReport& of_body : reports) {
+        report.contacts += of_body.contacts;
+        report.deepest = std::max(report.deepest, of_body.deepest);
     }
     std::vector<PairForce> pair_forces(pairs_.size());
     parallel_for(context, pairs_.size(), kContactForcesGrain, [&](std::size_t begin, std::size_t end) {
@@ -167,6 +184,7 @@ void Contacts::push_out(std::span<BodyState> bodies, double time) {
     const ObstaclePoses poses(world_, time);
     for (std::size_t b = 0; b < bodies.size(); ++b) {
         BodyState& body = bodies[b];
+        if (!(touched_[b] & kOnObstacle)) continue;
         const float most = kDeepest * float(body.body->spacing());
         for (const Near& at : near_[b]) {
             if (!(at.depth > most) || body.sleeps()) continue;

@@ -98,6 +98,7 @@ void Contacts::find_near(std::span<const BodyState> bodies, double time, float r
             }
         }
         near_[b] = std::move(found);
+        near_clear_until_[b] = 0;
     }
 }
 
@@ -187,6 +188,7 @@ bool Contacts::set_memory(const Memory& memory, std::span<const BodyState> bodie
     if (!std::isfinite(memory.near_way) || !std::isfinite(memory.near_until)) return false;
     if (!std::ranges::all_of(memory.near, is_sound) || !matter_.is_sound(memory.matter, bodies)) return false;
     for (std::vector<Near>& near : near_) near.clear();
+    near_clear_until_.assign(near_.size(), 0);
     for (const NearMemory& near : memory.near)
         near_[near.body].push_back({near.obstacle,
                                     near.point,

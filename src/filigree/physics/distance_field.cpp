@@ -239,10 +239,9 @@ DistanceField::Sample DistanceField::at(const Vec3f& point) const {
     std::array<std::size_t, 3> cube;
     Vec3f t;
     for (int axis = 0; axis < 3; ++axis) {
-        const float x = (within[axis] - corner_[axis]) / spacing_;
-        const float cell = std::clamp(std::floor(x), 0.0f, float(counts_[axis] - 2));
-        cube[axis] = std::size_t(cell);
-        t[axis] = std::clamp(x - cell, 0.0f, 1.0f);
+        const float x = std::max(0.0f, (within[axis] - corner_[axis]) / spacing_);
+        cube[axis] = std::min(std::size_t(x), counts_[axis] - 2);
+        t[axis] = std::min(x - float(cube[axis]), 1.0f);
     }
     const std::size_t dy = counts_[0], dz = counts_[0] * counts_[1];
     const float* d = &distances_[cube[2] * dz + cube[1] * dy + cube[0]];

@@ -14,7 +14,7 @@ namespace filigree {
 
 namespace {
 
-constexpr std::size_t kExplicitStepsGrain = 2048;
+constexpr std::size_t kExplicitStepsGrain = 2048, kAwakeGrain = 16; // bodies
 constexpr double kSafety = 0.9;           ///< part of the stable step that is used: it changes while a step is made
 constexpr double kLeastSubsteps = 2;      ///< a frame; with one, large motions gain energy
 constexpr double kShortestOpening = 0.25; ///< of the stable step: cracks that open faster are followed less well
@@ -189,6 +189,10 @@ private:
                 frequencies[cracks.first_piece() + piece] += double(pace.squared_frequency);
             opening_step = std::min(opening_step, double(pace.opening_step));
         }
+        rigid_loads_.resize(bodies_.size());
+        each_awake([&](const BodyState& body, std::size_t b) {
+            if (body.rigid) rigid_loads_[b] = rigid_load(body);
+        });
         for (std::size_t b = 0; b < bodies_.size(); ++b)
             if (!bodies_[b].sleeps())
                 stable_step_ = std::min(stable_step_, stable_step(frequencies[b], double(delay_of(b, dt))));
@@ -235,44 +239,44 @@ private:
         ++report_.substeps;
     }
 
+    template <class Visit>
+    void each_awake(const Visit& visit) { ///< on all threads
+        parallel_for(context_, bodies_.size(), kAwakeGrain, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t b = begin; b < end; ++b)
+                if (!bodies_[b].sleeps()) visit(bodies_[b], b);
+        });
+    }
+
     /// Pinned particles too: move_pins sets them right.
     void kick(float dt, bool damp) {
         const Vec3f gravity = state_.world.gravity.cast<float>();
-        for (BodyState& body : bodies_) {
-            if (body.sleeps()) continue;
-            if (body.rigid) {
-                kick_rigid(body, state_.world.gravity, double(dt),
-                           damp ? std::exp(-2 * double(dt) * body.body->material.damping) : 1);
-                continue;
-            }
-            const float kept = damp ? std::exp(-2 * dt * float(body.body->material.damping)) : 1.0f;
+        each_awake([&](BodyState& body, std::size_t b) {
+            const double kept = damp ? std::exp(-2 * double(dt) * body.body->material.damping) : 1;
+            if (body.rigid) return kick_rigid(body, rigid_loads_[b], state_.world.gravity, double(dt), kept);
             parallel_for(context_, body.positions.size(), kExplicitStepsGrain, [&](std::size_t begin, std::size_t end) {
                 const float* inverse_mass = body.inverse_mass.data();
                 const auto kick_axis = [&](std::vector<float>& velocities, const std::vector<float>& forces, float g) {
                     float* v = velocities.data();
                     const float* f = forces.data();
-                    for (std::size_t i = begin; i < end; ++i) v[i] = (v[i] + dt * (f[i] * inverse_mass[i] + g)) * kept;
+                    const auto left = float(kept);
+                    for (std::size_t i = begin; i < end; ++i) v[i] = (v[i] + dt * (f[i] * inverse_mass[i] + g)) * left;
                 };
                 kick_axis(body.velocities.x, body.forces.x, gravity.x());
                 kick_axis(body.velocities.y, body.forces.y, gravity.y());
                 kick_axis(body.velocities.z, body.forces.z, gravity.z());
             });
-        }
+        });
     }
 
     void drift(float dt) {
-        for (BodyState& body : bodies_) {
-            if (body.sleeps()) continue;
-            if (body.rigid) {
-                drift_rigid(body, double(dt));
-                continue;
-            }
+        each_awake([&](BodyState& body, std::size_t) {
+            if (body.rigid) return drift_rigid(body, double(dt));
             parallel_for(context_, body.positions.size(), kExplicitStepsGrain, [&](std::size_t begin, std::size_t end) {
                 for (std::size_t i = begin; i < end; ++i) body.positions.x[i] += dt * body.velocities.x[i];
                 for (std::size_t i = begin; i < end; ++i) body.positions.y[i] += dt * body.velocities.y[i];
                 for (std::size_t i = begin; i < end; ++i) body.positions.z[i] += dt * body.velocities.z[i];
             });
-        }
+        });
     }
 
     SimulationState& state_;
@@ -283,7 +287,8 @@ private:
     float speed_ = 0;           // m/s, of the fastest particle
     const bool meets_anything_; // obstacles, other bodies or parts of the same
     std::vector<ElasticReport> elastic_;
-    double stable_step_ = 0; // s
+    std::vector<RigidLoad> rigid_loads_; ///< of each body, by find_forces
+    double stable_step_ = 0;             // s
 };
 
 } // namespace

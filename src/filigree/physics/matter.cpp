@@ -38,7 +38,7 @@ CellMap map_cell(const Vectors& x, const std::array<Index, 8>& corners, const Ve
 
 } // namespace
 
-Matter::Matter(const Body& body) : body_(body) {
+Matter::Matter(const Body& body) : body_(body), is_rigid_(body.material.model == MaterialModel::rigid) {
     const Cells& cells = body.cells;
     for (const auto& cell : cells.cells)
         for (int axis = 0; axis < 3; ++axis) counts_[axis] = std::max(counts_[axis], int(cell[axis]) + 1);
@@ -130,11 +130,22 @@ Matter::Weights Matter::weights(const Place& place) const {
 }
 
 Vec3f Matter::mean(const Place& place, const Vectors& values) const {
-    const Weights w = weights(place);
     const std::array<Index, 8>& corner = corners(place.cell);
+    const Vec3f& t = place.local;
+    if (is_rigid())
+        return (1 - t.sum()) * values[corner[0]] + t[0] * values[corner[1]] + t[1] * values[corner[2]] +
+               t[2] * values[corner[4]];
+    const Weights w = weights(place);
     Vec3f sum = Vec3f::Zero();
     for (int c = 0; c < 8; ++c) sum += w[c] * values[corner[c]];
     return sum;
+}
+
+void Matter::add(const Place& place, const Vec3f& value, Vectors& values) const {
+    const std::array<Index, 8>& corner = corners(place.cell);
+    const Weights w = weights(place);
+    for (int c = 0; c < 8; ++c)
+        if (w[c] != 0) values.add(corner[c], w[c] * value);
 }
 
 /// The cell beyond the side that `local` is furthest outside of and that has a neighbour; local coordinates become that
@@ -195,6 +206,11 @@ Mat3f Matter::inverse_derivative(const Vectors& positions, const Place& place) c
         return inverse / float(body_.spacing() * body_.spacing());
     }
     return map_cell(positions, corners(place.cell), place.local).slope.inverse();
+}
+
+Matter::RigidMap Matter::rigid_map(const Vectors& positions) const {
+    const Mat3f inverse = inverse_derivative(positions, {0, Vec3f::Zero()});
+    return {inverse.transpose() * float(body_.spacing()), rest_position({0, Vec3f::Zero()}), positions[corners(0)[0]]};
 }
 
 float Matter::volume_ratio(const Vectors& positions, Index cell) const {

@@ -17,7 +17,7 @@ public:
     /// are asked for: are_together, are_in_three_steps, cell_at, cell_of_point, rest_position.
     explicit Matter(const Body& body);
     /// A rigid body is one cell that goes on as far as one likes.
-    bool is_rigid() const { return body_.material.model == MaterialModel::rigid; }
+    bool is_rigid() const { return is_rigid_; }
 
     /// A point in a cell: local coordinates are 0 .. 1 inside, and go on linearly outside.
     struct Place {
@@ -30,12 +30,22 @@ public:
     const std::array<Index, 8>& corners(Index cell) const { return body_.cells.cell_corners[cell]; }
     Vec3f mean(const Place& place, const Vectors& values) const; ///< of the corners' values, by their weights
 
+    void add(const Place& place, const Vec3f& value, Vectors& values) const; ///< to the corners, by their weights
+
     /// The place of a point, by Newton's method from `place` on, from cell to neighbouring cell. `inverse`: of the
     /// derivative by local coordinates, 1/m. False where cells are inverted or flat, or the walk does not end.
     bool locate(const Vectors& positions, const Vec3f& point, Place& place, Mat3f& inverse) const;
 
     /// Derivative of local coordinates by position, 1/m.
     Mat3f inverse_derivative(const Vectors& positions, const Place& place) const;
+
+    /// Where a rigid body has turned and moved to.
+    struct RigidMap {
+        Mat3f turn;
+        Vec3f rest, now; ///< m, of one corner
+        Vec3f place(const Vec3f& rest_point) const { return now + turn * (rest_point - rest); }
+    };
+    RigidMap rigid_map(const Vectors& positions) const;
 
     float volume_ratio(const Vectors& positions, Index cell) const; ///< of the cell's middle, now to rest
 
@@ -64,6 +74,7 @@ private:
     void find_cells_of_points();
 
     const Body& body_;
+    const bool is_rigid_;
     std::array<int, 3> counts_{0, 0, 0};
     std::vector<Index> grid_;                            ///< cell at each lattice index, kNoIndex where there is none
     std::vector<std::array<std::uint64_t, 2>> together_; ///< of each cell: bits of the 5^3 cells around it

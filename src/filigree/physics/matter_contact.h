@@ -152,13 +152,24 @@ private:
     void count_from_here(std::span<const BodyState> bodies);
     void find_shifts(std::span<const BodyState> bodies);
     Side make_side(Index body, Index other, std::span<const BodyState> bodies) const;
-    static void take_pairs(Side& side, const BodyState& body, std::span<const Index> found);
+    template <class Find>
+    static void take_pairs(Side& side, const BodyState& body, std::size_t points, const Find& find);
+    /// m that a side may go until a point that lies so far outside might touch.
+    static float safe_way(const Side& side, float distance) {
+        constexpr float kClearer = 0.8f; // part of a distance that is safe to go
+        constexpr float kLittle = 0.05f; // spacings; later would be too late: the way in would cost no energy
+        return distance < kLittle * side.spacing ? 0 : kClearer * distance;
+    }
     class Surroundings;
     static bool both_sleep(const Side& side, std::span<const BodyState> bodies) {
         return bodies[side.body].sleeps() && bodies[side.other].sleeps();
     }
     void find_own_pairs(Side& side, const BodyState& body, float frame, const RunContext& context) const;
-    void find_other_pairs(Side& side, Surroundings& around, float frame, const RunContext& context) const;
+    static bool is_near(Side& side, const Surroundings& around, float frame);
+    void find_other_pairs(Side& side, const Surroundings& around, const BodyState& body,
+                          const RunContext& context) const;
+    void find_pairs(std::span<const Index> due, std::span<const BodyState> bodies, float frame,
+                    const RunContext& context);
     bool wake_touched(std::span<BodyState> bodies) const;
     void list_work(std::span<const BodyState> bodies);
     void find_sides(std::span<const BodyState> bodies, double frame);
@@ -181,9 +192,11 @@ private:
     struct Followed {              ///< the particles of a body whose motion says when to search again
         std::vector<float> counts; ///< of each particle, 1 or 0
         Index heaviest = 0;
+        std::vector<Index> corners; ///< of a rigid body, instead: those that all others lie between
     };
     static Followed followed(const BodyState& body);
     Extremes extremes(std::size_t body, const Vectors& values, const Vectors* from) const;
+    Box extent(const BodyState& body, std::size_t number) const; ///< m, of its particles
     std::vector<Followed> followed_;
     std::vector<Extremes> speeds_;
     std::vector<Vectors> places_;  ///< of each body's particles, where its shifts are counted from
@@ -192,6 +205,7 @@ private:
     float way_ = 0, sides_until_ = -1;
     std::vector<std::pair<Index, Index>> work_; ///< side and pair of each force
     std::vector<Vec3f> forces_;
+    bool is_too_deep_ = false; ///< something touches deeper than push_out lets it, as add_forces or update_anchors saw
 };
 
 } // namespace filigree

@@ -11,7 +11,6 @@ using namespace contact_law;
 namespace {
 
 constexpr std::size_t kMatterForcesGrain = 128;
-constexpr float kClearer = 0.8f; ///< part of a distance that is safe to go
 constexpr float kSlowest = 0.2f; ///< of a side's speed: what its pairs may gain unasked
 constexpr float kLittle = 0.05f; ///< spacings until a point that is nowhere is asked again
 
@@ -25,15 +24,15 @@ void MatterContacts::leave(Pair& pair, const Side& side, float clearance) const 
     pair.clear_until = side.way + clearance;
 }
 
-/// m that the side may go until a point that lies so far outside might touch. Neighbours move alike, so that the pair's
-/// own speed counts, and not the side's.
+/// As safe_way. Neighbours move alike, so that the pair's own speed counts, and not the side's.
 float MatterContacts::clearance(const Pair& pair, const Side& side, float distance,
                                 std::span<const BodyState> bodies) const {
-    if (distance < kLittle * side.spacing) return 0; // later would be too late: the way in would cost no energy
+    const float safe = safe_way(side, distance);
+    if (safe == 0) return 0;
     const BodyState &body = bodies[side.body], &other = bodies[side.other];
     const Vec3f velocity = embedded_point(body.surface, pair.point, body.velocities) -
                            matter_[side.other]->mean(pair.place, other.velocities);
-    return kClearer * distance * side.speed / (velocity.norm() + kSlowest * side.speed);
+    return safe * side.speed / (velocity.norm() + kSlowest * side.speed);
 }
 
 /// Finds where a point lies in the other's matter. The surface's normal there if it touches; else the pair is left
@@ -110,6 +109,7 @@ void MatterContacts::anchor_at(Pair& pair, const Side& side, const BodyState& ot
 ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, std::span<std::uint8_t> touched,
                                          const RunContext& context) {
     ContactReport report;
+    is_too_deep_ = false;
     forces_.assign(work_.size(), Vec3f::Zero());
     parallel_for(context, work_.size(), kMatterForcesGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k) {
@@ -122,18 +122,18 @@ ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, 
         const Pair& pair = side.pairs[work_[k].second];
         if (!(pair.depth > 0)) continue;
         add_to_particles(bodies[side.body].surface, pair.point, forces_[k], bodies[side.body].forces);
-        const Matter::Weights weights = matter_[side.other]->weights(pair.place);
-        const auto& corners = matter_[side.other]->corners(pair.place.cell);
-        for (int c = 0; c < 8; ++c) bodies[side.other].forces.add(corners[c], -weights[c] * forces_[k]);
+        matter_[side.other]->add(pair.place, -forces_[k], bodies[side.other].forces);
         touched[side.body] |= kTouched;
         touched[side.other] |= kTouched;
         ++report.contacts;
         report.deepest_in_matter = std::max(report.deepest_in_matter, pair.depth);
+        is_too_deep_ |= pair.depth > kDeepest * side.spacing;
     }
     return report;
 }
 
 void MatterContacts::push_out(std::span<BodyState> bodies) {
+    if (!is_too_deep_) return;
     for (Side& side : sides_) {
         const float most = kDeepest * side.spacing;
         if (both_sleep(side, bodies)) continue;
@@ -212,6 +212,7 @@ std::vector<MatterContacts::Frame> MatterContacts::frames(std::span<const BodySt
 
 ContactReport MatterContacts::update_anchors(std::span<const BodyState> bodies, std::span<std::uint8_t> touched) {
     ContactReport report;
+    is_too_deep_ = false;
     for (Side& side : sides_)
         for (Pair& pair : side.pairs) {
             const std::optional<Vec3f> normal = enter(pair, side, bodies);
@@ -222,6 +223,7 @@ ContactReport MatterContacts::update_anchors(std::span<const BodyState> bodies, 
             touched[side.other] |= kTouched;
             ++report.contacts;
             report.deepest_in_matter = std::max(report.deepest_in_matter, pair.depth);
+            is_too_deep_ |= pair.depth > kDeepest * side.spacing;
             const bool landed = !pair.grasp.holds;
             Vec3f offset = Vec3f::Zero();
             if (!landed)

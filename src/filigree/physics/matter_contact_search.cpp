@@ -9,12 +9,13 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
 
 namespace filigree {
 
 namespace {
 
-constexpr std::size_t kMatterSearchGrain = 512;
+constexpr std::size_t kMatterSearchGrain = 512, kBodiesGrain = 8, kSidesGrain = 8;
 constexpr float kLeastReach = 0.1f; ///< spacings that anything may go between two searches; at most kMostReach
 constexpr float kOwnReach = 0.3f;   ///< the same of a body beside itself ...
 constexpr float kOwnSearches = 4;   ///< ... which is searched no more often than this in a frame
@@ -63,20 +64,42 @@ Vectors positions_in(const BodyState& body, float seconds) {
     return positions;
 }
 
-std::vector<Vec3f> surface_places(const Embedding& points, const Vectors& positions, const RunContext& context) {
+std::vector<Vec3f> surface_places(const BodyState& body, const Matter* matter, const RunContext& context) {
+    const Embedding& points = body.surface;
     std::vector<Vec3f> places(points.size());
+    std::optional<Matter::RigidMap> map;
+    if (matter && matter->is_rigid()) map = matter->rigid_map(body.positions);
     parallel_for(context, places.size(), kMatterSearchGrain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t s = begin; s < end; ++s) places[s] = embedded_point(points, s, positions);
+        for (std::size_t s = begin; s < end; ++s)
+            places[s] = map ? map->place(points.rest[s]) : embedded_point(points, s, body.positions);
     });
     return places;
+}
+
+/// Particles of a lattice that all others lie between, along x, y or z.
+std::vector<Index> outermost(const Vectors& rest) {
+    std::vector<std::uint8_t> lies_between(rest.size(), 0);
+    std::vector<Index> order(rest.size());
+    std::iota(order.begin(), order.end(), Index{0});
+    for (int axis = 0; axis < 3; ++axis) {
+        const auto row = [&](Index i) { return std::pair(rest[i][(axis + 1) % 3], rest[i][(axis + 2) % 3]); };
+        const auto is_before = [&](Index i, Index j) { return row(i) == row(j) && rest[i][axis] < rest[j][axis]; };
+        std::ranges::sort(order, {}, [&](Index i) { return std::pair(row(i), rest[i][axis]); });
+        for (std::size_t k = 1; k + 1 < order.size(); ++k)
+            lies_between[order[k]] |= is_before(order[k - 1], order[k]) && is_before(order[k], order[k + 1]);
+    }
+    std::erase_if(order, [&](Index i) { return lies_between[i] != 0; });
+    std::ranges::sort(order);
+    return order;
 }
 
 } // namespace
 
 MatterContacts::Followed MatterContacts::followed(const BodyState& body) {
+    if (body.rigid) return {{}, 0, outermost(body.body->rest)};
     const std::vector<float>& mass = body.body->mass;
-    Followed followed{std::vector<float>(mass.size(), 1), Index(std::ranges::max_element(mass) - mass.begin())};
-    if (body.rigid || body.has_balls()) return followed; // those are light beside the corners of cells alone
+    Followed followed{std::vector<float>(mass.size(), 1), Index(std::ranges::max_element(mass) - mass.begin()), {}};
+    if (body.has_balls()) return followed; // those are light beside the corners of cells alone
     const std::vector<std::uint8_t> light = light_particles(*body.body);
     for (std::size_t i = 0; i < light.size(); ++i) followed.counts[i] = light[i] ? 0.0f : 1.0f;
     return followed;
@@ -85,8 +108,14 @@ MatterContacts::Followed MatterContacts::followed(const BodyState& body) {
 /// Of particles that are followed: of their values, less `from` unless that is null.
 MatterContacts::Extremes MatterContacts::extremes(std::size_t body, const Vectors& values, const Vectors* from) const {
     constexpr std::size_t kAtOnce = 16; // so that the compiler uses vectors
-    const auto& [counts, heaviest] = followed_[body];
+    const auto& [counts, heaviest, corners] = followed_[body];
+    const auto value_of = [&](Index i) -> Vec3f { return from ? Vec3f(values[i] - (*from)[i]) : values[i]; };
     Extremes found;
+    if (!corners.empty()) {
+        found.least = found.most = value_of(corners[0]);
+        for (const Index i : corners) found = found.with({value_of(i), value_of(i)});
+        return found;
+    }
     const auto take_axis = [&](int axis, const auto& value) {
         const float usual = value(heaviest);
         float least[kAtOnce], most[kAtOnce];
@@ -112,6 +141,14 @@ MatterContacts::Extremes MatterContacts::extremes(std::size_t body, const Vector
             take_axis(axis, [=](std::size_t i) { return along[i]; });
     }
     return found;
+}
+
+Box MatterContacts::extent(const BodyState& body, std::size_t number) const {
+    const std::vector<Index>& corners = followed_[number].corners;
+    if (corners.empty()) return box_of(body.positions);
+    Box box;
+    for (const Index i : corners) box.extend(body.positions[i].cast<double>());
+    return box;
 }
 
 void MatterContacts::begin(std::span<const BodyState> bodies) {
@@ -201,30 +238,33 @@ void MatterContacts::find_sides(std::span<const BodyState> bodies, double frame)
     for (Index b = 0; b < bodies.size(); ++b) {
         if (bodies[b].is_absent) continue;
         if (!is_finite(bodies[b].positions)) continue; // the frame is done again
-        boxes[b] = box_of(bodies[b].positions);
+        boxes[b] = extent(bodies[b], b);
         order.push_back(b);
         spacing = std::max(spacing, float(bodies[b].body->spacing()));
         speed = std::max(speed, relative_speed(b, order.front()));
     }
-    const float reach = std::max(spacing, std::min(speed * float(frame), 4 * spacing));
+    const float reach = std::max(spacing, std::min(speed * float(frame), 2 * spacing));
     way_ = 0;
     sides_until_ = reach;
     const double far = double(reach + spacing);
     std::ranges::sort(order, {}, [&](Index b) { return std::pair(boxes[b].min.x(), b); });
-    std::vector<std::pair<Index, Index>> found;
+    std::vector<std::uint64_t> found; // of two bodies
+    const auto add = [&](Index body, Index other) { found.push_back(std::uint64_t(body) << 32 | other); };
     for (auto a = order.begin(); a != order.end(); ++a) {
-        if (within_bodies_ && matter_[*a] && !bodies[*a].rigid) found.emplace_back(*a, *a);
+        if (within_bodies_ && matter_[*a] && !bodies[*a].rigid) add(*a, *a);
         if (!between_bodies_) continue;
         for (auto b = a + 1; b != order.end() && boxes[*b].min.x() - far <= boxes[*a].max.x(); ++b) {
             if (!are_near(boxes[*a], boxes[*b], far)) continue;
-            if (matter_[*b]) found.emplace_back(*a, *b);
-            if (matter_[*a]) found.emplace_back(*b, *a);
+            if (matter_[*b]) add(*a, *b);
+            if (matter_[*a]) add(*b, *a);
         }
     }
     std::ranges::sort(found);
     std::vector<Side> sides;
+    sides.reserve(found.size());
     auto old = sides_.begin();
-    for (const auto& [body, other] : found) {
+    for (const std::uint64_t two : found) {
+        const auto body = Index(two >> 32), other = Index(two);
         while (old != sides_.end() && std::pair(old->body, old->other) < std::pair(body, other)) ++old;
         if (old != sides_.end() && old->body == body && old->other == other)
             sides.push_back(std::move(*old));
@@ -248,17 +288,23 @@ void MatterContacts::find_approaching(std::span<const BodyState> bodies, double 
     find_sides(bodies, frame);
 }
 
-/// Pairs of a side anew, and its way counts from here; those that touch stay. found: of each point, the cell it is
-/// near.
-void MatterContacts::take_pairs(Side& side, const BodyState& body, std::span<const Index> found) {
+/// Pairs of a side anew, and its way counts from here; those that touch stay. find(s): what point s is near.
+template <class Find>
+void MatterContacts::take_pairs(Side& side, const BodyState& body, std::size_t points, const Find& find) {
     std::vector<Pair> pairs;
     auto old = side.pairs.begin();
-    for (Index s = 0; s < found.size(); ++s) {
+    for (Index s = 0; s < points; ++s) {
+        const CellBoxes::Near found = find(s);
+        if (found.cell == kNoIndex && (old == side.pairs.end() || s < old->point)) continue;
         while (old != side.pairs.end() && old->point < s) ++old;
         if (old != side.pairs.end() && old->point == s && (old->grasp.holds || old->tangled))
             pairs.push_back(*old);
-        else if (found[s] != kNoIndex && !body.is_hidden(s))
-            pairs.push_back({.point = s, .place = {found[s]}, .grasp = {}, .anchor = {}});
+        else if (found.cell != kNoIndex && !body.is_hidden(s))
+            pairs.push_back({.point = s,
+                             .place = {found.cell},
+                             .clear_until = side.way + safe_way(side, found.gap),
+                             .grasp = {},
+                             .anchor = {}});
     }
     for (Pair& pair : pairs) pair.clear_until -= side.way;
     side.way = side.moved = 0;
@@ -268,6 +314,7 @@ void MatterContacts::take_pairs(Side& side, const BodyState& body, std::span<con
 /// A body that sleeps wakes when one that touches it moves.
 bool MatterContacts::wake_touched(std::span<BodyState> bodies) const {
     bool woke = false;
+    if (std::ranges::none_of(bodies, &BodyState::sleeps)) return woke;
     for (const Side& side : sides_)
         for (const auto& [sleeper, other] : {std::pair(side.body, side.other), std::pair(side.other, side.body)}) {
             if (!bodies[sleeper].sleeps() || bodies[other].sleeps()) continue;
@@ -280,36 +327,47 @@ bool MatterContacts::wake_touched(std::span<BodyState> bodies) const {
     return woke;
 }
 
-/// What several sides of one search ask of bodies, worked out once.
+/// What several sides of one search ask of bodies, worked out once for each.
 class MatterContacts::Surroundings {
 public:
-    Surroundings(const MatterContacts& contacts, std::span<const BodyState> bodies, const RunContext& context)
-        : contacts_(contacts), bodies_(bodies), context_(context), extents_(bodies.size()), points_(bodies.size()) {}
-
-    const Box& extent(Index body) {
-        if (extents_[body].empty()) extents_[body] = box_of(bodies_[body].positions);
-        return extents_[body];
+    Surroundings(const MatterContacts& contacts, std::span<const BodyState> bodies)
+        : contacts_(contacts), bodies_(bodies), extents_(bodies.size()), points_(bodies.size()), cells_(bodies.size()) {
     }
-    std::span<const Vec3f> surface_points(Index body) {
-        std::vector<Vec3f>& points = points_[body];
-        if (points.empty()) points = surface_places(bodies_[body].surface, bodies_[body].positions, context_);
-        return points;
+    void find_extent(Index body) {
+        if (!extents_[body].empty()) return;
+        extents_[body] = contacts_.extent(bodies_[body], body);
+        if (is_rigid(body)) find_cells(body);
     }
-    const BodyState& body(Index body) const { return bodies_[body]; }
-    const CellBoxes& cells(Index body) {
-        const auto found = cells_.find(body);
-        if (found != cells_.end()) return found->second;
+    void find_points(Index body, const RunContext& context) {
+        points_[body] = surface_places(bodies_[body], contacts_.matter_[body].get(), context);
+    }
+    void find_cells(Index body) {
         const float reach = kMostReach * float(bodies_[body].body->spacing());
-        return cells_.try_emplace(body, *contacts_.matter_[body], bodies_[body].positions, reach).first->second;
+        if (!cells_[body]) cells_[body].emplace(*contacts_.matter_[body], bodies_[body].positions, reach);
+    }
+
+    const Box& extent(Index body) const { return extents_[body]; }            ///< after find_extent
+    std::span<const Vec3f> points(Index body) const { return points_[body]; } ///< after find_points
+    const CellBoxes& cells(Index body) const { return *cells_[body]; }        ///< after find_cells
+    /// m, after find_extent of both: points of a body are no nearer to another's cells. Looks no closer where that is
+    /// `enough`.
+    double gap(Index body, Index other, double enough) const {
+        const Box &a = extent(body), &b = extent(other);
+        const double gap = (a.min - b.max).cwiseMax(b.min - a.max).cwiseMax(0).norm();
+        if (gap > enough || !is_rigid(other)) return gap;
+        if (!is_rigid(body)) return std::max(gap, double(cells(other).gap_of_rigid(turned_box(a))));
+        return std::max({gap, double(cells(other).gap_of_rigid(cells(body).rigid_box())),
+                         double(cells(body).gap_of_rigid(cells(other).rigid_box()))});
     }
 
 private:
+    bool is_rigid(Index body) const { return contacts_.matter_[body] && contacts_.matter_[body]->is_rigid(); }
+
     const MatterContacts& contacts_;
     std::span<const BodyState> bodies_;
-    const RunContext& context_;
     std::vector<Box> extents_;
     std::vector<std::vector<Vec3f>> points_;
-    std::map<Index, CellBoxes> cells_;
+    std::vector<std::optional<CellBoxes>> cells_;
 };
 
 /// Of a body and itself: where everything will be halfway to the next search.
@@ -317,33 +375,73 @@ void MatterContacts::find_own_pairs(Side& side, const BodyState& body, float fra
     const float reach = kOwnReach * side.spacing;
     const float ahead = 0.5f * std::clamp(reach / side.speed, frame / kOwnSearches, frame);
     side.until = reach;
-    take_pairs(side, body, own_cells_[side.body]->find(positions_in(body, ahead), reach, context));
+    const std::vector<Index> cells = own_cells_[side.body]->find(positions_in(body, ahead), reach, context);
+    take_pairs(side, body, cells.size(), [&](Index s) { return CellBoxes::Near{cells[s]}; });
 }
 
-void MatterContacts::find_other_pairs(Side& side, Surroundings& around, float frame, const RunContext& context) const {
-    const float reach = std::clamp(side.speed * frame, kLeastReach * side.spacing, kMostReach * side.spacing);
-    side.until = reach;
-    const double far = double(reach + kOutside * side.spacing);
-    Box near = around.extent(side.other);
-    if (!are_near(around.extent(side.body), near, far)) {
-        side.pairs.clear();
-        side.way = side.moved = 0;
-        return;
-    }
-    near.min.array() -= far;
-    near.max.array() += far;
-    const std::span<const Vec3f> points = around.surface_points(side.body);
+/// Whether bodies are so near that points have to be looked for; else the side is left until they may be.
+bool MatterContacts::is_near(Side& side, const Surroundings& around, float frame) {
+    side.until = std::clamp(side.speed * frame, kLeastReach * side.spacing, kMostReach * side.spacing);
+    const float far = side.until + kOutside * side.spacing;
+    const auto gap = float(around.gap(side.body, side.other, double(far)));
+    if (!(gap > far)) return true;
+    side.pairs.clear();
+    side.way = side.moved = 0;
+    side.until = gap - kOutside * side.spacing;
+    return false;
+}
+
+void MatterContacts::find_other_pairs(Side& side, const Surroundings& around, const BodyState& body,
+                                      const RunContext& context) const {
+    const float far = side.until + kOutside * side.spacing;
+    const Box& box = around.extent(side.other);
+    const Vec3f low = box.min.cast<float>().array() - far, high = box.max.cast<float>().array() + far;
+    const std::span<const Vec3f> points = around.points(side.body);
     const CellBoxes& cells = around.cells(side.other);
-    const Vec3f low = near.min.cast<float>(), high = near.max.cast<float>();
-    std::vector<Index> found(points.size());
+    std::vector<CellBoxes::Near> found(points.size());
     parallel_for(context, points.size(), kMatterSearchGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t s = begin; s < end; ++s) {
             const Vec3f& p = points[s];
-            const bool is_near = ((p.array() >= low.array()) && (p.array() <= high.array())).all();
-            found[s] = is_near ? cells.find(p) : kNoIndex;
+            const bool is_near = p.x() >= low.x() && p.x() <= high.x() && p.y() >= low.y() && p.y() <= high.y() &&
+                                 p.z() >= low.z() && p.z() <= high.z();
+            if (is_near) found[s] = cells.find(p);
         }
     });
-    take_pairs(side, around.body(side.body), found);
+    take_pairs(side, body, points.size(), [&](Index s) { return found[s]; });
+}
+
+/// Finds the pairs of sides anew.
+void MatterContacts::find_pairs(std::span<const Index> due, std::span<const BodyState> bodies, float frame,
+                                const RunContext& context) {
+    Surroundings around(*this, bodies);
+    std::vector<Index> near; // sides of two bodies
+    std::vector<std::uint8_t> has_points(bodies.size(), 0), has_cells(bodies.size(), 0);
+    for (const Index i : due) {
+        Side& side = sides_[i];
+        side.since = 0;
+        if (side.body == side.other) {
+            find_own_pairs(side, bodies[side.body], frame, context);
+            continue;
+        }
+        around.find_extent(side.body);
+        around.find_extent(side.other);
+        if (is_near(side, around, frame)) {
+            near.push_back(i);
+            has_points[side.body] = has_cells[side.other] = 1;
+        }
+    }
+    parallel_for(context, bodies.size(), kBodiesGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t b = begin; b < end; ++b) {
+            if (has_points[b]) around.find_points(Index(b), context);
+            if (has_cells[b]) around.find_cells(Index(b));
+        }
+    });
+    parallel_for(context, near.size(), kSidesGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k) {
+            Side& side = sides_[near[k]];
+            find_other_pairs(side, around, bodies[side.body], context);
+        }
+    });
 }
 
 bool MatterContacts::search(std::span<BodyState> bodies, double frame, const RunContext& context) {
@@ -351,22 +449,17 @@ bool MatterContacts::search(std::span<BodyState> bodies, double frame, const Run
     if (changed) find_sides(bodies, frame);
     const bool woke = wake_touched(bodies);
     find_shifts(bodies);
-    const auto is_due = [&](const Side& side, float part) {
-        if (!(moved(side) > part * side.until) || both_sleep(side, bodies)) return false;
+    const auto is_due = [&](const Side& side, float moved, float part) {
+        if (!(moved > part * side.until) || both_sleep(side, bodies)) return false;
         return side.body != side.other || side.since >= float(frame) / kOwnSearches;
     };
-    if (std::ranges::any_of(sides_, [&](const Side& side) { return is_due(side, 1); })) {
+    if (std::ranges::any_of(sides_, [&](const Side& side) { return is_due(side, moved(side), 1); })) {
         changed = true;
         count_from_here(bodies);
-        Surroundings around(*this, bodies, context);
-        for (Side& side : sides_) {
-            if (!is_due(side, kSearchedAlong)) continue;
-            side.since = 0;
-            if (side.body == side.other)
-                find_own_pairs(side, bodies[side.body], float(frame), context);
-            else
-                find_other_pairs(side, around, float(frame), context);
-        }
+        std::vector<Index> due;
+        for (Index i = 0; i < sides_.size(); ++i)
+            if (is_due(sides_[i], sides_[i].moved, kSearchedAlong)) due.push_back(i);
+        find_pairs(due, bodies, float(frame), context);
     }
     if (changed || woke) list_work(bodies);
     return woke;

@@ -40,6 +40,19 @@ Vec3d centre_of(const Vectors& positions, std::span<const float> mass) {
     return sum / all;
 }
 
+/// to = centre + map (from - origin) of each point.
+void map_affinely(const Vectors& from, const Vec3d& origin, const Mat3d& map, const Vec3d& centre, Vectors& to) {
+    const Vec3f o = origin.cast<float>();
+    for (int axis = 0; axis < 3; ++axis) { // one at a time, so that the compiler uses vectors
+        const Vec3f m = map.row(axis).cast<float>();
+        const auto c = float(centre[axis]);
+        const float *x = from.x.data(), *y = from.y.data(), *z = from.z.data();
+        float* along = (to.*kVectorAxes[axis]).data();
+        for (std::size_t i = 0; i < from.size(); ++i)
+            along[i] = c + (m.x() * (x[i] - o.x()) + m.y() * (y[i] - o.y()) + m.z() * (z[i] - o.z()));
+    }
+}
+
 class RigidElasticity final : public Elasticity {
 public:
     explicit RigidElasticity(const Body& body) : body_(body) {
@@ -146,24 +159,12 @@ RigidPose rigid_pose(const BodyState& body) {
 
 void place_particles(BodyState& body) {
     const RigidPose& pose = *body.rigid;
-    const Mat3f r = pose.turn.toRotationMatrix().cast<float>();
-    const Vec3f spin = (turned(pose, pose.inverse_inertia) * pose.angular).cast<float>();
-    const Vec3f centre = pose.centre.cast<float>(), velocity = pose.velocity.cast<float>();
-    const Vec3f from = pose.rest_centre.cast<float>();
-    const Vectors& rest = body.body->rest;
-    Vectors &x = body.positions, &v = body.velocities;
-    for (std::size_t i = 0; i < rest.size(); ++i) { // numbers alone, so that the compiler uses vectors
-        const float qx = rest.x[i] - from.x(), qy = rest.y[i] - from.y(), qz = rest.z[i] - from.z();
-        const float ax = r(0, 0) * qx + r(0, 1) * qy + r(0, 2) * qz;
-        const float ay = r(1, 0) * qx + r(1, 1) * qy + r(1, 2) * qz;
-        const float az = r(2, 0) * qx + r(2, 1) * qy + r(2, 2) * qz;
-        x.x[i] = centre.x() + ax;
-        x.y[i] = centre.y() + ay;
-        x.z[i] = centre.z() + az;
-        v.x[i] = velocity.x() + (spin.y() * az - spin.z() * ay);
-        v.y[i] = velocity.y() + (spin.z() * ax - spin.x() * az);
-        v.z[i] = velocity.z() + (spin.x() * ay - spin.y() * ax);
-    }
+    const Mat3d turn = pose.turn.toRotationMatrix();
+    const Vec3d spin = turned(pose, pose.inverse_inertia) * pose.angular;
+    Mat3d spinning; // spin x r
+    for (int axis = 0; axis < 3; ++axis) spinning.col(axis) = spin.cross(turn.col(axis));
+    map_affinely(body.body->rest, pose.rest_centre, turn, pose.centre, body.positions);
+    map_affinely(body.body->rest, pose.rest_centre, spinning, pose.velocity, body.velocities);
 }
 
 void fit_pose(BodyState& body) {
@@ -177,17 +178,23 @@ void fit_pose(BodyState& body) {
     place_particles(body);
 }
 
-void kick_rigid(BodyState& body, const Vec3d& gravity, double dt, double kept) {
-    RigidPose& pose = *body.rigid;
+RigidLoad rigid_load(const BodyState& body) {
     Vec3d force = Vec3d::Zero(), torque = Vec3d::Zero();
-    for (std::size_t i = 0; i < body.forces.size(); ++i) {
-        const Vec3f f = body.forces[i];
-        if (f.isZero(0)) continue;
-        force += f.cast<double>();
-        torque += (body.positions[i].cast<double>() - pose.centre).cross(f.cast<double>());
+    const float *x = body.forces.x.data(), *y = body.forces.y.data(), *z = body.forces.z.data();
+    const Vec3d centre = body.rigid->centre;
+    for (std::size_t i = 0, count = body.forces.size(); i < count; ++i) {
+        if (x[i] == 0 && y[i] == 0 && z[i] == 0) continue; // of most, often
+        const Vec3d f(double(x[i]), double(y[i]), double(z[i]));
+        force += f;
+        torque += (body.positions[i].cast<double>() - centre).cross(f);
     }
-    pose.velocity = (pose.velocity + dt * (force / pose.mass + gravity)) * kept;
-    pose.angular = (pose.angular + dt * torque) * kept;
+    return {force, torque};
+}
+
+void kick_rigid(BodyState& body, const RigidLoad& load, const Vec3d& gravity, double dt, double kept) {
+    RigidPose& pose = *body.rigid;
+    pose.velocity = (pose.velocity + dt * (load.force / pose.mass + gravity)) * kept;
+    pose.angular = (pose.angular + dt * load.torque) * kept;
 }
 
 void drift_rigid(BodyState& body, double dt) {

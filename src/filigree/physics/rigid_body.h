@@ -6,8 +6,8 @@
 namespace filigree {
 
 /// Squared frequency that contacts give a rigid body at most, 1/s^2: stiff enough that five stacked stones sink in by
-/// less than a millimetre in all, soft enough for some 17 substeps a frame at 60 frames a second.
-inline constexpr float kRigidSquaredFrequency = 1e6f;
+/// less than a millimetre in all, soft enough for 16 substeps a frame at 60 frames a second.
+inline constexpr float kRigidSquaredFrequency = 0.99e6f;
 
 /// The same particles and surface, of a material that does not deform. body: of fem or springs.
 Body as_rigid(const Body& body);
@@ -19,8 +19,14 @@ void place_particles(BodyState& body);
 /// The pose that fits the particles best, after something moved them one by one.
 void fit_pose(BodyState& body);
 
-/// m/s of the forces on the particles and gravity, for dt; then what damping leaves, a factor.
-void kick_rigid(BodyState& body, const Vec3d& gravity, double dt, double kept);
+/// What the forces on the particles are together.
+struct RigidLoad {
+    Vec3d force = Vec3d::Zero();  ///< N
+    Vec3d torque = Vec3d::Zero(); ///< N m, about the centre of mass
+};
+RigidLoad rigid_load(const BodyState& body);
+/// m/s of the load and gravity, for dt; then what damping leaves, a factor.
+void kick_rigid(BodyState& body, const RigidLoad& load, const Vec3d& gravity, double dt, double kept);
 /// Moves by the velocities for dt, and places the particles.
 void drift_rigid(BodyState& body, double dt);
 
