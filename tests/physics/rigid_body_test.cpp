@@ -108,6 +108,73 @@ TEST(RigidBody, AStackOfFiveSleepsAndWakesWhenItIsHit) {
     EXPECT_GT((centre_of_mass(stack, 4) - before).norm(), 0.05) << "it is hit";
 }
 
+TEST(RigidBody, SleepersThatAHandWakesFeelTheGroundAndGoOnTheSameAfterARestore) {
+    World world;
+    world.obstacles.emplace_back().shape = HalfSpace{};
+    const auto cube = block(3, 3, 3, 0.1, stone(0.1));
+    std::vector<Actor> actors = {put(cube, Vec3d(0, 0.15, 0)), put(cube, Vec3d(0, 0.45, 0)), put(cube, Vec3d(2, 15, 0)),
+                                 put(cube, Vec3d(2.1, 30, 0))}; // two still fall
+    Simulation stack = begin(world, actors);
+    for (int frame = 0; frame < 100; ++frame) ASSERT_TRUE(stack.advance(kOneThread).ok());
+    const Vec3d before = centre_of_mass(stack, 1);
+    for (int frame = 0; frame < 5; ++frame) ASSERT_TRUE(stack.advance(kOneThread).ok());
+    ASSERT_EQ((centre_of_mass(stack, 1) - before).norm(), 0) << "it sleeps";
+    for (const std::size_t body : {0u, 1u}) { // as light as nothing, but it wakes them
+        Vectors push(stack.body(body).particle_count());
+        push.set(0, Vec3f(1e-3f, 0, 0));
+        ASSERT_TRUE(stack.set_forces(body, push).ok());
+    }
+    ASSERT_TRUE(stack.advance(kOneThread).ok()); // wakes them in its end
+    Simulation other = begin(world, actors);
+    for (const std::size_t body : {0u, 1u}) {
+        Vectors push(stack.body(body).particle_count());
+        push.set(0, Vec3f(1e-3f, 0, 0));
+        ASSERT_TRUE(other.set_forces(body, push).ok());
+    }
+    ASSERT_TRUE(other.restore(stack.save()).ok());
+    for (int frame = 0; frame < 30; ++frame) {
+        const FrameReport report = stack.advance(kOneThread).value();
+        ASSERT_TRUE(other.advance(kOneThread).ok());
+        EXPECT_TRUE(stack.save() == other.save()) << frame;
+        EXPECT_LT((centre_of_mass(stack, 1) - before).norm(), 1e-4) << frame;
+        EXPECT_LT(report.deepest_in_matter, 1e-3) << frame;
+    }
+}
+
+/// Meshfree particles lie in the middle of their cells: the surface is half a spacing outside of their box.
+TEST(RigidBody, MeshfreeBodiesLieOnRigidAndElasticOnes) {
+    World world;
+    world.obstacles.emplace_back().shape = HalfSpace{};
+    Material soft;
+    soft.model = MaterialModel::meshfree;
+    soft.young_modulus = 1e6;
+    soft.damping = 1;
+    Material rubber = soft;
+    rubber.model = MaterialModel::fem;
+    struct Case {
+        std::shared_ptr<const Body> below;
+        double spacing;
+    };
+    for (const auto& [below, spacing] :
+         {Case{block(8, 2, 8, 0.05, stone(0.1)), 0.05}, Case{block(8, 2, 8, 0.05, rubber), 0.05},
+          Case{block(40, 4, 40, 0.01, stone(0.1)), 0.05}}) {
+        const auto cube = block(4, 4, 4, spacing, soft);
+        const double top = double(below->spacing()) * (below->cells.cells.size() == 128 ? 2 : 4);
+        Simulation lying = begin(world, {put(below, Vec3d(0, 0.5 * top, 0)), put(cube, Vec3d(0, top + 2 * spacing, 0))},
+                                 StepMode::explicit_steps);
+        for (int frame = 0; frame < 150; ++frame) ASSERT_TRUE(lying.advance(kOneThread).ok());
+        double lowest = 1e9, highest = -1e9, deepest = 0;
+        for (int frame = 0; frame < 30; ++frame) {
+            deepest = std::max(deepest, lying.advance(kOneThread).value().deepest_in_matter);
+            lowest = std::min(lowest, centre_of_mass(lying, 1).y());
+            highest = std::max(highest, centre_of_mass(lying, 1).y());
+        }
+        EXPECT_LT(highest - lowest, 1e-4);
+        EXPECT_LT(deepest, 0.1 * spacing);
+        EXPECT_NEAR(highest, top + 2 * spacing, 0.3 * spacing);
+    }
+}
+
 TEST(RigidBody, SoftAndRigidBodiesMeet) {
     Material soft;
     soft.young_modulus = 2e5;

@@ -1,14 +1,16 @@
 #!/usr/bin/env python3
 """Tests of the tests: makes one small change of the library at a time, and sees whether a test fails.
 
-Usage: mutate.py RELEASE SINGLE WORK [--count N] [--seed S] [--add] [--jobs N] [--json FILE]
+Usage: mutate.py RELEASE SINGLE WORK [--count N] [--seed S] [--add | --again] [--jobs N] [--json FILE]
 RELEASE is a build whose tests pass; SINGLE is configured to compile one source at a time; WORK is for files of its own.
 The tree is left as it is: a changed copy of one source is compiled and linked into a library beside the release's, which
 its tests then load. Changes are of arithmetic, comparisons, logic and constants in the layers below. One that does not
-compile is passed over. --add counts on from what FILE holds, of other seeds.
+compile is passed over. --add counts on from what FILE holds, of other seeds; --again tries those that escaped there, as
+tests may catch them by now.
 """
 import argparse
 import concurrent.futures
+import itertools
 import json
 import os
 import pathlib
@@ -61,6 +63,28 @@ def command_of(test, release):
 
 def run(words, **how):
     return subprocess.run([str(word) for word in words], capture_output=True, **how)
+
+
+def random_changes(by_layer, choice):
+    """Of one layer after another, without end: layer, path, line number and what that line becomes."""
+    for layer in itertools.cycle(LAYERS):
+        path, number, begin, end, text = choice.choice(by_layer[layer])
+        was = path.read_text().splitlines(keepends=True)[number]
+        yield layer, path, number, was[:begin] + text + was[end:]
+
+
+def escaped_changes(told):
+    """The same, of those that escaped."""
+    changes = []
+    for mutant in told["escaped"]:
+        path = ROOT / mutant["where"].rsplit(":", 1)[0]
+        lines = path.read_text().splitlines(keepends=True)
+        number = next((n for n, line in enumerate(lines) if line.strip() == mutant["was"]), None)
+        if number is None:
+            sys.exit(f"mutate: {mutant['where']} has changed: there is no line \"{mutant['was']}\"; take it out of the file")
+        was = lines[number]
+        changes.append((path.parent.name, path, number, was.replace(mutant["was"], mutant["became"])))
+    return changes
 
 
 class Library:
@@ -122,18 +146,26 @@ def main():
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--add", action="store_true")
+    parser.add_argument("--again", action="store_true")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--json", type=pathlib.Path)
     options = parser.parse_args()
-    by_layer = sites()
-    choice = random.Random(options.seed)
     told = {"seeds": {}, "made": 0, "caught": 0, "escaped": []}
-    if options.add and options.json and options.json.exists():
+    if (options.add or options.again) and options.json and options.json.exists():
         told = json.loads(options.json.read_text())
+    by_layer = sites()
     seed = str(options.seed)
-    if seed in told["seeds"]:
+    if options.again:
+        changes = escaped_changes(told)
+        options.count = len(changes)
+        told["made"] -= len(changes)
+        told["escaped"] = []
+    elif seed in told["seeds"]:
         sys.exit(f"mutate: changes of seed {seed} are counted already; take another seed")
-    told["seeds"][seed] = 0
+    else:
+        changes = random_changes(by_layer, random.Random(options.seed))
+        told["seeds"][seed] = 0
+    changes = iter(changes)
     library = Library(options.release, options.single)
     lock = threading.Lock()
     tried = 0
@@ -162,12 +194,11 @@ def main():
             with lock:
                 if tried >= options.count:
                     return
-                layer = list(LAYERS)[tried % len(LAYERS)]
-                path, number, begin, end, text = choice.choice(by_layer[layer])
+                layer, path, number, line = next(changes)
                 tried += 1
             lines = path.read_text().splitlines(keepends=True)
             was = lines[number]
-            lines[number] = was[:begin] + text + was[end:]
+            lines[number] = line
             if not library.make(folder, path, "".join(lines)):
                 with lock:
                     tried -= 1
@@ -176,7 +207,8 @@ def main():
             where = f"{path.relative_to(ROOT)}:{number + 1}"
             with lock:
                 told["made"] += 1
-                told["seeds"][seed] += 1
+                if not options.again:
+                    told["seeds"][seed] += 1
                 told["caught"] += by is not None
                 if by is None:
                     told["escaped"].append({"where": where, "was": was.strip(), "became": lines[number].strip()})

@@ -102,16 +102,27 @@ def mutants():
     told = told_by("mutants")
     if not told:
         return None
+    verdicts = judgements()
+    same = sum(verdicts.get(f"{m['where'].rsplit(':', 1)[0]}: {m['became']}", "").startswith("changes nothing")
+               for m in told["escaped"])
     escaped = ["", "What escaped:", "", *[f"- `{m['where']}`: `{m['became']}`" for m in told["escaped"]]]
     runs = ", ".join(f"{made} of seed {seed}" for seed, made in told["seeds"].items())
     return [f"Small changes of hierarchy, sample, coding and fracture, one at a time (`scripts/mutate`; {runs}): "
-            f"{told['caught']} of {told['made']} made a test fail. Last run: {when_of('mutants')}.",
+            f"{told['caught']} of {told['made']} made a test fail, {same} of the others change nothing, as judged below: "
+            f"{100 * told['caught'] / max(1, told['made'] - same):.0f} % of those that change something were caught. "
+            f"Last run: {when_of('mutants')}.",
             *(escaped if told["escaped"] else [])]
 
 
+def judgements():
+    """What was found of mutants that escaped, by file and changed line. One that changes no result begins with "changes
+    nothing"."""
+    return json.loads((Path(__file__).parent / "judged_mutants.json").read_text())
+
+
 def judged(section):
-    """What was found of mutants that escaped (judged_mutants.json), behind each."""
-    verdicts = json.loads((Path(__file__).parent / "judged_mutants.json").read_text())
+    """The same, behind each."""
+    verdicts = judgements()
     lines = []
     for line in section or []:
         mutant = re.match(r"- `(.*?):\d+`: `(.*?)`", line)

@@ -19,13 +19,8 @@ CellBoxes::CellBoxes(const Matter& matter, const Vectors& positions, float reach
         inverse_ = matter.inverse_derivative(positions, {0, Vec3f::Zero()});
         corner_ = positions[matter.corners(0)[0]];
         reach_ = reach;
-        for (int axis = 0; axis < 3; ++axis)
-            for (const auto& cell : cells.cells) counts_[axis] = std::max(counts_[axis], cell[axis] + 1);
-        const auto& first = cells.cells[0]; // local coordinates are counted from it
-        for (int axis = 0; axis < 3; ++axis) {
-            low_[axis] = -float(first[axis]);
-            high_[axis] = float(counts_[axis] - first[axis]);
-        }
+        low_ = matter.rigid_low();
+        high_ = matter.rigid_high();
         return;
     }
     std::vector<Extent> extents(cells.cells.size());

@@ -29,8 +29,8 @@ public:
     };
     Near find(const Vec3f& point) const;
 
-    TurnedBox rigid_box() const; ///< all cells of a rigid body
-    /// m: the box is no nearer to the cells of a rigid body.
+    TurnedBox rigid_box() const; ///< all of a rigid body that may touch
+    /// m: the box is no nearer to a rigid body.
     float gap_of_rigid(const TurnedBox& box) const;
 
 private:
@@ -51,7 +51,7 @@ private:
     const Matter& matter_;
     Mat3f inverse_ = Mat3f::Zero(); ///< of a rigid body: from the world to its cell 0
     Vec3f corner_ = Vec3f::Zero();
-    Vec3f low_ = Vec3f::Zero();  ///< of all boxes, m; of a rigid body: of all cells in those coordinates
+    Vec3f low_ = Vec3f::Zero();  ///< of all boxes, m; of a rigid body: of all that may touch, in those coordinates
     Vec3f high_ = Vec3f::Zero(); ///< the same, of a rigid body
     float reach_ = 0;
     float boxes_a_metre_ = 1; ///< along an axis

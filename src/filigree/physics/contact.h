@@ -25,7 +25,7 @@ public:
     /// bodies: fixed in number from here on.
     Contacts(const World& world, std::size_t bodies, bool between_bodies, bool within_bodies)
         : world_(world), between_bodies_(between_bodies), within_bodies_(within_bodies), near_(bodies),
-          near_clear_until_(bodies, 0), touched_(bodies, 0), matter_(world, between_bodies, within_bodies) {}
+          near_clear_until_(bodies), touched_(bodies, 0), matter_(world, between_bodies, within_bodies) {}
     /// Once, when all bodies are there.
     void begin(std::span<const BodyState> bodies);
 
@@ -67,6 +67,8 @@ public:
         near_until_ = pairs_until_ = -1;
         matter_.begin_anew();
     }
+    /// The next search finds what is near obstacles: of what sleeps nothing was found.
+    void look_near_again() { near_until_ = -1; }
     void clear_touches() { touched_.assign(touched_.size(), 0); }
 
     /// Adds the forces of what touches now to the bodies' forces, and lets friction's anchors slide. dt: of the
@@ -213,7 +215,11 @@ private:
     const World& world_;
     bool between_bodies_, within_bodies_;
     std::vector<std::vector<Near>> near_; ///< by body, ascending by obstacle and point
-    std::vector<float> near_clear_until_; ///< of each body: near_way_ until which none of these can touch
+    static constexpr std::size_t kNearBlock = 64;
+    std::vector<std::vector<float>> near_clear_until_; ///< of each block of these: near_way_ until which none can touch
+    void ask_all_near(std::size_t body) {
+        near_clear_until_[body].assign((near_[body].size() + kNearBlock - 1) / kNearBlock, 0.0f);
+    }
     std::vector<NearPair> pairs_;
     struct OwnBalls;                                         ///< of a body whose balls meet each other
     std::vector<std::shared_ptr<const OwnBalls>> own_balls_; ///< null: of the others

@@ -14,6 +14,7 @@ using namespace contact_law;
 namespace {
 
 constexpr std::size_t kContactForcesGrain = 256, kObstacleForcesGrain = 16; // bodies
+constexpr std::size_t kBlocksGrain = 4;
 constexpr double kStiffness = 4; ///< times the stiffness of a spacing of material under the point
 
 } // namespace
@@ -125,18 +126,31 @@ ContactReport Contacts::add_obstacle_forces(BodyState& body, std::size_t b, cons
                                             std::vector<Vec3f>& forces, const RunContext& context) {
     ContactReport report;
     std::vector<Near>& near = near_[b];
-    forces.assign(near.size(), Vec3f::Zero());
-    parallel_for(context, near.size(), kContactForcesGrain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t k = begin; k < end; ++k) forces[k] = obstacle_force(near[k], body, poses, dt);
+    std::vector<float>& clear_until = near_clear_until_[b];
+    const auto each_near = [&](std::size_t block, const auto& visit) {
+        const std::size_t end = std::min(near.size(), (block + 1) * kNearBlock);
+        for (std::size_t k = block * kNearBlock; k < end; ++k) visit(k);
+    };
+    forces.resize(near.size());
+    parallel_for(context, clear_until.size(), kBlocksGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t block = begin; block < end; ++block) {
+            if (clear_until[block] > near_way_) continue;
+            clear_until[block] = std::numeric_limits<float>::infinity();
+            each_near(block, [&](std::size_t k) {
+                forces[k] = obstacle_force(near[k], body, poses, dt);
+                clear_until[block] = std::min(clear_until[block], near[k].clear_until);
+            });
+        }
     });
-    near_clear_until_[b] = std::numeric_limits<float>::infinity();
-    for (std::size_t k = 0; k < near.size(); ++k) {
-        near_clear_until_[b] = std::min(near_clear_until_[b], near[k].clear_until);
-        if (!(near[k].depth > 0)) continue;
-        add_to_particles(body.surface, near[k].point, forces[k], body.forces);
-        touched_[b] |= kOnObstacle;
-        ++report.contacts;
-        report.deepest = std::max(report.deepest, near[k].depth);
+    for (std::size_t block = 0; block < clear_until.size(); ++block) {
+        if (clear_until[block] > near_way_) continue;
+        each_near(block, [&](std::size_t k) {
+            if (!(near[k].depth > 0)) return;
+            add_to_particles(body.surface, near[k].point, forces[k], body.forces);
+            touched_[b] |= kOnObstacle;
+            ++report.contacts;
+            report.deepest = std::max(report.deepest, near[k].depth);
+        });
     }
     return report;
 }
@@ -149,8 +163,7 @@ ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, flo
         std::vector<Vec3f> forces;
         for (std::size_t b = begin; b < end; ++b) {
             touched_[b] = 0;
-            if (!bodies[b].sleeps() && !(near_clear_until_[b] > near_way_))
-                reports[b] = add_obstacle_forces(bodies[b], b, poses, dt, forces, context);
+            if (!bodies[b].sleeps()) reports[b] = add_obstacle_forces(bodies[b], b, poses, dt, forces, context);
         }
     });
     for (const ContactReport& of_body : reports) {

@@ -53,7 +53,7 @@ void Contacts::begin(std::span<const BodyState> bodies) {
 }
 
 void Contacts::search(std::span<BodyState> bodies, const Search& search, const RunContext& context) {
-    if (matter_.search(bodies, search.frame, context)) near_until_ = -1; // what woke has nothing near yet
+    if (matter_.search(bodies, search.frame, context)) look_near_again();
     if (near_way_ > near_until_ && !world_.obstacles.empty()) {
         find_near(bodies, search.time, search.obstacle_reach, context);
         near_way_ = 0;
@@ -98,7 +98,7 @@ void Contacts::find_near(std::span<const BodyState> bodies, double time, float r
             }
         }
         near_[b] = std::move(found);
-        near_clear_until_[b] = 0;
+        ask_all_near(b);
     }
 }
 
@@ -188,7 +188,6 @@ bool Contacts::set_memory(const Memory& memory, std::span<const BodyState> bodie
     if (!std::isfinite(memory.near_way) || !std::isfinite(memory.near_until)) return false;
     if (!std::ranges::all_of(memory.near, is_sound) || !matter_.is_sound(memory.matter, bodies)) return false;
     for (std::vector<Near>& near : near_) near.clear();
-    near_clear_until_.assign(near_.size(), 0);
     for (const NearMemory& near : memory.near)
         near_[near.body].push_back({near.obstacle,
                                     near.point,
@@ -196,6 +195,7 @@ bool Contacts::set_memory(const Memory& memory, std::span<const BodyState> bodie
                                     0,
                                     {(near.flags & 1) != 0, (near.flags & 2) != 0},
                                     near.anchor});
+    for (std::size_t b = 0; b < near_.size(); ++b) ask_all_near(b);
     pairs_.clear();
     pairs_until_ = -1;
     for (const BallMemory& pair : memory.balls)

@@ -47,8 +47,24 @@ Matter::Matter(const Body& body) : body_(body), is_rigid_(body.material.model ==
         const auto& at = cells.cells[c];
         grid_[(std::size_t(at[2]) * counts_[1] + at[1]) * counts_[0] + at[0]] = c;
     }
+    if (is_rigid_) find_rigid_box();
     find_together();
     find_cells_of_points();
+}
+
+/// Cells, and surface points of parts that have none; a sheet is matter as far as its field's radius from it.
+void Matter::find_rigid_box() {
+    const Cells& cells = body_.cells;
+    const auto& first = cells.cells[0];
+    Box box;
+    for (const auto& cell : cells.cells)
+        for (const int more : {0, 1}) box.extend(Vec3d(cell[0] + more, cell[1] + more, cell[2] + more));
+    for (const Vec3f& point : body_.surface.points.rest)
+        box.extend((point.cast<double>() - cells.origin) / cells.spacing);
+    const Vec3d from(first[0], first[1], first[2]);
+    const double around = double(body_.field_radius) / cells.spacing;
+    rigid_low_ = (box.min - from).cast<float>().array() - float(around);
+    rigid_high_ = (box.max - from).cast<float>().array() + float(around);
 }
 
 Index Matter::cell_at(int i, int j, int k) const {
@@ -206,11 +222,6 @@ Mat3f Matter::inverse_derivative(const Vectors& positions, const Place& place) c
         return inverse / float(body_.spacing() * body_.spacing());
     }
     return map_cell(positions, corners(place.cell), place.local).slope.inverse();
-}
-
-Matter::RigidMap Matter::rigid_map(const Vectors& positions) const {
-    const Mat3f inverse = inverse_derivative(positions, {0, Vec3f::Zero()});
-    return {inverse.transpose() * float(body_.spacing()), rest_position({0, Vec3f::Zero()}), positions[corners(0)[0]]};
 }
 
 float Matter::volume_ratio(const Vectors& positions, Index cell) const {

@@ -19,6 +19,10 @@ public:
     /// A rigid body is one cell that goes on as far as one likes.
     bool is_rigid() const { return is_rigid_; }
 
+    /// Of a rigid body: all that may touch, in local coordinates of cell 0.
+    const Vec3f& rigid_low() const { return rigid_low_; }
+    const Vec3f& rigid_high() const { return rigid_high_; }
+
     /// A point in a cell: local coordinates are 0 .. 1 inside, and go on linearly outside.
     struct Place {
         Index cell = kNoIndex;
@@ -38,14 +42,6 @@ public:
 
     /// Derivative of local coordinates by position, 1/m.
     Mat3f inverse_derivative(const Vectors& positions, const Place& place) const;
-
-    /// Where a rigid body has turned and moved to.
-    struct RigidMap {
-        Mat3f turn;
-        Vec3f rest, now; ///< m, of one corner
-        Vec3f place(const Vec3f& rest_point) const { return now + turn * (rest_point - rest); }
-    };
-    RigidMap rigid_map(const Vectors& positions) const;
 
     float volume_ratio(const Vectors& positions, Index cell) const; ///< of the cell's middle, now to rest
 
@@ -70,11 +66,13 @@ public:
 
 private:
     std::optional<Index> neighbour(Index cell, Vec3f& local) const;
+    void find_rigid_box();
     void find_together();
     void find_cells_of_points();
 
     const Body& body_;
     const bool is_rigid_;
+    Vec3f rigid_low_ = Vec3f::Zero(), rigid_high_ = Vec3f::Zero();
     std::array<int, 3> counts_{0, 0, 0};
     std::vector<Index> grid_;                            ///< cell at each lattice index, kNoIndex where there is none
     std::vector<std::array<std::uint64_t, 2>> together_; ///< of each cell: bits of the 5^3 cells around it

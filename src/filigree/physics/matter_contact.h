@@ -25,7 +25,7 @@ class OwnCells;
 /// pushes the cell's corners back at the same place, so that momentum and angular momentum stay what they were.
 class MatterContacts {
 public:
-    static constexpr float kMostReach = 0.5f; ///< spacings that anything may go between two searches
+    static constexpr float kMostReach = 0.5f; ///< spacings that near bodies may go between two searches, at most
     static constexpr float kOutside = 0.25f;  ///< cells that a point may lie outside of the last one and still touch
 
     MatterContacts(const World& world, bool between_bodies, bool within_bodies)
@@ -156,16 +156,16 @@ private:
     static void take_pairs(Side& side, const BodyState& body, std::size_t points, const Find& find);
     /// m that a side may go until a point that lies so far outside might touch.
     static float safe_way(const Side& side, float distance) {
-        constexpr float kClearer = 0.8f; // part of a distance that is safe to go
-        constexpr float kLittle = 0.05f; // spacings; later would be too late: the way in would cost no energy
-        return distance < kLittle * side.spacing ? 0 : kClearer * distance;
+        constexpr float kClearer = 0.8f;   // part of a distance that is safe to go
+        constexpr float kTouching = 0.05f; // spacings; later would be too late: the way in would cost no energy
+        return distance < kTouching * side.spacing ? 0 : kClearer * distance;
     }
     class Surroundings;
     static bool both_sleep(const Side& side, std::span<const BodyState> bodies) {
         return bodies[side.body].sleeps() && bodies[side.other].sleeps();
     }
     void find_own_pairs(Side& side, const BodyState& body, float frame, const RunContext& context) const;
-    static bool is_near(Side& side, const Surroundings& around, float frame);
+    static bool begin_side(Side& side, const Surroundings& around, float frame);
     void find_other_pairs(Side& side, const Surroundings& around, const BodyState& body,
                           const RunContext& context) const;
     void find_pairs(std::span<const Index> due, std::span<const BodyState> bodies, float frame,
@@ -190,14 +190,15 @@ private:
     std::vector<std::shared_ptr<const OwnCells>> own_cells_; ///< null: of bodies that do not meet themselves
     std::vector<std::uint8_t> recovers_;                     ///< of each body: 1 while it does not meet itself
     struct Followed {              ///< the particles of a body whose motion says when to search again
-        std::vector<float> counts; ///< of each particle, 1 or 0
+        std::vector<float> counts; ///< of each particle, 1 or 0; padded by zeros
         Index heaviest = 0;
-        std::vector<Index> corners; ///< of a rigid body, instead: those that all others lie between
+        std::vector<Index> corners;      ///< of a rigid body, instead: those that all others lie between
+        bool has_points_outside = false; ///< of the particles' box at rest; unknown of a rigid body
     };
     static Followed followed(const BodyState& body);
     Extremes extremes(std::size_t body, const Vectors& values, const Vectors* from) const;
-    Box extent(const BodyState& body, std::size_t number) const; ///< m, of its particles
-    std::vector<Followed> followed_;
+    Box extent(const BodyState& body, std::size_t number) const;
+    std::vector<std::shared_ptr<const Followed>> followed_;
     std::vector<Extremes> speeds_;
     std::vector<Vectors> places_;  ///< of each body's particles, where its shifts are counted from
     std::vector<Extremes> shifts_; ///< m

@@ -16,16 +16,19 @@ namespace filigree {
 namespace {
 
 constexpr std::size_t kMatterSearchGrain = 512, kBodiesGrain = 8, kSidesGrain = 8;
-constexpr float kLeastReach = 0.1f; ///< spacings that anything may go between two searches; at most kMostReach
+constexpr float kLeastReach = 0.1f; ///< as kMostReach, at least
 constexpr float kOwnReach = 0.3f;   ///< the same of a body beside itself ...
 constexpr float kOwnSearches = 4;   ///< ... which is searched no more often than this in a frame
 /// Of what another side may still move until it is searched; they share what a search finds out about bodies.
 constexpr float kSearchedAlong = 0.5f;
-constexpr float kLongestWay = 0.3f;      ///< spacings a substep that one body may go towards another
-constexpr float kCrushed = 0.05f;        ///< volume ratio below which a cell counts as crushed
-constexpr float kTooManyCrushed = 0.05f; ///< part of a body's cells
-constexpr Index kAskedCells = 7;         ///< one of so many is asked
-constexpr float kWaking = 0.02f;         ///< m/s of what touches a sleeper
+constexpr float kLongestWay = 0.3f;       ///< spacings a substep that one body may go towards another
+constexpr float kCrushed = 0.05f;         ///< volume ratio below which a cell counts as crushed
+constexpr float kTooManyCrushed = 0.05f;  ///< part of a body's cells
+constexpr Index kAskedCells = 7;          ///< one of so many is asked
+constexpr float kWaking = 0.02f;          ///< m/s of what touches a sleeper
+constexpr std::size_t kFollowedLanes = 8; ///< particles at once, no more than Vectors are padded by
+using FollowedLanes = Eigen::Array<float, kFollowedLanes, 1>;
+static_assert(kFollowedLanes <= Vectors::kPadding);
 
 bool are_near(const Box& a, const Box& b, double distance) {
     return (a.min.array() - distance <= b.max.array()).all() && (b.min.array() - distance <= a.max.array()).all();
@@ -64,16 +67,29 @@ Vectors positions_in(const BodyState& body, float seconds) {
     return positions;
 }
 
-std::vector<Vec3f> surface_places(const BodyState& body, const Matter* matter, const RunContext& context) {
+std::vector<Vec3f> surface_places(const BodyState& body, const RunContext& context) {
     const Embedding& points = body.surface;
     std::vector<Vec3f> places(points.size());
-    std::optional<Matter::RigidMap> map;
-    if (matter && matter->is_rigid()) map = matter->rigid_map(body.positions);
+    if (body.rigid) {
+        const Mat3f turn = body.rigid->turn.toRotationMatrix().cast<float>();
+        const Vec3f rest = body.rigid->rest_centre.cast<float>(), now = body.rigid->centre.cast<float>();
+        for (std::size_t s = 0; s < places.size(); ++s) places[s] = now + turn * (points.rest[s] - rest);
+        return places;
+    }
     parallel_for(context, places.size(), kMatterSearchGrain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t s = begin; s < end; ++s)
-            places[s] = map ? map->place(points.rest[s]) : embedded_point(points, s, body.positions);
+        for (std::size_t s = begin; s < end; ++s) places[s] = embedded_point(points, s, body.positions);
     });
     return places;
+}
+
+/// Whether surface points lie outside of the box of the particles: of meshfree bodies, and of parts without cells.
+bool has_points_outside(const Body& body) {
+    const Box box = box_of(body.rest);
+    const double slack = 1e-3 * body.spacing();
+    return std::ranges::any_of(body.surface.points.rest, [&](const Vec3f& point) {
+        const Vec3d p = point.cast<double>();
+        return (p.array() < box.min.array() - slack).any() || (p.array() > box.max.array() + slack).any();
+    });
 }
 
 /// Particles of a lattice that all others lie between, along x, y or z.
@@ -96,9 +112,16 @@ std::vector<Index> outermost(const Vectors& rest) {
 } // namespace
 
 MatterContacts::Followed MatterContacts::followed(const BodyState& body) {
-    if (body.rigid) return {{}, 0, outermost(body.body->rest)};
+    Followed followed;
+    if (body.rigid) {
+        followed.corners = outermost(body.body->rest);
+        return followed;
+    }
     const std::vector<float>& mass = body.body->mass;
-    Followed followed{std::vector<float>(mass.size(), 1), Index(std::ranges::max_element(mass) - mass.begin()), {}};
+    followed.heaviest = Index(std::ranges::max_element(mass) - mass.begin());
+    followed.has_points_outside = has_points_outside(*body.body);
+    followed.counts.resize((mass.size() + kFollowedLanes - 1) / kFollowedLanes * kFollowedLanes, 0);
+    std::fill_n(followed.counts.begin(), mass.size(), 1.0f);
     if (body.has_balls()) return followed; // those are light beside the corners of cells alone
     const std::vector<std::uint8_t> light = light_particles(*body.body);
     for (std::size_t i = 0; i < light.size(); ++i) followed.counts[i] = light[i] ? 0.0f : 1.0f;
@@ -107,8 +130,7 @@ MatterContacts::Followed MatterContacts::followed(const BodyState& body) {
 
 /// Of particles that are followed: of their values, less `from` unless that is null.
 MatterContacts::Extremes MatterContacts::extremes(std::size_t body, const Vectors& values, const Vectors* from) const {
-    constexpr std::size_t kAtOnce = 16; // so that the compiler uses vectors
-    const auto& [counts, heaviest, corners] = followed_[body];
+    const auto& [counts, heaviest, corners, has_points_outside] = *followed_[body];
     const auto value_of = [&](Index i) -> Vec3f { return from ? Vec3f(values[i] - (*from)[i]) : values[i]; };
     Extremes found;
     if (!corners.empty()) {
@@ -116,44 +138,46 @@ MatterContacts::Extremes MatterContacts::extremes(std::size_t body, const Vector
         for (const Index i : corners) found = found.with({value_of(i), value_of(i)});
         return found;
     }
-    const auto take_axis = [&](int axis, const auto& value) {
-        const float usual = value(heaviest);
-        float least[kAtOnce], most[kAtOnce];
-        std::ranges::fill(least, usual);
-        std::ranges::fill(most, usual);
-        const auto take = [&](std::size_t i, std::size_t k) {
-            const float v = usual + counts[i] * (value(i) - usual);
-            least[k] = v < least[k] ? v : least[k];
-            most[k] = v > most[k] ? v : most[k];
-        };
-        const std::size_t count = counts.size(), whole = count - count % kAtOnce;
-        for (std::size_t i = 0; i < whole; i += kAtOnce)
-            for (std::size_t k = 0; k < kAtOnce; ++k) take(i + k, k);
-        for (std::size_t i = whole; i < count; ++i) take(i, 0);
-        found.least[axis] = *std::ranges::min_element(least);
-        found.most[axis] = *std::ranges::max_element(most);
+    const auto take_axis = [&](int axis, float usual, const auto& lanes_at) {
+        FollowedLanes least = FollowedLanes::Constant(usual), most = least;
+        for (std::size_t i = 0; i < counts.size(); i += kFollowedLanes) {
+            const FollowedLanes v = usual + Eigen::Map<const FollowedLanes>(&counts[i]) * (lanes_at(i) - usual);
+            least = least.min(v);
+            most = most.max(v);
+        }
+        found.least[axis] = least.minCoeff();
+        found.most[axis] = most.maxCoeff();
     };
     for (int axis = 0; axis < 3; ++axis) {
         const float* along = (values.*kVectorAxes[axis]).data();
+        const auto lanes = [=](std::size_t i) { return FollowedLanes(Eigen::Map<const FollowedLanes>(along + i)); };
         if (const float* less = from ? (from->*kVectorAxes[axis]).data() : nullptr)
-            take_axis(axis, [=](std::size_t i) { return along[i] - less[i]; });
+            take_axis(axis, along[heaviest] - less[heaviest], [=](std::size_t i) {
+                return FollowedLanes(lanes(i) - Eigen::Map<const FollowedLanes>(less + i));
+            });
         else
-            take_axis(axis, [=](std::size_t i) { return along[i]; });
+            take_axis(axis, along[heaviest], lanes);
     }
     return found;
 }
 
+/// All of a body that may touch.
 Box MatterContacts::extent(const BodyState& body, std::size_t number) const {
-    const std::vector<Index>& corners = followed_[number].corners;
-    if (corners.empty()) return box_of(body.positions);
-    Box box;
-    for (const Index i : corners) box.extend(body.positions[i].cast<double>());
+    if (body.rigid && matter_[number]) {
+        const TurnedBox box = CellBoxes(*matter_[number], body.positions, 0).rigid_box();
+        const Vec3f half = box.half_axes.cwiseAbs().rowwise().sum();
+        return {(box.centre - half).cast<double>(), (box.centre + half).cast<double>()};
+    }
+    Box box = box_of(body.positions);
+    if (followed_[number]->has_points_outside)
+        for (const Vec3f& point : surface_places(body, RunContext(1))) box.extend(point.cast<double>());
     return box;
 }
 
 void MatterContacts::begin(std::span<const BodyState> bodies) {
     std::map<const Body*, std::shared_ptr<const Matter>> known; // pieces of one kind share theirs
     std::map<const Matter*, std::shared_ptr<const OwnCells>> own_cells;
+    std::map<const Body*, std::shared_ptr<const Followed>> known_followed;
     for (const BodyState& state : bodies) {
         std::shared_ptr<const Matter>& matter = known[state.body.get()];
         if (!matter && state.body->field) matter = std::make_shared<Matter>(*state.body);
@@ -162,7 +186,9 @@ void MatterContacts::begin(std::span<const BodyState> bodies) {
         std::shared_ptr<const OwnCells>& own = own_cells[matter.get()];
         if (matter && within_bodies_ && !state.rigid && !own) own = std::make_shared<OwnCells>(*matter);
         own_cells_.push_back(own);
-        followed_.push_back(followed(state));
+        std::shared_ptr<const Followed>& follows = known_followed[state.body.get()];
+        if (!follows) follows = std::make_shared<const Followed>(followed(state));
+        followed_.push_back(follows);
     }
     speeds_.resize(bodies.size());
     places_.resize(bodies.size());
@@ -182,6 +208,7 @@ void MatterContacts::begin_anew() {
 }
 
 void MatterContacts::begin_frame(std::span<const BodyState> bodies) {
+    list_work(bodies); // some may have woken or gone to sleep
     travel(bodies, 0);
     for (std::size_t b = 0; b < bodies.size(); ++b)
         if (!bodies[b].is_absent) places_[b] = bodies[b].positions;
@@ -298,15 +325,14 @@ void MatterContacts::take_pairs(Side& side, const BodyState& body, std::size_t p
         if (found.cell == kNoIndex && (old == side.pairs.end() || s < old->point)) continue;
         while (old != side.pairs.end() && old->point < s) ++old;
         if (old != side.pairs.end() && old->point == s && (old->grasp.holds || old->tangled))
-            pairs.push_back(*old);
+            pairs.emplace_back(*old).clear_until -= side.way;
         else if (found.cell != kNoIndex && !body.is_hidden(s))
             pairs.push_back({.point = s,
                              .place = {found.cell},
-                             .clear_until = side.way + safe_way(side, found.gap),
+                             .clear_until = safe_way(side, found.gap),
                              .grasp = {},
                              .anchor = {}});
     }
-    for (Pair& pair : pairs) pair.clear_until -= side.way;
     side.way = side.moved = 0;
     side.pairs = std::move(pairs);
 }
@@ -338,9 +364,7 @@ public:
         extents_[body] = contacts_.extent(bodies_[body], body);
         if (is_rigid(body)) find_cells(body);
     }
-    void find_points(Index body, const RunContext& context) {
-        points_[body] = surface_places(bodies_[body], contacts_.matter_[body].get(), context);
-    }
+    void find_points(Index body, const RunContext& context) { points_[body] = surface_places(bodies_[body], context); }
     void find_cells(Index body) {
         const float reach = kMostReach * float(bodies_[body].body->spacing());
         if (!cells_[body]) cells_[body].emplace(*contacts_.matter_[body], bodies_[body].positions, reach);
@@ -349,8 +373,9 @@ public:
     const Box& extent(Index body) const { return extents_[body]; }            ///< after find_extent
     std::span<const Vec3f> points(Index body) const { return points_[body]; } ///< after find_points
     const CellBoxes& cells(Index body) const { return *cells_[body]; }        ///< after find_cells
-    /// m, after find_extent of both: points of a body are no nearer to another's cells. Looks no closer where that is
-    /// `enough`.
+    /// m: how far outside of a body's cells points may touch it.
+    float outside(Index body) const { return is_rigid(body) ? 0 : kOutside * float(bodies_[body].body->spacing()); }
+    /// m, after find_extent of both: points of a body are no nearer to another. Looks no closer where that is `enough`.
     double gap(Index body, Index other, double enough) const {
         const Box &a = extent(body), &b = extent(other);
         const double gap = (a.min - b.max).cwiseMax(b.min - a.max).cwiseMax(0).norm();
@@ -379,21 +404,21 @@ void MatterContacts::find_own_pairs(Side& side, const BodyState& body, float fra
     take_pairs(side, body, cells.size(), [&](Index s) { return CellBoxes::Near{cells[s]}; });
 }
 
-/// Whether bodies are so near that points have to be looked for; else the side is left until they may be.
-bool MatterContacts::is_near(Side& side, const Surroundings& around, float frame) {
+/// False: the bodies are so far from each other that no points need be looked for, and the side is left until they may.
+bool MatterContacts::begin_side(Side& side, const Surroundings& around, float frame) {
     side.until = std::clamp(side.speed * frame, kLeastReach * side.spacing, kMostReach * side.spacing);
-    const float far = side.until + kOutside * side.spacing;
-    const auto gap = float(around.gap(side.body, side.other, double(far)));
-    if (!(gap > far)) return true;
+    const float outside = around.outside(side.other);
+    const auto gap = float(around.gap(side.body, side.other, double(side.until + outside)));
+    if (!(gap > side.until + outside)) return true;
     side.pairs.clear();
     side.way = side.moved = 0;
-    side.until = gap - kOutside * side.spacing;
+    side.until = gap - outside;
     return false;
 }
 
 void MatterContacts::find_other_pairs(Side& side, const Surroundings& around, const BodyState& body,
                                       const RunContext& context) const {
-    const float far = side.until + kOutside * side.spacing;
+    const float far = side.until + around.outside(side.other);
     const Box& box = around.extent(side.other);
     const Vec3f low = box.min.cast<float>().array() - far, high = box.max.cast<float>().array() + far;
     const std::span<const Vec3f> points = around.points(side.body);
@@ -425,7 +450,7 @@ void MatterContacts::find_pairs(std::span<const Index> due, std::span<const Body
         }
         around.find_extent(side.body);
         around.find_extent(side.other);
-        if (is_near(side, around, frame)) {
+        if (begin_side(side, around, frame)) {
             near.push_back(i);
             has_points[side.body] = has_cells[side.other] = 1;
         }
@@ -448,12 +473,15 @@ bool MatterContacts::search(std::span<BodyState> bodies, double frame, const Run
     bool changed = way_ > sides_until_;
     if (changed) find_sides(bodies, frame);
     const bool woke = wake_touched(bodies);
-    find_shifts(bodies);
     const auto is_due = [&](const Side& side, float moved, float part) {
         if (!(moved > part * side.until) || both_sleep(side, bodies)) return false;
         return side.body != side.other || side.since >= float(frame) / kOwnSearches;
     };
-    if (std::ranges::any_of(sides_, [&](const Side& side) { return is_due(side, moved(side), 1); })) {
+    // What has gone no further there and back is no further away.
+    const bool may_be_due =
+        std::ranges::any_of(sides_, [&](const Side& side) { return is_due(side, side.moved + side.way, 1); });
+    if (may_be_due) find_shifts(bodies);
+    if (may_be_due && std::ranges::any_of(sides_, [&](const Side& side) { return is_due(side, moved(side), 1); })) {
         changed = true;
         count_from_here(bodies);
         std::vector<Index> due;

@@ -218,10 +218,12 @@ void let_rest(SimulationState& state, double from, double until) {
     for (std::size_t b = 0; b < state.bodies.size(); ++b) {
         BodyState& body = state.bodies[b];
         if (!body.rigid) continue;
-        if (disturbed || body.is_held || state.external.pull(b, until) || state.external.push(body.actor))
+        if (disturbed || body.is_held || state.external.pull(b, until) || state.external.push(body.actor)) {
+            if (body.rigid->sleeps) state.contacts.look_near_again();
             wake(body);
-        else if (!body.rigid->sleeps)
+        } else if (!body.rigid->sleeps) {
             tire(body, state.frame_seconds());
+        }
     }
 }
 
