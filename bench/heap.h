@@ -7,7 +7,7 @@
 
 namespace filigree::bench {
 
-inline constexpr int kHeapRests = 300; ///< frames of 1/60 s after which the heap lies still
+inline constexpr int kHeapRests = 420; ///< frames of 1/60 s after which the heap lies still
 
 struct Heap {
     World world;

@@ -1,6 +1,7 @@
 // Bodies that touch each other and themselves.
 
 #include "filigree/core/random.h"
+#include "filigree/mesh/shapes.h"
 #include "filigree/physics/cell_boxes.h"
 #include "filigree/physics/own_cells.h"
 #include "filigree/physics/rigid_body.h"
@@ -476,6 +477,25 @@ TEST(CellBoxes, AGapIsNeverMoreThanTheDistanceOfAnyPoint) {
         apart += gap > 0.5f * nearest && gap > 0;
     }
     EXPECT_GT(apart, 15u);
+}
+
+TEST(CellBoxes, ARigidSheetIsMatterBeyondItsCells) {
+    Material stone;
+    stone.model = MaterialModel::rigid;
+    const Mesh plate = make_wavy_plane({.resolution = 8, .amplitude = 0});
+    const Body body = make_body(plate, stone, {.cells = {.spacing = 0.1}}, kOneThread).value();
+    ASSERT_GT(body.field_radius, 0.1 * body.spacing());
+    const Matter matter(body);
+    const CellBoxes boxes(matter, body.rest, 0.01f * float(body.spacing()));
+    const Box box = bounds(plate.positions);
+    const auto beyond = [&](double spacings) { // the rim, by so much
+        return Vec3d(box.max.x() + spacings * body.spacing(), box.centre().y(), box.centre().z()).cast<float>().eval();
+    };
+    const float radius = float(body.field_radius / body.spacing());
+    EXPECT_NE(boxes.find(beyond(0.9 * radius)).cell, kNoIndex);
+    EXPECT_EQ(boxes.find(beyond(1.5 * radius)).cell, kNoIndex);
+    const float away = 5 * radius * float(body.spacing());
+    EXPECT_LE(boxes.gap_of_rigid({beyond(5 * radius), Mat3f::Zero()}), away - 0.99f * float(body.field_radius));
 }
 
 /// The cell that holds a point or the nearest within reach, of those that count.
