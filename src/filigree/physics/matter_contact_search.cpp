@@ -170,7 +170,8 @@ Box MatterContacts::extent(const BodyState& body, std::size_t number) const {
     }
     Box box = box_of(body.positions);
     if (followed_[number]->has_points_outside)
-        for (const Vec3f& point : surface_places(body, RunContext(1))) box.extend(point.cast<double>());
+        for (std::size_t s = 0; s < body.surface.size(); ++s)
+            box.extend(embedded_point(body.surface, s, body.positions).cast<double>());
     return box;
 }
 
