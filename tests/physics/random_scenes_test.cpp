@@ -91,7 +91,9 @@ TEST(RandomScenes, StaySound) {
                     lowest = std::min(lowest, simulation.positions(b).y[i]);
                     highest = std::max(highest, simulation.positions(b).y[i]);
                 }
-                ASSERT_GT(highest, 0) << "body " << b << " in frame " << frame;
+                ASSERT_GT(highest, 0) << "body " << b << " in frame " << frame << ", model "
+                                      << int(simulation.body(b).material.model) << ", "
+                                      << simulation.body(b).material.young_modulus << " Pa";
             }
         }
         EXPECT_GT(lowest, -0.2f) << "two spacings through the ground";
