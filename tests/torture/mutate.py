@@ -77,9 +77,11 @@ def escaped_changes(told):
     """The same, of those that escaped."""
     changes = []
     for mutant in told["escaped"]:
-        path = ROOT / mutant["where"].rsplit(":", 1)[0]
+        file, was_at = mutant["where"].rsplit(":", 1)
+        path = ROOT / file
         lines = path.read_text().splitlines(keepends=True)
-        number = next((n for n, line in enumerate(lines) if line.strip() == mutant["was"]), None)
+        same = [n for n, line in enumerate(lines) if line.strip() == mutant["was"]]
+        number = min(same, key=lambda n: abs(n + 1 - int(was_at)), default=None)  # a line may stand there twice
         if number is None:
             sys.exit(f"mutate: {mutant['where']} has changed: there is no line \"{mutant['was']}\"; take it out of the file")
         was = lines[number]
