@@ -119,18 +119,17 @@ TEST(RigidBody, SleepersThatAHandWakesFeelTheGroundAndGoOnTheSameAfterARestore) 
     const Vec3d before = centre_of_mass(stack, 1);
     for (int frame = 0; frame < 5; ++frame) ASSERT_TRUE(stack.advance(kOneThread).ok());
     ASSERT_EQ((centre_of_mass(stack, 1) - before).norm(), 0) << "it sleeps";
-    for (const std::size_t body : {0u, 1u}) { // as light as nothing, but it wakes them
-        Vectors push(stack.body(body).particle_count());
-        push.set(0, Vec3f(1e-3f, 0, 0));
-        ASSERT_TRUE(stack.set_forces(body, push).ok());
-    }
+    const auto push_both = [](Simulation& of) { // as lightly as nothing, but it wakes them
+        for (const std::size_t body : {0u, 1u}) {
+            Vectors push(of.body(body).particle_count());
+            push.set(0, Vec3f(1e-3f, 0, 0));
+            ASSERT_TRUE(of.set_forces(body, push).ok());
+        }
+    };
+    push_both(stack);
     ASSERT_TRUE(stack.advance(kOneThread).ok()); // wakes them in its end
     Simulation other = begin(world, actors);
-    for (const std::size_t body : {0u, 1u}) {
-        Vectors push(stack.body(body).particle_count());
-        push.set(0, Vec3f(1e-3f, 0, 0));
-        ASSERT_TRUE(other.set_forces(body, push).ok());
-    }
+    push_both(other);
     ASSERT_TRUE(other.restore(stack.save()).ok());
     for (int frame = 0; frame < 30; ++frame) {
         const FrameReport report = stack.advance(kOneThread).value();
