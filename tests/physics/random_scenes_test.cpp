@@ -66,39 +66,47 @@ double from_environment(const char* name, double unset) {
     return text ? std::atof(text) : unset;
 }
 
+void expect_sound(std::uint64_t seed, std::size_t frames) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Scene scene = random_scene(seed);
+    Simulation simulation = Simulation::create(scene.world, scene.actors, scene.options, kOneThread).value();
+    double mass = 0;
+    for (const Actor& actor : scene.actors)
+        for (const float m : actor.body->mass) mass += double(m);
+    const double energy = simulation.energy(kOneThread).total(), scale = std::abs(energy) + 10 * mass;
+    float lowest = 0;
+    double most = energy;
+    for (std::size_t frame = 0; frame < frames; ++frame) {
+        const FrameReport report = simulation.advance(kOneThread).value();
+        ASSERT_EQ(report.clamped_particles, 0u) << "frame " << frame;
+        most = std::max(most, simulation.energy(kOneThread).total());
+        for (std::size_t b = 0; b < simulation.body_count(); ++b) {
+            float highest = -1;
+            for (std::size_t i = 0; i < simulation.positions(b).size(); ++i) {
+                ASSERT_TRUE(simulation.positions(b)[i].allFinite()) << "frame " << frame;
+                lowest = std::min(lowest, simulation.positions(b).y[i]);
+                highest = std::max(highest, simulation.positions(b).y[i]);
+            }
+            ASSERT_GT(highest, 0) << "body " << b << " in frame " << frame << ", model "
+                                  << int(simulation.body(b).material.model) << ", "
+                                  << simulation.body(b).material.young_modulus << " Pa";
+        }
+    }
+    EXPECT_GT(lowest, -0.2f) << "two spacings through the ground";
+    EXPECT_LT(most, energy + 0.02 * scale);
+}
+
 TEST(RandomScenes, StaySound) {
     const auto scenes = std::size_t(from_environment("FILIGREE_SCENES", 8));
     const auto frames = std::size_t(60 * from_environment("FILIGREE_SECONDS", 2));
     const auto first = std::uint64_t(from_environment("FILIGREE_FIRST", 1));
-    for (std::uint64_t seed = first; seed < first + scenes; ++seed) {
-        SCOPED_TRACE("seed " + std::to_string(seed));
-        const Scene scene = random_scene(seed);
-        Simulation simulation = Simulation::create(scene.world, scene.actors, scene.options, kOneThread).value();
-        double mass = 0;
-        for (const Actor& actor : scene.actors)
-            for (const float m : actor.body->mass) mass += double(m);
-        const double energy = simulation.energy(kOneThread).total(), scale = std::abs(energy) + 10 * mass;
-        float lowest = 0;
-        double most = energy;
-        for (std::size_t frame = 0; frame < frames; ++frame) {
-            const FrameReport report = simulation.advance(kOneThread).value();
-            ASSERT_EQ(report.clamped_particles, 0u) << "frame " << frame;
-            most = std::max(most, simulation.energy(kOneThread).total());
-            for (std::size_t b = 0; b < simulation.body_count(); ++b) {
-                float highest = -1;
-                for (std::size_t i = 0; i < simulation.positions(b).size(); ++i) {
-                    ASSERT_TRUE(simulation.positions(b)[i].allFinite()) << "frame " << frame;
-                    lowest = std::min(lowest, simulation.positions(b).y[i]);
-                    highest = std::max(highest, simulation.positions(b).y[i]);
-                }
-                ASSERT_GT(highest, 0) << "body " << b << " in frame " << frame << ", model "
-                                      << int(simulation.body(b).material.model) << ", "
-                                      << simulation.body(b).material.young_modulus << " Pa";
-            }
-        }
-        EXPECT_GT(lowest, -0.2f) << "two spacings through the ground";
-        EXPECT_LT(most, energy + 0.02 * scale);
-    }
+    for (std::uint64_t seed = first; seed < first + scenes; ++seed) expect_sound(seed, frames);
+}
+
+// Soft bodies that hit hard went three spacings into the ground, and in 508 a tiny one drew energy from the steps.
+
+TEST(RandomScenes, ThatFailedOnce) {
+    for (const std::uint64_t seed : {82, 503, 508, 532, 569, 574}) expect_sound(seed, 300);
 }
 
 } // namespace

@@ -25,7 +25,8 @@ public:
     /// bodies: fixed in number from here on.
     Contacts(const World& world, std::size_t bodies, bool between_bodies, bool within_bodies)
         : world_(world), between_bodies_(between_bodies), within_bodies_(within_bodies), near_(bodies),
-          near_clear_until_(bodies), touched_(bodies, 0), matter_(world, between_bodies, within_bodies) {}
+          near_clear_until_(bodies), most_depths_(bodies), touched_(bodies, 0),
+          matter_(world, between_bodies, within_bodies) {}
     /// Once, when all bodies are there.
     void begin(std::span<const BodyState> bodies);
 
@@ -208,6 +209,7 @@ private:
     static Vec3f between(const NearPair& pair, std::span<const BodyState> bodies, Embedding BodyState::*points,
                          const Vectors& of_first, const Vectors& of_second);
     std::vector<NearPair> held_pairs() const; ///< those that friction holds, ascending
+    void push_particles_out(BodyState& body, std::vector<float>& most_depths, const ObstaclePoses& poses);
     void find_near(std::span<const BodyState> bodies, double time, float reach, const RunContext& context);
     void find_pairs(std::span<const BodyState> bodies, float reach, const RunContext& context);
     void find_own_pairs(const BodyState& body, Index number, const Vectors& balls, float reach);
@@ -220,6 +222,7 @@ private:
     void ask_all_near(std::size_t body) {
         near_clear_until_[body].assign((near_[body].size() + kNearBlock - 1) / kNearBlock, 0.0f);
     }
+    std::vector<std::vector<float>> most_depths_; ///< of each body that was crushed: m, of its particles
     std::vector<NearPair> pairs_;
     struct OwnBalls;                                         ///< of a body whose balls meet each other
     std::vector<std::shared_ptr<const OwnBalls>> own_balls_; ///< null: of the others

@@ -3,6 +3,7 @@
 
 #include "filigree/core/parallel_for.h"
 #include "filigree/physics/contact_law.h"
+#include "filigree/physics/point_grid.h"
 
 #include <algorithm>
 #include <limits>
@@ -16,6 +17,30 @@ namespace {
 constexpr std::size_t kContactForcesGrain = 256, kObstacleForcesGrain = 16; // bodies
 constexpr std::size_t kBlocksGrain = 4;
 constexpr double kStiffness = 4; ///< times the stiffness of a spacing of material under the point
+
+constexpr float kCrushing = 0.5f; ///< spacings: what touches deeper may be crushed inside
+constexpr float kInside = 2;      ///< spacings below the surface at rest: what lies deeper counts as this deep
+constexpr float kThinnest = 0.1f; ///< of their depth at rest, to which crushed parts are pressed
+
+/// m that each particle may go into an obstacle: at the surface what a penalty is trusted with, a spacing below it
+/// nothing.
+std::vector<float> most_depths_of(const Body& body) {
+    constexpr float kBetween = 0.35f; // spacings that a particle at the surface may be from the surface's points
+    const float spacing = float(body.spacing());
+    const std::size_t points = body.surface.points.size();
+    Vectors places(points);
+    for (std::size_t s = 0; s < points; ++s) places.set(s, embedded_point(body.surface.points, s, body.rest));
+    const PointGrid grid(places, spacing);
+    std::vector<float> most(body.particle_count());
+    for (std::size_t i = 0; i < most.size(); ++i) {
+        float inside = kInside + kBetween;
+        grid.near(body.rest[i], inside * spacing,
+                  [&](Index s) { inside = std::min(inside, (places[s] - body.rest[i]).norm() / spacing); });
+        inside = std::max(0.0f, inside - kBetween);
+        most[i] = spacing * (kDeepest * std::max(0.0f, 1 - inside) - kThinnest * inside);
+    }
+    return most;
+}
 
 } // namespace
 
@@ -197,10 +222,12 @@ void Contacts::push_out(std::span<BodyState> bodies, double time) {
     const ObstaclePoses poses(world_, time);
     for (std::size_t b = 0; b < bodies.size(); ++b) {
         BodyState& body = bodies[b];
-        if (!(touched_[b] & kOnObstacle)) continue;
-        const float most = kDeepest * float(body.body->spacing());
+        if (!(touched_[b] & kOnObstacle) || body.sleeps()) continue;
+        const float spacing = float(body.body->spacing()), most = kDeepest * spacing;
+        bool is_deep = false;
         for (const Near& at : near_[b]) {
-            if (!(at.depth > most) || body.sleeps()) continue;
+            is_deep = is_deep || at.depth > kCrushing * spacing;
+            if (!(at.depth > most)) continue;
             const Vec3f place = embedded_point(body.surface, at.point, body.positions);
             const DistanceField::Sample surface =
                 distance_to(world_.obstacles[at.obstacle], poses.at(at.obstacle), place);
@@ -215,8 +242,26 @@ void Contacts::push_out(std::span<BodyState> bodies, double time) {
             for (Index k = body.surface.offsets[at.point]; k < body.surface.offsets[at.point + 1]; ++k)
                 push_particle(body, body.surface.particles[k], body.surface.weights[k], way, push);
         }
+        if (is_deep && !body.rigid) push_particles_out(body, most_depths_[b], poses);
     }
     matter_.push_out(bodies);
+}
+
+/// What hits faster than its own waves run is crushed flat, and its inside would go on through the surface that was
+/// stopped.
+void Contacts::push_particles_out(BodyState& body, std::vector<float>& most_depths, const ObstaclePoses& poses) {
+    if (most_depths.empty()) most_depths = most_depths_of(*body.body);
+    for (std::size_t o = 0; o < world_.obstacles.size(); ++o)
+        for (Index i = 0; i < body.positions.size(); ++i) {
+            if (!(body.inverse_mass[i] > 0)) continue;
+            const Vec3f place = body.positions[i];
+            const DistanceField::Sample surface = distance_to(world_.obstacles[o], poses.at(o), place);
+            const float most = body.has_flowed() ? kDeepest * float(body.body->spacing()) : most_depths[i];
+            const float too_deep = -surface.distance - most;
+            if (!(too_deep > 0)) continue;
+            const float inwards = std::min(0.0f, (body.velocities[i] - poses.velocity(o, place)).dot(surface.normal));
+            push_particle(body, i, 1 / body.inverse_mass[i], too_deep * surface.normal, -inwards * surface.normal);
+        }
 }
 
 } // namespace filigree

@@ -9,19 +9,23 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 namespace filigree {
 
 namespace {
 
 constexpr std::size_t kExplicitStepsGrain = 2048, kAwakeGrain = 16; // bodies
-constexpr double kSafety = 0.9;           ///< part of the stable step that is used: it changes while a step is made
-constexpr double kLeastSubsteps = 2;      ///< a frame; with one, large motions gain energy
+constexpr double kSafety = 0.9;      ///< part of the stable step that is used: it changes while a step is made
+constexpr double kLeastSubsteps = 2; ///< a frame; with one, large motions gain energy
+constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 constexpr double kShortestOpening = 0.25; ///< of the stable step: cracks that open faster are followed less well
-/// Where forces change as fast as in a crushed cell, steps of changing length give a body energy: 40 % in four seconds
-/// (Simulation.ACrushedBodyGainsNoEnergy). So little internal damping takes it away again.
-constexpr float kCrushedVolume = 0.1f;     ///< of a cell, of its volume at rest
-constexpr float kCrushedDelay = 0.1f;      ///< substeps
+/// Vibrations that steps hardly follow can draw energy from them where they are large: tiny bodies in free flight, and
+/// crushed ones, took in a hundred times what they had (ExplicitSteps.ANoisyBodyGainsNoEnergy). So little internal
+/// damping takes it away again. Vibrations that steps follow well change accelerations little in a substep.
+constexpr float kCalm = 0.05f;             ///< that change, as a speed, in parts of the speed of waves ...
+constexpr float kNoisy = 0.15f;            ///< ... from which on damping is full
+constexpr float kNoisyDelay = 0.05f;       ///< substeps
 constexpr float kLightDelay = 0.5f;        ///< substeps: of a piece's light corners, which would swing for ever ...
 constexpr float kFreeWay = 0.05f;          ///< spacings a substep: ... as far as they move faster
 constexpr unsigned kExplicitLimit = 20000; ///< substeps a frame, whatever was asked for
@@ -61,6 +65,29 @@ void damp_light_corners(const BodyState& body, float dt, Vectors& ahead) {
     }
 }
 
+/// m/s^2: how much accelerations have changed since forces were `before`, of the particles beside each other, root mean
+/// square by mass.
+float change_of_acceleration(const BodyState& body, const Vectors& before) {
+    constexpr std::size_t kAtOnce = 8; // so that the compiler uses vectors
+    float mass[kAtOnce] = {}, x[kAtOnce] = {}, y[kAtOnce] = {}, z[kAtOnce] = {}, squares[kAtOnce] = {};
+    const auto add = [&, m = body.body->mass.data(), w = body.inverse_mass.data()](std::size_t i, std::size_t k) {
+        const float ax = (body.forces.x[i] - before.x[i]) * w[i], ay = (body.forces.y[i] - before.y[i]) * w[i],
+                    az = (body.forces.z[i] - before.z[i]) * w[i];
+        mass[k] += m[i];
+        x[k] += m[i] * ax;
+        y[k] += m[i] * ay;
+        z[k] += m[i] * az;
+        squares[k] += m[i] * (ax * ax + ay * ay + az * az);
+    };
+    const std::size_t count = body.inverse_mass.size(), whole = count - count % kAtOnce;
+    for (std::size_t i = 0; i < whole; i += kAtOnce)
+        for (std::size_t k = 0; k < kAtOnce; ++k) add(i + k, k);
+    for (std::size_t i = whole; i < count; ++i) add(i, 0);
+    const auto sum = [](const float(&parts)[kAtOnce]) { return std::accumulate(parts, parts + kAtOnce, 0.0f); };
+    const float all = sum(mass), mean = Vec3f(sum(x), sum(y), sum(z)).squaredNorm() / all;
+    return std::sqrt(std::max(0.0f, sum(squares) - mean) / all);
+}
+
 /// s, longest that is stable; 0 where no step is. A spring that is also damped along its own motion has
 /// zeta = omega tau / 2.
 double stable_step(double squared_frequency, double internal_damping) {
@@ -86,6 +113,7 @@ public:
             state_.contacts.begin_anew();
             state_.contacts.begin_frame(bodies_);
             find_contacts();
+            steadiest_step_ = kNoLimit;
             find_forces(first_dt);
         }
         const auto is_left = [&] { return until_ - now_ > 1e-9 * state_.frame_seconds(); };
@@ -182,7 +210,7 @@ private:
                 squared_frequency += state_.contacts.added_frequency(b) * double(body.rest_squared_frequency);
             squared_frequency = state_.external.add_pulls(body, b, now_, squared_frequency);
         }
-        double opening_step = std::numeric_limits<double>::infinity();
+        double opening_step = kNoLimit;
         for (const Cracks& cracks : state_.cracks) {
             const Cracks::Pace pace = cracks.add_forces(bodies_, context_);
             for (std::size_t piece = 0; piece < cracks.body().pieces.size(); ++piece)
@@ -195,7 +223,8 @@ private:
         });
         for (std::size_t b = 0; b < bodies_.size(); ++b)
             if (!bodies_[b].sleeps())
-                stable_step_ = std::min(stable_step_, stable_step(frequencies[b], double(delay_of(b, dt))));
+                steadiest_step_ = std::min(steadiest_step_, stable_step(frequencies[b], double(delays_[b])));
+        stable_step_ = std::min(stable_step_, steadiest_step_);
         const double shortest = std::max(kShortestOpening * stable_step_, (until_ - now_) / steps_allowed());
         stable_step_ = std::min(stable_step_, std::max(opening_step, shortest));
     }
@@ -203,18 +232,24 @@ private:
     /// s of internal damping.
     float delay_of(std::size_t b, float dt) const {
         const BodyState& body = bodies_[b];
-        if (body.rigid) return 0;
-        const float least = elastic_[b].least_volume_ratio < kCrushedVolume ? kCrushedDelay * dt : 0;
-        return std::max(float(body.body->material.internal_damping), least);
+        const auto usual = float(body.body->material.internal_damping);
+        if (forces_before_[b].size() == 0) return usual;
+        const float wave_speed = float(pressure_wave_speed(body.body->material));
+        const float change = dt * change_of_acceleration(body, forces_before_[b]) / wave_speed;
+        return std::max(usual, kNoisyDelay * dt * std::clamp((change - kCalm) / (kNoisy - kCalm), 0.0f, 1.0f));
     }
 
     void find_elastic_forces(float dt) {
         const Stopwatch watch(report_.elastic_seconds);
+        const bool has_forces = !elastic_.empty(); // those before the frame are not known after a restore
         elastic_.resize(bodies_.size());
+        delays_.resize(bodies_.size());
+        forces_before_.resize(bodies_.size());
         for (std::size_t b = 0; b < bodies_.size(); ++b) {
             BodyState& body = bodies_[b];
             if (body.is_absent) continue;
-            const float delay = delay_of(b, dt);
+            const float delay = delays_[b] = body.rigid ? 0 : delay_of(b, dt);
+            if (has_forces && !body.rigid) forces_before_[b] = body.forces;
             if (delay > 0 || !body.light_corners.empty()) {
                 Vectors ahead = delay > 0 ? positions_ahead(body, delay, context_) : body.positions;
                 damp_light_corners(body, dt, ahead);
@@ -287,8 +322,13 @@ private:
     float speed_ = 0;           // m/s, of the fastest particle
     const bool meets_anything_; // obstacles, other bodies or parts of the same
     std::vector<ElasticReport> elastic_;
+    std::vector<float> delays_;          ///< s of internal damping, of each body
+    std::vector<Vectors> forces_before_; ///< of each body, in the substep before; empty: not known
     std::vector<RigidLoad> rigid_loads_; ///< of each body, by find_forces
     double stable_step_ = 0;             // s
+    /// s: what was stable for all bodies in the whole frame so far. Steps that become longer and shorter with the
+    /// vibrations that they follow give them energy.
+    double steadiest_step_ = kNoLimit;
 };
 
 } // namespace
