@@ -2,6 +2,7 @@
 #include "filigree/physics/simulation.h"
 
 #include "filigree/core/random.h"
+#include "filigree/mesh/shapes.h"
 #include "physics/simulation_scenes.h"
 #include "physics/test_bodies.h"
 
@@ -192,6 +193,26 @@ TEST(HardStarts, ABodyThatHitsFasterThanItsWavesIsStoppedByTheGround) {
             EXPECT_GT(centre_of_mass(hit).y(), 1.5 * spacing) << int(model) << ", " << int(mode);
             EXPECT_LT(shape_error(hit), 0.5 * spacing) << int(model) << ", " << int(mode);
         }
+}
+
+// Cells that the surface only passes through have corners far outside of it.
+
+TEST(HardStarts, ABodyDeepInSoftGroundKeepsTheCellsUnderIt) {
+    const Mesh sphere = make_wavy_sphere({.resolution = 40, .amplitude = 0});
+    Material heavy = material(MaterialModel::fem, 1e7);
+    heavy.density = 4500;
+    heavy.damping = 5;
+    const auto body =
+        std::make_shared<Body>(make_body(sphere, heavy, {.cells = {.count = 1000}}, RunContext(2)).value());
+    World world = with_ground(0);
+    world.obstacles[0].stiffness = 0.003;
+    Simulation resting = simulation(world, {actor(body, {0, 0.5, 0})});
+    run(resting, 120);
+    const FrameReport last = run(resting, 1);
+    const double depth = last.deepest_contact / body->spacing();
+    EXPECT_GT(depth, 0.5);
+    EXPECT_LT(depth, 0.77);
+    EXPECT_GT(last.least_volume_ratio, 0.8f);
 }
 
 TEST(HardStarts, ReportsSayWhichBodyIsCrushedMost) {

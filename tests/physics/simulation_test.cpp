@@ -388,7 +388,8 @@ TEST(Simulation, AHandPulls) {
     Simulation pulled = simulation(free_space(), {actor(body)});
     Hand hand;
     hand.point = {0.4f, 0.2f, 0.2f};
-    hand.target.constant = Vec3d(1.4, 0.2, 0.2);
+    hand.target.times = {0, 0.5}; // at once would turn the body inside out, and then to any side
+    hand.target.values = {hand.point.cast<double>(), Vec3d(1.4, 0.2, 0.2)};
     ASSERT_TRUE(pulled.set_hands({hand}, RunContext(1)).ok());
     run(pulled, 300);
     EXPECT_NEAR(centre_of_mass(pulled).x(), 1.2, 0.05);

@@ -8,6 +8,7 @@
 
 #include <array>
 #include <functional>
+#include <map>
 #include <memory>
 
 namespace filigree {
@@ -25,8 +26,7 @@ public:
     /// bodies: fixed in number from here on.
     Contacts(const World& world, std::size_t bodies, bool between_bodies, bool within_bodies)
         : world_(world), between_bodies_(between_bodies), within_bodies_(within_bodies), near_(bodies),
-          near_clear_until_(bodies), most_depths_(bodies), touched_(bodies, 0),
-          matter_(world, between_bodies, within_bodies) {}
+          near_clear_until_(bodies), touched_(bodies, 0), matter_(world, between_bodies, within_bodies) {}
     /// Once, when all bodies are there.
     void begin(std::span<const BodyState> bodies);
 
@@ -78,7 +78,7 @@ public:
 
     /// Moves what is deeper than a part of the spacing out, and takes its speed inwards away: for impacts faster than
     /// the penalty can stop. Looks at what the last add_forces or update_anchors found.
-    void push_out(std::span<BodyState> bodies, double time);
+    void push_out(std::span<BodyState> bodies, double time, const RunContext& context);
 
     /// Contacts of one body as blocks for vertex block descent. Valid until the next search.
     class Blocks final : public BlockTerms {
@@ -209,7 +209,8 @@ private:
     static Vec3f between(const NearPair& pair, std::span<const BodyState> bodies, Embedding BodyState::*points,
                          const Vectors& of_first, const Vectors& of_second);
     std::vector<NearPair> held_pairs() const; ///< those that friction holds, ascending
-    void push_particles_out(BodyState& body, std::vector<float>& most_depths, const ObstaclePoses& poses);
+    void push_particles_out(BodyState& body, std::size_t obstacle, const Vec3f& outwards, const ObstaclePoses& poses,
+                            const RunContext& context);
     void find_near(std::span<const BodyState> bodies, double time, float reach, const RunContext& context);
     void find_pairs(std::span<const BodyState> bodies, float reach, const RunContext& context);
     void find_own_pairs(const BodyState& body, Index number, const Vectors& balls, float reach);
@@ -222,7 +223,7 @@ private:
     void ask_all_near(std::size_t body) {
         near_clear_until_[body].assign((near_[body].size() + kNearBlock - 1) / kNearBlock, 0.0f);
     }
-    std::vector<std::vector<float>> most_depths_; ///< of each body that was crushed: m, of its particles
+    std::map<const Body*, std::vector<float>> most_depths_; ///< of bodies that were crushed: m, of each particle
     std::vector<NearPair> pairs_;
     struct OwnBalls;                                         ///< of a body whose balls meet each other
     std::vector<std::shared_ptr<const OwnBalls>> own_balls_; ///< null: of the others

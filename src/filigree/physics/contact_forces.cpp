@@ -22,23 +22,37 @@ constexpr float kCrushing = 0.5f; ///< spacings: what touches deeper may be crus
 constexpr float kInside = 2;      ///< spacings below the surface at rest: what lies deeper counts as this deep
 constexpr float kThinnest = 0.1f; ///< of their depth at rest, to which crushed parts are pressed
 
-/// m that each particle may go into an obstacle: at the surface what a penalty is trusted with, a spacing below it
-/// nothing.
-std::vector<float> most_depths_of(const Body& body) {
-    constexpr float kBetween = 0.35f; // spacings that a particle at the surface may be from the surface's points
+/// Spacings below the surface at rest, of a particle; corners of cells may lie outside, below 0. points: of the surface
+/// at rest.
+float rest_depth(const Body& body, const Vec3f& particle, const PointGrid& grid) {
     const float spacing = float(body.spacing());
-    const std::size_t points = body.surface.points.size();
-    Vectors places(points);
-    for (std::size_t s = 0; s < points; ++s) places.set(s, embedded_point(body.surface.points, s, body.rest));
-    const PointGrid grid(places, spacing);
+    if (body.field) return (body.field_radius - body.field->at(particle).distance) / spacing;
+    // Particles of meshfree bodies lie inside; about so far from the surface's points are those at the surface.
+    constexpr float kBetween = 0.35f; // spacings
+    float depth = kInside;
+    grid.near(particle, (kInside + kBetween) * spacing, [&](Index s) {
+        depth = std::min(depth, (body.surface.points.rest[s] - particle).norm() / spacing - kBetween);
+    });
+    return std::max(0.0f, depth);
+}
+
+/// m that each particle may go into an obstacle: at the surface what a penalty is trusted with, a spacing below it
+/// nothing, further inside less; corners outside of it go before.
+std::vector<float> most_depths_of(const Body& body, const RunContext& context) {
+    constexpr float kStretched = 2; // what is outside may be stretched
+    const float spacing = float(body.spacing());
+    Vectors points(body.field ? 0 : body.surface.points.size());
+    for (std::size_t s = 0; s < points.size(); ++s) points.set(s, body.surface.points.rest[s]);
+    const PointGrid grid(points, spacing);
     std::vector<float> most(body.particle_count());
-    for (std::size_t i = 0; i < most.size(); ++i) {
-        float inside = kInside + kBetween;
-        grid.near(body.rest[i], inside * spacing,
-                  [&](Index s) { inside = std::min(inside, (places[s] - body.rest[i]).norm() / spacing); });
-        inside = std::max(0.0f, inside - kBetween);
-        most[i] = spacing * (kDeepest * std::max(0.0f, 1 - inside) - kThinnest * inside);
-    }
+    parallel_for(context, most.size(), kContactForcesGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            const float depth = rest_depth(body, body.rest[i], grid);
+            most[i] =
+                spacing * (depth < 0 ? kDeepest - kStretched * depth
+                                     : kDeepest * std::max(0.0f, 1 - depth) - kThinnest * std::min(depth, kInside));
+        }
+    });
     return most;
 }
 
@@ -218,22 +232,22 @@ ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, flo
     return report;
 }
 
-void Contacts::push_out(std::span<BodyState> bodies, double time) {
+void Contacts::push_out(std::span<BodyState> bodies, double time, const RunContext& context) {
     const ObstaclePoses poses(world_, time);
     for (std::size_t b = 0; b < bodies.size(); ++b) {
         BodyState& body = bodies[b];
         if (!(touched_[b] & kOnObstacle) || body.sleeps()) continue;
         const float spacing = float(body.body->spacing()), most = kDeepest * spacing;
-        bool is_deep = false;
+        std::vector<Vec3f> outwards(world_.obstacles.size(), Vec3f::Zero()); // of what is deep
         for (const Near& at : near_[b]) {
-            is_deep = is_deep || at.depth > kCrushing * spacing;
-            if (!(at.depth > most)) continue;
+            if (!(at.depth > kCrushing * spacing)) continue;
             const Vec3f place = embedded_point(body.surface, at.point, body.positions);
             const DistanceField::Sample surface =
                 distance_to(world_.obstacles[at.obstacle], poses.at(at.obstacle), place);
-            if (!(-surface.distance > most)) continue;
             const float gives = yielding(body.surface, at.point, body.inverse_mass);
             if (!(gives > 0)) continue;
+            outwards[at.obstacle] += surface.normal;
+            if (!(-surface.distance > most)) continue;
             const float inwards = std::min(
                 0.0f, (embedded_point(body.surface, at.point, body.velocities) - poses.velocity(at.obstacle, place))
                           .dot(surface.normal));
@@ -242,26 +256,36 @@ void Contacts::push_out(std::span<BodyState> bodies, double time) {
             for (Index k = body.surface.offsets[at.point]; k < body.surface.offsets[at.point + 1]; ++k)
                 push_particle(body, body.surface.particles[k], body.surface.weights[k], way, push);
         }
-        if (is_deep && !body.rigid) push_particles_out(body, most_depths_[b], poses);
+        for (std::size_t o = 0; o < outwards.size(); ++o)
+            if (!outwards[o].isZero(0) && !body.rigid) push_particles_out(body, o, outwards[o], poses, context);
     }
     matter_.push_out(bodies);
 }
 
 /// What hits faster than its own waves run is crushed flat, and its inside would go on through the surface that was
-/// stopped.
-void Contacts::push_particles_out(BodyState& body, std::vector<float>& most_depths, const ObstaclePoses& poses) {
-    if (most_depths.empty()) most_depths = most_depths_of(*body.body);
-    for (std::size_t o = 0; o < world_.obstacles.size(); ++o)
-        for (Index i = 0; i < body.positions.size(); ++i) {
-            if (!(body.inverse_mass[i] > 0)) continue;
+/// stopped. outwards: of the obstacle's surface where the body is in it; particles that are past its middle stay.
+void Contacts::push_particles_out(BodyState& body, std::size_t obstacle, const Vec3f& outwards,
+                                  const ObstaclePoses& poses, const RunContext& context) {
+    std::vector<float>& most_depths = most_depths_[body.body.get()];
+    if (most_depths.empty()) most_depths = most_depths_of(*body.body, context);
+    std::vector<float> ways(body.positions.size(), 0.0f);
+    parallel_for(context, ways.size(), kContactForcesGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            const float share = body.inverse_mass[i] * body.body->mass[i]; // of a tied copy: its part of the whole
+            if (!(share > 0)) continue;
             const Vec3f place = body.positions[i];
-            const DistanceField::Sample surface = distance_to(world_.obstacles[o], poses.at(o), place);
+            const DistanceField::Sample surface = distance_to(world_.obstacles[obstacle], poses.at(obstacle), place);
             const float most = body.has_flowed() ? kDeepest * float(body.body->spacing()) : most_depths[i];
             const float too_deep = -surface.distance - most;
-            if (!(too_deep > 0)) continue;
-            const float inwards = std::min(0.0f, (body.velocities[i] - poses.velocity(o, place)).dot(surface.normal));
-            push_particle(body, i, 1 / body.inverse_mass[i], too_deep * surface.normal, -inwards * surface.normal);
+            if (!(too_deep > 0) || surface.normal.dot(outwards) < 0) continue;
+            const float inwards =
+                std::min(0.0f, (body.velocities[i] - poses.velocity(obstacle, place)).dot(surface.normal));
+            body.positions.add(i, share * too_deep * surface.normal);
+            body.velocities.add(i, -share * inwards * surface.normal);
+            ways[i] = too_deep;
         }
+    });
+    for (const float way : ways) body.pushed_way = std::max(body.pushed_way, way);
 }
 
 } // namespace filigree

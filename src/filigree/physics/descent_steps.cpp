@@ -211,7 +211,7 @@ private:
         restore_momentum();
         for (BodyState& body : bodies_)
             if (body.rigid) fit_pose(body);
-        push_out(state_, now_);
+        push_out(state_, now_, context_);
         finish_substep(state_, dt_, context_);
         break_bodies(state_, now_ - double(dt_), now_, context_);
         ++report_.substeps;

@@ -21,11 +21,14 @@ constexpr double kLeastSubsteps = 2; ///< a frame; with one, large motions gain 
 constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 constexpr double kShortestOpening = 0.25; ///< of the stable step: cracks that open faster are followed less well
 /// Vibrations that steps hardly follow can draw energy from them where they are large: tiny bodies in free flight, and
-/// crushed ones, took in a hundred times what they had (ExplicitSteps.ANoisyBodyGainsNoEnergy). So little internal
+/// crushed ones, took in a hundred times what they had (HardStarts.ANoisyBodyGainsNoEnergy). So little internal
 /// damping takes it away again. Vibrations that steps follow well change accelerations little in a substep.
-constexpr float kCalm = 0.05f;             ///< that change, as a speed, in parts of the speed of waves ...
-constexpr float kNoisy = 0.15f;            ///< ... from which on damping is full
-constexpr float kNoisyDelay = 0.05f;       ///< substeps
+constexpr float kCalm = 0.05f;       ///< that change, as a speed, in parts of the speed of waves ...
+constexpr float kNoisy = 0.15f;      ///< ... from which on damping is full
+constexpr float kNoisyDelay = 0.05f; ///< substeps
+/// A few crushed cells are little of a large body; forces change there as fast as steps follow.
+constexpr float kCrushedVolume = 0.1f;     ///< of a cell, of its volume at rest
+constexpr float kCrushedDelay = 0.1f;      ///< substeps
 constexpr float kLightDelay = 0.5f;        ///< substeps: of a piece's light corners, which would swing for ever ...
 constexpr float kFreeWay = 0.05f;          ///< spacings a substep: ... as far as they move faster
 constexpr unsigned kExplicitLimit = 20000; ///< substeps a frame, whatever was asked for
@@ -66,26 +69,41 @@ void damp_light_corners(const BodyState& body, float dt, Vectors& ahead) {
 }
 
 /// m/s^2: how much accelerations have changed since forces were `before`, of the particles beside each other, root mean
-/// square by mass.
-float change_of_acceleration(const BodyState& body, const Vectors& before) {
+/// square by mass. `before` becomes the forces now.
+float change_of_acceleration(const BodyState& body, Vectors& before, const RunContext& context) {
     constexpr std::size_t kAtOnce = 8; // so that the compiler uses vectors
-    float mass[kAtOnce] = {}, x[kAtOnce] = {}, y[kAtOnce] = {}, z[kAtOnce] = {}, squares[kAtOnce] = {};
-    const auto add = [&, m = body.body->mass.data(), w = body.inverse_mass.data()](std::size_t i, std::size_t k) {
-        const float ax = (body.forces.x[i] - before.x[i]) * w[i], ay = (body.forces.y[i] - before.y[i]) * w[i],
-                    az = (body.forces.z[i] - before.z[i]) * w[i];
-        mass[k] += m[i];
-        x[k] += m[i] * ax;
-        y[k] += m[i] * ay;
-        z[k] += m[i] * az;
-        squares[k] += m[i] * (ax * ax + ay * ay + az * az);
+    struct Sums {
+        float mass[kAtOnce] = {}, x[kAtOnce] = {}, y[kAtOnce] = {}, z[kAtOnce] = {}, squares[kAtOnce] = {};
     };
-    const std::size_t count = body.inverse_mass.size(), whole = count - count % kAtOnce;
-    for (std::size_t i = 0; i < whole; i += kAtOnce)
-        for (std::size_t k = 0; k < kAtOnce; ++k) add(i + k, k);
-    for (std::size_t i = whole; i < count; ++i) add(i, 0);
-    const auto sum = [](const float(&parts)[kAtOnce]) { return std::accumulate(parts, parts + kAtOnce, 0.0f); };
-    const float all = sum(mass), mean = Vec3f(sum(x), sum(y), sum(z)).squaredNorm() / all;
-    return std::sqrt(std::max(0.0f, sum(squares) - mean) / all);
+    const std::size_t count = body.inverse_mass.size();
+    std::vector<Sums> sums((count + kExplicitStepsGrain - 1) / kExplicitStepsGrain);
+    parallel_for(context, count, kExplicitStepsGrain, [&](std::size_t begin, std::size_t end) {
+        Sums& sum = sums[begin / kExplicitStepsGrain];
+        const auto change = [](const std::vector<float>& now, std::vector<float>& then, std::size_t i) {
+            return now[i] - std::exchange(then[i], now[i]);
+        };
+        const auto add = [&, m = body.body->mass.data(), w = body.inverse_mass.data()](std::size_t i, std::size_t k) {
+            const float ax = w[i] * change(body.forces.x, before.x, i), ay = w[i] * change(body.forces.y, before.y, i),
+                        az = w[i] * change(body.forces.z, before.z, i);
+            sum.mass[k] += m[i];
+            sum.x[k] += m[i] * ax;
+            sum.y[k] += m[i] * ay;
+            sum.z[k] += m[i] * az;
+            sum.squares[k] += m[i] * (ax * ax + ay * ay + az * az);
+        };
+        const std::size_t whole = end - (end - begin) % kAtOnce;
+        for (std::size_t i = begin; i < whole; i += kAtOnce)
+            for (std::size_t k = 0; k < kAtOnce; ++k) add(i + k, k);
+        for (std::size_t i = whole; i < end; ++i) add(i, 0);
+    });
+    const auto all = [&](const float(Sums::*parts)[kAtOnce]) {
+        float total = 0;
+        for (const Sums& sum : sums) total = std::accumulate(sum.*parts, sum.*parts + kAtOnce, total);
+        return total;
+    };
+    const float mass = all(&Sums::mass);
+    const float mean = Vec3f(all(&Sums::x), all(&Sums::y), all(&Sums::z)).squaredNorm() / mass;
+    return std::sqrt(std::max(0.0f, all(&Sums::squares) - mean) / mass);
 }
 
 /// s, longest that is stable; 0 where no step is. A spring that is also damped along its own motion has
@@ -114,6 +132,7 @@ public:
             state_.contacts.begin_frame(bodies_);
             find_contacts();
             steadiest_step_ = kNoLimit;
+            vibrations_.clear();
             find_forces(first_dt);
         }
         const auto is_left = [&] { return until_ - now_ > 1e-9 * state_.frame_seconds(); };
@@ -132,7 +151,7 @@ public:
                 if (meets_anything_) state_.contacts.begin_frame(bodies_);
                 find_contacts();
             }
-            if (breaks.forces || breaks.contacts) find_forces(dt);
+            if (breaks.forces || breaks.contacts) find_forces(dt, true);
         }
         place_rigid();
         if (meets_anything_) state_.contacts.end_frame(bodies_);
@@ -188,8 +207,8 @@ private:
     }
 
     /// All forces at the present positions, and the step that is stable there.
-    void find_forces(float dt) {
-        find_elastic_forces(dt);
+    void find_forces(float dt, bool is_again = false) {
+        find_elastic_forces(dt, is_again);
         {
             const Stopwatch watch(report_.contact_seconds);
             const ContactReport touching = state_.contacts.add_forces(bodies_, now_, dt, context_);
@@ -223,33 +242,39 @@ private:
         });
         for (std::size_t b = 0; b < bodies_.size(); ++b)
             if (!bodies_[b].sleeps())
-                steadiest_step_ = std::min(steadiest_step_, stable_step(frequencies[b], double(delays_[b])));
+                steadiest_step_ = std::min(steadiest_step_, stable_step(frequencies[b], double(vibrations_[b].delay)));
         stable_step_ = std::min(stable_step_, steadiest_step_);
         const double shortest = std::max(kShortestOpening * stable_step_, (until_ - now_) / steps_allowed());
         stable_step_ = std::min(stable_step_, std::max(opening_step, shortest));
     }
 
     /// s of internal damping.
-    float delay_of(std::size_t b, float dt) const {
+    float find_delay(std::size_t b, float dt) {
         const BodyState& body = bodies_[b];
+        Vibration& vibration = vibrations_[b];
         const auto usual = float(body.body->material.internal_damping);
-        if (forces_before_[b].size() == 0) return usual;
-        const float wave_speed = float(pressure_wave_speed(body.body->material));
-        const float change = dt * change_of_acceleration(body, forces_before_[b]) / wave_speed;
-        return std::max(usual, kNoisyDelay * dt * std::clamp((change - kCalm) / (kNoisy - kCalm), 0.0f, 1.0f));
+        if (!std::exchange(vibration.has_forces, true)) return usual;
+        const float crushed = elastic_[b].least_volume_ratio < kCrushedVolume ? kCrushedDelay * dt : 0;
+        if (vibration.before.size() == 0) {
+            vibration.before = body.forces;
+            return std::max(usual, crushed);
+        }
+        const float change = dt * change_of_acceleration(body, vibration.before, context_) /
+                             float(pressure_wave_speed(body.body->material));
+        const float noisy = kNoisyDelay * dt * std::clamp((change - kCalm) / (kNoisy - kCalm), 0.0f, 1.0f);
+        return std::max({usual, crushed, noisy});
     }
 
-    void find_elastic_forces(float dt) {
+    /// is_again: nothing has moved since the last time.
+    void find_elastic_forces(float dt, bool is_again) {
         const Stopwatch watch(report_.elastic_seconds);
-        const bool has_forces = !elastic_.empty(); // those before the frame are not known after a restore
         elastic_.resize(bodies_.size());
-        delays_.resize(bodies_.size());
-        forces_before_.resize(bodies_.size());
+        vibrations_.resize(bodies_.size());
         for (std::size_t b = 0; b < bodies_.size(); ++b) {
             BodyState& body = bodies_[b];
             if (body.is_absent) continue;
-            const float delay = delays_[b] = body.rigid ? 0 : delay_of(b, dt);
-            if (has_forces && !body.rigid) forces_before_[b] = body.forces;
+            float& delay = vibrations_[b].delay;
+            if (!body.rigid && !(is_again && vibrations_[b].has_forces)) delay = find_delay(b, dt);
             if (delay > 0 || !body.light_corners.empty()) {
                 Vectors ahead = delay > 0 ? positions_ahead(body, delay, context_) : body.positions;
                 damp_light_corners(body, dt, ahead);
@@ -265,7 +290,7 @@ private:
     void finish(float dt) {
         {
             const Stopwatch watch(report_.contact_seconds);
-            push_out(state_, now_);
+            push_out(state_, now_, context_);
         }
         const Stopwatch watch(report_.other_seconds);
         kick(0.5f * dt, true); // rigid bodies' particles follow with the next drift, or place_rigid
@@ -322,8 +347,12 @@ private:
     float speed_ = 0;           // m/s, of the fastest particle
     const bool meets_anything_; // obstacles, other bodies or parts of the same
     std::vector<ElasticReport> elastic_;
-    std::vector<float> delays_;          ///< s of internal damping, of each body
-    std::vector<Vectors> forces_before_; ///< of each body, in the substep before; empty: not known
+    struct Vibration {           ///< of a body
+        bool has_forces = false; ///< of this frame; those before it are not known after a restore
+        Vectors before;          ///< N, the forces of the substep before; empty: not known
+        float delay = 0;         ///< s of internal damping
+    };
+    std::vector<Vibration> vibrations_;
     std::vector<RigidLoad> rigid_loads_; ///< of each body, by find_forces
     double stable_step_ = 0;             // s
     /// s: what was stable for all bodies in the whole frame so far. Steps that become longer and shorter with the

@@ -66,7 +66,7 @@ void move_pins(SimulationState& state, double now, float dt);
 bool repair_start(SimulationState& state, std::span<const ElasticReport> elastic, FrameReport& report,
                   const RunContext& context);
 /// Moves out what contacts find too deep.
-void push_out(SimulationState& state, double now);
+void push_out(SimulationState& state, double now, const RunContext& context);
 /// Plastic flow and heat; neighbourhoods are renewed where that asks for it.
 void finish_substep(SimulationState& state, float dt, const RunContext& context);
 /// What lets go after a substep. `forces`: anything did, and forces have to be found anew; `contacts`: and they, too.

@@ -122,9 +122,9 @@ bool repair_start(SimulationState& state, std::span<const ElasticReport> elastic
     return repaired;
 }
 
-void push_out(SimulationState& state, double now) {
+void push_out(SimulationState& state, double now, const RunContext& context) {
     for (Cracks& cracks : state.cracks) cracks.remember_places(state.bodies);
-    state.contacts.push_out(state.bodies, now);
+    state.contacts.push_out(state.bodies, now, context);
     bool any = false;
     for (std::size_t b = 0; b < state.bodies.size(); ++b) {
         BodyState& body = state.bodies[b];
