@@ -22,32 +22,32 @@ constexpr float kCrushing = 0.5f; ///< spacings: what touches deeper may be crus
 constexpr float kInside = 2;      ///< spacings below the surface at rest: what lies deeper counts as this deep
 constexpr float kThinnest = 0.1f; ///< of their depth at rest, to which crushed parts are pressed
 
-/// Spacings below the surface at rest, of a particle; corners of cells may lie outside, below 0. points: of the surface
-/// at rest.
-float rest_depth(const Body& body, const Vec3f& particle, const PointGrid& grid) {
+/// Spacings of a particle below the surface at rest; corners of cells may lie outside, below 0. points: of the surface,
+/// for bodies without a field.
+float rest_depth(const Body& body, const Vec3f& particle, const PointGrid& points) {
     const float spacing = float(body.spacing());
     if (body.field) return (body.field_radius - body.field->at(particle).distance) / spacing;
     // Particles of meshfree bodies lie inside; about so far from the surface's points are those at the surface.
     constexpr float kBetween = 0.35f; // spacings
     float depth = kInside;
-    grid.near(particle, (kInside + kBetween) * spacing, [&](Index s) {
+    points.near(particle, (kInside + kBetween) * spacing, [&](Index s) {
         depth = std::min(depth, (body.surface.points.rest[s] - particle).norm() / spacing - kBetween);
     });
     return std::max(0.0f, depth);
 }
 
-/// m that each particle may go into an obstacle: at the surface what a penalty is trusted with, a spacing below it
-/// nothing, further inside less; corners outside of it go before.
+/// m that each particle may go into an obstacle: at the surface as deep as a penalty is trusted with, a spacing below
+/// it not at all. What lies deeper stays outside; corners outside of the surface may go further.
 std::vector<float> most_depths_of(const Body& body, const RunContext& context) {
     constexpr float kStretched = 2; // what is outside may be stretched
     const float spacing = float(body.spacing());
-    Vectors points(body.field ? 0 : body.surface.points.size());
-    for (std::size_t s = 0; s < points.size(); ++s) points.set(s, body.surface.points.rest[s]);
-    const PointGrid grid(points, spacing);
+    Vectors places(body.field ? 0 : body.surface.points.size());
+    for (std::size_t s = 0; s < places.size(); ++s) places.set(s, body.surface.points.rest[s]);
+    const PointGrid points(places, spacing);
     std::vector<float> most(body.particle_count());
     parallel_for(context, most.size(), kContactForcesGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-            const float depth = rest_depth(body, body.rest[i], grid);
+            const float depth = rest_depth(body, body.rest[i], points);
             most[i] =
                 spacing * (depth < 0 ? kDeepest - kStretched * depth
                                      : kDeepest * std::max(0.0f, 1 - depth) - kThinnest * std::min(depth, kInside));
@@ -238,7 +238,7 @@ void Contacts::push_out(std::span<BodyState> bodies, double time, const RunConte
         BodyState& body = bodies[b];
         if (!(touched_[b] & kOnObstacle) || body.sleeps()) continue;
         const float spacing = float(body.body->spacing()), most = kDeepest * spacing;
-        std::vector<Vec3f> outwards(world_.obstacles.size(), Vec3f::Zero()); // of what is deep
+        std::vector<Vec3f> outwards; // of what is deep in each obstacle
         for (const Near& at : near_[b]) {
             if (!(at.depth > kCrushing * spacing)) continue;
             const Vec3f place = embedded_point(body.surface, at.point, body.positions);
@@ -246,6 +246,7 @@ void Contacts::push_out(std::span<BodyState> bodies, double time, const RunConte
                 distance_to(world_.obstacles[at.obstacle], poses.at(at.obstacle), place);
             const float gives = yielding(body.surface, at.point, body.inverse_mass);
             if (!(gives > 0)) continue;
+            outwards.resize(world_.obstacles.size(), Vec3f::Zero());
             outwards[at.obstacle] += surface.normal;
             if (!(-surface.distance > most)) continue;
             const float inwards = std::min(

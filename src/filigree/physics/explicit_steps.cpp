@@ -20,9 +20,9 @@ constexpr double kSafety = 0.9;      ///< part of the stable step that is used: 
 constexpr double kLeastSubsteps = 2; ///< a frame; with one, large motions gain energy
 constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 constexpr double kShortestOpening = 0.25; ///< of the stable step: cracks that open faster are followed less well
-/// Vibrations that steps hardly follow can draw energy from them where they are large: tiny bodies in free flight, and
-/// crushed ones, took in a hundred times what they had (HardStarts.ANoisyBodyGainsNoEnergy). So little internal
-/// damping takes it away again. Vibrations that steps follow well change accelerations little in a substep.
+/// Large vibrations that steps hardly follow draw energy from them: tiny bodies in free flight took in a hundred times
+/// what they had (HardStarts.ANoisyBodyGainsNoEnergy). A little internal damping takes it away again. Accelerations
+/// tell: in vibrations that steps follow well they change little in a substep.
 constexpr float kCalm = 0.05f;       ///< that change, as a speed, in parts of the speed of waves ...
 constexpr float kNoisy = 0.15f;      ///< ... from which on damping is full
 constexpr float kNoisyDelay = 0.05f; ///< substeps
@@ -131,7 +131,7 @@ public:
             state_.contacts.begin_anew();
             state_.contacts.begin_frame(bodies_);
             find_contacts();
-            steadiest_step_ = kNoLimit;
+            stable_in_frame_ = kNoLimit;
             vibrations_.clear();
             find_forces(first_dt);
         }
@@ -242,8 +242,9 @@ private:
         });
         for (std::size_t b = 0; b < bodies_.size(); ++b)
             if (!bodies_[b].sleeps())
-                steadiest_step_ = std::min(steadiest_step_, stable_step(frequencies[b], double(vibrations_[b].delay)));
-        stable_step_ = std::min(stable_step_, steadiest_step_);
+                stable_in_frame_ =
+                    std::min(stable_in_frame_, stable_step(frequencies[b], double(vibrations_[b].delay)));
+        stable_step_ = std::min(stable_step_, stable_in_frame_);
         const double shortest = std::max(kShortestOpening * stable_step_, (until_ - now_) / steps_allowed());
         stable_step_ = std::min(stable_step_, std::max(opening_step, shortest));
     }
@@ -355,9 +356,9 @@ private:
     std::vector<Vibration> vibrations_;
     std::vector<RigidLoad> rigid_loads_; ///< of each body, by find_forces
     double stable_step_ = 0;             // s
-    /// s: what was stable for all bodies in the whole frame so far. Steps that become longer and shorter with the
-    /// vibrations that they follow give them energy.
-    double steadiest_step_ = kNoLimit;
+    /// s: the shortest step that any body's vibrations have asked for in this frame. Steps that become longer again as
+    /// these swing give them energy.
+    double stable_in_frame_ = kNoLimit;
 };
 
 } // namespace
