@@ -78,13 +78,11 @@ float change_of_acceleration(const BodyState& body, Vectors& before, const RunCo
     const std::size_t count = body.inverse_mass.size();
     std::vector<Sums> sums((count + kExplicitStepsGrain - 1) / kExplicitStepsGrain);
     parallel_for(context, count, kExplicitStepsGrain, [&](std::size_t begin, std::size_t end) {
-        Sums& sum = sums[begin / kExplicitStepsGrain];
-        const auto change = [](const std::vector<float>& now, std::vector<float>& then, std::size_t i) {
-            return now[i] - std::exchange(then[i], now[i]);
-        };
+        Sums sum; // not in place: the compiler would have to expect it among the particles
+        const auto& [fx, fy, fz] = body.forces;
+        const auto& [gx, gy, gz] = before;
         const auto add = [&, m = body.body->mass.data(), w = body.inverse_mass.data()](std::size_t i, std::size_t k) {
-            const float ax = w[i] * change(body.forces.x, before.x, i), ay = w[i] * change(body.forces.y, before.y, i),
-                        az = w[i] * change(body.forces.z, before.z, i);
+            const float ax = (fx[i] - gx[i]) * w[i], ay = (fy[i] - gy[i]) * w[i], az = (fz[i] - gz[i]) * w[i];
             sum.mass[k] += m[i];
             sum.x[k] += m[i] * ax;
             sum.y[k] += m[i] * ay;
@@ -95,7 +93,9 @@ float change_of_acceleration(const BodyState& body, Vectors& before, const RunCo
         for (std::size_t i = begin; i < whole; i += kAtOnce)
             for (std::size_t k = 0; k < kAtOnce; ++k) add(i + k, k);
         for (std::size_t i = whole; i < end; ++i) add(i, 0);
+        sums[begin / kExplicitStepsGrain] = sum;
     });
+    before = body.forces;
     const auto all = [&](const float(Sums::*parts)[kAtOnce]) {
         float total = 0;
         for (const Sums& sum : sums) total = std::accumulate(sum.*parts, sum.*parts + kAtOnce, total);
