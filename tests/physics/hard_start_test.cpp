@@ -146,6 +146,24 @@ TEST(HardStarts, ACrushedBodyGainsNoEnergy) {
     }
 }
 
+// A few crushed cells are little of all that moves.
+
+TEST(HardStarts, ALargeBodyWithACrushedCornerGainsNoEnergy) {
+    Simulation crushed = simulation(free_space(), {actor(box(16, 16, 16, 0.05, material(MaterialModel::fem, 5e4)))},
+                                    {.mode = StepMode::explicit_steps});
+    Vectors positions = crushed.positions(0);
+    const float corner = 0.2f;
+    for (std::size_t i = 0; i < positions.size(); ++i)
+        if (positions[i].maxCoeff() < corner) positions.y[i] = corner + 0.05f * (positions.y[i] - corner);
+    ASSERT_TRUE(crushed.set_positions(0, positions).ok());
+    const RunContext context(1);
+    const double before = crushed.energy(context).total();
+    for (int frame = 0; frame < 240; ++frame) {
+        ASSERT_TRUE(crushed.advance(context).ok());
+        ASSERT_LT(crushed.energy(context).total(), 1.01 * before) << "frame " << frame;
+    }
+}
+
 // The energy of Verlet steps swings by itself: what is all speed at first has up to half as much again later.
 
 TEST(HardStarts, ANoisyBodyGainsNoEnergy) {

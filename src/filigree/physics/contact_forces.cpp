@@ -269,24 +269,21 @@ void Contacts::push_particles_out(BodyState& body, std::size_t obstacle, const V
                                   const ObstaclePoses& poses, const RunContext& context) {
     std::vector<float>& most_depths = most_depths_[body.body.get()];
     if (most_depths.empty()) most_depths = most_depths_of(*body.body, context);
-    std::vector<float> ways(body.positions.size(), 0.0f);
-    parallel_for(context, ways.size(), kContactForcesGrain, [&](std::size_t begin, std::size_t end) {
+    std::vector<DistanceField::Sample> found(body.positions.size()); // distance: m beyond the limit, below 0
+    parallel_for(context, found.size(), kContactForcesGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-            const float share = body.inverse_mass[i] * body.body->mass[i]; // of a tied copy: its part of the whole
-            if (!(share > 0)) continue;
-            const Vec3f place = body.positions[i];
-            const DistanceField::Sample surface = distance_to(world_.obstacles[obstacle], poses.at(obstacle), place);
-            const float most = body.has_flowed() ? kDeepest * float(body.body->spacing()) : most_depths[i];
-            const float too_deep = -surface.distance - most;
-            if (!(too_deep > 0) || surface.normal.dot(outwards) < 0) continue;
-            const float inwards =
-                std::min(0.0f, (body.velocities[i] - poses.velocity(obstacle, place)).dot(surface.normal));
-            body.positions.add(i, share * too_deep * surface.normal);
-            body.velocities.add(i, -share * inwards * surface.normal);
-            ways[i] = too_deep;
+            found[i] = distance_to(world_.obstacles[obstacle], poses.at(obstacle), body.positions[i]);
+            found[i].distance += body.has_flowed() ? kDeepest * float(body.body->spacing()) : most_depths[i];
         }
     });
-    for (const float way : ways) body.pushed_way = std::max(body.pushed_way, way);
+    for (Index i = 0; i < found.size(); ++i) {
+        const auto& [distance, normal] = found[i];
+        if (!(distance < 0) || normal.dot(outwards) < 0) continue;
+        const float inwards =
+            std::min(0.0f, (body.velocities[i] - poses.velocity(obstacle, body.positions[i])).dot(normal));
+        // By its mass, so that copies that are tied share one way.
+        push_particle(body, i, body.body->mass[i], -distance * normal, -inwards * normal);
+    }
 }
 
 } // namespace filigree
