@@ -6,6 +6,7 @@
 #include "filigree/io/extension.h"
 #include "filigree/io/file.h"
 #include "filigree/io/file_error.h"
+#include "filigree/io/temporary_file.h"
 
 #include <algorithm>
 #include <charconv>
@@ -141,7 +142,8 @@ public:
                 if (!lines) return lines.error();
                 table += *lines;
             }
-            const fs::path whole = file(0).parent_path() / "table";
+            // By a name of its own: another process may be joining the same.
+            const fs::path whole = temporary_path(file(0).parent_path());
             if (Status written = write_file(whole, table); !written) return written;
             std::error_code failed;
             fs::rename(whole, options_.output, failed);

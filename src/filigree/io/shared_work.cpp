@@ -30,6 +30,17 @@ std::string hexadecimal(const XXH128_hash_t& hash) {
     return text;
 }
 
+/// Removes a folder that nobody finds any more under the name it had. Whoever was about to write a file there when it
+/// was renamed may do so while it is being emptied, and another process may be removing the same.
+void remove_folder(const fs::path& folder) {
+    constexpr int kMostTries = 100; // each follows a file that came, or went, in between
+    for (int tries = 0; tries < kMostTries; ++tries) {
+        std::error_code failed;
+        fs::remove_all(folder, failed);
+        if (failed != std::errc::directory_not_empty && failed != std::errc::no_such_file_or_directory) return;
+    }
+}
+
 } // namespace
 
 Status check_chunk(const WorkChunk& chunk) {
@@ -54,9 +65,8 @@ bool SharedFolder::is_finished() const {
 }
 
 Result<bool> SharedFolder::begin() const {
-    std::error_code ignored;
     if (is_finished()) {
-        fs::remove_all(aside_, ignored); // of a process that was killed
+        remove_folder(aside_); // of a process that was killed
         return true;
     }
     const bool is_new = ::mkdir(folder_.c_str(), 0777) == 0;
@@ -106,17 +116,18 @@ std::vector<bool> SharedFolder::are_there(std::span<const std::string> names) co
 }
 
 Status SharedFolder::end() const {
-    // By links, so that a kill leaves no file of ours under another name.
+    // At no moment is it gone: another process may have ended, and whoever comes now asks for it.
     if (!has_plan(finished_)) {
-        ::unlink(finished_.c_str());
-        if (::link(file(kPlanName).c_str(), finished_.c_str()) != 0 && errno != EEXIST && errno != ENOENT)
-            return cannot_write(finished_, errno);
+        const fs::path plan =
+            temporary_path(folder_); // there, so that a kill leaves no file of ours under another name
+        const bool is_moved =
+            ::link(file(kPlanName).c_str(), plan.c_str()) == 0 && ::rename(plan.c_str(), finished_.c_str()) == 0;
+        if (!is_moved && errno != ENOENT) return cannot_write(finished_, errno);
     }
     // Renamed first, so that nobody takes half of it for parts that are missing.
-    std::error_code ignored; // what is left hinders nobody
-    fs::remove_all(aside_, ignored);
+    remove_folder(aside_);
     if (::rename(folder_.c_str(), aside_.c_str()) != 0 && errno != ENOENT) return cannot_write(folder_, errno);
-    fs::remove_all(aside_, ignored);
+    remove_folder(aside_); // what is left hinders nobody
     sync_folder(path_.parent_path());
     return Success{};
 }
