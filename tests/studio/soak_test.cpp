@@ -18,6 +18,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <sstream>
 
 #include <gtest/gtest.h>
@@ -69,8 +70,8 @@ protected:
     }
     fs::path at(const std::string& name) const { return fs::path(folder_.path().toStdString()) / name; }
 
-    /// One window's life. Returns how many things were done in it.
-    int round(unsigned seed) {
+    /// One window's life, cut short where its time is over. Returns how many things were done in it.
+    int round(unsigned seed, const std::function<bool()>& has_time) {
         for (std::size_t k = 0; k < kFiles.size(); ++k) write_bytes(at(kFiles[k]), originals_[k]);
         auto window = std::make_unique<MainWindow>(false);
         window->resize(700, 500);
@@ -80,12 +81,13 @@ protected:
         done_ = {QStringLiteral("seed %1").arg(seed)};
         workbench.open(at(kFiles[monkey.below(kFiles.size())]).string());
         if (monkey.below(2)) workbench.wait_until_idle();
-        const int count = 20 + int(monkey.below(120));
-        for (int i = 0; i < count; ++i) {
+        const int most = 20 + int(monkey.below(120));
+        int count = 0;
+        for (; count < most && has_time(); ++count) {
             done_ << (monkey.below(8) ? monkey.act() : mishap(workbench, monkey));
             QCoreApplication::processEvents(QEventLoop::AllEvents, 10);
             expect_sound(workbench);
-            if (HasFatalFailure()) return i;
+            if (HasFatalFailure()) return count;
         }
         if (monkey.below(2)) { // else it closes whatever is at work
             workbench.pause();
@@ -202,7 +204,13 @@ TEST_F(StudioSoak, ThreadsSurviveIt) {
     const auto goes_on = [&] {
         return minutes ? double(time.elapsed()) < 60e3 * std::atof(minutes) : rounds < (all_cases() ? 3u : 1u);
     };
-    for (; goes_on() && !HasFailure(); ++rounds) actions += round(seed + rounds);
+    const auto has_time = [&] { return !minutes || goes_on(); };
+    for (; goes_on() && !HasFailure(); ++rounds) {
+        actions += round(seed + rounds, has_time);
+        if (minutes)
+            std::printf("window of seed %u: ended after %.1f minutes\n", seed + rounds, double(time.elapsed()) / 60e3);
+        std::fflush(stdout);
+    }
     std::printf("soak: %u windows, %ld actions, %.1f minutes, %s\n", rounds, actions, double(time.elapsed()) / 60e3,
                 HasFailure() ? "broken" : "whole");
 }
