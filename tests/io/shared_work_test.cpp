@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <functional>
 #include <thread>
 
 namespace filigree {
@@ -42,6 +43,58 @@ TEST(SharedFolderTest, IsFinishedThoughSomebodyJustMadeItAnew) {
     EXPECT_FALSE(folder.begin().value());
     ASSERT_TRUE(folder.end().ok());
     EXPECT_FALSE(fs::exists(parts));
+    fs::remove_all(root);
+}
+
+/// While one was at work its own work was finished by others, and another was begun at the same path.
+TEST(SharedFolderTest, ThatIsAnotherWorksIsLeftAlone) {
+    const fs::path root = fs::temp_directory_path() / ("filigree-others-" + std::to_string(::getpid()));
+    fs::remove_all(root);
+    fs::create_directory(root);
+    const fs::path whole = root / "whole", parts = root / "whole.chunks";
+    const auto is_there = [&] { return fs::exists(whole); };
+    const SharedFolder late(whole, "a plan\n", is_there), other(whole, "another plan\n", is_there);
+    EXPECT_FALSE(late.begin().value());
+    ASSERT_TRUE(write_file(whole, "whole").ok());
+    ASSERT_TRUE(late.end().ok());
+    EXPECT_FALSE(other.begin().value());
+    ASSERT_TRUE(other.mark("done-1").ok());
+
+    EXPECT_FALSE(late.is_ours());
+    EXPECT_TRUE(late.is_finished());
+    EXPECT_FALSE(late.mark("done-2").ok());
+    EXPECT_FALSE(fs::exists(parts / "done-2"));
+    EXPECT_TRUE(late.end().ok());
+    EXPECT_TRUE(fs::exists(parts / "done-1"));
+    EXPECT_TRUE(other.is_ours());
+    fs::remove_all(root);
+}
+
+TEST(SharedItemsTest, LateOnesDoNotComeIntoAnotherWork) {
+    const fs::path root = fs::temp_directory_path() / ("filigree-late-" + std::to_string(::getpid()));
+    fs::remove_all(root);
+    fs::create_directory(root);
+    const fs::path whole = root / "whole";
+    const SharedItems items{.path = whole, .what = "letters", .names = {"a", "b"}, .phase = "writing"};
+    using Make = std::function<Result<std::string>(std::size_t)>;
+    const auto made = [&](const std::string& job, std::size_t number, const Make& make) {
+        const auto place = [&](const std::function<fs::path(std::size_t)>& file) {
+            return write_file(whole, read_file(file(0)).value() + read_file(file(1)).value());
+        };
+        return make_shared_items(items, {number, 2, job}, make, place, [&] { return fs::exists(whole); }, {}).value();
+    };
+    const Make small = [](std::size_t item) { return std::string(item ? "b" : "a"); };
+    const Make capital = [](std::size_t item) { return std::string(item ? "B" : "A"); };
+    const SharedItemsReport late = made("small", 2, [&](std::size_t item) {
+        made("small", 1, small);
+        EXPECT_TRUE(made("small", 2, small).is_whole);
+        EXPECT_FALSE(made("capital", 1, capital).is_whole);
+        return small(item);
+    });
+    EXPECT_TRUE(late.is_whole);
+    EXPECT_EQ(read_file(whole).value(), "ab");
+    EXPECT_TRUE(made("capital", 2, capital).is_whole);
+    EXPECT_EQ(read_file(whole).value(), "AB");
     fs::remove_all(root);
 }
 

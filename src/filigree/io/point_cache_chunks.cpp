@@ -71,8 +71,12 @@ public:
 
     /// All chunks are there: the file goes to its place. Another process may do the same at this moment.
     Status finish() const {
-        const fs::path frames = folder_.file(kFrames);
-        if (::rename(frames.c_str(), path_.c_str()) != 0) {
+        // It keeps its name in the folder: whoever is at work there would begin an empty one, and put that in its
+        // place.
+        const fs::path frames = folder_.file(kFrames), whole = temporary_path(folder_.file(""));
+        if (!folder_.is_ours()) return cannot_write(frames, ENOENT);
+        const bool is_moved = ::link(frames.c_str(), whole.c_str()) == 0 && ::rename(whole.c_str(), path_.c_str()) == 0;
+        if (!is_moved) {
             if (errno != ENOENT) return cannot_write(path_, errno);
             if (!is_in_place()) // one that was killed had put it there, and somebody took it away
                 return cannot_write(path_, frames.string() + " is gone; delete its folder, and run all chunks again");
@@ -121,6 +125,7 @@ write_shared_pc2(std::size_t frames, std::size_t points, const fs::path& path, c
     report.first_frame = chunk.first_of(frames);
     report.frames = chunk.end_of(frames) - report.first_frame;
     const auto whole = [&] {
+        shared.folder().clear();
         report.chunks_done = chunk.count;
         report.is_whole = true;
         return report;

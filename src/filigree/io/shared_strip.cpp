@@ -410,6 +410,7 @@ private:
     }
 
     Status place(const fs::path& whole) const {
+        if (!folder_.is_ours()) return cannot_write(whole, ENOENT);
         std::error_code failed, ignored;
         fs::rename(whole, strip_.path, failed);
         // Without locks another process may have written it too, and was quicker.

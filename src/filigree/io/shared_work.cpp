@@ -60,13 +60,14 @@ bool SharedFolder::has_plan(const fs::path& file) const {
 
 bool SharedFolder::is_finished() const {
     // A folder without a plan is of somebody who finds out in begin() that all is done.
-    std::error_code failed;
-    return !fs::exists(file(kPlanName), failed) && has_plan(finished_) && is_in_place_();
+    return !is_ours() && has_plan(finished_) && is_in_place_();
 }
+
+bool SharedFolder::is_ours() const { return has_plan(file(kPlanName)); }
 
 Result<bool> SharedFolder::begin() const {
     if (is_finished()) {
-        remove_folder(aside_); // of a process that was killed
+        clear();
         return true;
     }
     const bool is_new = ::mkdir(folder_.c_str(), 0777) == 0;
@@ -76,7 +77,7 @@ Result<bool> SharedFolder::begin() const {
         return true;
     }
     const Status planned = add(kPlanName, [&](const fs::path& plan) { return write_file(plan, plan_); });
-    if (has_plan(file(kPlanName))) return false;
+    if (is_ours()) return false;
     if (is_finished()) return true;
     if (!planned) return planned.error();
     return Error{ErrorCode::mismatch, folder_.string() +
@@ -98,6 +99,7 @@ Status SharedFolder::add(const std::string& name, const std::function<Status(con
 }
 
 Status SharedFolder::mark(const std::string& name) const {
+    if (!is_ours()) return cannot_write(file(name), ENOENT);
     if (::link(file(kPlanName).c_str(), file(name).c_str()) != 0 && errno != EEXIST)
         return cannot_write(file(name), errno);
     sync_folder(folder_);
@@ -126,11 +128,14 @@ Status SharedFolder::end() const {
     }
     // Renamed first, so that nobody takes half of it for parts that are missing.
     remove_folder(aside_);
+    if (!is_ours()) return Success{}; // others took it away, and another work may have begun
     if (::rename(folder_.c_str(), aside_.c_str()) != 0 && errno != ENOENT) return cannot_write(folder_, errno);
     remove_folder(aside_); // what is left hinders nobody
     sync_folder(path_.parent_path());
     return Success{};
 }
+
+void SharedFolder::clear() const { remove_folder(aside_); }
 
 Result<SharedItemsReport>
 make_shared_items(const SharedItems& items, const WorkChunk& chunk,
@@ -147,6 +152,7 @@ make_shared_items(const SharedItems& items, const WorkChunk& chunk,
     report.first = chunk.first_of(items.names.size());
     report.count = chunk.end_of(items.names.size()) - report.first;
     const auto whole = [&] {
+        folder.clear();
         report.done = items.names.size();
         report.is_whole = true;
         return report;
@@ -162,7 +168,8 @@ make_shared_items(const SharedItems& items, const WorkChunk& chunk,
         if (before[report.first + k]) continue;
         const Result<std::string> bytes = make(report.first + k);
         if (!bytes) return bytes.error();
-        const Status written = write_file(folder.file(items.names[report.first + k]), *bytes);
+        const fs::path file = folder.file(items.names[report.first + k]);
+        const Status written = folder.is_ours() ? write_file(file, *bytes) : Status(cannot_write(file, ENOENT));
         if (!written && folder.is_finished()) return whole(); // another process made the same, and was the last
         if (!written) return written.error();
         ++report.made;
@@ -173,7 +180,8 @@ make_shared_items(const SharedItems& items, const WorkChunk& chunk,
     report.done = std::size_t(std::ranges::count(after, true));
     if (folder.is_finished()) return whole();
     if (report.done < items.names.size()) return report;
-    Status placed = place([&](std::size_t item) { return folder.file(items.names[item]); });
+    Status placed = folder.is_ours() ? place([&](std::size_t item) { return folder.file(items.names[item]); })
+                                     : Status(cannot_write(items.path, ENOENT));
     if (placed) placed = folder.end();
     if (!placed && !folder.is_finished()) return placed.error();
     return whole();

@@ -37,8 +37,10 @@ public:
     /// plan: lines of text. is_in_place: whether what stands at `path` may be this work, finished.
     SharedFolder(std::filesystem::path path, std::string plan, std::function<bool()> is_in_place);
 
-    /// Whether this very work is finished.
+    /// Whether this very work is finished. Another work may have begun since.
     bool is_finished() const;
+    /// Whether the folder is this work's: others may have finished it, and begun another.
+    bool is_ours() const;
     /// Makes the folder, or joins it. True: the work is finished. Errors: mismatch (parts of another work lie there),
     /// unwritable.
     Result<bool> begin() const;
@@ -52,6 +54,8 @@ public:
     std::vector<bool> are_there(std::span<const std::string> names) const;
     /// What was made is in its place: says so in PATH.plan, and removes the folder. Errors: unwritable.
     Status end() const;
+    /// The work is finished: removes what is left of the folder where the process that did so was killed.
+    void clear() const;
 
 private:
     bool has_plan(const std::filesystem::path& file) const;
