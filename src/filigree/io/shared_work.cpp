@@ -118,6 +118,8 @@ std::vector<bool> SharedFolder::are_there(std::span<const std::string> names) co
 }
 
 Status SharedFolder::end() const {
+    clear();
+    if (!is_ours()) return Success{}; // others ended it, and another work may have begun
     // At no moment is it gone: another process may have ended, and whoever comes now asks for it.
     if (!has_plan(finished_)) {
         const fs::path plan =
@@ -127,10 +129,8 @@ Status SharedFolder::end() const {
         if (!is_moved && errno != ENOENT) return cannot_write(finished_, errno);
     }
     // Renamed first, so that nobody takes half of it for parts that are missing.
-    remove_folder(aside_);
-    if (!is_ours()) return Success{}; // others took it away, and another work may have begun
     if (::rename(folder_.c_str(), aside_.c_str()) != 0 && errno != ENOENT) return cannot_write(folder_, errno);
-    remove_folder(aside_); // what is left hinders nobody
+    clear(); // what is left hinders nobody
     sync_folder(path_.parent_path());
     return Success{};
 }
