@@ -54,6 +54,7 @@ public:
     /// Has `fill` write frames, and keeps them safe.
     Status write(const std::function<Status(const WriteAt&)>& fill) const {
         const fs::path frames = folder_.file(kFrames);
+        if (!folder_.is_ours()) return cannot_write(frames, ENOENT);
         if (Status made = folder_.add(kFrames, [&](const fs::path& empty) { return make_empty(empty); }); !made)
             return made;
         const FileDescriptor file(::open(frames.c_str(), O_WRONLY | O_CLOEXEC));
@@ -71,8 +72,7 @@ public:
 
     /// All chunks are there: the file goes to its place. Another process may do the same at this moment.
     Status finish() const {
-        // It keeps its name in the folder: whoever is at work there would begin an empty one, and put that in its
-        // place.
+        // It keeps its name in the folder: without it another process would begin an empty one there.
         const fs::path frames = folder_.file(kFrames), whole = temporary_path(folder_.file(""));
         if (!folder_.is_ours()) return cannot_write(frames, ENOENT);
         const bool is_moved = ::link(frames.c_str(), whole.c_str()) == 0 && ::rename(whole.c_str(), path_.c_str()) == 0;
