@@ -37,8 +37,14 @@ bool share_an_edge(const Triangle& s, const Triangle& t) {
 
 /// One for the process: a device is slow to make, and its own threads are TBB's.
 RTCDevice embree_device() {
+#ifdef __SANITIZE_THREAD__
+    // The thread sanitizer takes every hand-over in oneTBB for a race: see run_pieces.
+    constexpr const char* kConfig = "threads=1";
+#else
+    constexpr const char* kConfig = nullptr; // as many as oneTBB has
+#endif
     struct Device {
-        RTCDevice handle = rtcNewDevice(nullptr);
+        RTCDevice handle = rtcNewDevice(kConfig);
         ~Device() { rtcReleaseDevice(handle); }
     };
     static const Device device;
