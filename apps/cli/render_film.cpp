@@ -89,6 +89,8 @@ private:
         const SharedItemsReport written = require(make_shared_items(
             pictures, chunk, picture, [&](const auto& file) { return place(pictures.names, name.folder, file); },
             are_there, context()));
+        // Of a process that was killed while it placed the same: its pictures would come back with the next batch.
+        if (written.is_whole) require(complete_batches(name.folder));
         report_chunk(options_.output, chunk, written, "pictures", now_seconds() - start, session_);
     }
 

@@ -197,6 +197,18 @@ TEST_F(ChunkedItems, PicturesInAnyOrderAreTheSame) {
     in_any_order(pictures, 5);
 }
 
+TEST_F(ChunkedItems, PicturesOfAKilledBatchDoNotComeBack) {
+    if (!has_opengl()) GTEST_SKIP() << "no OpenGL";
+    ok(pictures("a", "1/1"));
+    const auto whole = all_in("a");
+    std::filesystem::create_directories(path("a/.filigree-killed-placing/new"));
+    write("a/.filigree-killed-placing/lock", "");
+    write("a/.filigree-killed-placing/new/" + whole.begin()->first, "of the killed one");
+    EXPECT_EQ(json(pictures("a", "1/1"))["made"], 0) << "it is finished";
+    EXPECT_EQ(all_in("a"), whole);
+    EXPECT_FALSE(std::filesystem::exists(path("a/.filigree-killed-placing")));
+}
+
 TEST_F(ChunkedItems, WhatIsThereIsKeptWithOtherNumbersOfChunksToo) {
     ok(sweep("b"));
     EXPECT_EQ(json(sweep("a", "1/2"))["made"], 3);

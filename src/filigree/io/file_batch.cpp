@@ -160,24 +160,6 @@ void remove_batch(const fs::path& batch) {
     fs::remove(batch, ignored);
 }
 
-/// Completes or removes what killed batches of this user left.
-Status clear_leftovers(const fs::path& folder) {
-    for (const std::string& name : names_in(folder)) {
-        const bool placing = is_batch(name, kPlacing);
-        if (!placing && !is_batch(name, kMaking)) continue;
-        const fs::path batch = folder / name;
-        const auto status = status_of(batch);
-        if (!status || !S_ISDIR(status->st_mode) || status->st_uid != ::geteuid()) continue;
-        const Lock lock(batch / kLock, O_NOFOLLOW);
-        if (!lock.is_there()) ::rmdir(batch.c_str()); // all but the empty folder was removed
-        if (!lock.is_held()) continue;
-        if (placing)
-            if (Status placed = place_rest(batch, folder); !placed) return placed;
-        remove_batch(batch);
-    }
-    return Success{};
-}
-
 } // namespace
 
 /// The hidden folder of a batch at work.
@@ -285,7 +267,7 @@ FileBatch::~FileBatch() = default;
 
 Result<FileBatch> FileBatch::create(const fs::path& folder) {
     const fs::path target = folder.empty() ? fs::path(".") : folder;
-    if (Status clear = clear_leftovers(target); !clear) return clear.error();
+    if (Status completed = complete_batches(target); !completed) return completed.error();
     auto made = std::make_unique<Folder>(target);
     if (const int failed = made->make()) return cannot_write(target, failed);
     return FileBatch(std::move(made));
@@ -294,6 +276,23 @@ Result<FileBatch> FileBatch::create(const fs::path& folder) {
 fs::path FileBatch::path(const std::string& name) const { return folder_->file(name); }
 Status FileBatch::check_place(const std::string& name) const { return check_target(folder_->target() / name); }
 Status FileBatch::finish() { return folder_->finish(); }
+
+Status complete_batches(const fs::path& folder) {
+    for (const std::string& name : names_in(folder)) {
+        const bool placing = is_batch(name, kPlacing);
+        if (!placing && !is_batch(name, kMaking)) continue;
+        const fs::path batch = folder / name;
+        const auto status = status_of(batch);
+        if (!status || !S_ISDIR(status->st_mode) || status->st_uid != ::geteuid()) continue;
+        const Lock lock(batch / kLock, O_NOFOLLOW);
+        if (!lock.is_there()) ::rmdir(batch.c_str()); // all but the empty folder was removed
+        if (!lock.is_held()) continue;
+        if (placing)
+            if (Status placed = place_rest(batch, folder); !placed) return placed;
+        remove_batch(batch);
+    }
+    return Success{};
+}
 
 std::vector<fs::path> unplaced_files(const fs::path& folder) {
     std::vector<fs::path> unplaced;

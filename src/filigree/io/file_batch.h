@@ -44,6 +44,10 @@ private:
     std::unique_ptr<Folder> folder_;
 };
 
+/// What the next batch in this folder would do first: puts in place what killed batches of this user had still to
+/// place, and removes what else they left. Errors: unwritable.
+Status complete_batches(const std::filesystem::path& folder);
+
 /// The files that a killed batch (or one at work right now) has still to put into this folder, where they are now: what
 /// stands under their names in the folder is older.
 std::vector<std::filesystem::path> unplaced_files(const std::filesystem::path& folder);
