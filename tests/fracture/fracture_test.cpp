@@ -468,6 +468,47 @@ TEST(FracturePattern, ClumpsDoNotReachAcrossGaps) {
     }
 }
 
+TEST(FracturePattern, WhatIsInsideOutBreaksAlike) {
+    const RunContext context(1);
+    const auto breaks = [&](const Mesh& mesh, Index pieces) {
+        const FracturedMesh f =
+            fracture(mesh, make_fracture_cells(mesh, {.pieces = pieces}, context).value(), {}, context).value();
+        EXPECT_EQ(f.pieces, pieces + f.report.islands);
+        EXPECT_LT(f.report.volume_error, 1e-6);
+        EXPECT_GT(f.report.smallest, 0.1 * f.report.median);
+        EXPECT_EQ(f.report.open_edges, 0u);
+        return f.pieces;
+    };
+    Mesh turned;
+    append(turned, box_mesh(Vec3d(-1, -1, -1), Vec3d(1, 1, 1)), true);
+    EXPECT_EQ(breaks(turned, 6), 6u);
+    Mesh both = box_mesh(Vec3d(-1, -1, -1), Vec3d(1, 1, 1));
+    append(both, box_mesh(Vec3d(2, -1, -1), Vec3d(4, 1, 1)), true);
+    EXPECT_GE(breaks(both, 6), 6u);
+    Mesh hollow; // all of it inside out, the cavity too
+    append(hollow, box_mesh(Vec3d(-1, -1, -1), Vec3d(1, 1, 1)), true);
+    append(hollow, box_mesh(Vec3d(-0.1, -0.1, -0.1), Vec3d(0.1, 0.1, 0.1)), false);
+    EXPECT_EQ(breaks(hollow, 1), 1u) << "the cavity goes along with what is around it";
+}
+
+TEST(FracturePattern, PartsApartAreNoPiece) {
+    Mesh mesh;
+    for (int n = 0; n < 64; ++n) {
+        const Vec3d at(n % 4, n / 4 % 4, n / 16);
+        append(mesh, box_mesh(at, at + Vec3d::Constant(0.5)), false);
+    }
+    const RunContext context(1);
+    for (const double roughness : {0.0, 0.5}) {
+        const FracturePattern pattern{.pieces = 6, .roughness = roughness};
+        const FracturedMesh f =
+            fracture(mesh, make_fracture_cells(mesh, pattern, context).value(), {}, context).value();
+        EXPECT_GE(f.pieces, 64u);
+        expect_sound(mesh, f);
+        for (Index piece = 0; piece < f.pieces; ++piece)
+            EXPECT_LT(bounds(piece_mesh(f, piece)).size().maxCoeff(), 0.51) << piece;
+    }
+}
+
 TEST(FracturePattern, ImpactBreaksSmallWhereItHit) {
     const Mesh cube = box_mesh(Vec3d(-1, -1, -1), Vec3d(1, 1, 1));
     const RunContext context(1);

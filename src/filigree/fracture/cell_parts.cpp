@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <map>
+#include <numeric>
 #include <unordered_map>
 
 namespace filigree {
@@ -37,6 +38,7 @@ public:
     Parts(const CutSurface& cut, std::vector<CellTriangle>& triangles, bool is_sheet) : is_sheet_(is_sheet) {
         find(cut, triangles);
         measure(cut, triangles);
+        if (!is_sheet_) find_cavities();
     }
 
     std::size_t count() const { return size_.size(); }
@@ -49,9 +51,8 @@ public:
             Index& largest = largest_of_cell.try_emplace(cell_[p], p).first->second;
             if (size_[p] > size_[largest]) largest = p;
         }
-        if (!is_sheet_)
-            for (Index p = 0; p < count(); ++p)
-                if (size_[p] <= 0 && sets.join(p, largest_of_cell[cell_[p]])) ++result.joined;
+        for (const auto& [shell, around] : cavities_)
+            if (sets.join(shell, around)) ++result.joined;
         std::vector<double> size(count(), 0);
         double total = 0;
         for (Index p = 0; p < count(); ++p) {
@@ -130,8 +131,10 @@ private:
 
     void measure(const CutSurface& cut, const std::vector<CellTriangle>& triangles) {
         size_.assign(cell_.size(), 0);
-        const Vec3d middle = bounds(cut.vertices.positions()).centre();
-        const CellTriangle* previous = nullptr;
+        box_.assign(cell_.size(), {});
+        is_cut_.assign(cell_.size(), false);
+        const Vec3d middle = cut.box.centre();
+        const CellTriangle* first_side = nullptr; // of a triangle of a crack; the second follows
         for (const CellTriangle& t : triangles) {
             const auto at = [&](std::size_t k) -> Vec3d {
                 return cut.vertices.position(t.vertices[k]).cast<double>() - middle;
@@ -142,16 +145,48 @@ private:
                 size_[t.part] += a.dot(cross) / 6;
             else if (t.facet == kNoIndex && !is_virtual)
                 size_[t.part] += 0.5 * cross.norm();
-            if (t.facet != kNoIndex && previous && previous->facet == t.facet && previous->cell != t.cell)
-                shared_area_[std::minmax(previous->part, t.part)] +=
-                    0.5 * cross.norm(); // the two sides follow each other
-            previous = &t;
+            for (std::size_t k = 0; k < 3; ++k) box_[t.part].extend(at(k));
+            if (t.facet == kNoIndex) continue;
+            is_cut_[t.part] = true;
+            if (!first_side) {
+                first_side = &t;
+                continue;
+            }
+            if (first_side->cell != t.cell) shared_area_[std::minmax(first_side->part, t.part)] += 0.5 * cross.norm();
+            first_side = nullptr;
+        }
+    }
+
+    /// Which parts are shells around cavities, and what is around them. Other parts of negative volume are inside out:
+    /// they are matter too.
+    void find_cavities() {
+        if (std::accumulate(size_.begin(), size_.end(), 0.0) < 0)
+            for (double& size : size_) size = -size;
+        std::map<Index, std::vector<Index>> solid; // of each cell
+        for (Index p = 0; p < count(); ++p)
+            if (size_[p] > 0) solid[cell_[p]].push_back(p);
+        for (Index p = 0; p < count(); ++p) {
+            if (size_[p] > 0) continue;
+            Index around = kNoIndex;
+            if (const auto others = solid.find(cell_[p]); !is_cut_[p] && others != solid.end())
+                for (const Index other : others->second) {
+                    const bool holds = (box_[other].min.array() <= box_[p].min.array()).all() &&
+                                       (box_[other].max.array() >= box_[p].max.array()).all();
+                    if (holds && (around == kNoIndex || size_[other] < size_[around])) around = other;
+                }
+            if (around == kNoIndex)
+                size_[p] = -size_[p];
+            else
+                cavities_.emplace_back(p, around);
         }
     }
 
     bool is_sheet_;
     std::vector<Index> cell_;  ///< of each part
     std::vector<double> size_; ///< volume; of sheets, area
+    std::vector<Box> box_;
+    std::vector<bool> is_cut_; ///< by a crack
+    std::vector<std::pair<Index, Index>> cavities_;
     std::map<std::pair<Index, Index>, double> shared_area_;
 };
 
