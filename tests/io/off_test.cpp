@@ -13,8 +13,8 @@ const std::string kSquare = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
 } // namespace
 
 TEST(Off, HeadersComeInManyForms) {
-    for (const std::string header :
-         {"OFF\n4 1 0\n", "OFF 4 1 0\n", "OFF4 1 0\n", "# c\nOFF # c\n\n4 1 4 # c\n", "4 1 0\n", "OFF\n4 1\n"}) {
+    for (const std::string header : {"OFF\n4 1 0\n", "OFF 4 1 0\n", "OFF4 1 0\n", "# c\nOFF # c\n\n4 1 4 # c\n",
+                                     "4 1 0\n", "OFF\n4 1\n", "OFF\n4 1\n0\n", "OFF\n4 1 # c\n# c\n 4 # c\n"}) {
         const auto file = read(header + kSquare + "4 0 1 2 3\n");
         ASSERT_TRUE(file.ok()) << header << file.error().message;
         EXPECT_EQ(file->mesh.corners, (std::vector<Index>{0, 1, 2, 3}));

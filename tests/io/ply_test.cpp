@@ -19,6 +19,15 @@ std::string ascii(const std::string& elements, const std::string& body) {
 
 } // namespace
 
+TEST(Ply, WhatFollowsTheLastElementIsToldOf) {
+    const std::string body = "0 0 0 1 0 0 0 1 0\n3 0 1 2\n";
+    EXPECT_TRUE(read(ascii(kVertices + kFaces, body + " \n"))->warnings.empty());
+    const auto file = read(ascii(kVertices + kFaces, body + "3 0 2 1\n"));
+    EXPECT_EQ(file->mesh.face_count(), 1u);
+    ASSERT_EQ(file->warnings.size(), 1u);
+    EXPECT_EQ(file->warnings[0], "8 bytes after the last element were left out.");
+}
+
 TEST(Ply, ElementsComeInAnyOrderAmongOthers) {
     const auto file = read(ascii("element edge 1\nproperty int a\nproperty list uchar int b\n" + kFaces + kVertices,
                                  "7 2 8 9\n3 0 1 2\n0 0 0 1 0 0 0 1 0"));

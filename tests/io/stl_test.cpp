@@ -42,6 +42,17 @@ TEST(Stl, SolidsBecomeObjects) {
     EXPECT_EQ(read(bytes)->mesh.objects.of_face, file->mesh.objects.of_face);
 }
 
+TEST(Stl, ABinaryHeaderMayHoldAnyWords) {
+    std::string bytes = "solid cube\nfacet normal\n";
+    bytes.resize(84 + 50, '\0');
+    bytes[80] = 1;
+    for (const auto& [corner, axis] : {std::pair(1, 0), std::pair(2, 1)}) // 1 as a float
+        bytes.replace(std::size_t(84 + 12 + 12 * corner + 4 * axis), 4, std::string("\0\0\x80\x3f", 4));
+    const auto file = read(bytes);
+    ASSERT_TRUE(file.ok()) << file.error().message;
+    EXPECT_EQ(file->mesh.positions, (std::vector<Vec3f>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}));
+}
+
 TEST(Stl, ErrorsNameThePlace) {
     std::string count_lies(84 + 50, '\0');
     count_lies[80] = 2;

@@ -37,7 +37,7 @@ public:
 
     Result<MeshFile> read() {
         if (!read_header() || !read_counts() || !read_vertices() || !read_faces()) return *error_;
-        SplitPositions split = split_origin(world_);
+        SplitPositions split = split_origin(world_, file_.mesh.corners);
         Mesh& mesh = file_.mesh;
         mesh.positions = std::move(split.positions);
         mesh.origin = split.origin;
@@ -91,11 +91,22 @@ private:
         text_.skip_blanks();
         std::size_t edges = 0; // nobody needs it, and some files have none
         if (!text_.at_line_end() && !read_count(edges, "edges")) return false;
+        skip_edges_on_their_own_line();
         // every row has at least two bytes
         if (vertex_count_ / 2 > text_.bytes_left() || face_count_ / 2 > text_.bytes_left())
             return fail("the counts " + std::to_string(vertex_count_) + " and " + std::to_string(face_count_) +
                         " are more than the file can hold.");
         return vertex_count_ < kNoIndex || fail_unsupported("has more vertices than 32-bit indices can count.");
+    }
+
+    /// Where the counts went over lines. No row has one number.
+    void skip_edges_on_their_own_line() {
+        TextScanner after = text_;
+        after.skip_space();
+        std::int64_t edges = 0;
+        if (!after.integer(edges) || !after.at_word_end()) return;
+        after.skip_blanks();
+        if (after.at_line_end()) text_ = after;
     }
 
     bool report_progress(std::size_t row) {

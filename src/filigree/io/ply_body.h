@@ -67,6 +67,11 @@ public:
         return "";
     }
     std::size_t bytes_left() const { return text_.bytes_left(); }
+    /// Of these, from the next number on.
+    std::size_t bytes_after_space() {
+        text_.skip_space();
+        return bytes_left();
+    }
     std::size_t offset() const { return text_.offset(); }
     Error error(const std::string& row, const std::string& cause) const {
         return source_.error_at_line(text_.line(), row + ": " + cause + ".");
@@ -90,6 +95,7 @@ public:
         return "";
     }
     std::size_t bytes_left() const { return source_.bytes.size() - offset_; }
+    std::size_t bytes_after_space() const { return bytes_left(); }
     std::size_t offset() const { return offset_; }
     const char* data() const { return source_.bytes.data() + offset_; }
     bool swap() const { return swap_; }

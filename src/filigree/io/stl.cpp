@@ -94,7 +94,7 @@ public:
             if (!read_solid()) return *error_;
             if (source_.context.is_cancelled()) return cancelled_error();
         }
-        SplitPositions split = split_origin(corners_);
+        SplitPositions split = split_origin(corners_, {});
         file_.mesh.origin = split.origin;
         weld(std::move(split.positions), file_.mesh);
         // one solid without a name says nothing
@@ -283,7 +283,9 @@ bool is_binary_stl(std::string_view bytes) {
 }
 
 Result<MeshFile> read_stl(const MeshSource& source) {
-    return is_ascii_stl(source.bytes) ? AsciiReader(source).read() : read_binary(source);
+    // A binary file's header may hold any words; the count behind it does not fit the size of a text.
+    const bool is_binary = is_binary_stl(source.bytes) || !is_ascii_stl(source.bytes);
+    return is_binary ? read_binary(source) : AsciiReader(source).read();
 }
 
 std::vector<std::string> write_stl(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes) {
