@@ -21,8 +21,10 @@ TEST(Frustum, PointsInsideAreThoseThatRaysFind) {
         InsideTest::create(cube, by(InsideMethod::rays), kAllThreads)->contains(points, kAllThreads).value();
     EXPECT_EQ(from_eye, from_elsewhere);
     EXPECT_GT(std::count(from_eye.begin(), from_eye.end(), 1), 200);
-    frustum.near = 6;
-    EXPECT_EQ(frustum_points(frustum).error().code, ErrorCode::usage);
+    for (const double near : {6.0, 0.0, -1.0}) {
+        frustum.near = near;
+        EXPECT_EQ(frustum_points(frustum).error().code, ErrorCode::usage) << near;
+    }
 }
 
 TEST(Frustum, MorePointsThanMemoryWouldHoldAreRefused) {
