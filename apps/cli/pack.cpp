@@ -116,6 +116,12 @@ void run(PackArguments options, Session& session) {
     Report report;
     report_coding(model, coding, options, now_seconds() - start, report);
     if (coding.lacks_level_attributes) session.warn(kLevelsLackAttributes);
+    if (coding.out_of_reach > 0)
+        session.warn(fmt::format("{} unused {} too far from the mesh to be coded there, and {} back nearer; --profile "
+                                 "lossless keeps every place.",
+                                 with_commas(coding.out_of_reach),
+                                 coding.out_of_reach == 1 ? "vertex lies" : "vertices lie",
+                                 coding.out_of_reach == 1 ? "comes" : "come"));
     if (options.output != "-") report_surface(model, options, session, report);
     session.print(report);
 }

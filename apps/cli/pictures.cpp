@@ -41,7 +41,8 @@ void report_picture(const std::string& path, UpAxis up, Report& report) {
 }
 
 Camera camera_for(const Mesh& mesh, View view, UpAxis up, double aspect, double point_radius) {
-    const CameraPoints points{mesh.positions, mesh.origin, point_radius};
+    std::vector<Vec3f> room;
+    const CameraPoints points = points_of_faces(mesh, room, point_radius);
     return fit_camera(std::span(&points, 1), view_direction(view, up), up_vector(up), aspect);
 }
 

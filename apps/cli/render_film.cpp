@@ -127,12 +127,13 @@ private:
     /// A first look at every moment, for a camera, a ground and a range of colours that hold for the whole film.
     void look_ahead() {
         std::vector<float> values;
+        std::vector<Vec3f> room;
         for (std::size_t m = 0; m < moments_; ++m) {
             if (context().is_cancelled()) throw Failure{cancelled_error()};
             context().report("looking ahead", double(m) / double(moments_));
             if (by_file_ && m > 0) subject_ = read(options_.files[m]);
             if (by_pose_) set_pose(*subject_, pose_at(m), false);
-            extent_.add(subject_->mesh.positions, subject_->mesh.origin);
+            extent_.add(shown_points(*subject_, room).positions, subject_->mesh.origin);
             const std::size_t stride = 1 + subject_->mesh.vertex_count() / 20'000;
             for (std::size_t v = 0; v < subject_->scalars.size(); v += stride) values.push_back(subject_->scalars[v]);
         }

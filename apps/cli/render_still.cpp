@@ -67,11 +67,12 @@ private:
     /// With one camera or one range for all, all are read first.
     void read_all() {
         std::vector<CameraPoints> points;
+        std::vector<std::vector<Vec3f>> rooms(count_);
         std::vector<float> values;
         for (std::size_t i = 0; i < count_; ++i) {
             subjects_[i] = read(options_.files[i]);
             if (options_.frame > 0) set_pose(*subjects_[i], subjects_[i]->poses.frames[options_.frame - 1], false);
-            points.push_back({subjects_[i]->mesh.positions, subjects_[i]->mesh.origin});
+            points.push_back(shown_points(*subjects_[i], rooms[i]));
             values.insert(values.end(), subjects_[i]->scalars.begin(), subjects_[i]->scalars.end());
         }
         if (options_.shared_camera) shared_ = camera_for(points, aspect());
@@ -86,7 +87,8 @@ private:
         upload(subject);
         if (!options_.poses.empty()) set_pose(subject, read_pose(subject, options_.poses[0]), true);
         if (options_.frame > 0) set_pose(subject, subject.poses.frames[options_.frame - 1], true);
-        const CameraPoints points{subject.mesh.positions, subject.mesh.origin, subject.drawable->point_radius()};
+        std::vector<Vec3f> room;
+        const CameraPoints points = shown_points(subject, room, subject.drawable->point_radius());
         const Camera camera = shared_ ? *shared_ : camera_for(std::span(&points, 1), aspect());
         Picture picture = require(
             renderer_.picture(scene_of(subject), camera, picture_options(layout_.width, layout_.height), context()));

@@ -188,6 +188,11 @@ Scene Rendering::scene_of(const Subject& subject) const {
     return scene;
 }
 
+CameraPoints Rendering::shown_points(const Subject& subject, std::vector<Vec3f>& room, double radius) const {
+    if (options_.points) return {subject.mesh.positions, subject.mesh.origin, radius};
+    return points_of_faces(subject.mesh, room, radius);
+}
+
 Camera Rendering::camera_for(std::span<const CameraPoints> points, double aspect) const {
     if (options_.camera.empty())
         return fit_camera(points, view_direction(options_.view, up_), up_vector(up_), aspect, options_.field_of_view);

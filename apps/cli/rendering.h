@@ -95,6 +95,8 @@ protected:
     /// Poses a model; its vertices' places are left in subject.mesh.
     void set_pose(Subject& subject, const Pose& pose, bool on_screen);
     Scene scene_of(const Subject& subject) const;
+    /// What the camera has to show of a subject; as points_of_faces.
+    CameraPoints shown_points(const Subject& subject, std::vector<Vec3f>& room, double radius = 0) const;
     Camera camera_for(std::span<const CameraPoints> points, double aspect) const;
     PictureOptions picture_options(unsigned width, unsigned height) const {
         return {.width = width, .height = height, .passes = options_.passes};

@@ -66,7 +66,7 @@ struct Found {
 
 /// The report's points: in the view from the eye, in regular steps across the picture and in depth.
 Found find_in_view(const Mesh& mesh, const SampleArguments& options, const RunContext& context) {
-    const Box box = bounds(mesh.positions);
+    const Box box = bounds(mesh);
     InsideOptions inside = options.inside;
     Frustum frustum = frustum_around(box, inside.eye);
     inside.eye = frustum.eye;
@@ -86,7 +86,7 @@ Found find_on_lattice(const Mesh& mesh, const SampleArguments& options, const Ru
         lattice_options.spacing = require(spacing_for_count(mesh, options.count, options.inside, context));
     if (!options.origin.empty())
         lattice_options.origin = Vec3d(options.origin[0], options.origin[1], options.origin[2]) - mesh.origin;
-    const Lattice lattice = require(make_lattice(bounds(mesh.positions), lattice_options));
+    const Lattice lattice = require(make_lattice(bounds(mesh), lattice_options));
     found.points = require(spread_inside(mesh, lattice, options.pattern, options.inside, context, &found.inside));
     found.spacing = lattice.spacing;
     found.counts = lattice.counts();

@@ -234,7 +234,7 @@ void Workbench::sample_inside_points(std::size_t count) {
             const Mesh& mesh = source->mesh;
             const Result<double> spacing = spacing_for_count(mesh, std::max<std::size_t>(count, 1), {}, context);
             if (!spacing) return spacing.error();
-            const Result<Lattice> lattice = make_lattice(bounds(mesh.positions), {.spacing = *spacing});
+            const Result<Lattice> lattice = make_lattice(bounds(mesh), {.spacing = *spacing});
             if (!lattice) return lattice.error();
             const Result<Occupancy> occupancy = sample_inside(mesh, *lattice, {}, context);
             if (!occupancy) return occupancy.error();

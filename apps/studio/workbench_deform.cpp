@@ -79,7 +79,7 @@ void Workbench::begin_pull(Index vertex, const Vec3d& at) {
         return Q_EMIT told("What is in pieces is pulled as a body: make one (the Body panel), then pull it until it "
                            "breaks.",
                            false);
-    const double diagonal = bounds(mesh.positions).diagonal();
+    const double diagonal = bounds(mesh).diagonal();
     Handle pull{.centre = rest,
                 .grip = view_.settings().grip * diagonal,
                 .reach = std::max(view_.settings().reach, view_.settings().grip) * diagonal};

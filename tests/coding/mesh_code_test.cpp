@@ -105,6 +105,21 @@ Mesh random_mesh(std::mt19937& random) {
 
 } // namespace
 
+TEST(MeshCode, AStrayVertexSaysNothing) {
+    Mesh torus = make_torus({.resolution = 32});
+    const Coded alone = coded(torus);
+    torus.positions.emplace_back(0.9f, 0, 0);
+    EXPECT_EQ(coded(torus).report.out_of_reach, 0u);
+    torus.positions.emplace_back(1e8f, 0, -1e30f);
+    for (const bool levels : {false, true}) {
+        const Coded out = coded(torus, {.levels = levels});
+        EXPECT_EQ(out.code.step, alone.code.step);
+        EXPECT_EQ(out.report.out_of_reach, 1u);
+        EXPECT_LT(out.report.largest, 4 * alone.code.step);
+        EXPECT_EQ(out.mesh.vertex_count(), torus.vertex_count());
+    }
+}
+
 TEST(MeshCode, ShapesKeepTheirFacesAndPlaces) {
     for (const std::string_view name : shape_names()) {
         const Mesh mesh = *make_shape(name, {.resolution = 24});

@@ -112,7 +112,7 @@ TEST(Strip, MillimetresAtHalfAThousandKilometres) {
     const Mesh near = mesh;
     std::vector<Vec3d> world;
     for (const Vec3f& p : mesh.positions) world.push_back(p.cast<double>() + Vec3d(500000, -4500000, 300));
-    SplitPositions split = split_origin(world);
+    SplitPositions split = split_origin(world, mesh.corners);
     mesh.positions = std::move(split.positions);
     mesh.origin = split.origin;
     const Model model = stripped(mesh).model;

@@ -30,6 +30,13 @@ Mesh box_of(const Vec3f& size) {
     return box;
 }
 
+TEST(SpacingForCount, AStrayVertexSaysNothing) {
+    Mesh torus = make_torus({.resolution = 32});
+    const double spacing = spacing_for_count(torus, 2000, {}, kAllThreads).value();
+    torus.positions.emplace_back(1e5f, 0, 0);
+    EXPECT_EQ(spacing_for_count(torus, 2000, {}, kAllThreads).value(), spacing);
+}
+
 TEST(SpacingForCount, FlatBoxesAndNeedlesGetTheirCount) {
     for (const Vec3f& size :
          {Vec3f(1, 1, 1e-5f), Vec3f(1, 0.2f, 1e-5f), Vec3f(1e30f, 1e27f, 1e29f), Vec3f(1e-20f, 2e-20f, 3e-20f)})

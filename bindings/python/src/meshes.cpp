@@ -10,16 +10,24 @@ namespace filigree::python {
 
 namespace {
 
-void set_positions(const py::handle& vertices, Mesh& mesh) {
+/// Positions that are more precise than float; none where the mesh has them already.
+std::vector<Vec3d> set_positions(const py::handle& vertices, Mesh& mesh) {
     const py::array array = py::array::ensure(vertices);
     if (array && array.dtype().kind() == 'f' && array.dtype().itemsize() <= 4) {
         mesh.positions = points_of(vertices, "vertices");
-        split_origin(mesh);
-    } else {
-        SplitPositions split = split_origin(double_points_of(vertices, "vertices"));
-        mesh.positions = std::move(split.positions);
-        mesh.origin = split.origin;
+        return {};
     }
+    std::vector<Vec3d> world = double_points_of(vertices, "vertices");
+    mesh.positions.resize(world.size());
+    return world;
+}
+
+/// When the faces are there: see split_origin.
+void split_off_origin(std::span<const Vec3d> world, Mesh& mesh) {
+    if (world.empty()) return split_origin(mesh);
+    SplitPositions split = split_origin(world, mesh.corners);
+    mesh.positions = std::move(split.positions);
+    mesh.origin = split.origin;
 }
 
 void add_polygons(const py::sequence& polygons, Mesh& mesh) {
@@ -80,8 +88,9 @@ MeshPtr make_mesh(const py::object& vertices, const py::object& faces, const py:
                   const py::object& normals, const py::object& normal_corners, const py::object& uvs,
                   const py::object& uv_corners, const py::object& colors, const py::dict& scalars) {
     auto mesh = std::make_shared<Mesh>();
-    set_positions(vertices, *mesh);
+    const std::vector<Vec3d> world = set_positions(vertices, *mesh);
     set_faces(faces, face_offsets, *mesh);
+    split_off_origin(world, *mesh);
     set_attribute(normals, normal_corners, "normals", "normal_corners", 3, mesh->normals);
     set_attribute(uvs, uv_corners, "uvs", "uv_corners", 2, mesh->uvs);
     set_colors(colors, *mesh);
@@ -131,7 +140,7 @@ py::object labels_of(const FaceLabels& labels, const py::object& self) {
 MeshPtr with_vertices(const Mesh& mesh, const py::object& vertices) {
     auto moved = std::make_shared<Mesh>(mesh);
     moved->origin = Vec3d::Zero();
-    set_positions(vertices, *moved);
+    split_off_origin(set_positions(vertices, *moved), *moved);
     if (moved->positions.size() != mesh.vertex_count())
         refuse(ErrorCode::mismatch, "The mesh has " + std::to_string(mesh.vertex_count()) + " vertices and was given " +
                                         std::to_string(moved->positions.size()) + ".");

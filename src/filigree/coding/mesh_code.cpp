@@ -26,12 +26,14 @@ constexpr std::size_t kCoarsestVertices = 500;
 
 GeometrySteps steps_of(const MeshCodeOptions& options) { return {1, options.surface ? 4 : 1}; }
 
-/// Sixteenths of a step from the box's corner.
+/// Sixteenths of a step from the box's corner. A vertex that no face meets may lie further out than they reach.
 FinePlace fine_place(const Vec3f& position, const CodedMesh& coded) {
+    constexpr double kMost = kFarthest - kFine;
     FinePlace place{};
-    for (int k = 0; k < 3; ++k)
-        place[std::size_t(k)] = static_cast<std::int32_t>(
-            std::lround((double(position[k]) - coded.low[std::size_t(k)]) / coded.step * kFine));
+    for (int k = 0; k < 3; ++k) {
+        const double fine = (double(position[k]) - coded.low[std::size_t(k)]) / coded.step * kFine;
+        place[std::size_t(k)] = static_cast<std::int32_t>(std::lround(std::clamp(fine, -kMost, kMost)));
+    }
     return place;
 }
 
@@ -59,6 +61,7 @@ struct OrderedMesh {
     Mesh mesh;
     std::vector<FinePlace> places; ///< as they will be read
     std::vector<Index> vertex, face, first_corner;
+    std::size_t met = 0;   ///< vertices that faces meet: the first ones
     LevelValues in_levels; ///< which attributes are: outline and counts alone
 };
 
@@ -199,6 +202,7 @@ std::optional<OrderedMesh> encode_regular_shape(const Mesh& mesh, CodedMesh& cod
     ordered.mesh.face_offsets = std::move(encoded->read.face_offsets);
     ordered.mesh.corners = std::move(encoded->read.corners);
     ordered.places = std::move(encoded->read.places);
+    ordered.met = ordered.vertex.size();
     return ordered;
 }
 
@@ -226,6 +230,7 @@ OrderedMesh encode_shape(const Mesh& mesh, CodedMesh& coded, const RunContext& c
     if (!coded.levels.attributes.empty())
         ordered.in_levels = {
             .outline = attributes.outline, .met = walked.met, .walked_corners = walked.half_edges.size()};
+    ordered.met = walked.met;
     ordered.vertex = std::move(faces.vertex);
     ordered.face = std::move(faces.face);
     ordered.first_corner = std::move(faces.first_corner);
@@ -400,7 +405,7 @@ Result<CodedMesh> encode_mesh(const Mesh& mesh, const MeshCodeOptions& options, 
     coded.faces = mesh.face_count();
     coded.corners = mesh.corner_count();
     coded.options = options;
-    const Box box = bounds(mesh.positions);
+    const Box box = bounds(mesh);
     coded.low = {box.min[0], box.min[1], box.min[2]};
     const double longest = box.size().maxCoeff();
     coded.step = (longest > 0 ? longest : 1.0) / double((1u << options.bits) - 1);
@@ -416,13 +421,18 @@ Result<CodedMesh> encode_mesh(const Mesh& mesh, const MeshCodeOptions& options, 
     if (report) {
         report->vertex = ordered->vertex;
         double squares = 0, largest = 0;
-        for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
+        const std::size_t count = ordered->met > 0 ? ordered->met : mesh.vertex_count();
+        for (std::size_t v = 0; v < count; ++v) {
             const double off =
                 (moved.positions[v].cast<double>() - mesh.positions[ordered->vertex[v]].cast<double>()).squaredNorm();
             squares += off;
             largest = std::max(largest, off);
         }
-        report->rms = std::sqrt(squares / double(mesh.vertex_count()));
+        for (std::size_t v = ordered->met; v < mesh.vertex_count(); ++v) {
+            const Vec3d from_low = mesh.positions[ordered->vertex[v]].cast<double>() - box.min;
+            report->out_of_reach += from_low.cwiseAbs().maxCoeff() / coded.step * kFine > kFarthest;
+        }
+        report->rms = std::sqrt(squares / double(count));
         report->largest = std::sqrt(largest);
     }
     SymbolWriter attributes_out(kAllAttributeContexts);

@@ -35,7 +35,9 @@ struct CodedMesh {
 /// What was where before, and how far it is off.
 struct MeshCodeReport {
     std::vector<Index> vertex;   ///< of each coded vertex: which one it was
-    double rms = 0, largest = 0; ///< of the places, model units
+    double rms = 0, largest = 0; ///< of the places, model units; of the vertices that faces meet, if any
+    /// Vertices that no face meets, so far from the others (four boxes or more) that they come back nearer.
+    std::size_t out_of_reach = 0;
 };
 
 /// Errors: usage (bits), unsuitable (nothing to code), cancelled. Cost O(size log size), about 0.6 processor seconds a

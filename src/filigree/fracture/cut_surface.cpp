@@ -60,9 +60,11 @@ void close_borders(CutSurface& cut, std::size_t mesh_vertices, const FractureCel
         }
 }
 
-/// Areas, and the volume.
+/// The box, areas, and the volume.
 void measure(CutSurface& cut) {
-    const Vec3d middle = bounds(cut.vertices.positions()).centre();
+    for (const UncutTriangle& t : cut.triangles)
+        for (const Index v : t.vertices) cut.box.extend(cut.vertices.position(v).cast<double>());
+    const Vec3d middle = cut.box.centre();
     for (const UncutTriangle& t : cut.triangles) {
         const auto at = [&](std::size_t k) -> Vec3d {
             return cut.vertices.position(t.vertices[k]).cast<double>() - middle;

@@ -94,6 +94,7 @@ struct CutSurface {
     std::size_t closing_triangles = 0; ///< the last ones: cones over open borders
     double closing_area = 0, area = 0; ///< of those, and of the mesh's own; model units squared
     double volume = 0;                 ///< of the mesh, its borders closed; model units cubed
+    Box box;                           ///< of the triangles
 };
 
 /// Cuts a mesh's surface. Open borders are closed by cones; where cracks are rough, triangles near them are divided

@@ -17,14 +17,14 @@ double now() { return std::chrono::duration<double>(std::chrono::steady_clock::n
 
 /// How far a piece of average volume is across.
 double piece_size(const CutSurface& cut, Index cells) {
-    const double thinnest = 1e-3 * std::pow(bounds(cut.vertices.positions()).diagonal(), 3);
+    const double thinnest = 1e-3 * std::pow(cut.box.diagonal(), 3);
     return std::cbrt(std::max(std::abs(cut.volume), thinnest) / double(cells));
 }
 
 /// The pieces' sizes, and how far they are from adding up.
 void report_sizes(const CutSurface& cut, std::span<const CellTriangle> triangles, std::span<const Index> piece_of_part,
                   Index pieces, CutReport& report) {
-    const Vec3d middle = bounds(cut.vertices.positions()).centre();
+    const Vec3d middle = cut.box.centre();
     std::vector<double> volume(pieces, 0), area(pieces, 0);
     for (const CellTriangle& t : triangles) {
         const auto at = [&](std::size_t k) -> Vec3d {
@@ -36,9 +36,12 @@ void report_sizes(const CutSurface& cut, std::span<const CellTriangle> triangles
             area[piece_of_part[t.part]] += 0.5 * cross.norm();
     }
     report.volume = cut.volume;
-    double sum = 0;
-    for (const double v : volume) sum += v;
-    if (!report.is_sheet && report.volume != 0) report.volume_error = std::abs(sum / report.volume - 1);
+    double sum = 0, of_all = 0; // which are not the same where parts are inside out
+    for (const double v : volume) {
+        sum += v;
+        of_all += std::abs(v);
+    }
+    if (!report.is_sheet && of_all > 0) report.volume_error = std::abs(sum - report.volume) / of_all;
     std::vector<double>& size = report.is_sheet ? area : volume;
     for (double& v : size) v = std::abs(v);
     std::sort(size.begin(), size.end());
@@ -102,7 +105,7 @@ Result<FracturedMesh> fracture(const Mesh& mesh, const FractureCells& cells, con
 
 void explode(FracturedMesh& fractured, double distance) {
     Mesh& mesh = fractured.mesh;
-    const Vec3d middle = bounds(mesh.positions).centre();
+    const Vec3d middle = bounds(mesh).centre();
     std::vector<Box> boxes(fractured.pieces);
     for (std::size_t v = 0; v < mesh.vertex_count(); ++v)
         if (fractured.piece_of_vertex[v] != kNoIndex)

@@ -63,7 +63,7 @@ Result<Matter> matter_of(const Mesh& mesh, Index pieces, const RunContext& conte
     const Result<double> spacing =
         is_tangle ? Result<double>(Error{ErrorCode::unsuitable, ""}) : spacing_for_count(mesh, count, {}, context);
     if (spacing) {
-        const Result<Lattice> lattice = make_lattice(bounds(mesh.positions), {.spacing = *spacing});
+        const Result<Lattice> lattice = make_lattice(bounds(mesh), {.spacing = *spacing});
         Result<std::vector<Vec3d>> inside = lattice ? spread_inside(mesh, *lattice, Pattern::jitter, {}, context)
                                                     : Result<std::vector<Vec3d>>(lattice.error());
         if (inside && inside->size() >= pieces) {
@@ -211,7 +211,7 @@ Result<FractureCells> make_fracture_cells(const Mesh& mesh, const FracturePatter
     context.report("choosing where it breaks", 0);
     const Result<Matter> matter = matter_of(mesh, count, context);
     if (!matter) return matter.error();
-    CrackWarpOptions warp{.box = bounds(mesh.positions),
+    CrackWarpOptions warp{.box = bounds(mesh),
                           .roughness = pattern.roughness,
                           .wavelength = kWavelength * matter->piece_size,
                           .seed = context.seed};

@@ -63,7 +63,7 @@ struct PoseError::Calibration {
     double from_positions = 1, with_gradients = 1;
 
     Calibration(const Model& model, unsigned threads_to_use)
-        : restorer(model, kSampled), driver(level_mesh(model, 0)), diagonal(bounds(model.mesh.positions).diagonal()),
+        : restorer(model, kSampled), driver(level_mesh(model, 0)), diagonal(bounds(model.mesh).diagonal()),
           threads(threads_to_use) {}
 
     double factor(const PoseError& error, bool has_gradients) {

@@ -207,7 +207,7 @@ void spread_to_rest(const WorkingMesh& work, std::vector<Index>& nearest) {
 
 Result<WorkingMesh> make_working_mesh(const Mesh& mesh, const RunContext& context) {
     WorkingMesh work;
-    const Box box = bounds(mesh.positions);
+    const Box box = bounds(mesh);
     const double diagonal = box.diagonal();
     const double scale = diagonal > 0 ? 1 / diagonal : 1;
     work.positions.resize(mesh.vertex_count());

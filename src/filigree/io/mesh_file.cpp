@@ -140,7 +140,8 @@ Result<MeshFile> read_checked(std::string_view bytes, const std::string& name, c
     if (!format.ok()) return format.error();
     Result<MeshFile> file = parse({text, name, context}, *format);
     if (!file.ok()) return file;
-    if (file->mesh.positions.empty()) return source.error("has no vertices.");
+    if (file->mesh.positions.empty())
+        return source.error("has no vertices." + (file->warnings.empty() ? "" : " " + file->warnings.front()));
     if (file->mesh.face_count() == 0)
         file->warnings.push_back("There are no faces: read as " + std::to_string(file->mesh.vertex_count()) +
                                  (file->mesh.vertex_count() == 1 ? " point." : " points."));

@@ -216,6 +216,7 @@ Result<CodedModel> code_model(const Model& model, const PoseSequence& poses, con
                   .driver_corners = driver.corners.size()};
     coded.report = {.rms = report.rms,
                     .largest = report.largest,
+                    .out_of_reach = report.out_of_reach,
                     .bytes = {coded.mesh.connectivity.size(), coded.mesh.places.size(), coded.mesh.attributes.size(),
                               coded.mesh.order.size(),
                               coded.driver.size() + sizeof(Vec3f) * coded.driver_positions.size()}};

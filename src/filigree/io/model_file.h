@@ -90,7 +90,8 @@ std::string write_model(const Model& model, const PoseSequence& poses);
 
 /// How a coded model came out. Distances in model units.
 struct CodingReport {
-    double rms = 0, largest = 0; ///< of the vertices
+    double rms = 0, largest = 0;  ///< of the vertices
+    std::size_t out_of_reach = 0; ///< as MeshCodeReport::out_of_reach
     CodedBytes bytes;
     /// A stream's texture coordinates, colours and materials come with its last byte: seams are too dense for levels.
     bool lacks_level_attributes = false;

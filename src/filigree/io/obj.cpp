@@ -323,7 +323,7 @@ private:
     }
 
     MeshFile finish() {
-        SplitPositions split = split_origin(world_);
+        SplitPositions split = split_origin(world_, mesh_.corners);
         mesh_.positions = std::move(split.positions);
         mesh_.origin = split.origin;
         mesh_.uvs = uvs_.attribute(mesh_);

@@ -27,6 +27,9 @@ public:
         vertex_count_ = vertices->count;
         for (const Element& element : header_.elements)
             if (!read_element(element)) return *error_;
+        if (const std::size_t rest = numbers_.bytes_after_space(); rest > 0)
+            file_.warnings.push_back(std::to_string(rest) + " bytes after the last element were left out.");
+        split_off_origin();
         return std::move(file_);
     }
 
@@ -158,6 +161,7 @@ private:
     bool read_positions(const Element& element, const Table& table) {
         const std::size_t axes[3] = {element.find("x"), element.find("y"), element.find("z")};
         Mesh& mesh = file_.mesh;
+        mesh.positions.resize(table.rows);
         const bool floats =
             std::all_of(axes, axes + 3, [&](std::size_t a) { return table.columns[a].type == Type::float32; });
         if (!floats) {
@@ -167,12 +171,9 @@ private:
             for (std::size_t row = 0; row < world.size(); ++row)
                 for (const double x : world[row])
                     if (!fits_float(x)) return fail_position(element, row);
-            SplitPositions split = split_origin(world);
-            mesh.positions = std::move(split.positions);
-            mesh.origin = split.origin;
+            world_ = std::move(world);
             return true;
         }
-        mesh.positions.resize(table.rows);
         const std::size_t x_offset = table.columns[axes[0]].offset;
         const bool adjacent =
             table.columns[axes[1]].offset == x_offset + 4 && table.columns[axes[2]].offset == x_offset + 8;
@@ -187,8 +188,15 @@ private:
         }
         for (std::size_t row = 0; row < table.rows; ++row)
             if (!mesh.positions[row].allFinite()) return fail_position(element, row);
-        split_origin(mesh);
         return true;
+    }
+
+    void split_off_origin() {
+        Mesh& mesh = file_.mesh;
+        if (world_.empty()) return split_origin(mesh);
+        SplitPositions split = split_origin(world_, mesh.corners);
+        mesh.positions = std::move(split.positions);
+        mesh.origin = split.origin;
     }
 
     void read_attributes(const Element& element, const Table& table) {
@@ -432,6 +440,7 @@ private:
     Numbers numbers_;
     std::optional<Error> error_;
     MeshFile file_;
+    std::vector<Vec3d> world_; ///< positions that are more precise than float
     std::size_t vertex_count_ = 0, short_faces_ = 0;
     bool has_faces_ = false;
 };

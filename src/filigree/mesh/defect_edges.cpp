@@ -10,7 +10,7 @@ std::vector<DefectEdge> defect_edges(const Mesh& mesh) {
         bool is_forward;
         auto operator<=>(const Side&) const = default;
     };
-    const double diagonal = bounds(mesh.positions).diagonal(), least_area = 1e-14 * diagonal * diagonal;
+    const double diagonal = bounds(mesh).diagonal(), least_area = 1e-14 * diagonal * diagonal;
     std::vector<Side> sides;
     sides.reserve(mesh.corner_count());
     std::vector<Index> flat, corners;

@@ -1,6 +1,8 @@
 // Based on: [Sterbenz 1974], when the difference of two floating-point numbers is exact (split_origin).
 #include "filigree/mesh/mesh.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace filigree {
@@ -31,6 +33,34 @@ Vec3d choose_origin(const Box& box) {
         if (std::abs(rounded) <= 2 * near && far <= 2 * std::abs(rounded)) origin[axis] = rounded;
     }
     return origin;
+}
+
+/// Whether a face has the vertex. Faces of a vertex lie where it does in most files: looked for from there on.
+bool is_used(std::size_t vertex, std::size_t vertices, std::span<const Index> corners) {
+    const auto start = std::size_t(double(vertex) / double(vertices) * double(corners.size()));
+    for (std::size_t d = 0; d < corners.size(); ++d) {
+        if (start + d < corners.size() && corners[start + d] == vertex) return true;
+        if (d < start && corners[start - d - 1] == vertex) return true;
+    }
+    return false;
+}
+
+/// Of the positions that corners name; of all where there are none.
+template <class Vector>
+Box used_box(std::span<const Vector> positions, std::span<const Index> corners) {
+    Box all;
+    std::array<std::size_t, 6> furthest{}; // vertices at its sides: used as a rule, so that it is the box of the used
+    for (std::size_t v = 0; v < positions.size(); ++v)
+        for (int axis = 0; axis < 3; ++axis) {
+            const auto x = double(positions[v][axis]);
+            if (x < all.min[axis]) all.min[axis] = x, furthest[std::size_t(axis)] = v;
+            if (x > all.max[axis]) all.max[axis] = x, furthest[std::size_t(axis) + 3] = v;
+        }
+    const auto has_face = [&](std::size_t v) { return is_used(v, positions.size(), corners); };
+    if (corners.empty() || std::ranges::all_of(furthest, has_face)) return all;
+    Box used;
+    for (const Index v : corners) used.extend(positions[v].template cast<double>());
+    return used;
 }
 
 bool all_finite(std::span<const float> numbers) {
@@ -106,17 +136,17 @@ std::string check_vertex_data(const Mesh& mesh) {
 
 } // namespace
 
-SplitPositions split_origin(std::span<const Vec3d> world) {
-    Box box;
-    for (const Vec3d& p : world) box.extend(p);
-    SplitPositions split{{}, choose_origin(box)};
+Box bounds(const Mesh& mesh) { return used_box(std::span<const Vec3f>(mesh.positions), mesh.corners); }
+
+SplitPositions split_origin(std::span<const Vec3d> world, std::span<const Index> corners) {
+    SplitPositions split{{}, choose_origin(used_box(world, corners))};
     split.positions.resize(world.size());
     for (std::size_t v = 0; v < world.size(); ++v) split.positions[v] = (world[v] - split.origin).cast<float>();
     return split;
 }
 
 void split_origin(Mesh& mesh) {
-    const Vec3d origin = choose_origin(bounds(mesh.positions));
+    const Vec3d origin = choose_origin(bounds(mesh));
     if (origin.isZero(0)) return;
     for (Vec3f& p : mesh.positions) p = (p.cast<double>() - origin).cast<float>();
     mesh.origin = origin;

@@ -89,9 +89,12 @@ struct Mesh {
     }
 };
 
-/// The box of a mesh's vertices in the world. Cost O(V).
+/// The box of a mesh's positions: of the vertices that faces use, or of all where there is no face. A stray vertex far
+/// away says nothing about a mesh's size. Cost O(V + corners).
+Box bounds(const Mesh& mesh);
+/// The same in the world.
 inline Box world_bounds(const Mesh& mesh) {
-    Box box = bounds(mesh.positions);
+    Box box = bounds(mesh);
     box.min += mesh.origin;
     box.max += mesh.origin;
     return box;
@@ -105,9 +108,11 @@ struct SplitPositions {
 
 /// Chooses the origin for `world` positions: zero unless their box is more than twice its own diagonal away from
 /// the world's origin; then the box's centre (0 on axes where the box is close), rounded so that taking it off is exact
-/// for float input. Cost O(V).
-SplitPositions split_origin(std::span<const Vec3d> world);
-/// The same for float positions, in place: moves mesh.positions and sets mesh.origin (which must be zero).
+/// for float input. The box is that of the positions that `corners` name; of all where it is empty. Cost O(V +
+/// corners).
+SplitPositions split_origin(std::span<const Vec3d> world, std::span<const Index> corners);
+/// The same for float positions, in place, when the faces are there: moves mesh.positions and sets mesh.origin (which
+/// must be zero).
 void split_origin(Mesh& mesh);
 
 /// The first thing wrong with the arrays, as a sentence, or "" when all that `Mesh` promises holds: offsets ascend,

@@ -195,7 +195,7 @@ VertexDistance vertex_distance(const Mesh& mesh, std::span<const Vec3f> a, std::
 
 Result<MeshDistance> mesh_distance(const Mesh& a, const Mesh& b, std::size_t samples, const RunContext& context) {
     MeshDistance result;
-    result.diagonal = bounds(b.positions).diagonal();
+    result.diagonal = bounds(b).diagonal();
     if (a.vertex_count() == b.vertex_count()) result.vertices = vertex_distance(a, b, context).value();
     if (a.face_count() > 0 && b.face_count() > 0) {
         Result<SurfaceDistance> surfaces = compare_surfaces(a, b, samples, context);

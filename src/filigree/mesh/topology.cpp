@@ -237,7 +237,7 @@ void analyse_vertices(const Mesh& mesh, Incidence& incidence, const RunContext& 
 }
 
 void measure_faces(const Mesh& mesh, Incidence& incidence, const RunContext& context, TopologyReport& report) {
-    const Box box = bounds(mesh.positions);
+    const Box box = bounds(mesh);
     const double smallest = kDegenerateArea * box.diagonal() * box.diagonal();
     struct Sums {
         double area = 0, volume = 0; // volume: of tetrahedra over the box's centre, which keeps the digits
@@ -280,7 +280,7 @@ TopologyReport analyse_topology(const Mesh& mesh, const RunContext& context) {
         report.quads += mesh.face_size(f) == 4;
     }
     report.polygons = report.faces - report.triangles - report.quads;
-    report.box = bounds(mesh.positions);
+    report.box = bounds(mesh);
     if (!report.box.empty()) {
         report.box.min += mesh.origin;
         report.box.max += mesh.origin;

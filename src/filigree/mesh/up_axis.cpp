@@ -48,7 +48,7 @@ double flat_area(const Mesh& mesh, const Box& box, int axis, double side) {
 } // namespace
 
 UpAxis find_up_axis(const Mesh& mesh, UpAxis usual) {
-    const Box box = bounds(mesh.positions);
+    const Box box = bounds(mesh);
     if (box.empty()) return usual;
     std::array<double, 3> base = {}, box_side = {};
     for (std::size_t axis = 0; axis < 3; ++axis) {

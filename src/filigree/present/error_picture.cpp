@@ -25,7 +25,8 @@ Status write_error_picture(const Mesh& mesh, const HeatMap& errors, const std::s
                           : Drawable::points(mesh.positions, mesh.origin, {.scalars = scalars}, context);
     if (!drawable) return drawable.error();
     constexpr unsigned kWidth = 1120, kHeight = 840;
-    const CameraPoints points{mesh.positions, mesh.origin, drawable->point_radius()};
+    std::vector<Vec3f> room;
+    const CameraPoints points = points_of_faces(mesh, room, drawable->point_radius());
     const Camera camera =
         fit_camera(std::span(&points, 1), view_direction(View::iso, up), up_vector(up), double(kWidth) / kHeight);
     Scene scene;

@@ -33,7 +33,7 @@ double ground_below(const ModelFilm& film) {
         for (const Pose& pose : film.poses.frames) level = std::min(level, lowest(pose.positions, up));
     else
         level = lowest(film.pose.positions.empty() ? mesh.positions : film.pose.positions, up);
-    return mesh.origin.dot(up) + level - 1e-4 * bounds(mesh.positions).diagonal();
+    return mesh.origin.dot(up) + level - 1e-4 * bounds(mesh).diagonal();
 }
 
 Result<std::vector<Drawable>> obstacle_drawables(const ModelFilm& film, const RunContext& context) {

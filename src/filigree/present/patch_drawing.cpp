@@ -40,7 +40,7 @@ double total_area(const Mesh& mesh) {
 
 double ribbon_width(const Mesh& mesh, const RegularPatches& patches) {
     const double side = std::sqrt(total_area(mesh) / double(std::max<std::size_t>(1, patches.patch_count())));
-    return std::min(kRibbon * side, kWidestRibbon * bounds(mesh.positions).diagonal());
+    return std::min(kRibbon * side, kWidestRibbon * bounds(mesh).diagonal());
 }
 
 /// Vertex k, counted along side `side` of a patch, `rows` rows inwards.

@@ -150,7 +150,7 @@ struct Spot {
 class SeamGrid {
 public:
     SeamGrid(const InputSurface& surface, std::span<const std::uint8_t> seam, double cell) {
-        const Box box = bounds(surface.mesh.positions);
+        const Box box = bounds(surface.mesh);
         double length = 0;
         for_each_seam(surface, seam, [&](const Vec3d& a, const Vec3d& b) { length += (b - a).norm(); });
         origin_ = box.min;

@@ -108,6 +108,18 @@ Camera::Ray Camera::ray(double x, double y, double width, double picture_height)
     return {eye + across, -axes.col(2)};
 }
 
+CameraPoints points_of_faces(const Mesh& mesh, std::vector<Vec3f>& room, double radius) {
+    const CameraPoints all{mesh.positions, mesh.origin, radius};
+    if (mesh.face_count() == 0) return all;
+    std::vector<bool> is_used(mesh.vertex_count(), false);
+    for (const Index v : mesh.corners) is_used[v] = true;
+    if (std::ranges::find(is_used, false) == is_used.end()) return all;
+    room.clear();
+    for (std::size_t v = 0; v < is_used.size(); ++v)
+        if (is_used[v]) room.push_back(mesh.positions[v]);
+    return {room, mesh.origin, radius};
+}
+
 Camera fit_camera(std::span<const CameraPoints> points, const Vec3d& direction, const Vec3d& up, double aspect,
                   double field_of_view_deg, double margin) {
     const double half_height = field_of_view_deg > 0 ? std::tan(radians(field_of_view_deg) / 2) : 0.5;

@@ -39,6 +39,10 @@ struct CameraPoints {
     double radius = 0; ///< of balls around them, model units
 };
 
+/// The positions that a mesh's faces use; all where there are no faces. Into `room`, which has to stay, where some
+/// vertices are unused: a stray one far away would make the picture empty.
+CameraPoints points_of_faces(const Mesh& mesh, std::vector<Vec3f>& room, double radius = 0);
+
 /// The camera that looks along -direction and shows all points as large as they fit in a picture of that aspect (width
 /// / height) with `margin` (a fraction of the picture's height, on every side). Exact, also in perspective: for each
 /// side of the frustum the point furthest out decides; only that the eye stays a thousandth of the points' box in front

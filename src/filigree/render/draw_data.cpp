@@ -93,7 +93,7 @@ void fill(DrawData::Content& content, const Mesh& mesh, const SurfaceOptions& op
             order_for_vertex_cache(std::span(content.triangles).subspan(part.first, part.count), count);
     content.mesh_vertex_count = mesh.vertex_count();
     content.origin = mesh.origin;
-    content.box = moved_to(bounds(mesh.positions), mesh.origin);
+    content.box = moved_to(bounds(mesh), mesh.origin);
     for (const DrawArrays::Part& drawn : draw.parts) {
         DrawData::Content::Part part;
         part.first = drawn.first;

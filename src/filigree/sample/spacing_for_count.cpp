@@ -42,7 +42,7 @@ Error hardly_inside(std::size_t inside, const Lattice& lattice) {
 
 Result<double> spacing_for_count(const Mesh& mesh, std::size_t count, const InsideOptions& options,
                                  const RunContext& context) {
-    const Box box = bounds(mesh.positions);
+    const Box box = bounds(mesh);
     const Vec3d size = box.size();
     if (count == 0 || !((size.array() > 0).all() && size.prod() > 0))
         return Error{ErrorCode::unsuitable, "The mesh has no volume, so no point is inside."};

@@ -28,7 +28,7 @@ std::size_t default_base(const Body& body) {
 }
 
 double default_max_edge(const Mesh& mesh, const Body& body) {
-    return std::min(1.0, kLongestEdgeMade * body.spacing() / (body.scale * bounds(mesh.positions).diagonal()));
+    return std::min(1.0, kLongestEdgeMade * body.spacing() / (body.scale * bounds(mesh).diagonal()));
 }
 
 /// For each of the driver's faces how many other vertices of the mesh hang on it. The blend code's cells are the faces;
@@ -115,7 +115,7 @@ ExpectedError expected_error(const PoseSequence& poses, const DriverEdges& edges
         if (count > 0) sum += std::sqrt(squares / double(count));
     }
     if (poses.frames.size() < 2) return {};
-    const double h = body.spacing(), diagonal = body.scale * bounds(model.mesh.positions).diagonal();
+    const double h = body.spacing(), diagonal = body.scale * bounds(model.mesh).diagonal();
     const double bend = sum / double(poses.frames.size() - 1) * h * h / diagonal;
     return {kSpacingError * bend, kDriverError * bend * edges.mean * edges.mean * edges.carried};
 }

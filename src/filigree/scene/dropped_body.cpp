@@ -164,7 +164,7 @@ bool can_melt(const DroppedBody& dropped) {
 
 double torch_radius(const DroppedBody& dropped, const Torch& torch) {
     constexpr double kSpacings = 4; // less does not flow on the body's grid
-    const double longest = bounds(dropped.model->mesh.positions).size().maxCoeff();
+    const double longest = bounds(dropped.model->mesh).size().maxCoeff();
     return std::max(torch.size * longest, kSpacings * dropped.body->spacing() / dropped.scale);
 }
 
@@ -184,7 +184,7 @@ Result<std::shared_ptr<const DroppedBody>> make_dropped_body(std::shared_ptr<con
                                                              const BodyLook& look, const DropOptions& options,
                                                              std::span<const Index> pinned, const Vec3d& up,
                                                              const RunContext& context) {
-    const Box box = bounds(model->mesh.positions);
+    const Box box = bounds(model->mesh);
     const double longest = box.size().maxCoeff();
     if (!(longest > 0))
         return Error{ErrorCode::unsuitable,

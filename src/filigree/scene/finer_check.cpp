@@ -44,7 +44,7 @@ public:
         particles_ = finer.attach(number, particles, context);
         attached_ = carried.attach(number, mesh, context);
         driver_ = carried.attach(number, body.in_metres(driver_positions(body.model)), context);
-        diagonal_ = body.scale * bounds(body.model.mesh.positions).diagonal();
+        diagonal_ = body.scale * bounds(body.model.mesh).diagonal();
     }
 
     void compare(const Simulation& finer, Simulation& carried, FinerCheck& check, const RunContext& context) const {

@@ -55,7 +55,7 @@ private:
 
 constexpr double kOpen = 0.02; ///< spacings between a crack's two sides, from which on it is seen
 
-Box body_box(const ReadyBody& body) { return bounds(body.model.mesh.positions); }
+Box body_box(const ReadyBody& body) { return bounds(body.model.mesh); }
 
 class Builder {
 public:
@@ -296,7 +296,7 @@ private:
                 return std::make_shared<const DistanceField>(
                     DistanceField::create(mesh, from.scale, from.spacing, context_).value());
             });
-            const Vec3d own = from.scale * bounds(mesh.positions).centre();
+            const Vec3d own = from.scale * bounds(mesh).centre();
             middle = from.centre.value_or(own + from.scale * mesh.origin - result_.origin);
             shape.offset = middle - own;
             obstacle.shape = shape;
