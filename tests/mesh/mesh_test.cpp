@@ -120,9 +120,13 @@ TEST(SplitOrigin, AStrayVertexSaysNothing) {
     EXPECT_EQ(bounds(mesh).min.x(), 0) << "all vertices of a mesh without faces";
     mesh.add_face(triangle);
     EXPECT_EQ(bounds(mesh).min.x(), 500000);
+    Mesh rounded = mesh;
+    rounded.positions[3] = Vec3f(0.1f, 0, 0);
     split_origin(mesh);
     EXPECT_NEAR(mesh.origin.x(), 500000, 2);
     EXPECT_EQ(world_bounds(mesh).max.x(), 500001);
+    split_origin(rounded);
+    EXPECT_EQ(rounded.world_position(3), Vec3d(double(0.1f), 0, 0)) << "floats keep their digits, strays too";
 }
 
 TEST(SplitOrigin, OnePointKeepsItsPlace) {

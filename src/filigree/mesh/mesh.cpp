@@ -146,9 +146,13 @@ SplitPositions split_origin(std::span<const Vec3d> world, std::span<const Index>
 }
 
 void split_origin(Mesh& mesh) {
-    const Vec3d origin = choose_origin(bounds(mesh));
+    Vec3d origin = choose_origin(bounds(mesh));
     if (origin.isZero(0)) return;
-    for (Vec3f& p : mesh.positions) p = (p.cast<double>() - origin).cast<float>();
+    const auto moved = [&](const Vec3f& p) -> Vec3f { return (p.cast<double>() - origin).cast<float>(); };
+    const auto stays = [&](const Vec3f& p) { return origin + moved(p).cast<double>() == p.cast<double>(); };
+    // Moving what faces use is exact; a stray vertex must not lose digits either.
+    if (!std::ranges::all_of(mesh.positions, stays)) origin = choose_origin(bounds(mesh.positions));
+    for (Vec3f& p : mesh.positions) p = moved(p);
     mesh.origin = origin;
 }
 
