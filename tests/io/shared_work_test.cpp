@@ -81,7 +81,9 @@ TEST(SharedItemsTest, LateOnesDoNotComeIntoAnotherWork) {
         const auto place = [&](const std::function<fs::path(std::size_t)>& file) {
             return write_file(whole, read_file(file(0)).value() + read_file(file(1)).value());
         };
-        return make_shared_items(items, {number, 2, job}, make, place, [&] { return fs::exists(whole); }, {}).value();
+        return make_shared_items(
+                   items, {number, 2, job}, make, place, [&] { return fs::exists(whole); }, RunContext())
+            .value();
     };
     const Make small = [](std::size_t item) { return std::string(item ? "b" : "a"); };
     const Make capital = [](std::size_t item) { return std::string(item ? "B" : "A"); };
@@ -123,7 +125,7 @@ TEST(SharedItemsTest, ManyAtTheSameTime) {
                 const auto made = make_shared_items(
                     items, {.number = 1 + maker % 2, .count = 2, .job = "j"},
                     [&](std::size_t item) { return Result<std::string>(items.names[item]); }, place,
-                    [&] { return fs::exists(whole); }, {});
+                    [&] { return fs::exists(whole); }, RunContext());
                 if (!made) wrong[maker] = made.error().message;
             });
         for (std::thread& maker : makers) maker.join();
