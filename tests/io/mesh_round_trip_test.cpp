@@ -9,6 +9,7 @@
 #include <rapidcheck/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <map>
@@ -48,6 +49,8 @@ Mesh any_mesh() {
         const auto size = *gen::inRange<std::size_t>(3, 7);
         mesh.add_face(*gen::container<std::vector<Index>>(size, gen::inRange<Index>(0, static_cast<Index>(count))));
     }
+    // Those that faces use are around it as well.
+    if (faces > 0) mesh.add_face(std::array<Index, 3>{0, static_cast<Index>(count - 1), 0});
     if (*gen::arbitrary<bool>()) mesh.uvs.values = any_vectors<Vec2f>(count);
     if (*gen::arbitrary<bool>()) mesh.normals.values = any_vectors<Vec3f>(count);
     if (*gen::arbitrary<bool>()) mesh.colors = any_vectors<Vec4f>(count);

@@ -108,11 +108,11 @@ struct SplitPositions {
 
 /// Chooses the origin for `world` positions: zero unless their box is more than twice its own diagonal away from
 /// the world's origin; then the box's centre (0 on axes where the box is close), rounded so that taking it off is exact
-/// for float input. The box is that of the positions that `corners` name; of all where it is empty. Cost O(V +
-/// corners).
+/// for float input. The box is that of the positions that `corners` name; of all where it is empty. Others get float's
+/// precision beside that origin. Cost O(V + corners).
 SplitPositions split_origin(std::span<const Vec3d> world, std::span<const Index> corners);
 /// The same for float positions, in place, when the faces are there: moves mesh.positions and sets mesh.origin (which
-/// must be zero).
+/// must be zero). All keep their digits: where others would not, the box is of all.
 void split_origin(Mesh& mesh);
 
 /// The first thing wrong with the arrays, as a sentence, or "" when all that `Mesh` promises holds: offsets ascend,
