@@ -597,6 +597,14 @@ TEST_F(Cli, LittleAddressSpaceIsOutOfMemory) {
 }
 #endif
 
+TEST_F(Cli, PackSaysWhatComesBackNearer) {
+    ok({"make", "wavy-sphere", "-o", "ball.obj", "--resolution", "8"});
+    std::ofstream(path("ball.obj"), std::ios::app) << "v 5000 0 0\n";
+    EXPECT_NE(ok({"pack", "ball.obj", "-o", "ball.fil"}).err.find("1 unused vertex lies too far"), std::string::npos);
+    EXPECT_EQ(ok({"pack", "ball.obj", "-o", "ball.fil", "--profile", "lossless"}).err.find("unused"),
+              std::string::npos);
+}
+
 TEST_F(Cli, WarningsAreSaidOnceAndQuietlyNot) {
     write("points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n");
     const Ran ran = ok({"compare", "points.obj", "points.obj"});

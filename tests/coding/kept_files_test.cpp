@@ -1,5 +1,6 @@
 // Coded files that people keep: those of tests/coding/kept_files, written by version 0.1 on 2026-11-27, are read as
-// they were then. A ring of triangles and quads with a hole and loose vertices, in a random order.
+// they were then. A ring of triangles and quads with a hole and loose vertices, in a random order; `crumpled` is a
+// small ball.
 #include "filigree/io/model_file.h"
 #include "threads.h"
 
@@ -33,13 +34,14 @@ struct KeptFile {
 
 TEST(KeptFiles, AreReadAsTheyWere) {
     const KeptFile files[] = {
-        {"compact", 0, 0x041fd23fa0811287, kNothing},            // normals, colours and texture coordinates of vertices
-        {"ordered", 0, 0x780465f431f60d5e, kNothing},            // the same, 12 bits, in its order
-        {"surface", 0, 0xd756d49c0d852227, kNothing},            // vertices may slide
-        {"corners", 0, 0x7fbbe9fded053134, kNothing},            // attributes of corners and labels, in its order
-        {"stream", 0, 0x41b073d316f2ee2d, kNothing},             // the same, coarse to fine
-        {"moving", 40, 0x041fd23fa0811287, 0xd12fa3891d7a0b67},  // compact, with poses
-        {"lossless", 6, 0xe810088715ebb798, 0x47e2bfd44f5da11d}, // plain model and poses
+        {"compact", 0, 0x041fd23fa0811287, kNothing},           // normals, colours and texture coordinates of vertices
+        {"ordered", 0, 0x780465f431f60d5e, kNothing},           // the same, 12 bits, in its order
+        {"surface", 0, 0xd756d49c0d852227, kNothing},           // vertices may slide
+        {"corners", 0, 0x7fbbe9fded053134, kNothing},           // attributes of corners and labels, in its order
+        {"stream", 0, 0x41b073d316f2ee2d, kNothing},            // the same, coarse to fine
+        {"moving", 40, 0x041fd23fa0811287, 0xd12fa3891d7a0b67}, // compact, with poses
+        {"crumpled", 64, 0x77e374e3b1ce34e7, 0x5f353c5a6390bdc5}, // poses without any order
+        {"lossless", 6, 0xe810088715ebb798, 0x47e2bfd44f5da11d},  // plain model and poses
         {"lossless_corners", 0, 0x789c825a5a32bf74, kNothing},
     };
     for (const KeptFile& file : files) {
@@ -48,8 +50,6 @@ TEST(KeptFiles, AreReadAsTheyWere) {
         const Result<Model> model = read_model(path, kTwoThreads);
         ASSERT_TRUE(model.ok()) << model.error().message;
         const Mesh& mesh = model->mesh;
-        EXPECT_EQ(mesh.vertex_count(), 800u);
-        EXPECT_EQ(mesh.face_count(), 1170u);
         Digest of_mesh;
         of_mesh.add(mesh.positions);
         of_mesh.add(mesh.face_offsets);

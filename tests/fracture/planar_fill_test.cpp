@@ -1,7 +1,9 @@
 #include "filigree/fracture/planar_fill.h"
 
 #include "filigree/core/random.h"
+#include "filigree/fracture/constrained_delaunay.h"
 
+#include <Eigen/LU>
 #include <gtest/gtest.h>
 #include <map>
 #include <numbers>
@@ -116,6 +118,28 @@ TEST(PlanarFill, WindingTwiceGivesTwoCopies) {
     const PlanarFill back = fill_plane(points, segments, {});
     ASSERT_EQ(back.triangles.size(), 1u);
     EXPECT_LT(area(back, points), 0);
+}
+
+TEST(ConstrainedDelaunay, SegmentsCrossAtTheirCrossing) {
+    for (std::uint64_t k = 0; k < 200; ++k) {
+        ConstrainedDelaunay plane;
+        std::array<PlanePoint, 4> p; // a square's corners, moved at random: its diagonals cross
+        for (std::size_t c = 0; c < 4; ++c)
+            for (std::size_t axis = 0; axis < 2; ++axis) {
+                const double side = (axis == 0 ? c == 1 || c == 2 : c >= 2) ? 1 : -1;
+                p[c][axis] = std::int64_t(4e6 * (side + 0.4 * random_unit(k, 2 * c + axis) - 0.2));
+            }
+        std::array<Index, 4> v;
+        std::ranges::transform(p, v.begin(), [&](const PlanePoint& point) { return plane.insert(point); });
+        ASSERT_TRUE(plane.constrain(v[0], v[2], 1) && plane.constrain(v[1], v[3], 1));
+        ASSERT_EQ(plane.vertex_count(), 8u) << "the outer three, four ends, and where they cross";
+        const auto real = [](const PlanePoint& point) { return Vec2d(double(point[0]), double(point[1])); };
+        const Eigen::Matrix2d along{{double(p[2][0] - p[0][0]), double(p[1][0] - p[3][0])},
+                                    {double(p[2][1] - p[0][1]), double(p[1][1] - p[3][1])}};
+        const Vec2d t = along.inverse() * (real(p[1]) - real(p[0]));
+        const Vec2d crossing = real(p[0]) + t[0] * along.col(0);
+        EXPECT_LE((real(plane.point(7)) - crossing).cwiseAbs().maxCoeff(), 0.51) << k;
+    }
 }
 
 TEST(PlanarFill, NothingInsideNothing) {

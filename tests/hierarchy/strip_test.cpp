@@ -112,9 +112,7 @@ TEST(Strip, MillimetresAtHalfAThousandKilometres) {
     const Mesh near = mesh;
     std::vector<Vec3d> world;
     for (const Vec3f& p : mesh.positions) world.push_back(p.cast<double>() + Vec3d(500000, -4500000, 300));
-    SplitPositions split = split_origin(world, mesh.corners);
-    mesh.positions = std::move(split.positions);
-    mesh.origin = split.origin;
+    split_origin(world, mesh);
     const Model model = stripped(mesh).model;
     const Result<Mesh> back = restorer_of(model).mesh(rest_pose(model), kOneThread);
     for (std::size_t v = 0; v < world.size(); ++v)

@@ -208,6 +208,7 @@ TEST(MeshFile, ForeignContentIsNamed) {
     EXPECT_NE(error_of("hello", "a.xyz").find(".obj, .ply, .stl, .off or .glb"), std::string::npos);
     EXPECT_NE(error_of("", "a.obj").find("empty"), std::string::npos);
     EXPECT_NE(error_of("# nothing\n", "a.obj").find("no vertices"), std::string::npos);
+    EXPECT_NE(error_of("hello\nthere 1\n", "a.obj").find("the first: 'hello' in line 1"), std::string::npos);
 }
 
 TEST(MeshFile, EndingsNameFormatsInAnyCase) {

@@ -50,6 +50,16 @@ TEST(Ply, PropertiesComeInAnyOrder) {
     EXPECT_EQ(file->warnings.size(), 1u); // the list
 }
 
+TEST(Ply, DoublesFarAwayKeepTheirDigitsBesideAStrayVertex) {
+    const auto file = read(ascii("element vertex 4\nproperty double x\nproperty double y\nproperty double z\n" + kFaces,
+                                 "5e5 4e6 0.001 500000.002 4e6 0 5e5 4000001.003 0 0 0 0\n3 0 1 2\n"));
+    const Mesh& mesh = file->mesh;
+    EXPECT_LT((mesh.world_position(0) - Vec3d(5e5, 4e6, 0.001)).norm(), 1e-6);
+    EXPECT_LT((mesh.world_position(1) - Vec3d(500000.002, 4e6, 0)).norm(), 1e-6);
+    EXPECT_LT((mesh.world_position(2) - Vec3d(5e5, 4000001.003, 0)).norm(), 1e-6);
+    EXPECT_LT(mesh.world_position(3).norm(), 1);
+}
+
 TEST(Ply, ABinaryBodyMayBeginWithALineFeed) {
     std::string body(36, '\0');
     body[0] = '\n'; // the lowest byte of x

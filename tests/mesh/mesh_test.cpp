@@ -85,36 +85,39 @@ TEST(CheckMesh, FindsEachThingThatCanBeWrong) {
     EXPECT_NE(check_mesh(mesh), "");
 }
 
+Mesh split(std::span<const Vec3d> world, std::span<const Index> face = {}) {
+    Mesh mesh;
+    if (!face.empty()) mesh.add_face(face);
+    split_origin(world, mesh);
+    return mesh;
+}
+
 TEST(SplitOrigin, IsZeroUpToTwiceTheDiagonal) {
     const auto origin_at = [](double x) {
         const Vec3d points[] = {{x, 0, 0}, {x + 1, 0, 0}}; // diagonal 1
-        return split_origin(points, {}).origin;
+        return split(points).origin;
     };
     EXPECT_EQ(origin_at(0), Vec3d::Zero());
     EXPECT_EQ(origin_at(2), Vec3d::Zero());
     EXPECT_EQ(origin_at(-3), Vec3d::Zero());
     EXPECT_NE(origin_at(2.001), Vec3d::Zero());
     EXPECT_NE(origin_at(-3.001), Vec3d::Zero());
-    EXPECT_EQ(split_origin(std::span<const Vec3d>{}, {}).origin, Vec3d::Zero());
+    EXPECT_EQ(split(std::span<const Vec3d>{}).origin, Vec3d::Zero());
 }
 
 TEST(SplitOrigin, KeepsMillimetresFarAway) {
     const Vec3d points[] = {{500000.001, 4500000.002, 10.003}, {500001.004, 4500003.005, 12.006}};
-    const SplitPositions split = split_origin(points, {});
-    for (int i = 0; i < 2; ++i) {
-        const Vec3d back = split.origin + split.positions[i].cast<double>();
-        EXPECT_LT((back - points[i]).norm(), 1e-6);
-    }
+    const Mesh mesh = split(points);
+    for (int i = 0; i < 2; ++i) EXPECT_LT((mesh.world_position(i) - points[i]).norm(), 1e-6);
     // the box's centre, to within half its diagonal
-    EXPECT_LT((split.origin - 0.5 * (points[0] + points[1])).norm(), (points[1] - points[0]).norm());
+    EXPECT_LT((mesh.origin - 0.5 * (points[0] + points[1])).norm(), (points[1] - points[0]).norm());
 }
 
 TEST(SplitOrigin, AStrayVertexSaysNothing) {
     const Vec3d points[] = {{500000.001, 4e6, 0}, {500001, 4e6, 0}, {500000, 4000001.002, 0}, {0, 0, 0}};
     const Index triangle[] = {0, 1, 2};
-    const SplitPositions split = split_origin(points, triangle);
-    for (int i = 0; i < 3; ++i)
-        EXPECT_LT((split.origin + split.positions[i].cast<double>() - points[i]).norm(), 1e-6) << i;
+    const Mesh precise = split(points, triangle);
+    for (int i = 0; i < 3; ++i) EXPECT_LT((precise.world_position(i) - points[i]).norm(), 1e-6) << i;
     Mesh mesh;
     for (const Vec3d& p : points) mesh.positions.push_back(p.cast<float>());
     EXPECT_EQ(bounds(mesh).min.x(), 0) << "all vertices of a mesh without faces";
@@ -131,8 +134,7 @@ TEST(SplitOrigin, AStrayVertexSaysNothing) {
 
 TEST(SplitOrigin, OnePointKeepsItsPlace) {
     const Vec3d point[] = {{0.1, -1e9, 3}};
-    const SplitPositions split = split_origin(point, {});
-    EXPECT_EQ(split.origin + split.positions[0].cast<double>(), point[0]);
+    EXPECT_EQ(split(point).world_position(0), point[0]);
 }
 
 TEST(SplitOrigin, IsExactForFloats) {

@@ -10,7 +10,7 @@ namespace filigree::python {
 
 namespace {
 
-/// Positions that are more precise than float; none where the mesh has them already.
+/// Also gives positions that are more precise than float, for split_origin.
 std::vector<Vec3d> set_positions(const py::handle& vertices, Mesh& mesh) {
     const py::array array = py::array::ensure(vertices);
     if (array && array.dtype().kind() == 'f' && array.dtype().itemsize() <= 4) {
@@ -18,16 +18,8 @@ std::vector<Vec3d> set_positions(const py::handle& vertices, Mesh& mesh) {
         return {};
     }
     std::vector<Vec3d> world = double_points_of(vertices, "vertices");
-    mesh.positions.resize(world.size());
+    for (const Vec3d& p : world) mesh.positions.push_back(p.cast<float>());
     return world;
-}
-
-/// When the faces are there: see split_origin.
-void split_off_origin(std::span<const Vec3d> world, Mesh& mesh) {
-    if (world.empty()) return split_origin(mesh);
-    SplitPositions split = split_origin(world, mesh.corners);
-    mesh.positions = std::move(split.positions);
-    mesh.origin = split.origin;
 }
 
 void add_polygons(const py::sequence& polygons, Mesh& mesh) {
@@ -90,13 +82,14 @@ MeshPtr make_mesh(const py::object& vertices, const py::object& faces, const py:
     auto mesh = std::make_shared<Mesh>();
     const std::vector<Vec3d> world = set_positions(vertices, *mesh);
     set_faces(faces, face_offsets, *mesh);
-    split_off_origin(world, *mesh);
     set_attribute(normals, normal_corners, "normals", "normal_corners", 3, mesh->normals);
     set_attribute(uvs, uv_corners, "uvs", "uv_corners", 2, mesh->uvs);
     set_colors(colors, *mesh);
     for (const auto& [name, values] : scalars)
         mesh->scalars.push_back({name.cast<std::string>(), values_of(values, "scalars")});
-    return checked(std::move(mesh));
+    mesh = checked(std::move(mesh));
+    split_origin(world, *mesh);
+    return mesh;
 }
 
 /// (m, k) where all faces have k corners; else None.
@@ -140,10 +133,12 @@ py::object labels_of(const FaceLabels& labels, const py::object& self) {
 MeshPtr with_vertices(const Mesh& mesh, const py::object& vertices) {
     auto moved = std::make_shared<Mesh>(mesh);
     moved->origin = Vec3d::Zero();
-    split_off_origin(set_positions(vertices, *moved), *moved);
+    moved->positions.clear();
+    const std::vector<Vec3d> world = set_positions(vertices, *moved);
     if (moved->positions.size() != mesh.vertex_count())
         refuse(ErrorCode::mismatch, "The mesh has " + std::to_string(mesh.vertex_count()) + " vertices and was given " +
                                         std::to_string(moved->positions.size()) + ".");
+    split_origin(world, *moved);
     return moved;
 }
 

@@ -46,9 +46,7 @@ Subject subject_of(const py::handle& given) {
     }
     if (py::hasattr(given, "vertices")) return {mesh_of(given)};
     auto points = std::make_shared<Mesh>();
-    SplitPositions split = split_origin(double_points_of(given, "points"), {});
-    points->positions = std::move(split.positions);
-    points->origin = split.origin;
+    split_origin(double_points_of(given, "points"), *points);
     return {points};
 }
 

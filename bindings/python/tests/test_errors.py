@@ -106,6 +106,21 @@ def test_meshes_of_others(kind, mesh):
     assert filigree.contains(theirs, [[0, 0, 0]])[0]
 
 
+def test_faces_that_fit_no_vertices():
+    for dtype in ("f4", "f8"):
+        corners = numpy.array([[5e5, 0, 0], [5e5 + 1, 0, 0], [5e5, 1, 0]], dtype)
+        with pytest.raises(filigree.Error, match="there are 3, counted from 0"):
+            filigree.Mesh(corners, [[0, 1, 3_000_000_000]])
+        with pytest.raises(filigree.MismatchError, match="3 vertices and was given 2"):
+            filigree.Mesh(corners, [[0, 1, 2]]).with_vertices(corners[:2])
+
+
+def test_a_stray_vertex_far_away_takes_no_digits(mesh):
+    world = numpy.vstack([mesh.vertices + numpy.array([1e7, 0, 0]), [[0, 0, 0]]])
+    for far in (filigree.Mesh(world, mesh.faces), filigree.Mesh(0 * world, mesh.faces).with_vertices(world)):
+        assert far.origin[0] > 9e6 and abs(far.world_vertices - world)[:-1].max() < 1e-6
+
+
 def test_far_from_the_origin_digits_stay(mesh):
     far = filigree.Mesh(mesh.vertices + numpy.array([1e7, 0, 0]), mesh.faces)
     assert far.origin[0] > 9e6 and abs(far.world_vertices - mesh.vertices - [1e7, 0, 0]).max() < 1e-6

@@ -70,9 +70,7 @@ void place_rest(gltf::Scene& scene, const RunContext& context) {
         if (!(world[v].allFinite() && fits_float(world[v].cwiseAbs().maxCoeff())))
             throw gltf::Damage{"its nodes carry vertex " + std::to_string(v) +
                                " to no place that 32-bit float can hold."};
-    SplitPositions split = split_origin(world, mesh.corners);
-    mesh.positions = std::move(split.positions);
-    mesh.origin = split.origin;
+    split_origin(world, mesh);
     if (!mesh.normals.empty()) mesh.normals.values = gltf::turned_normals(scene, pose, context);
 }
 

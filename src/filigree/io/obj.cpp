@@ -323,9 +323,7 @@ private:
     }
 
     MeshFile finish() {
-        SplitPositions split = split_origin(world_, mesh_.corners);
-        mesh_.positions = std::move(split.positions);
-        mesh_.origin = split.origin;
+        split_origin(world_, mesh_);
         mesh_.uvs = uvs_.attribute(mesh_);
         mesh_.normals = normals_.attribute(mesh_);
         mesh_.objects = objects_.labels(mesh_.face_count());

@@ -37,10 +37,7 @@ public:
 
     Result<MeshFile> read() {
         if (!read_header() || !read_counts() || !read_vertices() || !read_faces()) return *error_;
-        SplitPositions split = split_origin(world_, file_.mesh.corners);
-        Mesh& mesh = file_.mesh;
-        mesh.positions = std::move(split.positions);
-        mesh.origin = split.origin;
+        split_origin(world_, file_.mesh);
         collect_warnings();
         return std::move(file_);
     }

@@ -29,7 +29,7 @@ public:
             if (!read_element(element)) return *error_;
         if (const std::size_t rest = numbers_.bytes_after_space(); rest > 0)
             file_.warnings.push_back(std::to_string(rest) + " bytes after the last element were left out.");
-        split_off_origin();
+        split_origin(world_, file_.mesh);
         return std::move(file_);
     }
 
@@ -189,14 +189,6 @@ private:
         for (std::size_t row = 0; row < table.rows; ++row)
             if (!mesh.positions[row].allFinite()) return fail_position(element, row);
         return true;
-    }
-
-    void split_off_origin() {
-        Mesh& mesh = file_.mesh;
-        if (world_.empty()) return split_origin(mesh);
-        SplitPositions split = split_origin(world_, mesh.corners);
-        mesh.positions = std::move(split.positions);
-        mesh.origin = split.origin;
     }
 
     void read_attributes(const Element& element, const Table& table) {

@@ -94,9 +94,8 @@ public:
             if (!read_solid()) return *error_;
             if (source_.context.is_cancelled()) return cancelled_error();
         }
-        SplitPositions split = split_origin(corners_, {});
-        file_.mesh.origin = split.origin;
-        weld(std::move(split.positions), file_.mesh);
+        split_origin(corners_, file_.mesh);
+        weld(std::exchange(file_.mesh.positions, {}), file_.mesh);
         // one solid without a name says nothing
         if (file_.mesh.objects.names.size() > 1 || !file_.mesh.objects.names.front().empty())
             file_.mesh.objects.of_face = solids_;

@@ -2,7 +2,6 @@
 #include "filigree/mesh/mesh.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace filigree {
@@ -35,32 +34,14 @@ Vec3d choose_origin(const Box& box) {
     return origin;
 }
 
-/// Whether a face has the vertex. Faces of a vertex lie where it does in most files: looked for from there on.
-bool is_used(std::size_t vertex, std::size_t vertices, std::span<const Index> corners) {
-    const auto start = std::size_t(double(vertex) / double(vertices) * double(corners.size()));
-    for (std::size_t d = 0; d < corners.size(); ++d) {
-        if (start + d < corners.size() && corners[start + d] == vertex) return true;
-        if (d < start && corners[start - d - 1] == vertex) return true;
-    }
-    return false;
-}
-
 /// Of the positions that corners name; of all where there are none.
 template <class Vector>
 Box used_box(std::span<const Vector> positions, std::span<const Index> corners) {
-    Box all;
-    std::array<std::size_t, 6> furthest{}; // vertices at its sides: used as a rule, so that it is the box of the used
-    for (std::size_t v = 0; v < positions.size(); ++v)
-        for (int axis = 0; axis < 3; ++axis) {
-            const auto x = double(positions[v][axis]);
-            if (x < all.min[axis]) all.min[axis] = x, furthest[std::size_t(axis)] = v;
-            if (x > all.max[axis]) all.max[axis] = x, furthest[std::size_t(axis) + 3] = v;
-        }
-    const auto has_face = [&](std::size_t v) { return is_used(v, positions.size(), corners); };
-    if (corners.empty() || std::ranges::all_of(furthest, has_face)) return all;
-    Box used;
-    for (const Index v : corners) used.extend(positions[v].template cast<double>());
-    return used;
+    Box box;
+    for (const Index v : corners) box.extend(positions[v].template cast<double>());
+    if (corners.empty())
+        for (const Vector& p : positions) box.extend(p.template cast<double>());
+    return box;
 }
 
 bool all_finite(std::span<const float> numbers) {
@@ -138,13 +119,6 @@ std::string check_vertex_data(const Mesh& mesh) {
 
 Box bounds(const Mesh& mesh) { return used_box(std::span<const Vec3f>(mesh.positions), mesh.corners); }
 
-SplitPositions split_origin(std::span<const Vec3d> world, std::span<const Index> corners) {
-    SplitPositions split{{}, choose_origin(used_box(world, corners))};
-    split.positions.resize(world.size());
-    for (std::size_t v = 0; v < world.size(); ++v) split.positions[v] = (world[v] - split.origin).cast<float>();
-    return split;
-}
-
 void split_origin(Mesh& mesh) {
     Vec3d origin = choose_origin(bounds(mesh));
     if (origin.isZero(0)) return;
@@ -154,6 +128,13 @@ void split_origin(Mesh& mesh) {
     if (!std::ranges::all_of(mesh.positions, stays)) origin = choose_origin(bounds(mesh.positions));
     for (Vec3f& p : mesh.positions) p = moved(p);
     mesh.origin = origin;
+}
+
+void split_origin(std::span<const Vec3d> world, Mesh& mesh) {
+    if (world.empty()) return split_origin(mesh);
+    mesh.origin = choose_origin(used_box(world, mesh.corners));
+    mesh.positions.resize(world.size());
+    for (std::size_t v = 0; v < world.size(); ++v) mesh.positions[v] = (world[v] - mesh.origin).cast<float>();
 }
 
 std::string check_mesh(const Mesh& mesh) {

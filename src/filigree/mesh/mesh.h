@@ -100,20 +100,14 @@ inline Box world_bounds(const Mesh& mesh) {
     return box;
 }
 
-/// Positions with their origin split off, so that float keeps their digits far from the world's origin.
-struct SplitPositions {
-    std::vector<Vec3f> positions;
-    Vec3d origin;
-};
-
-/// Chooses the origin for `world` positions: zero unless their box is more than twice its own diagonal away from
-/// the world's origin; then the box's centre (0 on axes where the box is close), rounded so that taking it off is exact
-/// for float input. The box is that of the positions that `corners` name; of all where it is empty. Others get float's
-/// precision beside that origin. Cost O(V + corners).
-SplitPositions split_origin(std::span<const Vec3d> world, std::span<const Index> corners);
-/// The same for float positions, in place, when the faces are there: moves mesh.positions and sets mesh.origin (which
-/// must be zero). All keep their digits: where others would not, the box is of all.
+/// Splits the origin off, so that float keeps the digits of positions far from the world's origin: moves mesh.positions
+/// and sets mesh.origin (which must be zero). The origin is zero unless the mesh's box (see bounds) is more than twice
+/// its own diagonal away; then it is the box's centre (0 on axes where the box is close), rounded so that every
+/// position keeps all its digits. Cost O(V + corners).
 void split_origin(Mesh& mesh);
+/// The same, of positions in double, which become mesh.positions; the mesh's own where there are none. A vertex that no
+/// face uses gets float's precision beside that origin.
+void split_origin(std::span<const Vec3d> world, Mesh& mesh);
 
 /// The first thing wrong with the arrays, as a sentence, or "" when all that `Mesh` promises holds: offsets ascend,
 /// faces have three corners or more, every index is in range, attribute sizes fit, all numbers are finite.

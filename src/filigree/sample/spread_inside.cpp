@@ -18,7 +18,8 @@ constexpr std::size_t kDarts = 8;        // for each lattice point inside
 constexpr double kDartReach = 1.5;       // spacings: the side of the cube around the point that they fall into
 constexpr double kApart = 0.8;           // spacings between points
 constexpr double kDartsAtOnce = 1 << 21; // about; they take 60 bytes each
-constexpr double kMostPasses = 16;       // over all darts, so that making them again stays cheap
+constexpr double kFirstPass = 1.0 / 8;   // of all darts; a later pass has as many as all before it
+constexpr double kSmallestPart = 1.0 / 16;                  // of all darts at once, so that passes stay few
 constexpr std::size_t kBucketsAhead = 16, kPointsAhead = 8; // darts
 constexpr std::size_t kBetweenLooks = 1 << 14;              // darts from one look at `cancel` to the next
 
@@ -55,8 +56,16 @@ public:
           mask_(std::bit_ceil(std::max<std::size_t>(expected, kBlockCells)) / kBlockCells - 1),
           last_((mask_ + 1) * kBlockCells, kNoIndex) {}
 
-    /// Takes the point unless one is too near. point: nowhere below the corner.
+    /// Takes the point, which has room.
     void add(const Vec3d& point) {
+        Index& last = last_[bucket(cell_of(point))];
+        before_.push_back(last);
+        last = static_cast<Index>(points_.size());
+        points_.push_back(point);
+    }
+
+    /// No point is too near. point: nowhere below the corner.
+    bool has_room(const Vec3d& point) const {
         const Vec3d place = (point - corner_) / distance_;
         const Cell cell = place.cast<std::int64_t>();
         const Vec3d above = place - cell.cast<double>(), below = Vec3d::Ones() - above; // cells to the planes around
@@ -66,12 +75,9 @@ public:
                 if (step[axis] < 0) squared += above[axis] * above[axis];
                 if (step[axis] > 0) squared += below[axis] * below[axis];
             }
-            if (squared < 1 && has_near(cell + Cell(step[0], step[1], step[2]), point)) return;
+            if (squared < 1 && has_near(cell + Cell(step[0], step[1], step[2]), point)) return false;
         }
-        Index& last = last_[bucket(cell)];
-        before_.push_back(last);
-        last = static_cast<Index>(points_.size());
-        points_.push_back(point);
+        return true;
     }
 
     /// Darts fall anywhere: what a later one will look at is on its way while earlier ones are added.
@@ -142,18 +148,37 @@ Darts make_darts(const Lattice& lattice, const Occupancy& occupancy, double low,
     return darts;
 }
 
+/// Drops darts that are too near to a point: they lie in the lattice's order, whose neighbours look at the same points,
+/// and that takes far less than asking whether they are inside.
+void keep_those_with_room(const SpacedPoints& points, Darts& darts, const RunContext& context) {
+    std::vector<std::uint8_t> stays(darts.places.size());
+    parallel_for(context, stays.size(), 1024, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t d = begin; d < end; ++d) stays[d] = points.has_room(darts.places[d]);
+    });
+    std::size_t kept = 0;
+    for (std::size_t d = 0; d < stays.size(); ++d) {
+        if (!stays[d]) continue;
+        darts.places[kept] = darts.places[d];
+        darts.orders[kept++] = darts.orders[d];
+    }
+    darts.places.resize(kept);
+    darts.orders.resize(kept);
+}
+
 /// Darts in random order, each kept when nothing kept is too near. They are made and thrown in passes, lower orders
-/// first, so that few of them are in memory.
+/// first, so that few of them are in memory, and most of later passes have no room.
 Result<std::vector<Vec3d>> throw_darts(const Lattice& lattice, const Occupancy& occupancy, const InsideTest& test,
                                        const RunContext& context) {
     const std::size_t lattice_points = occupancy.count();
     if (lattice_points == 0) return std::vector<Vec3d>{};
-    const double passes = std::clamp(std::ceil(double(kDarts * lattice_points) / kDartsAtOnce), 1.0, kMostPasses);
+    const double most = std::max(kDartsAtOnce / double(kDarts * lattice_points), kSmallestPart);
     const Vec3d corner = lattice.point(0, 0, 0) - Vec3d::Constant(lattice.spacing);
     SpacedPoints points(corner, kApart * lattice.spacing, lattice_points);
-    for (double pass = 0; pass < passes; ++pass) {
-        context.report("throwing darts", pass / passes);
-        const Darts darts = make_darts(lattice, occupancy, pass / passes, (pass + 1) / passes, context.seed);
+    for (double low = 0, high = 0; low < 1; low = high) {
+        context.report("throwing darts", low);
+        high = std::min({std::max(2 * low, kFirstPass), low + most, 1.0});
+        Darts darts = make_darts(lattice, occupancy, low, high, context.seed);
+        if (low > 0) keep_those_with_room(points, darts, context);
         const Result<std::vector<std::uint8_t>> inside = test.contains(darts.places, context);
         if (!inside) return inside.error();
         std::vector<std::pair<double, std::size_t>> thrown;
@@ -166,7 +191,7 @@ Result<std::vector<Vec3d>> throw_darts(const Lattice& lattice, const Occupancy& 
             if (t % kBetweenLooks == 0 && context.is_cancelled()) return cancelled_error();
             if (t + kBucketsAhead < places.size()) points.fetch_bucket(places[t + kBucketsAhead]);
             if (t + kPointsAhead < places.size()) points.fetch_point(places[t + kPointsAhead]);
-            points.add(places[t]);
+            if (points.has_room(places[t])) points.add(places[t]);
         }
     }
     if (context.is_cancelled()) return cancelled_error();
