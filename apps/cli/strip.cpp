@@ -157,6 +157,7 @@ void run(const StripCommandOptions& options, Session& session) {
     if (spilled > 0) report.row("beside the output", fmt::format("{} MiB that did not fit in memory", spilled >> 20));
     report.set("spilled_bytes", spilled);
     if (options.fidelity) report_fidelity(result, options, report);
+    for (const std::string& warning : result.stripped.report.warnings) session.warn(warning);
     if (options.fidelity && result.error > *options.fidelity)
         session.warn(
             fmt::format("No driver restores to {:.2g} of the diagonal: with every vertex in it the error is {:.2g}, "

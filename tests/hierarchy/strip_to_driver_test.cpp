@@ -23,6 +23,10 @@ Stripped bound(Mesh mesh, const Mesh& driver, const RunContext& context = kOneTh
 /// A ball without waves, of other vertices than the wavy one's.
 Mesh smooth_ball(unsigned resolution) { return make_wavy_sphere({.resolution = resolution, .amplitude = 0}); }
 
+bool mentions(const std::vector<std::string>& sentences, const char* words) {
+    return std::ranges::any_of(sentences, [&](const std::string& s) { return s.find(words) != std::string::npos; });
+}
+
 /// Two sheets that face away from each other, `gap` apart.
 Mesh two_sheets(unsigned resolution, float amplitude, float gap) {
     const Mesh sheet = make_wavy_plane({.resolution = resolution, .frequency = 3, .amplitude = amplitude});
@@ -156,6 +160,18 @@ TEST(StripToDriver, NothingIsRefusedWithASentence) {
     const RunContext cancelled(1);
     cancelled.cancel();
     EXPECT_EQ(code(mesh, mesh, cancelled), ErrorCode::cancelled);
+}
+
+TEST(StripToDriver, SaysWhatMakesADriverABadOne) {
+    const Mesh ball = make_wavy_sphere({.resolution = 16});
+    Mesh cage = smooth_ball(6);
+    EXPECT_TRUE(bound(ball, cage).report.warnings.empty());
+    Mesh over = cage;
+    for (std::size_t f = 0; f < over.face_count(); ++f)
+        std::reverse(over.corners.begin() + over.face_offsets[f], over.corners.begin() + over.face_offsets[f + 1]);
+    EXPECT_TRUE(mentions(bound(ball, over).report.warnings, "inside out"));
+    for (Vec3f& p : cage.positions) p.x() += 1e6f;
+    EXPECT_TRUE(mentions(bound(ball, cage).report.warnings, "times as far"));
 }
 
 } // namespace strip_to_driver_test

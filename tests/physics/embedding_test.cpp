@@ -200,6 +200,15 @@ TEST(Embedding, ParticlesInAPlaneOrAloneCarryToo) {
     move_embedded(by_one, one, one, doubled, moved, {}, kAllThreads);
     EXPECT_LT((moved[0] - 2 * points[0]).norm(), 1e-6f);
 
+    // A splash on its own: rounding spans no direction.
+    for (const Vec3f& p : random_points(Vec3f::Constant(-0.9f), Vec3f::Constant(0.9f), 0, 500)) {
+        Vectors splash(2);
+        splash.set(0, Vec3f(0.1f, -1.3f, 70.7f) + p);
+        splash.set(1, Vec3f(9, 0, 0));
+        const Embedding alone = embed(std::vector<Vec3f>{Vec3f(0.1f, -1.3f, 70.7f)}, splash, 1, kAllThreads);
+        for (const float weight : alone.weights) EXPECT_LE(std::abs(weight), 1.01f) << p.transpose();
+    }
+
     // What is no number is carried by something, and carries nothing.
     const float nan = std::numeric_limits<float>::quiet_NaN();
     Vectors damaged = plane;

@@ -60,11 +60,47 @@ TEST(SimulationState, RefusesStatesThatAreDamagedOrOfOthers) {
     const std::string bytes = one.save();
     for (std::size_t length = 0; length < bytes.size(); length += 7)
         EXPECT_FALSE(one.restore(std::string_view(bytes).substr(0, length)).ok());
+    for (std::size_t at = 0; at < bytes.size(); at += 97) {
+        std::string flipped = bytes;
+        flipped[at] = char(flipped[at] ^ 0x40);
+        EXPECT_FALSE(one.restore(flipped).ok()) << at;
+    }
     EXPECT_TRUE(one.restore(bytes).ok());
     Simulation other = simulation(with_ground(), {actor(box(3, 3, 2, 0.1, material(MaterialModel::fem)))});
     const Status refused = other.restore(bytes);
     ASSERT_FALSE(refused.ok());
     EXPECT_EQ(refused.error().code, ErrorCode::mismatch);
+}
+
+TEST(SimulationState, DriversOfFlowedMatterGoOnTheSame) {
+    Material clay = material(MaterialModel::meshfree, 2e5);
+    clay.yield_stress = 2e3;
+    const auto body = box(6, 6, 6, 0.1, clay);
+    Actor thrown = actor(body, {0, 0.05, 0});
+    thrown.velocity = {0, -4, 0};
+    std::vector<Vec3f> driver;
+    for (float x = -0.05f; x <= 0.66f; x += 0.1f)
+        for (float y = -0.05f; y <= 0.66f; y += 0.1f) driver.emplace_back(x, y, 0.33f);
+    const auto after = [&](Simulation& clays, int frames) {
+        run(clays, frames);
+        std::vector<Vec3f> points(driver.size());
+        std::vector<Mat3f> gradients(driver.size());
+        clays.attached(0, points, gradients, kOneThread);
+        return std::pair(points, gradients);
+    };
+    const auto begin = [&] {
+        Simulation clays = simulation(with_ground(), {thrown});
+        clays.attach(0, driver, kOneThread);
+        return clays;
+    };
+    Simulation whole = begin(), resumed = begin();
+    after(whole, 12);
+    const std::string middle = whole.save();
+    ASSERT_TRUE(resumed.restore(middle).ok());
+    const auto at_end = after(whole, 8);
+    EXPECT_TRUE(at_end == after(resumed, 8));
+    ASSERT_TRUE(whole.restore(middle).ok());
+    EXPECT_TRUE(at_end == after(whole, 8));
 }
 
 TEST(SimulationState, CancelLeavesTheFrameUndone) {

@@ -49,6 +49,23 @@ std::pair<double, double> depths(const Frustum& frustum, const Box& box) {
     return {least, most};
 }
 
+TEST(Frustum, EachSideHasItsOwnCount) {
+    const Frustum frustum{.eye = {0, 0, 4},
+                          .target = {0, 0, 0},
+                          .field_of_view_deg = 90,
+                          .aspect = 2,
+                          .near = 1,
+                          .far = 4,
+                          .counts = {4, 2, 3}};
+    const std::vector<Vec3d> points = *frustum_points(frustum);
+    ASSERT_EQ(points.size(), 24u);
+    std::size_t p = 0;
+    for (const double depth : {1.5, 2.5, 3.5}) // from the eye; half as high as wide, with middles of cells
+        for (const double y : {-0.5, 0.5})
+            for (const double x : {-1.5, -0.5, 0.5, 1.5})
+                EXPECT_LT((points[p++] - Vec3d(depth * x, depth * y, 4 - depth)).norm(), 1e-12);
+}
+
 TEST(Frustum, AroundABoxReachesFromBeforeToBehindIt) {
     const Box box{Vec3d(1, 2, 3), Vec3d(3, 3, 4)};
     for (const std::optional<Vec3d>& eye : {std::optional<Vec3d>(), std::optional(Vec3d(-9, 4, 2))}) {

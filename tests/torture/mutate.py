@@ -19,6 +19,7 @@ import re
 import resource
 import shlex
 import shutil
+import signal
 import subprocess
 import sys
 import threading
@@ -132,13 +133,16 @@ def fails(release, test, folder, seconds):
     where = folder / "run"
     shutil.rmtree(where, ignore_errors=True)
     where.mkdir()
+    process = subprocess.Popen([str(word) for word in command_of(test, release)], cwd=where, start_new_session=True,
+                               stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                               env={**os.environ, "LD_LIBRARY_PATH": str(folder), "TMPDIR": str(where)},
+                               preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY)))
     try:
-        done = run(command_of(test, release), cwd=where, timeout=seconds,
-                   env={**os.environ, "LD_LIBRARY_PATH": str(folder), "TMPDIR": str(where)},
-                   preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY)))
+        return test if process.wait(timeout=seconds) != 0 else None
     except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)  # what it started, too
+        process.wait()
         return f"{test} does not end"
-    return test if done.returncode != 0 else None
 
 
 def main():

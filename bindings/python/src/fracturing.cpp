@@ -8,6 +8,8 @@ namespace filigree::python {
 
 namespace {
 
+constexpr double kFarthestApart = 1e6;
+
 py::dict fracture_report(const FracturedMesh& fractured) {
     const CutReport& report = fractured.report;
     py::dict said;
@@ -106,6 +108,8 @@ One piece as a mesh of its own.
         .def(
             "exploded",
             [](const FracturedMesh& self, double distance) {
+                if (!(std::abs(distance) <= kFarthestApart))
+                    refuse("distance has to be from -1,000,000 to 1,000,000 times the way to a piece.");
                 return without_interpreter([&] {
                     FracturedMesh apart = self;
                     explode(apart, distance);

@@ -47,6 +47,7 @@ PyModel strip_to(const py::object& given, const py::object& driver_given, const 
     const Precision stored = precision_of(precision);
     Stripped stripped = LongCall{threads, progress}.owning(
         [=](const RunContext& context) { return strip_to_driver(*mesh, *driver, stored, context).value(); });
+    warn(stripped.report.warnings);
     return {std::make_shared<const Model>(std::move(stripped.model)), report_of(stripped.report)};
 }
 

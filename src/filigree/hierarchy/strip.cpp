@@ -2,6 +2,7 @@
 
 #include "filigree/core/now_seconds.h"
 #include "filigree/core/parallel_for.h"
+#include "filigree/core/text.h"
 #include "filigree/hierarchy/simplify_levels.h"
 #include "filigree/hierarchy/vertex_order.h"
 #include "filigree/mesh/closest_point.h"
@@ -14,6 +15,9 @@
 namespace filigree {
 
 namespace {
+
+constexpr double kInsideOut = 0.2; // of a mesh's vertices, bound to backs: with a driver the right way round few are
+constexpr double kFarReach = 1000; // of the mesh and a driver together, in mesh diagonals: three digits of seven
 
 /// The driver's cells over its own vertices, and as triangles over the mesh's.
 struct Cells {
@@ -176,6 +180,24 @@ std::optional<Error> check_strip(const Mesh& mesh, const StripOptions& options) 
     return std::nullopt;
 }
 
+namespace {
+
+/// positions: the mesh's first, `own` of them, then the driver's.
+std::vector<std::string> driver_warnings(std::span<const Vec3f> positions, std::size_t own, std::size_t facing_away) {
+    std::vector<std::string> warnings;
+    if (double(facing_away) > kInsideOut * double(own))
+        warnings.push_back("The driver seems to be inside out, as " + with_commas(facing_away) +
+                           " vertices are bound to the backs of its faces: turn its faces over.");
+    const double size = bounds(positions.first(own)).diagonal(), reach = bounds(positions).diagonal();
+    if (reach > kFarReach * size && size > 0)
+        warnings.push_back("The driver reaches " + with_commas(std::uint64_t(std::min(reach / size, 1e18))) +
+                           " times as far as the mesh is large, and 32-bit numbers lose as much: put it around the "
+                           "mesh.");
+    return warnings;
+}
+
+} // namespace
+
 Result<Stripped> strip_to_driver(Mesh mesh, const Mesh& driver, Precision precision, const RunContext& context) {
     if (std::optional<Error> error = check_driver(mesh, driver)) return *error;
     const double bind_start = now_seconds();
@@ -208,6 +230,7 @@ Result<Stripped> strip_to_driver(Mesh mesh, const Mesh& driver, Precision precis
     result.report.across_gap = binding->across_gap.size();
     result.report.facing_away = binding->facing_away.size();
     result.report.bind_seconds = now_seconds() - bind_start;
+    result.report.warnings = driver_warnings(mesh.positions, own, binding->facing_away.size());
     result.model.detail = encode_blend(mesh.positions, level.vertices, std::move(cells.local), *binding, precision);
     result.model.levels.push_back(std::move(level));
     result.model.mesh = std::move(mesh);

@@ -5,6 +5,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numeric>
 
@@ -15,6 +16,7 @@ namespace {
 constexpr std::size_t kBodyStateGrain = 2048;
 constexpr float kMostFlow = 4; ///< stretch, and 1 over it: what flows is sheared without end, its detail is not
 constexpr double kLight = 0.3, kLightBeside = 0.2; ///< of what a full cell gives its corner, and of the mean
+constexpr double kSurfaceStiffness = 4;            ///< times the stiffness of a spacing of material under the point
 constexpr float kTogether = 1; ///< spacings between two ways of placing a point; further, its particles came apart
 
 /// A gradient with its stretches within [1 / kMostFlow, kMostFlow].
@@ -159,6 +161,36 @@ void renew_neighbourhoods(BodyState& state, std::span<Attachment* const> attachm
     if (!balls.empty()) state.balls = embed(balls, state.positions, spacing, context);
     for (std::size_t a = 0; a < attachments.size(); ++a)
         attachments[a]->embedding = embed_to_follow(carried[a], state.positions, spacing, nullptr, context);
+    set_surface_stiffness(state);
+}
+
+void set_surface_stiffness(BodyState& state) {
+    const Body& body = *state.body;
+    const double modulus = body.material.density * std::pow(pressure_wave_speed(body.material), 2);
+    std::vector<float>& stiffness = state.surface_stiffness;
+    stiffness.resize(state.surface.size());
+    for (std::size_t s = 0; s < stiffness.size(); ++s)
+        stiffness[s] = float(kSurfaceStiffness * modulus * double(body.surface.areas[s]) / body.spacing());
+    const auto bound = [&](const Embedding& points) {
+        const auto each_weight = [&](std::size_t point, const auto& visit) {
+            for (Index k = points.offsets[point]; k < points.offsets[point + 1]; ++k)
+                visit(points.particles[k], std::abs(points.weights[k]));
+        };
+        std::vector<double> sums(body.particle_count(), 0);
+        for (std::size_t s = 0; s < points.size(); ++s)
+            each_weight(s, [&](Index particle, float weight) { sums[particle] += double(weight * stiffness[s]); });
+        for (std::size_t s = 0; s < points.size(); ++s) {
+            double part = 1;
+            each_weight(s, [&](Index particle, float weight) {
+                if (weight > 0)
+                    part = std::min(part, double(kContactShare) * double(body.mass[particle]) *
+                                              double(state.rest_squared_frequency) / sums[particle]);
+            });
+            stiffness[s] *= float(part);
+        }
+    };
+    bound(state.surface);
+    if (state.has_flowed()) bound(state.balls); // at rest they are the surface's neighbours, with the same particles
 }
 
 void embed_surface_at_rest(BodyState& state, bool with_balls, const RunContext& context) {

@@ -21,6 +21,9 @@ struct RigidPose {
     bool sleeps = false;                                      ///< it rests, and nothing is computed for it
 };
 
+/// Share of the body's squared frequency at rest that contacts may add: they never shorten explicit steps by more.
+inline constexpr float kContactShare = 1;
+
 struct BodyState {
     std::shared_ptr<const Body> body;
     std::size_t actor = 0;   ///< that it belongs to: a piece, to the one that broke
@@ -46,9 +49,11 @@ struct BodyState {
     std::vector<LightCorner> light_corners;
 
     // Contact: points of the surface; meshfree bodies touch each other by balls just below them.
-    Embedding surface, balls;             ///< in the elasticity's reference
-    std::vector<float> surface_stiffness; ///< N/m
-    float ball_radius = 0;                ///< m
+    Embedding surface, balls; ///< in the elasticity's reference
+    /// Of each surface point, N/m: that of a spacing's depth of material under the point's area, bounded so that all
+    /// points together add no more than kContactShare times the body's own squared frequency to any particle.
+    std::vector<float> surface_stiffness;
+    float ball_radius = 0; ///< m
     bool has_balls() const { return balls.size() != 0; }
     std::vector<std::uint8_t> hidden; ///< 1: a surface point on a crack that has not opened; empty: none
     bool is_hidden(std::size_t point) const { return !hidden.empty() && hidden[point]; }
@@ -104,6 +109,8 @@ void move_attached(const BodyState& state, const Attachment& attachment, std::sp
 void renew_neighbourhoods(BodyState& state, std::span<Attachment* const> attachments, const RunContext& context);
 /// The surface's points and balls as they are on a body that has not flowed.
 void embed_surface_at_rest(BodyState& state, bool with_balls, const RunContext& context);
+/// For the particles that carry the surface's points now; not of a rigid body.
+void set_surface_stiffness(BodyState& state);
 
 Box box_of(const Vectors& positions); ///< at least one, all finite
 

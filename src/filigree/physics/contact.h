@@ -13,13 +13,6 @@
 
 namespace filigree {
 
-/// Share of the body's squared frequency at rest that contacts may add: they never shorten explicit steps by more.
-inline constexpr float kContactShare = 1;
-
-/// Stiffness of each surface point, N/m: that of a spacing's depth of material under the point's area, bounded so that
-/// all points together add no more than kContactShare times the body's own squared frequency to any particle.
-std::vector<float> surface_stiffness(const Body& body, float rest_squared_frequency);
-
 /// All contacts of a scene. Finding what is near is separate from forces, and rare.
 class Contacts {
 public:

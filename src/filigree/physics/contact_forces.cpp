@@ -16,7 +16,6 @@ namespace {
 
 constexpr std::size_t kContactForcesGrain = 256, kObstacleForcesGrain = 16; // bodies
 constexpr std::size_t kBlocksGrain = 4;
-constexpr double kStiffness = 4; ///< times the stiffness of a spacing of material under the point
 
 constexpr float kCrushing = 0.5f; ///< spacings: what touches deeper may be crushed inside
 constexpr float kInside = 2;      ///< spacings below the surface at rest: what lies deeper counts as this deep
@@ -57,31 +56,6 @@ std::vector<float> most_depths_of(const Body& body, const RunContext& context) {
 }
 
 } // namespace
-
-std::vector<float> surface_stiffness(const Body& body, float rest_squared_frequency) {
-    const Embedding& points = body.surface.points;
-    const double modulus = body.material.density * std::pow(pressure_wave_speed(body.material), 2);
-    std::vector<float> stiffness(points.size());
-    std::vector<double> sums(body.particle_count(), 0);
-    const auto each_weight = [&](std::size_t point, const auto& visit) {
-        for (Index k = points.offsets[point]; k < points.offsets[point + 1]; ++k)
-            visit(points.particles[k], std::abs(points.weights[k]));
-    };
-    for (std::size_t s = 0; s < points.size(); ++s) {
-        stiffness[s] = float(kStiffness * modulus * double(body.surface.areas[s]) / body.spacing());
-        each_weight(s, [&](Index particle, float weight) { sums[particle] += double(weight * stiffness[s]); });
-    }
-    for (std::size_t s = 0; s < points.size(); ++s) {
-        double part = 1;
-        each_weight(s, [&](Index particle, float weight) {
-            if (weight > 0)
-                part = std::min(part, double(kContactShare) * double(body.mass[particle]) *
-                                          double(rest_squared_frequency) / sums[particle]);
-        });
-        stiffness[s] *= float(part);
-    }
-    return stiffness;
-}
 
 /// The force on a surface point; lets friction's anchor begin, slide and end.
 Vec3f Contacts::obstacle_force(Near& at, const BodyState& body, const ObstaclePoses& poses, float dt) const {

@@ -24,6 +24,7 @@ constexpr double kLeastWeight = -0.5; // beyond, a weight makes more of the nois
 constexpr double kFollowingWeight = -0.05;
 /// 27 det / trace^3 of the particles' covariance, 1 for a round cloud: below, they count as lying in a plane.
 constexpr double kSpanning = 2e-3;
+constexpr double kRoundedSpread = 1e-9; ///< radii squared: a mean square of offsets below it is rounding
 
 /// Particles sorted into the boxes of a regular grid, those of a row of boxes one after the other. Those whose
 /// positions are not finite are left out.
@@ -164,7 +165,7 @@ struct Fit {
         if (near.size() >= 4 && 27 * covariance.determinant() > kSpanning * trace * trace * trace)
             slope = covariance.inverse() * -mean;
         else if (anyway)
-            slope = within_span(covariance, -mean);
+            slope = within_span(covariance, -mean, kRoundedSpread * sum * radius * radius);
         else
             return false;
         slope *= part_above_floor(slope, point + mean, sum);
@@ -188,11 +189,12 @@ private:
         return part;
     }
 
-    static Vec3d within_span(const Mat3d& covariance, const Vec3d& b) {
+    /// least: an eigenvalue below it is rounding, as of a particle on its own.
+    static Vec3d within_span(const Mat3d& covariance, const Vec3d& b, double least) {
         const SymmetricEigen<double, 3> eigen = symmetric_eigen(covariance);
         Vec3d slope = Vec3d::Zero();
         for (int i = 0; i < 3; ++i)
-            if (eigen.values[i] > 1e-2 * eigen.values[2])
+            if (eigen.values[i] > std::max(1e-2 * eigen.values[2], least))
                 slope += eigen.vectors.col(i).dot(b) / eigen.values[i] * eigen.vectors.col(i);
         return slope;
     }

@@ -2,12 +2,15 @@
 
 #include "filigree/physics/byte_stream.h"
 
+#define XXH_INLINE_ALL
+#include <xxhash.h>
+
 namespace filigree {
 
 namespace {
 
-// The name of the format, its version last. 7: friction holds the surface points over balls, not their centres.
-constexpr std::uint64_t kMagic = 0x37455441'54534c46; // "FLSTATE7"
+// The name of the format, its version last. 8: a checksum at the end.
+constexpr std::uint64_t kMagic = 0x38455441'54534c46; // "FLSTATE8"
 static_assert(sizeof(Contacts::NearMemory) == 5 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
 static_assert(sizeof(Contacts::BallMemory) == 5 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
 static_assert(sizeof(MatterContacts::SideMemory) == 6 * sizeof(Index), "padding would be saved");
@@ -113,14 +116,22 @@ std::string write_saved_state(const SavedState& state) {
         writer.array(std::span(cracks.links));
         writer.array(std::span(cracks.broke));
     }
-    return writer.take();
+    std::string bytes = writer.take();
+    ByteWriter sum;
+    sum.value(std::uint64_t{XXH3_64bits(bytes.data(), bytes.size())});
+    return bytes + sum.take();
 }
 
 Result<SavedState> read_saved_state(std::string_view bytes) {
-    ByteReader reader(bytes);
-    if (reader.value<std::uint64_t>() != kMagic)
+    const Error damaged{ErrorCode::bad_file, "The saved state is damaged; start the simulation anew."};
+    if (ByteReader(bytes).value<std::uint64_t>() != kMagic)
         return Error{ErrorCode::bad_file,
                      "The saved state is damaged or of another version; start the simulation anew."};
+    const std::string_view contents = bytes.substr(0, bytes.size() - sizeof(std::uint64_t));
+    const auto sum = ByteReader(bytes.substr(contents.size())).value<std::uint64_t>();
+    if (sum != XXH3_64bits(contents.data(), contents.size())) return damaged;
+    ByteReader reader(contents);
+    reader.value<std::uint64_t>(); // the magic
     SavedState state;
     state.frame = reader.value<std::uint64_t>();
     state.bodies.resize(reader.count(sizeof(std::uint64_t)));
@@ -134,8 +145,7 @@ Result<SavedState> read_saved_state(std::string_view bytes) {
         cracks.links = reader.array<LinkState>();
         cracks.broke = reader.array<double>();
     }
-    if (!reader.ok() || !reader.at_end())
-        return Error{ErrorCode::bad_file, "The saved state is damaged; start the simulation anew."};
+    if (!reader.ok() || !reader.at_end()) return damaged;
     return state;
 }
 

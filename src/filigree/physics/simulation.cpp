@@ -58,11 +58,10 @@ BodyState begin_body(const Actor& actor, std::size_t number, bool with_balls, co
         fit_pose(state);
         state.rest_squared_frequency = kRigidSquaredFrequency;
         state.surface_stiffness = rigid_surface_stiffness(state);
-    } else {
-        state.surface_stiffness = surface_stiffness(body, state.rest_squared_frequency);
     }
     state.ball_radius = kBallRadius * float(body.spacing());
     embed_surface_at_rest(state, with_balls && body.material.model == MaterialModel::meshfree, context);
+    if (!state.rigid) set_surface_stiffness(state);
     return state;
 }
 

@@ -23,7 +23,8 @@ SavedBody save_body(const BodyState& body) {
     return saved;
 }
 
-/// Embeds points where they were saved. Those that are there already cost nothing. False where they are not as many.
+/// Embeds points of the surface where they were saved. Those that are there already cost nothing. False where they are
+/// not as many.
 bool embed_again(Embedding& points, const std::vector<Vec3f>& places, const BodyState& body,
                  const RunContext& context) {
     if (places.size() != points.size()) return false;
@@ -32,8 +33,10 @@ bool embed_again(Embedding& points, const std::vector<Vec3f>& places, const Body
 }
 
 bool restore_attachment(Attachment& attachment, SavedPoints saved, const BodyState& body, const RunContext& context) {
-    if (saved.gradients.size() != saved.places.size()) return false;
-    if (!embed_again(attachment.embedding, saved.places, body, context)) return false;
+    if (saved.gradients.size() != saved.places.size() || saved.places.size() != attachment.points.size()) return false;
+    if (saved.places != attachment.embedding.rest)
+        attachment.embedding =
+            embed_to_follow(saved.places, body.elasticity->reference(), body.body->spacing(), nullptr, context);
     attachment.gradients = std::move(saved.gradients);
     return true;
 }
@@ -44,12 +47,14 @@ bool restore_points(BodyState& body, SavedBody& saved, std::span<Attachment* con
     if (!body.has_flowed()) {
         if (!had_flowed) return true;
         embed_surface_at_rest(body, body.has_balls(), context);
+        set_surface_stiffness(body);
         for (Attachment* attachment : attachments)
             *attachment = attach(body, attachment->body, std::vector(attachment->points), context);
         return true;
     }
     if (!embed_again(body.surface, saved.surface, body, context)) return false;
     if (!embed_again(body.balls, saved.balls, body, context)) return false;
+    set_surface_stiffness(body);
     for (std::size_t a = 0; a < attachments.size(); ++a) {
         if (a >= saved.attachments.size()) // attached since
             *attachments[a] = attach(body, attachments[a]->body, std::vector(attachments[a]->points), context);
