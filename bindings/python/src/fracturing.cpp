@@ -119,7 +119,7 @@ One piece as a mesh of its own.
             py::arg("distance"), R"(exploded(self, distance)
 --
 
-All pieces in one mesh, each moved by `distance` times the way from the mesh's middle to its own.
+All pieces in one mesh, each moved by `distance` (-1e6 to 1e6) times the way from the mesh's middle to its own.
 )");
     m.def(
         "fracture",

@@ -115,6 +115,19 @@ def test_faces_that_fit_no_vertices():
             filigree.Mesh(corners, [[0, 1, 2]]).with_vertices(corners[:2])
 
 
+@pytest.mark.parametrize("distance", [float("nan"), float("inf"), 1e39])
+def test_pieces_go_no_further_than_numbers(mesh, distance):
+    with pytest.raises(filigree.UsageError, match="distance"):
+        filigree.fracture(mesh, 3).exploded(distance)
+
+
+def test_drivers_that_are_inside_out_are_named(mesh):
+    cage = filigree.make("wavy-sphere", resolution=6, amplitude=0)
+    ball = filigree.make("wavy-sphere", resolution=16)
+    with pytest.warns(filigree.FiligreeWarning, match="inside out"):
+        filigree.strip(ball, driver=filigree.Mesh(cage.vertices, numpy.array(cage.faces)[:, ::-1]))
+
+
 def test_a_stray_vertex_far_away_takes_no_digits(mesh):
     world = numpy.vstack([mesh.vertices + numpy.array([1e7, 0, 0]), [[0, 0, 0]]])
     for far in (filigree.Mesh(world, mesh.faces), filigree.Mesh(0 * world, mesh.faces).with_vertices(world)):
