@@ -200,7 +200,10 @@ def main():
             with lock:
                 if tried >= options.count:
                     return
-                layer, path, number, line = next(changes)
+                change = next(changes, None)
+                if change is None:
+                    return  # one of those that escaped does not compile any more
+                layer, path, number, line = change
                 tried += 1
             lines = path.read_text().splitlines(keepends=True)
             was = lines[number]
