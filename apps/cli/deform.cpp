@@ -66,11 +66,6 @@ private:
     std::vector<HandleRegion> handles_; ///< of the file; none: warps
 };
 
-Mesh restore_pose(const Model& model, const Pose& pose, const DeformArguments& options, const RunContext& context) {
-    const Restorer restorer = require(Restorer::create(model, options.restore, context));
-    return require(restorer.mesh(pose, context));
-}
-
 bool is_model_path(const std::string& path) { return lower_extension(path) == ".fil"; }
 
 void check(const DeformArguments& options, const Session& session) {
@@ -157,25 +152,43 @@ void deform_animation(const DeformArguments& options, const Session::Content& co
     session.print(report);
 }
 
-void deform_once(const DeformArguments& options, const Session::Content& content, Session& session) {
-    const Deformation deformation(options);
-    const double start = now_seconds();
-    const auto* model = std::get_if<Model>(&content.value);
-    if (!model && !options.pose_output.empty())
-        refuse("--pose writes a model's driver, and " + options.input + " is a mesh.");
-    const Pose pose = model ? deformation.driver(*model, 1, session.context()) : Pose{};
-    const Mesh mesh = model ? restore_pose(*model, pose, options, session.context())
-                            : deformation.mesh(std::get<Mesh>(content.value), 1, session.context());
-    const double seconds = now_seconds() - start;
-    session.write_mesh(mesh, options.output, options.input);
-    if (!options.pose_output.empty()) session.write_mesh(posed_driver(*model, pose), options.pose_output);
-    Report report;
+void report_deformed(const Mesh& mesh, bool through_driver, double seconds, const DeformArguments& options,
+                     Report& report) {
     report.say(fmt::format("{}: {} vertices deformed {} in {}\n", options.output, with_commas(mesh.vertex_count()),
-                           model ? "through the driver" : "one by one", seconds_text(seconds)));
+                           through_driver ? "through the driver" : "one by one", seconds_text(seconds)));
     report.set("output", options.output);
     report.set("vertices", mesh.vertex_count());
-    report.set("through_driver", model != nullptr);
+    report.set("through_driver", through_driver);
     report.set("seconds", seconds);
+}
+
+void deform_model(const Model& model, const DeformArguments& options, Session& session) {
+    const RunContext& context = session.context();
+    const Deformation deformation(options);
+    const double start = now_seconds();
+    const Pose pose = deformation.driver(model, 1, context);
+    const Restorer restorer = require(Restorer::create(model, options.restore, context));
+    const std::vector<Mat3f> gradients = require(restorer.gradients(pose, context));
+    const Mesh mesh = require(restorer.mesh(pose, gradients, context));
+    const double seconds = now_seconds() - start;
+    session.write_mesh(mesh, options.output, options.input);
+    if (!options.pose_output.empty()) session.write_mesh(posed_driver(model, pose), options.pose_output);
+    Report report;
+    report_deformed(mesh, true, seconds, options, report);
+    if (model.code() == DetailCode::blend)
+        note_expected_error(PoseError(model, context.threads()).estimate(pose, gradients), report, session);
+    session.print(report);
+}
+
+void deform_mesh(const Mesh& rest, const DeformArguments& options, Session& session) {
+    if (!options.pose_output.empty()) refuse("--pose writes a model's driver, and " + options.input + " is a mesh.");
+    const Deformation deformation(options);
+    const double start = now_seconds();
+    const Mesh mesh = deformation.mesh(rest, 1, session.context());
+    const double seconds = now_seconds() - start;
+    session.write_mesh(mesh, options.output, options.input);
+    Report report;
+    report_deformed(mesh, false, seconds, options, report);
     session.print(report);
 }
 
@@ -234,8 +247,12 @@ Command deform_command() {
             .run = [options](Session& session) {
                 check(*options, session);
                 const Session::Content content = session.read_any(options->input);
-                options->frames > 0 ? deform_animation(*options, content, session)
-                                    : deform_once(*options, content, session);
+                if (options->frames > 0)
+                    deform_animation(*options, content, session);
+                else if (const auto* model = std::get_if<Model>(&content.value))
+                    deform_model(*model, *options, session);
+                else
+                    deform_mesh(std::get<Mesh>(content.value), *options, session);
             }};
 }
 

@@ -25,6 +25,16 @@ OptionList restore_options(RestoreOptions& options) {
             Option("--thin-shell", options.thin_shell, "Bumps keep their shape, as on cloth and skin")};
 }
 
+void note_expected_error(const PoseError::Estimate& estimate, Report& report, Session& session) {
+    if (!(estimate.diagonal > 0)) return;
+    report.set("expected_error", estimate.share());
+    if (estimate.is_too_curved())
+        session.warn(
+            fmt::format("The pose is more curved than the driver can follow: the mesh is off by about {:.2g} of "
+                        "the diagonal. Strip with a finer driver (--base, or --fidelity).",
+                        estimate.share()));
+}
+
 const Pose& own_pose(const PoseSequence& poses, std::size_t frame, const std::string& path) {
     if (poses.empty())
         refuse(ErrorCode::unsuitable,
@@ -104,18 +114,11 @@ void draw_expected_error(const Model& model, const PoseError::Estimate& estimate
     report_picture(options.picture, up, report);
 }
 
-/// What the driver is too coarse for: seen in the pose alone.
 void report_expected_error(const Model& model, const PoseError::Estimate& estimate, const Mesh& mesh,
                            const RestoreArguments& options, Session& session, Report& report) {
     if (!(estimate.diagonal > 0)) return;
-    const double error = estimate.share();
-    report.say(fmt::format("Expected error: {:.2g} of the diagonal (rms).\n", error));
-    report.set("expected_error", error);
-    if (estimate.is_too_curved())
-        session.warn(
-            fmt::format("The pose is more curved than the driver can follow: the mesh is off by about {:.2g} of "
-                        "the diagonal. Strip with a finer driver (--base, or --fidelity).",
-                        error));
+    report.say(fmt::format("Expected error: {:.2g} of the diagonal (rms).\n", estimate.share()));
+    note_expected_error(estimate, report, session);
     if (!options.picture.empty()) draw_expected_error(model, estimate, mesh, options, session, report);
 }
 

@@ -1,8 +1,10 @@
-// Options that deform and restore share, and poses from files.
+// What deform and restore share: options, and what is expected of a pose.
 #pragma once
 
+#include "report.h"
 #include "session.h"
 
+#include "filigree/hierarchy/pose_error.h"
 #include "filigree/hierarchy/pose_mesh.h"
 #include "filigree/hierarchy/restore.h"
 
@@ -10,6 +12,9 @@ namespace filigree::cli {
 
 /// --law, --level and --thin-shell.
 OptionList restore_options(RestoreOptions& options);
+
+/// Into the JSON, with a warning where the driver is too coarse for the pose, as the pose alone shows.
+void note_expected_error(const PoseError::Estimate& estimate, Report& report, Session& session);
 
 /// One of a model's own poses, counted from 1. Fails when there is no such frame.
 const Pose& own_pose(const PoseSequence& poses, std::size_t frame, const std::string& path);

@@ -480,11 +480,15 @@ TEST_F(Cli, FidelityIsAskedForAndErrorsAreExpected) {
     EXPECT_TRUE(fine.at("warnings").empty());
 
     ok({"strip", "sphere.ply", "-o", "coarse.fil", "--base", "20"});
-    ok({"deform", "coarse.fil", "-o", "bent.ply", "--bend", "150", "--pose", "pose.obj"});
+    const Json bent = json({"deform", "coarse.fil", "-o", "bent.ply", "--bend", "150", "--pose", "pose.obj"});
     const Json coarse = json({"restore", "coarse.fil", "--pose", "pose.obj", "-o", "coarse.ply"});
     ASSERT_EQ(coarse.at("warnings").size(), 1u);
     EXPECT_NE(coarse.at("warnings")[0].get<std::string>().find("more curved than the driver can follow"),
               std::string::npos);
+    ASSERT_EQ(bent.at("warnings").size(), 2u); // OBJ holds no gradients; by them the mesh was less far off
+    EXPECT_EQ(bent.at("warnings")[1].get<std::string>().substr(0, 24), "The pose is more curved ");
+    EXPECT_LT(bent.at("expected_error").get<double>(), coarse.at("expected_error").get<double>());
+    EXPECT_GT(bent.at("expected_error").get<double>(), 1e-3);
 
     EXPECT_EQ(run({"strip", "sphere.ply", "-o", "x.fil", "--fidelity", "1e-4", "--base", "50"}).code, 2);
     EXPECT_EQ(run({"strip", "sphere.ply", "-o", "x.fil", "--fidelity-from", "gradients"}).code, 2);

@@ -48,7 +48,7 @@ TEST_F(HandlesFile, ReadsAllThatAHandleCanSay) {
 }
 
 TEST_F(HandlesFile, SaysWhatIsWrongAndWhere) {
-    refuses("{\"handles\": [", ErrorCode::bad_file, "docs/handles.md");
+    refuses("{'handles': [", ErrorCode::bad_file, "docs/handles.md");
     refuses("{}", ErrorCode::bad_file, "handles");
     refuses(R"({"handles": []})", ErrorCode::usage, "no handles");
     refuses(R"({"handles": [{"vertices": [0]}, {"vertices": [0], "mvoe": [1, 0, 0]}]})", ErrorCode::usage, "handle 2");
@@ -57,6 +57,17 @@ TEST_F(HandlesFile, SaysWhatIsWrongAndWhere) {
     refuses(R"({"handles": [{"vertices": [0], "axis": [0, 0, 1]}]})", ErrorCode::usage, "go together");
     refuses(R"({"handles": [{"vertices": [0], "axis": [0, 0, 0], "degrees": 3}]})", ErrorCode::usage, "zero");
     refuses(R"({"handles": [{"vertices": [0], "move": [1, 0]}]})", ErrorCode::usage, "three numbers");
+    refuses(R"([])", ErrorCode::bad_file, "the file must be an object");
+    refuses(R"({"handles": {}})", ErrorCode::bad_file, "'handles' must be a list");
+    refuses(R"({"handles": [], "unit": "m"})", ErrorCode::bad_file, "'unit' is not a word of the file");
+    refuses(R"({"handles": [], "handles": []})", ErrorCode::bad_file, "'handles' stands there twice");
+    refuses(R"({"handles": [{"vertices": [0], "name": 5}]})", ErrorCode::usage, "'name' must be text");
+    refuses(R"({"handles": [7]})", ErrorCode::usage, "a handle must be an object");
+    refuses(R"({"handles": [{"vertices": [0], "move": [1, 0, "2"]}]})", ErrorCode::usage, "three numbers");
+    refuses(R"({"handles": [{"box": {"min": [0, 0, 0]}}]})", ErrorCode::usage, "the box has no 'max'");
+    refuses(R"({"handles": [{"sphere": {"centre": [0, 0, 0], "radius": -1}}]})", ErrorCode::usage, "below 0");
+    refuses(R"({"handles": [{"sphere": {"center": [0, 0, 0], "radius": 1}}]})", ErrorCode::usage,
+            "'center' is not a word of a sphere");
     EXPECT_EQ(read_handles("no/such/file.json").error().code, ErrorCode::not_found);
 }
 

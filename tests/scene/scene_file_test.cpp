@@ -33,7 +33,7 @@ TEST_F(SceneFileTest, RefusesWithLineAndSuggestion) {
     EXPECT_EQ(refusal("[[body]]\nshape = \"bar\"\ncolor = \"red\"\n"),
               "3: color: 'red' is no colour; write it as #rrggbb, such as #d04030.");
     EXPECT_EQ(refusal("[[body]]\nshape = \"bar\"\nsize = 0\n"),
-              "3: 'size' in [[body]] must be a number, above 0, and is 0.");
+              "3: 'size' in [[body]] must be a number, 1e-30 to 1e+30, and is 0.");
 }
 
 TEST_F(SceneFileTest, ValuesTakeThePlaceOfWhatIsWritten) {

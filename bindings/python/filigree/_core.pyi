@@ -1,7 +1,7 @@
 # What the compiled part has: names and types alone. The docstrings are its own, and a test holds both against each other.
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
-from typing import Any, Protocol, Union
+from typing import Any, Protocol, Union, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -89,7 +89,7 @@ class Body:
         mesh: _MeshLike,
         material: Material | str = 'rubber',
         *,
-        particles: int = 8000,
+        particles: int | None = None,
         spacing: float | None = None,
         scale: float = 1.0,
         threads: int = 0,
@@ -411,7 +411,10 @@ class PoseSequence:
     @property
     def positions(self) -> _Floats: ...
     def __len__(self) -> int: ...
+    @overload
     def __getitem__(self, frame: int) -> Pose: ...
+    @overload
+    def __getitem__(self, frames: slice) -> PoseSequence: ...
 
 class Restorer:
     def __init__(

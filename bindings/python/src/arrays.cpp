@@ -15,8 +15,16 @@ std::string shape_text(const py::array& array) {
     return text + (array.ndim() == 1 ? ",)" : ")");
 }
 
+/// What a masked array hides would count as any other number.
+void refuse_masked(const py::handle& given, const char* name) {
+    if (!py::isinstance<py::array>(given) || !py::hasattr(given, "mask")) return;
+    if (py::module_::import("numpy").attr("any")(given.attr("mask")).cast<bool>())
+        refuse(std::string(name) + " has masked entries; fill them, or leave them out.");
+}
+
 /// Any array of numbers; `kinds`: those of numpy that will do.
 py::array array_of_kind(const py::handle& given, const char* name, const char* kinds, const char* wanted) {
+    refuse_masked(given, name);
     const py::array array = py::array::ensure(given);
     if (!array || (array.size() > 0 && !std::strchr(kinds, array.dtype().kind())))
         refuse(std::string(name) + " has to be an array of " + wanted + ".");
@@ -25,7 +33,10 @@ py::array array_of_kind(const py::handle& given, const char* name, const char* k
 
 template <class Number>
 Numbers<Number> numbers_of(const py::handle& given, const char* name) {
-    if (py::isinstance<Numbers<Number>>(given)) return py::reinterpret_borrow<Numbers<Number>>(given);
+    if (py::isinstance<Numbers<Number>>(given)) {
+        refuse_masked(given, name);
+        return py::reinterpret_borrow<Numbers<Number>>(given);
+    }
     const auto numbers = Numbers<Number>::ensure(array_of_kind(given, name, "fiu", "numbers"));
     if (!numbers) refuse(std::string(name) + " has to be an array of numbers."); // ensure() drops Python's error
     return numbers;
@@ -83,6 +94,7 @@ std::vector<double> double_values_of(const py::handle& given, const char* name) 
 }
 
 std::vector<Mat3f> gradients_of(const py::handle& given, const char* name) {
+    refuse_masked(given, name);
     // Our own gradients come back in our own order, and then nothing is turned.
     const auto numbers = py::isinstance<py::array_t<float>>(given) ? py::reinterpret_borrow<py::array_t<float>>(given)
                                                                    : py::array_t<float>(floats_of(given, name));

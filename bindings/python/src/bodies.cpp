@@ -65,13 +65,14 @@ Material make_material(const std::string& name, const py::kwargs& changes) {
     refuse("There is no material '" + name + "'; there are " + known + ".");
 }
 
-PyBody make_one(const py::object& given, const py::object& material, std::size_t particles,
+PyBody make_one(const py::object& given, const py::object& material, std::optional<std::size_t> particles,
                 std::optional<double> spacing, double scale, unsigned threads, const py::object& progress) {
     const MeshPtr mesh = mesh_of(given);
     const Material of = material_of(material);
     BodyOptions options;
     options.scale = scale;
-    options.cells.count = particles;
+    if (particles && spacing) refuse("Give particles or spacing, not both.");
+    options.cells.count = particles.value_or(options.cells.count);
     if (spacing && !(*spacing > 0)) refuse("spacing has to be above 0.");
     options.cells.spacing = spacing.value_or(0);
     PyBody made{nullptr, mesh->origin};
@@ -170,8 +171,8 @@ Parameters
 ----------
 mesh : Mesh, or an object with vertices and faces or triangles
 material : Material or str
-particles : int
-    About how many.
+particles : int, optional
+    About how many: 8000, unless `spacing` is given.
 spacing : float, optional
     Between them, m; in place of `particles`.
 scale : float
@@ -194,9 +195,9 @@ Examples
 )")
         .def(
             py::init(&make_one), py::arg("mesh"), py::arg("material") = "rubber", py::kw_only(),
-            py::arg("particles") = 8000, py::arg("spacing") = py::none(), py::arg("scale") = 1.0,
+            py::arg("particles") = py::none(), py::arg("spacing") = py::none(), py::arg("scale") = 1.0,
             py::arg("threads") = 0, py::arg("progress") = py::none(),
-            R"(__init__(self, mesh, material='rubber', *, particles=8000, spacing=None, scale=1.0, threads=0, progress=None)
+            R"(__init__(self, mesh, material='rubber', *, particles=None, spacing=None, scale=1.0, threads=0, progress=None)
 --
 
 )")

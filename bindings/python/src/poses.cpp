@@ -55,6 +55,16 @@ py::object frame_of(const py::object& self, py::ssize_t frame) {
     return py::cast(&poses.frames[static_cast<std::size_t>(frame)], py::return_value_policy::reference_internal, self);
 }
 
+PoseSequence frames_of(const PoseSequence& poses, const py::slice& slice) {
+    py::ssize_t start = 0, stop = 0, step = 0, count = 0;
+    if (!slice.compute(static_cast<py::ssize_t>(poses.frames.size()), &start, &stop, &step, &count))
+        throw py::error_already_set();
+    PoseSequence part{poses.frames_per_second, {}};
+    for (py::ssize_t k = 0; k < count; ++k)
+        part.frames.push_back(poses.frames[static_cast<std::size_t>(start + k * step)]);
+    return part;
+}
+
 py::array_t<float> all_positions(const PoseSequence& poses) {
     const auto frames = static_cast<py::ssize_t>(poses.frames.size());
     const auto points = frames > 0 ? static_cast<py::ssize_t>(poses.frames[0].positions.size()) : 0;
@@ -141,6 +151,8 @@ Examples
 >>> poses = filigree.PoseSequence(numpy.zeros((24, 5, 3)), 24)
 >>> len(poses), poses[-1]
 (24, <filigree.Pose: 5 vertices>)
+>>> poses[4:10]
+<filigree.PoseSequence: 6 frames>
 )")
         .def(py::init(&make_sequence), py::arg("frames"), py::arg("frames_per_second") = 60.0,
              py::arg("gradients") = py::none(),
@@ -154,6 +166,7 @@ Examples
         .def_property_readonly("positions", &all_positions, "All positions, a copy, float32 (f, d, 3).")
         .def("__len__", [](const PoseSequence& poses) { return poses.frames.size(); })
         .def("__getitem__", &frame_of, py::arg("frame"))
+        .def("__getitem__", &frames_of, py::arg("frames"))
         .def("__repr__",
              [](const PoseSequence& poses) {
                  return "<filigree.PoseSequence: " + std::to_string(poses.frames.size()) + " frames>";

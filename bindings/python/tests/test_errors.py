@@ -4,6 +4,7 @@ import numpy
 import pytest
 
 import filigree
+from conftest import same_mesh
 
 TWINS = {
     "UsageError": (2, ValueError),
@@ -104,6 +105,30 @@ def test_meshes_of_others(kind, mesh):
     assert filigree.info(theirs)["triangles"] == len(mesh.triangles)
     assert filigree.compare(theirs, ours, samples=100)["max"] == 0
     assert filigree.contains(theirs, [[0, 0, 0]])[0]
+
+
+def test_masked_arrays(mesh):
+    masked = numpy.ma.array(mesh.vertices, mask=False)
+    assert same_mesh(filigree.Mesh(masked, mesh.faces), mesh)
+    masked[3] = numpy.ma.masked
+    raises("UsageError", "vertices has masked entries", lambda: filigree.Mesh(masked, mesh.faces))
+    raises("UsageError", "vertices has masked entries", lambda: filigree.Mesh(masked.astype("f8"), mesh.faces))
+    hidden = numpy.ma.array(numpy.zeros((2, 3, 3), "f4"), mask=True)
+    raises("UsageError", "gradients has masked entries", lambda: filigree.Pose(numpy.zeros((2, 3)), hidden))
+
+
+def test_a_body_has_particles_or_a_spacing(mesh):
+    raises("UsageError", "particles or spacing", lambda: filigree.Body(mesh, particles=100, spacing=0.1))
+
+
+def test_parts_of_a_sequence():
+    poses = filigree.PoseSequence(numpy.arange(24 * 15, dtype="f4").reshape(24, 5, 3), 24)
+    part = poses[20:2:-3]
+    assert len(part) == 6 and part.frames_per_second == 24
+    assert numpy.array_equal(part.positions, poses.positions[20:2:-3])
+    assert len(poses[30:]) == 0
+    with pytest.raises(TypeError):
+        poses["first"]
 
 
 def test_faces_that_fit_no_vertices():

@@ -19,9 +19,9 @@ constexpr double kDartReach = 1.5;       // spacings: the side of the cube aroun
 constexpr double kApart = 0.8;           // spacings between points
 constexpr double kDartsAtOnce = 1 << 21; // about; they take 60 bytes each
 constexpr double kFirstPass = 1.0 / 8;   // of all darts; a later pass has as many as all before it
-constexpr double kSmallestPart = 1.0 / 16;                  // of all darts at once, so that passes stay few
-constexpr std::size_t kBucketsAhead = 16, kPointsAhead = 8; // darts
-constexpr std::size_t kBetweenLooks = 1 << 14;              // darts from one look at `cancel` to the next
+constexpr double kSmallestPart = 1.0 / 16;     // of all darts at once, so that passes stay few
+constexpr std::size_t kAhead = 8;              // darts
+constexpr std::size_t kBetweenLooks = 1 << 14; // darts from one look at `cancel` to the next
 
 std::vector<Vec3d> lattice_points(const Lattice& lattice, const Occupancy& occupancy) {
     std::vector<Vec3d> points;
@@ -53,15 +53,19 @@ class SpacedPoints {
 public:
     SpacedPoints(const Vec3d& corner, double distance, std::size_t expected)
         : corner_(corner), distance_(distance),
-          mask_(std::bit_ceil(std::max<std::size_t>(expected, kBlockCells)) / kBlockCells - 1),
-          last_((mask_ + 1) * kBlockCells, kNoIndex) {}
+          mask_(std::bit_ceil(std::max<std::size_t>(2 * expected, kBlockCells)) / kBlockCells - 1),
+          buckets_((mask_ + 1) * kBlockCells) {}
 
     /// Takes the point, which has room.
     void add(const Vec3d& point) {
-        Index& last = last_[bucket(cell_of(point))];
-        before_.push_back(last);
-        last = static_cast<Index>(points_.size());
         points_.push_back(point);
+        Entry& first = buckets_[bucket(cell_of(point))];
+        if (first.is_taken) {
+            others_.push_back(first);
+            first.other = static_cast<Index>(others_.size() - 1);
+        }
+        first.point = point;
+        first.is_taken = true;
     }
 
     /// No point is too near. point: nowhere below the corner.
@@ -81,17 +85,18 @@ public:
     }
 
     /// Darts fall anywhere: what a later one will look at is on its way while earlier ones are added.
-    void fetch_bucket(const Vec3d& point) const { __builtin_prefetch(&last_[bucket(cell_of(point))]); }
-    void fetch_point(const Vec3d& point) const { ///< some darts after fetch_bucket
-        const Index last = last_[bucket(cell_of(point))];
-        if (last != kNoIndex) __builtin_prefetch(&points_[last]);
-    }
+    void fetch(const Vec3d& point) const { __builtin_prefetch(&buckets_[bucket(cell_of(point))]); }
 
     std::vector<Vec3d> take() { return std::move(points_); }
 
 private:
     using Cell = Eigen::Matrix<std::int64_t, 3, 1>;
     using Step = std::array<int, 3>;
+    struct Entry {
+        Vec3d point = Vec3d::Zero();
+        Index other = kNoIndex; ///< the next of its bucket
+        bool is_taken = false;
+    };
     /// To a cell itself and to its neighbours, the nearest first: what is too near is found soonest there.
     static constexpr std::array<Step, 27> kSteps = [] {
         std::array<Step, 27> steps;
@@ -111,8 +116,12 @@ private:
     }
     /// Cells that share a bucket do not matter: what is too near is too near from any cell.
     bool has_near(const Cell& cell, const Vec3d& point) const {
-        for (Index other = last_[bucket(cell)]; other != kNoIndex; other = before_[other])
-            if ((points_[other] - point).squaredNorm() < distance_ * distance_) return true;
+        const auto is_near = [&](const Entry& e) { return (e.point - point).squaredNorm() < distance_ * distance_; };
+        const Entry& first = buckets_[bucket(cell)];
+        if (!first.is_taken) return false;
+        if (is_near(first)) return true;
+        for (Index other = first.other; other != kNoIndex; other = others_[other].other)
+            if (is_near(others_[other])) return true;
         return false;
     }
 
@@ -120,8 +129,8 @@ private:
     double distance_;
     std::size_t mask_; ///< of blocks
     std::vector<Vec3d> points_;
-    std::vector<Index> last_;   ///< of each bucket: its last point
-    std::vector<Index> before_; ///< of each point: the one before it in its bucket
+    std::vector<Entry> buckets_; ///< of each bucket, its last point: neighbours in space lie side by side in memory
+    std::vector<Entry> others_;  ///< those before it
 };
 
 /// Darts around lattice points inside, those whose order is from `low` to below `high`. Cells that merely touch the
@@ -189,8 +198,7 @@ Result<std::vector<Vec3d>> throw_darts(const Lattice& lattice, const Occupancy& 
         for (std::size_t t = 0; t < thrown.size(); ++t) places[t] = darts.places[thrown[t].second];
         for (std::size_t t = 0; t < places.size(); ++t) {
             if (t % kBetweenLooks == 0 && context.is_cancelled()) return cancelled_error();
-            if (t + kBucketsAhead < places.size()) points.fetch_bucket(places[t + kBucketsAhead]);
-            if (t + kPointsAhead < places.size()) points.fetch_point(places[t + kPointsAhead]);
+            if (t + kAhead < places.size()) points.fetch(places[t + kAhead]);
             if (points.has_room(places[t])) points.add(places[t]);
         }
     }

@@ -15,6 +15,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::size_t kMostShown = 4; ///< values of a list
+
 unsigned line_of(const toml::node& node) { return node.source().begin.line; }
 
 /// "; did you mean 'this'?" or where to look.
@@ -36,8 +38,19 @@ std::string shown(const toml::node& node) {
     if (const auto flag = node.value_exact<bool>()) return *flag ? "true" : "false";
     if (const auto whole = node.value_exact<std::int64_t>()) return fmt::format("{}", *whole);
     if (const auto number = node.value_exact<double>()) return fmt::format("{}", *number);
-    if (node.is_array()) return "a list";
-    return node.is_table() ? "a table" : "a date or time";
+    if (const toml::array* list = node.as_array()) {
+        if (list->empty()) return "an empty list";
+        if (list->size() > kMostShown) return fmt::format("a list of {}", list->size());
+        std::vector<std::string> values;
+        for (const toml::node& value : *list) values.push_back(shown(value));
+        return fmt::format("[{}]", fmt::join(values, ", "));
+    }
+    if (const toml::table* table = node.as_table()) {
+        std::vector<std::string_view> keys;
+        for (const auto& [key, value] : *table) keys.push_back(key.str());
+        return keys.empty() ? "an empty table" : fmt::format("a table with {}", fmt::join(keys, ", "));
+    }
+    return "a date or time";
 }
 
 std::string wanted_number(const char* kind, const KeyRule& rule) {
