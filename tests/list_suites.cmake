@@ -8,6 +8,6 @@ set(lines "")
 foreach(suite IN LISTS suites)
   string(REGEX REPLACE "[\n.]" "" suite "${suite}")
   string(APPEND lines "add_test([[${LABEL}.${suite}]] [[${PROGRAM}]] [[--gtest_filter=${suite}.*]])\n"
-         "set_tests_properties([[${LABEL}.${suite}]] PROPERTIES TIMEOUT 600 LABELS ${LABEL} ENVIRONMENT [[${ENVIRONMENT}]])\n")
+         "set_tests_properties([[${LABEL}.${suite}]] PROPERTIES TIMEOUT 600 COST 20 LABELS ${LABEL} ENVIRONMENT [[${ENVIRONMENT}]])\n")
 endforeach()
 file(WRITE ${LIST} "${lines}")

@@ -37,3 +37,8 @@ if sphinx.version_info < (7, 3):
         return declaration.filigree_newest_id
 
     ASTDeclaration.get_newest_id = _newest_id
+
+    # It compares names by all that they have, of every type.
+    from sphinx.domains.cpp import ASTIdentifier
+
+    ASTIdentifier.__eq__ = lambda name, other: type(other) is ASTIdentifier and other.identifier == name.identifier

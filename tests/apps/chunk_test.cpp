@@ -264,7 +264,7 @@ TEST_F(ChunkedItems, SweepsSayWhatIsWrongBeforeTheySimulate) {
 }
 
 /// A process is killed before its calls that change a file or a folder: before each from where the new begins to take
-/// the place of the old, before every third until then (before each with FILIGREE_ALL_CASES).
+/// the place of the old, before every sixth until then (before each with FILIGREE_ALL_CASES).
 class KilledEverywhere : public ChunkedItems {
 protected:
     void SetUp() override {
@@ -288,7 +288,7 @@ protected:
         namespace fs = std::filesystem;
         fs::copy(path("a"), path("begun"), fs::copy_options::recursive);
         int kills = 0;
-        for (int number = 1, step = all_cases() ? 1 : 3;; number += step) {
+        for (int number = 1, step = all_cases() ? 1 : 6;; number += step) {
             fs::remove_all(path("a"));
             fs::copy(path("begun"), path("a"), fs::copy_options::recursive);
             const Ran ran = run_shell("FAILING_CALL=any FAILING_HOW=kill FAILING_NUMBER=" + std::to_string(number) +

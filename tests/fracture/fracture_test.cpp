@@ -128,7 +128,7 @@ std::vector<Index> random_clumps(std::size_t cells, std::uint64_t seed) {
 /// Random closed meshes and seeds, among them lattices of seeds over boxes, where cracks run through vertices, along
 /// edges and in faces.
 TEST(Fracture, RandomCases) {
-    const std::uint64_t count = all_cases() ? 10'000 : 2'500;
+    const std::uint64_t count = all_cases() ? 10'000 : 1'250;
     for (std::uint64_t seed = 0; seed < count; ++seed) {
         SCOPED_TRACE(seed);
         const auto pick = [&](std::uint64_t which, std::uint64_t below) {
