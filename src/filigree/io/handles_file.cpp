@@ -4,7 +4,6 @@
 #include "filigree/io/text_scanner.h"
 
 #include <algorithm>
-#include <cmath>
 #include <initializer_list>
 #include <numbers>
 #include <set>
