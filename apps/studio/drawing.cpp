@@ -25,10 +25,9 @@ Status Drawing::preview(const std::vector<Tile>& tiles, const Camera& camera, un
     });
 }
 
-Status Drawing::begin(const std::vector<Tile>& tiles, const Camera& camera, unsigned height) {
-    constexpr unsigned kBySize = 0;
+Status Drawing::begin(const std::vector<Tile>& tiles, const Camera& camera, unsigned height, unsigned passes) {
     Status begun = for_each(tiles, [&](Renderer& renderer, const Tile& tile) {
-        return renderer.begin(tile.scene, camera, tile.width, height, kBySize);
+        return renderer.begin(tile.scene, camera, tile.width, height, passes);
     });
     is_adding_ = static_cast<bool>(begun);
     return begun;

@@ -19,7 +19,8 @@ class Drawing {
 public:
     /// Errors of both: as Renderer's.
     Status preview(const std::vector<Tile>& tiles, const Camera& camera, unsigned height);
-    Status begin(const std::vector<Tile>& tiles, const Camera& camera, unsigned height);
+    /// passes: of every tile; 0 for as many as suit its size.
+    Status begin(const std::vector<Tile>& tiles, const Camera& camera, unsigned height, unsigned passes);
     /// The next pass of every tile; false: all are done.
     bool add_pass();
     void stop() { is_adding_ = false; } ///< no more passes; what is shown stays

@@ -40,6 +40,7 @@ struct Viewport::Impl {
     Timings timings;
     std::string trouble;
     bool is_software = false;
+    unsigned passes = 0; ///< of a still picture; 0: as many as suit its size
 
     bool needs_preview = true;
     bool was_drawn = false;
@@ -244,7 +245,7 @@ struct Viewport::Impl {
         drawn_level = level_for(false);
         change.set(drawn_level);
         drawn.prepare(levels_drawn({}));
-        const Status begun = drawing.begin(tiles(drawn_level, {}), camera.camera(), pixels_high());
+        const Status begun = drawing.begin(tiles(drawn_level, {}), camera.camera(), pixels_high(), passes);
         widget.doneCurrent();
         if (!begun) {
             fail(begun.error().message);
@@ -329,6 +330,7 @@ Viewport::~Viewport() {
 const Timings& Viewport::timings() const { return impl_->timings; }
 const std::string& Viewport::trouble() const { return impl_->trouble; }
 void Viewport::set_animated(bool animated) { impl_->camera.set_animated(animated); }
+void Viewport::set_passes(unsigned passes) { impl_->passes = passes; }
 void Viewport::set_covered(int height) { impl_->overlay->set_covered(height); }
 void Viewport::look_from(View view) { impl_->camera.show_all_from(view_direction(view, impl_->settings().up)); }
 void Viewport::show_all() { impl_->camera.show_all(); }

@@ -39,6 +39,8 @@ public:
     QPointF place_of(const Vec3d& world) const;
     /// Whether the camera goes where it is told on a short way, or at once. By default as the style animates.
     void set_animated(bool animated);
+    /// How many passes a still picture is the sum of; 0, as by default, for as many as suit its size.
+    void set_passes(unsigned passes);
     /// Something else lies over so much of the top, pixels: what is written there begins below it.
     void set_covered(int height);
     /// Whether nothing is prepared, moves or waits to be drawn: the picture is what finish_drawing() would give.

@@ -27,7 +27,13 @@ double milliseconds_since(std::chrono::steady_clock::time_point begin) {
     return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
 }
 
-Workbench::Workbench(QObject* parent) : QObject(parent), impl_(std::make_unique<Impl>()) {
+State first_state() {
+    State state;
+    state.body.material = material_of(state.body.preset);
+    return state_of_shape(std::move(state), Shape{}, RunContext()).value();
+}
+
+Workbench::Workbench(State start, QObject* parent) : QObject(parent), impl_(std::make_unique<Impl>()) {
     connect(&document_, &Document::changed, this, &Workbench::follow_document);
     connect(&playback_, &Playback::moved, this, &Workbench::follow_playback);
     connect(&playback_, &Playback::state_changed, this, [this] {
@@ -65,10 +71,7 @@ Workbench::Workbench(QObject* parent) : QObject(parent), impl_(std::make_unique<
             show_pose();
     });
     connect(&impl_->replay, &QTimer::timeout, this, &Workbench::replay_frame);
-
-    State state;
-    state.body.material = material_of(state.body.preset);
-    document_.replace(state_of_shape(std::move(state), Shape{}, RunContext()).value());
+    document_.replace(std::move(start));
 }
 
 Workbench::~Workbench() = default;

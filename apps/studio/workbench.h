@@ -25,10 +25,13 @@ struct FilmSettings {
 /// without a number the file itself, if it is there. For whoever asks before they are replaced.
 std::vector<std::string> existing_outputs(const std::string& pattern, std::size_t frames);
 
+/// What a new window shows: the wavy cube.
+State first_state();
+
 class Workbench : public QObject {
     Q_OBJECT
 public:
-    explicit Workbench(QObject* parent = nullptr);
+    explicit Workbench(State start = first_state(), QObject* parent = nullptr);
     ~Workbench() override;
 
     Document& document() { return document_; }

@@ -1,5 +1,6 @@
 // What is drawn while the document is another already.
 #include "drawn_objects.h"
+#include "studio/first_state_once.h"
 #include "studio/patience.h"
 #include "viewport.h"
 
@@ -18,7 +19,7 @@ using namespace filigree::studio;
 namespace {
 
 TEST(DrawnObjects, AModelWithMoreLevelsThanTheOneDrawn) {
-    Workbench workbench;
+    Workbench workbench{first_state_once()};
     workbench.make_shape({.name = "wavy-cube", .options = {.resolution = 16}});
     workbench.wait_until_idle();
     workbench.set_strip({.levels = 1});
@@ -26,6 +27,7 @@ TEST(DrawnObjects, AModelWithMoreLevelsThanTheOneDrawn) {
     Viewport viewport(workbench);
     viewport.resize(360, 240);
     viewport.set_animated(false);
+    viewport.set_passes(kPasses);
     viewport.show();
     const auto is_ready = [&] { return viewport.is_ready(); };
     ASSERT_TRUE(QTest::qWaitFor(is_ready, kPatience));
@@ -46,7 +48,7 @@ TEST(DrawnObjects, AModelWithMoreLevelsThanTheOneDrawn) {
 
 /// Without a window.
 struct DrawnObjectsTest : testing::Test {
-    Workbench workbench;
+    Workbench workbench{first_state_once()};
     QOffscreenSurface surface;
     QOpenGLContext opengl;
     std::unique_ptr<DrawnObjects> drawn;

@@ -1,5 +1,6 @@
 // What the pose shown is expected to be off by, followed while it moves.
 #include "expected_error.h"
+#include "studio/first_state_once.h"
 #include "studio/patience.h"
 
 #include "workbench.h"
@@ -16,7 +17,7 @@ namespace filigree::studio {
 namespace {
 
 struct ExpectedErrorTest : testing::Test {
-    Workbench bench;
+    Workbench bench{first_state_once()};
     ExpectedError& expected = bench.expected_error();
 
     void SetUp() override {

@@ -1,6 +1,7 @@
 // One window for all tests of a suite; each begins with the document and the view as they were.
 #pragma once
 
+#include "studio/patience.h"
 #include "window.h"
 
 #include <QTest>
@@ -13,6 +14,7 @@ class OneWindow : public testing::Test {
 protected:
     static void SetUpTestSuite() {
         window = new MainWindow(false);
+        window->viewport().set_passes(kPasses);
         window->resize(1280, 800);
         start = window->workbench().state();
     }

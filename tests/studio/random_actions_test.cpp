@@ -22,6 +22,7 @@ int step_count() {
 
 TEST(RandomActions, ThreadsSurviveThem) {
     MainWindow window(false);
+    window.viewport().set_passes(kPasses);
     window.resize(900, 620);
     window.show();
     ASSERT_TRUE(QTest::qWaitForWindowExposed(&window));

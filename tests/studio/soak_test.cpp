@@ -74,6 +74,7 @@ protected:
     int round(unsigned seed, const std::function<bool()>& has_time) {
         for (std::size_t k = 0; k < kFiles.size(); ++k) write_bytes(at(kFiles[k]), originals_[k]);
         auto window = std::make_unique<MainWindow>(false);
+        window->viewport().set_passes(kPasses);
         window->resize(700, 500);
         window->show();
         Workbench& workbench = window->workbench();
@@ -174,6 +175,7 @@ protected:
 
 TEST_F(StudioSoak, AFullDiskIsToldOf) {
     MainWindow window(false);
+    window.viewport().set_passes(kPasses);
     Workbench& workbench = window.workbench();
     workbench.open(at("ball.ply").string());
     workbench.wait_until_idle();

@@ -1,6 +1,7 @@
 // A viewport in a window, and a mouse for it.
 #pragma once
 
+#include "studio/first_state_once.h"
 #include "studio/patience.h"
 #include "viewport.h"
 
@@ -20,7 +21,7 @@ inline double distance(const QPointF& a, const QPointF& b) { return std::hypot(a
 
 /// A viewport with a bumpy ball, shown and drawn.
 struct Stand {
-    Workbench workbench;
+    Workbench workbench{first_state_once()};
     QWidget window;
     Viewport* viewport = nullptr;
 
@@ -31,6 +32,7 @@ struct Stand {
         workbench.wait_until_idle();
         viewport = new Viewport(workbench, &window);
         viewport->set_animated(false);
+        viewport->set_passes(kPasses);
         auto* layout = new QVBoxLayout(&window);
         layout->setContentsMargins(0, 0, 0, 0);
         layout->addWidget(viewport);

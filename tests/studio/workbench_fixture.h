@@ -1,7 +1,7 @@
 // A workbench without a window, for tests of what a user can do.
 #pragma once
 
-#include "workbench.h"
+#include "studio/first_state_once.h"
 
 #include <QTemporaryDir>
 
@@ -59,7 +59,7 @@ protected:
         bench.pause();
     }
 
-    Workbench bench;
+    Workbench bench{first_state_once()};
     std::vector<std::string> errors, notes;
     int opened = 0;
     QTemporaryDir folder;
