@@ -7,7 +7,7 @@ target_compile_options(filigree_options INTERFACE
   -ffp-contract=off      # no fused multiply-add: the same bytes whatever the processor has
   $<$<BOOL:${FILIGREE_STRICT}>:-Werror>
   # GCC looks for memory to reuse from 128 MB on, which the precompiled headers alone take: up to a fifth of its time.
-  $<$<CXX_COMPILER_ID:GNU>:--param=ggc-min-heapsize=600000>)
+  $<$<CXX_COMPILER_ID:GNU>:--param=ggc-min-heapsize=2000000>)
 if(CMAKE_UNITY_BUILD) # sources look like headers then
   target_compile_options(filigree_options INTERFACE -Wno-subobject-linkage)
 endif()

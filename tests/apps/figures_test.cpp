@@ -1,5 +1,6 @@
 // filigree figures: the files, the numbers in them, and what they are made of.
 #include "apps/program.h"
+#include "cases.h"
 
 #include <algorithm>
 #include <cmath>
@@ -64,10 +65,15 @@ protected:
 
 TEST_F(Figures, EveryFigureBecomesAFile) {
     if (!can_render()) GTEST_SKIP() << "no OpenGL";
-    const Json result = json(command({}));
     std::vector<std::string> names,
         in_order = {"1.1", "2.1",  "2.2", "2.3",    "2.4",   "2.5",     "2.6",    "2.7", "2.8",
                     "2.9", "2.10", "3.1", "border", "codes", "surfels", "broken", "scan"};
+    std::vector<std::string> asked; // all
+    if (!all_cases()) {             // a body falls and breaks for "broken"
+        std::erase(in_order, "broken");
+        asked = in_order;
+    }
+    const Json result = json(command(asked));
     for (const Json& figure : result.at("figures")) {
         names.push_back(figure.at("name"));
         const std::string bytes = bytes_of(path(figure.at("file")));
@@ -77,7 +83,7 @@ TEST_F(Figures, EveryFigureBecomesAFile) {
         EXPECT_EQ(bytes.substr(16, 4), std::string("\0\0\0\xb4", 4)) << figure.at("name");
     }
     EXPECT_EQ(names, in_order);
-    EXPECT_EQ(std::distance(std::filesystem::directory_iterator(path("out")), {}), 17);
+    EXPECT_EQ(std::distance(std::filesystem::directory_iterator(path("out")), {}), in_order.size());
 }
 
 TEST_F(Figures, SimpleTriangleObeysTheInverseLaw) {
