@@ -1,3 +1,4 @@
+#include "cases.h"
 #include "filigree/hierarchy/reference_code.h"
 #include "filigree/mesh/shapes.h"
 #include "hierarchy/stripping.h"
@@ -127,6 +128,7 @@ TEST(ReferenceCode, RoundTrip) {
 }
 
 TEST(ReferenceCode, RoundTripAtSixMillionPoints) {
+    if (!all_cases()) GTEST_SKIP() << "large: scripts/check cases runs it";
     const Mesh mesh = make_wavy_cube({.resolution = 1024});
     const ReferenceDetail detail = encoded(mesh);
     EXPECT_EQ(detail.patches.levels, 10u);

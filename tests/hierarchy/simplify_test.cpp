@@ -1,4 +1,5 @@
 // Levels for any mesh: counts are reached, what is closed stays closed, and the error is what it says.
+#include "cases.h"
 #include "filigree/hierarchy/simplify.h"
 
 #include "filigree/mesh/mesh_distance.h"
@@ -216,6 +217,7 @@ TEST(Simplify, FansTakeNoQuadraticTime) {
 
 /// A large mesh: still closed and oriented, and threads change nothing.
 TEST(Simplify, TwoMillionTrianglesStayClosed) {
+    if (!all_cases()) GTEST_SKIP() << "large: scripts/check cases runs it";
     const Mesh mesh = make_wavy_cube({.resolution = 410}); // 2,017,200 triangles
     const std::vector<Triangle> triangles = triangulate(mesh).triangles;
     const Simplified one = simplify(mesh.positions, triangles, {.target_vertices = 60'000}, RunContext(1));
