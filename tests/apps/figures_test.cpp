@@ -83,7 +83,7 @@ TEST_F(Figures, EveryFigureBecomesAFile) {
         EXPECT_EQ(bytes.substr(16, 4), std::string("\0\0\0\xb4", 4)) << figure.at("name");
     }
     EXPECT_EQ(names, in_order);
-    EXPECT_EQ(std::distance(std::filesystem::directory_iterator(path("out")), {}), in_order.size());
+    EXPECT_EQ(std::size_t(std::distance(std::filesystem::directory_iterator(path("out")), {})), in_order.size());
 }
 
 TEST_F(Figures, SimpleTriangleObeysTheInverseLaw) {

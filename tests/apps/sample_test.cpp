@@ -1,5 +1,6 @@
 // filigree sample, as a user runs it.
 #include "apps/program.h"
+#include "cases.h"
 
 #include <gtest/gtest.h>
 
@@ -42,6 +43,7 @@ TEST_F(Sample, AnOpenMeshIsTakenByWindingNumbers) {
 }
 
 TEST_F(Sample, ThePictureStandsAsTheFileDoes) {
+    if (!all_cases()) GTEST_SKIP() << "as Remesh.PictureIsDrawn: scripts/check cases runs it";
     ok({"make", "wavy-cube", "-o", "cube.stl", "--resolution", "8", "--quiet"}); // says nothing; STL has z up
     const Ran ran = run({"sample", "cube.stl", "-o", "points.ply", "--count", "50", "--picture", "p.png", "--json"});
     if (ran.code == 5) GTEST_SKIP() << "no OpenGL";
