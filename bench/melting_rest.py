@@ -44,3 +44,5 @@ new = (surfaces[-1].scalars["origin"] < 0).mean()
 moved = [filigree.distances_to_surface(b, a) / cell for a, b in zip(surfaces[-21:], surfaces[-20:])]
 print(f"new vertices at the end  {100 * new:.0f} %")
 print(f"from frame to frame      {max(m.max() for m in moved):.4f} cells at most, {sum(m.mean() for m in moved) / len(moved):.5f} on average")
+below = -surfaces[-1].world_vertices[:, 1].min() * CELL / cell
+print(f"below the plate          {below:.1f} spacings of the particles at the end")

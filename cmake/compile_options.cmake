@@ -2,13 +2,13 @@
 add_library(filigree_options INTERFACE)
 # GCC looks for memory to reuse from 128 MB on, which the precompiled headers alone take: up to a fifth of its time. Here
 # it takes half of a core's share of the memory there is first: 0.6 to 2 GB (in kB).
-cmake_host_system_information(RESULT unsearched QUERY TOTAL_PHYSICAL_MEMORY) # MB
+cmake_host_system_information(RESULT heap_before_search QUERY TOTAL_PHYSICAL_MEMORY) # MB
 cmake_host_system_information(RESULT cores QUERY NUMBER_OF_LOGICAL_CORES)
-math(EXPR unsearched "${unsearched} * 1000 / (2 * ${cores})")
-if(unsearched GREATER 2000000)
-  set(unsearched 2000000)
-elseif(unsearched LESS 600000)
-  set(unsearched 600000)
+math(EXPR heap_before_search "${heap_before_search} * 1000 / (2 * ${cores})")
+if(heap_before_search GREATER 2000000)
+  set(heap_before_search 2000000)
+elseif(heap_before_search LESS 600000)
+  set(heap_before_search 600000)
 endif()
 target_compile_options(filigree_options INTERFACE
   -Wall -Wextra -Wno-restrict -Wno-array-bounds -Wno-stringop-overflow -Wno-stringop-overread -Wno-free-nonheap-object  # false alarms about std::string and std::vector, GCC 12
@@ -16,7 +16,7 @@ target_compile_options(filigree_options INTERFACE
   -Wshadow -Wconversion -Wno-sign-conversion -Wno-psabi
   -ffp-contract=off      # no fused multiply-add: the same bytes whatever the processor has
   $<$<BOOL:${FILIGREE_STRICT}>:-Werror>
-  $<$<CXX_COMPILER_ID:GNU>:--param=ggc-min-heapsize=${unsearched}>)
+  $<$<CXX_COMPILER_ID:GNU>:--param=ggc-min-heapsize=${heap_before_search}>)
 if(CMAKE_UNITY_BUILD) # sources look like headers then
   target_compile_options(filigree_options INTERFACE -Wno-subobject-linkage)
 endif()

@@ -33,7 +33,7 @@ State first_state() {
     return state_of_shape(std::move(state), Shape{}, RunContext()).value();
 }
 
-Workbench::Workbench(State start, QObject* parent) : QObject(parent), impl_(std::make_unique<Impl>()) {
+Workbench::Workbench(State start) : impl_(std::make_unique<Impl>()) {
     connect(&document_, &Document::changed, this, &Workbench::follow_document);
     connect(&playback_, &Playback::moved, this, &Workbench::follow_playback);
     connect(&playback_, &Playback::state_changed, this, [this] {

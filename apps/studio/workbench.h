@@ -31,7 +31,7 @@ State first_state();
 class Workbench : public QObject {
     Q_OBJECT
 public:
-    explicit Workbench(State start = first_state(), QObject* parent = nullptr);
+    explicit Workbench(State start = first_state());
     ~Workbench() override;
 
     Document& document() { return document_; }

@@ -1,5 +1,5 @@
-// Opens the page that own_files.mjs makes of a painted tube, from disk and, with FILIGREE_ALL_CASES set, from servers:
-// its coarsest level and its finest show the picture's stripes where they belong, and the other material's colour.
+// Opens the page that own_files.mjs makes of a painted tube, from disk and from a server: its coarsest level and its finest
+// show the picture's stripes where they belong, and the other material's colour.
 // Usage: node textured_page.mjs FOLDER [--pictures FOLDER] [--any]
 // --any: another model; that every material with a picture shows one is all that is asked then.
 import { mkdirSync } from 'node:fs';
@@ -65,10 +65,8 @@ const browser = await open_browser();
 const server = await serve(folder), whole = await serve(folder, {}, { has_ranges: false });
 try {
     await visit(browser, pathToFileURL(join(resolve(folder), 'index.html')).href, 'disk');
-    if (process.env.FILIGREE_ALL_CASES) {
-        await visit(browser, `${server.url}/index.html`, 'ranges');
-        await visit(browser, `${whole.url}/index.html`, 'whole');
-    }
+    await visit(browser, `${server.url}/index.html`, 'ranges');
+    await visit(browser, `${whole.url}/index.html`, 'whole');
 } finally {
     await browser.close();
     server.close();
