@@ -20,6 +20,15 @@ target_compile_options(filigree_options INTERFACE
 if(CMAKE_UNITY_BUILD) # sources look like headers then
   target_compile_options(filigree_options INTERFACE -Wno-subobject-linkage)
 endif()
+# All of a target is compiled as one where a unity build is; else the headers named are precompiled. For one unit that
+# would cost more than it saves.
+function(compile_as_one target)
+  if(CMAKE_UNITY_BUILD)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD_BATCH_SIZE 0)
+  else()
+    target_precompile_headers(${target} PRIVATE ${ARGN})
+  endif()
+endfunction()
 if(BUILD_SHARED_LIBS) # calls of our own stay direct, as in a static library
   target_compile_options(filigree_options INTERFACE -fno-semantic-interposition)
   target_link_options(filigree_options INTERFACE -Wl,-Bsymbolic-functions)

@@ -14,7 +14,7 @@ namespace filigree::cli {
 
 namespace {
 
-PictureSize parse_size(const std::string& text) {
+PictureSize parse_picture_size(const std::string& text) {
     PictureSize size;
     const char* end = text.data() + text.size();
     const auto [x, first] = std::from_chars(text.data(), end, size.width);
@@ -84,7 +84,8 @@ void check(const RenderOptions& options, bool is_film) {
 }
 
 OptionList camera_options(RenderOptions& options) {
-    return {Option("--size", Option::EachText([&](const std::string& text) { options.size = parse_size(text); }),
+    return {Option("--size",
+                   Option::EachText([&](const std::string& text) { options.size = parse_picture_size(text); }),
                    "Width and height in pixels, such as 1920x1080 (unset: by what is drawn)"),
             view_option(options.view, "Where to look from (unset: iso)"),
             found_up_option(options.up),

@@ -147,7 +147,7 @@ std::uint64_t memory_to_use() {
     return std::min(std::min(free, kNone / 1024) * 1024, limit) / 4 * 3;
 }
 
-std::uint64_t parse_size(const std::string& text) {
+std::uint64_t parse_memory_size(const std::string& text) {
     double number = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
     if (error != std::errc()) return 0;

@@ -11,7 +11,7 @@ namespace filigree::cli {
 std::uint64_t memory_to_use();
 
 /// Bytes of "8G", "500M" or "1073741824" (K, M, G, T: powers of 1024, "GiB" too); 0: not a size.
-std::uint64_t parse_size(const std::string& text);
+std::uint64_t parse_memory_size(const std::string& text);
 
 /// From here on arrays of 4 MiB and more that would make all of them larger than `limit` bytes lie in an unnamed file
 /// in `folder`. It goes with the program, however that ends. A full disk is std::bad_alloc; where no such file can be

@@ -86,7 +86,7 @@ void report_fidelity(const StrippedToFidelity& result, const StripCommandOptions
 /// Arrays beyond the memory that may be used go into a file beside the output.
 void bound_memory(const StripCommandOptions& options) {
     const bool is_asked = !options.memory.empty();
-    const std::uint64_t limit = is_asked ? parse_size(options.memory) : memory_to_use();
+    const std::uint64_t limit = is_asked ? parse_memory_size(options.memory) : memory_to_use();
     if (limit == 0) refuse("--memory: '" + options.memory + "' is not a size; give one such as 8G or 500M.");
     const std::filesystem::path folder = std::filesystem::path(options.output).parent_path();
     spill_beyond(limit, folder);

@@ -402,7 +402,7 @@ TEST_F(Simulate, WrongTypesAndRangesAreNamed) {
     refused(kBody + "[[pair]]\nfirst = \"bar\"\nsecond = \"bar\"\nfriction = -1\n", {"bad.toml:6:", "friction"});
     refused(kBody + "[[hand]]\ntarget = [0, 0, 0]\n", {"bad.toml:3:", "point and vertex"});
     refused(kBody + "[simulation]\nframes = 1\nduration = 2\n", {"bad.toml:5:", "frames and duration"});
-    refused(kBody + "[simulation]\nmode = \"fast\"\n", {"bad.toml:4:", "automatic, explicit, descent"});
+    refused(kBody + "[simulation]\nmode = \"fast\"\n", {"bad.toml:4:", "auto, explicit, descent"});
 }
 
 TEST_F(Simulate, WhatIsNoSceneIsRefused) {

@@ -326,6 +326,7 @@ TEST_F(Panels, DefectsAreListed) {
 }
 
 TEST_F(Panels, NothingIsCutOff) {
+    window->viewport().setUpdatesEnabled(false); // its pictures do not matter here
     get<QToolButton>("body.advanced").setChecked(true);
     ViewSettings settings;
     settings.clip = settings.inside_points = true;
@@ -356,6 +357,7 @@ TEST_F(Panels, NothingIsCutOff) {
         }
     }
     get<QToolButton>("body.advanced").setChecked(false);
+    window->viewport().setUpdatesEnabled(true);
 }
 
 TEST_F(Panels, TheColumnShowsWhatTheScriptNames) {

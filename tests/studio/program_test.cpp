@@ -49,12 +49,12 @@ std::size_t color_count(const Picture& picture) {
 }
 
 TEST_F(Program, SavesAScreenshotOfTheSizeAskedFor) {
-    const Ran ran = run({"--screenshot", "window.png", "--size", "1000x700", "--panel", "detail"});
+    const Ran ran = run({"--screenshot", "window.png", "--size", "700x520", "--panel", "detail"});
     ASSERT_EQ(ran.code, 0) << ran.errors;
     const Result<Picture> picture = read_picture(file("window.png"));
     ASSERT_TRUE(picture.ok()) << picture.error().message;
-    EXPECT_EQ(picture->width, 1000u);
-    EXPECT_EQ(picture->height, 700u);
+    EXPECT_EQ(picture->width, 700u);
+    EXPECT_EQ(picture->height, 520u);
     EXPECT_GT(color_count(*picture), 500u);
 }
 
@@ -66,14 +66,14 @@ TEST_F(Program, PullsSavesAndExportsByAScript) {
                       "save pulled.fil\nsave_mesh pulled.obj\nsave_driver driver.ply\n"
                       "do edit.undo\ndo edit.undo\nexpect deform.bend 0\n"
                       "screenshot \"after the pull.png\"\n");
-    const Ran ran = run({"--script", "tour.txt", "--size", "900x620"});
+    const Ran ran = run({"--script", "tour.txt", "--size", "700x520"});
     ASSERT_EQ(ran.code, 0) << ran.errors;
     for (const char* name : {"pulled.fil", "pulled.obj", "driver.ply", "after the pull.png"})
         EXPECT_TRUE(fs::exists(file(name))) << name;
 }
 
 TEST_F(Program, SimulatesFramesForAScreenshot) {
-    const Ran ran = run({"--screenshot", "body.png", "--panel", "body", "--frames", "3", "--size", "900x620"});
+    const Ran ran = run({"--screenshot", "body.png", "--panel", "body", "--frames", "3", "--size", "700x520"});
     ASSERT_EQ(ran.code, 0) << ran.errors;
     EXPECT_TRUE(fs::exists(file("body.png")));
 }

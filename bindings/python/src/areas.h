@@ -2,6 +2,9 @@
 #pragma once
 
 #include <pybind11/pybind11.h>
+// Here, for all: a source that lacks a converter compiles, and fails when it is called.
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 
 namespace filigree::python {
 

@@ -6,8 +6,6 @@
 #include <filigree/io/gltf_skin_export.h>
 #include <filigree/io/point_cache.h>
 
-#include <pybind11/stl/filesystem.h>
-
 namespace filigree::python {
 
 namespace {

@@ -4,8 +4,6 @@
 #include <filigree/io/model_file.h>
 #include <filigree/io/point_cache.h>
 
-#include <pybind11/stl/filesystem.h>
-
 namespace filigree::python {
 
 namespace {

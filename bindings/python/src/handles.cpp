@@ -5,8 +5,6 @@
 #include <filigree/io/handles_file.h>
 #include <filigree/mesh/triangulate.h>
 
-#include <pybind11/stl/filesystem.h>
-
 #include <mutex>
 #include <numbers>
 

@@ -7,8 +7,6 @@
 #include <filigree/render/camera.h>
 #include <filigree/render/color_map.h>
 
-#include <pybind11/stl/filesystem.h>
-
 #include <mutex>
 
 namespace filigree::python {

@@ -3,8 +3,6 @@
 #include <filigree/scene/melting_surface.h>
 #include <filigree/scene/scene_run.h>
 
-#include <pybind11/stl/filesystem.h>
-
 #include <mutex>
 
 namespace filigree::python {

@@ -28,7 +28,6 @@ SingularValues<typename Matrix::Scalar> decompose(const Matrix& matrix) {
 
 SymmetricEigen<float, 3> symmetric_eigen(const Mat3f& matrix) { return eigen_of(matrix); }
 SymmetricEigen<double, 3> symmetric_eigen(const Mat3d& matrix) { return eigen_of(matrix); }
-SymmetricEigen<double, 4> symmetric_eigen(const Eigen::Matrix4d& matrix) { return eigen_of(matrix); }
 SymmetricEigen<double, Eigen::Dynamic> symmetric_eigen(const Eigen::MatrixXd& matrix) { return eigen_of(matrix); }
 
 Vec3f symmetric_eigenvalues(const Mat3f& matrix) {
@@ -42,6 +41,13 @@ Vec3d singular_values_only(const Mat3d& matrix) {
     const Eigen::JacobiSVD<Mat3d> svd(matrix);
     if (svd.info() != Eigen::Success) return Vec3d::Constant(std::numeric_limits<double>::quiet_NaN());
     return svd.singularValues();
+}
+
+Mat3d nearest_rotation(const Mat3d& matrix) {
+    const SingularValues<double> svd = singular_values(matrix);
+    Vec3d sign = Vec3d::Ones();
+    sign[2] = (svd.u * svd.v.transpose()).determinant() < 0 ? -1 : 1;
+    return svd.u * sign.asDiagonal() * svd.v.transpose();
 }
 
 Vec3d solve_semidefinite(const Mat3d& matrix, const Vec3d& right) { return matrix.ldlt().solve(right); }

@@ -17,7 +17,6 @@ struct SymmetricEigen {
 };
 SymmetricEigen<float, 3> symmetric_eigen(const Mat3f& matrix);
 SymmetricEigen<double, 3> symmetric_eigen(const Mat3d& matrix);
-SymmetricEigen<double, 4> symmetric_eigen(const Eigen::Matrix4d& matrix);
 SymmetricEigen<double, Eigen::Dynamic> symmetric_eigen(const Eigen::MatrixXd& matrix);
 /// The eigenvalues alone, which is twice as fast; they may differ from the above in their last bits.
 Vec3f symmetric_eigenvalues(const Mat3f& matrix);
@@ -33,6 +32,10 @@ SingularValues<float> singular_values(const Mat3f& matrix);
 SingularValues<double> singular_values(const Mat3d& matrix);
 /// s alone; NaN where the matrix is not finite.
 Vec3d singular_values_only(const Mat3d& matrix);
+
+/// The rotation R, always proper, with the largest trace(R^T matrix) [Kabsch 1976]; the identity where the matrix is not
+/// finite.
+Mat3d nearest_rotation(const Mat3d& matrix);
 
 /// How oriented areas, and so normals, are transformed by a: det(a) a^-T, defined for singular a too.
 inline Mat3d cofactor(const Mat3d& a) {

@@ -9,7 +9,7 @@
 //   rotational part of deformations: rotations start from those of the round before, so flat and inverted
 //   neighbourhoods keep a sensible one. Ours takes Newton's step where the energy is convex, which on flat
 //   neighbourhoods needs 2 steps where the paper's step halves the error, and leaves the saddle points (half turns) by
-//   [Horn 1987] Closed-form solution of absolute orientation using unit quaternions.
+//   [Kabsch 1976] A solution for the best rotation to relate two sets of vectors.
 //   [Nesterov 1983], [O'Donoghue 2015] Momentum: a round starts from where the last ones were heading, and where that
 //   raises the energy it is undone and the momentum starts anew. A third to a tenth of the rounds.
 // New solves start from the last solution moved by the best rigid motion of the handles, so a rigid motion is exact.
@@ -70,18 +70,9 @@ SparseMatrix edge_weights(std::span<const Vec3f> positions, std::span<const Tria
     return weights;
 }
 
-/// The rotation R (always proper) with the largest trace(R^T A), in closed form [Horn 1987].
-Eigen::Quaterniond closed_form_rotation(const Mat3d& A) {
-    Eigen::Matrix4d K;
-    const Mat3d At = A.transpose();
-    const Vec3d axial(At(1, 2) - At(2, 1), At(2, 0) - At(0, 2), At(0, 1) - At(1, 0));
-    K << A.trace(), axial.transpose(), axial, A + At - A.trace() * Mat3d::Identity();
-    const Eigen::Vector4d q = symmetric_eigen(K).vectors.col(3);
-    return Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized();
-}
-
-/// The same near `start`, which decides where A leaves a choice (a flat, thin or collapsed neighbourhood).
-/// With B = A R^T, turning R by a small omega gains omega . g - omega . H omega / 2, g the axial part of B.
+/// The rotation R with the largest trace(R^T A), near `start`, which decides where A leaves a choice (a flat, thin or
+/// collapsed neighbourhood). With B = A R^T, turning R by a small omega gains omega . g - omega . H omega / 2, g the
+/// axial part of B.
 Eigen::Quaterniond closest_rotation(const Mat3d& A, const Eigen::Quaterniond& start) {
     const double scale = A.norm();
     if (!(scale > 0)) return start;
@@ -111,7 +102,7 @@ Eigen::Quaterniond closest_rotation(const Mat3d& A, const Eigen::Quaterniond& st
         if (convex) return q;
         break; // at rest, but not at the top: a saddle
     }
-    return closed_form_rotation(A);
+    return Eigen::Quaterniond(nearest_rotation(A));
 }
 
 /// Where what turned from `before` to `now` would be after turning further by `momentum` times as much.

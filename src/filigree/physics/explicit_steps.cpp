@@ -29,6 +29,8 @@ constexpr float kNoisyDelay = 0.05f; ///< substeps
 /// A few crushed cells are little of a large body; forces change there as fast as steps follow.
 constexpr float kCrushedVolume = 0.1f;     ///< of a cell, of its volume at rest
 constexpr float kCrushedDelay = 0.1f;      ///< substeps
+/// Clay that is thrown at the ground would throw bits off, but for damping of waves of a few spacings [von Neumann 1950].
+constexpr float kFlowingDelay = 0.25f;     ///< of the time that a wave takes across a spacing
 constexpr float kLightDelay = 0.5f;        ///< substeps: of a piece's light corners, which would swing for ever ...
 constexpr float kFreeWay = 0.05f;          ///< spacings a substep: ... as far as they move faster
 constexpr unsigned kExplicitLimit = 20000; ///< substeps a frame, whatever was asked for
@@ -249,11 +251,18 @@ private:
         stable_step_ = std::min(stable_step_, std::max(opening_step, shortest));
     }
 
+    /// s of internal damping, unless more is needed.
+    static float usual_delay(const Body& body) {
+        const auto asked = float(body.material.internal_damping);
+        if (body.material.model != MaterialModel::meshfree || !body.material.is_plastic()) return asked;
+        return std::max(asked, kFlowingDelay * float(body.spacing() / pressure_wave_speed(body.material)));
+    }
+
     /// s of internal damping.
     float find_delay(std::size_t b, float dt) {
         const BodyState& body = bodies_[b];
         Vibration& vibration = vibrations_[b];
-        const auto usual = float(body.body->material.internal_damping);
+        const float usual = usual_delay(*body.body);
         if (!std::exchange(vibration.has_forces, true)) return usual;
         const float crushed = elastic_[b].least_volume_ratio < kCrushedVolume ? kCrushedDelay * dt : 0;
         if (vibration.before.size() == 0) {

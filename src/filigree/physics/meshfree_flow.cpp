@@ -20,7 +20,8 @@ constexpr float kMostFlowMeasured = 2.5f;  // ... of any single particle
 constexpr float kSlipToRenew = 0.5f;       // spacings: of a neighbour from where F says
 constexpr std::size_t kShareToRenew = 100; // renew when one particle of this many is distorted
 constexpr double kMostHeatSteps = 16;
-constexpr float kLeastMelt = 0.8f;       // volume ratio: below it a renewed melt forgets its shape
+constexpr float kLeastSolid = 0.2f;      // volume ratio: below it what is renewed forgets its shape ...
+constexpr float kLeastMelt = 0.8f;       // ... and a melt does
 constexpr float kMostCorrection = 0.02f; // of a volume ratio, a renewal
 
 /// Of a pair, m: V / sum of weights over the mean square of offsets is the Laplacian's scale; both ends' mean.
@@ -141,22 +142,23 @@ void Flow::take_gradients(const MlsNeighbours& neighbours, const Float4* positio
 }
 
 void Flow::begin_anew(const MlsNeighbours& neighbours, const RunContext& context) {
-    if (body_.material.melts()) correct_volume(neighbours, context);
+    correct_volume(neighbours, context);
     renewed_ = stored_;
 }
 
-/// The product of gradients over many renewals drifts from the volume there is. Inside, and wherever particles are
-/// denser than at the start, the kernel's sum tells how far. At its surface a melt bears no tension (drops come apart),
-/// and a neighbourhood that was turned inside out is a round one from now on.
+/// A neighbourhood that was crushed flat or turned inside out is a round one from now on: remembered as it was, it would
+/// push its neighbours away for ever. And of melts the product of gradients over many renewals drifts from the volume
+/// there is. Inside, and wherever particles are denser than at the start, the kernel's sum tells how far. At its surface
+/// a melt bears no tension (drops come apart).
 void Flow::correct_volume(const MlsNeighbours& neighbours, const RunContext& context) {
     parallel_for(context, body_.particle_count(), kMeshfreeFlowGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-            const float part = melted(i);
-            if (!(part > 0)) continue;
-            const float exposure = neighbours.exposure[i], J = stored_[i].determinant();
+            const float part = melted(i), exposure = neighbours.exposure[i], J = stored_[i].determinant();
+            const bool is_solid = !(part > 0);
+            if (is_solid && J > kLeastSolid) continue;
             float there = std::clamp(1 / neighbours.density[i], kLeastMelt, 1 / kLeastMelt);
             if (exposure > 0) there = std::min(there, 1.f);
-            if (!(J > kLeastMelt)) {
+            if (is_solid || !(J > kLeastMelt)) {
                 stored_[i] = Mat3f::Identity() * std::cbrt(there);
                 continue;
             }

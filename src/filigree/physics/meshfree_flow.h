@@ -30,7 +30,7 @@ public:
 
     /// Before neighbourhoods are renewed: D takes up the gradients there are.
     void take_gradients(const MlsNeighbours& neighbours, const Float4* position, const RunContext& context);
-    /// After that: the volume of melts is set right.
+    /// After that: what was crushed is round, and the volume of melts is set right.
     void begin_anew(const MlsNeighbours& neighbours, const RunContext& context);
 
     /// What is remembered.

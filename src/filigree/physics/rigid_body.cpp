@@ -22,14 +22,6 @@ Mat3d turned(const RigidPose& pose, const Mat3d& at_rest) {
     return r * at_rest * r.transpose();
 }
 
-/// Rotation nearest to the moment of places times places at rest [Kabsch 1976].
-Mat3d nearest_rotation(const Mat3d& moment) {
-    const SingularValues<double> svd = singular_values(moment);
-    Vec3d sign = Vec3d::Ones();
-    sign[2] = (svd.u * svd.v.transpose()).determinant() < 0 ? -1 : 1;
-    return svd.u * sign.asDiagonal() * svd.v.transpose();
-}
-
 Vec3d centre_of(const Vectors& positions, std::span<const float> mass) {
     Vec3d sum = Vec3d::Zero();
     double all = 0;

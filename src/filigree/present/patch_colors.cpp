@@ -1,5 +1,7 @@
 #include "filigree/present/patch_colors.h"
 
+#include "filigree/render/color_map.h"
+
 #include <algorithm>
 #include <map>
 

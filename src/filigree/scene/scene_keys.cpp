@@ -41,7 +41,7 @@ constexpr KeyRule kKeys[] = {
     from(1, 1e6, "simulation", "frames", whole, "", "120", "frames to compute; the start is one more in the output"),
     above(0, 1e6, "simulation", "duration", number, "s", "", "or how long to compute"),
     from(10, 1e4, "simulation", "frames_per_second", number, "1/s", "60", "of the output"),
-    one_of("automatic explicit descent", "simulation", "mode", "automatic",
+    one_of("auto explicit descent", "simulation", "mode", "auto",
            "how time is stepped: explicit where most_substeps are enough, else descent; or always one of them"),
     from(1, 1e5, "simulation", "most_substeps", whole, "", "256", "a frame, explicit"),
     from(1, 1000, "simulation", "descent_substeps", whole, "", "4", "a frame, descent"),
