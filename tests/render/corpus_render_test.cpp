@@ -18,7 +18,8 @@ TEST(CorpusRender, EveryMeshThatCanBeReadIsDrawn) {
     Result<Renderer> renderer = Renderer::create();
     ASSERT_TRUE(renderer.ok());
     const RunContext context;
-    const std::uintmax_t most_bytes = all_cases() ? 20'000'000 : 400'000; // the large ones hold nothing that the small ones lack
+    const std::uintmax_t most_bytes =
+        all_cases() ? 20'000'000 : 400'000; // the large ones hold nothing that the small ones lack
     std::size_t drawn = 0;
     for (const CorpusRow& row : corpus) {
         std::error_code missing;
