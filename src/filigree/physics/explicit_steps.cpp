@@ -27,9 +27,10 @@ constexpr float kCalm = 0.05f;       ///< that change, as a speed, in parts of t
 constexpr float kNoisy = 0.15f;      ///< ... from which on damping is full
 constexpr float kNoisyDelay = 0.05f; ///< substeps
 /// A few crushed cells are little of a large body; forces change there as fast as steps follow.
-constexpr float kCrushedVolume = 0.1f;     ///< of a cell, of its volume at rest
-constexpr float kCrushedDelay = 0.1f;      ///< substeps
-/// Clay that is thrown at the ground would throw bits off, but for damping of waves of a few spacings [von Neumann 1950].
+constexpr float kCrushedVolume = 0.1f; ///< of a cell, of its volume at rest
+constexpr float kCrushedDelay = 0.1f;  ///< substeps
+/// Clay that is thrown at the ground would throw bits off, but for damping of waves of a few spacings [von Neumann
+/// 1950].
 constexpr float kFlowingDelay = 0.25f;     ///< of the time that a wave takes across a spacing
 constexpr float kLightDelay = 0.5f;        ///< substeps: of a piece's light corners, which would swing for ever ...
 constexpr float kFreeWay = 0.05f;          ///< spacings a substep: ... as far as they move faster
