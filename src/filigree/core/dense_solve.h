@@ -33,8 +33,8 @@ SingularValues<double> singular_values(const Mat3d& matrix);
 /// s alone; NaN where the matrix is not finite.
 Vec3d singular_values_only(const Mat3d& matrix);
 
-/// The rotation R, always proper, with the largest trace(R^T matrix) [Kabsch 1976]; the identity where the matrix is not
-/// finite.
+/// The rotation R, always proper, with the largest trace(R^T matrix) [Kabsch 1976]; the identity where the matrix is
+/// not finite.
 Mat3d nearest_rotation(const Mat3d& matrix);
 
 /// How oriented areas, and so normals, are transformed by a: det(a) a^-T, defined for singular a too.

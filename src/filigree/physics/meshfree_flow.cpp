@@ -146,10 +146,10 @@ void Flow::begin_anew(const MlsNeighbours& neighbours, const RunContext& context
     renewed_ = stored_;
 }
 
-/// A neighbourhood that was crushed flat or turned inside out is a round one from now on: remembered as it was, it would
-/// push its neighbours away for ever. And of melts the product of gradients over many renewals drifts from the volume
-/// there is. Inside, and wherever particles are denser than at the start, the kernel's sum tells how far. At its surface
-/// a melt bears no tension (drops come apart).
+/// A neighbourhood that was crushed flat or turned inside out is a round one from now on: remembered as it was, it
+/// would push its neighbours away for ever. And of melts the product of gradients over many renewals drifts from the
+/// volume there is. Inside, and wherever particles are denser than at the start, the kernel's sum tells how far. At its
+/// surface a melt bears no tension (drops come apart).
 void Flow::correct_volume(const MlsNeighbours& neighbours, const RunContext& context) {
     parallel_for(context, body_.particle_count(), kMeshfreeFlowGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
