@@ -3,6 +3,7 @@
 
 #include "physics/simulation_scenes.h"
 #include "physics/test_bodies.h"
+#include "threads.h"
 
 #include <thread>
 
