@@ -21,7 +21,7 @@ Pose pose_of_mesh(const Mesh& moved, const Vec3d& origin);
 /// Level 0 for others to move: without scalars of the mesh's own that pose_of_mesh would take for gradients.
 Mesh driver_mesh(const Model& model);
 /// The same of a coarsest level, as level_mesh(model, 0) gives it.
-Mesh driver_mesh(Mesh level);
+Mesh driver_mesh(Mesh driver);
 
 /// Level 0 as the pose moves it, with the scalars that pose_of_mesh reads where the pose has gradients, and without the
 /// normals of the driver at rest. pose: of this model (check_pose).

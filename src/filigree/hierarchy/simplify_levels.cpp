@@ -20,7 +20,7 @@ std::size_t default_base(std::size_t vertices) {
     return std::min(vertices, std::max<std::size_t>(50, vertices / 20));
 }
 
-Level make_level(std::vector<Triangle> triangles, std::size_t vertex_count) {
+Level make_level(const std::vector<Triangle>& triangles, std::size_t vertex_count) {
     Level level;
     std::vector<Index> local(vertex_count, kNoIndex);
     for (const Triangle& t : triangles)

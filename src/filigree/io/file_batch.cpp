@@ -193,7 +193,7 @@ public:
         const std::vector<std::string> names = names_in(path_ / kNew);
         if (Status ready = prepare(names); !ready) return ready;
         for (const std::string& name : names) {
-            const Status placed = place(name);
+            Status placed = place(name);
             if (placed) continue;
             take_back();
             return placed;

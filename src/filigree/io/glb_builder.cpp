@@ -45,12 +45,12 @@ std::size_t GlbBuilder::add_accessor(const GltfAccessor& accessor, std::size_t v
     return json["accessors"].size() - 1;
 }
 
-std::size_t GlbBuilder::add(GltfAccessor accessor, std::size_t byte_count, Producer producer) {
+std::size_t GlbBuilder::add(const GltfAccessor& accessor, std::size_t byte_count, Producer producer) {
     const std::size_t view = add_part({byte_count, {}, std::move(producer)}, accessor.target);
     return add_accessor(accessor, view, 0);
 }
 
-std::size_t GlbBuilder::append(GltfAccessor accessor, std::string_view bytes) {
+std::size_t GlbBuilder::append(const GltfAccessor& accessor, std::string_view bytes) {
     Part& part = parts_.back();
     const std::size_t before = padded(part.byte_count);
     part.bytes.resize(before);
@@ -61,8 +61,8 @@ std::size_t GlbBuilder::append(GltfAccessor accessor, std::string_view bytes) {
     return add_accessor(accessor, parts_.size() - 1, before);
 }
 
-std::size_t GlbBuilder::add(GltfAccessor accessor, std::string bytes) {
-    const std::size_t number = add(std::move(accessor), bytes.size(), Producer{});
+std::size_t GlbBuilder::add(const GltfAccessor& accessor, std::string bytes) {
+    const std::size_t number = add(accessor, bytes.size(), Producer{});
     parts_.back().bytes = std::move(bytes);
     return number;
 }
@@ -72,18 +72,18 @@ std::size_t GlbBuilder::add_view(std::string bytes) {
     return add_part({count, std::move(bytes), {}}, GltfTarget::none);
 }
 
-std::size_t GlbBuilder::add_positions(std::span<const Vec3f> given) {
-    std::vector<Vec3f> positions(given.begin(), given.end());
-    Box box = bounds(positions);
+std::size_t GlbBuilder::add_positions(std::span<const Vec3f> positions) {
+    std::vector<Vec3f> rounded(positions.begin(), positions.end());
+    Box box = bounds(rounded);
     if (rounds_positions_ && !box.empty() && box.size().maxCoeff() > 0) {
         const float step = std::ldexp(1.0f, std::ilogb(box.size().maxCoeff()) - kPositionBits); // exact in floats
-        for (Vec3f& p : positions) p = (p / step).array().round() * step;
-        box = bounds(positions);
+        for (Vec3f& p : rounded) p = (p / step).array().round() * step;
+        box = bounds(rounded);
     }
-    GltfAccessor accessor{.type = "VEC3", .target = GltfTarget::vertices, .count = positions.size()};
+    GltfAccessor accessor{.type = "VEC3", .target = GltfTarget::vertices, .count = rounded.size()};
     accessor.min.assign(box.min.data(), box.min.data() + 3);
     accessor.max.assign(box.max.data(), box.max.data() + 3);
-    return add(std::move(accessor), bytes_of(std::span<const Vec3f>(positions)));
+    return add(accessor, bytes_of(std::span<const Vec3f>(rounded)));
 }
 
 std::size_t GlbBuilder::add_vectors(std::span<const Vec3f> vectors, GltfTarget target) {
@@ -107,7 +107,7 @@ std::size_t GlbBuilder::add_scalars(std::span<const float> values, GltfTarget ta
         accessor.min = {*least};
         accessor.max = {*most};
     }
-    return add(std::move(accessor), bytes_of(values));
+    return add(accessor, bytes_of(values));
 }
 
 std::string GlbBuilder::json_chunk() const {

@@ -44,11 +44,11 @@ public:
     Json json = Json::object();
 
     /// An accessor over bytes that are kept until the file is written. Returns its number.
-    std::size_t add(GltfAccessor accessor, std::string bytes);
+    std::size_t add(const GltfAccessor& accessor, std::string bytes);
     /// The same at the end of the buffer view that was added last, for many small ones (none of them vertices).
-    std::size_t append(GltfAccessor accessor, std::string_view bytes);
+    std::size_t append(const GltfAccessor& accessor, std::string_view bytes);
     /// Over bytes that are made while the file is written; the producer must give exactly `byte_count`.
-    std::size_t add(GltfAccessor accessor, std::size_t byte_count, Producer producer);
+    std::size_t add(const GltfAccessor& accessor, std::size_t byte_count, Producer producer);
     /// A picture's bytes as a buffer view. Returns the view's number.
     std::size_t add_view(std::string bytes);
 

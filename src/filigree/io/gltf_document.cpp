@@ -398,7 +398,7 @@ std::filesystem::path Document::beside(const Value& uri, const std::string& name
     for (const fs::path& part : fs::path(name))
         if (part == "..") uri.fail(in_quotes(name) + " leads out of its folder" + advice);
     std::error_code failed;
-    const fs::path path = fs::canonical(folder_ / name, failed);
+    fs::path path = fs::canonical(folder_ / name, failed);
     if (failed) uri.fail("there is no file " + in_quotes(name) + " beside it.", ErrorCode::not_found);
     const fs::path folder = fs::canonical(folder_, failed);
     const auto [in_folder, in_path] = std::mismatch(folder.begin(), folder.end(), path.begin(), path.end());

@@ -107,7 +107,7 @@ private:
     std::optional<fs::path> find(std::string_view name, const fs::path& beside, Trouble& missing) {
         const std::string_view bare = trimmed(name.substr(0, std::min(name.find(" #"), name.find("\t#"))));
         for (const std::string_view tried : {without_quotes(name), without_quotes(bare)}) {
-            const std::optional<fs::path> path = inside(tried, beside);
+            std::optional<fs::path> path = inside(tried, beside);
             if (path && is_file(*path)) return path;
         }
         (inside(without_quotes(bare), beside) ? missing : outside_).add(bare);

@@ -63,7 +63,7 @@ std::optional<MeshFormat> sniff_format(std::string_view bytes) {
 
 Result<MeshFormat> decide_format(std::string_view bytes, const std::string& name) {
     if (const auto format = sniff_format(bytes)) return *format;
-    const Result<MeshFormat> by_name = mesh_format(name);
+    Result<MeshFormat> by_name = mesh_format(name);
     if (by_name.ok()) return by_name;
     if (is_obj(bytes)) return MeshFormat::obj;
     return Error{ErrorCode::unsupported, name +

@@ -29,7 +29,7 @@ PatchGrid sample_patches(const SurfaceMap& map, const BaseQuads& base, const Sur
                          const RunContext& context);
 
 /// One level more: what is new begins between its neighbours, walked onto the surface.
-PatchGrid halve_grid(const PatchGrid& grid, const SurfaceWalk& walk, const RunContext& context);
+PatchGrid halve_grid(const PatchGrid& coarse, const SurfaceWalk& walk, const RunContext& context);
 
 /// The surface as a mesh of quads.
 Mesh grid_mesh(const PatchGrid& grid, const Vec3d& origin);

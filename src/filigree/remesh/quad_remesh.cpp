@@ -208,7 +208,7 @@ private:
         const std::optional<PatchLayout> finer = options_.levels ? std::nullopt : finer_layout(layout_);
         double angle = options_.feature_angle_deg;
         for (bool is_finer = false;;) {
-            const Outcome outcome = try_surface(surface_, is_finer ? *finer : layout_, angle);
+            Outcome outcome = try_surface(surface_, is_finer ? *finer : layout_, angle);
             if (!outcome || !*outcome) return outcome;
             const bool has_features = angle < 180 && report().feature_edges > 0;
             const bool can_be_finer = finer && !is_finer;
