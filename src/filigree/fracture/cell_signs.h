@@ -113,7 +113,7 @@ inline double ratio(Wide a, Wide b) {
         x = y;
         y = rest;
     }
-    return x == 0 ? 0 : double(a / x) / double(b / x); // NOLINT(bugprone-integer-division): x divides both
+    return x == 0 ? 0 : double(a / x) / double(b / x);
 }
 
 } // namespace filigree

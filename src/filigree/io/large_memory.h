@@ -19,8 +19,7 @@ void reserve_large(Container& container, std::size_t count) {
     const std::uintptr_t end = begin + container.capacity() * sizeof(typename Container::value_type);
     const std::uintptr_t first = (begin + kHugePage - 1) / kHugePage * kHugePage, last = end / kHugePage * kHugePage;
     // a hint: when it is not taken, all is as it would be without
-    if (first < last)
-        ::madvise(reinterpret_cast<void*>(first), last - first, MADV_HUGEPAGE); // NOLINT(performance-no-int-to-ptr)
+    if (first < last) ::madvise(reinterpret_cast<void*>(first), last - first, MADV_HUGEPAGE);
 }
 
 } // namespace filigree

@@ -141,6 +141,7 @@ private:
 
     /// True: the model is there meanwhile.
     template <class Make>
+    // NOLINTNEXTLINE(performance-unnecessary-value-param): names are moved
     bool step(const char* phase, std::vector<std::string> names, const Make& make) {
         return steps_
             .take({.names = std::move(names),

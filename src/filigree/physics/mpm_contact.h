@@ -42,12 +42,11 @@ public:
     /// near: as go_to has it.
     void act(Particle& particle, const Matter& matter, const Vec3f& emptiness, const ObstaclePoses& poses,
              std::span<const std::size_t> near) const;
-    /// Which obstacles may warm or cool particles of a block: all but those that are far.
-    void go_to(const BlockPlace& block, const ObstaclePoses& poses, std::vector<std::size_t>& near) const;
+    /// Which obstacles may warm or cool particles of a block at `place`: all but those that are far.
+    void go_to(const BlockPlace& place, const ObstaclePoses& poses, std::vector<std::size_t>& near) const;
 
 private:
     const World& world_;
-    double time_;
     float dt_, grid_spacing_, air_temperature_;
     std::vector<float> obstacle_temperature_; ///< K; of those that exchange heat
     struct Source {

@@ -176,7 +176,7 @@ RigidLoad rigid_load(const BodyState& body) {
     const Vec3d centre = body.rigid->centre;
     for (std::size_t i = 0, count = body.forces.size(); i < count; ++i) {
         if (x[i] == 0 && y[i] == 0 && z[i] == 0) continue; // of most, often
-        const Vec3d f(double(x[i]), double(y[i]), double(z[i]));
+        const Vec3d f = body.forces[i].cast<double>();
         force += f;
         torque += (body.positions[i].cast<double>() - centre).cross(f);
     }

@@ -26,7 +26,7 @@ Result<ModelInPieces> cut_model(const Model& whole, const FractureCells& cells, 
     return result;
 }
 
-Result<Fracture> make_fracture(std::shared_ptr<const Body> body, std::shared_ptr<const FractureCells> cells,
+Result<Fracture> make_fracture(std::shared_ptr<const Body> body, const std::shared_ptr<const FractureCells>& cells,
                                double scale, const FractureMaterial& material, const RunContext& context,
                                BrokenBodyReport* report) {
     Partition partition{cells->pieces(), [cells, scale](const Vec3d& point) { return cells->piece_at(point / scale); }};

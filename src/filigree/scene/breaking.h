@@ -30,7 +30,7 @@ Result<ModelInPieces> cut_model(const Model& whole, const FractureCells& cells, 
                                 const RunContext& context);
 
 /// How the body breaks. cells: in model units; scale: metres a model unit. Cost, errors: as of break_body.
-Result<Fracture> make_fracture(std::shared_ptr<const Body> body, std::shared_ptr<const FractureCells> cells,
+Result<Fracture> make_fracture(std::shared_ptr<const Body> body, const std::shared_ptr<const FractureCells>& cells,
                                double scale, const FractureMaterial& material, const RunContext& context,
                                BrokenBodyReport* report = nullptr);
 

@@ -23,9 +23,9 @@ public:
     /// A state, for resume().
     std::string save() const;
 
-    /// Simulates until that many frames are done; progress: "simulating". Errors: as of Simulation::advance and
+    /// Simulates until frame `last` is done; progress: "simulating". Errors: as of Simulation::advance and
     /// Restorer::positions; what was recorded before is whole. Cancelled: the frame that was begun is left out.
-    Status advance_to(std::uint64_t frame, const RunContext& context);
+    Status advance_to(std::uint64_t last, const RunContext& context);
 
     std::uint64_t frame() const { return recording_.totals.frames; }
     const Recording& recording() const { return recording_; }
