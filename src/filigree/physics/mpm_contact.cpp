@@ -160,8 +160,7 @@ void NodeContacts::meet_obstacles(Grid& grid, std::size_t place, const ObstacleP
 
 HeatExchange::HeatExchange(const World& world, double time, float dt, float grid_spacing,
                            std::span<const Particle> particles)
-    : world_(world), dt_(dt), grid_spacing_(grid_spacing),
-      air_temperature_(float(world.air_temperature.at(time))) {
+    : world_(world), dt_(dt), grid_spacing_(grid_spacing), air_temperature_(float(world.air_temperature.at(time))) {
     for (const Obstacle& obstacle : world.obstacles)
         obstacle_temperature_.push_back(float(obstacle.temperature.at(time)));
     for (const HeatSource& source : world.heat_sources) {
