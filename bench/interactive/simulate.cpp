@@ -368,7 +368,7 @@ private:
 
     bool has_more_threads() const { return context_.threads() > 1; }
 
-    std::vector<std::size_t> sizes(std::vector<std::size_t> usual) const {
+    std::vector<std::size_t> sizes(const std::vector<std::size_t>& usual) const {
         return options_.particles ? std::vector{options_.particles} : usual;
     }
     /// Particles along the sides of a box of about so many.

@@ -21,9 +21,9 @@ public:
     const Box& box() const { return box_; } ///< of all points, world
     /// For fit_camera; valid until the next call of add.
     CameraPoints points() const { return {points_, origin_.value_or(Vec3d::Zero()), radius_}; }
-    /// The same of all that is reached while everything turns about the axis `up` through the box's centre: into
+    /// The same of all that is reached while everything turns about the axis through the box's centre: into
     /// `ring`, which has to stay.
-    CameraPoints points_turning(UpAxis up, std::vector<Vec3f>& ring) const;
+    CameraPoints points_turning(UpAxis axis, std::vector<Vec3f>& ring) const;
     /// A little below the lowest point, so that rounding cuts nothing off.
     double ground_level(UpAxis up) const;
 
