@@ -51,7 +51,7 @@ public:
     /// What a picture needs of levels: posed and coloured. Returns the milliseconds that posing took.
     double prepare(std::span<const unsigned> levels);
     /// One tile's objects. `from` melts into `level`; part: of `level`.
-    Scene scene(TileShows content, unsigned level, std::optional<unsigned> from, double part, const QPalette& palette);
+    Scene scene(TileShows shows, unsigned level, std::optional<unsigned> from, double part, const QPalette& palette);
     /// Why the full deformation of the pose shown is not there (yet), for its tile; "" when it is.
     std::string full_problem() const;
     std::string patches_problem() const; ///< why patches are wanted and not seen; "" when they are

@@ -22,7 +22,7 @@ std::shared_ptr<const Source> input_of_quads(std::shared_ptr<const Source> sourc
 Result<std::shared_ptr<const Source>> make_quads_of(std::shared_ptr<const Source> input,
                                                     const QuadRemeshOptions& options, const RunContext& context);
 
-QString quads_summary(const Source& quads);  ///< in a sentence, for the message bar
+QString quads_summary(const Source& source); ///< in a sentence, for the message bar
 QString quads_table(const MadeQuads& quads); ///< the figures, as rich text
 /// What was changed before and how it went, a line each; "" when there is nothing to say.
 QString quads_remarks(const MadeQuads& quads);

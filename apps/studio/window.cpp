@@ -175,7 +175,7 @@ struct MainWindow::Impl {
         });
         connect(&workbench->document(), &Document::changed, &window, [this, &window] { show_title(window); });
         connect(&workbench->document().undo_stack(), &QUndoStack::cleanChanged, &window,
-                [this, &window](bool clean) { window.setWindowModified(!clean); });
+                [&window](bool clean) { window.setWindowModified(!clean); });
         connect(workbench.get(), &Workbench::saved, &window, [this, &window](const std::string& path) {
             file_path = QString::fromStdString(path);
             add_recent(window, file_path);

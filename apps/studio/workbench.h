@@ -77,7 +77,7 @@ public:
     void set_law(std::optional<HeightLaw> law);
     void set_thin_shell(bool thin);
     // Deform
-    void set_warps(const Warps& warps, const std::string& merge = {});
+    void set_warps(const Warps& wanted, const std::string& merge = {});
     void reset_deformation(); ///< warps and handles
     void pin(std::span<const Index> driver_vertices);
     void unpin(std::span<const Index> driver_vertices);
