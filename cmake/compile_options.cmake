@@ -20,15 +20,6 @@ target_compile_options(filigree_options INTERFACE
 if(CMAKE_UNITY_BUILD) # sources look like headers then
   target_compile_options(filigree_options INTERFACE -Wno-subobject-linkage)
 endif()
-# All of a target is compiled as one where a unity build is; else the headers named are precompiled. For one unit that
-# would cost more than it saves.
-function(compile_as_one target)
-  if(CMAKE_UNITY_BUILD)
-    set_target_properties(${target} PROPERTIES UNITY_BUILD_BATCH_SIZE 0)
-  else()
-    target_precompile_headers(${target} PRIVATE ${ARGN})
-  endif()
-endfunction()
 if(BUILD_SHARED_LIBS) # calls of our own stay direct, as in a static library
   target_compile_options(filigree_options INTERFACE -fno-semantic-interposition)
   target_link_options(filigree_options INTERFACE -Wl,-Bsymbolic-functions)
@@ -56,3 +47,13 @@ if(FILIGREE_COVERAGE) # of the library's sources alone: to count in Eigen and th
   target_compile_options(filigree_options INTERFACE --coverage -fprofile-abs-path "-fprofile-filter-files=.*/src/filigree/.*")
   target_link_options(filigree_options INTERFACE --coverage)
 endif()
+
+# In a unity build all of a target is one unit, for which a precompiled header costs more than it saves; else the headers
+# named are precompiled.
+function(compile_as_one target)
+  if(CMAKE_UNITY_BUILD)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD_BATCH_SIZE 0)
+  else()
+    target_precompile_headers(${target} PRIVATE ${ARGN})
+  endif()
+endfunction()

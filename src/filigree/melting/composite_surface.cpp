@@ -591,7 +591,7 @@ private:
             const Vec4f from = color_of(between.from, colors);
             return from + between.part * (color_of(between.to, colors) - from);
         }
-        Vec4f own = restored_.colors.empty() ? Vec4f::Ones() : restored_.colors[v];
+        const Vec4f own = restored_.colors.empty() ? Vec4f::Ones() : restored_.colors[v];
         const float part = restored_.colors.empty() ? 1 : faded_.faded[v];
         if (part == 0) return own;
         return own + part * (colors.at(faded_.positions[v]).value_or(own) - own);
