@@ -86,6 +86,40 @@ TEST(Usd, HoldsEveryFrameToTheBit) {
     EXPECT_FLOAT_EQ(colors[2], 0);
 }
 
+TEST(Usd, FarFromTheOriginNoDigitIsLost) {
+    Mesh mesh = make_sheet();
+    mesh.origin = {4e6, -0.1, 5e5 + 1.0 / 3};
+    const std::string placed = "    double3 xformOp:translate = (4e+06, -0.1, 500000.3333333333)\n"
+                               "    uniform token[] xformOpOrder = [\"xformOp:translate\"]\n";
+    const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / "filigree_usd_far.usda";
+    const MeshAnimation still{&mesh, 1, 24, [&](std::size_t, std::span<Vec3f> out) -> Status {
+                                  std::copy(mesh.positions.begin(), mesh.positions.end(), out.begin());
+                                  return Success{};
+                              }};
+    const auto said = write_animation(still, path, kAllThreads);
+    ASSERT_TRUE(said.ok());
+    EXPECT_TRUE(said->empty());
+    std::string text = read_file(path).value();
+    EXPECT_NE(text.find(placed), std::string::npos);
+    EXPECT_EQ(numbers_after(text, "points.timeSamples = {\n        0: "), flat(mesh.positions));
+
+    const auto moment = [&](std::size_t frame) -> Result<MeshMoment> {
+        MeshMoment now{mesh, {}};
+        if (frame == 1) now.mesh.origin.x() += 2; // its own is another
+        return now;
+    };
+    std::vector<std::string> warnings;
+    ASSERT_TRUE(write_usda_moments(2, 24, moment, path, warnings, kAllThreads).ok());
+    text = read_file(path).value();
+    std::filesystem::remove(path);
+    EXPECT_NE(text.find(placed), std::string::npos);
+    std::vector<Vec3f> later = mesh.positions;
+    for (Vec3f& p : later) p.x() += 2;
+    const std::string points = text.substr(text.find("points.timeSamples"));
+    EXPECT_EQ(numbers_after(points, "\n        0: "), flat(mesh.positions));
+    EXPECT_EQ(numbers_after(points, "\n        1: "), flat(later));
+}
+
 TEST(Usd, FacesMayChangeInTime) {
     const auto moment = [](std::size_t frame) -> Result<MeshMoment> {
         MeshMoment now;

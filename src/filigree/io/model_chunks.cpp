@@ -172,7 +172,8 @@ class ChunkRestoration {
 public:
     ChunkRestoration(const ModelChunks& model, const PoseStream& poses, const std::filesystem::path& path,
                      const RunContext& context)
-        : model_(model), poses_(poses), context_(context), silent_(context), frames_(animation_, path) {
+        : model_(model), poses_(poses), context_(context), silent_(context),
+          frames_(animation_, path, model.driver().mesh.origin) {
         silent_.progress = nullptr;
         animation_.rest = &model.driver().mesh; // its origin, and a size to hold lost digits against
         animation_.positions = [this](std::size_t frame, std::span<Vec3f> out) -> Status {
@@ -226,7 +227,7 @@ private:
     const RunContext& context_;
     RunContext silent_;
     MeshAnimation animation_;
-    WorldFrames frames_;
+    CheckedFrames frames_;
     KnownPoses known_;
     std::optional<BlendRestorer> restorer_; ///< of the chunk that is written
     std::vector<Vec3f> points_;

@@ -77,13 +77,12 @@ Result<Mesh> mesh_at(const MeshAnimation& animation, std::size_t frame, const Ru
 
 } // namespace
 
-Status WorldFrames::fetch(std::size_t frame, std::span<Vec3f> positions) {
+Status CheckedFrames::fetch(std::size_t frame, std::span<Vec3f> positions) {
     if (Status fetched = animation_.positions(frame, positions); !fetched) return fetched;
-    const Vec3d& origin = animation_.rest->origin;
-    const bool is_far = !origin.isZero();
+    const bool is_far = !origin_.isZero();
     for (Vec3f& p : positions) {
         if (is_far) {
-            const Vec3d world = origin + p.cast<double>();
+            const Vec3d world = origin_ + p.cast<double>();
             p = world.cast<float>();
             lost_ = std::max(lost_, (p.cast<double>() - world).cwiseAbs().maxCoeff());
         }
@@ -94,14 +93,16 @@ Status WorldFrames::fetch(std::size_t frame, std::span<Vec3f> positions) {
     return Success{};
 }
 
-void WorldFrames::warn(std::vector<std::string>& warnings) const {
+void CheckedFrames::warn(std::vector<std::string>& warnings) const {
     constexpr double kUnseen = 1e-7; // of the diagonal: what 32 bits lose anyway
     const double diagonal = bounds(animation_.rest->positions).diagonal();
     if (!(lost_ > kUnseen * diagonal)) return;
-    std::string digits = std::to_string(lost_ / diagonal * 1e6);
-    warnings.push_back("The mesh is far from the world's origin, and the format holds 32 bits a coordinate: "
-                       "positions are up to " +
-                       digits.substr(0, digits.find('.') + 2) + " millionths of the diagonal off.");
+    char percent[16];
+    std::snprintf(percent, sizeof percent, "%.2g", lost_ / diagonal * 100);
+    warnings.push_back("The mesh is far from the world's origin, and the format holds 32 bits a coordinate: positions "
+                       "are rounded by up to " +
+                       std::string(percent) +
+                       " % of the mesh's diagonal. USD (.usda) and glTF (.glb) hold where it is in full.");
 }
 
 Result<AnimationFormat> animation_format(const fs::path& path) {
@@ -174,8 +175,9 @@ Result<std::vector<std::string>> write_animation(const MeshAnimation& animation,
     if (animation.frames == 0)
         return Error{ErrorCode::unsuitable, path.string() + ": not written: there are no frames."};
     std::vector<std::string> warnings;
-    WorldFrames frames(animation, path);
-    const WorldPositions positions = [&](std::size_t frame, std::span<Vec3f> out) { return frames.fetch(frame, out); };
+    const bool holds_origin = *format == AnimationFormat::usda;
+    CheckedFrames frames(animation, path, holds_origin ? Vec3d::Zero() : animation.rest->origin);
+    const FramePositions positions = [&](std::size_t frame, std::span<Vec3f> out) { return frames.fetch(frame, out); };
     Status written = Success{};
     switch (*format) {
     case AnimationFormat::pc2:

@@ -52,8 +52,9 @@ Result<PoseStream> open_poses(const std::filesystem::path& path, std::size_t poi
 Result<MeshAnimation> open_animation(const std::filesystem::path& path, const Mesh& rest,
                                      const PoseFileOptions& options, const RunContext& context);
 
-/// Writes every frame, one in memory at a time, whole or not at all. World coordinates (the origin is added) in 32-bit
-/// floats; a warning says when that loses digits. Numbered meshes are PLY in a folder (under its name), or what the
+/// Writes every frame, one in memory at a time, whole or not at all. Point caches hold world coordinates (the origin is
+/// added) in 32-bit floats, and a warning says when that loses digits; USD and glTF have a place for the origin.
+/// Numbered meshes are PLY in a folder (under its name), or what the
 /// #### name ends in, counted from 1; they have the rest's attributes, and where it has normals, normals of their own.
 /// They replace files, whose permissions they keep, but no symbolic links: all or none, also when the process is killed
 /// (io/file_batch.h). A sequence whose placing was interrupted is not read until it is written again.

@@ -154,7 +154,7 @@ write_shared_pc2(std::size_t frames, std::size_t points, const fs::path& path, c
 Result<ChunkReport> write_animation_chunk(const MeshAnimation& animation, const fs::path& path, const WorkChunk& chunk,
                                           const RunContext& context) {
     const auto fill = [&](std::size_t first, std::size_t last, const WriteAt& write_at) -> Status {
-        WorldFrames positions(animation, path);
+        CheckedFrames positions(animation, path, animation.rest->origin);
         std::vector<Vec3f> points(animation.rest->vertex_count());
         const std::string_view bytes(reinterpret_cast<const char*>(points.data()), points.size() * sizeof(Vec3f));
         for (std::size_t frame = first; frame < last; ++frame) {

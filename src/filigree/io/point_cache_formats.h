@@ -26,10 +26,10 @@ Result<PoseStream> open_numbered(const std::filesystem::path& path, std::size_t 
 Result<PoseStream> open_gltf_poses(const std::filesystem::path& path, std::size_t points, const Vec3d& origin,
                                    const PoseFileOptions& options, const RunContext& context);
 
-/// Writes a frame's positions in the world. Errors: also unsuitable, where one is not finite.
-using WorldPositions = std::function<Status(std::size_t frame, std::span<Vec3f> positions)>;
+/// Writes a frame's positions as the file is to hold them. Errors: also unsuitable, where one is not finite.
+using FramePositions = std::function<Status(std::size_t frame, std::span<Vec3f> positions)>;
 
-Status write_pc2(const MeshAnimation& animation, const WorldPositions& positions, const std::filesystem::path& path,
+Status write_pc2(const MeshAnimation& animation, const FramePositions& positions, const std::filesystem::path& path,
                  const RunContext& context);
 inline constexpr std::uint64_t kPc2HeaderBytes = 32;
 /// The first bytes of a PC2, frames behind them. Errors: unsupported (more than its 32-bit numbers hold).
@@ -40,14 +40,15 @@ using WriteAt = std::function<Status(std::uint64_t offset, std::string_view byte
 Result<ChunkReport>
 write_shared_pc2(std::size_t frames, std::size_t points, const std::filesystem::path& path, const WorkChunk& chunk,
                  const std::function<Status(std::size_t first, std::size_t last, const WriteAt& write_at)>& fill);
-Status write_mdd(const MeshAnimation& animation, const WorldPositions& positions, const std::filesystem::path& path,
+Status write_mdd(const MeshAnimation& animation, const FramePositions& positions, const std::filesystem::path& path,
                  const RunContext& context);
 
-/// Adds the origin, checks, and keeps account of the digits that 32 bits lose. animation must outlive it.
-class WorldFrames {
+/// Adds the origin, checks, and keeps account of the digits that 32 bits lose. origin: of the mesh, or zero where the
+/// format has a place for it. animation must outlive it.
+class CheckedFrames {
 public:
-    WorldFrames(const MeshAnimation& animation, std::filesystem::path path)
-        : animation_(animation), path_(std::move(path)) {}
+    CheckedFrames(const MeshAnimation& animation, std::filesystem::path path, const Vec3d& origin)
+        : animation_(animation), path_(std::move(path)), origin_(origin) {}
 
     Status fetch(std::size_t frame, std::span<Vec3f> positions);
     void warn(std::vector<std::string>& warnings) const;
@@ -55,6 +56,7 @@ public:
 private:
     const MeshAnimation& animation_;
     std::filesystem::path path_;
+    Vec3d origin_;
     double lost_ = 0;
 };
 

@@ -149,7 +149,7 @@ Status check_sizes(std::size_t frames, std::size_t points, const fs::path& path)
     return Error{ErrorCode::unsupported, path.string() + ": point caches hold at most 2147483647 frames and points."};
 }
 
-Status write_frames(FileWriter& file, const MeshAnimation& animation, const WorldPositions& positions,
+Status write_frames(FileWriter& file, const MeshAnimation& animation, const FramePositions& positions,
                     bool is_big_endian, const RunContext& context) {
     std::vector<Vec3f> points(animation.rest->vertex_count());
     const std::string_view bytes(reinterpret_cast<const char*>(points.data()), points.size() * kPointBytes);
@@ -230,7 +230,7 @@ Result<std::string> pc2_header(std::size_t frames, std::size_t points, const fs:
     return header;
 }
 
-Status write_pc2(const MeshAnimation& animation, const WorldPositions& positions, const fs::path& path,
+Status write_pc2(const MeshAnimation& animation, const FramePositions& positions, const fs::path& path,
                  const RunContext& context) {
     const Result<std::string> header = pc2_header(animation.frames, animation.rest->vertex_count(), path);
     if (!header) return header.error();
@@ -240,7 +240,7 @@ Status write_pc2(const MeshAnimation& animation, const WorldPositions& positions
     return write_frames(*file, animation, positions, false, context);
 }
 
-Status write_mdd(const MeshAnimation& animation, const WorldPositions& positions, const fs::path& path,
+Status write_mdd(const MeshAnimation& animation, const FramePositions& positions, const fs::path& path,
                  const RunContext& context) {
     if (Status sound = check_sizes(animation.frames, animation.rest->vertex_count(), path); !sound) return sound;
     Result<FileWriter> file = FileWriter::create(path);

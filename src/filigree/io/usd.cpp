@@ -34,6 +34,12 @@ public:
         writer_.number(x);
         return *this;
     }
+    /// "(1, 2)".
+    template <class Vector>
+    UsdText& vector(const Vector& v) {
+        for (int i = 0; i < int(Vector::RowsAtCompileTime); ++i) text(i == 0 ? "(" : ", ").number(v[i]);
+        return text(")");
+    }
     /// "[(1, 2), (3, 4)]" of vectors, "[1, 2]" of numbers.
     template <class Items>
     UsdText& list(const Items& items) {
@@ -41,7 +47,10 @@ public:
         bool is_first = true;
         for (const auto& item : items) {
             if (!std::exchange(is_first, false)) text(", ");
-            this->item(item);
+            if constexpr (std::is_arithmetic_v<std::decay_t<decltype(item)>>)
+                number(item);
+            else
+                vector(item);
             drain(kPiece);
         }
         return text("]");
@@ -60,15 +69,6 @@ public:
 private:
     static constexpr std::size_t kPiece = std::size_t{1} << 20;
 
-    template <class T>
-    void item(const T& value) {
-        if constexpr (std::is_arithmetic_v<T>) {
-            number(value);
-        } else {
-            for (int i = 0; i < int(T::RowsAtCompileTime); ++i) text(i == 0 ? "(" : ", ").number(value[i]);
-            text(")");
-        }
-    }
     void drain(std::size_t until) {
         if (until == 0) writer_.flush();
         if (bytes_.size() <= until) return;
@@ -82,7 +82,8 @@ private:
     Status written_ = Success{};
 };
 
-void write_header(UsdText& out, std::size_t frames, double frames_per_second) {
+/// origin: of the points that follow, in the world. Numbers of 64 bits, where points have 32.
+void write_header(UsdText& out, std::size_t frames, double frames_per_second, const Vec3d& origin) {
     out.text("#usda 1.0\n(\n    defaultPrim = \"mesh\"\n    doc = \"Written by Filigree\"\n    endTimeCode = ")
         .number(frames - 1)
         .text("\n    framesPerSecond = ")
@@ -90,6 +91,9 @@ void write_header(UsdText& out, std::size_t frames, double frames_per_second) {
         .text("\n    startTimeCode = 0\n    timeCodesPerSecond = ")
         .number(frames_per_second)
         .text("\n    upAxis = \"Y\"\n)\n\ndef Mesh \"mesh\"\n{\n");
+    if (origin.isZero(0)) return;
+    out.text("    double3 xformOp:translate = ").vector(origin);
+    out.text("\n    uniform token[] xformOpOrder = [\"xformOp:translate\"]\n");
 }
 
 std::vector<Index> face_sizes(const Mesh& mesh) {
@@ -158,7 +162,7 @@ void add_warnings(const MeshAnimation& animation, std::vector<std::string>& warn
 /// What moves: points with their boxes, and normals where the mesh has some.
 class TimeSamples {
 public:
-    TimeSamples(const MeshAnimation& animation, const WorldPositions& positions, UsdText& out,
+    TimeSamples(const MeshAnimation& animation, const FramePositions& positions, UsdText& out,
                 const RunContext& context)
         : animation_(animation), positions_(positions), out_(out), context_(context),
           has_normals_(!animation.rest->normals.empty()), points_(animation.rest->vertex_count()) {}
@@ -170,7 +174,7 @@ public:
 
 private:
     const MeshAnimation& animation_;
-    const WorldPositions& positions_;
+    const FramePositions& positions_;
     UsdText& out_;
     const RunContext& context_;
     bool has_normals_;
@@ -268,10 +272,12 @@ public:
 
     Status add(std::size_t frame, const MeshMoment& moment, const RunContext& context) {
         const Mesh& mesh = moment.mesh;
-        std::vector<Vec3f> points;
-        for (std::size_t v = 0; v < mesh.vertex_count(); ++v) points.push_back(mesh.world_position(v).cast<float>());
-        const Box box = bounds(points);
         is_first_ = frame == 0;
+        if (is_first_) origin_ = mesh.origin;
+        std::vector<Vec3f> points;
+        for (std::size_t v = 0; v < mesh.vertex_count(); ++v)
+            points.push_back((mesh.world_position(v) - origin_).cast<float>());
+        const Box box = bounds(points);
         count_ = 0;
         add(frame, "point3f[] points", points);
         add(frame, "float3[] extent", std::array<Vec3f, 2>{box.min.cast<float>(), box.max.cast<float>()});
@@ -291,6 +297,9 @@ public:
                                                 " lacks colours, velocities or origins that the first frame has."};
     }
 
+    /// Of all points: the first mesh's.
+    const Vec3d& origin() const { return origin_; }
+
     Status append_to(FileWriter& out) {
         for (const auto& attribute : attributes_) {
             const std::string& name = attribute->declared;
@@ -308,6 +317,7 @@ public:
 private:
     std::filesystem::path folder_;
     std::vector<std::unique_ptr<SampledAttribute>> attributes_;
+    Vec3d origin_ = Vec3d::Zero();
     bool is_first_ = true;
     std::size_t count_ = 0; ///< attributes of the frame at hand
 
@@ -324,12 +334,12 @@ private:
 
 } // namespace
 
-Status write_usda(const MeshAnimation& animation, const WorldPositions& positions, const std::filesystem::path& path,
+Status write_usda(const MeshAnimation& animation, const FramePositions& positions, const std::filesystem::path& path,
                   std::vector<std::string>& warnings, const RunContext& context) {
     Result<FileWriter> file = FileWriter::create(path);
     if (!file) return file.error();
     UsdText out(*file);
-    write_header(out, animation.frames, animation.frames_per_second);
+    write_header(out, animation.frames, animation.frames_per_second, animation.rest->origin);
     write_faces(out, *animation.rest);
     write_uvs(out, *animation.rest);
     write_colors(out, *animation.rest);
@@ -360,7 +370,7 @@ Status write_usda_moments(std::size_t frames, double frames_per_second,
         bytes += 200 * now->mesh.vertex_count();
     }
     UsdText header(*file);
-    write_header(header, frames, frames_per_second);
+    write_header(header, frames, frames_per_second, moments.origin());
     header.text("    uniform token subdivisionScheme = \"none\"\n");
     if (Status written = header.finish(); !written) return written;
     if (Status written = moments.append_to(*file); !written) return written;
