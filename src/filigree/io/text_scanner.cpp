@@ -1,5 +1,6 @@
 // Based on: [Clinger 1990], which decimal numbers need a single exact operation (in the header).
 #include "filigree/io/text_scanner.h"
+#include "filigree/core/text.h"
 
 #include <algorithm>
 #include <charconv>
@@ -41,10 +42,22 @@ const char* parse_number_exactly(const char* p, const char* end, double& value) 
 }
 
 std::string in_quotes(std::string_view text) {
-    constexpr std::size_t kLongest = 24;
+    constexpr std::size_t kLongest = 24; // bytes
     std::string quote = "'";
-    for (const char c : text.substr(0, kLongest)) quote += c >= ' ' && c <= '~' ? c : '?';
-    return quote + (text.size() > kLongest ? "...'" : "'");
+    std::size_t at = 0;
+    while (at < text.size()) {
+        const std::size_t length = utf8_length(text, at);
+        const std::string_view character = text.substr(at, std::max<std::size_t>(1, length));
+        if (at + character.size() > kLongest) break;
+        const bool is_control = length == 1 ? character[0] < ' ' || character[0] == '\x7f'
+                                            : character.starts_with('\xc2') && character[1] < '\xa0'; // C1
+        if (length == 0 || is_control)
+            quote += '?';
+        else
+            quote += character;
+        at += character.size();
+    }
+    return quote + (at < text.size() ? "...'" : "'");
 }
 
 } // namespace filigree

@@ -2,6 +2,7 @@
 // they are in SVG and PDF. (A recording surface would do the same, but puts a group and a clip around it all.)
 #include "filigree/present/page.h"
 
+#include "filigree/core/text.h"
 #include "filigree/io/file.h"
 
 #include <algorithm>
@@ -62,25 +63,6 @@ struct Run {
 };
 using Runs = std::vector<Run>;
 
-/// Bytes of the UTF-8 character at `at`; 0 where there is none.
-std::size_t character_length(const std::string& text, std::size_t at) {
-    const auto byte = [&](std::size_t i) {
-        return at + i < text.size() ? static_cast<unsigned char>(text[at + i]) : 0u;
-    };
-    const unsigned lead = byte(0);
-    if (lead < 0x80) return 1;
-    const std::size_t length = lead >= 0xc2 && lead < 0xe0   ? 2
-                               : (lead & 0xf0) == 0xe0       ? 3
-                               : lead >= 0xf0 && lead < 0xf5 ? 4
-                                                             : 0;
-    for (std::size_t i = 1; i < length; ++i)
-        if ((byte(i) & 0xc0) != 0x80) return 0;
-    if ((lead == 0xe0 && byte(1) < 0xa0) || (lead == 0xed && byte(1) >= 0xa0) || (lead == 0xf0 && byte(1) < 0x90) ||
-        (lead == 0xf4 && byte(1) >= 0x90))
-        return 0; // overlong, a surrogate, or beyond the last
-    return length;
-}
-
 /// Takes the marks out of a text (see Page::text).
 Runs parse(const std::string& text, const TextStyle& style) {
     Runs runs;
@@ -101,7 +83,7 @@ Runs parse(const std::string& text, const TextStyle& style) {
         const char c = text[at];
         const char next = at + 1 < text.size() ? text[at + 1] : '\0';
         if (c == '\\' && next != '\0') {
-            const std::size_t behind = std::max<std::size_t>(1, character_length(text, at + 1));
+            const std::size_t behind = std::max<std::size_t>(1, utf8_length(text, at + 1));
             add(text.substr(at + 1, behind));
             at += 1 + behind;
         } else if (c == '*') {
@@ -116,7 +98,7 @@ Runs parse(const std::string& text, const TextStyle& style) {
             in_braces = false;
             script = Script::none;
             ++at;
-        } else if (const std::size_t length = character_length(text, at); length > 0 && (c < 0 || c >= ' ')) {
+        } else if (const std::size_t length = utf8_length(text, at); length > 0 && (c < 0 || c >= ' ')) {
             add(text.substr(at, length));
             at += length;
         } else {
