@@ -1,10 +1,12 @@
 // Bodies that touch each other and themselves.
 
 #include "filigree/core/random.h"
+#include "filigree/io/mesh_file.h"
 #include "filigree/mesh/shapes.h"
 #include "filigree/physics/cell_boxes.h"
 #include "filigree/physics/own_cells.h"
 #include "filigree/physics/rigid_body.h"
+#include "io/corpus.h"
 #include "physics/test_bodies.h"
 #include "threads.h"
 
@@ -264,6 +266,36 @@ TEST(MatterContact, ABodyMeetsItself) {
     EXPECT_LT(with.deepest_in_matter, 0.3 * 0.1);
     EXPECT_GT(with.deepest_in_matter, 0);
     EXPECT_EQ(without.deepest_in_matter, 0);
+}
+
+/// Two plates press a koala's legs against each other and its belly.
+TEST(MatterContact, AKoalasLegsStayOutOfEachOther) {
+    const std::vector<filigree_test::CorpusRow> rows = filigree_test::read_corpus();
+    const auto koala = std::ranges::find_if(rows, [](const auto& row) { return row.path.stem() == "koala_100k"; });
+    if (koala == rows.end()) GTEST_SKIP() << "no koala in the corpus";
+    const Mesh mesh = read_mesh(koala->path, kAllThreads).value().mesh;
+    const double scale = 0.12;
+    BodyOptions options;
+    options.scale = scale;
+    options.cells.count = 6000;
+    const auto body = std::make_shared<Body>(make_body(mesh, rubber(2e5, 0.2), options, kAllThreads).value());
+    const Box box = bounds(mesh.positions);
+    const Vec3d size = scale * box.size();
+    World world;
+    world.gravity.setZero();
+    for (const int side : {-1, 1}) {
+        Obstacle& plate = world.obstacles.emplace_back();
+        plate.shape = Cuboid{Vec3d(side * (size.x() / 2 + 0.1), -size.y() / 4, 0), Vec3d(0.2, 0.35 * size.y(), 2)};
+        plate.motion.move = {{0, 1.5}, {Vec3d::Zero(), Vec3d(-side * 0.225 * size.x(), 0, 0)}, Vec3d::Zero()};
+        plate.friction = 0.5;
+    }
+    Simulation pressed = begin(world, {put(body, -scale * box.centre())}, StepMode::automatic);
+    double deepest = 0;
+    for (int frame = 0; frame < 120; ++frame)
+        deepest = std::max(deepest, pressed.advance(kAllThreads).value().deepest_in_matter);
+    EXPECT_GT(deepest, 0) << "the scene asks nothing of contact";
+    EXPECT_LT(deepest, 0.3 * body->spacing());
+    RecordProperty("spacings", std::to_string(deepest / body->spacing()));
 }
 
 TEST_P(EachStepMode, AMeshfreeBodyMeetsItself) {

@@ -136,8 +136,11 @@ public:
     /// What the last add_forces may have added to the squared frequency of a body, in parts of that at rest. Two bodies
     /// that push each other swing by the sum of what each feels.
     double added_frequency(std::size_t body) const {
-        return double(kContactShare) *
-               ((touched_[body] & kOnObstacle ? 1.0 : 0.0) + (touched_[body] & kInMatter ? 2.0 : 0.0));
+        const std::uint8_t touched = touched_[body];
+        const double in_matter = touched & kInItself   ? double(MatterContacts::kWithinOneBody)
+                                 : touched & kInMatter ? 1.0
+                                                       : 0.0;
+        return double(kContactShare) * ((touched & kOnObstacle ? 1.0 : 0.0) + 2 * in_matter);
     }
     /// Bodies that touch each other, and nothing else, as numbers of groups, one a body: such a group keeps its
     /// momentum. kNoIndex: of bodies that touch an obstacle, or others that do.
@@ -223,7 +226,8 @@ private:
     float near_way_ = 0;                       ///< m that anything may have gone since they were found ...
     float pairs_way_ = 0;                      ///< ... and balls beside each other ...
     float near_until_ = -1, pairs_until_ = -1; ///< ... and may go before they hold no more
-    static constexpr std::uint8_t kOnObstacle = 1, kInMatter = MatterContacts::kTouched;
+    static constexpr std::uint8_t kOnObstacle = 1, kInMatter = MatterContacts::kTouched,
+                                  kInItself = MatterContacts::kTouchedItself;
     std::vector<std::uint8_t> touched_; ///< of each body
     MatterContacts matter_;
 };

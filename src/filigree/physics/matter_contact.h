@@ -69,8 +69,11 @@ public:
     /// s: in longer steps something could pass through something.
     double longest_step() const;
 
-    static constexpr std::uint8_t kTouched = 2;
-    /// As Contacts::add_forces. touched: of each body; kTouched is set where it touches.
+    /// How much harder parts of one body push each other than two bodies: nothing else about them is stiffer, and
+    /// folds are deep.
+    static constexpr float kWithinOneBody = 1.5f;
+    static constexpr std::uint8_t kTouched = 2, kTouchedItself = 4;
+    /// As Contacts::add_forces. touched: of each body; kTouched or kTouchedItself is set where it touches.
     ContactReport add_forces(std::span<BodyState> bodies, float dt, std::span<std::uint8_t> touched,
                              const RunContext& context);
     /// As Contacts::push_out.
@@ -136,6 +139,7 @@ private:
         PairContact law;
         std::vector<Pair> pairs;
     };
+    static std::uint8_t touch_of(const Side& side) { return side.body == side.other ? kTouchedItself : kTouched; }
     struct Extremes { ///< of a body's particles along each axis
         Vec3f least = Vec3f::Zero(), most = Vec3f::Zero();
         /// Bound on what particles of two bodies, or of one, have beside each other.

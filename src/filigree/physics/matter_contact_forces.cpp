@@ -70,7 +70,7 @@ std::optional<Vec3f> MatterContacts::enter(Pair& pair, const Side& side, std::sp
 /// N/m; half where the other body's points push as well.
 float MatterContacts::stiffness(const Side& side, const Pair& pair, std::span<const BodyState> bodies) const {
     const BodyState& body = bodies[side.body];
-    return (matter_[side.body] ? 0.5f : 1.0f) *
+    return (matter_[side.body] ? 0.5f : 1.0f) * (side.body == side.other ? kWithinOneBody : 1) *
            std::min(body.surface_stiffness[pair.point],
                     body.body->surface.areas[pair.point] * per_area_[side.other][pair.place.cell]);
 }
@@ -123,8 +123,8 @@ ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, 
         if (!(pair.depth > 0)) continue;
         add_to_particles(bodies[side.body].surface, pair.point, forces_[k], bodies[side.body].forces);
         matter_[side.other]->add(pair.place, -forces_[k], bodies[side.other].forces);
-        touched[side.body] |= kTouched;
-        touched[side.other] |= kTouched;
+        touched[side.body] |= touch_of(side);
+        touched[side.other] |= touch_of(side);
         ++report.contacts;
         report.deepest_in_matter = std::max(report.deepest_in_matter, pair.depth);
         is_too_deep_ |= pair.depth > kDeepest * side.spacing;
@@ -219,8 +219,8 @@ ContactReport MatterContacts::update_anchors(std::span<const BodyState> bodies, 
             if (!normal) continue;
             const BodyState& other = bodies[side.other];
             const Matter& matter = *matter_[side.other];
-            touched[side.body] |= kTouched;
-            touched[side.other] |= kTouched;
+            touched[side.body] |= touch_of(side);
+            touched[side.other] |= touch_of(side);
             ++report.contacts;
             report.deepest_in_matter = std::max(report.deepest_in_matter, pair.depth);
             is_too_deep_ |= pair.depth > kDeepest * side.spacing;
