@@ -59,7 +59,7 @@ void heap(benchmark::State& state) {
     run(state, heap.world, heap.actors, from, from + 60, true, state.range(1) == 2 ? kTwoThreads : kOneThread);
 }
 
-/// A mesh of 1 m, FILIGREE_SCAN, that falls 0.3 m; 0 or 1: whether it meets itself.
+/// A mesh of 1 m, FILIGREE_SCAN, that falls 0.3 m; 0 or 1: whether it meets itself; and threads.
 void scan(benchmark::State& state) {
     const char* path = std::getenv("FILIGREE_SCAN");
     if (!path || !*path) {
@@ -75,7 +75,8 @@ void scan(benchmark::State& state) {
     options.cells.count = 10'600;
     const auto body = std::make_shared<Body>(make_body(mesh, rubber, options, kOneThread).value());
     const Vec3d foot(box.centre().x(), box.min.y(), box.centre().z());
-    run(state, ground(), {put(body, Vec3d(0, 0.3, 0) - options.scale * foot)}, 0, 90, state.range(0) != 0);
+    run(state, ground(), {put(body, Vec3d(0, 0.3, 0) - options.scale * foot)}, 0, 90, state.range(0) != 0,
+        state.range(1) == 2 ? kTwoThreads : kOneThread);
 }
 
 /// Five soft cubes in a stack that has come to rest.
@@ -89,7 +90,7 @@ void stack(benchmark::State& state) {
 }
 
 BENCHMARK(heap)->Args({0, 1})->Args({1, 1})->Args({0, 2})->Iterations(60)->Unit(benchmark::kMillisecond);
-BENCHMARK(scan)->Arg(0)->Arg(1)->Iterations(90)->Unit(benchmark::kMillisecond);
+BENCHMARK(scan)->Args({0, 1})->Args({1, 1})->Args({1, 2})->Iterations(90)->Unit(benchmark::kMillisecond);
 BENCHMARK(stack)->Iterations(60)->Unit(benchmark::kMillisecond);
 
 } // namespace
