@@ -54,6 +54,21 @@ def fuzzing():
             f"| all | {sum(runs for runs, _ in rows.values()):,} | | | |"]
 
 
+def checks():
+    if not (counts / "check").exists():
+        return None
+    rows = {}
+    for line in old_section("Checks of the tree") or []:
+        row = re.match(r"\| `(.+?)` \| (?:passed|failed) \|", line)
+        if row:
+            rows[row[1]] = line
+    for line in (counts / "check").read_text().splitlines():
+        word, ended, minutes, processors, day, commit = line.split()
+        rows[word] = f"| `{word}` | {ended} | {minutes} | {processors} | {day}, {commit} |"
+    return ["`scripts/check` over everything, or over the layers behind the colon; with building.", "",
+            "| step | | minutes | processors | last run |", "|---|---|---|---|---|", *[line for _, line in sorted(rows.items())]]
+
+
 def properties():
     if not (counts / "properties").exists():
         return None
@@ -183,14 +198,14 @@ def uncovered(sections):
             "- No soak of a day."]
 
 
-MAKERS = {"Fuzzing": fuzzing, "Properties": properties, "Line coverage": coverage, "Torture of outputs": torture,
+MAKERS = {"Checks of the tree": checks, "Fuzzing": fuzzing, "Properties": properties, "Line coverage": coverage, "Torture of outputs": torture,
           "Bounds": bounds, "Long life": long_life, "The studio": studio, "Tests of the tests": mutants}
 sections = {title: make() or old_section(title) for title, make in MAKERS.items()}
 sections["Tests of the tests"] = judged(sections["Tests of the tests"])
 sections["What nothing covers"] = uncovered(sections)
 lines = ["# Reliability", "",
-         "Written by `scripts/reliability` from what `scripts/fuzz`, `properties`, `coverage`, `torture`, `bounds`, `long-life`, "
-         "`soak-studio` and `mutate` counted last; not by hand.", ""]
+         "Written by `scripts/reliability` from what `scripts/check`, `fuzz`, `properties`, `coverage`, `torture`, `bounds`, "
+         "`long-life`, `soak-studio` and `mutate` counted last; not by hand.", ""]
 for title, text in sections.items():
     if text:
         lines += [f"## {title}", "", *text, ""]

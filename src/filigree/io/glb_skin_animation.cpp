@@ -100,8 +100,8 @@ public:
             const std::vector<float> floats(values.begin(), values.end());
             bytes = bytes_of(std::span<const float>(floats));
         }
-        const std::size_t output = samplers_.empty() ? builder_.add(accessor, std::move(bytes))
-                                                     : builder_.append(accessor, bytes);
+        const std::size_t output =
+            samplers_.empty() ? builder_.add(accessor, std::move(bytes)) : builder_.append(accessor, bytes);
         if (held) held_.push_back(samplers_.size());
         Json sampler = {{"input", input_}, {"output", output}};
         if (cubic_ && !held) sampler["interpolation"] = "CUBICSPLINE";
