@@ -1,6 +1,6 @@
 #include "filigree/io/mesh_file.h"
+#include "filigree/mesh/half_edges.h"
 #include "filigree/mesh/shapes.h"
-#include "filigree/remesh/half_edges.h"
 #include "filigree/remesh/manifold_surface.h"
 #include "remesh/manifold_check.h"
 #include "threads.h"

@@ -2,9 +2,9 @@
 #pragma once
 
 #include "filigree/io/mesh_file.h"
+#include "filigree/mesh/half_edges.h"
 #include "filigree/mesh/shapes.h"
 #include "filigree/remesh/feature_curves.h"
-#include "filigree/remesh/half_edges.h"
 #include "filigree/remesh/patch_grid.h"
 #include "io/corpus.h"
 #include "threads.h"

@@ -6,6 +6,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
+
 namespace filigree {
 namespace {
 
@@ -16,13 +19,30 @@ TEST(Closure, KnowsOpenEdgesAndTurnedFaces) {
     std::swap(cube.corners[1], cube.corners[3]); // the first quad, turned round
     const Closure turned = weld_triangles(cube, kAllThreads)->closure;
     EXPECT_TRUE(turned.is_closed());
-    EXPECT_EQ(turned.unbalanced, 4u);
+    EXPECT_TRUE(turned.is_oriented()); // turned back
     cube.corners.erase(cube.corners.begin(), cube.corners.begin() + 4);
     cube.face_offsets.pop_back();
     const Closure open = weld_triangles(cube, kAllThreads)->closure;
     EXPECT_EQ(open.open_edges, 4u);
     EXPECT_EQ(open.unbalanced, 4u);
     EXPECT_NEAR((open.first_open[0] - open.first_open[1]).norm(), bounds(cube.positions).size().x() / 2, 1e-6);
+}
+
+TEST(Closure, WhatHasOnlyOneSideStaysUnbalanced) {
+    Mesh band; // of Moebius
+    for (int i = 0; i < 12; ++i)
+        for (const double side : {-0.3, 0.3}) {
+            const double a = i * std::numbers::pi / 6, r = 1 + side * std::cos(a / 2);
+            band.positions.push_back(Vec3d(r * std::cos(a), r * std::sin(a), side * std::sin(a / 2)).cast<float>());
+        }
+    for (Index i = 0; i < 12; ++i) {
+        const Index a = 2 * i, b = a + 1, next = 2 * ((i + 1) % 12);
+        const bool crosses = i == 11;
+        band.add_face(std::array<Index, 4>{a, b, crosses ? next : next + 1, crosses ? next + 1 : next});
+    }
+    const Closure closure = weld_triangles(band, kAllThreads)->closure;
+    EXPECT_EQ(closure.open_edges, 24u);
+    EXPECT_EQ(closure.turned, 1u);
 }
 
 TEST(Closure, VerticesAtOnePlaceAreOne) {

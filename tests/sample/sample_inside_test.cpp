@@ -5,6 +5,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <random>
+
 namespace filigree {
 namespace {
 
@@ -31,6 +34,23 @@ TEST(SampleInside, ThreeWaysAgreeOnClosedMeshes) {
         EXPECT_EQ(scan.bits, rays.bits);
         EXPECT_EQ(scan.bits, winding.bits);
     }
+}
+
+TEST(SampleInside, FacesMayRunEitherWay) {
+    Mesh mesh = make_wavy_sphere({.resolution = 12});
+    const Lattice lattice = lattice_over(mesh, bounds(mesh.positions).diagonal() / 31);
+    const Occupancy right = sample_inside(mesh, lattice, {}, kAllThreads).value();
+    std::mt19937 random(3);
+    for (std::size_t f = 0; f < mesh.face_count(); ++f)
+        if (random() % 2 == 0)
+            std::reverse(mesh.corners.begin() + mesh.face_offsets[f], mesh.corners.begin() + mesh.face_offsets[f + 1]);
+    InsideReport report;
+    EXPECT_EQ(sample_inside(mesh, lattice, {}, kAllThreads, &report).value().bits, right.bits);
+    EXPECT_EQ(report.used, InsideMethod::scan);
+    const Mesh open = without_faces(mesh, mesh.face_count() - 1); // winding numbers need the way
+    const Occupancy nearly = sample_inside(open, lattice, {}, kAllThreads, &report).value();
+    EXPECT_EQ(report.used, InsideMethod::winding);
+    EXPECT_NEAR(double(nearly.count()) / double(right.count()), 1, 0.01);
 }
 
 TEST(SampleInside, AnOpenMeshIsNotScanned) {

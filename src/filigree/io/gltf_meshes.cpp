@@ -27,7 +27,9 @@ public:
         describe_motions();
         walk();
         if (runs_.empty()) read_points();
-        if (scene_.blocks.empty()) throw Damage{"has no mesh in its scene."};
+        if (scene_.blocks.empty())
+            throw Damage{without_area_ > 0 ? "has nothing but lines in its scene, and triangles and points are read."
+                                           : "has no mesh in its scene."};
         lay_out();
         label_faces();
         finish_corners();

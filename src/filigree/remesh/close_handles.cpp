@@ -6,7 +6,7 @@
 // 2001], a short walk around each of these edges finds the handle's shortest loop, and no region is grown everywhere.
 #include "filigree/core/disjoint_sets.h"
 #include "filigree/core/random.h"
-#include "filigree/remesh/half_edges.h"
+#include "filigree/mesh/half_edges.h"
 #include "filigree/remesh/manifold_surface.h"
 
 #include <algorithm>

@@ -1,7 +1,7 @@
 #include "filigree/remesh/feature_curves.h"
 
 #include "filigree/core/disjoint_sets.h"
-#include "filigree/remesh/half_edges.h"
+#include "filigree/mesh/half_edges.h"
 
 #include <algorithm>
 #include <cmath>

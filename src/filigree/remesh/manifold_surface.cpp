@@ -5,9 +5,10 @@
 
 #include "filigree/core/disjoint_sets.h"
 #include "filigree/core/parallel_for.h"
+#include "filigree/mesh/half_edges.h"
+#include "filigree/mesh/orientation.h"
 #include "filigree/mesh/triangulate.h"
 #include "filigree/mesh/weld.h"
-#include "filigree/remesh/half_edges.h"
 
 #include <algorithm>
 #include <cassert>
@@ -213,34 +214,6 @@ std::vector<Index> pair_neighbours(const Soup& soup, std::span<const Index> sort
     return neighbour;
 }
 
-/// Which triangles to turn so that neighbours agree, as far as they can; of each component the smaller area turns.
-std::vector<std::uint8_t> triangles_to_flip(std::span<const Triangle> triangles, std::span<const Index> neighbour,
-                                            std::span<const double> areas) {
-    std::vector<std::uint8_t> flip(triangles.size(), 0), seen(triangles.size(), 0);
-    std::vector<Index> component;
-    for (Index seed = 0; seed < triangles.size(); ++seed) {
-        if (seen[seed]) continue;
-        component.assign(1, seed);
-        seen[seed] = 1;
-        double kept = 0, turned = 0;
-        for (std::size_t i = 0; i < component.size(); ++i) {
-            const Index t = component[i];
-            (flip[t] ? turned : kept) += areas[t];
-            for (Index h = 3 * t; h < 3 * t + 3; ++h) {
-                const Index other = neighbour[h];
-                if (other == kNoIndex || seen[other / 3]) continue;
-                seen[other / 3] = 1;
-                const bool agree = half_edge_start(triangles, h) != half_edge_start(triangles, other);
-                flip[other / 3] = flip[t] ^ !agree;
-                component.push_back(other / 3);
-            }
-        }
-        if (turned > kept)
-            for (const Index t : component) flip[t] ^= 1;
-    }
-    return flip;
-}
-
 /// Turns triangles over, and renumbers their half-edges: the edge i becomes the edge 2 - i.
 void flip_triangles(Soup& soup, std::span<Index> sorted, std::span<const std::uint8_t> flip, CleanReport& report) {
     Index last_face = kNoIndex;
@@ -431,7 +404,7 @@ Result<ManifoldSurface> make_manifold(const Mesh& mesh, CleanReport& report, con
     if (!step(0.5)) return cancelled_error();
 
     const std::vector<Index> neighbour = pair_neighbours(soup, sorted);
-    flip_triangles(soup, sorted, triangles_to_flip(soup.triangles, neighbour, areas), report);
+    flip_triangles(soup, sorted, triangles_to_turn(soup.triangles, neighbour, mesh.positions), report);
     if (!step(0.7)) return cancelled_error();
     const Gluer gluer(positions, soup, sorted);
     const Labels fan = fans(gluer.opposite());

@@ -45,8 +45,8 @@ struct SurfaceTopology {
 };
 
 /// Any mesh as a manifold: triangulates, welds vertices at the same position, drops triangles that repeat a vertex or
-/// the vertices of an earlier one, glues edges with exactly two triangles, orients each component (the majority by area
-/// stays), cuts what cannot be glued, and gives each fan its own vertex. Nothing else moves or goes.
+/// the vertices of an earlier one, glues edges with exactly two triangles, orients each component
+/// (mesh/orientation.h), cuts what cannot be glued, and gives each fan its own vertex. Nothing else moves or goes.
 /// Where bodies touch along an edge they come apart closed: the two sides of each solid wedge are glued. Where they
 /// share a wall (triangles that are there twice, with the surface going on all around them) the wall goes and they
 /// become one; a sheet that is there twice and meets a closed surface along some edges becomes a component of its own.

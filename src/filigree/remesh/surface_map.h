@@ -2,7 +2,7 @@
 // changed, every point of it knows its place on the surface it began as.
 #pragma once
 
-#include "filigree/remesh/half_edges.h"
+#include "filigree/mesh/half_edges.h"
 #include "filigree/remesh/manifold_surface.h"
 
 #include <cstdint>

@@ -10,8 +10,8 @@
 
 namespace filigree {
 
-/// automatic: scan for a mesh that is closed and consistently oriented (once vertices at one place are one), else
-/// winding.
+/// automatic: scan for a mesh that is closed and consistently oriented (once vertices at one place are one, and faces
+/// agree with their neighbours), else winding.
 enum class InsideMethod { automatic, scan, rays, winding };
 
 struct InsideOptions {

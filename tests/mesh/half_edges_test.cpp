@@ -1,4 +1,4 @@
-#include "filigree/remesh/half_edges.h"
+#include "filigree/mesh/half_edges.h"
 
 #include "filigree/mesh/shapes.h"
 #include "remesh/manifold_check.h"

@@ -1,0 +1,71 @@
+#include "filigree/mesh/orientation.h"
+
+#include "filigree/mesh/half_edges.h"
+
+#include <algorithm>
+
+namespace filigree {
+
+namespace {
+
+constexpr double kClearMajority = 0.75; // of a component's area
+
+/// Twice the area, and six times the volume of the cone from `apex`.
+struct Measures {
+    double area, volume;
+};
+Measures measures_of(const Triangle& t, std::span<const Vec3f> positions, const Vec3d& apex) {
+    const auto corner = [&](std::size_t i) -> Vec3d { return positions[t[i]].cast<double>() - apex; };
+    const Vec3d a = corner(0), b = corner(1), c = corner(2);
+    return {(b - a).cross(c - a).norm(), a.dot(b.cross(c))};
+}
+
+} // namespace
+
+std::vector<std::uint8_t> triangles_to_turn(std::span<const Triangle> triangles, std::span<const Index> neighbour,
+                                            std::span<const Vec3f> positions) {
+    std::vector<std::uint8_t> turn(triangles.size(), 0), seen(triangles.size(), 0);
+    std::vector<Index> component;
+    for (Index seed = 0; seed < triangles.size(); ++seed) {
+        if (seen[seed]) continue;
+        component.assign(1, seed);
+        seen[seed] = 1;
+        const Vec3d apex = positions[triangles[seed][0]].cast<double>();
+        double kept = 0, turned = 0, volume = 0;
+        for (std::size_t i = 0; i < component.size(); ++i) {
+            const Index t = component[i];
+            const Measures measures = measures_of(triangles[t], positions, apex);
+            (turn[t] ? turned : kept) += measures.area;
+            volume += turn[t] ? -measures.volume : measures.volume;
+            for (Index h = 3 * t; h < 3 * t + 3; ++h) {
+                const Index other = neighbour[h];
+                if (other == kNoIndex || seen[other / 3]) continue;
+                seen[other / 3] = 1;
+                const bool agree = half_edge_start(triangles, h) != half_edge_start(triangles, other);
+                turn[other / 3] = turn[t] ^ !agree;
+                component.push_back(other / 3);
+            }
+        }
+        const bool is_clear = std::max(kept, turned) >= kClearMajority * (kept + turned);
+        if (is_clear ? turned > kept : volume < 0)
+            for (const Index t : component) turn[t] ^= 1;
+    }
+    return turn;
+}
+
+std::size_t orient(std::span<Triangle> triangles, std::span<const Vec3f> positions) {
+    std::vector<Index> neighbour(3 * triangles.size(), kNoIndex);
+    const std::vector<Index> sorted = half_edges_by_edge(triangles, positions.size());
+    const auto apex = [&](Index h) { return half_edge_start(triangles, previous_half_edge(h)); };
+    for_each_edge(std::span<const Triangle>(triangles), sorted, [&](std::span<const Index> edge) {
+        if (edge.size() != 2 || apex(edge[0]) == apex(edge[1])) return;
+        neighbour[edge[0]] = edge[1];
+        neighbour[edge[1]] = edge[0];
+    });
+    const std::vector<std::uint8_t> turn = triangles_to_turn(triangles, neighbour, positions);
+    for (std::size_t t = 0; t < triangles.size(); ++t)
+        if (turn[t]) std::swap(triangles[t][1], triangles[t][2]);
+    return std::size_t(std::ranges::count(turn, 1));
+}
+
+} // namespace filigree
