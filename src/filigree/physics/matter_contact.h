@@ -69,8 +69,8 @@ public:
     /// s: in longer steps something could pass through something.
     double longest_step() const;
 
-    /// How much harder parts of one body push each other than two bodies: nothing else about them is stiffer, and
-    /// folds are deep.
+    /// How much harder parts of one body push each other than two bodies do: a dragon that falls on itself is 0.29
+    /// spacings deep with it, 0.34 without.
     static constexpr float kWithinOneBody = 1.5f;
     static constexpr std::uint8_t kTouched = 2, kTouchedItself = 4;
     /// As Contacts::add_forces. touched: of each body; kTouched or kTouchedItself is set where it touches.
