@@ -156,6 +156,7 @@ TEST(TextScanner, QuotesAreReadableInEveryScript) {
     EXPECT_EQ(in_quotes("plain"), "'plain'");
     EXPECT_EQ(in_quotes("K\u00e4se \u65e5\u672c"), "'K\u00e4se \u65e5\u672c'");
     EXPECT_EQ(in_quotes("a\tb\x7f \xc2\x85 \xff\xe6"), "'a?b? ? ?\?'"); // controls, and what is no UTF-8
+    EXPECT_EQ(in_quotes("\xc2"), "'?'");
     EXPECT_EQ(in_quotes(std::string(23, 'x') + "\u00e4"), "'" + std::string(23, 'x') + "...'"); // no half of one
     EXPECT_EQ(in_quotes(std::string(24, 'x')), "'" + std::string(24, 'x') + "'");
 }

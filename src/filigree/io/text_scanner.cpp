@@ -49,8 +49,9 @@ std::string in_quotes(std::string_view text) {
         const std::size_t length = utf8_length(text, at);
         const std::string_view character = text.substr(at, std::max<std::size_t>(1, length));
         if (at + character.size() > kLongest) break;
-        const bool is_control = length == 1 ? character[0] < ' ' || character[0] == '\x7f'
-                                            : character.starts_with('\xc2') && character[1] < '\xa0'; // C1
+        const bool is_control = length == 1   ? character[0] < ' ' || character[0] == '\x7f'
+                                : length == 2 ? character[0] == '\xc2' && character[1] < '\xa0' // C1
+                                              : false;
         if (length == 0 || is_control)
             quote += '?';
         else
