@@ -23,7 +23,7 @@ Measures measures_of(const Triangle& t, std::span<const Vec3f> positions, const 
 } // namespace
 
 std::vector<std::uint8_t> triangles_to_turn(std::span<const Triangle> triangles, std::span<const Index> neighbour,
-                                            std::span<const Vec3f> positions) {
+                                            std::span<const Vec3f> positions, OneSided one_sided) {
     std::vector<std::uint8_t> turn(triangles.size(), 0), seen(triangles.size(), 0);
     std::vector<Index> component;
     for (Index seed = 0; seed < triangles.size(); ++seed) {
@@ -32,6 +32,7 @@ std::vector<std::uint8_t> triangles_to_turn(std::span<const Triangle> triangles,
         seen[seed] = 1;
         const Vec3d apex = positions[triangles[seed][0]].cast<double>();
         double kept = 0, turned = 0, volume = 0;
+        bool has_one_side = false;
         for (std::size_t i = 0; i < component.size(); ++i) {
             const Index t = component[i];
             const Measures measures = measures_of(triangles[t], positions, apex);
@@ -39,12 +40,21 @@ std::vector<std::uint8_t> triangles_to_turn(std::span<const Triangle> triangles,
             volume += turn[t] ? -measures.volume : measures.volume;
             for (Index h = 3 * t; h < 3 * t + 3; ++h) {
                 const Index other = neighbour[h];
-                if (other == kNoIndex || seen[other / 3]) continue;
-                seen[other / 3] = 1;
+                if (other == kNoIndex) continue;
                 const bool agree = half_edge_start(triangles, h) != half_edge_start(triangles, other);
-                turn[other / 3] = turn[t] ^ !agree;
+                const std::uint8_t wanted = turn[t] ^ !agree;
+                if (seen[other / 3]) {
+                    has_one_side |= turn[other / 3] != wanted;
+                    continue;
+                }
+                seen[other / 3] = 1;
+                turn[other / 3] = wanted;
                 component.push_back(other / 3);
             }
+        }
+        if (has_one_side && one_sided == OneSided::left) {
+            for (const Index t : component) turn[t] = 0;
+            continue;
         }
         const bool is_clear = std::max(kept, turned) >= kClearMajority * (kept + turned);
         if (is_clear ? turned > kept : volume < 0)
@@ -62,7 +72,7 @@ std::size_t orient(std::span<Triangle> triangles, std::span<const Vec3f> positio
         neighbour[edge[0]] = edge[1];
         neighbour[edge[1]] = edge[0];
     });
-    const std::vector<std::uint8_t> turn = triangles_to_turn(triangles, neighbour, positions);
+    const std::vector<std::uint8_t> turn = triangles_to_turn(triangles, neighbour, positions, OneSided::left);
     for (std::size_t t = 0; t < triangles.size(); ++t)
         if (turn[t]) std::swap(triangles[t][1], triangles[t][2]);
     return std::size_t(std::ranges::count(turn, 1));

@@ -404,7 +404,8 @@ Result<ManifoldSurface> make_manifold(const Mesh& mesh, CleanReport& report, con
     if (!step(0.5)) return cancelled_error();
 
     const std::vector<Index> neighbour = pair_neighbours(soup, sorted);
-    flip_triangles(soup, sorted, triangles_to_turn(soup.triangles, neighbour, mesh.positions), report);
+    flip_triangles(soup, sorted, triangles_to_turn(soup.triangles, neighbour, mesh.positions, OneSided::turned),
+                   report);
     if (!step(0.7)) return cancelled_error();
     const Gluer gluer(positions, soup, sorted);
     const Labels fan = fans(gluer.opposite());
