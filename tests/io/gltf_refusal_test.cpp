@@ -229,6 +229,9 @@ TEST(GltfRefusal, Containers) {
     expect_refused(R"({"asset":{"version":"2.0"},)", "JSON is damaged at byte");
     expect_refused(R"({"asset":{"version":"1.0"}})", "glTF 2.0 is read", ErrorCode::unsupported);
     expect_refused(R"({"asset":{"version":"2.0"}})", "has no mesh in its scene");
+    expect_refused(
+        triangle().text(R"("nodes":[{"mesh":0}],"meshes":[{"primitives":[{"mode":1,"attributes":{"POSITION":0}}]}])"),
+        "has nothing but lines in its scene");
 }
 
 TEST(GltfRefusal, CompressedDataSaysHowToUnpackIt) {

@@ -7,6 +7,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <random>
 
 namespace filigree {
@@ -50,6 +52,25 @@ TEST(Orientation, WhereNoWayPrevailsFacesLookOutwards) {
         orient(some, mesh.positions);
         EXPECT_NEAR(volume(some, mesh.positions), volume(right, mesh.positions), 1e-9);
     }
+}
+
+TEST(Orientation, WhatHasOneSideStays) {
+    std::vector<Vec3f> positions; // a band with half a turn
+    for (int i = 0; i < 12; ++i)
+        for (const double side : {-0.3, 0.3}) {
+            const double a = i * std::numbers::pi / 6, r = 1 + side * std::cos(a / 2);
+            positions.push_back(Vec3d(r * std::cos(a), r * std::sin(a), side * std::sin(a / 2)).cast<float>());
+        }
+    std::vector<Triangle> band;
+    for (Index i = 0; i < 12; ++i) {
+        const Index a = 2 * i, b = a + 1, c = i == 11 ? 0 : b + 2, d = i == 11 ? 1 : a + 2;
+        band.push_back({a, b, c});
+        band.push_back({a, c, d});
+    }
+    turn(band, 0.3, 1);
+    const std::vector<Triangle> before = band;
+    EXPECT_EQ(orient(band, positions), 0u);
+    EXPECT_EQ(band, before);
 }
 
 TEST(Orientation, AFaceThatIsThereTwiceStays) {

@@ -198,8 +198,9 @@ def uncovered(sections):
             "- No soak of a day."]
 
 
-MAKERS = {"Checks of the tree": checks, "Fuzzing": fuzzing, "Properties": properties, "Line coverage": coverage, "Torture of outputs": torture,
-          "Bounds": bounds, "Long life": long_life, "The studio": studio, "Tests of the tests": mutants}
+MAKERS = {"Checks of the tree": checks, "Fuzzing": fuzzing, "Properties": properties, "Line coverage": coverage,
+          "Torture of outputs": torture, "Bounds": bounds, "Long life": long_life, "The studio": studio,
+          "Tests of the tests": mutants}
 sections = {title: make() or old_section(title) for title, make in MAKERS.items()}
 sections["Tests of the tests"] = judged(sections["Tests of the tests"])
 sections["What nothing covers"] = uncovered(sections)
