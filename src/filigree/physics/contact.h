@@ -34,14 +34,14 @@ public:
     };
     void search(std::span<BodyState> bodies, const Search& search, const RunContext& context);
     /// Before a frame of explicit steps.
-    void begin_frame(std::span<const BodyState> bodies) {
+    void begin_frame(std::span<const BodyState> bodies, const RunContext& context) {
         pairs_until_ = -1;
-        matter_.begin_frame(bodies);
+        matter_.begin_frame(bodies, context);
     }
     /// After a frame of explicit steps.
-    void end_frame(std::span<const BodyState> bodies) { matter_.end_frame(bodies); }
+    void end_frame(std::span<const BodyState> bodies, const RunContext& context) { matter_.end_frame(bodies, context); }
     /// Positions have changed by dt times velocities. way: m, bound on how far anything has gone, with obstacles.
-    void travel(std::span<const BodyState> bodies, float dt, float way);
+    void travel(std::span<const BodyState> bodies, float dt, float way, const RunContext& context);
     /// A body's particles were moved by so much, m, beside their velocities.
     void was_moved(std::size_t body, float way) {
         near_way_ += way;
@@ -51,9 +51,9 @@ public:
     /// s: in longer steps something could pass through something.
     double longest_step() const { return matter_.longest_step(); }
     /// The same before anything is searched for, of all that is found anew: before a substep of descent.
-    double longest_step_from(std::span<const BodyState> bodies, double left) {
+    double longest_step_from(std::span<const BodyState> bodies, double left, const RunContext& context) {
         near_until_ = pairs_until_ = -1;
-        matter_.find_approaching(bodies, left);
+        matter_.find_approaching(bodies, left, context);
         return matter_.longest_step();
     }
     /// The next search finds everything again, and ways are counted from here; anchors and touches stay.

@@ -142,7 +142,7 @@ Contacts::Blocks::Entry Contacts::block_of(const Near& at, const BodyState& body
                                            float dt) const {
     const Obstacle& obstacle = world_.obstacles[at.obstacle];
     const Vec3f place = embedded_point(body.surface, at.point, body.positions);
-    const Vec3f normal = distance_to(obstacle, poses.at(at.obstacle), place).normal;
+    const Vec3f normal = poses.distance_to(at.obstacle, place).normal;
     const Vec3f velocity = embedded_point(body.surface, at.point, body.velocities) - poses.velocity(at.obstacle, place);
     Blocks::Entry entry;
     entry.embedding = &body.surface;
@@ -228,7 +228,7 @@ ContactReport Contacts::update_anchors(std::span<const BodyState> bodies, std::s
         for (Near& at : near_[b]) {
             const Obstacle& obstacle = world_.obstacles[at.obstacle];
             const Vec3f place = embedded_point(body.surface, at.point, body.positions);
-            const DistanceField::Sample surface = distance_to(obstacle, poses.at(at.obstacle), place);
+            const DistanceField::Sample surface = poses.distance_to(at.obstacle, place);
             at.depth = std::max(0.0f, -surface.distance);
             if (!(surface.distance < 0)) {
                 at.grasp = {};

@@ -66,7 +66,7 @@ Vec3f Contacts::obstacle_force(Near& at, const BodyState& body, const ObstaclePo
     }
     const Obstacle& obstacle = world_.obstacles[at.obstacle];
     const Vec3f place = embedded_point(body.surface, at.point, body.positions);
-    const DistanceField::Sample surface = distance_to(obstacle, poses.at(at.obstacle), place);
+    const DistanceField::Sample surface = poses.distance_to(at.obstacle, place);
     at.clear_until = near_way_ + surface.distance;
     if (!(surface.distance < 0)) {
         at.grasp = {};
@@ -94,13 +94,13 @@ Vec3f Contacts::between(const NearPair& pair, std::span<const BodyState> bodies,
            embedded_point(bodies[pair.second_body].*points, pair.second, of_second);
 }
 
-void Contacts::travel(std::span<const BodyState> bodies, float dt, float way) {
+void Contacts::travel(std::span<const BodyState> bodies, float dt, float way, const RunContext& context) {
     near_way_ += way;
     for (NearPair& pair : pairs_)
         if (pair.grasp.holds)
             pair.offset += dt * between(pair, bodies, &BodyState::surface, bodies[pair.first_body].velocities,
                                         bodies[pair.second_body].velocities);
-    matter_.travel(bodies, dt);
+    matter_.travel(bodies, dt, context);
     pairs_way_ += dt * matter_.relative_speed_of_all([&](std::size_t b) { return bodies[b].has_balls(); });
 }
 
@@ -216,8 +216,7 @@ void Contacts::push_out(std::span<BodyState> bodies, double time, const RunConte
         for (const Near& at : near_[b]) {
             if (!(at.depth > kCrushing * spacing)) continue;
             const Vec3f place = embedded_point(body.surface, at.point, body.positions);
-            const DistanceField::Sample surface =
-                distance_to(world_.obstacles[at.obstacle], poses.at(at.obstacle), place);
+            const DistanceField::Sample surface = poses.distance_to(at.obstacle, place);
             const float gives = yielding(body.surface, at.point, body.inverse_mass);
             if (!(gives > 0)) continue;
             outwards.resize(world_.obstacles.size(), Vec3f::Zero());
@@ -246,7 +245,7 @@ void Contacts::push_particles_out(BodyState& body, std::size_t obstacle, const V
     std::vector<DistanceField::Sample> found(body.positions.size()); // distance: m beyond the limit, below 0
     parallel_for(context, found.size(), kContactForcesGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-            found[i] = distance_to(world_.obstacles[obstacle], poses.at(obstacle), body.positions[i]);
+            found[i] = poses.distance_to(obstacle, body.positions[i]);
             found[i].distance += body.has_flowed() ? kDeepest * float(body.body->spacing()) : most_depths[i];
         }
     });

@@ -81,12 +81,10 @@ void Contacts::find_near(std::span<const BodyState> bodies, double time, float r
         auto old = near_[b].begin();
         const Box box = bounds(places);
         for (std::size_t o = 0; o < world_.obstacles.size(); ++o) {
-            const float nearest = distance_to(world_.obstacles[o], poses.at(o), box.centre().cast<float>()).distance -
-                                  float(box.diagonal() / 2);
+            const float nearest = poses.distance_to(o, box.centre().cast<float>()).distance - float(box.diagonal() / 2);
             if (nearest > reach) continue;
             parallel_for(context, points, kContactSearchGrain, [&](std::size_t begin, std::size_t end) {
-                for (std::size_t s = begin; s < end; ++s)
-                    distances[s] = distance_to(world_.obstacles[o], poses.at(o), places[s]).distance;
+                for (std::size_t s = begin; s < end; ++s) distances[s] = poses.distance_to(o, places[s]).distance;
             });
             for (Index s = 0; s < points; ++s) {
                 if (!(distances[s] < reach) || body.is_hidden(s)) continue;

@@ -305,7 +305,7 @@ private:
 void step_by_descent(SimulationState& state, double from, double until, FrameReport& report,
                      const RunContext& context) {
     for (double now = from; now < until && !context.is_cancelled();) {
-        const double longest = state.descent_step(state.contacts.longest_step_from(state.bodies, until - now));
+        const double longest = state.descent_step(state.contacts.longest_step_from(state.bodies, until - now, context));
         const double steps = std::max(1.0, std::ceil((until - now) / longest - 1e-6));
         const double next = steps == 1 ? until : now + (until - now) / steps;
         if (!DescentStep(state, next, float(next - now), report, context).run()) return;

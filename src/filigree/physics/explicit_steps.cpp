@@ -126,13 +126,13 @@ public:
 
     double run() {
         speed_ = most_particle_speed(bodies_);
-        if (meets_anything_) state_.contacts.begin_frame(bodies_);
+        if (meets_anything_) state_.contacts.begin_frame(bodies_, context_);
         find_contacts();
         const float first_dt = float(state_.frame_seconds() / state_.options.most_substeps);
         find_forces(first_dt);
         if (repair_start(state_, elastic_, report_, context_)) {
             state_.contacts.begin_anew();
-            state_.contacts.begin_frame(bodies_);
+            state_.contacts.begin_frame(bodies_, context_);
             find_contacts();
             stable_in_frame_ = kNoLimit;
             vibrations_.clear();
@@ -151,13 +151,13 @@ public:
             const Breaks breaks = break_bodies(state_, before, now_, context_);
             if (breaks.contacts) {
                 place_rigid();
-                if (meets_anything_) state_.contacts.begin_frame(bodies_);
+                if (meets_anything_) state_.contacts.begin_frame(bodies_, context_);
                 find_contacts();
             }
             if (breaks.forces || breaks.contacts) find_forces(dt, true);
         }
         place_rigid();
-        if (meets_anything_) state_.contacts.end_frame(bodies_);
+        if (meets_anything_) state_.contacts.end_frame(bodies_, context_);
         return is_left() ? now_ : until_;
     }
 
@@ -191,7 +191,8 @@ private:
         move_pins(state_, now_, dt);
         if (!meets_anything_) return;
         speed_ = most_particle_speed(bodies_);
-        state_.contacts.travel(bodies_, dt, dt * speed_ + float(obstacle_way(state_.world, bodies_, before, now_)));
+        const float way = dt * speed_ + float(obstacle_way(state_.world, bodies_, before, now_));
+        state_.contacts.travel(bodies_, dt, way, context_);
     }
 
     void find_contacts() {

@@ -37,11 +37,11 @@ public:
     /// The next search finds everything again; what touches is remembered.
     void begin_anew();
     /// Before a frame: speeds, and which bodies meet themselves, as positions and velocities are now.
-    void begin_frame(std::span<const BodyState> bodies);
+    void begin_frame(std::span<const BodyState> bodies, const RunContext& context);
     /// After a frame of explicit steps: what has moved since the last search, for the next frame and memory().
-    void end_frame(std::span<const BodyState> bodies);
+    void end_frame(std::span<const BodyState> bodies, const RunContext& context);
     /// Positions have changed by dt times velocities. Cost O(particles).
-    void travel(std::span<const BodyState> bodies, float dt);
+    void travel(std::span<const BodyState> bodies, float dt, const RunContext& context);
     /// m/s: bound on what particles of bodies that `counts` have beside each other, as of the last travel.
     template <class Counts>
     float relative_speed_of_all(const Counts& counts) const {
@@ -57,7 +57,7 @@ public:
     /// what is found is to hold.
     bool search(std::span<BodyState> bodies, double frame, const RunContext& context);
     /// Begins anew, and finds only which bodies are near each other, for longest_step.
-    void find_approaching(std::span<const BodyState> bodies, double frame);
+    void find_approaching(std::span<const BodyState> bodies, double frame, const RunContext& context);
     /// Calls visit(body, other) for each two different bodies of which points touched at last.
     template <class Visit>
     void each_touching(const Visit& visit) const {
@@ -154,7 +154,7 @@ private:
         return side.moved + Extremes::between(shifts_[side.body], shifts_[side.other]);
     }
     void count_from_here(std::span<const BodyState> bodies);
-    void find_shifts(std::span<const BodyState> bodies);
+    void find_shifts(std::span<const BodyState> bodies, const RunContext& context);
     Side make_side(Index body, Index other, std::span<const BodyState> bodies) const;
     template <class Find>
     static void take_pairs(Side& side, const BodyState& body, std::size_t points, const Find& find);
@@ -176,7 +176,7 @@ private:
                     const RunContext& context);
     bool wake_touched(std::span<BodyState> bodies) const;
     void list_work(std::span<const BodyState> bodies);
-    void find_sides(std::span<const BodyState> bodies, double frame);
+    void find_sides(std::span<const BodyState> bodies, double frame, const RunContext& context);
     std::optional<Vec3f> enter(Pair& pair, const Side& side, std::span<const BodyState> bodies) const;
     float crushed_part(const BodyState& body, const Matter& matter) const;
     void find_recovering(std::span<const BodyState> bodies);
@@ -209,7 +209,11 @@ private:
     std::vector<Side> sides_;      ///< ascending by bodies
     float way_ = 0, sides_until_ = -1;
     std::vector<std::pair<Index, Index>> work_; ///< side and pair of each force
-    std::vector<Vec3f> forces_;
+    struct PairForce { ///< beside how deep its pair touches, so that those that do not are passed over fast
+        Vec3f force = Vec3f::Zero();
+        float depth = 0;
+    };
+    std::vector<PairForce> forces_; ///< of work_
     bool is_too_deep_ = false; ///< something touches deeper than push_out lets it, as add_forces or update_anchors saw
 };
 

@@ -110,24 +110,27 @@ ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, 
                                          const RunContext& context) {
     ContactReport report;
     is_too_deep_ = false;
-    forces_.assign(work_.size(), Vec3f::Zero());
+    forces_.resize(work_.size());
     parallel_for(context, work_.size(), kMatterForcesGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k) {
             Side& side = sides_[work_[k].first];
-            forces_[k] = force(side.pairs[work_[k].second], side, bodies, dt);
+            Pair& pair = side.pairs[work_[k].second];
+            const Vec3f on_point = force(pair, side, bodies, dt);
+            forces_[k] = {on_point, pair.depth};
         }
     });
     for (std::size_t k = 0; k < work_.size(); ++k) {
+        const auto& [force, depth] = forces_[k];
+        if (!(depth > 0)) continue;
         const Side& side = sides_[work_[k].first];
         const Pair& pair = side.pairs[work_[k].second];
-        if (!(pair.depth > 0)) continue;
-        add_to_particles(bodies[side.body].surface, pair.point, forces_[k], bodies[side.body].forces);
-        matter_[side.other]->add(pair.place, -forces_[k], bodies[side.other].forces);
+        add_to_particles(bodies[side.body].surface, pair.point, force, bodies[side.body].forces);
+        matter_[side.other]->add(pair.place, -force, bodies[side.other].forces);
         touched[side.body] |= touch_of(side);
         touched[side.other] |= touch_of(side);
         ++report.contacts;
-        report.deepest_in_matter = std::max(report.deepest_in_matter, pair.depth);
-        is_too_deep_ |= pair.depth > kDeepest * side.spacing;
+        report.deepest_in_matter = std::max(report.deepest_in_matter, depth);
+        is_too_deep_ |= depth > kDeepest * side.spacing;
     }
     return report;
 }

@@ -208,9 +208,9 @@ void MatterContacts::begin_anew() {
     }
 }
 
-void MatterContacts::begin_frame(std::span<const BodyState> bodies) {
+void MatterContacts::begin_frame(std::span<const BodyState> bodies, const RunContext& context) {
     list_work(bodies); // some may have woken or gone to sleep
-    travel(bodies, 0);
+    travel(bodies, 0, context);
     for (std::size_t b = 0; b < bodies.size(); ++b)
         if (!bodies[b].is_absent) places_[b] = bodies[b].positions;
     shifts_.assign(bodies.size(), {});
@@ -221,8 +221,8 @@ void MatterContacts::begin_frame(std::span<const BodyState> bodies) {
     }
 }
 
-void MatterContacts::end_frame(std::span<const BodyState> bodies) {
-    find_shifts(bodies);
+void MatterContacts::end_frame(std::span<const BodyState> bodies, const RunContext& context) {
+    find_shifts(bodies, context);
     count_from_here(bodies);
 }
 
@@ -232,9 +232,11 @@ void MatterContacts::was_moved(std::size_t body, float way) {
         if (side.body == body || side.other == body) side.way += way;
 }
 
-void MatterContacts::travel(std::span<const BodyState> bodies, float dt) {
-    for (std::size_t b = 0; b < bodies.size(); ++b)
-        if (!bodies[b].is_absent) speeds_[b] = extremes(b, bodies[b].velocities, nullptr);
+void MatterContacts::travel(std::span<const BodyState> bodies, float dt, const RunContext& context) {
+    parallel_for(context, bodies.size(), kBodiesGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t b = begin; b < end; ++b)
+            if (!bodies[b].is_absent) speeds_[b] = extremes(b, bodies[b].velocities, nullptr);
+    });
     way_ += dt * relative_speed_of_all([&](std::size_t b) { return !bodies[b].is_absent; });
     for (Side& side : sides_) {
         side.speed = relative_speed(side.body, side.other);
@@ -244,10 +246,11 @@ void MatterContacts::travel(std::span<const BodyState> bodies, float dt) {
 }
 
 /// How far particles are from where they are counted from.
-void MatterContacts::find_shifts(std::span<const BodyState> bodies) {
-    for (std::size_t b = 0; b < bodies.size(); ++b) {
-        if (!bodies[b].is_absent && !bodies[b].sleeps()) shifts_[b] = extremes(b, bodies[b].positions, &places_[b]);
-    }
+void MatterContacts::find_shifts(std::span<const BodyState> bodies, const RunContext& context) {
+    parallel_for(context, bodies.size(), kBodiesGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t b = begin; b < end; ++b)
+            if (!bodies[b].is_absent && !bodies[b].sleeps()) shifts_[b] = extremes(b, bodies[b].positions, &places_[b]);
+    });
 }
 
 /// What has moved so far goes into the sides, and shifts are counted from here.
@@ -259,14 +262,18 @@ void MatterContacts::count_from_here(std::span<const BodyState> bodies) {
 }
 
 /// Which bodies are near each other: boxes swept along x.
-void MatterContacts::find_sides(std::span<const BodyState> bodies, double frame) {
-    std::vector<Box> boxes(bodies.size());
+void MatterContacts::find_sides(std::span<const BodyState> bodies, double frame, const RunContext& context) {
+    std::vector<Box> boxes(bodies.size()); // empty: of bodies that meet nothing
+    parallel_for(context, bodies.size(), kBodiesGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t b = begin; b < end; ++b) {
+            if (bodies[b].is_absent) continue;
+            if (is_finite(bodies[b].positions)) boxes[b] = extent(bodies[b], b); // else the frame is done again
+        }
+    });
     float spacing = 0, speed = 0;
     std::vector<Index> order;
     for (Index b = 0; b < bodies.size(); ++b) {
-        if (bodies[b].is_absent) continue;
-        if (!is_finite(bodies[b].positions)) continue; // the frame is done again
-        boxes[b] = extent(bodies[b], b);
+        if (boxes[b].empty()) continue;
         order.push_back(b);
         spacing = std::max(spacing, float(bodies[b].body->spacing()));
         speed = std::max(speed, relative_speed(b, order.front()));
@@ -310,10 +317,10 @@ MatterContacts::Side MatterContacts::make_side(Index body, Index other, std::spa
     return side;
 }
 
-void MatterContacts::find_approaching(std::span<const BodyState> bodies, double frame) {
+void MatterContacts::find_approaching(std::span<const BodyState> bodies, double frame, const RunContext& context) {
     begin_anew();
-    begin_frame(bodies);
-    find_sides(bodies, frame);
+    begin_frame(bodies, context);
+    find_sides(bodies, frame, context);
 }
 
 /// Pairs of a side anew, and its way counts from here; those that touch stay. find(s): what point s is near.
@@ -361,7 +368,6 @@ public:
         : contacts_(contacts), bodies_(bodies), extents_(bodies.size()), points_(bodies.size()), cells_(bodies.size()) {
     }
     void find_extent(Index body) {
-        if (!extents_[body].empty()) return;
         extents_[body] = contacts_.extent(bodies_[body], body);
         if (is_rigid(body)) find_cells(body);
     }
@@ -441,26 +447,32 @@ void MatterContacts::find_pairs(std::span<const Index> due, std::span<const Body
                                 const RunContext& context) {
     Surroundings around(*this, bodies);
     std::vector<Index> near; // sides of two bodies
-    std::vector<std::uint8_t> has_points(bodies.size(), 0), has_cells(bodies.size(), 0);
+    std::vector<std::uint8_t> has_extent(bodies.size(), 0), has_points = has_extent, has_cells = has_extent;
+    const auto each_body = [&](const auto& visit) {
+        parallel_for(context, bodies.size(), kBodiesGrain, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t b = begin; b < end; ++b) visit(Index(b));
+        });
+    };
     for (const Index i : due) {
         Side& side = sides_[i];
         side.since = 0;
-        if (side.body == side.other) {
+        if (side.body == side.other)
             find_own_pairs(side, bodies[side.body], frame, context);
-            continue;
-        }
-        around.find_extent(side.body);
-        around.find_extent(side.other);
-        if (begin_side(side, around, frame)) {
-            near.push_back(i);
-            has_points[side.body] = has_cells[side.other] = 1;
-        }
+        else
+            has_extent[side.body] = has_extent[side.other] = 1;
     }
-    parallel_for(context, bodies.size(), kBodiesGrain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t b = begin; b < end; ++b) {
-            if (has_points[b]) around.find_points(Index(b), context);
-            if (has_cells[b]) around.find_cells(Index(b));
-        }
+    each_body([&](Index b) {
+        if (has_extent[b]) around.find_extent(b);
+    });
+    for (const Index i : due) {
+        Side& side = sides_[i];
+        if (side.body == side.other || !begin_side(side, around, frame)) continue;
+        near.push_back(i);
+        has_points[side.body] = has_cells[side.other] = 1;
+    }
+    each_body([&](Index b) {
+        if (has_points[b]) around.find_points(b, context);
+        if (has_cells[b]) around.find_cells(b);
     });
     parallel_for(context, near.size(), kSidesGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k) {
@@ -472,7 +484,7 @@ void MatterContacts::find_pairs(std::span<const Index> due, std::span<const Body
 
 bool MatterContacts::search(std::span<BodyState> bodies, double frame, const RunContext& context) {
     bool changed = way_ > sides_until_;
-    if (changed) find_sides(bodies, frame);
+    if (changed) find_sides(bodies, frame, context);
     const bool woke = wake_touched(bodies);
     const auto is_due = [&](const Side& side, float moved, float part) {
         if (!(moved > part * side.until) || both_sleep(side, bodies)) return false;
@@ -481,7 +493,7 @@ bool MatterContacts::search(std::span<BodyState> bodies, double frame, const Run
     // What has gone no further there and back is no further away.
     const bool may_be_due =
         std::ranges::any_of(sides_, [&](const Side& side) { return is_due(side, side.moved + side.way, 1); });
-    if (may_be_due) find_shifts(bodies);
+    if (may_be_due) find_shifts(bodies, context);
     if (may_be_due && std::ranges::any_of(sides_, [&](const Side& side) { return is_due(side, moved(side), 1); })) {
         changed = true;
         count_from_here(bodies);

@@ -141,11 +141,11 @@ void NodeContacts::meet_obstacles(Grid& grid, std::size_t place, const ObstacleP
     for (std::size_t o = 0; o < world_.obstacles.size(); ++o) {
         const Obstacle& obstacle = world_.obstacles[o];
         const float reach = 1.5f * std::sqrt(3.0f) * h;
-        if (!(distance_to(obstacle, poses.at(o), middle).distance < reach)) continue;
+        if (!(poses.distance_to(o, middle).distance < reach)) continue;
         for (int n = 0; n < kBlockNodes; ++n) {
             const std::array<int, 3> node = node_of(at, n);
             const Vec3f point = h * Vec3f(float(node[0]), float(node[1]), float(node[2]));
-            const DistanceField::Sample sample = distance_to(obstacle, poses.at(o), point);
+            const DistanceField::Sample sample = poses.distance_to(o, point);
             if (!(sample.distance < 0)) continue;
             const Vec3f moving = poses.velocity(o, point);
             for (const std::uint32_t block : here) {
@@ -183,9 +183,7 @@ void HeatExchange::go_to(const BlockPlace& place, const ObstaclePoses& poses, st
                               Vec3f::Constant(0.5f * kBlockSide + 0.5f));
     near.clear();
     for (std::size_t o = 0; o < world_.obstacles.size(); ++o)
-        if (world_.obstacles[o].heat_transfer > 0 &&
-            distance_to(world_.obstacles[o], poses.at(o), middle).distance < reach)
-            near.push_back(o);
+        if (world_.obstacles[o].heat_transfer > 0 && poses.distance_to(o, middle).distance < reach) near.push_back(o);
 }
 
 void HeatExchange::act(Particle& p, const Matter& matter, const Vec3f& emptiness, const ObstaclePoses& poses,
@@ -202,7 +200,7 @@ void HeatExchange::act(Particle& p, const Matter& matter, const Vec3f& emptiness
     if (world_.air_heat_transfer > 0) exchange(air_temperature_, world_.air_heat_transfer, area);
     for (const std::size_t o : near) {
         const Obstacle& obstacle = world_.obstacles[o];
-        if (!(distance_to(obstacle, poses.at(o), point).distance < grid_spacing_)) continue;
+        if (!(poses.distance_to(o, point).distance < grid_spacing_)) continue;
         exchange(obstacle_temperature_[o], obstacle.heat_transfer, volume / grid_spacing_);
     }
     for (const Source& source : sources_)

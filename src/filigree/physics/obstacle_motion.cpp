@@ -31,11 +31,18 @@ double furthest_from(const Vec3d& point, std::span<const BodyState> bodies) {
 
 } // namespace
 
-ObstaclePoses::ObstaclePoses(const World& world, double time) {
+ObstaclePoses::ObstaclePoses(const World& world, double time) : world_(world) {
     for (const Obstacle& obstacle : world.obstacles) {
         const bool moves = obstacle.motion.moves();
-        motions_.push_back({obstacle.motion.at(time), obstacle.motion.at(moves ? time - kStep : time),
-                            obstacle.motion.at(moves ? time + kStep : time), moves});
+        Motion& motion = motions_.emplace_back();
+        motion.now = obstacle.motion.at(time);
+        motion.before = obstacle.motion.at(moves ? time - kStep : time);
+        motion.after = obstacle.motion.at(moves ? time + kStep : time);
+        motion.moves = moves;
+        const auto* ground = std::get_if<HalfSpace>(&obstacle.shape);
+        motion.is_half_space = ground != nullptr;
+        motion.point = ground ? Vec3d(motion.now * ground->point) : Vec3d::Zero();
+        motion.normal = ground ? Vec3d(motion.now.linear() * ground->normal.normalized()) : Vec3d::Zero();
     }
 }
 

@@ -9,9 +9,15 @@ namespace filigree {
 /// How obstacles stand at a moment, and how fast their matter moves.
 class ObstaclePoses {
 public:
-    ObstaclePoses(const World& world, double time);
+    ObstaclePoses(const World& world, double time); ///< world: outlives this
 
     const Eigen::Isometry3d& at(std::size_t obstacle) const { return motions_[obstacle].now; }
+    /// As filigree::distance_to; of half-spaces in a few steps.
+    DistanceField::Sample distance_to(std::size_t obstacle, const Vec3f& point) const {
+        const Motion& motion = motions_[obstacle];
+        if (!motion.is_half_space) return filigree::distance_to(world_.obstacles[obstacle], motion.now, point);
+        return {float(motion.normal.dot(point.cast<double>() - motion.point)), motion.normal.cast<float>()};
+    }
     Vec3f to_own_axes(std::size_t obstacle, const Vec3f& point) const;
     Vec3f to_world(std::size_t obstacle, const Vec3f& own) const;
     /// m/s, of the obstacle's matter at a point of the world.
@@ -20,8 +26,10 @@ public:
 private:
     struct Motion {
         Eigen::Isometry3d now, before, after;
-        bool moves;
+        bool moves, is_half_space;
+        Vec3d point, normal; ///< of a half-space's plane, in the world
     };
+    const World& world_;
     std::vector<Motion> motions_;
 };
 

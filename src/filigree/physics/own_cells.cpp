@@ -3,6 +3,7 @@
 #include "filigree/core/parallel_for.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -11,7 +12,7 @@ namespace filigree {
 
 namespace {
 
-constexpr std::size_t kOwnCellsGrain = 16;
+constexpr std::size_t kOwnCellsGrain = 16, kClusterCells = 8;
 constexpr float kClusterBoxSize = 2.5f;                          ///< spacings
 constexpr double kMostClusterBoxes = 8, kFewClusterBoxes = 4096; ///< a cluster, and whatever their number
 constexpr double kTangledClusters = 512;   ///< boxes, and near clusters, a cluster of a body crushed or mixed
@@ -33,10 +34,11 @@ OwnCells::OwnCells(const Matter& matter) : matter_(matter), points_(matter.body(
         overhang_ = std::max(overhang_, (points_.rest[s] - middle).cwiseAbs().maxCoeff() - 0.5f * spacing);
     }
     for (const auto& [at, members] : by_key) {
-        clusters_.push_back({at, 0, Index(cells_.size()), Index(corners_.size()), Index(surface_points_.size())});
+        clusters_.push_back({at, 0, Index(cells_.size()), Index(corners_.size()), 0});
         std::vector<Index> corners;
         for (const Index cell : members) {
             cells_.push_back(cell);
+            point_offsets_.push_back(Index(surface_points_.size()));
             corners.insert(corners.end(), cells.cell_corners[cell].begin(), cells.cell_corners[cell].end());
             surface_points_.insert(surface_points_.end(), points_of[cell].begin(), points_of[cell].end());
         }
@@ -44,19 +46,33 @@ OwnCells::OwnCells(const Matter& matter) : matter_(matter), points_(matter.body(
         corners.erase(std::ranges::unique(corners).begin(), corners.end());
         corners_.insert(corners_.end(), corners.begin(), corners.end());
     }
-    clusters_.push_back({{}, 0, Index(cells_.size()), Index(corners_.size()), Index(surface_points_.size())});
+    clusters_.push_back({{}, 0, Index(cells_.size()), Index(corners_.size()), 0});
+    point_offsets_.push_back(Index(surface_points_.size()));
 
     auto cluster = clusters_.begin();
     for (const auto& [at, members] : by_key) {
+        cluster->first_far = Index(far_cells_.size());
         for (int n = 0; n < 27; ++n) {
             const auto other = by_key.find({at[0] + n % 3 - 1, at[1] + n / 3 % 3 - 1, at[2] + n / 9 - 1});
             if (other == by_key.end()) continue;
-            for (const Index cell : members)
-                if (std::ranges::any_of(other->second, [&](Index its) { return are_far(cell, its); }))
-                    cluster->far_near |= 1u << n;
+            std::uint64_t far = 0;
+            for (std::size_t j = 0; j < other->second.size(); ++j)
+                for (std::size_t i = 0; i < members.size(); ++i)
+                    far |= std::uint64_t{are_far(members[i], other->second[j])} << (i + kClusterCells * j);
+            if (far == 0) continue;
+            cluster->far_near |= 1u << n;
+            far_cells_.push_back(far);
         }
         ++cluster;
     }
+}
+
+/// As far_cells_, of any two clusters that have such cells.
+std::uint64_t OwnCells::far_cells(Index cluster, Index other) const {
+    const int n = neighbour(cluster, other);
+    if (n < 0) return ~std::uint64_t{0};
+    const std::uint32_t before = clusters_[cluster].far_near & ((1u << n) - 1);
+    return far_cells_[clusters_[cluster].first_far + Index(std::popcount(before))];
 }
 
 /// Which of the 3^3 clusters around a cluster is b; -1: none.
@@ -184,52 +200,78 @@ std::vector<std::pair<Index, Index>> OwnCells::near_clusters(std::span<const Ext
     return near;
 }
 
+/// Of cells_; of the clusters in `near` alone.
+std::vector<OwnCells::CellBox> OwnCells::cell_boxes(std::span<const std::pair<Index, Index>> near,
+                                                    const Vectors& positions, const RunContext& context) const {
+    std::vector<std::uint8_t> is_near(clusters_.size() - 1, 0);
+    for (const auto& [cluster, other] : near) is_near[cluster] = is_near[other] = 1;
+    std::vector<CellBox> boxes(cells_.size());
+    parallel_for(context, is_near.size(), kOwnCellsGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k) {
+            if (!is_near[k]) continue;
+            for (Index c = clusters_[k].first_cell; c < clusters_[k + 1].first_cell; ++c) {
+                const auto& corners = matter_.corners(cells_[c]);
+                Vec3f low = positions[corners[0]], high = low, centre = low;
+                for (int corner = 1; corner < 8; ++corner) {
+                    const Vec3f p = positions[corners[corner]];
+                    low = low.cwiseMin(p);
+                    high = high.cwiseMax(p);
+                    centre += p;
+                }
+                boxes[c] = {low, high, centre / 8};
+            }
+        }
+    });
+    return boxes;
+}
+
 /// near: a cluster with those whose cells its points might lie in.
 void OwnCells::look_into(std::span<const std::pair<Index, Index>> near, std::span<const Extent> extents,
-                         const Vectors& positions, float reach, std::vector<Index>& found) const {
-    const Index cluster = near[0].first;
+                         std::span<const CellBox> boxes, const Vectors& positions, float reach,
+                         std::vector<Index>& found) const {
+    const Index cluster = near[0].first, begin = clusters_[cluster].first_cell, end = clusters_[cluster + 1].first_cell;
     struct Point {
         Vec3f place;
         Index number;
         float least;
     };
-    std::vector<Point> points;
-    std::vector<Point*> inside;
-    for (Index k = clusters_[cluster].first_point; k < clusters_[cluster + 1].first_point; ++k)
-        points.push_back({embedded_point(points_, surface_points_[k], positions), surface_points_[k],
-                          std::numeric_limits<float>::infinity()});
-    const auto is_within = [](const Vec3f& p, const Vec3f& low, const Vec3f& high) {
-        return p.x() >= low.x() && p.x() <= high.x() && p.y() >= low.y() && p.y() <= high.y() && p.z() >= low.z() &&
-               p.z() <= high.z();
+    std::array<std::vector<Point>, kClusterCells> points; // of each cell, once any is asked for
+    const auto come_near = [](const auto& a, const auto& b, float around) {
+        return a.low.x() - around <= b.high.x() && b.low.x() - around <= a.high.x() &&
+               a.low.y() - around <= b.high.y() && b.low.y() - around <= a.high.y() &&
+               a.low.z() - around <= b.high.z() && b.low.z() - around <= a.high.z();
     };
+    const float around = reach + 2 * overhang_; // as in find
     for (const auto& [own, other] : near) {
-        const bool neighbours = neighbour(own, other) >= 0;
-        const Vec3f around = Vec3f::Constant(reach);
-        const Vec3f least = extents[other].low - around, most = extents[other].high + around;
-        inside.clear();
-        for (Point& point : points)
-            if (is_within(point.place, least, most)) inside.push_back(&point);
-        if (inside.empty()) continue;
-        for (Index c = clusters_[other].first_cell; c < clusters_[other + 1].first_cell; ++c) {
-            const Index cell = cells_[c];
-            const auto& corners = matter_.corners(cell);
-            Vec3f low = positions[corners[0]], high = low, centre = low;
-            for (int k = 1; k < 8; ++k) {
-                const Vec3f p = positions[corners[k]];
-                low = low.cwiseMin(p);
-                high = high.cwiseMax(p);
-                centre += p;
-            }
-            low -= around;
-            high += around;
-            centre /= 8;
-            for (Point* point : inside) {
-                if (!is_within(point->place, low, high)) continue;
-                const float away = (centre - point->place).squaredNorm();
-                if (away >= point->least) continue;
-                if (neighbours && !are_far(matter_.cell_of_point(point->number), cell)) continue;
-                point->least = away;
-                found[point->number] = cell;
+        std::array<Index, kClusterCells> cells; // that have points near the other cluster
+        std::size_t count = 0;
+        for (Index c = begin; c < end; ++c)
+            if (point_offsets_[c] < point_offsets_[c + 1] && come_near(boxes[c], extents[other], around))
+                cells[count++] = c;
+        if (count == 0) continue;
+        const std::uint64_t far = far_cells(own, other);
+        const Index first = clusters_[other].first_cell;
+        for (Index j = first; j < clusters_[other + 1].first_cell; ++j) {
+            const Vec3f low = boxes[j].low.array() - reach, high = boxes[j].high.array() + reach;
+            for (std::size_t k = 0; k < count; ++k) {
+                const Index i = cells[k];
+                if (!(far >> (i - begin + kClusterCells * (j - first)) & 1)) continue;
+                if (!come_near(boxes[i], boxes[j], around)) continue;
+                std::vector<Point>& inside = points[i - begin];
+                if (inside.empty())
+                    for (const Index s : points_of_cells(i, i + 1))
+                        inside.push_back(
+                            {embedded_point(points_, s, positions), s, std::numeric_limits<float>::infinity()});
+                for (Point& point : inside) {
+                    const Vec3f& p = point.place;
+                    if (!(p.x() >= low.x() && p.x() <= high.x() && p.y() >= low.y() && p.y() <= high.y() &&
+                          p.z() >= low.z() && p.z() <= high.z()))
+                        continue;
+                    const float away = (boxes[j].centre - p).squaredNorm();
+                    if (away >= point.least) continue;
+                    point.least = away;
+                    found[point.number] = cells_[j];
+                }
             }
         }
     }
@@ -241,13 +283,15 @@ std::vector<Index> OwnCells::find(const Vectors& positions, float reach, const R
     const std::vector<Extent> around = extents(positions);
     const auto near = near_clusters(around, reach + 2 * overhang_, // twice: matter that is stretched
                                     std::numeric_limits<double>::infinity());
+    const std::vector<CellBox> boxes = cell_boxes(near, positions, context);
     std::vector<std::size_t> starts;
     for (std::size_t k = 0; k < near.size(); ++k)
         if (k == 0 || near[k].first != near[k - 1].first) starts.push_back(k);
     starts.push_back(near.size());
     parallel_for(context, starts.size() - 1, kOwnCellsGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k)
-            look_into(std::span(near).subspan(starts[k], starts[k + 1] - starts[k]), around, positions, reach, found);
+            look_into(std::span(near).subspan(starts[k], starts[k + 1] - starts[k]), around, boxes, positions, reach,
+                      found);
     });
     return found;
 }

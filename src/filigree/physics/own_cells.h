@@ -7,7 +7,8 @@
 namespace filigree {
 
 /// Surface points of a body that might lie in far cells of the same. Clusters of 2^3 cells are compared first, by boxes
-/// and balls around them, so that matter which lies where it belongs is not looked at point by point.
+/// and balls around them, then cells by their boxes, so that matter which lies where it belongs is not looked at point
+/// by point.
 ///
 /// A cell is far from another if it is not reached in two steps through matter; nor in three, of neighbouring clusters.
 class OwnCells {
@@ -15,7 +16,7 @@ public:
     explicit OwnCells(const Matter& matter); ///< matter: not rigid; outlives this
 
     /// For each surface point the far cell that holds it, or the nearest within reach (m); kNoIndex where there is
-    /// none. Cost O(clusters and points that are near far cells). positions: of the body's particles.
+    /// none. Cost O(clusters, and cells and points that are near far cells). positions: of the body's particles.
     std::vector<Index> find(const Vectors& positions, float reach, const RunContext& context) const;
 
     bool are_far(Index cell, Index other) const;
@@ -31,7 +32,11 @@ private:
     struct Cluster {
         Key at;                 ///< lattice index of its cells, halved
         std::uint32_t far_near; ///< bits of the 3^3 clusters around: some of their cells are far from some of this one
-        Index first_cell, first_corner, first_point;
+        Index first_cell, first_corner;
+        Index first_far; ///< of far_cells_, one for each of those bits
+    };
+    struct CellBox { ///< of a cell's corners
+        Vec3f low, high, centre;
     };
     struct Extent {
         Vec3f low, high, centre;
@@ -39,21 +44,29 @@ private:
     };
     static Extent extent_of(std::span<const Index> members, const Vectors& places);
     std::span<const Index> points_of(Index cluster) const {
-        return {&surface_points_[0] + clusters_[cluster].first_point,
-                clusters_[cluster + 1].first_point - clusters_[cluster].first_point};
+        return points_of_cells(clusters_[cluster].first_cell, clusters_[cluster + 1].first_cell);
+    }
+    std::span<const Index> points_of_cells(Index begin, Index end) const { ///< numbers in cells_
+        return std::span(surface_points_).subspan(point_offsets_[begin], point_offsets_[end] - point_offsets_[begin]);
     }
     int neighbour(Index a, Index b) const;
+    std::uint64_t far_cells(Index cluster, Index other) const;
     std::vector<Extent> extents(const Vectors& positions) const;
     std::vector<std::pair<Index, Index>> near_clusters(std::span<const Extent> extents, float around,
                                                        double most) const;
+    std::vector<CellBox> cell_boxes(std::span<const std::pair<Index, Index>> near, const Vectors& positions,
+                                    const RunContext& context) const;
     void look_into(std::span<const std::pair<Index, Index>> near, std::span<const Extent> extents,
-                   const Vectors& positions, float reach, std::vector<Index>& found) const;
+                   std::span<const CellBox> boxes, const Vectors& positions, float reach,
+                   std::vector<Index>& found) const;
 
     const Matter& matter_;
     const Embedding& points_;
     std::vector<Cluster> clusters_; ///< and one behind the last
     std::vector<Index> cells_, corners_, surface_points_;
-    float overhang_ = 0; ///< m that points may lie outside of their cells
+    std::vector<Index> point_offsets_;     ///< of each of cells_, and the end
+    std::vector<std::uint64_t> far_cells_; ///< bit i + 8 j: a cluster's i-th cell is far from its neighbour's j-th
+    float overhang_ = 0;                   ///< m that points may lie outside of their cells
 };
 
 } // namespace filigree
