@@ -13,9 +13,7 @@ namespace filigree {
 namespace {
 
 constexpr std::size_t kOwnCellsGrain = 16, kClusterCells = 8;
-constexpr float kClusterBoxSize = 2.5f;                          ///< spacings
-constexpr double kMostClusterBoxes = 8, kFewClusterBoxes = 4096; ///< a cluster, and whatever their number
-constexpr double kTangledClusters = 512;   ///< boxes, and near clusters, a cluster of a body crushed or mixed
+constexpr double kTangledClusters = 512;   ///< near clusters a cluster of a body crushed or mixed
 constexpr std::size_t kTangledPoints = 16; ///< near points a point of such a body
 
 } // namespace
@@ -115,7 +113,7 @@ std::vector<OwnCells::Extent> OwnCells::extents(const Vectors& positions) const 
 }
 
 /// Pairs of clusters that come within `around` of each other and have cells that are far; ascending, both ways round.
-/// None where there are more than `most` boxes or pairs.
+/// None where there are more than `most`. Boxes are swept along the body's longest side.
 std::vector<std::pair<Index, Index>> OwnCells::near_clusters(std::span<const Extent> extents, float around,
                                                              double most) const {
     Vec3f low = Vec3f::Constant(std::numeric_limits<float>::infinity()), high = -low;
@@ -126,90 +124,84 @@ std::vector<std::pair<Index, Index>> OwnCells::near_clusters(std::span<const Ext
         high = high.cwiseMax(extent.high);
     }
     if (!(high - low).allFinite()) return {};
-    const float half = 0.5f * around;
-    low.array() -= half;
-    high.array() += half;
-    float step = kClusterBoxSize * float(matter_.body().spacing());
-    const auto boxes = [&] { return ((high - low) / step).array().floor().cast<double>() + 1; };
-    while (boxes().prod() > kMostClusterBoxes * double(extents.size()) + kFewClusterBoxes) step *= 1.25f;
-    const Eigen::Array3i counts = boxes().cast<int>();
-    const auto boxes_of = [&](const Extent& extent) {
-        Eigen::Array3i from, to;
-        for (int axis = 0; axis < 3; ++axis) {
-            from[axis] = int((extent.low[axis] - half - low[axis]) / step);
-            to[axis] = std::min(int((extent.high[axis] + half - low[axis]) / step), counts[axis] - 1);
-        }
-        return std::pair(from, to);
-    };
-    const auto each_box = [&](const Extent& extent, const auto& visit) {
-        if (extent.radius < 0) return;
-        const auto [from, to] = boxes_of(extent);
-        for (int k = from[2]; k <= to[2]; ++k)
-            for (int j = from[1]; j <= to[1]; ++j)
-                for (int i = from[0]; i <= to[0]; ++i) visit((std::size_t(k) * counts[1] + j) * counts[0] + i);
-    };
-    double in_boxes = 0;
-    for (const Extent& extent : extents) {
-        if (extent.radius < 0) continue;
-        const auto [from, to] = boxes_of(extent);
-        in_boxes += (to - from + 1).cast<double>().prod();
-    }
-    if (in_boxes > most) return {};
-    std::vector<std::pair<Index, Index>> near;
-    std::vector<Index> offsets(std::size_t(counts.cast<double>().prod()) + 1, 0);
-    for (const Extent& extent : extents) each_box(extent, [&](std::size_t box) { ++offsets[box + 1]; });
-    for (std::size_t box = 1; box < offsets.size(); ++box) offsets[box] += offsets[box - 1];
-    std::vector<Index> entries(offsets.back()), next(offsets.begin(), offsets.end() - 1);
-    for (Index k = 0; k < extents.size(); ++k) each_box(extents[k], [&](std::size_t box) { entries[next[box]++] = k; });
+    int along = 0;
+    (high - low).maxCoeff(&along);
+    const int u = (along + 1) % 3, v = (along + 2) % 3;
+    std::vector<std::pair<float, Index>> order; // where they begin
+    for (Index k = 0; k < extents.size(); ++k)
+        if (!(extents[k].radius < 0)) order.emplace_back(extents[k].low[along], k);
+    std::ranges::sort(order, {}, &std::pair<float, Index>::first);
 
-    struct ClusterBall { // and what else decides most pairs, side by side in memory
-        Vec3f centre;
-        float radius;
-        Key at;
-        Index cluster;
-        std::uint32_t far_near;
+    constexpr std::size_t kAtOnce = 16; // so that the compiler uses vectors; what follows the last is near nothing
+    constexpr auto kBits = [] {
+        std::array<std::uint32_t, kAtOnce> bits{};
+        for (std::size_t k = 0; k < kAtOnce; ++k) bits[k] = 1u << k;
+        return bits;
+    }();
+    const std::size_t padded = order.size() + kAtOnce;
+    std::vector<float> begins(padded, std::numeric_limits<float>::infinity()), low_u = begins, high_u = begins,
+                                                                               low_v = begins, high_v = begins;
+    for (std::size_t k = 0; k < order.size(); ++k) {
+        const Extent& extent = extents[order[k].second];
+        begins[k] = extent.low[along];
+        low_u[k] = extent.low[u];
+        high_u[k] = extent.high[u];
+        low_v[k] = extent.low[v];
+        high_v[k] = extent.high[v];
+    }
+    const auto may_touch = [&](Index one, Index other) { // of two whose boxes are near
+        if (const int n = neighbour(one, other); n >= 0) return (clusters_[one].far_near >> n & 1) != 0;
+        const float far = extents[one].radius + extents[other].radius + around;
+        return (extents[one].centre - extents[other].centre).squaredNorm() <= far * far;
     };
-    const auto come_near = [&](const ClusterBall& a, const ClusterBall& b) {
-        const int i = b.at[0] - a.at[0] + 1, j = b.at[1] - a.at[1] + 1, k = b.at[2] - a.at[2] + 1;
-        if (unsigned(i) <= 2 && unsigned(j) <= 2 && unsigned(k) <= 2)
-            return (a.far_near >> (i + 3 * j + 9 * k) & 1) != 0;
-        const float far = a.radius + b.radius + around;
-        if ((a.centre - b.centre).squaredNorm() > far * far) return false;
-        const Extent &one = extents[a.cluster], &other = extents[b.cluster];
-        return (one.low.array() - around <= other.high.array()).all() &&
-               (other.low.array() - around <= one.high.array()).all();
-    };
-    std::vector<ClusterBall> balls;
-    for (std::size_t box = 0; box + 1 < offsets.size(); ++box) {
-        balls.clear();
-        for (Index k = offsets[box]; k < offsets[box + 1]; ++k) {
-            const Index c = entries[k];
-            balls.push_back({extents[c].centre, extents[c].radius, clusters_[c].at, c, clusters_[c].far_near});
-        }
-        for (std::size_t p = 0; p < balls.size(); ++p) {
-            if (double(near.size()) > most) return {};
-            for (std::size_t q = p; q < balls.size(); ++q) {
-                if (!come_near(balls[p], balls[q])) continue;
-                near.emplace_back(balls[p].cluster, balls[q].cluster);
-                if (p != q) near.emplace_back(balls[q].cluster, balls[p].cluster);
+    std::vector<std::uint64_t> near; // of two clusters
+    for (std::size_t a = 0; a < order.size(); ++a) {
+        if (double(near.size()) > most) return {};
+        const Index one = order[a].second;
+        const Extent& extent = extents[one];
+        const float end = extent.high[along], from_u = extent.low[u], to_u = extent.high[u], from_v = extent.low[v],
+                    to_v = extent.high[v];
+        for (std::size_t b = a; begins[b] - end <= around; b += kAtOnce) {
+            std::uint32_t come_near = 0; // bits
+            for (std::size_t k = 0; k < kAtOnce; ++k) {
+                const float gap_u = std::max(low_u[b + k] - to_u, from_u - high_u[b + k]);
+                const float gap_v = std::max(low_v[b + k] - to_v, from_v - high_v[b + k]);
+                const float gap = std::max(std::max(gap_u, gap_v), begins[b + k] - end);
+                come_near |= kBits[k] & (0u - std::uint32_t{gap <= around});
+            }
+            for (; come_near != 0; come_near &= come_near - 1) {
+                const Index other = order[b + std::size_t(std::countr_zero(come_near))].second;
+                if (!may_touch(one, other)) continue;
+                near.push_back(std::uint64_t{one} << 32 | other);
+                if (one != other) near.push_back(std::uint64_t{other} << 32 | one);
             }
         }
     }
     std::ranges::sort(near);
-    near.erase(std::ranges::unique(near).begin(), near.end());
-    return near;
+    std::vector<std::pair<Index, Index>> pairs;
+    pairs.reserve(near.size());
+    for (const std::uint64_t two : near) pairs.emplace_back(Index(two >> 32), Index(two));
+    return pairs;
 }
 
-/// Of cells_; of the clusters in `near` alone.
-std::vector<OwnCells::CellBox> OwnCells::cell_boxes(std::span<const std::pair<Index, Index>> near,
-                                                    const Vectors& positions, const RunContext& context) const {
-    std::vector<std::uint8_t> is_near(clusters_.size() - 1, 0);
-    for (const auto& [cluster, other] : near) is_near[cluster] = is_near[other] = 1;
-    std::vector<CellBox> boxes(cells_.size());
-    parallel_for(context, is_near.size(), kOwnCellsGrain, [&](std::size_t begin, std::size_t end) {
+/// Of the clusters in `near` alone.
+OwnCells::NearBoxes OwnCells::cell_boxes(std::span<const std::pair<Index, Index>> near, const Vectors& positions,
+                                         const RunContext& context) const {
+    NearBoxes boxes;
+    boxes.first.assign(clusters_.size() - 1, kNoIndex);
+    std::vector<Index> clusters;
+    Index count = 0;
+    for (const auto& [cluster, other] : near) { // each of them comes first in some pair
+        if (boxes.first[cluster] != kNoIndex) continue;
+        clusters.push_back(cluster);
+        boxes.first[cluster] = count;
+        count += clusters_[cluster + 1].first_cell - clusters_[cluster].first_cell;
+    }
+    boxes.boxes.resize(count);
+    parallel_for(context, clusters.size(), kOwnCellsGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k) {
-            if (!is_near[k]) continue;
-            for (Index c = clusters_[k].first_cell; c < clusters_[k + 1].first_cell; ++c) {
+            CellBox* box = &boxes.boxes[boxes.first[clusters[k]]];
+            for (Index c = clusters_[clusters[k]].first_cell; c < clusters_[clusters[k] + 1].first_cell; ++c) {
                 const auto& corners = matter_.corners(cells_[c]);
                 Vec3f low = positions[corners[0]], high = low, centre = low;
                 for (int corner = 1; corner < 8; ++corner) {
@@ -218,7 +210,7 @@ std::vector<OwnCells::CellBox> OwnCells::cell_boxes(std::span<const std::pair<In
                     high = high.cwiseMax(p);
                     centre += p;
                 }
-                boxes[c] = {low, high, centre / 8};
+                *box++ = {low, high, centre / 8};
             }
         }
     });
@@ -227,50 +219,51 @@ std::vector<OwnCells::CellBox> OwnCells::cell_boxes(std::span<const std::pair<In
 
 /// near: a cluster with those whose cells its points might lie in.
 void OwnCells::look_into(std::span<const std::pair<Index, Index>> near, std::span<const Extent> extents,
-                         std::span<const CellBox> boxes, const Vectors& positions, float reach,
+                         const NearBoxes& boxes, const Vectors& positions, float reach,
                          std::vector<Index>& found) const {
-    const Index cluster = near[0].first, begin = clusters_[cluster].first_cell, end = clusters_[cluster + 1].first_cell;
+    const auto come_near = [around = reach + 2 * overhang_](const auto& a, const auto& b) { // as in find
+        return a.low.x() - around <= b.high.x() && b.low.x() - around <= a.high.x() &&
+               a.low.y() - around <= b.high.y() && b.low.y() - around <= a.high.y() &&
+               a.low.z() - around <= b.high.z() && b.low.z() - around <= a.high.z();
+    };
+    const auto is_within = [](const Vec3f& p, const Vec3f& low, const Vec3f& high) {
+        return p.x() >= low.x() && p.x() <= high.x() && p.y() >= low.y() && p.y() <= high.y() && p.z() >= low.z() &&
+               p.z() <= high.z();
+    };
     struct Point {
         Vec3f place;
         Index number;
         float least;
     };
+    const Index cluster = near[0].first, first = clusters_[cluster].first_cell;
+    const Index count = clusters_[cluster + 1].first_cell - first;
+    const CellBox* own_boxes = &boxes.boxes[boxes.first[cluster]];
     std::array<std::vector<Point>, kClusterCells> points; // of each cell, once any is asked for
-    const auto come_near = [](const auto& a, const auto& b, float around) {
-        return a.low.x() - around <= b.high.x() && b.low.x() - around <= a.high.x() &&
-               a.low.y() - around <= b.high.y() && b.low.y() - around <= a.high.y() &&
-               a.low.z() - around <= b.high.z() && b.low.z() - around <= a.high.z();
+    const auto points_in = [&](Index i) -> std::vector<Point>& {
+        if (points[i].empty())
+            for (const Index s : points_of_cells(first + i, first + i + 1))
+                points[i].push_back({embedded_point(points_, s, positions), s, std::numeric_limits<float>::infinity()});
+        return points[i];
     };
-    const float around = reach + 2 * overhang_; // as in find
     for (const auto& [own, other] : near) {
-        std::array<Index, kClusterCells> cells; // that have points near the other cluster
-        std::size_t count = 0;
-        for (Index c = begin; c < end; ++c)
-            if (point_offsets_[c] < point_offsets_[c + 1] && come_near(boxes[c], extents[other], around))
-                cells[count++] = c;
-        if (count == 0) continue;
+        std::uint64_t asked = 0; // bits of the cells that have points near the other cluster
+        for (Index i = 0; i < count; ++i)
+            if (!points_of_cells(first + i, first + i + 1).empty() && come_near(own_boxes[i], extents[other]))
+                asked |= std::uint64_t{1} << i;
         const std::uint64_t far = far_cells(own, other);
-        const Index first = clusters_[other].first_cell;
-        for (Index j = first; j < clusters_[other + 1].first_cell; ++j) {
-            const Vec3f low = boxes[j].low.array() - reach, high = boxes[j].high.array() + reach;
-            for (std::size_t k = 0; k < count; ++k) {
-                const Index i = cells[k];
-                if (!(far >> (i - begin + kClusterCells * (j - first)) & 1)) continue;
-                if (!come_near(boxes[i], boxes[j], around)) continue;
-                std::vector<Point>& inside = points[i - begin];
-                if (inside.empty())
-                    for (const Index s : points_of_cells(i, i + 1))
-                        inside.push_back(
-                            {embedded_point(points_, s, positions), s, std::numeric_limits<float>::infinity()});
-                for (Point& point : inside) {
-                    const Vec3f& p = point.place;
-                    if (!(p.x() >= low.x() && p.x() <= high.x() && p.y() >= low.y() && p.y() <= high.y() &&
-                          p.z() >= low.z() && p.z() <= high.z()))
-                        continue;
-                    const float away = (boxes[j].centre - p).squaredNorm();
+        const Index others = clusters_[other + 1].first_cell - clusters_[other].first_cell;
+        for (Index j = 0; j < others; ++j) {
+            const CellBox& box = boxes.boxes[boxes.first[other] + j];
+            for (std::uint64_t left = asked & far >> kClusterCells * j; left != 0; left &= left - 1) {
+                const auto i = Index(std::countr_zero(left));
+                if (!come_near(own_boxes[i], box)) continue;
+                const Vec3f low = box.low.array() - reach, high = box.high.array() + reach;
+                for (Point& point : points_in(i)) {
+                    if (!is_within(point.place, low, high)) continue;
+                    const float away = (box.centre - point.place).squaredNorm();
                     if (away >= point.least) continue;
                     point.least = away;
-                    found[point.number] = cells_[j];
+                    found[point.number] = cells_[clusters_[other].first_cell + j];
                 }
             }
         }
@@ -283,7 +276,7 @@ std::vector<Index> OwnCells::find(const Vectors& positions, float reach, const R
     const std::vector<Extent> around = extents(positions);
     const auto near = near_clusters(around, reach + 2 * overhang_, // twice: matter that is stretched
                                     std::numeric_limits<double>::infinity());
-    const std::vector<CellBox> boxes = cell_boxes(near, positions, context);
+    const NearBoxes boxes = cell_boxes(near, positions, context);
     std::vector<std::size_t> starts;
     for (std::size_t k = 0; k < near.size(); ++k)
         if (k == 0 || near[k].first != near[k - 1].first) starts.push_back(k);

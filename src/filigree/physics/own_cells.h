@@ -38,6 +38,10 @@ private:
     struct CellBox { ///< of a cell's corners
         Vec3f low, high, centre;
     };
+    struct NearBoxes {            ///< of some clusters' cells
+        std::vector<Index> first; ///< of each cluster, in `boxes`; kNoIndex of the others
+        std::vector<CellBox> boxes;
+    };
     struct Extent {
         Vec3f low, high, centre;
         float radius; ///< below 0: of nothing
@@ -54,11 +58,10 @@ private:
     std::vector<Extent> extents(const Vectors& positions) const;
     std::vector<std::pair<Index, Index>> near_clusters(std::span<const Extent> extents, float around,
                                                        double most) const;
-    std::vector<CellBox> cell_boxes(std::span<const std::pair<Index, Index>> near, const Vectors& positions,
-                                    const RunContext& context) const;
+    NearBoxes cell_boxes(std::span<const std::pair<Index, Index>> near, const Vectors& positions,
+                         const RunContext& context) const;
     void look_into(std::span<const std::pair<Index, Index>> near, std::span<const Extent> extents,
-                   std::span<const CellBox> boxes, const Vectors& positions, float reach,
-                   std::vector<Index>& found) const;
+                   const NearBoxes& boxes, const Vectors& positions, float reach, std::vector<Index>& found) const;
 
     const Matter& matter_;
     const Embedding& points_;
