@@ -15,7 +15,8 @@ namespace filigree {
 
 namespace {
 
-constexpr std::size_t kExplicitStepsGrain = 2048, kAwakeGrain = 16; // bodies
+constexpr std::size_t kExplicitStepsGrain = 2048;
+constexpr std::size_t kAwakeGrain = 16, kElasticGrain = 4; // bodies
 constexpr double kSafety = 0.9;      ///< part of the stable step that is used: it changes while a step is made
 constexpr double kLeastSubsteps = 2; ///< a frame; with one, large motions gain energy
 constexpr double kNoLimit = std::numeric_limits<double>::infinity();
@@ -282,19 +283,24 @@ private:
         const Stopwatch watch(report_.elastic_seconds);
         elastic_.resize(bodies_.size());
         vibrations_.resize(bodies_.size());
-        for (std::size_t b = 0; b < bodies_.size(); ++b) {
-            BodyState& body = bodies_[b];
-            if (body.is_absent) continue;
-            float& delay = vibrations_[b].delay;
-            if (!body.rigid && !(is_again && vibrations_[b].has_forces)) delay = find_delay(b, dt);
-            if (delay > 0 || !body.light_corners.empty()) {
-                Vectors ahead = delay > 0 ? positions_ahead(body, delay, context_) : body.positions;
-                damp_light_corners(body, dt, ahead);
-                elastic_[b] = body.elasticity->forces(ahead, body.forces, context_);
-            } else {
-                elastic_[b] = body.elasticity->forces(body.positions, body.forces, context_);
-            }
-            note_deformation(report_, b, elastic_[b]);
+        parallel_for(context_, bodies_.size(), kElasticGrain, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t b = begin; b < end; ++b)
+                if (!bodies_[b].is_absent) find_elastic_forces_of(b, dt, is_again);
+        });
+        for (std::size_t b = 0; b < bodies_.size(); ++b)
+            if (!bodies_[b].is_absent) note_deformation(report_, b, elastic_[b]);
+    }
+
+    void find_elastic_forces_of(std::size_t b, float dt, bool is_again) {
+        BodyState& body = bodies_[b];
+        float& delay = vibrations_[b].delay;
+        if (!body.rigid && !(is_again && vibrations_[b].has_forces)) delay = find_delay(b, dt);
+        if (delay > 0 || !body.light_corners.empty()) {
+            Vectors ahead = delay > 0 ? positions_ahead(body, delay, context_) : body.positions;
+            damp_light_corners(body, dt, ahead);
+            elastic_[b] = body.elasticity->forces(ahead, body.forces, context_);
+        } else {
+            elastic_[b] = body.elasticity->forces(body.positions, body.forces, context_);
         }
     }
 

@@ -15,7 +15,7 @@ namespace filigree {
 
 namespace {
 
-constexpr std::size_t kMatterSearchGrain = 512, kBodiesGrain = 8, kSidesGrain = 8;
+constexpr std::size_t kMatterSearchGrain = 512, kBodiesGrain = 8, kSidesGrain = 8, kTravelGrain = 512; // sides
 constexpr float kLeastReach = 0.1f; ///< as kMostReach, at least
 constexpr float kOwnReach = 0.3f;   ///< the same of a body beside itself ...
 constexpr float kOwnSearches = 4;   ///< ... which is searched no more often than this in a frame
@@ -238,11 +238,14 @@ void MatterContacts::travel(std::span<const BodyState> bodies, float dt, const R
             if (!bodies[b].is_absent) speeds_[b] = extremes(b, bodies[b].velocities, nullptr);
     });
     way_ += dt * relative_speed_of_all([&](std::size_t b) { return !bodies[b].is_absent; });
-    for (Side& side : sides_) {
-        side.speed = relative_speed(side.body, side.other);
-        side.way += dt * side.speed;
-        side.since += dt;
-    }
+    parallel_for(context, sides_.size(), kTravelGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k) {
+            Side& side = sides_[k];
+            side.speed = relative_speed(side.body, side.other);
+            side.way += dt * side.speed;
+            side.since += dt;
+        }
+    });
 }
 
 /// How far particles are from where they are counted from.
