@@ -17,9 +17,7 @@ namespace filigree {
 class Contacts {
 public:
     /// bodies: fixed in number from here on.
-    Contacts(const World& world, std::size_t bodies, bool between_bodies, bool within_bodies)
-        : world_(world), between_bodies_(between_bodies), within_bodies_(within_bodies), near_(bodies),
-          near_clear_until_(bodies), touched_(bodies, 0), matter_(world, between_bodies, within_bodies) {}
+    Contacts(const World& world, std::size_t bodies, bool between_bodies, bool within_bodies);
     /// Once, when all bodies are there.
     void begin(std::span<const BodyState> bodies);
 
@@ -40,8 +38,11 @@ public:
     }
     /// After a frame of explicit steps.
     void end_frame(std::span<const BodyState> bodies, const RunContext& context) { matter_.end_frame(bodies, context); }
-    /// Positions have changed by dt times velocities. way: m, bound on how far anything has gone, with obstacles.
-    void travel(std::span<const BodyState> bodies, float dt, float way, const RunContext& context);
+    /// Positions have changed by dt times velocities. obstacle_way: m, bound on how far obstacles have gone.
+    void travel(std::span<const BodyState> bodies, float dt, float obstacle_way, const RunContext& context);
+    /// m/s: bound on how fast particles go towards any obstacle, as of the last travel or begin_frame; but for light
+    /// corners, which hardly move the surface.
+    float approach_speed(std::span<const BodyState> bodies) const;
     /// A body's particles were moved by so much, m, beside their velocities.
     void was_moved(std::size_t body, float way) {
         near_way_ += way;
@@ -213,6 +214,7 @@ private:
 
     const World& world_;
     bool between_bodies_, within_bodies_;
+    std::vector<Vec3f> towards_;          ///< of each obstacle, the way to it: of half-spaces that stand still; else 0
     std::vector<std::vector<Near>> near_; ///< by body, ascending by obstacle and point
     static constexpr std::size_t kNearBlock = 64;
     std::vector<std::vector<float>> near_clear_until_; ///< of each block of these: near_way_ until which none can touch
@@ -223,7 +225,7 @@ private:
     std::vector<NearPair> pairs_;
     struct OwnBalls;                                         ///< of a body whose balls meet each other
     std::vector<std::shared_ptr<const OwnBalls>> own_balls_; ///< null: of the others
-    float near_way_ = 0;                       ///< m that anything may have gone since they were found ...
+    float near_way_ = 0;                       ///< m that anything may have come nearer to obstacles since ...
     float pairs_way_ = 0;                      ///< ... and balls beside each other ...
     float near_until_ = -1, pairs_until_ = -1; ///< ... and may go before they hold no more
     static constexpr std::uint8_t kOnObstacle = 1, kInMatter = MatterContacts::kTouched,

@@ -94,14 +94,26 @@ Vec3f Contacts::between(const NearPair& pair, std::span<const BodyState> bodies,
            embedded_point(bodies[pair.second_body].*points, pair.second, of_second);
 }
 
-void Contacts::travel(std::span<const BodyState> bodies, float dt, float way, const RunContext& context) {
-    near_way_ += way;
+void Contacts::travel(std::span<const BodyState> bodies, float dt, float obstacle_way, const RunContext& context) {
     for (NearPair& pair : pairs_)
         if (pair.grasp.holds)
             pair.offset += dt * between(pair, bodies, &BodyState::surface, bodies[pair.first_body].velocities,
                                         bodies[pair.second_body].velocities);
     matter_.travel(bodies, dt, context);
+    near_way_ += dt * approach_speed(bodies) + obstacle_way;
     pairs_way_ += dt * matter_.relative_speed_of_all([&](std::size_t b) { return bodies[b].has_balls(); });
+}
+
+float Contacts::approach_speed(std::span<const BodyState> bodies) const {
+    float most = 0;
+    for (std::size_t b = 0; b < bodies.size(); ++b) {
+        if (bodies[b].is_absent || bodies[b].sleeps()) continue;
+        for (const Vec3f& towards : towards_) {
+            const float speed = towards.isZero(0) ? matter_.speed(b) : matter_.speed_along(b, towards);
+            most = speed > most ? speed : most; // not a number: the frame is done again
+        }
+    }
+    return most;
 }
 
 /// Lets friction's anchor begin, slide and end.

@@ -41,6 +41,17 @@ struct Contacts::OwnBalls {
     OwnCells cells;
 };
 
+Contacts::Contacts(const World& world, std::size_t bodies, bool between_bodies, bool within_bodies)
+    : world_(world), between_bodies_(between_bodies), within_bodies_(within_bodies), near_(bodies),
+      near_clear_until_(bodies), touched_(bodies, 0), matter_(world, between_bodies, within_bodies) {
+    for (const Obstacle& obstacle : world.obstacles) {
+        const auto* ground = std::get_if<HalfSpace>(&obstacle.shape);
+        const bool stands = ground && !obstacle.motion.moves();
+        const Vec3d out = stands ? Vec3d(obstacle.motion.at(0).linear() * ground->normal.normalized()) : Vec3d::Zero();
+        towards_.push_back(-out.cast<float>());
+    }
+}
+
 void Contacts::begin(std::span<const BodyState> bodies) {
     matter_.begin(bodies);
     std::map<const Body*, std::shared_ptr<const OwnBalls>> known;

@@ -126,7 +126,6 @@ public:
                           (state.options.contacts_between_bodies && state.bodies.size() > 1)) {}
 
     double run() {
-        speed_ = most_particle_speed(bodies_);
         if (meets_anything_) state_.contacts.begin_frame(bodies_, context_);
         find_contacts();
         const float first_dt = float(state_.frame_seconds() / state_.options.most_substeps);
@@ -190,18 +189,16 @@ private:
         drift(dt);
         const double before = std::exchange(now_, until);
         move_pins(state_, now_, dt);
-        if (!meets_anything_) return;
-        speed_ = most_particle_speed(bodies_);
-        const float way = dt * speed_ + float(obstacle_way(state_.world, bodies_, before, now_));
-        state_.contacts.travel(bodies_, dt, way, context_);
+        if (meets_anything_)
+            state_.contacts.travel(bodies_, dt, float(obstacle_way(state_.world, bodies_, before, now_)), context_);
     }
 
     void find_contacts() {
         if (!meets_anything_) return;
         const Stopwatch watch(report_.contact_seconds);
         const double frame = state_.frame_seconds();
-        const float way = (speed_ + float(state_.world.gravity.norm() * frame)) * float(frame) +
-                          float(obstacle_way(state_.world, bodies_, now_, now_ + frame));
+        const float speed = state_.contacts.approach_speed(bodies_) + float(state_.world.gravity.norm() * frame);
+        const float way = speed * float(frame) + float(obstacle_way(state_.world, bodies_, now_, now_ + frame));
         const float spacing = least_spacing(bodies_);
         state_.contacts.search(bodies_,
                                {.time = now_,
@@ -362,7 +359,6 @@ private:
     FrameReport& report_;
     const RunContext& context_;
     double now_, until_;        // s
-    float speed_ = 0;           // m/s, of the fastest particle
     const bool meets_anything_; // obstacles, other bodies or parts of the same
     std::vector<ElasticReport> elastic_;
     struct Vibration {           ///< of a body

@@ -50,6 +50,15 @@ public:
             if (counts(b)) all = all ? all->with(speeds_[b]) : speeds_[b];
         return all ? Extremes::between(*all, *all) : 0;
     }
+    /// m/s: bound on how fast a body's particles go, as of the last travel ...
+    float speed(std::size_t body) const {
+        return speeds_[body].least.cwiseAbs().cwiseMax(speeds_[body].most.cwiseAbs()).norm();
+    }
+    /// ... and how fast along a direction of length 1.
+    float speed_along(std::size_t body, const Vec3f& direction) const {
+        const auto& [least, most] = speeds_[body];
+        return least.cwiseProduct(direction).cwiseMax(most.cwiseProduct(direction)).sum();
+    }
     /// A body's particles were moved by so much, m, beside their velocities.
     void was_moved(std::size_t body, float way);
     /// Finds which points might touch which cells, as far as what was found last does not hold any more. Sleeping

@@ -355,8 +355,7 @@ bool MatterContacts::wake_touched(std::span<BodyState> bodies) const {
     for (const Side& side : sides_)
         for (const auto& [sleeper, other] : {std::pair(side.body, side.other), std::pair(side.other, side.body)}) {
             if (!bodies[sleeper].sleeps() || bodies[other].sleeps()) continue;
-            const Extremes& speeds = speeds_[other];
-            if (!(speeds.least.cwiseAbs().cwiseMax(speeds.most.cwiseAbs()).norm() > kWaking)) continue;
+            if (!(speed(other) > kWaking)) continue;
             if (std::ranges::none_of(side.pairs, [](const Pair& pair) { return pair.grasp.holds; })) continue;
             wake(bodies[sleeper]);
             woke = true;

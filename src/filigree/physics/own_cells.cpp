@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
 
 namespace filigree {
 
@@ -15,6 +16,77 @@ namespace {
 constexpr std::size_t kOwnCellsGrain = 16, kClusterCells = 8;
 constexpr double kTangledClusters = 512;   ///< near clusters a cluster of a body crushed or mixed
 constexpr std::size_t kTangledPoints = 16; ///< near points a point of such a body
+
+/// Boxes, of which those that come near each other are found by a sweep along the longest side of them all.
+class BoxSweep {
+public:
+    /// box(number): the lowest and highest corner, finite. Cost O(boxes).
+    template <class Box>
+    BoxSweep(std::span<const Index> numbers, const Box& box) : order_(numbers.begin(), numbers.end()) {
+        Vec3f low = Vec3f::Constant(std::numeric_limits<float>::max()), high = -low;
+        for (const Index k : numbers) {
+            low = low.cwiseMin(box(k).first);
+            high = high.cwiseMax(box(k).second);
+        }
+        int along = 0;
+        (high - low).maxCoeff(&along);
+        sort_by([&](Index k) { return box(k).first[along]; }, low[along], high[along]);
+        sides_.assign(6, std::vector<float>(order_.size() + kAtOnce, std::numeric_limits<float>::infinity()));
+        for (std::size_t k = 0; k < order_.size(); ++k) {
+            const auto& [from, to] = box(order_[k]);
+            for (int axis = 0; axis < 3; ++axis) {
+                sides_[std::size_t(2 * axis)][k] = from[(along + axis) % 3];
+                sides_[std::size_t(2 * axis + 1)][k] = to[(along + axis) % 3];
+            }
+        }
+    }
+
+    std::span<const Index> order() const { return order_; } ///< numbers as they are swept
+    /// Calls visit(b) for the boxes from a on, in that order, that come within `around` of a: places in order().
+    template <class Visit>
+    void each_near(std::size_t a, float around, const Visit& visit) const {
+        const float *low = sides_[0].data(), *low_u = sides_[2].data(), *high_u = sides_[3].data(),
+                    *low_v = sides_[4].data(), *high_v = sides_[5].data();
+        const float end = sides_[1][a], from_u = low_u[a], to_u = high_u[a], from_v = low_v[a], to_v = high_v[a];
+        for (std::size_t b = a; slabs_[b] - end <= around; b += kAtOnce) {
+            std::uint32_t near = 0; // bits
+            for (std::size_t k = 0; k < kAtOnce; ++k) {
+                const float gap_u = std::max(low_u[b + k] - to_u, from_u - high_u[b + k]);
+                const float gap_v = std::max(low_v[b + k] - to_v, from_v - high_v[b + k]);
+                const float gap = std::max(std::max(gap_u, gap_v), low[b + k] - end);
+                near |= kBits[k] & (0u - std::uint32_t{gap <= around});
+            }
+            for (; near != 0; near &= near - 1) visit(b + std::size_t(std::countr_zero(near)));
+        }
+    }
+
+private:
+    static constexpr std::size_t kAtOnce = 16; // so that the compiler uses vectors
+    static constexpr auto kBits = [] {
+        std::array<std::uint32_t, kAtOnce> bits{};
+        for (std::size_t k = 0; k < kAtOnce; ++k) bits[k] = 1u << k;
+        return bits;
+    }();
+    /// By slabs, as many as there are boxes: that is near enough to a sorted order, and sooner there.
+    template <class Begin>
+    void sort_by(const Begin& begin, float low, float high) {
+        const std::size_t count = order_.size();
+        const float step = std::max((high - low) / float(count), std::numeric_limits<float>::min());
+        const auto slab_of = [&](Index k) { return std::min(std::size_t((begin(k) - low) / step), count - 1); };
+        std::vector<Index> offsets(count + 1, 0), sorted(count);
+        for (const Index k : order_) ++offsets[slab_of(k) + 1];
+        std::partial_sum(offsets.begin(), offsets.end(), offsets.begin());
+        for (const Index k : order_) sorted[offsets[slab_of(k)]++] = k;
+        order_ = std::move(sorted);
+        slabs_.assign(count + kAtOnce, std::numeric_limits<float>::infinity());
+        float least = std::numeric_limits<float>::infinity();
+        for (std::size_t k = count; k-- > 0;) slabs_[k] = least = std::min(least, begin(order_[k]));
+    }
+
+    std::vector<Index> order_;
+    std::vector<std::vector<float>> sides_; ///< low and high along the sweep, and along the others; infinite at the end
+    std::vector<float> slabs_;              ///< no box from here on begins before; infinite at the end
+};
 
 } // namespace
 
@@ -67,17 +139,16 @@ OwnCells::OwnCells(const Matter& matter) : matter_(matter), points_(matter.body(
 
 /// As far_cells_, of any two clusters that have such cells.
 std::uint64_t OwnCells::far_cells(Index cluster, Index other) const {
-    const int n = neighbour(cluster, other);
+    const int n = direction(clusters_[cluster].at, clusters_[other].at);
     if (n < 0) return ~std::uint64_t{0};
     const std::uint32_t before = clusters_[cluster].far_near & ((1u << n) - 1);
     return far_cells_[clusters_[cluster].first_far + Index(std::popcount(before))];
 }
 
-/// Which of the 3^3 clusters around a cluster is b; -1: none.
-int OwnCells::neighbour(Index a, Index b) const {
-    const Key &from = clusters_[a].at, &to = clusters_[b].at;
-    const int i = to[0] - from[0] + 1, j = to[1] - from[1] + 1, k = to[2] - from[2] + 1;
-    return std::min({i, j, k}) < 0 || std::max({i, j, k}) > 2 ? -1 : i + 3 * j + 9 * k;
+/// Which of the 3^3 clusters around that at `from` is at `to`; -1: none.
+int OwnCells::direction(const Key& from, const Key& to) {
+    const auto i = unsigned(to[0] - from[0] + 1), j = unsigned(to[1] - from[1] + 1), k = unsigned(to[2] - from[2] + 1);
+    return i > 2 || j > 2 || k > 2 ? -1 : int(i + 3 * j + 9 * k);
 }
 
 bool OwnCells::are_far(Index cell, Index other) const {
@@ -113,75 +184,52 @@ std::vector<OwnCells::Extent> OwnCells::extents(const Vectors& positions) const 
 }
 
 /// Pairs of clusters that come within `around` of each other and have cells that are far; ascending, both ways round.
-/// None where there are more than `most`. Boxes are swept along the body's longest side.
+/// None where there are more than `most`.
 std::vector<std::pair<Index, Index>> OwnCells::near_clusters(std::span<const Extent> extents, float around,
                                                              double most) const {
-    Vec3f low = Vec3f::Constant(std::numeric_limits<float>::infinity()), high = -low;
-    for (const Extent& extent : extents) {
-        if (extent.radius < 0) continue;
-        if (!(extent.high - extent.low).allFinite()) return {}; // the frame is done again
-        low = low.cwiseMin(extent.low);
-        high = high.cwiseMax(extent.high);
-    }
-    if (!(high - low).allFinite()) return {};
-    int along = 0;
-    (high - low).maxCoeff(&along);
-    const int u = (along + 1) % 3, v = (along + 2) % 3;
-    std::vector<std::pair<float, Index>> order; // where they begin
-    for (Index k = 0; k < extents.size(); ++k)
-        if (!(extents[k].radius < 0)) order.emplace_back(extents[k].low[along], k);
-    std::ranges::sort(order, {}, &std::pair<float, Index>::first);
-
-    constexpr std::size_t kAtOnce = 16; // so that the compiler uses vectors; what follows the last is near nothing
-    constexpr auto kBits = [] {
-        std::array<std::uint32_t, kAtOnce> bits{};
-        for (std::size_t k = 0; k < kAtOnce; ++k) bits[k] = 1u << k;
-        return bits;
-    }();
-    const std::size_t padded = order.size() + kAtOnce;
-    std::vector<float> begins(padded, std::numeric_limits<float>::infinity()), low_u = begins, high_u = begins,
-                                                                               low_v = begins, high_v = begins;
-    for (std::size_t k = 0; k < order.size(); ++k) {
-        const Extent& extent = extents[order[k].second];
-        begins[k] = extent.low[along];
-        low_u[k] = extent.low[u];
-        high_u[k] = extent.high[u];
-        low_v[k] = extent.low[v];
-        high_v[k] = extent.high[v];
-    }
-    const auto may_touch = [&](Index one, Index other) { // of two whose boxes are near
-        if (const int n = neighbour(one, other); n >= 0) return (clusters_[one].far_near >> n & 1) != 0;
-        const float far = extents[one].radius + extents[other].radius + around;
-        return (extents[one].centre - extents[other].centre).squaredNorm() <= far * far;
+    struct ClusterBall { // and what else decides about two whose boxes are near, side by side in memory
+        Vec3f centre;
+        float radius;
+        Key at;
+        Index cluster;
+        std::uint32_t far_near;
     };
-    std::vector<std::uint64_t> near; // of two clusters
-    for (std::size_t a = 0; a < order.size(); ++a) {
-        if (double(near.size()) > most) return {};
-        const Index one = order[a].second;
-        const Extent& extent = extents[one];
-        const float end = extent.high[along], from_u = extent.low[u], to_u = extent.high[u], from_v = extent.low[v],
-                    to_v = extent.high[v];
-        for (std::size_t b = a; begins[b] - end <= around; b += kAtOnce) {
-            std::uint32_t come_near = 0; // bits
-            for (std::size_t k = 0; k < kAtOnce; ++k) {
-                const float gap_u = std::max(low_u[b + k] - to_u, from_u - high_u[b + k]);
-                const float gap_v = std::max(low_v[b + k] - to_v, from_v - high_v[b + k]);
-                const float gap = std::max(std::max(gap_u, gap_v), begins[b + k] - end);
-                come_near |= kBits[k] & (0u - std::uint32_t{gap <= around});
-            }
-            for (; come_near != 0; come_near &= come_near - 1) {
-                const Index other = order[b + std::size_t(std::countr_zero(come_near))].second;
-                if (!may_touch(one, other)) continue;
-                near.push_back(std::uint64_t{one} << 32 | other);
-                if (one != other) near.push_back(std::uint64_t{other} << 32 | one);
-            }
-        }
+    std::vector<Index> clusters;
+    for (Index k = 0; k < extents.size(); ++k) {
+        if (extents[k].radius < 0) continue;
+        if (!(extents[k].high - extents[k].low).allFinite()) return {}; // the frame is done again
+        clusters.push_back(k);
     }
-    std::ranges::sort(near);
-    std::vector<std::pair<Index, Index>> pairs;
-    pairs.reserve(near.size());
-    for (const std::uint64_t two : near) pairs.emplace_back(Index(two >> 32), Index(two));
-    return pairs;
+    const BoxSweep sweep(clusters, [&](Index k) { return std::pair(extents[k].low, extents[k].high); });
+    std::vector<ClusterBall> balls;
+    balls.reserve(clusters.size());
+    for (const Index k : sweep.order())
+        balls.push_back({extents[k].centre, extents[k].radius, clusters_[k].at, k, clusters_[k].far_near});
+    const auto may_touch = [around](const ClusterBall& one, const ClusterBall& other) {
+        if (const int n = direction(one.at, other.at); n >= 0) return (one.far_near >> n & 1) != 0;
+        const float far = one.radius + other.radius + around;
+        return (one.centre - other.centre).squaredNorm() <= far * far;
+    };
+    std::vector<std::pair<Index, Index>> near;
+    std::vector<Index> offsets(extents.size() + 1, 0);
+    for (std::size_t a = 0; a < balls.size(); ++a) {
+        if (double(near.size()) > most) return {};
+        sweep.each_near(a, around, [&](std::size_t b) {
+            if (!may_touch(balls[a], balls[b])) return;
+            near.emplace_back(balls[a].cluster, balls[b].cluster);
+            ++offsets[balls[a].cluster + 1];
+            if (a == b) return;
+            near.emplace_back(balls[b].cluster, balls[a].cluster);
+            ++offsets[balls[b].cluster + 1];
+        });
+    }
+    std::partial_sum(offsets.begin(), offsets.end(), offsets.begin());
+    std::vector<std::pair<Index, Index>> ascending(near.size());
+    std::vector<Index> next(offsets.begin(), offsets.end() - 1);
+    for (const auto& pair : near) ascending[next[pair.first]++] = pair;
+    for (std::size_t k = 0; k + 1 < offsets.size(); ++k)
+        std::sort(ascending.begin() + offsets[k], ascending.begin() + offsets[k + 1]);
+    return ascending;
 }
 
 /// Of the clusters in `near` alone.
@@ -238,6 +286,10 @@ void OwnCells::look_into(std::span<const std::pair<Index, Index>> near, std::spa
     const Index cluster = near[0].first, first = clusters_[cluster].first_cell;
     const Index count = clusters_[cluster + 1].first_cell - first;
     const CellBox* own_boxes = &boxes.boxes[boxes.first[cluster]];
+    std::uint64_t has_points = 0; // bits of cells
+    for (Index i = 0; i < count; ++i)
+        if (!points_of_cells(first + i, first + i + 1).empty()) has_points |= std::uint64_t{1} << i;
+    if (has_points == 0) return;
     std::array<std::vector<Point>, kClusterCells> points; // of each cell, once any is asked for
     const auto points_in = [&](Index i) -> std::vector<Point>& {
         if (points[i].empty())
@@ -246,11 +298,14 @@ void OwnCells::look_into(std::span<const std::pair<Index, Index>> near, std::spa
         return points[i];
     };
     for (const auto& [own, other] : near) {
-        std::uint64_t asked = 0; // bits of the cells that have points near the other cluster
-        for (Index i = 0; i < count; ++i)
-            if (!points_of_cells(first + i, first + i + 1).empty() && come_near(own_boxes[i], extents[other]))
-                asked |= std::uint64_t{1} << i;
         const std::uint64_t far = far_cells(own, other);
+        std::uint64_t of_some = far | far >> 32;
+        of_some |= of_some >> 16;
+        of_some |= of_some >> 8;
+        std::uint64_t asked = 0; // bits of the cells that have points near the other cluster
+        for (std::uint64_t left = of_some & has_points; left != 0; left &= left - 1)
+            if (come_near(own_boxes[std::countr_zero(left)], extents[other])) asked |= left & (0 - left);
+        if (asked == 0) continue;
         const Index others = clusters_[other + 1].first_cell - clusters_[other].first_cell;
         for (Index j = 0; j < others; ++j) {
             const CellBox& box = boxes.boxes[boxes.first[other] + j];

@@ -53,7 +53,7 @@ private:
     std::span<const Index> points_of_cells(Index begin, Index end) const { ///< numbers in cells_
         return std::span(surface_points_).subspan(point_offsets_[begin], point_offsets_[end] - point_offsets_[begin]);
     }
-    int neighbour(Index a, Index b) const;
+    static int direction(const Key& from, const Key& to);
     std::uint64_t far_cells(Index cluster, Index other) const;
     std::vector<Extent> extents(const Vectors& positions) const;
     std::vector<std::pair<Index, Index>> near_clusters(std::span<const Extent> extents, float around,
