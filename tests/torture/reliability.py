@@ -65,7 +65,7 @@ def checks():
     for line in (counts / "check").read_text().splitlines():
         word, ended, minutes, processors, day, commit = line.split()
         rows[word] = f"| `{word}` | {ended} | {minutes} | {processors} | {day}, {commit} |"
-    return ["`scripts/check` over everything, or over the layers behind the colon; with building.", "",
+    return ["`scripts/check` over everything, or over the layers behind the colon; with building what was not built.", "",
             "| step | | minutes | processors | last run |", "|---|---|---|---|---|", *[line for _, line in sorted(rows.items())]]
 
 
