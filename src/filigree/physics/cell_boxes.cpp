@@ -28,16 +28,7 @@ CellBoxes::CellBoxes(const Matter& matter, const Vectors& positions, float reach
     low_ = -high;
     for (Index c = 0; c < extents.size(); ++c) {
         Extent& extent = extents[c];
-        extent.cell = c;
-        const auto& corners = cells.cell_corners[c];
-        extent.low = extent.high = extent.centre = positions[corners[0]];
-        for (int k = 1; k < 8; ++k) {
-            const Vec3f p = positions[corners[k]];
-            extent.low = extent.low.cwiseMin(p);
-            extent.high = extent.high.cwiseMax(p);
-            extent.centre += p;
-        }
-        extent.centre /= 8;
+        extent = {CellBox(cells.cell_corners[c], positions), c};
         extent.low.array() -= reach;
         extent.high.array() += reach;
         low_ = low_.cwiseMin(extent.low);

@@ -7,6 +7,23 @@
 
 namespace filigree {
 
+/// Of a cell's corners, where they are now.
+struct CellBox {
+    Vec3f low, high, centre; ///< centre: their mean
+
+    CellBox() = default;
+    CellBox(const std::array<Index, 8>& corners, const Vectors& positions) {
+        low = high = centre = positions[corners[0]];
+        for (int k = 1; k < 8; ++k) {
+            const Vec3f p = positions[corners[k]];
+            low = low.cwiseMin(p);
+            high = high.cwiseMax(p);
+            centre += p;
+        }
+        centre /= 8;
+    }
+};
+
 /// A box about any axes.
 struct TurnedBox {
     Vec3f centre;
@@ -57,8 +74,7 @@ private:
     float boxes_a_metre_ = 1; ///< along an axis
     float around_ = 0;        ///< m: how far from a point the boxes lie that have all of its cells
     std::array<int, 3> counts_{0, 0, 0};
-    struct Extent {
-        Vec3f low, high, centre; ///< the first two `reach` wider than the cell is
+    struct Extent : CellBox { ///< low and high `reach` further out
         Index cell;
     };
     std::vector<Index> offsets_;

@@ -29,6 +29,23 @@ Turn turn_in(const RigidState& state, double dt) {
     return turn;
 }
 
+/// m/s, of the fastest particle.
+float most_particle_speed(std::span<const BodyState> bodies) {
+    float squared = 0;
+    for (const BodyState& body : bodies) {
+        constexpr std::size_t kAtOnce = 16; // so that the compiler uses vectors; what follows the last particle is 0
+        float most[kAtOnce] = {};
+        const Vectors& v = body.velocities;
+        for (std::size_t i = 0; i < v.size(); i += kAtOnce)
+            for (std::size_t k = 0; k < kAtOnce; ++k) {
+                const float here = v.x[i + k] * v.x[i + k] + v.y[i + k] * v.y[i + k] + v.z[i + k] * v.z[i + k];
+                most[k] = here > most[k] ? here : most[k];
+            }
+        squared = std::max(squared, *std::ranges::max_element(most));
+    }
+    return std::sqrt(squared);
+}
+
 /// One substep, from `now` less dt to `now`.
 class DescentStep {
 public:

@@ -249,17 +249,8 @@ OwnCells::NearBoxes OwnCells::cell_boxes(std::span<const std::pair<Index, Index>
     parallel_for(context, clusters.size(), kOwnCellsGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k) {
             CellBox* box = &boxes.boxes[boxes.first[clusters[k]]];
-            for (Index c = clusters_[clusters[k]].first_cell; c < clusters_[clusters[k] + 1].first_cell; ++c) {
-                const auto& corners = matter_.corners(cells_[c]);
-                Vec3f low = positions[corners[0]], high = low, centre = low;
-                for (int corner = 1; corner < 8; ++corner) {
-                    const Vec3f p = positions[corners[corner]];
-                    low = low.cwiseMin(p);
-                    high = high.cwiseMax(p);
-                    centre += p;
-                }
-                *box++ = {low, high, centre / 8};
-            }
+            for (Index c = clusters_[clusters[k]].first_cell; c < clusters_[clusters[k] + 1].first_cell; ++c)
+                *box++ = CellBox(matter_.corners(cells_[c]), positions);
         }
     });
     return boxes;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "filigree/physics/body_state.h"
+#include "filigree/physics/cell_boxes.h"
 #include "filigree/physics/matter.h"
 
 namespace filigree {
@@ -34,9 +35,6 @@ private:
         std::uint32_t far_near; ///< bits of the 3^3 clusters around: some of their cells are far from some of this one
         Index first_cell, first_corner;
         Index first_far; ///< of far_cells_, one for each of those bits
-    };
-    struct CellBox { ///< of a cell's corners
-        Vec3f low, high, centre;
     };
     struct NearBoxes {            ///< of some clusters' cells
         std::vector<Index> first; ///< of each cluster, in `boxes`; kNoIndex of the others

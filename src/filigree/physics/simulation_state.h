@@ -56,8 +56,6 @@ void step_by_descent(SimulationState& state, double from, double until, FrameRep
 /// What a body's elasticity met, into the frame's report.
 void note_deformation(FrameReport& report, std::size_t body, const ElasticReport& met);
 
-/// m/s, of the fastest particle.
-float most_particle_speed(std::span<const BodyState> bodies);
 float least_spacing(std::span<const BodyState> bodies);
 /// Puts pinned particles where their motion has them at `now`, with its mean velocity over dt.
 void move_pins(SimulationState& state, double now, float dt);

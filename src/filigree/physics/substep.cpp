@@ -68,22 +68,6 @@ double SimulationState::descent_step(double longest) const {
     return std::clamp(longest, usual / kMostParts, usual);
 }
 
-float most_particle_speed(std::span<const BodyState> bodies) {
-    float squared = 0;
-    for (const BodyState& body : bodies) {
-        constexpr std::size_t kAtOnce = 16; // so that the compiler uses vectors; what follows the last particle is 0
-        float most[kAtOnce] = {};
-        const Vectors& v = body.velocities;
-        for (std::size_t i = 0; i < v.size(); i += kAtOnce)
-            for (std::size_t k = 0; k < kAtOnce; ++k) {
-                const float here = v.x[i + k] * v.x[i + k] + v.y[i + k] * v.y[i + k] + v.z[i + k] * v.z[i + k];
-                most[k] = here > most[k] ? here : most[k];
-            }
-        squared = std::max(squared, *std::ranges::max_element(most));
-    }
-    return std::sqrt(squared);
-}
-
 float least_spacing(std::span<const BodyState> bodies) {
     float spacing = std::numeric_limits<float>::max();
     for (const BodyState& body : bodies) spacing = std::min(spacing, float(body.body->spacing()));
