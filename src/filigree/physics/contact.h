@@ -8,6 +8,7 @@
 
 #include <array>
 #include <functional>
+#include <limits>
 #include <map>
 #include <memory>
 
@@ -64,7 +65,10 @@ public:
     }
     /// The next search finds what is near obstacles: of what sleeps nothing was found.
     void look_near_again() { near_until_ = -1; }
-    void clear_touches() { touched_.assign(touched_.size(), 0); }
+    void clear_touches() {
+        touched_.assign(touched_.size(), 0);
+        deepest_near_.assign(deepest_near_.size(), 0);
+    }
 
     /// Adds the forces of what touches now to the bodies' forces, and lets friction's anchors slide. dt: of the
     /// substep.
@@ -175,8 +179,7 @@ private:
     /// A surface point near an obstacle.
     struct Near {
         Index obstacle, point;
-        float clear_until = 0; ///< near_way_ until which this cannot touch
-        float depth = 0;       ///< now
+        float depth = 0; ///< m, now
         contact_law::Grasp grasp;
         Vec3f anchor = Vec3f::Zero();
     };
@@ -200,7 +203,8 @@ private:
                        std::vector<Blocks::Entry>& entries) const;
     ContactReport add_obstacle_forces(BodyState& body, std::size_t b, const ObstaclePoses& poses, float dt,
                                       std::vector<Vec3f>& forces, const RunContext& context);
-    Vec3f obstacle_force(Near& at, const BodyState& body, const ObstaclePoses& poses, float dt) const;
+    Vec3f obstacle_force(Near& at, float& clear_until, const BodyState& body, const ObstaclePoses& poses,
+                         float dt) const;
     PairForce pair_force(NearPair& pair, std::span<const BodyState> bodies, float dt) const;
     /// From the second's point to the first's, balls or surface points over them; of positions, or of velocities.
     static Vec3f between(const NearPair& pair, std::span<const BodyState> bodies, Embedding BodyState::*points,
@@ -217,10 +221,14 @@ private:
     std::vector<Vec3f> towards_;          ///< of each obstacle, the way to it: of half-spaces that stand still; else 0
     std::vector<std::vector<Near>> near_; ///< by body, ascending by obstacle and point
     static constexpr std::size_t kNearBlock = 64;
-    std::vector<std::vector<float>> near_clear_until_; ///< of each block of these: near_way_ until which none can touch
-    void ask_all_near(std::size_t body) {
-        near_clear_until_[body].assign((near_[body].size() + kNearBlock - 1) / kNearBlock, 0.0f);
+    /// Of each of these, near_way_ until which it cannot touch; padded by infinity to whole blocks. Beside them, as
+    /// most are asked nothing more. What cannot touch has no depth and holds nothing.
+    std::vector<std::vector<float>> near_clear_until_;
+    void pad_near(std::size_t body) {
+        const std::size_t blocks = (near_[body].size() + kNearBlock - 1) / kNearBlock;
+        near_clear_until_[body].resize(blocks * kNearBlock, std::numeric_limits<float>::infinity());
     }
+    std::vector<float> deepest_near_;                       ///< m, of each body, now
     std::map<const Body*, std::vector<float>> most_depths_; ///< of bodies that were crushed: m, of each particle
     std::vector<NearPair> pairs_;
     struct OwnBalls;                                         ///< of a body whose balls meet each other

@@ -225,6 +225,7 @@ ContactReport Contacts::update_anchors(std::span<const BodyState> bodies, std::s
     std::ranges::fill(touched_, std::uint8_t{0});
     for (std::size_t b = 0; b < bodies.size(); ++b) {
         const BodyState& body = bodies[b];
+        deepest_near_[b] = 0;
         for (Near& at : near_[b]) {
             const Obstacle& obstacle = world_.obstacles[at.obstacle];
             const Vec3f place = embedded_point(body.surface, at.point, body.positions);
@@ -236,7 +237,7 @@ ContactReport Contacts::update_anchors(std::span<const BodyState> bodies, std::s
             }
             touched_[b] |= kOnObstacle;
             ++report.contacts;
-            report.deepest = std::max(report.deepest, -surface.distance);
+            deepest_near_[b] = std::max(deepest_near_[b], at.depth);
             if (!at.grasp.holds) at.anchor = poses.to_own_axes(at.obstacle, place);
             at.grasp = {true, false};
             const float stiffness = body.surface_stiffness[at.point] * float(obstacle.stiffness);
@@ -246,6 +247,7 @@ ContactReport Contacts::update_anchors(std::span<const BodyState> bodies, std::s
             if (const float stretch = offset.norm(); grip * stretch > limit)
                 at.anchor = poses.to_own_axes(at.obstacle, place - offset * (limit / (grip * stretch)));
         }
+        report.deepest = std::max(report.deepest, deepest_near_[b]);
     }
     for (NearPair& pair : pairs_) {
         const BodyState &a = bodies[pair.first_body], &b = bodies[pair.second_body];

@@ -1,12 +1,12 @@
 // Contacts in explicit steps: forces of what touches, and moving out what is too deep.
 #include "filigree/physics/contact.h"
 
+#include "filigree/core/bits.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/physics/contact_law.h"
 #include "filigree/physics/point_grid.h"
 
 #include <algorithm>
-#include <limits>
 
 namespace filigree {
 
@@ -58,16 +58,13 @@ std::vector<float> most_depths_of(const Body& body, const RunContext& context) {
 } // namespace
 
 /// The force on a surface point; lets friction's anchor begin, slide and end.
-Vec3f Contacts::obstacle_force(Near& at, const BodyState& body, const ObstaclePoses& poses, float dt) const {
+Vec3f Contacts::obstacle_force(Near& at, float& clear_until, const BodyState& body, const ObstaclePoses& poses,
+                               float dt) const {
     at.depth = 0;
-    if (at.clear_until > near_way_) {
-        at.grasp = {};
-        return Vec3f::Zero();
-    }
     const Obstacle& obstacle = world_.obstacles[at.obstacle];
     const Vec3f place = embedded_point(body.surface, at.point, body.positions);
     const DistanceField::Sample surface = poses.distance_to(at.obstacle, place);
-    at.clear_until = near_way_ + surface.distance;
+    clear_until = near_way_ + surface.distance;
     if (!(surface.distance < 0)) {
         at.grasp = {};
         return Vec3f::Zero();
@@ -152,31 +149,30 @@ ContactReport Contacts::add_obstacle_forces(BodyState& body, std::size_t b, cons
     ContactReport report;
     std::vector<Near>& near = near_[b];
     std::vector<float>& clear_until = near_clear_until_[b];
-    const auto each_near = [&](std::size_t block, const auto& visit) {
-        const std::size_t end = std::min(near.size(), (block + 1) * kNearBlock);
-        for (std::size_t k = block * kNearBlock; k < end; ++k) visit(k);
-    };
+    std::vector<std::uint64_t> touching(clear_until.size() / kNearBlock); // bits of each block
     forces.resize(near.size());
-    parallel_for(context, clear_until.size(), kBlocksGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, touching.size(), kBlocksGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t block = begin; block < end; ++block) {
-            if (clear_until[block] > near_way_) continue;
-            clear_until[block] = std::numeric_limits<float>::infinity();
-            each_near(block, [&](std::size_t k) {
-                forces[k] = obstacle_force(near[k], body, poses, dt);
-                clear_until[block] = std::min(clear_until[block], near[k].clear_until);
+            const float* until = &clear_until[block * kNearBlock];
+            const std::uint64_t asked = bits_where<kNearBlock>([&](std::size_t k) { return !(until[k] > near_way_); });
+            for_each_bit(asked,
+                         [&](int bit) { read_ahead(body.surface, near[block * kNearBlock + std::size_t(bit)].point); });
+            for_each_bit(asked, [&](int bit) {
+                const std::size_t k = block * kNearBlock + std::size_t(bit);
+                forces[k] = obstacle_force(near[k], clear_until[k], body, poses, dt);
+                touching[block] |= std::uint64_t{near[k].depth > 0} << bit;
             });
         }
     });
-    for (std::size_t block = 0; block < clear_until.size(); ++block) {
-        if (clear_until[block] > near_way_) continue;
-        each_near(block, [&](std::size_t k) {
-            if (!(near[k].depth > 0)) return;
+    for (std::size_t block = 0; block < touching.size(); ++block)
+        for_each_bit(touching[block], [&](int bit) {
+            const std::size_t k = block * kNearBlock + std::size_t(bit);
             add_to_particles(body.surface, near[k].point, forces[k], body.forces);
             touched_[b] |= kOnObstacle;
             ++report.contacts;
             report.deepest = std::max(report.deepest, near[k].depth);
         });
-    }
+    deepest_near_[b] = report.deepest;
     return report;
 }
 
@@ -188,6 +184,7 @@ ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, flo
         std::vector<Vec3f> forces;
         for (std::size_t b = begin; b < end; ++b) {
             touched_[b] = 0;
+            deepest_near_[b] = 0;
             if (!bodies[b].sleeps()) reports[b] = add_obstacle_forces(bodies[b], b, poses, dt, forces, context);
         }
     });
@@ -222,8 +219,8 @@ void Contacts::push_out(std::span<BodyState> bodies, double time, const RunConte
     const ObstaclePoses poses(world_, time);
     for (std::size_t b = 0; b < bodies.size(); ++b) {
         BodyState& body = bodies[b];
-        if (!(touched_[b] & kOnObstacle) || body.sleeps()) continue;
         const float spacing = float(body.body->spacing()), most = kDeepest * spacing;
+        if (!(deepest_near_[b] > kCrushing * spacing) || body.sleeps()) continue;
         std::vector<Vec3f> outwards; // of what is deep in each obstacle
         for (const Near& at : near_[b]) {
             if (!(at.depth > kCrushing * spacing)) continue;

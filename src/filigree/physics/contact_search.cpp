@@ -43,7 +43,8 @@ struct Contacts::OwnBalls {
 
 Contacts::Contacts(const World& world, std::size_t bodies, bool between_bodies, bool within_bodies)
     : world_(world), between_bodies_(between_bodies), within_bodies_(within_bodies), near_(bodies),
-      near_clear_until_(bodies), touched_(bodies, 0), matter_(world, between_bodies, within_bodies) {
+      near_clear_until_(bodies), deepest_near_(bodies, 0), touched_(bodies, 0),
+      matter_(world, between_bodies, within_bodies) {
     for (const Obstacle& obstacle : world.obstacles) {
         const auto* ground = std::get_if<HalfSpace>(&obstacle.shape);
         const bool stands = ground && !obstacle.motion.moves();
@@ -80,7 +81,10 @@ void Contacts::find_near(std::span<const BodyState> bodies, double time, float r
     const ObstaclePoses poses(world_, time);
     for (std::size_t b = 0; b < bodies.size(); ++b) {
         const BodyState& body = bodies[b];
-        if (body.is_absent) near_[b].clear();
+        if (body.is_absent) {
+            near_[b].clear();
+            near_clear_until_[b].clear();
+        }
         if (body.sleeps()) continue;
         const std::size_t points = body.surface.size();
         std::vector<Vec3f> places(points);
@@ -88,7 +92,7 @@ void Contacts::find_near(std::span<const BodyState> bodies, double time, float r
             for (std::size_t s = begin; s < end; ++s) places[s] = embedded_point(body.surface, s, body.positions);
         });
         std::vector<Near> found;
-        std::vector<float> distances(points);
+        std::vector<float> distances(points), clear_until;
         auto old = near_[b].begin();
         const Box box = bounds(places);
         for (std::size_t o = 0; o < world_.obstacles.size(); ++o) {
@@ -102,11 +106,12 @@ void Contacts::find_near(std::span<const BodyState> bodies, double time, float r
                 Near& near = found.emplace_back(Near{.obstacle = Index(o), .point = s, .grasp = {}});
                 while (old != near_[b].end() && std::pair(old->obstacle, old->point) < std::pair(Index(o), s)) ++old;
                 if (old != near_[b].end() && old->obstacle == o && old->point == s) near = *old;
-                near.clear_until = distances[s];
+                clear_until.push_back(near.grasp.holds ? 0 : distances[s]); // what holds is asked
             }
         }
         near_[b] = std::move(found);
-        ask_all_near(b);
+        near_clear_until_[b] = std::move(clear_until);
+        pad_near(b);
     }
 }
 
@@ -175,9 +180,11 @@ Contacts::Memory Contacts::memory() const {
         memory.balls.push_back(
             {pair.first_body, pair.first, pair.second_body, pair.second, pair.grasp.slides, pair.offset});
     for (Index b = 0; b < near_.size(); ++b)
-        for (const Near& at : near_[b])
+        for (std::size_t k = 0; k < near_[b].size(); ++k) {
+            const Near& at = near_[b][k];
             memory.near.push_back({b, at.obstacle, at.point, Index(at.grasp.holds) + 2 * Index(at.grasp.slides),
-                                   at.clear_until, at.anchor});
+                                   near_clear_until_[b][k], at.anchor});
+        }
     return memory;
 }
 
@@ -195,15 +202,16 @@ bool Contacts::set_memory(const Memory& memory, std::span<const BodyState> bodie
     if (!std::ranges::all_of(memory.balls, are_balls)) return false;
     if (!std::isfinite(memory.near_way) || !std::isfinite(memory.near_until)) return false;
     if (!std::ranges::all_of(memory.near, is_sound) || !matter_.is_sound(memory.matter, bodies)) return false;
-    for (std::vector<Near>& near : near_) near.clear();
-    for (const NearMemory& near : memory.near)
-        near_[near.body].push_back({near.obstacle,
-                                    near.point,
-                                    near.clear_until,
-                                    0,
-                                    {(near.flags & 1) != 0, (near.flags & 2) != 0},
-                                    near.anchor});
-    for (std::size_t b = 0; b < near_.size(); ++b) ask_all_near(b);
+    for (std::size_t b = 0; b < near_.size(); ++b) {
+        near_[b].clear();
+        near_clear_until_[b].clear();
+    }
+    for (const NearMemory& near : memory.near) {
+        const contact_law::Grasp grasp{(near.flags & 1) != 0, (near.flags & 2) != 0};
+        near_[near.body].push_back({near.obstacle, near.point, 0, grasp, near.anchor});
+        near_clear_until_[near.body].push_back(near.clear_until);
+    }
+    for (std::size_t b = 0; b < near_.size(); ++b) pad_near(b);
     pairs_.clear();
     pairs_until_ = -1;
     for (const BallMemory& pair : memory.balls)

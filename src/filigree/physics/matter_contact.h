@@ -3,6 +3,7 @@
 
 #include "filigree/physics/body_state.h"
 #include "filigree/physics/contact_law.h"
+#include "filigree/physics/extremes_kernel.h"
 #include "filigree/physics/matter.h"
 
 #include <algorithm>
@@ -149,14 +150,6 @@ private:
         std::vector<Pair> pairs;
     };
     static std::uint8_t touch_of(const Side& side) { return side.body == side.other ? kTouchedItself : kTouched; }
-    struct Extremes { ///< of a body's particles along each axis
-        Vec3f least = Vec3f::Zero(), most = Vec3f::Zero();
-        /// Bound on what particles of two bodies, or of one, have beside each other.
-        static float between(const Extremes& one, const Extremes& other) {
-            return (one.most - other.least).cwiseMax(other.most - one.least).norm();
-        }
-        Extremes with(const Extremes& other) const { return {least.cwiseMin(other.least), most.cwiseMax(other.most)}; }
-    };
     float relative_speed(Index a, Index b) const { return Extremes::between(speeds_[a], speeds_[b]); }
     /// m: bound on how far two bodies are from where they were beside each other at the last search.
     float moved(const Side& side) const {
@@ -203,7 +196,7 @@ private:
     std::vector<std::shared_ptr<const OwnCells>> own_cells_; ///< null: of bodies that do not meet themselves
     std::vector<std::uint8_t> recovers_;                     ///< of each body: 1 while it does not meet itself
     struct Followed {              ///< the particles of a body whose motion says when to search again
-        std::vector<float> counts; ///< of each particle, 1 or 0; padded by zeros
+        std::vector<float> counts; ///< of each particle, as extremes_of wants them
         Index heaviest = 0;
         std::vector<Index> corners;      ///< of a rigid body, instead: those that all others lie between
         bool has_points_outside = false; ///< of the particles' box at rest; unknown of a rigid body

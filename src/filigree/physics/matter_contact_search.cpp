@@ -1,5 +1,6 @@
 // Finding which points might be in which cells, and what contacts in matter remember.
 #include "filigree/core/parallel_for.h"
+#include "filigree/physics/box_sweep.h"
 #include "filigree/physics/cell_boxes.h"
 #include "filigree/physics/matter_contact.h"
 #include "filigree/physics/own_cells.h"
@@ -21,18 +22,11 @@ constexpr float kOwnReach = 0.3f;   ///< the same of a body beside itself ...
 constexpr float kOwnSearches = 4;   ///< ... which is searched no more often than this in a frame
 /// Of what another side may still move until it is searched; they share what a search finds out about bodies.
 constexpr float kSearchedAlong = 0.5f;
-constexpr float kLongestWay = 0.3f;       ///< spacings a substep that one body may go towards another
-constexpr float kCrushed = 0.05f;         ///< volume ratio below which a cell counts as crushed
-constexpr float kTooManyCrushed = 0.05f;  ///< part of a body's cells
-constexpr Index kAskedCells = 7;          ///< one of so many is asked
-constexpr float kWaking = 0.02f;          ///< m/s of what touches a sleeper
-constexpr std::size_t kFollowedLanes = 8; ///< particles at once, no more than Vectors are padded by
-using FollowedLanes = Eigen::Array<float, kFollowedLanes, 1>;
-static_assert(kFollowedLanes <= Vectors::kPadding);
-
-bool are_near(const Box& a, const Box& b, double distance) {
-    return (a.min.array() - distance <= b.max.array()).all() && (b.min.array() - distance <= a.max.array()).all();
-}
+constexpr float kLongestWay = 0.3f;      ///< spacings a substep that one body may go towards another
+constexpr float kCrushed = 0.05f;        ///< volume ratio below which a cell counts as crushed
+constexpr float kTooManyCrushed = 0.05f; ///< part of a body's cells
+constexpr Index kAskedCells = 7;         ///< one of so many is asked
+constexpr float kWaking = 0.02f;         ///< m/s of what touches a sleeper
 
 /// N/m^3 in each cell: what the body's own surface has there, per area.
 std::vector<float> stiffness_per_area(const BodyState& state) {
@@ -120,7 +114,7 @@ MatterContacts::Followed MatterContacts::followed(const BodyState& body) {
     const std::vector<float>& mass = body.body->mass;
     followed.heaviest = Index(std::ranges::max_element(mass) - mass.begin());
     followed.has_points_outside = has_points_outside(*body.body);
-    followed.counts.resize((mass.size() + kFollowedLanes - 1) / kFollowedLanes * kFollowedLanes, 0);
+    followed.counts.resize((mass.size() + kExtremesPadding - 1) / kExtremesPadding * kExtremesPadding, 0);
     std::fill_n(followed.counts.begin(), mass.size(), 1.0f);
     if (body.has_balls()) return followed; // those are light beside the corners of cells alone
     const std::vector<std::uint8_t> light = light_particles(*body.body);
@@ -129,35 +123,13 @@ MatterContacts::Followed MatterContacts::followed(const BodyState& body) {
 }
 
 /// Of particles that are followed: of their values, less `from` unless that is null.
-MatterContacts::Extremes MatterContacts::extremes(std::size_t body, const Vectors& values, const Vectors* from) const {
-    const auto& [counts, heaviest, corners, has_points_outside] = *followed_[body];
+Extremes MatterContacts::extremes(std::size_t body, const Vectors& values, const Vectors* from) const {
+    const Followed& followed = *followed_[body];
+    const std::vector<Index>& corners = followed.corners;
+    if (corners.empty()) return extremes_of(values, from, followed.counts, followed.heaviest);
     const auto value_of = [&](Index i) -> Vec3f { return from ? Vec3f(values[i] - (*from)[i]) : values[i]; };
-    Extremes found;
-    if (!corners.empty()) {
-        found.least = found.most = value_of(corners[0]);
-        for (const Index i : corners) found = found.with({value_of(i), value_of(i)});
-        return found;
-    }
-    const auto take_axis = [&](int axis, float usual, const auto& lanes_at) {
-        FollowedLanes least = FollowedLanes::Constant(usual), most = least;
-        for (std::size_t i = 0; i < counts.size(); i += kFollowedLanes) {
-            const FollowedLanes v = usual + Eigen::Map<const FollowedLanes>(&counts[i]) * (lanes_at(i) - usual);
-            least = least.min(v);
-            most = most.max(v);
-        }
-        found.least[axis] = least.minCoeff();
-        found.most[axis] = most.maxCoeff();
-    };
-    for (int axis = 0; axis < 3; ++axis) {
-        const float* along = (values.*kVectorAxes[axis]).data();
-        const auto lanes = [=](std::size_t i) { return FollowedLanes(Eigen::Map<const FollowedLanes>(along + i)); };
-        if (const float* less = from ? (from->*kVectorAxes[axis]).data() : nullptr)
-            take_axis(axis, along[heaviest] - less[heaviest], [=](std::size_t i) {
-                return FollowedLanes(lanes(i) - Eigen::Map<const FollowedLanes>(less + i));
-            });
-        else
-            take_axis(axis, along[heaviest], lanes);
-    }
+    Extremes found{value_of(corners[0]), value_of(corners[0])};
+    for (const Index i : corners) found = found.with({value_of(i), value_of(i)});
     return found;
 }
 
@@ -264,7 +236,7 @@ void MatterContacts::count_from_here(std::span<const BodyState> bodies) {
     shifts_.assign(bodies.size(), {});
 }
 
-/// Which bodies are near each other: boxes swept along x.
+/// Which bodies are near each other.
 void MatterContacts::find_sides(std::span<const BodyState> bodies, double frame, const RunContext& context) {
     std::vector<Box> boxes(bodies.size()); // empty: of bodies that meet nothing
     parallel_for(context, bodies.size(), kBodiesGrain, [&](std::size_t begin, std::size_t end) {
@@ -274,28 +246,32 @@ void MatterContacts::find_sides(std::span<const BodyState> bodies, double frame,
         }
     });
     float spacing = 0, speed = 0;
-    std::vector<Index> order;
+    std::vector<Index> meeting;
+    std::vector<BoxSweep::Bounds> bounds;
     for (Index b = 0; b < bodies.size(); ++b) {
         if (boxes[b].empty()) continue;
-        order.push_back(b);
+        meeting.push_back(b);
+        bounds.push_back({boxes[b].min.cast<float>(), boxes[b].max.cast<float>()});
         spacing = std::max(spacing, float(bodies[b].body->spacing()));
-        speed = std::max(speed, relative_speed(b, order.front()));
+        speed = std::max(speed, relative_speed(b, meeting.front()));
     }
     const float reach = std::max(spacing, std::min(speed * float(frame), 2 * spacing));
     way_ = 0;
     sides_until_ = reach;
-    const double far = double(reach + spacing);
-    std::ranges::sort(order, {}, [&](Index b) { return std::pair(boxes[b].min.x(), b); });
     std::vector<std::uint64_t> found; // of two bodies
     const auto add = [&](Index body, Index other) { found.push_back(std::uint64_t(body) << 32 | other); };
-    for (auto a = order.begin(); a != order.end(); ++a) {
-        if (within_bodies_ && matter_[*a] && !bodies[*a].rigid) add(*a, *a);
+    const BoxSweep sweep(bounds);
+    std::vector<std::uint16_t> room;
+    for (std::size_t a = 0; a < meeting.size(); ++a) {
+        const Index body = meeting[sweep.order()[a]];
+        if (within_bodies_ && matter_[body] && !bodies[body].rigid) add(body, body);
         if (!between_bodies_) continue;
-        for (auto b = a + 1; b != order.end() && boxes[*b].min.x() - far <= boxes[*a].max.x(); ++b) {
-            if (!are_near(boxes[*a], boxes[*b], far)) continue;
-            if (matter_[*b]) add(*a, *b);
-            if (matter_[*a]) add(*b, *a);
-        }
+        sweep.each_near(a, reach + spacing, room, [&](std::size_t b) {
+            const Index other = meeting[sweep.order()[b]];
+            if (other == body) return;
+            if (matter_[other]) add(body, other);
+            if (matter_[body]) add(other, body);
+        });
     }
     std::ranges::sort(found);
     std::vector<Side> sides;

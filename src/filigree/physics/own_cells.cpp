@@ -1,6 +1,8 @@
 #include "filigree/physics/own_cells.h"
 
+#include "filigree/core/bits.h"
 #include "filigree/core/parallel_for.h"
+#include "filigree/physics/box_sweep.h"
 
 #include <algorithm>
 #include <bit>
@@ -16,77 +18,6 @@ namespace {
 constexpr std::size_t kOwnCellsGrain = 16, kClusterCells = 8;
 constexpr double kTangledClusters = 512;   ///< near clusters a cluster of a body crushed or mixed
 constexpr std::size_t kTangledPoints = 16; ///< near points a point of such a body
-
-/// Boxes, of which those that come near each other are found by a sweep along the longest side of them all.
-class BoxSweep {
-public:
-    /// box(number): the lowest and highest corner, finite. Cost O(boxes).
-    template <class Box>
-    BoxSweep(std::span<const Index> numbers, const Box& box) : order_(numbers.begin(), numbers.end()) {
-        Vec3f low = Vec3f::Constant(std::numeric_limits<float>::max()), high = -low;
-        for (const Index k : numbers) {
-            low = low.cwiseMin(box(k).first);
-            high = high.cwiseMax(box(k).second);
-        }
-        int along = 0;
-        (high - low).maxCoeff(&along);
-        sort_by([&](Index k) { return box(k).first[along]; }, low[along], high[along]);
-        sides_.assign(6, std::vector<float>(order_.size() + kAtOnce, std::numeric_limits<float>::infinity()));
-        for (std::size_t k = 0; k < order_.size(); ++k) {
-            const auto& [from, to] = box(order_[k]);
-            for (int axis = 0; axis < 3; ++axis) {
-                sides_[std::size_t(2 * axis)][k] = from[(along + axis) % 3];
-                sides_[std::size_t(2 * axis + 1)][k] = to[(along + axis) % 3];
-            }
-        }
-    }
-
-    std::span<const Index> order() const { return order_; } ///< numbers as they are swept
-    /// Calls visit(b) for the boxes from a on, in that order, that come within `around` of a: places in order().
-    template <class Visit>
-    void each_near(std::size_t a, float around, const Visit& visit) const {
-        const float *low = sides_[0].data(), *low_u = sides_[2].data(), *high_u = sides_[3].data(),
-                    *low_v = sides_[4].data(), *high_v = sides_[5].data();
-        const float end = sides_[1][a], from_u = low_u[a], to_u = high_u[a], from_v = low_v[a], to_v = high_v[a];
-        for (std::size_t b = a; slabs_[b] - end <= around; b += kAtOnce) {
-            std::uint32_t near = 0; // bits
-            for (std::size_t k = 0; k < kAtOnce; ++k) {
-                const float gap_u = std::max(low_u[b + k] - to_u, from_u - high_u[b + k]);
-                const float gap_v = std::max(low_v[b + k] - to_v, from_v - high_v[b + k]);
-                const float gap = std::max(std::max(gap_u, gap_v), low[b + k] - end);
-                near |= kBits[k] & (0u - std::uint32_t{gap <= around});
-            }
-            for (; near != 0; near &= near - 1) visit(b + std::size_t(std::countr_zero(near)));
-        }
-    }
-
-private:
-    static constexpr std::size_t kAtOnce = 16; // so that the compiler uses vectors
-    static constexpr auto kBits = [] {
-        std::array<std::uint32_t, kAtOnce> bits{};
-        for (std::size_t k = 0; k < kAtOnce; ++k) bits[k] = 1u << k;
-        return bits;
-    }();
-    /// By slabs, as many as there are boxes: that is near enough to a sorted order, and sooner there.
-    template <class Begin>
-    void sort_by(const Begin& begin, float low, float high) {
-        const std::size_t count = order_.size();
-        const float step = std::max((high - low) / float(count), std::numeric_limits<float>::min());
-        const auto slab_of = [&](Index k) { return std::min(std::size_t((begin(k) - low) / step), count - 1); };
-        std::vector<Index> offsets(count + 1, 0), sorted(count);
-        for (const Index k : order_) ++offsets[slab_of(k) + 1];
-        std::partial_sum(offsets.begin(), offsets.end(), offsets.begin());
-        for (const Index k : order_) sorted[offsets[slab_of(k)]++] = k;
-        order_ = std::move(sorted);
-        slabs_.assign(count + kAtOnce, std::numeric_limits<float>::infinity());
-        float least = std::numeric_limits<float>::infinity();
-        for (std::size_t k = count; k-- > 0;) slabs_[k] = least = std::min(least, begin(order_[k]));
-    }
-
-    std::vector<Index> order_;
-    std::vector<std::vector<float>> sides_; ///< low and high along the sweep, and along the others; infinite at the end
-    std::vector<float> slabs_;              ///< no box from here on begins before; infinite at the end
-};
 
 } // namespace
 
@@ -195,16 +126,20 @@ std::vector<std::pair<Index, Index>> OwnCells::near_clusters(std::span<const Ext
         std::uint32_t far_near;
     };
     std::vector<Index> clusters;
+    std::vector<BoxSweep::Bounds> boxes;
     for (Index k = 0; k < extents.size(); ++k) {
         if (extents[k].radius < 0) continue;
         if (!(extents[k].high - extents[k].low).allFinite()) return {}; // the frame is done again
         clusters.push_back(k);
+        boxes.push_back({extents[k].low, extents[k].high});
     }
-    const BoxSweep sweep(clusters, [&](Index k) { return std::pair(extents[k].low, extents[k].high); });
+    const BoxSweep sweep(boxes);
     std::vector<ClusterBall> balls;
     balls.reserve(clusters.size());
-    for (const Index k : sweep.order())
+    for (const Index number : sweep.order()) {
+        const Index k = clusters[number];
         balls.push_back({extents[k].centre, extents[k].radius, clusters_[k].at, k, clusters_[k].far_near});
+    }
     const auto may_touch = [around](const ClusterBall& one, const ClusterBall& other) {
         if (const int n = direction(one.at, other.at); n >= 0) return (one.far_near >> n & 1) != 0;
         const float far = one.radius + other.radius + around;
@@ -212,9 +147,10 @@ std::vector<std::pair<Index, Index>> OwnCells::near_clusters(std::span<const Ext
     };
     std::vector<std::pair<Index, Index>> near;
     std::vector<Index> offsets(extents.size() + 1, 0);
+    std::vector<std::uint16_t> room;
     for (std::size_t a = 0; a < balls.size(); ++a) {
         if (double(near.size()) > most) return {};
-        sweep.each_near(a, around, [&](std::size_t b) {
+        sweep.each_near(a, around, room, [&](std::size_t b) {
             if (!may_touch(balls[a], balls[b])) return;
             near.emplace_back(balls[a].cluster, balls[b].cluster);
             ++offsets[balls[a].cluster + 1];
@@ -283,9 +219,11 @@ void OwnCells::look_into(std::span<const std::pair<Index, Index>> near, std::spa
     if (has_points == 0) return;
     std::array<std::vector<Point>, kClusterCells> points; // of each cell, once any is asked for
     const auto points_in = [&](Index i) -> std::vector<Point>& {
-        if (points[i].empty())
-            for (const Index s : points_of_cells(first + i, first + i + 1))
-                points[i].push_back({embedded_point(points_, s, positions), s, std::numeric_limits<float>::infinity()});
+        if (!points[i].empty()) return points[i];
+        const std::span<const Index> numbers = points_of_cells(first + i, first + i + 1);
+        for (const Index s : numbers) read_ahead(points_, s);
+        for (const Index s : numbers)
+            points[i].push_back({embedded_point(points_, s, positions), s, std::numeric_limits<float>::infinity()});
         return points[i];
     };
     for (const auto& [own, other] : near) {
@@ -294,8 +232,9 @@ void OwnCells::look_into(std::span<const std::pair<Index, Index>> near, std::spa
         of_some |= of_some >> 16;
         of_some |= of_some >> 8;
         std::uint64_t asked = 0; // bits of the cells that have points near the other cluster
-        for (std::uint64_t left = of_some & has_points; left != 0; left &= left - 1)
-            if (come_near(own_boxes[std::countr_zero(left)], extents[other])) asked |= left & (0 - left);
+        for_each_bit(of_some & has_points, [&](int i) {
+            if (come_near(own_boxes[i], extents[other])) asked |= std::uint64_t{1} << i;
+        });
         if (asked == 0) continue;
         const Index others = clusters_[other + 1].first_cell - clusters_[other].first_cell;
         for (Index j = 0; j < others; ++j) {

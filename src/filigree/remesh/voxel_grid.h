@@ -1,11 +1,11 @@
 // A set of voxels, and the border between those and the rest.
 #pragma once
 
+#include "filigree/core/bits.h"
 #include "filigree/core/run_context.h"
 #include "filigree/core/types.h"
 
 #include <array>
-#include <bit>
 #include <span>
 #include <vector>
 
@@ -49,12 +49,6 @@ inline std::uint64_t voxels_below(std::span<const std::uint64_t> row, std::size_
 }
 inline std::uint64_t voxels_above(std::span<const std::uint64_t> row, std::size_t word) {
     return row[word] >> 1 | (word + 1 < row.size() ? row[word + 1] << 63 : 0);
-}
-
-/// Calls visit(x) for each bit, lowest first.
-template <class Visit>
-void for_each_bit(std::uint64_t bits, const Visit& visit) {
-    for (; bits; bits &= bits - 1) visit(std::countr_zero(bits));
 }
 
 VoxelGrid complement(VoxelGrid grid);
