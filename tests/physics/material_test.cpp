@@ -39,6 +39,7 @@ TEST(Material, SaysWhatIsWrong) {
         {[=](Material& m) { m.density = nan; }, "density"},
         {[](Material& m) { m.young_modulus = -1; }, "Young"},
         {[=](Material& m) { m.young_modulus = infinite; }, "Young"},
+        {[](Material& m) { m.young_modulus = 1e-46; }, "1e-9 to 1e12 Pa"}, // 0 as a float
         {[](Material& m) { m.poisson_ratio = 0.5; }, "Poisson"},
         {[=](Material& m) { m.poisson_ratio = nan; }, "Poisson"},
         {[](Material& m) { m.damping = -0.1; }, "damping"},

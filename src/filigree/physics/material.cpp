@@ -15,8 +15,9 @@ std::string check_material(const Material& material) {
     const auto is_not_negative = [](double value) { return std::isfinite(value) && value >= 0; };
     const auto within = [](double value, double least, double most) { return value >= least && value <= most; };
 
-    if (!is_positive(material.density)) return "The density must be above 0 kg/m^3.";
-    if (!is_positive(material.young_modulus)) return "Young's modulus must be above 0 Pa.";
+    // Beyond all matter, and within what floats can multiply.
+    if (!within(material.density, 1e-9, 1e6)) return "The density must be from 1e-9 to 1e6 kg/m^3.";
+    if (!within(material.young_modulus, 1e-9, 1e12)) return "Young's modulus must be from 1e-9 to 1e12 Pa.";
     if (!within(material.poisson_ratio, 0, 0.49)) return "Poisson's ratio must be from 0 to 0.49.";
     if (!is_not_negative(material.damping)) return "The damping must be 0 or more (1/s).";
     if (!is_not_negative(material.internal_damping)) return "The internal damping must be 0 s or more.";

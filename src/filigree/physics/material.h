@@ -14,8 +14,8 @@ enum class MaterialModel { fem, springs, meshfree, rigid, mpm };
 
 struct Material {
     MaterialModel model = MaterialModel::fem;
-    double density = 1000;       ///< kg/m^3, above 0
-    double young_modulus = 1e5;  ///< Pa, above 0
+    double density = 1000;       ///< kg/m^3, 1e-9 to 1e6
+    double young_modulus = 1e5;  ///< Pa, 1e-9 to 1e12
     double poisson_ratio = 0.3;  ///< 0 .. 0.49; springs: always 1/4
     double damping = 0.5;        ///< 1/s: motion through still air loses this fraction of its speed a second
     double internal_damping = 0; ///< s: stress a rate of strain adds, as a multiple of stiffness (Kelvin-Voigt)
