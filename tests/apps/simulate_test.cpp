@@ -366,7 +366,7 @@ TEST_F(Simulate, WrongTypesAndRangesAreNamed) {
     refused(kBody + "density = \"heavy\"\n", {"bad.toml:3:", "'density'", "number", "\"heavy\""});
     refused(kBody + "[simulation]\nduration = 20000\n", {"bad.toml:4:", "1200000 frames", "1000000", "duration"});
     refused(kBody + "[simulation]\nframes_per_second = 9\n", {"bad.toml:4:", "10 to 10000", "9"});
-    refused(kBody + "density = -1\n", {"bad.toml:3:", "above 0", "-1"});
+    refused(kBody + "density = -1\n", {"bad.toml:3:", "1e-09 to", "-1"});
     refused(kBody + "poisson_ratio = 0.5\n", {"bad.toml:3:", "0 to 0.49"});
     refused(kBody + "particles = 1.5\n", {"bad.toml:3:", "whole number"});
     refused(kBody + "centre = [1, 2]\n", {"bad.toml:3:", "three numbers", "and is [1, 2]"});

@@ -64,7 +64,7 @@ TEST_F(SceneFileTest, ValuesTakeThePlaceOfWhatIsWritten) {
     EXPECT_EQ(said({"body", "density", 0, "1\nother = 2"}),
               ": body.density: '1\nother = 2' is no value that TOML knows.");
     EXPECT_EQ(said({"body", "density", 0, "-1"}),
-              ": 'density' in [[body]] must be a number, above 0, to 1e+06, and is -1.");
+              ": 'density' in [[body]] must be a number, 1e-09 to 1e+06, and is -1.");
 }
 
 TEST_F(SceneFileTest, ReadsWhatBreaks) {
