@@ -33,7 +33,8 @@ void BoxSweep::sort(std::span<const Bounds> boxes, int along, float low, float h
     const std::size_t count = boxes.size();
     const double step = std::max((double{high} - double{low}) / double(count), std::numeric_limits<double>::min());
     const auto slab_of = [&](const Bounds& box) {
-        return std::min(std::size_t((double{box.low[along]} - double{low}) / step), count - 1);
+        const double slab = (double{box.low[along]} - double{low}) / step;
+        return slab < double(count) ? std::size_t(slab) : count - 1; // also where it is not a number
     };
     std::vector<Index> offsets(count + 1, 0);
     for (const Bounds& box : boxes) ++offsets[slab_of(box) + 1];

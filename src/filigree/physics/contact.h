@@ -8,7 +8,6 @@
 
 #include <array>
 #include <functional>
-#include <limits>
 #include <map>
 #include <memory>
 
@@ -221,12 +220,12 @@ private:
     std::vector<Vec3f> towards_;          ///< of each obstacle, the way to it: of half-spaces that stand still; else 0
     std::vector<std::vector<Near>> near_; ///< by body, ascending by obstacle and point
     static constexpr std::size_t kNearBlock = 64;
-    /// Of each of these, near_way_ until which it cannot touch; padded by infinity to whole blocks. Beside them, as
-    /// most are asked nothing more. What cannot touch has no depth and holds nothing.
+    /// Of each of these, near_way_ until which it cannot touch; padded to whole blocks. Beside them, as most are
+    /// asked nothing more. What cannot touch has no depth and holds nothing.
     std::vector<std::vector<float>> near_clear_until_;
     void pad_near(std::size_t body) {
         const std::size_t blocks = (near_[body].size() + kNearBlock - 1) / kNearBlock;
-        near_clear_until_[body].resize(blocks * kNearBlock, std::numeric_limits<float>::infinity());
+        near_clear_until_[body].resize(blocks * kNearBlock, 0);
     }
     std::vector<float> deepest_near_;                       ///< m, of each body, now
     std::map<const Body*, std::vector<float>> most_depths_; ///< of bodies that were crushed: m, of each particle

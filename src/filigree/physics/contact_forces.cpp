@@ -154,7 +154,9 @@ ContactReport Contacts::add_obstacle_forces(BodyState& body, std::size_t b, cons
     parallel_for(context, touching.size(), kBlocksGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t block = begin; block < end; ++block) {
             const float* until = &clear_until[block * kNearBlock];
-            const std::uint64_t asked = bits_where<kNearBlock>([&](std::size_t k) { return !(until[k] > near_way_); });
+            std::uint64_t asked = bits_where<kNearBlock>([&](std::size_t k) { return !(until[k] > near_way_); });
+            const std::size_t left = near.size() - block * kNearBlock;
+            if (left < kNearBlock) asked &= (std::uint64_t{1} << left) - 1; // also where a way is not a number
             for_each_bit(asked,
                          [&](int bit) { read_ahead(body.surface, near[block * kNearBlock + std::size_t(bit)].point); });
             for_each_bit(asked, [&](int bit) {
