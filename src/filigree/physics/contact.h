@@ -182,6 +182,16 @@ private:
         contact_law::Grasp grasp;
         Vec3f anchor = Vec3f::Zero();
     };
+    struct NearPoints { ///< of a body
+        static constexpr std::size_t kBlock = 64;
+        std::vector<Near> points; ///< ascending by obstacle and point
+        /// Of each, near_way_ until which it cannot touch; padded to whole blocks. Beside the points, as most are asked
+        /// nothing more. What cannot touch has no depth and holds nothing.
+        std::vector<float> clear_until;
+
+        std::size_t blocks() const { return (points.size() + kBlock - 1) / kBlock; }
+        void pad() { clear_until.resize(blocks() * kBlock, 0); }
+    };
     /// Two balls near each other, of different bodies or of far parts of one.
     struct NearPair {
         Index first_body, first, second_body, second;
@@ -217,17 +227,9 @@ private:
 
     const World& world_;
     bool between_bodies_, within_bodies_;
-    std::vector<Vec3f> towards_;          ///< of each obstacle, the way to it: of half-spaces that stand still; else 0
-    std::vector<std::vector<Near>> near_; ///< by body, ascending by obstacle and point
-    static constexpr std::size_t kNearBlock = 64;
-    /// Of each of these, near_way_ until which it cannot touch; padded to whole blocks. Beside them, as most are
-    /// asked nothing more. What cannot touch has no depth and holds nothing.
-    std::vector<std::vector<float>> near_clear_until_;
-    void pad_near(std::size_t body) {
-        const std::size_t blocks = (near_[body].size() + kNearBlock - 1) / kNearBlock;
-        near_clear_until_[body].resize(blocks * kNearBlock, 0);
-    }
-    std::vector<float> deepest_near_;                       ///< m, of each body, now
+    std::vector<Vec3f> towards_;      ///< of each obstacle, the way to it: of half-spaces that stand still; else 0
+    std::vector<NearPoints> near_;    ///< by body
+    std::vector<float> deepest_near_; ///< m, of each body, now
     std::map<const Body*, std::vector<float>> most_depths_; ///< of bodies that were crushed: m, of each particle
     std::vector<NearPair> pairs_;
     struct OwnBalls;                                         ///< of a body whose balls meet each other

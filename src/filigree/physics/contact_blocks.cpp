@@ -198,7 +198,7 @@ Contacts::Blocks Contacts::blocks(std::span<const BodyState> bodies, std::size_t
     blocks.matter_ = &matter_;
     for (std::size_t o = 0; o < world_.obstacles.size(); ++o)
         blocks.motions_.push_back(std::make_unique<Eigen::Isometry3d>(poses.at(o)));
-    for (const Near& at : near_[b]) {
+    for (const Near& at : near_[b].points) {
         blocks.entries_.push_back(block_of(at, body, poses, dt));
         blocks.entries_.back().motion = blocks.motions_[at.obstacle].get();
     }
@@ -226,7 +226,7 @@ ContactReport Contacts::update_anchors(std::span<const BodyState> bodies, std::s
     for (std::size_t b = 0; b < bodies.size(); ++b) {
         const BodyState& body = bodies[b];
         deepest_near_[b] = 0;
-        for (Near& at : near_[b]) {
+        for (Near& at : near_[b].points) {
             const Obstacle& obstacle = world_.obstacles[at.obstacle];
             const Vec3f place = embedded_point(body.surface, at.point, body.positions);
             const DistanceField::Sample surface = poses.distance_to(at.obstacle, place);

@@ -147,32 +147,32 @@ Contacts::PairForce Contacts::pair_force(NearPair& pair, std::span<const BodySta
 ContactReport Contacts::add_obstacle_forces(BodyState& body, std::size_t b, const ObstaclePoses& poses, float dt,
                                             std::vector<Vec3f>& forces, const RunContext& context) {
     ContactReport report;
-    std::vector<Near>& near = near_[b];
-    std::vector<float>& clear_until = near_clear_until_[b];
-    std::vector<std::uint64_t> touching(clear_until.size() / kNearBlock); // bits of each block
-    forces.resize(near.size());
+    constexpr std::size_t kBlock = NearPoints::kBlock;
+    std::vector<Near>& points = near_[b].points;
+    std::vector<float>& clear_until = near_[b].clear_until;
+    std::vector<std::uint64_t> touching(near_[b].blocks()); // bits of each block
+    forces.resize(points.size());
     parallel_for(context, touching.size(), kBlocksGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t block = begin; block < end; ++block) {
-            const float* until = &clear_until[block * kNearBlock];
-            std::uint64_t asked = bits_where<kNearBlock>([&](std::size_t k) { return !(until[k] > near_way_); });
-            const std::size_t left = near.size() - block * kNearBlock;
-            if (left < kNearBlock) asked &= (std::uint64_t{1} << left) - 1; // also where a way is not a number
-            for_each_bit(asked,
-                         [&](int bit) { read_ahead(body.surface, near[block * kNearBlock + std::size_t(bit)].point); });
+            const std::size_t first = block * kBlock, left = points.size() - first;
+            const float* until = &clear_until[first];
+            std::uint64_t asked = bits_where<kBlock>([&](std::size_t k) { return !(until[k] > near_way_); });
+            if (left < kBlock) asked &= (std::uint64_t{1} << left) - 1; // also where a way is not a number
+            for_each_bit(asked, [&](int bit) { read_ahead(body.surface, points[first + std::size_t(bit)].point); });
             for_each_bit(asked, [&](int bit) {
-                const std::size_t k = block * kNearBlock + std::size_t(bit);
-                forces[k] = obstacle_force(near[k], clear_until[k], body, poses, dt);
-                touching[block] |= std::uint64_t{near[k].depth > 0} << bit;
+                const std::size_t k = first + std::size_t(bit);
+                forces[k] = obstacle_force(points[k], clear_until[k], body, poses, dt);
+                touching[block] |= std::uint64_t{points[k].depth > 0} << bit;
             });
         }
     });
     for (std::size_t block = 0; block < touching.size(); ++block)
         for_each_bit(touching[block], [&](int bit) {
-            const std::size_t k = block * kNearBlock + std::size_t(bit);
-            add_to_particles(body.surface, near[k].point, forces[k], body.forces);
+            const std::size_t k = block * kBlock + std::size_t(bit);
+            add_to_particles(body.surface, points[k].point, forces[k], body.forces);
             touched_[b] |= kOnObstacle;
             ++report.contacts;
-            report.deepest = std::max(report.deepest, near[k].depth);
+            report.deepest = std::max(report.deepest, points[k].depth);
         });
     deepest_near_[b] = report.deepest;
     return report;
@@ -224,7 +224,7 @@ void Contacts::push_out(std::span<BodyState> bodies, double time, const RunConte
         const float spacing = float(body.body->spacing()), most = kDeepest * spacing;
         if (!(deepest_near_[b] > kCrushing * spacing) || body.sleeps()) continue;
         std::vector<Vec3f> outwards; // of what is deep in each obstacle
-        for (const Near& at : near_[b]) {
+        for (const Near& at : near_[b].points) {
             if (!(at.depth > kCrushing * spacing)) continue;
             const Vec3f place = embedded_point(body.surface, at.point, body.positions);
             const DistanceField::Sample surface = poses.distance_to(at.obstacle, place);

@@ -43,8 +43,7 @@ struct Contacts::OwnBalls {
 
 Contacts::Contacts(const World& world, std::size_t bodies, bool between_bodies, bool within_bodies)
     : world_(world), between_bodies_(between_bodies), within_bodies_(within_bodies), near_(bodies),
-      near_clear_until_(bodies), deepest_near_(bodies, 0), touched_(bodies, 0),
-      matter_(world, between_bodies, within_bodies) {
+      deepest_near_(bodies, 0), touched_(bodies, 0), matter_(world, between_bodies, within_bodies) {
     for (const Obstacle& obstacle : world.obstacles) {
         const auto* ground = std::get_if<HalfSpace>(&obstacle.shape);
         const bool stands = ground && !obstacle.motion.moves();
@@ -81,19 +80,16 @@ void Contacts::find_near(std::span<const BodyState> bodies, double time, float r
     const ObstaclePoses poses(world_, time);
     for (std::size_t b = 0; b < bodies.size(); ++b) {
         const BodyState& body = bodies[b];
-        if (body.is_absent) {
-            near_[b].clear();
-            near_clear_until_[b].clear();
-        }
+        if (body.is_absent) near_[b] = {};
         if (body.sleeps()) continue;
         const std::size_t points = body.surface.size();
         std::vector<Vec3f> places(points);
         parallel_for(context, points, kContactSearchGrain, [&](std::size_t begin, std::size_t end) {
             for (std::size_t s = begin; s < end; ++s) places[s] = embedded_point(body.surface, s, body.positions);
         });
-        std::vector<Near> found;
-        std::vector<float> distances(points), clear_until;
-        auto old = near_[b].begin();
+        NearPoints found;
+        std::vector<float> distances(points);
+        auto old = near_[b].points.begin();
         const Box box = bounds(places);
         for (std::size_t o = 0; o < world_.obstacles.size(); ++o) {
             const float nearest = poses.distance_to(o, box.centre().cast<float>()).distance - float(box.diagonal() / 2);
@@ -103,15 +99,15 @@ void Contacts::find_near(std::span<const BodyState> bodies, double time, float r
             });
             for (Index s = 0; s < points; ++s) {
                 if (!(distances[s] < reach) || body.is_hidden(s)) continue;
-                Near& near = found.emplace_back(Near{.obstacle = Index(o), .point = s, .grasp = {}});
-                while (old != near_[b].end() && std::pair(old->obstacle, old->point) < std::pair(Index(o), s)) ++old;
-                if (old != near_[b].end() && old->obstacle == o && old->point == s) near = *old;
-                clear_until.push_back(near.grasp.holds ? 0 : distances[s]); // what holds is asked
+                Near& near = found.points.emplace_back(Near{.obstacle = Index(o), .point = s, .grasp = {}});
+                while (old != near_[b].points.end() && std::pair(old->obstacle, old->point) < std::pair(Index(o), s))
+                    ++old;
+                if (old != near_[b].points.end() && old->obstacle == o && old->point == s) near = *old;
+                found.clear_until.push_back(near.grasp.holds ? 0 : distances[s]); // what holds is asked
             }
         }
+        found.pad();
         near_[b] = std::move(found);
-        near_clear_until_[b] = std::move(clear_until);
-        pad_near(b);
     }
 }
 
@@ -180,10 +176,10 @@ Contacts::Memory Contacts::memory() const {
         memory.balls.push_back(
             {pair.first_body, pair.first, pair.second_body, pair.second, pair.grasp.slides, pair.offset});
     for (Index b = 0; b < near_.size(); ++b)
-        for (std::size_t k = 0; k < near_[b].size(); ++k) {
-            const Near& at = near_[b][k];
+        for (std::size_t k = 0; k < near_[b].points.size(); ++k) {
+            const Near& at = near_[b].points[k];
             memory.near.push_back({b, at.obstacle, at.point, Index(at.grasp.holds) + 2 * Index(at.grasp.slides),
-                                   near_clear_until_[b][k], at.anchor});
+                                   near_[b].clear_until[k], at.anchor});
         }
     return memory;
 }
@@ -202,16 +198,13 @@ bool Contacts::set_memory(const Memory& memory, std::span<const BodyState> bodie
     if (!std::ranges::all_of(memory.balls, are_balls)) return false;
     if (!std::isfinite(memory.near_way) || !std::isfinite(memory.near_until)) return false;
     if (!std::ranges::all_of(memory.near, is_sound) || !matter_.is_sound(memory.matter, bodies)) return false;
-    for (std::size_t b = 0; b < near_.size(); ++b) {
-        near_[b].clear();
-        near_clear_until_[b].clear();
-    }
+    for (NearPoints& near : near_) near = {};
     for (const NearMemory& near : memory.near) {
         const contact_law::Grasp grasp{(near.flags & 1) != 0, (near.flags & 2) != 0};
-        near_[near.body].push_back({near.obstacle, near.point, 0, grasp, near.anchor});
-        near_clear_until_[near.body].push_back(near.clear_until);
+        near_[near.body].points.push_back({near.obstacle, near.point, 0, grasp, near.anchor});
+        near_[near.body].clear_until.push_back(near.clear_until);
     }
-    for (std::size_t b = 0; b < near_.size(); ++b) pad_near(b);
+    for (NearPoints& near : near_) near.pad();
     pairs_.clear();
     pairs_until_ = -1;
     for (const BallMemory& pair : memory.balls)

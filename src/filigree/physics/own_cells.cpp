@@ -239,9 +239,9 @@ void OwnCells::look_into(std::span<const std::pair<Index, Index>> near, std::spa
         const Index others = clusters_[other + 1].first_cell - clusters_[other].first_cell;
         for (Index j = 0; j < others; ++j) {
             const CellBox& box = boxes.boxes[boxes.first[other] + j];
-            for (std::uint64_t left = asked & far >> kClusterCells * j; left != 0; left &= left - 1) {
-                const auto i = Index(std::countr_zero(left));
-                if (!come_near(own_boxes[i], box)) continue;
+            for_each_bit(asked & far >> kClusterCells * j, [&](int bit) {
+                const auto i = Index(bit);
+                if (!come_near(own_boxes[i], box)) return;
                 const Vec3f low = box.low.array() - reach, high = box.high.array() + reach;
                 for (Point& point : points_in(i)) {
                     if (!is_within(point.place, low, high)) continue;
@@ -250,7 +250,7 @@ void OwnCells::look_into(std::span<const std::pair<Index, Index>> near, std::spa
                     point.least = away;
                     found[point.number] = cells_[clusters_[other].first_cell + j];
                 }
-            }
+            });
         }
     }
 }
