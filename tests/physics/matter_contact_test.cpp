@@ -268,6 +268,64 @@ TEST(MatterContact, ABodyMeetsItself) {
     EXPECT_EQ(without.deepest_in_matter, 0);
 }
 
+/// Surface points that lie deeper than 0.3 spacings in a body's own matter, more than a spacing at rest from their own
+/// place: asked cell by cell.
+std::size_t points_within(const Matter& matter, const Vectors& positions) {
+    const Body& body = matter.body();
+    const Embedding& points = body.surface.points;
+    std::vector<CellBox> boxes;
+    for (Index c = 0; c < body.cells.cells.size(); ++c) boxes.emplace_back(matter.corners(c), positions);
+    const auto spacing = float(body.spacing());
+    std::size_t count = 0;
+    for (Index s = 0; s < points.size(); ++s) {
+        float deepest = 0;
+        const Eigen::Array3f p = embedded_point(points, s, positions).array();
+        for (Index c = 0; c < boxes.size(); ++c) {
+            if ((p < boxes[c].low.array()).any() || (p > boxes[c].high.array()).any()) continue;
+            Matter::Place place{c};
+            if (!matter.locate_in_cell(positions, p.matrix(), place)) continue;
+            if ((matter.rest_position(place) - points.rest[s]).norm() < spacing) continue;
+            const auto depth = matter.depth(place, matter.inverse_derivative(positions, place), Vec3f::Zero());
+            if (depth) deepest = std::max(deepest, depth->depth);
+        }
+        count += deepest > 0.3f * spacing;
+    }
+    return count;
+}
+
+/// It lands on its feet, and its creases close.
+TEST(MatterContact, AKoalaThatSitsDownStaysOutOfItself) {
+    const std::vector<filigree_test::CorpusRow> rows = filigree_test::read_corpus();
+    const auto koala = std::ranges::find_if(rows, [](const auto& row) { return row.path.stem() == "koala_100k"; });
+    if (koala == rows.end()) GTEST_SKIP() << "no koala in the corpus";
+    const Mesh mesh = read_mesh(koala->path, kAllThreads).value().mesh;
+    BodyOptions options;
+    options.scale = 0.12;
+    options.cells.count = 6000;
+    const auto body = std::make_shared<Body>(make_body(mesh, rubber(1.5e5, 1), options, kAllThreads).value());
+    const Box box = bounds(mesh.positions);
+    const auto drop = [&](bool meets_itself) {
+        World world;
+        Obstacle& ground = world.obstacles.emplace_back();
+        ground.shape = HalfSpace{Vec3d::Zero(), Vec3d::UnitY()};
+        ground.friction = 0.8;
+        Simulation dropped = Simulation::create(world, {put(body, Vec3d(0, 0.55, 0) - 0.12 * box.centre())},
+                                                {.contacts_within_bodies = meets_itself}, kAllThreads)
+                                 .value();
+        const Matter matter(*body);
+        std::size_t within = 0;
+        for (int frame = 0; frame < 90; ++frame) {
+            EXPECT_TRUE(dropped.advance(kAllThreads).ok());
+            if (frame % 3 == 0) within += points_within(matter, dropped.positions(0));
+        }
+        return within;
+    };
+    const std::size_t within = drop(true), unmet = drop(false);
+    EXPECT_LT(within, 30u); // in 30 frames; 274 where no folds are looked for
+    EXPECT_GT(unmet, 300u) << "the scene asks nothing of contact";
+    RecordProperty("points", std::to_string(within) + " of " + std::to_string(unmet));
+}
+
 /// Two plates press a koala's legs against each other and its belly.
 TEST(MatterContact, AKoalasLegsStayOutOfEachOther) {
     const std::vector<filigree_test::CorpusRow> rows = filigree_test::read_corpus();
@@ -594,7 +652,7 @@ TEST(OwnCells, FindWhatBruteForceFinds) {
     const auto compare = [&](const Body& body, const Vectors& positions) {
         const Matter matter(body);
         const OwnCells cells(matter);
-        const std::vector<Index> found = cells.find(positions, reach, RunContext(2));
+        const std::vector<Index> found = cells.find(positions, {}, reach, RunContext(2));
         Vectors points(found.size());
         for (Index s = 0; s < points.size(); ++s) points.set(s, embedded_point(body.surface.points, s, positions));
         auto near = cells.near_points(points, far);
@@ -635,6 +693,40 @@ TEST(OwnCells, FindWhatBruteForceFinds) {
     const Hits in_rolled = compare(bar, rolled);
     EXPECT_GT(in_rolled.in_cells, 200u);
     EXPECT_GT(in_rolled.points, 200u);
+}
+
+// A bar that is folded in its middle until its halves lie in each other.
+TEST(OwnCells, FindWhatIsFolded) {
+    const Body bar = make_body(box_cells(16, 3, 3, 0.1), rubber());
+    const Matter matter(bar);
+    const OwnCells cells(matter);
+    EXPECT_TRUE(cells.folds(bar.rest, 0, RunContext(2)).empty());
+    Vectors folded = bar.rest;
+    const Box box = box_of(bar.rest);
+    const auto middle = float(box.centre().x()), top = float(box.max.y());
+    for (std::size_t i = 0; i < folded.size(); ++i) {
+        const float x = folded.x[i] - middle, y = folded.y[i] - top;
+        const float angle = 1.66f * std::clamp(x / 0.1f, -1.0f, 1.0f); // a quarter turn is 1.57
+        folded.x[i] = std::cos(angle) * x - std::sin(angle) * y;
+        folded.y[i] = std::sin(angle) * x + std::cos(angle) * y;
+    }
+    const OwnCells::Folds folds = cells.folds(folded, 0, RunContext(2));
+    const std::vector<Index> found = cells.find(folded, folds, 0.01f, RunContext(2));
+    std::size_t hits = 0;
+    for (Index s = 0; s < bar.surface.points.size(); ++s) {
+        const Vec3f point = embedded_point(bar.surface.points, s, folded);
+        bool is_in_fold = false;
+        for (Index c = 0; c < bar.cells.cells.size(); ++c) {
+            Matter::Place place{c};
+            is_in_fold |= matter.are_together(matter.cell_of_point(s), c) &&
+                          matter.locate_in_cell(folded, point, place) && matter.is_elsewhere(s, place, 0.5f);
+        }
+        if (!is_in_fold) continue;
+        ++hits;
+        EXPECT_NE(found[s], kNoIndex) << s << " at " << bar.surface.points.rest[s].transpose();
+        EXPECT_TRUE(std::ranges::any_of(folds, [&](const auto& fold) { return fold.first == s; })) << s;
+    }
+    EXPECT_GT(hits, 10u);
 }
 
 } // namespace

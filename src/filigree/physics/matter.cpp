@@ -13,7 +13,8 @@ constexpr float kLeastVolume = 1e-3f;             ///< of a cell at rest: flatte
 constexpr float kMostDepthStretch = 3;            ///< of depth, and 1 over it: more is the noise of a crushed cell
 constexpr float kConverged = 1e-3f, kFar = 0.5f;  ///< cells
 constexpr int kNewtonSteps = 4, kLongestWalk = 6; ///< that a walk may go
-constexpr float kTurned = -0.2f;                  ///< cosine between the entry and a normal that is not its side's
+constexpr int kNewtonStepsInCell = 8;
+constexpr float kTurned = -0.2f; ///< cosine between the entry and a normal that is not its side's
 constexpr int kTraceSteps = 12;
 
 /// Position in a cell and its derivative by local coordinates.
@@ -211,6 +212,30 @@ bool Matter::locate(const Vectors& positions, const Vec3f& point, Place& place, 
         place.cell = *next;
     }
     return false;
+}
+
+bool Matter::locate_in_cell(const Vectors& positions, const Vec3f& point, Place& place, float around) const {
+    const auto spacing = float(body_.spacing());
+    const float least = kLeastVolume * spacing * spacing * spacing;
+    place.local.setConstant(0.5f);
+    for (int step = 0; step < kNewtonStepsInCell; ++step) {
+        const Vec3f from = place.local.cwiseMax(-kFar).cwiseMin(1 + kFar);
+        const CellMap map = map_cell(positions, corners(place.cell), from);
+        if (!(map.slope.determinant() > least)) return false;
+        const Vec3f next = from + map.slope.inverse() * (point - map.point);
+        const bool converged = (next - place.local).cwiseAbs().maxCoeff() < kConverged;
+        place.local = next;
+        if (converged) return next.minCoeff() >= -around && next.maxCoeff() <= 1 + around;
+    }
+    return false;
+}
+
+Matter::Turned Matter::turned(const Vectors& positions, Index cell, const Vec3f& normal) const {
+    const auto [middle, f] = map_cell(positions, corners(cell), Vec3f::Constant(0.5f));
+    const Vec3f area = normal.x() * f.col(1).cross(f.col(2)) + normal.y() * f.col(2).cross(f.col(0)) +
+                       normal.z() * f.col(0).cross(f.col(1));
+    const float size = area.norm();
+    return {middle, size > 0 && std::isfinite(size) ? Vec3f(area / size) : Vec3f::Zero()};
 }
 
 Mat3f Matter::inverse_derivative(const Vectors& positions, const Place& place) const {

@@ -40,8 +40,19 @@ public:
     /// derivative by local coordinates, 1/m. False where cells are inverted or flat, or the walk does not end.
     bool locate(const Vectors& positions, const Vec3f& point, Place& place, Mat3f& inverse) const;
 
+    /// The place of a point in place.cell, from its middle on. False where the point lies further outside of the cell
+    /// than `around` (cells), or the cell is inverted or flat on the way. Not of a rigid body.
+    bool locate_in_cell(const Vectors& positions, const Vec3f& point, Place& place, float around = 0) const;
+
     /// Derivative of local coordinates by position, 1/m.
     Mat3f inverse_derivative(const Vectors& positions, const Place& place) const;
+
+    /// A cell's middle, and where it has turned an area with that normal at rest: a unit normal, of the same side of
+    /// the area where the cell is inverted, zero where nothing is left of the area. Not of a rigid body.
+    struct Turned {
+        Vec3f middle, normal;
+    };
+    Turned turned(const Vectors& positions, Index cell, const Vec3f& normal) const;
 
     float volume_ratio(const Vectors& positions, Index cell) const; ///< of the cell's middle, now to rest
 
@@ -58,6 +69,28 @@ public:
     Vec3f rest_position(const Place& place) const; ///< m
     /// Whether two cells are the same piece of matter: one is reached from the other in two steps between neighbours.
     bool are_together(Index a, Index b) const;
+    /// Calls visit(cell, way) for those that are the same piece of matter as a cell; way: to them at rest, in cells.
+    template <class Visit>
+    void each_together(Index cell, const Visit& visit) const {
+        const auto& at = body_.cells.cells[cell];
+        for (int n = 0; n < 125; ++n) {
+            if (!(together_[cell][n / 64] >> (n % 64) & 1)) continue;
+            const int i = n % 5 - 2, j = n / 5 % 5 - 2, k = n / 25 - 2;
+            visit(cell_at(at[0] + i, at[1] + j, at[2] + k), Vec3f(float(i), float(j), float(k)));
+        }
+    }
+    /// Of normals at rest, way: from the place of the first towards that of the other. Matter lies between them.
+    static bool are_sides_of_thin_part(const Vec3f& normal, const Vec3f& other, const Vec3f& way) {
+        constexpr float kOpposed = -0.5f;
+        return normal.dot(other) < kOpposed && way.dot(normal) < 0;
+    }
+    /// Whether a place is not a surface point's own: its cell is not the same piece of matter, or it is at rest more
+    /// than so many spacings from the point.
+    bool is_elsewhere(Index surface_point, const Place& place, float spacings) const {
+        if (!are_together(cell_of_point_[surface_point], place.cell)) return true;
+        const float least = spacings * float(body_.spacing());
+        return (rest_position(place) - body_.surface.points.rest[surface_point]).squaredNorm() > least * least;
+    }
     /// The same, or one is three cells from the other and reached in three steps.
     bool are_in_three_steps(Index a, Index b) const;
     Index cell_at(int i, int j, int k) const; ///< kNoIndex where there is none

@@ -5,6 +5,7 @@
 #include "filigree/physics/contact_law.h"
 #include "filigree/physics/extremes_kernel.h"
 #include "filigree/physics/matter.h"
+#include "filigree/physics/own_cells.h"
 
 #include <algorithm>
 #include <limits>
@@ -19,7 +20,6 @@ struct ContactReport {
 };
 
 class CellBoxes;
-class OwnCells;
 
 /// Each surface point that lies in a cell of another body, or of a far part of its own, is pushed out along the normal
 /// of that matter's surface, and held by friction to the place in that matter where it landed. What pushes the point
@@ -82,6 +82,7 @@ public:
     /// How much harder parts of one body push each other than two bodies do: a dragon that falls on itself is 0.29
     /// spacings deep with it, 0.34 without.
     static constexpr float kWithinOneBody = 1.5f;
+    static constexpr float kDeepestWithin = 0.3f; ///< as kDeepest, of parts of one body
     static constexpr std::uint8_t kTouched = 2, kTouchedItself = 4;
     /// As Contacts::add_forces. touched: of each body; kTouched or kTouchedItself is set where it touches.
     ContactReport add_forces(std::span<BodyState> bodies, float dt, std::span<std::uint8_t> touched,
@@ -148,7 +149,11 @@ private:
         float spacing = 0;                               ///< m, the smaller of both
         PairContact law;
         std::vector<Pair> pairs;
+        std::optional<OwnCells::Folds> folds; ///< of a body beside itself, in this frame
     };
+    static float most_depth(const Side& side) {
+        return (side.body == side.other ? kDeepestWithin : contact_law::kDeepest) * side.spacing;
+    }
     static std::uint8_t touch_of(const Side& side) { return side.body == side.other ? kTouchedItself : kTouched; }
     float relative_speed(Index a, Index b) const { return Extremes::between(speeds_[a], speeds_[b]); }
     /// m: bound on how far two bodies are from where they were beside each other at the last search.
@@ -180,6 +185,13 @@ private:
     void list_work(std::span<const BodyState> bodies);
     void find_sides(std::span<const BodyState> bodies, double frame, const RunContext& context);
     std::optional<Vec3f> enter(Pair& pair, const Side& side, std::span<const BodyState> bodies) const;
+    /// Spacings at rest from its own place that a point in matter beside it has to be.
+    static float least_apart(const Pair& pair) {
+        constexpr float kApart = 0.35f, kStillApart = 0.2f;
+        return pair.entry.isZero(0) ? kApart : kStillApart;
+    }
+    static bool find_fold(const Pair& pair, const Vec3f& point, const Matter& matter, const Vectors& positions,
+                          Matter::Place& place);
     float crushed_part(const BodyState& body, const Matter& matter) const;
     void find_recovering(std::span<const BodyState> bodies);
     float clearance(const Pair& pair, const Side& side, float distance, std::span<const BodyState> bodies) const;

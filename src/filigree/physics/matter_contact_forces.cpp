@@ -1,5 +1,6 @@
 // Contacts in matter: forces in explicit steps, moving out what is too deep; frames and anchors in descent.
 #include "filigree/core/parallel_for.h"
+#include "filigree/physics/cell_boxes.h"
 #include "filigree/physics/matter_contact.h"
 
 #include <algorithm>
@@ -35,26 +36,59 @@ float MatterContacts::clearance(const Pair& pair, const Side& side, float distan
     return safe * side.speed / (velocity.norm() + kSlowest * side.speed);
 }
 
+/// The place of a point in the cells around place.cell that is furthest from its own. Where matter is crushed a walk
+/// from cell to cell ends at the point's own place, or nowhere.
+bool MatterContacts::find_fold(const Pair& pair, const Vec3f& point, const Matter& matter, const Vectors& positions,
+                               Matter::Place& place) {
+    const auto& at = matter.body().cells.cells[place.cell];
+    const Vec3f own = matter.body().surface.points.rest[pair.point];
+    float furthest = -1;
+    for (int n = 0; n < 27; ++n) {
+        const Index cell = matter.cell_at(at[0] + n % 3 - 1, at[1] + n / 3 % 3 - 1, at[2] + n / 9 - 1);
+        if (cell == kNoIndex) continue;
+        const CellBox box(matter.corners(cell), positions);
+        if ((point.array() < box.low.array()).any() || (point.array() > box.high.array()).any()) continue;
+        Matter::Place found{cell};
+        if (!matter.locate_in_cell(positions, point, found) ||
+            !matter.is_elsewhere(pair.point, found, least_apart(pair)))
+            continue;
+        const float apart = (matter.rest_position(found) - own).squaredNorm();
+        if (!(apart > furthest)) continue;
+        furthest = apart;
+        place = found;
+    }
+    return furthest >= 0;
+}
+
 /// Finds where a point lies in the other's matter. The surface's normal there if it touches; else the pair is left
 /// until it might.
 std::optional<Vec3f> MatterContacts::enter(Pair& pair, const Side& side, std::span<const BodyState> bodies) const {
     const BodyState &body = bodies[side.body], &other = bodies[side.other];
     const Matter& matter = *matter_[side.other];
     const bool own = side.body == side.other;
+    const Index from = pair.place.cell;
     const auto leave_for = [&](float clear) {
         leave(pair, side, clear);
         return std::nullopt;
     };
+    const Vec3f point = embedded_point(body.surface, pair.point, body.positions);
     Mat3f inverse;
-    if (!matter.locate(other.positions, embedded_point(body.surface, pair.point, body.positions), pair.place,
-                       inverse)) {
+    bool is_there = matter.locate(other.positions, point, pair.place, inverse);
+    if (own && !(is_there && matter.is_elsewhere(pair.point, pair.place, least_apart(pair)))) {
+        pair.place.cell = from;
+        is_there = find_fold(pair, point, matter, body.positions, pair.place);
+        if (is_there) inverse = matter.inverse_derivative(body.positions, pair.place);
+    }
+    if (!is_there) {
         pair.place.local.setConstant(0.5f);
         return leave_for(kLittle * side.spacing);
     }
-    if (own && matter.are_together(matter.cell_of_point(pair.point), pair.place.cell))
-        return leave_for(kLittle * side.spacing);
     const std::optional<Matter::Depth> found = matter.depth(pair.place, inverse, pair.entry);
     if (!found) return leave_for(kLittle * side.spacing);
+    if (own && matter.are_together(matter.cell_of_point(pair.point), pair.place.cell) &&
+        Matter::are_sides_of_thin_part(body.body->surface.normals[pair.point], found->rest,
+                                       matter.rest_position(pair.place) - body.surface.rest[pair.point]))
+        return leave_for(kLittle * side.spacing);
     if (found->depth < 0) return leave_for(clearance(pair, side, -found->depth, bodies));
     const Vec3f& local = pair.place.local;
     const float outside = std::max(-local.minCoeff(), local.maxCoeff() - 1);
@@ -130,7 +164,7 @@ ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, 
         touched[side.other] |= touch_of(side);
         ++report.contacts;
         report.deepest_in_matter = std::max(report.deepest_in_matter, depth);
-        is_too_deep_ |= depth > kDeepest * side.spacing;
+        is_too_deep_ |= depth > most_depth(side);
     }
     return report;
 }
@@ -138,7 +172,7 @@ ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, 
 void MatterContacts::push_out(std::span<BodyState> bodies) {
     if (!is_too_deep_) return;
     for (Side& side : sides_) {
-        const float most = kDeepest * side.spacing;
+        const float most = most_depth(side);
         if (both_sleep(side, bodies)) continue;
         for (Pair& pair : side.pairs)
             if (pair.depth > most) push_out(pair, side, bodies);
@@ -147,7 +181,7 @@ void MatterContacts::push_out(std::span<BodyState> bodies) {
 
 void MatterContacts::push_out(Pair& pair, const Side& side, std::span<BodyState> bodies) const {
     const std::optional<Vec3f> normal = enter(pair, side, bodies); // others have moved it since
-    const float too_deep = pair.depth - kDeepest * side.spacing;
+    const float too_deep = pair.depth - most_depth(side);
     if (!normal || !(too_deep > 0)) return;
     BodyState &body = bodies[side.body], &other = bodies[side.other];
     const Matter& matter = *matter_[side.other];
@@ -226,7 +260,7 @@ ContactReport MatterContacts::update_anchors(std::span<const BodyState> bodies, 
             touched[side.other] |= touch_of(side);
             ++report.contacts;
             report.deepest_in_matter = std::max(report.deepest_in_matter, pair.depth);
-            is_too_deep_ |= pair.depth > kDeepest * side.spacing;
+            is_too_deep_ |= pair.depth > most_depth(side);
             const bool landed = !pair.grasp.holds;
             Vec3f offset = Vec3f::Zero();
             if (!landed)

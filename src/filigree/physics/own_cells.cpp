@@ -18,6 +18,13 @@ namespace {
 constexpr std::size_t kOwnCellsGrain = 16, kClusterCells = 8;
 constexpr double kTangledClusters = 512;   ///< near clusters a cluster of a body crushed or mixed
 constexpr std::size_t kTangledPoints = 16; ///< near points a point of such a body
+constexpr std::size_t kFoldsGrain = 256;
+constexpr float kFarFold = 2;   ///< spacings between cells' middles: further ones do not touch in the next frame
+constexpr float kBehind = 0.8f; ///< spacings that two such cells may lie behind each other, along both normals together
+constexpr float kApart = 0.2f;  ///< spacings at rest from its own place that a point has to be to lie in a fold
+
+/// Cosine between the normals of two cells where the surface may touch itself, at most; rest: their cosine at rest.
+float most_of_fold(float rest) { return 0.7f * rest - 0.3f; }
 
 } // namespace
 
@@ -65,6 +72,31 @@ OwnCells::OwnCells(const Matter& matter) : matter_(matter), points_(matter.body(
             far_cells_.push_back(far);
         }
         ++cluster;
+    }
+    find_beside();
+}
+
+/// Surface cells that are not far from each other, but for both sides of a thin part.
+void OwnCells::find_beside() {
+    std::vector<Index> number_of_cell(cells_.size(), kNoIndex); // in surface_cells_
+    for (Index i = 0; i < cells_.size(); ++i) {
+        Vec3f normal = Vec3f::Zero();
+        for (const Index s : points_of_cells(i, i + 1)) normal += matter_.body().surface.normals[s];
+        if (!(normal.norm() > 0)) continue;
+        number_of_cell[cells_[i]] = Index(surface_cells_.size());
+        surface_cells_.push_back(i);
+        rest_normals_.push_back(normal.normalized());
+    }
+    beside_offsets_.push_back(0);
+    for (Index a = 0; a < surface_cells_.size(); ++a) {
+        const Index cell = cells_[surface_cells_[a]];
+        matter_.each_together(cell, [&](Index other, const Vec3f& way) {
+            const Index b = number_of_cell[other];
+            if (b == kNoIndex || b <= a || Matter::are_sides_of_thin_part(rest_normals_[a], rest_normals_[b], way))
+                return;
+            beside_.push_back(b);
+        });
+        beside_offsets_.push_back(Index(beside_.size()));
     }
 }
 
@@ -255,7 +287,66 @@ void OwnCells::look_into(std::span<const std::pair<Index, Index>> near, std::spa
     }
 }
 
-std::vector<Index> OwnCells::find(const Vectors& positions, float reach, const RunContext& context) const {
+/// Pairs of surface cells that are not far from each other, where the surface has turned so much that it may touch
+/// itself; ascending, both ways round.
+std::vector<std::pair<Index, Index>> OwnCells::folded_cells(const Vectors& positions, const RunContext& context) const {
+    using Pairs = std::vector<std::pair<Index, Index>>;
+    std::vector<Matter::Turned> turned(surface_cells_.size());
+    parallel_for(context, turned.size(), kFoldsGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t a = begin; a < end; ++a)
+            turned[a] = matter_.turned(positions, cells_[surface_cells_[a]], rest_normals_[a]);
+    });
+    const auto spacing = float(matter_.body().spacing());
+    const float far = kFarFold * spacing;
+    const auto has_folded = [&](std::size_t a, Index b) {
+        const Matter::Turned &one = turned[a], &other = turned[b];
+        if (!(one.normal.dot(other.normal) < most_of_fold(rest_normals_[a].dot(rest_normals_[b])))) return false;
+        const Vec3f way = other.middle - one.middle;
+        return way.squaredNorm() < far * far && way.dot(one.normal - other.normal) > -kBehind * spacing;
+    };
+    std::vector<Pairs> parts((turned.size() + kFoldsGrain - 1) / kFoldsGrain);
+    parallel_for(context, parts.size(), 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t part = begin; part < end; ++part)
+            for (std::size_t a = part * kFoldsGrain; a < std::min(turned.size(), (part + 1) * kFoldsGrain); ++a)
+                for (Index k = beside_offsets_[a]; k < beside_offsets_[a + 1]; ++k)
+                    if (has_folded(a, beside_[k])) parts[part].emplace_back(Index(a), beside_[k]);
+    });
+    Pairs folded;
+    for (const Pairs& part : parts)
+        for (const auto& [a, b] : part) folded.insert(folded.end(), {{a, b}, {b, a}});
+    std::ranges::sort(folded);
+    return folded;
+}
+
+OwnCells::Folds OwnCells::folds(const Vectors& positions, float reach, const RunContext& context) const {
+    Folds folds;
+    const auto spacing = float(matter_.body().spacing());
+    std::vector<Vec3f> points;
+    const auto pairs = folded_cells(positions, context);
+    for (std::size_t k = 0; k < pairs.size(); ++k) {
+        const auto& [own, other] = pairs[k];
+        const std::span<const Index> numbers = points_of_cells(surface_cells_[own], surface_cells_[own] + 1);
+        if (k == 0 || pairs[k - 1].first != own) {
+            points.clear();
+            for (const Index s : numbers) points.push_back(embedded_point(points_, s, positions));
+        }
+        const Index cell = cells_[surface_cells_[other]];
+        const CellBox box(matter_.corners(cell), positions);
+        const Vec3f low = box.low.array() - reach, high = box.high.array() + reach;
+        for (std::size_t i = 0; i < numbers.size(); ++i) {
+            const Vec3f& p = points[i];
+            if ((p.array() < low.array()).any() || (p.array() > high.array()).any()) continue;
+            Matter::Place place{cell};
+            if (matter_.locate_in_cell(positions, p, place, reach / spacing) &&
+                matter_.is_elsewhere(numbers[i], place, kApart))
+                folds.emplace_back(numbers[i], cell);
+        }
+    }
+    return folds;
+}
+
+std::vector<Index> OwnCells::find(const Vectors& positions, const Folds& folds, float reach,
+                                  const RunContext& context) const {
     std::vector<Index> found(points_.size(), kNoIndex);
     if (clusters_.size() < 2) return found;
     const std::vector<Extent> around = extents(positions);
@@ -271,6 +362,12 @@ std::vector<Index> OwnCells::find(const Vectors& positions, float reach, const R
             look_into(std::span(near).subspan(starts[k], starts[k + 1] - starts[k]), around, boxes, positions, reach,
                       found);
     });
+    for (const auto& [s, cell] : folds) {
+        const auto away = [&, p = embedded_point(points_, s, positions)](Index held_by) {
+            return (CellBox(matter_.corners(held_by), positions).centre - p).squaredNorm();
+        };
+        if (found[s] == kNoIndex || away(cell) < away(found[s])) found[s] = cell;
+    }
     return found;
 }
 

@@ -9,16 +9,22 @@ namespace filigree {
 
 /// Surface points of a body that might lie in far cells of the same. Clusters of 2^3 cells are compared first, by boxes
 /// and balls around them, then cells by their boxes, so that matter which lies where it belongs is not looked at point
-/// by point.
+/// by point. Cells that are not far touch where the surface folds: those are compared by their normals.
 ///
 /// A cell is far from another if it is not reached in two steps through matter; nor in three, of neighbouring clusters.
 class OwnCells {
 public:
     explicit OwnCells(const Matter& matter); ///< matter: not rigid; outlives this
 
-    /// For each surface point the far cell that holds it, or the nearest within reach (m); kNoIndex where there is
-    /// none. Cost O(clusters, and cells and points that are near far cells). positions: of the body's particles.
-    std::vector<Index> find(const Vectors& positions, float reach, const RunContext& context) const;
+    /// Surface points with cells that are not far from their own, in which the surface folds them or is about to: these
+    /// may still move by `reach` (m). Cost O(surface cells).
+    using Folds = std::vector<std::pair<Index, Index>>;
+    Folds folds(const Vectors& positions, float reach, const RunContext& context) const;
+
+    /// For each surface point the far cell that holds it, or the one that the surface folds onto it, or the nearest of
+    /// these within reach (m); kNoIndex where there is none. Cost O(clusters and folds, and cells and points
+    /// that are near far cells). positions: of the body's particles.
+    std::vector<Index> find(const Vectors& positions, const Folds& folds, float reach, const RunContext& context) const;
 
     bool are_far(Index cell, Index other) const;
 
@@ -61,6 +67,9 @@ private:
     void look_into(std::span<const std::pair<Index, Index>> near, std::span<const Extent> extents,
                    const NearBoxes& boxes, const Vectors& positions, float reach, std::vector<Index>& found) const;
 
+    void find_beside();
+    std::vector<std::pair<Index, Index>> folded_cells(const Vectors& positions, const RunContext& context) const;
+
     const Matter& matter_;
     const Embedding& points_;
     std::vector<Cluster> clusters_; ///< and one behind the last
@@ -68,6 +77,9 @@ private:
     std::vector<Index> point_offsets_;     ///< of each of cells_, and the end
     std::vector<std::uint64_t> far_cells_; ///< bit i + 8 j: a cluster's i-th cell is far from its neighbour's j-th
     float overhang_ = 0;                   ///< m that points may lie outside of their cells
+    std::vector<Index> surface_cells_;     ///< numbers in cells_ of those that have points ...
+    std::vector<Vec3f> rest_normals_;      ///< ... and the mean of their points' normals, unit
+    std::vector<Index> beside_offsets_, beside_; ///< of each, in surface_cells_: those it may be folded onto
 };
 
 } // namespace filigree
