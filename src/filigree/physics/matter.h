@@ -79,7 +79,8 @@ public:
             visit(cell_at(at[0] + i, at[1] + j, at[2] + k), Vec3f(float(i), float(j), float(k)));
         }
     }
-    /// Of normals at rest, way: from the place of the first towards that of the other. Matter lies between them.
+    /// Whether two places of the surface are the two sides of a thin part. Their normals at rest; way: from the first
+    /// place to the other.
     static bool are_sides_of_thin_part(const Vec3f& normal, const Vec3f& other, const Vec3f& way) {
         constexpr float kOpposed = -0.5f;
         return normal.dot(other) < kOpposed && way.dot(normal) < 0;

@@ -16,14 +16,14 @@ class OwnCells {
 public:
     explicit OwnCells(const Matter& matter); ///< matter: not rigid; outlives this
 
-    /// Surface points with cells that are not far from their own, in which the surface folds them or is about to: these
-    /// may still move by `reach` (m). Cost O(surface cells).
+    /// A surface point and a cell that is not far from its own, onto which the surface has folded it or is about to.
     using Folds = std::vector<std::pair<Index, Index>>;
+    /// Those that hold while points move by `reach` (m). Cost O(surface cells).
     Folds folds(const Vectors& positions, float reach, const RunContext& context) const;
 
-    /// For each surface point the far cell that holds it, or the one that the surface folds onto it, or the nearest of
-    /// these within reach (m); kNoIndex where there is none. Cost O(clusters and folds, and cells and points
-    /// that are near far cells). positions: of the body's particles.
+    /// For each surface point the far or folded cell that holds it, or the nearest of these within reach (m); kNoIndex
+    /// where there is none. Cost O(clusters and folds, and cells and points that are near far cells). positions: of the
+    /// body's particles.
     std::vector<Index> find(const Vectors& positions, const Folds& folds, float reach, const RunContext& context) const;
 
     bool are_far(Index cell, Index other) const;
