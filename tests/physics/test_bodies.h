@@ -12,6 +12,16 @@ inline std::shared_ptr<const Body> block(std::size_t nx, std::size_t ny, std::si
     return std::make_shared<Body>(make_body(box_cells(nx, ny, nz, spacing, -half), material));
 }
 
+/// Two arms, one spacing apart, on a foot.
+inline Cells fork() {
+    std::vector<Cells::LatticeIndex> cells;
+    for (std::uint16_t k = 0; k < 3; ++k)
+        for (std::uint16_t j = 0; j < 14; ++j)
+            for (std::uint16_t i = 0; i < 7; ++i)
+                if (j < 3 || i < 3 || i > 3) cells.push_back({i, j, k});
+    return lattice_cells(std::move(cells), 0.1, Vec3d(-0.35, 0, -0.15));
+}
+
 /// 1,000 kg/m^3, 1e6 Pa, without damping.
 inline Material undamped(double poisson_ratio) {
     Material material;

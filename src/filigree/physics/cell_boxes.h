@@ -22,6 +22,9 @@ struct CellBox {
         }
         centre /= 8;
     }
+    bool holds(const Vec3f& point, float around) const { ///< or is no further from it along any axis
+        return (point.array() >= low.array() - around).all() && (point.array() <= high.array() + around).all();
+    }
 };
 
 /// A box about any axes.

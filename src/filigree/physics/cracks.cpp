@@ -3,6 +3,7 @@
 #include "filigree/core/disjoint_sets.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/physics/cell_kernel.h"
+#include "filigree/physics/cofactor.h"
 #include "filigree/physics/plastic_cells.h"
 #include "filigree/physics/vertex_block.h"
 
@@ -59,11 +60,9 @@ Cracks::Stress Cracks::stress(const CrackFacet& facet, std::span<const BodyState
             gradient *= plastic[cell].inverse;
             normal = plastic[cell].inverse.transpose() * normal;
         }
-        Mat3f cofactor;
-        cofactor << gradient.col(1).cross(gradient.col(2)), gradient.col(2).cross(gradient.col(0)),
-            gradient.col(0).cross(gradient.col(1));
-        const float squares = gradient.squaredNorm(), volume = gradient.col(0).dot(cofactor.col(0));
-        const Vec3f along = cofactor * normal;
+        const Mat3f areas = cofactor(gradient);
+        const float squares = gradient.squaredNorm(), volume = gradient.col(0).dot(areas.col(0));
+        const Vec3f along = areas * normal;
         sum.traction += share * (material.shear * (squares / (squares + 1)) * (gradient * normal) +
                                  material.bulk * (volume - material.rest_ratio) * along);
         sum.normal += share * along;

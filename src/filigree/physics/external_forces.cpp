@@ -1,6 +1,7 @@
 #include "filigree/physics/external_forces.h"
 
 #include "filigree/core/parallel_for.h"
+#include "filigree/physics/cofactor.h"
 
 #include <algorithm>
 #include <cmath>
@@ -22,11 +23,8 @@ Vec3f region_acceleration(const RegionForce& force, const Body& body, double tim
 
 Vec3f push_of_wind(const BodyState& body, std::size_t point, const Mat3f& gradient, const Vec3f& wind,
                    double air_density, double frames_per_second) {
-    const Mat3f& a = gradient;
-    Mat3f cofactor;
-    cofactor << a.col(1).cross(a.col(2)), a.col(2).cross(a.col(0)), a.col(0).cross(a.col(1));
     const BodySurface& surface = body.body->surface;
-    const Vec3f area = surface.areas[point] * (cofactor * surface.normals[point]); // m^2, outward
+    const Vec3f area = surface.areas[point] * (cofactor(gradient) * surface.normals[point]); // m^2, outward
     const float size = area.norm();
     if (!(size > 0)) return Vec3f::Zero();
     const float inwards = -(wind - embedded_point(body.surface, point, body.velocities)).dot(area) / size;

@@ -1,5 +1,7 @@
 #include "filigree/physics/matter.h"
 
+#include "filigree/physics/cofactor.h"
+
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -185,6 +187,21 @@ std::optional<Index> Matter::neighbour(Index cell, Vec3f& local) const {
     return std::nullopt;
 }
 
+/// One step of Newton's method in place.cell. False where the cell is inverted or flat.
+bool Matter::newton_step(const Vectors& positions, const Vec3f& point, Place& place, Mat3f& inverse,
+                         bool& converged) const {
+    const auto spacing = float(body_.spacing());
+    const float least = kLeastVolume * spacing * spacing * spacing;
+    const Vec3f from = place.local.cwiseMax(-kFar).cwiseMin(1 + kFar);
+    const CellMap map = map_cell(positions, corners(place.cell), from);
+    if (!(map.slope.determinant() > least)) return false;
+    inverse = map.slope.inverse();
+    const Vec3f next = from + inverse * (point - map.point);
+    converged = (next - place.local).cwiseAbs().maxCoeff() < kConverged;
+    place.local = next;
+    return true;
+}
+
 bool Matter::locate(const Vectors& positions, const Vec3f& point, Place& place, Mat3f& inverse) const {
     if (is_rigid()) {
         place.cell = 0;
@@ -193,19 +210,11 @@ bool Matter::locate(const Vectors& positions, const Vec3f& point, Place& place, 
         place.local = inverse * (point - positions[corners(0)[0]]);
         return place.local.allFinite();
     }
-    const auto spacing = float(body_.spacing());
-    const float least = kLeastVolume * spacing * spacing * spacing;
     for (int walked = 0; walked < kLongestWalk; ++walked) {
         bool converged = false;
         for (int step = 0; step < kNewtonSteps && !converged; ++step) {
-            const Vec3f from = place.local.cwiseMax(-kFar).cwiseMin(1 + kFar);
-            const CellMap map = map_cell(positions, corners(place.cell), from);
-            if (!(map.slope.determinant() > least)) return false;
-            inverse = map.slope.inverse();
-            const Vec3f next = from + inverse * (point - map.point);
-            converged = (next - place.local).cwiseAbs().maxCoeff() < kConverged;
-            place.local = next;
-            if (!(next.cwiseAbs().maxCoeff() < 4)) break; // the cells on the way come closer
+            if (!newton_step(positions, point, place, inverse, converged)) return false;
+            if (!(place.local.cwiseAbs().maxCoeff() < 4)) break; // the cells on the way come closer
         }
         const std::optional<Index> next = neighbour(place.cell, place.local);
         if (!next) return converged && place.local.allFinite();
@@ -215,25 +224,17 @@ bool Matter::locate(const Vectors& positions, const Vec3f& point, Place& place, 
 }
 
 bool Matter::locate_in_cell(const Vectors& positions, const Vec3f& point, Place& place, float around) const {
-    const auto spacing = float(body_.spacing());
-    const float least = kLeastVolume * spacing * spacing * spacing;
     place.local.setConstant(0.5f);
-    for (int step = 0; step < kNewtonStepsInCell; ++step) {
-        const Vec3f from = place.local.cwiseMax(-kFar).cwiseMin(1 + kFar);
-        const CellMap map = map_cell(positions, corners(place.cell), from);
-        if (!(map.slope.determinant() > least)) return false;
-        const Vec3f next = from + map.slope.inverse() * (point - map.point);
-        const bool converged = (next - place.local).cwiseAbs().maxCoeff() < kConverged;
-        place.local = next;
-        if (converged) return next.minCoeff() >= -around && next.maxCoeff() <= 1 + around;
-    }
-    return false;
+    Mat3f inverse;
+    bool converged = false;
+    for (int step = 0; step < kNewtonStepsInCell && !converged; ++step)
+        if (!newton_step(positions, point, place, inverse, converged)) return false;
+    return converged && place.local.minCoeff() >= -around && place.local.maxCoeff() <= 1 + around;
 }
 
 Matter::Turned Matter::turned(const Vectors& positions, Index cell, const Vec3f& normal) const {
     const auto [middle, f] = map_cell(positions, corners(cell), Vec3f::Constant(0.5f));
-    const Vec3f area = normal.x() * f.col(1).cross(f.col(2)) + normal.y() * f.col(2).cross(f.col(0)) +
-                       normal.z() * f.col(0).cross(f.col(1));
+    const Vec3f area = cofactor(f) * normal;
     const float size = area.norm();
     return {middle, size > 0 && std::isfinite(size) ? Vec3f(area / size) : Vec3f::Zero()};
 }

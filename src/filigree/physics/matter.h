@@ -85,6 +85,8 @@ public:
         constexpr float kOpposed = -0.5f;
         return normal.dot(other) < kOpposed && way.dot(normal) < 0;
     }
+    static constexpr float kElsewhere = 0.35f;     ///< spacings at rest between a point and where it comes in ...
+    static constexpr float kStillElsewhere = 0.2f; ///< ... and until it counts as out
     /// Whether a place is not a surface point's own: its cell is not the same piece of matter, or it is at rest more
     /// than so many spacings from the point.
     bool is_elsewhere(Index surface_point, const Place& place, float spacings) const {
@@ -99,6 +101,7 @@ public:
     const Body& body() const { return body_; }
 
 private:
+    bool newton_step(const Vectors& positions, const Vec3f& point, Place& place, Mat3f& inverse, bool& converged) const;
     std::optional<Index> neighbour(Index cell, Vec3f& local) const;
     void find_rigid_box();
     void find_together();

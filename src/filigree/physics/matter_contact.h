@@ -185,10 +185,9 @@ private:
     void list_work(std::span<const BodyState> bodies);
     void find_sides(std::span<const BodyState> bodies, double frame, const RunContext& context);
     std::optional<Vec3f> enter(Pair& pair, const Side& side, std::span<const BodyState> bodies) const;
-    /// Spacings at rest from its own place that a point in matter beside it has to be.
-    static float least_apart(const Pair& pair) {
-        constexpr float kApart = 0.35f, kStillApart = 0.2f;
-        return pair.entry.isZero(0) ? kApart : kStillApart;
+    static bool is_elsewhere(const Pair& pair, const Matter::Place& place, const Matter& matter) {
+        return matter.is_elsewhere(pair.point, place,
+                                   pair.entry.isZero(0) ? Matter::kElsewhere : Matter::kStillElsewhere);
     }
     static bool find_fold(const Pair& pair, const Vec3f& point, const Matter& matter, const Vectors& positions,
                           Matter::Place& place);

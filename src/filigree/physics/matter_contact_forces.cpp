@@ -46,12 +46,9 @@ bool MatterContacts::find_fold(const Pair& pair, const Vec3f& point, const Matte
     for (int n = 0; n < 27; ++n) {
         const Index cell = matter.cell_at(at[0] + n % 3 - 1, at[1] + n / 3 % 3 - 1, at[2] + n / 9 - 1);
         if (cell == kNoIndex) continue;
-        const CellBox box(matter.corners(cell), positions);
-        if ((point.array() < box.low.array()).any() || (point.array() > box.high.array()).any()) continue;
+        if (!CellBox(matter.corners(cell), positions).holds(point, 0)) continue;
         Matter::Place found{cell};
-        if (!matter.locate_in_cell(positions, point, found) ||
-            !matter.is_elsewhere(pair.point, found, least_apart(pair)))
-            continue;
+        if (!matter.locate_in_cell(positions, point, found) || !is_elsewhere(pair, found, matter)) continue;
         const float apart = (matter.rest_position(found) - own).squaredNorm();
         if (!(apart > furthest)) continue;
         furthest = apart;
@@ -74,7 +71,7 @@ std::optional<Vec3f> MatterContacts::enter(Pair& pair, const Side& side, std::sp
     const Vec3f point = embedded_point(body.surface, pair.point, body.positions);
     Mat3f inverse;
     bool is_there = matter.locate(other.positions, point, pair.place, inverse);
-    if (own && !(is_there && matter.is_elsewhere(pair.point, pair.place, least_apart(pair)))) {
+    if (own && !(is_there && is_elsewhere(pair, pair.place, matter))) {
         pair.place.cell = from;
         is_there = find_fold(pair, point, matter, body.positions, pair.place);
         if (is_there) inverse = matter.inverse_derivative(body.positions, pair.place);

@@ -21,7 +21,6 @@ constexpr std::size_t kTangledPoints = 16; ///< near points a point of such a bo
 constexpr std::size_t kFoldsGrain = 256;
 constexpr float kFarFold = 2;   ///< spacings between cells' middles: further ones do not touch in the next frame
 constexpr float kBehind = 0.8f; ///< spacings that two such cells may lie behind each other, along both normals together
-constexpr float kApart = 0.2f;  ///< spacings at rest from its own place that a point has to be to lie in a fold
 
 /// Cosine between the normals of two cells where the surface may touch itself, at most; rest: their cosine at rest.
 float most_of_fold(float rest) { return 0.7f * rest - 0.3f; }
@@ -332,13 +331,12 @@ OwnCells::Folds OwnCells::folds(const Vectors& positions, float reach, const Run
         }
         const Index cell = cells_[surface_cells_[other]];
         const CellBox box(matter_.corners(cell), positions);
-        const Vec3f low = box.low.array() - reach, high = box.high.array() + reach;
         for (std::size_t i = 0; i < numbers.size(); ++i) {
             const Vec3f& p = points[i];
-            if ((p.array() < low.array()).any() || (p.array() > high.array()).any()) continue;
+            if (!box.holds(p, reach)) continue;
             Matter::Place place{cell};
             if (matter_.locate_in_cell(positions, p, place, reach / spacing) &&
-                matter_.is_elsewhere(numbers[i], place, kApart))
+                matter_.is_elsewhere(numbers[i], place, Matter::kStillElsewhere))
                 folds.emplace_back(numbers[i], cell);
         }
     }
