@@ -22,9 +22,11 @@ struct CellBox {
         }
         centre /= 8;
     }
-    bool holds(const Vec3f& point, float around) const { ///< or is no further from it along any axis
-        return (point.array() >= low.array() - around).all() && (point.array() <= high.array() + around).all();
+    /// Whether some of it is no further than `around` from a box, along each axis ...
+    bool meets(const Vec3f& from, const Vec3f& to, float around) const {
+        return (to.array() >= low.array() - around).all() && (from.array() <= high.array() + around).all();
     }
+    bool holds(const Vec3f& point, float around) const { return meets(point, point, around); } ///< ... or from a point
 };
 
 /// A box about any axes.

@@ -239,6 +239,11 @@ Matter::Turned Matter::turned(const Vectors& positions, Index cell, const Vec3f&
     return {middle, size > 0 && std::isfinite(size) ? Vec3f(area / size) : Vec3f::Zero()};
 }
 
+Matter::Linear Matter::linear(const Vectors& positions, Index cell) const {
+    const CellMap map = map_cell(positions, corners(cell), Vec3f::Constant(0.5f));
+    return {map.point, map.slope.inverse()};
+}
+
 Mat3f Matter::inverse_derivative(const Vectors& positions, const Place& place) const {
     if (is_rigid()) { // the derivative is the spacing times a rotation
         const std::array<Index, 8>& corner = corners(0);

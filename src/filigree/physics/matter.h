@@ -67,6 +67,13 @@ public:
     std::optional<Depth> depth(const Place& place, const Mat3f& inverse, const Vec3f& entry) const;
 
     Vec3f rest_position(const Place& place) const; ///< m
+    /// A cell's map about its middle.
+    struct Linear {
+        Vec3f middle;  ///< m
+        Mat3f inverse; ///< 1/m
+        Vec3f local(const Vec3f& point) const { return Vec3f::Constant(0.5f) + inverse * (point - middle); }
+    };
+    Linear linear(const Vectors& positions, Index cell) const;
     /// Whether two cells are the same piece of matter: one is reached from the other in two steps between neighbours.
     bool are_together(Index a, Index b) const;
     /// Calls visit(cell, way) for those that are the same piece of matter as a cell; way: to them at rest, in cells.
@@ -85,8 +92,8 @@ public:
         constexpr float kOpposed = -0.5f;
         return normal.dot(other) < kOpposed && way.dot(normal) < 0;
     }
-    static constexpr float kElsewhere = 0.35f;     ///< spacings at rest between a point and where it comes in ...
-    static constexpr float kStillElsewhere = 0.2f; ///< ... and until it counts as out
+    static constexpr float kElsewhere = 0.2f;      ///< spacings at rest between a point and where it comes in ...
+    static constexpr float kStillElsewhere = 0.1f; ///< ... and until it counts as out
     /// Whether a place is not a surface point's own: its cell is not the same piece of matter, or it is at rest more
     /// than so many spacings from the point.
     bool is_elsewhere(Index surface_point, const Place& place, float spacings) const {

@@ -189,11 +189,12 @@ private:
         return matter.is_elsewhere(pair.point, place,
                                    pair.entry.isZero(0) ? Matter::kElsewhere : Matter::kStillElsewhere);
     }
-    static bool find_fold(const Pair& pair, const Vec3f& point, const Matter& matter, const Vectors& positions,
-                          Matter::Place& place);
+    static std::optional<Matter::Depth> find_fold(const Pair& pair, const Vec3f& point, const Matter& matter,
+                                                  const Vectors& positions, Matter::Place& place);
     float crushed_part(const BodyState& body, const Matter& matter) const;
     void find_recovering(std::span<const BodyState> bodies);
-    float clearance(const Pair& pair, const Side& side, float distance, std::span<const BodyState> bodies) const;
+    float clearance(const Pair& pair, const Side& side, float distance, float slowest,
+                    std::span<const BodyState> bodies) const;
     void leave(Pair& pair, const Side& side, float clearance) const;
     float stiffness(const Side& side, const Pair& pair, std::span<const BodyState> bodies) const;
     void anchor_at(Pair& pair, const Side& side, const BodyState& other, const Vec3f& offset) const;

@@ -4,6 +4,7 @@
 #include "filigree/physics/matter_contact.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace filigree {
 
@@ -12,8 +13,10 @@ using namespace contact_law;
 namespace {
 
 constexpr std::size_t kMatterForcesGrain = 128;
-constexpr float kSlowest = 0.2f; ///< of a side's speed: what its pairs may gain unasked
-constexpr float kLittle = 0.05f; ///< spacings until a point that is nowhere is asked again
+/// Of a side's speed: what its pairs may gain unasked; less of those beside their own place, which all move alike.
+constexpr float kSlowest = 0.2f, kSlowestBeside = 0.02f;
+constexpr float kLittle = 0.05f;      ///< spacings until a point that is nowhere is asked again ...
+constexpr float kLittleBeside = 0.2f; ///< ... and the same of those, by their own speed
 
 } // namespace
 
@@ -25,36 +28,42 @@ void MatterContacts::leave(Pair& pair, const Side& side, float clearance) const 
     pair.clear_until = side.way + clearance;
 }
 
-/// As safe_way. Neighbours move alike, so that the pair's own speed counts, and not the side's.
-float MatterContacts::clearance(const Pair& pair, const Side& side, float distance,
+/// As safe_way. Neighbours move alike, so that the pair's own speed counts, and not the side's; but it may gain as much
+/// as the side's times `slowest` unasked.
+float MatterContacts::clearance(const Pair& pair, const Side& side, float distance, float slowest,
                                 std::span<const BodyState> bodies) const {
     const float safe = safe_way(side, distance);
     if (safe == 0) return 0;
     const BodyState &body = bodies[side.body], &other = bodies[side.other];
     const Vec3f velocity = embedded_point(body.surface, pair.point, body.velocities) -
                            matter_[side.other]->mean(pair.place, other.velocities);
-    return safe * side.speed / (velocity.norm() + kSlowest * side.speed);
+    return safe * side.speed / (velocity.norm() + slowest * side.speed);
 }
 
-/// The place of a point in the cells around place.cell that is furthest from its own. Where matter is crushed a walk
-/// from cell to cell ends at the point's own place, or nowhere.
-bool MatterContacts::find_fold(const Pair& pair, const Vec3f& point, const Matter& matter, const Vectors& positions,
-                               Matter::Place& place) {
+/// The place of a point in the cells around place.cell that is furthest from its own, of those that are inside of the
+/// surface if there are any. Where matter is crushed a walk from cell to cell ends at the point's own place, or
+/// nowhere.
+std::optional<Matter::Depth> MatterContacts::find_fold(const Pair& pair, const Vec3f& point, const Matter& matter,
+                                                       const Vectors& positions, Matter::Place& place) {
     const auto& at = matter.body().cells.cells[place.cell];
     const Vec3f own = matter.body().surface.points.rest[pair.point];
-    float furthest = -1;
+    std::optional<Matter::Depth> best;
+    float most = -std::numeric_limits<float>::infinity();
     for (int n = 0; n < 27; ++n) {
         const Index cell = matter.cell_at(at[0] + n % 3 - 1, at[1] + n / 3 % 3 - 1, at[2] + n / 9 - 1);
         if (cell == kNoIndex) continue;
         if (!CellBox(matter.corners(cell), positions).holds(point, 0)) continue;
         Matter::Place found{cell};
         if (!matter.locate_in_cell(positions, point, found) || !is_elsewhere(pair, found, matter)) continue;
-        const float apart = (matter.rest_position(found) - own).squaredNorm();
-        if (!(apart > furthest)) continue;
-        furthest = apart;
+        const auto depth = matter.depth(found, matter.inverse_derivative(positions, found), pair.entry);
+        if (!depth) continue;
+        const float rank = depth->depth > 0 ? (matter.rest_position(found) - own).norm() : depth->depth;
+        if (!(rank > most)) continue;
+        most = rank;
         place = found;
+        best = depth;
     }
-    return furthest >= 0;
+    return best;
 }
 
 /// Finds where a point lies in the other's matter. The surface's normal there if it touches; else the pair is left
@@ -69,24 +78,27 @@ std::optional<Vec3f> MatterContacts::enter(Pair& pair, const Side& side, std::sp
         return std::nullopt;
     };
     const Vec3f point = embedded_point(body.surface, pair.point, body.positions);
-    Mat3f inverse;
-    bool is_there = matter.locate(other.positions, point, pair.place, inverse);
-    if (own && !(is_there && is_elsewhere(pair, pair.place, matter))) {
+    const bool beside = own && matter.are_together(matter.cell_of_point(pair.point), from);
+    const float slowest = beside ? kSlowestBeside : kSlowest;
+    std::optional<Matter::Depth> found;
+    if (Mat3f inverse; !(beside && pair.entry.isZero(0)) && // its walk would end at its own place
+                       matter.locate(other.positions, point, pair.place, inverse) &&
+                       !(own && !is_elsewhere(pair, pair.place, matter)))
+        found = matter.depth(pair.place, inverse, pair.entry);
+    if (own && !found) {
         pair.place.cell = from;
-        is_there = find_fold(pair, point, matter, body.positions, pair.place);
-        if (is_there) inverse = matter.inverse_derivative(body.positions, pair.place);
+        found = find_fold(pair, point, matter, body.positions, pair.place);
     }
-    if (!is_there) {
+    if (!found) {
         pair.place.local.setConstant(0.5f);
-        return leave_for(kLittle * side.spacing);
+        return leave_for(beside ? clearance(pair, side, kLittleBeside * side.spacing, slowest, bodies)
+                                : kLittle * side.spacing);
     }
-    const std::optional<Matter::Depth> found = matter.depth(pair.place, inverse, pair.entry);
-    if (!found) return leave_for(kLittle * side.spacing);
     if (own && matter.are_together(matter.cell_of_point(pair.point), pair.place.cell) &&
         Matter::are_sides_of_thin_part(body.body->surface.normals[pair.point], found->rest,
                                        matter.rest_position(pair.place) - body.surface.rest[pair.point]))
         return leave_for(kLittle * side.spacing);
-    if (found->depth < 0) return leave_for(clearance(pair, side, -found->depth, bodies));
+    if (found->depth < 0) return leave_for(clearance(pair, side, -found->depth, slowest, bodies));
     const Vec3f& local = pair.place.local;
     const float outside = std::max(-local.minCoeff(), local.maxCoeff() - 1);
     if (found->depth == 0 || (outside > kOutside && !matter.is_rigid())) return leave_for(kLittle * side.spacing);

@@ -19,7 +19,7 @@ namespace {
 constexpr std::size_t kMatterSearchGrain = 512, kBodiesGrain = 8, kSidesGrain = 8, kTravelGrain = 512; // sides
 constexpr float kLeastReach = 0.1f; ///< as kMostReach, at least
 constexpr float kOwnReach = 0.3f;   ///< the same of a body beside itself ...
-constexpr float kFoldReach = 0.2f;  ///< spacings that points may go in a frame into matter folded onto theirs
+constexpr float kFoldReach = 0.1f;  ///< spacings that points may go in a frame into matter folded onto theirs
 constexpr float kOwnSearches = 4;   ///< ... which is searched no more often than this in a frame
 /// Of what another side may still move until it is searched; they share what a search finds out about bodies.
 constexpr float kSearchedAlong = 0.5f;

@@ -18,12 +18,13 @@ namespace {
 constexpr std::size_t kOwnCellsGrain = 16, kClusterCells = 8;
 constexpr double kTangledClusters = 512;   ///< near clusters a cluster of a body crushed or mixed
 constexpr std::size_t kTangledPoints = 16; ///< near points a point of such a body
-constexpr std::size_t kFoldsGrain = 256;
-constexpr float kFarFold = 2;   ///< spacings between cells' middles: further ones do not touch in the next frame
+constexpr std::size_t kFoldsGrain = 256, kFoldedGrain = 8;
+constexpr float kAstray = 0.5f;  ///< cells that a place in a deformed cell may be from where its middle's slope says
+constexpr float kFarFold = 1.5f; ///< spacings between cells' middles: further ones do not touch in the next frame
 constexpr float kBehind = 0.8f; ///< spacings that two such cells may lie behind each other, along both normals together
 
-/// Cosine between the normals of two cells where the surface may touch itself, at most; rest: their cosine at rest.
-float most_of_fold(float rest) { return 0.7f * rest - 0.3f; }
+/// As Beside::fold_cosine; rest: their cosine at rest.
+float fold_cosine(float rest) { return 0.7f * rest - 0.5f; }
 
 } // namespace
 
@@ -93,7 +94,8 @@ void OwnCells::find_beside() {
             const Index b = number_of_cell[other];
             if (b == kNoIndex || b <= a || Matter::are_sides_of_thin_part(rest_normals_[a], rest_normals_[b], way))
                 return;
-            beside_.push_back(b);
+            const float most = fold_cosine(rest_normals_[a].dot(rest_normals_[b]));
+            if (most > -1) beside_.push_back({b, most});
         });
         beside_offsets_.push_back(Index(beside_.size()));
     }
@@ -286,60 +288,101 @@ void OwnCells::look_into(std::span<const std::pair<Index, Index>> near, std::spa
     }
 }
 
-/// Pairs of surface cells that are not far from each other, where the surface has turned so much that it may touch
-/// itself; ascending, both ways round.
-std::vector<std::pair<Index, Index>> OwnCells::folded_cells(const Vectors& positions, const RunContext& context) const {
-    using Pairs = std::vector<std::pair<Index, Index>>;
-    std::vector<Matter::Turned> turned(surface_cells_.size());
-    parallel_for(context, turned.size(), kFoldsGrain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t a = begin; a < end; ++a)
-            turned[a] = matter_.turned(positions, cells_[surface_cells_[a]], rest_normals_[a]);
+/// Numbers in cells_ of those of which the surface has turned towards that of another that is not far, so much that it
+/// may touch itself; ascending.
+std::vector<Index> OwnCells::folded_cells(const Vectors& positions, const RunContext& context) const {
+    const std::size_t count = surface_cells_.size();
+    std::vector<Vec3f> normals(count), middles(count);
+    parallel_for(context, count, kFoldsGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t a = begin; a < end; ++a) {
+            const Matter::Turned turned = matter_.turned(positions, cells_[surface_cells_[a]], rest_normals_[a]);
+            normals[a] = turned.normal;
+            middles[a] = turned.middle;
+        }
     });
     const auto spacing = float(matter_.body().spacing());
     const float far = kFarFold * spacing;
-    const auto has_folded = [&](std::size_t a, Index b) {
-        const Matter::Turned &one = turned[a], &other = turned[b];
-        if (!(one.normal.dot(other.normal) < most_of_fold(rest_normals_[a].dot(rest_normals_[b])))) return false;
-        const Vec3f way = other.middle - one.middle;
-        return way.squaredNorm() < far * far && way.dot(one.normal - other.normal) > -kBehind * spacing;
+    const auto may_touch = [&](std::size_t a, std::size_t b) {
+        const Vec3f way = middles[b] - middles[a];
+        return way.squaredNorm() < far * far && way.dot(normals[a] - normals[b]) > -kBehind * spacing;
     };
-    std::vector<Pairs> parts((turned.size() + kFoldsGrain - 1) / kFoldsGrain);
+    std::vector<std::vector<Index>> parts((count + kFoldsGrain - 1) / kFoldsGrain);
     parallel_for(context, parts.size(), 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t part = begin; part < end; ++part)
-            for (std::size_t a = part * kFoldsGrain; a < std::min(turned.size(), (part + 1) * kFoldsGrain); ++a)
-                for (Index k = beside_offsets_[a]; k < beside_offsets_[a + 1]; ++k)
-                    if (has_folded(a, beside_[k])) parts[part].emplace_back(Index(a), beside_[k]);
+            for (std::size_t a = part * kFoldsGrain; a < std::min(count, (part + 1) * kFoldsGrain); ++a) {
+                const Vec3f normal = normals[a];
+                const Beside* const last = beside_.data() + beside_offsets_[a + 1];
+                for (const Beside* beside = beside_.data() + beside_offsets_[a]; beside != last; ++beside)
+                    if (normal.dot(normals[beside->other]) < beside->fold_cosine && may_touch(a, beside->other))
+                        parts[part].insert(parts[part].end(), {Index(a), beside->other});
+            }
     });
-    Pairs folded;
-    for (const Pairs& part : parts)
-        for (const auto& [a, b] : part) folded.insert(folded.end(), {{a, b}, {b, a}});
-    std::ranges::sort(folded);
+    std::vector<std::uint8_t> is_folded(count, 0);
+    for (const std::vector<Index>& part : parts)
+        for (const Index a : part) is_folded[a] = 1;
+    std::vector<Index> folded;
+    for (std::size_t a = 0; a < count; ++a)
+        if (is_folded[a]) folded.push_back(surface_cells_[a]);
     return folded;
 }
 
-OwnCells::Folds OwnCells::folds(const Vectors& positions, float reach, const RunContext& context) const {
-    Folds folds;
-    const auto spacing = float(matter_.body().spacing());
-    std::vector<Vec3f> points;
-    const auto pairs = folded_cells(positions, context);
-    for (std::size_t k = 0; k < pairs.size(); ++k) {
-        const auto& [own, other] = pairs[k];
-        const std::span<const Index> numbers = points_of_cells(surface_cells_[own], surface_cells_[own] + 1);
-        if (k == 0 || pairs[k - 1].first != own) {
-            points.clear();
-            for (const Index s : numbers) points.push_back(embedded_point(points_, s, positions));
-        }
-        const Index cell = cells_[surface_cells_[other]];
-        const CellBox box(matter_.corners(cell), positions);
-        for (std::size_t i = 0; i < numbers.size(); ++i) {
-            const Vec3f& p = points[i];
-            if (!box.holds(p, reach)) continue;
-            Matter::Place place{cell};
-            if (matter_.locate_in_cell(positions, p, place, reach / spacing) &&
-                matter_.is_elsewhere(numbers[i], place, Matter::kStillElsewhere))
-                folds.emplace_back(numbers[i], cell);
-        }
+/// Of the points of one cell, where it is folded. They may lie in any cell that is not far, under the one that folded
+/// onto theirs too.
+void OwnCells::add_folds(Index own, std::span<const CellBox> boxes, const Vectors& positions, float reach,
+                         Folds& folds) const {
+    struct Point {
+        Vec3f place;
+        Index number, cell = kNoIndex;
+        float away = std::numeric_limits<float>::infinity();
+    };
+    std::vector<Point> points;
+    for (const Index s : points_of_cells(own, own + 1))
+        points.push_back({.place = embedded_point(points_, s, positions), .number = s});
+    Vec3f low = points[0].place, high = low;
+    for (const Point& point : points) {
+        low = low.cwiseMin(point.place);
+        high = high.cwiseMax(point.place);
     }
+    const float around = reach / float(matter_.body().spacing());
+    matter_.each_together(cells_[own], [&](Index cell, const Vec3f&) {
+        const CellBox& box = boxes[cell];
+        if (!box.meets(low, high, reach)) return;
+        std::optional<Matter::Linear> linear; // most points are told by it to be elsewhere, or in their own place
+        for (Point& point : points) {
+            const float away = (box.centre - point.place).squaredNorm();
+            if (!(away < point.away) || !box.holds(point.place, reach)) continue;
+            if (!linear) linear = matter_.linear(positions, cell);
+            Matter::Place place{cell, linear->local(point.place)};
+            if (!((place.local.array() - 0.5f).abs().maxCoeff() < 0.5f + around + kAstray)) continue;
+            if (!matter_.is_elsewhere(point.number, place, Matter::kStillElsewhere)) continue;
+            if (!matter_.locate_in_cell(positions, point.place, place, around)) continue;
+            if (!matter_.is_elsewhere(point.number, place, Matter::kStillElsewhere)) continue;
+            point.cell = cell;
+            point.away = away;
+        }
+    });
+    for (const Point& point : points)
+        if (point.cell != kNoIndex) folds.emplace_back(point.number, point.cell);
+}
+
+OwnCells::Folds OwnCells::folds(const Vectors& positions, float reach, const RunContext& context) const {
+    const std::vector<Index> folded = folded_cells(positions, context);
+    std::vector<CellBox> boxes(cells_.size());
+    std::vector<std::uint8_t> is_asked(boxes.size(), 0);
+    for (const Index own : folded)
+        matter_.each_together(cells_[own], [&](Index cell, const Vec3f&) { is_asked[cell] = 1; });
+    parallel_for(context, boxes.size(), kFoldsGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t c = begin; c < end; ++c)
+            if (is_asked[c]) boxes[c] = CellBox(matter_.corners(Index(c)), positions);
+    });
+    std::vector<Folds> parts((folded.size() + kFoldedGrain - 1) / kFoldedGrain);
+    parallel_for(context, parts.size(), 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t part = begin; part < end; ++part)
+            for (std::size_t k = part * kFoldedGrain; k < std::min(folded.size(), (part + 1) * kFoldedGrain); ++k)
+                add_folds(folded[k], boxes, positions, reach, parts[part]);
+    });
+    Folds folds;
+    for (const Folds& part : parts) folds.insert(folds.end(), part.begin(), part.end());
     return folds;
 }
 

@@ -16,9 +16,10 @@ class OwnCells {
 public:
     explicit OwnCells(const Matter& matter); ///< matter: not rigid; outlives this
 
-    /// A surface point and a cell that is not far from its own, onto which the surface has folded it or is about to.
+    /// A surface point whose cell has folded, and the cell that is not far from it and holds the point; once a point.
     using Folds = std::vector<std::pair<Index, Index>>;
-    /// Those that hold while points move by `reach` (m). Cost O(surface cells).
+    /// Those that hold while points move by `reach` (m). Cost O(surface cells, and cells around those that have
+    /// folded).
     Folds folds(const Vectors& positions, float reach, const RunContext& context) const;
 
     /// For each surface point the far or folded cell that holds it, or the nearest of these within reach (m); kNoIndex
@@ -68,7 +69,9 @@ private:
                    const NearBoxes& boxes, const Vectors& positions, float reach, std::vector<Index>& found) const;
 
     void find_beside();
-    std::vector<std::pair<Index, Index>> folded_cells(const Vectors& positions, const RunContext& context) const;
+    std::vector<Index> folded_cells(const Vectors& positions, const RunContext& context) const;
+    void add_folds(Index own, std::span<const CellBox> boxes, const Vectors& positions, float reach,
+                   Folds& folds) const;
 
     const Matter& matter_;
     const Embedding& points_;
@@ -79,7 +82,12 @@ private:
     float overhang_ = 0;                   ///< m that points may lie outside of their cells
     std::vector<Index> surface_cells_;     ///< numbers in cells_ of those that have points ...
     std::vector<Vec3f> rest_normals_;      ///< ... and the mean of their points' normals, unit
-    std::vector<Index> beside_offsets_, beside_; ///< of each, in surface_cells_: those it may be folded onto
+    struct Beside {
+        Index other;       ///< in surface_cells_
+        float fold_cosine; ///< between their normals: below it the surface may touch itself
+    };
+    std::vector<Index> beside_offsets_; ///< of each of surface_cells_, and the end
+    std::vector<Beside> beside_;        ///< those later in surface_cells_ that it may be folded onto
 };
 
 } // namespace filigree
