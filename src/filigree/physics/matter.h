@@ -67,7 +67,7 @@ public:
     std::optional<Depth> depth(const Place& place, const Mat3f& inverse, const Vec3f& entry) const;
 
     Vec3f rest_position(const Place& place) const; ///< m
-    /// A cell's map about its middle.
+    /// A cell's map about its middle. Of a crushed cell's the inverse may not be finite.
     struct Linear {
         Vec3f middle;  ///< m
         Mat3f inverse; ///< 1/m

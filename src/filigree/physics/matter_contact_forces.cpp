@@ -40,8 +40,8 @@ float MatterContacts::clearance(const Pair& pair, const Side& side, float distan
     return safe * side.speed / (velocity.norm() + slowest * side.speed);
 }
 
-/// The place of a point in the cells around place.cell that is furthest from its own, of those that are inside of the
-/// surface if there are any. Where matter is crushed a walk from cell to cell ends at the point's own place, or
+/// Of the places that a point has in the cells around place.cell: the furthest from its own inside of the surface, or
+/// else the nearest to the surface. Where matter is crushed a walk from cell to cell ends at the point's own place, or
 /// nowhere.
 std::optional<Matter::Depth> MatterContacts::find_fold(const Pair& pair, const Vec3f& point, const Matter& matter,
                                                        const Vectors& positions, Matter::Place& place) {

@@ -326,8 +326,8 @@ std::vector<Index> OwnCells::folded_cells(const Vectors& positions, const RunCon
     return folded;
 }
 
-/// Of the points of one cell, where it is folded. They may lie in any cell that is not far, under the one that folded
-/// onto theirs too.
+/// Of the points of a folded cell. They may lie in any cell that is not far: also under the one that has folded onto
+/// theirs.
 void OwnCells::add_folds(Index own, std::span<const CellBox> boxes, const Vectors& positions, float reach,
                          Folds& folds) const {
     struct Point {
@@ -347,7 +347,7 @@ void OwnCells::add_folds(Index own, std::span<const CellBox> boxes, const Vector
     matter_.each_together(cells_[own], [&](Index cell, const Vec3f&) {
         const CellBox& box = boxes[cell];
         if (!box.meets(low, high, reach)) return;
-        std::optional<Matter::Linear> linear; // most points are told by it to be elsewhere, or in their own place
+        std::optional<Matter::Linear> linear; // says of most points that they are out of the cell, or where they belong
         for (Point& point : points) {
             const float away = (box.centre - point.place).squaredNorm();
             if (!(away < point.away) || !box.holds(point.place, reach)) continue;
