@@ -238,38 +238,49 @@ TEST(OwnCells, FindWhatBruteForceFinds) {
     EXPECT_GT(in_rolled.points, 200u);
 }
 
-// A bar that is folded in its middle until its halves lie in each other.
+// A bar that is folded in its middle until its halves lie in each other, and one in which a layer of cells has flipped,
+// so that those on both its sides lie in each other the same way up.
 TEST(OwnCells, FindWhatIsFolded) {
     const Body bar = make_body(box_cells(16, 3, 3, 0.1), undamped(0.3));
     const Matter matter(bar);
     const OwnCells cells(matter);
     EXPECT_TRUE(cells.folds(bar.rest, 0, RunContext(2)).empty());
-    Vectors folded = bar.rest;
+    const auto compare = [&](const Vectors& folded) {
+        const OwnCells::Folds folds = cells.folds(folded, 0, RunContext(2));
+        const std::vector<Index> found = cells.find(folded, folds, 0.01f, RunContext(2));
+        std::size_t hits = 0;
+        for (Index s = 0; s < bar.surface.points.size(); ++s) {
+            const Vec3f point = embedded_point(bar.surface.points, s, folded);
+            bool is_in_fold = false;
+            for (Index c = 0; c < bar.cells.cells.size(); ++c) {
+                Matter::Place place{c};
+                is_in_fold |= matter.are_together(matter.cell_of_point(s), c) &&
+                              matter.locate_in_cell(folded, point, place) && matter.is_elsewhere(s, place, 0.5f);
+            }
+            if (!is_in_fold) continue;
+            ++hits;
+            EXPECT_NE(found[s], kNoIndex) << s << " at " << bar.surface.points.rest[s].transpose();
+            EXPECT_TRUE(std::ranges::any_of(folds, [&](const auto& fold) { return fold.first == s; })) << s;
+        }
+        return hits;
+    };
     const Box box = box_of(bar.rest);
     const auto middle = float(box.centre().x()), top = float(box.max.y());
-    for (std::size_t i = 0; i < folded.size(); ++i) {
-        const float x = folded.x[i] - middle, y = folded.y[i] - top;
+    Vectors bent = bar.rest;
+    for (std::size_t i = 0; i < bent.size(); ++i) {
+        const float x = bent.x[i] - middle, y = bent.y[i] - top;
         const float angle = 1.66f * std::clamp(x / 0.1f, -1.0f, 1.0f); // a quarter turn is 1.57
-        folded.x[i] = std::cos(angle) * x - std::sin(angle) * y;
-        folded.y[i] = std::sin(angle) * x + std::cos(angle) * y;
+        bent.x[i] = std::cos(angle) * x - std::sin(angle) * y;
+        bent.y[i] = std::sin(angle) * x + std::cos(angle) * y;
     }
-    const OwnCells::Folds folds = cells.folds(folded, 0, RunContext(2));
-    const std::vector<Index> found = cells.find(folded, folds, 0.01f, RunContext(2));
-    std::size_t hits = 0;
-    for (Index s = 0; s < bar.surface.points.size(); ++s) {
-        const Vec3f point = embedded_point(bar.surface.points, s, folded);
-        bool is_in_fold = false;
-        for (Index c = 0; c < bar.cells.cells.size(); ++c) {
-            Matter::Place place{c};
-            is_in_fold |= matter.are_together(matter.cell_of_point(s), c) &&
-                          matter.locate_in_cell(folded, point, place) && matter.is_elsewhere(s, place, 0.5f);
-        }
-        if (!is_in_fold) continue;
-        ++hits;
-        EXPECT_NE(found[s], kNoIndex) << s << " at " << bar.surface.points.rest[s].transpose();
-        EXPECT_TRUE(std::ranges::any_of(folds, [&](const auto& fold) { return fold.first == s; })) << s;
+    EXPECT_GT(compare(bent), 10u);
+    Vectors flipped = bar.rest;
+    for (std::size_t i = 0; i < flipped.size(); ++i) {
+        if (flipped.x[i] < middle + 0.05f) continue;
+        flipped.x[i] -= 0.16f;
+        flipped.y[i] += 0.04f;
     }
-    EXPECT_GT(hits, 10u);
+    EXPECT_GT(compare(flipped), 10u);
 }
 
 } // namespace

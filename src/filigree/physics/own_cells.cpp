@@ -229,15 +229,7 @@ OwnCells::NearBoxes OwnCells::cell_boxes(std::span<const std::pair<Index, Index>
 void OwnCells::look_into(std::span<const std::pair<Index, Index>> near, std::span<const Extent> extents,
                          const NearBoxes& boxes, const Vectors& positions, float reach,
                          std::vector<Index>& found) const {
-    const auto come_near = [around = reach + 2 * overhang_](const auto& a, const auto& b) { // as in find
-        return a.low.x() - around <= b.high.x() && b.low.x() - around <= a.high.x() &&
-               a.low.y() - around <= b.high.y() && b.low.y() - around <= a.high.y() &&
-               a.low.z() - around <= b.high.z() && b.low.z() - around <= a.high.z();
-    };
-    const auto is_within = [](const Vec3f& p, const Vec3f& low, const Vec3f& high) {
-        return p.x() >= low.x() && p.x() <= high.x() && p.y() >= low.y() && p.y() <= high.y() && p.z() >= low.z() &&
-               p.z() <= high.z();
-    };
+    const float around = reach + 2 * overhang_; // as in find
     struct Point {
         Vec3f place;
         Index number;
@@ -266,7 +258,7 @@ void OwnCells::look_into(std::span<const std::pair<Index, Index>> near, std::spa
         of_some |= of_some >> 8;
         std::uint64_t asked = 0; // bits of the cells that have points near the other cluster
         for_each_bit(of_some & has_points, [&](int i) {
-            if (come_near(own_boxes[i], extents[other])) asked |= std::uint64_t{1} << i;
+            if (own_boxes[i].meets(extents[other].low, extents[other].high, around)) asked |= std::uint64_t{1} << i;
         });
         if (asked == 0) continue;
         const Index others = clusters_[other + 1].first_cell - clusters_[other].first_cell;
@@ -274,10 +266,9 @@ void OwnCells::look_into(std::span<const std::pair<Index, Index>> near, std::spa
             const CellBox& box = boxes.boxes[boxes.first[other] + j];
             for_each_bit(asked & far >> kClusterCells * j, [&](int bit) {
                 const auto i = Index(bit);
-                if (!come_near(own_boxes[i], box)) return;
-                const Vec3f low = box.low.array() - reach, high = box.high.array() + reach;
+                if (!own_boxes[i].meets(box.low, box.high, around)) return;
                 for (Point& point : points_in(i)) {
-                    if (!is_within(point.place, low, high)) continue;
+                    if (!box.holds(point.place, reach)) continue;
                     const float away = (box.centre - point.place).squaredNorm();
                     if (away >= point.least) continue;
                     point.least = away;
