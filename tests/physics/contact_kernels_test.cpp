@@ -1,6 +1,8 @@
 // What contacts ask of many boxes or particles at once gives what asking one by one gives.
 #include "filigree/core/random.h"
 #include "filigree/physics/box_sweep.h"
+#include "filigree/physics/cell_normals.h"
+#include "filigree/physics/cofactor.h"
 #include "filigree/physics/extremes_kernel.h"
 
 #include <gtest/gtest.h>
@@ -97,6 +99,42 @@ TEST(Extremes, AreThoseOfWhatCounts) {
             EXPECT_EQ(found.least, expected.least);
             EXPECT_EQ(found.most, expected.most);
         }
+}
+
+// Runs of all lengths up to two registers, an inverted layer, a crushed cell and cells without a normal.
+TEST(CellNormals, AreTurnedByCofactors) {
+    std::uint64_t counter = 0;
+    std::vector<Cells::LatticeIndex> indices;
+    for (std::uint16_t j = 0; j < 34; ++j)
+        for (std::uint16_t i = 0; i <= j; ++i) indices.push_back({i, j, 0});
+    const Cells cells = lattice_cells(indices, 0.1, Vec3d::Zero());
+    const std::size_t count = cells.cells.size();
+    Vectors positions(cells.corners.size()), at_rest(count), turned(count);
+    for (std::size_t c = 0; c < positions.size(); ++c) {
+        const Vec3f moved(draw(3, counter, -0.03, 0.03), draw(3, counter, -0.03, 0.03), draw(3, counter, -0.03, 0.03));
+        const auto& at = cells.corners[c];
+        positions.set(c, 0.1f * Vec3f(at[0] < 20 ? at[0] : 40 - at[0], at[1], at[2]) + moved);
+    }
+    for (std::size_t cell = 0; cell < count; ++cell)
+        if (cell % 5 != 0)
+            at_rest.set(cell,
+                        Vec3f(draw(3, counter, -1, 1), draw(3, counter, -1, 1), draw(3, counter, -1, 1)).normalized());
+    for (const Index corner : cells.cell_corners[7]) positions.set(corner, Vec3f(1, 2, 3));
+    turn_cell_normals(cells.runs, positions, at_rest, turned);
+    std::size_t inverted = 0;
+    for (std::size_t cell = 0; cell < count; ++cell) {
+        const auto& corner = cells.cell_corners[cell];
+        Mat3f slope = Mat3f::Zero();
+        for (int c = 0; c < 8; ++c)
+            for (int axis = 0; axis < 3; ++axis)
+                slope.col(axis) += (c >> axis & 1 ? 2.5f : -2.5f) * positions[corner[std::size_t(c)]];
+        inverted += slope.determinant() < 0;
+        const Vec3f area = cofactor(slope) * at_rest[cell];
+        const Vec3f expected = area.norm() > 1e-6f ? Vec3f(area.normalized()) : Vec3f::Zero();
+        EXPECT_LT((turned[cell] - expected).norm(), 1e-4f) << cell;
+    }
+    EXPECT_GT(inverted, 50u);
+    EXPECT_TRUE(turned[7].isZero(0));
 }
 
 } // namespace

@@ -1,7 +1,5 @@
 #include "filigree/physics/matter.h"
 
-#include "filigree/physics/cofactor.h"
-
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -230,13 +228,6 @@ bool Matter::locate_in_cell(const Vectors& positions, const Vec3f& point, Place&
     for (int step = 0; step < kNewtonStepsInCell && !converged; ++step)
         if (!newton_step(positions, point, place, inverse, converged)) return false;
     return converged && place.local.minCoeff() >= -around && place.local.maxCoeff() <= 1 + around;
-}
-
-Matter::Turned Matter::turned(const Vectors& positions, Index cell, const Vec3f& normal) const {
-    const auto [middle, f] = map_cell(positions, corners(cell), Vec3f::Constant(0.5f));
-    const Vec3f area = cofactor(f) * normal;
-    const float size = area.norm();
-    return {middle, size > 0 && std::isfinite(size) ? Vec3f(area / size) : Vec3f::Zero()};
 }
 
 Matter::Linear Matter::linear(const Vectors& positions, Index cell) const {

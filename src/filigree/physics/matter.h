@@ -47,13 +47,6 @@ public:
     /// Derivative of local coordinates by position, 1/m.
     Mat3f inverse_derivative(const Vectors& positions, const Place& place) const;
 
-    /// A cell's middle, and where it has turned an area with that normal at rest: a unit normal, of the same side of
-    /// the area where the cell is inverted, zero where nothing is left of the area. Not of a rigid body.
-    struct Turned {
-        Vec3f middle, normal;
-    };
-    Turned turned(const Vectors& positions, Index cell, const Vec3f& normal) const;
-
     float volume_ratio(const Vectors& positions, Index cell) const; ///< of the cell's middle, now to rest
 
     /// Where a place lies beside the surface.

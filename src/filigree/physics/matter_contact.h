@@ -149,7 +149,6 @@ private:
         float spacing = 0;                               ///< m, the smaller of both
         PairContact law;
         std::vector<Pair> pairs;
-        std::optional<OwnCells::Folds> folds; ///< of a body beside itself, in this frame
     };
     static float most_depth(const Side& side) {
         return (side.body == side.other ? kDeepestWithin : contact_law::kDeepest) * side.spacing;

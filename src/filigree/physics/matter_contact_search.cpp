@@ -19,8 +19,9 @@ namespace {
 constexpr std::size_t kMatterSearchGrain = 512, kBodiesGrain = 8, kSidesGrain = 8, kTravelGrain = 512; // sides
 constexpr float kLeastReach = 0.1f; ///< as kMostReach, at least
 constexpr float kOwnReach = 0.3f;   ///< the same of a body beside itself ...
-constexpr float kFoldReach = 0.1f;  ///< spacings that points may go in a frame into matter folded onto theirs
-constexpr float kOwnSearches = 4;   ///< ... which is searched no more often than this in a frame
+constexpr float kFoldReach =
+    0.1f; ///< spacings that points may go from one of these to the next into matter folded onto theirs
+constexpr float kOwnSearches = 4; ///< ... which is searched no more often than this in a frame
 /// Of what another side may still move until it is searched; they share what a search finds out about bodies.
 constexpr float kSearchedAlong = 0.5f;
 constexpr float kLongestWay = 0.3f;      ///< spacings a substep that one body may go towards another
@@ -177,7 +178,6 @@ void MatterContacts::begin_anew() {
         side.way = side.moved = 0;
         side.until = -1;
         side.since = std::numeric_limits<float>::max();
-        side.folds.reset();
         for (Pair& pair : side.pairs) pair.clear_until = 0;
     }
 }
@@ -191,7 +191,6 @@ void MatterContacts::begin_frame(std::span<const BodyState> bodies, const RunCon
     find_recovering(bodies);
     for (Side& side : sides_) {
         side.way = 0;
-        side.folds.reset();
         for (Pair& pair : side.pairs) pair.clear_until = 0; // by speeds that may have changed
     }
 }
@@ -296,8 +295,7 @@ MatterContacts::Side MatterContacts::make_side(Index body, Index other, std::spa
     Side side{.body = body,
               .other = other,
               .law = world_.contact_of(bodies[body].actor, bodies[other].actor),
-              .pairs = {},
-              .folds = {}};
+              .pairs = {}};
     side.spacing = float(std::min(bodies[body].body->spacing(), bodies[other].body->spacing()));
     return side;
 }
@@ -392,8 +390,9 @@ void MatterContacts::find_own_pairs(Side& side, const BodyState& body, float fra
     const float ahead = 0.5f * std::clamp(reach / side.speed, frame / kOwnSearches, frame);
     side.until = reach;
     const OwnCells& own = *own_cells_[side.body];
-    if (!side.folds) side.folds = own.folds(positions_in(body, 0.5f * frame), kFoldReach * side.spacing, context);
-    const std::vector<Index> cells = own.find(positions_in(body, ahead), *side.folds, reach, context);
+    const Vectors positions = positions_in(body, ahead);
+    const OwnCells::Folds folds = own.folds(positions, kFoldReach * side.spacing, context);
+    const std::vector<Index> cells = own.find(positions, folds, reach, context);
     take_pairs(side, body, cells.size(), [&](Index s) { return CellBoxes::Near{cells[s]}; });
 }
 

@@ -19,16 +19,12 @@ constexpr std::size_t kOwnCellsGrain = 16, kClusterCells = 8;
 constexpr double kTangledClusters = 512;   ///< near clusters a cluster of a body crushed or mixed
 constexpr std::size_t kTangledPoints = 16; ///< near points a point of such a body
 constexpr std::size_t kFoldsGrain = 256, kFoldedGrain = 8;
-constexpr float kAstray = 0.5f;  ///< cells that a place in a deformed cell may be from where its middle's slope says
-constexpr float kFarFold = 1.5f; ///< spacings between cells' middles: further ones do not touch in the next frame
-constexpr float kBehind = 0.8f; ///< spacings that two such cells may lie behind each other, along both normals together
-
-/// As Beside::fold_cosine; rest: their cosine at rest.
-float fold_cosine(float rest) { return 0.7f * rest - 0.5f; }
+constexpr float kAstray = 0.5f; ///< cells that a place in a deformed cell may be from where its middle's slope says
 
 } // namespace
 
-OwnCells::OwnCells(const Matter& matter) : matter_(matter), points_(matter.body().surface.points) {
+OwnCells::OwnCells(const Matter& matter)
+    : matter_(matter), points_(matter.body().surface.points), folded_cells_(matter) {
     const Cells& cells = matter.body().cells;
     std::map<Key, std::vector<Index>> by_key;
     for (Index c = 0; c < cells.cells.size(); ++c)
@@ -41,11 +37,14 @@ OwnCells::OwnCells(const Matter& matter) : matter_(matter), points_(matter.body(
         const Vec3f middle = matter.rest_position({cell, Vec3f::Constant(0.5f)});
         overhang_ = std::max(overhang_, (points_.rest[s] - middle).cwiseAbs().maxCoeff() - 0.5f * spacing);
     }
+    numbers_.resize(cells.cells.size());
     for (const auto& [at, members] : by_key) {
         clusters_.push_back({at, 0, Index(cells_.size()), Index(corners_.size()), 0});
         std::vector<Index> corners;
         for (const Index cell : members) {
+            numbers_[cell] = Index(cells_.size());
             cells_.push_back(cell);
+            cell_corners_.push_back(cells.cell_corners[cell]);
             point_offsets_.push_back(Index(surface_points_.size()));
             corners.insert(corners.end(), cells.cell_corners[cell].begin(), cells.cell_corners[cell].end());
             surface_points_.insert(surface_points_.end(), points_of[cell].begin(), points_of[cell].end());
@@ -72,32 +71,6 @@ OwnCells::OwnCells(const Matter& matter) : matter_(matter), points_(matter.body(
             far_cells_.push_back(far);
         }
         ++cluster;
-    }
-    find_beside();
-}
-
-/// Surface cells that are not far from each other, but for both sides of a thin part.
-void OwnCells::find_beside() {
-    std::vector<Index> number_of_cell(cells_.size(), kNoIndex); // in surface_cells_
-    for (Index i = 0; i < cells_.size(); ++i) {
-        Vec3f normal = Vec3f::Zero();
-        for (const Index s : points_of_cells(i, i + 1)) normal += matter_.body().surface.normals[s];
-        if (!(normal.norm() > 0)) continue;
-        number_of_cell[cells_[i]] = Index(surface_cells_.size());
-        surface_cells_.push_back(i);
-        rest_normals_.push_back(normal.normalized());
-    }
-    beside_offsets_.push_back(0);
-    for (Index a = 0; a < surface_cells_.size(); ++a) {
-        const Index cell = cells_[surface_cells_[a]];
-        matter_.each_together(cell, [&](Index other, const Vec3f& way) {
-            const Index b = number_of_cell[other];
-            if (b == kNoIndex || b <= a || Matter::are_sides_of_thin_part(rest_normals_[a], rest_normals_[b], way))
-                return;
-            const float most = fold_cosine(rest_normals_[a].dot(rest_normals_[b]));
-            if (most > -1) beside_.push_back({b, most});
-        });
-        beside_offsets_.push_back(Index(beside_.size()));
     }
 }
 
@@ -219,7 +192,7 @@ OwnCells::NearBoxes OwnCells::cell_boxes(std::span<const std::pair<Index, Index>
         for (std::size_t k = begin; k < end; ++k) {
             CellBox* box = &boxes.boxes[boxes.first[clusters[k]]];
             for (Index c = clusters_[clusters[k]].first_cell; c < clusters_[clusters[k] + 1].first_cell; ++c)
-                *box++ = CellBox(matter_.corners(cells_[c]), positions);
+                *box++ = CellBox(cell_corners_[c], positions);
         }
     });
     return boxes;
@@ -279,44 +252,6 @@ void OwnCells::look_into(std::span<const std::pair<Index, Index>> near, std::spa
     }
 }
 
-/// Numbers in cells_ of those of which the surface has turned towards that of another that is not far, so much that it
-/// may touch itself; ascending.
-std::vector<Index> OwnCells::folded_cells(const Vectors& positions, const RunContext& context) const {
-    const std::size_t count = surface_cells_.size();
-    std::vector<Vec3f> normals(count), middles(count);
-    parallel_for(context, count, kFoldsGrain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t a = begin; a < end; ++a) {
-            const Matter::Turned turned = matter_.turned(positions, cells_[surface_cells_[a]], rest_normals_[a]);
-            normals[a] = turned.normal;
-            middles[a] = turned.middle;
-        }
-    });
-    const auto spacing = float(matter_.body().spacing());
-    const float far = kFarFold * spacing;
-    const auto may_touch = [&](std::size_t a, std::size_t b) {
-        const Vec3f way = middles[b] - middles[a];
-        return way.squaredNorm() < far * far && way.dot(normals[a] - normals[b]) > -kBehind * spacing;
-    };
-    std::vector<std::vector<Index>> parts((count + kFoldsGrain - 1) / kFoldsGrain);
-    parallel_for(context, parts.size(), 1, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t part = begin; part < end; ++part)
-            for (std::size_t a = part * kFoldsGrain; a < std::min(count, (part + 1) * kFoldsGrain); ++a) {
-                const Vec3f normal = normals[a];
-                const Beside* const last = beside_.data() + beside_offsets_[a + 1];
-                for (const Beside* beside = beside_.data() + beside_offsets_[a]; beside != last; ++beside)
-                    if (normal.dot(normals[beside->other]) < beside->fold_cosine && may_touch(a, beside->other))
-                        parts[part].insert(parts[part].end(), {Index(a), beside->other});
-            }
-    });
-    std::vector<std::uint8_t> is_folded(count, 0);
-    for (const std::vector<Index>& part : parts)
-        for (const Index a : part) is_folded[a] = 1;
-    std::vector<Index> folded;
-    for (std::size_t a = 0; a < count; ++a)
-        if (is_folded[a]) folded.push_back(surface_cells_[a]);
-    return folded;
-}
-
 /// Of the points of a folded cell. They may lie in any cell that is not far: also under the one that has folded onto
 /// theirs.
 void OwnCells::add_folds(Index own, std::span<const CellBox> boxes, const Vectors& positions, float reach,
@@ -327,7 +262,7 @@ void OwnCells::add_folds(Index own, std::span<const CellBox> boxes, const Vector
         float away = std::numeric_limits<float>::infinity();
     };
     std::vector<Point> points;
-    for (const Index s : points_of_cells(own, own + 1))
+    for (const Index s : points_of_cells(numbers_[own], numbers_[own] + 1))
         points.push_back({.place = embedded_point(points_, s, positions), .number = s});
     Vec3f low = points[0].place, high = low;
     for (const Point& point : points) {
@@ -335,7 +270,7 @@ void OwnCells::add_folds(Index own, std::span<const CellBox> boxes, const Vector
         high = high.cwiseMax(point.place);
     }
     const float around = reach / float(matter_.body().spacing());
-    matter_.each_together(cells_[own], [&](Index cell, const Vec3f&) {
+    matter_.each_together(own, [&](Index cell, const Vec3f&) {
         const CellBox& box = boxes[cell];
         if (!box.meets(low, high, reach)) return;
         std::optional<Matter::Linear> linear; // says of most points that they are out of the cell, or where they belong
@@ -357,11 +292,10 @@ void OwnCells::add_folds(Index own, std::span<const CellBox> boxes, const Vector
 }
 
 OwnCells::Folds OwnCells::folds(const Vectors& positions, float reach, const RunContext& context) const {
-    const std::vector<Index> folded = folded_cells(positions, context);
+    const std::vector<Index> folded = folded_cells_.find(positions, context);
     std::vector<CellBox> boxes(cells_.size());
     std::vector<std::uint8_t> is_asked(boxes.size(), 0);
-    for (const Index own : folded)
-        matter_.each_together(cells_[own], [&](Index cell, const Vec3f&) { is_asked[cell] = 1; });
+    for (const Index own : folded) matter_.each_together(own, [&](Index cell, const Vec3f&) { is_asked[cell] = 1; });
     parallel_for(context, boxes.size(), kFoldsGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t c = begin; c < end; ++c)
             if (is_asked[c]) boxes[c] = CellBox(matter_.corners(Index(c)), positions);

@@ -3,13 +3,14 @@
 
 #include "filigree/physics/body_state.h"
 #include "filigree/physics/cell_boxes.h"
+#include "filigree/physics/folded_cells.h"
 #include "filigree/physics/matter.h"
 
 namespace filigree {
 
 /// Surface points of a body that might lie in far cells of the same. Clusters of 2^3 cells are compared first, by boxes
 /// and balls around them, then cells by their boxes, so that matter which lies where it belongs is not looked at point
-/// by point. Cells that are not far touch where the surface folds: those are compared by their normals.
+/// by point. Cells that are not far touch where the surface folds: FoldedCells finds those.
 ///
 /// A cell is far from another if it is not reached in two steps through matter; nor in three, of neighbouring clusters.
 class OwnCells {
@@ -18,7 +19,7 @@ public:
 
     /// A surface point whose cell has folded, and the cell that is not far from it and holds the point; once a point.
     using Folds = std::vector<std::pair<Index, Index>>;
-    /// Those that hold while points move by `reach` (m). Cost O(surface cells, and cells around those that have
+    /// Those of points that may move by `reach` (m). Cost as FoldedCells::find, and O(cells around those that have
     /// folded).
     Folds folds(const Vectors& positions, float reach, const RunContext& context) const;
 
@@ -68,8 +69,6 @@ private:
     void look_into(std::span<const std::pair<Index, Index>> near, std::span<const Extent> extents,
                    const NearBoxes& boxes, const Vectors& positions, float reach, std::vector<Index>& found) const;
 
-    void find_beside();
-    std::vector<Index> folded_cells(const Vectors& positions, const RunContext& context) const;
     void add_folds(Index own, std::span<const CellBox> boxes, const Vectors& positions, float reach,
                    Folds& folds) const;
 
@@ -80,14 +79,9 @@ private:
     std::vector<Index> point_offsets_;     ///< of each of cells_, and the end
     std::vector<std::uint64_t> far_cells_; ///< bit i + 8 j: a cluster's i-th cell is far from its neighbour's j-th
     float overhang_ = 0;                   ///< m that points may lie outside of their cells
-    std::vector<Index> surface_cells_;     ///< numbers in cells_ of those that have points ...
-    std::vector<Vec3f> rest_normals_;      ///< ... and the mean of their points' normals, unit
-    struct Beside {
-        Index other;       ///< in surface_cells_
-        float fold_cosine; ///< between their normals: below it the surface may touch itself
-    };
-    std::vector<Index> beside_offsets_; ///< of each of surface_cells_, and the end
-    std::vector<Beside> beside_;        ///< those later in surface_cells_ that it may be folded onto
+    std::vector<Index> numbers_;           ///< of each cell, in cells_
+    std::vector<std::array<Index, 8>> cell_corners_; ///< of each of cells_, read one after the other
+    FoldedCells folded_cells_;
 };
 
 } // namespace filigree
