@@ -82,7 +82,7 @@ public:
     /// How much harder parts of one body push each other than two bodies do: a dragon that falls on itself is 0.29
     /// spacings deep with it, 0.34 without.
     static constexpr float kWithinOneBody = 1.5f;
-    static constexpr float kDeepestWithin = 0.3f; ///< as kDeepest, of parts of one body
+    static constexpr float kDeepestWithin = 0.25f; ///< as kDeepest, of parts of one body
     static constexpr std::uint8_t kTouched = 2, kTouchedItself = 4;
     /// As Contacts::add_forces. touched: of each body; kTouched or kTouchedItself is set where it touches.
     ContactReport add_forces(std::span<BodyState> bodies, float dt, std::span<std::uint8_t> touched,
