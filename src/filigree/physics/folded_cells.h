@@ -5,7 +5,7 @@
 
 namespace filigree {
 
-/// Cells of the surface whose normals have turned towards those of cells that they touch in matter.
+/// Cells of the surface whose normals have turned towards those of cells with which they share a side.
 class FoldedCells {
 public:
     explicit FoldedCells(const Matter& matter); ///< matter: not rigid; outlives this
@@ -16,10 +16,10 @@ public:
 
 private:
     struct Beside {
-        Index other;       ///< cell, later than the first
+        Index other;       ///< number in surface_cells_, larger than the first's
         float fold_cosine; ///< between their normals: below it the surface may touch itself
     };
-    bool may_touch(const Vectors& positions, const Vectors& normals, Index cell, Index other) const;
+    bool may_touch(const Vectors& positions, Index one, Index other, const Vec3f& turned) const;
 
     const Matter& matter_;
     Vectors rest_normals_;              ///< of each cell: the mean of its points' normals, unit; zero without points

@@ -293,6 +293,7 @@ void OwnCells::add_folds(Index own, std::span<const CellBox> boxes, const Vector
 
 OwnCells::Folds OwnCells::folds(const Vectors& positions, float reach, const RunContext& context) const {
     const std::vector<Index> folded = folded_cells_.find(positions, context);
+    if (folded.empty()) return {};
     std::vector<CellBox> boxes(cells_.size());
     std::vector<std::uint8_t> is_asked(boxes.size(), 0);
     for (const Index own : folded) matter_.each_together(own, [&](Index cell, const Vec3f&) { is_asked[cell] = 1; });
