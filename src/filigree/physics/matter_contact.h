@@ -79,8 +79,8 @@ public:
     /// s: in longer steps something could pass through something.
     double longest_step() const;
 
-    /// How much harder parts of one body push each other than two bodies do: a dragon that falls on itself is 0.29
-    /// spacings deep with it, 0.34 without.
+    /// How much harder parts of one body push each other than two bodies do: it took a dragon that falls on itself from
+    /// 0.34 spacings deep to 0.29.
     static constexpr float kWithinOneBody = 1.5f;
     static constexpr float kDeepestWithin = 0.25f; ///< as kDeepest, of parts of one body
     static constexpr std::uint8_t kTouched = 2, kTouchedItself = 4;
