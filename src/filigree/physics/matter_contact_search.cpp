@@ -19,9 +19,8 @@ namespace {
 constexpr std::size_t kMatterSearchGrain = 512, kBodiesGrain = 8, kSidesGrain = 8, kTravelGrain = 512; // sides
 constexpr float kLeastReach = 0.1f; ///< as kMostReach, at least
 constexpr float kOwnReach = 0.3f;   ///< the same of a body beside itself ...
-constexpr float kFoldReach =
-    0.1f; ///< spacings that points may go from one of these to the next into matter folded onto theirs
-constexpr float kOwnSearches = 4; ///< ... which is searched no more often than this in a frame
+constexpr float kOwnSearches = 4;   ///< ... which is searched no more often than this in a frame
+constexpr float kFoldReach = 0.1f; ///< spacings that points may go until the next search into matter folded onto theirs
 /// Of what another side may still move until it is searched; they share what a search finds out about bodies.
 constexpr float kSearchedAlong = 0.5f;
 constexpr float kLongestWay = 0.3f;      ///< spacings a substep that one body may go towards another
@@ -292,10 +291,8 @@ void MatterContacts::find_sides(std::span<const BodyState> bodies, double frame,
 }
 
 MatterContacts::Side MatterContacts::make_side(Index body, Index other, std::span<const BodyState> bodies) const {
-    Side side{.body = body,
-              .other = other,
-              .law = world_.contact_of(bodies[body].actor, bodies[other].actor),
-              .pairs = {}};
+    Side side{
+        .body = body, .other = other, .law = world_.contact_of(bodies[body].actor, bodies[other].actor), .pairs = {}};
     side.spacing = float(std::min(bodies[body].body->spacing(), bodies[other].body->spacing()));
     return side;
 }
