@@ -9,7 +9,7 @@ namespace filigree {
 
 namespace {
 
-constexpr std::size_t kRunsGrain = 64, kFoldsGrain = 256;
+constexpr std::size_t kRunsGrain = 64, kSurfaceCellsGrain = 256;
 constexpr float kBehind = 0.8f; ///< spacings that such cells may lie behind each other, along both normals together
 
 /// As Beside::fold_cosine; rest: their cosine at rest.
@@ -60,16 +60,16 @@ std::vector<Index> FoldedCells::find(const Vectors& positions, const RunContext&
     });
     const std::size_t count = surface_cells_.size();
     std::vector<Eigen::Vector4f> normals(count); // of surface cells alone, each in one load
-    parallel_for(context, count, kFoldsGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, count, kSurfaceCellsGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t a = begin; a < end; ++a) {
             const Index cell = surface_cells_[a];
             normals[a] = {turned.x[cell], turned.y[cell], turned.z[cell], 0};
         }
     });
-    std::vector<std::vector<Index>> parts((count + kFoldsGrain - 1) / kFoldsGrain);
+    std::vector<std::vector<Index>> parts((count + kSurfaceCellsGrain - 1) / kSurfaceCellsGrain);
     parallel_for(context, parts.size(), 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t part = begin; part < end; ++part)
-            for (std::size_t a = part * kFoldsGrain; a < std::min(count, (part + 1) * kFoldsGrain); ++a) {
+            for (std::size_t a = part * kSurfaceCellsGrain; a < std::min(count, (part + 1) * kSurfaceCellsGrain); ++a) {
                 const Eigen::Vector4f normal = normals[a];
                 const Beside* const last = beside_.data() + beside_offsets_[a + 1];
                 for (const Beside* beside = beside_.data() + beside_offsets_[a]; beside != last; ++beside) {
