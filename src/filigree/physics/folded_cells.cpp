@@ -9,76 +9,57 @@ namespace filigree {
 
 namespace {
 
-constexpr std::size_t kRunsGrain = 64, kSurfaceCellsGrain = 256;
+constexpr std::size_t kRunsGrain = 64, kNeighboursGrain = 1024;
 constexpr float kBehind = 0.8f; ///< spacings that such cells may lie behind each other, along both normals together
 
-/// As Beside::fold_cosine; rest: their cosine at rest.
+/// As Neighbours::fold_cosine; rest: their cosine at rest.
 float fold_cosine(float rest) { return 0.7f * rest - 0.5f; }
 
 } // namespace
 
 FoldedCells::FoldedCells(const Matter& matter) : matter_(matter) {
-    const std::size_t count = matter.body().cells.cells.size();
+    const Cells& cells = matter.body().cells;
     const BodySurface& surface = matter.body().surface;
-    rest_normals_ = Vectors(count);
-    std::vector<Index> number_of_cell(count, kNoIndex);
+    rest_normals_ = Vectors(cells.cells.size());
     for (Index s = 0; s < surface.points.size(); ++s) rest_normals_.add(matter.cell_of_point(s), surface.normals[s]);
-    for (Index cell = 0; cell < count; ++cell) {
+    for (Index cell = 0; cell < cells.cells.size(); ++cell) {
         const Vec3f normal = rest_normals_[cell];
-        const bool has_normal = normal.norm() > 0;
-        rest_normals_.set(cell, has_normal ? normal.normalized() : Vec3f::Zero());
-        if (!has_normal) continue;
-        number_of_cell[cell] = Index(surface_cells_.size());
-        surface_cells_.push_back(cell);
+        rest_normals_.set(cell, normal.norm() > 0 ? normal.normalized() : Vec3f::Zero());
     }
-    beside_offsets_.push_back(0);
-    for (const Index cell : surface_cells_) { // both sides of a thin part do not meet
-        const Vec3f normal = rest_normals_[cell];
-        matter.each_together(cell, [&](Index other, const Vec3f& way) {
-            const Vec3f other_normal = rest_normals_[other];
-            if (other <= cell || way.squaredNorm() > 1 || other_normal.isZero(0)) return;
-            if (Matter::are_sides_of_thin_part(normal, other_normal, way)) return;
+    for (Index one = 0; one < cells.cells.size(); ++one)
+        for (int axis = 0; axis < 3; ++axis) {
+            std::array<int, 3> at = {cells.cells[one][0], cells.cells[one][1], cells.cells[one][2]};
+            ++at[std::size_t(axis)];
+            const Index other = matter.cell_at(at[0], at[1], at[2]);
+            if (other == kNoIndex) continue;
+            const Vec3f normal = rest_normals_[one], other_normal = rest_normals_[other];
+            if (normal.isZero(0) || other_normal.isZero(0)) continue;
+            if (Matter::are_sides_of_thin_part(normal, other_normal, Vec3f::Unit(axis))) continue; // they do not meet
             const float most = fold_cosine(normal.dot(other_normal));
-            if (most > -1) beside_.push_back({number_of_cell[other], most});
-        });
-        beside_offsets_.push_back(Index(beside_.size()));
-    }
-}
-
-/// Of two surface cells whose normals have turned towards each other.
-bool FoldedCells::may_touch(const Vectors& positions, Index one, Index other, const Vec3f& turned) const {
-    const auto spacing = float(matter_.body().spacing());
-    const Vec3f way = matter_.mean({surface_cells_[other]}, positions) - matter_.mean({surface_cells_[one]}, positions);
-    return way.dot(turned) > -kBehind * spacing;
+            if (most > -1) neighbours_.push_back({one, other, most});
+        }
 }
 
 std::vector<Index> FoldedCells::find(const Vectors& positions, const RunContext& context) const {
     const std::span<const Cells::Run> runs = matter_.body().cells.runs;
-    Vectors turned(rest_normals_.size());
+    Vectors normals(rest_normals_.size());
     parallel_for(context, runs.size(), kRunsGrain, [&](std::size_t begin, std::size_t end) {
-        turn_cell_normals(runs.subspan(begin, end - begin), positions, rest_normals_, turned);
+        turn_cell_normals(runs.subspan(begin, end - begin), positions, rest_normals_, normals);
     });
-    const std::size_t count = surface_cells_.size();
-    std::vector<Eigen::Vector4f> normals(count); // of surface cells alone, each in one load
-    parallel_for(context, count, kSurfaceCellsGrain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t a = begin; a < end; ++a) {
-            const Index cell = surface_cells_[a];
-            normals[a] = {turned.x[cell], turned.y[cell], turned.z[cell], 0};
-        }
-    });
-    std::vector<std::vector<Index>> parts((count + kSurfaceCellsGrain - 1) / kSurfaceCellsGrain);
+    const float behind = kBehind * float(matter_.body().spacing());
+    const auto is_fold = [&](const Neighbours& cells) {
+        const Vec3f one = normals[cells.one], other = normals[cells.other];
+        if (!(one.dot(other) < cells.fold_cosine)) return false;
+        return (matter_.mean({cells.other}, positions) - matter_.mean({cells.one}, positions)).dot(one - other) >
+               -behind;
+    };
+    std::vector<std::vector<Index>> parts((neighbours_.size() + kNeighboursGrain - 1) / kNeighboursGrain);
     parallel_for(context, parts.size(), 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t part = begin; part < end; ++part)
-            for (std::size_t a = part * kSurfaceCellsGrain; a < std::min(count, (part + 1) * kSurfaceCellsGrain); ++a) {
-                const Eigen::Vector4f normal = normals[a];
-                const Beside* const last = beside_.data() + beside_offsets_[a + 1];
-                for (const Beside* beside = beside_.data() + beside_offsets_[a]; beside != last; ++beside) {
-                    const Index b = beside->other;
-                    if (normal.dot(normals[b]) < beside->fold_cosine &&
-                        may_touch(positions, Index(a), b, (normal - normals[b]).head<3>()))
-                        parts[part].insert(parts[part].end(), {surface_cells_[a], surface_cells_[b]});
-                }
-            }
+            for (std::size_t k = part * kNeighboursGrain;
+                 k < std::min(neighbours_.size(), (part + 1) * kNeighboursGrain); ++k)
+                if (is_fold(neighbours_[k]))
+                    parts[part].insert(parts[part].end(), {neighbours_[k].one, neighbours_[k].other});
     });
     std::vector<Index> folded;
     for (const std::vector<Index>& part : parts) folded.insert(folded.end(), part.begin(), part.end());

@@ -15,17 +15,14 @@ public:
     std::vector<Index> find(const Vectors& positions, const RunContext& context) const;
 
 private:
-    struct Beside {
-        Index other;       ///< number in surface_cells_, larger than the first's
+    struct Neighbours { ///< two surface cells that share a side
+        Index one, other;
         float fold_cosine; ///< between their normals: below it the surface may touch itself
     };
-    bool may_touch(const Vectors& positions, Index one, Index other, const Vec3f& turned) const;
 
     const Matter& matter_;
-    Vectors rest_normals_;              ///< of each cell: the mean of its points' normals, unit; zero without points
-    std::vector<Index> surface_cells_;  ///< those that have a normal, ascending
-    std::vector<Index> beside_offsets_; ///< of each of surface_cells_, and the end
-    std::vector<Beside> beside_;        ///< those that it may be folded onto
+    Vectors rest_normals_; ///< of each cell: the mean of its points' normals, unit; zero where it has none
+    std::vector<Neighbours> neighbours_;
 };
 
 } // namespace filigree
