@@ -5,6 +5,7 @@
 #include "filigree/mesh/normals.h"
 #include "filigree/mesh/shapes.h"
 #include "filigree/mesh/triangulate.h"
+#include "hierarchy/part_meshes.h"
 #include "threads.h"
 
 #include <gtest/gtest.h>
@@ -24,7 +25,7 @@ Bound bound(const Mesh& mesh, std::vector<Triangle> cells, const RunContext& con
     out.cells = std::move(cells);
     auto binding =
         bind_to_driver(mesh.positions, out.surface, vertex_normals(out.surface.triangles, mesh.positions, kOneThread),
-                       out.cells, context);
+                       out.cells, out.surface.triangles, context);
     EXPECT_TRUE(binding.ok());
     out.binding = std::move(*binding);
     EXPECT_EQ(out.binding.bonds.size(), mesh.vertex_count());
@@ -118,6 +119,58 @@ TEST(Bind, PartsWithoutADriverVertexAreReported) {
         EXPECT_LT((anchor(mesh, out, v) - mesh.positions[v].cast<double>()).norm(), 0.4) << v;
 }
 
+/// How far the bonds of vertices from `first` on are from them, at most.
+double furthest_bond(const Mesh& mesh, const Bound& bound, std::size_t first) {
+    double furthest = 0;
+    for (std::size_t v = first; v < mesh.vertex_count(); ++v)
+        furthest = std::max(furthest, (anchor(mesh, bound, v) - mesh.positions[v].cast<double>()).norm());
+    return furthest;
+}
+
+/// Half of a rivet's vertices face away from all of the surface below it.
+TEST(Bind, ARivetHangsOnTheSurfaceBelowItWhateverItFaces) {
+    Mesh mesh = make_ball(Vec3d::Zero(), 1);
+    const std::size_t ball = mesh.vertex_count();
+    const std::vector<Triangle> cells =
+        simplify(mesh.positions, triangulate(mesh).triangles, {.target_vertices = 400}, RunContext()).triangles;
+    for (const Vec3f& at : {Vec3f(0, 0, 1.015f), Vec3f(0.6f, -0.8f, 0), Vec3f(-0.577f, 0.577f, 0.6f)})
+        filigree_test::add_part(mesh, make_ball(Vec3d::Zero(), 1), 0.02f, at);
+    const Bound out = bound(mesh, cells);
+    EXPECT_EQ(out.binding.across_gap.size(), mesh.vertex_count() - ball);
+    EXPECT_LT(furthest_bond(mesh, out, ball), 0.06); // its size and its height, and what the driver cuts off the ball
+}
+
+/// A patch on the upper side of a plate that is thinner than the driver is exact.
+TEST(Bind, APatchOnAThinPlateHangsOnTheSideItLiesOn) {
+    Mesh mesh = thin_plate(0.004f, false);
+    const auto half = static_cast<Index>(mesh.vertex_count() / 2), plate = 2 * half;
+    const std::vector<Triangle> cells =
+        simplify(mesh.positions, triangulate(mesh).triangles, {.target_vertices = 60}, RunContext()).triangles;
+    const Mesh patch = make_wavy_plane({.resolution = 4, .amplitude = 0});
+    for (const Index at : {410u, 700u, 1230u}) // vertices of the upper side
+        filigree_test::add_part(mesh, patch, 0.01f, mesh.positions[at] + Vec3f(0, 0, 0.001f));
+    const Bound out = bound(mesh, cells);
+    std::size_t wrong = 0;
+    for (Index v = plate; v < mesh.vertex_count(); ++v) wrong += out.cells[out.binding.bonds[v].cell][0] >= half;
+    EXPECT_EQ(wrong, 0u);
+}
+
+/// A hose that touches a plane at one end only: the other end hangs on what it passes there.
+TEST(Bind, TheFarEndOfALongPartHangsOnWhatIsThere) {
+    Mesh mesh = make_wavy_plane({.resolution = 40, .amplitude = 0});
+    const std::vector<Triangle> cells =
+        simplify(mesh.positions, triangulate(mesh).triangles, {.target_vertices = 100}, RunContext()).triangles;
+    const std::size_t plane = mesh.vertex_count();
+    for (Index i = 0; i <= 60; ++i) // a ribbon that rises slowly
+        for (const float y : {-0.01f, 0.01f})
+            mesh.positions.emplace_back(-0.45f + 0.015f * float(i), y, 0.01f + 0.0005f * float(i));
+    for (Index i = 0; i < 60; ++i) {
+        const auto a = static_cast<Index>(plane + 2 * i);
+        mesh.add_face(std::array<Index, 4>{a, a + 2, a + 3, a + 1});
+    }
+    EXPECT_LT(furthest_bond(mesh, bound(mesh, cells), plane), 0.045);
+}
+
 TEST(Bind, WhatFacesTheOtherWayIsReported) {
     Mesh mesh; // a driver that faces up, and a flap at its corner that faces down
     mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {-0.2f, 0.1f, 0.1f}, {0.1f, -0.2f, 0.1f}};
@@ -152,9 +205,9 @@ TEST(Bind, CanBeCancelled) {
     const Bound bound = bound_to(mesh, 50);
     const RunContext cancelled(1);
     cancelled.cancel();
-    const auto binding =
-        bind_to_driver(mesh.positions, bound.surface,
-                       vertex_normals(bound.surface.triangles, mesh.positions, kOneThread), bound.cells, cancelled);
+    const auto binding = bind_to_driver(mesh.positions, bound.surface,
+                                        vertex_normals(bound.surface.triangles, mesh.positions, kOneThread),
+                                        bound.cells, bound.surface.triangles, cancelled);
     EXPECT_EQ(binding.error().code, ErrorCode::cancelled);
 }
 

@@ -6,6 +6,7 @@
 #include "filigree/mesh/shapes.h"
 #include "filigree/mesh/topology.h"
 #include "filigree/mesh/triangulate.h"
+#include "hierarchy/part_meshes.h"
 #include "threads.h"
 
 #include <cmath>
@@ -147,6 +148,29 @@ TEST(Simplify, FlatPartsKeepVerticesForTheSakeOfTheLongestEdge) {
         // A count that the bound leaves room for is met as without one.
         expect_near_target(simplified(mesh, {.target_vertices = 1000, .max_edge = kMost}).vertex_count, 1000);
     }
+}
+
+/// A smooth tube beside a wavy one costs no quadric error, and still keeps vertices along its length, in both stages.
+TEST(Simplify, StraightPartsAreNotLeftAsNeedles) {
+    const Mesh mesh = filigree_test::make_two_tubes(160, 150); // 48,320 vertices
+    for (const std::size_t target : {25'000u, 3'000u, 1'000u, 300u}) {
+        const Simplified result = simplified(mesh, {.target_vertices = target});
+        expect_near_target(result.vertex_count, target);
+        const double even = std::sqrt(2.6 / double(target)); // of the tubes' area, a vertex's share
+        EXPECT_LT(longest_edge(mesh, result), 10 * even) << target;
+    }
+}
+
+/// A spike's sides are so steep that their planes hardly see it go, and its area is nothing.
+TEST(Simplify, ThinTipsStay) {
+    Mesh mesh = make_wavy_plane({.resolution = 80, .amplitude = 0.01});
+    const std::vector<Index> tips = {1'000, 2'530, 5'011};
+    for (const Index tip : tips) mesh.positions[tip].z() += 0.12f;
+    const Simplified result = simplified(mesh, {.target_vertices = 300});
+    for (const Index tip : tips)
+        EXPECT_TRUE(std::ranges::any_of(result.triangles, [&](const Triangle& t) {
+            return std::ranges::find(t, tip) != t.end();
+        })) << tip;
 }
 
 TEST(Simplify, EdgesOfTheMeshMayBeLonger) {

@@ -107,6 +107,20 @@ TEST(Strip, ExtremeSizesComeBack) {
             }
 }
 
+/// A vertex that no face uses may be anywhere: it has a place, and the others keep their digits.
+TEST(Strip, AStrayVertexMayBeAnywhere) {
+    for (const float far : {1e30f, -3e38f, 1e7f}) {
+        std::vector<Vec3f> positions = kCorners;
+        for (Vec3f& p : positions) p *= 1e-10f;
+        positions.emplace_back(far, 0, 0);
+        const Mesh mesh = with_faces(positions, {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}});
+        const Model model = stripped(mesh).model;
+        const std::vector<Vec3f> back = restored(model, rest_pose(model));
+        for (std::size_t v = 0; v < 4; ++v) EXPECT_LT((back[v] - positions[v]).norm(), 1e-16f) << far << ' ' << v << ' ' << back[v].transpose();
+        EXPECT_NEAR(back[4].x() / far, 1, 1e-6) << far;
+    }
+}
+
 TEST(Strip, MillimetresAtHalfAThousandKilometres) {
     Mesh mesh = make_wavy_plane({.resolution = 64, .frequency = 20, .amplitude = 0.001}); // a metre, with waves of 1 mm
     const Mesh near = mesh;

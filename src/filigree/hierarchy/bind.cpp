@@ -100,10 +100,11 @@ std::vector<Index> nearest_driver_vertices(std::span<const Vec3f> positions, std
     return nearest_sources(positions, triangles, triangles_at_vertices(triangles, positions.size()), in_driver);
 }
 
-/// Bonds of the representatives by a walk from their source, the nearest driver vertex, or from the cell of the vertex
-/// they were removed beside; without either, a gap. corners: what cells are over.
+/// Bonds of the representatives by a walk from the driver vertex near them, or from the cell of the vertex they were
+/// removed beside. What faces where says nothing about loose parts: they lie on a side, and belong to none.
+/// corners: what cells are over.
 void walk_to_bonds(std::span<const Vec3f> corners, std::span<const Triangle> cells, std::span<const Vec3f> positions,
-                   std::span<const Vec3f> normals, std::span<const Index> representative, std::span<const Index> source,
+                   std::span<const Vec3f> normals, std::span<const Index> representative, const NearestDriver& nearest,
                    const RemovedVertices& removed, std::span<Bond> bonds, std::span<BondKind> kinds,
                    const RunContext& context) {
     const IndexLists around = triangles_at_vertices(cells, corners.size());
@@ -113,7 +114,7 @@ void walk_to_bonds(std::span<const Vec3f> corners, std::span<const Triangle> cel
     const auto start_of = [&](Index v) -> std::span<const Index> {
         const Index beside = removed.empty() ? kNoIndex : removed.nearest_left[v];
         if (beside != kNoIndex && bonds[beside].cell != kNoIndex) return cells[bonds[beside].cell];
-        if (source[v] != kNoIndex) return source.subspan(v, 1);
+        if (nearest.vertex[v] != kNoIndex) return std::span(nearest.vertex).subspan(v, 1);
         return {};
     };
     const auto walk_round = [&](std::uint8_t round) {
@@ -124,11 +125,11 @@ void walk_to_bonds(std::span<const Vec3f> corners, std::span<const Triangle> cel
                 if (representative[v] != v) continue;
                 if (!removed.empty() && removed.removed[v] != round) continue;
                 const std::span<const Index> start = start_of(Index(v));
-                if (start.empty()) {
-                    kinds[v] = BondKind::gap;
-                    continue;
-                }
-                const Walk::Found found = walk.closest(positions[v], normals[v], start);
+                const bool is_loose = start.empty() || nearest.loose(v);
+                if (is_loose) kinds[v] = BondKind::gap;
+                if (start.empty()) continue;
+                const Vec3f normal = is_loose ? Vec3f(Vec3f::Zero()) : normals[v];
+                const Walk::Found found = walk.closest(positions[v], normal, start);
                 bonds[v] = bond_at(found.point);
                 if (found.faces_away) kinds[v] = BondKind::away;
             }
@@ -138,22 +139,19 @@ void walk_to_bonds(std::span<const Vec3f> corners, std::span<const Triangle> cel
     for (std::uint8_t round = removed.rounds; round > 0; --round) walk_round(round);
 }
 
-/// Bonds of the gaps: the closest cell that faces the same way, else the closest.
-void bond_across_gaps(std::span<const Vec3f> corners, std::span<const Triangle> cells, std::span<const Vec3f> positions,
-                      std::span<const Vec3f> normals, std::span<const BondKind> kinds, std::span<Bond> bonds,
-                      const RunContext& context) {
-    if (std::find(kinds.begin(), kinds.end(), BondKind::gap) == kinds.end()) return;
-    std::optional<ClosestPointTree> built; // Embree builds on the threads of the arena it is called in
-    context.execute([&] { built.emplace(corners, cells); });
-    const ClosestPointTree& tree = *built;
+/// Bonds of what nothing is near, as in a mesh without triangles: the closest cell.
+void bind_to_closest(std::span<const Vec3f> corners, std::span<const Triangle> cells, std::span<const Vec3f> positions,
+                     std::span<const Index> representative, std::span<Bond> bonds, const RunContext& context) {
+    const auto is_unbound = [&](Index v) { return representative[v] == v && bonds[v].cell == kNoIndex; };
+    Index first = 0;
+    while (first < positions.size() && !is_unbound(first)) ++first;
+    if (first == positions.size()) return;
+    std::optional<ClosestPointTree> tree; // Embree builds on the threads of the arena it is called in
+    context.execute([&] { tree.emplace(corners, cells); });
     parallel_for(context, positions.size(), 1 << 12, [&](std::size_t begin, std::size_t end) {
         if (context.is_cancelled()) return;
-        for (std::size_t v = begin; v < end; ++v) {
-            if (kinds[v] != BondKind::gap) continue;
-            SurfacePoint point = tree.closest(positions[v], std::numeric_limits<double>::infinity(), normals[v]);
-            if (point.triangle == kNoIndex) point = tree.closest(positions[v]);
-            bonds[v] = bond_at(point);
-        }
+        for (Index v = Index(begin); v < end; ++v)
+            if (is_unbound(v)) bonds[v] = bond_at(tree->closest(positions[v]));
     });
 }
 
@@ -166,21 +164,23 @@ std::optional<Error> check_size(const Surface& surface, std::span<const Triangle
 } // namespace
 
 Result<Binding> bind_to_driver(std::span<const Vec3f> positions, const Surface& surface, std::span<const Vec3f> normals,
-                               std::span<const Triangle> cells, const RunContext& context) {
+                               std::span<const Triangle> cells, std::span<const Triangle> beside,
+                               const RunContext& context) {
     context.report("bind", 0);
     if (std::optional<Error> error = check_size(surface, cells)) return *error;
-    const std::vector<Index> source = nearest_driver_vertices(positions, surface.triangles, cells);
+    const NearestDriver nearest = hang_loose_parts(
+        positions, surface, beside, cells, nearest_driver_vertices(positions, surface.triangles, cells), context);
     if (context.is_cancelled()) return cancelled_error();
     context.report("bind", 0.4);
-    return bind_to_driver(positions, surface, normals, cells, source, {}, context);
+    return bind_to_driver(positions, surface, normals, cells, nearest, {}, context);
 }
 
 Result<Binding> bind_to_driver(std::span<const Vec3f> positions, const Surface& surface, std::span<const Vec3f> normals,
-                               std::span<const Triangle> cells, std::span<const Index> source,
+                               std::span<const Triangle> cells, const NearestDriver& nearest,
                                const RemovedVertices& removed, const RunContext& context) {
     if (std::optional<Error> error = check_size(surface, cells)) return *error;
     PlaceBonds bound =
-        bind_places(positions, cells, positions, normals, surface.representative, source, removed, context);
+        bind_places(positions, cells, positions, normals, surface.representative, nearest, removed, context);
     if (context.is_cancelled()) return cancelled_error();
     Binding binding = binding_of(std::move(bound), surface.representative);
     context.report("bind", 1);
@@ -189,14 +189,14 @@ Result<Binding> bind_to_driver(std::span<const Vec3f> positions, const Surface& 
 
 PlaceBonds bind_places(std::span<const Vec3f> corners, std::span<const Triangle> cells,
                        std::span<const Vec3f> positions, std::span<const Vec3f> normals,
-                       std::span<const Index> representative, std::span<const Index> source,
+                       std::span<const Index> representative, const NearestDriver& nearest,
                        const RemovedVertices& removed, const RunContext& context) {
     PlaceBonds bound{.bonds = std::vector<Bond>(positions.size()),
                      .kinds = std::vector<BondKind>(positions.size(), BondKind::good)};
-    walk_to_bonds(corners, cells, positions, normals, representative, source, removed, bound.bonds, bound.kinds,
+    walk_to_bonds(corners, cells, positions, normals, representative, nearest, removed, bound.bonds, bound.kinds,
                   context);
     if (context.is_cancelled()) return bound;
-    bond_across_gaps(corners, cells, positions, normals, bound.kinds, bound.bonds, context);
+    bind_to_closest(corners, cells, positions, representative, bound.bonds, context);
     return bound;
 }
 

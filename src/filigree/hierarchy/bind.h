@@ -2,6 +2,7 @@
 #pragma once
 
 #include "filigree/core/run_context.h"
+#include "filigree/hierarchy/loose_parts.h"
 #include "filigree/mesh/surface.h"
 
 namespace filigree {
@@ -23,8 +24,8 @@ struct RemovedVertices {
 /// A bond a vertex, and what could not be bound the good way.
 struct Binding {
     std::vector<Bond> bonds;
-    /// Not connected along the surface to any driver vertex (a dropped part, a loose vertex): bound to the closest
-    /// driver triangle across the gap. Ascending vertex ids.
+    /// Not connected along the surface to any driver vertex (a loose part, a loose vertex): bound across the gap to the
+    /// driver below the surface beside it, see hang_loose_parts. Ascending vertex ids.
     std::vector<Index> across_gap;
     /// No triangle nearby along the surface faces the same way; bound to one that does not and is much closer.
     /// Ascending.
@@ -35,15 +36,16 @@ struct Binding {
 /// same way: labels spread from the driver's vertices over the mesh's edges, then each vertex walks from its label's
 /// triangles downhill to the closest one. Plain closest points would take the other side of thin parts.
 /// positions: V points; surface: over them; normals: V, unit or zero; cells: driver triangles over representatives (at
-/// least one). A vertex gets its representative's bond. Cost O(V log V); same bytes for any thread count.
-/// Errors: unsuitable (more than kMostListedTriangles), cancelled.
+/// least one); beside: the surface's triangles that loose parts may hang on. A vertex gets its representative's bond.
+/// Cost O(V log V); same bytes for any thread count. Errors: unsuitable (more than kMostListedTriangles), cancelled.
 Result<Binding> bind_to_driver(std::span<const Vec3f> positions, const Surface& surface, std::span<const Vec3f> normals,
-                               std::span<const Triangle> cells, const RunContext& context);
+                               std::span<const Triangle> cells, std::span<const Triangle> beside,
+                               const RunContext& context);
 
-/// The same with what is nearest to each vertex along the surface already known: source, V, a vertex of a cell or
-/// kNoIndex. A vertex that was removed walks from the cell of the one it hangs near. removed: of V vertices, or empty.
+/// The same with what is nearest to each vertex already known: vertices of cells. A vertex that was removed walks from
+/// the cell of the one it hangs near. removed: of V vertices, or empty.
 Result<Binding> bind_to_driver(std::span<const Vec3f> positions, const Surface& surface, std::span<const Vec3f> normals,
-                               std::span<const Triangle> cells, std::span<const Index> source,
+                               std::span<const Triangle> cells, const NearestDriver& nearest,
                                const RemovedVertices& removed, const RunContext& context);
 
 /// How well a vertex could be bound; see Binding.
@@ -55,11 +57,11 @@ struct PlaceBonds {
 };
 
 /// The bonds of representatives, as above; the other vertices have none yet. corners: positions of the cells' own
-/// vertices. source: one of those, or kNoIndex. Cancelled: half of it. So some vertices can be bound without the
-/// others, if those that they hang near are among them.
+/// vertices; nearest: some of those. A vertex that nothing is near is bound to the closest cell. Cancelled: half of it.
+/// So some vertices can be bound without the others, if those that they hang near are among them.
 PlaceBonds bind_places(std::span<const Vec3f> corners, std::span<const Triangle> cells,
                        std::span<const Vec3f> positions, std::span<const Vec3f> normals,
-                       std::span<const Index> representative, std::span<const Index> source,
+                       std::span<const Index> representative, const NearestDriver& nearest,
                        const RemovedVertices& removed, const RunContext& context);
 
 /// All vertices bound as their representatives are. Cost O(V).

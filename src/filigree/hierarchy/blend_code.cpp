@@ -109,6 +109,17 @@ struct BlendRestorer::Content {
 
 namespace {
 
+/// A power of two that keeps a driver's digits: both it and its inverse are floats, and so is what lies far from the
+/// driver, as a vertex that no face uses may. Lengths in model units.
+double scale_inside(double driver, double all) {
+    constexpr double kSmall = 1e-15, kLarge = 1e15, kLargest = 1e30;
+    const double size = driver > 0 ? driver : all;
+    if (!(size > 0) || (size >= kSmall && size <= kLarge && all <= kLargest)) return 1;
+    const double wanted = std::round(std::log2(size));
+    const double least = std::ceil(std::log2(all / kLargest));
+    return std::exp2(-std::min(std::max(wanted, least), 127.0));
+}
+
 struct WantedRecord {
     Index cell, record, item;
 };
@@ -150,12 +161,10 @@ BlendRestorer::~BlendRestorer() = default;
 BlendRestorer::BlendRestorer(const BlendDetail& detail, std::span<const Vec3f> positions, std::span<const Index> driver,
                              std::span<const Item> items, std::span<const Vec3f> normals)
     : content_(std::make_unique<Content>()) {
-    const double diagonal = bounds(positions).diagonal();
     Box box; // the driver's, which files of either precision keep to the bit
     for (Index v : driver) box.extend(positions[v].cast<double>());
     const Vec3d centre = box.centre();
-    if (diagonal > 0 && (diagonal < 1e-15 || diagonal > 1e15)) // the inverse has to be a float
-        content_->scale = std::exp2(-std::min(std::round(std::log2(diagonal)), 127.0));
+    content_->scale = scale_inside(box.diagonal(), bounds(positions).diagonal());
     const double scale = content_->scale;
     for (Index v : driver) content_->rest.push_back(scale * (positions[v].cast<double>() - centre));
 

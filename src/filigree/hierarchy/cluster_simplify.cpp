@@ -4,6 +4,7 @@
 #include "filigree/core/parallel_for.h"
 #include "filigree/hierarchy/morton_order.h"
 #include "filigree/hierarchy/nearest_sources.h"
+#include "filigree/hierarchy/roughen.h"
 
 #include <algorithm>
 #include <array>
@@ -188,21 +189,26 @@ public:
     }
 
 private:
-    /// meshoptimizer 0.18 locks vertices of which there are three at one place; those it is given twice more are in no
-    /// triangle.
+    /// What meshoptimizer sees. Version 0.18 locks a vertex of which there are three at one place; those it is given
+    /// twice more are in no triangle.
+    std::vector<Vec3f> rough_places(std::span<const Triangle> triangles) const {
+        std::vector<Vec3f> places = roughened(mesh_.positions, triangles, mesh_.vertices, mesh_.locked);
+        for (Index v = 0; v < mesh_.vertices.size(); ++v)
+            if (mesh_.locked[v]) places.insert(places.end(), 2, mesh_.positions[v]);
+        return places;
+    }
+
     void collapse(double share, double max_error, double& error, std::vector<Triangle>& left) {
         const std::size_t count = mesh_.vertices.size();
-        std::vector<Vec3f> places = mesh_.positions;
-        for (Index v = 0; v < count; ++v)
-            if (mesh_.locked[v]) places.insert(places.end(), 2, mesh_.positions[v]);
-        const double longest = bounds(places).size().maxCoeff();
-        if (!(longest > 0)) return;
-        const auto limit = static_cast<float>(std::min(max_error / longest, 1e6));
         const double wanted = share * double(free_count_) + double(locked_count());
         std::size_t now = count;
         std::vector<Triangle> out(left.size());
         constexpr double kNear = 1.02;
         for (int call = 0; call < 4 && double(now) > kNear * wanted; ++call) {
+            const std::vector<Vec3f> places = rough_places(left);
+            const double longest = bounds(places).size().maxCoeff();
+            if (!(longest > 0)) return;
+            const auto limit = static_cast<float>(std::min(max_error / longest, 1e6));
             float relative = 0;
             const std::size_t target = triangles_of(left.size(), now, wanted);
             const std::size_t indices =

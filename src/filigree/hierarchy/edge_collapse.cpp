@@ -1,6 +1,13 @@
 // Based on: quadric error metrics [Garland 1997], half-edge form. Where we differ: quadrics are weighted by area, and
 // nothing is forbidden, only priced, so that every mesh can be brought to any count.
 //
+// Three prices beside the quadric's, as the restored mesh is only as good as its worst place:
+// - length: a collapse costs the square of its length, so that flat parts keep vertices too;
+// - a least area: a thin tip has hardly any, and would go for nothing;
+// - height: planes of steep sides pass near a tip's axis, and their quadric does not see the tip go. So each vertex
+//   remembers the point that stands out most of those merged into it, and a collapse whose turn has come is priced
+//   again by how far that point will be from the triangles left.
+//
 // Hubs, vertices of very many triangles (the middle of a fan), would make it quadratic: every collapse next to one
 // would look at all of them. So removed triangles stay in the lists until these are half empty, what two vertices share
 // is looked for at the one with fewer triangles, and a collapse into a hub prices only what it changed. The hub's other
@@ -8,6 +15,7 @@
 // never too late.
 #include "filigree/hierarchy/edge_collapse.h"
 
+#include "filigree/mesh/closest_point.h"
 #include "filigree/mesh/quadric.h"
 
 #include <algorithm>
@@ -24,8 +32,13 @@ namespace {
 constexpr double kBorderWeight = 1; // of the planes that stand on open edges, so that outlines keep their shape
 constexpr double kLengthWeight =
     0.02; // of (edge length)^2 x area: spreads vertices evenly; 0.001 and 0.1 restore 1.3 to 2 times worse
-constexpr double kMinCosine = 0.2;       // a triangle that turns further than this in a collapse counts as turned over
-constexpr std::size_t kHub = 1024;       // triangles at a vertex from which it counts as a hub
+constexpr double kLeastArea = 0.2; // what merges counts as this large at least, in mean areas of the driver's vertices
+constexpr std::size_t kMostTakenDown = 32; // vertices a vertex that is left, as far as mean areas go
+constexpr double kHeightWeight = 0.3;      // of (height of what stands out)^2 x area
+constexpr double kFarthestPoint = 3;       // times the largest error: how far off a single point may be left
+constexpr double kTellingHeight = 0.2; // a height that makes a collapse dearer by less than this share changes no order
+constexpr double kMinCosine = 0.2;     // a triangle that turns further than this in a collapse counts as turned over
+constexpr std::size_t kHub = 1024;     // triangles at a vertex from which it counts as a hub
 constexpr std::size_t kFewTriangles = 8; // a list this long is no trouble even when all of it is gone
 constexpr double kHubSlack =
     1.5; // an edge of a hub may have become this much dearer since it was priced: 1.2 in distance
@@ -36,6 +49,7 @@ struct Collapse {
     Index from, to;
     Index stamp; ///< of both ends together when it was priced; older entries are void
     bool forced;
+    bool has_height = false; ///< whether the height is in the cost
 
     bool operator>(const Collapse& other) const {
         if (cost != other.cost) return cost > other.cost;
@@ -74,6 +88,7 @@ public:
         for (Index t = 0; t < triangles_.size(); ++t)
             for (Index v : triangles_[t]) around_[v].add(t);
         stamp_.assign(points_.size(), 0);
+        stands_out_.assign(points_.size(), kNoIndex);
         was_hub_.assign(points_.size(), false);
         vertex_count_ = points_.size();
         triangle_count_ = triangles_.size();
@@ -81,6 +96,7 @@ public:
     }
 
     void run(const EdgeCollapseOptions& options, const RunContext& context) {
+        set_least_area(options.target_vertices);
         for (Index v = 0; v < points_.size(); ++v) {
             const std::vector<Index> neighbours = neighbours_of(v);
             for (Index w : neighbours) price(v, w);
@@ -95,6 +111,7 @@ public:
                 queue_.push(forced(next));
                 continue;
             }
+            if (waits_for_height(next, options.max_error)) continue;
             const double area = quadrics_[next.from].area + quadrics_[next.to].area;
             const double distance = area > 0 ? std::sqrt(next.error / area) : 0;
             if (options.max_error && distance > *options.max_error) break;
@@ -165,9 +182,12 @@ private:
     Collapse priced(Index from, Index to) const {
         const double along = (points_[to] - points_[from]).squaredNorm();
         const double error = quadrics_[from].at(points_[to]) + quadrics_[to].at(points_[to]);
-        const double cost = error + kLengthWeight * along * quadrics_[from].area;
+        const double area = quadrics_[from].area + quadrics_[to].area;
+        const double counted = area > 0 ? error * std::max(1.0, least_area_ / area) : error;
+        const double cost = counted + kLengthWeight * along * counted_area(from);
         return {cost, error, from, to, stamp_of(from, to), false};
     }
+    double counted_area(Index v) const { return std::max(quadrics_[v].area, least_area_); }
     void price(Index from, Index to) { queue_.push(priced(from, to)); }
 
     /// An entry with an old stamp is void, for whatever changed its ends has priced the edge again; but not all edges
@@ -181,6 +201,66 @@ private:
         next = now;
         if (!is_due) queue_.push(now);
         return is_due;
+    }
+
+    void set_least_area(std::size_t target) {
+        double area = 0;
+        for (const Quadric& quadric : quadrics_) area += quadric.area;
+        const std::size_t left = std::max({target, points_.size() / kMostTakenDown, std::size_t{3}});
+        least_area_ = kLeastArea * area / double(left);
+    }
+
+    /// Whether a collapse waits again, as it loses more height than it was priced for, or is dropped, as with a largest
+    /// error a point would be left too far off; it comes back when one of its ends is priced again.
+    bool waits_for_height(Collapse& collapse, const std::optional<double>& max_error) {
+        if (collapse.forced || collapse.has_height || is_hub(collapse.from) || is_hub(collapse.to)) return false;
+        const auto [from, to] = std::pair(collapse.from, collapse.to);
+        double height = squared_height(from, from, to);
+        if (stands_out_[from] != kNoIndex) height = std::max(height, squared_height(stands_out_[from], from, to));
+        if (max_error && height > kFarthestPoint * kFarthestPoint * *max_error * *max_error) return true;
+        const double loss = kHeightWeight * height * counted_area(from);
+        if (loss <= kTellingHeight * collapse.cost) return false;
+        collapse.cost += loss;
+        collapse.has_height = true;
+        queue_.push(collapse);
+        return true;
+    }
+
+    /// Of a point from the triangles that are at `to` once `from` has gone there. from: kNoIndex when it has.
+    double squared_height(Index point, Index from, Index to) const {
+        const Vec3f p = points_[point].cast<float>();
+        double least = std::numeric_limits<double>::infinity();
+        const auto look_at = [&](const Triangle& t) {
+            const SurfacePoint closest = closest_point_on_triangle(
+                p, points_[t[0]].cast<float>(), points_[t[1]].cast<float>(), points_[t[2]].cast<float>());
+            least = std::min(least, closest.distance * closest.distance);
+        };
+        for (const Index t : around_[to].all)
+            if (is_left(t) && (from == kNoIndex || !has(triangles_[t], from))) look_at(triangles_[t]);
+        if (from != kNoIndex)
+            for (const Index t : around_[from].all) {
+                Triangle moved = triangles_[t];
+                if (!is_left(t) || has(moved, to)) continue;
+                std::ranges::replace(moved, from, to);
+                look_at(moved);
+            }
+        return std::isfinite(least) ? least : 0;
+    }
+
+    /// Of what was merged into `to`, now that `from` was too, the point that stands out most.
+    void remember_height(Index from, Index to) {
+        if (is_hub(to)) return;
+        double most = -1;
+        Index highest = kNoIndex;
+        for (const Index point : {from, stands_out_[from], stands_out_[to]}) {
+            if (point == kNoIndex) continue;
+            const double height = squared_height(point, kNoIndex, to);
+            if (height > most) {
+                most = height;
+                highest = point;
+            }
+        }
+        stands_out_[to] = highest;
     }
 
     /// What a collapse that is not clean is taken to lose: everything around `from`, moved by the edge's length.
@@ -264,6 +344,7 @@ private:
         }
         around_[from] = {};
         quadrics_[to] += quadrics_[from];
+        remember_height(from, to);
         ++stamp_[from];
         ++stamp_[to];
         const std::vector<Index> changed = is_hub(to) ? other_corners(moved, to) : std::vector<Index>{};
@@ -335,6 +416,8 @@ private:
     std::vector<Triangle> triangles_; ///< removed: kNoIndex
     std::vector<TriangleList> around_;
     std::vector<Quadric> quadrics_;
+    double least_area_ = 0;
+    std::vector<Index> stands_out_; ///< of what was merged into each vertex, the point that stands out most
     std::vector<Index> stamp_;
     std::vector<bool> was_hub_; ///< whether a collapse into it left edges that are not priced again
     std::priority_queue<Collapse, std::vector<Collapse>, std::greater<>> queue_;

@@ -5,6 +5,7 @@
 #include "filigree/hierarchy/simplify.h"
 
 #include "filigree/hierarchy/edge_collapse.h"
+#include "filigree/hierarchy/roughen.h"
 
 #include <algorithm>
 #include <utility>
@@ -56,13 +57,14 @@ std::vector<std::pair<Index, Index>> long_edges(std::span<const Vec3f> positions
 /// One call of meshoptimizer that leaves about `ratio` of the triangles; false when it could not go on.
 bool collapse_bulk(std::span<const Vec3f> positions, double ratio, double max_error, Simplified& current) {
     if (largest_fan(current.triangles, positions.size()) > kLargestBulkFan) return false;
-    const double longest_side = bounds(positions).size().maxCoeff();
+    const std::vector<Vec3f> rough = roughened(positions, current.triangles);
+    const double longest_side = bounds(rough).size().maxCoeff();
     std::vector<Triangle> out(current.triangles.size());
     float relative_error = 0; // to the longest side
     const auto target = static_cast<std::size_t>(double(current.triangles.size()) * ratio);
     const std::size_t indices =
         meshopt_simplify(out.data()->data(), current.triangles.data()->data(), current.triangles.size() * 3,
-                         positions.data()->data(), positions.size(), sizeof(Vec3f), target * 3,
+                         rough.data()->data(), rough.size(), sizeof(Vec3f), target * 3,
                          static_cast<float>(std::min(max_error / longest_side, 1e6)), 0, &relative_error);
     if (indices == 0 || indices / 3 == current.triangles.size()) return false;
     out.resize(indices / 3);

@@ -13,6 +13,7 @@ namespace filigree {
 
 namespace {
 
+constexpr double kFarthest = 1e15; // what no face uses may lie further off; its square has to be a float
 constexpr double kLevelFactor = 4; // vertices of a level as a multiple of the next coarser one's, as in subdivision
 
 std::size_t default_base(std::size_t vertices) {
@@ -212,7 +213,10 @@ Result<WorkingMesh> make_working_mesh(const Mesh& mesh, const RunContext& contex
     const double scale = diagonal > 0 ? 1 / diagonal : 1;
     work.positions.resize(mesh.vertex_count());
     for (std::size_t v = 0; v < mesh.vertex_count(); ++v)
-        work.positions[v] = (scale * (mesh.positions[v].cast<double>() - box.centre())).cast<float>();
+        work.positions[v] = (scale * (mesh.positions[v].cast<double>() - box.centre()))
+                                .cwiseMin(kFarthest)
+                                .cwiseMax(-kFarthest)
+                                .cast<float>();
     Result<Surface> surface = make_surface(mesh, context);
     if (!surface) return surface.error();
     work.surface = std::move(*surface);
@@ -275,8 +279,26 @@ std::vector<Triangle> driver_cells(const Level& driver) {
     return cells;
 }
 
-std::vector<Index> nearest_driver_vertices(const WorkingMesh& work, const SimplifiedLevels& simplified,
-                                           const RunContext& context) {
+namespace {
+
+/// Loose parts look for a place on the mesh itself, or on a level where it has more triangles than these: the tree over
+/// them takes about 150 bytes each.
+constexpr std::size_t kMostBeside = std::size_t{1} << 20;
+
+/// The triangles of the finest level that is small enough, over the mesh's vertices.
+std::vector<Triangle> triangles_beside(const WorkingMesh& work, const SimplifiedLevels& simplified) {
+    if (work.surface.triangles.size() <= kMostBeside) return work.surface.triangles;
+    const auto& levels = simplified.levels;
+    std::size_t k = levels.size() - 1;
+    while (k > 0 && levels[k].face_count() > kMostBeside) --k;
+    std::vector<Triangle> triangles;
+    for (const Triangle& t : driver_cells(levels[k]))
+        triangles.push_back({levels[k].vertices[t[0]], levels[k].vertices[t[1]], levels[k].vertices[t[2]]});
+    return triangles;
+}
+
+std::vector<Index> nearest_along_surface(const WorkingMesh& work, const SimplifiedLevels& simplified,
+                                         const RunContext& context) {
     std::span<const Triangle> triangles = work.surface.triangles;
     const std::vector<Index>& driver = simplified.levels.front().vertices;
     if (simplified.removed.empty()) return nearest_of(work.positions, triangles, driver);
@@ -301,6 +323,21 @@ std::vector<Index> nearest_driver_vertices(const WorkingMesh& work, const Simpli
     });
     spread_to_rest(work, result);
     return result;
+}
+
+} // namespace
+
+NearestDriver nearest_driver_vertices(const WorkingMesh& work, const SimplifiedLevels& simplified,
+                                      const RunContext& context) {
+    std::vector<Index> source = nearest_along_surface(work, simplified, context);
+    const Level& driver = simplified.levels.front();
+    std::vector<Triangle> cells = driver_cells(driver);
+    for (Triangle& cell : cells)
+        for (Index& v : cell) v = driver.vertices[v];
+    const bool has_loose = std::ranges::find(source, kNoIndex) != source.end();
+    return hang_loose_parts(work.positions, work.surface,
+                            has_loose ? triangles_beside(work, simplified) : std::vector<Triangle>(), cells,
+                            std::move(source), context);
 }
 
 } // namespace filigree

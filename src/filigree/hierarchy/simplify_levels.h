@@ -60,10 +60,10 @@ struct NextRound {
 };
 std::optional<NextRound> next_round(std::size_t places, const StripOptions& options, std::span<const RoundLeft> made);
 
-/// The driver's vertex nearest to each of the mesh's along the surface, kNoIndex where there is none. What clusters
-/// took away follows what they left. Cost O(V).
-std::vector<Index> nearest_driver_vertices(const WorkingMesh& work, const SimplifiedLevels& simplified,
-                                           const RunContext& context);
+/// The driver's vertex nearest to each of the mesh's along the surface; loose parts hang on the surface beside them.
+/// What clusters took away follows what they left. Cost as of hang_loose_parts.
+NearestDriver nearest_driver_vertices(const WorkingMesh& work, const SimplifiedLevels& simplified,
+                                      const RunContext& context);
 
 /// A driver's cells: three of its vertices each, or one where it has no faces.
 std::vector<Triangle> driver_cells(const Level& driver);

@@ -108,8 +108,8 @@ Result<Stripped> strip_blend(Mesh mesh, const StripOptions& options, const RunCo
 
     const double bind_start = now_seconds();
     Cells cells = make_cells(levels.front());
-    const std::vector<Index> source = nearest_driver_vertices(*work, simplified, context);
-    Result<Binding> binding = bind_to_driver(work->positions, work->surface, work->normals, cells.global, source,
+    const NearestDriver nearest = nearest_driver_vertices(*work, simplified, context);
+    Result<Binding> binding = bind_to_driver(work->positions, work->surface, work->normals, cells.global, nearest,
                                              simplified.removed, context);
     if (!binding) return binding.error();
     result.report.across_gap = binding->across_gap.size();
@@ -213,12 +213,13 @@ Result<Stripped> strip_to_driver(Mesh mesh, const Mesh& driver, Precision precis
     for (std::size_t i = 0; i < driver.vertex_count(); ++i)
         work->surface.representative[own + i] = static_cast<Index>(own + driver_surface->representative[i]);
     std::copy(driver_normals.begin(), driver_normals.end(), work->normals.begin() + static_cast<std::ptrdiff_t>(own));
-    const std::vector<Triangle> links = link_driver(*work, own, context);
+    const std::vector<Triangle> links = link_driver(*work, own, context), beside = work->surface.triangles;
     work->surface.triangles.insert(work->surface.triangles.end(), links.begin(), links.end());
 
     Level level = make_driver_level(own, driver.vertex_count(), driver_surface->triangles);
     Cells cells = make_cells(level);
-    Result<Binding> binding = bind_to_driver(work->positions, work->surface, work->normals, cells.global, context);
+    Result<Binding> binding =
+        bind_to_driver(work->positions, work->surface, work->normals, cells.global, beside, context);
     if (!binding) return binding.error();
     const auto drop_drivers = [own](std::vector<Index>& ids) {
         ids.erase(std::lower_bound(ids.begin(), ids.end(), own), ids.end());
@@ -245,7 +246,8 @@ Result<Model> bind_to_own_driver(Mesh mesh, Level driver, Precision precision, c
     std::vector<Triangle> over_places = cells.global; // a driver's vertex may lie where an earlier one does
     for (Triangle& cell : over_places)
         for (Index& v : cell) v = work->surface.representative[v];
-    const Result<Binding> binding = bind_to_driver(work->positions, work->surface, work->normals, over_places, context);
+    const Result<Binding> binding =
+        bind_to_driver(work->positions, work->surface, work->normals, over_places, work->surface.triangles, context);
     if (!binding) return binding.error();
     Model model;
     model.detail = encode_blend(mesh.positions, driver.vertices, std::move(cells.local), *binding, precision);

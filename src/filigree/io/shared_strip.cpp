@@ -44,7 +44,7 @@ enum { counts, error, triangles, removed }; // counts: vertices, whether there a
 }
 namespace finish_file {
 // counts: rounds, levels. Of each level three arrays from `levels` on.
-enum { counts, corners, cells, nearest_left, removed, source, levels };
+enum { counts, corners, cells, nearest_left, removed, source, is_loose, levels };
 } // namespace finish_file
 namespace bound_file {
 enum { bonds, kinds };
@@ -328,8 +328,9 @@ private:
             simplify_levels(work, strip_.options, made_rounds(round, work.positions.size()), context_);
         stop_if_cancelled();
         const Level& driver = simplified.levels.front();
-        std::vector<Index> source = nearest_driver_vertices(work, simplified, context_);
-        for (Index& v : source)
+        NearestDriver nearest = nearest_driver_vertices(work, simplified, context_);
+        nearest.is_loose.resize(nearest.vertex.size(), 0);
+        for (Index& v : nearest.vertex)
             if (v != kNoIndex) v = Index(std::ranges::lower_bound(driver.vertices, v) - driver.vertices.begin());
         std::vector<Vec3f> corners;
         for (const Index v : driver.vertices) corners.push_back(work.positions[v]);
@@ -337,7 +338,10 @@ private:
         const StripCounts counts{simplified.removed.rounds, simplified.levels.size()};
         ArrayFile out;
         out.add(counts).add(corners).add(cells);
-        out.add(simplified.removed.nearest_left).add(simplified.removed.removed).add(source);
+        out.add(simplified.removed.nearest_left)
+            .add(simplified.removed.removed)
+            .add(nearest.vertex)
+            .add(nearest.is_loose);
         for (const Level& level : simplified.levels) out.add(level.vertices).add(level.face_offsets).add(level.corners);
         save("finish", out);
     }
@@ -363,10 +367,12 @@ private:
                 if (to != kNoIndex) to = own.local(to);
         }
         const std::vector<Vec3f> corners = finish.read<Vec3f>(finish_file::corners).value();
-        PlaceBonds bound =
-            bind_places(corners, finish.read<Triangle>(finish_file::cells).value(),
-                        own.values<Vec3f>(mesh, mesh_file::positions), own.values<Vec3f>(mesh, mesh_file::normals),
-                        representative, own.values<Index>(finish, finish_file::source), removed, context_);
+        PlaceBonds bound = bind_places(corners, finish.read<Triangle>(finish_file::cells).value(),
+                                       own.values<Vec3f>(mesh, mesh_file::positions),
+                                       own.values<Vec3f>(mesh, mesh_file::normals), representative,
+                                       {.vertex = own.values<Index>(finish, finish_file::source),
+                                        .is_loose = own.values<std::uint8_t>(finish, finish_file::is_loose)},
+                                       removed, context_);
         stop_if_cancelled();
         bound.bonds.resize(count);
         bound.kinds.resize(count);
