@@ -47,5 +47,7 @@ inline filigree::Mesh moved_from() {
         }                                                                                                              \
         const auto of_moved = (call)(moved_from()), of_empty = (call)(filigree::Mesh());                               \
         ASSERT_EQ(of_moved.ok(), of_empty.ok());                                                                       \
-        if (!of_moved.ok()) EXPECT_EQ(of_moved.error().message, of_empty.error().message);                             \
+        if (!of_moved.ok()) {                                                                                          \
+            EXPECT_EQ(of_moved.error().message, of_empty.error().message);                                             \
+        }                                                                                                              \
     } while (false)
