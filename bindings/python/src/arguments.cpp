@@ -27,6 +27,7 @@ struct Signature {
     std::string function;
     std::vector<Parameter> parameters;
     bool takes_any_positional = false, takes_any_named = false, has_overloads = false;
+    bool makes_object = false; ///< what is given begins with the object, which is no parameter
 
     const Parameter* find(std::string_view name) const {
         const auto found = std::ranges::find(parameters, name, &Parameter::name);
@@ -90,7 +91,11 @@ std::optional<Signature> signature_of(std::string_view message) {
     signature.has_overloads = message.find("\n    2. ") != kNone;
     const std::size_t begin = first + 8, open = message.find('(', begin);
     if (open == kNone) return std::nullopt;
-    if (open > begin) signature.function = message.substr(begin, open - begin); // a class and what it is made of
+    if (open > begin) { // a class and what it is made of
+        signature.function = message.substr(begin, open - begin);
+        signature.function.erase(0, signature.function.rfind('.') + 1);
+        signature.makes_object = true;
+    }
     const std::size_t close = end_of_part(message, open + 1, ")");
     bool by_name_only = false;
     for (std::size_t at = open + 1; at < close;) {
@@ -250,7 +255,8 @@ void mend_error(PyObject* args, PyObject* kwargs) {
     const std::string message = py::str(kept.value);
     const std::optional<Signature> signature = signature_of(message);
     if (!signature) return;
-    const py::tuple positional = py::reinterpret_borrow<py::tuple>(args);
+    const py::tuple positional = py::reinterpret_steal<py::tuple>(
+        PyTuple_GetSlice(args, signature->makes_object ? 1 : 0, PyTuple_GET_SIZE(args)));
     const py::dict named = kwargs ? py::reinterpret_borrow<py::dict>(kwargs) : py::dict();
     const py::str sentence(sentence_for(*signature, positional, named));
     Py_XDECREF(kept.value);
@@ -295,17 +301,6 @@ void mend_class(py::handle of, const py::object& reduce) {
     }
 }
 
-newfunc make_pybind11_object = nullptr;
-
-/// The base of all classes has nothing to be made of; without this the interpreter would abort.
-PyObject* make_object(PyTypeObject* type, PyObject* args, PyObject* kwargs) {
-    if (py::detail::all_type_info(type).empty()) {
-        PyErr_Format(PyExc_TypeError, "%s has no objects of its own.", type->tp_name);
-        return nullptr;
-    }
-    return make_pybind11_object(type, args, kwargs);
-}
-
 } // namespace
 
 void mend_calls(py::module_& m) {
@@ -316,11 +311,6 @@ void mend_calls(py::module_& m) {
              py::module_::import("builtins").attr("__dict__"), names);
     const py::object reduce = names["__reduce_ex__"];
     auto* const base = reinterpret_cast<PyTypeObject*>(py::detail::get_internals().instance_base);
-    if (base->tp_new != &make_object) {
-        make_pybind11_object = base->tp_new;
-        base->tp_new = &make_object;
-        PyType_Modified(base);
-    }
     for (const auto& [name, member] : py::dict(m.attr("__dict__"))) {
         const bool is_class = PyType_Check(member.ptr()) && PyType_IsSubtype((PyTypeObject*)member.ptr(), base);
         is_class ? mend_class(member, reduce) : mend_function(member);

@@ -48,7 +48,7 @@ def test_wrong_counts_and_types(mesh, model):
 
 def test_what_is_right_stays():
     assert list(inspect.signature(filigree.strip).parameters)[:3] == ["mesh", "driver", "base"]
-    assert filigree.strip.__doc__.startswith("\nTake the detail off a mesh") or "Take the detail" in filigree.strip.__doc__
+    assert "Take the detail" in filigree.strip.__doc__
     with pytest.raises(filigree.UsageError, match="base"):
         filigree.strip(filigree.make("wavy-sphere", resolution=4), base=2)
 
@@ -77,13 +77,6 @@ def test_objects_that_nobody_initialised(kind):
             pass
     with pytest.raises(TypeError, match="__init__"):
         Careless()
-
-
-def test_the_base_of_all_has_no_objects():
-    base = filigree.Mesh.__base__
-    for make in (base, lambda: base.__new__(base), lambda: base(filigree.make("bar"))):
-        with pytest.raises(TypeError):
-            make()
 
 
 def picklable(mesh, model):
