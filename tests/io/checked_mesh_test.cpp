@@ -9,7 +9,7 @@ namespace filigree {
 namespace {
 
 constexpr MeshFormat kAllFormats[] = {MeshFormat::obj, MeshFormat::ply, MeshFormat::stl, MeshFormat::off,
-                                   MeshFormat::gltf};
+                                      MeshFormat::gltf};
 
 TEST(CheckedWriting, WhatIsBrokenIsRefused) {
     for (const MeshFormat format : kAllFormats)

@@ -13,9 +13,7 @@ std::map<ErrorCode, PyObject*>& error_classes() {
 }
 PyObject* warning_class = nullptr;
 
-void raise(const Error& error) {
-    PyErr_SetString(error_classes().at(error.code), error.message.c_str());
-}
+void raise(const Error& error) { PyErr_SetString(error_classes().at(error.code), error.message.c_str()); }
 
 py::object new_class(const char* name, const char* text, const py::tuple& bases) {
     PyObject* made = PyErr_NewExceptionWithDoc(("filigree." + std::string(name)).c_str(), text, bases.ptr(), nullptr);
