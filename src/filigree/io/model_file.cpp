@@ -593,10 +593,9 @@ Result<CodingReport> write_coded_model(const Model& model, const PoseSequence& p
         write_pictures(out, coded->mesh.rest.embedded_materials); // a stream's shape is there first
         write_end_of_code(out, *coded);
         const std::vector<std::string_view> file = out.finish();
-        const double scalars = double(coded->mesh.rest.scalars.size()) * double(coded->code.vertices) * sizeof(float);
-        const double largest =
-            std::max(unpacked_bytes(coded->code) + scalars, unpacked_bytes(coded->clip, coded->code));
-        if (std::optional<Error> error = too_plain_to_pack(largest, file)) return *error;
+        const double scalars = double(coded->mesh.rest.scalars.size() * coded->code.vertices * sizeof(float));
+        const double mesh = unpacked_bytes(coded->code) + scalars, clips = unpacked_bytes(coded->clip, coded->code);
+        if (std::optional<Error> error = too_plain_to_pack(std::max(mesh, clips), file)) return *error;
         if (const Status status = write_file(path, file); !status) return status.error();
         return coded->report;
     } catch (const Error& error) {
