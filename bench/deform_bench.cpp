@@ -28,7 +28,7 @@ std::unique_ptr<SpaceWarp> make_chain_of_three(const Box& box) {
     std::vector<std::unique_ptr<SpaceWarp>> warps;
     warps.push_back(make_bend(box, Axis::x, 90));
     warps.push_back(make_twist(box, Axis::y, 90));
-    warps.push_back(make_taper(box, Axis::z, 0.5));
+    warps.push_back(make_taper(box, Axis::z, 0.5).value());
     return make_chain(std::move(warps));
 }
 
@@ -38,11 +38,11 @@ struct NamedWarp {
 };
 
 constexpr std::array<NamedWarp, 8> kWarps = {{
-    {"stretch", [](const Box& box) { return make_stretch(box, Axis::x, 2); }},
-    {"squeeze", [](const Box& box) { return make_squeeze(box, Axis::x, 0.5); }},
+    {"stretch", [](const Box& box) { return make_stretch(box, Axis::x, 2).value(); }},
+    {"squeeze", [](const Box& box) { return make_squeeze(box, Axis::x, 0.5).value(); }},
     {"bend", [](const Box& box) { return make_bend(box, Axis::x, 90); }},
     {"twist", [](const Box& box) { return make_twist(box, Axis::x, 180); }},
-    {"taper", [](const Box& box) { return make_taper(box, Axis::x, 0.5); }},
+    {"taper", [](const Box& box) { return make_taper(box, Axis::x, 0.5).value(); }},
     {"smooth_random", [](const Box& box) { return make_smooth_random(box, 0.1, 1); }},
     {"rbf_200", make_rbf_of_200},
     {"chain_of_3", make_chain_of_three},

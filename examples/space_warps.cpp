@@ -15,7 +15,7 @@ int main() {
 
     const Box box = world_bounds(bar);
     std::vector<std::unique_ptr<SpaceWarp>> steps;
-    steps.push_back(make_squeeze(box, Axis::x, 1.5)); // longer and thinner
+    steps.push_back(make_squeeze(box, Axis::x, 1.5).value()); // longer and thinner
     steps.push_back(make_twist(box, Axis::x, 180));
     const auto warp = make_chain(std::move(steps));
 

@@ -274,7 +274,7 @@ Figure draw_deformation_process(FigureRenderer& renderer) {
     const RunContext& context = renderer.context();
     const Mesh cube = make_wavy_cube({.resolution = 64});
     const Model model = stripped_model(cube, {.code = DetailCode::reference, .levels = 5}, context);
-    const auto warp = make_stretch(world_bounds(cube), Axis::x, kStretch);
+    const auto warp = make_stretch(world_bounds(cube), Axis::x, kStretch).value();
     const Pose pose{warp_positions(*warp, driver_positions(model), model.mesh.origin, context), {}, {}};
     const Restorer restorer = Restorer::create(model, {.law = HeightLaw::inverse}, context).value();
     const Mesh low = level_mesh(model, 0);

@@ -94,7 +94,7 @@ Figure draw_remeshed_scan(FigureRenderer& renderer) {
     const Model blend = strip(remeshed.mesh, {.base = driver_count}, context).value().model;
 
     const Box box = world_bounds(remeshed.mesh);
-    const auto stretch = make_stretch(box, Axis::z, kStretch), extreme = extreme_warp(box);
+    const auto stretch = make_stretch(box, Axis::z, kStretch).value(), extreme = extreme_warp(box);
     const Returned stretched = put_back(reference, {.law = HeightLaw::inverse}, *stretch, context);
     const Returned twisted = put_back(reference, {}, *extreme, context),
                    blended = put_back(blend, {}, *extreme, context);

@@ -168,8 +168,8 @@ void restore_one(const RestoreArguments& options, Session& session) {
     report.set("from", from);
     report.set("seconds", seconds);
     if (model.code() == DetailCode::blend) {
-        const PoseError judge(model, session.context().threads());
-        report_expected_error(model, judge.estimate(pose, gradients), mesh, options, session, report);
+        const PoseError judge(model, session.context());
+        report_expected_error(model, require(judge.estimate(pose, gradients)), mesh, options, session, report);
     }
     session.print(report);
 }

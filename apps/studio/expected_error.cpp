@@ -106,12 +106,14 @@ void ExpectedError::look() {
             if (!judge || !judge->is_for(*model, options)) {
                 Result<Restorer> restorer = Restorer::create(*model, options, context);
                 if (!restorer) return restorer.error();
-                judge.reset(new Judge{model, options, std::move(*restorer), PoseError(*model, context.threads())});
+                judge.reset(new Judge{model, options, std::move(*restorer), PoseError(*model, context)});
             }
             if (cancels.is_cancelled()) return cancelled_error();
             const Result<std::vector<Mat3f>> gradients = judge->restorer.gradients(pose, context);
             if (!gradients) return gradients.error();
-            Judgement made{judge, judge->error.estimate(pose, *gradients), {}, {}};
+            Result<PoseError::Estimate> estimate = judge->error.estimate(pose, *gradients);
+            if (!estimate) return estimate.error();
+            Judgement made{judge, std::move(*estimate), {}, {}};
             if (with_colors) made.colors = expected_error_map(*model, made.estimate);
             made.took = Clock::now() - begin;
             return made;

@@ -13,17 +13,10 @@ namespace filigree::studio {
 
 namespace {
 
-/// The library's words name options of the command line; here there is a command for them.
 QString warning_of(const DroppedBody& made) {
-    const DriverEdges edges = measure_driver(*made.model, *made.body);
-    const std::string coarse = driver_warning(edges, *made.model, *made.body);
-    QString text = QString::fromStdString(made.report.warning);
-    if (coarse.empty()) return text;
-    return text.replace(QString::fromStdString(coarse),
-                        QStringLiteral("%1 % of the mesh hangs on driver triangles that cannot follow the particles: "
-                                       "Fit driver takes one of about %2 vertices.")
-                            .arg(100 * edges.on_long_edges, 0, 'f', 0)
-                            .arg(with_commas(*body_driver_options(made.model->mesh, *made.body).base)));
+    const QString text = QString::fromStdString(made.report.warning);
+    const bool is_coarse = !driver_warning(measure_driver(*made.model, *made.body), *made.model, *made.body).empty();
+    return is_coarse ? text + QStringLiteral(" Fit driver makes such a driver.") : text;
 }
 
 } // namespace

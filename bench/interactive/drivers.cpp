@@ -44,7 +44,7 @@ Warps others(const Box& box) {
     for (const Axis axis : {Axis::x, Axis::y, Axis::z}) {
         const double part = longest > 0 ? box.size()[static_cast<int>(axis)] / longest : 0;
         warps.push_back(make_bend(box, axis, 150 * part));
-        warps.push_back(make_taper(box, axis, 1 - 0.4 * part));
+        warps.push_back(make_taper(box, axis, 1 - 0.4 * part).value());
     }
     for (const double degrees : {-160, 100}) // about a shorter side the ends would go further round
         warps.push_back(make_twist(box, longest_axis(box), degrees));

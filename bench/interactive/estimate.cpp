@@ -73,7 +73,7 @@ Judged judge(const Driver& driver, const RandomWarp& warp, std::uint64_t seed, b
     const std::vector<Vec3f> restored = driver.restorer.positions(pose, context).value();
     const double rounding = kRounding * driver.diagonal;
     return {&driver, warp.kind, seed, std::max(vertex_distance(mesh, restored, truth, context).rms, rounding),
-            std::max(driver.error.estimate(pose, gradients).rms, rounding)};
+            std::max(driver.error.estimate(pose, gradients).value().rms, rounding)};
 }
 
 /// Percent of the poses that `counts` whose ratio is within a factor of 2.

@@ -220,7 +220,8 @@ private:
         std::vector<BlendRestorer::Item> items(mesh_.vertex_count());
         for (Index v = 0; v < items.size(); ++v) items[v] = {v, v};
         const std::vector<Vec3f> normals(items.size(), Vec3f::UnitZ());
-        const BlendRestorer restorer(detail, model.mesh.positions, model.driver().vertices, items, normals);
+        const BlendRestorer restorer(detail, model.mesh.positions, model.driver().vertices, items, normals,
+                                     RunContext());
         const std::vector<Vec3f> driver = driver_positions(model);
         const std::vector<Mat3f> gradients(driver.size(), Mat3f::Identity());
         std::vector<Vec3f> positions(items.size()), out_normals(items.size());

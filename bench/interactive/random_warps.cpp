@@ -67,7 +67,7 @@ RandomWarp random_warp(const Box& box, std::uint64_t seed) {
     case 1:
         return {"twist", make_twist(box, axis, draw.between(10, 300))};
     case 2:
-        return {"taper", make_taper(box, axis, draw.between(0.3, 2))};
+        return {"taper", make_taper(box, axis, draw.between(0.3, 2)).value()};
     case 3: {
         const Vec3d centre = draw.in(box);
         const double deviation = draw.between(0.1, 0.4) * box.diagonal();

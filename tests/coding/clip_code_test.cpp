@@ -99,3 +99,14 @@ TEST(ClipCode, DamageIsNamedOrHarmless) {
     for (std::size_t length = 0; length < code.size(); length += 7)
         EXPECT_FALSE(decode_clip(std::string_view(code).substr(0, length), 3, order));
 }
+
+TEST(ClipCode, MoreFramesThanThereIsRoomForAreDamage) {
+    const ClipFrames still(100, std::vector<float>(30, 1.5f));
+    const std::vector<double> weights(3, 1);
+    const std::vector<Index> offsets = {0, 3, 6, 9}, corners = {0, 1, 2, 3, 4, 5, 6, 7, 8};
+    const ClipOrder order = clip_order(offsets, corners, 10);
+    const std::string code = encode_clip(still, weights, 1e-3, order);
+    EXPECT_TRUE(decode_clip(code, 3, order));
+    EXPECT_TRUE(decode_clip(code, 3, order, 100));
+    EXPECT_FALSE(decode_clip(code, 3, order, 99));
+}

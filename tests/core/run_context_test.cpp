@@ -4,7 +4,28 @@
 
 #include <oneapi/tbb/task_arena.h>
 
+#include <cstdlib>
+#include <new>
+#include <optional>
+#include <vector>
+
 using namespace filigree;
+
+namespace {
+
+thread_local bool there_is_no_memory = false;
+
+void* memory(std::size_t size) {
+    if (there_is_no_memory) throw std::bad_alloc();
+    if (void* const found = std::malloc(size > 0 ? size : 1)) return found;
+    throw std::bad_alloc();
+}
+
+} // namespace
+
+void* operator new(std::size_t size) { return memory(size); }
+void operator delete(void* at) noexcept { std::free(at); }
+void operator delete(void* at, std::size_t) noexcept { std::free(at); }
 
 TEST(RunContext, ThreadsAreAsManyAsAskedForAndThere) {
     const unsigned processors = RunContext().threads();
@@ -36,4 +57,17 @@ TEST(RunContext, ReportsGoToTheCallerOrNowhere) {
     };
     context.report("read", 0.5);
     EXPECT_EQ(heard, "read0.500000");
+}
+
+TEST(RunContext, GoesWithoutMemory) {
+    for (const unsigned processors = RunContext().threads(); const unsigned threads : {1u, processors}) {
+        std::vector<std::optional<RunContext>> contexts(100);
+        for (std::optional<RunContext>& context : contexts) context.emplace(threads);
+        there_is_no_memory = true;
+        contexts.clear(); // their arenas cannot all be kept for later ones
+        there_is_no_memory = false;
+        int ran = 0;
+        RunContext(threads).execute([&] { ++ran; });
+        EXPECT_EQ(ran, 1);
+    }
 }

@@ -28,5 +28,23 @@ TEST(CarriedPoints, FollowTheNearestVertexMost) {
     EXPECT_TRUE(carried_points({}, kCorners, pose, RunContext()).empty());
 }
 
+TEST(CarriedPoints, UnitsOfAnySizeServe) {
+    const Mat3f turn = Eigen::AngleAxisf(0.7f, Vec3f(1, 2, 3).normalized()).toRotationMatrix();
+    Pose pose;
+    for (const Vec3f& p : kCorners) pose.positions.push_back(turn * p + Vec3f(3, -2, 1) + 0.1f * p.cwiseProduct(p));
+    pose.gradients.assign(kCorners.size(), turn);
+    const std::vector<Vec3f> usual = carried_points(kPoints, kCorners, pose, RunContext());
+    for (const int power : {-100, -30, -23, 32, 40, 100}) {
+        const auto scaled = [&](std::vector<Vec3f> points) {
+            for (Vec3f& p : points) p *= std::exp2(float(power));
+            return points;
+        };
+        const Pose there{scaled(pose.positions), pose.gradients, {}};
+        EXPECT_EQ(carried_points(scaled(kPoints), scaled(kCorners), there, RunContext()), scaled(usual)) << power;
+    }
+    const std::vector<Vec3f> far = {{1e15f, 0, 0}};
+    EXPECT_TRUE(carried_points(far, kCorners, pose, RunContext())[0].allFinite());
+}
+
 } // namespace
 } // namespace filigree

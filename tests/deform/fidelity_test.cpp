@@ -130,7 +130,7 @@ double error_of_others(const Model& model) {
     WarpList others;
     others.push_back(make_bend(box, Axis::y, 120));
     others.push_back(make_twist(box, Axis::z, 150));
-    others.push_back(make_taper(box, Axis::y, 0.6));
+    others.push_back(make_taper(box, Axis::y, 0.6).value());
     others.push_back(make_smooth_random(box, 0.2, 77));
     return largest_error(model, others, PoseSource::positions);
 }
@@ -165,7 +165,7 @@ double error_of_others_along_all_axes(const Model& model, PoseSource source) {
     for (const Axis axis : {Axis::x, Axis::y, Axis::z}) {
         const double part = box.size()[static_cast<int>(axis)] / box.size().maxCoeff();
         others.push_back(make_bend(box, axis, 160 * part));
-        others.push_back(make_taper(box, axis, 1 - 0.45 * part));
+        others.push_back(make_taper(box, axis, 1 - 0.45 * part).value());
     }
     others.push_back(make_twist(box, longest_axis(box), -150));
     for (const std::uint64_t seed : {5, 6, 7}) others.push_back(make_smooth_random(box, 0.2, seed));

@@ -1,3 +1,4 @@
+#include "broken_meshes.h"
 #include "filigree/deform/handle_regions.h"
 
 #include "filigree/hierarchy/strip.h"
@@ -90,6 +91,40 @@ TEST(HandleRegions, SayWhichHandleIsWrong) {
     EXPECT_TRUE(unknown.message.starts_with("handle 'head' names vertex")) << unknown.message;
     const Error shared = refusal(bar, {{.vertices = {0, 1}}, {.vertices = {1}}});
     EXPECT_TRUE(shared.message.starts_with("handle 2 shares a vertex")) << shared.message;
+}
+
+TEST(HandleRegions, ManyNamedVerticesHoldTheNearestOfTheDriver) {
+    const Mesh bar = make_bar({.resolution = 24});
+    const Model model = strip(bar, {.base = 2000}, kAllThreads).value().model;
+    const std::vector<Vec3f> driver = driver_positions(model);
+    HandleRegion named{.move = Vec3d(0, 1, 0)};
+    std::vector<bool> is_held(driver.size());
+    for (Index v = 0; v < bar.vertex_count(); ++v) {
+        if (bar.positions[v].x() < 1) continue;
+        named.vertices.push_back(v);
+        Index best = 0;
+        for (Index d = 1; d < driver.size(); ++d)
+            if ((driver[d] - bar.positions[v]).squaredNorm() < (driver[best] - bar.positions[v]).squaredNorm())
+                best = d;
+        is_held[best] = true;
+    }
+    const std::vector<HandleRegion> handles = {ends(0)[0], named};
+    const Pose pose = pose_by_handles(model, handles, kAllThreads).value();
+    for (Index d = 0; d < driver.size(); ++d)
+        EXPECT_TRUE(!is_held[d] || (pose.positions[d] - driver[d] - Vec3f(0, 1, 0)).norm() < 1e-5f) << d;
+
+    std::vector<HandleRegion> often = handles; // two million names: seconds by trying every driver vertex for each
+    for (int k = 0; k < 400; ++k)
+        often[1].vertices.insert(often[1].vertices.end(), named.vertices.begin(), named.vertices.end());
+    EXPECT_EQ(pose_by_handles(model, often, kAllThreads).value().positions, pose.positions);
+    const RunContext cancelled(1);
+    cancelled.cancel();
+    EXPECT_EQ(pose_by_handles(model, often, cancelled).error().code, ErrorCode::cancelled);
+    EXPECT_EQ(move_by_handles(bar, handles, cancelled).error().code, ErrorCode::cancelled);
+}
+
+TEST(HandleRegions, WhatIsBrokenIsRefused) {
+    FILIGREE_EXPECT_BROKEN_MESHES_ARE_REFUSED([](const Mesh& m) { return move_by_handles(m, ends(1), kOneThread); });
 }
 
 } // namespace

@@ -23,9 +23,9 @@ Model stripped(Mesh mesh, std::size_t base) {
 class Judge {
 public:
     explicit Judge(const Model& model)
-        : restorer_(Restorer::create(model, {}, kOneThread).value()), error_(model, kOneThread.threads()) {}
+        : restorer_(Restorer::create(model, {}, kOneThread).value()), error_(model, kOneThread) {}
     double rms(const Pose& pose) const {
-        return error_.estimate(pose, restorer_.gradients(pose, kOneThread).value()).rms;
+        return error_.estimate(pose, restorer_.gradients(pose, kOneThread).value()).value().rms;
     }
 
 private:
@@ -42,7 +42,7 @@ std::unique_ptr<SpaceWarp> random_warp(const Box& box, std::uint64_t seed) {
     case 1:
         return make_twist(box, axis, between(20, 270));
     case 2:
-        return make_taper(box, axis, between(0.3, 0.9));
+        return make_taper(box, axis, between(0.3, 0.9)).value();
     default:
         return make_smooth_random(box, between(0.03, 0.3), seed);
     }
@@ -86,10 +86,11 @@ TEST(PoseError, SameBytesForAnyThreadsAndAfterAMove) {
     for (const bool with_gradients : {true, false}) {
         const std::vector<Mat3f> gradients = pose.gradients;
         if (!with_gradients) pose.gradients.clear();
-        PoseError one(model, 1), two(model, 2);
-        const PoseError::Estimate first = one.estimate(pose, gradients), second = two.estimate(pose, gradients);
+        PoseError one(model, RunContext(1)), two(model, RunContext(2));
+        const PoseError::Estimate first = one.estimate(pose, gradients).value(),
+                                  second = two.estimate(pose, gradients).value();
         const PoseError moved = std::move(one);
-        const PoseError::Estimate third = moved.estimate(pose, gradients);
+        const PoseError::Estimate third = moved.estimate(pose, gradients).value();
         EXPECT_EQ(first.rms, second.rms);
         EXPECT_EQ(first.rms, third.rms);
         EXPECT_EQ(first.local, second.local);
@@ -114,7 +115,8 @@ TEST(PoseError, IsLargestWhereThePoseIsCurved) {
         p.z() += float(0.5 * box.size().x() * (1 - std::cos(6 * x)));
     }
     const Restorer restorer = Restorer::create(model, {}, kOneThread).value();
-    const PoseError::Estimate estimate = PoseError(model).estimate(pose, restorer.gradients(pose, kOneThread).value());
+    const PoseError::Estimate estimate =
+        PoseError(model).estimate(pose, restorer.gradients(pose, kOneThread).value()).value();
     double still = 0, moved = 0;
     const std::vector<Vec3f> rest = driver_positions(model);
     for (std::size_t v = 0; v < rest.size(); ++v) {
@@ -144,6 +146,20 @@ TEST(PoseError, WarnsFromOneThousandthOfTheDiagonal) {
     EXPECT_DOUBLE_EQ(estimate.share(), 0.00105);
     estimate.diagonal = 0; // a single point
     EXPECT_FALSE(estimate.is_too_curved());
+}
+
+TEST(PoseError, CountsThatDoNotFitAreErrors) {
+    const Model model = strip(make_wavy_sphere({.resolution = 8}), {.base = 60}, kOneThread).value().model;
+    const PoseError error(model, kOneThread);
+    const Pose pose = rest_pose(model);
+    const std::vector<Mat3f> gradients(pose.positions.size(), Mat3f::Identity());
+    EXPECT_TRUE(error.estimate(pose, gradients).ok());
+    const auto few = error.estimate(pose, std::span(gradients).first(3));
+    ASSERT_FALSE(few.ok());
+    EXPECT_EQ(few.error().code, ErrorCode::mismatch);
+    const auto other = error.estimate(Pose{{Vec3f::Zero()}, {}, {}}, gradients);
+    ASSERT_FALSE(other.ok());
+    EXPECT_EQ(other.error().code, ErrorCode::mismatch);
 }
 
 } // namespace

@@ -65,9 +65,9 @@ std::vector<NamedWarp> all_warps(const Box& box) {
     std::vector<NamedWarp> warps;
     for (const Axis axis : kAxes) {
         const std::string suffix = "_" + std::to_string(static_cast<int>(axis));
-        warps.push_back({"stretch" + suffix, make_stretch(box, axis, -1.7)});
-        warps.push_back({"squeeze" + suffix, make_squeeze(box, axis, 0.4)});
-        warps.push_back({"taper" + suffix, make_taper(box, axis, 0.3)});
+        warps.push_back({"stretch" + suffix, make_stretch(box, axis, -1.7).value()});
+        warps.push_back({"squeeze" + suffix, make_squeeze(box, axis, 0.4).value()});
+        warps.push_back({"taper" + suffix, make_taper(box, axis, 0.3).value()});
         for (const double degrees : {0.0, 1e-7, 60.0, -90.0, 180.0, 360.0}) {
             warps.push_back({"bend" + suffix + "_" + std::to_string(degrees), make_bend(box, axis, degrees)});
             warps.push_back({"twist" + suffix + "_" + std::to_string(degrees), make_twist(box, axis, degrees)});
@@ -78,7 +78,7 @@ std::vector<NamedWarp> all_warps(const Box& box) {
     std::vector<std::unique_ptr<SpaceWarp>> links;
     links.push_back(make_bend(box, Axis::x, 70));
     links.push_back(make_smooth_random(box, 0.1, 4));
-    links.push_back(make_squeeze(box, Axis::y, 2));
+    links.push_back(make_squeeze(box, Axis::y, 2).value());
     warps.push_back({"chain", make_chain(std::move(links))});
     return warps;
 }
@@ -115,18 +115,18 @@ TEST(SpaceWarp, TheMiddleOfTheBoxStaysUnderBendTwistStretch) {
     for (const Axis axis : kAxes) {
         EXPECT_LT((make_bend(kBox, axis, 123)->position(kBox.centre()) - kBox.centre()).norm(), 1e-15);
         EXPECT_LT((make_twist(kBox, axis, 123)->position(kBox.centre()) - kBox.centre()).norm(), 1e-15);
-        EXPECT_LT((make_stretch(kBox, axis, 3)->position(kBox.centre()) - kBox.centre()).norm(), 1e-15);
+        EXPECT_LT((make_stretch(kBox, axis, 3).value()->position(kBox.centre()) - kBox.centre()).norm(), 1e-15);
     }
 }
 
 TEST(SpaceWarp, SqueezeKeepsVolume) {
     for (const Axis axis : kAxes)
         for (const double factor : {0.01, 0.5, 1.0, 7.0})
-            EXPECT_NEAR(make_squeeze(kBox, axis, factor)->warp(kBox.min).gradient.determinant(), 1, 1e-14);
+            EXPECT_NEAR(make_squeeze(kBox, axis, factor).value()->warp(kBox.min).gradient.determinant(), 1, 1e-14);
 }
 
 TEST(SpaceWarp, StretchScalesTheBoxAboutItsCentre) {
-    const Vec3d moved = make_stretch(kBox, Axis::y, 2)->position(kBox.max);
+    const Vec3d moved = make_stretch(kBox, Axis::y, 2).value()->position(kBox.max);
     EXPECT_LT((moved - Vec3d(3, 2.75, 2.75)).norm(), 1e-15);
 }
 
@@ -187,7 +187,7 @@ TEST(SpaceWarp, TwistTurnsTheEndsByHalfTheAngleEach) {
 
 TEST(SpaceWarp, TaperScalesTheHighEnd) {
     const Box box = make_box({0, -1, -1}, {4, 1, 1});
-    const auto warp = make_taper(box, Axis::x, 0.5);
+    const auto warp = make_taper(box, Axis::x, 0.5).value();
     EXPECT_LT((warp->position({0, 1, 1}) - Vec3d(0, 1, 1)).norm(), 1e-15);
     EXPECT_LT((warp->position({4, 1, 1}) - Vec3d(4, 0.5, 0.5)).norm(), 1e-15);
     EXPECT_LT((warp->position({2, 1, 0}) - Vec3d(2, 0.75, 0)).norm(), 1e-15);
@@ -208,7 +208,7 @@ TEST(SpaceWarp, BoxesWithoutLengthAreDefined) {
         EXPECT_EQ(make_bend(flat, Axis::z, degrees)->position({0.5, 0.25, 4}), Vec3d(0.5, 0.25, 4));
         EXPECT_EQ(make_twist(flat, Axis::z, degrees)->position({0.5, 0.25, 4}), Vec3d(0.5, 0.25, 4));
     }
-    EXPECT_EQ(make_taper(flat, Axis::z, 3)->position({0.5, 0.25, 4}), Vec3d(0.5, 0.25, 4));
+    EXPECT_EQ(make_taper(flat, Axis::z, 3).value()->position({0.5, 0.25, 4}), Vec3d(0.5, 0.25, 4));
 }
 
 TEST(SpaceWarp, WarpsFollowTheBoxWhenItIsMovedAndScaled) {
@@ -281,9 +281,9 @@ TEST(SpaceWarp, RbfWithDegenerateCentres) {
 TEST(SpaceWarp, ChainsAreAppliedInOrder) {
     std::vector<std::unique_ptr<SpaceWarp>> links;
     links.push_back(make_twist(kBox, Axis::x, 40));
-    links.push_back(make_taper(kBox, Axis::y, 2));
+    links.push_back(make_taper(kBox, Axis::y, 2).value());
     const auto chain = make_chain(std::move(links));
-    const auto twist = make_twist(kBox, Axis::x, 40), taper = make_taper(kBox, Axis::y, 2);
+    const auto twist = make_twist(kBox, Axis::x, 40), taper = make_taper(kBox, Axis::y, 2).value();
     for (const Vec3d& p : points_around(kBox)) EXPECT_EQ(chain->position(p), taper->position(twist->position(p)));
     EXPECT_EQ(make_chain({})->position({1, 2, 3}), Vec3d(1, 2, 3));
     EXPECT_EQ(make_chain({})->warp({1, 2, 3}).gradient, Mat3d::Identity());
@@ -331,7 +331,7 @@ TEST(WarpMesh, TransformsNormalsWithTheSurface) {
 TEST(WarpMesh, MirroringTurnsNormalsAsItTurnsTheWinding) {
     Mesh mesh = make_bulge(4);
     mesh.normals.values.assign(mesh.vertex_count(), Vec3f(0, 0, 1));
-    warp_mesh(*make_stretch(box_of(mesh), Axis::x, -1), mesh, RunContext(1));
+    warp_mesh(*make_stretch(box_of(mesh), Axis::x, -1).value(), mesh, RunContext(1));
     for (const Vec3f& n : mesh.normals.values) EXPECT_EQ(n, Vec3f(0, 0, -1));
 }
 
@@ -428,6 +428,22 @@ TEST(SpaceWarp, TheSameFarFromTheOrigin) {
     }
     EXPECT_GT(moved, 0.1);
     EXPECT_LT(moved, 3); // a box relative to the origin would send the bar hundreds of kilometres round an arc
+}
+
+TEST(SpaceWarp, FactorsThatLeaveNothingAreRefused) {
+    const Box box{Vec3d::Zero(), Vec3d::Ones()};
+    const double nan = std::nan("");
+    for (const double factor : {0.0, nan, double(INFINITY)}) {
+        const auto stretch = make_stretch(box, Axis::x, factor);
+        ASSERT_FALSE(stretch.ok()) << factor;
+        EXPECT_EQ(stretch.error().code, ErrorCode::usage);
+    }
+    EXPECT_TRUE(make_stretch(box, Axis::x, -1).ok()) << "a mirror";
+    for (const double factor : {0.0, -1.0, nan, double(INFINITY)})
+        for (const auto& made : {make_squeeze(box, Axis::x, factor), make_taper(box, Axis::x, factor)}) {
+            ASSERT_FALSE(made.ok()) << factor;
+            EXPECT_EQ(made.error().code, ErrorCode::usage);
+        }
 }
 
 } // namespace

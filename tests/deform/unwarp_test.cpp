@@ -8,10 +8,10 @@ namespace {
 TEST(Unwarped, IsTheWayBack) {
     const Box box{Vec3d(-0.5, -0.5, -0.5), Vec3d(0.5, 0.5, 0.5)};
     std::vector<std::unique_ptr<SpaceWarp>> steps;
-    steps.push_back(make_stretch(box, Axis::y, 1.2));
+    steps.push_back(make_stretch(box, Axis::y, 1.2).value());
     steps.push_back(make_bend(box, Axis::y, 90));
     steps.push_back(make_twist(box, Axis::y, 50));
-    steps.push_back(make_taper(box, Axis::y, 0.6));
+    steps.push_back(make_taper(box, Axis::y, 0.6).value());
     const auto warp = make_chain(std::move(steps));
     for (const Vec3d& point : {Vec3d(0.3, 0.4, -0.2), Vec3d(-0.5, 0.1, 0.5), Vec3d(0, -0.45, 0)}) {
         const Vec3d place = warp->position(point);

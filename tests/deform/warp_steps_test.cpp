@@ -11,7 +11,7 @@ const Vec3d kPoint(0.4, 1.3, -0.7);
 TEST(WarpSteps, AreDoneOneAfterTheOtherOverOneBox) {
     const std::vector<WarpStep> steps = {{WarpKind::bend, 60}, {WarpKind::stretch, 1.5}, {WarpKind::random, 0.1}};
     const Vec3d bent = make_bend(kTallBox, Axis::y, 60)->position(kPoint);
-    const Vec3d stretched = make_stretch(kTallBox, Axis::y, 1.5)->position(bent);
+    const Vec3d stretched = make_stretch(kTallBox, Axis::y, 1.5).value()->position(bent);
     const Vec3d all = make_smooth_random(kTallBox, 0.1, 7)->position(stretched);
     EXPECT_EQ(make_warp(steps, kTallBox, Axis::y, 7)->position(kPoint), all);
     EXPECT_EQ(make_warp(std::vector<WarpStep>(), kTallBox, Axis::y)->position(kPoint), kPoint);

@@ -102,7 +102,7 @@ TEST(Restore, CurvedWarpsOfTheCubeAreAsCloseAsTheDesignSays) {
     const Box box = bounds(mesh.positions);
     const Deformation warps[] = {
         from_warp(make_bend(box, Axis::x, 90)),      from_warp(make_bend(box, Axis::x, 180)),
-        from_warp(make_twist(box, Axis::x, 180)),    from_warp(make_taper(box, Axis::x, 0.5)),
+        from_warp(make_twist(box, Axis::x, 180)),    from_warp(make_taper(box, Axis::x, 0.5).value()),
         from_warp(make_smooth_random(box, 0.10, 1)), from_warp(make_smooth_random(box, 0.25, 1))};
     for (const Deformation& f : warps) {
         const std::vector<Vec3f> truth = deformed(f, mesh.positions);
@@ -306,3 +306,35 @@ concept Restorable = requires(M&& model) {
 };
 static_assert(Restorable<const Model&> && Restorable<Model&>);
 static_assert(!Restorable<Model> && !Restorable<const Model>);
+
+TEST(Restorer, SetUpOnAnyThreadsGivesTheSameBytes) {
+    for (const Precision precision : {Precision::float32, Precision::int16}) {
+        Mesh mesh = make_wavy_sphere({.resolution = 60});
+        mesh.normals = {vertex_normals(mesh, mesh.positions, kOneThread), {}};
+        const Model model = strip(mesh, {.base = 300, .precision = precision}, kOneThread).value().model;
+        Pose pose = rest_pose(model);
+        for (Vec3f& p : pose.positions) p.x() += 0.2f * p.y() * p.y();
+        const auto restored = [&](const RunContext& context) {
+            return Restorer::create(model, {}, context).value().mesh(pose, kOneThread).value();
+        };
+        const Mesh one = restored(kOneThread), all = restored(kAllThreads);
+        EXPECT_EQ(one.positions, all.positions);
+        EXPECT_EQ(one.normals.values, all.normals.values);
+    }
+}
+
+TEST(Restorer, NormalsHaveLengthOneUnderAnyScale) {
+    Mesh mesh = make_wavy_sphere({.resolution = 12});
+    mesh.normals = {vertex_normals(mesh, mesh.positions, kOneThread), {}};
+    const Model model = strip(mesh, {.base = 100}, kOneThread).value().model;
+    const Restorer restorer = Restorer::create(model, {}, kOneThread).value();
+    const std::vector<Vec3f> usual = restorer.mesh(rest_pose(model), kOneThread).value().normals.values;
+    for (const float scale : {1e-15f, 1e-10f, 1e-8f, 1e-4f, 1e4f, 1e10f, 1e15f}) {
+        Pose pose = rest_pose(model);
+        for (Vec3f& p : pose.positions) p *= scale;
+        pose.gradients.assign(pose.positions.size(), scale * Mat3f::Identity());
+        const std::vector<Vec3f> normals = restorer.mesh(pose, kOneThread).value().normals.values;
+        for (std::size_t v = 0; v < normals.size(); ++v)
+            ASSERT_LT((normals[v] - usual[v]).norm(), 1e-5f) << "scale " << scale << ", vertex " << v;
+    }
+}

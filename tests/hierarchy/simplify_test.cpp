@@ -269,5 +269,12 @@ TEST(Simplify, SameTrianglesEveryTime) {
     EXPECT_EQ(simplified(larger, {.target_vertices = 500}).triangles, first.triangles);
 }
 
+TEST(Simplify, WhereAllIsAtOnePlaceNothingIsOff) {
+    const std::vector<Vec3f> positions(6, Vec3f(1, 2, 3));
+    const std::vector<Triangle> triangles = {{0, 1, 2}, {2, 1, 3}, {3, 4, 5}, {0, 2, 4}};
+    const Simplified simplified = simplify(positions, triangles, {.target_vertices = 3}, kOneThread);
+    EXPECT_EQ(simplified.error, 0);
+}
+
 } // namespace
 } // namespace filigree

@@ -23,7 +23,7 @@ const Model& wavy_model() {
 Pose make_pose(const Model& model, double bend, double stretch) {
     const Box box = bounds(model.mesh.positions);
     std::vector<std::unique_ptr<SpaceWarp>> warps;
-    warps.push_back(make_stretch(box, Axis::x, stretch));
+    warps.push_back(make_stretch(box, Axis::x, stretch).value());
     warps.push_back(make_bend(box, Axis::z, bend));
     warps.push_back(make_twist(box, Axis::y, 120));
     return warp_pose(*make_chain(std::move(warps)), driver_positions(model), Vec3d::Zero(), kAllThreads);
@@ -218,6 +218,16 @@ TEST(AlignRotations, OfARigidMotionTurnsOneNodeAlone) {
     for (const NestedRotations& part : parts) {
         EXPECT_LT(turn_degrees(part.inner_rotation, Eigen::Quaterniond::Identity()), 1e-5);
         EXPECT_LT((part.outer_scale - resting_rotations(0.5).outer_scale).norm(), 1e-12);
+    }
+}
+
+TEST(Skin, LevelsAndInfluencesThatAreNotThereAreRefused) {
+    const Model model = strip(make_wavy_sphere({.resolution = 8}), {.base = 60}, kOneThread).value().model;
+    EXPECT_TRUE(make_skin(model, model.finest_level(), 3, false).ok());
+    for (const auto& [level, influences] : {std::pair(model.finest_level() + 1, 3u), {~0u, 3u}, {0u, 4u}}) {
+        const auto skin = make_skin(model, level, influences, false);
+        ASSERT_FALSE(skin.ok()) << level;
+        EXPECT_EQ(skin.error().code, ErrorCode::usage);
     }
 }
 

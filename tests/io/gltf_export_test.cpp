@@ -33,7 +33,7 @@ PoseSequence make_poses(const Model& model, std::size_t frames, double frames_pe
     for (std::size_t f = 0; f < frames; ++f) {
         const double t = frames > 1 ? double(f) / double(frames - 1) : 1;
         std::vector<std::unique_ptr<SpaceWarp>> warps;
-        warps.push_back(make_squeeze(box, Axis::y, 1 + 0.4 * t));
+        warps.push_back(make_squeeze(box, Axis::y, 1 + 0.4 * t).value());
         warps.push_back(make_bend(box, Axis::z, 90 * t));
         warps.push_back(make_twist(box, Axis::x, 60 * t));
         poses.frames.push_back(

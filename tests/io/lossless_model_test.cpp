@@ -115,7 +115,7 @@ TEST(LosslessModel, PartsAreReadAsFromAPlainFile) {
     }
     const ModelChunks chunks = ModelChunks::open(FileReader(coded), "it", kTwoThreads).value();
     EXPECT_EQ(chunks.vertex_count(), model.mesh.vertex_count());
-    EXPECT_TRUE(chunks.restorer(0).ok());
+    EXPECT_TRUE(chunks.restorer(0, RunContext()).ok());
     const SectionReader in(one); // any frame, in any order
     const SectionReader flat(other);
     for (const std::uint32_t frame : {39u, 0u, 31u, 32u, 33u, 5u})

@@ -134,8 +134,8 @@ TEST_F(ModelChunksTest, DamageIsSeenWhereItIsRead) {
     ASSERT_TRUE(write_file(path("m.fil"), bytes).ok());
     const Result<ModelChunks> chunks = ModelChunks::open(*FileReader::open(path("m.fil")), "m.fil", kTwoThreads);
     ASSERT_TRUE(chunks.ok());
-    EXPECT_TRUE(chunks->restorer(0).ok());
-    EXPECT_EQ(chunks->restorer(1).error().code, ErrorCode::bad_file);
+    EXPECT_TRUE(chunks->restorer(0, RunContext()).ok());
+    EXPECT_EQ(chunks->restorer(1, RunContext()).error().code, ErrorCode::bad_file);
     const auto written = write_restored_chunks(*chunks, stream_of(poses), {}, path("c.pc2"), kTwoThreads);
     EXPECT_EQ(written.error().code, ErrorCode::bad_file);
     EXPECT_NE(written.error().message.find("mesh.pos"), std::string::npos) << written.error().message;

@@ -4,6 +4,7 @@
 #include "filigree/hierarchy/restore.h"
 #include "filigree/hierarchy/strip.h"
 #include "filigree/io/file.h"
+#include "filigree/io/model_sections.h"
 #include "filigree/mesh/shapes.h"
 #include "io/sample_meshes.h"
 #include "threads.h"
@@ -18,8 +19,6 @@
 
 #include <sys/stat.h>
 #include <unistd.h>
-#define XXH_INLINE_ALL
-#include <xxhash.h>
 
 namespace model_file_test {
 
@@ -598,6 +597,50 @@ TEST(ModelFile, MaterialsAreNotTrusted) {
     Patcher names(bytes);
     names.set("mat.nam", 5, '+'); // two names become one
     EXPECT_NE(error_of(names.bytes()).find("number of materials"), std::string::npos);
+}
+
+TEST(ModelFile, PackedPartsThatWouldComeToAnySizeAreRefused) {
+    const std::filesystem::path path = std::filesystem::temp_directory_path() / "filigree_any_size.fil";
+    const Model model = strip(make_wavy_sphere({.resolution = 8}), {.base = 60}, RunContext()).value().model;
+    PoseSequence poses{24, {rest_pose(model), rest_pose(model)}};
+    const auto refused = [&](std::string bytes, bool has_a_mesh, const std::string& words = "would come to more than") {
+        const auto as_poses = read_poses(bytes, "hostile.fil", RunContext());
+        EXPECT_FALSE(as_poses.ok());
+        if (!as_poses.ok()) {
+            EXPECT_NE(as_poses.error().message.find(words), std::string::npos) << as_poses.error().message;
+        }
+        if (!has_a_mesh) return;
+        const auto as_model = read_model(bytes, "hostile.fil", RunContext());
+        ASSERT_FALSE(as_model.ok());
+        EXPECT_EQ(as_model.error().code, ErrorCode::bad_file);
+        EXPECT_NE(as_model.error().message.find(words), std::string::npos) << as_model.error().message;
+    };
+    ASSERT_TRUE(write_coded_model(model, poses, {}, path, RunContext()).ok());
+    const std::string coded = FileReader::open(path)->read_all().value();
+    Patcher frames(coded); // 4,294,967,295 poses
+    frames.set<std::uint32_t>("cd.pose", 0, ~0u);
+    refused(frames.bytes(), false);
+    Patcher vertices(coded); // a thousand million vertices
+    vertices.set<std::uint64_t>("cd.par", 0, 1'000'000'000);
+    refused(vertices.bytes(), true);
+
+    ASSERT_TRUE(write_lossless_model(model, poses, path, RunContext()).ok());
+    Patcher sections(FileReader::open(path)->read_all().value());
+    TestSection plain = sections.get<TestSection>("ll.tab", 0);
+    plain.count = std::uint64_t{1} << 40;
+    sections.set("ll.tab", 0, plain);
+    refused(sections.bytes(), true);
+    std::filesystem::remove(path);
+}
+
+TEST(ModelFile, WhatReadersWouldRefuseIsNotPacked) {
+    const std::vector<std::string_view> small = {"a few", " bytes"};
+    EXPECT_FALSE(too_plain_to_pack(1e8, small));
+    const std::optional<Error> error = too_plain_to_pack(1e9, small);
+    ASSERT_TRUE(error);
+    EXPECT_EQ(error->code, ErrorCode::unsuitable);
+    const std::string large(2 << 20, ' ');
+    EXPECT_FALSE(too_plain_to_pack(1e9, std::vector<std::string_view>{large}));
 }
 
 } // namespace model_file_test

@@ -2,6 +2,7 @@
 #include "filigree/io/text_writer.h"
 
 #include <gtest/gtest.h>
+#include <optional>
 
 #include <bit>
 #include <cmath>
@@ -159,4 +160,18 @@ TEST(TextScanner, QuotesAreReadableInEveryScript) {
     EXPECT_EQ(in_quotes("\xc2"), "'?'");
     EXPECT_EQ(in_quotes(std::string(23, 'x') + "\u00e4"), "'" + std::string(23, 'x') + "...'"); // no half of one
     EXPECT_EQ(in_quotes(std::string(24, 'x')), "'" + std::string(24, 'x') + "'");
+}
+
+TEST(TextWriter, ItsEndNeedsNoMemory) {
+    for (const std::size_t numbers : {1u, 100u, 5000u}) {
+        std::string text;
+        std::optional<TextWriter> out(std::in_place, text);
+        for (std::size_t k = 0; k < numbers; ++k) out->number(double(k) + 0.123).text(" ");
+        out->text(std::string(1000, 'x'));
+        out->text("end of the text, which is in the buffer still");
+        const char* const before = text.data();
+        out.reset();
+        EXPECT_EQ(text.data(), before) << "the destructor asked for memory";
+        EXPECT_TRUE(text.ends_with("still"));
+    }
 }

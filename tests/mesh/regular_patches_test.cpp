@@ -153,7 +153,7 @@ TEST(RegularPatches, SaysWhatIsInTheWay) {
     EXPECT_NE(refusal(Mesh{}).find("no faces"), std::string::npos);
 
     Mesh triangle;
-    triangle.positions.resize(3);
+    triangle.positions.resize(3, Vec3f::Zero());
     triangle.add_face(std::array<Index, 3>{0, 1, 2});
     EXPECT_NE(refusal(triangle).find("face 0 has 3 corners"), std::string::npos);
 
@@ -165,19 +165,21 @@ TEST(RegularPatches, SaysWhatIsInTheWay) {
     EXPECT_NE(refusal(turned).find("turned against each other"), std::string::npos);
 
     Mesh third = make_wavy_plane({.resolution = 4});
-    third.positions.resize(27);
+    third.positions.resize(27, Vec3f::Zero());
+    third.uvs = {};
     third.add_face(std::array<Index, 4>{6, 7, 25, 26});
     EXPECT_NE(refusal(third).find("More than two faces"), std::string::npos);
 
     Mesh unused = make_wavy_plane({.resolution = 4});
-    unused.positions.resize(26);
+    unused.positions.resize(26, Vec3f::Zero());
+    unused.uvs = {};
     EXPECT_NE(refusal(unused).find("vertex 25 is in no face"), std::string::npos);
 
     // Only the two quads at opposite sides of a vertex.
     const Mesh bowtie = plane_without(2, [](unsigned i, unsigned j) { return i != j; });
     EXPECT_NE(refusal(bowtie).find("no face"), std::string::npos);
     Mesh touching;
-    touching.positions.resize(7);
+    touching.positions.resize(7, Vec3f::Zero());
     touching.add_face(std::array<Index, 4>{0, 1, 2, 3});
     touching.add_face(std::array<Index, 4>{2, 4, 5, 6});
     EXPECT_NE(refusal(touching).find("vertex 2 touch"), std::string::npos);
@@ -213,6 +215,7 @@ TEST(RegularPatches, HolesMustLieOnEveryLevel) {
         v = ids[v];
     }
     mesh.positions = kept;
+    mesh.uvs = {}; // one a vertex, of which there are fewer now
     const auto patches = find_regular_patches(mesh, 16, RunContext(1));
     ASSERT_TRUE(patches.ok()) << patches.error().message;
     EXPECT_EQ(patches->levels, 2u);

@@ -57,7 +57,7 @@ TEST(BodyDriver, ACoarseOneIsToldWithWhatWouldDo) {
     EXPECT_NE(warning.find("% of the mesh hangs on driver triangles longer than 1.5 spacings"), std::string::npos);
     unsigned base = 0;
     double max_edge = 0;
-    ASSERT_EQ(std::sscanf(warning.c_str() + warning.find("--base"), "--base %u --max-edge %lf", &base, &max_edge), 2)
+    ASSERT_EQ(std::sscanf(warning.c_str() + warning.find("base"), "base %u and max_edge %lf", &base, &max_edge), 2)
         << warning;
     const Model fine = stripped(mesh, {.base = base, .max_edge = max_edge});
     EXPECT_EQ(driver_warning(measure_driver(fine, body), fine, body), "");

@@ -37,7 +37,9 @@ struct ExpectedErrorTest : testing::Test {
         RestoreOptions options = bench.state().restore;
         options.level.reset();
         const Restorer restorer = Restorer::create(model, options, RunContext()).value();
-        return PoseError(model).estimate(*bench.pose(), restorer.gradients(*bench.pose(), RunContext()).value());
+        return PoseError(model)
+            .estimate(*bench.pose(), restorer.gradients(*bench.pose(), RunContext()).value())
+            .value();
     }
 };
 

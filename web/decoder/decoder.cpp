@@ -79,14 +79,14 @@ Vec3f position(std::size_t v) {
 }
 
 /// The driver's triangle nearest to a point: from a near one on, to whichever beside it is nearer.
-TrianglePoint nearest(const Vec3d& p, Index& triangle) {
-    TrianglePoint best = closest_on_triangle(p, driver_corners(triangle));
+ClosestTrianglePoint nearest(const Vec3d& p, Index& triangle) {
+    ClosestTrianglePoint best = closest_on_triangle(p, driver_corners(triangle));
     for (bool is_better = true; is_better;) {
         is_better = false;
         const Triangle around = stream.driver_triangles[triangle];
         for (const Index corner : around)
             for (const Index other : stream.triangles_at[corner]) {
-                const TrianglePoint point = closest_on_triangle(p, driver_corners(other));
+                const ClosestTrianglePoint point = closest_on_triangle(p, driver_corners(other));
                 if (point.squared_distance >= best.squared_distance) continue;
                 best = point;
                 triangle = other;
@@ -99,13 +99,13 @@ TrianglePoint nearest(const Vec3d& p, Index& triangle) {
 void follow_driver(std::size_t v) {
     const Index parent = stream.levels->parents()[v];
     Index triangle = 0;
-    TrianglePoint point;
+    ClosestTrianglePoint point;
     const Vec3d p = position(v).cast<double>();
     if (parent != v)
         triangle = stream.near[parent];
     else
         for (Index t = 0; t < stream.driver_triangles.size(); ++t)
-            if (const TrianglePoint there = closest_on_triangle(p, driver_corners(t));
+            if (const ClosestTrianglePoint there = closest_on_triangle(p, driver_corners(t));
                 there.squared_distance < point.squared_distance) {
                 point = there;
                 triangle = t;
@@ -186,7 +186,8 @@ void sort_triangles(std::span<const Triangle> triangles) {
     for (Index t = 0; t < triangles.size(); ++t) {
         const Triangle& corners = triangles[t];
         if (closes_hole[corners[0]] || closes_hole[corners[1]] || closes_hole[corners[2]]) continue;
-        if (has_wedges() && std::ranges::count(wedge_at.begin() + 3 * t, wedge_at.begin() + 3 * t + 3, kNoIndex) > 0) continue;
+        if (has_wedges() && std::ranges::count(wedge_at.begin() + 3 * t, wedge_at.begin() + 3 * t + 3, kNoIndex) > 0)
+            continue;
         const Index region = stream.region_of[corners[0]];
         const bool is_inside = stream.region_of[corners[1]] == region && stream.region_of[corners[2]] == region;
         order.push_back({has_wedges() ? wedges[wedge_at[3 * t]].material : kNoIndex, is_inside ? region : kNoIndex, t});
@@ -195,7 +196,8 @@ void sort_triangles(std::span<const Triangle> triangles) {
     stream.corners.clear();
     stream.runs.clear();
     for (const Sorted& next : order) {
-        if (stream.runs.empty() || stream.runs.back().material != next.material || stream.runs.back().region != next.region)
+        if (stream.runs.empty() || stream.runs.back().material != next.material ||
+            stream.runs.back().region != next.region)
             stream.runs.push_back({next.material, next.region, 0});
         stream.runs.back().corners += 3;
         for (Index k = 0; k < 3; ++k)

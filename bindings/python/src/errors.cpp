@@ -1,7 +1,6 @@
 #include "errors.h"
 
 #include <map>
-#include <regex>
 
 namespace filigree::python {
 
@@ -14,9 +13,7 @@ std::map<ErrorCode, PyObject*>& error_classes() {
 }
 PyObject* warning_class = nullptr;
 
-void raise(const Error& error) {
-    PyErr_SetString(error_classes().at(error.code), in_python_words(error.message).c_str());
-}
+void raise(const Error& error) { PyErr_SetString(error_classes().at(error.code), error.message.c_str()); }
 
 py::object new_class(const char* name, const char* text, const py::tuple& bases) {
     PyObject* made = PyErr_NewExceptionWithDoc(("filigree." + std::string(name)).c_str(), text, bases.ptr(), nullptr);
@@ -29,22 +26,9 @@ py::object new_class(const char* name, const char* text, const py::tuple& bases)
 void refuse(ErrorCode code, const std::string& sentence) { throw BadResultAccess({code, sentence}); }
 void refuse(const std::string& sentence) { refuse(ErrorCode::usage, sentence); }
 
-std::string in_python_words(const std::string& sentence) {
-    static const std::regex option("--([a-z]+)(?:-([a-z]+))?(?: ([0-9][0-9.e+-]*[0-9]|[0-9]))?");
-    std::string words;
-    auto rest = sentence.cbegin();
-    for (std::sregex_iterator match(sentence.begin(), sentence.end(), option), end; match != end; ++match) {
-        words.append(rest, (*match)[0].first);
-        words += (*match)[1].str() + ((*match)[2].matched ? "_" + (*match)[2].str() : "");
-        if ((*match)[3].matched) words += "=" + (*match)[3].str();
-        rest = (*match)[0].second;
-    }
-    return words.append(rest, sentence.cend());
-}
-
 void warn(const std::vector<std::string>& sentences) {
     for (const std::string& sentence : sentences)
-        if (PyErr_WarnEx(warning_class, in_python_words(sentence).c_str(), 1) != 0) throw py::error_already_set();
+        if (PyErr_WarnEx(warning_class, sentence.c_str(), 1) != 0) throw py::error_already_set();
 }
 
 void add_errors(py::module_& m) {

@@ -21,10 +21,6 @@ namespace filigree::python {
 /// Says every sentence as a FiligreeWarning. Needs the interpreter.
 void warn(const std::vector<std::string>& sentences);
 
-/// A sentence of the library that names options of the command line, as Python writes them: "--max-edge 0.1" becomes
-/// "max_edge=0.1".
-std::string in_python_words(const std::string& sentence);
-
 /// What a word stands for; refuses others with the list of those there are.
 template <class Value>
 Value value_of(const std::string& word, const char* name,

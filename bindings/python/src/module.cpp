@@ -14,6 +14,7 @@ PYBIND11_MODULE(_core, m) {
                            add_handles, add_comparing, add_sampling, add_remeshing, add_fracturing, add_bodies,
                            add_world, add_simulation, add_scenes, add_exporting, add_pictures})
         add(m);
+    mend_calls(m);
     m.attr("__name__") = "filigree._core";
     py::module_::import("atexit").attr("register")(py::cpp_function(&join_left_work));
 }

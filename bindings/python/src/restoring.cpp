@@ -60,7 +60,7 @@ py::dict expect_error(const PyModel& self, const py::object& pose, unsigned thre
         check_pose(*self.model, moved).value();
         const Restorer restorer = Restorer::create(*self.model, {}, context).value();
         const std::vector<Mat3f> gradients = restorer.gradients(moved, context).value();
-        return PoseError(*self.model, threads).estimate(moved, gradients);
+        return PoseError(*self.model, context).estimate(moved, gradients).value();
     });
     py::dict said;
     said["rms"] = found.share();

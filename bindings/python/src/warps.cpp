@@ -37,6 +37,9 @@ private:
     std::vector<Warp> warps_;
 };
 
+Warp warp_of(std::unique_ptr<SpaceWarp> warp) { return {std::move(warp)}; }
+Warp warp_of(Result<std::unique_ptr<SpaceWarp>> made) { return {std::move(made).value()}; }
+
 Axis axis_of(const std::optional<std::string>& axis, const Box& box) {
     if (!axis) return longest_axis(box);
     return value_of<Axis>(*axis, "axis", {{"x", Axis::x}, {"y", Axis::y}, {"z", Axis::z}});
@@ -155,7 +158,7 @@ Where it does not arrive: the best points found.
             [=](const py::object& box, const std::optional<std::string>& axis, double value) {
                 check_number(value, only_positive ? value > 0 : true, wanted);
                 const Box all = box_of(box);
-                return Warp{make(all, axis_of(axis, all), value)};
+                return warp_of(make(all, axis_of(axis, all), value));
             },
             py::arg("box"), py::arg("axis"), py::arg(amount), text);
     };

@@ -4,8 +4,10 @@
 #include "filigree/coding/wedge.h"
 #include "filigree/mesh/incidence.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
+#include <utility>
 
 namespace filigree {
 
@@ -21,8 +23,9 @@ constexpr unsigned kSizes = 12, kCount = 0, kPlainValue = kCount + 1, kKind = kP
 static_assert(kAttributeEnd <= kAttributeContexts);
 
 constexpr unsigned kPlainBits = 10;
-constexpr double kGuessBits = 4;          // what it takes to expect a normal from something else than the last one
-constexpr std::int64_t kOctahedron = 352; // steps from the middle of an octahedron's square to its border
+constexpr std::ptrdiff_t kFewCorners = 16; // at a vertex: they are looked at one by one
+constexpr double kGuessBits = 4;           // what it takes to expect a normal from something else than the last one
+constexpr std::int64_t kOctahedron = 352;  // steps from the middle of an octahedron's square to its border
 
 Wide wide(const FinePlace& place) { return {place[0], place[1], place[2]}; }
 
@@ -120,9 +123,9 @@ private:
     template <class T, class CodeValue>
     void walk(CornerAttribute<T>& attribute, bool is_indexed, const CodeValue& code_value) {
         if (at_vertex_.size() == 0) {
-            at_vertex_ = corners_at_vertices(mesh_.corners, mesh_.vertex_count());
             for (std::size_t f = 0; f < mesh_.face_count(); ++f)
                 face_of_.insert(face_of_.end(), mesh_.face_size(f), static_cast<Index>(f));
+            find_corners();
         }
         const auto count = static_cast<Index>(attribute.values.size());
         std::vector<Index> latest(mesh_.vertex_count(), kNoIndex), known, order;
@@ -191,18 +194,53 @@ private:
         return candidate;
     }
 
-    /// Finds, for each edge of a face, its ends as corners of an earlier face.
+    /// The corner before one in its face.
+    Index corner_before(Index corner) const {
+        const Index face = face_of_[corner], begin = mesh_.face_offsets[face];
+        return (corner == begin ? mesh_.face_offsets[face + 1] : corner) - 1;
+    }
+    Index vertex_before(Index corner) const { return mesh_.corners[corner_before(corner)]; }
+
+    /// The corners at each vertex, ascending; where they are many, those with one vertex before them side by side.
+    void find_corners() {
+        at_vertex_ = corners_at_vertices(mesh_.corners, mesh_.vertex_count());
+        for (Index v = 0; v < mesh_.vertex_count(); ++v) {
+            const auto begin = at_vertex_.items.begin() + at_vertex_.offsets[v],
+                       end = at_vertex_.items.begin() + at_vertex_.offsets[v + 1];
+            if (end - begin <= kFewCorners) continue;
+            std::sort(begin, end, [&](Index a, Index b) {
+                return std::pair(vertex_before(a), a) < std::pair(vertex_before(b), b);
+            });
+        }
+    }
+
+    /// The last corner at `vertex` in the faces before f whose face comes to it from `from`; kNoIndex: there is none.
+    Index last_corner(Index vertex, Index from, std::size_t f) const {
+        const std::span<const Index> corners = at_vertex_[vertex];
+        const Index end = mesh_.face_offsets[f]; // of the corners of earlier faces
+        Index last = kNoIndex;
+        if (std::ptrdiff_t(corners.size()) <= kFewCorners) {
+            for (const Index corner : corners) {
+                if (corner >= end) break;
+                if (vertex_before(corner) == from) last = corner;
+            }
+            return last;
+        }
+        const auto after = std::partition_point(corners.begin(), corners.end(), [&](Index corner) {
+            return std::pair(vertex_before(corner), corner) < std::pair(from, end);
+        });
+        if (after != corners.begin() && vertex_before(after[-1]) == from) last = after[-1];
+        return last;
+    }
+
+    /// Finds, for each edge of a face, its ends as corners of an earlier face: the last one.
     void find_edges(std::size_t f) {
         const auto face = mesh_.face(f);
         edges_.assign(face.size(), {});
-        for (std::size_t k = 0; k < face.size(); ++k)
-            for (const Index corner : at_vertex_[face[k]]) {
-                const Index g = face_of_[corner];
-                if (g >= f) break; // corners ascend
-                const Index begin = mesh_.face_offsets[g], size = mesh_.face_size(g), at = corner - begin;
-                const Index ahead = begin + (at + size - 1) % size;
-                if (mesh_.corners[ahead] == face[(k + 1) % face.size()]) edges_[k] = {corner, ahead};
-            }
+        for (std::size_t k = 0; k < face.size(); ++k) {
+            const Index corner = last_corner(face[k], face[(k + 1) % face.size()], f);
+            if (corner != kNoIndex) edges_[k] = {corner, corner_before(corner)};
+        }
     }
 
     /// A face's corners: those of vertices that have a value, then the others.

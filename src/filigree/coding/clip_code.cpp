@@ -114,10 +114,12 @@ std::string encode_clip(const ClipFrames& frames, std::span<const double> weight
     return out.finish();
 }
 
-std::optional<ClipFrames> decode_clip(std::string_view stream, std::size_t numbers, const ClipOrder& order) {
+std::optional<ClipFrames> decode_clip(std::string_view stream, std::size_t numbers, const ClipOrder& order,
+                                      std::size_t most_frames) {
     SymbolReader in(stream, kClipContexts);
     const std::size_t count = in.number(0), curve_count = in.number(0), vertices = order.vertex.size();
-    if (in.is_damaged() || count == 0 || count > kClipFrames || curve_count > count) return std::nullopt;
+    if (in.is_damaged() || count == 0 || count > std::min(most_frames, kClipFrames) || curve_count > count)
+        return std::nullopt;
     const auto real = [&] { return std::bit_cast<float>(in.bits(32)); };
     const float step = real();
     std::vector<float> shares; // of each number, what one step is

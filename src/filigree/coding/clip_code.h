@@ -26,9 +26,9 @@ using ClipFrames = std::vector<std::vector<float>>;
 /// error: how far the block may be off (rms, model units) in each number so weighed. Cost O(frames^2 x numbers).
 std::string encode_clip(const ClipFrames& frames, std::span<const double> weights, double error,
                         const ClipOrder& order);
-/// None: damaged. The frames have as many numbers a vertex as there are weights.
-std::optional<ClipFrames> decode_clip(std::string_view stream, std::size_t numbers, const ClipOrder& order);
-
 inline constexpr std::size_t kClipFrames = 128;
+/// None: damaged, or of more than most_frames. The frames have as many numbers a vertex as there are weights.
+std::optional<ClipFrames> decode_clip(std::string_view stream, std::size_t numbers, const ClipOrder& order,
+                                      std::size_t most_frames = kClipFrames);
 
 } // namespace filigree

@@ -107,12 +107,17 @@ ClosedMap map_of(std::vector<Triangle> triangles, std::vector<bool> closes_hole)
             const Index to_a = ends(a).second, to_b = ends(b).second;
             return to_a != to_b ? to_a < to_b : a < b;
         });
-        for (auto a = low; a != high; ++a)
-            for (auto b = a + 1; b != high && map.opposite[*a] == kNoIndex && ends(*b).second == ends(*a).second; ++b) {
-                if (map.opposite[*b] != kNoIndex || map.origin(*b) == map.origin(*a)) continue;
-                map.opposite[*a] = *b;
-                map.opposite[*b] = *a;
+        for (auto begin = low, end = low; begin != high; begin = end) { // of one edge
+            auto waiting = begin;                                       // the first that has no opposite yet
+            for (; end != high && ends(*end).second == ends(*begin).second; ++end) {
+                if (waiting == end || map.origin(*waiting) == map.origin(*end)) continue;
+                map.opposite[*waiting] = *end;
+                map.opposite[*end] = *waiting;
+                do ++waiting;
+                while (waiting != end && map.opposite[*waiting] != kNoIndex);
+                if (waiting == end) ++waiting; // it has one now
             }
+        }
     }
     return map;
 }

@@ -26,7 +26,7 @@ struct ClosedMap {
 };
 
 /// With the opposite of each half-edge, which is kNoIndex where none is left for it. Where several triangles share an
-/// edge they are paired in their order. Cost O(F).
+/// edge they are paired in their order. Cost O(F log d) where at most d half-edges begin or end at a vertex.
 ClosedMap map_of(std::vector<Triangle> triangles, std::vector<bool> closes_hole);
 
 struct ClosedSurface {

@@ -28,7 +28,7 @@ struct FanTriangles {
 
 struct FaceSpans {
     std::span<const Index> offsets, corners;
-    std::size_t size() const { return offsets.size() - 1; }
+    std::size_t size() const { return offsets.empty() ? 0 : offsets.size() - 1; }
     std::span<const Index> operator[](std::size_t f) const {
         return corners.subspan(offsets[f], offsets[f + 1] - offsets[f]);
     }

@@ -1,10 +1,10 @@
 #include "filigree/coding/level_attributes.h"
 
 #include "filigree/coding/integer_frame.h"
+#include "filigree/coding/vertex_items.h"
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 namespace filigree {
 
@@ -56,8 +56,7 @@ SurfaceAttributes surface_attributes(const Mesh& mesh, const ClosedSurface& surf
     std::vector<Index> face_of;
     for (std::size_t f = 0; f < mesh.face_count() && outline.has_materials; ++f)
         face_of.insert(face_of.end(), mesh.face_size(f), static_cast<Index>(f));
-    // Wedges of each vertex, from one to the one before.
-    std::vector<Index> newest(map.vertex_count(), kNoIndex), before;
+    VertexItems wedges(map.vertex_count());
     made.wedge_at.assign(map.opposite.size(), kNoIndex);
     for (Index h = 0; h < map.opposite.size(); ++h) {
         if (!map.is_own(map.triangles[h / 3])) continue;
@@ -66,15 +65,11 @@ SurfaceAttributes surface_attributes(const Mesh& mesh, const ClosedSurface& surf
                     .material = outline.has_materials ? mesh.materials.of_face[face_of[corner]] : kNoIndex,
                     .has_uv = uv != kNoIndex};
         if (wedge.has_uv) wedge.uv = uv_steps(mesh.uvs.values[uv], outline);
-        Index known = newest[wedge.vertex];
-        const auto is_like = [&](const Wedge& w) {
-            return w.material == wedge.material && w.has_uv == wedge.has_uv && w.uv == wedge.uv;
-        };
-        while (known != kNoIndex && !is_like(made.wedges[known])) known = before[known];
+        const VertexItems::Key key = {std::int32_t(wedge.material), wedge.has_uv, wedge.uv[0], wedge.uv[1]};
+        Index known = wedges.find(wedge.vertex, key);
         if (known == kNoIndex) {
-            known = wedge.parent = static_cast<Index>(made.wedges.size());
+            known = wedge.parent = wedges.add(wedge.vertex, key);
             made.wedges.push_back(wedge);
-            before.push_back(std::exchange(newest[wedge.vertex], known));
         }
         made.wedge_at[h] = known;
     }
@@ -94,21 +89,18 @@ LevelValues level_values(const ReadAttributes& read, const WalkedFaces& walked, 
                 uvs.values[walked.corners[c]] = outline.uv(read.wedges[wedge]);
     } else if (outline.has_uvs) {
         uvs.corners.assign(walked.corners.size(), kNoIndex);
-        std::vector<Index> newest(walked.met, kNoIndex), before, value_of(read.wedges.size(), kNoIndex);
-        std::vector<std::array<std::int32_t, 2>> steps; // of each value: materials share it where it is the same
+        std::vector<Index> value_of(read.wedges.size(), kNoIndex);
+        VertexItems values(walked.met); // by their steps: materials share a value where it is the same
         for (std::size_t c = 0; c < walked.half_edges.size(); ++c) {
             const Index w = read.wedge_at[walked.half_edges[c]];
             if (w == kNoIndex || !read.wedges[w].has_uv) continue;
             Index& value = value_of[w];
             if (value == kNoIndex) {
-                Index& last = newest[walked.corners[c]];
-                value = last;
-                while (value != kNoIndex && steps[value] != read.wedges[w].uv) value = before[value];
+                const VertexItems::Key key = {read.wedges[w].uv[0], read.wedges[w].uv[1]};
+                value = values.find(walked.corners[c], key);
                 if (value == kNoIndex) {
-                    value = static_cast<Index>(steps.size());
-                    steps.push_back(read.wedges[w].uv);
+                    value = values.add(walked.corners[c], key);
                     uvs.values.push_back(outline.uv(read.wedges[w]));
-                    before.push_back(std::exchange(last, value));
                 }
             }
             uvs.corners[c] = value;

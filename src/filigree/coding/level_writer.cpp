@@ -3,6 +3,7 @@
 #include "filigree/coding/coarsening.h"
 #include "filigree/coding/level_walk.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace filigree {
@@ -138,18 +139,29 @@ std::string code_refinement(std::span<const FinePlace> exact, std::span<const In
     return out.finish();
 }
 
-/// Of each of the walk's triangles the source's half-edge from its first corner to its second.
+/// Of each of the walk's triangles the source's half-edge from its first corner to its second. It is looked for around
+/// the first corner, unless many triangles meet there: then around the one of the three where fewest do.
 std::vector<Index> find_half_edges(std::span<const Triangle> triangles, std::span<const Index> vertices,
                                    const ClosedMap& map) {
-    std::vector<Index> spokes(map.vertex_count(), kNoIndex), found;
+    constexpr Index kManyTriangles = 32; // at a vertex
+    std::vector<Index> spokes(map.vertex_count(), kNoIndex), around(map.vertex_count(), 0), found;
     std::vector<bool> is_taken(map.triangles.size(), false);
-    for (Index h = 0; h < map.opposite.size(); ++h) spokes[map.origin(h)] = h;
+    for (Index h = 0; h < map.opposite.size(); ++h) {
+        spokes[map.origin(h)] = h;
+        ++around[map.origin(h)];
+    }
     for (const Triangle& t : triangles) {
-        const Index to = vertices[t[1]], third = vertices[t[2]];
-        Index h = spokes[vertices[t[0]]];
+        const Triangle of_source = {vertices[t[0]], vertices[t[1]], vertices[t[2]]};
+        std::size_t k = 0; // the corner to turn around
+        if (around[of_source[0]] > kManyTriangles)
+            k = std::size_t(std::ranges::min_element(of_source, {}, [&](Index v) { return around[v]; }) -
+                            of_source.begin());
+        const Index to = of_source[(k + 1) % 3], third = of_source[(k + 2) % 3];
+        Index h = spokes[of_source[k]];
         while (is_taken[h / 3] || map.origin(ClosedMap::next(h)) != to || map.origin(ClosedMap::previous(h)) != third)
             h = map.turn_clockwise(h);
         is_taken[h / 3] = true;
+        for (; k > 0; --k) h = ClosedMap::previous(h); // back to the first corner
         found.push_back(h);
     }
     return found;

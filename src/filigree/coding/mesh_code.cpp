@@ -397,6 +397,7 @@ Result<CodedMesh> encode_mesh(const Mesh& mesh, const MeshCodeOptions& options, 
     if (options.bits < 10 || options.bits > 16)
         return Error{ErrorCode::usage,
                      "Positions are coded with 10 to 16 bits; " + std::to_string(options.bits) + " were asked for."};
+    if (std::optional<Error> error = mesh_error(mesh)) return *error;
     if (mesh.vertex_count() == 0) return Error{ErrorCode::unsuitable, "The mesh has no vertices: nothing to code."};
     if (mesh.corner_count() >= kNoIndex / 4)
         return Error{ErrorCode::unsuitable, "The mesh has more than a thousand million corners: too many to code."};

@@ -40,8 +40,8 @@ struct MeshCodeReport {
     std::size_t out_of_reach = 0;
 };
 
-/// Errors: usage (bits), unsuitable (nothing to code), cancelled. Cost O(size log size), about 0.6 processor seconds a
-/// million vertices.
+/// Errors: usage (bits; check_mesh refuses the mesh), unsuitable (nothing to code), cancelled. Cost O(size log size),
+/// about 0.6 processor seconds a million vertices.
 Result<CodedMesh> encode_mesh(const Mesh& mesh, const MeshCodeOptions& options, MeshCodeReport* report,
                               const RunContext& context);
 

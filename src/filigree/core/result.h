@@ -1,6 +1,7 @@
 // How things go wrong: a named code and one sentence that says where, why, and what to do.
 #pragma once
 
+#include <cassert>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -67,8 +68,11 @@ public:
     T* operator->() { return &value(); }
     const T* operator->() const { return &value(); }
 
-    /// The error; only of a failed result, else std::bad_variant_access is thrown.
-    const Error& error() const { return std::get<1>(content_); }
+    /// The error; only of a failed result.
+    const Error& error() const {
+        assert(!ok());
+        return *std::get_if<1>(&content_);
+    }
 
 private:
     void require_value() const {

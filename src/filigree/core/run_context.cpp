@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 #include <mutex>
+#include <new>
 #include <vector>
 
 #include <oneapi/tbb/info.h>
@@ -34,9 +35,14 @@ public:
         free.pop_back();
         return arena;
     }
-    void give_back(unsigned threads, std::unique_ptr<tbb::task_arena> arena) {
+    /// Never fails: an arena that there is no memory to keep is given up.
+    void give_back(unsigned threads, std::unique_ptr<tbb::task_arena> arena) noexcept {
         const std::scoped_lock lock(mutex_);
-        free_[threads].push_back(std::move(arena));
+        try {
+            free_[threads].push_back(std::move(arena));
+        } catch (const std::bad_alloc&) { // a vector that cannot grow leaves its new item where it was
+            arena.reset();
+        }
     }
 
 private:

@@ -71,13 +71,13 @@ Status check(const StripOptions& options, const FidelityGoal& goal) {
 std::vector<NamedWarp> fidelity_warps(const Box& box) {
     const Axis axis = longest_axis(box);
     std::vector<NamedWarp> warps;
-    warps.push_back({"stretch 2", true, make_stretch(box, axis, 2)});
-    warps.push_back({"stretch 0.5", true, make_stretch(box, axis, 0.5)});
-    warps.push_back({"squeeze 2", true, make_squeeze(box, axis, 2)});
+    warps.push_back({"stretch 2", true, make_stretch(box, axis, 2).value()});
+    warps.push_back({"stretch 0.5", true, make_stretch(box, axis, 0.5).value()});
+    warps.push_back({"squeeze 2", true, make_squeeze(box, axis, 2).value()});
     warps.push_back({"bend 90", false, make_bend(box, axis, 90)});
     warps.push_back({"bend 180", false, make_bend(box, axis, 180)});
     warps.push_back({"twist 180", false, make_twist(box, axis, 180)});
-    warps.push_back({"taper 0.5", false, make_taper(box, axis, 0.5)});
+    warps.push_back({"taper 0.5", false, make_taper(box, axis, 0.5).value()});
     warps.push_back({"random 10 %", false, make_smooth_random(box, 0.10, 1)});
     warps.push_back({"random 25 %", false, make_smooth_random(box, 0.25, 1)});
     return warps;
@@ -108,7 +108,7 @@ Result<DriverFidelity> driver_fidelity(const Model& model, const RunContext& con
         if (!error) return error.error();
         return DriverFidelity{*error, *error};
     }
-    const SampledRestorer restorer(model, kMostMeasured);
+    const SampledRestorer restorer(model, kMostMeasured, context);
     const GradientFit fit(level_mesh(model, 0), NormalColumn::fitted, context);
     DriverFidelity largest;
     for (const NamedWarp& named : fidelity_warps(world_bounds(model.mesh))) {

@@ -1,6 +1,7 @@
 #include "filigree/deform/handle_regions.h"
 
 #include "filigree/deform/handles.h"
+#include "filigree/mesh/closest_point.h"
 #include "filigree/mesh/normals.h"
 #include "filigree/mesh/triangulate.h"
 #include "filigree/mesh/weld.h"
@@ -12,6 +13,8 @@
 namespace filigree {
 
 namespace {
+
+constexpr std::size_t kVerticesBetweenLooks = 8192; // at the cancel flag
 
 /// Where each vertex that a handle holds goes to, in the world.
 using Targets = std::map<Index, Vec3d>;
@@ -29,10 +32,41 @@ struct Candidates {
     std::size_t named_count;                  ///< vertices of the mesh
 };
 
+/// A driver's vertices, asked again and again which of them is the nearest.
+class NearestVertices {
+public:
+    explicit NearestVertices(const Mesh& driver, const RunContext& context) : positions_(driver.positions) {
+        points_.reserve(positions_.size());
+        for (Index v = 0; v < positions_.size(); ++v) points_.push_back({v, v, v});
+        context.execute([&] { tree_.emplace(positions_, points_); }); // Embree builds on the arena's threads
+    }
+    /// The lowest of equally near ones.
+    Index operator()(const Vec3f& place) const {
+        const Index found = tree_->closest(place).triangle;
+        return found == kNoIndex ? by_trying_all(place) : found;
+    }
+
+private:
+    Index by_trying_all(const Vec3f& place) const { // so far away that the tree finds none
+        const auto distance = [&](Index v) { return (positions_[v] - place).cast<double>().squaredNorm(); };
+        Index best = 0;
+        for (Index v = 1; v < positions_.size(); ++v)
+            if (distance(v) < distance(best)) best = v;
+        return best;
+    }
+
+    std::span<const Vec3f> positions_;
+    std::vector<Triangle> points_;
+    std::optional<ClosestPointTree> tree_;
+};
+
 /// The vertices that a handle holds, ascending.
-Result<std::vector<Index>> held_vertices(const HandleRegion& handle, const std::string& name, const Candidates& from) {
+Result<std::vector<Index>> held_vertices(const HandleRegion& handle, const std::string& name, const Candidates& from,
+                                         const RunContext& context) {
     std::vector<Index> held;
-    for (const Index id : handle.vertices) {
+    for (std::size_t i = 0; i < handle.vertices.size(); ++i) {
+        if (i % kVerticesBetweenLooks == 0 && context.is_cancelled()) return cancelled_error();
+        const Index id = handle.vertices[i];
         if (id >= from.named_count)
             return wrong_handle(name + " names vertex " + std::to_string(id) + ", and there are " +
                                 std::to_string(from.named_count) + ".");
@@ -48,17 +82,19 @@ Result<std::vector<Index>> held_vertices(const HandleRegion& handle, const std::
     std::sort(held.begin(), held.end());
     held.erase(std::unique(held.begin(), held.end()), held.end());
     if (held.empty())
-        return wrong_handle(name + " holds no vertex of what is moved: make its region larger, or the driver finer "
-                                   "(strip --base).");
+        return wrong_handle(name + " holds no vertex of what is moved: make its region larger, or strip with a larger "
+                                   "base for a finer driver.");
     return held;
 }
 
-Result<Targets> handle_targets(std::span<const HandleRegion> handles, const Candidates& from) {
+Result<Targets> handle_targets(std::span<const HandleRegion> handles, const Candidates& from,
+                               const RunContext& context) {
     Targets targets;
     for (std::size_t number = 0; number < handles.size(); ++number) {
+        if (context.is_cancelled()) return cancelled_error();
         const HandleRegion& handle = handles[number];
         const std::string name = said_name(handle, number);
-        const Result<std::vector<Index>> held = held_vertices(handle, name, from);
+        const Result<std::vector<Index>> held = held_vertices(handle, name, from, context);
         if (!held) return held.error();
         Vec3d centre = Vec3d::Zero();
         for (const Index v : *held) centre += from.world[v] / double(held->size());
@@ -112,13 +148,16 @@ HandleRegion HandleRegion::part(double fraction) const {
 }
 
 Result<Mesh> move_by_handles(Mesh mesh, std::span<const HandleRegion> handles, const RunContext& context) {
+    if (std::optional<Error> error = mesh_error(mesh)) return *error;
     const std::vector<Index> representative = weld_map(mesh.positions);
     const Result<Targets> targets =
-        handle_targets(handles, {places_in_world(mesh), [](Index v) { return v; }, mesh.vertex_count()});
+        handle_targets(handles, {places_in_world(mesh), [](Index v) { return v; }, mesh.vertex_count()}, context);
     if (!targets) return targets.error();
     const Result<Targets> welded = welded_targets(*targets, representative);
     if (!welded) return welded.error();
-    std::vector<Triangle> triangles = triangulate(mesh).triangles;
+    Result<Triangulation> triangulation = triangulate(mesh, context);
+    if (!triangulation) return triangulation.error();
+    std::vector<Triangle>& triangles = triangulation->triangles;
     for (Triangle& triangle : triangles)
         for (Index& v : triangle) v = representative[v];
     const Result<Pose> pose = solve_targets(mesh.positions, triangles, mesh.origin, *welded, context);
@@ -133,17 +172,18 @@ Result<Mesh> move_by_handles(Mesh mesh, std::span<const HandleRegion> handles, c
 
 Result<Pose> pose_by_handles(const Model& model, std::span<const HandleRegion> handles, const RunContext& context) {
     const Mesh driver = level_mesh(model, 0);
-    const std::vector<Vec3d> places = places_in_world(driver);
-    const auto nearest = [&](Index id) {
-        const Vec3d p = model.mesh.world_position(id);
-        Index best = 0;
-        for (Index v = 1; v < places.size(); ++v)
-            if ((places[v] - p).squaredNorm() < (places[best] - p).squaredNorm()) best = v;
-        return best;
+    if (driver.vertex_count() == 0) return Error{ErrorCode::unsuitable, "The driver has no vertices to take hold of."};
+    std::optional<NearestVertices> nearest; // only where vertices are named
+    const auto standing_for = [&](Index id) {
+        if (!nearest) nearest.emplace(driver, context);
+        return (*nearest)(model.mesh.positions[id]);
     };
-    const Result<Targets> targets = handle_targets(handles, {places, nearest, model.mesh.vertex_count()});
+    const Result<Targets> targets =
+        handle_targets(handles, {places_in_world(driver), standing_for, model.mesh.vertex_count()}, context);
     if (!targets) return targets.error();
-    return solve_targets(driver.positions, triangulate(driver).triangles, driver.origin, *targets, context);
+    const Result<Triangulation> triangulation = triangulate(driver, context);
+    if (!triangulation) return triangulation.error();
+    return solve_targets(driver.positions, triangulation->triangles, driver.origin, *targets, context);
 }
 
 } // namespace filigree

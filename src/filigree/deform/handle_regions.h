@@ -31,8 +31,8 @@ struct HandleRegion {
 };
 
 /// Every vertex of the mesh, by one solve over all of them; normals turn along. Vertices at one place move together.
-/// Errors: usage (a handle that holds no vertex, a vertex that is not there or in two handles; the sentence begins with
-/// the handle), and as of HandleSolver.
+/// Errors: usage (check_mesh refuses the mesh; a handle that holds no vertex, a vertex that is not there or in two
+/// handles; the sentence begins with the handle), and as of HandleSolver.
 Result<Mesh> move_by_handles(Mesh mesh, std::span<const HandleRegion> handles, const RunContext& context);
 
 /// The driver of a model, by a solve over its vertices alone; for a named vertex of the mesh stands the driver's

@@ -42,7 +42,7 @@ class GrabbedVertex {
 public:
     GrabbedVertex(const Model& model, Index vertex, const Pose* start)
         : restorer_(std::get<BlendDetail>(model.detail), model.mesh.positions, model.driver().vertices,
-                    std::array{BlendRestorer::Item{vertex, 0}}),
+                    std::array{BlendRestorer::Item{vertex, 0}}, {}, RunContext(1)),
           start_(start ? place(*start) : model.mesh.positions[vertex]) {}
     /// From where it started.
     Vec3f way(const Pose& pose) const { return place(pose) - start_; }
@@ -122,7 +122,9 @@ Result<std::vector<Vec3f>> pull_every_vertex(const Model& model, std::span<const
     std::vector<Vec3f> positions = model.mesh.positions;
     if (pulls.empty()) return positions;
     const std::vector<Index> representative = weld_map(positions);
-    std::vector<Triangle> triangles = triangulate(model.mesh).triangles;
+    Result<Triangulation> triangulation = triangulate(model.mesh, context);
+    if (!triangulation) return triangulation.error();
+    std::vector<Triangle>& triangles = triangulation->triangles;
     for (Triangle& triangle : triangles)
         for (Index& vertex : triangle) vertex = representative[vertex];
     for (std::size_t k = 0; k < pulls.size(); ++k) {
@@ -176,8 +178,10 @@ PullSolver::~PullSolver() = default;
 Result<PullSolver> PullSolver::create(const Model& model, const Pose* start, const PullRegion& region,
                                       std::optional<Index> grabbed, const RunContext& context) {
     const Mesh driver = driver_mesh(model); // triangulating looks at the positions at rest
-    Result<PullTargets> targets = PullTargets::create(start ? start->positions : driver.positions,
-                                                      triangulate(driver).triangles, region, context);
+    const Result<Triangulation> triangulation = triangulate(driver, context);
+    if (!triangulation) return triangulation.error();
+    Result<PullTargets> targets =
+        PullTargets::create(start ? start->positions : driver.positions, triangulation->triangles, region, context);
     if (!targets) return targets.error();
     const double off_pointer = Solver::kOffPointer * bounds(model.mesh.positions).diagonal();
     auto solver = std::make_unique<Solver>(Solver{std::move(*targets), start, {}, off_pointer});

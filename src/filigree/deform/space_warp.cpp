@@ -209,15 +209,21 @@ void warp_normals(const SpaceWarp& warp, Mesh& mesh, const RunContext& context) 
     });
 }
 
+std::optional<Error> check_factor(const std::string& what, double factor) {
+    if (factor > 0 && std::isfinite(factor)) return std::nullopt;
+    return Error{ErrorCode::usage, "The factor of a " + what + " has to be a number above 0."};
+}
+
 } // namespace
 
-std::unique_ptr<SpaceWarp> make_stretch(const Box& box, Axis axis, double factor) {
-    assert(factor != 0);
+Result<std::unique_ptr<SpaceWarp>> make_stretch(const Box& box, Axis axis, double factor) {
+    if (factor == 0 || !std::isfinite(factor))
+        return Error{ErrorCode::usage, "The factor of a stretch has to be a number other than 0."};
     return make_scale(AxisBasis(box, axis), factor, 1);
 }
 
-std::unique_ptr<SpaceWarp> make_squeeze(const Box& box, Axis axis, double factor) {
-    assert(factor > 0);
+Result<std::unique_ptr<SpaceWarp>> make_squeeze(const Box& box, Axis axis, double factor) {
+    if (std::optional<Error> error = check_factor("squeeze", factor)) return *error;
     return make_scale(AxisBasis(box, axis), factor, 1 / std::sqrt(factor));
 }
 
@@ -266,8 +272,8 @@ std::unique_ptr<SpaceWarp> make_twist(const Box& box, Axis axis, double degrees)
     });
 }
 
-std::unique_ptr<SpaceWarp> make_taper(const Box& box, Axis axis, double factor) {
-    assert(factor > 0);
+Result<std::unique_ptr<SpaceWarp>> make_taper(const Box& box, Axis axis, double factor) {
+    if (std::optional<Error> error = check_factor("taper", factor)) return *error;
     const AxisBasis f(box, axis);
     if (f.thin) return make_identity();
     return make_warp([f, rate = (factor - 1) / f.length](const Vec3d& p) {

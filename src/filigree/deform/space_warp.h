@@ -40,10 +40,11 @@ Axis longest_axis(const Box& box);
 // there; a point exactly on an end has the gradient of the inside. Along an axis in which the box has no length
 // (below 1e-9 of its diagonal) these three are the identity.
 
-/// Scales by `factor` along the axis about the box's centre. factor != 0.
-std::unique_ptr<SpaceWarp> make_stretch(const Box& box, Axis axis, double factor);
-/// Scales by `factor` along the axis and by 1 / sqrt(factor) across it, so that volume stays. factor > 0.
-std::unique_ptr<SpaceWarp> make_squeeze(const Box& box, Axis axis, double factor);
+/// Scales by `factor` along the axis about the box's centre. Errors: usage (a factor of 0, or not finite).
+Result<std::unique_ptr<SpaceWarp>> make_stretch(const Box& box, Axis axis, double factor);
+/// Scales by `factor` along the axis and by 1 / sqrt(factor) across it, so that volume stays.
+/// Errors: usage (a factor that is not above 0).
+Result<std::unique_ptr<SpaceWarp>> make_squeeze(const Box& box, Axis axis, double factor);
 /// Bends the axis into an arc of `degrees` over the box's length, keeping the length of its centre line; the box's
 /// middle stays where it is. Beyond the box's ends the body continues straight. Towards the next axis (x to y to z to
 /// x).
@@ -52,8 +53,8 @@ std::unique_ptr<SpaceWarp> make_bend(const Box& box, Axis axis, double degrees);
 /// rigidly beyond.
 std::unique_ptr<SpaceWarp> make_twist(const Box& box, Axis axis, double degrees);
 /// Scales cross-sections linearly along the axis, from 1 at the low end to `factor` at the high end; constant beyond.
-/// factor > 0.
-std::unique_ptr<SpaceWarp> make_taper(const Box& box, Axis axis, double factor);
+/// Errors: usage (a factor that is not above 0).
+Result<std::unique_ptr<SpaceWarp>> make_taper(const Box& box, Axis axis, double factor);
 /// A sum of eight Gaussian bumps with random centres in the box and random displacements, the longest of which is
 /// `amplitude` times the box's diagonal; the bumps' standard deviation is 0.35 diagonals. Seeded.
 std::unique_ptr<SpaceWarp> make_smooth_random(const Box& box, double amplitude, std::uint64_t seed);
@@ -73,7 +74,8 @@ std::vector<Vec3f> warp_positions(const SpaceWarp& warp, std::span<const Vec3f> 
 /// The same with gradients: the pose of a driver that starts from these positions instead of its model's.
 Pose warp_pose(const SpaceWarp& warp, std::span<const Vec3f> positions, const Vec3d& origin, const RunContext& context);
 /// Deforms every vertex of a mesh, and its normals by the cofactor of the gradient, to unit vectors. A normal that
-/// several vertices share becomes one value for each of them, the further ones at the end of normals.values.
+/// several vertices share becomes one value for each of them, the further ones at the end of normals.values. The mesh
+/// is not checked.
 void warp_mesh(const SpaceWarp& warp, Mesh& mesh, const RunContext& context);
 
 } // namespace filigree

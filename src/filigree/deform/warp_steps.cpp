@@ -11,15 +11,15 @@ bool is_factor(WarpKind kind) {
 std::unique_ptr<SpaceWarp> make_step(const WarpStep& step, const Box& box, Axis axis, std::uint64_t seed) {
     switch (step.kind) {
     case WarpKind::stretch:
-        return make_stretch(box, axis, step.amount);
+        return make_stretch(box, axis, step.amount).value();
     case WarpKind::squeeze:
-        return make_squeeze(box, axis, step.amount);
+        return make_squeeze(box, axis, step.amount).value();
     case WarpKind::bend:
         return make_bend(box, axis, step.amount);
     case WarpKind::twist:
         return make_twist(box, axis, step.amount);
     case WarpKind::taper:
-        return make_taper(box, axis, step.amount);
+        return make_taper(box, axis, step.amount).value();
     case WarpKind::random:
         break;
     }

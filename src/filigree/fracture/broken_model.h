@@ -32,8 +32,8 @@ std::vector<std::uint8_t> open_cracks(const Model& broken, std::span<const Index
                                       std::span<const std::array<Index, 2>> pieces_of_crack,
                                       std::span<const Pose> frames, double apart);
 
-/// Takes away the faces of cracks that never opened. crack_of_face, is_open: of FracturedMesh and open_cracks. Vertices
-/// stay, so that every frame has the same ones.
+/// Takes away the faces of cracks that never opened. The mesh is not checked. crack_of_face, is_open: of FracturedMesh
+/// and open_cracks. Vertices stay, so that every frame has the same ones.
 void drop_closed_cracks(Mesh& mesh, std::span<const Index> crack_of_face, std::span<const std::uint8_t> is_open);
 
 } // namespace filigree

@@ -55,8 +55,8 @@ struct FracturedMesh {
 
 /// Breaks a mesh along the borders of cells. Nothing rests on a tolerance: each piece is closed wherever the mesh is,
 /// at any place of the seeds (restricted Voronoi diagram, [Yan 2009], with exact signs). Cost: cut_surface and
-/// crack_surfaces; on one core about 0.1 s for 900,000 triangles and 20 planar cells. Errors: unsuitable (no face with
-/// three different corners), cancelled.
+/// crack_surfaces; on one core about 0.1 s for 900,000 triangles and 20 planar cells. Errors: usage (check_mesh refuses
+/// the mesh), unsuitable (no face with three different corners), cancelled.
 Result<FracturedMesh> fracture(const Mesh& mesh, const FractureCells& cells, const FractureOptions& options,
                                const RunContext& context);
 

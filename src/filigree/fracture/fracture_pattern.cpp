@@ -31,18 +31,18 @@ struct Matter {
 };
 
 /// Points of the surface, by area.
-std::vector<Vec3d> points_on_surface(const Mesh& mesh, std::size_t count, std::uint64_t seed, double& area) {
-    const Triangulation surface = triangulate(mesh);
+std::vector<Vec3d> points_on_surface(const Mesh& mesh, std::span<const Triangle> triangles, std::size_t count,
+                                     std::uint64_t seed, double& area) {
     std::vector<double> until; // sum of areas
     area = 0;
     const auto at = [&](const Triangle& t, std::size_t k) { return mesh.positions[t[k]].cast<double>().eval(); };
-    for (const Triangle& t : surface.triangles)
+    for (const Triangle& t : triangles)
         until.push_back(area += 0.5 * (at(t, 1) - at(t, 0)).cross(at(t, 2) - at(t, 0)).norm());
     std::vector<Vec3d> points;
     for (std::size_t k = 0; k < count; ++k) {
         const double where = random_unit(seed, 3 * k) * area;
         const auto found = std::min(std::upper_bound(until.begin(), until.end(), where), until.end() - 1);
-        const Triangle& t = surface.triangles[static_cast<std::size_t>(found - until.begin())];
+        const Triangle& t = triangles[static_cast<std::size_t>(found - until.begin())];
         double u = random_unit(seed, 3 * k + 1), v = random_unit(seed, 3 * k + 2);
         if (u + v > 1) {
             u = 1 - u;
@@ -74,8 +74,10 @@ Result<Matter> matter_of(const Mesh& mesh, Index pieces, const RunContext& conte
         }
     }
     if (context.is_cancelled()) return cancelled_error();
+    const Result<Triangulation> surface = triangulate(mesh, context);
+    if (!surface) return surface.error();
     double area = 0;
-    matter.points = points_on_surface(mesh, count, context.seed, area);
+    matter.points = points_on_surface(mesh, surface->triangles, count, context.seed, area);
     matter.piece_size = std::sqrt(area / pieces);
     matter.spacing = 2 * std::sqrt(area / double(count)); // they are not evenly spread
     return matter;
@@ -192,6 +194,7 @@ std::vector<double> grain_density(const Matter& matter, std::uint64_t seed) {
 } // namespace
 
 Result<FractureCells> make_fracture_cells(const Mesh& mesh, const FracturePattern& pattern, const RunContext& context) {
+    if (std::optional<Error> error = mesh_error(mesh)) return *error;
     if (mesh.face_count() == 0)
         return Error{ErrorCode::unsuitable, "The mesh has no faces: there is nothing to break."};
     if (pattern.pieces < 1 || pattern.pieces > FractureCells::kMostSeeds)

@@ -32,8 +32,8 @@ struct FracturePattern {
 /// of the median volume; of `grains`, the noise makes cells per volume differ by a factor of e^4 at most. Clumps: the
 /// one of the fewest cells joins a neighbour of the fewest until as many are left as pieces were asked for; none has
 /// more than three times `clump` cells unless matter hangs together too little. Cost: 100 points a piece, and the
-/// cells'. Errors: usage (counts and shares out of range, points that are not finite), unsuitable (no faces),
-/// cancelled.
+/// cells'. Errors: usage (counts and shares out of range, points that are not finite; check_mesh refuses the mesh),
+/// unsuitable (no faces), cancelled.
 Result<FractureCells> make_fracture_cells(const Mesh& mesh, const FracturePattern& pattern, const RunContext& context);
 
 } // namespace filigree

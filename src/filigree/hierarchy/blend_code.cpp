@@ -109,6 +109,8 @@ struct BlendRestorer::Content {
 
 namespace {
 
+constexpr std::size_t kRestorerGrain = 16384;
+
 /// A power of two that keeps a driver's digits: both it and its inverse are floats, and so is what lies far from the
 /// driver, as a vertex that no face uses may. Lengths in model units.
 double scale_inside(double driver, double all) {
@@ -152,35 +154,28 @@ bool sort_into_blocks(std::span<const BlendRestorer::Item> items, std::vector<Wa
     return true;
 }
 
-} // namespace
-
-BlendRestorer::BlendRestorer(BlendRestorer&&) noexcept = default;
-BlendRestorer& BlendRestorer::operator=(BlendRestorer&&) noexcept = default;
-BlendRestorer::~BlendRestorer() = default;
-
-BlendRestorer::BlendRestorer(const BlendDetail& detail, std::span<const Vec3f> positions, std::span<const Index> driver,
-                             std::span<const Item> items, std::span<const Vec3f> normals)
-    : content_(std::make_unique<Content>()) {
-    Box box; // the driver's, which files of either precision keep to the bit
-    for (Index v : driver) box.extend(positions[v].cast<double>());
-    const Vec3d centre = box.centre();
-    content_->scale = scale_inside(box.diagonal(), bounds(positions).diagonal());
-    const double scale = content_->scale;
-    for (Index v : driver) content_->rest.push_back(scale * (positions[v].cast<double>() - centre));
-
-    // Which records are wanted, in record order, and by which items (a vertex may have several).
-    std::vector<Index> first_item(positions.size(), kNoIndex), next_item(items.size(), kNoIndex);
+/// Which records are wanted, in record order, and by which items (a vertex may have several).
+std::vector<WantedRecord> wanted_records(const BlendDetail& detail, std::size_t vertices,
+                                         std::span<const BlendRestorer::Item> items) {
+    std::vector<Index> first_item(vertices, kNoIndex), next_item(items.size(), kNoIndex);
     for (Index i = static_cast<Index>(items.size()); i-- > 0;) {
         next_item[i] = first_item[items[i].vertex];
         first_item[items[i].vertex] = i;
     }
+    std::vector<WantedRecord> wanted;
+    wanted.reserve(items.size());
+    for (Index c = 0; c < detail.cells.size(); ++c)
+        for (Index r = detail.cell_offsets[c]; r < detail.cell_offsets[c + 1]; ++r)
+            for (Index i = first_item[detail.order[r]]; i != kNoIndex; i = next_item[i]) wanted.push_back({c, r, i});
+    return wanted;
+}
 
-    blend_kernel::Records& records = content_->records;
-    const bool int16 = detail.precision == Precision::int16;
-    records.count = items.size();
+void make_room(const BlendDetail& detail, std::size_t items, bool has_normals, double scale,
+               blend_kernel::Records& records) {
+    records.count = items;
     records.cells = detail.cells;
-    const std::size_t padded = items.size() + blend_kernel::kPadding;
-    if (int16) {
+    const std::size_t padded = items + blend_kernel::kPadding;
+    if (detail.precision == Precision::int16) {
         records.u16.assign(padded, 0);
         records.v16.assign(padded, 0);
         for (auto& o : records.offset) o.assign(padded, 0);
@@ -190,19 +185,16 @@ BlendRestorer::BlendRestorer(const BlendDetail& detail, std::span<const Vec3f> p
         records.v.assign(padded, 0);
         for (auto& q : records.q) q.assign(padded, 0);
     }
-    if (!normals.empty())
+    if (has_normals)
         for (auto& n : records.normal) n.assign(padded, 0);
-    records.slot.reserve(items.size());
+}
 
-    std::vector<WantedRecord> wanted;
-    wanted.reserve(items.size());
-    for (Index c = 0; c < detail.cells.size(); ++c)
-        for (Index r = detail.cell_offsets[c]; r < detail.cell_offsets[c + 1]; ++r)
-            for (Index i = first_item[detail.order[r]]; i != kNoIndex; i = next_item[i]) wanted.push_back({c, r, i});
-    const bool in_blocks = sort_into_blocks(items, wanted);
+/// Slots, and runs of records with one cell.
+void add_runs(std::span<const BlendRestorer::Item> items, std::span<const WantedRecord> wanted, bool in_blocks,
+              blend_kernel::Records& records) {
+    records.slot.reserve(items.size());
     for (const auto& [c, r, i] : wanted) {
-        const Triangle& cell = detail.cells[c];
-        const Index vertex = detail.order[r], at = static_cast<Index>(records.slot.size());
+        const Index at = static_cast<Index>(records.slot.size());
         const bool begins_block = in_blocks && at % blend_kernel::kBlock == 0;
         if (begins_block) records.block_runs.push_back(static_cast<Index>(records.runs.size()));
         if (records.runs.empty() || begins_block || records.runs.back().cell != c ||
@@ -210,25 +202,55 @@ BlendRestorer::BlendRestorer(const BlendDetail& detail, std::span<const Vec3f> p
             records.runs.push_back({c, at, 0});
         ++records.runs.back().count;
         records.slot.push_back(items[i].slot);
-        if (!normals.empty())
-            for (int k = 0; k < 3; ++k) records.normal[k][at] = normals[i][k];
-        if (int16) {
-            records.u16[at] = static_cast<std::int16_t>(std::round(detail.u[r] * 32767.0f));
-            records.v16[at] = static_cast<std::int16_t>(std::round(detail.v[r] * 32767.0f));
-            for (int k = 0; k < 3; ++k) records.offset[k][at] = detail.offsets[r][k];
-            continue;
-        }
-        records.u[at] = detail.u[r];
-        records.v[at] = detail.v[r];
-        const Vec3d m = scale * (anchor(cell, detail.u[r], detail.v[r], positions, driver) - centre);
-        const Vec3d q = scale * (positions[vertex].cast<double>() - centre) - 0.5 * m;
-        for (int k = 0; k < 3; ++k) records.q[k][at] = static_cast<float>(q[k]);
     }
     if (!in_blocks) return;
     records.block_runs.push_back(static_cast<Index>(records.runs.size()));
     records.from.resize(items.size());
     for (std::size_t at = 0; at < records.slot.size(); ++at)
         records.from[records.slot[at]] = static_cast<std::uint16_t>(at % blend_kernel::kBlock);
+}
+
+} // namespace
+
+BlendRestorer::BlendRestorer(BlendRestorer&&) noexcept = default;
+BlendRestorer& BlendRestorer::operator=(BlendRestorer&&) noexcept = default;
+BlendRestorer::~BlendRestorer() = default;
+
+BlendRestorer::BlendRestorer(const BlendDetail& detail, std::span<const Vec3f> positions, std::span<const Index> driver,
+                             std::span<const Item> items, std::span<const Vec3f> normals, const RunContext& context)
+    : content_(std::make_unique<Content>()) {
+    Box box; // the driver's, which files of either precision keep to the bit
+    for (Index v : driver) box.extend(positions[v].cast<double>());
+    const Vec3d centre = box.centre();
+    content_->scale = scale_inside(box.diagonal(), bounds(positions).diagonal());
+    const double scale = content_->scale;
+    for (Index v : driver) content_->rest.push_back(scale * (positions[v].cast<double>() - centre));
+
+    std::vector<WantedRecord> wanted = wanted_records(detail, positions.size(), items);
+    const bool in_blocks = sort_into_blocks(items, wanted);
+    blend_kernel::Records& records = content_->records;
+    make_room(detail, items.size(), !normals.empty(), scale, records);
+    add_runs(items, wanted, in_blocks, records);
+    // Every record has a place of its own by now.
+    const bool int16 = detail.precision == Precision::int16;
+    parallel_for(context, wanted.size(), kRestorerGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t at = begin; at < end; ++at) {
+            const auto& [c, r, i] = wanted[at];
+            if (!normals.empty())
+                for (int k = 0; k < 3; ++k) records.normal[k][at] = normals[i][k];
+            if (int16) {
+                records.u16[at] = static_cast<std::int16_t>(std::round(detail.u[r] * 32767.0f));
+                records.v16[at] = static_cast<std::int16_t>(std::round(detail.v[r] * 32767.0f));
+                for (int k = 0; k < 3; ++k) records.offset[k][at] = detail.offsets[r][k];
+                continue;
+            }
+            records.u[at] = detail.u[r];
+            records.v[at] = detail.v[r];
+            const Vec3d m = scale * (anchor(detail.cells[c], detail.u[r], detail.v[r], positions, driver) - centre);
+            const Vec3d q = scale * (positions[detail.order[r]].cast<double>() - centre) - 0.5 * m;
+            for (int k = 0; k < 3; ++k) records.q[k][at] = static_cast<float>(q[k]);
+        }
+    });
 }
 
 std::span<const Index> BlendRestorer::slots() const { return content_->records.slot; }
@@ -266,7 +288,9 @@ void BlendRestorer::restore(std::span<const Vec3f> driver_positions, std::span<c
     output.in_order = in_order;
     output.scale = output_scale();
     if (!output.positions && !output.normals) return;
-    blend_kernel::restore(content_->records, transforms(driver_positions, gradients, context), output, context);
+    const std::vector<blend_kernel::VertexTransform> moved = transforms(driver_positions, gradients, context);
+    if (output.normals) output.normal_scale = blend_kernel::normal_scale(moved);
+    blend_kernel::restore(content_->records, moved, output, context);
 }
 
 } // namespace filigree

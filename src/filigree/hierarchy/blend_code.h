@@ -60,8 +60,9 @@ public:
         Index vertex, slot;
     };
     /// positions: the mesh's at rest. items: what to restore. normals: empty or the unit rest normal of each item.
+    /// Cost O(V), most of it on all threads; same bytes for any number of them.
     BlendRestorer(const BlendDetail& detail, std::span<const Vec3f> positions, std::span<const Index> driver,
-                  std::span<const Item> items, std::span<const Vec3f> normals = {});
+                  std::span<const Item> items, std::span<const Vec3f> normals, const RunContext& context);
     ~BlendRestorer();
     BlendRestorer(BlendRestorer&&) noexcept;
     BlendRestorer& operator=(BlendRestorer&&) noexcept;

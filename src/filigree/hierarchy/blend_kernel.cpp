@@ -8,7 +8,9 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <cstring>
+#include <limits>
 #include <utility>
 
 #if defined(__SSE2__)
@@ -136,13 +138,14 @@ struct Place {
 
 /// Gives normals length one, in a loop of its own: the root's latency is long, and here several are under way at once.
 template <int N>
-FILIGREE_INLINE void store_unit(const NormalBuffer& normals, std::size_t count, const Place& to) {
+FILIGREE_INLINE void store_unit(const NormalBuffer& normals, std::size_t count, float scale, const Place& to) {
     using L = PointLanes<N>;
     using Float = typename L::Float;
     for (std::size_t k = 0; k < count; k += N) {
-        const Float n[3] = {L::load(normals.at[0] + k), L::load(normals.at[1] + k), L::load(normals.at[2] + k)};
+        const Float n[3] = {scale * L::load(normals.at[0] + k), scale * L::load(normals.at[1] + k),
+                            scale * L::load(normals.at[2] + k)};
         const Float squared = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
-        const Float tiny = Float{} + 1e-30f; // a zero normal stays zero
+        const Float tiny = Float{} + std::numeric_limits<float>::min(); // a zero normal stays zero
         const Float length = inverse_sqrt<Float>(squared > tiny ? squared : tiny);
         float rest[3 * N];
         const bool fits = k + N <= to.room;
@@ -182,7 +185,7 @@ FILIGREE_INLINE Group restore_group(const Job& job, std::size_t run_begin, std::
         if (Positions && !fits) std::memcpy(to, last, run.count * sizeof(Vec3f));
         group.count += run.count;
     }
-    if constexpr (Normals) store_unit<N>(lengthy, group.count, normals);
+    if constexpr (Normals) store_unit<N>(lengthy, group.count, job.output.normal_scale, normals);
     if (Positions && job.output.scale != 1)
         for (std::size_t k = 0; k < 3 * group.count; ++k) positions.points[k] *= job.output.scale;
     return group;
@@ -350,6 +353,16 @@ RestoreFunction restore_function(int lanes) {
 }
 
 } // namespace
+
+float normal_scale(std::span<const VertexTransform> transforms) {
+    constexpr int kUsual = 10, kMost = 60; // powers of two
+    float largest = 0;
+    for (const VertexTransform& transform : transforms)
+        for (const float entry : transform.a) largest = std::max(largest, std::abs(entry));
+    if (!(largest > 0) || !std::isfinite(largest)) return 1;
+    const int power = std::clamp(std::ilogb(largest), -kMost, kMost);
+    return std::abs(power) <= kUsual ? 1.0f : std::ldexp(1.0f, -2 * power); // a cofactor has two factors
+}
 
 std::span<const int> lane_counts() {
     static constexpr int kCounts[] = {4, 8, 16};

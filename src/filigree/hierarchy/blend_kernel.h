@@ -52,7 +52,13 @@ struct Output {
     Vec3f* normals = nullptr;
     bool in_order = false;
     float scale = 1; ///< multiplies positions; a power of two
+    /// Multiplies normals before they get length one; a power of two. For gradients about 1 none is needed; see
+    /// normal_scale.
+    float normal_scale = 1;
 };
+
+/// What keeps normals within float's range: 1 unless the largest entry of all gradients is far from 1.
+float normal_scale(std::span<const VertexTransform> transforms);
 
 /// p' = sum b t + (sum b A) q for every record, and n' = unit(cofactor(sum b A) n). Same bytes for any thread count and
 /// any processor. Cost: bounded by memory.

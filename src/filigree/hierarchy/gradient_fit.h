@@ -24,7 +24,7 @@ enum class NormalColumn {
 /// normal column at every vertex with a face is s n', whatever lies around.
 class GradientFit {
 public:
-    /// driver: the driver at rest. Cost O(V) solves of 36 unknowns, and O(V log V) for the neighbours.
+    /// driver: the driver at rest, not checked. Cost O(V) solves of 36 unknowns, and O(V log V) for the neighbours.
     GradientFit(const Mesh& driver, NormalColumn normal_column, const RunContext& context);
 
     /// One gradient a vertex of the driver, whose vertices are now at `positions`. Cost O(V); same bytes for any thread

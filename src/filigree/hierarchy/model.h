@@ -19,7 +19,7 @@ struct Level {
     std::vector<Index> face_offsets = {0}; ///< as in Mesh
     std::vector<Index> corners;            ///< positions in `vertices`
 
-    std::size_t face_count() const { return face_offsets.size() - 1; }
+    std::size_t face_count() const { return face_offsets.empty() ? 0 : face_offsets.size() - 1; }
 };
 
 /// Everything needed to restore a mesh from a pose of its driver.

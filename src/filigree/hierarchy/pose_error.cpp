@@ -2,6 +2,7 @@
 
 #include "filigree/core/random.h"
 #include "filigree/hierarchy/gradient_fit.h"
+#include "filigree/hierarchy/restore.h"
 #include "filigree/hierarchy/sampled_restorer.h"
 
 #include <algorithm>
@@ -62,9 +63,9 @@ struct PoseError::Calibration {
     std::once_flag from_positions_made, with_gradients_made;
     double from_positions = 1, with_gradients = 1;
 
-    Calibration(const Model& model, unsigned threads_to_use)
-        : restorer(model, kSampled), driver(level_mesh(model, 0)), diagonal(bounds(model.mesh).diagonal()),
-          threads(threads_to_use) {}
+    Calibration(const Model& model, const RunContext& context)
+        : restorer(model, kSampled, context), driver(level_mesh(model, 0)), diagonal(bounds(model.mesh).diagonal()),
+          threads(context.threads()) {}
 
     double factor(const PoseError& error, bool has_gradients) {
         std::call_once(has_gradients ? with_gradients_made : from_positions_made,
@@ -103,10 +104,10 @@ PoseError::PoseError(PoseError&&) noexcept = default;
 PoseError& PoseError::operator=(PoseError&&) noexcept = default;
 PoseError::~PoseError() = default;
 
-PoseError::PoseError(const Model& model, unsigned threads) : rest_(driver_positions(model)) {
+PoseError::PoseError(const Model& model, const RunContext& context) : rest_(driver_positions(model)) {
     const auto* detail = std::get_if<BlendDetail>(&model.detail);
     if (!detail) return;
-    calibration_ = std::make_unique<Calibration>(model, threads);
+    calibration_ = std::make_unique<Calibration>(model, context);
     cells_ = detail->cells;
     for (std::size_t c = 0; c < cells_.size(); ++c) {
         Load load{};
@@ -127,7 +128,11 @@ PoseError::PoseError(const Model& model, unsigned threads) : rest_(driver_positi
     }
 }
 
-PoseError::Estimate PoseError::estimate(const Pose& pose, std::span<const Mat3f> gradients) const {
+Result<PoseError::Estimate> PoseError::estimate(const Pose& pose, std::span<const Mat3f> gradients) const {
+    if (Status fits = check_pose(rest_.size(), pose); !fits) return fits.error();
+    if (calibration_ && gradients.size() != rest_.size())
+        return Error{ErrorCode::mismatch, "There are " + std::to_string(gradients.size()) + " gradients for " +
+                                              std::to_string(rest_.size()) + " driver vertices."};
     Estimate result = estimate_unscaled(pose.positions, gradients);
     if (!calibration_) return result;
     const double factor = calibration_->factor(*this, !pose.gradients.empty());

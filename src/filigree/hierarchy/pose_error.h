@@ -16,9 +16,9 @@ namespace filigree {
 /// would have moved the whole mesh differently.
 class PoseError {
 public:
-    /// Of a blend model; for others every estimate is 0. Does not refer to the model later on. threads: for what is
-    /// measured, 0 for all; same bytes for any. Cost O(V).
-    explicit PoseError(const Model& model, unsigned threads = 0);
+    /// Of a blend model; for others every estimate is 0. Does not refer to the model later on. context: what is
+    /// measured later takes its threads, and cannot be cancelled; same bytes for any number. Cost O(V).
+    explicit PoseError(const Model& model, const RunContext& context = RunContext());
     PoseError(PoseError&&) noexcept;
     PoseError& operator=(PoseError&&) noexcept;
     ~PoseError();
@@ -35,8 +35,9 @@ public:
     };
     /// gradients: those that the pose is restored with (Restorer::gradients), one a driver vertex. Cost O(driver); the
     /// first pose that comes with gradients costs a few restores of 16,384 vertices too, and the first one without also
-    /// a GradientFit. From many threads at a time.
-    Estimate estimate(const Pose& pose, std::span<const Mat3f> gradients) const;
+    /// a GradientFit. From many threads at a time. Errors: as of check_pose; mismatch (another number of
+    /// gradients, blend code).
+    Result<Estimate> estimate(const Pose& pose, std::span<const Mat3f> gradients) const;
 
 private:
     /// What hangs on a cell: sums over its vertices, for the edges 0-1, 1-2 and 2-0, of the square of 4 b_k b_l (one in

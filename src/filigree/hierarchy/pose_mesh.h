@@ -11,11 +11,11 @@ namespace filigree {
 /// a moved driver holds it.
 bool is_gradient_name(std::string_view scalar);
 
-/// Puts a pose's gradients, where it has any, into a mesh of its vertices as those nine scalars.
+/// Puts a pose's gradients, where it has any, into a mesh of its vertices as those nine scalars. Nothing is checked.
 void add_gradients(Mesh& mesh, const Pose& pose);
 
 /// The pose that a moved driver is in: its positions, and the gradients in its vertex scalars f00 .. f22 where all nine
-/// are there. origin: the model's. Whether it fits a model, check_pose says.
+/// are there. origin: the model's. The mesh is not checked; whether the pose fits a model, check_pose says.
 Pose pose_of_mesh(const Mesh& moved, const Vec3d& origin);
 
 /// Level 0 for others to move: without scalars of the mesh's own that pose_of_mesh would take for gradients.

@@ -45,7 +45,7 @@ struct ReferenceDetail {
 
 /// Removes detail level by level against *decoded* coarser points (closed loop), in the precision of the decode, so
 /// that errors do not add up. Level 0's vertices are the corners of the base quads. Cost O(V).
-/// Errors: as find_regular_patches; usage (references not 3, 4 or 6).
+/// Errors: as find_regular_patches, which checks the mesh; usage (references not 3, 4 or 6).
 Result<ReferenceDetail> encode_reference(const Mesh& mesh, const ReferenceOptions& options, const RunContext& context);
 
 /// Restores a regular mesh from driver positions, again and again; from several threads at once if need be.
@@ -53,6 +53,7 @@ class ReferenceRestorer {
 public:
     /// Folds the law into the records. Keeps a reference to `detail`. Cost O(V).
     ReferenceRestorer(const ReferenceDetail& detail, HeightLaw law, const RunContext& context);
+    ReferenceRestorer(const ReferenceDetail&&, HeightLaw, const RunContext&) = delete;
     ~ReferenceRestorer();
     ReferenceRestorer(ReferenceRestorer&&) noexcept;
     ReferenceRestorer& operator=(ReferenceRestorer&&) noexcept;

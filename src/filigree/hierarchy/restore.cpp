@@ -25,7 +25,7 @@ struct Restorer::Content {
     std::optional<ReferenceRestorer> reference;
 
     bool has_vertex_normals() const { return !rest.normals.empty() && rest.normals.per_vertex(); }
-    void prepare_blend();
+    Status prepare_blend(const RunContext& context);
     const GradientFit& fit(unsigned threads) const;
     std::vector<Mat3f> gradients(const Pose& pose, const RunContext& context) const;
 };
@@ -48,7 +48,7 @@ const GradientFit& Restorer::Content::fit(unsigned threads) const {
     return *gradient_fit;
 }
 
-void Restorer::Content::prepare_blend() {
+Status Restorer::Content::prepare_blend(const RunContext& context) {
     const BlendDetail& detail = std::get<BlendDetail>(model->detail);
     const std::span<const Vec3f> positions = model->mesh.positions;
     const std::span<const Index> driver = model->driver().vertices;
@@ -57,8 +57,9 @@ void Restorer::Content::prepare_blend() {
     const auto finest_id = [&](Index v) { return vertices.empty() ? v : vertices[v]; };
     for (Index v = 0; v < items.size(); ++v) items[v] = {finest_id(v), v};
     blend.emplace(detail, positions, driver, items,
-                  has_vertex_normals() ? unit(rest.normals.values) : std::vector<Vec3f>{});
-    if (rest.normals.empty() || has_vertex_normals()) return;
+                  has_vertex_normals() ? unit(rest.normals.values) : std::vector<Vec3f>{}, context);
+    if (context.is_cancelled()) return cancelled_error();
+    if (rest.normals.empty() || has_vertex_normals()) return Success{};
 
     items.clear();
     std::vector<Vec3f> normals;
@@ -67,7 +68,9 @@ void Restorer::Content::prepare_blend() {
         items.push_back({finest_id(vertex_of_normal[i]), i});
         normals.push_back(rest.normals.values[i]);
     }
-    blend_normals.emplace(detail, positions, driver, items, unit(std::move(normals)));
+    blend_normals.emplace(detail, positions, driver, items, unit(std::move(normals)), context);
+    if (context.is_cancelled()) return cancelled_error();
+    return Success{};
 }
 
 std::vector<Mat3f> Restorer::Content::gradients(const Pose& pose, const RunContext& context) const {
@@ -87,8 +90,9 @@ Result<unsigned> restored_level(const Model& model, const RestoreOptions& option
     return options.level.value_or(model.finest_level());
 }
 
-Status check_pose(const Model& model, const Pose& pose) {
-    const std::size_t driver = model.driver().vertices.size();
+Status check_pose(const Model& model, const Pose& pose) { return check_pose(model.driver().vertices.size(), pose); }
+
+Status check_pose(std::size_t driver, const Pose& pose) {
     const auto wrong = [&](std::size_t count, const char* what) {
         return Error{ErrorCode::mismatch,
                      "The pose has " + std::to_string(count) + " " + what + " and the model's driver " +
@@ -113,15 +117,18 @@ Result<Restorer> Restorer::create(const Model& model, const RestoreOptions& opti
     content->model = &model;
     content->options = options;
     content->level = *level;
+    if (context.is_cancelled()) return cancelled_error();
     content->rest = level_mesh(model, content->level);
     if (content->level < model.finest_level()) content->vertices = model.levels[content->level].vertices;
     content->vertex_of_normal = split_shared_normals(content->rest);
+    if (context.is_cancelled()) return cancelled_error();
     if (model.code() == DetailCode::blend) {
         content->law = options.law.value_or(HeightLaw::proportional);
-        content->prepare_blend();
+        if (Status prepared = content->prepare_blend(context); !prepared) return prepared.error();
     } else {
         content->law = options.law.value_or(HeightLaw::inverse);
         content->reference.emplace(std::get<ReferenceDetail>(model.detail), content->law, context);
+        if (context.is_cancelled()) return cancelled_error();
     }
     return Restorer(std::move(content));
 }

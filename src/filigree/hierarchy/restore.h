@@ -22,11 +22,14 @@ struct RestoreOptions {
 Result<unsigned> restored_level(const Model& model, const RestoreOptions& options);
 /// Whether a pose belongs to a model. Errors: mismatch (the pose has another number of vertices than the driver).
 Status check_pose(const Model& model, const Pose& pose);
+/// The same for a driver of so many vertices.
+Status check_pose(std::size_t driver_vertices, const Pose& pose);
 
 /// Restores one model at one level, pose after pose. Everything that does not depend on the pose is prepared once.
 class Restorer {
 public:
-    /// The model must outlive the restorer. Errors: usage (no such level).
+    /// The model must outlive the restorer; it is not checked (check_model). Cost O(V). Errors: usage (no such level),
+    /// cancelled.
     static Result<Restorer> create(const Model& model, const RestoreOptions& options, const RunContext& context);
     static Result<Restorer> create(const Model&& model, const RestoreOptions&, const RunContext&) = delete;
     Restorer(Restorer&&) noexcept;

@@ -11,7 +11,7 @@ namespace filigree {
 class SampledRestorer {
 public:
     /// Cost O(V).
-    SampledRestorer(const Model& model, std::size_t most);
+    SampledRestorer(const Model& model, std::size_t most, const RunContext& context);
 
     /// Where the vertices are at rest, relative to the mesh's origin.
     const std::vector<Vec3f>& rest() const { return rest_; }

@@ -127,7 +127,7 @@ Simplified simplify(std::span<const Vec3f> positions, std::span<const Triangle> 
         current.error = std::max(current.error, finished.error);
         current.forced = finished.forced;
     }
-    current.error /= diagonal;
+    if (diagonal > 0) current.error /= diagonal; // else all is at one place, and nothing is off
     return current;
 }
 

@@ -1,6 +1,7 @@
 #include "filigree/hierarchy/skin.h"
 
 #include "filigree/core/dense_solve.h"
+#include "filigree/hierarchy/restore.h"
 
 #include <algorithm>
 #include <cmath>
@@ -136,7 +137,9 @@ void keep_sign(Eigen::Quaterniond& rotation, const Eigen::Quaterniond& before) {
 } // namespace
 
 Result<Skin> make_skin(const Model& model, unsigned level, unsigned influences, bool exact) {
-    assert(influences == 3 || influences == 6);
+    if (influences != 3 && influences != 6)
+        return Error{ErrorCode::usage, "A skin has 3 or 6 influences, not " + std::to_string(influences) + "."};
+    if (const Result<unsigned> found = restored_level(model, {.level = level}); !found) return found.error();
     if (model.code() != DetailCode::blend)
         return Error{ErrorCode::unsuitable,
                      "The model has the reference code, whose levels follow one another, so no skin "
@@ -152,7 +155,7 @@ Result<Skin> make_skin(const Model& model, unsigned level, unsigned influences, 
     JointList joint_list(driver, skin);
 
     std::vector<Index> place(positions.size(), kNoIndex); // of each mesh vertex in the level
-    const bool finest = level >= model.finest_level();
+    const bool finest = level == model.finest_level();
     const std::size_t count = finest ? positions.size() : model.levels[level].vertices.size();
     for (Index k = 0; k < count; ++k) place[finest ? k : model.levels[level].vertices[k]] = k;
     skin.positions.resize(count);

@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 namespace filigree {
 
@@ -81,11 +82,29 @@ Level make_driver_level(std::size_t first, std::size_t count, std::span<const Tr
 }
 
 std::optional<Error> check_driver(const Mesh& mesh, const Mesh& driver) {
+    if (std::optional<Error> error = mesh_error(mesh)) return error;
+    if (std::optional<Error> error = mesh_error(driver, "The driver")) return error;
     if (mesh.vertex_count() == 0) return Error{ErrorCode::unsuitable, "The mesh has no vertices: nothing to bind."};
     if (driver.vertex_count() == 0)
         return Error{ErrorCode::unsuitable, "The driver has no vertices: nothing to bind to."};
     if (mesh.vertex_count() + driver.vertex_count() >= kNoIndex)
         return Error{ErrorCode::unsuitable, "The mesh and its driver have more vertices than 32-bit indices can name."};
+    return std::nullopt;
+}
+
+/// A driver of the mesh's own vertices.
+std::optional<Error> check_level(const Mesh& mesh, const Level& driver) {
+    Mesh as_mesh; // what check_mesh says of faces over as many vertices
+    as_mesh.positions.assign(driver.vertices.size(), Vec3f::Zero());
+    as_mesh.face_offsets = driver.face_offsets;
+    as_mesh.corners = driver.corners;
+    if (std::optional<Error> error = mesh_error(as_mesh, "The driver")) return error;
+    const bool ascend = std::ranges::adjacent_find(driver.vertices, std::greater_equal{}) == driver.vertices.end();
+    if (!ascend || driver.vertices.back() >= mesh.vertex_count())
+        return Error{ErrorCode::usage,
+                     "The driver is inconsistent: Its vertices are not vertices of the mesh, ascending."};
+    if (driver.corners.size() != 3 * driver.face_count())
+        return Error{ErrorCode::usage, "The driver is inconsistent: It has faces that are no triangles."};
     return std::nullopt;
 }
 
@@ -160,6 +179,7 @@ Result<Stripped> strip_reference(Mesh mesh, const StripOptions& options, const R
 } // namespace
 
 std::optional<Error> check_strip(const Mesh& mesh, const StripOptions& options) {
+    if (std::optional<Error> error = mesh_error(mesh)) return error;
     if (int(options.base.has_value()) + int(options.levels.has_value()) + int(options.error.has_value()) > 1)
         return Error{ErrorCode::usage,
                      "Give at most one of base, levels and error: each says how coarse the driver is."};
@@ -240,6 +260,8 @@ Result<Stripped> strip_to_driver(Mesh mesh, const Mesh& driver, Precision precis
 
 Result<Model> bind_to_own_driver(Mesh mesh, Level driver, Precision precision, const RunContext& context) {
     if (driver.vertices.empty()) return Error{ErrorCode::unsuitable, "The driver has no vertices: nothing to bind to."};
+    if (std::optional<Error> error = mesh_error(mesh)) return *error;
+    if (std::optional<Error> error = check_level(mesh, driver)) return *error;
     const Result<WorkingMesh> work = make_working_mesh(mesh, context);
     if (!work) return work.error();
     Cells cells = make_cells(driver);

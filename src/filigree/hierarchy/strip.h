@@ -47,23 +47,26 @@ struct Stripped {
 
 /// Strips a mesh. The blend code takes every mesh that has a vertex: what it cannot bind well it counts. The reference
 /// code needs quads with subdivision connectivity.
-/// Errors: usage (options that make no sense), unsuitable (no vertices; no subdivision connectivity), cancelled.
-/// Cost O(F): about 2.5 processor seconds a million vertices. Same bytes for any number of threads.
+/// Errors: usage (options that make no sense; check_mesh refuses the mesh), unsuitable (no vertices; more triangles
+/// than kMostListedTriangles, see mesh/incidence.h; no subdivision connectivity), cancelled. Cost O(F) while the mesh
+/// has more than StripOptions::one_piece vertices, and O(F log F) for what is simplified in one piece: about 2.5
+/// processor seconds a million vertices. Same bytes for any number of threads.
 Result<Stripped> strip(Mesh mesh, const StripOptions& options, const RunContext& context);
 
-/// The errors of strip that are known before any work: usage, unsuitable (no vertices).
+/// The errors of strip that are known before any work: usage, unsuitable (no vertices). Cost O(size) for check_mesh.
 std::optional<Error> check_strip(const Mesh& mesh, const StripOptions& options);
 
 /// Takes the detail off a mesh down to a driver that somebody else made: any mesh near it, of vertices of its own. Its
 /// vertices are the driver's, all of them and in their order, so poses are arrays of that mesh's positions.
 /// Restored meshes have them too, without faces, behind the mesh's own vertices. Each vertex is bound to the driver's
 /// side that it belongs to along the mesh's surface; nothing is refused, see StripReport and its warnings: a driver
-/// that is inside out, or so far away that positions lose their digits. Errors: unsuitable (no vertices in either, more
-/// triangles or vertices than indices), cancelled. Cost O(V log V).
+/// that is inside out, or so far away that positions lose their digits. Errors: usage (check_mesh refuses one of the
+/// two), unsuitable (no vertices in either, more triangles or vertices than indices), cancelled. Cost O(V log V).
 Result<Stripped> strip_to_driver(Mesh mesh, const Mesh& driver, Precision precision, const RunContext& context);
 
 /// Takes the detail off a mesh down to a driver of its own vertices that is known already: two levels, the driver and
-/// the mesh. driver: triangles. Errors: unsuitable (no vertices), cancelled. Cost O(V log V).
+/// the mesh. driver: triangles. Errors: usage (check_mesh refuses the mesh; the driver's vertices do not ascend or are
+/// not the mesh's, or its faces are no triangles over them), unsuitable (no vertices), cancelled. Cost O(V log V).
 Result<Model> bind_to_own_driver(Mesh mesh, Level driver, Precision precision, const RunContext& context);
 
 } // namespace filigree

@@ -9,12 +9,12 @@
 
 namespace filigree {
 
-/// The vertices along Morton's curve over the mesh's box, 1,024 steps an axis; at one place as they come. Cost
-/// O(V log V).
+/// The vertices along Morton's curve over the mesh's box, 1,024 steps an axis; at one place as they come. The mesh
+/// is not checked. Cost O(V log V).
 std::vector<Index> order_by_place(const Mesh& mesh, const RunContext& context);
 
 /// The mesh whose vertex i was vertex order[i]; order has each vertex once. Faces, and attributes of faces and corners,
-/// stay in their order. Cost O(size).
+/// stay in their order. The mesh is not checked. Cost O(size).
 Mesh with_vertex_order(Mesh mesh, std::span<const Index> order, const RunContext& context);
 
 /// What undoes it: where each vertex went.

@@ -167,7 +167,11 @@ class FileBatch::Folder {
 public:
     explicit Folder(fs::path target) : target_(std::move(target)) {}
     ~Folder() {
-        if (!path_.empty()) remove_batch(path_);
+        if (path_.empty()) return;
+        try {
+            remove_batch(path_);
+        } catch (const std::bad_alloc&) { // it stays, as after a kill, and the next batch clears it away
+        }
     }
     Folder(const Folder&) = delete;
     Folder& operator=(const Folder&) = delete;

@@ -172,8 +172,10 @@ class PrimitiveSorter {
 public:
     PrimitiveSorter(const Mesh& mesh, bool by_object) : mesh_(mesh), by_object_(by_object && !mesh.objects.empty()) {}
 
-    std::vector<GlbObject> sort(std::span<const Index> vertex_of) {
-        const Triangulation faces = triangulate(mesh_);
+    Result<std::vector<GlbObject>> sort(std::span<const Index> vertex_of, const RunContext& context) {
+        const Result<Triangulation> cut = triangulate(mesh_, context);
+        if (!cut) return cut.error();
+        const Triangulation& faces = *cut;
         CornerFinder finder(mesh_);
         using Labels = std::pair<Index, Index>; // object and material
         std::map<Labels, std::size_t> counts;
@@ -376,10 +378,13 @@ Result<GlbParts> make_glb_parts(const Mesh& mesh, const GlbPartsOptions& options
     const std::vector<Index> vertex_of = VertexSplitter(mesh, options.normals, parts, context).split();
     if (context.is_cancelled()) return cancelled_error();
     parts.is_points = mesh.face_count() == 0;
-    if (parts.is_points)
+    if (parts.is_points) {
         parts.objects.push_back(all_points(mesh.vertex_count()));
-    else
-        parts.objects = PrimitiveSorter(mesh, options.objects).sort(vertex_of);
+    } else {
+        Result<std::vector<GlbObject>> sorted = PrimitiveSorter(mesh, options.objects).sort(vertex_of, context);
+        if (!sorted) return sorted.error();
+        parts.objects = *std::move(sorted);
+    }
     parts.has_colors = !mesh.colors.empty();
     parts.lost = what_is_lost(mesh, options.objects);
     if (context.is_cancelled()) return cancelled_error();

@@ -14,7 +14,7 @@ namespace filigree {
 /// One material for each of mesh.materials.names: the embedded ones, else from the libraries that the mesh names,
 /// looked for beside `mesh_path`; and one sentence for whatever was missing or not understood (a library, a material, a
 /// texture). Names that lead out of the mesh's folder are not followed. Never fails: a mesh can be drawn without its
-/// materials.
+/// materials. Meshes are not checked here: only their names and materials are read.
 struct MeshMaterials {
     std::vector<MeshMaterial> materials;
     std::vector<std::string> warnings;

@@ -221,7 +221,7 @@ Result<MeshFile> read_mesh(const std::filesystem::path& path, const RunContext& 
 
 Result<std::vector<std::string>> write_mesh(const Mesh& mesh, MeshFormat format, std::string& bytes,
                                             const WriteMeshOptions& options, const RunContext& context) {
-    assert(check_mesh(mesh).empty());
+    if (std::optional<Error> error = mesh_error(mesh)) return *error;
     bytes.clear();
     std::vector<std::string> lost, warnings;
     const char* name = "";
@@ -234,7 +234,11 @@ Result<std::vector<std::string>> write_mesh(const Mesh& mesh, MeshFormat format,
             name = "PLY", lost = write_ply(mesh, options, bytes);
             break;
         case MeshFormat::stl:
-            name = "STL", lost = write_stl(mesh, options, bytes);
+            name = "STL";
+            if (Result<std::vector<std::string>> left_out = write_stl(mesh, options, bytes, context))
+                lost = *std::move(left_out);
+            else
+                return left_out.error();
             break;
         case MeshFormat::off:
             name = "OFF", lost = write_off(mesh, bytes);

@@ -51,8 +51,8 @@ struct WriteMeshOptions {
 /// unwritable, out_of_memory, cancelled.
 Result<std::vector<std::string>> write_mesh(const Mesh& mesh, const std::filesystem::path& path,
                                             const WriteMeshOptions& options, const RunContext& context);
-/// The bytes of a file of that format into `bytes` (options.format does not count here). mesh: passes check_mesh. Same
-/// warnings; errors: unsupported, out_of_memory, cancelled.
+/// The bytes of a file of that format into `bytes` (options.format does not count here). Same warnings; errors:
+/// usage (check_mesh refuses the mesh), unsupported, out_of_memory, cancelled.
 Result<std::vector<std::string>> write_mesh(const Mesh& mesh, MeshFormat format, std::string& bytes,
                                             const WriteMeshOptions& options, const RunContext& context);
 

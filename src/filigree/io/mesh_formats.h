@@ -46,7 +46,8 @@ Result<MeshFile> read_gltf(const MeshSource& source);
 /// library: the name of the .mtl that holds the embedded materials; empty: they are lost.
 std::vector<std::string> write_obj(const Mesh& mesh, std::string_view library, std::string& bytes);
 std::vector<std::string> write_ply(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes);
-std::vector<std::string> write_stl(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes);
+Result<std::vector<std::string>> write_stl(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes,
+                                           const RunContext& context);
 std::vector<std::string> write_off(const Mesh& mesh, std::string& bytes);
 
 /// What is lost, and further sentences (textures that are not there).

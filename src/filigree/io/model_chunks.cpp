@@ -48,10 +48,10 @@ struct ModelChunks::Content {
     std::size_t vertices = 0;
 
     Content(FileReader opened, std::string called) : file(std::move(opened)), name(std::move(called)) {}
-    BlendRestorer restorer(std::size_t k) const;
+    BlendRestorer restorer(std::size_t k, const RunContext& context) const;
 };
 
-BlendRestorer ModelChunks::Content::restorer(std::size_t k) const {
+BlendRestorer ModelChunks::Content::restorer(std::size_t k, const RunContext& context) const {
     // The driver's positions first, then the chunk's: what the restorer takes for the mesh.
     const Index drivers = static_cast<Index>(driver.mesh.vertex_count());
     const std::size_t count = std::min(kChunkVertices, vertices - k * kChunkVertices);
@@ -72,7 +72,7 @@ BlendRestorer ModelChunks::Content::restorer(std::size_t k) const {
     }
     std::vector<BlendRestorer::Item> items(count);
     for (Index i = 0; i < count; ++i) items[i] = {drivers + i, i};
-    return BlendRestorer(detail, positions, driver.driver().vertices, items);
+    return BlendRestorer(detail, positions, driver.driver().vertices, items, {}, context);
 }
 
 ModelChunks::ModelChunks(std::unique_ptr<Content> content) : content_(std::move(content)) {}
@@ -133,9 +133,9 @@ Result<ModelChunks> ModelChunks::open(FileReader file, const std::string& name, 
     return ModelChunks(std::move(content));
 }
 
-Result<BlendRestorer> ModelChunks::restorer(std::size_t k) const {
+Result<BlendRestorer> ModelChunks::restorer(std::size_t k, const RunContext& context) const {
     try {
-        return content_->restorer(k);
+        return content_->restorer(k, context);
     } catch (const FileDamage& damage) {
         return error_of(damage, content_->name);
     } catch (const Error& error) {
@@ -207,7 +207,7 @@ public:
 
 private:
     Status write_chunk(std::size_t k, const WriteAt& write_at) {
-        Result<BlendRestorer> restorer = model_.restorer(k);
+        Result<BlendRestorer> restorer = model_.restorer(k, context_);
         if (!restorer) return restorer.error();
         restorer_.emplace(std::move(*restorer));
         points_.resize(model_.first_vertex(k + 1) - model_.first_vertex(k));

@@ -26,7 +26,7 @@ public:
     /// Around the vertices of chunk k at rest, relative to the origin.
     Box box(std::size_t k) const;
     /// Restores the vertices of chunk k: item i is vertex first_vertex(k) + i. Errors: as read_model.
-    Result<BlendRestorer> restorer(std::size_t k) const;
+    Result<BlendRestorer> restorer(std::size_t k, const RunContext& context) const;
 
 private:
     struct Content;

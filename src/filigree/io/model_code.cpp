@@ -84,7 +84,12 @@ Model bind_elsewhere(const SectionReader& in, Mesh mesh, const FileCode& code, c
 
 constexpr double kClipError = 4.5e-6;   // of the diagonal: restored vertices are 1e-5 off, finer than restoring is
 constexpr double kGradientReach = 0.01; // of the diagonal: how far vertices lie from their driver, about
-constexpr std::size_t kClipNumbers = std::size_t{1} << 25; // in a block
+
+/// The most frames of a block, with the one at rest: as many as are 2^25 numbers, but at least 8.
+std::size_t most_clip_frames(std::size_t numbers_a_frame) {
+    constexpr std::size_t kClipNumbers = std::size_t{1} << 25;
+    return std::clamp<std::size_t>(kClipNumbers / std::max<std::size_t>(numbers_a_frame, 1), 8, kClipFrames);
+}
 
 std::vector<float> clip_numbers(std::span<const Vec3f> positions, std::span<const Mat3f> gradients,
                                 std::size_t numbers) {
@@ -122,7 +127,7 @@ void code_clips(const Model& model, const PoseSequence& poses, CodedModel& coded
     std::vector<double> weights(numbers, kGradientReach * unit);
     std::fill_n(weights.begin(), 3, 1.0);
     const std::vector<float> rest = clip_numbers(driver_positions(model), {}, numbers);
-    const std::size_t block = std::clamp<std::size_t>(kClipNumbers / rest.size(), 8, kClipFrames) - 1;
+    const std::size_t block = most_clip_frames(rest.size()) - 1;
     for (std::size_t begin = 0; begin < poses.frames.size(); begin += block) {
         ClipFrames frames = {rest};
         for (std::size_t f = begin; f < std::min(begin + block, poses.frames.size()); ++f)
@@ -181,12 +186,12 @@ Result<CodedModel> code_model(const Model& model, const PoseSequence& poses, con
                      "The model has the reference code, which is not packed; strip the mesh with the blend code."};
     const bool elsewhere = is_made_elsewhere(model);
     if (elsewhere && options.levels)
-        return Error{ErrorCode::unsuitable, "The model's driver was made elsewhere (strip --driver), and streams need "
-                                            "one of the mesh's own vertices; the other profiles take it."};
+        return Error{ErrorCode::unsuitable, "The model was stripped to a driver made elsewhere, and streams need one "
+                                            "of the mesh's own vertices; the other profiles take it."};
     std::optional<Mesh> own;
     if (elsewhere && !(own = without_driver(model)))
         return Error{ErrorCode::unsuitable, "The mesh's faces use none of the driver's vertices, and these do not "
-                                            "stand behind the mesh's own; --profile lossless takes such a model."};
+                                            "stand behind the mesh's own; the profile lossless takes such a model."};
     const Mesh& source = own ? *own : model.mesh;
     CodedModel coded;
     MeshCodeReport report;
@@ -265,6 +270,17 @@ void write_end_of_code(SectionWriter& out, const CodedModel& coded) {
 bool is_coded(const SectionReader& in) { return in.count("cd.par").first > 0; }
 bool is_made_elsewhere(const SectionReader& in) { return in.count("cd.dpos").first > 0; }
 
+double unpacked_bytes(const FileCode& code) {
+    const double vertices = double(code.vertices) + double(code.driver_vertices);
+    const double faces = double(code.faces) + double(code.driver_faces);
+    const double corners = double(code.corners) + double(code.driver_corners);
+    return sizeof(Vec3f) * vertices + sizeof(Index) * (faces + corners);
+}
+
+double unpacked_bytes(const FileClip& clip, const FileCode& code) {
+    return double(clip.frames) * double(code.driver_vertices) * double(clip.numbers) * sizeof(float);
+}
+
 FileCode read_file_code(const SectionReader& in) {
     const auto revision = in.count("cd.rev").first == 0 ? 0 : in.value<std::uint32_t>("cd.rev");
     if (revision != kCodeRevision && revision != kRevisionWithAttributes)
@@ -274,6 +290,7 @@ FileCode read_file_code(const SectionReader& in) {
     if (code.precision > 1 || code.bits > 16 || code.driver_vertices == 0 || code.driver_vertices > most_driver ||
         (is_made_elsewhere(in) && code.driver_vertices != most_driver) || code.vertices >= kNoIndex)
         throw FileDamage{"has coded parts that make no sense"};
+    in.require_room(unpacked_bytes(code));
     return code;
 }
 
@@ -281,6 +298,7 @@ FileClip clip_of(const SectionReader& in) {
     if (in.count("cd.pose").first == 0) return {};
     const auto clip = in.value<FileClip>("cd.pose");
     if (clip.numbers != 3 && clip.numbers != 12) throw FileDamage{"has poses that make no sense"};
+    in.require_room(unpacked_bytes(clip, in.value<FileCode>("cd.par")));
     return clip;
 }
 
@@ -292,8 +310,10 @@ PoseSequence read_clips(const SectionReader& in) {
     poses.frames_per_second = in.value<double>("pose.fps");
     const Level driver = driver_of(in, read_file_code(in));
     const ClipOrder order = clip_order(driver.face_offsets, driver.corners, driver.vertices.size());
+    const std::size_t most_frames = most_clip_frames(driver.vertices.size() * clip.numbers);
     for (std::uint32_t k = 0; poses.frames.size() < clip.frames; ++k) {
-        const std::optional<ClipFrames> frames = decode_clip(stream_of(in, "cd.clip", k), clip.numbers, order);
+        const std::optional<ClipFrames> frames =
+            decode_clip(stream_of(in, "cd.clip", k), clip.numbers, order, most_frames);
         if (!frames || frames->size() < 2 || poses.frames.size() + frames->size() - 1 > clip.frames) throw damage;
         for (std::size_t f = 1; f < frames->size(); ++f) {
             Pose& pose = poses.frames.emplace_back();
@@ -362,6 +382,7 @@ CodedLevels read_levels(const SectionReader& in) {
 
 Model read_model_code(const SectionReader& in, Mesh rest, const RunContext& context) {
     const FileCode code = read_file_code(in);
+    in.require_room(unpacked_bytes(code) + double(rest.scalars.size()) * double(code.vertices) * sizeof(float));
     CodedMesh coded = coded_outline(in, code);
     coded.connectivity = stream_of(in, "cd.con");
     coded.places = stream_of(in, "cd.pos");

@@ -30,10 +30,15 @@ struct FileLevel {
 };
 static_assert(sizeof(FileLevel) == 16);
 
+/// The bytes of the mesh and its driver once they are read, without attributes.
+double unpacked_bytes(const FileCode& code);
+
 /// The section "cd.pose": the poses of a coded file, in blocks "cd.clip". Each begins with the driver at rest.
 struct FileClip {
     std::uint32_t frames, numbers; ///< of a vertex: 3, or 12 with gradients
 };
+/// The bytes of the poses once they are read.
+double unpacked_bytes(const FileClip& clip, const FileCode& code);
 
 struct CodedModel {
     CodedMesh mesh;

@@ -592,7 +592,11 @@ Result<CodingReport> write_coded_model(const Model& model, const PoseSequence& p
         write_model_code(out, *coded);
         write_pictures(out, coded->mesh.rest.embedded_materials); // a stream's shape is there first
         write_end_of_code(out, *coded);
-        if (const Status status = write_file(path, out.finish()); !status) return status.error();
+        const std::vector<std::string_view> file = out.finish();
+        const double scalars = double(coded->mesh.rest.scalars.size() * coded->code.vertices * sizeof(float));
+        const double mesh = unpacked_bytes(coded->code) + scalars, clips = unpacked_bytes(coded->clip, coded->code);
+        if (std::optional<Error> error = too_plain_to_pack(std::max(mesh, clips), file)) return *error;
+        if (const Status status = write_file(path, file); !status) return status.error();
         return coded->report;
     } catch (const Error& error) {
         return error;
@@ -633,7 +637,11 @@ Result<LosslessReport> write_lossless_model(const Model& model, const PoseSequen
             out.bytes("ll.sec", codes[k], k);
             sizes.emplace_back(name_of(sections[k]), codes[k].size());
         }
-        if (const Status status = write_file(path, out.finish()); !status) return status.error();
+        const std::vector<std::string_view> file = out.finish();
+        double unpacked = 0;
+        for (const FileSection& section : sections) unpacked += double(section.count) * section.item_size;
+        if (std::optional<Error> error = too_plain_to_pack(unpacked, file)) return *error;
+        if (const Status status = write_file(path, file); !status) return status.error();
         std::uint64_t plain_bytes = 0;
         for (const std::string_view piece : plain.finish()) plain_bytes += piece.size();
         return LosslessReport{lossless_parts(sizes), plain_bytes};

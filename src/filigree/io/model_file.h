@@ -18,8 +18,9 @@ bool is_model_file(std::string_view bytes);
 bool is_model_file(const FileReader& file);
 
 /// Reads a model; "-" is standard input. Nothing in the file is trusted: sizes are held against the file's length
-/// before anything is allocated, every section has a checksum, and what comes back passes check_model.
-/// Errors: not_found, bad_file (truncated, damaged, of a later version, not a model), out_of_memory, cancelled.
+/// before anything is allocated (packed parts may come to 1,024 times its bytes, or 256 MiB), every section has a
+/// checksum, and what comes back passes check_model. Errors: not_found, bad_file (truncated, damaged, of a later
+/// version, not a model), out_of_memory, cancelled.
 Result<Model> read_model(const std::filesystem::path& path, const RunContext& context);
 /// The same from a file that is open, or from bytes in memory; `name` stands in messages.
 Result<Model> read_model(const FileReader& file, const std::string& name, const RunContext& context);

@@ -12,6 +12,7 @@
 #include <cstring>
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -44,6 +45,22 @@ struct FileSection {
     std::uint64_t hash;      ///< XXH3-64 of the section's bytes
 };
 static_assert(sizeof(FileSection) == 40);
+
+/// The bytes that a file of so many may come to in memory. Codes can be as short as the truth is plain, so a small file
+/// might ask for any memory; real ones, 2 to 100 times their bytes, stay far below.
+inline double most_unpacked(std::uint64_t file_bytes) {
+    constexpr double kAlwaysAllowed = 1 << 28, kTimesTheBytes = 1024;
+    return std::max(kAlwaysAllowed, kTimesTheBytes * double(file_bytes));
+}
+/// The writer's side: the error of a file that readers would refuse.
+inline std::optional<Error> too_plain_to_pack(double unpacked, std::span<const std::string_view> file) {
+    std::uint64_t bytes = 0;
+    for (const std::string_view piece : file) bytes += piece.size();
+    if (unpacked <= most_unpacked(bytes)) return std::nullopt;
+    return Error{ErrorCode::unsuitable,
+                 "The model packs to so few bytes that readers would take the file for a damaged "
+                 "one; write it as it is, or with fewer frames."};
+}
 
 inline std::string name_of(const FileSection& section) {
     return {section.name, strnlen(section.name, sizeof section.name)};
@@ -173,6 +190,15 @@ public:
     SectionReader& operator=(const SectionReader&) = delete;
 
     std::uint32_t version() const { return version_; }
+
+    /// Refuses a file whose parts would come to so many bytes; see most_unpacked.
+    void require_room(double bytes) const {
+        if (!(bytes <= most_unpacked(file_.size())))
+            throw FileDamage{"has " + std::to_string(file_.size()) +
+                                 " bytes, and would come to more than 1,024 times as "
+                                 "many: that makes no sense",
+                             "pack its source again"};
+    }
 
     /// The items of a section; empty when there is none.
     template <class T>
@@ -316,16 +342,19 @@ private:
         const std::vector<FileSection> plain = array<FileSection>("ll.tab");
         auto lossless = std::make_unique<Lossless>(*this);
         std::map<Key, FileSection> sections;
+        double unpacked = 0;
         for (std::uint32_t k = 0; k < plain.size(); ++k) {
             const FileSection& section = plain[k];
             const std::string name = name_of(section);
             if (section.item_size == 0 || section.count > (std::uint64_t{1} << 48) / section.item_size)
                 throw FileDamage{"has a section " + name + " that makes no sense", "pack it again"};
+            unpacked += double(section.count) * section.item_size;
             const auto code = sections_.find({"ll.sec", k});
             if (code != sections_.end() && code->second.item_size == 1) lossless->codes.emplace(k, code->second);
             lossless->number.emplace(Key(name, section.index), k);
             sections.emplace(Key(name, section.index), section);
         }
+        require_room(unpacked);
         sections_ = std::move(sections);
         lossless_ = std::move(lossless);
     }

@@ -42,7 +42,7 @@ private:
         const FileReader file(bytes, header.file_size);
         const SectionReader in(file);
         if (in.count("cd.stm").first == 0)
-            throw Error{ErrorCode::unsuitable, name + ": is no stream; filigree pack --profile stream makes one."};
+            throw Error{ErrorCode::unsuitable, name + ": is no stream; pack its model with the profile stream."};
         const std::uint64_t stated = std::max({in.end_of("cd.rev"), in.end_of("cd.par"), in.end_of("cd.stm")});
         if (bytes.size() <
             std::max({stated, in.end_of("mesh.org"), in.end_of("mat.nam"), in.end_of("mat.emb"), in.end_of("mtllib")}))

@@ -48,7 +48,7 @@ struct PoseFileOptions {
 Result<PoseStream> open_poses(const std::filesystem::path& path, std::size_t points, const Vec3d& origin,
                               const PoseFileOptions& options, const RunContext& context);
 
-/// Any of those as the animation of `rest`, which must outlive it.
+/// Any of those as the animation of `rest`, which must outlive it and is not checked.
 Result<MeshAnimation> open_animation(const std::filesystem::path& path, const Mesh& rest,
                                      const PoseFileOptions& options, const RunContext& context);
 

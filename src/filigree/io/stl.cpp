@@ -287,8 +287,11 @@ Result<MeshFile> read_stl(const MeshSource& source) {
     return is_binary ? read_binary(source) : AsciiReader(source).read();
 }
 
-std::vector<std::string> write_stl(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes) {
-    const Triangulation faces = triangulate(mesh);
+Result<std::vector<std::string>> write_stl(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes,
+                                           const RunContext& context) {
+    const Result<Triangulation> cut = triangulate(mesh, context);
+    if (!cut) return cut.error();
+    const Triangulation& faces = *cut;
     if (options.ascii)
         write_ascii(mesh, faces, bytes);
     else

@@ -3,6 +3,7 @@
 
 #include "filigree/core/types.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cstring>
@@ -12,11 +13,12 @@
 
 namespace filigree {
 
-/// Appends text to `bytes` through a small buffer of its own; what is in it is appended by the destructor.
+/// Appends text to `bytes` through a small buffer of its own; what is in it is appended by the destructor, which never
+/// fails: `bytes` always has room for it. Nobody else appends to `bytes` meanwhile.
 class TextWriter {
 public:
-    explicit TextWriter(std::string& bytes) : bytes_(bytes) {}
-    ~TextWriter() { flush(); }
+    explicit TextWriter(std::string& bytes) : bytes_(bytes) { keep_room(); }
+    ~TextWriter() { append_buffer(); }
     TextWriter(const TextWriter&) = delete;
     TextWriter& operator=(const TextWriter&) = delete;
 
@@ -24,6 +26,7 @@ public:
         if (s.size() > kLongestNumber) {
             flush();
             bytes_ += s;
+            keep_room();
             return *this;
         }
         make_room();
@@ -63,13 +66,21 @@ public:
     }
 
     void flush() {
-        bytes_.append(buffer_.data(), used_);
-        used_ = 0;
+        append_buffer();
+        keep_room();
     }
 
 private:
     static constexpr std::size_t kLongestNumber = 128; // a double in fixed notation, of float's range
 
+    void append_buffer() noexcept {
+        bytes_.append(buffer_.data(), used_);
+        used_ = 0;
+    }
+    void keep_room() { // by a factor, as append would
+        if (bytes_.capacity() - bytes_.size() < buffer_.size())
+            bytes_.reserve(std::max(bytes_.size() + buffer_.size(), 2 * bytes_.capacity()));
+    }
     void make_room() {
         if (used_ + kLongestNumber > buffer_.size()) flush();
     }

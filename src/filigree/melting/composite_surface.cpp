@@ -634,8 +634,8 @@ Result<CompositeMesher> CompositeMesher::create(const Mesh& mesh, const RunConte
     if (!surface) return surface.error();
     if (!is_closed_and_oriented(surface->triangles))
         return Error{ErrorCode::unsuitable, "The mesh has open edges, edges with more than two faces, or faces that "
-                                            "disagree about the outside; a surface that melts must be closed. "
-                                            "`filigree info` shows where it is not."};
+                                            "disagree about the outside; a surface that melts must be closed: "
+                                            "close it first."};
     return CompositeMesher(std::move(*surface), mesh.face_count());
 }
 
@@ -662,6 +662,7 @@ Result<CompositeSurface> CompositeMesher::make(const Mesh& restored, std::span<c
     for (std::size_t v = 0; v < renewal.size(); ++v)
         if (!restored.positions[v].allFinite() || !std::isfinite(renewal[v]))
             return usage("Vertex " + std::to_string(v) + " has a position or renewal that is not finite.");
+    if (std::optional<Error> error = mesh_error(restored, "The restored mesh")) return *error;
     if (dead.empty()) dead.resize(renewal.size(), 0);
     if (dead.size() != renewal.size()) return usage("It is not known of each vertex whether it is dead.");
     const FadedMesh faded = fade(restored, surface_, renewal, field, dead, context);

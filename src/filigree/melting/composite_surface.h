@@ -18,8 +18,8 @@ struct CompositeSurface {
 /// by it; in between it is cut along a grid's faces, in which both are stitched [Wojtan et al. 2009].
 class CompositeMesher {
 public:
-    /// mesh: at rest. Cost O(corners log corners). Errors: unsuitable (welded, it is open, not manifold or not
-    /// oriented: says so), cancelled.
+    /// mesh: at rest. Cost O(corners log corners). Errors: usage (check_mesh refuses the mesh), unsuitable (welded, it
+    /// is open, not manifold or not oriented: says so), cancelled.
     static Result<CompositeMesher> create(const Mesh& mesh, const RunContext& context);
     /// Of another body, which may flow together with this one: make takes its mesh behind those before it.
     void append(const CompositeMesher& other);
@@ -29,7 +29,7 @@ public:
     /// Nothing renewed: the mesh itself, to the byte. Vertices that live come first, in their order. The same bytes for
     /// any number of threads. dead: of each vertex whether it died in an earlier frame, none at first; those that die
     /// now are added, so that nothing comes back. Cost O(mesh + field). Errors: usage (lengths that differ, numbers
-    /// that are not finite), cancelled.
+    /// that are not finite; check_mesh refuses the restored mesh), cancelled.
     Result<CompositeSurface> make(const Mesh& restored, std::span<const float> renewal,
                                   const MatterParticles& particles, std::span<const Vec4f> particle_colors,
                                   const ParticleField& field, std::vector<std::uint8_t>& dead,

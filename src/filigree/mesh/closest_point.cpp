@@ -25,7 +25,7 @@ constexpr double kMostPieces = 64; // of a needle as long as the whole
 constexpr std::size_t kMostMorePieces = std::size_t(1) << 20; // for all needles together
 constexpr double kRadiusSlack = 1e-6; // of the coordinates' size: several roundings of Embree's floats
 
-SurfacePoint surface_point(const TrianglePoint& point, Index triangle) {
+SurfacePoint surface_point(const ClosestTrianglePoint& point, Index triangle) {
     return {triangle, point.barycentric.cast<float>(), point.position.cast<float>(), std::sqrt(point.squared_distance)};
 }
 

@@ -1,5 +1,7 @@
 #include "filigree/mesh/defect_edges.h"
 
+#include "filigree/mesh/normals.h"
+
 #include <algorithm>
 
 namespace filigree {
@@ -19,17 +21,11 @@ std::vector<DefectEdge> defect_edges(const Mesh& mesh) {
         for (const Index v : mesh.face(face))
             if (corners.empty() || corners.back() != v) corners.push_back(v);
         while (corners.size() > 1 && corners.front() == corners.back()) corners.pop_back();
-        Vec3d area = Vec3d::Zero();
-        for (std::size_t k = 2; k < corners.size(); ++k) {
-            const Vec3d from = mesh.positions[corners[0]].cast<double>();
-            area += (mesh.positions[corners[k - 1]].cast<double>() - from)
-                        .cross(mesh.positions[corners[k]].cast<double>() - from) /
-                    2;
-        }
+        const double area = corners.size() > 2 ? 0.5 * doubled_area_vector(mesh.positions, corners).norm() : 0;
         std::vector<Index> once = corners;
         std::sort(once.begin(), once.end());
         const bool repeats = std::adjacent_find(once.begin(), once.end()) != once.end();
-        if (!corners.empty() && (repeats || corners.size() != mesh.face(face).size() || !(area.norm() > least_area)))
+        if (!corners.empty() && (repeats || corners.size() != mesh.face(face).size() || !(area > least_area)))
             flat.push_back(corners[0]);
         for (std::size_t k = 0; corners.size() > 2 && k < corners.size(); ++k) {
             const Index a = corners[k], b = corners[(k + 1) % corners.size()];

@@ -12,7 +12,8 @@ struct DefectEdge {
     bool is_open = false;
     bool is_opposed = false; ///< its two faces run along it the same way; neither: it has three faces or more
 };
-/// All of them, by the rules of TopologyReport: edges, ascending, then faces. Cost O(corners log corners).
+/// All of them, by the rules of TopologyReport: edges, ascending, then faces. The mesh is not checked. Cost
+/// O(corners log corners).
 std::vector<DefectEdge> defect_edges(const Mesh& mesh);
 
 } // namespace filigree

@@ -1,11 +1,14 @@
 #include "filigree/mesh/half_edges.h"
+#include "filigree/mesh/incidence.h"
 
 #include <algorithm>
+#include <cassert>
 #include <numeric>
 
 namespace filigree {
 
 std::vector<Index> half_edges_by_edge(std::span<const Triangle> triangles, std::size_t vertex_count) {
+    assert(triangles.size() <= kMostListedTriangles);
     // buckets by the lower vertex hold a handful of half-edges each, sorted by the higher one: no sort over everything
     const auto lower = [&](Index h) { return std::min(half_edge_start(triangles, h), half_edge_end(triangles, h)); };
     const auto higher = [&](Index h) { return std::max(half_edge_start(triangles, h), half_edge_end(triangles, h)); };

@@ -16,8 +16,8 @@ inline Index half_edge_end(std::span<const Triangle> triangles, Index h) {
 }
 
 /// All half-edges, those of an edge side by side: sorted by the edge's lower vertex, its higher vertex, and their own
-/// number. triangles: without repeated vertices, over vertices 0 to vertex_count - 1. Cost O(F) but for edges with very
-/// many triangles.
+/// number. triangles: without repeated vertices, over vertices 0 to vertex_count - 1, at most kMostListedTriangles
+/// (mesh/incidence.h). Cost O(F log d) where at most d half-edges begin or end at a vertex.
 std::vector<Index> half_edges_by_edge(std::span<const Triangle> triangles, std::size_t vertex_count);
 
 /// Calls visit(std::span<const Index>) for the half-edges of each edge. sorted: from half_edges_by_edge.

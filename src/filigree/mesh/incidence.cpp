@@ -21,6 +21,12 @@ IndexLists lists_by_vertex(std::span<const Index> corners, std::size_t vertex_co
 
 } // namespace
 
+std::optional<Error> too_many_triangles(std::size_t count) {
+    if (count <= kMostListedTriangles) return std::nullopt;
+    return Error{ErrorCode::unsuitable, "The mesh has more triangles than 32-bit indices can list (" +
+                                            std::to_string(kMostListedTriangles) + "); split it into parts."};
+}
+
 IndexLists corners_at_vertices(std::span<const Index> corners, std::size_t vertex_count) {
     assert(corners.size() < kNoIndex);
     return lists_by_vertex(corners, vertex_count, [](Index corner) { return corner; });

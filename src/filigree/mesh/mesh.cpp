@@ -58,7 +58,11 @@ bool all_finite(const std::vector<Vector>& vectors) {
 std::string number(std::size_t n) { return std::to_string(n); }
 
 std::string check_faces(const Mesh& mesh) {
-    if (mesh.face_offsets.empty() || mesh.face_offsets.front() != 0) return "The face offsets do not start with 0.";
+    if (mesh.vertex_count() >= kNoIndex) return "There are more vertices than 32-bit indices can name.";
+    if (mesh.corner_count() >= kNoIndex) return "There are more corners than 32-bit indices can name.";
+    if (mesh.face_offsets.empty()) // moved from
+        return mesh.corners.empty() ? "" : "There are corners, and no face offsets.";
+    if (mesh.face_offsets.front() != 0) return "The face offsets do not start with 0.";
     if (mesh.face_offsets.back() != mesh.corners.size()) return "The last face offset is not the number of corners.";
     for (std::size_t f = 0; f < mesh.face_count(); ++f) {
         if (mesh.face_offsets[f + 1] < mesh.face_offsets[f]) return "The offsets of face " + number(f) + " descend.";
@@ -149,6 +153,12 @@ std::string check_mesh(const Mesh& mesh) {
     if (problem.empty() && !mesh.smoothing.empty() && mesh.smoothing.size() != mesh.face_count())
         problem = "There is not one smoothing group a face.";
     return problem;
+}
+
+std::optional<Error> mesh_error(const Mesh& mesh, std::string_view what) {
+    const std::string problem = check_mesh(mesh);
+    if (problem.empty()) return std::nullopt;
+    return Error{ErrorCode::usage, std::string(what) + " is inconsistent: " + problem};
 }
 
 } // namespace filigree

@@ -1,12 +1,15 @@
 // A polygon mesh as plain arrays: what every file is read into and every algorithm takes.
 #pragma once
 
+#include "filigree/core/result.h"
 #include "filigree/core/types.h"
 
 #include <array>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace filigree {
@@ -54,7 +57,8 @@ struct MeshMaterial {
 
 /// Polygons over shared vertices. Face f has the corners face_offsets[f] .. face_offsets[f + 1] - 1, each at least
 /// three, counter-clockwise seen from outside. Vertex and face order is the file's and is never changed.
-/// What holds between the arrays is said by `check_mesh`.
+/// What holds between the arrays is said by `check_mesh`: calls that return a Result or a Status refuse a mesh that it
+/// refuses (usage), others have to be given a sound one. A mesh that was moved from is an empty mesh.
 struct Mesh {
     std::vector<Vec3f> positions;          ///< model units, relative to `origin`
     Vec3d origin = Vec3d::Zero();          ///< added to every position; not zero only far from the world's origin
@@ -74,7 +78,7 @@ struct Mesh {
     std::vector<MeshMaterial> embedded_materials;
 
     std::size_t vertex_count() const { return positions.size(); }
-    std::size_t face_count() const { return face_offsets.size() - 1; }
+    std::size_t face_count() const { return face_offsets.empty() ? 0 : face_offsets.size() - 1; }
     std::size_t corner_count() const { return corners.size(); }
     Index face_size(std::size_t face) const { return face_offsets[face + 1] - face_offsets[face]; }
     std::span<const Index> face(std::size_t face) const {
@@ -84,6 +88,7 @@ struct Mesh {
     Vec3d world_position(std::size_t vertex) const { return origin + positions[vertex].cast<double>(); }
 
     void add_face(std::span<const Index> face_corners) {
+        if (face_offsets.empty()) face_offsets.push_back(0); // moved from
         corners.insert(corners.end(), face_corners.begin(), face_corners.end());
         face_offsets.push_back(static_cast<Index>(corners.size()));
     }
@@ -110,8 +115,10 @@ void split_origin(Mesh& mesh);
 void split_origin(std::span<const Vec3d> world, Mesh& mesh);
 
 /// The first thing wrong with the arrays, as a sentence, or "" when all that `Mesh` promises holds: offsets ascend,
-/// faces have three corners or more, every index is in range, attribute sizes fit, all numbers are finite.
-/// Cost O(size).
+/// faces have three corners or more, every index is in range, attribute sizes fit, all numbers are finite, and
+/// there are fewer vertices and corners than indices. Cost O(size).
 std::string check_mesh(const Mesh& mesh);
+/// The same as an error of usage, none for a sound mesh. what: the mesh's name, with which the sentence begins.
+std::optional<Error> mesh_error(const Mesh& mesh, std::string_view what = "The mesh");
 
 } // namespace filigree

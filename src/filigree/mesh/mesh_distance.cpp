@@ -76,6 +76,11 @@ std::vector<Vec3f> shifted(std::vector<Vec3f> positions, const Vec3d& shift) {
     return positions;
 }
 
+std::optional<Error> either_mesh_error(const Mesh& a, const Mesh& b) {
+    if (std::optional<Error> error = mesh_error(a, "The first mesh")) return error;
+    return mesh_error(b, "The second mesh");
+}
+
 Result<PlacedTriangles> place_triangles(const Mesh& mesh, const Vec3d& shift, const RunContext& context) {
     Result<Triangulation> triangulation = triangulate(mesh, context);
     if (!triangulation) return triangulation.error();
@@ -176,6 +181,7 @@ Result<SurfaceDistance> compare_surfaces(const Mesh& a, const Mesh& b, std::size
 } // namespace
 
 Result<VertexDistance> vertex_distance(const Mesh& a, const Mesh& b, const RunContext& context) {
+    if (std::optional<Error> error = either_mesh_error(a, b)) return *error;
     if (a.vertex_count() != b.vertex_count())
         return Error{ErrorCode::mismatch, "The meshes have " + std::to_string(a.vertex_count()) + " and " +
                                               std::to_string(b.vertex_count()) +
@@ -194,6 +200,7 @@ VertexDistance vertex_distance(const Mesh& mesh, std::span<const Vec3f> a, std::
 }
 
 Result<MeshDistance> mesh_distance(const Mesh& a, const Mesh& b, std::size_t samples, const RunContext& context) {
+    if (std::optional<Error> error = either_mesh_error(a, b)) return *error;
     MeshDistance result;
     result.diagonal = bounds(b).diagonal();
     if (a.vertex_count() == b.vertex_count()) result.vertices = vertex_distance(a, b, context).value();
@@ -207,6 +214,7 @@ Result<MeshDistance> mesh_distance(const Mesh& a, const Mesh& b, std::size_t sam
 }
 
 Result<std::vector<float>> distances_to_surface(const Mesh& a, const Mesh& b, const RunContext& context) {
+    if (std::optional<Error> error = either_mesh_error(a, b)) return *error;
     if (b.face_count() == 0)
         return Error{ErrorCode::unsuitable, "The mesh to measure against has no faces; give one with a surface."};
     const Result<PlacedTriangles> surface = place_triangles(b, Vec3d::Zero(), context);
@@ -217,6 +225,7 @@ Result<std::vector<float>> distances_to_surface(const Mesh& a, const Mesh& b, co
 }
 
 Result<std::vector<float>> edge_strains(const Mesh& a, const Mesh& rest) {
+    if (std::optional<Error> error = either_mesh_error(a, rest)) return *error;
     if (a.vertex_count() != rest.vertex_count() || a.face_offsets != rest.face_offsets || a.corners != rest.corners)
         return Error{ErrorCode::mismatch, "Strain is measured between two poses of one mesh, and these two do not have "
                                           "the same vertices and faces."};

@@ -36,23 +36,26 @@ struct MeshDistance {
     double relative(double units) const { return diagonal > 0 ? units / diagonal : 0.0; }
 };
 
-/// Vertex by vertex. Cost O(V + corners). Origins are respected. Errors: mismatch (another number of vertices).
+/// Vertex by vertex. Cost O(V + corners). Origins are respected. Errors: usage (check_mesh refuses one), mismatch
+/// (another number of vertices).
 Result<VertexDistance> vertex_distance(const Mesh& a, const Mesh& b, const RunContext& context);
-/// The same for two shapes of one mesh. a, b: one position a vertex of `mesh`, whose faces give the normals.
+/// The same for two shapes of one mesh. a, b: one position a vertex of `mesh`, whose faces give the normals. Nothing is
+/// checked.
 VertexDistance vertex_distance(const Mesh& mesh, std::span<const Vec3f> a, std::span<const Vec3f> b,
                                const RunContext& context);
 
 /// a against b, vertex by vertex and surface to surface. samples: points spread over each surface besides its vertices
-/// (seeded by the context). Cost O((V + samples) log F). Origins are respected. Errors: cancelled.
+/// (seeded by the context). Cost O((V + samples) log F). Origins are respected. Errors: usage (check_mesh
+/// refuses one), cancelled.
 Result<MeshDistance> mesh_distance(const Mesh& a, const Mesh& b, std::size_t samples, const RunContext& context);
 
 /// The distance of each of a's vertices from b's surface, model units, for heat maps. Cost O(V log F). Origins are
-/// respected. Errors: unsuitable (b has no faces), cancelled.
+/// respected. Errors: usage (check_mesh refuses one), unsuitable (b has no faces), cancelled.
 Result<std::vector<float>> distances_to_surface(const Mesh& a, const Mesh& b, const RunContext& context);
 
 /// How much the edges at each vertex have changed their length: the mean over the edges of the faces at it of
 /// |length in a / length in rest - 1|, over edges that have a length at rest. Cost O(corners).
-/// Errors: mismatch (the meshes do not have the same faces).
+/// Errors: usage (check_mesh refuses one), mismatch (the meshes do not have the same faces).
 Result<std::vector<float>> edge_strains(const Mesh& a, const Mesh& rest);
 
 } // namespace filigree

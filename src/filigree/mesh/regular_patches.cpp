@@ -310,6 +310,7 @@ std::vector<Index> lay_out_grid(std::span<const Undone> levels, const Quads& fin
 } // namespace
 
 Result<RegularPatches> find_regular_patches(const Mesh& mesh, unsigned max_levels, const RunContext& context) {
+    if (auto error = mesh_error(mesh)) return *error;
     if (auto error = check_quads(mesh)) return *error;
     if (mesh.corners.size() >= kNoIndex) return unsuitable("The mesh has more than a thousand million faces");
     Quads finest;

@@ -25,8 +25,8 @@ struct RegularPatches {
 
 /// Undoes subdivision (each quad into four) as often as all components allow, at most max_levels times. Where several
 /// colourings are possible (a torus), the one that keeps vertex 0 of each component. Open borders are fine.
-/// Errors: unsuitable, with the reason and the place (a face that is no quad, a non-manifold edge, not even one level);
-/// cancelled. Cost O(V + F).
+/// Errors: usage (check_mesh refuses the mesh), unsuitable, with the reason and the place (a face that is no quad, a
+/// non-manifold edge, not even one level); cancelled. Cost O(V + F).
 Result<RegularPatches> find_regular_patches(const Mesh& mesh, unsigned max_levels, const RunContext& context);
 
 } // namespace filigree

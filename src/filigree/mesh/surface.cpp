@@ -6,6 +6,7 @@
 namespace filigree {
 
 Result<Surface> make_surface(const Mesh& mesh, const RunContext& context) {
+    if (std::optional<Error> error = mesh_error(mesh)) return *error;
     Surface surface;
     surface.representative = weld_map(mesh.positions);
     for (Index v = 0; v < surface.vertex_count(); ++v) surface.place_count += surface.representative[v] == v;

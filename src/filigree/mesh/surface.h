@@ -18,7 +18,9 @@ struct Surface {
     std::size_t vertex_count() const { return representative.size(); }
 };
 
-/// Welds and triangulates; faces keep their order. Cost: O(V) for welding, and that of triangulate. Errors: cancelled.
+/// Welds and triangulates; faces keep their order. Cost: O(size) for checking and welding, and that of triangulate.
+/// Errors: usage (check_mesh refuses the mesh), unsuitable (more triangles than kMostListedTriangles, see
+/// mesh/incidence.h), cancelled.
 Result<Surface> make_surface(const Mesh& mesh, const RunContext& context);
 
 } // namespace filigree

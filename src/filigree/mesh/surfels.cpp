@@ -99,6 +99,7 @@ Vec3f unit_normal(const Vec3f& u, const Vec3f& v) { return u.cross(v).stableNorm
 } // namespace
 
 Result<Surfels> make_surfels(const Mesh& mesh, const RunContext& context) {
+    if (std::optional<Error> error = mesh_error(mesh)) return *error;
     const Result<Triangulation> triangulation = triangulate(mesh, context);
     if (!triangulation) return triangulation.error();
     const std::vector<Triangle>& triangles = triangulation->triangles;

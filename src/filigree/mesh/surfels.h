@@ -26,7 +26,7 @@ struct Surfels {
 /// A disc at each vertex that has a face, across the vertex normal, and further ones in triangles much larger than
 /// others. Each is a fifth larger than it takes to cover its share of the triangles around it, seen along their
 /// normals: discs together leave no gap in the surface, seen obliquely hardly one. Colours come along. Cost O(V +
-/// corners + surfels). Errors: cancelled.
+/// corners + surfels). Errors: usage (check_mesh refuses the mesh), cancelled.
 Result<Surfels> make_surfels(const Mesh& mesh, const RunContext& context);
 
 /// Surfels moved with what is around them: each goes with its vertex (between three, with the triangle), and its axes
@@ -41,7 +41,7 @@ inline constexpr float kMostStretch = 1.9f;
 
 /// As a point set that files hold: normals, colours, and the scalars ux uy uz vx vy vz.
 Mesh surfel_points(const Surfels& surfels);
-/// Back from such a point set; nothing where it lacks the scalars.
+/// Back from such a point set; nothing where it lacks the scalars. The mesh is not checked.
 std::optional<Surfels> surfels_of_points(const Mesh& mesh);
 /// To be drawn: an octagon around each ellipse, with its normal and its colour.
 Mesh surfel_polygons(const Surfels& surfels);

@@ -4,6 +4,7 @@
 
 #include "filigree/core/disjoint_sets.h"
 #include "filigree/core/parallel_for.h"
+#include "filigree/core/random.h"
 #include "filigree/mesh/incidence.h"
 #include "filigree/mesh/normals.h"
 #include "filigree/mesh/weld.h"
@@ -38,12 +39,6 @@ struct Incidence {
     std::vector<std::uint8_t> degenerate;       ///< a face
 };
 
-std::uint64_t mix(std::uint64_t x) { // [Steele 2014], the finaliser of SplitMix64
-    x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;
-    x = (x ^ (x >> 27)) * 0x94D049BB133111EBu;
-    return x ^ (x >> 31);
-}
-
 /// Number of corners that differ from the one before them.
 std::size_t distinct_corners(std::span<const Index> face) {
     std::size_t count = 0;
@@ -66,7 +61,7 @@ Incidence gather_incidence(const Mesh& mesh, const RunContext& context) {
     parallel_for(context, faces, kTopologyGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t f = begin; f < end; ++f) {
             std::uint64_t hash = 0;
-            for (const Index vertex : mesh.face(f)) hash += mix(vertex + 1);
+            for (const Index vertex : mesh.face(f)) hash += random_bits(0, vertex);
             in.vertex_set_hash[f] = hash;
             in.lowest_vertex[f] = std::ranges::min(mesh.face(f));
             in.collapsed[f] = distinct_corners(mesh.face(f)) < 3;

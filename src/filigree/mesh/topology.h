@@ -40,8 +40,8 @@ struct TopologyReport {
     bool is_oriented() const { return inconsistent_edges.count == 0; }
 };
 
-/// Cost O(corners), and O(n log n) at a vertex of n faces. Never fails on a mesh that passes check_mesh. Deterministic
-/// for any thread count.
+/// Cost O(corners), and O(n log n) at a vertex of n faces. The mesh is not checked; on one that passes check_mesh
+/// nothing can fail. Deterministic for any thread count.
 TopologyReport analyse_topology(const Mesh& mesh, const RunContext& context);
 
 } // namespace filigree

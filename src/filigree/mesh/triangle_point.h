@@ -5,7 +5,7 @@
 
 namespace filigree {
 
-struct TrianglePoint {
+struct ClosestTrianglePoint {
     Vec3d barycentric;
     Vec3d position;
     double squared_distance = std::numeric_limits<double>::infinity();
@@ -13,6 +13,6 @@ struct TrianglePoint {
 
 /// Defined for triangles without an area too, where it is the closest point of the edges. Method: [Ericson 2005, 5.1],
 /// in double.
-TrianglePoint closest_on_triangle(const Vec3d& p, const std::array<Vec3d, 3>& corners);
+ClosestTrianglePoint closest_on_triangle(const Vec3d& p, const std::array<Vec3d, 3>& corners);
 
 } // namespace filigree

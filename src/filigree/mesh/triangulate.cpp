@@ -3,6 +3,7 @@
 //   outlines with bridged holes work too.
 #include "filigree/mesh/triangulate.h"
 
+#include "filigree/mesh/incidence.h"
 #include "filigree/mesh/normals.h"
 
 #include <algorithm>
@@ -142,6 +143,7 @@ Triangulation triangulate(const Mesh& mesh) {
 Result<Triangulation> triangulate(const Mesh& mesh, const RunContext& context) {
     Triangulation result;
     const std::size_t count = mesh.corner_count() - 2 * mesh.face_count();
+    if (std::optional<Error> error = too_many_triangles(count)) return *error;
     result.triangles.reserve(count);
     result.source_face.reserve(count);
     for (std::size_t f = 0; f < mesh.face_count(); ++f) {

@@ -16,8 +16,10 @@ struct Triangulation {
 /// in the plane of their normal, and by a fan where no ear is left (self-crossing outlines).
 /// Cost O(corners) for triangles and quads, O(n r) for a face of n corners with r reflex ones; after 1024 n tests the
 /// rest of a face becomes a fan, to stay bounded. That bound is a second for a face of 200,000 corners.
-Triangulation triangulate(const Mesh& mesh);
-/// The same, for meshes that may have such faces. Errors: cancelled.
+/// The mesh is not checked: it has to pass check_mesh. Errors: unsuitable (more triangles than kMostListedTriangles,
+/// see mesh/incidence.h), cancelled.
 Result<Triangulation> triangulate(const Mesh& mesh, const RunContext& context);
+/// The same where nobody can cancel it, for small meshes; an error is thrown, as Result::value() does.
+Triangulation triangulate(const Mesh& mesh);
 
 } // namespace filigree

@@ -1,8 +1,9 @@
 #include "filigree/mesh/up_axis.h"
 
+#include "filigree/core/text.h"
+
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <string>
 
@@ -66,10 +67,7 @@ UpAxis find_up_axis(const Mesh& mesh, UpAxis usual) {
 }
 
 UpAxis usual_up_axis(std::string_view path) {
-    std::string ending(path.substr(std::max<std::size_t>(path.size(), 4) - 4));
-    std::transform(ending.begin(), ending.end(), ending.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    return ending == ".stl" ? UpAxis::z : UpAxis::y;
+    return lower_case(path.substr(std::max<std::size_t>(path.size(), 4) - 4)) == ".stl" ? UpAxis::z : UpAxis::y;
 }
 
 } // namespace filigree

@@ -55,8 +55,8 @@ struct CellReport {
 /// Cells of a mesh whose coordinates are multiplied by `scale` (metres a model unit). A cell's fraction comes from 4^3
 /// samples (open meshes, by winding numbers: 2^3, or one of very many cells); cells that only the surface passes
 /// through are added, so that every vertex lies in a cell (but those of loose parts: groups with fewer than 2 % of the
-/// largest group's cells). Errors: as sample_inside; usage (spacing); unsuitable (no faces; more than 2^26 cells: says
-/// a spacing that would do), cancelled.
+/// largest group's cells). Errors: as sample_inside; usage (spacing; check_mesh refuses the mesh); unsuitable (no
+/// faces; more than 2^26 cells: says a spacing that would do), cancelled.
 Result<Cells> make_cells(const Mesh& mesh, double scale, const CellOptions& options, const RunContext& context,
                          CellReport* report = nullptr);
 

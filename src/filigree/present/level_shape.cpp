@@ -38,12 +38,11 @@ Result<std::shared_ptr<const LevelShape>> LevelShape::make(std::shared_ptr<const
     if (!restorer) return restorer.error();
     shape->restorer_ = std::move(restorer).value();
     shape->vertex_count_ = shape->restorer_->vertex_count();
-    if (level == model->finest_level()) {
-        shape->triangles_ = triangulate(model->mesh).triangles;
-    } else {
-        shape->vertices_ = model->levels[level].vertices;
-        shape->triangles_ = triangulate(level_mesh(*model, level)).triangles;
-    }
+    const bool is_finest = level == model->finest_level();
+    if (!is_finest) shape->vertices_ = model->levels[level].vertices;
+    Result<Triangulation> cut = triangulate(is_finest ? model->mesh : level_mesh(*model, level), context);
+    if (!cut) return cut.error();
+    shape->triangles_ = std::move(cut->triangles);
     shape->model_ = std::move(model);
     return std::shared_ptr<const LevelShape>(std::move(shape));
 }

@@ -538,9 +538,7 @@ Picture Page::pixels(double scale) const {
 }
 
 Status Page::write(const std::filesystem::path& path, double scale) const {
-    std::string ending = path.extension().string();
-    std::transform(ending.begin(), ending.end(), ending.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    const std::string ending = lower_case(path.extension().string());
     std::string bytes;
     if (ending == ".png") {
         const Picture picture = pixels(scale);

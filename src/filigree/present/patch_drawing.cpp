@@ -116,6 +116,7 @@ PatchDrawing::PatchDrawing(Drawable surface, Drawable borders, float line_width)
 
 Result<PatchDrawing> PatchDrawing::create(const Mesh& mesh, const RegularPatches& patches, float line_width,
                                           const RunContext& context) {
+    if (std::optional<Error> error = mesh_error(mesh)) return *error;
     Result<Drawable> surface = Drawable::surface(colored_patches(mesh, patches), {}, context);
     if (!surface) return surface.error();
     const double width = ribbon_width(mesh, patches);

@@ -7,7 +7,8 @@
 
 namespace filigree {
 
-/// The quads in their patches' colours: vertices on borders once for each patch. Patch by patch, row by row.
+/// The quads in their patches' colours: vertices on borders once for each patch. Patch by patch, row by row. Here and
+/// below the patches are the mesh's, which is not checked.
 Mesh colored_patches(const Mesh& mesh, const RegularPatches& patches);
 
 /// Ribbons over the patches' borders, a hair above the surface. width: from the border to either side, model units.

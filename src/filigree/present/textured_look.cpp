@@ -144,6 +144,7 @@ Vec4f seen(const Vec3f& linear) {
 
 Result<BodyLook> textured_look(const Mesh& mesh, const std::string& mesh_path, double spacing, const Vec3f& plain,
                                std::vector<std::string>& warnings, const RunContext& context) {
+    if (std::optional<Error> error = mesh_error(mesh)) return *error;
     BodyLook look;
     if (mesh.materials.empty() || !mesh.colors.empty()) return look;
     const SurfaceMaterials loaded = load_surface_materials(mesh, mesh_path);

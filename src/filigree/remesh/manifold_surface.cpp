@@ -77,7 +77,7 @@ std::vector<Index> repeated_polygons(const Mesh& mesh, std::span<const Index> we
 /// Triangles over corners: every corner is a vertex of its own, so that faces which repeat a vertex name the right one.
 /// Polygons that are there twice begin at their lowest vertex, so that both get the same diagonals; all others are cut
 /// as `triangulate` cuts them everywhere else.
-Triangulation triangulate_corners(const Mesh& mesh, std::span<const Index> welded) {
+Result<Triangulation> triangulate_corners(const Mesh& mesh, std::span<const Index> welded, const RunContext& context) {
     Mesh loose;
     loose.positions.resize(mesh.corner_count());
     for (std::size_t c = 0; c < mesh.corner_count(); ++c) loose.positions[c] = mesh.positions[mesh.corners[c]];
@@ -89,10 +89,10 @@ Triangulation triangulate_corners(const Mesh& mesh, std::span<const Index> welde
         const auto lowest = std::ranges::min_element(face, {}, [&](Index c) { return welded[mesh.corners[c]]; });
         std::ranges::rotate(face, lowest);
     }
-    return triangulate(loose);
+    return triangulate(loose, context);
 }
 
-Soup triangle_soup(const Mesh& mesh, std::span<const Index> welded) {
+Result<Soup> triangle_soup(const Mesh& mesh, std::span<const Index> welded, const RunContext& context) {
     Soup soup;
     if (mesh.corner_count() == 3 * mesh.face_count()) {
         soup.resize(mesh.face_count());
@@ -101,9 +101,10 @@ Soup triangle_soup(const Mesh& mesh, std::span<const Index> welded) {
             soup.source_face[f] = f;
         }
     } else {
-        Triangulation triangulation = triangulate_corners(mesh, welded);
-        soup.corners = std::move(triangulation.triangles);
-        soup.source_face = std::move(triangulation.source_face);
+        Result<Triangulation> triangulation = triangulate_corners(mesh, welded, context);
+        if (!triangulation) return triangulation.error();
+        soup.corners = std::move(triangulation->triangles);
+        soup.source_face = std::move(triangulation->source_face);
     }
     soup.resize(soup.corners.size());
     for (std::size_t t = 0; t < soup.corners.size(); ++t)
@@ -385,11 +386,14 @@ Result<ManifoldSurface> make_manifold(const Mesh& mesh, CleanReport& report, con
         context.report("cleaning", fraction);
         return !context.is_cancelled();
     };
+    if (std::optional<Error> error = mesh_error(mesh)) return *error;
     if (!step(0)) return cancelled_error();
     const std::vector<Index> welded = weld_map(mesh.positions);
     std::size_t places = 0;
     for (Index v = 0; v < welded.size(); ++v) places += welded[v] == v;
-    Soup soup = triangle_soup(mesh, welded);
+    Result<Soup> made = triangle_soup(mesh, welded, context);
+    if (!made) return made.error();
+    Soup soup = *std::move(made);
     drop_degenerate(soup, report);
     if (!step(0.2)) return cancelled_error();
 

@@ -51,7 +51,8 @@ struct SurfaceTopology {
 /// share a wall (triangles that are there twice, with the surface going on all around them) the wall goes and they
 /// become one; a sheet that is there twice and meets a closed surface along some edges becomes a component of its own.
 /// Vertices and triangles keep the mesh's order.
-/// Adds to `report`. Errors: unsuitable (no face with an area is left), cancelled. Cost O(F log F).
+/// Adds to `report`. Errors: usage (check_mesh refuses the mesh), unsuitable (no face with an area is left; more
+/// triangles than kMostListedTriangles, see mesh/incidence.h), cancelled. Cost O(F log F).
 Result<ManifoldSurface> make_manifold(const Mesh& mesh, CleanReport& report, const RunContext& context);
 
 /// Cost O(F).

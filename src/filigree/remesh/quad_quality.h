@@ -20,7 +20,7 @@ struct QuadQuality {
     Index worst_quad = kNoIndex; ///< the one with the smallest
 };
 
-/// Faces that are no quads are passed over. Cost O(F).
+/// Faces that are no quads are passed over. The mesh is not checked. Cost O(F).
 QuadQuality measure_quads(const Mesh& mesh, const RunContext& context);
 
 } // namespace filigree

@@ -478,6 +478,7 @@ private:
 } // namespace
 
 Result<QuadRemeshed> quad_remesh(const Mesh& mesh, const QuadRemeshOptions& options, const RunContext& context) {
+    if (std::optional<Error> error = mesh_error(mesh)) return *error;
     return Remesher(mesh, options, context).run();
 }
 

@@ -78,8 +78,8 @@ struct QuadRemeshed {
 
 /// Remeshes any mesh that has an area. What comes back has passed the gate: no inverted quad, watertight where the
 /// (cleaned) input is, the same Euler number, both distances within the limit. Same bytes for any number of threads.
-/// Errors: usage (options out of range); unsuitable, with the reason (nothing with an area; fewer quads than the parts
-/// need; the gate fails every way there is); cancelled. Cost O(F log F + quads).
+/// Errors: usage (options out of range; check_mesh refuses the mesh); unsuitable, with the reason (nothing with an
+/// area; fewer quads than the parts need; the gate fails every way there is); cancelled. Cost O(F log F + quads).
 /// Method: [Lee 1998] (a parametrisation through recorded edge collapses); docs/remesh.md.
 Result<QuadRemeshed> quad_remesh(const Mesh& mesh, const QuadRemeshOptions& options, const RunContext& context);
 

@@ -37,8 +37,8 @@ struct InputSurface {
     std::vector<Index> beyond;
     std::vector<Index> place; ///< of each vertex
 
-    explicit InputSurface(const Mesh& from) : mesh(from), place(weld_map(from.positions)) {
-        cut_faces();
+    InputSurface(const Mesh& from, const Triangulation& cut) : mesh(from), place(weld_map(from.positions)) {
+        take_faces(cut);
         sort_by_middle();
         join_edges();
     }
@@ -67,8 +67,7 @@ private:
         return std::max(std::min(t[0], t[1]), std::min(std::max(t[0], t[1]), t[2]));
     }
 
-    void cut_faces() {
-        const Triangulation cut = triangulate(mesh);
+    void take_faces(const Triangulation& cut) {
         face_of_corner.resize(mesh.corner_count());
         for (std::size_t f = 0; f < mesh.face_count(); ++f)
             for (Index c = mesh.face_offsets[f]; c < mesh.face_offsets[f + 1]; ++c) face_of_corner[c] = Index(f);
@@ -657,17 +656,32 @@ bool has_face_data(const Mesh& mesh) {
            !mesh.materials.empty() || !mesh.smoothing.empty();
 }
 
+std::optional<Error> transfer_error(const Mesh& from, std::span<const CornerPoint> points, const Mesh& to) {
+    if (std::optional<Error> error = mesh_error(from, "The mesh with the attributes")) return error;
+    if (std::optional<Error> error = mesh_error(to, "The mesh that takes the attributes")) return error;
+    if (points.size() != to.vertex_count())
+        return Error{ErrorCode::usage, "There is not one point for each vertex that takes attributes."};
+    for (const CornerPoint& point : points) {
+        if (point.corners[0] == kNoIndex) continue;
+        if (std::ranges::any_of(point.corners, [&](Index corner) { return corner >= from.corner_count(); }))
+            return Error{ErrorCode::usage, "A point lies on corners that the mesh with the attributes does not have."};
+    }
+    return std::nullopt;
+}
+
 } // namespace
 
 Status transfer_attributes(const Mesh& from, std::span<const CornerPoint> points, Mesh& to, const RunContext& context) {
-    assert(points.size() == to.vertex_count());
+    if (std::optional<Error> error = transfer_error(from, points, to)) return *error;
     const std::vector<CornerPoint> filled = fill_missing_points(to, points);
     interpolate_vertex_data(from, filled, to, context);
     clear_face_data(from, to);
     if (context.is_cancelled()) return cancelled_error();
     if (!has_face_data(from)) return Success{};
 
-    const InputSurface surface(from);
+    const Result<Triangulation> cut = triangulate(from, context);
+    if (!cut) return cut.error();
+    const InputSurface surface(from, *cut);
     const Placement placement = make_placement(surface, to, filled, context);
     if (context.is_cancelled()) return cancelled_error();
     to.uvs = transfer_corners(placement, from.uvs, kSameUv, context);

@@ -24,7 +24,8 @@ struct CornerPoint {
 /// Normals are renormalised, and left out where `from` has none. Material files and materials are copied.
 /// Vertices whose point is none (kNoIndex) take that of the nearest vertex of their faces that has one; in a component
 /// without any, colours and scalars are 0, and there are no UVs, normals and labels.
-/// Cost O(V + F log F), and a short search per face near a seam. Errors: cancelled.
+/// Cost O(V + F log F), and a short search per face near a seam. Errors: usage (check_mesh refuses one of the meshes;
+/// not one point a vertex of `to`, or one whose corners `from` does not have), cancelled.
 Status transfer_attributes(const Mesh& from, std::span<const CornerPoint> points, Mesh& to, const RunContext& context);
 
 } // namespace filigree

@@ -40,7 +40,7 @@ struct CameraPoints {
 };
 
 /// The positions that a mesh's faces use; all where there are no faces. Into `room`, which has to stay, where some
-/// vertices are unused: a stray one far away would make the picture empty.
+/// vertices are unused: a stray one far away would make the picture empty. The mesh is not checked.
 CameraPoints points_of_faces(const Mesh& mesh, std::vector<Vec3f>& room, double radius = 0);
 
 /// The camera that looks along -direction and shows all points as large as they fit in a picture of that aspect (width

@@ -215,9 +215,8 @@ private:
 };
 
 /// Triangles by material; those without one come last.
-void add_triangles(const Mesh& mesh, const SurfaceOptions& options, std::span<const Index> draw_vertex,
-                   DrawArrays& arrays) {
-    const Triangulation cut = triangulate(mesh);
+void add_triangles(const Mesh& mesh, const Triangulation& cut, const SurfaceOptions& options,
+                   std::span<const Index> draw_vertex, DrawArrays& arrays) {
     const bool by_material = !options.materials.empty() && !mesh.materials.empty();
     const auto slot_of = [&](Index face) {
         const Index m = by_material ? mesh.materials.of_face[face] : kNoIndex;
@@ -275,7 +274,9 @@ Result<DrawArrays> make_draw_arrays(const Mesh& mesh, std::span<const Vec3f> pos
         vertices.add(corners, faces, normals, corner_normals);
     }
     vertices.finish();
-    add_triangles(mesh, options, vertices.of_corner, arrays);
+    const Result<Triangulation> cut = triangulate(mesh, context);
+    if (!cut) return cut.error();
+    add_triangles(mesh, *cut, options, vertices.of_corner, arrays);
     return arrays;
 }
 

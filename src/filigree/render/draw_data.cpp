@@ -180,6 +180,7 @@ DrawData& DrawData::operator=(DrawData&&) noexcept = default;
 DrawData::~DrawData() = default;
 
 Result<DrawData> DrawData::surface(const Mesh& mesh, const SurfaceOptions& options, const RunContext& context) {
+    if (std::optional<Error> error = mesh_error(mesh)) return *error;
     Result<DrawArrays> draw = arrays_of(mesh, options, context, NormalFaces::forget);
     if (!draw) return draw.error();
     auto content = std::make_unique<Content>();
@@ -225,7 +226,7 @@ Result<DrawData> DrawData::model(const Model& model, const RestoreOptions& resto
         std::vector<BlendRestorer::Item> items(vertices.size());
         for (Index i = 0; i < items.size(); ++i) items[i] = {vertices[i], i};
         motion.on_cpu.emplace(std::get<BlendDetail>(model.detail), model.mesh.positions, model.driver().vertices, items,
-                              draw->normals);
+                              draw->normals, context);
         drawn_at.resize(items.size());
         for (Index r = 0; r < items.size(); ++r) drawn_at[motion.on_cpu->slots()[r]] = r;
     }

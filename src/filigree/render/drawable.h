@@ -47,7 +47,8 @@ struct PointOptions {
 enum class RestoreOn { gpu, cpu };
 
 /// The processor's half of a drawable: all that needs no OpenGL, and so can be made in any thread while a window goes
-/// on drawing. Errors of both: unsuitable (nothing to draw), usage (no such level), cancelled.
+/// on drawing. Errors of both: unsuitable (nothing to draw), usage (no such level; check_mesh refuses the mesh),
+/// cancelled.
 class DrawData {
 public:
     static Result<DrawData> surface(const Mesh& mesh, const SurfaceOptions& options, const RunContext& context);
@@ -72,7 +73,8 @@ public:
     /// The graphics card's half: copies what was prepared. Errors: out_of_memory (graphics memory), unsupported.
     static Result<Drawable> upload(DrawData data);
 
-    /// Errors of all three: out_of_memory (graphics memory), unsuitable (nothing to draw), cancelled.
+    /// Errors of all three: out_of_memory (graphics memory), unsuitable (nothing to draw), usage (check_mesh refuses
+    /// the mesh), cancelled.
     static Result<Drawable> surface(const Mesh& mesh, const SurfaceOptions& options, const RunContext& context);
     static Result<Drawable> points(std::span<const Vec3f> positions, const Vec3d& origin, const PointOptions& options,
                                    const RunContext& context);

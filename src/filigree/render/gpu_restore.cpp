@@ -164,7 +164,7 @@ Result<GpuRestorer> GpuRestorer::prepare(const Model& model, std::span<const Ind
     content->driver.emplace(std::move(*driver));
 
     const auto prepared = [&](std::span<const BlendRestorer::Item> items, std::span<const Vec3f> item_normals) {
-        return BlendRestorer(detail, model.mesh.positions, model.driver().vertices, items, item_normals);
+        return BlendRestorer(detail, model.mesh.positions, model.driver().vertices, items, item_normals, context);
     };
     content->poses.emplace(prepared({}, {}));
     std::vector<BlendRestorer::Item> items(vertices.size());

@@ -19,7 +19,7 @@ struct SurfaceMaterials {
 /// Of materials whose pictures are bytes, such as a mesh's embedded ones.
 SurfaceMaterials decoded_materials(std::span<const MeshMaterial> materials);
 
-/// As read_materials, with the pictures. Never fails: a mesh can be drawn without them.
+/// As read_materials, with the pictures. Never fails: a mesh can be drawn without them. The mesh is not checked.
 SurfaceMaterials load_surface_materials(const Mesh& mesh, const std::filesystem::path& mesh_path);
 
 } // namespace filigree

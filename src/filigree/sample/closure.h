@@ -24,7 +24,7 @@ struct WeldedTriangles {
     std::vector<Triangle> triangles; ///< over the mesh's own positions
     Closure closure;
 };
-/// Cost: that of make_surface, and O(d log d) for a vertex with d edges. Errors: cancelled.
+/// Cost: that of make_surface, and O(d log d) for a vertex with d edges. Errors: as of make_surface.
 Result<WeldedTriangles> weld_triangles(const Mesh& mesh, const RunContext& context);
 
 } // namespace filigree

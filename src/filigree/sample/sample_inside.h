@@ -36,8 +36,8 @@ struct InsideReport {
 class InsideSampler {
 public:
     /// mesh: has to outlive the sampler. Cost O(V + F) for scan, O(F log F) for rays and winding.
-    /// Errors: unsuitable (no faces; scan or rays of an open mesh: names an open edge and suggests winding; the eye
-    /// lies on the surface), cancelled.
+    /// Errors: usage (check_mesh refuses the mesh), unsuitable (no faces; scan or rays of an open mesh: names an open
+    /// edge and suggests winding; the eye lies on the surface), cancelled.
     static Result<InsideSampler> create(const Mesh& mesh, const InsideOptions& options, const RunContext& context);
     static Result<InsideSampler> create(const Mesh&& mesh, const InsideOptions&, const RunContext&) = delete;
     InsideSampler(InsideSampler&&) noexcept;

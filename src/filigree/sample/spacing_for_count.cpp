@@ -42,6 +42,7 @@ Error hardly_inside(std::size_t inside, const Lattice& lattice) {
 
 Result<double> spacing_for_count(const Mesh& mesh, std::size_t count, const InsideOptions& options,
                                  const RunContext& context) {
+    if (std::optional<Error> error = mesh_error(mesh)) return *error;
     const Box box = bounds(mesh);
     const Vec3d size = box.size();
     if (count == 0 || !((size.array() > 0).all() && size.prod() > 0))

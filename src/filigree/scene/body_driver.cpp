@@ -88,7 +88,8 @@ DriverEdges measure_driver(const Model& model, const Body& body) {
 std::string driver_warning(const DriverEdges& edges, const Model& model, const Body& body) {
     if (edges.on_long_edges <= kFewOnLongEdges) return "";
     return fmt::format("{:.0f} % of the mesh hangs on driver triangles longer than {} spacings ({:.1f} at most), which "
-                       "cannot follow the particles; one of {} vertices does (strip --base {} --max-edge {:.2g}).",
+                       "cannot follow the particles; a driver of about {} vertices does (stripped with base {} and "
+                       "max_edge {:.2g}).",
                        100 * edges.on_long_edges, kLongestDriverEdge, edges.longest, with_commas(default_base(body)),
                        default_base(body), default_max_edge(model.mesh, body));
 }

@@ -22,7 +22,7 @@ struct DriverEdges {
 
 /// How a body's driver is stripped where nothing else is asked for: edges of 0.8 spacings on average, none that
 /// simplification makes longer than 1.2. A mesh with fewer than four times as many vertices is all driver.
-/// mesh: what the body was made of.
+/// mesh: what the body was made of; not checked.
 StripOptions body_driver_options(const Mesh& mesh, const Body& body);
 
 /// Cost O(vertices).

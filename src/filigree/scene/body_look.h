@@ -24,7 +24,8 @@ struct DrawnSurface {
     Mesh mesh;                 ///< the surface's vertices, and copies of some behind them, with all that they have
     std::vector<Index> copied; ///< of each copy: which vertex
 };
-/// colors: one a name in surface.materials. Without materials or colours: the surface as it is. Cost O(size).
+/// colors: one a name in surface.materials. Without materials or colours: the surface as it is. It is not
+/// checked. Cost O(size).
 DrawnSurface with_materials_apart(Mesh surface, std::span<const Vec3f> colors);
 
 } // namespace filigree

@@ -37,8 +37,8 @@ private:
     std::vector<Near> near_;
 };
 
-/// The colour of each particle: of the mesh's vertices nearest to it; none where the mesh has no colours. points: the
-/// mesh's vertices where the particles are.
+/// The colour of each particle: of the mesh's vertices nearest to it; none where the mesh has no colours. The mesh
+/// is not checked. points: its vertices where the particles are.
 std::vector<Vec4f> matter_colors(const Mesh& mesh, const std::vector<Vec3f>& points, std::span<const Vec3f> particles,
                                  double spacing, const RunContext& context);
 

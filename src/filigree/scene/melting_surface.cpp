@@ -54,7 +54,7 @@ Status MeltingSurface::add(std::size_t b, const BodyLook* look, const RunContext
     Result<CompositeMesher> mesher = CompositeMesher::create(body.model.mesh, context);
     if (!mesher && mesher.error().code == ErrorCode::unsuitable) {
         warnings.push_back(fmt::format("body '{}': its mesh is not closed, so it neither parts nor joins where it "
-                                       "melts; `filigree info` shows where it is open",
+                                       "melts; its open edges have to be closed",
                                        body.name));
         return Success{};
     }

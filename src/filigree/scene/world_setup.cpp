@@ -380,7 +380,7 @@ private:
             check_vertex(body, *from.vertex, from.line);
             hand.point = float(body.scale) * mesh.positions[*from.vertex];
         } else {
-            const std::vector<Triangle> triangles = triangulate(mesh).triangles;
+            const std::vector<Triangle> triangles = triangulate(mesh, context_).value().triangles;
             const ClosestPointTree tree(mesh.positions, triangles);
             const Vec3d at =
                 result_.actors[from.body].placement.inverse() * (*from.point - result_.origin) / body.scale;
