@@ -1,4 +1,4 @@
-// Poses from an animated glTF: its animation, sampled at the frame rate from its first key to its last.
+// Poses from an animated glTF: its animation, sampled at the frame rate from 0 s to its last key.
 #include "filigree/io/gltf.h"
 #include "filigree/io/point_cache_formats.h"
 
@@ -37,7 +37,9 @@ Result<PoseStream> open_gltf_poses(const std::filesystem::path& path, std::size_
                          " vertices, and what it should move has " + std::to_string(points) +
                          "; it is of another mesh, or vertices were split for their normals or UVs on the way."};
     const GltfAnimation& keys = scene->animations()[*animation];
-    const double rate = options.frames_per_second.value_or(kUnsaidRate), first = keys.first_key;
+    const double rate = options.frames_per_second.value_or(kUnsaidRate);
+    // a clip begins at 0 and holds its first key until then, so that those of one scene stay in step
+    const double first = std::min(keys.first_key, 0.0);
     const double last_frame = (keys.last_key - first) * rate + kRounding;
     if (!(last_frame >= 0 && last_frame < kMostFrames))
         return Error{ErrorCode::unsuitable, path.string() + ": its animation is too long for this frame rate."};
