@@ -135,10 +135,10 @@ std::pair<std::string, std::string> split_at(const std::string& text, const std:
 std::string sentence_of(const CLI::App& command, const CLI::ParseError& error, const OptionList& options,
                         std::span<const std::string> words) {
     const std::string kind = error.get_name(), said = error.what();
-    if (const std::string unknown = unknown_option(options, words); kind == "ExtrasError" && !unknown.empty())
-        return unknown;
-    if (kind == "ExtrasError" && !command.remaining().empty())
-        return "'" + command.remaining().front() + "' is one argument too many";
+    if (dynamic_cast<const CLI::ExtrasError*>(&error)) { // whose name is the command's
+        if (std::string unknown = unknown_option(options, words); !unknown.empty()) return unknown;
+        if (!command.remaining().empty()) return "'" + command.remaining().front() + "' is one argument too many";
+    }
     if (kind == "ArgumentMismatch") {
         const std::string received = split_at(said, "received ").second;
         return wrong_count(options, split_at(said, ":").first, std::size_t(std::atoll(received.c_str())));

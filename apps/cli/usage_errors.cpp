@@ -93,7 +93,7 @@ std::string given_again(const OptionList& options, std::span<const std::string> 
         const Option* option = find_option(options, option_part(word));
         if (!option || !counts_once(*option)) continue;
         if (std::find(met.begin(), met.end(), option) != met.end())
-            return option->long_name() + " is given twice; give it once";
+            return option->long_name() + " is given twice, and counts once";
         met.push_back(option);
     }
     return "";
