@@ -1,5 +1,6 @@
 #include "usage_errors.h"
 
+#include "filigree/io/extension.h"
 #include "filigree/scene/scene_keys.h"
 
 #include <cctype>
@@ -54,10 +55,15 @@ std::string meant_option(const OptionList& options, const std::string& given) {
     const std::string word = given.substr(std::min(given.find_first_not_of('-'), given.size()));
     if (const std::string alike = like(word, names); !alike.empty()) return "--" + alike;
     constexpr std::size_t kShortestWord = 4;
-    for (const Option& option : options)
-        if (word.size() >= kShortestWord && !option.is_positional() && option.text.find(word) != std::string::npos)
-            return option.long_name();
-    return "";
+    std::string speaks_of_it; // first of all in its help
+    std::size_t earliest = std::string::npos;
+    for (const Option& option : options) {
+        const std::size_t at = lower_case(option.text).find(lower_case(word));
+        if (word.size() < kShortestWord || option.is_positional() || at >= earliest) continue;
+        earliest = at;
+        speaks_of_it = option.long_name();
+    }
+    return speaks_of_it;
 }
 
 std::string values_taken(const Option& option) {
