@@ -101,7 +101,8 @@ MeshAnimation restored_animation(const Restorer& restorer, const PoseStream& pos
                 const Result<Pose> pose = poses.pose(frame);
                 if (!pose) return pose.error();
                 return restorer.positions(*pose, positions, silent);
-            }};
+            },
+            poses.metres_per_unit};
 }
 
 void write_numbered(const Restorer& restorer, const PoseStream& poses, const std::string& path,
@@ -177,18 +178,31 @@ void check_not_input(const std::string& output, const std::vector<std::string>& 
     }
 }
 
+Option pose_up_option(PoseFileOptions& options) {
+    return choice<UpAxis>("--pose-up", options.up, {{"y", UpAxis::y}, {"z", UpAxis::z}},
+                          "Axis that is up in the file of poses, where it is the other one in the model: turns them");
+}
+
 OptionList pose_file_options(PoseFileOptions& options) {
     return {Option("--frame-rate", options.frames_per_second,
                    "Frames a second (unset: as the file says; 60 for .pc2 and numbered meshes)")
                 .above_zero(),
-            Option("--animation", options.animation, "Of a .glb with several (unset: the first)")};
+            Option("--animation", options.animation, "Of a .glb with several (unset: the first)"),
+            pose_up_option(options)};
 }
 
 PoseStream poses_of(const std::string& poses, const PoseFileOptions& options, const Model& model,
                     const PoseSequence& own, const std::string& model_path, Session& session) {
-    if (!poses.empty())
-        return require(
-            open_poses(poses, model.driver().vertices.size(), model.mesh.origin, options, session.context()));
+    if (!poses.empty()) {
+        const std::vector<Vec3f> rest = driver_positions(model);
+        std::vector<std::string> warnings;
+        PoseFileOptions matched = options;
+        matched.rest = rest;
+        matched.warnings = &warnings;
+        PoseStream stream = require(open_poses(poses, rest.size(), model.mesh.origin, matched, session.context()));
+        session.warn(warnings);
+        return stream;
+    }
     if (!options.animation.empty()) refuse("--animation belongs to --poses.");
     own_pose(own, 1, model_path);
     PoseStream stream = stream_of(own);

@@ -40,7 +40,9 @@ void check_animation_options(const std::vector<std::string>& paths, const Sessio
 /// meshes in an output folder.
 void check_not_input(const std::string& output, const std::vector<std::string>& inputs);
 
-/// --frame-rate and --animation: how a file of poses is read.
+/// --pose-up: of poses from a program with another axis up.
+Option pose_up_option(PoseFileOptions& options);
+/// --frame-rate, --animation and --pose-up: how a file of poses is read.
 OptionList pose_file_options(PoseFileOptions& options);
 
 /// The poses of a file, one frame in memory where it allows that, or the model's own, which `own` keeps.

@@ -1,11 +1,13 @@
 // The one source that knows CLI11: a command line read by the tables of options.h.
 #include "options.h"
 #include "session.h"
+#include "usage_errors.h"
 
 #include <charconv>
 #include <cmath>
 
 #include <CLI/CLI.hpp>
+#include <fmt/format.h>
 
 namespace filigree::cli {
 
@@ -33,6 +35,15 @@ std::string check_whole(const std::string& text, std::int64_t least) {
     return is_whole ? "" : "'" + text + "' is not a whole number from " + std::to_string(least) + " up";
 }
 
+/// CLI11's validator, which says in help what it wants, with a sentence of ours.
+template <class Says>
+CLI::Validator in_our_words(CLI::Validator validator, Says says) {
+    return validator.operation([asked = CLI::Validator(validator), says](std::string& text) -> std::string {
+        const std::string given = text;
+        return asked(text).empty() ? "" : says(given);
+    });
+}
+
 /// Adds an option's check to CLI11's option.
 struct AddCheck {
     CLI::Option& option;
@@ -43,9 +54,21 @@ struct AddCheck {
     void operator()(Option::WholeFrom whole) const {
         option.check(CLI::Validator([whole](std::string& text) { return check_whole(text, whole.least); }, ""));
     }
-    void operator()(Option::IntegerRange range) const { option.check(CLI::Range(range.least, range.most)); }
-    void operator()(Option::Range range) const { option.check(CLI::Range(range.least, range.most)); }
-    void operator()(const Option::Words& words) const { option.check(CLI::IsMember(words.words)); }
+    void operator()(Option::IntegerRange range) const {
+        option.check(in_our_words(CLI::Range(range.least, range.most), [range](const std::string& given) {
+            return fmt::format("'{}' is not a whole number from {} to {}", given, range.least, range.most);
+        }));
+    }
+    void operator()(Option::Range range) const {
+        option.check(in_our_words(CLI::Range(range.least, range.most), [range](const std::string& given) {
+            return fmt::format("'{}' is not a number from {:g} to {:g}", given, range.least, range.most);
+        }));
+    }
+    void operator()(const Option::Words& words) const {
+        option.check(in_our_words(CLI::IsMember(words.words), [words = words.words](const std::string& given) {
+            return wrong_word(given, words);
+        }));
+    }
 };
 
 /// Adds an option by what it writes to.
@@ -76,7 +99,7 @@ CLI::Option* add(CLI::App& command, const Option& option) {
     if (option.is_required) added->required();
     if (option.most_values > 0) added->expected(option.least_values, option.most_values);
     if (option.has_commas) added->delimiter(',');
-    if (option.takes_one) added->allow_extra_args(false);
+    if (option.takes_one) added->allow_extra_args(false)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
     if (!option.value_name.empty()) added->type_name(option.value_name);
     if (option.shows_default) added->capture_default_str();
     return added;
@@ -101,16 +124,85 @@ void add(CLI::App& app, const Command& command, const OptionList& options, Sessi
     });
 }
 
-/// What is wrong with the arguments, in one line that says where help is; or the help or version that was asked for.
-int leave(const CLI::App& app, const CLI::ParseError& error, int argc, char** argv) {
-    if (error.get_exit_code() == 0) return app.exit(error);
-    std::string sentence = error.what(), command = app.get_name();
+/// "--at" of "--at: At least 3 required ...", "--at" of "Could not convert: --at = x", with what is behind it.
+std::pair<std::string, std::string> split_at(const std::string& text, const std::string& mark) {
+    const std::size_t at = text.find(mark);
+    if (at == std::string::npos) return {text, ""};
+    return {text.substr(0, at), text.substr(at + mark.size())};
+}
+
+/// CLI11's sentence in our words. words: those behind the command.
+std::string sentence_of(const CLI::App& command, const CLI::ParseError& error, const OptionList& options,
+                        std::span<const std::string> words) {
+    const std::string kind = error.get_name(), said = error.what();
+    if (dynamic_cast<const CLI::ExtrasError*>(&error)) { // whose name is the command's
+        if (std::string unknown = unknown_option(options, words); !unknown.empty()) return unknown;
+        if (!command.remaining().empty()) return "'" + command.remaining().front() + "' is one argument too many";
+    }
+    if (kind == "ArgumentMismatch") {
+        const std::string received = split_at(said, "received ").second;
+        return wrong_count(options, split_at(said, ":").first, std::size_t(std::atoll(received.c_str())));
+    }
+    if (kind == "ConversionError" && said.starts_with("Could not convert: ")) {
+        const auto [name, value] = split_at(split_at(said, ": ").second, " = ");
+        return wrong_type(options, name, value);
+    }
+    if (kind == "ExcludesError") {
+        const auto [one, other] = split_at(said, " excludes ");
+        return one + " and " + other + " exclude each other; give one of them";
+    }
+    return said;
+}
+
+int say_usage(const std::string& program, const std::string& command, std::string sentence) {
     std::replace(sentence.begin(), sentence.end(), '\n', ' ');
-    for (const CLI::App* chosen : app.get_subcommands()) command += " " + chosen->get_name();
-    if (app.get_subcommands().empty() && error.get_name() == "RequiredError")
-        sentence = argc > 1 ? "'" + std::string(argv[1]) + "' is no command" : "A command is required";
-    say(app.get_name() + ": " + sentence + "; '" + command + " --help' says what there is.");
+    const std::string where = "'" + program + (command.empty() ? "" : " " + command) + " --help' says what there is.";
+    say(program + ": " + sentence + (sentence.ends_with('?') ? " " : "; ") + where);
     return static_cast<int>(ErrorCode::usage);
+}
+
+/// What is wrong with the arguments, in one line that says where help is; or the help or version that was asked for.
+int leave(const CLI::App& app, const CLI::ParseError& error, const Program& program,
+          std::span<const std::string> words) {
+    if (error.get_exit_code() == 0) return app.exit(error);
+    const std::vector<CLI::App*> chosen = app.get_subcommands();
+    if (chosen.empty()) {
+        const std::string unknown = unknown_option({}, words);
+        return say_usage(program.name, "", unknown.empty() ? "A command is required" : unknown);
+    }
+    const std::string name = chosen.front()->get_name();
+    OptionList options = program.common;
+    for (const Command& command : program.commands)
+        if (command.name == name) options = command.options + program.common;
+    const auto behind = std::find(words.begin(), words.end(), name);
+    return say_usage(
+        program.name, name,
+        sentence_of(*chosen.front(), error, options, words.last(static_cast<std::size_t>(words.end() - behind) - 1)));
+}
+
+/// What CLI11 would let pass: a word that is no command beside --help, and an option given again whose values would be
+/// taken for one. Empty: nothing.
+std::optional<int> refuse_words(const Program& program, std::span<const std::string> words) {
+    if (const std::string wrong = wrong_command(program, words); !wrong.empty())
+        return say_usage(program.name, "", wrong);
+    for (const Command& command : program.commands) {
+        const auto at = std::find(words.begin(), words.end(), command.name);
+        if (at == words.end() || std::any_of(words.begin(), at, [](const auto& word) { return word[0] != '-'; }))
+            continue;
+        const std::string again =
+            given_again(command.options + program.common, words.last(static_cast<std::size_t>(words.end() - at) - 1));
+        if (!again.empty()) return say_usage(program.name, command.name, again);
+    }
+    return {};
+}
+
+/// "help strip" is "strip --help".
+std::vector<std::string> words_of(int argc, char** argv) {
+    std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
+    if (words.empty() || words[0] != "help") return words;
+    words.erase(words.begin());
+    words.emplace_back("--help");
+    return words;
 }
 
 } // namespace
@@ -121,11 +213,13 @@ int run_command_line(const Program& program, Session& session, int argc, char** 
     app.require_subcommand(1);
     app.footer("Examples:\n" + program.examples + "\n\n" + program.notes);
     for (const Command& command : program.commands) add(app, command, command.options + program.common, session);
+    const std::vector<std::string> words = words_of(argc, argv);
+    if (const std::optional<int> refused = refuse_words(program, words)) return *refused;
     try {
-        app.parse(argc, argv);
+        app.parse(std::vector<std::string>(words.rbegin(), words.rend())); // which CLI11 wants from behind
         return 0;
     } catch (const CLI::ParseError& error) {
-        return leave(app, error, argc, argv);
+        return leave(app, error, program, words);
     }
 }
 

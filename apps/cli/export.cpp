@@ -36,9 +36,9 @@ void export_levels(const Model& model, const ExportArguments& options, Session& 
                options.input + (options.at_rest ? ": a" : ": has no poses, and a") +
                    " model at rest goes to .glb, or with --web to a folder with a page; 'filigree simulate' makes "
                    "poses, and --poses takes another program's.");
-    const std::string given = session.first_given({"--as", "--key-rate", "--interpolation", "--influences",
-                                                   "--full-precision", "--compress", "--no-normals", "--morph-normals",
-                                                   "--law", "--level", "--thin-shell", "--frame-rate", "--animation"});
+    const std::string given = session.first_given(
+        {"--as", "--key-rate", "--interpolation", "--influences", "--full-precision", "--compress", "--no-normals",
+         "--morph-normals", "--law", "--level", "--thin-shell", "--frame-rate", "--animation", "--pose-up"});
     if (!given.empty())
         refuse(given + " belongs to a model that moves, and " + options.input +
                " is exported at rest; 'filigree level' writes one level of it.");
@@ -57,8 +57,15 @@ void convert_animation(const Mesh& rest, const ExportArguments& options, Session
     if (!may_move)
         refuse(ErrorCode::unsuitable, options.input + ": is a mesh that does not move; --poses FILE moves it, and "
                                                       "'filigree strip' makes a model of it.");
-    const MeshAnimation animation = require(open_animation(options.poses.empty() ? options.input : options.poses, rest,
-                                                           options.pose_file, session.context()));
+    PoseFileOptions matched = options.pose_file;
+    std::vector<std::string> warnings;
+    if (!options.poses.empty()) { // else the file moves itself
+        matched.rest = rest.positions;
+        matched.warnings = &warnings;
+    }
+    const MeshAnimation animation = require(
+        open_animation(options.poses.empty() ? options.input : options.poses, rest, matched, session.context()));
+    session.warn(warnings);
     check_animation_options({options.output}, session);
     write_animation_output(animation, options.animation, options.output, options.input, session, report);
 }
@@ -128,7 +135,7 @@ void export_glb_page(const ExportArguments& options, const std::string& glb, Ses
     const std::string given =
         session.first_given({"--poses", "--frame-rate", "--animation", "--rest", "--stream", "--bits", "--as",
                              "--key-rate", "--interpolation", "--influences", "--full-precision", "--all-levels",
-                             "--no-normals", "--morph-normals", "--law", "--level", "--thin-shell"});
+                             "--no-normals", "--morph-normals", "--law", "--level", "--thin-shell", "--pose-up"});
     if (!given.empty()) refuse(given + " belongs to a model, and the page plays " + options.input + " as it is.");
     const GltfScene scene = require(GltfScene::read_view(glb, options.input, session.context()));
     if (!scene.files_beside().empty())

@@ -22,6 +22,15 @@ struct FractureArguments {
 
 bool is_folder(const std::string& output) { return output.ends_with('/'); }
 
+void check(const FractureArguments& options) {
+    if (options.at.size() % 3 != 0)
+        refuse(fmt::format("--at takes a point X,Y,Z each time it is given, and there are {} numbers.",
+                           options.at.size()));
+    if (!is_folder(options.output))
+        require(with_hint(mesh_format(options.output), ErrorCode::unsupported,
+                          "Or end the name in '/' (" + options.output + "/) for a file a piece."));
+}
+
 void report_fracture(const FracturedMesh& fractured, double seconds, Report& report) {
     const CutReport& r = fractured.report;
     const char* unit = r.is_sheet ? "area" : "volume";
@@ -103,7 +112,7 @@ void write_folder(const FracturedMesh& fractured, const Mesh& input, const Fract
 }
 
 void run(FractureArguments options, Session& session) {
-    if (!is_folder(options.output)) require(mesh_format(options.output));
+    check(options);
     const Mesh mesh = session.read_mesh(options.input);
     for (std::size_t k = 0; k + 2 < options.at.size(); k += 3)
         options.pattern.at.emplace_back(Vec3d(options.at[k], options.at[k + 1], options.at[k + 2]) - mesh.origin);
@@ -128,6 +137,8 @@ void run(FractureArguments options, Session& session) {
         report_mesh_written(fractured.mesh, options.output, report);
     }
     report_fracture(fractured, seconds, report);
+    if (!(options.explode > 0) && fractured.pieces > 1)
+        report.row("look", "cracks are closed and do not show; --explode 0.3 moves the pieces apart");
     session.print(report);
 }
 

@@ -1,6 +1,7 @@
 // filigree: the command line. Each command is in the file of its name.
 #include "commands.h"
 #include "session.h"
+#include "usage_errors.h"
 
 #include <cstdio>
 #include <cstdlib>
@@ -40,7 +41,9 @@ cli::Program make_program(cli::Session& session) {
 int print_manual(const cli::Program& program, const std::string& command) {
     const std::string page = cli::manual_page(program, command);
     if (page.empty()) {
-        cli::say("filigree: '" + command + "' is no command; 'filigree --help' says what there is.");
+        const std::string sentence = cli::no_such_command(program, command);
+        cli::say("filigree: " + sentence + (sentence.ends_with('?') ? " " : "; ") +
+                 "'filigree --help' says what there is.");
         return exit_code(ErrorCode::usage);
     }
     const bool is_written = std::fputs(page.c_str(), stdout) >= 0 && std::fflush(stdout) == 0;

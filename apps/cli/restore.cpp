@@ -5,6 +5,7 @@
 #include "restore_options.h"
 
 #include "filigree/hierarchy/vertex_order.h"
+#include "filigree/io/pose_match.h"
 #include "filigree/mesh/surfels.h"
 #include "filigree/present/error_picture.h"
 #include "filigree/present/page.h"
@@ -72,6 +73,8 @@ void check(const RestoreArguments& options, const Session& session) {
     if (options.poses.empty() && !options.poses_file.animation.empty()) refuse("--animation belongs to --poses.");
     if (!options.is_animation() && options.poses_file.frames_per_second)
         refuse("--frame-rate belongs to --poses or --frames.");
+    if (options.pose.empty() && options.poses.empty() && options.poses_file.up)
+        refuse("--pose-up belongs to --pose or --poses.");
     if (options.is_animation() && !options.picture.empty()) refuse("--picture belongs to --pose or --frame.");
     if (!options.picture.empty() && options.restore.level)
         refuse("--picture draws the finest level; leave out --level.");
@@ -135,11 +138,33 @@ Mesh surfels_of(const Model& model, const Mesh& restored, std::span<const Mat3f>
         split_surfels(carried_surfels(rest, restored.positions, vertex_gradients(*detail, gradients))));
 }
 
+/// The driver as another program moved it. Vertices that it split for normals or UVs are made one again.
+Pose moved_pose(const Model& model, const std::string& path, const RestoreArguments& options, Session& session) {
+    const Mesh moved = session.read_mesh(path);
+    Pose pose = pose_of_mesh(moved, model.mesh.origin);
+    const Mesh driver = driver_mesh(model);
+    if (moved.vertex_count() > driver.vertex_count())
+        if (const std::optional<VertexMatch> match = match_by_faces(driver, moved)) {
+            std::vector<Vec3f> positions(driver.vertex_count());
+            require(match->apply(pose.positions, positions, path));
+            pose = {std::move(positions), {}, {}};
+            session.warn(fmt::format("{}: its {} vertices were split for their normals or UVs; those at one place are "
+                                     "one again, which makes the driver's {}.",
+                                     path, with_commas(moved.vertex_count()), with_commas(driver.vertex_count())));
+        }
+    if (options.poses_file.up) {
+        turn_up(pose.positions, model.mesh.origin, *options.poses_file.up);
+        const Mat3f turn = turn_of(*options.poses_file.up).cast<float>();
+        for (Mat3f& gradient : pose.gradients) gradient = turn * gradient * turn.transpose();
+    }
+    return pose;
+}
+
 void restore_one(const RestoreArguments& options, Session& session) {
     PoseSequence own;
     const Model model = session.read_model(options.model, options.frame ? &own : nullptr);
-    Pose pose = options.frame ? own_pose(own, options.frame, options.model)
-                              : pose_of_mesh(session.read_mesh(options.pose), model.mesh.origin);
+    Pose pose =
+        options.frame ? own_pose(own, options.frame, options.model) : moved_pose(model, options.pose, options, session);
     if (!options.ghosts.empty())
         pose.ghosts = pose_of_mesh(session.read_mesh(options.ghosts), model.mesh.origin).positions;
     if (!options.picture.empty() && model.code() != DetailCode::blend)
@@ -181,10 +206,11 @@ std::string job_of(const RestoreArguments& options) {
         for (const std::filesystem::path& path : animation_files(options.poses)) inputs.push_back(path);
     const RestoreOptions& restore = options.restore;
     const PoseFileOptions& file = options.poses_file;
-    return fmt::format("{} level {} law {} thin-shell {} rate {} animation {}", require(hash_of_files(inputs)),
+    return fmt::format("{} level {} law {} thin-shell {} rate {} animation {} up {}", require(hash_of_files(inputs)),
                        restore.level ? std::to_string(*restore.level) : "finest",
                        restore.law ? std::to_string(int(*restore.law)) : "own", restore.thin_shell,
-                       file.frames_per_second.value_or(0), file.animation);
+                       file.frames_per_second.value_or(0), file.animation,
+                       file.up ? std::to_string(int(*file.up)) : "own");
 }
 
 /// The model where it can stay in its file: restored to its finest level, into a .pc2, from a file that can be read

@@ -282,8 +282,9 @@ private:
             for (std::size_t b = 0; b < ready_.bodies.size(); ++b) {
                 if (melting.has_body(b)) continue;
                 Report report;
-                write_animation_output(ready_.bodies[b].model, stream_of(run_->recording().poses[b]), {},
-                                       options_.animation,
+                PoseStream poses = stream_of(run_->recording().poses[b]);
+                poses.metres_per_unit = 1; // the world of scenes
+                write_animation_output(ready_.bodies[b].model, poses, {}, options_.animation,
                                        model_path(path, ready_.bodies.size(), ready_.bodies[b].name),
                                        scene_.bodies[b].mesh, session_, report);
                 animation_rows_.add_rows(report);

@@ -254,3 +254,49 @@ TEST_F(Animation, WhatCannotBeIsSaidBeforeTheWork) {
     fails(2, {"deform", "mesh.ply", "--bend", "9", "--frames", "3", "-o", "x.fil"}, {"x.fil", "mesh"});
     EXPECT_FALSE(std::filesystem::exists(path("x.pc2")));
 }
+
+TEST_F(Animation, ACageWhoseVerticesWereSplitIsRestoredAsTheCage) {
+    Mesh moved = driver_, flat;
+    moved.positions = poses_.frames[2].positions;
+    std::vector<Index> place(moved.corner_count()); // corners by their vertices, as Blender writes them
+    for (Index v = 0; v < moved.vertex_count(); ++v)
+        for (std::size_t c = 0; c < moved.corner_count(); ++c)
+            if (moved.corners[c] == v) {
+                place[c] = static_cast<Index>(flat.positions.size());
+                flat.positions.push_back(moved.positions[v]);
+            }
+    for (std::size_t f = 0; f < moved.face_count(); ++f) {
+        std::vector<Index> corners;
+        for (std::size_t c = moved.face_offsets[f]; c < moved.face_offsets[f + 1]; ++c) corners.push_back(place[c]);
+        flat.add_face(corners);
+    }
+    EXPECT_TRUE(write_mesh(moved, path("smooth.ply"), {}, kOneThread).ok());
+    EXPECT_TRUE(write_mesh(flat, path("flat.ply"), {}, kOneThread).ok());
+    ok({"restore", "moving.fil", "--pose", "smooth.ply", "-o", "a.ply"});
+    const Ran ran = ok({"restore", "moving.fil", "--pose", "flat.ply", "-o", "b.ply"});
+    EXPECT_EQ(bytes_of(path("a.ply")), bytes_of(path("b.ply")));
+    EXPECT_NE(ran.err.find("were split for their normals or UVs"), std::string::npos) << ran.err;
+    std::reverse(flat.positions.begin(), flat.positions.end()); // another mesh of as many places
+    EXPECT_TRUE(write_mesh(flat, path("other.ply"), {}, kOneThread).ok());
+    fails(8, {"restore", "moving.fil", "--pose", "other.ply", "-o", "c.ply"}, {"filigree level MODEL 0"});
+}
+
+TEST_F(Animation, ACacheOfAProgramWithZUpIsToldOfAndTurnedBack) {
+    const MeshAnimation lying{&driver_, 3, 25, [this](std::size_t frame, std::span<Vec3f> positions) -> Status {
+                                  for (std::size_t v = 0; v < positions.size(); ++v) {
+                                      const Vec3f& p = poses_.frames[frame].positions[v];
+                                      positions[v] = Vec3f(p.x(), -p.z(), p.y());
+                                  }
+                                  return Success{};
+                              }};
+    EXPECT_TRUE(write_animation(lying, path("z.mdd"), kOneThread).ok());
+    const Ran ran = ok({"restore", "moving.fil", "--poses", "z.mdd", "-o", "z.pc2"});
+    EXPECT_NE(ran.err.find("turned by 90 degrees about x"), std::string::npos) << ran.err;
+    EXPECT_NE(ran.err.find("--pose-up z"), std::string::npos) << ran.err;
+    const Ran back = ok({"restore", "moving.fil", "--poses", "z.mdd", "--pose-up", "z", "-o", "back.pc2"});
+    EXPECT_EQ(back.err.find("turned by"), std::string::npos) << back.err;
+    ok({"restore", "moving.fil", "--frames", "-o", "own.pc2"});
+    EXPECT_TRUE(bytes_of(path("back.pc2")) == bytes_of(path("own.pc2")));
+    ok({"export", "moving.fil", "--poses", "z.mdd", "--pose-up", "z", "-o", "back.glb"});
+    fails(2, {"restore", "moving.fil", "--frames", "--pose-up", "z", "-o", "x.pc2"}, {"--pose-up belongs to"});
+}

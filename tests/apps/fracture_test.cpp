@@ -54,6 +54,31 @@ TEST_F(FractureCommand, ClumpsAndGrains) {
     fails(2, {"fracture", "cube.obj", "-o", "x.ply", "--clump", "0"}, {"--clump"});
 }
 
+TEST_F(FractureCommand, EveryPointThatWasHitCounts) {
+    make_cube();
+    const auto broken = [&](const std::vector<std::string>& at) {
+        std::vector<std::string> words = {"fracture",  "cube.obj", "-o",       "x.ply",
+                                          "--pattern", "impact",   "--pieces", "40"};
+        words.insert(words.end(), at.begin(), at.end());
+        ok(words);
+        return bytes_of(path("x.ply"));
+    };
+    const std::string one = broken({"--at", "1,1,1"}), other = broken({"--at", "-1,-1,-1"});
+    const std::string both = broken({"--at", "1,1,1", "--at", "-1,-1,-1"});
+    EXPECT_NE(both, one);
+    EXPECT_NE(both, other);
+    EXPECT_EQ(both, broken({"--at", "1", "1", "1", "--at=-1,-1,-1"}));
+    fails(2, {"fracture", "cube.obj", "-o", "x.ply", "--pattern", "impact", "--at", "1,1,1,1", "--at", "1,1,1"},
+          {"--at takes a point X,Y,Z"});
+}
+
+TEST_F(FractureCommand, SentencesSayWhatToDoNext) {
+    make_cube();
+    fails(5, {"fracture", "cube.obj", "-o", "pieces"}, {"pieces:", "(pieces/) for a file a piece"});
+    EXPECT_NE(ok({"fracture", "cube.obj", "-o", "x.ply"}).out.find("--explode 0.3"), std::string::npos);
+    EXPECT_EQ(ok({"fracture", "cube.obj", "-o", "x.ply", "--explode", "0.2"}).out.find("--explode"), std::string::npos);
+}
+
 TEST_F(FractureCommand, PiecesAreNamedInEveryFormat) {
     make_cube();
     for (const char* file : {"broken.obj", "broken.glb", "broken.ply", "broken.stl"})

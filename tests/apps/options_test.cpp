@@ -48,6 +48,62 @@ TEST_F(OptionTables, NoCommandWritesOverItsInput) {
     for (const std::string& name : files()) EXPECT_EQ(bytes_of(path(name)), before[name]) << name;
 }
 
+TEST_F(OptionTables, WhatIsNoCommandIsRefusedBesideHelpAndVersionToo) {
+    for (const std::vector<std::string>& words : {std::vector<std::string>{"stripp"},
+                                                  {"stripp", "--help"},
+                                                  {"--help", "stripp"},
+                                                  {"stripp", "--version"},
+                                                  {"--version", "stripp"},
+                                                  {"help", "stripp"},
+                                                  {"--man", "stripp"},
+                                                  {"stripp", "cube.ply", "-o", "x.fil"}})
+        fails(2, words, {"'stripp' is no command; did you mean 'strip'?", "filigree --help"});
+    fails(2, {"NONSENSE", "--help"}, {"'NONSENSE' is no command", "filigree --help"});
+    fails(2, {"--nonsense"}, {"there is no option --nonsense"});
+    EXPECT_EQ(ok({"help", "strip"}).out, ok({"strip", "--help"}).out);
+    EXPECT_EQ(ok({"help"}).out, ok({"--help"}).out);
+}
+
+TEST_F(OptionTables, AnOptionThatCountsOnceIsRefusedWhenGivenTwice) {
+    const std::vector<std::vector<std::string>> runs = {
+        {"strip", "cube.ply", "-o", "x.fil", "--base", "50", "--base", "60"},
+        {"strip", "cube.ply", "-o", "x.fil", "--base=50", "--base", "60"},
+        {"strip", "cube.ply", "-o", "x.fil", "--output", "y.fil"},
+        {"fracture", "cube.ply", "-o", "x.ply", "--pattern", "even", "--pattern", "slabs"},
+        {"fracture", "cube.ply", "-o", "x.ply", "--pattern", "slabs", "--grain", "1,0,0", "--grain", "0,1,0"},
+        {"render", "cube.ply", "-o", "x.png", "--camera", "1,2,3,4,5,6", "--camera", "7,8,9"},
+        {"deform", "cube.ply", "-o", "x.ply", "--bend", "10", "--axis", "x", "--axis", "y"},
+        {"sample", "cube.ply", "-o", "x.ply", "--spacing", "0.1", "--eye", "1,2,3", "--eye", "1,2,3"},
+    };
+    for (const std::vector<std::string>& run : runs)
+        fails(2, run, {"is given twice, and counts once", run[0] + " --help"});
+    ok({"deform", "cube.ply", "-o", "x.ply", "--bend", "10", "--bend", "20"}); // steps, one after the other
+    ok({"info", "cube.ply", "--json", "--json"});
+}
+
+TEST_F(OptionTables, WrongOptionsAndValuesAreToldInOurWords) {
+    const std::vector<std::string> strip = {"strip", "cube.ply", "-o", "x.fil"};
+    const auto with = [](std::vector<std::string> words, const std::vector<std::string>& more) {
+        words.insert(words.end(), more.begin(), more.end());
+        return words;
+    };
+    fails(2, with(strip, {"--bse", "300"}), {"there is no option --bse; did you mean --base?", "strip --help"});
+    fails(2, with(strip, {"--vertices", "300"}), {"there is no option --vertices; did you mean --base?"});
+    fails(2, with(strip, {"other.ply"}), {"'other.ply' is one argument too many"});
+    fails(2, with(strip, {"--base"}), {"--base takes 1 value", "none is given"});
+    fails(2, {"fracture", "cube.ply", "-o", "x.ply", "--at", "0,0"}, {"--at takes a point X,Y,Z", "2 numbers"});
+    fails(2, {"fracture", "cube.ply", "-o", "x.ply", "--at", "0,0,q"}, {"--at", "'0,0,q' is not a number"});
+    fails(2, {"fracture", "cube.ply", "-o", "x.ply", "--roughness", "5"}, {"'5' is not a number from 0 to 1"});
+    fails(2, {"fracture", "cube.ply", "-o", "x.ply", "--pattern", "radiall"},
+          {"'radiall' is none of", "did you mean 'radial'?"});
+    fails(2, {"sample", "cube.ply", "-o", "x.ply", "--spacing", "1", "--count", "5"}, {"exclude each other"});
+}
+
+TEST_F(OptionTables, AMeshInPlaceOfASceneIsToldOf) {
+    fails(4, {"simulate", "cube.ply", "-o", "x.fil"}, {"cube.ply: is a mesh, not a scene", "docs/scenes.md"});
+    fails(4, {"simulate", "cube.fil", "-o", "x.fil"}, {"cube.fil: is a model, not a scene"});
+}
+
 TEST_F(OptionTables, ManualPagesNameEveryOption) {
     const std::string help = ok({"--help"}).out, page = ok({"--man"}).out;
     EXPECT_TRUE(page.starts_with(".TH FILIGREE 1")) << page.substr(0, 80);

@@ -223,3 +223,21 @@ TEST_F(File, ManyThreadsWriteOneFile) {
     EXPECT_EQ(*read_file(folder_ / "a"), "whole");
     EXPECT_EQ(files_in_folder(), 1u);
 }
+
+TEST_F(File, WhatIsLargerThanMemoryIsRefusedBeforeItIsRead) {
+    const fs::path path = folder_ / "sparse.stl";
+    std::ofstream(path) << "solid";
+    std::error_code failed;
+    fs::resize_file(path, std::uintmax_t{1} << 42, failed);
+    if (failed) GTEST_SKIP() << "no such large files here";
+    const Result<std::string> whole = read_file(path);
+    ASSERT_FALSE(whole.ok());
+    EXPECT_EQ(whole.error().code, ErrorCode::out_of_memory);
+    EXPECT_NE(whole.error().message.find("sparse.stl"), std::string::npos);
+    EXPECT_NE(whole.error().message.find("of memory"), std::string::npos) << whole.error().message;
+    const Result<FileReader> reader = FileReader::open(path);
+    ASSERT_TRUE(reader.ok());
+    std::array<char, 5> beginning;
+    EXPECT_TRUE(reader->read(0, beginning).ok()); // a part of it is read all the same
+    EXPECT_EQ(reader->read_all().error().code, ErrorCode::out_of_memory);
+}

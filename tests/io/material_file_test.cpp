@@ -125,9 +125,11 @@ TEST_F(MaterialFile, PictureNamesAreWhatProgramsWrite) {
 }
 
 TEST_F(MaterialFile, ScaledAndMovedPicturesAreSaid) {
-    for (const std::string line : {"-s 2 2 1 wood.png", "-o 0.5 wood.png", "-t 0 0.1 0 wood.png"}) {
+    for (const std::string line : {"-s 2 2 1 wood.png", "-o 0.5 wood.png", "-t 0 0.1 0 wood.png",
+                                   "-o 0.0 -7.0 0.0 -s 1.0 10.0 1.0 -clamp on wood.png"}) {
         EXPECT_EQ(picture(line), "wood.png");
         expect_warning({"'m'", "scale"});
+        EXPECT_EQ(warnings_[0].find("more"), std::string::npos) << warnings_[0]; // it is one texture
     }
 }
 

@@ -1,4 +1,5 @@
 #include "filigree/io/mesh_file.h"
+#include "filigree/mesh/shapes.h"
 
 #include <gtest/gtest.h>
 
@@ -201,6 +202,80 @@ TEST(Ply, AZeroByteInANameDoesNotReachOtherFiles) {
     EXPECT_EQ(file->mesh.scalars[0].name, "a_b");
     ASSERT_EQ(file->warnings.size(), 1u);
     EXPECT_NE(file->warnings[0].find("zero byte"), std::string::npos);
+}
+
+TEST(Ply, ColoursHaveManyNames) {
+    const auto colored = [](const std::vector<std::string>& names, const std::string& type,
+                            const std::string& numbers) {
+        std::string properties = kVertices;
+        for (const std::string& name : names) properties += "property " + type + " " + name + "\n";
+        return read(ascii(properties + kFaces,
+                          "0 0 0 " + numbers + "\n1 0 0 " + numbers + "\n0 1 0 " + numbers + "\n3 0 1 2\n"));
+    };
+    const std::vector<std::vector<std::string>> names = {{"r", "g", "b"},
+                                                         {"R", "G", "B"},
+                                                         {"Red", "Green", "Blue"},
+                                                         {"diffuse_red", "diffuse_green", "diffuse_blue"},
+                                                         {"diffuse_r", "diffuse_g", "diffuse_b"},
+                                                         {"DIFFUSE_RED", "DIFFUSE_GREEN", "DIFFUSE_BLUE"}};
+    for (const auto& name : names) {
+        SCOPED_TRACE(name[0]);
+        for (const std::string type : {"uchar", "short", "ushort", "int", "uint", "float", "double"}) {
+            const auto file = colored(name, type, "255 0 51");
+            ASSERT_TRUE(file.ok()) << file.error().message;
+            ASSERT_EQ(file->mesh.colors.size(), 3u) << type;
+            EXPECT_EQ(file->mesh.colors[1], Vec4f(1, 0, 0.2f, 1)) << type;
+            EXPECT_TRUE(file->mesh.scalars.empty()) << type;
+        }
+        EXPECT_EQ(colored(name, "double", "1 0 0.5")->mesh.colors[0], Vec4f(1, 0, 0.5f, 1));
+        EXPECT_EQ(colored(name, "ushort", "65535 0 13107")->mesh.colors[0], Vec4f(1, 0, 0.2f, 1));
+    }
+    const auto four = colored({"diffuse_red", "diffuse_green", "diffuse_blue", "Alpha"}, "uchar", "255 0 51 102");
+    EXPECT_TRUE(four->mesh.colors_have_alpha);
+    EXPECT_EQ(four->mesh.colors[0], Vec4f(1, 0, 0.2f, 0.4f));
+    EXPECT_TRUE(colored({"r", "g", "b", "a"}, "float", "1 0 1 0.5")->mesh.colors_have_alpha);
+}
+
+TEST(Ply, OpacityFromNoughtToOneBesideColoursTo255) {
+    const auto file = read(ascii(kVertices +
+                                     "property float red\nproperty float green\nproperty float blue\n"
+                                     "property float alpha\n" +
+                                     kFaces,
+                                 "0 0 0 255 0 51 1\n1 0 0 255 0 51 0.5\n0 1 0 0 0 0 1\n3 0 1 2\n"));
+    EXPECT_EQ(file->mesh.colors[1], Vec4f(1, 0, 0.2f, 0.5f));
+}
+
+TEST(Ply, NumbersThatAreNoColourStayScalars) {
+    const auto scalars = [](const std::string& properties, const std::string& numbers) {
+        const auto file = read(ascii(kVertices + properties + kFaces,
+                                     "0 0 0 " + numbers + "\n1 0 0 " + numbers + "\n0 1 0 " + numbers + "\n3 0 1 2\n"));
+        EXPECT_TRUE(file->mesh.colors.empty());
+        return file->mesh.scalars.size();
+    };
+    EXPECT_EQ(scalars("property float r\nproperty float g\n", "1 1"), 2u);
+    EXPECT_EQ(scalars("property float r\nproperty float g\nproperty float b\n", "1 -1 0"), 3u);
+    EXPECT_EQ(scalars("property float r\nproperty float g\nproperty float b\n", "1 2 1000"), 3u);
+    EXPECT_EQ(scalars("property float r\nproperty uchar g\nproperty float b\n", "1 1 1"), 3u);
+    EXPECT_EQ(scalars("property uchar alpha\n", "1"), 1u);
+}
+
+TEST(Ply, ScalarsWithNamesOfColoursComeBackAsScalars) {
+    for (const bool has_colors : {false, true}) {
+        Mesh mesh = make_box(Vec3d::Zero(), Vec3d::Ones());
+        const std::size_t count = mesh.vertex_count();
+        for (const char* name : {"Red", "green", "BLUE", "r", "g", "b", "a", "alpha"})
+            mesh.scalars.push_back({name, std::vector<float>(count, 0.25f)});
+        if (has_colors) mesh.colors.assign(count, Vec4f(1, 0, 0, 1));
+        std::string bytes;
+        const auto lost = write_mesh(mesh, MeshFormat::ply, bytes, {}, RunContext());
+        ASSERT_TRUE(lost.ok());
+        EXPECT_FALSE(lost->empty());
+        const auto file = read(bytes);
+        ASSERT_TRUE(file.ok()) << file.error().message;
+        EXPECT_EQ(file->mesh.scalars.size(), 8u);
+        EXPECT_EQ(file->mesh.colors.empty(), !has_colors);
+        EXPECT_FALSE(file->mesh.colors_have_alpha);
+    }
 }
 
 } // namespace ply_test

@@ -6,6 +6,7 @@
 #include "filigree/io/mesh_file.h"
 #include "filigree/io/model_file.h"
 #include "filigree/mesh/shapes.h"
+#include "io/gltf_text.h"
 #include "io/sample_meshes.h"
 #include "threads.h"
 
@@ -491,4 +492,32 @@ TEST_F(PointCache, SequencesOfManyThreadsDoNotDisturbEachOther) {
     for (std::thread& thread : threads) thread.join();
     EXPECT_EQ(failures, 0);
     EXPECT_EQ(std::distance(fs::directory_iterator(path("n")), fs::directory_iterator()), 24);
+}
+
+TEST_F(PointCache, AClipOfGltfBeginsAtNoughtAndHoldsItsFirstKey) {
+    filigree_test::GltfText file;
+    file.add(filigree_test::kTriangle, "VEC3");
+    file.add({1.5f, 2.5f}, "SCALAR");
+    file.add({1, 0, 0, 2, 0, 0}, "VEC3");
+    file.add({0, 0, 1, 0, 0, 2, 0, 0, 3}, "VEC3"); // of a morph target
+    file.add({0.25f, 1}, "SCALAR");
+    const auto clip = [&](const std::string& channel, const std::string& output) {
+        return put(channel + ".gltf",
+                   file.text(R"("nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":{"POSITION":0},)"
+                             R"("targets":[{"POSITION":3}]}]}],"animations":[{"channels":[{"sampler":0,)"
+                             R"("target":{"node":0,"path":")" +
+                             channel + R"("}}],"samplers":[{"input":1,"output":)" + output + "}]}]"));
+    };
+    for (const auto& [channel, output] : {std::pair{"translation", "2"}, std::pair{"weights", "4"}}) {
+        const auto poses = open_poses(clip(channel, output), 3, Vec3d::Zero(), {.frames_per_second = 10}, kOneThread);
+        ASSERT_TRUE(poses.ok()) << poses.error().message;
+        EXPECT_EQ(poses->frames, 26u) << channel;
+        const std::vector<Vec3f> held = poses->pose(15)->positions;
+        EXPECT_EQ(poses->pose(0)->positions, held) << channel;
+        EXPECT_NE(poses->pose(20)->positions, held) << channel;
+    }
+    EXPECT_EQ(open_poses(clip("translation", "2"), 3, Vec3d::Zero(), {.frames_per_second = 10}, kOneThread)
+                  ->pose(20)
+                  ->positions[0],
+              Vec3f(1.5f, 0, 0));
 }

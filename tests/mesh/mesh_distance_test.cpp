@@ -1,3 +1,4 @@
+#include "filigree/mesh/measured_surface.h"
 #include "filigree/mesh/mesh_distance.h"
 
 #include "filigree/mesh/closest_point.h"
@@ -192,6 +193,20 @@ TEST(MeshDistance, IsSeededAndIndependentOfThreads) {
     EXPECT_NEAR(mean(1, 1), mean(1, 2), 1e-3);
     FILIGREE_NEEDS_TWO_THREADS();
     EXPECT_EQ(mean(1, 1), mean(2, 1));
+}
+
+TEST(MeshDistance, AMeasuredSurfaceGivesTheSameToTheBitAgainAndAgain) {
+    const Mesh whole = make_wavy_sphere({.resolution = 20});
+    MeasuredSurface surface = MeasuredSurface::create(whole, 500, RunContext(1)).value();
+    for (const unsigned resolution : {4u, 30u, 8u, 60u}) { // fewer and more samples than triangles
+        Mesh other = make_wavy_sphere({.resolution = resolution});
+        other.origin = Vec3d(0.01, 0, 0);
+        const SurfaceDistance again = surface.distance_of(other, RunContext(1)).value();
+        const SurfaceDistance fresh = *mesh_distance(other, whole, 500, RunContext(1))->surfaces;
+        EXPECT_EQ(again.rms_distance, fresh.rms_distance);
+        EXPECT_EQ(again.hausdorff, fresh.hausdorff);
+        EXPECT_EQ(again.max_b_to_a, fresh.max_b_to_a);
+    }
 }
 
 TEST(MeshDistance, CanBeCancelled) {

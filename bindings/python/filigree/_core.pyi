@@ -642,6 +642,7 @@ def read_poses(
     *,
     frames_per_second: float | None = None,
     animation: str = '',
+    up: str = '',
     threads: int = 0,
     progress: _Progress | None = None,
 ) -> PoseSequence: ...

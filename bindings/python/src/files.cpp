@@ -90,14 +90,24 @@ py::dict pack_model_file(const PyModel& model, const fs::path& path, unsigned bi
 }
 
 PoseSequence read_pose_file(const fs::path& path, const py::object& model, std::optional<double> frames_per_second,
-                            const std::string& animation, unsigned threads, const py::object& progress) {
+                            const std::string& animation, const std::string& up, unsigned threads,
+                            const py::object& progress) {
     const LongCall call{threads, progress};
+    if (!up.empty() && up != "y" && up != "z")
+        throw BadResultAccess({ErrorCode::usage, "up is 'y' or 'z', of files in which that axis is up."});
     if (model.is_none()) return call([&](const RunContext& context) { return read_poses(path, context).value(); });
     const auto of = model_of(model);
-    return call([&](const RunContext& context) {
-        const PoseStream stream =
-            open_poses(path, of->driver().vertices.size(), of->mesh.origin, {frames_per_second, animation}, context)
-                .value();
+    std::vector<std::string> warnings;
+    PoseSequence read = call([&](const RunContext& context) {
+        const std::vector<Vec3f> rest = driver_positions(*of);
+        const PoseFileOptions options{.frames_per_second = frames_per_second,
+                                      .animation = animation,
+                                      .up = up == "z"   ? std::optional(UpAxis::z)
+                                            : up == "y" ? std::optional(UpAxis::y)
+                                                        : std::nullopt,
+                                      .rest = rest,
+                                      .warnings = &warnings};
+        const PoseStream stream = open_poses(path, rest.size(), of->mesh.origin, options, context).value();
         PoseSequence poses{stream.frames_per_second, {}};
         for (std::size_t frame = 0; frame < stream.frames; ++frame) {
             if (context.is_cancelled()) throw BadResultAccess(cancelled_error());
@@ -106,6 +116,8 @@ PoseSequence read_pose_file(const fs::path& path, const py::object& model, std::
         }
         return poses;
     });
+    warn(warnings);
+    return read;
 }
 
 } // namespace
@@ -248,9 +260,9 @@ True
 <filigree.Model: 1154 vertices on a driver of 57>
 )");
     m.def("read_poses", &read_pose_file, py::arg("path"), py::arg("model") = py::none(), py::kw_only(),
-          py::arg("frames_per_second") = py::none(), py::arg("animation") = "", py::arg("threads") = 0,
-          py::arg("progress") = py::none(),
-          R"(read_poses(path, model=None, *, frames_per_second=None, animation='', threads=0, progress=None)
+          py::arg("frames_per_second") = py::none(), py::arg("animation") = "", py::arg("up") = "",
+          py::arg("threads") = 0, py::arg("progress") = py::none(),
+          R"(read_poses(path, model=None, *, frames_per_second=None, animation='', up='', threads=0, progress=None)
 --
 
 Read the poses that a model's file holds, or with `model` those of a driver that another program moved.
@@ -265,10 +277,14 @@ frames_per_second : float, optional
     Of files that do not say it; glTF: frames to take a second.
 animation : str
     Of a glTF with several; empty: the first.
+up : str
+    'y' or 'z': the axis that is up in the file, where it is the other one in the model. Poses are turned.
 
 Returns
 -------
 PoseSequence
+    Vertices that another program split for normals or UVs (glTF, numbered meshes) are matched to the driver's by their
+    places at rest. That, and a first frame that is the driver turned over, is said as a `FiligreeWarning`.
 
 Raises
 ------

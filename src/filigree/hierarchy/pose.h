@@ -31,6 +31,7 @@ struct PoseStream {
     double frames_per_second = 60;
     /// The pose of a frame, 0 .. frames - 1; in any order, and again. Positions are relative to the mesh's origin.
     std::function<Result<Pose>(std::size_t frame)> pose;
+    double metres_per_unit = 0; ///< 0: not known
 };
 
 /// The sequence as a stream; it must outlive the stream.

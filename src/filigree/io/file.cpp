@@ -6,7 +6,9 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
+#include <fstream>
 #include <new>
 #include <optional>
 #include <stdexcept>
@@ -35,6 +37,27 @@ Result<std::string> in_memory(const fs::path& path, const Read& read) {
     }
 }
 
+/// Bytes of memory that there are for this program: the machine's, or fewer where its container has a limit.
+std::uint64_t memory_here() {
+    const long pages = ::sysconf(_SC_PHYS_PAGES), page = ::sysconf(_SC_PAGESIZE);
+    std::uint64_t memory = pages > 0 && page > 0 ? std::uint64_t(pages) * std::uint64_t(page) : UINT64_MAX;
+    std::ifstream limit("/sys/fs/cgroup/memory.max"); // "max" where there is none
+    if (std::uint64_t bytes = 0; limit >> bytes) memory = std::min(memory, bytes);
+    return memory;
+}
+
+/// Refuses a file whose bytes cannot all be here, before any of them is read: where memory is promised freely, the
+/// program would be killed in the midst of it.
+Status check_room(const fs::path& path, std::uint64_t bytes) {
+    constexpr double kGigabyte = 1e9;
+    const std::uint64_t memory = memory_here();
+    if (bytes <= memory) return Success{};
+    char sizes[96];
+    std::snprintf(sizes, sizeof sizes, "has %.3g GB, and there are %.3g GB of memory", double(bytes) / kGigabyte,
+                  double(memory) / kGigabyte);
+    return Error{ErrorCode::out_of_memory, path.string() + ": does not fit into memory: it " + sizes + "."};
+}
+
 Result<std::string> read_descriptor(int descriptor, const fs::path& path) {
     constexpr std::size_t kPipePiece = std::size_t{1} << 16;
     struct stat status {};
@@ -42,12 +65,17 @@ Result<std::string> read_descriptor(int descriptor, const fs::path& path) {
     if (S_ISDIR(status.st_mode)) return cannot_read(path, EISDIR);
     // The size is a hint: pipes have none, and files grow and shrink. One byte more finds the end without another
     // round.
+    if (S_ISREG(status.st_mode))
+        if (Status fits = check_room(path, static_cast<std::uint64_t>(status.st_size)); !fits) return fits.error();
     std::string bytes;
     const std::size_t first_size = S_ISREG(status.st_mode) ? static_cast<std::size_t>(status.st_size) + 1 : kPipePiece;
     reserve_large(bytes, first_size);
     bytes.resize(first_size);
     for (std::size_t used = 0;;) {
-        if (used == bytes.size()) bytes.resize(2 * bytes.size());
+        if (used == bytes.size()) {
+            if (Status fits = check_room(path, used); !fits) return fits.error();
+            bytes.resize(2 * bytes.size());
+        }
         const ssize_t got = ::read(descriptor, bytes.data() + used, bytes.size() - used);
         if (got < 0 && errno == EINTR) continue;
         if (got < 0) return cannot_read(path, errno);
@@ -160,6 +188,7 @@ Status FileReader::read(std::uint64_t offset, std::span<char> to) const {
 
 Result<std::string> FileReader::read_all() const {
     return in_memory(file_->path, [&]() -> Result<std::string> {
+        if (Status fits = check_room(file_->path, size()); !fits) return fits.error();
         std::string bytes;
         reserve_large(bytes, size());
         bytes.resize(size());

@@ -13,16 +13,30 @@ namespace {
 
 constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
 
-/// Extensions that a file may ask for and still be shown: they change how it looks, or are read.
-bool is_harmless(const std::string& extension) {
-    static constexpr std::string_view kKnown[] = {"KHR_mesh_quantization", "KHR_texture_transform",
-                                                  "KHR_texture_basisu",    "KHR_lights_punctual",
-                                                  "KHR_animation_pointer", "MSFT_lod",
-                                                  "EXT_texture_webp",      "EXT_texture_avif",
-                                                  "MSFT_texture_dds",      "KHR_xmp",
-                                                  "KHR_xmp_json_ld"};
-    return extension.starts_with("KHR_materials_") ||
-           std::find(std::begin(kKnown), std::end(kKnown), extension) != std::end(kKnown);
+/// Extensions that a file may require: what they say of a mesh is read, or is nothing of a mesh (lights, notes).
+bool is_supported(const std::string& extension) {
+    static constexpr std::string_view kKnown[] = {"KHR_mesh_quantization",
+                                                  "KHR_texture_transform",
+                                                  "KHR_materials_pbrSpecularGlossiness",
+                                                  "KHR_materials_unlit",
+                                                  "KHR_lights_punctual",
+                                                  "KHR_xmp",
+                                                  "KHR_xmp_json_ld",
+                                                  "MSFT_lod"};
+    return std::find(std::begin(kKnown), std::end(kKnown), extension) != std::end(kKnown);
+}
+
+/// What to do about another one.
+std::string advice_on(const std::string& extension) {
+    constexpr std::size_t kLongestName = 64;
+    const std::string the_extension = "the extension " + in_quotes(extension, kLongestName);
+    if (extension == "KHR_draco_mesh_compression" || extension.ends_with("_meshopt_compression"))
+        return extension + " (compressed data) is not read; unpack the file with 'gltf-transform copy'.";
+    if (extension.find("_texture_") != std::string::npos)
+        return the_extension + " is required and not read; export the file with pictures in PNG or JPEG.";
+    if (extension.starts_with("KHR_materials_"))
+        return the_extension + " is required and not read; export the file with plain materials.";
+    return the_extension + " is not known; export the file without it.";
 }
 
 void check_extensions(gltf::Scene& scene) {
@@ -30,12 +44,7 @@ void check_extensions(gltf::Scene& scene) {
     const Value required = scene.document->root()["extensionsRequired"];
     for (std::size_t e = 0; e < required.size(); ++e) {
         const std::string name = required[e].text();
-        if (is_harmless(name)) continue;
-        const bool packed = name == "KHR_draco_mesh_compression" || name == "EXT_meshopt_compression" ||
-                            name == "KHR_meshopt_compression";
-        required[e].fail(packed ? name + " (compressed data) is not read; unpack the file with 'gltf-transform copy'."
-                                : "the extension " + in_quotes(name) + " is not known; export the file without it.",
-                         ErrorCode::unsupported);
+        if (!is_supported(name)) required[e].fail(advice_on(name), ErrorCode::unsupported);
     }
     const Value used = scene.document->root()["extensionsUsed"];
     for (std::size_t e = 0; e < used.size(); ++e)

@@ -467,6 +467,15 @@ Document::View Document::view(const Value& reference) {
     return {bytes.substr(offset, length), place["byteStride"].whole(0)};
 }
 
+bool Document::serves(const Value& reference, const Wanted& wanted) const {
+    const Value place = item("accessors", reference.index(count("accessors"), "accessors"));
+    const std::string type = place["type"].text();
+    const std::size_t component = place["componentType"].whole();
+    return std::any_of(wanted.types.begin(), wanted.types.end(), [&](const char* t) { return type == t; }) &&
+           std::any_of(wanted.components.begin(), wanted.components.end(),
+                       [&](Component c) { return static_cast<std::size_t>(c) == component; });
+}
+
 Accessor Document::accessor(const Value& reference, const Wanted& wanted) {
     const Value place = item("accessors", reference.index(count("accessors"), "accessors"));
     Accessor accessor;
@@ -484,8 +493,6 @@ Accessor Document::accessor(const Value& reference, const Wanted& wanted) {
                                     ".");
     accessor.component = static_cast<Component>(component);
     accessor.normalized = accessor.component != Component::float32 && place["normalized"].flag(false);
-    if (wanted.normalized_if_integer && accessor.component != Component::float32 && !accessor.normalized)
-        place.fail("has integers that are not normalized, which do not serve for " + reference.path() + ".");
 
     accessor.count = place["count"].whole();
     const std::size_t element_size = accessor.width * size_of(accessor.component);

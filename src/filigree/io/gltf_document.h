@@ -107,7 +107,6 @@ private:
 struct Wanted {
     std::vector<const char*> types;
     std::vector<Component> components;
-    bool normalized_if_integer = false;
 };
 
 /// The parsed file. Bytes and documents must outlive what it hands out.
@@ -123,7 +122,9 @@ public:
     Value item(const char* array, std::size_t i) const { return root()[array][i]; }
     std::size_t count(const char* array) const { return root()[array].size(); }
 
-    /// The accessor whose number `reference` is.
+    /// Whether the accessor whose number `reference` is has numbers of the wanted kind.
+    bool serves(const Value& reference, const Wanted& wanted) const;
+    /// That accessor.
     Accessor accessor(const Value& reference, const Wanted& wanted);
     /// The bytes of an image (a URI or a buffer view): a PNG or JPEG file.
     std::string picture(std::size_t image);

@@ -19,14 +19,12 @@ public:
             const Value place = document_.item("materials", m);
             if (is_none(place)) {
                 read.number.push_back(kNoIndex);
+                read.uvs.emplace_back();
                 continue;
             }
             read.number.push_back(static_cast<Index>(read.materials.size()));
-            read.materials.push_back(material(place, m));
+            read.materials.push_back(material(place, m, read.uvs.emplace_back()));
         }
-        if (transformed_ > 0)
-            warnings_.push_back(std::to_string(transformed_) +
-                                " textures are moved over their UVs (KHR_texture_transform), which is not done.");
         return read;
     }
 
@@ -39,19 +37,30 @@ private:
         return note && note.json().is_string() && note.text() == "none";
     }
 
-    MeshMaterial material(const Value& place, std::size_t number) {
+    /// uvs: gets what its picture is laid by.
+    MeshMaterial material(const Value& place, std::size_t number, UvUse& uvs) {
         MeshMaterial material;
         const Value name = place["name"], surface = place["pbrMetallicRoughness"];
+        const Value glossy = place["extensions"]["KHR_materials_pbrSpecularGlossiness"];
         material.name = unique(name && name.json().is_string() ? name.text() : "", number);
         double color[4] = {1, 1, 1, 1};
-        surface["baseColorFactor"].numbers(color, 4);
+        if (glossy)
+            glossy["diffuseFactor"].numbers(color, 4);
+        else
+            surface["baseColorFactor"].numbers(color, 4);
         for (int k = 0; k < 3; ++k) material.color[k] = static_cast<float>(srgb_from_linear(color[k]));
         if (place["alphaMode"].text("OPAQUE") == "BLEND")
             material.opacity = static_cast<float>(std::clamp(color[3], 0.0, 1.0));
-        material.metallic = static_cast<float>(std::clamp(surface["metallicFactor"].number(1), 0.0, 1.0));
-        material.roughness = static_cast<float>(std::clamp(surface["roughnessFactor"].number(1), 0.0, 1.0));
+        const double metallic = glossy ? 0 : surface["metallicFactor"].number(1);
+        const double roughness =
+            glossy ? 1 - glossy["glossinessFactor"].number(1) : surface["roughnessFactor"].number(1);
+        material.metallic = static_cast<float>(std::clamp(metallic, 0.0, 1.0));
+        material.roughness = static_cast<float>(std::clamp(roughness, 0.0, 1.0));
         material.double_sided = place["doubleSided"].flag(false);
-        if (const Value texture = surface["baseColorTexture"]) material.picture_bytes = picture(texture);
+        if (const Value texture = glossy ? glossy["diffuseTexture"] : surface["baseColorTexture"]) {
+            material.picture_bytes = picture(texture);
+            if (material.picture_bytes) uvs = uv_use(texture);
+        }
         return material;
     }
 
@@ -64,15 +73,21 @@ private:
         return chosen;
     }
 
+    static UvUse uv_use(const Value& texture) {
+        UvUse use;
+        use.set = texture["texCoord"].whole(0);
+        const Value transform = texture["extensions"]["KHR_texture_transform"];
+        if (!transform) return use;
+        transform["offset"].numbers(use.offset, 2);
+        transform["scale"].numbers(use.scale, 2);
+        use.rotation = transform["rotation"].number(0);
+        use.set = transform["texCoord"].whole(use.set);
+        return use;
+    }
+
     /// Null with a warning where it cannot be had: a mesh can be drawn without.
     std::shared_ptr<const std::string> picture(const Value& texture) {
         const std::size_t number = texture["index"].index(document_.count("textures"), "textures");
-        if (const Value extensions = texture["extensions"]; extensions && extensions["KHR_texture_transform"])
-            ++transformed_;
-        if (texture["texCoord"].whole(0) != 0) {
-            warnings_.push_back(texture.path() + ": uses a second set of UVs, which is not read; left out.");
-            return nullptr;
-        }
         const Value source = document_.item("textures", number)["source"];
         if (!source) {
             warnings_.push_back(texture.path() + ": has no PNG or JPEG picture; left out.");
@@ -95,7 +110,6 @@ private:
     std::vector<std::string>& warnings_;
     std::set<std::string> names_;
     std::map<std::size_t, std::shared_ptr<const std::string>> pictures_;
-    std::size_t transformed_ = 0;
 };
 
 } // namespace

@@ -15,6 +15,8 @@ struct FaceRun {
     std::size_t block = 0;
     std::size_t first_corner = 0, first_face = 0;
     Index material = kNoIndex, object = kNoIndex;
+    UvUse uvs;                 ///< how its material takes them
+    Index first_uv = kNoIndex; ///< in the values of mesh.uvs: one a vertex of the geometry; kNoIndex: it has none
 };
 
 class MeshReader {
@@ -24,6 +26,7 @@ public:
 
     void read() {
         materials_ = read_materials(document_, scene_.warnings);
+        for (const UvUse& use : materials_.uvs) uv_sets_.insert(use.set);
         describe_motions();
         walk();
         if (runs_.empty()) read_points();
@@ -112,7 +115,7 @@ private:
         const auto [entry, is_new] = geometry_numbers_.try_emplace(key, scene_.geometries.size());
         if (is_new) {
             if (context_.is_cancelled()) throw Damage{"", ErrorCode::cancelled};
-            scene_.geometries.push_back(read_geometry(document_, primitive, scene_.warnings, left_out_));
+            scene_.geometries.push_back(read_geometry(document_, primitive, uv_sets_, scene_.warnings, notes_));
             if (note) read_repeats(*note, scene_.geometries.back());
         }
         return entry->second;
@@ -237,8 +240,11 @@ private:
         run.block = block;
         run.first_corner = mesh_.corners.size();
         run.first_face = mesh_.face_count();
-        if (const Value material = primitive["material"])
-            run.material = materials_.number[material.index(materials_.number.size(), "materials")];
+        if (const Value material = primitive["material"]) {
+            const std::size_t number = material.index(materials_.number.size(), "materials");
+            run.material = materials_.number[number];
+            run.uvs = materials_.uvs[number];
+        }
         std::string name = scene_.nodes[n].name;
         if (const Value mesh_name = mesh["name"]; name.empty() && mesh_name && mesh_name.json().is_string())
             name = mesh_name.text();
@@ -310,23 +316,62 @@ private:
                 throw Damage{"has more vertices than 32-bit indices can count.", ErrorCode::unsupported};
         }
         mesh_.positions.resize(vertices);
-        gather(&Geometry::normals, &Block::first_normal, mesh_.normals, normals_of_corners_);
-        gather(&Geometry::uvs, &Block::first_uv, mesh_.uvs, uvs_of_corners_);
+        lay_out_normals();
+        lay_out_uvs();
         lay_out_colors();
         lay_out_scalars();
     }
 
     /// One value a vertex where every block has them and no vertex has several.
-    template <class T>
-    void gather(std::vector<T> Geometry::*values, std::size_t Block::*first, CornerAttribute<T>& attribute,
-                bool& of_corners) {
+    void lay_out_normals() {
         for (Block& block : scene_.blocks) {
             const Geometry& from = geometry(block);
-            block.*first = attribute.values.size();
-            attribute.values.insert(attribute.values.end(), (from.*values).begin(), (from.*values).end());
-            if ((from.*values).empty() || !from.repeats.empty()) of_corners = true;
+            block.first_normal = mesh_.normals.values.size();
+            mesh_.normals.values.insert(mesh_.normals.values.end(), from.normals.begin(), from.normals.end());
+            if (from.normals.empty() || !from.repeats.empty()) normals_of_corners_ = true;
         }
-        if (attribute.values.empty()) of_corners = false;
+        if (mesh_.normals.values.empty()) normals_of_corners_ = false;
+    }
+
+    /// The same, where a block's faces also take their UVs in one way.
+    void lay_out_uvs() {
+        std::vector<std::vector<std::size_t>> laid(scene_.blocks.size()); // runs whose values are new, by block
+        std::set<std::pair<std::size_t, std::size_t>> used;               // geometry and set
+        for (std::size_t r = 0; r < runs_.size(); ++r) {
+            FaceRun& run = runs_[r];
+            std::vector<std::size_t>& known = laid[run.block];
+            const auto same = std::find_if(known.begin(), known.end(),
+                                           [&](std::size_t other) { return runs_[other].uvs == run.uvs; });
+            if (same != known.end()) {
+                run.first_uv = runs_[*same].first_uv;
+                continue;
+            }
+            known.push_back(r);
+            used.insert({scene_.blocks[run.block].geometry, run.uvs.set});
+            run.first_uv = add_uvs(scene_.blocks[run.block], run.uvs);
+            if (run.first_uv == kNoIndex && run.uvs.set > 0) ++without_set_;
+            if (known.size() > 1) uvs_of_corners_ = true;
+        }
+        if (runs_.empty()) // points
+            for (const Block& block : scene_.blocks) add_uvs(block, {}), used.insert({block.geometry, 0});
+        if (mesh_.uvs.values.empty()) uvs_of_corners_ = false;
+        for (std::size_t g = 0; g < scene_.geometries.size(); ++g)
+            for (const auto& [set, values] : scene_.geometries[g].uvs)
+                if (!used.contains({g, set})) notes_.left_out.insert("TEXCOORD_" + std::to_string(set));
+    }
+
+    /// A block's UVs as a material takes them, behind the others; their place; kNoIndex where the block lacks them.
+    Index add_uvs(const Block& block, const UvUse& use) {
+        const Geometry& from = geometry(block);
+        const auto values = from.uvs.find(use.set);
+        if (values == from.uvs.end() || !from.repeats.empty()) uvs_of_corners_ = true;
+        if (values == from.uvs.end()) return kNoIndex;
+        const std::size_t first = mesh_.uvs.values.size();
+        document_.charge(values->second.size(), "the UVs of a material");
+        if (first + values->second.size() >= kNoIndex)
+            throw Damage{"has more UVs than 32-bit indices can count.", ErrorCode::unsupported};
+        for (const Vec2f& uv : values->second) mesh_.uvs.values.push_back(use.apply(uv));
+        return static_cast<Index>(first);
     }
 
     void lay_out_colors() {
@@ -381,31 +426,44 @@ private:
             const std::size_t end = r + 1 < runs_.size() ? runs_[r + 1].first_corner : mesh_.corners.size();
             const Block& block = scene_.blocks[runs_[r].block];
             const Geometry& from = geometry(block);
-            const bool normals = normals_of_corners_ && !from.normals.empty(),
-                       uvs = uvs_of_corners_ && !from.uvs.empty();
+            const bool normals = normals_of_corners_ && !from.normals.empty();
+            const Index first_uv = uvs_of_corners_ ? runs_[r].first_uv : kNoIndex;
             for (std::size_t c = runs_[r].first_corner; c < end; ++c) {
                 Index& corner = mesh_.corners[c];
                 if (normals) mesh_.normals.corners[c] = static_cast<Index>(block.first_normal + corner);
-                if (uvs) mesh_.uvs.corners[c] = static_cast<Index>(block.first_uv + corner);
+                if (first_uv != kNoIndex) mesh_.uvs.corners[c] = first_uv + corner;
                 corner = static_cast<Index>(block.first_vertex + from.source(corner));
             }
         }
     }
 
     void collect_warnings() {
-        constexpr std::size_t kMostNames = 5;
         const auto warn = [&](std::size_t count, const std::string& what) {
             if (count > 0) scene_.warnings.push_back(std::to_string(count) + " " + what);
         };
         warn(without_area_, "primitives of points or lines were left out.");
         warn(cut_triangles_, "primitives end within a triangle, which was left out.");
-        if (left_out_.empty()) return;
-        std::string names;
+        warn(without_set_, "primitives lack the set of UVs that their material's picture is laid by; they have none.");
+        warn_of("Attributes that are not read were left out: ", notes_.left_out, ".");
+        warn_of("Attributes whose numbers are of a kind that glTF does not have for them were left out: ",
+                notes_.unsuited, ".");
+        warn_of("Integers without \"normalized\" were taken as normalized (the largest of their type is 1): ",
+                notes_.as_normalized, ".");
+        warn_of("Integers without \"normalized\" were taken as they are, as none is beyond 1: ", notes_.as_they_are,
+                ".");
+        warn_of("Joints whose numbers are of a kind that glTF does not have for them were taken as whole numbers: ",
+                notes_.whole_numbers, ".");
+    }
+
+    void warn_of(const std::string& before, const std::set<std::string>& names, const std::string& end) {
+        constexpr std::size_t kMostNames = 5;
+        if (names.empty()) return;
+        std::string list;
         std::size_t count = 0;
-        for (const std::string& name : left_out_)
-            if (count++ < kMostNames) names += (names.empty() ? "" : ", ") + in_quotes(name);
-        scene_.warnings.push_back("Attributes that are not read were left out: " + names +
-                                  (count > kMostNames ? " and " + std::to_string(count - kMostNames) + " more." : "."));
+        for (const std::string& name : names)
+            if (count++ < kMostNames) list += (list.empty() ? "" : ", ") + in_quotes(name);
+        scene_.warnings.push_back(
+            before + list + (count > kMostNames ? " and " + std::to_string(count - kMostNames) + " more" : "") + end);
     }
 
     Scene& scene_;
@@ -422,8 +480,9 @@ private:
     std::vector<std::string> objects_;
     std::map<std::string, Index> object_numbers_;
     std::vector<std::pair<std::size_t, std::size_t>> points_; ///< node and primitive
-    std::set<std::string> left_out_;
-    std::size_t without_area_ = 0, cut_triangles_ = 0;
+    std::set<std::size_t> uv_sets_ = {0};
+    AttributeNotes notes_;
+    std::size_t without_area_ = 0, cut_triangles_ = 0, without_set_ = 0;
     bool normals_of_corners_ = false, uvs_of_corners_ = false;
 };
 

@@ -125,6 +125,7 @@ public:
     }
 
     std::size_t pointers() const { return pointers_; }
+    std::size_t unflagged() const { return unflagged_; }
 
 private:
     void read_channel(const Value& channel) {
@@ -179,11 +180,14 @@ private:
         else if (how != "LINEAR")
             place["interpolation"].fail("is " + in_quotes(how) + ", which is not known.");
         sampler.times = times(place["input"]);
-        sampler.values = document_.accessor(
-            place["output"],
-            {.types = output_types(path),
-             .components = {Component::float32, Component::int8, Component::uint8, Component::int16, Component::uint16},
-             .normalized_if_integer = true});
+        sampler.values =
+            document_.accessor(place["output"], {.types = output_types(path),
+                                                 .components = {Component::float32, Component::int8, Component::uint8,
+                                                                Component::int16, Component::uint16}});
+        if (path == Path::rotation || path == Path::weights) {
+            Accessor* const values[] = {&sampler.values};
+            if (mend_unflagged(values) == Unflagged::as_normalized) ++unflagged_;
+        }
         const std::size_t tangents = sampler.interpolation == Interpolation::cubic ? 3 : 1;
         const std::size_t each = tangents * (path == Path::weights ? width : 1);
         if (sampler.values.count / each != sampler.times.count || sampler.values.count % each != 0)
@@ -213,7 +217,7 @@ private:
     Animation animation_;
     std::vector<std::map<std::pair<Path, std::size_t>, std::size_t>> sampler_of_; ///< by path and width
     std::set<std::string> checked_times_;
-    std::size_t pointers_ = 0;
+    std::size_t pointers_ = 0, unflagged_ = 0;
 };
 
 } // namespace
@@ -252,13 +256,18 @@ void read_skins(Scene& scene) {
 }
 
 void read_animations(Scene& scene) {
-    std::size_t pointers = 0;
+    std::size_t pointers = 0, unflagged = 0;
     for (std::size_t a = 0; a < scene.document->count("animations"); ++a) {
         AnimationReader reader(scene, a);
         scene.animations.push_back(reader.read());
         scene.summaries.push_back(scene.animations.back().summary);
         pointers += reader.pointers();
+        unflagged += reader.unflagged();
     }
+    if (unflagged > 0)
+        scene.warnings.push_back(std::to_string(unflagged) +
+                                 " samplers of animations have integers without \"normalized\"; they were taken as "
+                                 "normalized.");
     if (pointers > 0)
         scene.warnings.push_back(std::to_string(pointers) +
                                  " channels animate other things than nodes (KHR_animation_pointer); left out.");

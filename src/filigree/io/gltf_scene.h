@@ -52,10 +52,30 @@ struct MorphTarget {
     std::optional<Accessor> positions, normals; ///< differences from the vertices
 };
 
+/// Which UVs a material's picture is laid by, and how they are moved for it (KHR_texture_transform).
+struct UvUse {
+    std::size_t set = 0; ///< of TEXCOORD_0, TEXCOORD_1, ...
+    double offset[2] = {0, 0}, scale[2] = {1, 1};
+    double rotation = 0; ///< radians
+
+    bool operator==(const UvUse& other) const = default;
+    /// Ours (v up) of one as the file has it (v down).
+    Vec2f apply(const Vec2f& uv) const;
+};
+
+/// What is told once of a file's attributes, by their names.
+struct AttributeNotes {
+    std::set<std::string> left_out;      ///< not read by us
+    std::set<std::string> unsuited;      ///< left out: numbers of a kind that glTF does not have for them
+    std::set<std::string> as_normalized; ///< integers without "normalized", taken as if they had it
+    std::set<std::string> as_they_are;   ///< the same, where none is beyond 1
+    std::set<std::string> whole_numbers; ///< joints whose numbers are not of the kind that glTF has for them
+};
+
 /// Vertices as attributes give them; primitives and nodes share them.
 struct Geometry {
     std::vector<Vec3f> positions, normals;
-    std::vector<Vec2f> uvs;
+    std::map<std::size_t, std::vector<Vec2f>> uvs; ///< by the number of their set, as the file has them
     std::vector<Vec4f> colors;
     bool colors_have_alpha = false;
     std::vector<VertexScalar> scalars;
@@ -78,8 +98,7 @@ struct Block {
     bool skinned = false;         ///< by the node's skin; its transform does not count then
     bool mirrored = false;        ///< its node turns it inside out, so faces were turned over
     std::size_t first_vertex = 0; ///< geometry.kept of them
-    /// In the values of mesh.normals and mesh.uvs: one a vertex of the geometry, where it has them.
-    std::size_t first_normal = 0, first_uv = 0;
+    std::size_t first_normal = 0; ///< in the values of mesh.normals: one a vertex of the geometry, where it has them
 };
 
 enum class Path { translation, rotation, scale, weights };
@@ -122,15 +141,21 @@ struct Scene {
 void read_nodes(Scene& scene);
 void read_skins(Scene& scene);
 void read_animations(Scene& scene);
-/// A primitive's attributes and morph targets. left_out: gets the names of attributes that are not read.
-Geometry read_geometry(Document& document, const Value& primitive, std::vector<std::string>& warnings,
-                       std::set<std::string>& left_out);
+/// A primitive's attributes and morph targets. uv_sets: the numbers of the sets of UVs to read.
+Geometry read_geometry(Document& document, const Value& primitive, const std::set<std::size_t>& uv_sets,
+                       std::vector<std::string>& warnings, AttributeNotes& notes);
+/// What is done with integers that lack "normalized" where glTF has only normalized ones.
+enum class Unflagged { none, as_normalized, as_they_are };
+/// Marks such accessors as normalized when one of their numbers is beyond 1: nobody means a colour or a weight of 255.
+Unflagged mend_unflagged(std::span<Accessor* const> accessors);
 /// Geometries, blocks, and the mesh's faces and attributes.
 void read_meshes(Scene& scene, const RunContext& context);
-/// The document's materials, and for each its number in the mesh; kNoIndex for our own stand-in for none.
+/// The document's materials, and for each its number in the mesh (kNoIndex for our own stand-in for none) and how its
+/// picture is laid.
 struct Materials {
     std::vector<MeshMaterial> materials;
     std::vector<Index> number;
+    std::vector<UvUse> uvs;
 };
 Materials read_materials(Document& document, std::vector<std::string>& warnings);
 

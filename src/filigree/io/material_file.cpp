@@ -188,8 +188,10 @@ private:
 
     void read_picture(std::size_t material, std::string_view rest, const fs::path& beside) {
         std::string_view name = rest;
-        while (skip_option(material, name)) {
+        bool is_moved = false;
+        while (skip_option(name, is_moved)) {
         }
+        if (is_moved) moved_pictures_.add(materials_[material].name); // once, whatever moves it
         if (name.empty()) return missing_pictures_.add(rest);
         const std::optional<fs::path> path = find(name, beside, missing_pictures_);
         if (!path) return;
@@ -198,7 +200,7 @@ private:
     }
 
     /// Takes one option with its values off the front of `text`. A name may begin with '-' as well.
-    bool skip_option(std::size_t material, std::string_view& text) {
+    static bool skip_option(std::string_view& text, bool& is_moved) {
         std::string_view rest = text;
         const std::string option = lower_case(take_word(rest));
         const bool moves = option == "-o" || option == "-s" || option == "-t";
@@ -213,8 +215,7 @@ private:
             std::string_view behind = rest;
             double value = 0;
             if (!is_number(take_word(behind), value) || behind.empty()) break; // the last word is the name
-            if (moves && value != neutral && !(option == "-s" && i == 2))
-                moved_pictures_.add(materials_[material].name);
+            is_moved = is_moved || (moves && value != neutral && !(option == "-s" && i == 2));
             rest = behind;
         }
         text = rest;

@@ -124,7 +124,8 @@ void scale_colors(MeshFile& file) {
     const bool bytes =
         std::any_of(colors.begin(), colors.end(), [](const Vec4f& c) { return c.head<3>().maxCoeff() > 1; });
     if (!bytes) return;
-    for (Vec4f& c : colors) c.head(file.mesh.colors_have_alpha ? 4 : 3) /= 255.0f;
+    const bool alpha = std::any_of(colors.begin(), colors.end(), [](const Vec4f& c) { return c.w() > 1; });
+    for (Vec4f& c : colors) c.head(alpha ? 4 : 3) /= 255.0f;
     file.warnings.emplace_back("Colours go beyond 1 and were taken as 0 to 255.");
 }
 

@@ -6,7 +6,7 @@
 #include "filigree/hierarchy/restore.h"
 #include "filigree/hierarchy/strip.h"
 #include "filigree/hierarchy/vertex_order.h"
-#include "filigree/mesh/mesh_distance.h"
+#include "filigree/mesh/measured_surface.h"
 
 #include <ranges>
 
@@ -153,14 +153,17 @@ Mesh as_fans(const Mesh& mesh) {
 std::vector<FileLevel> levels_of(const CodedMesh& coded, const Mesh& mesh, const RunContext& context) {
     const LevelCodeOptions options = level_options(coded.options);
     LevelReader reader(options.steps, options.is_refined, kNoIndex);
+    constexpr std::size_t kSamples = 20'000;
     const Mesh fans = as_fans(mesh);
+    std::optional<MeasuredSurface> whole; // its tree serves all levels
+    if (fans.face_count() > 0)
+        if (Result<MeasuredSurface> made = MeasuredSurface::create(fans, kSamples, context)) whole = std::move(*made);
     std::vector<FileLevel> levels;
     const auto add = [&](std::uint32_t vertices, std::uint32_t triangles, std::uint32_t batches) {
-        constexpr std::size_t kSamples = 20'000;
         float error = 0;
-        if (const Result<MeshDistance> distance = mesh_distance(mesh_of_levels(reader, coded), fans, kSamples, context);
-            distance && distance->surfaces)
-            error = static_cast<float>(distance->surfaces->rms_distance);
+        if (const Mesh level = mesh_of_levels(reader, coded); whole && level.face_count() > 0)
+            if (const Result<SurfaceDistance> distance = whole->distance_of(level, context))
+                error = static_cast<float>(distance->rms_distance);
         levels.push_back({vertices, triangles, batches, error});
     };
     const CodedLevels& code = coded.levels;

@@ -6,7 +6,9 @@
 
 #include <algorithm>
 #include <limits>
+#include <new>
 #include <optional>
+#include <stdexcept>
 
 namespace filigree {
 
@@ -21,10 +23,11 @@ public:
     std::vector<std::uint64_t> ends; ///< of the file, when each entry of the table is whole
     std::optional<LevelReader> reader;
     std::size_t levels = 0;
+    std::uint64_t needed = sizeof(ModelHeader); ///< bytes until the table can be read on: not looked at before
 
     void take(std::string_view more) {
         bytes += more;
-        if (table.empty() && !read_table()) return;
+        if (table.empty() && (bytes.size() < needed || !read_table())) return;
         while (levels < ends.size() && bytes.size() >= ends[levels]) read_level();
     }
 
@@ -38,15 +41,15 @@ private:
         const std::uint64_t front = sizeof header + std::uint64_t{header.section_count} * sizeof(FileSection);
         if (header.file_size > most_bytes || front > header.file_size)
             throw FileDamage{"says it has " + std::to_string(header.file_size) + " bytes, which makes no sense"};
-        if (bytes.size() < front) return false;
+        if (bytes.size() < front) return needed = front, false;
         const FileReader file(bytes, header.file_size);
         const SectionReader in(file);
         if (in.count("cd.stm").first == 0)
             throw Error{ErrorCode::unsuitable, name + ": is no stream; pack its model with the profile stream."};
         const std::uint64_t stated = std::max({in.end_of("cd.rev"), in.end_of("cd.par"), in.end_of("cd.stm")});
-        if (bytes.size() <
-            std::max({stated, in.end_of("mesh.org"), in.end_of("mat.nam"), in.end_of("mat.emb"), in.end_of("mtllib")}))
-            return false;
+        needed =
+            std::max({stated, in.end_of("mesh.org"), in.end_of("mat.nam"), in.end_of("mat.emb"), in.end_of("mtllib")});
+        if (bytes.size() < needed) return false;
         const FileCode code = read_file_code(in);
         outline = coded_outline(in, code);
         outline.rest.materials.names = in.strings("mat.nam");
@@ -103,6 +106,10 @@ Status ModelStream::feed(std::string_view bytes) {
         return error_of(damage, arrival_->name);
     } catch (const Error& error) {
         return error;
+    } catch (const std::bad_alloc&) {
+        return Error{ErrorCode::out_of_memory, arrival_->name + ": does not fit into memory."};
+    } catch (const std::length_error&) {
+        return Error{ErrorCode::out_of_memory, arrival_->name + ": does not fit into memory."};
     }
 }
 

@@ -18,7 +18,8 @@ public:
     ModelStream(ModelStream&&) noexcept;
     ModelStream& operator=(ModelStream&&) noexcept;
 
-    /// Errors: bad_file (damaged), unsuitable (no stream: a plain model, one coded in one piece). Cost O(bytes), about
+    /// Errors: bad_file (damaged), unsuitable (no stream: a plain model, one coded in one piece), out_of_memory.
+    /// Cost O(bytes) in all, however few of them come at a time, about
     /// 0.5 processor seconds a million vertices.
     Status feed(std::string_view bytes);
 

@@ -1,4 +1,5 @@
 #include "filigree/io/ply_header.h"
+#include "filigree/io/extension.h"
 
 #include <array>
 
@@ -135,5 +136,25 @@ private:
 } // namespace
 
 Result<HeaderAndBody> read_header(const MeshSource& source) { return HeaderReader(source).read(); }
+
+std::vector<std::size_t> find_color(const std::vector<std::string>& names) {
+    std::vector<std::string> lower;
+    for (const std::string& name : names) lower.push_back(lower_case(name));
+    const auto find = [&](const std::string& name) {
+        return static_cast<std::size_t>(std::find(lower.begin(), lower.end(), name) - lower.begin());
+    };
+    static constexpr std::array<std::array<const char*, 3>, 2> kColors = {{{"red", "green", "blue"}, {"r", "g", "b"}}};
+    for (const auto& color : kColors)
+        for (const std::string prefix : {"", "diffuse_", "color_", "colour_"}) {
+            std::vector<std::size_t> found;
+            for (const char* name : color)
+                if (const std::size_t i = find(prefix + name); i < lower.size()) found.push_back(i);
+            if (found.size() < 3) continue;
+            for (const std::string& alpha : {prefix + "alpha", prefix + "a", std::string("alpha"), std::string("a")})
+                if (const std::size_t i = find(alpha); i < lower.size() && found.size() == 3) found.push_back(i);
+            return found;
+        }
+    return {};
+}
 
 } // namespace filigree::ply

@@ -64,4 +64,8 @@ struct HeaderAndBody {
 /// Errors: bad_file, with the line.
 Result<HeaderAndBody> read_header(const MeshSource& source);
 
+/// Which of these properties are the colour of a vertex, by the names that programs give them (red, r, diffuse_red,
+/// Red): three, or four with the opacity; none where one of the three is missing. names: empty for what cannot be one.
+std::vector<std::size_t> find_color(const std::vector<std::string>& names);
+
 } // namespace filigree::ply

@@ -4,12 +4,15 @@
 
 #include <algorithm>
 #include <array>
+#include <span>
 
 namespace filigree {
 
 using namespace ply;
 
 namespace {
+
+constexpr double kFullByte = 255, kFullShort = 65535; // a full colour
 
 template <class Numbers>
 class BodyReader {
@@ -216,8 +219,7 @@ private:
         copy_columns(find_columns({"nx", "ny", "nz"}), mesh.normals.values);
         for (const auto& names : {std::array{"s", "t"}, std::array{"u", "v"}, std::array{"texture_u", "texture_v"}})
             if (mesh.uvs.empty()) copy_columns(find_columns({names[0], names[1]}), mesh.uvs.values);
-        if (const auto rgb = find_columns({"red", "green", "blue"}); !rgb.empty())
-            read_colors(element, table, rgb, find_columns({"alpha"})); // without a colour, alpha is a scalar
+        for (const std::size_t i : read_colors(element, table, used)) used[i] = true;
         for (std::size_t i = 0; i < used.size(); ++i) {
             if (used[i]) continue;
             VertexScalar scalar{element.properties[i].name, std::vector<float>(table.rows)};
@@ -226,19 +228,66 @@ private:
         }
     }
 
-    void read_colors(const Element& element, const Table& table, std::vector<std::size_t> columns,
-                     const std::vector<std::size_t>& alpha) {
+    /// Returns the columns that are the colour. Without one, alpha is a scalar; and r, g and b that are no colours are.
+    std::vector<std::size_t> read_colors(const Element& element, const Table& table, const std::vector<bool>& used) {
+        std::vector<std::string> names;
+        for (std::size_t i = 0; i < used.size(); ++i) names.push_back(used[i] ? "" : element.properties[i].name);
+        const std::vector<std::size_t> columns = find_color(names);
+        if (columns.empty()) return {};
+        const std::span<const std::size_t> rgb = std::span(columns).first(3);
+        const bool is_short = element.properties[columns[0]].name.size() == 1;
+        if (is_short && !are_colors(element, table, rgb)) return {};
         Mesh& mesh = file_.mesh;
         mesh.colors.assign(table.rows, Vec4f::Ones());
-        mesh.colors_have_alpha = !alpha.empty();
-        columns.insert(columns.end(), alpha.begin(), alpha.end());
+        mesh.colors_have_alpha = columns.size() == 4;
+        const double full = full_color(element, table, rgb);
         for (std::size_t i = 0; i < columns.size(); ++i) {
-            const Type type = element.properties[columns[i]].type;
-            const float full = type == Type::uint8 ? 255.0f : type == Type::uint16 ? 65535.0f : 1.0f;
+            const auto of_column =
+                static_cast<float>(i < 3 ? full : full_color(element, table, std::span(columns).subspan(i)));
             table.for_each(columns[i], [&](std::size_t row, auto x) {
-                mesh.colors[row][static_cast<int>(i)] = static_cast<float>(x) / full;
+                mesh.colors[row][static_cast<int>(i)] = static_cast<float>(x) / of_column;
             });
         }
+        return columns;
+    }
+
+    /// Whether columns r, g and b, which may be anything, are of one type and from 0 up.
+    static bool are_colors(const Element& element, const Table& table, std::span<const std::size_t> columns) {
+        bool sound = true;
+        for (const std::size_t c : columns) {
+            sound = sound && element.properties[c].type == element.properties[columns[0]].type;
+            table.for_each(c, [&](std::size_t, auto x) { sound = sound && x >= 0; });
+        }
+        const double largest = largest_of(table, columns);
+        return sound && (is_float(element.properties[columns[0]].type) ? largest <= kFullByte : true);
+    }
+
+    static bool is_float(Type type) { return type == Type::float32 || type == Type::float64; }
+
+    static double largest_of(const Table& table, std::span<const std::size_t> columns) {
+        double largest = 0;
+        for (const std::size_t c : columns)
+            table.for_each(c, [&](std::size_t, auto x) { // not NaN
+                if (static_cast<double>(x) > largest) largest = static_cast<double>(x);
+            });
+        return largest;
+    }
+
+    /// What stands for a full colour in these columns: by the type where it is a byte, else by the largest number.
+    double full_color(const Element& element, const Table& table, std::span<const std::size_t> columns) {
+        const Type type = element.properties[columns[0]].type;
+        const double largest = largest_of(table, columns);
+        if (type == Type::uint8) return kFullByte;
+        if (type == Type::uint16 && largest > kFullByte) return kFullShort;
+        if (largest <= 1) return 1;
+        const double full = largest <= kFullByte                      ? kFullByte
+                            : type == Type::int16                     ? 32767
+                            : largest <= kFullShort || is_float(type) ? kFullShort
+                            : type == Type::int32                     ? 2147483647
+                                                                      : 4294967295;
+        file_.warnings.push_back("Colours go beyond 1 and were taken as 0 to " +
+                                 std::to_string(static_cast<std::uint64_t>(full)) + ".");
+        return full;
     }
 
     // ---- faces

@@ -98,12 +98,30 @@ private:
             add_columns(columns_, {"red", "green", "blue", "alpha"}, mesh_.colors, color_type, scale);
         else
             add_columns(columns_, {"red", "green", "blue"}, mesh_.colors, color_type, scale);
+        const std::size_t first_scalar = columns_.size();
         for (const VertexScalar& scalar : mesh_.scalars) {
             std::string name = unique_name(property_name(scalar.name));
             if (name != scalar.name)
                 renamed_.push_back("the name " + in_quotes(scalar.name) + " of a scalar (now " + in_quotes(name) + ")");
             columns_.push_back({std::move(name), Type::float32, scalar.values.data()});
         }
+        while (rename_color(first_scalar)) {
+        }
+    }
+
+    /// Scalars that a reader would take for a colour or its opacity get a number. Returns whether there were some.
+    bool rename_color(std::size_t first_scalar) {
+        std::vector<std::string> names;
+        for (const OutputColumn& column : columns_) names.push_back(column.name);
+        bool renamed = false;
+        for (const std::size_t i : find_color(names)) {
+            if (i < first_scalar) continue;
+            columns_[i].name = unique_name(names[i]);
+            renamed_.push_back("the name " + in_quotes(names[i]) + " of a scalar (now " + in_quotes(columns_[i].name) +
+                               ", as it would be read as a colour)");
+            renamed = true;
+        }
+        return renamed;
     }
 
     /// The name, or with a number behind it where a column has it already.

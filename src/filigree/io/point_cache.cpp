@@ -5,6 +5,7 @@
 #include "filigree/io/model_file.h"
 #include "filigree/io/numbered_name.h"
 #include "filigree/io/point_cache_formats.h"
+#include "filigree/io/pose_match.h"
 #include "filigree/io/usd.h"
 #include "filigree/mesh/normals.h"
 
@@ -122,8 +123,11 @@ Result<AnimationFormat> animation_format(const fs::path& path) {
                  path.string() + ": is no name for an animation; " + std::string(kKnownCacheFormats) + "."};
 }
 
-Result<PoseStream> open_poses(const fs::path& path, std::size_t points, const Vec3d& origin,
-                              const PoseFileOptions& options, const RunContext& context) {
+namespace {
+
+/// As the file has them.
+Result<PoseStream> open_unturned(const fs::path& path, std::size_t points, const Vec3d& origin,
+                                 const PoseFileOptions& options, const RunContext& context) {
     if (Status sound = check_rate(options); !sound) return sound.error();
     const std::string extension = lower_extension(path);
     if (is_cache(extension)) {
@@ -149,11 +153,45 @@ Result<PoseStream> open_poses(const fs::path& path, std::size_t points, const Ve
     return open_numbered(path, points, origin, options, context);
 }
 
+void turn_pose(Pose& pose, const Vec3d& origin, UpAxis up) {
+    turn_up(pose.positions, origin, up);
+    const Mat3f turn = turn_of(up).cast<float>();
+    for (Mat3f& gradient : pose.gradients) gradient = turn * gradient * turn.transpose();
+}
+
+/// Programs with another axis up save their drivers lying on their faces.
+Status warn_of_turn(const PoseStream& stream, const fs::path& path, const Vec3d& origin,
+                    const PoseFileOptions& options) {
+    if (!options.warnings || options.rest.empty() || stream.frames == 0 || lower_extension(path) == ".fil")
+        return Success{};
+    const Result<Pose> first = stream.pose(0);
+    if (!first) return first.error();
+    if (const std::string turned = turned_first_frame(options.rest, first->positions, origin, path); !turned.empty())
+        options.warnings->push_back(turned);
+    return Success{};
+}
+
+} // namespace
+
+Result<PoseStream> open_poses(const fs::path& path, std::size_t points, const Vec3d& origin,
+                              const PoseFileOptions& options, const RunContext& context) {
+    Result<PoseStream> stream = open_unturned(path, points, origin, options, context);
+    if (!stream) return stream;
+    if (options.up)
+        stream->pose = [pose = std::move(stream->pose), origin, up = *options.up](std::size_t frame) -> Result<Pose> {
+            Result<Pose> read = pose(frame);
+            if (read) turn_pose(*read, origin, up);
+            return read;
+        };
+    if (Status looked = warn_of_turn(*stream, path, origin, options); !looked) return looked.error();
+    return stream;
+}
+
 Result<MeshAnimation> open_animation(const fs::path& path, const Mesh& rest, const PoseFileOptions& options,
                                      const RunContext& context) {
     if (Status sound = check_rate(options); !sound) return sound.error();
     const std::string extension = lower_extension(path);
-    if (is_cache(extension)) {
+    if (is_cache(extension) && !options.up && !options.warnings) { // without a pose between
         Result<PointSource> source = open_cache(path, extension, rest.vertex_count(), options);
         if (!source) return source.error();
         return MeshAnimation{

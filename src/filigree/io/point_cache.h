@@ -3,6 +3,7 @@
 
 #include "filigree/core/result.h"
 #include "filigree/core/run_context.h"
+#include "filigree/core/view.h"
 #include "filigree/hierarchy/pose.h"
 #include "filigree/io/numbered_name.h"
 #include "filigree/io/shared_work.h"
@@ -11,6 +12,7 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -36,6 +38,14 @@ struct PoseFileOptions {
     /// rate divides it. glTF: frames to take a second.
     std::optional<double> frames_per_second = {};
     std::string animation = {}; ///< glTF: by name; empty: the first
+    /// Which of y and z is up in the file, where it is the other one in the model: what is read is turned.
+    std::optional<UpAxis> up = {};
+    /// The driver at rest, relative to the mesh's origin. With it, vertices of glTF and numbered meshes that were split
+    /// for normals or UVs, or are in another order, are matched by their places at rest (of a sequence: in its first
+    /// mesh). They have to stay together in every frame, else fetching one is a mismatch. Looked at when opened.
+    std::span<const Vec3f> rest = {};
+    /// Gets what was matched so, and that the first frame is the driver turned over.
+    std::vector<std::string>* warnings = nullptr;
 };
 
 /// Poses of a driver that another program moved, opened for reading frame by frame: PC2, MDD, numbered meshes (with
@@ -99,10 +109,10 @@ struct MeshMoment {
 };
 
 /// Writes a .usda whose faces change in time: for every frame points, extent, faces, normals, colours, velocities, and
-/// the mesh's scalar `origin` as a primvar where they are there. moment: of a frame, 0 .. frames - 1, asked for once
-/// and in order. One frame in memory; as much room as the file again beside it while it is written. Whole or not at
-/// all. Errors: unsuitable (no frames; a frame lacks what the first has), unwritable, cancelled, and what `moment`
-/// gives.
+/// the mesh's scalar `origin` as a primvar where they are there; in metres (metersPerUnit = 1). moment: of a frame, 0
+/// .. frames - 1, asked for once and in order. One frame in memory; as much room as the file again beside it while it
+/// is written. Whole or not at all. Errors: unsuitable (no frames; a frame lacks what the first has), unwritable,
+/// cancelled, and what `moment` gives.
 Status write_usda_moments(std::size_t frames, double frames_per_second,
                           const std::function<Result<MeshMoment>(std::size_t frame)>& moment,
                           const std::filesystem::path& path, std::vector<std::string>& warnings,

@@ -6,6 +6,7 @@
 #include "filigree/io/new_folders.h"
 #include "filigree/io/numbered_name.h"
 #include "filigree/io/point_cache_formats.h"
+#include "filigree/io/pose_match.h"
 #include "filigree/io/text_scanner.h"
 
 #include <algorithm>
@@ -84,25 +85,65 @@ Result<std::vector<fs::path>> numbered_files(const NumberedName& name, const std
     return sequence;
 }
 
-/// A moved mesh as a pose. has_gradients: as the first of its sequence, where that is known.
-Result<Pose> read_pose(const fs::path& file, std::size_t points, const Vec3d& origin, std::optional<bool> has_gradients,
-                       const RunContext& context) {
+/// What the meshes of a sequence have in common, which its first says.
+struct SequenceKind {
+    std::size_t points = 0; ///< of a file
+    std::optional<bool> has_gradients;
+    std::optional<VertexMatch> match; ///< where vertices were split on the way
+};
+
+Result<Mesh> read_sequence_mesh(const fs::path& file, const RunContext& context) {
     std::error_code ignored;
     const fs::file_status status = fs::status(file, ignored); // a pipe would wait for its writer
     if (fs::exists(status) && !fs::is_regular_file(status))
         return Error{ErrorCode::unsupported, file.string() + ": is a pipe, a device or a folder, and the meshes of a "
                                                              "sequence are files; take it out of the sequence."};
-    const Result<MeshFile> read = read_mesh(file, context);
+    Result<MeshFile> read = read_mesh(file, context);
     if (!read) return read.error();
-    if (read->mesh.vertex_count() != points)
-        return Error{ErrorCode::mismatch, file.string() + ": has " + std::to_string(read->mesh.vertex_count()) +
-                                              " vertices, and what it should move has " + std::to_string(points) +
-                                              "; it is of another mesh, or vertices were merged or split."};
-    Pose pose = pose_of_mesh(read->mesh, origin);
-    if (has_gradients && *has_gradients == pose.gradients.empty())
-        return Error{ErrorCode::mismatch, file.string() + ": has " + (*has_gradients ? "no " : "") +
+    return std::move(read->mesh);
+}
+
+Error other_points(const fs::path& file, std::size_t has, std::size_t wanted) {
+    return {ErrorCode::mismatch, file.string() + ": has " + std::to_string(has) +
+                                     " vertices, and what it should move has " + std::to_string(wanted) +
+                                     "; it is of another mesh, or vertices were merged or split."};
+}
+
+/// A moved mesh as a pose of so many points.
+Result<Pose> read_pose(const fs::path& file, std::size_t points, const Vec3d& origin, const SequenceKind& kind,
+                       const RunContext& context) {
+    const Result<Mesh> mesh = read_sequence_mesh(file, context);
+    if (!mesh) return mesh.error();
+    if (mesh->vertex_count() != kind.points) return other_points(file, mesh->vertex_count(), points);
+    Pose pose = pose_of_mesh(*mesh, origin);
+    if (kind.has_gradients && *kind.has_gradients == pose.gradients.empty())
+        return Error{ErrorCode::mismatch, file.string() + ": has " + (*kind.has_gradients ? "no " : "") +
                                               "gradients (f00 to f22), unlike the first of its sequence."};
-    return pose;
+    if (!kind.match) return pose;
+    Pose matched;
+    matched.positions.resize(points);
+    if (Status done = kind.match->apply(pose.positions, matched.positions, file); !done) return done.error();
+    if (!pose.gradients.empty())
+        for (const Index source : kind.match->source) matched.gradients.push_back(pose.gradients[source]);
+    return matched;
+}
+
+/// What the first mesh of a sequence says of all. Vertices that were split are matched by their places in it.
+Result<SequenceKind> look_at_first(const fs::path& file, std::size_t points, const Vec3d& origin,
+                                   const PoseFileOptions& options, const RunContext& context) {
+    const Result<Mesh> mesh = read_sequence_mesh(file, context);
+    if (!mesh) return mesh.error();
+    Pose pose = pose_of_mesh(*mesh, origin);
+    SequenceKind kind{mesh->vertex_count(), !pose.gradients.empty(), {}};
+    if (kind.points == points) return kind;
+    if (options.up) turn_up(pose.positions, origin, *options.up);
+    if (options.rest.size() == points) kind.match = match_by_place(options.rest, pose.positions);
+    if (!kind.match) return other_points(file, kind.points, points);
+    if (options.warnings)
+        options.warnings->push_back(file.string() + ": its " + std::to_string(kind.points) +
+                                    " vertices were split, and were matched to the driver's " + std::to_string(points) +
+                                    " by their places in this first mesh.");
+    return kind;
 }
 
 /// Refuses a sequence of which a killed process has put only some files into their places.
@@ -166,13 +207,13 @@ Result<PoseStream> open_numbered(const fs::path& path, std::size_t points, const
     if (!files) return files.error();
     RunContext silent = context; // whoever fetches tells of frames
     silent.progress = nullptr;
-    const Result<Pose> first = read_pose(files->front(), points, origin, {}, silent);
-    if (!first) return first.error();
+    Result<SequenceKind> kind = look_at_first(files->front(), points, origin, options, silent);
+    if (!kind) return kind.error();
     const std::size_t frames = files->size();
-    return PoseStream{
-        frames, options.frames_per_second.value_or(kUnsaidRate),
-        [files = std::move(*files), points, origin, has_gradients = !first->gradients.empty(),
-         silent](std::size_t frame) { return read_pose(files[frame], points, origin, has_gradients, silent); }};
+    return PoseStream{frames, options.frames_per_second.value_or(kUnsaidRate),
+                      [files = std::move(*files), points, origin, kind = *std::move(kind), silent](std::size_t frame) {
+                          return read_pose(files[frame], points, origin, kind, silent);
+                      }};
 }
 
 namespace {

@@ -41,14 +41,13 @@ const char* parse_number_exactly(const char* p, const char* end, double& value) 
     return last;
 }
 
-std::string in_quotes(std::string_view text) {
-    constexpr std::size_t kLongest = 24; // bytes
+std::string in_quotes(std::string_view text, std::size_t longest) {
     std::string quote = "'";
     std::size_t at = 0;
     while (at < text.size()) {
         const std::size_t length = utf8_length(text, at);
         const std::string_view character = text.substr(at, std::max<std::size_t>(1, length));
-        if (at + character.size() > kLongest) break;
+        if (at + character.size() > longest) break;
         const bool is_control = length == 1   ? character[0] < ' ' || character[0] == '\x7f'
                                 : length == 2 ? character[0] == '\xc2' && character[1] < '\xa0' // C1
                                               : false;

@@ -14,7 +14,7 @@ namespace filigree {
 const char* parse_number_exactly(const char* p, const char* end, double& value);
 
 /// The start of `text`, in quotes and printable, for a message.
-std::string in_quotes(std::string_view text);
+std::string in_quotes(std::string_view text, std::size_t longest = 24);
 
 inline bool is_digit(char c) { return static_cast<unsigned char>(c - '0') < 10; }
 

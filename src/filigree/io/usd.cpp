@@ -83,12 +83,15 @@ private:
 };
 
 /// origin: of the points that follow, in the world. Numbers of 64 bits, where points have 32.
-void write_header(UsdText& out, std::size_t frames, double frames_per_second, const Vec3d& origin) {
+/// metres_per_unit: 0 is not said.
+void write_header(UsdText& out, std::size_t frames, double frames_per_second, const Vec3d& origin,
+                  double metres_per_unit) {
     out.text("#usda 1.0\n(\n    defaultPrim = \"mesh\"\n    doc = \"Written by Filigree\"\n    endTimeCode = ")
         .number(frames - 1)
         .text("\n    framesPerSecond = ")
-        .number(frames_per_second)
-        .text("\n    startTimeCode = 0\n    timeCodesPerSecond = ")
+        .number(frames_per_second);
+    if (metres_per_unit > 0) out.text("\n    metersPerUnit = ").number(metres_per_unit);
+    out.text("\n    startTimeCode = 0\n    timeCodesPerSecond = ")
         .number(frames_per_second)
         .text("\n    upAxis = \"Y\"\n)\n\ndef Mesh \"mesh\"\n{\n");
     if (origin.isZero(0)) return;
@@ -339,7 +342,7 @@ Status write_usda(const MeshAnimation& animation, const FramePositions& position
     Result<FileWriter> file = FileWriter::create(path);
     if (!file) return file.error();
     UsdText out(*file);
-    write_header(out, animation.frames, animation.frames_per_second, animation.rest->origin);
+    write_header(out, animation.frames, animation.frames_per_second, animation.rest->origin, animation.metres_per_unit);
     write_faces(out, *animation.rest);
     write_uvs(out, *animation.rest);
     write_colors(out, *animation.rest);
@@ -370,7 +373,7 @@ Status write_usda_moments(std::size_t frames, double frames_per_second,
         bytes += 200 * now->mesh.vertex_count();
     }
     UsdText header(*file);
-    write_header(header, frames, frames_per_second, moments.origin());
+    write_header(header, frames, frames_per_second, moments.origin(), 1);
     header.text("    uniform token subdivisionScheme = \"none\"\n");
     if (Status written = header.finish(); !written) return written;
     if (Status written = moments.append_to(*file); !written) return written;

@@ -17,6 +17,7 @@ struct MeshAnimation {
     /// Writes the positions of a frame, 0 .. frames - 1, relative to rest->origin; one a vertex. Frames may be asked
     /// for in any order, and again.
     std::function<Status(std::size_t frame, std::span<Vec3f> positions)> positions;
+    double metres_per_unit = 0; ///< 0: not known. Formats that have a place for it say it
 };
 
 } // namespace filigree

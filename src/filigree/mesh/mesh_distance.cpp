@@ -1,4 +1,5 @@
 #include "filigree/mesh/mesh_distance.h"
+#include "filigree/mesh/measured_surface.h"
 
 #include "filigree/core/parallel_for.h"
 #include "filigree/core/random.h"
@@ -10,11 +11,19 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <memory>
 #include <numbers>
 #include <numeric>
 #include <optional>
 
 namespace filigree {
+
+/// A mesh's triangles, in the frame of the mesh that it is measured against.
+struct PlacedTriangles {
+    std::vector<Vec3f> positions;
+    std::vector<Triangle> triangles;
+};
+
 namespace {
 
 constexpr std::size_t kMeshDistanceGrain = 1024; // queries a piece
@@ -63,12 +72,6 @@ VertexDistance compare_positions(std::span<const Vec3f> a, std::span<const Vec3f
     if (!a.empty()) result.rms = std::sqrt(sum_of_squares / double(a.size()));
     return result;
 }
-
-/// A mesh's triangles, in the frame of the mesh that it is measured against.
-struct PlacedTriangles {
-    std::vector<Vec3f> positions;
-    std::vector<Triangle> triangles;
-};
 
 std::vector<Vec3f> shifted(std::vector<Vec3f> positions, const Vec3d& shift) {
     if (!shift.isZero(0))
@@ -130,12 +133,14 @@ void search_in_turn(std::span<const Vec3f> samples, const PlacedTriangles& to, c
     }
 }
 
+/// The tree that suits so many samples.
+TreeLeaves leaves_for(std::size_t samples, const PlacedTriangles& to) {
+    return samples < to.triangles.size() ? TreeLeaves::pairs : TreeLeaves::single;
+}
+
 /// The distance of every sample to a surface; fewer when cancelled.
-std::vector<double> distances(std::span<const Vec3f> samples, const PlacedTriangles& to, const RunContext& context) {
-    std::optional<ClosestPointTree> built; // Embree builds on the threads of the arena it is called in
-    const auto leaves = samples.size() < to.triangles.size() ? TreeLeaves::pairs : TreeLeaves::single;
-    context.execute([&] { built.emplace(to.positions, to.triangles, leaves); });
-    const ClosestPointTree& tree = *built;
+std::vector<double> distances(std::span<const Vec3f> samples, const PlacedTriangles& to, const ClosestPointTree& tree,
+                              const RunContext& context) {
     std::vector<double> result(samples.size());
     for (std::size_t done = 0; done < samples.size(); done += kBatch) {
         if (context.is_cancelled()) return {};
@@ -149,14 +154,20 @@ std::vector<double> distances(std::span<const Vec3f> samples, const PlacedTriang
     return result;
 }
 
-Result<SurfaceDistance> compare_surfaces(const Mesh& a, const Mesh& b, std::size_t samples, const RunContext& context) {
-    const Result<PlacedTriangles> placed_a = place_triangles(a, a.origin - b.origin, context);
-    if (!placed_a) return placed_a.error();
-    const Result<PlacedTriangles> placed_b = place_triangles(b, Vec3d::Zero(), context);
-    if (!placed_b) return placed_b.error();
-    const std::vector<double> there = distances(sample_surface(*placed_a, samples, context.seed), *placed_b, context);
-    const std::vector<double> back = distances(sample_surface(*placed_b, samples, context.seed), *placed_a, context);
-    if (context.is_cancelled()) return cancelled_error();
+std::unique_ptr<ClosestPointTree> make_distance_tree(const PlacedTriangles& to, TreeLeaves leaves,
+                                                     const RunContext& context) {
+    std::unique_ptr<ClosestPointTree> tree; // Embree builds on the threads of the arena it is called in
+    context.execute([&] { tree = std::make_unique<ClosestPointTree>(to.positions, to.triangles, leaves); });
+    return tree;
+}
+
+/// The same, with a tree for this alone.
+std::vector<double> distances(std::span<const Vec3f> samples, const PlacedTriangles& to, const RunContext& context) {
+    const auto tree = make_distance_tree(to, leaves_for(samples.size(), to), context);
+    return distances(samples, to, *tree, context);
+}
+
+SurfaceDistance surface_distance(const std::vector<double>& there, const std::vector<double>& back) {
     SurfaceDistance result;
     double sum = 0, sum_of_squares = 0;
     const auto add = [&](const std::vector<double>& way, double& max, double& rms) {
@@ -199,13 +210,57 @@ VertexDistance vertex_distance(const Mesh& mesh, std::span<const Vec3f> a, std::
     return result;
 }
 
+struct MeasuredSurface::Content {
+    PlacedTriangles surface;
+    Vec3d origin;
+    std::size_t sample_count;
+    std::vector<Vec3f> samples;
+    std::unique_ptr<ClosestPointTree> pairs, single;
+
+    const ClosestPointTree& tree(TreeLeaves leaves, const RunContext& context) {
+        std::unique_ptr<ClosestPointTree>& known = leaves == TreeLeaves::pairs ? pairs : single;
+        if (!known) known = make_distance_tree(surface, leaves, context);
+        return *known;
+    }
+};
+
+MeasuredSurface::MeasuredSurface(std::unique_ptr<Content> content) : content_(std::move(content)) {}
+MeasuredSurface::MeasuredSurface(MeasuredSurface&&) noexcept = default;
+MeasuredSurface& MeasuredSurface::operator=(MeasuredSurface&&) noexcept = default;
+MeasuredSurface::~MeasuredSurface() = default;
+
+Result<MeasuredSurface> MeasuredSurface::create(const Mesh& mesh, std::size_t samples, const RunContext& context) {
+    Result<PlacedTriangles> placed = place_triangles(mesh, Vec3d::Zero(), context);
+    if (!placed) return placed.error();
+    auto content = std::make_unique<Content>();
+    content->surface = std::move(*placed);
+    content->origin = mesh.origin;
+    content->sample_count = samples;
+    content->samples = sample_surface(content->surface, samples, context.seed);
+    return MeasuredSurface(std::move(content));
+}
+
+Result<SurfaceDistance> MeasuredSurface::distance_of(const Mesh& other, const RunContext& context) {
+    Content& own = *content_;
+    const Result<PlacedTriangles> placed = place_triangles(other, other.origin - own.origin, context);
+    if (!placed) return placed.error();
+    const std::vector<Vec3f> samples = sample_surface(*placed, own.sample_count, context.seed);
+    const ClosestPointTree& tree = own.tree(leaves_for(samples.size(), own.surface), context);
+    const std::vector<double> there = distances(samples, own.surface, tree, context);
+    const std::vector<double> back = distances(own.samples, *placed, context);
+    if (context.is_cancelled()) return cancelled_error();
+    return surface_distance(there, back);
+}
+
 Result<MeshDistance> mesh_distance(const Mesh& a, const Mesh& b, std::size_t samples, const RunContext& context) {
     if (std::optional<Error> error = either_mesh_error(a, b)) return *error;
     MeshDistance result;
     result.diagonal = bounds(b).diagonal();
     if (a.vertex_count() == b.vertex_count()) result.vertices = vertex_distance(a, b, context).value();
     if (a.face_count() > 0 && b.face_count() > 0) {
-        Result<SurfaceDistance> surfaces = compare_surfaces(a, b, samples, context);
+        Result<MeasuredSurface> surface = MeasuredSurface::create(b, samples, context);
+        if (!surface) return surface.error();
+        Result<SurfaceDistance> surfaces = surface->distance_of(a, context);
         if (!surfaces) return surfaces.error();
         result.surfaces = *surfaces;
     }

@@ -1,6 +1,8 @@
 #include "filigree/scene/scene_file.h"
 
 #include "filigree/io/file.h"
+#include "filigree/io/mesh_file.h"
+#include "filigree/io/model_file.h"
 #include "filigree/physics/named_materials.h"
 #include "filigree/scene/scene_keys.h"
 #include "filigree/scene/scene_table.h"
@@ -32,6 +34,12 @@ public:
     explicit SceneReader(const std::string& path) {
         scene_.path = path;
         const std::string bytes = read_file(path).value();
+        if (const bool is_model = is_model_file(bytes); is_model || mesh_format(path))
+            throw BadResultAccess(
+                {ErrorCode::bad_file,
+                 fmt::format("{}: is a {}, not a scene; a scene is a TOML file that names {}, such as "
+                             "[[body]] mesh = \"scan.ply\" (docs/scenes.md).",
+                             path, is_model ? "model" : "mesh", is_model ? "a mesh" : "it")});
         try {
             root_ = toml::parse(bytes, path);
         } catch (const toml::parse_error& error) {
