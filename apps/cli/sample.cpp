@@ -96,6 +96,8 @@ Found find_on_lattice(const Mesh& mesh, const SampleArguments& options, const Ru
 }
 
 void warn_of_doubts(const Found& found, const std::string& input, Session& session) {
+    if (const std::string turned = outward_sentence(found.inside.outward); !turned.empty())
+        session.warn(input + ": " + turned);
     if (found.points.empty())
         session.warn(fmt::format("{}: no point is inside; take a smaller spacing than {:.4g}.", input, found.spacing));
     const auto& winding = found.inside.winding;

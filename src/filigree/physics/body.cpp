@@ -214,12 +214,13 @@ Status add_field(Body& body, const Mesh& mesh, const RunContext& context) {
     return Success{};
 }
 
-std::string warning_of(const CellReport& cells) {
-    std::string warning;
+std::string warning_of(const CellReport& cells, const OutwardReport& outward) {
+    std::string warning = outward_sentence(outward);
     if (cells.thin_cells > 0)
-        warning = std::to_string(cells.thin_cells) + " of " + std::to_string(cells.cells) +
-                  " cells lie in parts fewer than two cells across, which will be too soft or too stiff there; more "
-                  "particles make them right.";
+        warning += (warning.empty() ? "" : " ") + std::to_string(cells.thin_cells) + " of " +
+                   std::to_string(cells.cells) +
+                   " cells lie in parts fewer than two cells across, which will be too soft or too stiff there; more "
+                   "particles make them right.";
     if (cells.loose_parts > 0)
         warning += (warning.empty() ? "" : " ") + std::to_string(cells.loose_parts) +
                    " small unconnected part(s) have no particles of their own and go along with the nearest ones.";
@@ -255,7 +256,8 @@ Result<Body> make_body(const Mesh& mesh, const Material& material, const BodyOpt
 
     found.surface_points = body.surface.points.size();
     for (const float mass : body.mass) found.mass += mass;
-    found.warning = warning_of(found.cells);
+    found.outward = welded->outward;
+    found.warning = warning_of(found.cells, found.outward);
     return body;
 }
 

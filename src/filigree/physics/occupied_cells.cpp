@@ -150,8 +150,10 @@ Error too_many_cells(const Grid& grid, double count, double scale) {
 
 Result<std::vector<Draft>> sample_cells(const MeshToFill& mesh, const Grid& grid, double scale,
                                         const RunContext& context) {
-    const WeldedTriangles& welded = mesh.welded;
-    const bool scans = welded.closure.is_closed() && welded.closure.is_oriented();
+    const Result<InsideSampler> sampler = InsideSampler::create(
+        mesh.positions, mesh.welded, {.overlap = Overlap::merged, .accuracy = kWindingAccuracy}, context);
+    if (!sampler) return sampler.error();
+    const bool scans = sampler->used() == InsideMethod::scan;
     const double most = 8 * double(grid.counts[0]) * double(grid.counts[1]) * double(grid.counts[2]);
     const unsigned n = scans ? kSamples : most <= kMostWindings ? kWindingSamples : 1;
     const std::size_t bytes_a_layer = n * n * grid.counts[1] * ((n * grid.counts[0] + 63) / 64) * 8;
@@ -160,10 +162,7 @@ Result<std::vector<Draft>> sample_cells(const MeshToFill& mesh, const Grid& grid
     for (std::size_t k = 0; k < grid.counts[2]; k += slab) {
         const std::size_t end = std::min(k + slab, grid.counts[2]);
         const Lattice lattice = sample_points(grid, n, k, end);
-        const Result<Occupancy> occupancy =
-            scans
-                ? scan_inside({mesh.positions, welded.triangles}, lattice, {.overlap = Overlap::merged}, context)
-                : winding_inside({mesh.positions, welded.triangles}, lattice, {.accuracy = kWindingAccuracy}, context);
+        const Result<Occupancy> occupancy = sampler->inside(lattice, context);
         if (!occupancy) return occupancy.error();
         const std::vector<Draft> found = find_occupied(grid, *occupancy, n, k, end, context);
         cells.insert(cells.end(), found.begin(), found.end());
