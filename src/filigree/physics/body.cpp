@@ -2,6 +2,7 @@
 
 #include "filigree/core/dense_solve.h"
 #include "filigree/core/parallel_for.h"
+#include "filigree/physics/cell_shares.h"
 #include "filigree/physics/mesh_cells.h"
 #include "filigree/physics/surface_points.h"
 
@@ -245,6 +246,7 @@ Result<Body> make_body(const Mesh& mesh, const Material& material, const BodyOpt
     body.material = material;
     body.scale = options.scale;
     body.cells = std::move(cells).value();
+    if (!uses_centroids(material.model)) share_with_neighbours(body.cells);
     found.split_cells = make_particles(body, context);
     SurfacePoints spread =
         spread_on_surface(mesh.positions, welded->triangles, options.scale, point_spacing(material) * body.spacing());

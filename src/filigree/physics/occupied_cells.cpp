@@ -172,4 +172,44 @@ Result<std::vector<Draft>> sample_cells(const MeshToFill& mesh, const Grid& grid
     return cells;
 }
 
+Result<std::optional<double>> exact_volume(const MeshToFill& mesh, const RunContext& context) {
+    constexpr double kAcross = 64, kSameCount = 1e-3; // points along the longest side; relative
+    const Closure& closure = mesh.welded.closure;
+    if (!closure.is_closed() || !closure.is_oriented() || !(mesh.box.size().array() > 0).all())
+        return std::optional<double>();
+    const Result<Lattice> lattice = make_lattice(mesh.box, {.spacing = mesh.box.size().maxCoeff() / kAcross});
+    if (!lattice) return lattice.error();
+    std::array<double, 2> counts = {};
+    for (const Overlap overlap : {Overlap::parity, Overlap::merged}) {
+        const Result<Occupancy> inside =
+            scan_inside({mesh.positions, mesh.welded.triangles}, *lattice, {.overlap = overlap}, context);
+        if (!inside) return inside.error();
+        counts[overlap == Overlap::merged] = double(inside->count());
+    }
+    if (std::abs(counts[0] - counts[1]) > kSameCount * counts[1]) return std::optional<double>();
+    double six = 0;
+    for (const Triangle& triangle : mesh.welded.triangles) {
+        const auto [a, b, c] = mesh.corners_of(triangle);
+        const Vec3d from = mesh.box.centre();
+        six += (a - from).dot((b - from).cross(c - from));
+    }
+    return std::optional<double>(six / 6);
+}
+
+void match_volume(std::vector<Draft>& cells, double volume) {
+    constexpr int kRounds = 4; // those at a limit are no help to the others
+    for (int round = 0; round < kRounds; ++round) {
+        double fixed = 0, free = 0;
+        const auto is_free = [](const Draft& cell) {
+            return cell.fraction > Cells::kLeastFraction && cell.fraction < 1;
+        };
+        for (const Draft& cell : cells) (is_free(cell) ? free : fixed) += double(cell.fraction);
+        if (!(free > 0) || volume <= fixed) return;
+        const double factor = (volume - fixed) / free;
+        for (Draft& cell : cells)
+            if (is_free(cell))
+                cell.fraction = std::clamp(float(factor * double(cell.fraction)), Cells::kLeastFraction, 1.0f);
+    }
+}
+
 } // namespace filigree::mesh_cells
