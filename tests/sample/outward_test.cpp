@@ -132,6 +132,17 @@ TEST(Outward, PartsThatCrossOrTouchLieBesideEachOther) {
     for (int k = 0; k < 5; ++k)
         add(touching, box({0, 0, 0.25f * float(k)}, {1, 1, 0.25f * float(k + 1)}, 4, k % 2 == 1));
     expect_volume(touching, 1.25);
+    EXPECT_GT(report_of(touching).inner_faces, 0u);
+    Mesh right, wrong; // solids that look one way are left as they are, or turned as a whole
+    for (int k = 0; k < 3; ++k) {
+        add(right, box({0, 0, 0.5f * float(k)}, {1, 1, 0.5f * float(k + 1)}, 4));
+        add(wrong, box({0, 0, 0.5f * float(k)}, {1, 1, 0.5f * float(k + 1)}, 4, true));
+    }
+    expect_volume(right, 1.5);
+    EXPECT_TRUE(report_of(right).is_as_it_was());
+    expect_volume(wrong, 1.5);
+    EXPECT_EQ(report_of(wrong).inward_parts, 1u);
+    EXPECT_EQ(report_of(wrong).inner_faces, 0u);
     Mesh notch = box({0, 0, 0}, {3, 1, 1}, 1), beside = box({1, 1, 0}, {2, 2, 1}, 1); // coarse: share no whole face
     add(notch, beside);
     expect_volume(notch, 4);

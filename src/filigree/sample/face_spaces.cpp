@@ -110,8 +110,60 @@ public:
         return sides;
     }
 
+    /// Of each part that is known: see winding_signs.
+    std::vector<std::int8_t> winding_signs() {
+        const std::vector<Index> outside = outer_nodes();
+        const std::vector<Door> doors = all_doors();
+        constexpr int kUncounted = std::numeric_limits<int>::min();
+        std::vector<int> winding(2 * patches_.count, kUncounted); // of roots
+        std::vector<std::int8_t> signs(known_.size(), 0);
+        std::vector<std::array<std::uint8_t, 2>> has(known_.size()); // numbers below 0, above 0
+        for (Index part = 0; part < known_.size(); ++part) {
+            if (!known_[part] || outside[part] == kNoIndex) continue;
+            bool agree = true;
+            std::vector<Index> waiting = {nodes_.root(outside[part])};
+            winding[waiting[0]] = 0;
+            while (!waiting.empty()) {
+                const Index space = waiting.back();
+                waiting.pop_back();
+                has[part][winding[space] > 0] |= winding[space] != 0;
+                for (const Door& door : doors_of(doors, space))
+                    for (const bool is_before : {true, false}) {
+                        const Index here = nodes_.root(2 * door.patch + !is_before);
+                        const Index other = nodes_.root(2 * door.patch + is_before);
+                        if (here != space) continue;
+                        const int wanted = winding[space] + (is_before ? 1 : -1);
+                        agree = agree && (winding[other] == kUncounted || winding[other] == wanted);
+                        if (winding[other] == kUncounted) waiting.push_back(other);
+                        winding[other] = wanted;
+                    }
+                if (!agree) break;
+            }
+            if (agree && has[part][0] != has[part][1]) signs[part] = has[part][1] ? 1 : -1;
+        }
+        return signs;
+    }
+
 private:
     enum : std::uint8_t { kUnknown, kOutside, kInside };
+
+    /// A space's root, and a patch beside it.
+    struct Door {
+        Index space, patch;
+        auto operator<=>(const Door&) const = default;
+    };
+    std::vector<Door> all_doors() {
+        std::vector<Door> doors;
+        for (Index p = 0; p < patches_.count; ++p)
+            if (known_[patches_.part[p]])
+                for (const Index node : {2 * p, 2 * p + 1}) doors.push_back({nodes_.root(node), p});
+        std::sort(doors.begin(), doors.end());
+        return doors;
+    }
+    static std::span<const Door> doors_of(std::span<const Door> doors, Index space) {
+        const auto found = std::ranges::equal_range(doors, space, {}, &Door::space);
+        return {found.begin(), found.end()};
+    }
 
     Index part_of(Index triangle) const { return patches_.part[patches_.of[triangle]]; }
     Vec3d at(Index vertex) const { return positions_[vertex].cast<double>(); }
@@ -187,21 +239,15 @@ private:
     /// From outside through patch after patch: a space behind each patch before which one is known. A part where two
     /// ways disagree is not known.
     void count_through(std::vector<std::uint8_t>& inside) {
-        std::vector<std::pair<Index, Index>> doors; // a space's root, a patch beside it
-        for (Index p = 0; p < patches_.count; ++p)
-            if (known_[patches_.part[p]])
-                for (const Index node : {2 * p, 2 * p + 1}) doors.emplace_back(nodes_.root(node), p);
-        std::ranges::sort(doors);
+        const std::vector<Door> doors = all_doors();
         std::vector<Index> waiting;
         for (Index node = 0; node < inside.size(); ++node)
             if (inside[node] != kUnknown) waiting.push_back(node);
         while (!waiting.empty()) {
             const Index space = waiting.back();
             waiting.pop_back();
-            const auto [begin, end] =
-                std::ranges::equal_range(doors, space, {}, [](const auto& door) { return door.first; });
-            for (auto door = begin; door != end; ++door) {
-                const Index p = door->second, part = patches_.part[p];
+            for (const Door& door : doors_of(doors, space)) {
+                const Index p = door.patch, part = patches_.part[p];
                 if (patches_.part_is_odd[part]) continue;
                 const Index other = nodes_.root(2 * p) == space ? nodes_.root(2 * p + 1) : nodes_.root(2 * p);
                 const std::uint8_t wanted = inside[space] == kOutside ? kInside : kOutside;
@@ -224,10 +270,12 @@ private:
 
 } // namespace
 
-std::vector<std::uint8_t> repeated_faces(std::span<const Triangle> triangles, std::span<const Index> faces,
-                                         std::span<const Index> sorted) {
-    std::vector<std::uint8_t> repeated(triangles.size(), 0), is_odd(triangles.size(), 0), is_suspect;
-    is_suspect.assign(triangles.size(), 0);
+RepeatedFaces repeated_faces(std::span<const Triangle> triangles, std::span<const Index> faces,
+                             std::span<const Index> sorted) {
+    RepeatedFaces found;
+    found.left_out.assign(triangles.size(), 0);
+    found.all_of_part.assign(triangles.size(), 0);
+    std::vector<std::uint8_t> is_odd(triangles.size(), 0), is_suspect(triangles.size(), 0);
     DisjointSets parts(triangles.size());
     for_each_edge(triangles, sorted, [&](std::span<const Index> edge) {
         for (const Index h : edge) parts.join(edge[0] / 3, h / 3);
@@ -235,7 +283,7 @@ std::vector<std::uint8_t> repeated_faces(std::span<const Triangle> triangles, st
             for (const Index h : edge) is_suspect[h / 3] = 1;
     });
     std::vector<SuspectFace> suspects = suspect_faces(triangles, faces, is_suspect);
-    if (suspects.empty()) return repeated;
+    if (suspects.empty()) return found;
     for_each_edge(triangles, sorted, [&](std::span<const Index> edge) {
         if (edge.size() % 2 == 1) is_odd[parts.root(edge[0] / 3)] = 1;
     });
@@ -254,13 +302,59 @@ std::vector<std::uint8_t> repeated_faces(std::span<const Triangle> triangles, st
         for (const SuspectFace& face : group) in_groups[part] += face.count;
         common[part] = std::gcd(common[part], group.size());
     });
+    for (Index t = 0; t < triangles.size(); ++t) {
+        const Index part = parts.root(t);
+        found.all_of_part[t] = in_groups[part] == of_part[part] && common[part] > 1;
+    }
     for_each_group([&](std::span<const SuspectFace> group, Index part) {
         const std::size_t times = group.size() / (in_groups[part] == of_part[part] ? common[part] : 1);
         const bool keeps_one = is_odd[part] || times % 2 == 1;
         for (const SuspectFace& face : group.subspan(keeps_one ? 1 : 0))
-            std::fill_n(repeated.begin() + face.first, face.count, std::uint8_t{1});
+            std::fill_n(found.left_out.begin() + face.first, face.count, std::uint8_t{1});
     });
-    return repeated;
+    return found;
+}
+
+std::vector<std::int8_t> winding_signs(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
+                                       std::span<const Index> sorted) {
+    std::vector<Index> neighbour(3 * triangles.size(), kNoIndex);
+    DisjointSets joined(triangles.size());
+    std::vector<std::uint8_t> is_unfit(triangles.size(), 0), is_crowded(triangles.size(), 0); // of parts
+    for_each_edge(triangles, sorted, [&](std::span<const Index> edge) {
+        for (const Index h : edge) joined.join(edge[0] / 3, h / 3);
+    });
+    for_each_edge(triangles, sorted, [&](std::span<const Index> edge) {
+        int net = 0;
+        for (const Index h : edge) net += half_edge_start(triangles, h) < half_edge_end(triangles, h) ? 1 : -1;
+        const Index part = joined.root(edge[0] / 3);
+        if (net != 0) is_unfit[part] = 1;
+        if (edge.size() > 2) is_crowded[part] = 1;
+        if (edge.size() != 2 || is_one_face_twice(triangles, edge)) return;
+        neighbour[edge[0]] = edge[1];
+        neighbour[edge[1]] = edge[0];
+    });
+    Patches patches;
+    Labels labels = components(neighbour);
+    patches.of = std::move(labels.of);
+    patches.count = labels.count;
+    patches.part.resize(patches.count);
+    std::vector<Index> number(triangles.size(), kNoIndex);
+    for (Index t = 0; t < triangles.size(); ++t) {
+        const Index root = joined.root(t);
+        if (number[root] == kNoIndex) {
+            number[root] = Index(patches.part_is_open.size());
+            patches.part_is_open.push_back(is_unfit[root]);
+            patches.part_is_simple.push_back(!is_crowded[root]);
+            patches.part_is_odd.push_back(0);
+        }
+        patches.part[patches.of[t]] = number[root];
+    }
+    Spaces spaces(positions, triangles, patches);
+    spaces.join_around(sorted);
+    const std::vector<std::int8_t> of_part = spaces.winding_signs();
+    std::vector<std::int8_t> signs(triangles.size());
+    for (Index t = 0; t < triangles.size(); ++t) signs[t] = of_part[patches.part[patches.of[t]]];
+    return signs;
 }
 
 PatchSides sides_of_patches(std::span<const Vec3f> positions, std::span<const Triangle> triangles,

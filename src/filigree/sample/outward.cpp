@@ -55,15 +55,21 @@ private:
         for_each_edge(given_, sorted_, [&](std::span<const Index> edge) {
             is_crowded |= edge.size() > 2 || (edge.size() == 2 && apex(given_, edge[0]) == apex(given_, edge[1]));
         });
-        std::vector<std::uint8_t> repeated;
-        if (is_crowded) repeated = repeated_faces(given_, faces_, sorted_);
+        RepeatedFaces repeated;
+        std::vector<std::int8_t> signs;
+        if (is_crowded) {
+            repeated = repeated_faces(given_, faces_, sorted_);
+            signs = winding_signs(positions_, given_, sorted_);
+        }
         for (Index t = 0; t < given_.size(); ++t) {
-            if (!repeated.empty() && repeated[t]) {
+            const bool is_solid = is_crowded && signs[t] != 0 && !repeated.all_of_part[t];
+            if (is_crowded && !is_solid && repeated.left_out[t]) {
                 turns_[t] = FaceTurn::left_out;
                 continue;
             }
             triangles_.push_back(given_[t]);
             source_.push_back(t);
+            solid_sign_.push_back(is_solid ? signs[t] : std::int8_t{0});
         }
         if (triangles_.size() < given_.size()) sorted_ = half_edges_by_edge(triangles_, positions_.size());
     }
@@ -101,6 +107,7 @@ private:
         closed_positions_ = std::move(cones.positions);
         positions_ = closed_positions_;
         triangles_.insert(triangles_.end(), closing.begin(), closing.end());
+        solid_sign_.resize(triangles_.size(), 0);
         sorted_ = half_edges_by_edge(triangles_, positions_.size());
     }
 
@@ -166,6 +173,8 @@ private:
     /// Turns what looks inwards in parts whose inside is known, and finds walls between matter and matter.
     void look_outwards() {
         const std::vector<double> volume = volumes();
+        std::vector<std::int8_t> solid(part_count_, 0);
+        for (std::size_t t = 0; t < triangles_.size(); ++t) solid[part_of(t)] |= solid_sign_[t];
         is_known_.assign(part_count_, 0);
         is_wall_.assign(triangles_.size(), 0);
         std::vector<std::uint8_t> turns(patches_.count, 0), walls(patches_.count, 0);
@@ -175,7 +184,10 @@ private:
         for (Index p = 0; p < patches_.count; ++p) {
             const Index part = patches_.part[p];
             if (is_one_sided_[part] || patches_.part_is_open[part]) continue;
-            if (patches_.part_is_simple[part]) {
+            if (solid[part] != 0) {
+                is_known_[part] = 1;
+                turns[p] = solid[part] < 0;
+            } else if (patches_.part_is_simple[part]) {
                 is_known_[part] = volume[part] != 0;
                 turns[p] = volume[part] < 0;
             } else if (sides.part_is_known[part]) {
@@ -265,6 +277,7 @@ private:
 
     std::vector<Triangle> triangles_;     ///< those that count, then cones
     std::vector<Index> source_;           ///< of each but the cones, in given_
+    std::vector<std::int8_t> solid_sign_; ///< 1, -1: its part is solids that touch or cross (winding_signs)
     std::vector<std::uint8_t> turned_;    ///< beside what they were
     std::vector<std::uint8_t> is_wall_;   ///< with matter on both sides
     std::vector<Index> sorted_;           ///< half-edges by edge
