@@ -97,7 +97,8 @@ std::vector<std::uint8_t> may_be_inside(const std::vector<Box>& boxes) {
 
 std::vector<Place> places_behind_faces(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
                                        std::span<const Index> part, const std::vector<Box>& boxes,
-                                       const std::vector<std::uint8_t>& may) {
+                                       const std::vector<std::uint8_t>& may,
+                                       std::span<const std::uint8_t> looks_inwards) {
     std::vector<std::size_t> left(boxes.size(), 0), seen(boxes.size(), 0); // triangles of each part
     for (const Index p : part)
         if (p != kNoIndex) ++left[p];
@@ -118,7 +119,8 @@ std::vector<Place> places_behind_faces(std::span<const Vec3f> positions, std::sp
         }
         const double largest = std::max(boxes[p].min.cwiseAbs().maxCoeff(), boxes[p].max.cwiseAbs().maxCoeff());
         const double behind = std::max(kBehind * std::sqrt(area), kNestingRounding * largest);
-        places.push_back({(a + b + c) / 3 - behind / area * normal, p});
+        const double way = (!looks_inwards.empty() && looks_inwards[p] ? behind : -behind) / area;
+        places.push_back({(a + b + c) / 3 + way * normal, p});
     }
     return places;
 }
@@ -126,7 +128,8 @@ std::vector<Place> places_behind_faces(std::span<const Vec3f> positions, std::sp
 } // namespace
 
 std::vector<Index> nesting_depths(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
-                                  std::span<const Index> part, std::size_t part_count) {
+                                  std::span<const Index> part, std::size_t part_count,
+                                  std::span<const std::uint8_t> looks_inwards) {
     std::vector<Index> depths(part_count, 0);
     if (part_count < 2) return depths;
     std::vector<Box> boxes(part_count);
@@ -134,7 +137,8 @@ std::vector<Index> nesting_depths(std::span<const Vec3f> positions, std::span<co
         if (part[t] != kNoIndex)
             for (const Vec3d& corner : corners_of(triangles[t], positions)) boxes[part[t]].extend(corner);
     const std::vector<std::uint8_t> may = may_be_inside(boxes);
-    const PlaceGrid grid(places_behind_faces(positions, triangles, part, boxes, may));
+    if (std::ranges::find(may, 1) == may.end()) return depths;
+    const PlaceGrid grid(places_behind_faces(positions, triangles, part, boxes, may, looks_inwards));
 
     std::vector<std::array<Index, 3>> crossings; // the place's part, the part crossed, the place
     for (std::size_t t = 0; t < triangles.size(); ++t) {
