@@ -189,7 +189,7 @@ OptionList inside_options(SampleArguments& options) {
                             "How the points are spread (unset: lattice)"),
             choice<Overlap>("--overlap", options.inside.overlap,
                             {{"parity", Overlap::parity}, {"merged", Overlap::merged}},
-                            "scan: closed parts that overlap are hollow there, or merged (unset: parity)"),
+                            "Closed parts that overlap are hollow there, or merged (unset: parity)"),
             Option("--accuracy", options.inside.accuracy, "winding: largest error of a winding number")
                 .between(1e-4, 0.1)
                 .with_default(),

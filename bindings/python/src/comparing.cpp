@@ -146,7 +146,8 @@ Returns
 -------
 dict
     The keys of `filigree info --json` (docs/command-line.md). Of a mesh counts, 'closed', 'manifold', 'oriented',
-    'box', 'area', 'volume', 'defects' (each a 'count' and the first five 'places') and 'quad_quality'; of a model
+    'box', 'area', 'volume' (by the way faces look), 'inside_volume' (None where open), 'inside_said', 'defects'
+    (each a 'count' and the first five 'places') and 'quad_quality'; of a model
     'code', 'levels' and what its code has.
 
 Examples
