@@ -11,7 +11,7 @@ namespace {
 
 /// What tells whether any face may have to be turned.
 struct Survey {
-    Closure closure;
+    Closure closure = {};
     bool is_crowded = false;          ///< an edge has more than two triangles
     std::size_t parts = 0;            ///< that share no edge
     DisjointSets joined;              ///< triangles of a part
