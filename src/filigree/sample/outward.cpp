@@ -305,11 +305,12 @@ std::string outward_sentence(const OutwardReport& r) {
     const auto add = [&](std::size_t count, const std::string& sentence) {
         if (count > 0) text += (text.empty() ? "" : " ") + sentence;
     };
-    const std::string of_parts = r.parts > 1 ? " of " + with_commas(r.parts) : "";
-    add(r.inward_parts, with_commas(r.inward_parts) + of_parts +
-                            (r.inward_parts == 1 ? " part looks inwards (it is inside out); its faces"
-                                                 : " parts look inwards (they are inside out); their faces") +
-                            " count as turned outwards.");
+    const std::string looking =
+        r.parts == 1          ? "The mesh looks inwards (it is inside out); its faces"
+        : r.inward_parts == 1 ? "1 of " + with_commas(r.parts) + " parts looks inwards (it is inside out); its faces"
+                              : with_commas(r.inward_parts) + " of " + with_commas(r.parts) +
+                                    " parts look inwards (they are inside out); their faces";
+    add(r.inward_parts, looking + " count as turned outwards.");
     add(r.cavities, times(r.cavities, "part lies inside another and counts as a hollow; its faces count as turned.",
                           "parts lie inside others and count as hollows; their faces count as turned."));
     add(r.turned_faces, times(r.turned_faces, "triangle runs against its neighbours and counts as turned.",
