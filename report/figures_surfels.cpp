@@ -95,8 +95,10 @@ Figure draw_surfels(FigureRenderer& renderer) {
     const Pose pose = warp_pose(*warp, model, context);
     const Restorer restorer = Restorer::create(model, {}, context).value();
     const std::vector<Vec3f> restored = restorer.positions(pose, context).value();
-    const Surfels carried = split_surfels(
-        carried_surfels(rest, restored, vertex_gradients(std::get<BlendDetail>(model.detail), pose.gradients)));
+    const Surfels carried =
+        split_surfels(
+            carried_surfels(rest, restored, vertex_gradients(std::get<BlendDetail>(model.detail), pose.gradients)))
+            .value();
 
     const double drawn_error = rms(drawn.positions, truth), carried_error = rms(restored, full.positions);
     Page page = captioned_page(

@@ -123,6 +123,8 @@ void run(FractureArguments options, Session& session) {
     const FractureCells cells = require(make_fracture_cells(mesh, options.pattern, context));
     FracturedMesh fractured = require(fracture(mesh, cells, options.cut, context));
     const double seconds = now_seconds() - start;
+    if (const std::string turned = outward_sentence(fractured.report.outward); !turned.empty())
+        session.warn(options.input + ": " + turned);
     if (!mesh.objects.empty() || !mesh.groups.empty())
         session.warn(options.input + ": its objects and groups are replaced by the pieces.");
     if (options.explode > 0) explode(fractured, options.explode);

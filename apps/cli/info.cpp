@@ -6,6 +6,9 @@
 #include "filigree/io/gltf.h"
 #include "filigree/mesh/topology.h"
 #include "filigree/remesh/quad_quality.h"
+#include "filigree/sample/closure.h"
+
+#include <cmath>
 
 #include <fmt/format.h>
 
@@ -103,14 +106,31 @@ void describe_size(const TopologyReport& topology, Report& report) {
         report.set("diagonal_units", box.diagonal());
     }
     report.add("area", fmt::format("{:.6g}", topology.area), "area", topology.area);
-    if (topology.is_closed() && topology.is_oriented()) report.row("volume", fmt::format("{:.6g}", topology.volume));
     report.set("volume", topology.volume);
+}
+
+/// What is inside, as sample, bodies and fracture see it; the volume of faces as they look is in the report as it was.
+void describe_inside(const Mesh& mesh, const TopologyReport& topology, Session& session, Report& report) {
+    constexpr double kSame = 1e-5; // of the volume: rounding
+    const InsideVolume inside = require(inside_volume(mesh, session.context()));
+    if (inside.volume) {
+        const bool differs = std::abs(*inside.volume - topology.volume) > kSame * std::abs(*inside.volume);
+        report.row("volume", differs ? fmt::format("{:.6g} inside ({:.6g} by the way the faces look)", *inside.volume,
+                                                   topology.volume)
+                                     : fmt::format("{:.6g}", *inside.volume));
+        report.set("inside_volume", *inside.volume);
+    } else {
+        report.set("inside_volume", Json());
+    }
+    if (const std::string turned = outward_sentence(inside.outward); !turned.empty()) report.row("inside", turned);
+    report.set("inside_said", outward_sentence(inside.outward));
 }
 
 void describe_mesh(const Mesh& mesh, Session& session, Report& report) {
     const TopologyReport topology = analyse_topology(mesh, session.context());
     describe_counts(topology, report);
     describe_size(topology, report);
+    describe_inside(mesh, topology, session, report);
     const std::vector<std::string> attributes = attribute_names(mesh);
     if (!attributes.empty()) report.row("attributes", fmt::format("{}", fmt::join(attributes, ", ")));
     report.set("attributes", attributes);

@@ -116,7 +116,7 @@ ValueRange Rendering::range_of(std::span<const float> values) const {
 void Rendering::upload_surfels(Subject& subject) {
     Surfels surfels = *subject.surfels;
     if (!subject.gradients.empty())
-        surfels = split_surfels(carried_surfels(surfels, subject.mesh.positions, subject.gradients));
+        surfels = require(split_surfels(carried_surfels(surfels, subject.mesh.positions, subject.gradients)));
     const Mesh polygons = surfel_polygons(surfels);
     std::vector<float> scalars;
     for (std::size_t f = 0; f < polygons.face_count() && !subject.scalars.empty(); ++f)

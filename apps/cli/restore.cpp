@@ -135,7 +135,7 @@ Mesh surfels_of(const Model& model, const Mesh& restored, std::span<const Mat3f>
     const Surfels rest = require(make_surfels(model.mesh, session.context()));
     if (rest.size() == 0) refuse(ErrorCode::unsuitable, options.model + ": has no faces to make surfels of.");
     return surfel_points(
-        split_surfels(carried_surfels(rest, restored.positions, vertex_gradients(*detail, gradients))));
+        require(split_surfels(carried_surfels(rest, restored.positions, vertex_gradients(*detail, gradients)))));
 }
 
 /// The driver as another program moved it. Vertices that it split for normals or UVs are made one again.

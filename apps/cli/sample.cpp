@@ -96,6 +96,8 @@ Found find_on_lattice(const Mesh& mesh, const SampleArguments& options, const Ru
 }
 
 void warn_of_doubts(const Found& found, const std::string& input, Session& session) {
+    if (const std::string turned = outward_sentence(found.inside.outward); !turned.empty())
+        session.warn(input + ": " + turned);
     if (found.points.empty())
         session.warn(fmt::format("{}: no point is inside; take a smaller spacing than {:.4g}.", input, found.spacing));
     const auto& winding = found.inside.winding;
@@ -187,7 +189,7 @@ OptionList inside_options(SampleArguments& options) {
                             "How the points are spread (unset: lattice)"),
             choice<Overlap>("--overlap", options.inside.overlap,
                             {{"parity", Overlap::parity}, {"merged", Overlap::merged}},
-                            "scan: closed parts that overlap are hollow there, or merged (unset: parity)"),
+                            "Closed parts that overlap are hollow there, or merged (unset: parity)"),
             Option("--accuracy", options.inside.accuracy, "winding: largest error of a winding number")
                 .between(1e-4, 0.1)
                 .with_default(),

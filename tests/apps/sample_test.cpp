@@ -42,6 +42,53 @@ TEST_F(Sample, AnOpenMeshIsTakenByWindingNumbers) {
     fails(7, {"sample", "open.obj", "-o", "x.ply", "--spacing", "0.1", "--method", "scan"}, {"open edges", "winding"});
 }
 
+/// A box of 2 x 2 x 2 with a smaller one inside it, all faces outwards: 7 are inside.
+std::string hollow_box() {
+    std::string text;
+    for (const char* half : {"1", "0.5"})
+        for (int corner = 0; corner < 8; ++corner) {
+            text += "v";
+            for (int axis = 0; axis < 3; ++axis) text += std::string(corner >> axis & 1 ? " " : " -") + half;
+            text += "\n";
+        }
+    constexpr int kFaces[6][4] = {{1, 3, 4, 2}, {5, 6, 8, 7}, {1, 2, 6, 5}, {3, 7, 8, 4}, {1, 5, 7, 3}, {2, 4, 8, 6}};
+    for (const int first : {0, 8})
+        for (const auto& face : kFaces) {
+            text += "f";
+            for (const int corner : face) text += " " + std::to_string(first + corner);
+            text += "\n";
+        }
+    return text;
+}
+
+TEST_F(Sample, EveryCommandHasOneInsideAndSaysWhatItTurned) {
+    write("hollow.obj", hollow_box());
+    const auto says_so = [](const Json& report) {
+        ASSERT_EQ(report.at("warnings").size(), 1u);
+        EXPECT_NE(report.at("warnings")[0].get<std::string>().find("counts as a hollow"), std::string::npos);
+    };
+    for (const char* method : {"auto", "scan", "rays", "winding"}) {
+        const Json sample = json({"sample", "hollow.obj", "-o", "p.ply", "--spacing", "0.1", "--method", method});
+        EXPECT_EQ(sample.at("points"), 7000);
+        says_so(sample);
+    }
+    const Json info = json({"info", "hollow.obj"});
+    EXPECT_NEAR(info.at("inside_volume").get<double>(), 7, 1e-9);
+    EXPECT_NE(info.at("inside_said").get<std::string>().find("hollow"), std::string::npos);
+    const Json fracture = json({"fracture", "hollow.obj", "-o", "f.obj", "--pieces", "5"});
+    EXPECT_NEAR(fracture.at("volume").get<double>(), 7, 1e-4);
+    EXPECT_EQ(fracture.at("open_edges"), 0);
+    says_so(fracture);
+    write("s.toml",
+          "[simulation]\nframes = 1\n[[body]]\nmesh = \"hollow.obj\"\nmaterial = \"rubber\"\nspacing = 0.125\n"
+          "[[obstacle]]\nshape = \"mesh\"\nmesh = \"hollow.obj\"\ncentre = [0, -5, 0]\n");
+    const Json simulated = json({"simulate", "s.toml", "-o", "s.pc2"});
+    EXPECT_NEAR(simulated.at("bodies")[0].at("volume_m3").get<double>(), 7, 0.07);
+    const std::string warnings = simulated.at("warnings").dump();
+    EXPECT_NE(warnings.find("body 'hollow'"), std::string::npos) << warnings;
+    EXPECT_NE(warnings.find("obstacle 'hollow.obj'"), std::string::npos) << warnings;
+}
+
 TEST_F(Sample, ThePictureStandsAsTheFileDoes) {
     if (!all_cases()) GTEST_SKIP() << "as Remesh.PictureIsDrawn: scripts/check cases runs it";
     ok({"make", "wavy-cube", "-o", "cube.stl", "--resolution", "8", "--quiet"}); // says nothing; STL has z up

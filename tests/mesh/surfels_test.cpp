@@ -85,7 +85,7 @@ TEST(Surfels, AffineMapsCarryThemExactly) {
         EXPECT_LT((carried.u[i] - a * rest.u[i]).norm(), 1e-7f);
     }
     EXPECT_EQ(uncovered(moved, carried), 0); // an affine map keeps what covers what
-    const Surfels split = split_surfels(carried);
+    const Surfels split = split_surfels(carried).value();
     EXPECT_GT(split.size(), carried.size());
     EXPECT_LT(uncovered(moved, split), 1e-3);
 }
@@ -98,7 +98,7 @@ TEST(Surfels, NoneStaysLong) {
     one.rest_radius = {1};
     one.corners = {{7, 7, 7}};
     one.weights = {Vec3f(1, 0, 0)};
-    const Surfels split = split_surfels(one);
+    const Surfels split = split_surfels(one).value();
     EXPECT_GT(split.size(), 100u);
     for (std::size_t i = 0; i < split.size(); ++i) {
         EXPECT_LE(split.u[i].norm(), kMostStretch);
@@ -107,9 +107,25 @@ TEST(Surfels, NoneStaysLong) {
         EXPECT_EQ(split.corners[i][0], 7u);
     }
     one.u = {Vec3f(1e30f, 0, 0)};
-    EXPECT_LE(split_surfels(one).size(), 1'000'000u);
+    EXPECT_LE(split_surfels(one)->size(), 1'000'000u);
     one.u = {Vec3f(std::numeric_limits<float>::infinity(), 0, 0)};
-    EXPECT_EQ(split_surfels(one).size(), 1u);
+    EXPECT_EQ(split_surfels(one)->size(), 1u);
+}
+
+TEST(Surfels, AreNotSplitWithoutEnd) {
+    Surfels many;
+    for (int i = 0; i < 20; ++i) {
+        many.positions.emplace_back(0, 0, float(i));
+        many.u.emplace_back(1e30f, 0, 0);
+        many.v.emplace_back(0, 0, 1);
+        many.rest_radius.push_back(1);
+        many.corners.push_back({0, 0, 0});
+        many.weights.emplace_back(1, 0, 0);
+    }
+    const auto refused = split_surfels(many, 5000);
+    ASSERT_FALSE(refused.ok());
+    EXPECT_EQ(refused.error().code, ErrorCode::unsuitable);
+    EXPECT_NE(refused.error().message.find("5,000"), std::string::npos) << refused.error().message;
 }
 
 TEST(Surfels, PointSetsHoldThem) {

@@ -8,6 +8,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <numeric>
 
 namespace filigree {
@@ -171,6 +173,93 @@ TEST(Body, BadMaterialsAndScalesAreRefused) {
     EXPECT_EQ(make_body(cube, {}, {.scale = 0, .cells = {}}, kAllThreads).error().code, ErrorCode::usage);
     EXPECT_EQ(make_body(cube, {}, {.cells = {.spacing = -1}}, kAllThreads).error().code, ErrorCode::usage);
     EXPECT_EQ(make_body(Mesh{}, {}, {}, kAllThreads).error().code, ErrorCode::unsuitable);
+}
+
+/// A cube of 4^2 quads a side, about the origin.
+Mesh cube_of(float half, bool inwards) {
+    Mesh cube = make_wavy_cube({.resolution = 4, .amplitude = 0});
+    const float size = 0.5f * float(bounds(cube).size().x());
+    for (Vec3f& p : cube.positions) p *= half / size;
+    if (inwards)
+        for (std::size_t f = 0; f < cube.face_count(); ++f)
+            std::reverse(cube.corners.begin() + cube.face_offsets[f], cube.corners.begin() + cube.face_offsets[f + 1]);
+    return cube;
+}
+
+TEST(Body, ItsMatterIsInsideHoweverFacesLook) {
+    for (const bool inwards : {false, true})
+        for (const bool has_hollow : {false, true}) {
+            Mesh mesh = cube_of(1, inwards);
+            if (has_hollow) { // whose faces look outwards, as exporters write them
+                const Mesh hollow = cube_of(0.5f, false);
+                for (std::size_t f = 0; f < hollow.face_count(); ++f) {
+                    std::vector<Index> face;
+                    for (const Index v : hollow.face(f)) face.push_back(v + Index(mesh.vertex_count()));
+                    mesh.add_face(face);
+                }
+                mesh.positions.insert(mesh.positions.end(), hollow.positions.begin(), hollow.positions.end());
+            }
+            for (const MaterialModel model : {MaterialModel::fem, MaterialModel::springs, MaterialModel::rigid,
+                                              MaterialModel::meshfree, MaterialModel::mpm}) {
+                BodyReport report;
+                const auto body = make_body(mesh, of(model), {.cells = {.spacing = 0.25}}, kAllThreads, &report);
+                ASSERT_TRUE(body) << body.error().message;
+                EXPECT_NEAR(sum(body->mass), has_hollow ? 7000 : 8000, 10);
+                EXPECT_EQ(report.warning.find("inwards") != std::string::npos, inwards) << report.warning;
+                EXPECT_EQ(report.warning.find("hollow") != std::string::npos, has_hollow) << report.warning;
+            }
+        }
+}
+
+TEST(Body, WeighsWhatItsMeshHolds) {
+    Mesh plate = cube_of(1, false);
+    for (Vec3f& p : plate.positions) p = p.cwiseProduct(Vec3f(0.5f, 0.5f, 0.01f)); // in cells of 0.047
+    for (const MaterialModel model : {MaterialModel::fem, MaterialModel::rigid, MaterialModel::mpm}) {
+        const auto body = make_body(plate, of(model), {.cells = {.spacing = 0.047}}, kAllThreads);
+        EXPECT_NEAR(sum(body->mass), 1000 * 0.02, 0.2);
+    }
+    const Mesh ball = make_wavy_sphere({.resolution = 40, .amplitude = 0});
+    for (const double spacing : {0.3, 0.2, 0.1}) {
+        const auto body = make_body(ball, of(MaterialModel::fem), {.cells = {.spacing = spacing}}, kAllThreads);
+        EXPECT_NEAR(sum(body->mass) / 523.6, 1, 0.01) << spacing;
+    }
+}
+
+TEST(Body, MatterOfARoundBeamLiesWhereItIs) {
+    constexpr int kSides = 48, kRings = 9;
+    Mesh beam;
+    for (int ring = 0; ring < kRings; ++ring)
+        for (int side = 0; side < kSides; ++side) {
+            const double angle = 2 * 3.14159265358979 * side / kSides;
+            beam.positions.emplace_back(0.25f * float(ring), float(0.5 * std::cos(angle)),
+                                        float(0.5 * std::sin(angle)));
+        }
+    std::vector<Index> first(kSides), last(kSides);
+    for (Index side = 0; side < kSides; ++side) {
+        first[side] = kSides - 1 - side;
+        last[side] = (kRings - 1) * kSides + side;
+        for (Index ring = 0; ring + 1 < kRings; ++ring) {
+            const Index next = (side + 1) % kSides, at = ring * kSides;
+            beam.add_face(std::array<Index, 4>{at + side, at + next, at + kSides + next, at + kSides + side});
+        }
+    }
+    beam.add_face(first);
+    beam.add_face(last);
+    const double area = kSides * 0.125 * std::sin(2 * 3.14159265358979 / kSides),
+                 exact = area * area / (4 * 3.14159265);
+    for (const int across : {4, 6, 8}) {
+        const auto body = make_body(beam, of(MaterialModel::fem), {.cells = {.spacing = 1.0 / across}}, kAllThreads);
+        const Cells& cells = body->cells;
+        const double h = cells.spacing;
+        double sum = 0, bending = 0; // of all, and of the second moment about z, which bending stiffness goes by
+        for (std::size_t c = 0; c < cells.cells.size(); ++c) {
+            const double y = cells.origin.y() + h * (cells.cells[c][1] + 0.5);
+            sum += double(cells.fraction[c]) * h * h * h;
+            bending += double(cells.fraction[c]) * h * h * h * (y * y + h * h / 12);
+        }
+        EXPECT_NEAR(sum, 2 * area, 0.01 * area);
+        EXPECT_NEAR(bending / (2 * exact), 1, 0.055) << across; // 1.115 and more where cells keep what is theirs
+    }
 }
 
 } // namespace

@@ -128,5 +128,19 @@ TEST(DistanceField, BadRequestsAreRefused) {
     EXPECT_EQ(field.error().code, ErrorCode::cancelled);
 }
 
+TEST(DistanceField, AnObstacleThatIsInsideOutIsSolid) {
+    Mesh cube = make_wavy_cube({.resolution = 4, .amplitude = 0});
+    OutwardReport outward;
+    const DistanceField right = DistanceField::create(cube, 1, 0, kAllThreads, &outward).value();
+    EXPECT_TRUE(outward.is_as_it_was());
+    for (std::size_t f = 0; f < cube.face_count(); ++f)
+        std::reverse(cube.corners.begin() + cube.face_offsets[f], cube.corners.begin() + cube.face_offsets[f + 1]);
+    const DistanceField turned = DistanceField::create(cube, 1, 0, kAllThreads, &outward).value();
+    EXPECT_EQ(outward.inward_parts, 1u);
+    EXPECT_LT(turned.at(Vec3f::Zero()).distance, 0);
+    for (const Vec3f& p : {Vec3f(0, 0, 0), Vec3f(0.4f, 0.1f, 0), Vec3f(0.7f, 0, 0.2f)})
+        EXPECT_NEAR(turned.at(p).distance, right.at(p).distance, 1e-6f);
+}
+
 } // namespace
 } // namespace filigree

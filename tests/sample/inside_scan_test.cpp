@@ -570,6 +570,11 @@ TEST(InsideScan, RefusesWhatIsTooMuchAndSaysHowMuch) {
     EXPECT_FALSE(scan_inside(box.view(), small, {.most_bytes = 100000}, context).ok());
     EXPECT_TRUE(scan_inside(box.view(), small, {.most_bytes = 200000}, context).ok());
     EXPECT_FALSE(scan_inside(box.view(), small, {.overlap = Overlap::merged, .most_bytes = 200000}, context).ok());
+    const auto windings = scan_winding(box.view(), *large, 0, 4096, context);
+    ASSERT_FALSE(windings.ok());
+    EXPECT_EQ(windings.error().code, ErrorCode::unsuitable);
+    EXPECT_NE(windings.error().message.find("8192 x 8192 x 4096"), std::string::npos) << windings.error().message;
+    EXPECT_TRUE(scan_winding(box.view(), *large, 7, 1, context).ok());
 }
 
 TEST(InsideScan, RefusesLatticesThatAreNone) {

@@ -3,6 +3,7 @@
 #include <filigree/mesh/mesh_distance.h>
 #include <filigree/mesh/topology.h>
 #include <filigree/remesh/quad_quality.h>
+#include <filigree/sample/closure.h>
 
 namespace filigree::python {
 
@@ -89,10 +90,13 @@ py::dict model_info(const Model& model) {
 py::dict info(const py::object& given, unsigned threads) {
     if (py::isinstance<PyModel>(given)) return model_info(*model_of(given));
     const MeshPtr mesh = mesh_of(given);
-    const auto [topology, quality] = LongCall{threads}([&](const RunContext& context) {
-        return std::pair(analyse_topology(*mesh, context), measure_quads(*mesh, context));
+    const auto [topology, quality, inside] = LongCall{threads}([&](const RunContext& context) {
+        return std::tuple(analyse_topology(*mesh, context), measure_quads(*mesh, context),
+                          inside_volume(*mesh, context).value());
     });
     py::dict said = mesh_info(*mesh, topology);
+    said["inside_volume"] = inside.volume;
+    said["inside_said"] = outward_sentence(inside.outward);
     if (topology.quads > 0) said["quad_quality"] = quad_info(quality);
     return said;
 }
@@ -142,7 +146,8 @@ Returns
 -------
 dict
     The keys of `filigree info --json` (docs/command-line.md). Of a mesh counts, 'closed', 'manifold', 'oriented',
-    'box', 'area', 'volume', 'defects' (each a 'count' and the first five 'places') and 'quad_quality'; of a model
+    'box', 'area', 'volume' (by the way faces look), 'inside_volume' (None where open), 'inside_said', 'defects'
+    (each a 'count' and the first five 'places') and 'quad_quality'; of a model
     'code', 'levels' and what its code has.
 
 Examples

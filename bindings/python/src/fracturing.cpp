@@ -54,11 +54,13 @@ FracturedPtr fracture_mesh(const py::object& given, std::size_t pieces, const st
     pattern.roughness = roughness;
     if (edge && !(*edge >= 0)) refuse("edge has to be 0 or more.");
     if (!(smallest >= 0 && smallest <= 1)) refuse("smallest has to be from 0 to 1.");
-    return LongCall{threads, progress, seed}.owning([=](const RunContext& context) {
+    FracturedPtr fractured = LongCall{threads, progress, seed}.owning([=](const RunContext& context) {
         const FractureCells cells = make_fracture_cells(*mesh, pattern, context).value();
         const FractureOptions options{.edge = edge, .smallest = smallest};
         return std::make_shared<const FracturedMesh>(fracture(*mesh, cells, options, context).value());
     });
+    warn_of_turns(fractured->report.outward);
+    return fractured;
 }
 
 } // namespace

@@ -234,6 +234,10 @@ MeshPtr mesh_of(const py::handle& given, const char* name) {
                      py::none(), py::none(), {});
 }
 
+void warn_of_turns(const OutwardReport& outward) {
+    if (const std::string sentence = outward_sentence(outward); !sentence.empty()) warn({sentence});
+}
+
 Box box_of(const py::handle& given) {
     if (py::isinstance<PyModel>(given)) return world_bounds(given.cast<const PyModel&>().model->mesh);
     if (py::hasattr(given, "vertices")) return world_bounds(*mesh_of(given, "box"));

@@ -4,6 +4,7 @@
 #include "arrays.h"
 
 #include <filigree/mesh/mesh.h>
+#include <filigree/sample/outward.h>
 
 #include <memory>
 
@@ -17,5 +18,8 @@ MeshPtr mesh_of(const py::handle& given, const char* name = "mesh");
 
 /// Of a mesh, a model, or points: their box in the world.
 Box box_of(const py::handle& given);
+
+/// Warns of what of a mesh counts as turned, if anything does. Needs the interpreter.
+void warn_of_turns(const OutwardReport& outward);
 
 } // namespace filigree::python

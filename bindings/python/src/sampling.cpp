@@ -38,6 +38,7 @@ PyInsideTest make_test(const py::object& given, const std::string& method, const
     auto test = LongCall{threads, progress}.owning([=](const RunContext& context) {
         return std::make_shared<const InsideTest>(InsideTest::create(*mesh, options, context).value());
     });
+    warn_of_turns(test->outward());
     return {std::move(test), mesh->origin};
 }
 
@@ -52,16 +53,28 @@ py::array_t<bool> ask(const PyInsideTest& self, const py::object& given, unsigne
     return take<bool>(std::move(inside), Shape{count});
 }
 
+/// Points of the world, and how they were found.
+struct Sampled {
+    std::vector<Vec3d> points;
+    InsideReport report;
+};
+
+py::array_t<double> take_warned(Sampled&& found) {
+    warn_of_turns(found.report.outward);
+    return take(std::move(found.points));
+}
+
 /// The report's points: in the view from the eye, in regular steps across the picture and in depth.
 py::array_t<double> sample_in_view(const MeshPtr& mesh, const std::array<std::size_t, 3>& counts, InsideOptions options,
                                    const LongCall& call) {
     Frustum frustum = frustum_around(bounds(mesh->positions), options.eye);
     options.eye = frustum.eye;
     frustum.counts = counts;
-    return take(call.owning([=](const RunContext& context) {
-        std::vector<Vec3d> inside = points_inside(*mesh, frustum_points(frustum).value(), options, context).value();
-        for (Vec3d& point : inside) point += mesh->origin;
-        return inside;
+    return take_warned(call.owning([=](const RunContext& context) {
+        Sampled found;
+        found.points = points_inside(*mesh, frustum_points(frustum).value(), options, context, &found.report).value();
+        for (Vec3d& point : found.points) point += mesh->origin;
+        return found;
     }));
 }
 
@@ -80,13 +93,14 @@ py::array_t<double> sample(const py::object& given, std::optional<double> spacin
                           {{"lattice", Pattern::lattice}, {"jitter", Pattern::jitter}, {"poisson", Pattern::poisson}});
     LatticeOptions wanted{.spacing = spacing.value_or(0)};
     if (const auto at = optional_vector_of(origin, "origin")) wanted.origin = *at - mesh->origin;
-    return take(LongCall{threads, progress, seed}.owning([=](const RunContext& context) {
+    return take_warned(LongCall{threads, progress, seed}.owning([=](const RunContext& context) {
         LatticeOptions lattice = wanted;
         if (count) lattice.spacing = spacing_for_count(*mesh, *count, options, context).value();
         const Lattice points = make_lattice(bounds(mesh->positions), lattice).value();
-        std::vector<Vec3d> inside = spread_inside(*mesh, points, how, options, context).value();
-        for (Vec3d& point : inside) point += mesh->origin;
-        return inside;
+        Sampled found;
+        found.points = spread_inside(*mesh, points, how, options, context, &found.report).value();
+        for (Vec3d& point : found.points) point += mesh->origin;
+        return found;
     }));
 }
 
@@ -102,7 +116,7 @@ method : str
     'auto' ('scan' where the mesh is closed, else 'winding'), 'scan' and 'rays' (exact, closed meshes alone),
     'winding' (any mesh).
 overlap : str
-    Scan: closed parts that overlap are hollow there ('parity') or 'merged'.
+    Closed parts that overlap are hollow there ('parity') or 'merged'. Open meshes are always merged.
 accuracy : float
     Winding: largest error of a winding number, 0.0001 to 0.1.
 eye : array_like, (3,), optional

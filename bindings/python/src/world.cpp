@@ -169,10 +169,12 @@ A box along the axes before its motion; m. The others as of `plane`.
            double restitution, double stiffness, const py::object& temperature, double heat_transfer, unsigned threads,
            const py::object& progress) {
             const MeshPtr mesh = mesh_of(given);
+            OutwardReport outward;
             auto field = LongCall{threads, progress}([&](const RunContext& context) {
                 return std::make_shared<const DistanceField>(
-                    DistanceField::create(*mesh, scale, spacing, context).value());
+                    DistanceField::create(*mesh, scale, spacing, context, &outward).value());
             });
+            warn_of_turns(outward);
             return make_obstacle(MeshObstacle{std::move(field), scale * mesh->origin}, motion, friction, restitution,
                                  stiffness, temperature, heat_transfer);
         },
@@ -184,6 +186,7 @@ A box along the axes before its motion; m. The others as of `plane`.
 --
 
 A mesh, `scale` metres a model unit, as a field of distances with this `spacing` (m; 0: a 64th of the longest side).
+Warns where faces look inwards and count as turned: a room whose faces look inwards is a solid block.
 )");
 
     py::class_<Pin>(m, "Pin", R"(Particles held fast.

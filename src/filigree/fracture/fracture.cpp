@@ -1,10 +1,12 @@
 #include "filigree/fracture/fracture.h"
 
 #include "filigree/fracture/piece_assembly.h"
+#include "filigree/sample/closure.h"
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <optional>
 
 namespace filigree {
 
@@ -51,24 +53,37 @@ void report_sizes(const CutSurface& cut, std::span<const CellTriangle> triangles
     report.largest = size.back();
 }
 
-} // namespace
+/// Turns a face's corners over, the first of them staying the first.
+void turn_face(Mesh& mesh, Index face) {
+    const auto turn = [&](std::vector<Index>& corners) {
+        if (!corners.empty())
+            std::reverse(corners.begin() + mesh.face_offsets[face] + 1, corners.begin() + mesh.face_offsets[face + 1]);
+    };
+    turn(mesh.corners);
+    turn(mesh.uvs.corners);
+    turn(mesh.normals.corners);
+}
 
-Result<FracturedMesh> fracture(const Mesh& mesh, const FractureCells& cells, const FractureOptions& options,
-                               const RunContext& context) {
-    if (mesh.face_count() == 0)
-        return Error{ErrorCode::unsuitable, "The mesh has no faces: there is nothing to break."};
-    const Result<Surface> surface = make_surface(mesh, context);
-    if (!surface) return surface.error();
-    if (surface->triangles.empty())
-        return Error{ErrorCode::unsuitable,
-                     "No face of the mesh has three different corners: there is nothing to break."};
-    CutReport report;
+/// The mesh with the faces turned that look inwards; nothing where there is none.
+std::optional<Mesh> turned_outwards(const Mesh& mesh, const Surface& surface, OutwardReport& outward) {
+    const std::vector<FaceTurn> turns = turns_of(surface, mesh.positions, outward);
+    if (std::ranges::find(turns, FaceTurn::turned) == turns.end()) return std::nullopt;
+    Mesh turned = mesh;
+    for (std::size_t t = 0; t < turns.size(); ++t) {
+        const bool is_first = t == 0 || surface.source_face[t] != surface.source_face[t - 1];
+        if (is_first && turns[t] == FaceTurn::turned) turn_face(turned, surface.source_face[t]);
+    }
+    return turned;
+}
+
+Result<FracturedMesh> fracture_outward(const Mesh& mesh, const Surface& surface, const FractureCells& cells,
+                                       const FractureOptions& options, CutReport report, const RunContext& context) {
     double start = now();
     const auto lap = [&start] {
         const double before = start;
         return (start = now()) - before;
     };
-    Result<CutSurface> cut = cut_surface(mesh, *surface, cells, context);
+    Result<CutSurface> cut = cut_surface(mesh, surface, cells, context);
     if (!cut) return cut.error();
     report.cut_seconds = lap();
     report.closing_triangles = cut->closing_triangles;
@@ -93,7 +108,7 @@ Result<FracturedMesh> fracture(const Mesh& mesh, const FractureCells& cells, con
     report.islands = parts.islands;
     report.joined = parts.joined;
     FracturedMesh result =
-        assemble_pieces(mesh, *surface, *cut, *facets, cells, triangles, parts.piece, report.is_sheet, context);
+        assemble_pieces(mesh, surface, *cut, *facets, cells, triangles, parts.piece, report.is_sheet, context);
     report.inside_faces = result.report.inside_faces;
     report.assemble_seconds = lap();
     if (!report.is_sheet) report.open_edges = count_open_edges(*cut, triangles, parts.piece);
@@ -101,6 +116,24 @@ Result<FracturedMesh> fracture(const Mesh& mesh, const FractureCells& cells, con
     result.report = report;
     if (context.is_cancelled()) return cancelled_error();
     return result;
+}
+
+} // namespace
+
+Result<FracturedMesh> fracture(const Mesh& mesh, const FractureCells& cells, const FractureOptions& options,
+                               const RunContext& context) {
+    if (mesh.face_count() == 0)
+        return Error{ErrorCode::unsuitable, "The mesh has no faces: there is nothing to break."};
+    Result<Surface> surface = make_surface(mesh, context);
+    if (!surface) return surface.error();
+    if (surface->triangles.empty())
+        return Error{ErrorCode::unsuitable,
+                     "No face of the mesh has three different corners: there is nothing to break."};
+    CutReport report;
+    const std::optional<Mesh> turned = turned_outwards(mesh, *surface, report.outward);
+    if (turned) surface = make_surface(*turned, context);
+    if (!surface) return surface.error();
+    return fracture_outward(turned ? *turned : mesh, *surface, cells, options, std::move(report), context);
 }
 
 void explode(FracturedMesh& fractured, double distance) {

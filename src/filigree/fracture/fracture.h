@@ -2,6 +2,7 @@
 #pragma once
 
 #include "filigree/fracture/cut_surface.h"
+#include "filigree/sample/outward.h"
 
 #include <optional>
 
@@ -28,6 +29,7 @@ struct CutReport {
     std::size_t open_edges = 0;   ///< of pieces, where edges do not cancel; the mesh's own open borders count as closed
     std::size_t closing_triangles = 0; ///< that closed those borders while it was cut
     bool is_sheet = false;   ///< the mesh has no inside: pieces are parts of its surface, without inner surfaces
+    OutwardReport outward;   ///< what of the mesh was turned first
     double volume = 0;       ///< of the mesh, its borders closed; model units cubed
     double volume_error = 0; ///< |sum of the pieces' volumes / volume - 1|; 0 for sheets
     double smallest = 0, median = 0, largest = 0; ///< volumes of pieces (areas of a sheet's)

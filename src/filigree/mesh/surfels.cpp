@@ -1,5 +1,6 @@
 #include "filigree/mesh/surfels.h"
 
+#include "filigree/core/text.h"
 #include "filigree/mesh/normals.h"
 #include "filigree/mesh/triangulate.h"
 
@@ -139,7 +140,7 @@ Surfels carried_surfels(const Surfels& rest, std::span<const Vec3f> positions, s
     return carried;
 }
 
-Surfels split_surfels(const Surfels& surfels) {
+Result<Surfels> split_surfels(const Surfels& surfels, std::size_t most) {
     constexpr std::size_t kMostParts = 1'000'000;
     Surfels split;
     split.origin = surfels.origin;
@@ -160,6 +161,10 @@ Surfels split_surfels(const Surfels& surfels) {
                 ++made;
                 continue;
             }
+            if (split.size() == most)
+                return Error{ErrorCode::unsuitable,
+                             "The surfels are stretched so far that they take more than " + with_commas(most) +
+                                 " pieces; deform the mesh less, or take one with more vertices where it stretches."};
             split.positions.push_back(part.position);
             split.u.push_back(part.u);
             split.v.push_back(part.v);

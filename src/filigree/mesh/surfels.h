@@ -34,9 +34,11 @@ Result<Surfels> make_surfels(const Mesh& mesh, const RunContext& context);
 /// one a vertex of the mesh that the surfels were made of. Cost O(surfels).
 Surfels carried_surfels(const Surfels& rest, std::span<const Vec3f> positions, std::span<const Mat3f> gradients);
 
+inline constexpr std::size_t kMostSplitSurfels = 20'000'000; ///< 2 GB
 /// Surfels longer than kMostStretch of their disc's radius become two, each 0.62 as long, and so on: one flat ellipse
 /// cannot follow the surface that it has been drawn over. At most a million from one. Cost O(surfels made).
-Surfels split_surfels(const Surfels& surfels);
+/// Errors: unsuitable (more than `most` in all).
+Result<Surfels> split_surfels(const Surfels& surfels, std::size_t most = kMostSplitSurfels);
 inline constexpr float kMostStretch = 1.9f;
 
 /// As a point set that files hold: normals, colours, and the scalars ux uy uz vx vy vz.

@@ -2,6 +2,7 @@
 
 #include "filigree/core/dense_solve.h"
 #include "filigree/core/parallel_for.h"
+#include "filigree/physics/cell_shares.h"
 #include "filigree/physics/mesh_cells.h"
 #include "filigree/physics/surface_points.h"
 
@@ -214,12 +215,13 @@ Status add_field(Body& body, const Mesh& mesh, const RunContext& context) {
     return Success{};
 }
 
-std::string warning_of(const CellReport& cells) {
-    std::string warning;
+std::string warning_of(const CellReport& cells, const OutwardReport& outward) {
+    std::string warning = outward_sentence(outward);
     if (cells.thin_cells > 0)
-        warning = std::to_string(cells.thin_cells) + " of " + std::to_string(cells.cells) +
-                  " cells lie in parts fewer than two cells across, which will be too soft or too stiff there; more "
-                  "particles make them right.";
+        warning += (warning.empty() ? "" : " ") + std::to_string(cells.thin_cells) + " of " +
+                   std::to_string(cells.cells) +
+                   " cells lie in parts fewer than two cells across, which will be too soft or too stiff there; more "
+                   "particles make them right.";
     if (cells.loose_parts > 0)
         warning += (warning.empty() ? "" : " ") + std::to_string(cells.loose_parts) +
                    " small unconnected part(s) have no particles of their own and go along with the nearest ones.";
@@ -244,6 +246,7 @@ Result<Body> make_body(const Mesh& mesh, const Material& material, const BodyOpt
     body.material = material;
     body.scale = options.scale;
     body.cells = std::move(cells).value();
+    if (!uses_centroids(material.model)) share_with_neighbours(body.cells);
     found.split_cells = make_particles(body, context);
     SurfacePoints spread =
         spread_on_surface(mesh.positions, welded->triangles, options.scale, point_spacing(material) * body.spacing());
@@ -255,7 +258,8 @@ Result<Body> make_body(const Mesh& mesh, const Material& material, const BodyOpt
 
     found.surface_points = body.surface.points.size();
     for (const float mass : body.mass) found.mass += mass;
-    found.warning = warning_of(found.cells);
+    found.outward = welded->outward;
+    found.warning = warning_of(found.cells, found.outward);
     return body;
 }
 

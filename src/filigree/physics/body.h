@@ -50,8 +50,9 @@ struct BodyReport {
     CellReport cells;
     std::size_t split_cells = 0; ///< meshfree: with eight particles
     std::size_t surface_points = 0;
-    double mass = 0;     ///< kg
-    std::string warning; ///< a sentence where parts are fewer than two cells across, or left out; or ""
+    double mass = 0;       ///< kg
+    OutwardReport outward; ///< what of the mesh counts as turned
+    std::string warning;   ///< sentences where parts are fewer than two cells across, left out, or turned; or ""
 };
 
 /// A body from a mesh. Errors: as make_cells; usage (check_material, scale).

@@ -18,7 +18,8 @@ struct Cells {
     std::vector<LatticeIndex> cells;
     std::vector<LatticeIndex> corners;
     std::vector<std::array<Index, 8>> cell_corners; ///< corner with bits x = 1, y = 2, z = 4
-    std::vector<float> fraction;                    ///< occupied part of each cell's volume, kLeastFraction .. 1
+    std::vector<float> fraction;                    ///< occupied part of each cell's volume, kLeastFraction .. 1;
+                                                    ///< above 1 where neighbours have shared theirs (cell_shares.h)
     std::vector<Vec3f> centroid;                    ///< of the occupied part, m, relative to the mesh's origin
 
     /// Below this a cell counts as this full: emptier ones would be all stiffness noise and no mass.

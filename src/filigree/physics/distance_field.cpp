@@ -148,7 +148,8 @@ Result<DistanceGrid> make_distance_grid(const Box& box, double spacing, double s
 
 } // namespace
 
-Result<DistanceField> DistanceField::create(const Mesh& mesh, double scale, double spacing, const RunContext& context) {
+Result<DistanceField> DistanceField::create(const Mesh& mesh, double scale, double spacing, const RunContext& context,
+                                            OutwardReport* outward) {
     if (!std::isfinite(scale) || scale <= 0)
         return Error{ErrorCode::usage, "The scale is " + short_number(scale) + "; give metres a model unit, above 0."};
     if (!std::isfinite(spacing) || spacing < 0)
@@ -157,6 +158,7 @@ Result<DistanceField> DistanceField::create(const Mesh& mesh, double scale, doub
     const Result<WeldedTriangles> welded_triangles = weld_triangles(mesh, context);
     if (!welded_triangles) return welded_triangles.error();
     const WeldedTriangles& welded = *welded_triangles;
+    if (outward) *outward = welded.outward;
     if (welded.triangles.empty())
         return Error{ErrorCode::unsuitable, "The mesh has no faces with an area, so nothing has a distance from it."};
     Box box;
@@ -198,10 +200,10 @@ Result<DistanceField> DistanceField::create(const Mesh& mesh, double scale, doub
     for (int axis = 0; axis < 3; ++axis)
         for (std::size_t i = 0; i < grid.counts[axis]; ++i)
             lattice.coordinates[axis].push_back(grid.corner[axis] + double(i) * grid.spacing);
-    const Result<Occupancy> inside =
-        welded.closure.is_closed() && welded.closure.is_oriented()
-            ? scan_inside({mesh.positions, welded.triangles}, lattice, {.overlap = Overlap::merged}, context)
-            : winding_inside({mesh.positions, welded.triangles}, lattice, {}, context);
+    const Result<InsideSampler> sampler =
+        InsideSampler::create(mesh.positions, welded, {.overlap = Overlap::merged}, context);
+    if (!sampler) return sampler.error();
+    const Result<Occupancy> inside = sampler->inside(lattice, context);
     if (!inside) return inside.error();
 
     DistanceField field;

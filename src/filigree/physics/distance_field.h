@@ -4,6 +4,7 @@
 #include "filigree/core/result.h"
 #include "filigree/core/run_context.h"
 #include "filigree/mesh/mesh.h"
+#include "filigree/sample/outward.h"
 
 namespace filigree {
 
@@ -16,9 +17,10 @@ public:
     };
 
     /// Of a mesh with coordinates times `scale`, relative to the mesh's origin; `spacing` in m (0: a 64th of the
-    /// longest side). Inside is told as by InsideMethod::automatic. Errors: as InsideTest; unsuitable (more than 2^27
-    /// points), cancelled.
-    static Result<DistanceField> create(const Mesh& mesh, double scale, double spacing, const RunContext& context);
+    /// longest side). Inside is told as by InsideMethod::automatic, overlaps merged. outward: what of the mesh counts
+    /// as turned. Errors: as InsideTest; unsuitable (more than 2^27 points), cancelled.
+    static Result<DistanceField> create(const Mesh& mesh, double scale, double spacing, const RunContext& context,
+                                        OutwardReport* outward = nullptr);
 
     /// Outside the grid a lower bound: the distance to the grid, or what the border's distance leaves of it.
     Sample at(const Vec3f& point) const;

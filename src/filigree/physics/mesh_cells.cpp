@@ -24,6 +24,12 @@ public:
     }
 
     const Box& box() const { return mesh_.box; }
+    Status find_volume() {
+        const Result<std::optional<double>> volume = exact_volume(mesh_, context_);
+        if (!volume) return volume.error();
+        volume_ = *volume;
+        return Success{};
+    }
 
     /// spacing: model units.
     Result<Cells> make(double spacing, CellReport& report) const {
@@ -32,6 +38,7 @@ public:
         Result<std::vector<Draft>> drafts = sample_cells(mesh_, *grid, scale_, context_);
         if (!drafts) return drafts.error();
         add_surface_cells(mesh_, *grid, *drafts);
+        if (volume_) match_volume(*drafts, *volume_ / (spacing * spacing * spacing));
         if (context_.is_cancelled()) return cancelled_error();
         if (double(drafts->size()) > kMostCells) return too_many_cells(*grid, double(drafts->size()), scale_);
         Cells cells = finish(*grid, *drafts);
@@ -71,7 +78,8 @@ private:
 
     MeshToFill mesh_;
     double scale_;
-    RunContext context_; ///< without progress: the spacings are counted, not what each takes
+    std::optional<double> volume_; ///< exact, model units cubed
+    RunContext context_;           ///< without progress: the spacings are counted, not what each takes
 };
 
 /// What came of a spacing.
@@ -158,8 +166,9 @@ Result<Cells> make_cells(const Mesh& mesh, const WeldedTriangles& welded, double
                          CellReport* report) {
     if (welded.triangles.empty())
         return Error{ErrorCode::unsuitable, "The mesh has no faces with an area, so no body can be made of it."};
-    const CellMaker maker(mesh, welded, scale, context);
+    CellMaker maker(mesh, welded, scale, context);
     if (const auto error = check(maker, scale, options)) return *error;
+    if (const Status found = maker.find_volume(); !found) return found.error();
     Trial trial;
     if (options.spacing > 0) {
         Result<Cells> cells = maker.make(options.spacing / scale, trial.report);

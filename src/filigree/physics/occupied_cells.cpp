@@ -17,6 +17,9 @@ constexpr double kMostGridCells = 0x1p30; // of the box, one byte each
 constexpr std::size_t kMostAlong = 16383; // times four samples: what scan_inside takes on an axis
 // Samples a cell along each axis: a closed mesh is scanned at a nanosecond each, a winding number takes microseconds.
 constexpr unsigned kSamples = 4, kWindingSamples = 2;
+// Where cells are few, how full those are that were found is looked at more closely: they are what bends.
+constexpr unsigned kCloserSamples = 8;
+constexpr double kMostCloserPoints = 0x1p24;
 constexpr double kMostWindings = 0x1p20; // beyond, one sample a cell
 constexpr double kWindingAccuracy = 0.03;
 constexpr std::size_t kSlabBytes = std::size_t{1} << 27;
@@ -43,11 +46,20 @@ struct Samples {
     std::array<unsigned, 3> sums = {}; ///< of the samples' places in the cell, counted from 0
 };
 
-/// Adds up to four samples, in the bits of `row`, in row (y, z) of the cell.
+/// Sums of the places of the bits of each byte.
+constexpr std::array<std::uint8_t, 256> kPlaceSums = [] {
+    std::array<std::uint8_t, 256> sums = {};
+    for (unsigned byte = 0; byte < 256; ++byte)
+        for (unsigned bit = 0; bit < 8; ++bit)
+            if (byte >> bit & 1) sums[byte] = std::uint8_t(sums[byte] + bit);
+    return sums;
+}();
+
+/// Adds up to eight samples, in the bits of `row`, in row (y, z) of the cell.
 void add_samples(Samples& samples, unsigned row, unsigned y, unsigned z) {
     const auto count = unsigned(std::popcount(row));
     samples.count += count;
-    samples.sums[0] += (row >> 1 & 1) + 2 * (row >> 2 & 1) + 3 * (row >> 3 & 1);
+    samples.sums[0] += kPlaceSums[row];
     samples.sums[1] += count * y;
     samples.sums[2] += count * z;
 }
@@ -95,6 +107,32 @@ std::vector<Draft> find_occupied(const Grid& grid, const Occupancy& occupancy, u
     std::vector<Draft> cells;
     for (const auto& layer : layers) cells.insert(cells.end(), layer.begin(), layer.end());
     return cells;
+}
+
+/// Cells of layers k_begin .. k_end - 1 with some of their n^3 samples inside.
+Result<std::vector<Draft>> sample_layers(const InsideSampler& sampler, const Grid& grid, unsigned n,
+                                         std::size_t k_begin, std::size_t k_end, const RunContext& context) {
+    const Lattice lattice = sample_points(grid, n, k_begin, k_end);
+    const Result<Occupancy> occupancy = sampler.inside(lattice, context);
+    if (!occupancy) return occupancy.error();
+    return find_occupied(grid, *occupancy, n, k_begin, k_end, context);
+}
+
+bool draft_precedes(const Draft& a, const Draft& b) {
+    return std::tie(a.index[2], a.index[1], a.index[0]) < std::tie(b.index[2], b.index[1], b.index[0]);
+}
+
+/// Gives cells the fractions and centroids that more samples find; no cell comes or goes.
+Status look_closer(const InsideSampler& sampler, const Grid& grid, std::vector<Draft>& cells,
+                   const RunContext& context) {
+    const Result<std::vector<Draft>> closer = sample_layers(sampler, grid, kCloserSamples, 0, grid.counts[2], context);
+    if (!closer) return closer.error();
+    auto found = closer->begin();
+    for (Draft& cell : cells) {
+        while (found != closer->end() && draft_precedes(*found, cell)) ++found;
+        if (found != closer->end() && found->index == cell.index) cell = *found;
+    }
+    return Success{};
 }
 
 } // namespace
@@ -150,8 +188,10 @@ Error too_many_cells(const Grid& grid, double count, double scale) {
 
 Result<std::vector<Draft>> sample_cells(const MeshToFill& mesh, const Grid& grid, double scale,
                                         const RunContext& context) {
-    const WeldedTriangles& welded = mesh.welded;
-    const bool scans = welded.closure.is_closed() && welded.closure.is_oriented();
+    const Result<InsideSampler> sampler = InsideSampler::create(
+        mesh.positions, mesh.welded, {.overlap = Overlap::merged, .accuracy = kWindingAccuracy}, context);
+    if (!sampler) return sampler.error();
+    const bool scans = sampler->used() == InsideMethod::scan;
     const double most = 8 * double(grid.counts[0]) * double(grid.counts[1]) * double(grid.counts[2]);
     const unsigned n = scans ? kSamples : most <= kMostWindings ? kWindingSamples : 1;
     const std::size_t bytes_a_layer = n * n * grid.counts[1] * ((n * grid.counts[0] + 63) / 64) * 8;
@@ -159,18 +199,55 @@ Result<std::vector<Draft>> sample_cells(const MeshToFill& mesh, const Grid& grid
     std::vector<Draft> cells;
     for (std::size_t k = 0; k < grid.counts[2]; k += slab) {
         const std::size_t end = std::min(k + slab, grid.counts[2]);
-        const Lattice lattice = sample_points(grid, n, k, end);
-        const Result<Occupancy> occupancy =
-            scans
-                ? scan_inside({mesh.positions, welded.triangles}, lattice, {.overlap = Overlap::merged}, context)
-                : winding_inside({mesh.positions, welded.triangles}, lattice, {.accuracy = kWindingAccuracy}, context);
-        if (!occupancy) return occupancy.error();
-        const std::vector<Draft> found = find_occupied(grid, *occupancy, n, k, end, context);
-        cells.insert(cells.end(), found.begin(), found.end());
+        const Result<std::vector<Draft>> found = sample_layers(*sampler, grid, n, k, end, context);
+        if (!found) return found.error();
+        cells.insert(cells.end(), found->begin(), found->end());
         if (double(cells.size()) > kMostCells)
             return too_many_cells(grid, double(cells.size()) * double(grid.counts[2]) / double(end), scale);
     }
+    if (scans && most / 8 * std::pow(kCloserSamples, 3) <= kMostCloserPoints)
+        if (const Status closer = look_closer(*sampler, grid, cells, context); !closer) return closer.error();
     return cells;
+}
+
+Result<std::optional<double>> exact_volume(const MeshToFill& mesh, const RunContext& context) {
+    constexpr double kAcross = 64, kSameCount = 1e-3; // points along the longest side; relative
+    const Closure& closure = mesh.welded.closure;
+    if (!closure.is_closed() || !closure.is_oriented() || !(mesh.box.size().array() > 0).all())
+        return std::optional<double>();
+    const Result<Lattice> lattice = make_lattice(mesh.box, {.spacing = mesh.box.size().maxCoeff() / kAcross});
+    if (!lattice) return lattice.error();
+    std::array<double, 2> counts = {};
+    for (const Overlap overlap : {Overlap::parity, Overlap::merged}) {
+        const Result<Occupancy> inside =
+            scan_inside({mesh.positions, mesh.welded.triangles}, *lattice, {.overlap = overlap}, context);
+        if (!inside) return inside.error();
+        counts[overlap == Overlap::merged] = double(inside->count());
+    }
+    if (std::abs(counts[0] - counts[1]) > kSameCount * counts[1]) return std::optional<double>();
+    double six = 0;
+    for (const Triangle& triangle : mesh.welded.triangles) {
+        const auto [a, b, c] = mesh.corners_of(triangle);
+        const Vec3d from = mesh.box.centre();
+        six += (a - from).dot((b - from).cross(c - from));
+    }
+    return std::optional<double>(six / 6);
+}
+
+void match_volume(std::vector<Draft>& cells, double volume) {
+    constexpr int kRounds = 4; // those at a limit are no help to the others
+    for (int round = 0; round < kRounds; ++round) {
+        double fixed = 0, free = 0;
+        const auto is_free = [](const Draft& cell) {
+            return cell.fraction > Cells::kLeastFraction && cell.fraction < 1;
+        };
+        for (const Draft& cell : cells) (is_free(cell) ? free : fixed) += double(cell.fraction);
+        if (!(free > 0) || volume <= fixed) return;
+        const double factor = (volume - fixed) / free;
+        for (Draft& cell : cells)
+            if (is_free(cell))
+                cell.fraction = std::clamp(float(factor * double(cell.fraction)), Cells::kLeastFraction, 1.0f);
+    }
 }
 
 } // namespace filigree::mesh_cells

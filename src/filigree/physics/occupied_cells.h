@@ -4,6 +4,7 @@
 
 #include "filigree/physics/cells.h"
 
+#include <optional>
 #include <string>
 
 namespace filigree::mesh_cells {
@@ -54,6 +55,12 @@ Error too_many_cells(const Grid& grid, double count, double scale);
 /// Cells with samples inside the mesh, in the order of Cells. scale: as above. Errors: unsuitable, cancelled.
 Result<std::vector<Draft>> sample_cells(const MeshToFill& mesh, const Grid& grid, double scale,
                                         const RunContext& context);
+/// The volume inside, where it is known exactly: of a closed mesh that does not cross itself. Model units cubed.
+/// Errors: unsuitable, cancelled.
+Result<std::optional<double>> exact_volume(const MeshToFill& mesh, const RunContext& context);
+/// Makes the fractions of cells that are not whole larger or smaller by one factor, so that all cells together have
+/// this volume (in cells' volumes), as far as limits of fractions let them: samples are few where a sheet is thin.
+void match_volume(std::vector<Draft>& cells, double volume);
 /// Adds cells for vertices and large triangles that no sampled cell holds; keeps the order of Cells.
 void add_surface_cells(const MeshToFill& mesh, const Grid& grid, std::vector<Draft>& cells);
 

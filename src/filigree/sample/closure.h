@@ -2,9 +2,11 @@
 #pragma once
 
 #include "filigree/core/run_context.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh/surface.h"
+#include "filigree/sample/outward.h"
 
 #include <array>
+#include <optional>
 
 namespace filigree {
 
@@ -18,13 +20,28 @@ struct Closure {
     bool is_oriented() const { return unbalanced == 0; }
 };
 
-/// Triangles of a mesh over welded vertices, degenerate ones left out, and turned so that neighbours agree
-/// (mesh/orientation.h). What is left unbalanced is open, has more than two faces at an edge, or has only one side.
+/// Triangles of a mesh over welded vertices, those that repeat a vertex left out, and turned so that they look away
+/// from the inside (outward.h). What is left unbalanced is open, crosses itself at an edge of more than two faces, or
+/// has only one side.
 struct WeldedTriangles {
     std::vector<Triangle> triangles; ///< over the mesh's own positions
     Closure closure;
+    OutwardReport outward; ///< what was turned for it
 };
-/// Cost: that of make_surface, and O(d log d) for a vertex with d edges. Errors: as of make_surface.
+/// The one way from a mesh to what has an inside: everything that asks for points inside takes it.
+/// Cost: that of make_surface, O(d log d) for a vertex with d edges, and that of outward_turns where the mesh has
+/// several parts, or is not one closed surface that looks outwards. Errors: as of make_surface.
 Result<WeldedTriangles> weld_triangles(const Mesh& mesh, const RunContext& context);
+/// What weld_triangles does to the triangles of a surface: empty where all of them stay as they are. closure: before.
+std::vector<FaceTurn> turns_of(const Surface& surface, std::span<const Vec3f> positions, OutwardReport& report,
+                               Closure* closure = nullptr);
+
+/// How much is inside of a mesh that is closed once it is welded and turned, model units cubed; overlaps count twice.
+struct InsideVolume {
+    std::optional<double> volume; ///< none: the mesh is open, or has only one side
+    OutwardReport outward;
+};
+/// Cost and errors: as weld_triangles.
+Result<InsideVolume> inside_volume(const Mesh& mesh, const RunContext& context);
 
 } // namespace filigree

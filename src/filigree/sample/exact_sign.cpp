@@ -212,4 +212,15 @@ int orient3d_perturbed(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec
     return 0;
 }
 
+int crosses_along_x(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& p) {
+    const auto side_of_edge = [&](const Vec3d& from, const Vec3d& to) {
+        if (const int side = orient2d({from[1], from[2]}, {to[1], to[2]}, {p[1], p[2]})) return side;
+        if (from[2] != to[2]) return from[2] > to[2] ? 1 : -1;
+        return (to[1] > from[1]) - (to[1] < from[1]);
+    };
+    const int side = side_of_edge(a, b);
+    if (side == 0 || side_of_edge(b, c) != side || side_of_edge(c, a) != side) return 0;
+    return orient3d_perturbed(a, b, c, p) != side ? side : 0;
+}
+
 } // namespace filigree::exact

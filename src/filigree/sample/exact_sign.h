@@ -32,4 +32,8 @@ std::array<int, 3> normal_signs(const Vec3d& a, const Vec3d& b, const Vec3d& c, 
 /// the surface.
 int orient3d_perturbed(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& d, Tally* tally = nullptr);
 
+/// Whether the ray from p + (e, e^2, e^3) towards higher x crosses the triangle: 1 where it leaves through it (the
+/// normal points along x), -1 where it enters, 0 where it does not.
+int crosses_along_x(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& p);
+
 } // namespace filigree::exact

@@ -55,6 +55,7 @@ struct RayTree {
     std::vector<RayNode> nodes; ///< the first is the root
     std::vector<RayLeaf> leaves;
     Vec3d eye;
+    std::int64_t eye_winding = 0; ///< of the mesh around the eye
     bool eye_inside = false;
     Vec3d lowest, highest, centre;
     double inverse_half_size = 1;
@@ -172,9 +173,16 @@ FILIGREE_INLINE void count_leaf(const RayLeaf& leaf, const Vec3d& eye, const Vec
     const Long4 beyond = across > across_bound, before = across < -across_bound;
     const Long4 crossed = possible & (all_left | all_right) & beyond;
     const Long4 open = possible & ~((all_left | all_right) & beyond) & ~before;
-    count.crossings += static_cast<std::uint64_t>(std::popcount(lane_bits<Avx2>(crossed)));
+    const auto add = [&](unsigned lanes, unsigned seen_from_front) __attribute__((always_inline)) {
+        const int all = std::popcount(lanes);
+        count.crossings += static_cast<std::uint64_t>(all);
+        count.net += 2 * std::popcount(lanes & seen_from_front) - all;
+    };
+    const unsigned seen_from_front = lane_bits<Avx2>(eye_side > 0);
+    add(lane_bits<Avx2>(crossed), seen_from_front);
     for (unsigned lanes = lane_bits<Avx2>(open); lanes != 0; lanes &= lanes - 1)
-        if (crosses_exactly(leaf, std::countr_zero(lanes), eye, point, count.tally)) ++count.crossings;
+        if (crosses_exactly(leaf, std::countr_zero(lanes), eye, point, count.tally))
+            add(lanes & -lanes, seen_from_front);
 }
 
 template <bool Avx2>
@@ -239,18 +247,6 @@ bool is_in_triangle(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d&
     return false; // without area; where it belongs to a closed surface, others lie there as well
 }
 
-/// Whether the ray from p + (e, e^2, e^3) along x crosses the triangle.
-bool crosses_along_x(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& p) {
-    const auto side_of_edge = [&](const Vec3d& from, const Vec3d& to) {
-        if (const int side = exact::orient2d({from[1], from[2]}, {to[1], to[2]}, {p[1], p[2]})) return side;
-        if (from[2] != to[2]) return from[2] > to[2] ? 1 : -1;
-        return (to[1] > from[1]) - (to[1] < from[1]);
-    };
-    const int side = side_of_edge(a, b);
-    return side != 0 && side_of_edge(b, c) == side && side_of_edge(c, a) == side &&
-           exact::orient3d_perturbed(a, b, c, p) != side;
-}
-
 } // namespace
 
 struct RayParity::Content : RayTree {};
@@ -294,8 +290,10 @@ Result<RayParity> RayParity::create(std::span<const Vec3f> positions, std::span<
     std::vector<FlatBox> boxes(triangles.size());
     std::atomic<bool> is_on_surface = false;
     std::atomic<std::uint64_t> crossings = 0;
+    std::atomic<std::int64_t> winding = 0;
     parallel_for(context, triangles.size(), 1 << 14, [&](std::size_t begin, std::size_t end) {
         std::uint64_t crossed = 0;
+        std::int64_t net = 0;
         for (std::size_t t = begin; t < end; ++t) {
             std::array<Vec3d, 3> p;
             for (std::size_t k = 0; k < 3; ++k) {
@@ -307,14 +305,18 @@ Result<RayParity> RayParity::create(std::span<const Vec3f> positions, std::span<
             eye_side[t] = static_cast<std::int8_t>(exact::orient3d(p[0], p[1], p[2], e));
             if (!is_within_box) continue;
             if (eye_side[t] == 0 && is_in_triangle(p[0], p[1], p[2], e)) is_on_surface = true;
-            crossed += crosses_along_x(p[0], p[1], p[2], e);
+            const int crossing = exact::crosses_along_x(p[0], p[1], p[2], e);
+            crossed += crossing != 0;
+            net += crossing;
         }
         crossings += crossed;
+        winding += net;
     });
     if (is_on_surface)
         return Error{ErrorCode::unsuitable,
                      "The eye lies on the surface, so it is neither inside nor outside; move it a little."};
     content->eye_inside = crossings % 2 == 1;
+    content->eye_winding = winding;
 
     const auto shape = make_wide_tree(boxes, context);
     if (!shape) return shape.error();
@@ -323,11 +325,11 @@ Result<RayParity> RayParity::create(std::span<const Vec3f> positions, std::span<
     return RayParity(std::move(content));
 }
 
-bool RayParity::contains(const Vec3d& point, Count* count) const {
+RayParity::Crossings RayParity::crossings(const Vec3d& point, Count* count) const {
     // Beyond the box there is nothing; as the point counts as moved up, nothing begins at the highest coordinate
     // either.
     const auto p = point.array();
-    if (!((p >= content_->lowest.array()).all() && (p < content_->highest.array()).all())) return false;
+    if (!((p >= content_->lowest.array()).all() && (p < content_->highest.array()).all())) return {};
     Count own;
     content_->count_crossings(*content_, point, own);
     if (count) {
@@ -336,11 +338,11 @@ bool RayParity::contains(const Vec3d& point, Count* count) const {
         count->tally.integers += own.tally.integers;
         count->tally.expansions += own.tally.expansions;
     }
-    return (own.crossings % 2 == 1) != content_->eye_inside;
+    return {(own.crossings % 2 == 1) != content_->eye_inside, content_->eye_winding + own.net};
 }
 
 Result<std::vector<std::uint8_t>> RayParity::contains(std::span<const Vec3d> points, const RunContext& context,
-                                                      Count* count) const {
+                                                      Count* count, bool merged) const {
     constexpr std::size_t kPiece = 1024, kBetweenReports = std::size_t{1} << 18;
     std::vector<std::uint8_t> inside(points.size());
     std::mutex adding;
@@ -352,7 +354,8 @@ Result<std::vector<std::uint8_t>> RayParity::contains(std::span<const Vec3d> poi
             Count own;
             for (std::size_t i = first + begin; i < first + end; ++i) {
                 if (i % kRaysBetweenLooks == 0 && context.is_cancelled()) return;
-                inside[i] = contains(points[i], &own);
+                const Crossings found = crossings(points[i], &own);
+                inside[i] = merged ? found.winding >= 1 : found.is_odd;
             }
             if (!count) return;
             const std::lock_guard lock(adding);

@@ -28,13 +28,21 @@ public:
 
     struct Count {
         std::uint64_t crossings = 0, triangles_tested = 0;
+        std::int64_t net = 0; ///< crossings from the side that normals point to, less those from behind
         exact::Tally tally;
     };
     /// Points outside the mesh's box, and those that are no numbers, are outside without a count. Adds to `count`.
-    bool contains(const Vec3d& point, Count* count = nullptr) const;
-    /// One 0 or 1 a point. Errors: cancelled.
+    bool contains(const Vec3d& point, Count* count = nullptr) const { return crossings(point, count).is_odd; }
+
+    struct Crossings {
+        bool is_odd = false;      ///< inside by parity
+        std::int64_t winding = 0; ///< how often the triangles, closed and facing one way, go round the point
+    };
+    /// The same, with the winding number: a whole number, and scan_winding's for every eye.
+    Crossings crossings(const Vec3d& point, Count* count = nullptr) const;
+    /// One 0 or 1 a point; merged: by winding numbers of 1 and more. Errors: cancelled.
     Result<std::vector<std::uint8_t>> contains(std::span<const Vec3d> points, const RunContext& context,
-                                               Count* count = nullptr) const;
+                                               Count* count = nullptr, bool merged = false) const;
     const Vec3d& eye() const;
 
 private:

@@ -342,7 +342,13 @@ Result<Occupancy> scan_inside_with_lanes(const ScanMesh& mesh, const Lattice& la
 }
 
 Result<std::vector<std::int16_t>> scan_winding(const ScanMesh& mesh, const Lattice& lattice, std::size_t first_k,
-                                               std::size_t layers, const RunContext& context, ScanReport* report) {
+                                               std::size_t layers, const RunContext& context, ScanReport* report,
+                                               std::size_t most_bytes) {
+    Lattice some = lattice; // the layers alone
+    some.coordinates[2].resize(
+        std::min(layers, lattice.coordinates[2].size() - std::min(first_k, lattice.counts()[2])));
+    const double bytes = some.point_count() * sizeof(std::int16_t);
+    if (Status fits = check_lattice_bytes(some, bytes, most_bytes); !fits) return fits.error();
     auto scan = Scan::create(mesh, lattice, context, scan_lane_counts().back());
     if (!scan) return scan.error();
     const std::array<std::size_t, 3>& counts = scan->counts();

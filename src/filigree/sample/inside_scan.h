@@ -44,10 +44,12 @@ Result<Occupancy> scan_inside(const ScanMesh& mesh, const Lattice& lattice, cons
 
 /// Net signed crossings before each point (winding numbers for closed, oriented meshes), for the layers first_k ..
 /// first_k + layers - 1 (as far as there are any): one int16 a point, rows along x without padding.
-/// Errors: as scan_inside; unsuitable (a number does not fit: more than 32,767 surfaces, one within the other).
+/// Errors: as scan_inside; unsuitable (a number does not fit: more than 32,767 surfaces, one within the other; the
+/// layers take more than `most_bytes`: says how much).
 Result<std::vector<std::int16_t>> scan_winding(const ScanMesh& mesh, const Lattice& lattice, std::size_t first_k,
                                                std::size_t layers, const RunContext& context,
-                                               ScanReport* report = nullptr);
+                                               ScanReport* report = nullptr,
+                                               std::size_t most_bytes = kMostLatticeBytes);
 
 /// Vector widths this processor has an implementation for (2, 4 or 8 doubles), ascending, so that tests can hold them
 /// against each other; scan_inside takes the last.

@@ -1,42 +1,56 @@
 #include "filigree/sample/inside_test.h"
 
+#include "filigree/core/parallel_for.h"
+
+#include <algorithm>
 #include <chrono>
 
 namespace filigree {
-
-namespace {
-
-constexpr double kInside = 0.5; // winding number: half way from outside to inside
-
-} // namespace
 
 Result<InsideTest> InsideTest::create(const Mesh& mesh, const InsideOptions& options, const RunContext& context) {
     InsideMethod method = options.method;
     const Result<WeldedTriangles> welded = weld_for(method, mesh, context);
     if (!welded) return welded.error();
-    InsideTest test;
-    if (method == InsideMethod::winding) {
-        Result<WindingTree> winding = WindingTree::create(mesh.positions, welded->triangles, options.accuracy, context);
-        if (!winding) return winding.error();
-        test.winding_ = std::move(winding).value();
-    } else {
-        Result<RayParity> rays = RayParity::create(mesh.positions, welded->triangles, options.eye, context);
-        if (!rays) return rays.error();
-        test.rays_ = std::move(rays).value();
+    const bool by_winding = method == InsideMethod::winding;
+    ScanMesh surface{mesh.positions, welded->triangles};
+    ClosedByCones closed;
+    if (by_winding) {
+        Result<ClosedByCones> made = close_by_cones(surface, options.accuracy, context);
+        if (!made) return made.error();
+        closed = std::move(made).value();
+        if (closed.cones) surface = {closed.positions, closed.triangles};
     }
+    Result<RayParity> rays =
+        RayParity::create(surface.positions, surface.triangles, by_winding ? std::nullopt : options.eye, context);
+    if (!rays) return rays.error();
+    InsideTest test(std::move(rays).value());
+    test.cones_ = std::move(closed.cones);
+    test.by_parity_ = !by_winding && options.overlap == Overlap::parity;
+    test.used_ = by_winding ? InsideMethod::winding : InsideMethod::rays;
+    test.outward_ = welded->outward;
+    test.closure_ = welded->closure;
     return test;
 }
 
 bool InsideTest::contains(const Vec3d& point) const {
-    return rays_ ? rays_->contains(point) : winding_->winding(point) >= kInside;
+    const RayParity::Crossings crossings = rays_.crossings(point);
+    if (by_parity_) return crossings.is_odd;
+    return crossings.winding >= (cones_ ? ClosedByCones::least_winding(cones_->winding(point)) : 1);
 }
 
 Result<std::vector<std::uint8_t>> InsideTest::contains(std::span<const Vec3d> points, const RunContext& context) const {
-    if (rays_) return rays_->contains(points, context);
-    const Result<std::vector<float>> windings = winding_->winding(points, context);
-    if (!windings) return windings.error();
+    constexpr std::size_t kGrain = 64, kBetweenReports = std::size_t{1} << 16;
+    if (by_parity_) return rays_.contains(points, context);
     std::vector<std::uint8_t> inside(points.size());
-    for (std::size_t i = 0; i < inside.size(); ++i) inside[i] = (*windings)[i] >= float(kInside);
+    for (std::size_t first = 0; first < points.size(); first += kBetweenReports) {
+        context.report("inside", static_cast<double>(first) / static_cast<double>(points.size()));
+        const std::size_t count = std::min(kBetweenReports, points.size() - first);
+        parallel_for(context, count, kGrain, [&](std::size_t begin, std::size_t end) {
+            if (context.is_cancelled()) return;
+            for (std::size_t i = first + begin; i < first + end; ++i) inside[i] = contains(points[i]);
+        });
+        if (context.is_cancelled()) return cancelled_error();
+    }
     return inside;
 }
 
@@ -52,6 +66,8 @@ Result<std::vector<Vec3d>> points_inside(const Mesh& mesh, std::span<const Vec3d
     if (!inside) return inside.error();
     if (report) {
         report->used = test->used();
+        report->closure = test->closure();
+        report->outward = test->outward();
         report->setup_seconds = std::chrono::duration<double>(prepared - begin).count();
         report->seconds = std::chrono::duration<double>(Clock::now() - prepared).count();
     }

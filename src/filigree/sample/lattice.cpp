@@ -98,6 +98,15 @@ Result<Lattice> make_lattice(const Box& box, const LatticeOptions& options) {
     return lattice;
 }
 
+Status check_lattice_bytes(const Lattice& lattice, double bytes, std::size_t most_bytes) {
+    if (bytes <= double(most_bytes)) return Success{};
+    const auto [nx, ny, nz] = lattice.counts();
+    return Error{ErrorCode::unsuitable, "A lattice of " + std::to_string(nx) + " x " + std::to_string(ny) + " x " +
+                                            std::to_string(nz) + " points takes " + gigabytes(bytes) +
+                                            " of memory, and " + gigabytes(double(most_bytes)) +
+                                            " are allowed; take a larger spacing."};
+}
+
 Result<Occupancy> make_occupancy(const Lattice& lattice, double other_bytes, std::size_t most_bytes) {
     Occupancy occupancy;
     occupancy.counts = lattice.counts();
@@ -105,11 +114,7 @@ Result<Occupancy> make_occupancy(const Lattice& lattice, double other_bytes, std
     occupancy.words_per_row = (nx + 63) / 64;
     const double words = double(occupancy.words_per_row) * double(ny) * double(nz);
     const double bytes = words * sizeof(std::uint64_t) + other_bytes;
-    if (bytes > double(most_bytes))
-        return Error{ErrorCode::unsuitable, "A lattice of " + std::to_string(nx) + " x " + std::to_string(ny) + " x " +
-                                                std::to_string(nz) + " points takes " + gigabytes(bytes) +
-                                                " of memory, and " + gigabytes(double(most_bytes)) +
-                                                " are allowed; take a larger spacing."};
+    if (const Status fits = check_lattice_bytes(lattice, bytes, most_bytes); !fits) return fits.error();
     occupancy.bits.resize(occupancy.words_per_row * ny * nz);
     return occupancy;
 }

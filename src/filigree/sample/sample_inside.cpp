@@ -21,17 +21,19 @@ Error not_closed(const Closure& closure, const Vec3d& origin) {
                                        "), so crossings do not tell inside from outside; use the method winding."};
 }
 
-Result<Occupancy> inside_by_rays(const RayParity& rays, const Lattice& lattice, std::size_t most_bytes,
+Result<Occupancy> inside_by_rays(const RayParity& rays, const Lattice& lattice, const InsideOptions& options,
                                  const RunContext& context, RayParity::Count& count) {
     const auto [nx, ny, nz] = lattice.counts();
-    Result<Occupancy> occupancy = make_occupancy(lattice, double(sizeof(Vec3d)) * double(nx) * double(ny), most_bytes);
+    Result<Occupancy> occupancy =
+        make_occupancy(lattice, double(sizeof(Vec3d)) * double(nx) * double(ny), options.most_bytes);
     if (!occupancy) return occupancy;
     std::vector<Vec3d> layer(nx * ny);
     for (std::size_t k = 0; k < nz; ++k) {
         context.report("counting crossings", double(k) / double(nz));
         for (std::size_t j = 0; j < ny; ++j)
             for (std::size_t i = 0; i < nx; ++i) layer[j * nx + i] = lattice.point(i, j, k);
-        const Result<std::vector<std::uint8_t>> inside = rays.contains(layer, context, &count);
+        const Result<std::vector<std::uint8_t>> inside =
+            rays.contains(layer, context, &count, options.overlap == Overlap::merged);
         if (!inside) return inside.error();
         for (std::size_t j = 0; j < ny; ++j)
             for (std::size_t i = 0; i < nx; ++i)
@@ -43,28 +45,40 @@ Result<Occupancy> inside_by_rays(const RayParity& rays, const Lattice& lattice, 
 
 } // namespace
 
+namespace {
+
+/// The place of the mesh's origin is for the sentence alone.
+std::optional<Error> choose_method(InsideMethod& method, const WeldedTriangles& welded, const Vec3d& origin) {
+    if (welded.triangles.empty())
+        return Error{ErrorCode::unsuitable, "The mesh has no faces with an area, so nothing is inside."};
+    const Closure& closure = welded.closure;
+    if (method == InsideMethod::automatic)
+        method = closure.is_closed() && closure.is_oriented() ? InsideMethod::scan : InsideMethod::winding;
+    if (method != InsideMethod::winding && !closure.is_closed()) return not_closed(closure, origin);
+    return std::nullopt;
+}
+
+} // namespace
+
 Result<WeldedTriangles> weld_for(InsideMethod& method, const Mesh& mesh, const RunContext& context) {
     Result<WeldedTriangles> welded = weld_triangles(mesh, context);
     if (!welded) return welded;
-    if (welded->triangles.empty())
-        return Error{ErrorCode::unsuitable, "The mesh has no faces with an area, so nothing is inside."};
-    const Closure& closure = welded->closure;
-    if (method == InsideMethod::automatic)
-        method = closure.is_closed() && closure.is_oriented() ? InsideMethod::scan : InsideMethod::winding;
-    if (method != InsideMethod::winding && !closure.is_closed()) return not_closed(closure, mesh.origin);
+    if (auto error = choose_method(method, *welded, mesh.origin)) return *error;
     return welded;
 }
 
 struct InsideSampler::Prepared {
-    const Mesh& mesh;
+    std::span<const Vec3f> positions;
     InsideOptions options;
     InsideMethod used = options.method;
-    WeldedTriangles welded = {};
+    double start = now_seconds();
+    WeldedTriangles own = {}; ///< where it was welded here
+    const WeldedTriangles* welded = &own;
     std::optional<RayParity> rays = {};
     std::optional<WindingSampler> winding = {};
     double seconds = 0; ///< that preparing took
 
-    ScanMesh triangles() const { return {mesh.positions, welded.triangles}; }
+    ScanMesh triangles() const { return {positions, welded->triangles}; }
 };
 
 InsideSampler::InsideSampler(std::unique_ptr<Prepared> prepared) : prepared_(std::move(prepared)) {}
@@ -75,13 +89,27 @@ InsideSampler::~InsideSampler() = default;
 InsideMethod InsideSampler::used() const { return prepared_->used; }
 
 Result<InsideSampler> InsideSampler::create(const Mesh& mesh, const InsideOptions& options, const RunContext& context) {
-    const double start = now_seconds();
-    auto prepared = std::make_unique<Prepared>(Prepared{mesh, options});
+    auto prepared = std::make_unique<Prepared>(Prepared{mesh.positions, options});
     Result<WeldedTriangles> welded = weld_for(prepared->used, mesh, context);
     if (!welded) return welded.error();
-    prepared->welded = std::move(welded).value();
+    prepared->own = std::move(welded).value();
+    prepared->welded = &prepared->own;
+    return prepare(std::move(prepared), context);
+}
+
+Result<InsideSampler> InsideSampler::create(std::span<const Vec3f> positions, const WeldedTriangles& welded,
+                                            const InsideOptions& options, const RunContext& context) {
+    auto prepared = std::make_unique<Prepared>(Prepared{positions, options});
+    prepared->welded = &welded;
+    if (auto error = choose_method(prepared->used, welded, Vec3d::Zero())) return *error;
+    return prepare(std::move(prepared), context);
+}
+
+Result<InsideSampler> InsideSampler::prepare(std::unique_ptr<Prepared> prepared, const RunContext& context) {
+    const InsideOptions& options = prepared->options;
     if (prepared->used == InsideMethod::rays) {
-        Result<RayParity> rays = RayParity::create(mesh.positions, prepared->welded.triangles, options.eye, context);
+        Result<RayParity> rays =
+            RayParity::create(prepared->positions, prepared->welded->triangles, options.eye, context);
         if (!rays) return rays.error();
         prepared->rays = std::move(rays).value();
     } else if (prepared->used == InsideMethod::winding) {
@@ -90,7 +118,7 @@ Result<InsideSampler> InsideSampler::create(const Mesh& mesh, const InsideOption
         if (!winding) return winding.error();
         prepared->winding = std::move(winding).value();
     }
-    prepared->seconds = now_seconds() - start;
+    prepared->seconds = now_seconds() - prepared->start;
     return InsideSampler(std::move(prepared));
 }
 
@@ -99,10 +127,11 @@ Result<Occupancy> InsideSampler::inside(const Lattice& lattice, const RunContext
     const Prepared& p = *prepared_;
     InsideReport found;
     found.used = p.used;
-    found.closure = p.welded.closure;
+    found.closure = p.welded->closure;
+    found.outward = p.welded->outward;
     found.setup_seconds = p.seconds;
     Result<Occupancy> occupancy =
-        p.rays ? inside_by_rays(*p.rays, lattice, p.options.most_bytes, context, found.rays)
+        p.rays ? inside_by_rays(*p.rays, lattice, p.options, context, found.rays)
         : p.winding
             ? p.winding->inside(lattice, context, &found.winding)
             : scan_inside(p.triangles(), lattice, {p.options.overlap, p.options.most_bytes}, context, &found.scan);

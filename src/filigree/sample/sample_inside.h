@@ -16,7 +16,7 @@ enum class InsideMethod { automatic, scan, rays, winding };
 
 struct InsideOptions {
     InsideMethod method = InsideMethod::automatic;
-    Overlap overlap = Overlap::parity;          ///< scan: what lies in two closed parts
+    Overlap overlap = Overlap::parity;          ///< scan, rays: what lies in two closed parts
     std::optional<Vec3d> eye = {};              ///< rays: where they start, relative to the mesh's origin
     double accuracy = 0.01;                     ///< winding: largest error of a winding number, about
     std::size_t most_bytes = kMostLatticeBytes; ///< for all that is kept of a lattice
@@ -25,6 +25,7 @@ struct InsideOptions {
 struct InsideReport {
     InsideMethod used = InsideMethod::automatic; ///< never automatic once filled
     Closure closure;
+    OutwardReport outward; ///< what of the mesh counts as turned
     ScanReport scan;
     RayParity::Count rays;
     WindingReport winding;
@@ -40,6 +41,9 @@ public:
     /// edge and suggests winding; the eye lies on the surface), cancelled.
     static Result<InsideSampler> create(const Mesh& mesh, const InsideOptions& options, const RunContext& context);
     static Result<InsideSampler> create(const Mesh&& mesh, const InsideOptions&, const RunContext&) = delete;
+    /// The same of what weld_triangles made; both have to outlive the sampler.
+    static Result<InsideSampler> create(std::span<const Vec3f> positions, const WeldedTriangles& welded,
+                                        const InsideOptions& options, const RunContext& context);
     InsideSampler(InsideSampler&&) noexcept;
     InsideSampler& operator=(InsideSampler&&) noexcept;
     ~InsideSampler();
@@ -51,6 +55,7 @@ public:
 
 private:
     struct Prepared;
+    static Result<InsideSampler> prepare(std::unique_ptr<Prepared> prepared, const RunContext& context);
     explicit InsideSampler(std::unique_ptr<Prepared> prepared);
     std::unique_ptr<Prepared> prepared_;
 };

@@ -5,9 +5,9 @@
 // tree. They vary slowly away from the cones, so most blocks of points are decided at their centres.
 #include "filigree/sample/winding_inside.h"
 
-#include "filigree/core/disjoint_sets.h"
 #include "filigree/core/now_seconds.h"
 #include "filigree/core/parallel_for.h"
+#include "filigree/sample/border_cones.h"
 #include "filigree/sample/edge_balance.h"
 
 #include <algorithm>
@@ -18,56 +18,14 @@ namespace filigree {
 
 namespace {
 
-/// What closes a mesh: for each connected part of the edges at which faces do not cancel, a cone from their middle.
-struct Cones {
-    std::vector<Vec3f> positions;    ///< the mesh's, and the tips
-    std::vector<Triangle> triangles; ///< over these; as many on an edge as are missing there
-    std::size_t open_edges = 0;
-};
-
-Cones make_cones(std::span<const Vec3f> positions, std::span<const Triangle> triangles) {
-    struct Edge {
-        Index from, to;
-        int missing;
-    };
-    std::vector<Edge> edges;
-    DisjointSets parts(positions.size());
-    for_each_edge(positions.size(), triangles, [&](const EdgeBalance& e) {
+/// Cones over the edges at which faces do not cancel.
+BorderCones cones_of(const ScanMesh& mesh) {
+    std::vector<MissingSide> sides;
+    for_each_edge(mesh.positions.size(), mesh.triangles, [&](const EdgeBalance& e) {
         if (e.net == 0) return;
-        edges.push_back(e.net > 0 ? Edge{e.low, e.high, e.net} : Edge{e.high, e.low, -e.net});
-        parts.join(e.low, e.high);
+        sides.push_back(e.net > 0 ? MissingSide{e.low, e.high, e.net} : MissingSide{e.high, e.low, -e.net});
     });
-
-    Cones cones;
-    cones.open_edges = edges.size();
-    cones.positions.assign(positions.begin(), positions.end());
-    struct Tip {
-        Vec3d sum = Vec3d::Zero();
-        std::size_t count = 0;
-        Index id = kNoIndex;
-    };
-    std::vector<Tip> tips;
-    std::vector<Index> tip_of(edges.empty() ? 0 : positions.size(), kNoIndex); // of each root
-    const auto tip_at = [&](Index v) -> Tip& {
-        Index& tip = tip_of[parts.root(v)];
-        if (tip == kNoIndex) {
-            tip = static_cast<Index>(tips.size());
-            tips.push_back({});
-        }
-        return tips[tip];
-    };
-    for (const Edge& e : edges) {
-        Tip& tip = tip_at(e.from);
-        tip.sum += positions[e.from].cast<double>() + positions[e.to].cast<double>();
-        tip.count += 2;
-    }
-    for (Tip& tip : tips) {
-        tip.id = static_cast<Index>(cones.positions.size());
-        cones.positions.push_back((tip.sum / static_cast<double>(tip.count)).cast<float>());
-    }
-    for (const Edge& e : edges)
-        for (int copy = 0; copy < e.missing; ++copy) cones.triangles.push_back({e.to, e.from, tip_at(e.from).id});
-    return cones;
+    return make_border_cones(mesh.positions, sides);
 }
 
 constexpr std::size_t kBlock = 16, kSmallestBlock = 4; // points along a side
@@ -143,8 +101,7 @@ struct Layers {
 
 private:
     static double from_half(double number) { return std::abs(number - std::floor(number) - 0.5); }
-    /// Least crossings with which a point is inside: those less what the cones add are 1/2 or more.
-    static int threshold(double number) { return static_cast<int>(std::ceil(number + 0.5)); }
+    static int threshold(double number) { return ClosedByCones::least_winding(number); }
 
     template <class Threshold>
     void set(const Block& block, std::size_t j, std::size_t k, const Threshold& threshold_at) const {
@@ -168,19 +125,27 @@ std::size_t slab_layers(const std::array<std::size_t, 3>& counts) {
 
 } // namespace
 
+Result<ClosedByCones> close_by_cones(const ScanMesh& mesh, double accuracy, const RunContext& context) {
+    ClosedByCones closed;
+    BorderCones cones = cones_of(mesh);
+    if (context.is_cancelled()) return cancelled_error();
+    closed.open_edges = cones.open_edges;
+    if (cones.triangles.empty()) return closed;
+    Result<WindingTree> tree = WindingTree::create(cones.positions, cones.triangles, accuracy, context);
+    if (!tree) return tree.error();
+    closed.cones = std::move(tree).value();
+    closed.positions = std::move(cones.positions);
+    closed.triangles.assign(mesh.triangles.begin(), mesh.triangles.end());
+    closed.triangles.insert(closed.triangles.end(), cones.triangles.begin(), cones.triangles.end());
+    return closed;
+}
+
 Result<WindingSampler> WindingSampler::create(const ScanMesh& mesh, const WindingOptions& options,
                                               const RunContext& context) {
     WindingSampler sampler(mesh, options);
-    Cones cones = make_cones(mesh.positions, mesh.triangles);
-    if (context.is_cancelled()) return cancelled_error();
-    sampler.open_edges_ = cones.open_edges;
-    if (cones.triangles.empty()) return sampler;
-    Result<WindingTree> tree = WindingTree::create(cones.positions, cones.triangles, options.accuracy, context);
-    if (!tree) return tree.error();
-    sampler.cones_ = std::move(tree).value();
-    sampler.positions_ = std::move(cones.positions);
-    sampler.triangles_.assign(mesh.triangles.begin(), mesh.triangles.end());
-    sampler.triangles_.insert(sampler.triangles_.end(), cones.triangles.begin(), cones.triangles.end());
+    Result<ClosedByCones> closed = close_by_cones(mesh, options.accuracy, context);
+    if (!closed) return closed.error();
+    sampler.closed_ = std::move(closed).value();
     return sampler;
 }
 
@@ -188,12 +153,12 @@ Result<Occupancy> WindingSampler::inside(const Lattice& lattice, const RunContex
                                          WindingReport* report) const {
     const double start = now_seconds();
     WindingReport found;
-    found.open_edges = open_edges_;
+    found.open_edges = closed_.open_edges;
     const auto finish = [&] {
         found.seconds = now_seconds() - start;
         if (report) *report = found;
     };
-    if (!cones_) {
+    if (!closed_.cones) {
         auto occupancy =
             scan_inside(mesh_, lattice, {.overlap = Overlap::merged, .most_bytes = options_.most_bytes}, context);
         finish();
@@ -208,9 +173,9 @@ Result<Occupancy> WindingSampler::inside(const Lattice& lattice, const RunContex
     std::atomic<std::size_t> near_half = 0;
     for (std::size_t first_k = 0; first_k < nz; first_k += layers) {
         context.report("winding", double(first_k) / double(nz));
-        const auto crossings = scan_winding({positions_, triangles_}, lattice, first_k, layers, context);
+        const auto crossings = scan_winding({closed_.positions, closed_.triangles}, lattice, first_k, layers, context);
         if (!crossings) return crossings.error();
-        const Layers slab{lattice, *cones_, first_k, *crossings, *occupancy, context};
+        const Layers slab{lattice, *closed_.cones, first_k, *crossings, *occupancy, context};
         const std::size_t last_k = std::min(first_k + layers, nz);
         parallel_for(context, ny, kBlock, [&](std::size_t begin, std::size_t end) {
             std::size_t near = 0;

@@ -213,7 +213,9 @@ Result<Surfels> MeltingSurface::surfels(const CompositeSurface& surface, const R
         });
         first += part.start.size();
     }
-    all = split_surfels(all);
+    Result<Surfels> split = split_surfels(all);
+    if (!split) return split.error();
+    all = std::move(split).value();
     Result<Surfels> fresh = make_surfels(surface.mesh, context);
     if (!fresh) return fresh.error();
     append_if(*fresh,

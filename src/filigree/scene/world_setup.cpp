@@ -292,10 +292,13 @@ private:
             hash_.add(mesh.positions);
             hash_.add(mesh.corners);
             MeshObstacle shape;
+            OutwardReport outward;
             shape.field = at_line(scene_, from.line, [&] {
                 return std::make_shared<const DistanceField>(
-                    DistanceField::create(mesh, from.scale, from.spacing, context_).value());
+                    DistanceField::create(mesh, from.scale, from.spacing, context_, &outward).value());
             });
+            if (const std::string turned = outward_sentence(outward); !turned.empty())
+                warn("obstacle '" + from.mesh + "': " + turned);
             const Vec3d own = from.scale * bounds(mesh).centre();
             middle = from.centre.value_or(own + from.scale * mesh.origin - result_.origin);
             shape.offset = middle - own;

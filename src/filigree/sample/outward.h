@@ -1,0 +1,45 @@
+// Faces turned away from what is inside: the one answer to "inside" that all of Filigree takes.
+#pragma once
+
+#include "filigree/mesh/mesh.h"
+
+#include <cstdint>
+#include <string>
+
+namespace filigree {
+
+/// What counts as other than it is in the file. Parts are faces that hang together over edges.
+struct OutwardReport {
+    std::size_t parts = 0;
+    std::size_t inward_parts = 0; ///< looked inwards, and count as turned outwards
+    std::size_t cavities = 0;     ///< lie in others and looked outwards: count as their hollows, turned
+    std::size_t turned_faces = 0; ///< triangles that ran against the rest of their part
+    std::size_t inner_faces = 0;  ///< triangles left out: walls between matter and matter, faces that are there twice
+    std::size_t one_sided_parts = 0; ///< as Moebius' band: left as they are, nothing tells their inside
+
+    bool is_as_it_was() const { return inward_parts + cavities + turned_faces + inner_faces + one_sided_parts == 0; }
+};
+
+/// The report as sentences; empty where nothing was changed.
+std::string outward_sentence(const OutwardReport& report);
+
+enum class FaceTurn : std::uint8_t { kept, turned, left_out };
+
+/// Decides for each triangle of a welded surface (mesh/surface.h) whether it looks away from the inside:
+///
+/// - In a part without open edges, and in one whose cones over open edges (border_cones.h) have less than 0.6 of its
+///   area, neighbours agree, and faces look outwards.
+/// - Where edges have three triangles and more, the spaces that faces divide are told apart by the angles around those
+///   edges. If all edges have an even number of triangles, spaces beside each other are in turn outside and inside;
+///   else all closed ones are inside, and walls between them are left out. Of faces that are there twice one counts or
+///   none, so that the number of triangles at each edge stays even where it was.
+/// - A part that lies in an odd number of others is a cavity: its faces look inwards.
+/// - Neighbours of other parts agree as far as mesh/orientation.h makes them. Where such parts together enclose a
+///   volume of which all looks inwards, all are turned.
+///
+/// Cost O(F). Deterministic.
+/// faces: the face of each triangle, ascending.
+std::vector<FaceTurn> outward_turns(std::span<const Triangle> triangles, std::span<const Index> faces,
+                                    std::span<const Vec3f> positions, OutwardReport& report);
+
+} // namespace filigree
