@@ -3,7 +3,6 @@
 #include "filigree/core/parallel_for.h"
 #include "filigree/physics/byte_stream.h"
 #include "filigree/physics/mpm_contact.h"
-#include "filigree/physics/mpm_kernel.h"
 #include "filigree/physics/stopwatch.h"
 
 #include <Eigen/Cholesky>
@@ -21,6 +20,8 @@ constexpr float kLeastNodeMass = 1e-6f; ///< of a full node's: what tracers look
 constexpr float kRidge = 0.01f;         ///< cells squared: holds a tracer's gradient at a rim
 constexpr float kHeldShare = 0.5f;      ///< of a node's mass that is pinned, from which on the node is
 constexpr std::size_t kTracerGrain = 256;
+/// Particles tell of the half of a surface's slope that lies inside, and of less where the body is a few cells thick.
+constexpr float kMostSurface = 8;
 
 Float4 lanes(float x, float y, float z, float w) { return Float4{x, y, z, w}; }
 Vec3f vector_of(const Float4& v) { return {v[0], v[1], v[2]}; }
@@ -58,6 +59,40 @@ Bodies::Bodies(const World& world, std::span<const Actor> actors)
         matter.limit_viscosity(grid_.spacing());
         grid_mass_.push_back(matter.density() * grid_.spacing() * grid_.spacing() * grid_.spacing());
     }
+    find_surfaces(actors);
+}
+
+/// The gradient of mass around particles tells where the surface is, and not quite how large. At rest that is known.
+void Bodies::find_surfaces(std::span<const Actor> actors) {
+    const RunContext alone(1);
+    for (std::size_t f = 0; f < matter_.size(); ++f)
+        set_positions(actor_of_field_[f], actors[actor_of_field_[f]].body->rest);
+    grid_.begin(particles_, field_, alone);
+    scatter(0, alone);
+    std::vector<double> told(matter_.size());
+    std::vector<AtParticle> found;
+    Node tile[kTileNodes];
+    for (const std::vector<std::uint32_t>& group : grid_.groups())
+        for (const std::uint32_t block : group) {
+            grid_.read_tile(block, tile);
+            const std::span<const std::uint32_t> numbers = grid_.particles(block);
+            const std::uint32_t field = grid_.place(block).body;
+            found.resize(numbers.size());
+            gather_at_particles(numbers, particles_.data(), grid_.spacing(), tile, found.data());
+            for (std::size_t i = 0; i < numbers.size(); ++i)
+                told[field] += double(particles_[numbers[i]].volume * emptiness(found[i], field).norm());
+        }
+    for (std::size_t f = 0; f < matter_.size(); ++f) {
+        double area = 0;
+        for (const float part : actors[actor_of_field_[f]].body->surface.areas) area += double(part);
+        surface_.push_back(told[f] > 0 ? std::clamp(float(area / told[f]), 1.0f, kMostSurface) : 1.0f);
+    }
+}
+
+/// Gradient of the share of space that is full, 1/m.
+Vec3f Bodies::emptiness(const AtParticle& found, std::size_t field) const {
+    const float h = grid_.spacing();
+    return 4 / (h * h * grid_mass_[field]) * Vec3f(found.slope[0][3], found.slope[1][3], found.slope[2][3]);
 }
 
 std::size_t Bodies::particle_count(std::size_t actor) const {
@@ -173,6 +208,7 @@ void Bodies::gather(float dt, double time, const RunContext& context) {
     const float h = grid_.spacing(), moment = 4 / (h * h);
     const ObstaclePoses poses(world_, time);
     const HeatExchange exchange(world_, time, dt, grid_.spacing(), particles_);
+    const bool has_heat = has_heat_ || HeatExchange::acts_in(world_);
     for (const std::vector<std::uint32_t>& group : grid_.groups())
         parallel_for(context, group.size(), 1, [&](std::size_t begin, std::size_t end) {
             Node tile[kTileNodes];
@@ -184,7 +220,6 @@ void Bodies::gather(float dt, double time, const RunContext& context) {
                 const std::uint32_t field = grid_.place(group[g]).body;
                 const Matter& matter = matter_[field];
                 const float kept = std::exp(-dt * matter.damping());
-                const float emptiness = moment / grid_mass_[field];
                 exchange.go_to(grid_.place(group[g]), poses, near);
                 found.resize(numbers.size());
                 gather_at_particles(numbers, particles_.data(), h, tile, found.data());
@@ -195,15 +230,15 @@ void Bodies::gather(float dt, double time, const RunContext& context) {
                         for (int k = 0; k < 3; ++k) p.v[k] = p.c[k][0] = p.c[k][1] = p.c[k][2] = 0;
                         continue;
                     }
+                    if (has_heat) {
+                        p.add_heat(value[5]);
+                        exchange.act(p, matter, emptiness(found[i], field).norm(), surface_[field], poses, near);
+                    }
                     for (int k = 0; k < 3; ++k) {
                         p.v[k] = kept * value[k];
                         p.x[k] += dt * value[k];
                         for (int r = 0; r < 3; ++r) p.c[k][r] = moment * slope[k][r];
                         p.warming[k] = moment * slope[k][4];
-                    }
-                    if (has_heat_) {
-                        p.enthalpy() += value[5];
-                        exchange.act(p, matter, emptiness * Vec3f(slope[0][3], slope[1][3], slope[2][3]), poses, near);
                     }
                 }
                 matter.deform(numbers, particles_.data(), dt);
@@ -362,7 +397,7 @@ Vec3d Bodies::affine_momentum() const {
 
 double Bodies::heat() const {
     double sum = 0;
-    for (const Particle& p : particles_) sum += double(p.mass) * double(p.enthalpy());
+    for (const Particle& p : particles_) sum += double(p.mass) * (double(p.enthalpy()) + double(p.enthalpy_beside));
     return sum;
 }
 

@@ -7,6 +7,7 @@
 
 #include "filigree/physics/matter_particles.h"
 #include "filigree/physics/mpm_grid.h"
+#include "filigree/physics/mpm_kernel.h"
 #include "filigree/physics/obstacle_motion.h"
 #include "filigree/physics/simulation.h"
 
@@ -58,6 +59,8 @@ private:
         std::uint32_t field;
     };
 
+    Vec3f emptiness(const AtParticle& found, std::size_t field) const;
+    void find_surfaces(std::span<const Actor> actors);
     float longest_step(const RunContext& context) const; ///< s
     void scatter(float dt, const RunContext& context);
     void update_nodes(float dt, double time, const RunContext& context);
@@ -75,6 +78,7 @@ private:
     std::vector<Particle> particles_;
     std::vector<std::uint32_t> field_; ///< of each particle
     std::vector<float> grid_mass_;     ///< kg, of a full node, by field
+    std::vector<float> surface_;       ///< by field: area of the body at rest, in parts of what its particles tell
     std::vector<Tracer> tracers_;
     std::vector<std::vector<Vec3f>> pinned_from_; ///< of each pin of these bodies
     Grid grid_;
