@@ -173,6 +173,22 @@ TEST_F(SceneRunTest, ParticlesNearAPointAreThoseWithinHalfACellAndTheNearest) {
     for (const Index i : near) EXPECT_LE((body.rest[i] - there[0]).norm(), 0.88 * body.spacing());
     EXPECT_EQ(particles_near(body, far).size(), 1U);
     EXPECT_TRUE(particles_near(body, {}).empty());
+    // As trying every particle would say, near and far.
+    for (const float away : {0.0f, 0.3f, 2.0f, 40.0f}) {
+        const std::vector<Vec3f> at = {body.rest[3] + Vec3f(away, 0.3f * away, 0), Vec3f(away, 0.1f, -away)};
+        std::vector<Index> wanted;
+        for (const Vec3f& point : at) {
+            Index nearest = 0;
+            for (Index i = 0; i < body.rest.size(); ++i) {
+                if ((body.rest[i] - point).norm() <= float(0.87 * body.spacing())) wanted.push_back(i);
+                if ((body.rest[i] - point).norm() < (body.rest[nearest] - point).norm()) nearest = i;
+            }
+            wanted.push_back(nearest);
+        }
+        std::sort(wanted.begin(), wanted.end());
+        wanted.erase(std::unique(wanted.begin(), wanted.end()), wanted.end());
+        EXPECT_EQ(particles_near(body, at), wanted) << away;
+    }
 }
 
 TEST(HoldLost, HoldsWhatIsFarOrNoNumber) {
