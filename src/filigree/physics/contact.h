@@ -17,7 +17,7 @@ namespace filigree {
 class Contacts {
 public:
     /// bodies: fixed in number from here on.
-    Contacts(const World& world, std::size_t bodies, bool between_bodies, bool within_bodies);
+    Contacts(const World& world, std::size_t bodies, std::size_t actors, bool between_bodies, bool within_bodies);
     /// Once, when all bodies are there.
     void begin(std::span<const BodyState> bodies);
 

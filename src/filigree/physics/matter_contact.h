@@ -6,6 +6,7 @@
 #include "filigree/physics/extremes_kernel.h"
 #include "filigree/physics/matter.h"
 #include "filigree/physics/own_cells.h"
+#include "filigree/physics/pair_laws.h"
 
 #include <algorithm>
 #include <limits>
@@ -29,8 +30,9 @@ public:
     static constexpr float kMostReach = 0.5f; ///< spacings that near bodies may go between two searches, at most
     static constexpr float kOutside = 0.25f;  ///< cells that a point may lie outside of the last one and still touch
 
-    MatterContacts(const World& world, bool between_bodies, bool within_bodies)
-        : world_(world), between_bodies_(between_bodies), within_bodies_(within_bodies) {}
+    /// actors: that bodies belong to.
+    MatterContacts(const World& world, std::size_t actors, bool between_bodies, bool within_bodies)
+        : world_(world), laws_(world, actors), between_bodies_(between_bodies), within_bodies_(within_bodies) {}
 
     /// Once, when all bodies are there. Meshfree bodies have no cells that move, and take no part.
     void begin(std::span<const BodyState> bodies);
@@ -134,6 +136,7 @@ public:
     };
     std::vector<Frame> frames(std::span<const BodyState> bodies, float dt) const;
     const Matter& matter(std::size_t body) const { return *matter_[body]; }
+    const PairLaws& laws() const { return laws_; }
     /// After a descent substep: what touches, and friction's anchors, as positions say.
     ContactReport update_anchors(std::span<const BodyState> bodies, std::span<std::uint8_t> touched);
 
@@ -201,6 +204,7 @@ private:
     void push_out(Pair& pair, const Side& side, std::span<BodyState> bodies) const;
 
     const World& world_;
+    const PairLaws laws_;
     bool between_bodies_, within_bodies_;
     std::vector<std::shared_ptr<const Matter>> matter_;      ///< null: of meshfree bodies
     std::vector<std::vector<float>> per_area_;               ///< N/m^3 in each cell of each body

@@ -291,8 +291,7 @@ void MatterContacts::find_sides(std::span<const BodyState> bodies, double frame,
 }
 
 MatterContacts::Side MatterContacts::make_side(Index body, Index other, std::span<const BodyState> bodies) const {
-    Side side{
-        .body = body, .other = other, .law = world_.contact_of(bodies[body].actor, bodies[other].actor), .pairs = {}};
+    Side side{.body = body, .other = other, .law = laws_.of(bodies[body].actor, bodies[other].actor), .pairs = {}};
     side.spacing = float(std::min(bodies[body].body->spacing(), bodies[other].body->spacing()));
     return side;
 }
@@ -544,6 +543,8 @@ bool MatterContacts::is_sound(const Memory& memory, std::span<const BodyState> b
     const SideMemory* before = nullptr;
     for (const SideMemory& side : memory.sides) {
         if (side.body >= bodies.size() || side.other >= bodies.size() || !matter_[side.other]) return false;
+        const bool is_own = side.body == side.other;
+        if (is_own ? !own_cells_[side.body] : !between_bodies_) return false; // nothing here would search for these
         if (!std::isfinite(side.moved) || !std::isfinite(side.until) || !(side.since >= 0)) return false;
         if (before && std::pair(before->body, before->other) >= std::pair(side.body, side.other)) return false;
         before = &side;

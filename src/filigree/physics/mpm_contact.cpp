@@ -51,9 +51,9 @@ Vec3f after_contact(const Vec3f& relative, const Vec3f& normal, float friction) 
 
 } // namespace
 
-NodeContacts::NodeContacts(const Grid& grid, const World& world, std::span<const std::size_t> actors,
-                           const RunContext& context)
-    : world_(world), actors_(actors) {
+NodeContacts::NodeContacts(const Grid& grid, const World& world, const PairLaws& laws,
+                           std::span<const std::size_t> actors, const RunContext& context)
+    : world_(world), laws_(laws), actors_(actors) {
     for (std::uint32_t b = 0; b < grid.block_count(); ++b) {
         const BlockPlace& here = grid.place(b);
         const BlockPlace* before = b > 0 ? &grid.place(b - 1) : nullptr;
@@ -120,17 +120,25 @@ void NodeContacts::meet_bodies(Grid& grid, std::size_t place) const {
             Node& node = grid.nodes(here[k])[n];
             const Vec3f& normal = normals_[place][next + k];
             if (!(node.motion[3] > 0)) continue;
-            double friction = world_.body_friction;
-            if (here.size() == 2)
-                friction =
-                    world_.contact_of(actors_[grid.place(here[0]).body], actors_[grid.place(here[1]).body]).friction;
             Vec3f own = velocity_of(node);
             if (heaviest * kLeastMass < mass - node.motion[3] && !normal.isZero())
-                own = common + after_contact(own - common, -normal, float(friction));
+                own = common + after_contact(own - common, -normal, friction_of(grid, here, k, n));
             set_velocity(node, own + one * (common - own));
         }
         next += here.size();
     }
+}
+
+/// Between a body and those it meets at a node: the mean of its pairs', by the others' mass there.
+float NodeContacts::friction_of(const Grid& grid, std::span<const std::uint32_t> here, std::size_t k, int node) const {
+    double sum = 0, mass = 0;
+    for (std::size_t other = 0; other < here.size(); ++other) {
+        const auto m = double(grid.nodes(here[other])[node].motion[3]);
+        if (other == k || !(m > 0)) continue;
+        sum += m * laws_.of(actors_[grid.place(here[k]).body], actors_[grid.place(here[other]).body]).friction;
+        mass += m;
+    }
+    return mass > 0 ? float(sum / mass) : 0.0f;
 }
 
 void NodeContacts::meet_obstacles(Grid& grid, std::size_t place, const ObstaclePoses& poses) const {

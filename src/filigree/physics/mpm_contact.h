@@ -4,7 +4,7 @@
 
 #include "filigree/physics/mpm_grid.h"
 #include "filigree/physics/obstacle_motion.h"
-#include "filigree/physics/world.h"
+#include "filigree/physics/pair_laws.h"
 
 namespace filigree::mpm {
 
@@ -13,7 +13,8 @@ namespace filigree::mpm {
 class NodeContacts {
 public:
     /// Before nodes have velocities: looks at masses alone. actors: of each body of the grid.
-    NodeContacts(const Grid& grid, const World& world, std::span<const std::size_t> actors, const RunContext& context);
+    NodeContacts(const Grid& grid, const World& world, const PairLaws& laws, std::span<const std::size_t> actors,
+                 const RunContext& context);
 
     /// Places of blocks, each with the blocks of all bodies there.
     std::size_t place_count() const { return first_block_.size() - 1; }
@@ -25,9 +26,11 @@ public:
 
 private:
     void meet_bodies(Grid& grid, std::size_t place) const;
+    float friction_of(const Grid& grid, std::span<const std::uint32_t> here, std::size_t k, int node) const;
     void meet_obstacles(Grid& grid, std::size_t place, const ObstaclePoses& poses) const;
 
     const World& world_;
+    const PairLaws& laws_;
     std::span<const std::size_t> actors_;
     std::vector<std::uint32_t> blocks_, first_block_;
     std::vector<std::vector<Vec3f>> normals_; ///< of each place: of nodes with several bodies, one a body; outward

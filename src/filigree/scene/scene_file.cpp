@@ -358,9 +358,7 @@ private:
         PairContact contact{scene_.body_friction, scene_.body_restitution};
         in.set("friction", contact.friction);
         in.set("restitution", contact.restitution);
-        for (const std::size_t first : bodies_called(in, "first"))
-            for (const std::size_t second : bodies_called(in, "second"))
-                scene_.pairs.push_back({first, second, contact});
+        scene_.pairs.push_back({bodies_called(in, "first"), bodies_called(in, "second"), contact});
     }
 
     void read_fracture(const SceneTable& in) {

@@ -127,7 +127,7 @@ struct SceneFile {
     std::vector<HeatSource> heat_sources; ///< world
     std::vector<SceneBody> bodies;
     std::vector<SceneObstacle> obstacles;
-    std::vector<BodyPair> pairs;
+    std::vector<GroupPair> pairs;
     std::vector<SceneFracture> fractures;
     std::vector<SceneCrack> cracks;
     std::vector<ScenePin> pins;

@@ -86,7 +86,7 @@ public:
         }
         result_.world.body_friction = scene_.body_friction;
         result_.world.body_restitution = scene_.body_restitution;
-        result_.world.body_pairs = scene_.pairs;
+        result_.world.group_pairs = scene_.pairs;
         result_.hash = hash_.value();
         return std::move(result_);
     }
