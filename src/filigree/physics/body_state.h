@@ -26,7 +26,8 @@ inline constexpr float kContactShare = 1;
 
 struct BodyState {
     std::shared_ptr<const Body> body;
-    std::size_t actor = 0;   ///< that it belongs to: a piece, to the one that broke
+    std::size_t actor = 0;                                       ///< that it belongs to: a piece, to the one that broke
+    Eigen::Isometry3d placement = Eigen::Isometry3d::Identity(); ///< Actor::placement
     bool is_absent = false;  ///< a body that has broken, a piece of one that has not, or one on the grid
     bool is_on_grid = false; ///< of the model mpm: moved by mpm::Bodies; it has no elasticity
     std::shared_ptr<const BrokenBody> broken; ///< of a body that breaks: its pieces ...

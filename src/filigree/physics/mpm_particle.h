@@ -27,6 +27,7 @@ struct alignas(16) Particle {
     float warming[3];      ///< gradient of the temperature, K/m
     float enthalpy_beside; ///< J/kg that the enthalpy has no digits for: heat that comes slowly adds up here
 
+    bool is_sound() const; ///< all that it carries is finite, and its volume ratio is one that deform leaves
     float volume_ratio() const { return c[0][3]; }
     float& volume_ratio() { return c[0][3]; }
     float plastic_strain() const { return c[1][3]; }

@@ -9,8 +9,8 @@ namespace filigree {
 
 namespace {
 
-// The name of the format, its version last. 8: a checksum at the end.
-constexpr std::uint64_t kMagic = 0x38455441'54534c46; // "FLSTATE8"
+// The name of the format, its version last. 9: what it was made for.
+constexpr std::uint64_t kMagic = 0x39455441'54534c46; // "FLSTATE9"
 static_assert(sizeof(Contacts::NearMemory) == 5 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
 static_assert(sizeof(Contacts::BallMemory) == 5 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
 static_assert(sizeof(MatterContacts::SideMemory) == 6 * sizeof(Index), "padding would be saved");
@@ -106,6 +106,8 @@ Contacts::Memory read_contacts(ByteReader& reader) {
 std::string write_saved_state(const SavedState& state) {
     ByteWriter writer;
     writer.value(kMagic);
+    for (const std::uint64_t hash : {state.made_for.bodies, state.made_for.world, state.made_for.options})
+        writer.value(hash);
     writer.value(state.frame);
     writer.value(std::uint64_t(state.bodies.size()));
     for (const SavedBody& body : state.bodies) write_body(writer, body);
@@ -133,6 +135,8 @@ Result<SavedState> read_saved_state(std::string_view bytes) {
     ByteReader reader(contents);
     reader.value<std::uint64_t>(); // the magic
     SavedState state;
+    for (std::uint64_t* hash : {&state.made_for.bodies, &state.made_for.world, &state.made_for.options})
+        *hash = reader.value<std::uint64_t>();
     state.frame = reader.value<std::uint64_t>();
     state.bodies.resize(reader.count(sizeof(std::uint64_t)));
     for (SavedBody& body : state.bodies) body = read_body(reader);
