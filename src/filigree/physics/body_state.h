@@ -18,7 +18,8 @@ struct RigidPose {
     Eigen::Quaterniond turn = Eigen::Quaterniond::Identity(); ///< from the body at rest
     Vec3d angular = Vec3d::Zero();                            ///< angular momentum about the centre, kg m^2/s
     double quiet_seconds = 0;                                 ///< that it has hardly moved
-    bool sleeps = false;                                      ///< it rests, and nothing is computed for it
+    bool rests = false;  ///< an obstacle holds it, or a rigid body that rests; nothing else moves it
+    bool sleeps = false; ///< nothing is computed for it
 };
 
 /// Share of the body's squared frequency at rest that contacts may add: they never shorten explicit steps by more.
@@ -38,6 +39,7 @@ struct BodyState {
     std::vector<float> inverse_mass;  ///< 0: pinned
     std::vector<std::uint8_t> fixed;  ///< 1: pinned
     float rest_squared_frequency = 0; ///< ElasticReport::squared_frequency at rest
+    bool may_sleep = true;            ///< Actor::may_sleep
     bool is_held = false;             ///< by pins, forces or wind: not left to itself
     std::optional<RigidPose> rigid;   ///< of a rigid body
     float pushed_way = 0; ///< m that particles were moved one by one, at most; a rigid body's pose has to follow

@@ -78,6 +78,14 @@ public:
                 std::ranges::any_of(side.pairs, [](const Pair& pair) { return pair.depth > 0; }))
                 visit(side.body, side.other);
     }
+    /// The same of those that friction holds together.
+    template <class Visit>
+    void each_holding(const Visit& visit) const {
+        for (const Side& side : sides_)
+            if (side.body != side.other &&
+                std::ranges::any_of(side.pairs, [](const Pair& pair) { return pair.grasp.holds; }))
+                visit(side.body, side.other);
+    }
     /// s: in longer steps something could pass through something.
     double longest_step() const;
 
@@ -135,6 +143,8 @@ public:
         Vec3f offset = Vec3f::Zero(); ///< from the anchor, along the surface, then
     };
     std::vector<Frame> frames(std::span<const BodyState> bodies, float dt) const;
+    /// Sleepers wake that something is about to touch. Returns whether any did.
+    bool wake_met(std::span<BodyState> bodies, std::span<const Frame> frames) const;
     const Matter& matter(std::size_t body) const { return *matter_[body]; }
     const PairLaws& laws() const { return laws_; }
     /// After a descent substep: what touches, and friction's anchors, as positions say.
@@ -184,6 +194,7 @@ private:
     void find_pairs(std::span<const Index> due, std::span<const BodyState> bodies, float frame,
                     const RunContext& context);
     bool wake_touched(std::span<BodyState> bodies) const;
+    bool disturbs(const BodyState& body, std::size_t number) const;
     void list_work(std::span<const BodyState> bodies);
     void find_sides(std::span<const BodyState> bodies, double frame, const RunContext& context);
     std::optional<Vec3f> enter(Pair& pair, const Side& side, std::span<const BodyState> bodies) const;

@@ -24,7 +24,7 @@ void write_pose(ByteWriter& writer, const std::optional<RigidPose>& pose) {
         for (int axis = 0; axis < 3; ++axis) writer.value(v[axis]);
     for (int k = 0; k < 4; ++k) writer.value(pose->turn.coeffs()[k]);
     writer.value(pose->quiet_seconds);
-    writer.value(std::uint64_t(pose->sleeps));
+    writer.value(std::uint64_t(pose->sleeps) + 2 * std::uint64_t(pose->rests));
 }
 
 std::optional<RigidPose> read_pose(ByteReader& reader) {
@@ -34,7 +34,9 @@ std::optional<RigidPose> read_pose(ByteReader& reader) {
         for (int axis = 0; axis < 3; ++axis) (*v)[axis] = reader.value<double>();
     for (int k = 0; k < 4; ++k) pose.turn.coeffs()[k] = reader.value<double>();
     pose.quiet_seconds = reader.value<double>();
-    pose.sleeps = reader.value<std::uint64_t>() != 0;
+    const auto flags = reader.value<std::uint64_t>();
+    pose.sleeps = (flags & 1) != 0;
+    pose.rests = (flags & 2) != 0;
     return pose;
 }
 

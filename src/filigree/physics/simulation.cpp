@@ -5,6 +5,7 @@
 #include "filigree/physics/rigid_body.h"
 #include "filigree/physics/rigid_state.h"
 #include "filigree/physics/simulation_state.h"
+#include "filigree/physics/sleep.h"
 
 #include <algorithm>
 #include <cassert>
@@ -33,6 +34,7 @@ BodyState place_body(const Actor& actor, std::size_t number) {
     state.body = actor.body;
     state.actor = number;
     state.placement = actor.placement;
+    state.may_sleep = actor.may_sleep;
     const Body& body = *actor.body;
     const std::size_t count = body.particle_count();
     state.positions = state.velocities = Vectors(count);
@@ -197,21 +199,6 @@ bool is_finite(const SimulationState& state) {
         state.bodies, [](const BodyState& body) { return is_finite(body.positions) && is_finite(body.velocities); });
 }
 
-/// Rigid bodies that have hardly moved for a while sleep, and wake when anything moves them.
-void let_rest(SimulationState& state, double from, double until) {
-    const bool disturbed = state.external.has_wind() || obstacle_way(state.world, state.bodies, from, until) > 0;
-    for (std::size_t b = 0; b < state.bodies.size(); ++b) {
-        BodyState& body = state.bodies[b];
-        if (!body.rigid) continue;
-        if (disturbed || body.is_held || state.external.pull(b, until) || state.external.push(body.actor)) {
-            if (body.rigid->sleeps) state.contacts.look_near_again();
-            wake(body);
-        } else if (!body.rigid->sleeps) {
-            tire(body, state.frame_seconds());
-        }
-    }
-}
-
 /// One frame, whatever way it takes. Cancelled work leaves the state half done.
 Result<FrameReport> step_frame(SimulationState& state, const SavedState& start, const RunContext& context) {
     const double from = state.time(), until = double(state.frame + 1) * state.frame_seconds();
@@ -223,12 +210,15 @@ Result<FrameReport> step_frame(SimulationState& state, const SavedState& start, 
         held += more;
     };
     hold_lost();
+    const bool began_lost = held > 0;
     state.contacts.clear_touches();
     state.external.find_wind(state.bodies, from, state.options.frames_per_second, context);
 
     double reached = from;
     DescentCause cause = DescentCause::chosen;
-    if (state.options.mode != StepMode::descent) {
+    if (state.options.mode != StepMode::descent && began_lost) {
+        cause = DescentCause::not_finite; // the frame began so
+    } else if (state.options.mode != StepMode::descent) {
         reached = step_explicitly(state, from, until, report, context);
         cause = DescentCause::too_many_substeps;
     }
@@ -265,6 +255,7 @@ void fit_rigid(SimulationState& state, BodyState& body) {
     if (!body.rigid) return;
     hold_lost_particles(state, body);
     fit_pose(body);
+    body.rigid->rests = false;
 }
 
 /// Puts the state back to what it was, unless all went well: also where memory ran out on the way.

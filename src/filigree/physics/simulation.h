@@ -16,6 +16,8 @@ struct Actor {
     Vec3d velocity = Vec3d::Zero();                              ///< m/s
     Vec3d spin = Vec3d::Zero();                                  ///< rad/s about the centre of mass
     std::shared_ptr<const Fracture> fracture = nullptr;          ///< of this body; null: it does not break
+    /// A rigid body that hardly moves while something holds it sleeps, and costs nothing until something touches it.
+    bool may_sleep = true;
 };
 
 /// explicit_steps: velocity Verlet, as many substeps as stability asks for; where that is more than 20,000 a frame, or

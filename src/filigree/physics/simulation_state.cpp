@@ -75,6 +75,7 @@ bool restore_pose(RigidPose& pose, const RigidPose& saved) {
     pose.angular = saved.angular;
     pose.quiet_seconds = saved.quiet_seconds;
     pose.sleeps = saved.sleeps;
+    pose.rests = saved.rests;
     return true;
 }
 
