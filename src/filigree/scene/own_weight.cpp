@@ -1,5 +1,7 @@
 #include "filigree/scene/own_weight.h"
 
+#include "filigree/core/text.h"
+
 #include <cmath>
 
 #include <fmt/format.h>
@@ -8,8 +10,8 @@ namespace filigree {
 
 namespace {
 
-constexpr double kMostStrain = 0.2; ///< at the foot
-constexpr double kGoodStrain = 0.1; ///< with what is proposed
+constexpr double kMostStrain = 0.25; ///< at the foot
+constexpr double kGoodStrain = 0.1;  ///< with what is proposed
 
 /// Rounded down to one digit.
 double one_digit(double x) {
@@ -18,6 +20,7 @@ double one_digit(double x) {
 }
 
 std::string mass_text(double kilograms) {
+    if (kilograms >= 1e5) return with_commas(std::uint64_t(std::lround(kilograms / 1000))) + " t";
     if (kilograms >= 1000) return fmt::format("{:.2g} t", kilograms / 1000);
     return kilograms >= 1 ? fmt::format("{:.3g} kg", kilograms) : fmt::format("{:.3g} g", 1000 * kilograms);
 }
