@@ -32,7 +32,8 @@ cli::Program make_program(cli::Session& session) {
             .notes = "FILE '-' is standard input or output. Each command has examples: 'filigree COMMAND --help'.\n"
                      "Exit codes: 0 done, 1 an error of our own, 2 usage, 3 cannot read, 4 damaged file, 5 unknown "
                      "format, 6 cannot write,\n"
-                     "7 unsuitable input, 8 inputs do not belong together, 9 out of memory, 130 cancelled.",
+                     "7 unsuitable input, 8 inputs do not belong together, 9 out of memory, 10 done but not to be "
+                     "trusted, 130 cancelled.",
             .common = session.common_options(),
             .commands = cli::all_commands()};
 }
@@ -111,6 +112,9 @@ int main(int argc, char** argv) {
         return run(argc, argv);
     } catch (const cli::Failure& failure) {
         return fail(failure.error);
+    } catch (const cli::Doubt& doubt) {
+        cli::say("filigree: " + doubt.sentence);
+        return cli::kDoubtful;
     } catch (const BadResultAccess& failure) {
         return fail(failure.error());
     } catch (const std::bad_alloc&) {

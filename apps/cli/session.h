@@ -29,6 +29,12 @@ struct Failure {
 /// What the arguments ask for makes no sense.
 [[noreturn]] inline void refuse(const std::string& sentence) { refuse(ErrorCode::usage, sentence); }
 
+/// The outputs are written and are not to be trusted: the program leaves with kDoubtful.
+struct Doubt {
+    std::string sentence;
+};
+inline constexpr int kDoubtful = 10;
+
 /// The result; an error of that kind gets a sentence more, of what the command line has against it.
 template <class T>
 Result<T> with_hint(Result<T> result, ErrorCode code, const std::string& hint) {

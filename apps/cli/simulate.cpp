@@ -203,6 +203,10 @@ public:
     }
 
     void report() const;
+    /// Throws where what was written is not to be trusted.
+    void doubt() const {
+        if (const std::optional<std::string> why = run_->broke_down()) throw Doubt{*why};
+    }
 
 private:
     /// What has one topology cannot part and join.
@@ -387,6 +391,7 @@ void run(const SimulateArguments& options, Session& session) {
     run.simulate();
     run.write();
     run.report();
+    run.doubt();
 }
 
 } // namespace

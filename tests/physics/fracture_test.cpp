@@ -48,6 +48,23 @@ World empty_world() {
     return world;
 }
 
+/// Pieces that are not there, or too few of them: points go with the piece they lie in.
+TEST(BrokenBody, PointsOfPiecesThatAreNotThereGoWithThoseTheyLieIn) {
+    const auto whole = block(6, 5, 4, 0.1, brittle());
+    Actor falls{whole};
+    falls.fracture = fracture_of(whole, halves({0.013, 0, 0}, {1, 0.3, 0.2}), 1e3, 1);
+    Simulation simulation = Simulation::create(World{}, {falls}, {}, kTwoThreads).value();
+    const std::vector<Vec3f> points = {{0.2f, 0, 0}, {-0.2f, 0.1f, 0}};
+    const std::vector<Index> wrong = {99, kNoIndex}, few = {77};
+    for (const std::size_t attached :
+         {simulation.attach(0, points, kTwoThreads), simulation.attach(0, points, wrong, kTwoThreads),
+          simulation.attach(0, points, few, kTwoThreads)}) {
+        std::vector<Vec3f> now(2);
+        simulation.attached(attached, now, {}, kTwoThreads);
+        for (std::size_t p = 0; p < 2; ++p) EXPECT_LT((now[p] - points[p]).norm(), 1e-5f);
+    }
+}
+
 TEST(BrokenBody, PiecesAreTheWhole) {
     const auto whole = block(6, 5, 4, 0.1, brittle());
     BrokenBodyReport report;

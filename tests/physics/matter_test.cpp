@@ -240,6 +240,37 @@ TEST(OwnCells, FindWhatBruteForceFinds) {
 
 // A bar that is folded in its middle until its halves lie in each other, and one in which a layer of cells has flipped,
 // so that those on both its sides lie in each other the same way up.
+/// A part too small for cells of its own, beside a body: what is looked at is no more than without it.
+TEST(OwnCells, AFleckCostsNoMoreThanNone) {
+    const auto candidates = [](bool with_fleck, MaterialModel model) {
+        Mesh mesh = make_wavy_cube({.resolution = 24});
+        if (with_fleck) {
+            const auto first = Index(mesh.positions.size());
+            for (const Vec3f& p : {Vec3f(0, 0, 0), Vec3f(0.01f, 0, 0), Vec3f(0, 0.01f, 0), Vec3f(0, 0, 0.01f)})
+                mesh.positions.push_back(p + Vec3f(1.6f, 0.2f, 0.1f));
+            for (const std::array<Index, 3>& face : {std::array<Index, 3>{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}})
+                mesh.add_face(std::array{first + face[0], first + face[1], first + face[2]});
+        }
+        Material material = undamped(0.3);
+        material.model = model;
+        BodyReport report;
+        const Body body = make_body(mesh, material, {.cells = {.count = 4000}}, kOneThread, &report).value();
+        EXPECT_EQ(report.cells.loose_parts, with_fleck ? 1U : 0U);
+        const Matter matter(body);
+        for (std::size_t s = 0; s < body.surface.points.size(); ++s) {
+            const Vec3f middle = matter.rest_position({matter.cell_of_point(s), Vec3f::Constant(0.5f)});
+            const float away = (body.surface.points.rest[s] - middle).cwiseAbs().maxCoeff();
+            EXPECT_TRUE(matter.is_loose(s) || away < 1.5f * float(body.spacing()));
+            EXPECT_TRUE(!matter.is_loose(s) || away < 1.3f) << "carried by a cell that is near";
+        }
+        const Vectors& corners = body.rest.size() == body.cells.corners.size() ? body.rest : Vectors(0);
+        return corners.size() == 0 ? 0 : OwnCells(matter).candidates(corners, 0.3f * float(body.spacing()));
+    };
+    const auto without = double(candidates(false, MaterialModel::fem));
+    EXPECT_LT(double(candidates(true, MaterialModel::fem)), 1.1 * without + 100);
+    candidates(true, MaterialModel::meshfree);
+}
+
 TEST(OwnCells, FindWhatIsFolded) {
     const Body bar = make_body(box_cells(16, 3, 3, 0.1), undamped(0.3));
     const Matter matter(bar);

@@ -281,6 +281,26 @@ TEST(Mpm, MeltsFlowsAndFreezesInTheShapeItHas) {
     EXPECT_NEAR(volume, 0.16 * 0.16 * 0.16, 0.03 * 0.16 * 0.16 * 0.16);
 }
 
+/// A third body near two, in the same block of nodes, does not change how these rub.
+TEST(Mpm, FrictionOfAPairHoldsBesideAThirdBody) {
+    const auto slab = box(16, 4, 8, 0.02, elastic(2e5)), block = box(6, 4, 4, 0.02, elastic(2e5));
+    const auto way = [&](bool beside) {
+        World world = on_ground(5);
+        world.gravity = {4, -9.81, 0};
+        world.body_pairs.push_back({0, 1, {.friction = 0}});
+        world.body_friction = 5;
+        std::vector<Actor> actors = {{slab, at(0, 0, 0)}, {block, at(0.02, 0.081, 0.0)}};
+        if (beside) actors.push_back({box(6, 6, 3, 0.02, elastic(2e5)), at(0.02, 0, 0.205)});
+        Simulation simulation = begin(std::move(world), std::move(actors));
+        const double from = middle(simulation, 1).x();
+        run(simulation, 18);
+        return middle(simulation, 1).x() - from;
+    };
+    const double alone = way(false);
+    EXPECT_GT(alone, 0.1) << "it slides without friction";
+    EXPECT_NEAR(way(true), alone, 0.1 * alone);
+}
+
 TEST(Mpm, SameBytesForAnyNumberOfThreadsAndWhenResumed) {
     Material wax = melting();
     wax.temperature = 299;

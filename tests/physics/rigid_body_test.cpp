@@ -140,6 +140,96 @@ TEST(RigidBody, SleepersThatAHandWakesFeelTheGroundAndGoOnTheSameAfterARestore) 
     }
 }
 
+/// What nothing holds goes on, however slowly.
+TEST(RigidBody, WhatFloatsDoesNotSleep) {
+    for (const StepMode mode : {StepMode::explicit_steps, StepMode::descent}) {
+        World slight;
+        slight.gravity = {0, -0.005, 0};
+        Simulation falls = begin(slight, {put(block(2, 2, 2, 0.1, stone()), Vec3d(0, 0, 0))}, mode);
+        World none;
+        none.gravity.setZero();
+        Actor drifting = put(block(2, 2, 2, 0.1, stone()), Vec3d(0, 0, 0));
+        drifting.velocity = {0.004, 0, 0};
+        Actor beside = put(block(2, 2, 2, 0.1, stone()), Vec3d(0.2, 0, 0)); // touching it, as slow
+        beside.velocity = drifting.velocity;
+        Simulation drifts = begin(none, {drifting, beside}, mode);
+        const Vec3d momentum = drifts.momentum().linear;
+        for (int frame = 0; frame < 180; ++frame) {
+            ASSERT_TRUE(falls.advance(kOneThread).ok());
+            ASSERT_TRUE(drifts.advance(kOneThread).ok());
+        }
+        EXPECT_NEAR(centre_of_mass(falls).y(), -0.5 * 0.005 * 9, 2e-4);
+        EXPECT_LT((drifts.momentum().linear - momentum).norm(),
+                  (mode == StepMode::descent ? 1e-3 : 1e-5) * momentum.norm());
+    }
+}
+
+/// A stone that comes slowly to one that sleeps on ice pushes it on, as one that is awake.
+TEST(RigidBody, ASleeperIsNoWallForWhatComesToIt) {
+    for (const StepMode mode : {StepMode::explicit_steps, StepMode::descent})
+        for (const double speed : {0.008, 0.015, 0.03, 0.3}) {
+            const auto momentum_after = [&](bool may_sleep) {
+                World ice;
+                ice.obstacles.emplace_back().shape = HalfSpace{};
+                ice.obstacles.back().friction = 0;
+                ice.body_friction = 0;
+                const auto cube = block(3, 3, 3, 0.1, stone(0));
+                Actor rests = put(cube, Vec3d(0, 0.15, 0)), comes = put(cube, Vec3d(0.32 + 1.5 * speed, 0.15, 0));
+                rests.may_sleep = may_sleep;
+                comes.may_sleep = false; // else a slow one stops by itself
+                Simulation both = begin(ice, {rests, comes}, mode);
+                for (int frame = 0; frame < 60; ++frame) EXPECT_TRUE(both.advance(kOneThread).ok());
+                Vectors velocities = both.velocities(1);
+                for (std::size_t i = 0; i < velocities.size(); ++i) velocities.set(i, Vec3f(float(-speed), 0, 0));
+                EXPECT_TRUE(both.set_velocities(1, velocities).ok());
+                const double before = both.momentum().linear.x();
+                for (int frame = 0; frame < int(60 * (3 + 0.05 / speed)); ++frame)
+                    EXPECT_TRUE(both.advance(kOneThread).ok());
+                return both.momentum().linear.x() / before;
+            };
+            const double awake = momentum_after(false);
+            EXPECT_NEAR(momentum_after(true), awake, 0.02) << speed << " " << int(mode);
+            if (mode == StepMode::explicit_steps) { // descent loses some of its own in a blow on the ground
+                EXPECT_NEAR(awake, 1, 0.02) << speed;
+            }
+        }
+}
+
+TEST(RigidBody, ASleeperFallsWhenWhatHeldItIsTakenAway) {
+    for (const StepMode mode : {StepMode::explicit_steps, StepMode::descent}) {
+        World world;
+        world.obstacles.emplace_back().shape = HalfSpace{};
+        const auto cube = block(3, 3, 3, 0.1, stone(0.1));
+        Simulation stack = begin(world, {put(cube, Vec3d(0, 0.15, 0)), put(cube, Vec3d(0, 0.45, 0))}, mode);
+        for (int frame = 0; frame < 90; ++frame) ASSERT_TRUE(stack.advance(kOneThread).ok());
+        const Vec3d before = centre_of_mass(stack, 1);
+        for (int frame = 0; frame < 5; ++frame) ASSERT_TRUE(stack.advance(kOneThread).ok());
+        ASSERT_EQ((centre_of_mass(stack, 1) - before).norm(), 0) << "it sleeps";
+        Vectors away = stack.positions(0);
+        for (std::size_t i = 0; i < away.size(); ++i) away.set(i, away[i] + Vec3f(5, 0, 0));
+        ASSERT_TRUE(stack.set_positions(0, away).ok());
+        for (int frame = 0; frame < 60; ++frame) ASSERT_TRUE(stack.advance(kOneThread).ok());
+        EXPECT_NEAR(centre_of_mass(stack, 1).y(), 0.15, 0.01);
+    }
+}
+
+TEST(RigidBody, OneThatMayNotSleepStaysAwakeAndLetsOthersSleep) {
+    World world;
+    world.obstacles.emplace_back().shape = HalfSpace{};
+    const auto cube = block(3, 3, 3, 0.1, stone(0.1));
+    std::vector<Actor> actors = {put(cube, Vec3d(0, 0.1499, 0)), put(cube, Vec3d(1, 0.1499, 0))};
+    actors[1].may_sleep = false;
+    Simulation rests = begin(world, actors);
+    for (int frame = 0; frame < 120; ++frame) ASSERT_TRUE(rests.advance(kOneThread).ok());
+    const auto is_still = [&](std::size_t body) {
+        double most = 0;
+        for (std::size_t i = 0; i < 8; ++i) most = std::max(most, double(rests.velocities(body)[i].norm()));
+        return most == 0;
+    };
+    EXPECT_TRUE(is_still(0));
+    EXPECT_FALSE(is_still(1));
+}
+
 /// Meshfree particles lie in the middle of their cells: the surface is half a spacing outside of their box.
 TEST(RigidBody, MeshfreeBodiesLieOnRigidAndElasticOnes) {
     World world;

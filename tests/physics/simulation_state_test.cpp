@@ -1,11 +1,17 @@
 // States saved and restored, threads, and what may run at the same time.
+#include "filigree/core/random.h"
 #include "filigree/physics/simulation.h"
 
 #include "physics/simulation_scenes.h"
 #include "physics/test_bodies.h"
 #include "threads.h"
 
+#include <array>
+#include <cstring>
 #include <thread>
+
+#define XXH_INLINE_ALL
+#include <xxhash.h>
 
 namespace filigree {
 namespace {
@@ -71,6 +77,87 @@ TEST(SimulationState, RefusesStatesThatAreDamagedOrOfOthers) {
     const Status refused = other.restore(bytes);
     ASSERT_FALSE(refused.ok());
     EXPECT_EQ(refused.error().code, ErrorCode::mismatch);
+}
+
+TEST(SimulationState, RefusesStatesOfOtherOptionsAndWorlds) {
+    const auto body = box(4, 4, 4, 0.1, material(MaterialModel::fem));
+    const auto begin = [&](const World& world, const StepOptions& options) {
+        return simulation(world, {actor(body, {0, 0.01, 0}), actor(body, {0.1, 0.5, 0})}, options);
+    };
+    Simulation saved = begin(with_ground(), {});
+    run(saved, 12);
+    const std::string bytes = saved.save();
+    const auto refuses = [&](Simulation other, const char* what) {
+        const std::string before = other.save();
+        const Status refused = other.restore(bytes);
+        ASSERT_FALSE(refused.ok()) << what;
+        EXPECT_EQ(refused.error().code, ErrorCode::mismatch);
+        EXPECT_NE(refused.error().message.find(what), std::string::npos) << refused.error().message;
+        EXPECT_TRUE(other.save() == before);
+        run(other, 3);
+    };
+    refuses(begin(with_ground(), {.contacts_within_bodies = false}), "options");
+    refuses(begin(with_ground(), {.contacts_between_bodies = false}), "options");
+    refuses(begin(with_ground(), {.automatic_rigid = false}), "options");
+    refuses(begin(with_ground(), {.frames_per_second = 30}), "options");
+    refuses(begin(free_space(), {}), "world");
+    World slippery = with_ground();
+    slippery.obstacles[0].friction = 0;
+    refuses(begin(slippery, {}), "world");
+    World held = with_ground();
+    held.pins.push_back({.body = 0, .particles = {0}, .motion = {}});
+    refuses(begin(held, {}), "world");
+    refuses(simulation(with_ground(), {actor(body), actor(box(4, 4, 4, 0.1, material(MaterialModel::fem, 2e5)))}),
+            "bodies");
+
+    // What may be set while it runs is no part of it.
+    World windless = with_ground();
+    windless.hands.push_back({.body = 0, .target = {{}, {}, Vec3d(1, 1, 1)}});
+    windless.air_heat_transfer = 10;
+    Simulation same = begin(windless, {});
+    EXPECT_TRUE(same.restore(bytes).ok());
+}
+
+/// Bytes with a checksum that is right for them.
+std::string with_checksum(std::string bytes) {
+    const std::size_t length = bytes.size() - sizeof(std::uint64_t);
+    const std::uint64_t sum = XXH3_64bits(bytes.data(), length);
+    std::memcpy(bytes.data() + length, &sum, sizeof sum);
+    return bytes;
+}
+
+/// States that somebody made up are refused, or gone on from: nothing crashes.
+TEST(SimulationState, HostileStatesDoNoHarm) {
+    const std::vector<MaterialModel> models = {MaterialModel::fem, MaterialModel::meshfree, MaterialModel::rigid,
+                                               MaterialModel::mpm, MaterialModel::springs};
+    for (const MaterialModel model : models) {
+        Material matter = material(model);
+        if (model == MaterialModel::fem || model == MaterialModel::meshfree) matter.yield_stress = 2e3;
+        const auto body = box(3, 3, 3, 0.1, matter);
+        Simulation one = simulation(with_ground(), {actor(body, {0, 0.001, 0}), actor(body, {0.05, 0.302, 0.02})});
+        one.attach(0, std::vector<Vec3f>{{0.1f, 0.2f, 0.1f}}, kOneThread);
+        run(one, 12);
+        const std::string bytes = one.save();
+        constexpr std::size_t kFixed = 4 * sizeof(std::uint64_t); // the magic and what it was made for
+        for (std::uint64_t attempt = 0; attempt < 80; ++attempt) {
+            const auto roll = [&](std::uint64_t n) { return random_unit(attempt + 1, n); };
+            std::string hostile = bytes;
+            for (std::uint64_t change = 0; change < 1 + attempt % 5; ++change) {
+                const std::size_t words = (bytes.size() - kFixed) / 4 - 2;
+                const std::size_t at = kFixed + 4 * std::size_t(roll(3 * change) * double(words));
+                constexpr std::array<std::uint32_t, 8> kWords = {0,          1,          0xffffffff, 0x7fc00000,
+                                                                 0x7f800000, 0x7e967699, 0xfe967699, 0x00000007};
+                std::uint32_t word = kWords[std::size_t(roll(3 * change + 1) * 8) % 8];
+                if (roll(3 * change + 2) < 0.3) word = std::uint32_t(roll(3 * change + 1) * 4294967295.0);
+                std::memcpy(hostile.data() + at, &word, sizeof word);
+            }
+            if (!one.restore(with_checksum(hostile)).ok()) continue;
+            for (int frame = 0; frame < 2; ++frame) ASSERT_TRUE(one.advance(kOneThread).ok());
+            for (std::size_t b = 0; b < 2; ++b)
+                ASSERT_TRUE(all_finite(one.positions(b))) << int(model) << " " << attempt;
+        }
+        ASSERT_TRUE(one.restore(bytes).ok());
+    }
 }
 
 TEST(SimulationState, DriversOfFlowedMatterGoOnTheSame) {

@@ -384,6 +384,49 @@ TEST(Simulation, PinsFollowTheirKeys) {
     EXPECT_GT(centre_of_mass(moved).y(), 0.3);
 }
 
+/// A floor that jumps down by 0.1 m and up again takes no speed with it: whoever stands on it falls, and no more.
+TEST_P(EachMode, AJumpOfAnObstacleIsNoBlow) {
+    World world = with_ground(0);
+    world.obstacles[0].motion.move = {{0, 0.5, 0.5, 1}, {}, Vec3d::Zero()};
+    for (const double down : {0.0, 0.0, -0.02, -0.02}) world.obstacles[0].motion.move.values.emplace_back(0, down, 0);
+    Simulation stands =
+        simulation(world, {actor(box(4, 4, 4, 0.1, material(MaterialModel::fem)), {0, 0, 0})}, {.mode = GetParam()});
+    double fastest = 0;
+    for (int frame = 0; frame < 60; ++frame) {
+        run(stands, 1);
+        for (std::size_t i = 0; i < stands.velocities(0).size(); ++i)
+            fastest = std::max(fastest, double(stands.velocities(0)[i].norm()));
+    }
+    EXPECT_LT(fastest, 2);
+}
+
+TEST(Simulation, AJumpOfAPinIsNoBlowOfItsOwn) {
+    const auto body = box(2, 2, 2, 0.1, material(MaterialModel::fem));
+    World world = free_space();
+    Pin pin;
+    for (Index i = 0; i < body->particle_count(); ++i) pin.particles.push_back(i);
+    pin.motion.move = {{0, 0.1, 0.1, 1}, {Vec3d::Zero(), Vec3d::Zero(), Vec3d(1, 0, 0), Vec3d(1, 0, 0)}, Vec3d::Zero()};
+    world.pins.push_back(pin);
+    Simulation held = simulation(world, {actor(body)});
+    for (int frame = 0; frame < 10; ++frame) {
+        run(held, 1);
+        EXPECT_EQ(held.energy(kOneThread).kinetic, 0);
+    }
+}
+
+/// A force that names no particles is the whole body's, whatever that is of.
+TEST(Simulation, AForceWithoutParticlesPushesTheWholeBody) {
+    for (const MaterialModel model : {MaterialModel::fem, MaterialModel::springs, MaterialModel::meshfree,
+                                      MaterialModel::rigid, MaterialModel::mpm})
+        for (const StepMode mode : {StepMode::explicit_steps, StepMode::descent}) {
+            World world = free_space();
+            world.forces.push_back({.body = 0, .particles = {}, .force = {{}, {}, Vec3d(10, 0, 0)}});
+            Simulation pushed = simulation(world, {actor(box(3, 3, 3, 0.1, material(model)))}, {.mode = mode});
+            run(pushed, 20);
+            EXPECT_NEAR(pushed.momentum().linear.x(), 10 * pushed.time(), 0.01 * 10 * pushed.time()) << int(model);
+        }
+}
+
 TEST(Simulation, AHandPulls) {
     Material soft = material(MaterialModel::fem);
     soft.damping = 2;

@@ -36,6 +36,15 @@ TEST_F(SceneFileTest, RefusesWithLineAndSuggestion) {
               "3: 'size' in [[body]] must be a number, 1e-30 to 1e+30, and is 0.");
 }
 
+TEST_F(SceneFileTest, WhatCannotBreakIsToldWhatToWrite) {
+    const std::string said = refusal("[[body]]\nname = \"statue\"\nshape = \"bar\"\nmaterial = \"stone\"\n"
+                                     "[[fracture]]\npieces = 25\n");
+    EXPECT_NE(said.find("'statue'"), std::string::npos) << said;
+    EXPECT_NE(said.find("add model = \"fem\" and young_modulus = "), std::string::npos) << said;
+    EXPECT_TRUE(read_scene(write("[[body]]\nname = \"statue\"\nshape = \"bar\"\nmaterial = \"stone\"\n"
+                                 "model = \"fem\"\nyoung_modulus = 2e7\n[[fracture]]\npieces = 25\n")));
+}
+
 TEST_F(SceneFileTest, ValuesTakeThePlaceOfWhatIsWritten) {
     const std::string path = write(kDrop + "[[body]]\nshape = \"bar\"\n");
     const auto with = [&](std::vector<SceneValue> values) { return read_scene(path, values); };

@@ -1,6 +1,7 @@
 #include "scene/scenes.h"
 #include "threads.h"
 
+#include "filigree/io/mesh_file.h"
 #include "filigree/scene/particles_near.h"
 #include "filigree/scene/saved_state.h"
 
@@ -40,6 +41,60 @@ TEST_F(SceneRunTest, AResumedRunSavesWhatOneThatWentThroughSaves) {
     EXPECT_EQ(resumed->run->frame(), 3U);
     EXPECT_EQ(state_after(*resumed, 6), through);
     EXPECT_EQ(resumed->run->times().frames, 3U);
+}
+
+/// Soft, and thrown at the ground: crushed, partly by descent, at last inside out.
+TEST_F(SceneRunTest, AResumedRunKnowsWhatMadeItDoubtful) {
+    const std::string text = "[simulation]\nframes = 30\nmost_substeps = 20\n[[body]]\nname = \"jelly\"\n"
+                             "shape = \"wavy-cube\"\nresolution = 8\nsize = 0.3\nparticles = 64\ndriver = 60\n"
+                             "young_modulus = 2e3\ncentre = [0, 0.3, 0]\nvelocity = [0, -12, 0]\n"
+                             "[[obstacle]]\nshape = \"ground\"\n";
+    const auto through = made(text), resumed = made(text);
+    const std::string half = state_after(*through, 12);
+    ASSERT_TRUE(resumed->run->resume(half, "half"));
+    EXPECT_EQ(resumed->run->warnings(), through->run->warnings());
+    EXPECT_FALSE(resumed->run->warnings().empty());
+    EXPECT_EQ(state_after(*resumed, 30), state_after(*through, 30));
+    EXPECT_EQ(resumed->run->warnings(), through->run->warnings());
+    EXPECT_EQ(resumed->run->broke_down(), through->run->broke_down());
+    const DescentCauses &ours = resumed->run->descent_causes(), &theirs = through->run->descent_causes();
+    EXPECT_EQ(ours.chosen + ours.too_many_substeps + ours.not_finite, through->run->recording().totals.descent_frames);
+    EXPECT_EQ(ours.too_many_substeps, theirs.too_many_substeps);
+}
+
+TEST_F(SceneRunTest, ABodyThatCannotCarryItselfIsToldBeforeTheWork) {
+    const auto said = [&](const std::string& body, const std::string& world = "") {
+        const ReadyScene ready =
+            set_up(scene(world + "[[body]]\nname = \"koala\"\nresolution = 8\n" + body), kOneThread).value();
+        std::string all;
+        for (const std::string& warning : ready.warnings)
+            if (warning.find("cannot carry itself") != std::string::npos) all += warning;
+        return all;
+    };
+    const std::string cube = "shape = \"wavy-cube\"\nparticles = 100\nmaterial = \"soft-rubber\"\n";
+    const std::string large = said(cube + "scale = 20\n");
+    EXPECT_NE(large.find("body 'koala' is 2"), std::string::npos) << large;
+    EXPECT_NE(large.find(" t; soft-rubber of that size cannot carry itself: scale = "), std::string::npos) << large;
+    EXPECT_EQ(said(cube + "scale = 0.5\n"), "");
+    EXPECT_EQ(said(cube + "scale = 20\nmodel = \"rigid\"\n"), "");
+    EXPECT_EQ(said(cube + "scale = 20\n", "[world]\ngravity = [0, 0, 0]\n"), "");
+    EXPECT_EQ(said(cube + "scale = 20\nyoung_modulus = 1e9\n"), "");
+    // A bar that lies is as high as it is thick.
+    const std::string bar = "shape = \"bar\"\nlength = 40\nparticles = 500\nmaterial = \"soft-rubber\"\n";
+    EXPECT_EQ(said(bar), "");
+    EXPECT_NE(said(bar + "rotate = { axis = [0, 0, 1], degrees = 90 }\n"), "");
+}
+
+TEST_F(SceneRunTest, SizeIsTheLongestSideOfAMesh) {
+    const std::string mesh = (std::filesystem::temp_directory_path() / "filigree_size_test.ply").string();
+    ASSERT_TRUE(write_mesh(make_wavy_cube({.resolution = 8, .size = 9.3}), mesh, {}, kOneThread));
+    const std::string body = "[[body]]\nmesh = \"" + mesh + "\"\nparticles = 200\ndriver = 60\n";
+    const ReadyScene ready = set_up(scene(body + "size = 0.5\n"), kOneThread).value();
+    const Box box = bounds(ready.bodies[0].model.mesh);
+    EXPECT_NEAR(ready.bodies[0].scale * box.size().maxCoeff(), 0.5, 1e-6);
+    EXPECT_EQ(ready.bodies[0].body->scale, ready.bodies[0].scale);
+    EXPECT_NE(refusal(body + "size = 0.5\nscale = 2\n").find("give one of size and scale"), std::string::npos);
+    std::filesystem::remove(mesh);
 }
 
 TEST_F(SceneRunTest, BodiesBreakAndGoOnFromTheMiddle) {
@@ -173,6 +228,22 @@ TEST_F(SceneRunTest, ParticlesNearAPointAreThoseWithinHalfACellAndTheNearest) {
     for (const Index i : near) EXPECT_LE((body.rest[i] - there[0]).norm(), 0.88 * body.spacing());
     EXPECT_EQ(particles_near(body, far).size(), 1U);
     EXPECT_TRUE(particles_near(body, {}).empty());
+    // As trying every particle would say, near and far.
+    for (const float away : {0.0f, 0.3f, 2.0f, 40.0f}) {
+        const std::vector<Vec3f> at = {body.rest[3] + Vec3f(away, 0.3f * away, 0), Vec3f(away, 0.1f, -away)};
+        std::vector<Index> wanted;
+        for (const Vec3f& point : at) {
+            Index nearest = 0;
+            for (Index i = 0; i < body.rest.size(); ++i) {
+                if ((body.rest[i] - point).norm() <= float(0.87 * body.spacing())) wanted.push_back(i);
+                if ((body.rest[i] - point).norm() < (body.rest[nearest] - point).norm()) nearest = i;
+            }
+            wanted.push_back(nearest);
+        }
+        std::sort(wanted.begin(), wanted.end());
+        wanted.erase(std::unique(wanted.begin(), wanted.end()), wanted.end());
+        EXPECT_EQ(particles_near(body, at), wanted) << away;
+    }
 }
 
 TEST(HoldLost, HoldsWhatIsFarOrNoNumber) {

@@ -75,7 +75,9 @@ class Actor:
         axis: ArrayLike = ...,
         degrees: float = 0.0,
         velocity: ArrayLike = ...,
-        spin: ArrayLike = ...,
+        spin: ArrayLike | None = None,
+        spin_degrees: ArrayLike | None = None,
+        may_sleep: bool = True,
     ) -> None: ...
 
 class Attachment:

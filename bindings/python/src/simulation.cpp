@@ -70,7 +70,7 @@ SimulationPtr make_simulation(const py::object& bodies, const py::object& gravit
         const PyActor actor = py::isinstance<PyActor>(given)
                                   ? given.cast<PyActor>()
                                   : make_actor(given.cast<PyBody>(), py::make_tuple(0, 0, 0), py::make_tuple(0, 1, 0),
-                                               0, py::make_tuple(0, 0, 0), py::make_tuple(0, 0, 0));
+                                               0, py::make_tuple(0, 0, 0), py::none(), py::none(), true);
         held.push_back(actor.body);
         actors.push_back(actor.actor);
     }
@@ -84,9 +84,6 @@ SimulationPtr make_simulation(const py::object& bodies, const py::object& gravit
     world.obstacles = obstacles;
     world.pins = pins;
     world.forces = forces;
-    for (RegionForce& force : world.forces)
-        if (force.particles.empty() && force.body < held.size())
-            for (Index i = 0; i < held[force.body].body->particle_count(); ++i) force.particles.push_back(i);
     world.hands = hands;
     world.body_friction = friction;
     world.body_restitution = restitution;
@@ -250,9 +247,11 @@ dict
     Of the last frame: 'used' ('explicit' or 'descent'), 'substeps', 'contacts', 'least_volume_ratio' and more.
 )")
         .def_property_readonly(
-            "frame", [](const PySimulation& self) { return self.simulation.frame(); }, "Frames done.")
+            "frame", [](PySimulation& self) { return self.alone([&] { return self.simulation.frame(); }); },
+            "Frames done.")
         .def_property_readonly(
-            "time", [](const PySimulation& self) { return self.simulation.time(); }, "Seconds done.")
+            "time", [](PySimulation& self) { return self.alone([&] { return self.simulation.time(); }); },
+            "Seconds done.")
         .def_property_readonly(
             "bodies", [](const PySimulation& self) { return self.bodies; }, "A list of Body.")
         .def(
@@ -451,7 +450,8 @@ Linear, kg m/s, and angular about the world's origin, kg m^2/s: two arrays of fl
             R"(save(self)
 --
 
-Everything that moves, as bytes. Hands and forces that were set are no part of it.
+Everything that moves, as bytes. Hands and forces that were set are no part of it. It goes on only with the bodies, the
+world and the options that it was saved with.
 )")
         .def(
             "restore",

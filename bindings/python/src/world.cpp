@@ -19,7 +19,7 @@ Keyed<double> keyed_number_of(const py::object& given, const char* name) {
 }
 
 PyActor make_actor(const PyBody& body, const py::object& move, const py::object& axis, double degrees,
-                   const py::object& velocity, const py::object& spin) {
+                   const py::object& velocity, const py::object& spin, const py::object& spin_degrees, bool may_sleep) {
     PyActor made{body, {.body = body.body}};
     const Vec3d about = vector_of(axis, "axis");
     if (!(about.norm() > 0)) refuse("axis has no length.");
@@ -27,7 +27,10 @@ PyActor make_actor(const PyBody& body, const py::object& move, const py::object&
     made.actor.placement = Eigen::Translation3d(middle + vector_of(move, "move")) *
                            Eigen::AngleAxisd(degrees * std::numbers::pi / 180, about.normalized());
     made.actor.velocity = vector_of(velocity, "velocity");
-    made.actor.spin = vector_of(spin, "spin");
+    if (!spin.is_none() && !spin_degrees.is_none()) refuse("Give one of spin (rad/s) and spin_degrees (degrees/s).");
+    if (!spin.is_none()) made.actor.spin = vector_of(spin, "spin");
+    if (!spin_degrees.is_none()) made.actor.spin = std::numbers::pi / 180 * vector_of(spin_degrees, "spin_degrees");
+    made.actor.may_sleep = may_sleep;
     return made;
 }
 
@@ -292,13 +295,19 @@ move : array_like, (3,)
 axis, degrees : array_like (3,), float
 velocity : array_like, (3,)
     m/s.
-spin : array_like, (3,)
-    rad/s about the centre of mass.
+spin : array_like, (3,), optional
+    rad/s about the centre of mass; or
+spin_degrees : array_like, (3,), optional
+    degrees/s, as scenes have it.
+may_sleep : bool
+    A rigid body that hardly moves while something holds it sleeps, and costs nothing until something touches it.
 )")
-        .def(py::init(&make_actor), py::arg("body"), py::kw_only(), py::arg("move") = py::make_tuple(0, 0, 0),
-             py::arg("axis") = py::make_tuple(0, 1, 0), py::arg("degrees") = 0.0,
-             py::arg("velocity") = py::make_tuple(0, 0, 0), py::arg("spin") = py::make_tuple(0, 0, 0),
-             R"(__init__(self, body, *, move=(0, 0, 0), axis=(0, 1, 0), degrees=0.0, velocity=(0, 0, 0), spin=(0, 0, 0))
+        .def(
+            py::init(&make_actor), py::arg("body"), py::kw_only(), py::arg("move") = py::make_tuple(0, 0, 0),
+            py::arg("axis") = py::make_tuple(0, 1, 0), py::arg("degrees") = 0.0,
+            py::arg("velocity") = py::make_tuple(0, 0, 0), py::arg("spin") = py::none(),
+            py::arg("spin_degrees") = py::none(), py::arg("may_sleep") = true,
+            R"(__init__(self, body, *, move=(0, 0, 0), axis=(0, 1, 0), degrees=0.0, velocity=(0, 0, 0), spin=None, spin_degrees=None, may_sleep=True)
 --
 
 )");

@@ -14,7 +14,7 @@ struct PyActor {
 };
 
 PyActor make_actor(const PyBody& body, const py::object& move, const py::object& axis, double degrees,
-                   const py::object& velocity, const py::object& spin);
+                   const py::object& velocity, const py::object& spin, const py::object& spin_degrees, bool may_sleep);
 
 /// A number, or (times, values).
 Keyed<double> keyed_number_of(const py::object& given, const char* name);

@@ -1,5 +1,7 @@
 """Bodies step by step: forces of one's own, pins, hands, saved states."""
 
+import concurrent.futures
+
 import numpy
 import pytest
 
@@ -84,6 +86,61 @@ def test_actors_and_obstacles(body):
     energy = simulation.energy()
     simulation.step(40)
     assert simulation.energy()["potential"] < energy["potential"]
+
+
+def test_spin_in_degrees_and_radians(body):
+    def momentum(**how):
+        return filigree.Simulation([filigree.Actor(body, **how)], gravity=(0, 0, 0)).momentum()[1]
+
+    assert momentum(spin_degrees=(0, 90, 0)) == pytest.approx(momentum(spin=(0, numpy.pi / 2, 0)))
+    assert abs(momentum()).max() < 1e-6
+    with pytest.raises(filigree.UsageError):
+        filigree.Actor(body, spin=(1, 0, 0), spin_degrees=(1, 0, 0))
+
+
+def test_nothing_that_floats_sleeps():
+    still = filigree.Material("stone", damping=0)
+    stone = filigree.Body(filigree.make("wavy-cube", resolution=8), still, particles=100)
+    adrift = filigree.Simulation([stone], gravity=(0, -0.005, 0))
+    adrift.step(180)
+    assert adrift.positions(0)[:, 1].mean() - stone.rest[:, 1].mean() == pytest.approx(-0.5 * 0.005 * 9, rel=0.02)
+    floor = filigree.Obstacle.plane((0, float(stone.rest[:, 1].min()) - 0.05, 0))
+    for may_sleep in (True, False):
+        lies = filigree.Simulation([filigree.Actor(stone, may_sleep=may_sleep)], obstacles=[floor])
+        lies.step(300)
+        assert (abs(lies.velocities(0)).max() == 0) == may_sleep
+
+
+def test_states_of_other_options_are_refused(body):
+    floor = filigree.Obstacle.plane((0, -0.6, 0))
+    state = filigree.Simulation([body], obstacles=[floor])
+    state.step(3)
+    for other in (
+        filigree.Simulation([body], obstacles=[floor], contacts_within_bodies=False),
+        filigree.Simulation([body], obstacles=[floor], frames_per_second=30),
+        filigree.Simulation([body]),
+    ):
+        with pytest.raises(filigree.MismatchError):
+            other.restore(state.save())
+        other.step(2)
+
+
+def test_forces_without_particles_push_the_whole_body(body):
+    pushed = filigree.Simulation([body], gravity=(0, 0, 0), forces=[filigree.Force(0, (10, 0, 0))])
+    pushed.step(10)
+    damped = 1 - 0.5 * body.material.damping * pushed.time
+    assert pushed.momentum()[0][0] == pytest.approx(10 * pushed.time * damped, rel=0.01)
+
+
+def test_the_clock_may_be_read_while_it_runs(body):
+    runs = filigree.Simulation([body])
+    with concurrent.futures.ThreadPoolExecutor(2) as pool:
+        steps = [pool.submit(runs.step) for _ in range(10)]
+        seen = [runs.frame for _ in range(50)]
+        assert seen == sorted(seen)
+        for done in steps:
+            done.result()
+    assert runs.frame == 10 and len(runs.bodies) == 1
 
 
 def test_matter_melts():

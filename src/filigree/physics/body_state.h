@@ -18,7 +18,8 @@ struct RigidPose {
     Eigen::Quaterniond turn = Eigen::Quaterniond::Identity(); ///< from the body at rest
     Vec3d angular = Vec3d::Zero();                            ///< angular momentum about the centre, kg m^2/s
     double quiet_seconds = 0;                                 ///< that it has hardly moved
-    bool sleeps = false;                                      ///< it rests, and nothing is computed for it
+    bool rests = false;  ///< an obstacle holds it, or a rigid body that rests; nothing else moves it
+    bool sleeps = false; ///< nothing is computed for it
 };
 
 /// Share of the body's squared frequency at rest that contacts may add: they never shorten explicit steps by more.
@@ -26,7 +27,8 @@ inline constexpr float kContactShare = 1;
 
 struct BodyState {
     std::shared_ptr<const Body> body;
-    std::size_t actor = 0;   ///< that it belongs to: a piece, to the one that broke
+    std::size_t actor = 0;                                       ///< that it belongs to: a piece, to the one that broke
+    Eigen::Isometry3d placement = Eigen::Isometry3d::Identity(); ///< Actor::placement
     bool is_absent = false;  ///< a body that has broken, a piece of one that has not, or one on the grid
     bool is_on_grid = false; ///< of the model mpm: moved by mpm::Bodies; it has no elasticity
     std::shared_ptr<const BrokenBody> broken; ///< of a body that breaks: its pieces ...
@@ -37,6 +39,7 @@ struct BodyState {
     std::vector<float> inverse_mass;  ///< 0: pinned
     std::vector<std::uint8_t> fixed;  ///< 1: pinned
     float rest_squared_frequency = 0; ///< ElasticReport::squared_frequency at rest
+    bool may_sleep = true;            ///< Actor::may_sleep
     bool is_held = false;             ///< by pins, forces or wind: not left to itself
     std::optional<RigidPose> rigid;   ///< of a rigid body
     float pushed_way = 0; ///< m that particles were moved one by one, at most; a rigid body's pose has to follow

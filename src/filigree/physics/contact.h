@@ -2,10 +2,13 @@
 // restitution. Private to the layer.
 #pragma once
 
+#include "filigree/core/disjoint_sets.h"
+#include "filigree/mesh/incidence.h"
 #include "filigree/physics/body_state.h"
 #include "filigree/physics/matter_contact.h"
 #include "filigree/physics/obstacle_motion.h"
 
+#include <algorithm>
 #include <array>
 #include <functional>
 #include <map>
@@ -17,7 +20,7 @@ namespace filigree {
 class Contacts {
 public:
     /// bodies: fixed in number from here on.
-    Contacts(const World& world, std::size_t bodies, bool between_bodies, bool within_bodies);
+    Contacts(const World& world, std::size_t bodies, std::size_t actors, bool between_bodies, bool within_bodies);
     /// Once, when all bodies are there.
     void begin(std::span<const BodyState> bodies);
 
@@ -77,7 +80,30 @@ public:
     /// the penalty can stop. Looks at what the last add_forces or update_anchors found.
     void push_out(std::span<BodyState> bodies, double time, const RunContext& context);
 
-    /// Contacts of one body as blocks for vertex block descent. Valid until the next search.
+    /// Whether friction holds a body's surface on an obstacle.
+    bool is_on_obstacle(std::size_t body) const {
+        return std::ranges::any_of(near_[body].points, [](const Near& at) { return at.grasp.holds; });
+    }
+    /// Calls visit(body, other) for each two different bodies that friction holds together.
+    template <class Visit>
+    void each_holding(const Visit& visit) const {
+        matter_.each_holding(visit);
+        for (const NearPair& pair : pairs_)
+            if (pair.grasp.holds && pair.first_body != pair.second_body) visit(pair.first_body, pair.second_body);
+    }
+
+    /// What bodies meet in a substep of descent, worked out once for all of them.
+    struct Meetings {
+        ObstaclePoses poses; ///< where the substep ends
+        std::vector<MatterContacts::Frame> frames;
+        /// Of each body, ascending: twice the number of a frame, or of a pair of balls, and 1 for its second body.
+        IndexLists frames_of, pairs_of;
+    };
+    /// Searches; search.time, dt: of the substep's end, and its length. Sleepers that something is about to touch wake.
+    Meetings meetings(std::span<BodyState> bodies, const Search& search, float dt, const RunContext& context);
+
+    /// Contacts of one body as blocks for vertex block descent. Valid as long as the meetings, and until the next
+    /// search.
     class Blocks final : public BlockTerms {
     public:
         /// Before every sweep: takes the points' places. During the sweep add sees each move by the asking particle
@@ -119,20 +145,15 @@ public:
         std::size_t body_ = 0;
         const MatterContacts* matter_ = nullptr;
         std::vector<Entry> entries_;
-        std::vector<std::unique_ptr<Eigen::Isometry3d>> motions_; ///< of the obstacles
-        Vectors start_;                                           ///< what is swept, at the last update_places
+        Vectors start_; ///< what is swept, at the last update_places
         float scale_ = 1;
         std::vector<std::uint8_t> touched_;
         std::vector<Index> offsets_, entry_of_; ///< entries of each particle
         std::vector<float> weight_of_;
     };
-    /// `pulls` adds hands before the particles are linked. time, dt: of the substep's end, and its length.
-    /// frames: of the substep, by matter_frames.
-    Blocks blocks(std::span<const BodyState> bodies, std::size_t body, double time, float dt,
-                  std::span<const MatterContacts::Frame> frames, const std::function<void(Blocks&)>& pulls) const;
-    std::vector<MatterContacts::Frame> matter_frames(std::span<const BodyState> bodies, float dt) const {
-        return matter_.frames(bodies, dt);
-    }
+    /// `pulls` adds hands before the particles are linked. Cost O(the body's contacts and particles).
+    Blocks blocks(std::span<const BodyState> bodies, std::size_t body, const Meetings& met, float dt,
+                  const std::function<void(Blocks&)>& pulls) const;
     /// After a descent substep: anchors begin, slide and end as positions say.
     /// start: each body's positions before the substep.
     ContactReport update_anchors(std::span<const BodyState> bodies, std::span<const Vectors> start, double time);
@@ -146,9 +167,9 @@ public:
                                                        : 0.0;
         return double(kContactShare) * ((touched & kOnObstacle ? 1.0 : 0.0) + 2 * in_matter);
     }
-    /// Bodies that touch each other, and nothing else, as numbers of groups, one a body: such a group keeps its
-    /// momentum. kNoIndex: of bodies that touch an obstacle, or others that do.
-    std::vector<Index> free_groups() const;
+    /// Joins bodies that touch each other: a group that touches nothing else keeps its momentum. is_held: 1 is set of
+    /// those that touch an obstacle.
+    void join_touching(DisjointSets& groups, std::span<std::uint8_t> is_held) const;
 
     /// A surface point near an obstacle, and where friction holds it in the obstacle's own axes.
     struct NearMemory {

@@ -4,7 +4,7 @@
 #include "filigree/physics/contact_law.h"
 
 #include <algorithm>
-#include <numeric>
+#include <utility>
 
 namespace filigree {
 
@@ -188,26 +188,37 @@ void Contacts::add_blocks_of(const NearPair& pair, std::span<const BodyState> bo
     entries.push_back(friction);
 }
 
-Contacts::Blocks Contacts::blocks(std::span<const BodyState> bodies, std::size_t b, double time, float dt,
-                                  std::span<const MatterContacts::Frame> frames,
+Contacts::Meetings Contacts::meetings(std::span<BodyState> bodies, const Search& search, float dt,
+                                      const RunContext& context) {
+    this->search(bodies, search, context);
+    std::vector<MatterContacts::Frame> frames = matter_.frames(bodies, dt);
+    if (matter_.wake_met(bodies, frames)) {
+        near_until_ = -1; // of what slept nothing was found
+        this->search(bodies, search, context);
+        frames = matter_.frames(bodies, dt);
+    }
+    std::vector<Index> of_frames, of_pairs; // two bodies of each
+    for (const MatterContacts::Frame& frame : frames) of_frames.insert(of_frames.end(), {frame.body, frame.other});
+    for (const NearPair& pair : pairs_) of_pairs.insert(of_pairs.end(), {pair.first_body, pair.second_body});
+    return {ObstaclePoses(world_, search.time), std::move(frames), corners_at_vertices(of_frames, bodies.size()),
+            corners_at_vertices(of_pairs, bodies.size())};
+}
+
+Contacts::Blocks Contacts::blocks(std::span<const BodyState> bodies, std::size_t b, const Meetings& met, float dt,
                                   const std::function<void(Blocks&)>& pulls) const {
     const BodyState& body = bodies[b];
-    const ObstaclePoses poses(world_, time);
     Blocks blocks;
     blocks.body_ = b;
     blocks.matter_ = &matter_;
-    for (std::size_t o = 0; o < world_.obstacles.size(); ++o)
-        blocks.motions_.push_back(std::make_unique<Eigen::Isometry3d>(poses.at(o)));
     for (const Near& at : near_[b].points) {
-        blocks.entries_.push_back(block_of(at, body, poses, dt));
-        blocks.entries_.back().motion = blocks.motions_[at.obstacle].get();
+        blocks.entries_.push_back(block_of(at, body, met.poses, dt));
+        blocks.entries_.back().motion = &met.poses.at(at.obstacle);
     }
-    for (const NearPair& pair : pairs_) {
-        if (pair.first_body == b) add_blocks_of(pair, bodies, true, dt, blocks.entries_);
-        if (pair.second_body == b) add_blocks_of(pair, bodies, false, dt, blocks.entries_);
-    }
-    for (const MatterContacts::Frame& frame : frames) {
-        if (frame.body != b && frame.other != b) continue;
+    for (const Index end : met.pairs_of[b]) add_blocks_of(pairs_[end / 2], bodies, end % 2 == 0, dt, blocks.entries_);
+    const MatterContacts::Frame* before = nullptr;
+    for (const Index end : met.frames_of[b]) {
+        const MatterContacts::Frame& frame = met.frames[end / 2];
+        if (std::exchange(before, &frame) == &frame) continue; // the body meets itself
         Blocks::Entry& entry = blocks.entries_.emplace_back();
         entry.frame = &frame;
         entry.embedding = &bodies[frame.body].surface;
@@ -275,19 +286,12 @@ ContactReport Contacts::update_anchors(std::span<const BodyState> bodies, std::s
     return report;
 }
 
-std::vector<Index> Contacts::free_groups() const {
-    std::vector<Index> group(touched_.size());
-    std::iota(group.begin(), group.end(), Index{0});
-    const auto join = [&](Index a, Index b) {
-        const Index from = std::max(group[a], group[b]), to = std::min(group[a], group[b]);
-        std::ranges::replace(group, from, to);
-    };
-    matter_.each_touching(join);
+void Contacts::join_touching(DisjointSets& groups, std::span<std::uint8_t> is_held) const {
+    matter_.each_touching([&](Index a, Index b) { groups.join(a, b); });
     for (const NearPair& pair : pairs_)
-        if (touched_[pair.first_body] && touched_[pair.second_body]) join(pair.first_body, pair.second_body);
-    for (std::size_t b = 0; b < group.size(); ++b)
-        if (touched_[b] & kOnObstacle) std::ranges::replace(group, Index(group[b]), kNoIndex);
-    return group;
+        if (touched_[pair.first_body] && touched_[pair.second_body]) groups.join(pair.first_body, pair.second_body);
+    for (std::size_t b = 0; b < touched_.size(); ++b)
+        if (touched_[b] & kOnObstacle) is_held[b] = 1;
 }
 
 } // namespace filigree

@@ -41,9 +41,9 @@ struct Contacts::OwnBalls {
     OwnCells cells;
 };
 
-Contacts::Contacts(const World& world, std::size_t bodies, bool between_bodies, bool within_bodies)
+Contacts::Contacts(const World& world, std::size_t bodies, std::size_t actors, bool between_bodies, bool within_bodies)
     : world_(world), between_bodies_(between_bodies), within_bodies_(within_bodies), near_(bodies),
-      deepest_near_(bodies, 0), touched_(bodies, 0), matter_(world, between_bodies, within_bodies) {
+      deepest_near_(bodies, 0), touched_(bodies, 0), matter_(world, actors, between_bodies, within_bodies) {
     for (const Obstacle& obstacle : world.obstacles) {
         const auto* ground = std::get_if<HalfSpace>(&obstacle.shape);
         const bool stands = ground && !obstacle.motion.moves();
@@ -140,7 +140,7 @@ void Contacts::find_pairs(std::span<const BodyState> bodies, float reach, const 
             const Vec3d low = boxes[*a].min.cwiseMax(boxes[*b].min) - Vec3d::Constant(double(far));
             const Vec3d high = boxes[*a].max.cwiseMin(boxes[*b].max) + Vec3d::Constant(double(far));
             if (!(low.array() <= high.array()).all()) continue;
-            const PairContact law = world_.contact_of(bodies[*a].actor, bodies[*b].actor);
+            const PairContact law = matter_.laws().of(bodies[*a].actor, bodies[*b].actor);
             const Vectors &own = balls_of(*a), &others = balls_of(*b);
             const std::vector<Index> near = within(own, low, high), near_others = within(others, low, high);
             Vectors places(near_others.size());
@@ -164,7 +164,7 @@ void Contacts::find_pairs(std::span<const BodyState> bodies, float reach, const 
 /// Once matter has flowed, cells at rest do not say any more what belongs together, and it does not meet itself.
 void Contacts::find_own_pairs(const BodyState& body, Index number, const Vectors& balls, float reach) {
     if (body.has_flowed()) return;
-    const PairContact law = world_.contact_of(body.actor, body.actor);
+    const PairContact law = matter_.laws().of(body.actor, body.actor);
     const float touch = 2 * body.ball_radius;
     for (const auto& [s, t] : own_balls_[number]->cells.near_points(balls, touch + reach))
         pairs_.push_back({number, s, number, t, (balls[t] - balls[s]).norm() - touch, law});
@@ -213,7 +213,7 @@ bool Contacts::set_memory(const Memory& memory, std::span<const BodyState> bodie
                           .second_body = pair.second_body,
                           .second = pair.second,
                           .clear_until = 0,
-                          .law = world_.contact_of(bodies[pair.first_body].actor, bodies[pair.second_body].actor),
+                          .law = matter_.laws().of(bodies[pair.first_body].actor, bodies[pair.second_body].actor),
                           .grasp = {true, pair.slides != 0},
                           .offset = pair.offset});
     near_way_ = memory.near_way;

@@ -54,8 +54,6 @@ public:
 
     /// False when cancelled.
     bool run() {
-        for (BodyState& body : bodies_)
-            if (body.rigid) wake(body);
         find_contacts();
         find_elastic_state();
         predict();
@@ -70,18 +68,22 @@ private:
         const float speed = most_particle_speed(bodies_) + float(state_.world.gravity.norm()) * dt_;
         const float obstacles = float(obstacle_way(state_.world, bodies_, now_ - double(dt_), now_));
         const float way = 1.5f * speed * dt_ + 1.5f * obstacles, spacing = least_spacing(bodies_);
-        state_.contacts.search(bodies_,
-                               {.time = now_,
-                                .obstacle_reach = std::clamp(way, 0.25f * spacing, 8 * spacing),
-                                .pair_reach = std::clamp(2 * way, 0.5f * spacing, 1.5f * spacing),
-                                .frame = double(dt_)},
-                               context_);
-        frames_ = state_.contacts.matter_frames(bodies_, dt_);
-        for (std::size_t b = 0; b < bodies_.size(); ++b)
-            blocks_.push_back(state_.contacts.blocks(bodies_, b, now_, dt_, frames_, [&](Contacts::Blocks& blocks) {
+        met_.emplace(state_.contacts.meetings(bodies_,
+                                              {.time = now_,
+                                               .obstacle_reach = std::clamp(way, 0.25f * spacing, 8 * spacing),
+                                               .pair_reach = std::clamp(2 * way, 0.5f * spacing, 1.5f * spacing),
+                                               .frame = double(dt_)},
+                                              dt_, context_));
+        for (std::size_t b = 0; b < bodies_.size(); ++b) {
+            if (bodies_[b].sleeps()) {
+                blocks_.emplace_back(); // of what is not swept
+                continue;
+            }
+            blocks_.push_back(state_.contacts.blocks(bodies_, b, *met_, dt_, [&](Contacts::Blocks& blocks) {
                 for (const Grip& grip : state_.external.grips())
                     if (grip.pulls(b, now_)) blocks.add_pull(grip.region, 0, grip.target(now_), grip.stiffness);
             }));
+        }
     }
 
     /// How wild the start is; what no step can take is repaired.
@@ -103,14 +105,14 @@ private:
         wild.assign(state_.actor_count, 0);
         falls.assign(state_.actor_count, 1);
         for (std::size_t b = 0; b < bodies_.size(); ++b) {
-            if (bodies_[b].is_absent) continue;
+            if (bodies_[b].sleeps()) continue;
             if (!(elastic_[b].least_volume_ratio > 0) || !(elastic_[b].most_stretch < kWildStretch))
                 wild[bodies_[b].actor] = 1;
             if (bodies_[b].is_held || blocks_[b].holds()) falls[bodies_[b].actor] = 0;
         }
         for (std::size_t b = 0; b < bodies_.size(); ++b) {
             BodyState& body = bodies_[b];
-            const std::size_t count = body.is_absent ? 0 : body.positions.size();
+            const std::size_t count = body.sleeps() ? 0 : body.positions.size();
             before_.push_back(body.is_absent ? RigidState{} : rigid_state(body));
             turn_.push_back(turn_in(before_.back(), double(dt_)));
             start_.push_back(body.positions);
@@ -133,7 +135,7 @@ private:
             if (context_.is_cancelled()) return false;
             const Stopwatch watch(report_.elastic_seconds);
             for (std::size_t b = 0; b < bodies_.size(); ++b)
-                if (!bodies_[b].is_absent) sweep(b);
+                if (!bodies_[b].sleeps()) sweep(b);
             for (const Cracks& cracks : state_.cracks)
                 if (cracks.is_open()) sweep_cracks(cracks);
         }
@@ -224,10 +226,10 @@ private:
         }
         const Stopwatch watch(report_.other_seconds);
         for (std::size_t b = 0; b < bodies_.size(); ++b)
-            if (!bodies_[b].is_absent) update_velocities(b);
+            if (!bodies_[b].sleeps()) update_velocities(b);
         restore_momentum();
         for (BodyState& body : bodies_)
-            if (body.rigid) fit_pose(body);
+            if (body.rigid && !body.sleeps()) fit_pose(body);
         push_out(state_, now_, context_);
         finish_substep(state_, dt_, context_);
         break_bodies(state_, now_ - double(dt_), now_, context_);
@@ -245,40 +247,46 @@ private:
     /// Implicit Euler takes angular momentum away however well it is solved, and sweeps that are not solved let two
     /// bodies push each other unequally. Bodies that touch nothing but each other get it back, as if they were one.
     void restore_momentum() {
-        std::vector<Index> groups = state_.contacts.free_groups();
-        for (const Cracks& cracks : state_.cracks) join_parts(cracks, groups);
-        for (std::size_t b = 0; b < bodies_.size(); ++b)
-            if (bodies_[b].is_held || bodies_[b].is_absent || state_.external.pull(b, now_) ||
-                state_.external.push(bodies_[b].actor))
-                std::ranges::replace(groups, Index(groups[b]), kNoIndex);
-        for (Index group = 0; group < bodies_.size(); ++group) {
-            if (std::ranges::find(groups, group) == groups.end()) continue;
-            RigidState before, after, kept;
-            for (std::size_t b = 0; b < bodies_.size(); ++b) {
-                if (groups[b] != group) continue;
-                RigidState state = before_[b];
-                before = together(before, state);
-                const double part = std::exp(-double(dt_) * bodies_[b].body->material.damping);
-                state.linear = (state.linear + double(dt_) * state.mass * state_.world.gravity) * part;
-                state.angular *= part;
-                kept = together(kept, state);
-                after = together(after, rigid_state(bodies_[b]));
-            }
-            give_back(group, groups, before, kept, after);
+        DisjointSets sets(bodies_.size());
+        std::vector<std::uint8_t> is_held(bodies_.size(), 0); // then of each group, at its root
+        state_.contacts.join_touching(sets, is_held);
+        for (const Cracks& cracks : state_.cracks) join_parts(cracks, sets);
+        for (Index b = 0; b < bodies_.size(); ++b) {
+            const BodyState& body = bodies_[b];
+            if (is_held[b] || body.is_held || body.sleeps() || state_.external.pull(b, now_) ||
+                state_.external.push(body.actor))
+                is_held[sets.root(b)] = 1;
         }
+        std::vector<Index> roots(bodies_.size());
+        for (Index b = 0; b < bodies_.size(); ++b) roots[b] = sets.root(b);
+        const IndexLists groups = corners_at_vertices(roots, bodies_.size());
+        for (Index root = 0; root < bodies_.size(); ++root)
+            if (groups[root].size() > 0 && !is_held[root]) restore_momentum_of(groups[root]);
+    }
+
+    void restore_momentum_of(std::span<const Index> group) {
+        RigidState before, after, kept;
+        for (const Index b : group) {
+            RigidState state = before_[b];
+            before = together(before, state);
+            const double part = std::exp(-double(dt_) * bodies_[b].body->material.damping);
+            state.linear = (state.linear + double(dt_) * state.mass * state_.world.gravity) * part;
+            state.angular *= part;
+            kept = together(kept, state);
+            after = together(after, rigid_state(bodies_[b]));
+        }
+        give_back(group, before, kept, after);
     }
 
     /// Pieces that hang together are in one group.
-    static void join_parts(const Cracks& cracks, std::vector<Index>& groups) {
+    static void join_parts(const Cracks& cracks, DisjointSets& groups) {
         if (!cracks.is_open()) return;
         const std::vector<Index> parts = cracks.parts();
-        for (std::size_t k = 0; k < parts.size(); ++k) {
-            const Index a = groups[cracks.first_piece() + k], b = groups[cracks.first_piece() + parts[k]];
-            if (a != b) std::ranges::replace(groups, Index(a == kNoIndex ? b : a), Index(a == kNoIndex ? a : b));
-        }
+        for (std::size_t k = 0; k < parts.size(); ++k)
+            groups.join(Index(cracks.first_piece() + k), Index(cracks.first_piece() + parts[k]));
     }
 
-    void give_back(Index group, std::span<const Index> groups, const RigidState& before, const RigidState& kept,
+    void give_back(std::span<const Index> group, const RigidState& before, const RigidState& kept,
                    const RigidState& after) {
         const double t = double(dt_);
         const Vec3d& gravity = state_.world.gravity;
@@ -288,8 +296,7 @@ private:
         const double size = std::sqrt(after.inertia.trace() / after.mass);
         const double rounding = 1e-7 * std::max(centre.norm(), size);
         if ((centre - after.centre).norm() + t * (shift.norm() + size * turn.norm()) < rounding) return;
-        for (std::size_t b = 0; b < bodies_.size(); ++b) {
-            if (groups[b] != group) continue;
+        for (const Index b : group) {
             BodyState& body = bodies_[b];
             for (std::size_t i = 0; i < body.positions.size(); ++i) {
                 const Vec3d arm = body.positions[i].cast<double>() - after.centre;
@@ -306,7 +313,7 @@ private:
     const double now_; // s
     const float dt_;
 
-    std::vector<MatterContacts::Frame> frames_;
+    std::optional<Contacts::Meetings> met_;
 
     // Of each body.
     std::vector<Contacts::Blocks> blocks_;

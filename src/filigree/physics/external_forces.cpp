@@ -17,7 +17,7 @@ constexpr double kHandReach = 4;    // spacings
 /// m/s^2, of every particle of the region: the force is shared out by mass.
 Vec3f region_acceleration(const RegionForce& force, const Body& body, double time) {
     double mass = 0;
-    for (const Index particle : force.particles) mass += double(body.mass[particle]);
+    force.each_particle(body.particle_count(), [&](Index particle) { mass += double(body.mass[particle]); });
     return (force.force.at(time) / std::max(mass, 1e-30)).cast<float>();
 }
 
@@ -113,8 +113,9 @@ void ExternalForces::each_push(std::span<State> bodies, double time, const Visit
                   [&](State& body, std::size_t index, Index copy) { visit(body, index, copy, acceleration); });
     };
     for (const RegionForce& force : world_.forces) {
-        const Vec3f acceleration = region_acceleration(force, *bodies[force.body].body, time);
-        for (const Index particle : force.particles) push(force.body, particle, acceleration);
+        const Body& body = *bodies[force.body].body;
+        const Vec3f acceleration = region_acceleration(force, body, time);
+        force.each_particle(body.particle_count(), [&](Index particle) { push(force.body, particle, acceleration); });
     }
     for (std::size_t b = 0; b < pushes_.size(); ++b)
         for (Index i = 0; i < pushes_[b].size(); ++i)

@@ -21,7 +21,8 @@ FoldedCells::FoldedCells(const Matter& matter) : matter_(matter) {
     const Cells& cells = matter.body().cells;
     const BodySurface& surface = matter.body().surface;
     rest_normals_ = Vectors(cells.cells.size());
-    for (Index s = 0; s < surface.points.size(); ++s) rest_normals_.add(matter.cell_of_point(s), surface.normals[s]);
+    for (Index s = 0; s < surface.points.size(); ++s)
+        if (!matter.is_loose(s)) rest_normals_.add(matter.cell_of_point(s), surface.normals[s]);
     for (Index cell = 0; cell < cells.cells.size(); ++cell) {
         const Vec3f normal = rest_normals_[cell];
         rest_normals_.set(cell, normal.norm() > 0 ? normal.normalized() : Vec3f::Zero());

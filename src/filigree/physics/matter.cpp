@@ -100,7 +100,8 @@ void Matter::find_together() {
 void Matter::find_cells_of_points() {
     const Cells& cells = body_.cells;
     const std::vector<Vec3f>& points = body_.surface.points.rest;
-    cell_of_point_.assign(points.size(), 0);
+    cell_of_point_.assign(points.size(), kNoIndex);
+    is_loose_.assign(points.size(), 0);
     for (std::size_t s = 0; s < points.size(); ++s) {
         const Vec3d at = (points[s].cast<double>() - cells.origin) / cells.spacing;
         const Vec3d low = at.array().floor();
@@ -113,7 +114,28 @@ void Matter::find_cells_of_points() {
             least = away;
             cell_of_point_[s] = cell;
         }
+        if (cell_of_point_[s] != kNoIndex) continue;
+        is_loose_[s] = 1;
+        cell_of_point_[s] = carrying_cell(s);
     }
+}
+
+/// By the particles that the point is embedded in: the corners of a cell, or of meshfree bodies those of cells around.
+Index Matter::carrying_cell(std::size_t surface_point) const {
+    const Embedding& points = body_.surface.points;
+    const Index first = points.offsets[surface_point], last = points.offsets[surface_point + 1];
+    if (first == last) return 0;
+    const Cells& cells = body_.cells;
+    const Index particle = points.particles[first];
+    std::array<int, 3> at;
+    if (body_.rest.size() == cells.corners.size() && last - first == 8) {
+        for (int axis = 0; axis < 3; ++axis) at[axis] = int(cells.corners[particle][axis]);
+    } else {
+        const Vec3d rest = (body_.rest[particle].cast<double>() - cells.origin) / cells.spacing;
+        for (int axis = 0; axis < 3; ++axis) at[axis] = int(std::floor(rest[axis]));
+    }
+    const Index cell = cell_at(at[0], at[1], at[2]);
+    return cell == kNoIndex ? 0 : cell;
 }
 
 bool Matter::are_together(Index a, Index b) const {

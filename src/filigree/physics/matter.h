@@ -97,7 +97,10 @@ public:
     /// The same, or one is three cells from the other and reached in three steps.
     bool are_in_three_steps(Index a, Index b) const;
     Index cell_at(int i, int j, int k) const; ///< kNoIndex where there is none
+    /// The cell that a surface point is of, or that carries it.
     Index cell_of_point(std::size_t surface_point) const { return cell_of_point_[surface_point]; }
+    /// Whether a surface point is of a part that has no cells of its own, and is carried by some that may be far away.
+    bool is_loose(std::size_t surface_point) const { return is_loose_[surface_point]; }
     const Body& body() const { return body_; }
 
 private:
@@ -106,6 +109,7 @@ private:
     void find_rigid_box();
     void find_together();
     void find_cells_of_points();
+    Index carrying_cell(std::size_t surface_point) const;
 
     const Body& body_;
     const bool is_rigid_;
@@ -114,6 +118,7 @@ private:
     std::vector<Index> grid_;                            ///< cell at each lattice index, kNoIndex where there is none
     std::vector<std::array<std::uint64_t, 2>> together_; ///< of each cell: bits of the 5^3 cells around it
     std::vector<Index> cell_of_point_;
+    std::vector<std::uint8_t> is_loose_; ///< of each surface point
 };
 
 } // namespace filigree

@@ -6,6 +6,7 @@
 #include "filigree/physics/extremes_kernel.h"
 #include "filigree/physics/matter.h"
 #include "filigree/physics/own_cells.h"
+#include "filigree/physics/pair_laws.h"
 
 #include <algorithm>
 #include <limits>
@@ -29,8 +30,9 @@ public:
     static constexpr float kMostReach = 0.5f; ///< spacings that near bodies may go between two searches, at most
     static constexpr float kOutside = 0.25f;  ///< cells that a point may lie outside of the last one and still touch
 
-    MatterContacts(const World& world, bool between_bodies, bool within_bodies)
-        : world_(world), between_bodies_(between_bodies), within_bodies_(within_bodies) {}
+    /// actors: that bodies belong to.
+    MatterContacts(const World& world, std::size_t actors, bool between_bodies, bool within_bodies)
+        : world_(world), laws_(world, actors), between_bodies_(between_bodies), within_bodies_(within_bodies) {}
 
     /// Once, when all bodies are there. Meshfree bodies have no cells that move, and take no part.
     void begin(std::span<const BodyState> bodies);
@@ -74,6 +76,14 @@ public:
         for (const Side& side : sides_)
             if (side.body != side.other &&
                 std::ranges::any_of(side.pairs, [](const Pair& pair) { return pair.depth > 0; }))
+                visit(side.body, side.other);
+    }
+    /// The same of those that friction holds together.
+    template <class Visit>
+    void each_holding(const Visit& visit) const {
+        for (const Side& side : sides_)
+            if (side.body != side.other &&
+                std::ranges::any_of(side.pairs, [](const Pair& pair) { return pair.grasp.holds; }))
                 visit(side.body, side.other);
     }
     /// s: in longer steps something could pass through something.
@@ -133,7 +143,10 @@ public:
         Vec3f offset = Vec3f::Zero(); ///< from the anchor, along the surface, then
     };
     std::vector<Frame> frames(std::span<const BodyState> bodies, float dt) const;
+    /// Sleepers wake that something is about to touch. Returns whether any did.
+    bool wake_met(std::span<BodyState> bodies, std::span<const Frame> frames) const;
     const Matter& matter(std::size_t body) const { return *matter_[body]; }
+    const PairLaws& laws() const { return laws_; }
     /// After a descent substep: what touches, and friction's anchors, as positions say.
     ContactReport update_anchors(std::span<const BodyState> bodies, std::span<std::uint8_t> touched);
 
@@ -181,6 +194,7 @@ private:
     void find_pairs(std::span<const Index> due, std::span<const BodyState> bodies, float frame,
                     const RunContext& context);
     bool wake_touched(std::span<BodyState> bodies) const;
+    bool disturbs(const BodyState& body, std::size_t number) const;
     void list_work(std::span<const BodyState> bodies);
     void find_sides(std::span<const BodyState> bodies, double frame, const RunContext& context);
     std::optional<Vec3f> enter(Pair& pair, const Side& side, std::span<const BodyState> bodies) const;
@@ -201,6 +215,7 @@ private:
     void push_out(Pair& pair, const Side& side, std::span<BodyState> bodies) const;
 
     const World& world_;
+    const PairLaws laws_;
     bool between_bodies_, within_bodies_;
     std::vector<std::shared_ptr<const Matter>> matter_;      ///< null: of meshfree bodies
     std::vector<std::vector<float>> per_area_;               ///< N/m^3 in each cell of each body

@@ -27,7 +27,6 @@ constexpr float kLongestWay = 0.3f;      ///< spacings a substep that one body m
 constexpr float kCrushed = 0.05f;        ///< volume ratio below which a cell counts as crushed
 constexpr float kTooManyCrushed = 0.05f; ///< part of a body's cells
 constexpr Index kAskedCells = 7;         ///< one of so many is asked
-constexpr float kWaking = 0.02f;         ///< m/s of what touches a sleeper
 
 /// N/m^3 in each cell: what the body's own surface has there, per area.
 std::vector<float> stiffness_per_area(const BodyState& state) {
@@ -291,8 +290,7 @@ void MatterContacts::find_sides(std::span<const BodyState> bodies, double frame,
 }
 
 MatterContacts::Side MatterContacts::make_side(Index body, Index other, std::span<const BodyState> bodies) const {
-    Side side{
-        .body = body, .other = other, .law = world_.contact_of(bodies[body].actor, bodies[other].actor), .pairs = {}};
+    Side side{.body = body, .other = other, .law = laws_.of(bodies[body].actor, bodies[other].actor), .pairs = {}};
     side.spacing = float(std::min(bodies[body].body->spacing(), bodies[other].body->spacing()));
     return side;
 }
@@ -325,14 +323,29 @@ void MatterContacts::take_pairs(Side& side, const BodyState& body, std::size_t p
     side.pairs = std::move(pairs);
 }
 
-/// A body that sleeps wakes when one that touches it moves.
+/// Of those that touch a sleeper: whatever came to it or moves. One that rests beside it has gone to rest with it.
+bool MatterContacts::disturbs(const BodyState& body, std::size_t number) const {
+    return !body.sleeps() && (!body.rigid || !body.rigid->rests || speed(number) > kSlow);
+}
+
+bool MatterContacts::wake_met(std::span<BodyState> bodies, std::span<const Frame> frames) const {
+    bool woke = false;
+    for (const Frame& frame : frames)
+        for (const auto& [sleeper, other] : {std::pair(frame.body, frame.other), std::pair(frame.other, frame.body)}) {
+            if (bodies[sleeper].is_absent || !bodies[sleeper].sleeps() || !disturbs(bodies[other], other)) continue;
+            wake(bodies[sleeper]);
+            woke = true;
+        }
+    return woke;
+}
+
+/// A body that sleeps wakes when one that touches it disturbs it.
 bool MatterContacts::wake_touched(std::span<BodyState> bodies) const {
     bool woke = false;
     if (std::ranges::none_of(bodies, &BodyState::sleeps)) return woke;
     for (const Side& side : sides_)
         for (const auto& [sleeper, other] : {std::pair(side.body, side.other), std::pair(side.other, side.body)}) {
-            if (!bodies[sleeper].sleeps() || bodies[other].sleeps()) continue;
-            if (!(speed(other) > kWaking)) continue;
+            if (bodies[sleeper].is_absent || !bodies[sleeper].sleeps() || !disturbs(bodies[other], other)) continue;
             if (std::ranges::none_of(side.pairs, [](const Pair& pair) { return pair.grasp.holds; })) continue;
             wake(bodies[sleeper]);
             woke = true;
@@ -544,6 +557,8 @@ bool MatterContacts::is_sound(const Memory& memory, std::span<const BodyState> b
     const SideMemory* before = nullptr;
     for (const SideMemory& side : memory.sides) {
         if (side.body >= bodies.size() || side.other >= bodies.size() || !matter_[side.other]) return false;
+        const bool is_own = side.body == side.other;
+        if (is_own ? !own_cells_[side.body] : !between_bodies_) return false; // nothing here would search for these
         if (!std::isfinite(side.moved) || !std::isfinite(side.until) || !(side.since >= 0)) return false;
         if (before && std::pair(before->body, before->other) >= std::pair(side.body, side.other)) return false;
         before = &side;

@@ -3,7 +3,6 @@
 #include "filigree/core/parallel_for.h"
 #include "filigree/physics/byte_stream.h"
 #include "filigree/physics/mpm_contact.h"
-#include "filigree/physics/mpm_kernel.h"
 #include "filigree/physics/stopwatch.h"
 
 #include <Eigen/Cholesky>
@@ -21,6 +20,8 @@ constexpr float kLeastNodeMass = 1e-6f; ///< of a full node's: what tracers look
 constexpr float kRidge = 0.01f;         ///< cells squared: holds a tracer's gradient at a rim
 constexpr float kHeldShare = 0.5f;      ///< of a node's mass that is pinned, from which on the node is
 constexpr std::size_t kTracerGrain = 256;
+/// Particles tell of the half of a surface's slope that lies inside, and of less where the body is a few cells thick.
+constexpr float kMostSurface = 8;
 
 Float4 lanes(float x, float y, float z, float w) { return Float4{x, y, z, w}; }
 Vec3f vector_of(const Float4& v) { return {v[0], v[1], v[2]}; }
@@ -28,7 +29,7 @@ Vec3f vector_of(const Float4& v) { return {v[0], v[1], v[2]}; }
 } // namespace
 
 Bodies::Bodies(const World& world, std::span<const Actor> actors)
-    : world_(world), field_of_(actors.size(), kNoIndex), grid_(1) {
+    : world_(world), laws_(world, actors.size()), field_of_(actors.size(), kNoIndex), grid_(1) {
     for (std::size_t a = 0; a < actors.size(); ++a) {
         const Body& body = *actors[a].body;
         if (body.material.model != MaterialModel::mpm) continue;
@@ -38,16 +39,9 @@ Bodies::Bodies(const World& world, std::span<const Actor> actors)
         matter_.emplace_back(body.material, world.heat_pace);
         has_heat_ |= matter_.back().has_heat();
         spacing_ = std::max(spacing_, float(body.spacing()));
-        const float enthalpy = matter_.back().enthalpy(float(body.material.temperature));
+        start_enthalpy_.push_back(matter_.back().enthalpy(float(body.material.temperature)));
         for (std::size_t p = 0; p < body.particle_count(); ++p) {
-            Particle& particle = particles_.emplace_back();
-            particle = {};
-            particle.mass = body.mass[p];
-            particle.volume = body.volume[p];
-            particle.b[0] = particle.b[1] = particle.b[2] = 1;
-            particle.volume_ratio() = 1;
-            particle.enthalpy() = enthalpy;
-            particle.melted = matter_.back().liquid(enthalpy) >= 1;
+            particles_.push_back(at_rest(body.mass[p], body.volume[p], field_of_[a]));
             field_.push_back(field_of_[a]);
         }
     }
@@ -58,6 +52,51 @@ Bodies::Bodies(const World& world, std::span<const Actor> actors)
         matter.limit_viscosity(grid_.spacing());
         grid_mass_.push_back(matter.density() * grid_.spacing() * grid_.spacing() * grid_.spacing());
     }
+    find_surfaces(actors);
+}
+
+Particle Bodies::at_rest(float mass, float volume, std::size_t field) const {
+    Particle particle = {};
+    particle.mass = mass;
+    particle.volume = volume;
+    particle.b[0] = particle.b[1] = particle.b[2] = 1;
+    particle.volume_ratio() = 1;
+    particle.enthalpy() = start_enthalpy_[field];
+    particle.melted = matter_[field].liquid(particle.enthalpy()) >= 1;
+    return particle;
+}
+
+/// The gradient of mass around particles tells where the surface is, and not quite how large. At rest that is known.
+void Bodies::find_surfaces(std::span<const Actor> actors) {
+    const RunContext alone(1);
+    for (std::size_t f = 0; f < matter_.size(); ++f)
+        set_positions(actor_of_field_[f], actors[actor_of_field_[f]].body->rest);
+    grid_.begin(particles_, field_, alone);
+    scatter(0, alone);
+    std::vector<double> told(matter_.size());
+    std::vector<AtParticle> found;
+    Node tile[kTileNodes];
+    for (const std::vector<std::uint32_t>& group : grid_.groups())
+        for (const std::uint32_t block : group) {
+            grid_.read_tile(block, tile);
+            const std::span<const std::uint32_t> numbers = grid_.particles(block);
+            const std::uint32_t field = grid_.place(block).body;
+            found.resize(numbers.size());
+            gather_at_particles(numbers, particles_.data(), grid_.spacing(), tile, found.data());
+            for (std::size_t i = 0; i < numbers.size(); ++i)
+                told[field] += double(particles_[numbers[i]].volume * emptiness(found[i], field).norm());
+        }
+    for (std::size_t f = 0; f < matter_.size(); ++f) {
+        double area = 0;
+        for (const float part : actors[actor_of_field_[f]].body->surface.areas) area += double(part);
+        surface_.push_back(told[f] > 0 ? std::clamp(float(area / told[f]), 1.0f, kMostSurface) : 1.0f);
+    }
+}
+
+/// Gradient of the share of space that is full, 1/m.
+Vec3f Bodies::emptiness(const AtParticle& found, std::size_t field) const {
+    const float h = grid_.spacing();
+    return 4 / (h * h * grid_mass_[field]) * Vec3f(found.slope[0][3], found.slope[1][3], found.slope[2][3]);
 }
 
 std::size_t Bodies::particle_count(std::size_t actor) const {
@@ -80,7 +119,7 @@ void Bodies::advance(double from, double until, FrameReport& report, const RunCo
         update_nodes(dt, now, context);
         gather(dt, now, context);
         move_tracers(dt, context);
-        hold_pinned(dt, now);
+        hold_pinned(now);
         ++steps;
     }
     report.substeps = std::max(report.substeps, steps);
@@ -120,7 +159,7 @@ void Bodies::scatter(float dt, const RunContext& context) {
 
 void Bodies::update_nodes(float dt, double time, const RunContext& context) {
     const ObstaclePoses poses(world_, time);
-    const NodeContacts contacts(grid_, world_, actor_of_field_, context);
+    const NodeContacts contacts(grid_, world_, laws_, actor_of_field_, context);
     const Vec3f gravity = dt * world_.gravity.cast<float>();
     const Float4 kick = lanes(gravity.x(), gravity.y(), gravity.z(), 0);
     parallel_for(context, contacts.place_count(), 8, [&](std::size_t begin, std::size_t end) {
@@ -173,6 +212,7 @@ void Bodies::gather(float dt, double time, const RunContext& context) {
     const float h = grid_.spacing(), moment = 4 / (h * h);
     const ObstaclePoses poses(world_, time);
     const HeatExchange exchange(world_, time, dt, grid_.spacing(), particles_);
+    const bool has_heat = has_heat_ || HeatExchange::acts_in(world_);
     for (const std::vector<std::uint32_t>& group : grid_.groups())
         parallel_for(context, group.size(), 1, [&](std::size_t begin, std::size_t end) {
             Node tile[kTileNodes];
@@ -184,7 +224,6 @@ void Bodies::gather(float dt, double time, const RunContext& context) {
                 const std::uint32_t field = grid_.place(group[g]).body;
                 const Matter& matter = matter_[field];
                 const float kept = std::exp(-dt * matter.damping());
-                const float emptiness = moment / grid_mass_[field];
                 exchange.go_to(grid_.place(group[g]), poses, near);
                 found.resize(numbers.size());
                 gather_at_particles(numbers, particles_.data(), h, tile, found.data());
@@ -195,15 +234,15 @@ void Bodies::gather(float dt, double time, const RunContext& context) {
                         for (int k = 0; k < 3; ++k) p.v[k] = p.c[k][0] = p.c[k][1] = p.c[k][2] = 0;
                         continue;
                     }
+                    if (has_heat) {
+                        p.add_heat(value[5]);
+                        exchange.act(p, matter, emptiness(found[i], field).norm(), surface_[field], poses, near);
+                    }
                     for (int k = 0; k < 3; ++k) {
                         p.v[k] = kept * value[k];
                         p.x[k] += dt * value[k];
                         for (int r = 0; r < 3; ++r) p.c[k][r] = moment * slope[k][r];
                         p.warming[k] = moment * slope[k][4];
-                    }
-                    if (has_heat_) {
-                        p.enthalpy() += value[5];
-                        exchange.act(p, matter, emptiness * Vec3f(slope[0][3], slope[1][3], slope[2][3]), poses, near);
                     }
                 }
                 matter.deform(numbers, particles_.data(), dt);
@@ -251,27 +290,26 @@ void Bodies::add_forces(float dt, double time) {
     for (const RegionForce& force : world_.forces) {
         if (!has(force.body)) continue;
         const std::size_t first = first_[field_of_[force.body]];
-        std::vector<Index> all;
-        if (force.particles.empty())
-            for (Index p = 0; p < particle_count(force.body); ++p) all.push_back(p);
-        const std::span<const Index> chosen = force.particles.empty() ? all : force.particles;
+        const std::size_t count = particle_count(force.body);
         double mass = 0;
-        for (const Index p : chosen) mass += double(particles_[first + p].mass);
+        force.each_particle(count, [&](Index p) { mass += double(particles_[first + p].mass); });
         const Vec3f kick = (double(dt) / mass * force.force.at(time)).cast<float>();
-        for (const Index p : chosen)
+        force.each_particle(count, [&](Index p) {
             for (int k = 0; k < 3; ++k) particles_[first + p].v[k] += kick[k];
+        });
     }
 }
 
-void Bodies::hold_pinned(float dt, double time) {
+void Bodies::hold_pinned(double time) {
     for (std::size_t n = 0; n < world_.pins.size(); ++n) {
         const Pin& pin = world_.pins[n];
         if (!has(pin.body)) continue;
-        const Eigen::Isometry3d now = pin.motion.at(time), before = pin.motion.at(time - double(dt));
+        const Eigen::Isometry3d now = pin.motion.at(time);
+        const MotionRate rate = rate_of(pin.motion, time);
         for (std::size_t k = 0; k < pin.particles.size(); ++k) {
             Particle& p = particles_[first_[field_of_[pin.body]] + pin.particles[k]];
             const Vec3d from = pinned_from_[n][k].cast<double>(), place = now * from;
-            const Vec3d velocity = (place - before * from) / double(dt);
+            const Vec3d velocity = rate.at(place);
             for (int axis = 0; axis < 3; ++axis) {
                 p.x[axis] = float(place[axis]);
                 p.v[axis] = float(velocity[axis]);
@@ -313,6 +351,27 @@ void Bodies::set_velocities(std::size_t actor, const Vectors& velocities) {
     const std::size_t first = first_[field_of_[actor]];
     for (std::size_t i = 0; i < velocities.size(); ++i)
         for (int k = 0; k < 3; ++k) particles_[first + i].v[k] = velocities[i][k];
+}
+
+std::size_t Bodies::repair(std::size_t actor, const Vectors& positions, const Vectors& velocities,
+                           std::span<const std::uint8_t> is_lost) {
+    const Index field = field_of_[actor];
+    std::size_t repaired = 0;
+    for (std::size_t i = 0; i < is_lost.size(); ++i) {
+        Particle& p = particles_[first_[field] + i];
+        if (!is_lost[i] && p.is_sound()) continue;
+        ++repaired;
+        for (int k = 0; k < 3; ++k) {
+            p.x[k] = positions[i][k];
+            p.v[k] = velocities[i][k];
+        }
+        if (p.is_sound()) continue;
+        Particle whole = at_rest(p.mass, p.volume, field);
+        std::copy_n(p.x, 3, whole.x);
+        std::copy_n(p.v, 3, whole.v);
+        p = whole;
+    }
+    return repaired;
 }
 
 /// A body that turns or shears as a whole, from the velocities of its particles.
@@ -362,7 +421,7 @@ Vec3d Bodies::affine_momentum() const {
 
 double Bodies::heat() const {
     double sum = 0;
-    for (const Particle& p : particles_) sum += double(p.mass) * double(p.enthalpy());
+    for (const Particle& p : particles_) sum += double(p.mass) * (double(p.enthalpy()) + double(p.enthalpy_beside));
     return sum;
 }
 
@@ -395,6 +454,8 @@ bool Bodies::restore_state(std::string_view bytes) {
     std::vector<Particle> particles = reader.array<Particle>();
     std::vector<Tracer> tracers = reader.array<Tracer>();
     if (!reader.ok() || !reader.at_end() || particles.size() != particles_.size()) return false;
+    for (std::size_t p = 0; p < particles.size(); ++p) // what never changes
+        if (particles[p].mass != particles_[p].mass || particles[p].volume != particles_[p].volume) return false;
     for (const Tracer& tracer : tracers)
         if (tracer.field >= matter_.size()) return false;
     particles_ = std::move(particles);

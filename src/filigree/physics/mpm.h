@@ -7,7 +7,9 @@
 
 #include "filigree/physics/matter_particles.h"
 #include "filigree/physics/mpm_grid.h"
+#include "filigree/physics/mpm_kernel.h"
 #include "filigree/physics/obstacle_motion.h"
+#include "filigree/physics/pair_laws.h"
 #include "filigree/physics/simulation.h"
 
 #include <string>
@@ -35,6 +37,10 @@ public:
     void set_velocities(std::size_t actor, const Vectors& velocities);
     void set_velocity_gradient(std::size_t actor, const Mat3f& gradient); ///< 1/s, of all its particles
     void begin_pins();                                                    ///< once, when particles are where they begin
+    /// Takes lost particles from these, and makes whatever else a particle of the body carries finite. is_lost: of
+    /// each. Returns how many particles were changed.
+    std::size_t repair(std::size_t actor, const Vectors& positions, const Vectors& velocities,
+                       std::span<const std::uint8_t> is_lost);
     MatterParticles matter(std::size_t actor) const;
     double elastic_energy() const; ///< J
     // Of what particles carry beside their velocities: J, and kg m^2/s.
@@ -58,6 +64,9 @@ private:
         std::uint32_t field;
     };
 
+    Vec3f emptiness(const AtParticle& found, std::size_t field) const;
+    Particle at_rest(float mass, float volume, std::size_t field) const; ///< at the origin
+    void find_surfaces(std::span<const Actor> actors);
     float longest_step(const RunContext& context) const; ///< s
     void scatter(float dt, const RunContext& context);
     void update_nodes(float dt, double time, const RunContext& context);
@@ -65,16 +74,19 @@ private:
     void gather(float dt, double time, const RunContext& context);
     void move_tracers(float dt, const RunContext& context);
     void add_forces(float dt, double time);
-    void hold_pinned(float dt, double time);
+    void hold_pinned(double time);
 
     const World& world_;
+    const PairLaws laws_;
     std::vector<Index> field_of_;             ///< of each actor; kNoIndex: not of this model
     std::vector<Matter> matter_;              ///< of each field
     std::vector<std::size_t> actor_of_field_; ///< the way back
     std::vector<std::size_t> first_;          ///< particle of each field, and their number
     std::vector<Particle> particles_;
-    std::vector<std::uint32_t> field_; ///< of each particle
-    std::vector<float> grid_mass_;     ///< kg, of a full node, by field
+    std::vector<std::uint32_t> field_;  ///< of each particle
+    std::vector<float> start_enthalpy_; ///< J/kg, by field
+    std::vector<float> grid_mass_;      ///< kg, of a full node, by field
+    std::vector<float> surface_;        ///< by field: area of the body at rest, in parts of what its particles tell
     std::vector<Tracer> tracers_;
     std::vector<std::vector<Vec3f>> pinned_from_; ///< of each pin of these bodies
     Grid grid_;

@@ -51,9 +51,9 @@ Vec3f after_contact(const Vec3f& relative, const Vec3f& normal, float friction) 
 
 } // namespace
 
-NodeContacts::NodeContacts(const Grid& grid, const World& world, std::span<const std::size_t> actors,
-                           const RunContext& context)
-    : world_(world), actors_(actors) {
+NodeContacts::NodeContacts(const Grid& grid, const World& world, const PairLaws& laws,
+                           std::span<const std::size_t> actors, const RunContext& context)
+    : world_(world), laws_(laws), actors_(actors) {
     for (std::uint32_t b = 0; b < grid.block_count(); ++b) {
         const BlockPlace& here = grid.place(b);
         const BlockPlace* before = b > 0 ? &grid.place(b - 1) : nullptr;
@@ -120,17 +120,25 @@ void NodeContacts::meet_bodies(Grid& grid, std::size_t place) const {
             Node& node = grid.nodes(here[k])[n];
             const Vec3f& normal = normals_[place][next + k];
             if (!(node.motion[3] > 0)) continue;
-            double friction = world_.body_friction;
-            if (here.size() == 2)
-                friction =
-                    world_.contact_of(actors_[grid.place(here[0]).body], actors_[grid.place(here[1]).body]).friction;
             Vec3f own = velocity_of(node);
             if (heaviest * kLeastMass < mass - node.motion[3] && !normal.isZero())
-                own = common + after_contact(own - common, -normal, float(friction));
+                own = common + after_contact(own - common, -normal, friction_of(grid, here, k, n));
             set_velocity(node, own + one * (common - own));
         }
         next += here.size();
     }
+}
+
+/// Between a body and those it meets at a node: the mean of its pairs', by the others' mass there.
+float NodeContacts::friction_of(const Grid& grid, std::span<const std::uint32_t> here, std::size_t k, int node) const {
+    double sum = 0, mass = 0;
+    for (std::size_t other = 0; other < here.size(); ++other) {
+        const auto m = double(grid.nodes(here[other])[node].motion[3]);
+        if (other == k || !(m > 0)) continue;
+        sum += m * laws_.of(actors_[grid.place(here[k]).body], actors_[grid.place(here[other]).body]).friction;
+        mass += m;
+    }
+    return mass > 0 ? float(sum / mass) : 0.0f;
 }
 
 void NodeContacts::meet_obstacles(Grid& grid, std::size_t place, const ObstaclePoses& poses) const {
@@ -160,18 +168,31 @@ void NodeContacts::meet_obstacles(Grid& grid, std::size_t place, const ObstacleP
 
 HeatExchange::HeatExchange(const World& world, double time, float dt, float grid_spacing,
                            std::span<const Particle> particles)
-    : world_(world), dt_(dt), grid_spacing_(grid_spacing), air_temperature_(float(world.air_temperature.at(time))) {
+    : world_(world), dt_(dt), grid_spacing_(grid_spacing) {
+    const double middle = time - 0.5 * double(dt); // of the step: what rises from key to key is met on average
+    air_temperature_ = float(world.air_temperature.at(middle));
     for (const Obstacle& obstacle : world.obstacles)
-        obstacle_temperature_.push_back(float(obstacle.temperature.at(time)));
-    for (const HeatSource& source : world.heat_sources) {
-        const double watts = source.power.at(time);
-        if (watts == 0) continue;
-        const Vec3f centre = (source.ball.centre + source.move.at(time)).cast<float>();
-        const auto squared_radius = float(source.ball.radius * source.ball.radius);
+        obstacle_temperature_.push_back(float(obstacle.temperature.at(middle)));
+    for (const HeatSource& source : world.heat_sources) add_source(source, middle, particles);
+}
+
+bool HeatExchange::acts_in(const World& world) {
+    return world.air_heat_transfer > 0 || !world.heat_sources.empty() ||
+           std::ranges::any_of(world.obstacles, [](const Obstacle& obstacle) { return obstacle.heat_transfer > 0; });
+}
+
+void HeatExchange::add_source(const HeatSource& source, double time, std::span<const Particle> particles) {
+    const double watts = source.power.at(time);
+    if (watts == 0) return;
+    const Vec3f centre = (source.ball.centre + source.move.at(time)).cast<float>();
+    const auto radius = float(source.ball.radius);
+    for (const float reach : {radius, radius + 0.5f * grid_spacing_}) {
         double mass = 0;
         for (const Particle& p : particles)
-            if ((Vec3f(p.x[0], p.x[1], p.x[2]) - centre).squaredNorm() < squared_radius) mass += double(p.mass);
-        if (mass > 0) sources_.push_back({centre, squared_radius, float(watts * world.heat_pace / mass)});
+            if ((Vec3f(p.x[0], p.x[1], p.x[2]) - centre).squaredNorm() < reach * reach) mass += double(p.mass);
+        if (!(mass > 0)) continue;
+        sources_.push_back({centre, reach * reach, float(watts * world_.heat_pace / mass)});
+        return;
     }
 }
 
@@ -186,17 +207,17 @@ void HeatExchange::go_to(const BlockPlace& place, const ObstaclePoses& poses, st
         if (world_.obstacles[o].heat_transfer > 0 && poses.distance_to(o, middle).distance < reach) near.push_back(o);
 }
 
-void HeatExchange::act(Particle& p, const Matter& matter, const Vec3f& emptiness, const ObstaclePoses& poses,
+void HeatExchange::act(Particle& p, const Matter& matter, float emptiness, float surface, const ObstaclePoses& poses,
                        std::span<const std::size_t> near) const {
     const Vec3f point(p.x[0], p.x[1], p.x[2]);
-    const float volume = p.volume * p.volume_ratio(), empty = emptiness.norm(), area = empty * volume;
+    const float volume = p.volume * p.volume_ratio(), area = surface * emptiness * volume;
     const float temperature = matter.temperature(p.enthalpy()), heat_capacity = p.mass * matter.specific_heat();
     // Never beyond what is around it.
-    const auto exchange = [&](float around, double transfer, float surface) {
-        const float share = std::min(1.0f, float(transfer * world_.heat_pace) * surface * dt_ / heat_capacity);
-        p.enthalpy() += share * matter.specific_heat() * (around - temperature);
+    const auto exchange = [&](float around, double transfer, float over) {
+        const float share = std::min(1.0f, float(transfer * world_.heat_pace) * over * dt_ / heat_capacity);
+        p.add_heat(share * matter.specific_heat() * (around - temperature));
     };
-    p.enthalpy() += matter.specific_heat() * matter.heating() * dt_ * std::min(1.0f, empty * grid_spacing_);
+    p.add_heat(matter.specific_heat() * matter.heating() * dt_ * std::min(1.0f, emptiness * grid_spacing_));
     if (world_.air_heat_transfer > 0) exchange(air_temperature_, world_.air_heat_transfer, area);
     for (const std::size_t o : near) {
         const Obstacle& obstacle = world_.obstacles[o];
@@ -204,9 +225,7 @@ void HeatExchange::act(Particle& p, const Matter& matter, const Vec3f& emptiness
         exchange(obstacle_temperature_[o], obstacle.heat_transfer, volume / grid_spacing_);
     }
     for (const Source& source : sources_)
-        if ((point - source.centre).squaredNorm() < source.squared_radius)
-            p.enthalpy() += source.watts_a_kilogram * dt_;
-    p.enthalpy() = std::max(p.enthalpy(), 0.0f);
+        if ((point - source.centre).squaredNorm() < source.squared_radius) p.add_heat(source.watts_a_kilogram * dt_);
 }
 
 } // namespace filigree::mpm

@@ -4,7 +4,7 @@
 
 #include "filigree/physics/mpm_grid.h"
 #include "filigree/physics/obstacle_motion.h"
-#include "filigree/physics/world.h"
+#include "filigree/physics/pair_laws.h"
 
 namespace filigree::mpm {
 
@@ -13,7 +13,8 @@ namespace filigree::mpm {
 class NodeContacts {
 public:
     /// Before nodes have velocities: looks at masses alone. actors: of each body of the grid.
-    NodeContacts(const Grid& grid, const World& world, std::span<const std::size_t> actors, const RunContext& context);
+    NodeContacts(const Grid& grid, const World& world, const PairLaws& laws, std::span<const std::size_t> actors,
+                 const RunContext& context);
 
     /// Places of blocks, each with the blocks of all bodies there.
     std::size_t place_count() const { return first_block_.size() - 1; }
@@ -25,9 +26,11 @@ public:
 
 private:
     void meet_bodies(Grid& grid, std::size_t place) const;
+    float friction_of(const Grid& grid, std::span<const std::uint32_t> here, std::size_t k, int node) const;
     void meet_obstacles(Grid& grid, std::size_t place, const ObstaclePoses& poses) const;
 
     const World& world_;
+    const PairLaws& laws_;
     std::span<const std::size_t> actors_;
     std::vector<std::uint32_t> blocks_, first_block_;
     std::vector<std::vector<Vec3f>> normals_; ///< of each place: of nodes with several bodies, one a body; outward
@@ -36,16 +39,21 @@ private:
 /// Heat that comes and goes over the matter's surface, and from sources.
 class HeatExchange {
 public:
+    /// time: of the step's end. A ball that lies between particles warms those that are a particle's spacing around it.
     HeatExchange(const World& world, double time, float dt, float grid_spacing, std::span<const Particle> particles);
 
-    /// emptiness: gradient of the share of space that is full, 1/m; its norm is the surface in a unit of volume.
-    /// near: as go_to has it.
-    void act(Particle& particle, const Matter& matter, const Vec3f& emptiness, const ObstaclePoses& poses,
+    /// emptiness: size of the gradient of the share of space that is full, 1/m; times `surface` it is the area in a
+    /// unit of volume. near: as go_to has it. Before the particle moves: sources share their power out by where it is.
+    void act(Particle& particle, const Matter& matter, float emptiness, float surface, const ObstaclePoses& poses,
              std::span<const std::size_t> near) const;
+    /// Whether heat comes to bodies from outside at all.
+    static bool acts_in(const World& world);
     /// Which obstacles may warm or cool particles of a block at `place`: all but those that are far.
     void go_to(const BlockPlace& place, const ObstaclePoses& poses, std::vector<std::size_t>& near) const;
 
 private:
+    void add_source(const HeatSource& source, double time, std::span<const Particle> particles);
+
     const World& world_;
     float dt_, grid_spacing_, air_temperature_;
     std::vector<float> obstacle_temperature_; ///< K; of those that exchange heat

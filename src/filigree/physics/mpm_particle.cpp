@@ -100,6 +100,13 @@ struct alignas(64) Deforming {
 
 } // namespace
 
+bool Particle::is_sound() const {
+    const auto* const numbers = reinterpret_cast<const float*>(this);
+    const auto is_finite = [](float number) { return std::isfinite(number); };
+    return std::all_of(numbers, numbers + sizeof(Particle) / sizeof(float), is_finite) &&
+           volume_ratio() >= kLeastVolumeRatio && volume_ratio() <= kMostVolumeRatio && enthalpy() >= 0;
+}
+
 Matter::Matter(const Material& material, double heat_pace)
     : density_(float(material.density)), yield_(float(material.yield_stress)), viscosity_(float(material.viscosity)),
       damping_(float(material.damping)), melting_from_(float(material.melting_from)),

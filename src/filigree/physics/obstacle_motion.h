@@ -6,6 +6,16 @@
 
 namespace filigree {
 
+/// How a RigidMotion goes on at a moment.
+struct MotionRate {
+    Vec3d centre = Vec3d::Zero();   ///< m, where a point of its turn's axis is now
+    Vec3d velocity = Vec3d::Zero(); ///< m/s, of that point
+    Vec3d spin = Vec3d::Zero();     ///< rad/s
+    Vec3d at(const Vec3d& point) const { return velocity + spin.cross(point - centre); } ///< m/s
+};
+/// By the keys' segment that `time` lies in, or that ends there: what has no length, a jump, has no speed.
+MotionRate rate_of(const RigidMotion& motion, double time);
+
 /// How obstacles stand at a moment, and how fast their matter moves.
 class ObstaclePoses {
 public:
@@ -25,7 +35,8 @@ public:
 
 private:
     struct Motion {
-        Eigen::Isometry3d now, before, after;
+        Eigen::Isometry3d now;
+        MotionRate rate;
         bool moves, is_half_space;
         Vec3d point, normal; ///< of a half-space's plane, in the world
     };

@@ -32,6 +32,7 @@ OwnCells::OwnCells(const Matter& matter)
     std::vector<std::vector<Index>> points_of(cells.cells.size());
     const auto spacing = float(cells.spacing);
     for (Index s = 0; s < points_.size(); ++s) {
+        if (matter.is_loose(s)) continue; // as far from its cell as may be: everything would be near it
         const Index cell = matter.cell_of_point(s);
         points_of[cell].push_back(s);
         const Vec3f middle = matter.rest_position({cell, Vec3f::Constant(0.5f)});
@@ -312,13 +313,21 @@ OwnCells::Folds OwnCells::folds(const Vectors& positions, float reach, const Run
     return folds;
 }
 
+std::vector<std::pair<Index, Index>> OwnCells::near_of_find(std::span<const Extent> extents, float reach) const {
+    return near_clusters(extents, reach + 2 * overhang_, // twice: matter that is stretched
+                         std::numeric_limits<double>::infinity());
+}
+
+std::size_t OwnCells::candidates(const Vectors& positions, float reach) const {
+    return clusters_.size() < 2 ? 0 : near_of_find(extents(positions), reach).size();
+}
+
 std::vector<Index> OwnCells::find(const Vectors& positions, const Folds& folds, float reach,
                                   const RunContext& context) const {
     std::vector<Index> found(points_.size(), kNoIndex);
     if (clusters_.size() < 2) return found;
     const std::vector<Extent> around = extents(positions);
-    const auto near = near_clusters(around, reach + 2 * overhang_, // twice: matter that is stretched
-                                    std::numeric_limits<double>::infinity());
+    const auto near = near_of_find(around, reach);
     const NearBoxes boxes = cell_boxes(near, positions, context);
     std::vector<std::size_t> starts;
     for (std::size_t k = 0; k < near.size(); ++k)

@@ -8,9 +8,10 @@
 
 namespace filigree {
 
-/// Surface points of a body that might lie in far cells of the same. Clusters of 2^3 cells are compared first, by boxes
-/// and balls around them, then cells by their boxes, so that matter which lies where it belongs is not looked at point
-/// by point. Cells that are not far touch where the surface folds: FoldedCells finds those.
+/// Surface points of a body that might lie in far cells of the same; but for those of parts without cells. Clusters of
+/// 2^3 cells are compared first, by boxes and balls around them, then cells by their boxes, so that matter which lies
+/// where it belongs is not looked at point by point. Cells that are not far touch where the surface folds: FoldedCells
+/// finds those.
 ///
 /// A cell is far from another if it is not reached in two steps through matter; nor in three, of neighbouring clusters.
 class OwnCells {
@@ -29,6 +30,9 @@ public:
     std::vector<Index> find(const Vectors& positions, const Folds& folds, float reach, const RunContext& context) const;
 
     bool are_far(Index cell, Index other) const;
+
+    /// How many pairs of clusters `find` looks into, which is what it costs.
+    std::size_t candidates(const Vectors& positions, float reach) const;
 
     /// Pairs of surface points, the smaller number first, that have come nearer to each other than `far` (m) and lie in
     /// cells of which neither is reached from the other in three steps; none where the body is crushed or mixed, so
@@ -62,6 +66,7 @@ private:
     static int direction(const Key& from, const Key& to);
     std::uint64_t far_cells(Index cluster, Index other) const;
     std::vector<Extent> extents(const Vectors& positions) const;
+    std::vector<std::pair<Index, Index>> near_of_find(std::span<const Extent> extents, float reach) const;
     std::vector<std::pair<Index, Index>> near_clusters(std::span<const Extent> extents, float around,
                                                        double most) const;
     NearBoxes cell_boxes(std::span<const std::pair<Index, Index>> near, const Vectors& positions,
@@ -78,8 +83,8 @@ private:
     std::vector<Index> cells_, corners_, surface_points_;
     std::vector<Index> point_offsets_;     ///< of each of cells_, and the end
     std::vector<std::uint64_t> far_cells_; ///< bit i + 8 j: a cluster's i-th cell is far from its neighbour's j-th
-    float overhang_ = 0;                   ///< m that points may lie outside of their cells
-    std::vector<Index> numbers_;           ///< of each cell, in cells_
+    float overhang_ = 0;         ///< m that points may lie outside of their cells; without those of loose parts
+    std::vector<Index> numbers_; ///< of each cell, in cells_
     std::vector<std::array<Index, 8>> cell_corners_; ///< of each of cells_, read one after the other
     FoldedCells folded_cells_;
 };

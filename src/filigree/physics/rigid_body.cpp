@@ -13,8 +13,7 @@ namespace filigree {
 namespace {
 
 constexpr double kMostTouching = 6; ///< points that carry a body at one time, or a sixth of all
-constexpr double kSlow = 5e-3;      ///< m/s of the fastest point, below which a body tires ...
-constexpr double kTired = 0.5;      ///< ... and sleeps after so many seconds
+constexpr double kTired = 0.5;      ///< s, after which a body sleeps that hardly moves
 
 /// Turns what is given as of the body at rest into the world's axes.
 Mat3d turned(const RigidPose& pose, const Mat3d& at_rest) {
@@ -165,6 +164,7 @@ void fit_pose(BodyState& body) {
         pose.mass = body.rigid->mass;
         pose.inverse_inertia = body.rigid->inverse_inertia;
         pose.quiet_seconds = body.rigid->quiet_seconds;
+        pose.rests = body.rigid->rests;
     }
     body.rigid = pose;
     place_particles(body);
@@ -224,7 +224,7 @@ void tire(BodyState& body, double frame_seconds) {
     RigidPose& pose = *body.rigid;
     float most = 0;
     for (std::size_t i = 0; i < body.velocities.size(); ++i) most = std::max(most, body.velocities[i].squaredNorm());
-    if (double(most) > kSlow * kSlow) {
+    if (most > kSlow * kSlow) {
         pose.quiet_seconds = 0;
         return;
     }

@@ -40,6 +40,8 @@ void move_as_one(Vectors& positions, std::span<const float> mass, const Descent&
 /// Elastic forces of a body that has none.
 std::unique_ptr<Elasticity> make_rigid_elasticity(const Body& body);
 
+/// m/s of the fastest point, below which a body that rests tires.
+inline constexpr float kSlow = 5e-3f;
 /// Counts frames in which a body hardly moves; after half a second it sleeps.
 void tire(BodyState& body, double frame_seconds);
 void wake(BodyState& body);

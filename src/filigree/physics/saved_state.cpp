@@ -9,8 +9,8 @@ namespace filigree {
 
 namespace {
 
-// The name of the format, its version last. 8: a checksum at the end.
-constexpr std::uint64_t kMagic = 0x38455441'54534c46; // "FLSTATE8"
+// The name of the format, its version last. 9: what it was made for.
+constexpr std::uint64_t kMagic = 0x39455441'54534c46; // "FLSTATE9"
 static_assert(sizeof(Contacts::NearMemory) == 5 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
 static_assert(sizeof(Contacts::BallMemory) == 5 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
 static_assert(sizeof(MatterContacts::SideMemory) == 6 * sizeof(Index), "padding would be saved");
@@ -24,7 +24,7 @@ void write_pose(ByteWriter& writer, const std::optional<RigidPose>& pose) {
         for (int axis = 0; axis < 3; ++axis) writer.value(v[axis]);
     for (int k = 0; k < 4; ++k) writer.value(pose->turn.coeffs()[k]);
     writer.value(pose->quiet_seconds);
-    writer.value(std::uint64_t(pose->sleeps));
+    writer.value(std::uint64_t(pose->sleeps) + 2 * std::uint64_t(pose->rests));
 }
 
 std::optional<RigidPose> read_pose(ByteReader& reader) {
@@ -34,7 +34,9 @@ std::optional<RigidPose> read_pose(ByteReader& reader) {
         for (int axis = 0; axis < 3; ++axis) (*v)[axis] = reader.value<double>();
     for (int k = 0; k < 4; ++k) pose.turn.coeffs()[k] = reader.value<double>();
     pose.quiet_seconds = reader.value<double>();
-    pose.sleeps = reader.value<std::uint64_t>() != 0;
+    const auto flags = reader.value<std::uint64_t>();
+    pose.sleeps = (flags & 1) != 0;
+    pose.rests = (flags & 2) != 0;
     return pose;
 }
 
@@ -106,6 +108,8 @@ Contacts::Memory read_contacts(ByteReader& reader) {
 std::string write_saved_state(const SavedState& state) {
     ByteWriter writer;
     writer.value(kMagic);
+    for (const std::uint64_t hash : {state.made_for.bodies, state.made_for.world, state.made_for.options})
+        writer.value(hash);
     writer.value(state.frame);
     writer.value(std::uint64_t(state.bodies.size()));
     for (const SavedBody& body : state.bodies) write_body(writer, body);
@@ -133,6 +137,8 @@ Result<SavedState> read_saved_state(std::string_view bytes) {
     ByteReader reader(contents);
     reader.value<std::uint64_t>(); // the magic
     SavedState state;
+    for (std::uint64_t* hash : {&state.made_for.bodies, &state.made_for.world, &state.made_for.options})
+        *hash = reader.value<std::uint64_t>();
     state.frame = reader.value<std::uint64_t>();
     state.bodies.resize(reader.count(sizeof(std::uint64_t)));
     for (SavedBody& body : state.bodies) body = read_body(reader);

@@ -4,6 +4,7 @@
 #include "filigree/core/result.h"
 #include "filigree/physics/contact.h"
 #include "filigree/physics/cracks.h"
+#include "filigree/physics/made_for.h"
 
 #include <string>
 #include <string_view>
@@ -27,6 +28,7 @@ struct SavedBody {
 };
 
 struct SavedState {
+    MadeFor made_for;
     std::uint64_t frame = 0;
     std::vector<SavedBody> bodies;
     Contacts::Memory contacts;

@@ -1,9 +1,11 @@
 #include "filigree/physics/simulation.h"
 
 #include "filigree/core/text.h"
+#include "filigree/physics/lost_particles.h"
 #include "filigree/physics/rigid_body.h"
 #include "filigree/physics/rigid_state.h"
 #include "filigree/physics/simulation_state.h"
+#include "filigree/physics/sleep.h"
 
 #include <algorithm>
 #include <cassert>
@@ -31,6 +33,8 @@ BodyState place_body(const Actor& actor, std::size_t number) {
     BodyState state;
     state.body = actor.body;
     state.actor = number;
+    state.placement = actor.placement;
+    state.may_sleep = actor.may_sleep;
     const Body& body = *actor.body;
     const std::size_t count = body.particle_count();
     state.positions = state.velocities = Vectors(count);
@@ -195,53 +199,33 @@ bool is_finite(const SimulationState& state) {
         state.bodies, [](const BodyState& body) { return is_finite(body.positions) && is_finite(body.velocities); });
 }
 
-/// What cannot be computed stays with its body, at rest. Returns how many particles that are.
-std::size_t hold_lost_particles(SimulationState& state) {
-    std::size_t held = 0;
-    for (BodyState& body : state.bodies) {
-        const std::size_t before = held;
-        for (std::size_t i = 0; i < body.positions.size(); ++i) {
-            if (body.positions[i].allFinite() && body.velocities[i].allFinite()) continue;
-            if (!body.positions[i].allFinite()) body.positions.set(i, body.elasticity->reference()[i]);
-            body.velocities.set(i, Vec3f::Zero());
-            ++held;
-        }
-        if (body.rigid && held > before) fit_pose(body);
-    }
-    return held;
-}
-
-/// Rigid bodies that have hardly moved for a while sleep, and wake when anything moves them.
-void let_rest(SimulationState& state, double from, double until) {
-    const bool disturbed = state.external.has_wind() || obstacle_way(state.world, state.bodies, from, until) > 0;
-    for (std::size_t b = 0; b < state.bodies.size(); ++b) {
-        BodyState& body = state.bodies[b];
-        if (!body.rigid) continue;
-        if (disturbed || body.is_held || state.external.pull(b, until) || state.external.push(body.actor)) {
-            if (body.rigid->sleeps) state.contacts.look_near_again();
-            wake(body);
-        } else if (!body.rigid->sleeps) {
-            tire(body, state.frame_seconds());
-        }
-    }
-}
-
 /// One frame, whatever way it takes. Cancelled work leaves the state half done.
 Result<FrameReport> step_frame(SimulationState& state, const SavedState& start, const RunContext& context) {
     const double from = state.time(), until = double(state.frame + 1) * state.frame_seconds();
     FrameReport report;
+    std::size_t held = 0;
+    const auto hold_lost = [&] {
+        const std::size_t more = hold_lost_particles(state);
+        if (more > 0) state.contacts.begin_anew();
+        held += more;
+    };
+    hold_lost();
+    const bool began_lost = held > 0;
     state.contacts.clear_touches();
     state.external.find_wind(state.bodies, from, state.options.frames_per_second, context);
 
     double reached = from;
     DescentCause cause = DescentCause::chosen;
-    if (state.options.mode != StepMode::descent) {
+    if (state.options.mode != StepMode::descent && began_lost) {
+        cause = DescentCause::not_finite; // the frame began so
+    } else if (state.options.mode != StepMode::descent) {
         reached = step_explicitly(state, from, until, report, context);
         cause = DescentCause::too_many_substeps;
     }
     if (context.is_cancelled()) return cancelled_error();
     if (!is_finite(state)) { // an explicit frame that failed is done again
         if (Status undone = restore_state(state, start); !undone) return undone.error();
+        hold_lost_particles(state);
         report = {.elastic_seconds = report.elastic_seconds,
                   .contact_seconds = report.contact_seconds,
                   .other_seconds = report.other_seconds};
@@ -257,16 +241,42 @@ Result<FrameReport> step_frame(SimulationState& state, const SavedState& start, 
     for (BodyState& body : state.bodies)
         if (body.is_on_grid) state.grid->read(body.actor, body.positions, body.velocities);
     if (context.is_cancelled()) return cancelled_error();
-    if (const std::size_t held = hold_lost_particles(state)) {
-        report.clamped_particles += held;
-        state.contacts.begin_anew();
-    }
+    hold_lost();
+    report.clamped_particles += held;
     report.most_crushed = state.bodies[report.most_crushed].actor;
     for (const Cracks& cracks : state.cracks) cracks.show_whole(state.bodies);
     let_rest(state, from, until);
     ++state.frame;
     return report;
 }
+
+/// After particles were moved one by one. A pose is of finite ones alone.
+void fit_rigid(SimulationState& state, BodyState& body) {
+    if (!body.rigid) return;
+    hold_lost_particles(state, body);
+    fit_pose(body);
+    body.rigid->rests = false;
+}
+
+/// Puts the state back to what it was, unless all went well: also where memory ran out on the way.
+class UnlessWhole {
+public:
+    explicit UnlessWhole(SimulationState& state) : state_(state), start_(save_state(state)) {}
+    UnlessWhole(const UnlessWhole&) = delete;
+    UnlessWhole& operator=(const UnlessWhole&) = delete;
+    ~UnlessWhole() {
+        if (is_whole_) return;
+        [[maybe_unused]] const Status undone = restore_state(state_, std::move(start_));
+        assert(undone.ok());
+    }
+    const SavedState& state() const { return start_; }
+    void keep() { is_whole_ = true; }
+
+private:
+    SimulationState& state_;
+    SavedState start_;
+    bool is_whole_ = false;
+};
 
 } // namespace
 
@@ -282,7 +292,8 @@ Result<Simulation> Simulation::create(World world, std::vector<Actor> actors, co
     std::size_t count = actors.size();
     for (const Actor& actor : actors)
         if (actor.fracture) count += actor.fracture->body->pieces.size();
-    auto state = std::make_unique<SimulationState>(std::move(world), count, actors.size(), options);
+    const MadeFor made = made_for(world, actors, options);
+    auto state = std::make_unique<SimulationState>(std::move(world), count, actors.size(), options, made);
     state->grid = std::make_unique<mpm::Bodies>(state->world, actors);
     begin_bodies(*state, actors, context);
     begin_pieces(*state, actors, context);
@@ -301,10 +312,9 @@ Result<Simulation> Simulation::create(World world, std::vector<Actor> actors, co
 
 Result<FrameReport> Simulation::advance(const RunContext& context) {
     if (context.is_cancelled()) return cancelled_error();
-    const SavedState start = save_state(*state_);
-    Result<FrameReport> report = step_frame(*state_, start, context);
-    if (!report)
-        if (Status undone = restore_state(*state_, start); !undone) return undone.error();
+    UnlessWhole start(*state_);
+    Result<FrameReport> report = step_frame(*state_, start.state(), context);
+    if (report) start.keep();
     return report;
 }
 
@@ -333,7 +343,7 @@ const Vectors& Simulation::velocities(std::size_t body) const {
 Status Simulation::set_positions(std::size_t body, const Vectors& positions) {
     if (Status checked = check_vectors(body, positions, "positions"); !checked) return checked;
     state_->bodies[body].positions = positions;
-    if (state_->bodies[body].rigid) fit_pose(state_->bodies[body]);
+    fit_rigid(*state_, state_->bodies[body]);
     if (state_->bodies[body].is_on_grid) state_->grid->set_positions(body, positions);
     state_->contacts.begin_anew();
     return Success{};
@@ -341,7 +351,7 @@ Status Simulation::set_positions(std::size_t body, const Vectors& positions) {
 Status Simulation::set_velocities(std::size_t body, const Vectors& velocities) {
     if (Status checked = check_vectors(body, velocities, "velocities"); !checked) return checked;
     state_->bodies[body].velocities = velocities;
-    if (state_->bodies[body].rigid) fit_pose(state_->bodies[body]);
+    fit_rigid(*state_, state_->bodies[body]);
     if (state_->bodies[body].is_on_grid) state_->grid->set_velocities(body, velocities);
     return Success{};
 }
@@ -459,14 +469,15 @@ std::size_t Simulation::attach(std::size_t body, std::span<const Vec3f> points, 
     assert(body < body_count());
     const BodyState& state = state_->bodies[body];
     if (state.is_on_grid) return attach_on_grid(body, points, context);
-    assert(pieces.size() == (state.broken ? points.size() : 0));
     state_->attachments.push_back(filigree::attach(state, body, points, context));
     state_->first_tracers.push_back(0);
     std::vector<PieceFollower>& followers = state_->followers.emplace_back();
     if (state.broken) {
         std::vector<Index> numbers;
         for (std::size_t p = 0; p < points.size(); ++p) {
-            const Index piece = state.broken->piece_of_number[pieces[p]];
+            const std::vector<Index>& known = state.broken->piece_of_number;
+            const Index number = p < pieces.size() ? pieces[p] : kNoIndex;
+            const Index piece = number < known.size() ? known[number] : kNoIndex;
             numbers.push_back(piece != kNoIndex ? piece : state.broken->piece_at(points[p].cast<double>()));
         }
         followers = make_followers(*state.broken, state_->attachments.back().embedding, numbers);
@@ -507,6 +518,7 @@ std::string Simulation::save() const { return write_saved_state(save_state(*stat
 Status Simulation::restore(std::string_view bytes) {
     Result<SavedState> saved = read_saved_state(bytes);
     if (!saved) return saved.error();
+    if (Status same = check_same(saved->made_for, state_->made_for); !same) return same;
     SavedState before = save_state(*state_);
     Status restored = restore_state(*state_, std::move(saved).value());
     if (!restored) {

@@ -16,6 +16,8 @@ struct Actor {
     Vec3d velocity = Vec3d::Zero();                              ///< m/s
     Vec3d spin = Vec3d::Zero();                                  ///< rad/s about the centre of mass
     std::shared_ptr<const Fracture> fracture = nullptr;          ///< of this body; null: it does not break
+    /// A rigid body that hardly moves while something holds it sleeps, and costs nothing until something touches it.
+    bool may_sleep = true;
 };
 
 /// explicit_steps: velocity Verlet, as many substeps as stability asks for; where that is more than 20,000 a frame, or
@@ -90,7 +92,7 @@ public:
     Simulation& operator=(Simulation&&) noexcept;
     ~Simulation();
 
-    /// One frame. Errors: cancelled (the state is that of the frame's start).
+    /// One frame. Errors: cancelled. The state is then that of the frame's start, as it is where memory runs out.
     Result<FrameReport> advance(const RunContext& context);
 
     std::size_t frame() const; ///< frames done
@@ -103,7 +105,8 @@ public:
     const Vectors& positions(std::size_t body) const;  ///< world, m; broken: of the heaviest of each corner's copies
     const Vectors& velocities(std::size_t body) const; ///< m/s
     /// For tests, and for whoever starts a body in another shape. Values may be anything; the next frame repairs what
-    /// no step can take. Errors: usage (no such body, another number of particles).
+    /// no step can take: what is no number returns to where it was at rest beside the others. Errors: usage (no such
+    /// body, another number of particles).
     Status set_positions(std::size_t body, const Vectors& positions);
     Status set_velocities(std::size_t body, const Vectors& velocities);
     /// Hands may come and go while it runs, and take the place of those there were. Each seizes the particles that were
@@ -130,7 +133,7 @@ public:
     /// The same, each point with a piece, by the partition's number: what several pieces' copies of one point are
     /// carried by. Until the body breaks copies have the same bytes, and where pieces hold together also afterwards;
     /// then each goes with its own piece, also where that ends before it. Of a body that breaks; above, each point goes
-    /// with the piece it lies in.
+    /// with the piece it lies in, as do points here of a piece that there is none of, or without matter.
     std::size_t attach(std::size_t body, std::span<const Vec3f> points, std::span<const Index> pieces,
                        const RunContext& context);
     /// Where they are now (world, m) and the gradients from rest to there: as many as were attached. `gradients` may be
@@ -145,8 +148,9 @@ public:
     MatterParticles matter(std::size_t body) const;
     double heat() const; ///< J in bodies of mpm, from 0 K
 
-    /// Everything that moves, as bytes (docs/scenes.md), and back. Errors: bad_file (damaged), mismatch (of other
-    /// bodies).
+    /// Everything that moves, as bytes (docs/scenes.md), and back. A state goes on only with the bodies, the world and
+    /// the options that it was saved with, but for what the functions above may set. Errors: bad_file (damaged),
+    /// mismatch (of others); nothing has changed then.
     std::string save() const;
     Status restore(std::string_view bytes);
 

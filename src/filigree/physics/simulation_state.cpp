@@ -75,6 +75,7 @@ bool restore_pose(RigidPose& pose, const RigidPose& saved) {
     pose.angular = saved.angular;
     pose.quiet_seconds = saved.quiet_seconds;
     pose.sleeps = saved.sleeps;
+    pose.rests = saved.rests;
     return true;
 }
 
@@ -82,6 +83,7 @@ bool restore_pose(RigidPose& pose, const RigidPose& saved) {
 
 SavedState save_state(const SimulationState& state) {
     SavedState saved;
+    saved.made_for = state.made_for;
     saved.frame = state.frame;
     for (const BodyState& body : state.bodies) saved.bodies.push_back(save_body(body));
     for (const Attachment& attachment : state.attachments)
@@ -111,6 +113,7 @@ Status restore_state(SimulationState& state, SavedState saved) {
         const std::size_t count = body.body->particle_count();
         if (from.positions.size() != count || from.velocities.size() != count) return other;
         if (!from.flow.empty() && from.flow.size() != count) return other;
+        if (!from.flow.empty() && body.body->material.model != MaterialModel::meshfree) return damaged;
         for (const Mat3f& gradient : from.flow)
             if (!gradient.allFinite()) return damaged;
         if (!body.elasticity->restore_state(from.elasticity)) return other;

@@ -4,6 +4,7 @@
 #include "filigree/physics/contact.h"
 #include "filigree/physics/cracks.h"
 #include "filigree/physics/external_forces.h"
+#include "filigree/physics/made_for.h"
 #include "filigree/physics/mpm.h"
 #include "filigree/physics/piece_followers.h"
 #include "filigree/physics/saved_state.h"
@@ -14,9 +15,10 @@ namespace filigree {
 struct SimulationState {
     /// body_count: with pieces.
     SimulationState(World the_world, std::size_t body_count, std::size_t the_actor_count,
-                    const StepOptions& the_options)
-        : world(std::move(the_world)), options(the_options), actor_count(the_actor_count),
-          contacts(world, body_count, the_options.contacts_between_bodies, the_options.contacts_within_bodies),
+                    const StepOptions& the_options, const MadeFor& what_for)
+        : world(std::move(the_world)), options(the_options), actor_count(the_actor_count), made_for(what_for),
+          contacts(world, body_count, the_actor_count, the_options.contacts_between_bodies,
+                   the_options.contacts_within_bodies),
           external(world, body_count) {}
     SimulationState(const SimulationState&) = delete; // contacts and external refer to the world
     SimulationState& operator=(const SimulationState&) = delete;
@@ -24,6 +26,7 @@ struct SimulationState {
     World world;
     const StepOptions options;
     const std::size_t actor_count;
+    const MadeFor made_for;
     std::vector<BodyState> bodies;      ///< of the actors, then pieces
     std::vector<std::string> why_rigid; ///< of each actor: Simulation::why_rigid
     std::vector<Cracks> cracks;         ///< of bodies that break
@@ -57,7 +60,7 @@ void step_by_descent(SimulationState& state, double from, double until, FrameRep
 void note_deformation(FrameReport& report, std::size_t body, const ElasticReport& met);
 
 float least_spacing(std::span<const BodyState> bodies);
-/// Puts pinned particles where their motion has them at `now`, with its mean velocity over dt.
+/// Puts pinned particles where their motion has them at `now`, with its velocity; dt: of the substep, 0 at the start.
 void move_pins(SimulationState& state, double now, float dt);
 /// Starts that no step can take: coincident particles are shaken apart, and what is stretched too far is scaled down.
 /// Whether anything was done.

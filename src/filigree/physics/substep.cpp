@@ -11,9 +11,9 @@ namespace filigree {
 
 namespace {
 
-constexpr float kMostStretch = 10; ///< a body stretched further starts scaled down ...
+constexpr float kMostStretch = 10; ///< a body that is stretched more than this ...
+constexpr float kStretchAfter = 3; ///< ... is scaled down to this
 constexpr double kReveals = 8;     ///< a frame: how often points of new cracks begin to touch others
-constexpr float kStretchAfter = 3; ///< ... to this
 constexpr double kMostParts = 16;  ///< of a usual substep of descent, where bodies meet fast
 
 void shake(BodyState& body, std::uint64_t seed) {
@@ -28,8 +28,13 @@ void shake(BodyState& body, std::uint64_t seed) {
 std::size_t scale_down(BodyState& body, float factor) {
     const std::size_t count = body.positions.size();
     Vec3d mean = Vec3d::Zero();
-    for (std::size_t i = 0; i < count; ++i) mean += body.positions[i].cast<double>() / double(count);
-    if (!mean.allFinite()) mean.setZero();
+    std::size_t finite = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        if (!body.positions[i].allFinite()) continue;
+        mean += body.positions[i].cast<double>();
+        ++finite;
+    }
+    mean /= double(std::max<std::size_t>(finite, 1));
     std::size_t moved = 0;
     for (std::size_t i = 0; i < count; ++i) {
         if (body.fixed[i]) continue;
@@ -77,10 +82,11 @@ float least_spacing(std::span<const BodyState> bodies) {
 void move_pins(SimulationState& state, double now, float dt) {
     for (std::size_t p = 0; p < state.world.pins.size(); ++p) {
         const Pin& pin = state.world.pins[p];
-        const Eigen::Isometry3d motion = pin.motion.at(now), before = pin.motion.at(now - double(dt));
+        const Eigen::Isometry3d motion = pin.motion.at(now);
+        const MotionRate rate = rate_of(pin.motion, now);
         for (std::size_t k = 0; k < pin.particles.size(); ++k) {
             const Vec3d from = state.pinned_from[p][k].cast<double>(), place = motion * from;
-            const Vec3d velocity = dt > 0 ? Vec3d((place - before * from) / double(dt)) : Vec3d(Vec3d::Zero());
+            const Vec3d velocity = dt > 0 ? rate.at(place) : Vec3d(Vec3d::Zero());
             each_copy(std::span(state.bodies), pin.body, pin.particles[k],
                       [&](BodyState& body, std::size_t, Index particle) {
                           body.positions.set(particle, place.cast<float>());

@@ -1,5 +1,7 @@
 #include "filigree/physics/world.h"
 
+#include <algorithm>
+
 namespace filigree {
 
 namespace {
@@ -55,6 +57,12 @@ DistanceField::Sample distance_to(const Obstacle& obstacle, const Eigen::Isometr
 PairContact World::contact_of(std::size_t body, std::size_t other) const {
     for (const BodyPair& pair : body_pairs)
         if ((pair.first == body && pair.second == other) || (pair.first == other && pair.second == body))
+            return pair.contact;
+    const auto has = [](const std::vector<std::size_t>& group, std::size_t member) {
+        return std::ranges::find(group, member) != group.end();
+    };
+    for (const GroupPair& pair : group_pairs)
+        if ((has(pair.first, body) && has(pair.second, other)) || (has(pair.first, other) && has(pair.second, body)))
             return pair.contact;
     return {body_friction, body_restitution};
 }

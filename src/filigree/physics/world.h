@@ -78,8 +78,15 @@ struct Pin {
 /// A force on the particles of a region, or of the whole body, shared out by mass.
 struct RegionForce {
     std::size_t body = 0;
-    std::vector<Index> particles;
+    std::vector<Index> particles;              ///< empty: all of the body's
     Keyed<Vec3d> force{{}, {}, Vec3d::Zero()}; ///< N, of the whole region
+
+    /// Calls visit(particle) for all that it acts on, of a body of so many.
+    template <class Visit>
+    void each_particle(std::size_t count, const Visit& visit) const {
+        for (const Index particle : particles) visit(particle);
+        for (Index particle = 0; particles.empty() && particle < count; ++particle) visit(particle);
+    }
 };
 
 /// A hand that pulls a point of a body's surface towards a moving target by a damped spring.
@@ -110,6 +117,12 @@ struct BodyPair {
     PairContact contact;
 };
 
+/// How each body of one group touches each of another, where that differs from others.
+struct GroupPair {
+    std::vector<std::size_t> first, second; ///< bodies, in any order; a body may be in both
+    PairContact contact;
+};
+
 struct World {
     Vec3d gravity = {0, -9.81, 0};              ///< m/s^2
     Keyed<Vec3d> wind{{}, {}, Vec3d::Zero()};   ///< m/s
@@ -124,9 +137,10 @@ struct World {
     std::vector<Hand> hands;
     double body_friction = PairContact{}.friction; ///< between bodies, and between parts of one
     double body_restitution = PairContact{}.restitution;
-    std::vector<BodyPair> body_pairs; ///< those that touch otherwise
+    std::vector<BodyPair> body_pairs;   ///< those that touch otherwise; of several about the same two the first holds
+    std::vector<GroupPair> group_pairs; ///< the same of many, where body_pairs has nothing about two; the first holds
 
-    PairContact contact_of(std::size_t body, std::size_t other) const;
+    PairContact contact_of(std::size_t body, std::size_t other) const; ///< cost O(pairs and members of groups)
 };
 
 } // namespace filigree

@@ -112,6 +112,11 @@ public:
         at_least(obstacle.heat_transfer, 0, place + ".heat_transfer", "must be 0 W/(m^2 K) or more");
     }
     /// place: of what holds both.
+    void pair(const PairContact& contact, const std::string& place) {
+        at_least(contact.friction, 0, place + ".contact.friction", "must be 0 or more");
+        require(contact.restitution >= 0 && contact.restitution <= 1, place + ".contact.restitution",
+                "must be from 0 to 1");
+    }
     void air(const Keyed<double>& temperature, double heat_transfer, const std::string& place) {
         keys(temperature, kLeastTemperature, place + "air_temperature");
         at_least(heat_transfer, 0, place + "air_heat_transfer", "must be 0 W/(m^2 K) or more");
@@ -160,9 +165,15 @@ Status check_world(const World& world, std::span<const Actor> actors) {
         const std::string place = numbered("world.body_pairs", p);
         check.require(pair.first < actors.size() && pair.second < actors.size(), place,
                       "must name bodies that are there");
-        check.at_least(pair.contact.friction, 0, place + ".contact.friction", "must be 0 or more");
-        check.require(pair.contact.restitution >= 0 && pair.contact.restitution <= 1, place + ".contact.restitution",
-                      "must be from 0 to 1");
+        check.pair(pair.contact, place);
+    }
+    for (std::size_t p = 0; p < world.group_pairs.size(); ++p) {
+        const GroupPair& pair = world.group_pairs[p];
+        const std::string place = numbered("world.group_pairs", p);
+        const auto is_there = [&](std::size_t body) { return body < actors.size(); };
+        check.require(std::ranges::all_of(pair.first, is_there) && std::ranges::all_of(pair.second, is_there), place,
+                      "must name bodies that are there");
+        check.pair(pair.contact, place);
     }
     check.air(world.air_temperature, world.air_heat_transfer, "world.");
     check.require(std::isfinite(world.heat_pace) && world.heat_pace > 0, "world.heat_pace", "must be above 0");

@@ -133,7 +133,6 @@ double heat_of_melting(const Material& material) {
 /// The air, and the surface that parts and joins. A mesh that is open melts too, but neither parts nor joins.
 Status let_it_melt(const DropOptions& options, const BodyLook& look, DroppedBody& dropped, const RunContext& context) {
     constexpr double kWarmer = 60; // K
-    constexpr double kSlower = 2;  // as the warmth has to get inside
     const Body& body = *dropped.body;
     World& world = dropped.world;
     world.air_temperature.constant = options.air_temperature;
@@ -142,7 +141,7 @@ Status let_it_melt(const DropOptions& options, const BodyLook& look, DroppedBody
     const double area = std::cbrt(36 * std::numbers::pi * volume * volume); // of a ball of that volume
     const double seconds =
         volume * body.material.density * heat_of_melting(body.material) / (kAirHeatTransfer * area * kWarmer);
-    world.heat_pace = std::max(1.0, kSlower * seconds / options.melting_time);
+    world.heat_pace = std::max(1.0, seconds / options.melting_time);
     Result<MeltingModel> melting = MeltingModel::create(dropped.model, body, dropped.scale, look, context);
     if (melting) {
         dropped.melting = std::make_shared<const MeltingModel>(std::move(*melting));

@@ -9,7 +9,8 @@
 namespace filigree {
 
 /// Particles within half a cell's diagonal of any of the points, and the one nearest to each. points: in the body's
-/// rest space, m. Returns ascending ids, each once. Cost O(points x particles).
+/// rest space, m. Returns ascending ids, each once. Cost O(particles
+/// log(particles), and points); of a point that is far from all, O(particles).
 std::vector<Index> particles_near(const Body& body, std::span<const Vec3f> points);
 
 } // namespace filigree

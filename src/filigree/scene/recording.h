@@ -5,6 +5,7 @@
 #include "filigree/physics/simulation.h"
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 namespace filigree {
@@ -41,11 +42,23 @@ struct RunTimes {
     void add(const FrameReport& report);
 };
 
-/// Frames of this run that descent made or finished, by cause; those before it was resumed are not in it.
+/// Frames that descent made or finished, by cause.
 struct DescentCauses {
     std::uint64_t chosen = 0, too_many_substeps = 0, not_finite = 0;
 
     void add(const FrameReport& report);
+};
+
+/// How far a body was crushed.
+struct Crush {
+    std::uint64_t first = 0, worst = 0; ///< frames: first in which a cell kept too little, and of the least volume
+    float least = 1;                    ///< volume of a cell, of that at rest
+};
+
+/// What makes a body's motion doubtful.
+struct BodyDoubts {
+    std::optional<std::uint64_t> first_lost; ///< the first frame in which hold_lost held some
+    std::optional<Crush> crush;
 };
 
 struct Recording {
@@ -54,6 +67,9 @@ struct Recording {
     std::vector<std::vector<MatterParticles>> matter;       ///< of each body and frame; none of bodies not of mpm
     std::vector<CheckTotals> checks;                        ///< one a body where that was asked for, else none
     RunTotals totals;
+    DescentCauses descent_causes;
+    std::vector<BodyDoubts> doubts; ///< one a body
+    float last_volume_ratio = 1;    ///< the least of the last frame
 };
 
 /// Driver vertices that went nowhere sensible in a frame stay where they were, so that one does not spoil all.

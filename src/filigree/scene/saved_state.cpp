@@ -11,7 +11,7 @@ namespace filigree {
 
 namespace {
 
-constexpr std::string_view kFormat = "FILSTAT", kMagic = "FILSTAT6"; // ends in the version
+constexpr std::string_view kFormat = "FILSTAT", kMagic = "FILSTAT7"; // ends in the version
 
 void write_totals(ByteWriter& out, const RunTotals& t) {
     for (const std::uint64_t count : {t.frames, t.explicit_frames, t.descent_frames, t.substeps, t.least_substeps,
@@ -35,6 +35,35 @@ RunTotals read_totals(ByteReader& in) {
     t.most_stretch = in.value<float>();
     for (double* joules : {&t.start.kinetic, &t.start.elastic, &t.start.potential}) *joules = in.value<double>();
     return t;
+}
+
+void write_doubts(ByteWriter& out, const Recording& recording) {
+    const DescentCauses& causes = recording.descent_causes;
+    for (const std::uint64_t count : {causes.chosen, causes.too_many_substeps, causes.not_finite}) out.value(count);
+    out.value(recording.last_volume_ratio);
+    for (const BodyDoubts& body : recording.doubts) {
+        const Crush crush = body.crush.value_or(Crush{});
+        out.value(std::uint64_t(body.first_lost.has_value()) + 2 * std::uint64_t(body.crush.has_value()));
+        for (const std::uint64_t frame : {body.first_lost.value_or(0), crush.first, crush.worst}) out.value(frame);
+        out.value(crush.least);
+    }
+}
+
+void read_doubts(ByteReader& in, std::size_t bodies, Recording& recording) {
+    DescentCauses& causes = recording.descent_causes;
+    for (std::uint64_t* count : {&causes.chosen, &causes.too_many_substeps, &causes.not_finite})
+        *count = in.value<std::uint64_t>();
+    recording.last_volume_ratio = in.value<float>();
+    for (std::size_t b = 0; b < bodies; ++b) {
+        const auto flags = in.value<std::uint64_t>();
+        const auto first_lost = in.value<std::uint64_t>();
+        Crush crush;
+        for (std::uint64_t* frame : {&crush.first, &crush.worst}) *frame = in.value<std::uint64_t>();
+        crush.least = in.value<float>();
+        BodyDoubts& body = recording.doubts.emplace_back();
+        if (flags & 1) body.first_lost = first_lost;
+        if (flags & 2) body.crush = crush;
+    }
 }
 
 void write_poses(ByteWriter& out, const PoseSequence& poses) {
@@ -96,6 +125,7 @@ struct SavedRun {
 
     SavedRun(ByteReader& in, std::size_t bodies) {
         recording.totals = read_totals(in);
+        read_doubts(in, bodies, recording);
         for (std::size_t b = 0; b < bodies; ++b) recording.poses.push_back(read_poses(in));
         const std::uint64_t with_particles = in.value<std::uint64_t>();
         for (std::uint64_t b = 0; b < with_particles && in.ok(); ++b) recording.particles.push_back(read_particles(in));
@@ -116,6 +146,7 @@ std::string pack_state(const Recording& recording, const Simulation& simulation,
     ByteWriter out;
     out.value(hash);
     write_totals(out, recording.totals);
+    write_doubts(out, recording);
     for (const PoseSequence& poses : recording.poses) write_poses(out, poses);
     out.value(std::uint64_t{recording.particles.size()});
     for (const auto& frames : recording.particles) {

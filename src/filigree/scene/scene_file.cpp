@@ -197,7 +197,11 @@ private:
         in.set_whole("resolution", body.shape_options.resolution);
         in.set("frequency", body.shape_options.frequency);
         in.set("amplitude", body.shape_options.amplitude);
-        in.set("size", body.shape_options.size);
+        if (in.has("shape"))
+            in.set("size", body.shape_options.size);
+        else if (in.has("size"))
+            in.set("size", body.size.emplace());
+        if (body.size && in.has("scale")) in.fail("size", "give one of size and scale");
         in.set("length", body.shape_options.length);
         in.set("thickness", body.shape_options.thickness);
         if (in.has("driver")) in.set_whole("driver", body.driver.emplace());
@@ -366,9 +370,7 @@ private:
         PairContact contact{scene_.body_friction, scene_.body_restitution};
         in.set("friction", contact.friction);
         in.set("restitution", contact.restitution);
-        for (const std::size_t first : bodies_called(in, "first"))
-            for (const std::size_t second : bodies_called(in, "second"))
-                scene_.pairs.push_back({first, second, contact});
+        scene_.pairs.push_back({bodies_called(in, "first"), bodies_called(in, "second"), contact});
     }
 
     void read_fracture(const SceneTable& in) {
@@ -377,9 +379,9 @@ private:
         fracture.body = body_of(in);
         const Material& material = scene_.bodies[fracture.body].material;
         if (material.model != MaterialModel::fem)
-            in.fail(
-                in.line(),
-                "only bodies of model = \"fem\" break; this one's is another (with fem, clay dents and tears as well)");
+            in.fail(in.line(), "only bodies of model = \"fem\" break, and '" + scene_.bodies[fracture.body].name +
+                                   "' is of another; add model = \"fem\" and young_modulus = 2e7 to its [[body]] "
+                                   "(stiffer takes longer; with fem, clay dents and tears as well)");
         for (const SceneFracture& other : scene_.fractures)
             if (other.body == fracture.body) in.fail(in.line(), "a body has one [[fracture]] at most");
         in.set_whole("pieces", fracture.pattern.pieces);

@@ -35,7 +35,8 @@ struct SceneBody {
     std::string shape;
     ShapeOptions shape_options;
     std::optional<std::size_t> driver = {}; ///< vertices; unset: as fine as the particles, see body_driver_options
-    BodyOptions body;                       ///< with the scale, metres a model unit
+    BodyOptions body;                       ///< with the scale, metres a model unit; or
+    std::optional<double> size = {};        ///< m, the longest side of the mesh
     Material material;
     std::string material_name;        ///< that it began as
     std::optional<Vec3d> centre = {}; ///< m; unset: where the mesh's own coordinates say
@@ -127,7 +128,7 @@ struct SceneFile {
     std::vector<HeatSource> heat_sources; ///< world
     std::vector<SceneBody> bodies;
     std::vector<SceneObstacle> obstacles;
-    std::vector<BodyPair> pairs;
+    std::vector<GroupPair> pairs;
     std::vector<SceneFracture> fractures;
     std::vector<SceneCrack> cracks;
     std::vector<ScenePin> pins;

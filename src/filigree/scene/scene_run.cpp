@@ -94,12 +94,13 @@ Status SceneRun::follow(bool checks) {
         const std::size_t driver = attach(driver_positions(body.model), body.pieces.driver);
         Result<Restorer> restorer = Restorer::create(body.model, {}, always_);
         if (!restorer) return restorer.error();
-        Follower& follower = followers_.emplace_back(Follower{driver, {}, std::move(*restorer), {}, {}});
+        Follower& follower = followers_.emplace_back(Follower{driver, {}, std::move(*restorer), {}});
         follower.restored.resize(body.model.mesh.vertex_count());
         if (checks) follower.direct = attach(body.model.mesh.positions, body.pieces.vertices);
     }
     recording_.poses.assign(ready_->bodies.size(), {scene_->step.frames_per_second, {}});
     recording_.matter.resize(ready_->bodies.size());
+    recording_.doubts.resize(ready_->bodies.size());
     if (scene_->picture.particles) recording_.particles.resize(ready_->bodies.size());
     if (checks) recording_.checks.resize(ready_->bodies.size());
     return Success{};
@@ -121,8 +122,8 @@ Status SceneRun::advance_to(std::uint64_t last, const RunContext& context) {
         if (!report) return report.error();
         recording_.totals.add(*report);
         times_.add(*report);
-        descent_causes_.add(*report);
-        last_volume_ratio_ = report->least_volume_ratio;
+        recording_.descent_causes.add(*report);
+        recording_.last_volume_ratio = report->least_volume_ratio;
         note_crush(*report);
         for (std::size_t b = 0; b < followers_.size(); ++b)
             if (const Status recorded = record_body(b); !recorded) return recorded;
@@ -166,12 +167,13 @@ void SceneRun::hold_lost_of(std::size_t b) {
     const ReadyBody& body = ready_->bodies[b];
     const auto far = static_cast<float>(kFarInAFrame * body.scale * bounds(body.model.mesh.positions).diagonal());
     const std::size_t held = hold_lost(frames[frames.size() - 2], frames.back(), far, float(kFarInAFrame * body.scale));
-    if (held > 0 && !followers_[b].first_lost) followers_[b].first_lost = frame();
+    std::optional<std::uint64_t>& first = recording_.doubts[b].first_lost;
+    if (held > 0 && !first) first = frame();
 }
 
 void SceneRun::note_crush(const FrameReport& report) {
     if (!(report.least_volume_ratio < kCrushed)) return;
-    std::optional<Crush>& crush = followers_[report.most_crushed].crush;
+    std::optional<Crush>& crush = recording_.doubts[report.most_crushed].crush;
     if (!crush) crush = Crush{.first = frame()};
     if (!(report.least_volume_ratio < crush->least)) return;
     crush->least = report.least_volume_ratio;
@@ -200,7 +202,7 @@ Result<Mesh> SceneRun::mesh(std::size_t body, std::size_t frame, const RunContex
 std::vector<std::string> SceneRun::warnings() const {
     std::vector<std::string> sentences;
     for (std::size_t b = 0; b < followers_.size(); ++b)
-        if (const std::optional<std::uint64_t> first = followers_[b].first_lost)
+        if (const std::optional<std::uint64_t> first = recording_.doubts[b].first_lost)
             sentences.push_back(fmt::format("body '{}': the motion broke down at some of its surface, first in frame "
                                             "{}; parts of the driver were held where they were",
                                             ready_->bodies[b].name, *first));
@@ -214,16 +216,25 @@ std::vector<std::string> SceneRun::warnings() const {
             sentences.push_back(fmt::format("body '{}' is moved as a rigid body: {}; automatic_rigid = false keeps it "
                                             "elastic",
                                             name, reason));
-        if (const std::optional<Crush>& crush = followers_[b].crush)
+        if (const std::optional<Crush>& crush = recording_.doubts[b].crush)
             sentences.push_back(fmt::format("body '{}': cells were crushed to {} of their volume in frame {}, first "
                                             "below a tenth in frame {}: what follows may be wrong",
                                             name, volume_text(crush->least), crush->worst, crush->first));
     }
-    if (last_volume_ratio_ <= 0)
+    if (recording_.last_volume_ratio <= 0)
         sentences.push_back("some cells are inside out at the end: the bodies were pressed or pulled too hard");
     if (const std::optional<std::string> energy = energy_warning()) sentences.push_back(*energy);
     if (const std::optional<std::string> descent = descent_warning()) sentences.push_back(*descent);
     return sentences;
+}
+
+std::optional<std::string> SceneRun::broke_down() const {
+    const bool lost =
+        std::ranges::any_of(recording_.doubts, [](const BodyDoubts& body) { return body.first_lost.has_value(); });
+    if (recording_.totals.clamped_particles == 0 && !lost) return std::nullopt;
+    return scene_->path + ": the motion broke down and is not to be trusted: bodies are too soft for their size or "
+                          "speed. Make them smaller (scale, size), stiffer (young_modulus), slower, or give them "
+                          "damping.";
 }
 
 /// Whether nothing in the scene does work on the bodies but gravity.

@@ -30,28 +30,23 @@ public:
     std::uint64_t frame() const { return recording_.totals.frames; }
     const Recording& recording() const { return recording_; }
     const RunTimes& times() const { return times_; }
-    const DescentCauses& descent_causes() const { return descent_causes_; }
+    const DescentCauses& descent_causes() const { return recording_.descent_causes; }
     FractureReport fracture(std::size_t body) const { return simulation_.fracture(body); }
     Energy energy() const { return simulation_.energy(always_); }
     /// The body's mesh in one of the recorded poses, at the scene's origin. Errors: as of Restorer::mesh.
     Result<Mesh> mesh(std::size_t body, std::size_t frame, const RunContext& context) const;
     /// What makes the motion so far doubtful, or other than the scene says: sentences.
     std::vector<std::string> warnings() const;
+    /// A sentence where particles or the driver went nowhere sensible, so that what is recorded is not to be trusted.
+    std::optional<std::string> broke_down() const;
 
 private:
-    /// How far a body was crushed in this run.
-    struct Crush {
-        std::uint64_t first = 0, worst = 0; ///< frames: first below kCrushed, and of the least volume
-        float least = 1;                    ///< volume of a cell, of that at rest
-    };
     /// What goes along with a body.
     struct Follower {
         std::size_t driver = 0;            ///< attachment
         std::optional<std::size_t> direct; ///< of every vertex, where that is checked
         Restorer restorer;
-        std::vector<Vec3f> restored;             ///< the latest frame
-        std::optional<std::uint64_t> first_lost; ///< the first frame in which hold_lost held some
-        std::optional<Crush> crush = {};
+        std::vector<Vec3f> restored; ///< the latest frame
     };
 
     SceneRun(const SceneFile& scene, const ReadyScene& ready, Simulation simulation, unsigned threads);
@@ -71,8 +66,6 @@ private:
     std::vector<Follower> followers_;
     Recording recording_;
     RunTimes times_;
-    DescentCauses descent_causes_;
-    float last_volume_ratio_ = 1;
 };
 
 } // namespace filigree

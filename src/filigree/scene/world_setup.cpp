@@ -6,6 +6,7 @@
 #include "filigree/io/model_file.h"
 #include "filigree/mesh/closest_point.h"
 #include "filigree/mesh/triangulate.h"
+#include "filigree/scene/own_weight.h"
 #include "filigree/scene/particles_near.h"
 
 #include <algorithm>
@@ -86,7 +87,7 @@ public:
         }
         result_.world.body_friction = scene_.body_friction;
         result_.world.body_restitution = scene_.body_restitution;
-        result_.world.body_pairs = scene_.pairs;
+        result_.world.group_pairs = scene_.pairs;
         result_.hash = hash_.value();
         return std::move(result_);
     }
@@ -140,15 +141,17 @@ private:
         ReadyBody body;
         body.name = from.name;
         body.mesh_path = from.mesh;
-        body.scale = from.body.scale;
         body.model = at_line(scene_, from.line, [&] { return model_of(from); });
         Mesh& mesh = body.model.mesh;
+        BodyOptions options = from.body;
+        if (from.size) options.scale = scale_of(mesh, from);
+        body.scale = options.scale;
         const Vec3d origin = std::exchange(mesh.origin, Vec3d::Zero());
         hash_.add(mesh.positions);
         hash_.add(mesh.corners);
         body.body = at_line(scene_, from.line, [&] {
             return std::make_shared<const Body>(
-                make_body(mesh, from.material, from.body, context_, &body.report).value());
+                make_body(mesh, from.material, options, context_, &body.report).value());
         });
         if (!body.report.warning.empty()) warn("body '" + body.name + "': " + body.report.warning);
         const bool has_own_driver = !body.model.levels.empty();
@@ -165,8 +168,19 @@ private:
         Actor actor{body.body, Eigen::Isometry3d::Identity(), from.velocity, from.spin};
         actor.placement = Eigen::Translation3d(from.centre.value_or(middle + body.scale * origin)) * from.rotation *
                           Eigen::Translation3d(-middle);
+        const std::string weight =
+            weight_warning(*body.body, body_box(body), actor.placement.linear(), scene_.gravity, from.material_name);
+        if (!weight.empty()) warn("body '" + body.name + "' " + weight);
         result_.actors.push_back(std::move(actor));
         result_.bodies.push_back(std::move(body));
+    }
+
+    /// m a model unit, for a mesh whose longest side the scene says.
+    double scale_of(const Mesh& mesh, const SceneBody& from) const {
+        const double longest = bounds(mesh).size().maxCoeff();
+        if (!(longest > 0))
+            fail_in_scene(scene_, from.line, ErrorCode::unsuitable, from.mesh + ": has no size that could be scaled");
+        return *from.size / longest;
     }
 
     /// The middle of the bodies where it is far from the world's origin, rounded so that taking it off is exact.
