@@ -141,7 +141,7 @@ Result<Pose> pose_by_handles(const Model& model, std::span<const HandleRegion> h
             if ((places[v] - p).squaredNorm() < (places[best] - p).squaredNorm()) best = v;
         return best;
     };
-    const Result<Targets> targets = handle_targets(handles, {places, nearest, model.mesh.vertex_count()});
+    const Result<Targets> targets = handle_targets(handles, {places, nearest, model.vertex_count()});
     if (!targets) return targets.error();
     return solve_targets(driver.positions, triangulate(driver).triangles, driver.origin, *targets, context);
 }
