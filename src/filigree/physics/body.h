@@ -51,7 +51,7 @@ struct BodyReport {
     std::size_t split_cells = 0; ///< meshfree: with eight particles
     std::size_t surface_points = 0;
     double mass = 0;     ///< kg
-    std::string warning; ///< a sentence where parts are fewer than two cells across, or left out; or ""
+    std::string warning; ///< a sentence where much is fewer than two cells across, or parts are left out; or ""
 };
 
 /// A body from a mesh. Errors: as make_cells; usage (check_material, scale).
