@@ -57,15 +57,6 @@ std::string error_text(const ExportReport& exported, bool is_skin) {
                        with_commas(exported.moments));
 }
 
-void warn_of_export(const ExportReport& exported, bool has_normals, const std::string& path, Session& session) {
-    constexpr double kSeen = 10; // degrees
-    session.warn(exported.warnings);
-    if (has_normals && exported.normal_error_degrees > kSeen)
-        session.warn(fmt::format("{}: normals are up to {:.0f} degrees off in viewers that do not correct them "
-                                 "(three.js): --no-normals makes them flat and right; see docs/exchange.md.",
-                                 path, exported.normal_error_degrees));
-}
-
 /// What an export as skin or morph targets came to.
 void report_export(const ExportReport& exported, bool is_skin, bool has_normals, const std::string& path,
                    Report& report) {
@@ -79,7 +70,7 @@ void report_export(const ExportReport& exported, bool is_skin, bool has_normals,
     if (exported.moments_checked > 0) report.row("error of the file", error_text(exported, is_skin));
     if (has_normals && exported.normal_error_degrees > 0)
         report.row("normals", fmt::format("up to {:.3g} degrees off (95th percentile) in viewers that turn them with "
-                                          "the skin's matrix, such as three.js",
+                                          "the skin's matrix, such as three.js; in Blender import with Shading: Smooth",
                                           exported.normal_error_degrees));
     report.set("vertices", exported.vertices);
     report.set("joints", exported.joints);
@@ -241,7 +232,7 @@ void write_animation_output(const Model& model, const PoseStream& poses, const R
         options.materials_beside = materials_beside;
         session.begin_writing(path);
         const ExportReport exported = require(write_skin_glb(model, poses, options, path, session.context()));
-        warn_of_export(exported, !output.no_normals, path, session);
+        session.warn(exported.warnings);
         report_export(exported, true, !output.no_normals, path, report);
         set_moments(poses.frames, poses.frames_per_second, report);
         return;
@@ -273,7 +264,7 @@ void write_animation_output(const MeshAnimation& animation, const AnimationOutpu
         options.compress = output.compress;
         options.materials_beside = materials_beside;
         const ExportReport exported = require(write_morph_glb(animation, options, path, session.context()));
-        warn_of_export(exported, !output.no_normals, path, session);
+        session.warn(exported.warnings);
         report_export(exported, false, !output.no_normals, path, report);
         set_moments(animation.frames, animation.frames_per_second, report);
         return;

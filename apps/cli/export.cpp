@@ -45,7 +45,7 @@ void export_levels(const Model& model, const ExportArguments& options, Session& 
     session.begin_writing(options.output);
     session.warn(require(write_levels_glb(model, options.output, options.input, session.context())));
     const auto bytes = fs::file_size(options.output);
-    report.set("vertices", model.mesh.vertex_count());
+    report.set("vertices", model.vertex_count());
     report.add("levels", fmt::format("{}, as MSFT_lod", model.finest_level() + 1), "levels", model.finest_level() + 1);
     report.count("bytes", "bytes", bytes);
 }
@@ -116,10 +116,10 @@ void export_stream(const Model& model, const PoseSequence& own, const ExportArgu
         require(write_coded_model(embedding ? *embedding : model, poses, {.bits = options.bits, .levels = true},
                                   options.output, session.context()));
     const auto bytes = fs::file_size(options.output);
-    report.set("vertices", model.mesh.vertex_count());
+    report.set("vertices", model.vertex_count());
     report.count("frames", "frames", poses.frames.size());
     report.count("bytes", "bytes", bytes);
-    add_coding_shares(coding.bytes, model.mesh.vertex_count(), bytes, report);
+    add_coding_shares(coding.bytes, model.vertex_count(), bytes, report);
     const FileReader file = require(FileReader::open(options.output));
     add_stream_marks(require(read_model_outline(file, options.output, session.silent_context())), report);
     if (coding.lacks_level_attributes) session.warn(kLevelsLackAttributes);

@@ -30,9 +30,9 @@ void report_coding(const Model& model, const CodingReport& coding, const PackArg
     const double share = diagonal > 0 ? 1 / diagonal : 0;
     const std::uint64_t bytes = size_of(options.output);
     report.set("output", options.output);
-    report.count("vertices", "vertices", model.mesh.vertex_count());
+    report.count("vertices", "vertices", model.vertex_count());
     report.count("driver", "driver_vertices", model.driver().vertices.size());
-    add_coding_shares(coding.bytes, model.mesh.vertex_count(), bytes, report);
+    add_coding_shares(coding.bytes, model.vertex_count(), bytes, report);
     report.add("vertex error",
                fmt::format("{:.2g} of the diagonal (rms), {:.2g} at most", coding.rms * share, coding.largest * share),
                "vertex_error", {{"rms", coding.rms * share}, {"max", coding.largest * share}});
@@ -79,9 +79,9 @@ void pack_lossless(const Model& model, const PoseSequence& poses, const PackArgu
     const std::uint64_t bytes = size_of(options.output);
     Report report;
     report.set("output", options.output);
-    report.count("vertices", "vertices", model.mesh.vertex_count());
+    report.count("vertices", "vertices", model.vertex_count());
     report.count("driver", "driver_vertices", model.driver().vertices.size());
-    add_coding_shares(coding.bytes, model.mesh.vertex_count(), bytes, report);
+    add_coding_shares(coding.bytes, model.vertex_count(), bytes, report);
     report.count("bytes", "bytes", bytes);
     report.set("seconds", seconds);
     if (options.output == "-") return session.print(report);
@@ -167,10 +167,10 @@ void run_unpack(const UnpackArguments& options, Session& session) {
     const Status written = write_model(model, poses, options.output, session.context());
     if (!written) throw Failure{written.error()};
     Report report;
-    report.say(fmt::format("{}: {} vertices, a driver of {}\n", options.output, with_commas(model.mesh.vertex_count()),
+    report.say(fmt::format("{}: {} vertices, a driver of {}\n", options.output, with_commas(model.vertex_count()),
                            with_commas(model.driver().vertices.size())));
     report.set("output", options.output);
-    report.set("vertices", model.mesh.vertex_count());
+    report.set("vertices", model.vertex_count());
     report.set("driver_vertices", model.driver().vertices.size());
     session.print(report);
 }

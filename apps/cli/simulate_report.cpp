@@ -27,7 +27,7 @@ Json body_json(const ReadyBody& body) {
             {"volume_m3", body.report.cells.volume},
             {"thin_cells", body.report.cells.thin_cells},
             {"loose_parts", body.report.cells.loose_parts},
-            {"vertices", body.model.mesh.vertex_count()},
+            {"vertices", body.model.vertex_count()},
             {"driver_vertices", body.model.driver().vertices.size()}};
 }
 
@@ -36,8 +36,7 @@ void report_body(const ReadyBody& body, Report& report) {
                fmt::format("{} particles, {} cells of {:.3g} m; {:.4g} kg, {:.4g} m^3; {} vertices by a driver of {}",
                            with_commas(body.body->particle_count()), with_commas(body.body->cells.cells.size()),
                            body.body->spacing(), body.report.mass, body.report.cells.volume,
-                           with_commas(body.model.mesh.vertex_count()),
-                           with_commas(body.model.driver().vertices.size())));
+                           with_commas(body.model.vertex_count()), with_commas(body.model.driver().vertices.size())));
     report.set("bodies").push_back(body_json(body));
 }
 

@@ -54,7 +54,7 @@ Report make_report(const Stripped& stripped, const std::string& output, const St
 
     Report report;
     report.set("output", output);
-    report.count("vertices", "vertices", model.mesh.vertex_count());
+    report.count("vertices", "vertices", model.vertex_count());
     report.row("driver", fmt::format("{} vertices, {} faces", with_commas(driver.vertices.size()),
                                      with_commas(driver.face_count())));
     report.set("driver_vertices", driver.vertices.size());

@@ -10,6 +10,7 @@ std::shared_ptr<Source> source_of(Mesh mesh, const std::string& path, const std:
     source->mesh = std::move(mesh);
     source->path = path;
     source->name = name;
+    source->box = world_bounds(source->mesh);
     source->topology = analyse_topology(source->mesh, context);
     source->materials = load_surface_materials(source->mesh, path);
     return source;

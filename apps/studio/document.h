@@ -29,6 +29,7 @@ struct Source {
     Mesh mesh;
     std::string path; ///< "" for a built-in shape
     std::string name; ///< what the window calls it
+    Box box;          ///< of the mesh, in the world
     std::vector<std::string> warnings;
     TopologyReport topology;
     SurfaceMaterials materials;

@@ -29,7 +29,9 @@ void DrawnObjects::drop_colors() {
 void DrawnObjects::follow_colors() {
     if (!shown_) return;
     if (settings_.coloring != Coloring::heat && std::exchange(melt_is_colored_, false)) {
-        with_opengl_([this] { (void)melt_->set_scalars({}); });
+        with_opengl_([this] {
+            if (melt_) (void)melt_->set_scalars({});
+        });
         colors_ = {};
         color_stamp_ = 0;
     }
@@ -58,7 +60,7 @@ void DrawnObjects::follow_heat() {
     constexpr float kCelsius = 273.15f, kAround = 20; // K, K
     const auto made = workbench_.playback().made();
     const Moment* const moment = workbench_.playback().moment();
-    const std::size_t count = melt_of_ ? melt_of_->positions.size() : shown_->model().mesh.vertex_count();
+    const std::size_t count = melt_of_ ? melt_of_->positions.size() : shown_->model().vertex_count();
     if (!made || !moment || moment->surface != melt_of_ || moment->temperatures.size() != count) {
         if (!melt_of_) drop_colors();
         return;
@@ -84,7 +86,7 @@ void DrawnObjects::follow_heat() {
 /// While things move, the colours stay those of a pose just before.
 void DrawnObjects::follow_expected_error() {
     const ExpectedError& expected = workbench_.expected_error();
-    if (expected.colors().values.size() != shown_->model().mesh.vertex_count()) return drop_colors();
+    if (expected.colors().values.size() != shown_->model().vertex_count()) return drop_colors();
     if (colors_are_ == Coloring::expected_error && color_stamp_ != 0 && expected_number_ == expected.number()) return;
     expected_number_ = expected.number();
     put_colors(Coloring::expected_error, {expected.colors().values, ColorMap::sequential, expected.colors().range});
@@ -94,7 +96,7 @@ void DrawnObjects::follow_pieces() {
     const MadePieces* const pieces = workbench_.state().source->pieces.get();
     if (!pieces) return drop_colors();
     const std::vector<Index>& piece_of_vertex = pieces->breaking->carried.vertices;
-    if (piece_of_vertex.size() != shown_->model().mesh.vertex_count()) return drop_colors(); // not shown yet
+    if (piece_of_vertex.size() != shown_->model().vertex_count()) return drop_colors(); // not shown yet
     if (colors_are_ == Coloring::pieces && color_stamp_ != 0) return;
     std::vector<float> values;
     for (const Index piece : piece_of_vertex) values.push_back(float(piece % kCategoryCount) + 0.5f);
@@ -102,7 +104,7 @@ void DrawnObjects::follow_pieces() {
 }
 
 void DrawnObjects::follow_error() {
-    const std::size_t count = shown_->model().mesh.vertex_count();
+    const std::size_t count = shown_->model().vertex_count();
     const double diagonal = bounds(shown_->model().mesh.positions).diagonal();
     const std::optional<VertexDistance>& error = workbench_.error();
     if (pose_stamp_ == 0)

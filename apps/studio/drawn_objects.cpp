@@ -80,7 +80,7 @@ void DrawnObjects::stop() {
     inside_.reset();
     drop_posed_extras();
     melt_.reset();
-    melt_of_ = nullptr;
+    set_melt(nullptr);
     obstacles_.clear();
     particles_of_ = surroundings_of_ = nullptr;
     defects_of_ = nullptr;
@@ -242,12 +242,19 @@ void DrawnObjects::follow_inside_points() {
     Q_EMIT changed(false);
 }
 
+/// Nothing that is known of the surface before is left; its drawing goes where OpenGL is current.
+void DrawnObjects::set_melt(std::shared_ptr<const Mesh> surface) {
+    melt_of_ = std::move(surface);
+    melt_triangles_.reset();
+    melt_copies_.clear();
+    melt_is_colored_ = false;
+}
+
 /// The surface of what has melted, in place of the restored mesh.
 void DrawnObjects::follow_melt() {
     const std::shared_ptr<const Mesh> surface = is_started_ && shown_ ? workbench_.melt_surface() : nullptr;
     if (surface == melt_of_) return;
-    melt_of_ = surface;
-    melt_is_colored_ = false;
+    set_melt(surface);
     with_opengl_([this] {
         melt_.reset();
         if (!melt_of_) return;
@@ -260,17 +267,22 @@ void DrawnObjects::follow_melt() {
     Q_EMIT changed(true);
 }
 
-std::optional<Picked> DrawnObjects::pick_melt(const Camera::Ray& ray) const {
+std::span<const Triangle> DrawnObjects::melt_triangles() {
+    if (!melt_of_) return {};
+    if (!melt_triangles_) melt_triangles_ = triangulate(*melt_of_).triangles;
+    return *melt_triangles_;
+}
+
+std::optional<Picked> DrawnObjects::pick_melt(const Camera::Ray& ray) {
     if (!melt_of_) return std::nullopt;
-    const std::vector<Triangle> triangles = triangulate(*melt_of_).triangles;
     const std::optional<RayHit> hit =
-        first_hit(melt_of_->positions, triangles, ray.origin - origin(), ray.direction, RunContext());
+        first_hit(melt_of_->positions, melt_triangles(), ray.origin - origin(), ray.direction, RunContext());
     if (!hit) return std::nullopt;
     return Picked{ray.origin + hit->distance * ray.direction, 0};
 }
 
 bool DrawnObjects::has_full_vertices() const {
-    return shown_ && pose_stamp_ != 0 && workbench_.full().size() == shown_->model().mesh.vertex_count();
+    return shown_ && pose_stamp_ != 0 && workbench_.full().size() == shown_->model().vertex_count();
 }
 
 /// The full deformation is drawn for the pose shown, or not at all.
@@ -293,8 +305,8 @@ void DrawnObjects::follow_full() {
         "The picture", "full",
         [model = shown_->shared_model(), source = workbench_.state().source,
          positions = std::vector(workbench_.full().begin(), workbench_.full().end())](const RunContext& context) {
-            return DrawData::surface(moved_mesh(model->mesh, positions), {.materials = source->materials.materials},
-                                     context);
+            return DrawData::surface(moved_mesh(level_mesh(*model, model->finest_level()), positions),
+                                     {.materials = source->materials.materials}, context);
         },
         [this, fail, stamp = pose_stamp_](DrawData data) {
             if (stamp != full_asked_) return; // of another moment
@@ -563,7 +575,7 @@ Box DrawnObjects::box() {
         box.min += origin();
         box.max += origin();
     } else if (workbench_.state().source) {
-        box = world_bounds(workbench_.state().source->mesh);
+        box = workbench_.state().source->box;
     }
     return box;
 }

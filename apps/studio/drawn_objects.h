@@ -67,7 +67,9 @@ public:
     /// What is shown in place of the restored mesh, because it melts; null: nothing.
     const std::shared_ptr<const Mesh>& melt() const { return melt_of_; }
     /// Where a ray in the world meets it.
-    std::optional<Picked> pick_melt(const Camera::Ray& ray) const;
+    std::optional<Picked> pick_melt(const Camera::Ray& ray);
+    /// Its faces as triangles; cut once for a surface, when they are first asked for.
+    std::span<const Triangle> melt_triangles();
     const std::vector<DefectEdge>& defects() const { return defects_; }
     bool shows_particles() const;
 
@@ -85,6 +87,7 @@ private:
     bool has_full_vertices() const;
     void follow_full();
     void follow_melt();
+    void set_melt(std::shared_ptr<const Mesh> surface);
     void follow_patches();
     PatchSurface* patches_at(unsigned level); ///< what is drawn in its place; null: itself
     void follow_colors();
@@ -115,8 +118,9 @@ private:
 
     std::optional<Drawable> particles_, inside_, full_, melt_;
     std::shared_ptr<const Mesh> melt_of_;
-    std::vector<Index> melt_copies_; ///< vertices that are drawn twice
-    bool melt_is_colored_ = false;   ///< by heat
+    std::optional<std::vector<Triangle>> melt_triangles_; ///< of melt_of_
+    std::vector<Index> melt_copies_;                      ///< vertices that are drawn twice
+    bool melt_is_colored_ = false;                        ///< by heat
     std::shared_ptr<const DroppedBody> particles_of_, surroundings_of_;
     std::uint64_t full_asked_ = 0; ///< which pose the full deformation is of, or will be; 0: none
     std::string full_error_;       ///< why it cannot be drawn

@@ -124,7 +124,7 @@ void PictureCamera::follow_opened() {
 /// Of what was opened, as it is posed: the driver's box, and as much around it as the detail needs at rest.
 Box PictureCamera::opened_box() const {
     const State& state = workbench_.state();
-    Box box = world_bounds(state.source->mesh);
+    Box box = state.source->box;
     const Pose* pose = workbench_.pose();
     if (!pose || !state.model || pose->positions.size() != state.model->driver().vertices.size()) return box;
     const Vec3d origin = state.source->mesh.origin;

@@ -46,8 +46,8 @@ Result<std::shared_ptr<const DroppedBody>> make_body_of(const State& state, cons
         const double spacing = std::cbrt(size.prod() / double(state.body.particles));
         std::vector<std::string> warnings; // that were said when the mesh was opened
         Result<BodyLook> found =
-            textured_look(state.model->mesh, state.source->path, kPart * std::max(spacing, 1e-6 * size.maxCoeff()),
-                          Appearance().color, warnings, context);
+            textured_look(level_mesh(*state.model, state.model->finest_level()), state.source->path,
+                          kPart * std::max(spacing, 1e-6 * size.maxCoeff()), Appearance().color, warnings, context);
         if (!found) return found.error();
         look = std::move(*found);
     }

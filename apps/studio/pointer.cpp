@@ -32,7 +32,7 @@ Pointer::Pointer(Workbench& workbench, DrawnObjects& drawn, PictureCamera& camer
 
 Box Pointer::rest_box() const {
     const State& state = workbench_.state();
-    return state.source ? world_bounds(state.source->mesh) : Box();
+    return state.source ? state.source->box : Box();
 }
 
 double Pointer::grip() const {

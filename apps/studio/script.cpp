@@ -43,7 +43,10 @@ Status grab_window(const std::filesystem::path& path, MainWindow& window) {
     for (QDialog* const dialog : window.findChildren<QDialog*>()) // what stands over the window belongs to it
         if (dialog->isVisible()) {
             const QPoint middle((window.width() - dialog->width()) / 2, (window.height() - dialog->height()) / 2);
-            QPainter(&picture).drawPixmap(middle, dialog->grab());
+            QPainter painter(&picture);
+            painter.drawPixmap(middle, dialog->grab());
+            painter.setPen(dialog->palette().color(QPalette::Mid)); // the frame that a window manager would give it
+            painter.drawRect(QRect(middle, dialog->size()).adjusted(-1, -1, 0, 0));
         }
     QByteArray bytes;
     QBuffer buffer(&bytes);
@@ -340,6 +343,12 @@ const std::map<QString, Script::Command>& Script::commands() {
         {"export_film",
          {1, 1,
           [](Script& s, Words w) { return s.settle_well([&] { s.workbench().export_film(s.path(w[0]), {}); }); }}},
+        {"dismiss",
+         {0, 0,
+          [](Script& s, Words) {
+              s.window_.dismiss_message();
+              return Status(Success{});
+          }}},
         {"panel",
          {1, 1,
           [](Script& s, Words w) {

@@ -106,9 +106,11 @@ bool ShownModel::set_pose(ShownLevel& level, const Pose& pose, std::uint64_t sta
 void ShownModel::set_colors(ShownLevel& level, const VertexColors& colors, std::uint64_t stamp) {
     if (level.colors == stamp || level.is_points) return;
     level.colors = stamp;
-    if (colors.values.size() != model_->mesh.vertex_count()) return (void)level.drawable.set_scalars({});
+    if (colors.values.size() != model_->vertex_count()) return (void)level.drawable.set_scalars({});
     std::vector<float> values(level.shape->vertex_count());
-    for (Index v = 0; v < values.size(); ++v) values[v] = colors.values[level.shape->finest_vertex(v)];
+    for (Index v = 0; v < values.size(); ++v)
+        if (const Index finest = level.shape->finest_vertex(v); finest < colors.values.size()) // a cage's are not
+            values[v] = colors.values[finest];
     (void)level.drawable.set_scalars({values, colors.map, colors.range});
 }
 

@@ -47,7 +47,7 @@ public:
 
         vertices_ = part("status.vertices", "Vertices drawn, and in the driver that moves them");
         milliseconds_ = part("status.milliseconds",
-                             "Milliseconds of the last picture: moving the driver, restoring the mesh, drawing it");
+                             "What the last picture took: moving the driver, restoring the mesh, drawing it");
         rate_ = part("status.rate", "Pictures a second, while things move");
         auto* measure = new ActionButton("status.measure", actions.find("view.measure_error"), "Error", this);
         addPermanentWidget(measure);
@@ -75,7 +75,7 @@ private:
         const State& state = workbench_.state();
         if (!state.model) return vertices_->setText("no mesh");
         const Timings& timings = viewport_.timings();
-        const std::size_t shown = timings.vertices > 0 ? timings.vertices : state.model->mesh.vertex_count();
+        const std::size_t shown = timings.vertices > 0 ? timings.vertices : state.model->vertex_count();
         vertices_->setText(counted(shown, "vertex", "vertices") + QStringLiteral(" · driver ") +
                            with_commas(state.model->driver().vertices.size()));
     }
@@ -83,7 +83,7 @@ private:
     void show_timings() {
         const Timings& timings = viewport_.timings();
         const auto ms = [](double value) { return QString::number(value, 'f', value < 10 ? 1 : 0); };
-        milliseconds_->setText(QStringLiteral("driver %1 · restore %2 · draw %3 ms")
+        milliseconds_->setText(QStringLiteral("driver %1 ms · restore %2 ms · draw %3 ms")
                                    .arg(ms(timings.driver), ms(timings.restore), ms(timings.draw)));
         rate_->setText(timings.frames_per_second > 0
                            ? QStringLiteral("%1 pictures/s").arg(timings.frames_per_second, 0, 'f', 0)

@@ -73,11 +73,11 @@ private:
         const auto vertices = [](std::size_t count) { return with_commas(count) + " vertices"; };
         const ShownModel& shown = *drawn_.shown();
         const std::string problem = drawn_.full_problem();
-        content.captions = {
-            {"Driver", vertices(shown.facts()[0].vertices), tile(0)},
-            {"Restored", vertices(facts().vertices), tile(1)},
-            {"Full deformation",
-             problem.empty() ? vertices(shown.model().mesh.vertex_count()) : QString::fromStdString(problem), tile(2)}};
+        content.captions = {{"Driver", vertices(shown.facts()[0].vertices), tile(0)},
+                            {"Restored", vertices(facts().vertices), tile(1)},
+                            {"Full deformation",
+                             problem.empty() ? vertices(shown.model().vertex_count()) : QString::fromStdString(problem),
+                             tile(2)}};
     }
 
     void add_legend() {
@@ -116,9 +116,8 @@ private:
         const std::optional<unsigned> level = drawn_.shown()->nearest_ready(drawn_level_);
         if (!pulled || workbench_.mode() != Mode::body || !level) return;
         const std::span<const Vec3f> positions = drawn_.positions(*level);
-        const LevelShape& shape = *drawn_.shown()->level(*level)->shape;
-        for (Index v = 0; v < positions.size(); ++v)
-            if (shape.finest_vertex(v) == pulled->vertex) content.pull = QLineF(place(positions[v]), pointer_.place());
+        const std::optional<Index> vertex = drawn_.shown()->level(*level)->shape->vertex_of(pulled->vertex);
+        if (vertex && *vertex < positions.size()) content.pull = QLineF(place(positions[*vertex]), pointer_.place());
     }
 
     void add_knobs() {

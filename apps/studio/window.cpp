@@ -307,6 +307,9 @@ MainWindow::MainWindow(bool keep_settings, QWidget* parent) : QMainWindow(parent
     content.follow_files(*this);
 
     connect(content.workbench.get(), &Workbench::told, this, &MainWindow::show_message);
+    connect(content.workbench.get(), &Workbench::withdrawn, this, [this](const QString& sentence) {
+        if (message() == sentence) dismiss_message();
+    });
     connect(this, &MainWindow::panel_changed, this, [this] {
         workbench().view().edit([this](ViewSettings& settings) { settings.gizmos = panel() == "deform"; });
     });
@@ -424,6 +427,8 @@ void MainWindow::dropEvent(QDropEvent* event) {
 void MainWindow::show_message(const QString& sentence, bool is_error) {
     impl_->messages->show_message(sentence, is_error);
 }
+
+void MainWindow::dismiss_message() { impl_->messages->hide(); }
 
 QString MainWindow::message() const { return impl_->messages->message(); }
 

@@ -39,7 +39,8 @@ public:
     void show_help(); ///< the sheet of shortcuts
 
     void show_message(const QString& sentence, bool is_error); ///< in the window's message bar
-    QString message() const;                                   ///< what stands there; "" when it is hidden
+    void dismiss_message();
+    QString message() const; ///< what stands there; "" when it is hidden
 
 Q_SIGNALS:
     void files_changed(); ///< recent files, or the one that Save writes

@@ -152,7 +152,7 @@ void Workbench::find_full() {
         return full_is_new();
     }
     if (is_pulling_ || is_apart() || state().pose_from_file ||
-        (state().handle_pose && state().model->mesh.vertex_count() > kMostPulledUnasked))
+        (state().handle_pose && state().model->vertex_count() > kMostPulledUnasked))
         return;
     const std::uint64_t number = impl_->pose_number;
     jobs_.start<std::vector<Vec3f>>(

@@ -154,6 +154,7 @@ Q_SIGNALS:
     void opened();                                     ///< another mesh or model than before
     void saved(const std::string& path);               ///< by save_model
     void told(const QString& sentence, bool is_error); ///< for the window's message bar
+    void withdrawn(const QString& sentence);           ///< what was told is not so any more
 
 private:
     struct Impl;

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace filigree::studio {
 
@@ -139,7 +140,8 @@ void Workbench::put_body(std::shared_ptr<const DroppedBody> made) {
     impl_->replay.stop();
     impl_->keeps_body = true;
     document_.edit("Make a body", [](State& next) { next.recording = nullptr; });
-    impl_->body_warning = warning_of(*made);
+    const QString warned = std::exchange(impl_->body_warning, warning_of(*made));
+    if (!warned.isEmpty() && warned != impl_->body_warning) Q_EMIT withdrawn(warned);
     playback_.put(made);
     impl_->keeps_body = false;
     frame_ = 0;

@@ -56,7 +56,7 @@ Result<State> read_state(const std::string& path, const RunContext& context) {
             recording->follow(*poses);
             state.recording = std::move(recording);
         }
-        file.mesh = state.model->mesh;
+        file.mesh = level_mesh(*state.model, state.model->finest_level());
     } else {
         Result<MeshFile> read = read_mesh(*bytes, path, context);
         if (!read) return read.error();

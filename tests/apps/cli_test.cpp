@@ -191,6 +191,35 @@ TEST_F(Cli, WhatDoesNotFitInMemoryLiesBesideTheOutput) {
     EXPECT_EQ(files().size(), 3u);
 }
 
+/// A cage's vertices are none of the mesh's: whatever is written has those of the mesh, and compares with it.
+TEST_F(Cli, ADriverMadeElsewhereAddsNoVertices) {
+    ok({"make", "wavy-sphere", "-o", "ball.ply", "--resolution", "24"});
+    ok({"make", "wavy-sphere", "-o", "cage.obj", "--resolution", "8", "--amplitude", "0"});
+    const auto vertices = [&](const std::string& file) { return json({"info", file})["vertices"]; };
+    const Json count = vertices("ball.ply");
+    for (const char* precision : {"float", "int16"}) {
+        const Json stripped =
+            json({"strip", "ball.ply", "-o", "m.fil", "--driver", "cage.obj", "--precision", precision});
+        EXPECT_EQ(stripped["vertices"], count);
+        EXPECT_EQ(json({"info", "m.fil"})["levels"].back()["vertices"], count);
+        ok({"level", "m.fil", "1", "-o", "finest.ply"});
+        ok({"restore", "m.fil", "--pose", "cage.obj", "-o", "back.obj"});
+        ok({"deform", "m.fil", "-o", "bent.ply", "--bend", "40"});
+        ok({"deform", "ball.ply", "-o", "truth.ply", "--bend", "40"});
+        for (const char* file : {"finest.ply", "back.obj", "bent.ply"}) EXPECT_EQ(vertices(file), count) << file;
+        EXPECT_LT(json({"compare", "ball.ply", "back.obj"})["rms"].get<double>(), 1e-3);
+        EXPECT_LT(json({"compare", "truth.ply", "bent.ply"})["rms"].get<double>(), 1e-2);
+
+        ok({"deform", "m.fil", "-o", "moving.pc2", "--bend", "40", "--frames", "3"});
+        ok({"deform", "m.fil", "-o", "moving.glb", "--bend", "40", "--frames", "3"});
+        EXPECT_EQ(std::filesystem::file_size(path("moving.pc2")), 32 + 3 * 12 * count.get<std::size_t>());
+        EXPECT_EQ(vertices("moving.glb"), count);
+        ok({"pack", "m.fil", "-o", "packed.fil", "--keep-order"});
+        ok({"restore", "packed.fil", "--pose", "cage.obj", "-o", "packed.ply"});
+        EXPECT_EQ(vertices("packed.ply"), count);
+    }
+}
+
 TEST_F(Cli, ReorderedVerticesAreWrittenInTheirOldOrder) {
     ok({"make", "wavy-sphere", "-o", "sphere.ply", "--resolution", "32", "--quiet"});
     ok({"strip", "sphere.ply", "-o", "sphere.fil", "--reorder", "--quiet"});

@@ -8,7 +8,7 @@ import numpy as np
 
 import filigree
 import filigree_detail
-from filigree_detail import baking, meshes
+from filigree_detail import baking, meshes, obstacles
 from stage import activate, add, begin, bend, largest, refused, run_all, shown
 
 folder = tempfile.TemporaryDirectory(prefix="filigree-blender-")
@@ -106,6 +106,25 @@ def test_a_body_falls_on_a_moving_ground():
     heights = [(frame - 1) / 29 for frame in range(1, 31)]  # as keys ease in and out, between these
     assert min(lowest) < 0.9 and lowest[-1] > 0.9, lowest
     assert heights[-1] == 1
+
+
+def test_an_obstacle_spins_on_through_full_turns():
+    in_a_file()
+    scene = bpy.context.scene
+    wheel = add(filigree.make("bar"), "wheel")
+    add(filigree.make("wavy-cube", resolution=4), "cube")  # active, so no obstacle
+    wheel.location.x = 2
+    wheel.rotation_euler.z = 0.3
+    wheel.keyframe_insert("rotation_euler", frame=1)
+    wheel.rotation_euler.z = 0.3 + np.radians(20 * 54)
+    wheel.keyframe_insert("rotation_euler", frame=55)
+    for curve in wheel.animation_data.action.fcurves:
+        for key in curve.keyframe_points:
+            key.interpolation = "LINEAR"
+    gathered, = obstacles.gather(bpy.context, collection_of(wheel), range(1, 56))
+    assert np.allclose(np.array(gathered.turns)[:, 2], 20 * np.arange(55), atol=0.01), gathered.turns
+    assert np.allclose(gathered.times, np.arange(55) / 24) and np.allclose(gathered.pivot, (2, 0, 0))
+    gathered.for_simulation()
 
 
 def test_a_body_breaks():

@@ -39,9 +39,10 @@ TEST(CodedModel, ADriverMadeElsewhereComesBack) {
         ASSERT_TRUE(report.ok()) << report.error().message;
         EXPECT_LT(std::filesystem::file_size(path), sizeof(Vec3f) * model.mesh.vertex_count() / 2);
         const ModelOutline outline = read_model_outline(FileReader::open(path).value(), "packed", kTwoThreads).value();
-        EXPECT_EQ(outline.levels.back().vertices, model.mesh.vertex_count());
+        EXPECT_EQ(outline.levels.back().vertices, model.vertex_count());
         const Model back = read_model(path, kTwoThreads).value();
         EXPECT_EQ(back.mesh.vertex_count(), model.mesh.vertex_count());
+        EXPECT_EQ(back.vertex_count(), model.vertex_count());
         EXPECT_EQ(back.mesh.face_count(), model.mesh.face_count());
         EXPECT_EQ(driver_positions(back), driver_positions(model)) << "to the bit";
         EXPECT_EQ(back.driver().vertices, model.driver().vertices);

@@ -1,5 +1,7 @@
 #include "filigree/io/losses.h"
 
+#include "filigree/mesh/shapes.h"
+
 #include <gtest/gtest.h>
 
 namespace filigree {
@@ -13,6 +15,22 @@ TEST(Losses, PolygonsAreCutAndTheRestIsLeftOut) {
     EXPECT_EQ(cannot_hold("GLB", {kPolygonLoss, "groups"}),
               "GLB cannot hold groups; left out. Faces of more than three corners are cut into triangles; PLY and OBJ "
               "keep them.");
+}
+
+TEST(Losses, WhatIsPlayedMayBeOfTriangles) {
+    EXPECT_EQ(losses_of_played({kPolygonLoss, "groups"}), std::vector<std::string>{"groups"});
+    EXPECT_TRUE(losses_of_played({kPolygonLoss}).empty());
+}
+
+TEST(Losses, SmoothingGroupsAreNoLossBesideNormals) {
+    Mesh mesh = make_wavy_cube({.resolution = 1});
+    EXPECT_FALSE(needs_smoothing(mesh));
+    mesh.smoothing.assign(mesh.face_count(), 0); // "s off", as most programs write
+    EXPECT_FALSE(needs_smoothing(mesh));
+    mesh.smoothing.front() = 1;
+    EXPECT_TRUE(needs_smoothing(mesh));
+    mesh.normals.values.assign(mesh.vertex_count(), Vec3f::UnitZ());
+    EXPECT_FALSE(needs_smoothing(mesh));
 }
 
 } // namespace

@@ -59,8 +59,8 @@ protected:
     std::string whole(const PoseSequence& poses, const RestoreOptions& options = {}) {
         const Model model = *read_model(path("m.fil"), kTwoThreads);
         const Restorer restorer = *Restorer::create(model, options, kTwoThreads);
-        const MeshAnimation animation{&model.mesh, poses.frames.size(), 24,
-                                      [&](std::size_t frame, std::span<Vec3f> out) {
+        const Mesh rest = level_mesh(model, model.finest_level());
+        const MeshAnimation animation{&rest, poses.frames.size(), 24, [&](std::size_t frame, std::span<Vec3f> out) {
                                           return restorer.positions(poses.frames[frame], out, kTwoThreads);
                                       }};
         EXPECT_TRUE(write_animation(animation, path("whole.pc2"), kTwoThreads).ok());
@@ -97,6 +97,27 @@ TEST_F(ModelChunksTest, RestoreTheSameBytesAsTheWhole) {
                 EXPECT_TRUE(written->empty());
                 EXPECT_TRUE(bytes_of(path("chunks.pc2")) == whole(poses, options));
             }
+        }
+}
+
+/// One whose vertices end behind a chunk's beginning, and one whose mesh ends there while the driver's vertices go on.
+TEST_F(ModelChunksTest, HaveNoVerticesOfADriverMadeElsewhere) {
+    const Mesh ball = make_wavy_sphere({.resolution = 8, .amplitude = 0});
+    Mesh even = make_wavy_cube({.resolution = 180});
+    ASSERT_LT(even.vertex_count(), std::size_t{262'144});
+    even.positions.resize(262'144 - 10, Vec3f(0.1f, 0.2f, 0.3f)); // vertices that no face has
+    for (const Mesh& mesh : {make_wavy_cube({.resolution = 220}), even})
+        for (const Precision precision : {Precision::float32, Precision::int16}) {
+            const Model model = strip_to_driver(mesh, ball, precision, kTwoThreads)->model;
+            const PoseSequence poses = bent_poses(model, false);
+            const Result<ModelChunks> chunks = open(model);
+            ASSERT_TRUE(chunks.ok()) << chunks.error().message;
+            EXPECT_EQ(chunks->vertex_count(), mesh.vertex_count());
+            const ModelOutline outline = *read_model_outline(*FileReader::open(path("m.fil")), "m.fil", kTwoThreads);
+            EXPECT_EQ(outline.levels.back().vertices, mesh.vertex_count());
+            ASSERT_TRUE(write_restored_chunks(*chunks, stream_of(poses), {}, path("chunks.pc2"), kTwoThreads).ok());
+            EXPECT_EQ(fs::file_size(path("chunks.pc2")), 32 + 3 * 12 * mesh.vertex_count());
+            EXPECT_TRUE(bytes_of(path("chunks.pc2")) == whole(poses));
         }
 }
 

@@ -162,6 +162,24 @@ TEST(Body, ThinPartsAreSaid) {
     EXPECT_NE(report.warning.find("fewer than two cells across"), std::string::npos) << report.warning;
 }
 
+/// A warning is for who has to do something about it.
+TEST(Body, AFewThinCellsAreNotWorthAWarning) {
+    Mesh mesh = make_wavy_cube({.resolution = 8, .amplitude = 0});
+    const Mesh plate = make_wavy_plane({.resolution = 8, .amplitude = 0});
+    const auto first = static_cast<Index>(mesh.vertex_count());
+    for (const Vec3f& p : plate.positions) mesh.positions.push_back(0.4f * p + Vec3f(3, 0, 0));
+    for (std::size_t f = 0; f < plate.face_count(); ++f) {
+        std::vector<Index> face(plate.face(f).begin(), plate.face(f).end());
+        for (Index& v : face) v += first;
+        mesh.add_face(face);
+    }
+    BodyReport report;
+    ASSERT_TRUE(make_body(mesh, of(MaterialModel::fem), {.cells = {.spacing = 0.1}}, kAllThreads, &report));
+    EXPECT_GT(report.cells.thin_cells, 0u);
+    EXPECT_LT(report.cells.thin_cells, report.cells.cells / 20);
+    EXPECT_EQ(report.warning.find("fewer than two cells across"), std::string::npos) << report.warning;
+}
+
 TEST(Body, PartsOneCellThickAreNoSheets) {
     for (int k = 1; k < 40; ++k)
         EXPECT_EQ(make_body(box_cells(3, 2, 1, 0.013 * k), of(MaterialModel::fem)).field_radius, 0) << k;

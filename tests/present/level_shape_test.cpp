@@ -42,6 +42,21 @@ TEST(LevelDeviations, ShrinkTowardsTheFinest) {
     EXPECT_EQ(level_deviations(model, cancelled).error().code, ErrorCode::cancelled);
 }
 
+TEST(LevelShape, KnowsWhichOfItsVerticesAFinestOneIs) {
+    const auto model = cube_model();
+    for (unsigned level = 0; level <= model->finest_level(); ++level) {
+        const auto shape = LevelShape::make(model, {}, level, kAllThreads).value();
+        std::size_t found = 0;
+        for (Index v = 0; v < model->mesh.vertex_count(); ++v)
+            if (const std::optional<Index> local = shape->vertex_of(v)) {
+                EXPECT_EQ(shape->finest_vertex(*local), v);
+                ++found;
+            }
+        EXPECT_EQ(found, shape->vertex_count());
+        EXPECT_FALSE(shape->vertex_of(static_cast<Index>(model->mesh.vertex_count())));
+    }
+}
+
 TEST(LevelShape, IsPickedWhereTheRayMeetsIt) {
     const auto model = cube_model();
     const auto shape = LevelShape::make(model, {}, 0, kAllThreads).value();

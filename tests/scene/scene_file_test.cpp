@@ -2,6 +2,8 @@
 
 #include "filigree/scene/scene_keys.h"
 
+#include <numbers>
+
 namespace filigree {
 namespace {
 
@@ -23,6 +25,19 @@ TEST_F(SceneFileTest, HoldsWhatIsWrittenAndTheDefaultsElse) {
     EXPECT_TRUE(scene.obstacles[0].motion.moves());
     EXPECT_EQ(scene.obstacles[0].motion.move.values[1], Vec3d(0, 2, 0));
     EXPECT_EQ(scene.picture.up, UpAxis::z);
+}
+
+TEST_F(SceneFileTest, TwoMomentsOfOneTimeAreAJump) {
+    const auto turned = [&](const char* second) {
+        return kDrop +
+               "turn = [{ time = 0, value = [0, 350, 0] }, { time = 1, value = [0, 370, 0] }, { time = " + second +
+               ", value = [0, 10, 0] }, { time = 2, value = [0, 30, 0] }]\n";
+    };
+    const Keyed<Vec3d> angle = scene(turned("1")).obstacles[0].motion.angle;
+    const double degree = std::numbers::pi / 180;
+    EXPECT_NEAR(angle.at(0.5).y(), 360 * degree, 1e-9);
+    EXPECT_NEAR(angle.at(1.5).y(), 20 * degree, 1e-9);
+    EXPECT_NE(refusal(turned("0.9")).find("must ascend"), std::string::npos);
 }
 
 TEST_F(SceneFileTest, RefusesWithLineAndSuggestion) {

@@ -1,8 +1,11 @@
 // What is drawn while the document is another already.
 #include "drawn_objects.h"
 #include "studio/first_state_once.h"
+#include "studio/materials.h"
 #include "studio/patience.h"
 #include "viewport.h"
+
+#include "filigree/mesh/triangulate.h"
 
 #include <QOffscreenSurface>
 #include <QOpenGLContext>
@@ -98,6 +101,19 @@ struct DrawnObjectsTest : testing::Test {
             workbench.wait_until_idle();
             workbench.playback().wait_for_frames(0);
         }
+        settle();
+    }
+    /// Wax in warm air, until some of it flows.
+    void melt_some() {
+        BodySettings body = workbench.state().body;
+        body.material = material_named("wax");
+        body.particles = 300;
+        body.drop = 0;
+        body.melting_time = 1;
+        workbench.set_body(body);
+        workbench.melt();
+        EXPECT_TRUE(QTest::qWaitFor([&] { return drawn->melt() != nullptr; }, kPatience));
+        workbench.pause();
         settle();
     }
 };
@@ -219,6 +235,44 @@ TEST_F(DrawnObjectsTest, TheExpectedErrorIsColouredForEveryPose) {
     EXPECT_TRUE(drawn->colors().values.empty());
     set([](ViewSettings& s) { s.coloring = Coloring::own; });
     EXPECT_TRUE(drawn->colors().values.empty());
+}
+
+TEST_F(DrawnObjectsTest, TheMeltIsCutIntoTrianglesOnceForAllPicks) {
+    EXPECT_TRUE(drawn->melt_triangles().empty());
+    melt_some();
+    ASSERT_TRUE(drawn->melt());
+    const Box box = world_bounds(*drawn->melt());
+    const Vec3d middle = 0.5 * (box.min + box.max), above = middle + Vec3d(0, 10, 0);
+    const std::optional<Picked> first = drawn->pick_melt({above, -Vec3d::UnitY()});
+    ASSERT_TRUE(first);
+    const Triangle* const triangles = drawn->melt_triangles().data();
+    EXPECT_EQ(drawn->melt_triangles().size(), triangulate(*drawn->melt()).triangles.size());
+    for (int k = 0; k < 3; ++k) EXPECT_TRUE(drawn->pick_melt({above, -Vec3d::UnitY()}));
+    EXPECT_EQ(drawn->melt_triangles().data(), triangles) << "cut anew for a pick";
+    const std::shared_ptr<const Mesh> before = drawn->melt();
+    workbench.step();
+    workbench.wait_until_idle();
+    workbench.playback().wait_for_frames(0);
+    settle();
+    ASSERT_TRUE(drawn->melt());
+    EXPECT_NE(drawn->melt(), before);
+    EXPECT_EQ(drawn->melt_triangles().size(), triangulate(*drawn->melt()).triangles.size()) << "of the surface before";
+}
+
+/// OpenGL goes away while the melt's heat is shown, and comes back when there is neither.
+TEST_F(DrawnObjectsTest, NoHeatIsLeftOfAMeltThatIsGone) {
+    set([](ViewSettings& s) { s.coloring = Coloring::heat; });
+    melt_some();
+    ASSERT_TRUE(drawn->melt());
+    EXPECT_FALSE(drawn->colors().values.empty());
+    drawn->stop();
+    workbench.set_mode(Mode::deform);
+    set([](ViewSettings& s) { s.coloring = Coloring::own; });
+    drawn->start(RestoreOn::cpu);
+    settle();
+    EXPECT_FALSE(drawn->melt());
+    EXPECT_TRUE(drawn->colors().values.empty());
+    EXPECT_FALSE(full().objects.empty() && drawn->scene(TileShows::restored, 0, {}, 1, QPalette()).objects.empty());
 }
 
 } // namespace

@@ -278,6 +278,17 @@ TEST_F(Window, WhatMovesIsAskedForAsWell) {
     EXPECT_TRUE(workbench().document().is_modified());
 }
 
+TEST_F(Window, AMessageThatIsNotSoAnyMoreGoes) {
+    Q_EMIT workbench().told("The driver is coarse.", false);
+    Q_EMIT workbench().withdrawn("Another sentence.");
+    EXPECT_EQ(window->message(), "The driver is coarse.");
+    Q_EMIT workbench().withdrawn("The driver is coarse.");
+    EXPECT_EQ(window->message(), "");
+    Q_EMIT workbench().told("Saved.", false);
+    window->dismiss_message();
+    EXPECT_EQ(window->message(), "");
+}
+
 TEST_F(Window, LongNamesAreShortened) {
     const QString name = QString("a_very_long_name_").repeated(12);
     window->open_file(triangle((name + ".obj").toStdString().c_str()));
@@ -298,7 +309,7 @@ TEST_F(Window, TheStatusBarHasRoomForWhatItSays) {
     window->resize(1280, 800);
     const std::pair<const char*, const char*> texts[] = {
         {"status.vertices", "9,999,999 vertices · driver 20,000"},
-        {"status.milliseconds", "driver 999 · restore 999 · draw 999 ms"},
+        {"status.milliseconds", "driver 999 ms · restore 999 ms · draw 999 ms"},
         {"status.rate", "999 pictures/s"},
         {"status.error", "rms 0.00012 · max 0.00012 · 0.42°"},
     };

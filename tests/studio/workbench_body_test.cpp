@@ -125,8 +125,11 @@ TEST_F(WorkbenchTest, ADriverTooCoarseForTheBodyIsToldAndFitted) {
     EXPECT_EQ(warning.find("--"), std::string::npos) << "that is for the command line: " << warning;
     EXPECT_EQ(notes, std::vector{warning});
 
+    QSignalSpy withdrawn(&bench, &Workbench::withdrawn);
     bench.fit_driver();
     bench.wait_until_idle();
+    ASSERT_EQ(withdrawn.count(), 1);
+    EXPECT_EQ(withdrawn[0][0].toString().toStdString(), warning) << "it is not so any more";
     EXPECT_TRUE(bench.playback().has_body());
     EXPECT_EQ(bench.mode(), Mode::body);
     EXPECT_EQ(bench.body_warning(), "");

@@ -2,6 +2,7 @@
 #include "io/corpus.h"
 #include "workbench_fixture.h"
 
+#include "filigree/hierarchy/strip.h"
 #include "filigree/io/file.h"
 #include "filigree/io/mesh_file.h"
 #include "filigree/io/model_file.h"
@@ -301,6 +302,30 @@ TEST_F(WorkbenchTest, AnOpenedModelKnowsHowItWasStripped) {
     bench.wait_until_idle();
     EXPECT_EQ(state().strip.precision, Precision::int16);
     EXPECT_EQ(state().strip.base, driver);
+}
+
+/// Its vertices are in the file behind the mesh's own, and nowhere else.
+TEST_F(WorkbenchTest, ADriverMadeElsewhereIsNoPartOfTheMesh) {
+    const Mesh ball = make_wavy_sphere({.resolution = 24}), cage = make_wavy_sphere({.resolution = 8, .amplitude = 0});
+    const Model model = strip_to_driver(ball, cage, Precision::float32, RunContext()).value().model;
+    ASSERT_TRUE(write_model(model, path("caged.fil"), RunContext()).ok());
+    bench.open(path("caged.fil"));
+    bench.wait_until_idle();
+    EXPECT_EQ(state().source->mesh.vertex_count(), ball.vertex_count());
+    EXPECT_EQ(state().model->vertex_count(), ball.vertex_count());
+    bench.set_warps({.bend = 40});
+    bench.save_mesh(path("bent.ply"));
+    bench.wait_until_idle();
+    EXPECT_EQ(read_mesh(path("bent.ply"), RunContext())->mesh.vertex_count(), ball.vertex_count());
+    bench.want_full(true);
+    bench.wait_until_idle();
+    EXPECT_EQ(bench.full().size(), ball.vertex_count());
+    bench.measure_error();
+    bench.wait_until_idle();
+    ASSERT_TRUE(bench.error());
+    EXPECT_EQ(bench.error()->per_vertex.size(), ball.vertex_count());
+    EXPECT_LT(bench.error()->rms, 1e-2);
+    EXPECT_TRUE(errors.empty()) << errors.front();
 }
 
 TEST_F(WorkbenchTest, NumbersAreLookedForInTheFileNameAlone) {

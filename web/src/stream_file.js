@@ -1,15 +1,16 @@
 // A coded model file, read piece by piece: its table, then whatever section is asked for. docs/fil-format.md has every
 // byte.
+import { GrowingBytes } from './growing_bytes.js';
 
 const kHeaderBytes = 32, kEntryBytes = 40, kFirstBytes = 1 << 16;
 
 /// Bytes of a file on a server, in ranges where it gives them, else all in order.
 class ServedBytes {
-  constructor(url) { this.url = url; this.kept = new Uint8Array(0); }
+  constructor(url) { this.url = url; this.kept = new GrowingBytes(); }
 
   /// The bytes from `begin` to `end`.
   async read(begin, end) {
-    if (end <= this.kept.length) return this.kept.subarray(begin, end);
+    if (end <= this.kept.length) return this.kept.part(begin, end);
     if (!this.body) {
       const response = await fetch(this.url, { headers: { Range: `bytes=${begin}-${end - 1}` } });
       if (response.status === 206) return this.keep(begin, new Uint8Array(await response.arrayBuffer()));
@@ -19,15 +20,12 @@ class ServedBytes {
     while (this.kept.length < end) {
       const { done, value } = await this.body.read();
       if (done) throw new Error(`${this.url} ends too early.`);
-      const longer = new Uint8Array(this.kept.length + value.length);
-      longer.set(this.kept);
-      longer.set(value, this.kept.length);
-      this.kept = longer;
+      this.kept.append(value);
     }
-    return this.kept.subarray(begin, end);
+    return this.kept.part(begin, end);
   }
   keep(begin, bytes) {
-    if (begin === 0) this.kept = bytes;
+    if (begin === 0) this.kept = new GrowingBytes(bytes);
     return bytes;
   }
 }

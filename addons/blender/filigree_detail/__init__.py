@@ -2,8 +2,8 @@
 
 What is where: `library` finds the Python module; `settings` is what a file stores; `meshes` moves arrays between
 Blender and numpy; `models` keeps models in the file; `nodes` shows the restored shape; `follow` restores when Blender
-says that something moved; `jobs` runs long work; `binding`, `baking`, `error_map`, `simulating` (with `obstacles`) and
-`breaking` are the panel's buttons; `panel` draws them.
+says that something moved; `jobs` runs long work; `binding`, `baking`, `error_map`, `simulating` (with
+`obstacles` and their `turning`) and `breaking` are the panel's buttons; `panel` draws them.
 """
 
 bl_info = {

@@ -53,7 +53,7 @@ def driver_pose(high, depsgraph):
 
 
 def restore(high, pose, level=None):
-    """Positions of `high`'s vertices for a pose of its driver, (n, 3). A driver made elsewhere has its own behind them."""
+    """Positions of `high`'s vertices for a pose of its driver, (n, 3). Of an older file's model the driver's may stand behind them."""
     restorer, out = models.restorer_of(high.filigree, level)
     return restorer.positions(pose, out=out)
 

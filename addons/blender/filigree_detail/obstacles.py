@@ -6,6 +6,7 @@ import numpy as np
 
 from . import meshes
 from .library import filigree
+from .turning import turn_keys
 
 
 @dataclass
@@ -13,9 +14,9 @@ class Obstacle:
     name: str
     mesh: object  # in the world at the first frame
     plane: tuple = None  # (point, normal) of a flat mesh: solid below it, everywhere
-    times: list = field(default_factory=list)  # s; of keys, none where it stands still
+    times: list = field(default_factory=list)  # s; of keys, none where it stands still; two equal ones are one rotation, named twice
     moves: list = field(default_factory=list)  # m
-    turns: list = field(default_factory=list)  # degrees: axis times angle, about `pivot`
+    turns: list = field(default_factory=list)  # degrees: axis times angle, about `pivot`; they count full turns
     pivot: tuple = (0, 0, 0)
 
     def for_simulation(self):
@@ -89,13 +90,9 @@ def _set_motion(obstacle, matrices, rate):
     first, start = matrices[0].inverted_safe(), matrices[0].to_translation()
     if all(np.allclose(m, matrices[0], atol=1e-7) for m in matrices):
         return
-    turn = None
-    for k, matrix in enumerate(matrices):
-        rotation = (matrix @ first).to_quaternion()
-        if turn is not None:
-            rotation.make_compatible(turn)  # the same way round as in the frame before
-        turn = rotation
-        obstacle.times.append(k / rate)
-        obstacle.moves.append(tuple(matrix.to_translation() - start))
-        obstacle.turns.append(tuple(np.degrees(np.array(rotation.axis) * rotation.angle)))
+    rotations = [np.array((matrix @ first).to_quaternion().to_matrix()) for matrix in matrices]
+    for frame, turn in turn_keys(rotations):
+        obstacle.times.append(frame / rate)
+        obstacle.moves.append(tuple(matrices[frame].to_translation() - start))
+        obstacle.turns.append(tuple(np.degrees(turn)))
     obstacle.pivot = tuple(start)

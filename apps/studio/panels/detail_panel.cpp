@@ -114,7 +114,7 @@ private:
         if (!state().model) return;
         const Model& model = *state().model;
         level_->set_range(0, model.finest_level());
-        driver_->set_range(kLeastDriver, double(std::max(model.mesh.vertex_count(), kLeastDriver)));
+        driver_->set_range(kLeastDriver, double(std::max(model.vertex_count(), kLeastDriver)));
         Panel::refresh();
         levels_->setText(levels());
         report_->setText(report());
@@ -137,7 +137,7 @@ private:
 
     QString report() const {
         const StripReport& report = state().strip_report;
-        const std::size_t all = state().model->mesh.vertex_count(), moved = state().model->driver().vertices.size();
+        const std::size_t all = state().model->vertex_count(), moved = state().model->driver().vertices.size();
         const double seconds = report.simplify_seconds + report.bind_seconds + report.encode_seconds;
         QStringList lines;
         lines << QStringLiteral("%1 move %2, one in %3.")

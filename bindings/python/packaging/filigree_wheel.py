@@ -1,6 +1,8 @@
 """What pip asks to make a wheel (PEP 517), with the standard library and CMake alone.
 
-The library is built in build/release, where scripts/build has it too, or where `--config-settings build=FOLDER` says.
+The library is built in build/release where scripts/build has begun there, else in build/wheel, or where
+`--config-settings build=FOLDER` says: the library and the module alone, without programs, tests and the studio. What is
+being compiled is seen with `pip install -v`.
 The wheel holds the module and the libraries of ours beside it; those of Debian are needed where it runs.
 """
 
@@ -38,10 +40,19 @@ def run(*command):
     subprocess.run([str(word) for word in command], check=True, cwd=ROOT)
 
 
+def build_folder(settings):
+    if "build" in (settings or {}):
+        return Path(settings["build"]).resolve()
+    release = ROOT / "build" / "release"
+    return release if (release / "CMakeCache.txt").exists() else ROOT / "build" / "wheel"
+
+
 def build(folder):
     cache = folder / "CMakeCache.txt"
     if not cache.exists() or "FILIGREE_PYTHON:BOOL=ON" not in cache.read_text():
-        first = [] if cache.exists() else [f"-DFILIGREE_{part}=OFF" for part in ("STUDIO", "TESTS", "BENCH")]
+        first = [] if cache.exists() else [f"-DFILIGREE_{part}=OFF" for part in ("PROGRAMS", "STUDIO", "TESTS", "BENCH")]
+        if first:
+            print(f"filigree: compiling the library in {folder}: ten processor minutes, once", flush=True)
         # The interpreter itself: a virtual environment goes, and the build stays.
         python = f"-DPython3_EXECUTABLE={os.path.realpath(sys.executable)}"
         run("cmake", "--preset", "release", "-B", folder, "-DFILIGREE_PYTHON=ON", python, *first)
@@ -81,7 +92,7 @@ def prepare_metadata_for_build_wheel(metadata_directory, config_settings=None):
 
 
 def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
-    folder = Path((config_settings or {}).get("build", ROOT / "build" / "release")).resolve()
+    folder = build_folder(config_settings)
     build(folder)
     files = package_files(folder)
     info = f"filigree-{version()}.dist-info"

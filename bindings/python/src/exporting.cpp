@@ -102,7 +102,7 @@ py::dict export_model(const PyModel& self, const fs::path& path, const py::objec
         }));
         py::dict said;
         said["levels"] = model.finest_level() + 1;
-        said["vertices"] = model.mesh.vertex_count();
+        said["vertices"] = model.vertex_count();
         said["bytes"] = fs::file_size(path);
         return said;
     }

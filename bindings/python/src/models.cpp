@@ -96,6 +96,11 @@ PyModel strip_mesh(const py::object& given, const py::object& driver, std::optio
 
 } // namespace
 
+MeshPtr finest_mesh(const std::shared_ptr<const Model>& model) {
+    if (model->driver_is_behind) return std::make_shared<Mesh>(level_mesh(*model, model->finest_level()));
+    return MeshPtr(model, const_cast<Mesh*>(&model->mesh));
+}
+
 std::shared_ptr<const Model> model_of(const py::handle& given, const char* name) {
     if (!py::isinstance<PyModel>(given))
         throw py::type_error(std::string(name) + " has to be a filigree.Model; this is of type " +
@@ -110,7 +115,7 @@ void add_models(py::module_& m) {
 Made by `strip` and `read_model`; never changes. Pickles as the bytes of its file.
 )")
         .def_property_readonly(
-            "mesh", [](const PyModel& self) { return MeshPtr(self.model, const_cast<Mesh*>(&self.model->mesh)); },
+            "mesh", [](const PyModel& self) { return finest_mesh(self.model); },
             "The finest level: the mesh as it came in.")
         .def_property_readonly(
             "driver", [](const PyModel& self) { return std::make_shared<Mesh>(level_mesh(*self.model, 0)); },
@@ -118,7 +123,9 @@ Made by `strip` and `read_model`; never changes. Pickles as the bytes of its fil
         .def_property_readonly(
             "driver_vertices",
             [](const py::object& self) { return view(self.cast<const PyModel&>().model->driver().vertices, self); },
-            "The driver's vertices as ids in `mesh`, ascending, uint32 (d,), read-only.")
+            "The driver's vertices as ids in `mesh`, ascending, uint32 (d,), read-only. Those of a driver made "
+            "elsewhere "
+            "are none of the mesh's: they count on behind them.")
         .def_property_readonly(
             "source_order",
             [](const py::object& self) { return view(self.cast<const PyModel&>().model->source_order, self); },
@@ -197,8 +204,8 @@ dict
 )")
         .def("__repr__",
              [](const PyModel& self) {
-                 return "<filigree.Model: " + std::to_string(self.model->mesh.vertex_count()) +
-                        " vertices on a driver of " + std::to_string(self.model->driver().vertices.size()) + ">";
+                 return "<filigree.Model: " + std::to_string(self.model->vertex_count()) + " vertices on a driver of " +
+                        std::to_string(self.model->driver().vertices.size()) + ">";
              })
         .def(py::pickle([](const PyModel& self) { return model_bytes(self); },
                         [](const py::bytes& bytes) { return model_of_bytes(bytes, "pickle"); }));
@@ -219,8 +226,8 @@ Parameters
 mesh : Mesh, or an object with vertices and faces or triangles
     Any mesh that has a vertex; what cannot be bound well is counted in the model's `report`.
 driver : Mesh, or an object with vertices and faces or triangles, optional
-    Mesh to bind to that was made elsewhere: its vertices, in their order, are the driver's. Restored meshes have them
-    behind their own, without faces. Goes with `precision` alone.
+    Mesh to bind to that was made elsewhere: its vertices, in their order, are the driver's. Restored meshes have
+    the vertices of `mesh` alone. Goes with `precision` alone.
 base : int, optional
     Vertices of the driver, about; 3 or more. At most one of `base`, `levels`, `error` and `fidelity`; with none 1,000,
     fewer for meshes below 20,000.

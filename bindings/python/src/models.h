@@ -19,6 +19,9 @@ struct PyModel {
     py::dict report = {}; ///< of strip; empty for a model from a file
 };
 
+/// The finest level as a mesh: the model's own, or a copy without a driver that is behind it.
+MeshPtr finest_mesh(const std::shared_ptr<const Model>& model);
+
 std::shared_ptr<const Model> model_of(const py::handle& given, const char* name = "model");
 
 /// A pose: one of ours, or positions of shape (d, 3) with what else there is.

@@ -38,10 +38,7 @@ struct Subject {
 };
 
 Subject subject_of(const py::handle& given) {
-    if (py::isinstance<PyModel>(given)) {
-        const auto model = model_of(given);
-        return {MeshPtr(model, const_cast<Mesh*>(&model->mesh))};
-    }
+    if (py::isinstance<PyModel>(given)) return {finest_mesh(model_of(given))};
     if (py::hasattr(given, "vertices")) return {mesh_of(given)};
     auto points = std::make_shared<Mesh>();
     split_origin(double_points_of(given, "points"), *points);

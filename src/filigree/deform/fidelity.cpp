@@ -86,18 +86,18 @@ std::vector<NamedWarp> fidelity_warps(const Box& box) {
 Result<double> fidelity(const Model& model, PoseSource source, const RunContext& context) {
     const Result<Restorer> restorer = Restorer::create(model, {}, context);
     if (!restorer) return restorer.error();
+    const Mesh mesh = level_mesh(model, model.finest_level());
     double largest = 0;
-    for (const NamedWarp& named : fidelity_warps(world_bounds(model.mesh))) {
+    for (const NamedWarp& named : fidelity_warps(world_bounds(mesh))) {
         if (named.affine) continue;
         Pose pose = warp_pose(*named.warp, model, context);
         if (source == PoseSource::positions) pose.gradients.clear();
         const Result<std::vector<Vec3f>> restored = restorer->positions(pose, context);
         if (!restored) return restored.error();
-        const std::vector<Vec3f> truth = warp_positions(*named.warp, model.mesh.positions, model.mesh.origin, context);
+        const std::vector<Vec3f> truth = warp_positions(*named.warp, mesh.positions, mesh.origin, context);
         if (context.is_cancelled()) return cancelled_error();
         const double diagonal = bounds(truth).diagonal();
-        if (diagonal > 0)
-            largest = std::max(largest, vertex_distance(model.mesh, *restored, truth, context).rms / diagonal);
+        if (diagonal > 0) largest = std::max(largest, vertex_distance(mesh, *restored, truth, context).rms / diagonal);
     }
     return largest;
 }

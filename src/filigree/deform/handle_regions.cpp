@@ -179,7 +179,7 @@ Result<Pose> pose_by_handles(const Model& model, std::span<const HandleRegion> h
         return (*nearest)(model.mesh.positions[id]);
     };
     const Result<Targets> targets =
-        handle_targets(handles, {places_in_world(driver), standing_for, model.mesh.vertex_count()}, context);
+        handle_targets(handles, {places_in_world(driver), standing_for, model.vertex_count()}, context);
     if (!targets) return targets.error();
     const Result<Triangulation> triangulation = triangulate(driver, context);
     if (!triangulation) return triangulation.error();

@@ -120,7 +120,10 @@ PullRegion pull_region(const Model& model, std::span<const Index> pinned, const 
 Result<std::vector<Vec3f>> pull_every_vertex(const Model& model, std::span<const Pull> pulls,
                                              const RunContext& context) {
     std::vector<Vec3f> positions = model.mesh.positions;
-    if (pulls.empty()) return positions;
+    if (pulls.empty()) {
+        positions.resize(model.vertex_count());
+        return positions;
+    }
     const std::vector<Index> representative = weld_map(positions);
     Result<Triangulation> triangulation = triangulate(model.mesh, context);
     if (!triangulation) return triangulation.error();
@@ -138,6 +141,7 @@ Result<std::vector<Vec3f>> pull_every_vertex(const Model& model, std::span<const
         positions = std::move(result->pose.positions);
     }
     for (Index v = 0; v < positions.size(); ++v) positions[v] = positions[representative[v]];
+    positions.resize(model.vertex_count());
     return positions;
 }
 

@@ -1,11 +1,26 @@
 #include "filigree/hierarchy/model.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace filigree {
 
+namespace {
+
+/// The first vertices of a mesh, where no face has one of the others.
+Mesh first_vertices(Mesh mesh, std::size_t count) {
+    mesh.positions.resize(count);
+    if (!mesh.normals.empty() && mesh.normals.per_vertex()) mesh.normals.values.resize(count);
+    if (!mesh.uvs.empty() && mesh.uvs.per_vertex()) mesh.uvs.values.resize(count);
+    if (!mesh.colors.empty()) mesh.colors.resize(count);
+    for (VertexScalar& scalar : mesh.scalars) scalar.values.resize(count);
+    return mesh;
+}
+
+} // namespace
+
 Mesh level_mesh(const Model& model, unsigned level) {
-    if (level >= model.finest_level()) return model.mesh;
+    if (level >= model.finest_level()) return first_vertices(model.mesh, model.vertex_count());
     const Mesh& full = model.mesh;
     const Level& source = model.levels[level];
     Mesh mesh;
@@ -30,7 +45,7 @@ Mesh level_mesh(const Model& model, unsigned level) {
 
 LevelCounts level_counts(const Model& model, unsigned level) {
     if (level >= model.finest_level())
-        return {model.mesh.vertex_count(), model.mesh.face_count(), model.mesh.corner_count()};
+        return {model.vertex_count(), model.mesh.face_count(), model.mesh.corner_count()};
     const Level& counted = model.levels[level];
     return {counted.vertices.size(), counted.face_count(), counted.corners.size()};
 }
@@ -39,7 +54,10 @@ std::vector<float> vertex_levels(const Model& model, unsigned level) {
     std::vector<float> levels(model.mesh.vertex_count(), static_cast<float>(model.finest_level()));
     for (unsigned k = model.finest_level(); k-- > 0;)
         for (Index v : model.levels[k].vertices) levels[v] = static_cast<float>(k);
-    if (level == model.finest_level()) return levels;
+    if (level == model.finest_level()) {
+        levels.resize(model.vertex_count());
+        return levels;
+    }
     std::vector<float> chosen;
     for (Index v : model.levels[level].vertices) chosen.push_back(levels[v]);
     return chosen;
@@ -120,6 +138,17 @@ bool is_order(std::span<const Index> order, std::size_t vertices) {
     return true;
 }
 
+/// The first thing wrong with a driver that is said to be behind the mesh's own vertices, or "".
+std::string check_driver_behind(const Model& model) {
+    const std::vector<Index>& driver = model.driver().vertices;
+    if (model.levels.size() != 1 || driver.size() > model.mesh.vertex_count() ||
+        driver.front() != model.mesh.vertex_count() - driver.size())
+        return "a driver made elsewhere is not behind the mesh's own vertices";
+    if (std::ranges::any_of(model.mesh.corners, [&](Index v) { return v >= driver.front(); }))
+        return "faces have vertices of a driver made elsewhere";
+    return "";
+}
+
 } // namespace
 
 std::string check_model(const Model& model) {
@@ -129,6 +158,8 @@ std::string check_model(const Model& model) {
     if (model.levels.empty()) return "there is no driver";
     for (const Level& level : model.levels)
         if (std::string wrong = check_level(level, model.mesh.vertex_count()); !wrong.empty()) return wrong;
+    if (model.driver_is_behind)
+        if (std::string wrong = check_driver_behind(model); !wrong.empty()) return wrong;
     if (const auto* blend = std::get_if<BlendDetail>(&model.detail)) {
         if (!all_triangles(model.driver())) return "the driver of a blend model has faces that are not triangles";
         return check_blend(*blend, model.mesh.vertex_count(), model.driver().vertices.size());

@@ -6,6 +6,7 @@
 #include "filigree/hierarchy/reference_code.h"
 #include "filigree/mesh/mesh.h"
 
+#include <span>
 #include <string>
 #include <variant>
 
@@ -24,20 +25,28 @@ struct Level {
 
 /// Everything needed to restore a mesh from a pose of its driver.
 struct Model {
-    Mesh mesh;                 ///< the finest level, as it came in
+    Mesh mesh;                 ///< the finest level, as it came in; see driver_is_behind
     std::vector<Level> levels; ///< coarse to fine, without the finest; levels[0] is the driver
     std::variant<ReferenceDetail, BlendDetail> detail;
     /// Vertex i of the mesh was vertex source_order[i] of the mesh that was stripped; empty: the order is the same.
     std::vector<Index> source_order = {};
+    /// The driver was made elsewhere (strip_to_driver): its vertices are the last ones of `mesh`, where no face has
+    /// them. No level has them but the driver, so what is restored and written has the mesh's own vertices alone.
+    bool driver_is_behind = false;
 
     DetailCode code() const { return static_cast<DetailCode>(detail.index()); }
     /// The number of the finest level; levels 0 .. finest_level() exist.
     unsigned finest_level() const { return static_cast<unsigned>(levels.size()); }
     const Level& driver() const { return levels.front(); }
+    /// Of the finest level: the mesh's own, without those of a driver behind them.
+    std::size_t vertex_count() const { return mesh.vertex_count() - (driver_is_behind ? driver().vertices.size() : 0); }
+    /// Where these are at rest.
+    std::span<const Vec3f> positions() const { return std::span(mesh.positions).first(vertex_count()); }
 };
 
-/// Level k as a mesh of its own, 0 <= k <= finest_level(). Attributes of vertices come along, attributes of corners and
-/// faces only at the finest level (the caller can see which are empty). Cost O(size of the mesh).
+/// Level k as a mesh of its own, 0 <= k <= finest_level(): the finest has vertex_count() vertices. Attributes of
+/// vertices come along, attributes of corners and faces only at the finest level (the caller can see which are empty).
+/// Cost O(size of the mesh).
 Mesh level_mesh(const Model& model, unsigned level);
 
 /// What a level has, as its level_mesh() would.

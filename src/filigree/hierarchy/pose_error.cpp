@@ -182,6 +182,7 @@ std::vector<float> vertex_errors(const Model& model, std::span<const float> loca
             errors[detail->order[r]] = (1 - u - v) * local[i] + u * local[j] + v * local[k];
         }
     }
+    errors.resize(model.vertex_count());
     return errors;
 }
 

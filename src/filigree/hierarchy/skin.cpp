@@ -156,7 +156,7 @@ Result<Skin> make_skin(const Model& model, unsigned level, unsigned influences, 
 
     std::vector<Index> place(positions.size(), kNoIndex); // of each mesh vertex in the level
     const bool finest = level == model.finest_level();
-    const std::size_t count = finest ? positions.size() : model.levels[level].vertices.size();
+    const std::size_t count = finest ? model.vertex_count() : model.levels[level].vertices.size();
     for (Index k = 0; k < count; ++k) place[finest ? k : model.levels[level].vertices[k]] = k;
     skin.positions.resize(count);
     skin.vertex_joints.assign(count * skin.slots, 0);

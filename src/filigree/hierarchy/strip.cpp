@@ -255,6 +255,7 @@ Result<Stripped> strip_to_driver(Mesh mesh, const Mesh& driver, Precision precis
     result.model.detail = encode_blend(mesh.positions, level.vertices, std::move(cells.local), *binding, precision);
     result.model.levels.push_back(std::move(level));
     result.model.mesh = std::move(mesh);
+    result.model.driver_is_behind = true;
     return result;
 }
 

@@ -58,7 +58,7 @@ std::optional<Error> check_strip(const Mesh& mesh, const StripOptions& options);
 
 /// Takes the detail off a mesh down to a driver that somebody else made: any mesh near it, of vertices of its own. Its
 /// vertices are the driver's, all of them and in their order, so poses are arrays of that mesh's positions.
-/// Restored meshes have them too, without faces, behind the mesh's own vertices. Each vertex is bound to the driver's
+/// Restored meshes have the mesh's own vertices alone (Model::driver_is_behind). Each vertex is bound to the driver's
 /// side that it belongs to along the mesh's surface; nothing is refused, see StripReport and its warnings: a driver
 /// that is inside out, or so far away that positions lose their digits. Errors: usage (check_mesh refuses one of the
 /// two), unsuitable (no vertices in either, more triangles or vertices than indices), cancelled. Cost O(V log V).

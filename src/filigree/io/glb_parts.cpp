@@ -233,7 +233,7 @@ std::vector<std::string> what_is_lost(const Mesh& mesh, bool by_object) {
     if (polygons) lost.emplace_back(kPolygonLoss);
     if (!by_object && !mesh.objects.empty()) lost.emplace_back("objects");
     if (!mesh.groups.empty()) lost.emplace_back("groups");
-    if (!mesh.smoothing.empty()) lost.emplace_back("smoothing groups");
+    if (needs_smoothing(mesh)) lost.emplace_back("smoothing groups");
     return lost;
 }
 

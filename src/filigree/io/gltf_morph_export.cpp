@@ -81,7 +81,8 @@ private:
         const GlbMaterials materials = add_glb_materials(builder_, parts_, found.materials);
         report_.warnings = found.warnings;
         report_.warnings.insert(report_.warnings.end(), materials.warnings.begin(), materials.warnings.end());
-        if (!parts_.lost.empty()) report_.warnings.push_back(cannot_hold("A GLB with morph targets", parts_.lost));
+        if (const auto lost = losses_of_played(parts_.lost); !lost.empty())
+            report_.warnings.push_back(cannot_hold("A GLB with morph targets", lost));
         Json attributes = add_glb_attributes(builder_, parts_, mesh_);
         attributes["POSITION"] = builder_.add_positions(parts_.spread(std::span<const Vec3f>(mesh_.positions)));
         const Json repeats = add_glb_repeats(builder_, parts_);

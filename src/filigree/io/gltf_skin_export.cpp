@@ -173,7 +173,7 @@ private:
         const Result<GlbParts> cut = make_glb_parts(mesh, {.objects = !options_.all_levels}, context_);
         if (!cut) return cut.error();
         const GlbParts& parts = *cut;
-        if (level_nodes_.empty()) lost_ = parts.lost;
+        if (level_nodes_.empty()) lost_ = losses_of_played(parts.lost);
         const GlbMaterials& materials = levels_.add_materials(builder_, parts);
         Json attributes = add_glb_attributes(builder_, parts, mesh);
         attributes["POSITION"] = builder_.add_positions(parts.spread(std::span<const Vec3f>(skin.positions)));

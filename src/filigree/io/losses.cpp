@@ -4,6 +4,8 @@
 #include "filigree/io/mesh_file.h"
 #include "filigree/io/text_scanner.h"
 
+#include <algorithm>
+#include <functional>
 #include <utility>
 
 namespace filigree {
@@ -17,6 +19,16 @@ std::string cannot_hold(const std::string& what, std::vector<std::string> lost) 
     sentence += "; left out.";
     return has_polygons ? sentence + " Faces of more than three corners are cut into triangles; PLY and OBJ keep them."
                         : sentence;
+}
+
+std::vector<std::string> losses_of_played(std::vector<std::string> lost) {
+    std::erase(lost, kPolygonLoss);
+    return lost;
+}
+
+bool needs_smoothing(const Mesh& mesh) {
+    return mesh.normals.empty() &&
+           std::ranges::adjacent_find(mesh.smoothing, std::ranges::not_equal_to()) != mesh.smoothing.end();
 }
 
 void add_face_label_losses(const Mesh& mesh, std::vector<std::string>& lost) {

@@ -45,7 +45,8 @@ struct ModelChunks::Content {
     Model driver;
     BlendDetail shared; ///< what all chunks have: cells, their scales, the precision
     std::vector<FileBox> boxes;
-    std::size_t vertices = 0;
+    std::size_t vertices = 0;     ///< of the mesh
+    std::size_t all_vertices = 0; ///< in the file: with those of a driver behind them
 
     Content(FileReader opened, std::string called) : file(std::move(opened)), name(std::move(called)) {}
     BlendRestorer restorer(std::size_t k, const RunContext& context) const;
@@ -54,10 +55,10 @@ struct ModelChunks::Content {
 BlendRestorer ModelChunks::Content::restorer(std::size_t k, const RunContext& context) const {
     // The driver's positions first, then the chunk's: what the restorer takes for the mesh.
     const Index drivers = static_cast<Index>(driver.mesh.vertex_count());
-    const std::size_t count = std::min(kChunkVertices, vertices - k * kChunkVertices);
+    const std::size_t count = std::min(kChunkVertices, all_vertices - k * kChunkVertices);
     std::vector<Vec3f> positions = driver.mesh.positions;
     BlendDetail detail = shared;
-    read_chunk_records(*sections, k, k + 1, vertices, drivers, detail);
+    read_chunk_records(*sections, k, k + 1, all_vertices, drivers, detail);
     for (std::size_t r = 0; r < count; ++r)
         if (!(std::abs(detail.u[r]) <= 1 && std::abs(detail.v[r]) <= 1))
             throw FileDamage{"is inconsistent: a weight is out of range"};
@@ -70,8 +71,8 @@ BlendRestorer ModelChunks::Content::restorer(std::size_t k, const RunContext& co
     } else {
         positions.resize(drivers + count, driver.mesh.positions.front());
     }
-    std::vector<BlendRestorer::Item> items(count);
-    for (Index i = 0; i < count; ++i) items[i] = {drivers + i, i};
+    std::vector<BlendRestorer::Item> items(std::min(count, vertices - k * kChunkVertices));
+    for (Index i = 0; i < items.size(); ++i) items[i] = {drivers + i, i};
     return BlendRestorer(detail, positions, driver.driver().vertices, items, {}, context);
 }
 
@@ -104,10 +105,11 @@ Result<ModelChunks> ModelChunks::open(FileReader file, const std::string& name, 
         const SectionReader& in = content->sections.emplace(content->file);
         if (in.version() < 2) return no_chunks(name, "is a file of version 1");
         content->vertices = outline->levels.back().vertices;
-        if (content->vertices >= kNoIndex || in.count("bl.run").first != chunk_count(content->vertices))
+        content->all_vertices = content->vertices + (outline->driver_is_behind ? outline->levels.front().vertices : 0);
+        if (content->all_vertices >= kNoIndex || in.count("bl.run").first != chunk_count(content->all_vertices))
             throw FileDamage{"is inconsistent: there are not as many chunks as its vertices fill"};
         content->boxes = in.array<FileBox>("ck.box");
-        if (content->boxes.size() != chunk_count(content->vertices))
+        if (content->boxes.size() != chunk_count(content->all_vertices))
             throw FileDamage{"is inconsistent: there is not one box a chunk"};
         content->shared.precision = outline->precision;
         content->shared.cells = in.array<Triangle>("bl.cell");

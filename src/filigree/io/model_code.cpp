@@ -42,27 +42,13 @@ Mesh with_driver_first(Mesh mesh, Level& driver, const RunContext& context) {
     return with_vertex_order(std::move(mesh), order, context);
 }
 
-/// Whether the mesh's faces use none of the driver's vertices, though there are faces in both.
-bool is_made_elsewhere(const Model& model) {
-    if (model.mesh.face_count() == 0 || model.driver().face_count() == 0) return false;
+/// Whether the mesh's faces use none of the driver's vertices, though there are faces in both, and these do not stand
+/// behind the mesh's own: nothing says how the two belong together.
+bool is_driver_apart(const Model& model) {
+    if (model.driver_is_behind || model.mesh.face_count() == 0 || model.driver().face_count() == 0) return false;
     std::vector<bool> is_used(model.mesh.vertex_count());
     for (const Index v : model.mesh.corners) is_used[v] = true;
     return std::ranges::none_of(model.driver().vertices, [&](Index v) { return is_used[v]; });
-}
-
-/// The mesh that was bound to a driver made elsewhere. None: the driver's vertices do not lie behind the mesh's own.
-std::optional<Mesh> without_driver(const Model& model) {
-    const std::vector<Index>& driver = model.driver().vertices;
-    const std::size_t own = model.mesh.vertex_count() - driver.size();
-    for (std::size_t i = 0; i < driver.size(); ++i)
-        if (driver[i] != own + i) return std::nullopt;
-    Mesh mesh = model.mesh;
-    mesh.positions.resize(own);
-    if (!mesh.normals.empty() && mesh.normals.per_vertex()) mesh.normals.values.resize(own);
-    if (!mesh.uvs.empty() && mesh.uvs.per_vertex()) mesh.uvs.values.resize(own);
-    if (!mesh.colors.empty()) mesh.colors.resize(own);
-    for (VertexScalar& scalar : mesh.scalars) scalar.values.resize(own);
-    return mesh;
 }
 
 /// A mesh and a driver that was made elsewhere, bound anew.
@@ -187,15 +173,14 @@ Result<CodedModel> code_model(const Model& model, const PoseSequence& poses, con
     if (!detail)
         return Error{ErrorCode::unsuitable,
                      "The model has the reference code, which is not packed; strip the mesh with the blend code."};
-    const bool elsewhere = is_made_elsewhere(model);
+    const bool elsewhere = model.driver_is_behind;
     if (elsewhere && options.levels)
         return Error{ErrorCode::unsuitable, "The model was stripped to a driver made elsewhere, and streams need one "
                                             "of the mesh's own vertices; the other profiles take it."};
-    std::optional<Mesh> own;
-    if (elsewhere && !(own = without_driver(model)))
+    if (is_driver_apart(model))
         return Error{ErrorCode::unsuitable, "The mesh's faces use none of the driver's vertices, and these do not "
                                             "stand behind the mesh's own; the profile lossless takes such a model."};
-    const Mesh& source = own ? *own : model.mesh;
+    const Mesh source = level_mesh(model, model.finest_level());
     CodedModel coded;
     MeshCodeReport report;
     Result<CodedMesh> mesh = encode_mesh(source, options, &report, context);

@@ -194,6 +194,9 @@ void read_faces(const SectionReader& in, const std::string& name, std::uint32_t 
     for (std::size_t f = 0; f < offsets.size(); ++f) offsets[f] = static_cast<Index>(f * size[0]);
 }
 
+/// Whether the mesh's last vertices are those of a driver that was made elsewhere (of a file that is not coded).
+bool has_driver_behind(const SectionReader& in) { return !in.array<std::uint32_t>("mesh.drv").empty(); }
+
 Mesh read_mesh_sections(const SectionReader& in) {
     Mesh mesh;
     mesh.positions = in.all<Vec3f>("mesh.pos");
@@ -302,6 +305,7 @@ Model read_sections(const FileReader& file, const RunContext& context) {
     Model model;
     model.mesh = read_mesh_sections(in);
     model.source_order = in.array<Index>("mesh.ord");
+    model.driver_is_behind = has_driver_behind(in);
     const auto level_count = in.value<std::uint32_t>("levels");
     if (level_count > 64) throw FileDamage{"has more levels than make sense"};
     for (std::uint32_t k = 0; k < level_count; ++k) {
@@ -379,9 +383,8 @@ ModelOutline read_outline_sections(const FileReader& file) {
     ModelOutline outline;
     if (is_coded(in)) {
         const FileCode code = read_file_code(in);
-        const std::uint64_t behind = is_made_elsewhere(in) ? code.driver_vertices : 0;
         outline.levels = {{code.driver_vertices, code.driver_faces, code.driver_corners},
-                          {code.vertices + behind, code.faces, code.corners}};
+                          {code.vertices, code.faces, code.corners}};
         outline.precision = static_cast<Precision>(code.precision);
         outline.coding = coding_of(in, code);
         read_frames(in, outline);
@@ -400,7 +403,11 @@ ModelOutline read_outline_sections(const FileReader& file) {
     for (std::uint32_t k = 0; k < level_count; ++k)
         outline.levels.push_back(
             {in.item_count<Index>("lev.vert", k), faces("lev", k), in.item_count<Index>("lev.cor", k)});
-    outline.levels.push_back({in.value<std::uint64_t>("mesh.num"), faces("mesh", 0), in.item_count<Index>("mesh.cor")});
+    outline.driver_is_behind = has_driver_behind(in);
+    const std::uint64_t all = in.value<std::uint64_t>("mesh.num"),
+                        behind = outline.driver_is_behind ? outline.levels[0].vertices : 0;
+    if (behind > all) throw FileDamage{"is inconsistent: its driver has more vertices than there are"};
+    outline.levels.push_back({all - behind, faces("mesh", 0), in.item_count<Index>("mesh.cor")});
     if (in.value<std::uint32_t>("code") == static_cast<std::uint32_t>(DetailCode::reference)) {
         outline.code = DetailCode::reference;
         outline.references = in.value<std::array<std::uint32_t, 2>>("rf.par")[1];
@@ -527,6 +534,7 @@ void write_sections(SectionWriter& out, const Model& model, const PoseSequence& 
     const auto* blend = std::get_if<BlendDetail>(&model.detail);
     write_mesh_sections(out, model.mesh, !blend || blend->precision == Precision::float32);
     out.array("mesh.ord", model.source_order);
+    if (model.driver_is_behind) out.value("mesh.drv", std::uint32_t{1});
     out.value("code", static_cast<std::uint32_t>(model.code()));
     out.value("levels", static_cast<std::uint32_t>(model.levels.size()));
     for (std::uint32_t k = 0; k < model.levels.size(); ++k) {

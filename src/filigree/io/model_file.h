@@ -50,6 +50,7 @@ struct Coding {
 struct ModelOutline {
     DetailCode code = DetailCode::blend;
     std::vector<LevelCounts> levels; ///< coarse to fine, with the finest
+    bool driver_is_behind = false;   ///< see Model; of a coded file false
     Precision precision = Precision::float32;
     std::vector<Index> across_gap, facing_away; ///< blend code, as in BlendDetail
     unsigned references = 0;                    ///< reference code

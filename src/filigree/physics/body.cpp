@@ -216,8 +216,9 @@ Status add_field(Body& body, const Mesh& mesh, const RunContext& context) {
 }
 
 std::string warning_of(const CellReport& cells, const OutwardReport& outward) {
+    constexpr double kManyThin = 0.05; // of the cells; below, toes and ears that nobody sees bend too much
     std::string warning = outward_sentence(outward);
-    if (cells.thin_cells > 0)
+    if (double(cells.thin_cells) > kManyThin * double(cells.cells))
         warning += (warning.empty() ? "" : " ") + std::to_string(cells.thin_cells) + " of " +
                    std::to_string(cells.cells) +
                    " cells lie in parts fewer than two cells across, which will be too soft or too stiff there; more "

@@ -52,7 +52,7 @@ struct BodyReport {
     std::size_t surface_points = 0;
     double mass = 0;       ///< kg
     OutwardReport outward; ///< what of the mesh counts as turned
-    std::string warning;   ///< sentences where parts are fewer than two cells across, left out, or turned; or ""
+    std::string warning;   ///< sentences where much is fewer than two cells across, parts are left out or turned; or ""
 };
 
 /// A body from a mesh. Errors: as make_cells; usage (check_material, scale).

@@ -47,6 +47,13 @@ Result<std::shared_ptr<const LevelShape>> LevelShape::make(std::shared_ptr<const
     return std::shared_ptr<const LevelShape>(std::move(shape));
 }
 
+std::optional<Index> LevelShape::vertex_of(Index finest) const {
+    if (vertices_.empty()) return finest < vertex_count_ ? std::optional(finest) : std::nullopt;
+    const auto found = std::ranges::lower_bound(vertices_, finest);
+    if (found == vertices_.end() || *found != finest) return std::nullopt;
+    return static_cast<Index>(found - vertices_.begin());
+}
+
 std::vector<Vec3f> LevelShape::positions(const Pose& pose, const RunContext& context) const {
     Result<std::vector<Vec3f>> restored = restorer_->positions(pose, context);
     return restored ? std::move(restored).value() : std::vector<Vec3f>();

@@ -30,6 +30,8 @@ public:
     const std::vector<Triangle>& triangles() const { return triangles_; }
     std::size_t vertex_count() const { return vertex_count_; }
     Index finest_vertex(Index vertex) const { return vertices_.empty() ? vertex : vertices_[vertex]; }
+    /// The other way; unset: the level does not have it. Cost O(log V).
+    std::optional<Index> vertex_of(Index finest) const;
     /// As posed, relative to the mesh's origin. Empty: the pose does not belong to the model.
     std::vector<Vec3f> positions(const Pose& pose, const RunContext& context) const;
     /// What a ray in the world meets first of the shape at these positions, of which the clip plane takes away a part;

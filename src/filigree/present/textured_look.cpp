@@ -197,8 +197,8 @@ Result<std::vector<BodyLook>> looks_of(const ReadyScene& ready, std::vector<std:
     for (const ReadyBody& body : ready.bodies) {
         looks.emplace_back();
         if (body.body->material.model != MaterialModel::mpm || !body.has_own_color) continue;
-        Result<BodyLook> look = textured_look(body.model.mesh, body.mesh_path, 0.5 * body.body->spacing() / body.scale,
-                                              body.color, warnings, context);
+        Result<BodyLook> look = textured_look(level_mesh(body.model, body.model.finest_level()), body.mesh_path,
+                                              0.5 * body.body->spacing() / body.scale, body.color, warnings, context);
         if (!look) return look.error();
         looks.back() = std::move(*look);
     }

@@ -106,9 +106,11 @@ Moment BodyMotion::look(const MomentWishes& wishes) {
     for (std::size_t i = 0; i < particles.size(); ++i) moment.particles.push_back(to_units * particles[i]);
     if (dropped_->melting) look_at_melt(wishes, moment);
     if (!wishes.full) return moment;
+    const Model& model = *dropped_->model;
     if (!all_vertices_)
-        all_vertices_ = attach(dropped_->model->mesh.positions, pieces_of(*dropped_, &CarriedByPieces::vertices));
-    moment.full.resize(dropped_->model->mesh.vertex_count());
+        all_vertices_ = attach({model.positions().begin(), model.positions().end()},
+                               pieces_of(*dropped_, &CarriedByPieces::vertices));
+    moment.full.resize(model.vertex_count());
     simulation_.attached(*all_vertices_, moment.full, {}, always);
     for (Vec3f& p : moment.full) p *= to_units;
     return moment;

@@ -163,8 +163,7 @@ bool can_melt(const DroppedBody& dropped) {
 
 double torch_radius(const DroppedBody& dropped, const Torch& torch) {
     constexpr double kSpacings = 4; // less does not flow on the body's grid
-    const double longest = bounds(dropped.model->mesh).size().maxCoeff();
-    return std::max(torch.size * longest, kSpacings * dropped.body->spacing() / dropped.scale);
+    return std::max(torch.size * dropped.longest, kSpacings * dropped.body->spacing() / dropped.scale);
 }
 
 HeatSource torch_at(const DroppedBody& dropped, const Vec3d& place, const Torch& torch) {
@@ -190,6 +189,7 @@ Result<std::shared_ptr<const DroppedBody>> make_dropped_body(std::shared_ptr<con
                      "A body needs a mesh with a volume, and all points of this one lie at one place."};
     auto dropped = std::make_shared<DroppedBody>();
     dropped->model = std::move(model);
+    dropped->longest = longest;
     dropped->scale = options.size / longest;
     BodyOptions body_options;
     body_options.scale = dropped->scale;

@@ -52,8 +52,9 @@ struct DroppedBody {
     std::shared_ptr<const Fracture> fracture;      ///< null: it does not break
     std::shared_ptr<const MeltingModel> melting;   ///< null: it does not melt, or its mesh is open
     BodyReport report;
-    double scale = 1; ///< metres a model unit
-    World world;      ///< metres, relative to the model's origin times the scale
+    double scale = 1;   ///< metres a model unit
+    double longest = 0; ///< side of the mesh's box, model units
+    World world;        ///< metres, relative to the model's origin times the scale
     Surroundings surroundings;
 };
 

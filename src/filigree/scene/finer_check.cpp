@@ -24,7 +24,7 @@ SceneFile finer_scene(const SceneFile& scene, const ReadyScene& ready) {
     SceneFile finer = scene;
     for (std::size_t b = 0; b < finer.bodies.size(); ++b) {
         finer.bodies[b].body.cells.spacing = 0.5 * ready.bodies[b].body->spacing();
-        finer.bodies[b].driver = ready.bodies[b].model.mesh.vertex_count();
+        finer.bodies[b].driver = ready.bodies[b].model.vertex_count();
     }
     return finer;
 }
@@ -36,7 +36,7 @@ public:
     Compared(std::size_t number, const ReadyBody& body, Simulation& finer, Simulation& carried,
              const RunContext& context)
         : number_(number), body_(body), restorer_(Restorer::create(body.model, {}, context).value()) {
-        const std::vector<Vec3f> mesh = body.in_metres(body.model.mesh.positions);
+        const std::vector<Vec3f> mesh = body.in_metres({body.model.positions().begin(), body.model.positions().end()});
         const Vectors& rest = body.body->rest;
         std::vector<Vec3f> particles(rest.size());
         for (std::size_t i = 0; i < particles.size(); ++i) particles[i] = rest[i];
@@ -54,7 +54,7 @@ public:
         for (std::size_t i = 0; i < places.size(); ++i) positions.set(i, places[i]);
         require(carried.set_positions(number_, positions));
 
-        std::vector<Vec3f> truth(body_.model.mesh.vertex_count()), found(truth.size());
+        std::vector<Vec3f> truth(body_.model.vertex_count()), found(truth.size());
         finer.attached(truth_, truth, {}, context);
         carried.attached(attached_, found, {}, context);
         add(check.attached, found, truth, diagonal_);

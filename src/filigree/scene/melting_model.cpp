@@ -6,12 +6,12 @@ namespace filigree {
 
 Result<MeltingModel> MeltingModel::create(std::shared_ptr<const Model> model, const Body& body, double scale,
                                           const BodyLook& look, const RunContext& context) {
-    Result<CompositeMesher> mesher = CompositeMesher::create(model->mesh, context);
+    const Mesh mesh = level_mesh(*model, model->finest_level());
+    Result<CompositeMesher> mesher = CompositeMesher::create(mesh, context);
     if (!mesher) return mesher.error();
     Result<Restorer> restorer = Restorer::create(*model, {}, context);
     if (!restorer) return restorer.error();
     MeltingModel melting(std::move(model), std::move(*restorer), std::move(*mesher));
-    const Mesh& mesh = melting.model_->mesh;
     std::vector<Vec3f> rest;
     for (std::size_t p = 0; p < body.particle_count(); ++p) rest.push_back(Vec3f(body.rest[p]) / float(scale));
     const double spacing = body.spacing() / scale;

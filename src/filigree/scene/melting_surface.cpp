@@ -51,7 +51,8 @@ Result<MeltingSurface> MeltingSurface::create(const ReadyScene& ready, std::span
 
 Status MeltingSurface::add(std::size_t b, const BodyLook* look, const RunContext& context) {
     const ReadyBody& body = ready_->bodies[b];
-    Result<CompositeMesher> mesher = CompositeMesher::create(body.model.mesh, context);
+    const Mesh mesh = level_mesh(body.model, body.model.finest_level());
+    Result<CompositeMesher> mesher = CompositeMesher::create(mesh, context);
     if (!mesher && mesher.error().code == ErrorCode::unsuitable) {
         warnings.push_back(fmt::format("body '{}': its mesh is not closed, so it neither parts nor joins where it "
                                        "melts; its open edges have to be closed",
@@ -61,9 +62,9 @@ Status MeltingSurface::add(std::size_t b, const BodyLook* look, const RunContext
     if (!mesher) return mesher.error();
     Result<Restorer> restorer = Restorer::create(body.model, {}, context);
     if (!restorer) return restorer.error();
-    Result<Surfels> surfels = make_surfels(body.model.mesh, context);
+    Result<Surfels> surfels = make_surfels(mesh, context);
     if (look && surfels) { // vertices' colours go with them
-        Mesh colored = body.model.mesh;
+        Mesh colored = mesh;
         colored.colors = look->vertex_colors;
         surfels = make_surfels(colored, context);
     }
@@ -71,12 +72,12 @@ Status MeltingSurface::add(std::size_t b, const BodyLook* look, const RunContext
     for (float& radius : surfels->rest_radius) radius *= float(body.body->scale);
     if (surfels->colors.empty()) surfels->colors.assign(surfels->size(), opaque(body.color));
     BodyPart& part = bodies_.emplace_back(
-        BodyPart{b, std::move(*restorer), body.in_metres(body.model.mesh.positions), std::move(*surfels), {}, {}});
-    has_uvs_ = has_uvs_ || !body.model.mesh.uvs.empty();
+        BodyPart{b, std::move(*restorer), body.in_metres(mesh.positions), std::move(*surfels), {}, {}});
+    has_uvs_ = has_uvs_ || !mesh.uvs.empty();
     std::vector<Vec3f> rest;
     for (std::size_t p = 0; p < body.body->particle_count(); ++p) rest.push_back(body.body->rest[p]);
     part.matter = MatterAtPoints(part.start, rest, body.body->spacing(), context);
-    std::vector<Vec4f> colors = matter_colors(body.model.mesh, part.start, rest, body.body->spacing(), context);
+    std::vector<Vec4f> colors = matter_colors(mesh, part.start, rest, body.body->spacing(), context);
     if (look) {
         part.colors = look->vertex_colors;
         part.has_look = true;

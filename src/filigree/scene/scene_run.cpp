@@ -95,8 +95,10 @@ Status SceneRun::follow(bool checks) {
         Result<Restorer> restorer = Restorer::create(body.model, {}, always_);
         if (!restorer) return restorer.error();
         Follower& follower = followers_.emplace_back(Follower{driver, {}, std::move(*restorer), {}});
-        follower.restored.resize(body.model.mesh.vertex_count());
-        if (checks) follower.direct = attach(body.model.mesh.positions, body.pieces.vertices);
+        follower.restored.resize(body.model.vertex_count());
+        if (checks)
+            follower.direct =
+                attach({body.model.positions().begin(), body.model.positions().end()}, body.pieces.vertices);
     }
     recording_.poses.assign(ready_->bodies.size(), {scene_->step.frames_per_second, {}});
     recording_.matter.resize(ready_->bodies.size());

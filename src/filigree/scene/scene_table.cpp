@@ -162,7 +162,7 @@ Keyed<Vec3d> SceneTable::keyed(std::string_view key, double unit) const {
     }
     for (const toml::node& entry : *list) {
         value.times.push_back(
-            time_of(entry, key, value.times, "three numbers, or a list of { time = t, value = [x, y, z] }"));
+            time_of(entry, key, value.times, true, "three numbers, or a list of { time = t, value = [x, y, z] }"));
         value.values.push_back(unit * vector_of(*entry.as_table()->get("value"), fmt::format("{}.value", key)));
     }
     return value;
@@ -179,7 +179,8 @@ Keyed<double> SceneTable::keyed_number(std::string_view key, double unset) const
         return value;
     }
     for (const toml::node& entry : *list) {
-        value.times.push_back(time_of(entry, key, value.times, "a number, or a list of { time = t, value = v }"));
+        value.times.push_back(
+            time_of(entry, key, value.times, false, "a number, or a list of { time = t, value = v }"));
         value.values.push_back(number_of(*entry.as_table()->get("value"), key, rule));
     }
     return value;
@@ -302,13 +303,13 @@ const toml::table& SceneTable::sub_table(std::string_view key, std::array<std::s
     return *table;
 }
 
-double SceneTable::time_of(const toml::node& entry, std::string_view key, std::span<const double> before,
+double SceneTable::time_of(const toml::node& entry, std::string_view key, std::span<const double> before, bool may_jump,
                            const char* wanted) const {
     const toml::table* table = entry.as_table();
     if (!table || table->size() != 2 || !table->contains("time") || !table->contains("value"))
         wrong(entry, key, wanted);
     const double time = finite_of(*table->get("time"), fmt::format("{}.time", key), "a number");
-    if (!before.empty() && time <= before.back())
+    if (!before.empty() && (may_jump ? time < before.back() : time <= before.back()))
         fail(line_of(entry), fmt::format("the times of '{}' in {} must ascend", key, shown_table(name_)));
     return time;
 }

@@ -70,7 +70,8 @@ private:
     Vec3d vector_of(const toml::node& node, std::string_view key) const;
     const toml::table& sub_table(std::string_view key, std::array<std::string_view, 2> keys) const;
     /// The time of one of a list of keys, which ascend; `before`: those read by now.
-    double time_of(const toml::node& entry, std::string_view key, std::span<const double> before,
+    /// may_jump: two moments may have one time.
+    double time_of(const toml::node& entry, std::string_view key, std::span<const double> before, bool may_jump,
                    const char* wanted) const;
 
     const std::string& path_;

@@ -369,7 +369,7 @@ private:
     }
 
     void check_vertex(const ReadyBody& body, Index vertex, unsigned line) const {
-        const std::size_t count = body.model.mesh.vertex_count();
+        const std::size_t count = body.model.vertex_count();
         if (vertex >= count)
             fail_in_scene(scene_, line, ErrorCode::bad_file,
                           fmt::format("there is no vertex {} in '{}', which has {}", vertex, body.name, count));
