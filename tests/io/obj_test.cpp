@@ -87,6 +87,20 @@ TEST(Obj, ErrorsNameTheLine) {
     }
 }
 
+/// x y z r g b a and x y z w r g b look alike; a weight is 1 in practice, and so are alphas.
+TEST(Obj, SevenNumbersAreAColourWithAlphaOrAWeightAndAColour) {
+    const auto read = [](const std::string& text) { return read_mesh(text, "a.obj", kOneThread).value(); };
+    const MeshFile weights = read("v 0 0 0 1 .1 .2 .3\nv 1 0 0 1 .4 .5 .6\nv 0 1 0 1 1 0 1\nf 1 2 3\n");
+    EXPECT_EQ(weights.mesh.colors[1], Vec4f(0.4f, 0.5f, 0.6f, 1));
+    EXPECT_FALSE(weights.mesh.colors_have_alpha);
+    ASSERT_EQ(weights.warnings.size(), 1u);
+    const MeshFile alphas = read("v 0 0 0 1 .1 .2 .3\nv 1 0 0 .5 .4 .5 .6\nv 0 1 0 1 1 0 1\nf 1 2 3\n");
+    EXPECT_EQ(alphas.mesh.colors[1], Vec4f(0.5f, 0.4f, 0.5f, 0.6f));
+    EXPECT_TRUE(alphas.mesh.colors_have_alpha && alphas.warnings.empty());
+    const MeshFile red = read("v 0 0 0 1 0 0 1\nv 1 0 0 1 0 0 1\nv 0 1 0 1 1 0 1\nf 1 2 3\n");
+    EXPECT_EQ(red.mesh.colors[2], Vec4f(1, 1, 0, 1));
+}
+
 TEST(Obj, WeightsOfVerticesAreLeftOutWithAWarning) {
     const auto file = read("v 0 0 0 1\nv 1 0 0 2\nv 0 1 0 .5\nf 1 2 3\n");
     EXPECT_EQ(file->mesh.positions[1], Vec3f(1, 0, 0));

@@ -46,7 +46,7 @@ TEST(SurfelCoverage, RestAndBentShapesAreCovered) {
         Mesh bent = mesh;
         bent.positions = restored(model, pose);
         const std::vector<Mat3f> gradients = vertex_gradients(std::get<BlendDetail>(model.detail), pose.gradients);
-        EXPECT_LT(most_open(bent, split_surfels(carried_surfels(of(mesh), bent.positions, gradients))), 1e-3);
+        EXPECT_LT(most_open(bent, split_surfels(carried_surfels(of(mesh), bent.positions, gradients)).value()), 1e-3);
     }
 }
 

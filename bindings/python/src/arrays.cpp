@@ -75,7 +75,15 @@ std::vector<Number> read_values(const Numbers<Number>& numbers, const char* name
 Numbers<float> floats_of(const py::handle& given, const char* name) { return numbers_of<float>(given, name); }
 Numbers<double> doubles_of(const py::handle& given, const char* name) { return numbers_of<double>(given, name); }
 Numbers<long long> integers_of(const py::handle& given, const char* name) {
-    const auto numbers = Numbers<long long>::ensure(array_of_kind(given, name, "iu", "whole numbers"));
+    const py::array array = array_of_kind(given, name, "iuf", "whole numbers");
+    // What other programs write as floats (igl, savetxt) has to be whole, and no larger than doubles tell apart.
+    if (array.size() > 0 && array.dtype().kind() == 'f') {
+        const Numbers<double> numbers = doubles_of(array, name);
+        for (py::ssize_t i = 0; i < numbers.size(); ++i)
+            if (!(std::abs(numbers.data()[i]) <= 0x1p53) || std::round(numbers.data()[i]) != numbers.data()[i])
+                refuse(std::string(name) + " has to be an array of whole numbers.");
+    }
+    const auto numbers = Numbers<long long>::ensure(array);
     if (!numbers) refuse(std::string(name) + " has to be an array of whole numbers.");
     return numbers;
 }

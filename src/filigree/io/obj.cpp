@@ -177,6 +177,7 @@ private:
         world_.emplace_back(n[0], n[1], n[2]);
         if (count == 4 && n[3] != 1) ++weights_;
         if (count >= 6) add_color(Vec3d(n[3], n[4], n[5]), count == 7 ? &n[6] : nullptr);
+        seven_numbers_ += count == 7;
         return true;
     }
 
@@ -322,7 +323,19 @@ private:
                check_optional(normals_, highest_normal_, "normal", has_missing_normals_);
     }
 
+    /// Seven numbers are x y z r g b a, or x y z w r g b: the latter where all reds would be 1 and the alphas differ.
+    bool takes_reds_for_weights() {
+        const auto is_one = [](int channel) { return [channel](const Vec4f& c) { return c[channel] == 1; }; };
+        if (seven_numbers_ == 0 || seven_numbers_ < colored_vertices_ || colored_vertices_ < world_.size() ||
+            !std::ranges::all_of(mesh_.colors, is_one(0)) || std::ranges::all_of(mesh_.colors, is_one(3)))
+            return false;
+        for (Vec4f& color : mesh_.colors) color = Vec4f(color[1], color[2], color[3], 1);
+        mesh_.colors_have_alpha = false;
+        return true;
+    }
+
     MeshFile finish() {
+        has_weights_before_colors_ = takes_reds_for_weights();
         split_origin(world_, mesh_);
         mesh_.uvs = uvs_.attribute(mesh_);
         mesh_.normals = normals_.attribute(mesh_);
@@ -344,6 +357,8 @@ private:
         warn(lines_and_points_, "line and point elements were left out.");
         warn(unknown_statements_, "statements of other kinds were left out (the first: " + first_unknown_ + ").");
         warn(weights_, "vertices have a fourth coordinate, a weight, which was left out.");
+        if (has_weights_before_colors_)
+            warn(seven_numbers_, "vertices have seven numbers, the fourth always 1: read as x y z w r g b.");
         warn(third_uvs_, "UVs have a third number, which was left out.");
         if (has_missing_uvs_) warnings.emplace_back("The faces refer to UVs, but the file has none; left out.");
         if (has_missing_normals_) warnings.emplace_back("The faces refer to normals, but the file has none; left out.");
@@ -362,7 +377,9 @@ private:
     NameRuns objects_, groups_, materials_;
     LabelRuns smoothing_;
     HighestIndex highest_vertex_, highest_uv_, highest_normal_;
-    std::size_t lines_read_ = 0, short_faces_ = 0, lines_and_points_ = 0, third_uvs_ = 0, colored_vertices_ = 0;
+    std::size_t lines_read_ = 0, short_faces_ = 0, lines_and_points_ = 0, third_uvs_ = 0, colored_vertices_ = 0,
+                seven_numbers_ = 0;
+    bool has_weights_before_colors_ = false;
     std::size_t unknown_statements_ = 0, weights_ = 0;
     std::string first_unknown_;
     bool has_missing_uvs_ = false, has_missing_normals_ = false, has_end_mark_ = false;
