@@ -158,6 +158,7 @@ TEST(Bind, APatchOnAThinPlateHangsOnTheSideItLiesOn) {
 /// A hose that touches a plane at one end only: the other end hangs on what it passes there.
 TEST(Bind, TheFarEndOfALongPartHangsOnWhatIsThere) {
     Mesh mesh = make_wavy_plane({.resolution = 40, .amplitude = 0});
+    mesh.uvs = {};
     const std::vector<Triangle> cells =
         simplify(mesh.positions, triangulate(mesh).triangles, {.target_vertices = 100}, RunContext()).triangles;
     const std::size_t plane = mesh.vertex_count();

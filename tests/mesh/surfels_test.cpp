@@ -116,7 +116,7 @@ TEST(Surfels, AreNotSplitWithoutEnd) {
     Surfels many;
     for (int i = 0; i < 20; ++i) {
         many.positions.emplace_back(0, 0, float(i));
-        many.u.emplace_back(1e30f, 0, 0);
+        many.u.emplace_back(1e12f, 0, 0);
         many.v.emplace_back(0, 0, 1);
         many.rest_radius.push_back(1);
         many.corners.push_back({0, 0, 0});
