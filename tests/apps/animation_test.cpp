@@ -296,7 +296,7 @@ TEST_F(Animation, ACacheOfAProgramWithZUpIsToldOfAndTurnedBack) {
     EXPECT_TRUE(write_animation(lying, path("z.mdd"), kOneThread).ok());
     const Ran ran = ok({"restore", "moving.fil", "--poses", "z.mdd", "-o", "z.pc2"});
     EXPECT_NE(ran.err.find("turned by 90 degrees about x"), std::string::npos) << ran.err;
-    EXPECT_NE(ran.err.find("--pose-up z"), std::string::npos) << ran.err;
+    EXPECT_NE(ran.err.find("pose-up z"), std::string::npos) << ran.err;
     const Ran back = ok({"restore", "moving.fil", "--poses", "z.mdd", "--pose-up", "z", "-o", "back.pc2"});
     EXPECT_EQ(back.err.find("turned by"), std::string::npos) << back.err;
     ok({"restore", "moving.fil", "--frames", "-o", "own.pc2"});

@@ -406,7 +406,7 @@ TEST_F(Simulate, WrongTypesAndRangesAreNamed) {
     refused("[[body]]\nmesh = \"bad.toml\"\n", {"bad.toml:1:"}, 5);
     refused(kBody + "[[obstacle]]\nshape = \"ball\"\nsize = [1, 1, 1]\n", {"bad.toml:5:", "'size'", "box", "ball"});
     refused(kBody + "[[obstacle]]\nshape = \"mesh\"\n", {"bad.toml:3:", "mesh"});
-    refused(kBody + "[[obstacle]]\nshape = \"box\"\nmove = [{ time = 1, value = [0, 0, 0] }, { time = 1, value = [1, "
+    refused(kBody + "[[obstacle]]\nshape = \"box\"\nmove = [{ time = 1, value = [0, 0, 0] }, { time = 0.5, value = [1, "
                     "0, 0] }]\n",
             {"bad.toml:5:", "ascend"});
     refused(kBody + "[[obstacle]]\nshape = \"box\"\nmove = [{ time = 1 }]\n", {"bad.toml:5:", "time", "value"});

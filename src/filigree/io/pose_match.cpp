@@ -168,10 +168,11 @@ std::string turned_first_frame(std::span<const Vec3f> rest, std::span<const Vec3
             if (largest_distance(rest, first, origin, turn) > kSame * diagonal) continue;
             const std::string degrees = quarters == 2 ? "180" : quarters == 1 ? "90" : "-90";
             const std::string axes = {"xyz"[axis]};
-            const std::string way =
-                axis == 0 && quarters == 1   ? "its up is z; --pose-up z (in Python up='z') turns it back."
-                : axis == 0 && quarters == 3 ? "its up is y; --pose-up y (in Python up='y') turns it back."
-                                             : "turn it back where it was made.";
+            const std::string way = axis == 0 && quarters == 1
+                                        ? "its up is z, and the model's is y: read it with its up axis (pose-up z)."
+                                    : axis == 0 && quarters == 3
+                                        ? "its up is y, and the model's is z: read it with its up axis (pose-up y)."
+                                        : "turn it back where it was made.";
             return path.string() + ": its first frame is the driver turned by " + degrees + " degrees about " + axes +
                    "; " + way;
         }
