@@ -281,6 +281,20 @@ TEST(Mpm, MeltsFlowsAndFreezesInTheShapeItHas) {
     EXPECT_NEAR(volume, 0.16 * 0.16 * 0.16, 0.03 * 0.16 * 0.16 * 0.16);
 }
 
+/// Melt that spreads is no more than it was: its surface is made to enclose these volumes.
+TEST(Mpm, TheVolumeOfMeltStays) {
+    Material wax = *named_material("wax");
+    wax.temperature = 345;
+    wax.viscosity = 5;
+    Simulation simulation = begin(on_ground(), {{.body = box(10, 10, 10, 0.02, wax), .placement = at(0, 0.1, 0)}}, 30);
+    for (int k = 0; k < 3; ++k) {
+        run(simulation, 10);
+        double volume = 0;
+        for (const float v : simulation.matter(0).volumes) volume += double(v);
+        EXPECT_NEAR(volume, 0.008, 0.01 * 0.008) << k;
+    }
+}
+
 /// A third body near two, in the same block of nodes, does not change how these rub.
 TEST(Mpm, FrictionOfAPairHoldsBesideAThirdBody) {
     const auto slab = box(16, 4, 8, 0.02, elastic(2e5)), block = box(6, 4, 4, 0.02, elastic(2e5));

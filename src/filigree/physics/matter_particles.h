@@ -8,7 +8,7 @@ namespace filigree {
 /// One of each a particle, in an order that stays. World.
 struct MatterParticles {
     std::vector<Vec3f> positions;    ///< m
-    std::vector<float> volumes;      ///< m^3, as compressed as they are
+    std::vector<float> volumes;      ///< m^3, as compressed as they are; never above that at rest
     std::vector<float> temperatures; ///< K
     std::vector<float> liquid;       ///< 0 solid .. 1 fluid
     std::vector<float> renewal;      ///< 0: matter as it was at the start .. 1: new

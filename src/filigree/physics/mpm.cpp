@@ -388,7 +388,8 @@ MatterParticles Bodies::matter(std::size_t actor) const {
     for (std::size_t i = first_[field_of_[actor]]; i < first_[field_of_[actor] + 1]; ++i) {
         const Particle& p = particles_[i];
         result.positions.emplace_back(p.x[0], p.x[1], p.x[2]);
-        result.volumes.push_back(p.volume * p.volume_ratio());
+        // Melt has no tension, and a ratio above 1 says that particles drifted apart, not that there is more matter.
+        result.volumes.push_back(p.volume * std::min(p.volume_ratio(), 1.0f));
         result.temperatures.push_back(matter.temperature(p.enthalpy()));
         result.liquid.push_back(matter.liquid(p.enthalpy()));
         result.renewal.push_back(p.renewal);
