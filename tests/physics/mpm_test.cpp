@@ -283,7 +283,7 @@ TEST(Mpm, MeltsFlowsAndFreezesInTheShapeItHas) {
 
 /// Melt that spreads is no more than it was: its surface is made to enclose these volumes.
 TEST(Mpm, TheVolumeOfMeltStays) {
-    Material wax = *named_material("wax");
+    Material wax = std::ranges::find(named_materials(), "wax", &NamedMaterial::name)->material;
     wax.temperature = 345;
     wax.viscosity = 5;
     Simulation simulation = begin(on_ground(), {{.body = box(10, 10, 10, 0.02, wax), .placement = at(0, 0.1, 0)}}, 30);
