@@ -176,7 +176,7 @@ void deform_model(const Model& model, const DeformArguments& options, Session& s
     Report report;
     report_deformed(mesh, true, seconds, options, report);
     if (model.code() == DetailCode::blend)
-        note_expected_error(require(PoseError(model, context).estimate(pose, gradients)), report, session);
+        note_expected_error(require(PoseError(model, context).estimate(pose, gradients)), model, pose, report, session);
     session.print(report);
 }
 

@@ -26,14 +26,31 @@ OptionList restore_options(RestoreOptions& options) {
             Option("--thin-shell", options.thin_shell, "Bumps keep their shape, as on cloth and skin")};
 }
 
-void note_expected_error(const PoseError::Estimate& estimate, Report& report, Session& session) {
+namespace {
+
+/// What makes a pose that is too curved come out better.
+std::string advice_for(const Model& model, const Pose& pose) {
+    constexpr double kMany = 0.02; // of the vertices in loose parts: then these are what is off
+    const auto* detail = std::get_if<BlendDetail>(&model.detail);
+    const std::size_t loose = detail ? detail->across_gap.size() : 0;
+    if (!pose.gradients.empty() || double(loose) < kMany * double(model.vertex_count()))
+        return "Strip with a finer driver (--base, or --fidelity).";
+    return fmt::format("{} vertices are of parts that the driver has no vertex of, and positions alone do not say how "
+                       "such parts turn: give the pose with gradients or ghost points (--ghosts), or strip with a "
+                       "driver so fine that it has vertices of them (--base, or --fidelity).",
+                       with_commas(loose));
+}
+
+} // namespace
+
+void note_expected_error(const PoseError::Estimate& estimate, const Model& model, const Pose& pose, Report& report,
+                         Session& session) {
     if (!(estimate.diagonal > 0)) return;
     report.set("expected_error", estimate.share());
     if (estimate.is_too_curved())
-        session.warn(
-            fmt::format("The pose is more curved than the driver can follow: the mesh is off by about {:.2g} of "
-                        "the diagonal. Strip with a finer driver (--base, or --fidelity).",
-                        estimate.share()));
+        session.warn(fmt::format("The pose is more curved than the driver can follow: the mesh is off by about {:.2g} "
+                                 "of the diagonal. {}",
+                                 estimate.share(), advice_for(model, pose)));
 }
 
 const Pose& own_pose(const PoseSequence& poses, std::size_t frame, const std::string& path) {
@@ -117,11 +134,11 @@ void draw_expected_error(const Model& model, const PoseError::Estimate& estimate
     report_picture(options.picture, up, report);
 }
 
-void report_expected_error(const Model& model, const PoseError::Estimate& estimate, const Mesh& mesh,
+void report_expected_error(const Model& model, const Pose& pose, const PoseError::Estimate& estimate, const Mesh& mesh,
                            const RestoreArguments& options, Session& session, Report& report) {
     if (!(estimate.diagonal > 0)) return;
     report.say(fmt::format("Expected error: {:.2g} of the diagonal (rms).\n", estimate.share()));
-    note_expected_error(estimate, report, session);
+    note_expected_error(estimate, model, pose, report, session);
     if (!options.picture.empty()) draw_expected_error(model, estimate, mesh, options, session, report);
 }
 
@@ -194,7 +211,7 @@ void restore_one(const RestoreArguments& options, Session& session) {
     report.set("seconds", seconds);
     if (model.code() == DetailCode::blend) {
         const PoseError judge(model, session.context());
-        report_expected_error(model, require(judge.estimate(pose, gradients)), mesh, options, session, report);
+        report_expected_error(model, pose, require(judge.estimate(pose, gradients)), mesh, options, session, report);
     }
     session.print(report);
 }

@@ -1,5 +1,6 @@
 // Animations in and out, as a user makes them: restore --poses and --frames, deform --frames, simulate.
 #include "apps/program.h"
+#include "hierarchy/part_meshes.h"
 #include "threads.h"
 
 #include "filigree/hierarchy/restore.h"
@@ -256,6 +257,19 @@ TEST_F(Animation, WhatCannotBeIsSaidBeforeTheWork) {
     fails(2, {"deform", "moving.fil", "--bend", "9", "--frames", "3", "--pose", "p.ply", "-o", "x.pc2"}, {"--pose"});
     fails(2, {"deform", "mesh.ply", "--bend", "9", "--frames", "3", "-o", "x.fil"}, {"x.fil", "mesh"});
     EXPECT_FALSE(std::filesystem::exists(path("x.pc2")));
+}
+
+/// A finer driver does not help parts that it still has no vertex of: the sentence says what does.
+TEST_F(Animation, LooseParts) {
+    Mesh mesh = make_wavy_sphere({.resolution = 24, .amplitude = 0, .size = 2});
+    const Mesh rivet = make_wavy_sphere({.resolution = 4, .amplitude = 0, .size = 2});
+    for (const Vec3f& at : {Vec3f(0, 0, 1.02f), Vec3f(0, 1.02f, 0), Vec3f(1.02f, 0, 0)})
+        filigree_test::add_part(mesh, rivet, 0.02f, at);
+    EXPECT_TRUE(write_mesh(mesh, path("rivets.ply"), {}, kOneThread).ok());
+    ok({"strip", "rivets.ply", "-o", "rivets.fil", "--base", "300"});
+    ok({"deform", "rivets.fil", "--bend", "170", "--twist", "170", "-o", "b.ply", "--pose", "pose.obj"});
+    const Ran ran = ok({"restore", "rivets.fil", "--pose", "pose.obj", "-o", "c.ply"});
+    EXPECT_NE(ran.err.find("gradients or ghost points"), std::string::npos) << ran.err;
 }
 
 TEST_F(Animation, ACageWhoseVerticesWereSplitIsRestoredAsTheCage) {
