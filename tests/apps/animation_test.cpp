@@ -10,6 +10,7 @@
 #include "filigree/io/point_cache.h"
 #include "filigree/mesh/shapes.h"
 
+#include <cmath>
 #include <cstring>
 #include <fstream>
 
@@ -263,8 +264,8 @@ TEST_F(Animation, WhatCannotBeIsSaidBeforeTheWork) {
 TEST_F(Animation, LooseParts) {
     Mesh mesh = make_wavy_sphere({.resolution = 24, .amplitude = 0, .size = 2});
     const Mesh rivet = make_wavy_sphere({.resolution = 4, .amplitude = 0, .size = 2});
-    for (const Vec3f& at : {Vec3f(0, 0, 1.02f), Vec3f(0, 1.02f, 0), Vec3f(1.02f, 0, 0)})
-        filigree_test::add_part(mesh, rivet, 0.02f, at);
+    for (float turn = 0; turn < 6; turn += 0.1f) // a belt of them
+        filigree_test::add_part(mesh, rivet, 0.01f, 1.01f * Vec3f(std::cos(turn), std::sin(turn), 0));
     EXPECT_TRUE(write_mesh(mesh, path("rivets.ply"), {}, kOneThread).ok());
     ok({"strip", "rivets.ply", "-o", "rivets.fil", "--base", "300"});
     ok({"deform", "rivets.fil", "--bend", "170", "--twist", "170", "-o", "b.ply", "--pose", "pose.obj"});
