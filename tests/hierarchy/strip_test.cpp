@@ -116,7 +116,8 @@ TEST(Strip, AStrayVertexMayBeAnywhere) {
         const Mesh mesh = with_faces(positions, {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}});
         const Model model = stripped(mesh).model;
         const std::vector<Vec3f> back = restored(model, rest_pose(model));
-        for (std::size_t v = 0; v < 4; ++v) EXPECT_LT((back[v] - positions[v]).norm(), 1e-16f) << far << ' ' << v << ' ' << back[v].transpose();
+        for (std::size_t v = 0; v < 4; ++v)
+            EXPECT_LT((back[v] - positions[v]).norm(), 1e-16f) << far << ' ' << v << ' ' << back[v].transpose();
         EXPECT_NEAR(back[4].x() / far, 1, 1e-6) << far;
     }
 }

@@ -49,7 +49,7 @@ struct Stripped {
 /// code needs quads with subdivision connectivity.
 /// Errors: usage (options that make no sense; check_mesh refuses the mesh), unsuitable (no vertices; more triangles
 /// than kMostListedTriangles, see mesh/incidence.h; no subdivision connectivity), cancelled. Cost O(F) while the mesh
-/// has more than StripOptions::one_piece vertices, and O(F log F) for what is simplified in one piece: about 2.5
+/// has more than StripOptions::one_piece vertices, and O(F log F) for what is simplified in one piece: about 3
 /// processor seconds a million vertices. Same bytes for any number of threads.
 Result<Stripped> strip(Mesh mesh, const StripOptions& options, const RunContext& context);
 
