@@ -39,6 +39,7 @@ constexpr double kFarthestPoint = 3;       // times the largest error: how far o
 constexpr double kTellingHeight = 0.2; // a height that makes a collapse dearer by less than this share changes no order
 constexpr double kMinCosine = 0.2;     // a triangle that turns further than this in a collapse counts as turned over
 constexpr std::size_t kHub = 1024;     // triangles at a vertex from which it counts as a hub
+constexpr std::size_t kWideFan = 64;   // triangles at a vertex from which heights are not looked at: they cost so many
 constexpr std::size_t kFewTriangles = 8; // a list this long is no trouble even when all of it is gone
 constexpr double kHubSlack =
     1.5; // an edge of a hub may have become this much dearer since it was priced: 1.2 in distance
@@ -176,6 +177,7 @@ private:
 
     bool is_left(Index triangle) const { return triangles_[triangle][0] != kNoIndex; }
     bool is_hub(Index v) const { return around_[v].left >= kHub; }
+    bool is_wide(Index v) const { return around_[v].left >= kWideFan; }
     Index fewer_triangles(Index a, Index b) const { return around_[b].left < around_[a].left ? b : a; }
     Index stamp_of(Index from, Index to) const { return stamp_[from] + stamp_[to]; }
 
@@ -213,7 +215,7 @@ private:
     /// Whether a collapse waits again, as it loses more height than it was priced for, or is dropped, as with a largest
     /// error a point would be left too far off; it comes back when one of its ends is priced again.
     bool waits_for_height(Collapse& collapse, const std::optional<double>& max_error) {
-        if (collapse.forced || collapse.has_height || is_hub(collapse.from) || is_hub(collapse.to)) return false;
+        if (collapse.forced || collapse.has_height || is_wide(collapse.from) || is_wide(collapse.to)) return false;
         const auto [from, to] = std::pair(collapse.from, collapse.to);
         double height = squared_height(from, from, to);
         if (stands_out_[from] != kNoIndex) height = std::max(height, squared_height(stands_out_[from], from, to));
@@ -249,7 +251,7 @@ private:
 
     /// Of what was merged into `to`, now that `from` was too, the point that stands out most.
     void remember_height(Index from, Index to) {
-        if (is_hub(to)) return;
+        if (is_wide(to)) return;
         double most = -1;
         Index highest = kNoIndex;
         for (const Index point : {from, stands_out_[from], stands_out_[to]}) {
