@@ -24,7 +24,8 @@ struct EdgeCollapseResult {
     std::size_t forced = 0; ///< collapses that changed topology or turned a triangle over
 };
 
-/// Half-edge collapses in the order of their quadric error [Garland 1997]. No vertex moves, so what is left is a
+/// Half-edge collapses in the order of their quadric error [Garland 1997], their length, and the height of what they
+/// cut off. No vertex moves, so what is left is a
 /// subset. A collapse that would turn a triangle over or change the topology is not forbidden but priced as the loss of
 /// all it touches: scraps and needle-thin parts go early, a good surface never tears for them. Non-manifold input is
 /// fine, and the last triangle stays. triangles: over welded vertices. Cost O(F log F), about 300,000 collapses a

@@ -23,8 +23,10 @@ struct SimplifyOptions {
 struct Simplified {
     std::vector<Triangle> triangles;
     std::size_t vertex_count = 0; ///< distinct vertices in `triangles`
-    double error = 0;             ///< the worst collapse, as in max_error
-    std::size_t forced = 0;       ///< collapses that changed topology: dropped scraps, closed handles
+    /// The worst collapse, as in max_error. meshoptimizer sees a roughened mesh (roughen.h), so its part of the error
+    /// is a little too large.
+    double error = 0;
+    std::size_t forced = 0; ///< collapses that changed topology: dropped scraps, closed handles
 };
 
 /// Quadric edge collapses [Garland 1997]: meshoptimizer down to 20,000 vertices, our own (collapse_edges) from there,
