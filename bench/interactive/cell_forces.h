@@ -2,7 +2,7 @@
 #pragma once
 
 #include "filigree/physics/body.h"
-#include "filigree/physics/cell_kernel.h"
+#include "filigree/physics/fem/cell_kernel.h"
 
 #include <random>
 

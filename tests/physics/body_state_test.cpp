@@ -1,7 +1,7 @@
-#include "filigree/physics/body_state.h"
+#include "filigree/physics/body/body_state.h"
 
 #include "filigree/core/random.h"
-#include "filigree/physics/external_forces.h"
+#include "filigree/physics/step/external_forces.h"
 #include "threads.h"
 
 #include <gtest/gtest.h>

@@ -1,8 +1,8 @@
 // The fem material against a plain double version of its formulas, and against theory.
 #include "filigree/core/dense_solve.h"
 #include "filigree/physics/body.h"
-#include "filigree/physics/cell_kernel.h"
-#include "filigree/physics/vertex_block.h"
+#include "filigree/physics/fem/cell_kernel.h"
+#include "filigree/physics/fem/vertex_block.h"
 #include "threads.h"
 
 #include <gtest/gtest.h>

@@ -1,9 +1,9 @@
 // What contacts ask of many boxes or particles at once gives what asking one by one gives.
 #include "filigree/core/random.h"
-#include "filigree/physics/box_sweep.h"
-#include "filigree/physics/cell_normals.h"
-#include "filigree/physics/cofactor.h"
-#include "filigree/physics/extremes_kernel.h"
+#include "filigree/physics/contact/box_sweep.h"
+#include "filigree/physics/contact/cell_normals.h"
+#include "filigree/physics/contact/extremes_kernel.h"
+#include "filigree/physics/fem/cofactor.h"
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 #include "filigree/core/dense_solve.h"
 #include "filigree/core/random.h"
 #include "filigree/physics/body.h"
-#include "filigree/physics/elasticity.h"
+#include "filigree/physics/body/elasticity.h"
 
 #include <algorithm>
 #include <cmath>

@@ -2,9 +2,9 @@
 
 #include "filigree/core/random.h"
 #include "filigree/mesh/shapes.h"
-#include "filigree/physics/cell_boxes.h"
-#include "filigree/physics/own_cells.h"
-#include "filigree/physics/rigid_body.h"
+#include "filigree/physics/contact/cell_boxes.h"
+#include "filigree/physics/contact/own_cells.h"
+#include "filigree/physics/rigid/rigid_body.h"
 #include "physics/test_bodies.h"
 #include "threads.h"
 

@@ -1,6 +1,6 @@
 #include "filigree/core/dense_solve.h"
-#include "filigree/physics/mls_neighbours.h"
-#include "filigree/physics/plasticity.h"
+#include "filigree/physics/fem/plasticity.h"
+#include "filigree/physics/meshfree/mls_neighbours.h"
 
 #include "physics/elastic_checks.h"
 #include "threads.h"

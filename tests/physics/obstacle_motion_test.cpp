@@ -1,4 +1,4 @@
-#include "filigree/physics/obstacle_motion.h"
+#include "filigree/physics/contact/obstacle_motion.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "filigree/physics/pair_laws.h"
+#include "filigree/physics/contact/pair_laws.h"
 
 #include "filigree/core/random.h"
 

@@ -1,7 +1,7 @@
 // fem that yields: its formulas, and what it keeps.
 #include "elastic_checks.h"
 #include "filigree/mesh/shapes.h"
-#include "filigree/physics/plastic_cells.h"
+#include "filigree/physics/fem/plastic_cells.h"
 #include "test_bodies.h"
 #include "threads.h"
 

@@ -1,4 +1,4 @@
-#include "filigree/physics/rigid_body.h"
+#include "filigree/physics/rigid/rigid_body.h"
 #include "physics/test_bodies.h"
 #include "threads.h"
 

@@ -1,4 +1,4 @@
-#include "filigree/physics/elasticity.h"
+#include "filigree/physics/body/elasticity.h"
 
 #include "physics/elastic_checks.h"
 #include "threads.h"

@@ -2,9 +2,9 @@
 
 #include "filigree/core/dense_solve.h"
 #include "filigree/core/parallel_for.h"
-#include "filigree/physics/cell_shares.h"
-#include "filigree/physics/mesh_cells.h"
-#include "filigree/physics/surface_points.h"
+#include "filigree/physics/body/cell_shares.h"
+#include "filigree/physics/body/mesh_cells.h"
+#include "filigree/physics/body/surface_points.h"
 
 #include <algorithm>
 #include <cassert>

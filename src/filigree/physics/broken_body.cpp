@@ -2,8 +2,8 @@
 
 #include "filigree/core/disjoint_sets.h"
 #include "filigree/core/parallel_for.h"
-#include "filigree/physics/piece_regions.h"
-#include "filigree/physics/surface_points.h"
+#include "filigree/physics/body/surface_points.h"
+#include "filigree/physics/breaking/piece_regions.h"
 
 #include <algorithm>
 #include <cmath>

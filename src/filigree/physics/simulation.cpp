@@ -1,11 +1,11 @@
 #include "filigree/physics/simulation.h"
 
 #include "filigree/core/text.h"
-#include "filigree/physics/lost_particles.h"
-#include "filigree/physics/rigid_body.h"
-#include "filigree/physics/rigid_state.h"
-#include "filigree/physics/simulation_state.h"
-#include "filigree/physics/sleep.h"
+#include "filigree/physics/rigid/rigid_body.h"
+#include "filigree/physics/rigid/rigid_state.h"
+#include "filigree/physics/rigid/sleep.h"
+#include "filigree/physics/step/lost_particles.h"
+#include "filigree/physics/step/simulation_state.h"
 
 #include <algorithm>
 #include <cassert>

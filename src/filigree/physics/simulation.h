@@ -2,7 +2,6 @@
 #pragma once
 
 #include "filigree/physics/body.h"
-#include "filigree/physics/elasticity.h"
 #include "filigree/physics/fracture.h"
 #include "filigree/physics/matter_particles.h"
 #include "filigree/physics/world.h"

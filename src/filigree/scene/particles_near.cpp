@@ -1,6 +1,6 @@
 #include "filigree/scene/particles_near.h"
 
-#include "filigree/physics/point_grid.h"
+#include "filigree/physics/body/point_grid.h"
 
 #include <cstdint>
 #include <limits>

@@ -1,6 +1,6 @@
 #include "filigree/scene/saved_state.h"
 
-#include "filigree/physics/byte_stream.h"
+#include "filigree/physics/step/byte_stream.h"
 
 #include <cstring>
 

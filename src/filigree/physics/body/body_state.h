@@ -1,0 +1,156 @@
+// A body on its way: what the stepper and contacts change. Private to the layer.
+#pragma once
+
+#include "filigree/physics/body/elasticity.h"
+#include "filigree/physics/broken_body.h"
+
+#include <Eigen/Geometry>
+#include <optional>
+
+namespace filigree {
+
+/// Where a rigid body is and how it moves.
+struct RigidPose {
+    double mass = 0;                                          ///< kg
+    Mat3d inverse_inertia = Mat3d::Zero();                    ///< 1/(kg m^2), of the body at rest
+    Vec3d rest_centre = Vec3d::Zero();                        ///< of mass, m
+    Vec3d centre = Vec3d::Zero(), velocity = Vec3d::Zero();   ///< world, m and m/s
+    Eigen::Quaterniond turn = Eigen::Quaterniond::Identity(); ///< from the body at rest
+    Vec3d angular = Vec3d::Zero();                            ///< angular momentum about the centre, kg m^2/s
+    double quiet_seconds = 0;                                 ///< that it has hardly moved
+    bool rests = false;  ///< an obstacle holds it, or a rigid body that rests; nothing else moves it
+    bool sleeps = false; ///< nothing is computed for it
+};
+
+/// Share of the body's squared frequency at rest that contacts may add: they never shorten explicit steps by more.
+inline constexpr float kContactShare = 1;
+
+struct BodyState {
+    std::shared_ptr<const Body> body;
+    std::size_t actor = 0;                                       ///< that it belongs to: a piece, to the one that broke
+    Eigen::Isometry3d placement = Eigen::Isometry3d::Identity(); ///< Actor::placement
+    bool is_absent = false;  ///< a body that has broken, a piece of one that has not, or one on the grid
+    bool is_on_grid = false; ///< of the model mpm: moved by mpm::Bodies; it has no elasticity
+    std::shared_ptr<const BrokenBody> broken; ///< of a body that breaks: its pieces ...
+    std::size_t first_piece = 0;              ///< ... and the first of their numbers
+    std::unique_ptr<Elasticity> elasticity;
+    Vectors positions, velocities;    ///< world, m and m/s
+    Vectors forces;                   ///< N, of the last evaluation
+    std::vector<float> inverse_mass;  ///< 0: pinned
+    std::vector<std::uint8_t> fixed;  ///< 1: pinned
+    float rest_squared_frequency = 0; ///< ElasticReport::squared_frequency at rest
+    bool may_sleep = true;            ///< Actor::may_sleep
+    bool is_held = false;             ///< by pins, forces or wind: not left to itself
+    std::optional<RigidPose> rigid;   ///< of a rigid body
+    float pushed_way = 0; ///< m that particles were moved one by one, at most; a rigid body's pose has to follow
+    bool sleeps() const { return is_absent || (rigid && rigid->sleeps); }
+
+    /// Of a piece: a light corner, of cells that are hardly filled, and the heaviest corner of those cells.
+    struct LightCorner {
+        Index particle, neighbour;
+    };
+    std::vector<LightCorner> light_corners;
+
+    // Contact: points of the surface; meshfree bodies touch each other by balls just below them.
+    Embedding surface, balls; ///< in the elasticity's reference
+    /// Of each surface point, N/m: that of a spacing's depth of material under the point's area, bounded so that all
+    /// points together add no more than kContactShare times the body's own squared frequency to any particle.
+    std::vector<float> surface_stiffness;
+    float ball_radius = 0; ///< m
+    bool has_balls() const { return balls.size() != 0; }
+    std::vector<std::uint8_t> hidden; ///< 1: a surface point on a crack that has not opened; empty: none
+    bool is_hidden(std::size_t point) const { return !hidden.empty() && hidden[point]; }
+
+    /// Gradients from the body at rest to the elasticity's reference, one a particle: how matter has flowed until
+    /// neighbourhoods were last renewed. Empty: never; the reference is the body at rest.
+    std::vector<Mat3f> flow;
+    bool has_flowed() const { return !flow.empty(); }
+};
+
+/// Of each corner, whether its cells are hardly filled. Such corners fly to and fro beside the rest at ten times its
+/// speed, and carry nothing.
+std::vector<std::uint8_t> light_particles(const Body& body);
+void find_light_corners(BodyState& state);
+
+/// Calls visit(body, number, particle) for a particle of a body, or of one that has broken for each of its copies; of
+/// one on the grid not at all.
+template <class State, class Visit>
+void each_copy(std::span<State> bodies, std::size_t body, Index particle, const Visit& visit) {
+    const BodyState& whole = bodies[body];
+    if (whole.is_on_grid) return;
+    if (!whole.is_absent) return visit(bodies[body], body, particle);
+    for (const CornerCopy& copy : whole.broken->copies_of(particle))
+        visit(bodies[whole.first_piece + copy.piece], whole.first_piece + copy.piece, copy.corner);
+}
+
+/// Points of the body at rest, where they are in the elasticity's reference.
+struct PlacedPoints {
+    std::vector<Vec3f> places;
+    std::vector<Mat3f> gradients; ///< from rest to there, stretches within 1/4 and 4; empty: the body has not flowed
+};
+
+/// The door for all that is given as a point of the body at rest. A point goes with the particles that were around it
+/// at rest, or where these have come apart with the nearest of them.
+PlacedPoints place_in_reference(const BodyState& state, std::span<const Vec3f> rest_points, const RunContext& context);
+/// The same for the surface's points: their gradients alone, one at a time.
+Mat3f surface_flow(const BodyState& state, std::size_t point);
+
+/// Where points were put that others asked to be carried along.
+struct Attachment {
+    std::size_t body = 0;
+    std::vector<Vec3f> points;    ///< of the body at rest
+    Embedding embedding;          ///< of the points where they are in the elasticity's reference
+    std::vector<Mat3f> gradients; ///< from rest to there; empty: the body had not flowed
+};
+Attachment attach(const BodyState& state, std::size_t body, std::span<const Vec3f> rest_points,
+                  const RunContext& context);
+/// As Simulation::attached.
+void move_attached(const BodyState& state, const Attachment& attachment, std::span<Vec3f> points,
+                   std::span<Mat3f> gradients, const RunContext& context);
+
+/// Renews the elasticity's neighbourhoods where the particles are now; what is embedded in the body stays where it is.
+void renew_neighbourhoods(BodyState& state, std::span<Attachment* const> attachments, const RunContext& context);
+/// The surface's points and balls as they are on a body that has not flowed.
+void embed_surface_at_rest(BodyState& state, bool with_balls, const RunContext& context);
+/// For the particles that carry the surface's points now; not of a rigid body.
+void set_surface_stiffness(BodyState& state);
+
+Box box_of(const Vectors& positions); ///< at least one, all finite
+
+/// Where an embedded point is, by its weights alone.
+inline Vec3f embedded_point(const Embedding& embedding, std::size_t point, const Vectors& values) {
+    Vec3f sum = Vec3f::Zero();
+    for (Index k = embedding.offsets[point]; k < embedding.offsets[point + 1]; ++k)
+        sum += embedding.weights[k] * values[embedding.particles[k]];
+    return sum;
+}
+
+/// Begins to read what embedded_point reads of a point: where that follows for many points, they wait but once.
+inline void read_ahead(const Embedding& embedding, std::size_t point) {
+    const Index first = embedding.offsets[point];
+    __builtin_prefetch(embedding.particles.data() + first);
+    __builtin_prefetch(embedding.weights.data() + first);
+}
+
+inline void add_to_particles(const Embedding& embedding, std::size_t point, const Vec3f& value, Vectors& values) {
+    for (Index k = embedding.offsets[point]; k < embedding.offsets[point + 1]; ++k)
+        values.add(embedding.particles[k], embedding.weights[k] * value);
+}
+
+/// How far a point gives way to an impulse of 1 along any direction, 1/kg: sum w^2 / m.
+inline float yielding(const Embedding& embedding, std::size_t point, const std::vector<float>& inverse_mass) {
+    float sum = 0;
+    for (Index k = embedding.offsets[point]; k < embedding.offsets[point + 1]; ++k)
+        sum += embedding.weights[k] * embedding.weights[k] * inverse_mass[embedding.particles[k]];
+    return sum;
+}
+
+/// Moves a particle by its weight over its mass, as XPBD projects a constraint of zero compliance.
+inline void push_particle(BodyState& body, Index particle, float weight, const Vec3f& way, const Vec3f& velocity) {
+    const float share = weight * body.inverse_mass[particle];
+    body.positions.add(particle, share * way);
+    body.velocities.add(particle, share * velocity);
+    body.pushed_way = std::max(body.pushed_way, std::abs(share) * way.norm());
+}
+
+} // namespace filigree

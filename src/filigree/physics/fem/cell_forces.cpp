@@ -1,0 +1,287 @@
+// Based on: Smith, de Goes, Kim, Stable neo-Hookean flesh simulation, 2018 (the energy). Elastic forces of whole cells:
+// what two cells beside each other along x add to a corner meets in a register.
+#include "filigree/core/parallel_for.h"
+#include "filigree/physics/fem/cell_kernel.h"
+#include "filigree/physics/fem/cell_lanes.h"
+
+#include <algorithm>
+#include <cassert>
+#include <limits>
+
+namespace filigree::cell_kernel {
+
+namespace {
+
+/// What a slab found about its cells, N at a time; the extremes are one number in the end.
+template <int N>
+struct Extremes {
+    using Float = typename LaneTypes<N>::Float;
+    Float rate = {}; ///< over Factors::rate
+    Float J = Float{} + 1e30f;
+    Float I = {};
+};
+
+/// Largest eigenvalue of the energy density's second derivative in F, over bulk: with the singular values s of F, c of
+/// its cofactor, q = J - rest_ratio, a = 2 shear / (I + 1)^2 its part along s is
+///     a s s^T + c c^T + q M,  M_12 = s_3 ..., plus shear I / (I + 1),
+/// of which trace and Frobenius norm are polynomials in I, |c|^2 and J, and bound the largest eigenvalue (exactly,
+/// where the two others are equal, as at rest). Across s it is at most |q| s_1. Bent cells add little and are bounded
+/// roughly.
+template <int N>
+FILIGREE_INLINE typename LaneTypes<N>::Float stiffness_bound(const Factors& f, const CellShape<N>& shape,
+                                                             typename LaneTypes<N>::Float I,
+                                                             typename LaneTypes<N>::Float inverse_I1) {
+    using Float = typename LaneTypes<N>::Float;
+    const Float c2 = ((dot(shape.cofactor[0], shape.cofactor[0]) + dot(shape.cofactor[1], shape.cofactor[1])) +
+                      dot(shape.cofactor[2], shape.cofactor[2])) *
+                     (f.inverse_size2 * f.inverse_size2);
+    const Float a = (2 * f.shear_ratio) * inverse_I1 * inverse_I1;
+    const Float q = shape.J - f.rest_ratio;
+    const Float aI = a * shape.I_linear;
+    const Float trace = aI + c2;
+    const Float norm2 = ((aI * aI + c2 * c2) + 2.0f * q * q * shape.I_linear) +
+                        (a * shape.J * (18.0f * shape.J + 12.0f * q) + 4.0f * q * shape.J * shape.I_linear);
+    const Float spread = (2.0f / 3.0f) * (norm2 - trace * trace * (1.0f / 3.0f));
+    const Float along = trace * (1.0f / 3.0f) + CellLanes<N>::square_root(spread > 0.0f ? spread : Float{});
+    const Float across = CellLanes<N>::magnitude(q) * ((shape.I_linear + 3.0f) * 0.28867513f); // s_1 <= sqrt(I)
+    const Float bent = a * (0.05f * shape.I_linear + 4.0f * shape.I_bent);
+    return (f.shear_ratio * I * inverse_I1 + CellLanes<N>::most(along, across)) + bent;
+}
+
+/// What the cells on the left of a block's first corners add to them: sums over x of the right corners' forces, for
+/// y, z and both.
+template <int N>
+struct Carry {
+    Vectors3<N> right[4];
+};
+
+/// Forces of cells i .. i + N - 1 of a run (of which the first `count` are meant where Tail), added to corners i ..
+/// i + N - 1.
+template <int N, bool Tail>
+FILIGREE_INLINE void add_forces(const Factors& f, const Vectors& positions, const Cells::Run& run, Index i, Index count,
+                                const float* fraction, float* const* sums, Carry<N>& carry, Extremes<N>& extremes) {
+    using L = CellLanes<N>;
+    using Float = typename L::Float;
+    using Int = typename L::Int;
+    CellSums<N> s;
+    transform<N>(positions, run.rows, i, s);
+    const CellShape<N> shape = shape_of<N>(s, f.inverse_size);
+    const Float I = shape.I_linear + shape.I_bent;
+    const Float inverse_I1 = 1.0f / (I + 1.0f);
+    Float stiffness = stiffness_bound<N>(f, shape, I, inverse_I1);
+    stiffness = stiffness <= 3e38f ? stiffness : Float{} + std::numeric_limits<float>::infinity();
+
+    const Float share = L::load(fraction + run.first_cell + i);
+    const Float linear = share * (I * inverse_I1) * f.shear_force;
+    const Float volume = share * (shape.J - f.rest_ratio) * f.volume_force;
+    const Float bent = linear * (2.0f / 3.0f), last = linear * (1.0f / 3.0f);
+    Vectors3<N> P[8]; // derivatives of the energy by X
+    P[1] = linear * s.X[1] + volume * shape.cofactor[0];
+    P[2] = linear * s.X[2] + volume * shape.cofactor[1];
+    P[4] = linear * s.X[4] + volume * shape.cofactor[2];
+    P[3] = bent * s.X[3];
+    P[5] = bent * s.X[5];
+    P[6] = bent * s.X[6];
+    P[7] = last * s.X[7];
+
+    if constexpr (Tail) {
+        const Int mask = L::first(count);
+        for (int m = 1; m < 8; ++m) P[m] = {L::keep(mask, P[m].x), L::keep(mask, P[m].y), L::keep(mask, P[m].z)};
+        extremes.rate = L::most(extremes.rate, L::keep(mask, stiffness));
+        extremes.I = L::most(extremes.I, L::keep(mask, I));
+        extremes.J = L::least(extremes.J, mask ? shape.J : extremes.J);
+    } else {
+        extremes.rate = L::most(extremes.rate, stiffness);
+        extremes.I = L::most(extremes.I, I);
+        extremes.J = L::least(extremes.J, shape.J);
+    }
+
+    // Along x: corner i has the left force of cell i and the right one of cell i - 1.
+    const Vectors3<N> right[4] = {(Float{} - 1.0f) * P[1], Vectors3<N>{} - (P[2] + P[3]), Vectors3<N>{} - (P[4] + P[5]),
+                                  Vectors3<N>{} - (P[6] + P[7])};
+    const Vectors3<N> left[4] = {P[1], P[3] - P[2], P[5] - P[4], P[7] - P[6]};
+    Vectors3<N> sum[4];
+    for (int u = 0; u < 4; ++u) {
+        sum[u] = {left[u].x + L::shift_in(carry.right[u].x, right[u].x),
+                  left[u].y + L::shift_in(carry.right[u].y, right[u].y),
+                  left[u].z + L::shift_in(carry.right[u].z, right[u].z)};
+        carry.right[u] = right[u];
+    }
+    // Along y and z: the four rows.
+    const Vectors3<N> a = sum[0] - sum[2], b = sum[1] - sum[3], c = sum[0] + sum[2], d = sum[1] + sum[3];
+    const Vectors3<N> force[4] = {a - b, a + b, c - d, c + d};
+    for (int row = 0; row < 4; ++row) {
+        const std::size_t at = std::size_t{run.rows[row]} + i;
+        float* const* to = row < 2 ? sums : sums + 3;
+        L::add(to[0] + at, force[row].x);
+        L::add(to[1] + at, force[row].y);
+        L::add(to[2] + at, force[row].z);
+    }
+}
+
+/// The corner after a run whose cells fill their last block.
+template <int N>
+FILIGREE_INLINE void add_last_corner(const Cells::Run& run, float* const* sums, const Carry<N>& carry) {
+    const auto last = [](const Vectors3<N>& v) __attribute__((always_inline)) {
+        return Vec3f(v.x[N - 1], v.y[N - 1], v.z[N - 1]);
+    };
+    const Vec3f sum[4] = {last(carry.right[0]), last(carry.right[1]), last(carry.right[2]), last(carry.right[3])};
+    const Vec3f a = sum[0] - sum[2], b = sum[1] - sum[3], c = sum[0] + sum[2], d = sum[1] + sum[3];
+    const Vec3f force[4] = {a - b, a + b, c - d, c + d};
+    for (int row = 0; row < 4; ++row)
+        for (int axis = 0; axis < 3; ++axis)
+            sums[(row < 2 ? 0 : 3) + axis][std::size_t{run.rows[row]} + run.count] += force[row][axis];
+}
+
+/// Forces of a run's cells from i on, in blocks of N and then of as few as the rest needs.
+template <int N>
+FILIGREE_INLINE void add_run(const Factors& f, const Vectors& positions, const Cells::Run& run, Index i,
+                             const float* fraction, float* const* sums, Carry<N>& carry, Extremes<N>& extremes) {
+    for (; i + N <= run.count; i += N) add_forces<N, false>(f, positions, run, i, N, fraction, sums, carry, extremes);
+    const Index rest = run.count - i;
+    if (rest == 0) return add_last_corner<N>(run, sums, carry);
+    if constexpr (N > 4)
+        if (rest <= N / 2) {
+            using L = CellLanes<N>;
+            Carry<N / 2> half_carry;
+            for (int u = 0; u < 4; ++u)
+                half_carry.right[u] = {L::last_half(carry.right[u].x), L::last_half(carry.right[u].y),
+                                       L::last_half(carry.right[u].z)};
+            Extremes<N / 2> half;
+            add_run<N / 2>(f, positions, run, i, fraction, sums, half_carry, half);
+            extremes.rate = L::most(extremes.rate, L::twice(half.rate));
+            extremes.I = L::most(extremes.I, L::twice(half.I));
+            extremes.J = L::least(extremes.J, L::twice(half.J));
+            return;
+        }
+    add_forces<N, true>(f, positions, run, i, rest, fraction, sums, carry, extremes);
+}
+
+struct ForceJob {
+    const Plan& plan;
+    const Vectors& positions;
+    Sums& sums;
+    std::span<ElasticReport> reports; ///< one a slab
+};
+
+template <int N>
+FILIGREE_INLINE void add_slabs(const ForceJob& job, std::size_t begin, std::size_t end) {
+    const Plan& plan = job.plan;
+    const Factors factors(plan.material);
+    for (std::size_t index = begin; index < end; ++index) {
+        const Slab& slab = plan.slabs[index];
+        Vectors& to = job.sums.of_parity[index % 2];
+        const std::size_t first = plan.layer_starts[slab.first_layer] + kPadding * slab.first_layer;
+        const std::size_t last = plan.layer_starts[slab.last_layer + 1] + kPadding * (slab.last_layer + 1);
+        for (float* p : {to.x.data(), to.y.data(), to.z.data()}) std::fill(p + first, p + last, 0.0f);
+
+        Extremes<N> extremes;
+        for (std::size_t r = slab.first_run; r < slab.last_run; ++r) {
+            const Cells::Run& run = plan.cells->runs[r];
+            const std::size_t shift = kPadding * plan.run_layers[r];
+            float* const sums[6] = {to.x.data() + shift,
+                                    to.y.data() + shift,
+                                    to.z.data() + shift,
+                                    to.x.data() + shift + kPadding,
+                                    to.y.data() + shift + kPadding,
+                                    to.z.data() + shift + kPadding};
+            Carry<N> carry = {};
+            add_run<N>(factors, job.positions, run, 0, plan.fraction.data(), sums, carry, extremes);
+        }
+        ElasticReport& report = job.reports[index];
+        float rate = 0, J = extremes.J[0], I = 0;
+        for (int lane = 0; lane < N; ++lane) {
+            rate = std::max(rate, extremes.rate[lane]);
+            J = std::min(J, extremes.J[lane]);
+            I = std::max(I, extremes.I[lane]);
+        }
+        report.squared_frequency = rate * factors.rate;
+        report.least_volume_ratio = J;
+        report.most_stretch = std::sqrt(I / 3);
+    }
+}
+
+using ForceFunction = void (*)(const ForceJob&, std::size_t, std::size_t);
+
+#if defined(FILIGREE_HAS_WIDTHS)
+FILIGREE_AVX512 void add_slabs_avx512(const ForceJob& job, std::size_t begin, std::size_t end) {
+    add_slabs<16>(job, begin, end);
+}
+FILIGREE_AVX2 void add_slabs_avx2(const ForceJob& job, std::size_t begin, std::size_t end) {
+    add_slabs<8>(job, begin, end);
+}
+#endif
+void add_slabs_plain(const ForceJob& job, std::size_t begin, std::size_t end) { add_slabs<4>(job, begin, end); }
+
+ForceFunction force_function(int lanes) {
+#if defined(FILIGREE_HAS_WIDTHS)
+    if (lanes == 16) return add_slabs_avx512;
+    if (lanes == 8) return add_slabs_avx2;
+#endif
+    assert(lanes == 4);
+    return add_slabs_plain;
+}
+
+/// Forces of the corners in layers [begin, end), from what the slabs have. A layer between slabs has something in both
+/// arrays.
+void sum_layers(const Plan& plan, const Sums& sums, std::size_t begin, std::size_t end, Vectors& forces) {
+    const auto slab_of = [&](std::size_t layer) { // the first that has it
+        return static_cast<std::size_t>(
+            std::partition_point(plan.slabs.begin(), plan.slabs.end(),
+                                 [&](const Slab& slab) { return slab.last_layer < layer; }) -
+            plan.slabs.begin());
+    };
+    for (std::size_t layer = begin; layer < end; ++layer) {
+        const std::size_t slab = slab_of(layer);
+        const bool shared = slab + 1 < plan.slabs.size() && plan.slabs[slab + 1].first_layer <= layer;
+        const std::size_t first = plan.layer_starts[layer], last = plan.layer_starts[layer + 1];
+        for (const auto axis : {&Vectors::x, &Vectors::y, &Vectors::z}) {
+            const float* a = (sums.of_parity[slab % 2].*axis).data() + kPadding * layer;
+            const float* b = (sums.of_parity[1 - slab % 2].*axis).data() + kPadding * layer;
+            float* to = (forces.*axis).data();
+            if (shared)
+                for (std::size_t c = first; c < last; ++c) to[c] = a[c] + b[c];
+            else
+                std::copy(a + first, a + last, to + first);
+        }
+    }
+}
+
+} // namespace
+
+ElasticReport forces(const Plan& plan, const Vectors& positions, Vectors& forces, Sums& sums,
+                     const RunContext& context) {
+    static const int lanes = lane_counts().back();
+    return cell_kernel::forces(plan, positions, forces, sums, lanes, context);
+}
+
+ElasticReport forces(const Plan& plan, const Vectors& positions, Vectors& forces, Sums& sums, int lanes,
+                     const RunContext& context) {
+    assert(positions.size() == plan.cells->corners.size() && forces.size() == positions.size());
+    const std::size_t layer_count = plan.layer_starts.size() - 1;
+    const std::size_t needed = positions.size() + kPadding * (layer_count + 1);
+    for (Vectors& parity : sums.of_parity)
+        if (parity.size() != needed) parity = Vectors(needed);
+
+    std::vector<ElasticReport> reports(plan.slabs.size());
+    const ForceJob job{plan, positions, sums, reports};
+    const ForceFunction add_slabs_of = force_function(lanes);
+    parallel_for(context, plan.slabs.size(), 1,
+                 [&](std::size_t begin, std::size_t end) { add_slabs_of(job, begin, end); });
+
+    constexpr std::size_t kCornersPerPiece = 1 << 14;
+    const std::size_t layer_grain = std::max<std::size_t>(1, kCornersPerPiece * layer_count / (positions.size() + 1));
+    parallel_for(context, layer_count, layer_grain,
+                 [&](std::size_t begin, std::size_t end) { sum_layers(plan, sums, begin, end, forces); });
+
+    ElasticReport report;
+    if (!reports.empty()) report = reports[0];
+    for (const ElasticReport& r : reports) {
+        report.squared_frequency = std::max(report.squared_frequency, r.squared_frequency);
+        report.least_volume_ratio = std::min(report.least_volume_ratio, r.least_volume_ratio);
+        report.most_stretch = std::max(report.most_stretch, r.most_stretch);
+    }
+    return report;
+}
+
+} // namespace filigree::cell_kernel

@@ -1,0 +1,277 @@
+// The fem material that yields: whole cells as in cell_lanes.h, one after the other, each with the shape in which it
+// is at rest. With D the inverse of a cell's plastic gradient and b its bending at rest, the energy is that of
+//     Xe = [X_1 X_2 X_4] D  and  Xe_k = X_k - [X_1 X_2 X_4] b_k,  k = 3, 5, 6, 7,
+// so volume is as elastic as before, and turning a cell costs nothing. Once a substep strain beyond the yield stress
+// goes over into D and b [Simo 1992].
+#include "filigree/core/parallel_for.h"
+#include "filigree/physics/body.h"
+#include "filigree/physics/fem/cell_kernel.h"
+#include "filigree/physics/fem/plastic_cells.h"
+#include "filigree/physics/fem/vertex_block.h"
+#include "filigree/physics/step/byte_stream.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace filigree {
+
+namespace {
+
+constexpr std::size_t kPlasticGrain = 256;
+
+/// +1 or -1 of a corner in a sum.
+float sign_of(int corner, int sum) {
+    float sign = 1;
+    for (int bit = 1; bit < 8; bit *= 2)
+        if (sum & bit && !(corner & bit)) sign = -sign;
+    return sign;
+}
+
+/// What the energy of a cell depends on, by its elastic sums.
+struct ElasticShape {
+    CellSums X;
+    Mat3f cofactors; ///< of (X_1, X_2, X_4)
+    float linear, bent, J;
+    ElasticShape(const CellSums& sums, float size) : X(sums) {
+        cofactors << X[2].cross(X[4]), X[4].cross(X[1]), X[1].cross(X[2]);
+        linear = bent = 0;
+        for (const int m : kLinearSums) linear += X[m].squaredNorm();
+        for (const int m : kBentSums) bent += kSumShares[m] * X[m].squaredNorm();
+        linear /= size * size;
+        bent /= size * size;
+        J = X[1].dot(cofactors.col(0)) / (size * size * size);
+    }
+};
+
+/// Largest eigenvalue of a 3x3 matrix with real ones from the sums of them and of their squares; not below it.
+float largest_eigenvalue(float trace, float squares) {
+    return trace / 3 + std::sqrt(std::max((2.0f / 3) * (squares - trace * trace / 3), 0.0f));
+}
+
+/// A bound on the second derivative of the energy density over `bulk`: cell_kernel's in the elastic sums, brought back
+/// through what the cell keeps. Bending at rest couples sums of equal shear stiffness.
+float stiffness_of(const cell_kernel::CellMaterial& m, const PlasticCell& cell, const ElasticShape& shape, float size) {
+    const float I = shape.linear + shape.bent, ratio = m.shear / m.bulk;
+    const float c2 = shape.cofactors.squaredNorm() / (size * size * size * size);
+    const float a = 2 * ratio / ((I + 1) * (I + 1)), q = shape.J - m.rest_ratio;
+    const float trace = a * shape.linear + c2;
+    const float squares = a * shape.linear * a * shape.linear + c2 * c2 + 2 * q * q * shape.linear +
+                          a * shape.J * (18 * shape.J + 12 * q) + 4 * q * shape.J * shape.linear;
+    const float along = largest_eigenvalue(trace, squares);
+    const float across = std::abs(q) * (shape.linear + 3) * 0.28867513f;
+    const float shear = ratio * I / (I + 1), bent = a * (0.05f * shape.linear + 4 * shape.bent);
+    const Mat3f metric = cell.inverse * cell.inverse.transpose();
+    float at_rest = 0;
+    for (const Vec3f& b : cell.bent) at_rest += b.squaredNorm();
+    return (shear + std::max(along, across) + bent) * largest_eigenvalue(metric.trace(), metric.squaredNorm()) +
+           (shear + bent) * (at_rest + std::sqrt(at_rest));
+}
+
+class PlasticElasticity final : public Elasticity {
+public:
+    explicit PlasticElasticity(const Body& body)
+        : body_(body), material_(cell_kernel::cell_material(body.material, body.spacing())),
+          size_(4 * float(body.spacing())), plastic_(body.cells.cells.size()), pushes_(plastic_.size()) {
+        const Cells& cells = body_.cells;
+        cells_at_.resize(cells.corners.size());
+        for (auto& around : cells_at_) around.fill(kNoIndex);
+        for (Index cell = 0; cell < cells.cells.size(); ++cell)
+            for (int corner = 0; corner < 8; ++corner) cells_at_[cells.cell_corners[cell][corner]][corner] = cell;
+        for (Index corner = 0; corner < cells.corners.size(); ++corner) {
+            const auto& at = cells.corners[corner];
+            colors_[(at[0] & 1) + 2 * (at[1] & 1) + 4 * (at[2] & 1)].push_back(corner);
+        }
+    }
+
+    ElasticReport forces(const Vectors& positions, Vectors& forces, const RunContext& context) override {
+        std::vector<ElasticReport> found((plastic_.size() + kPlasticGrain - 1) / kPlasticGrain);
+        parallel_for(context, plastic_.size(), kPlasticGrain, [&](std::size_t begin, std::size_t end) {
+            ElasticReport report{0, std::numeric_limits<float>::infinity(), 0};
+            for (std::size_t cell = begin; cell < end; ++cell) push(cell, positions, report);
+            found[begin / kPlasticGrain] = report;
+        });
+        parallel_for(context, cells_at_.size(), kPlasticGrain, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t corner = begin; corner < end; ++corner) {
+                Vec3f sum = Vec3f::Zero();
+                for (int side = 0; side < 8; ++side)
+                    if (const Index cell = cells_at_[corner][side]; cell != kNoIndex) sum += pushes_[cell][side];
+                forces.set(corner, sum);
+            }
+        });
+        ElasticReport all{0, std::numeric_limits<float>::infinity(), 0};
+        for (const ElasticReport& report : found) take_worse(all, report);
+        return all;
+    }
+
+    /// Corners whose places have the same parities share no cell.
+    void sweep(Vectors& positions, const Descent& descent, const RunContext& context) override {
+        for (const std::vector<Index>& color : colors_)
+            parallel_for(context, color.size(), kPlasticGrain / 4, [&](std::size_t begin, std::size_t end) {
+                for (std::size_t n = begin; n < end; ++n) move_corner(positions, descent, color[n]);
+            });
+    }
+
+    void add_block(Index particle, const Vectors& positions, Vec3f& force, Symmetric3& block) const override {
+        for (int side = 0; side < 8; ++side)
+            if (const Index cell = cells_at_[particle][side]; cell != kNoIndex)
+                add_cell(cell, side, positions, force, block);
+    }
+
+    double energy(const Vectors& positions, const RunContext& context) const override {
+        std::vector<double> sums((plastic_.size() + kPlasticGrain - 1) / kPlasticGrain);
+        parallel_for(context, plastic_.size(), kPlasticGrain, [&](std::size_t begin, std::size_t end) {
+            double sum = 0;
+            for (std::size_t cell = begin; cell < end; ++cell) sum += energy_of(cell, positions);
+            sums[begin / kPlasticGrain] = sum;
+        });
+        double sum = 0;
+        for (const double part : sums) sum += part;
+        return sum;
+    }
+
+    const Vectors& reference() const override { return body_.rest; }
+
+    void gradients(const Vectors& positions, std::span<Mat3f> gradients, const RunContext& context) const override {
+        corner_gradients(body_.cells, positions, gradients, context);
+    }
+
+    void finish_substep(const Vectors& positions, float dt, const RunContext& context) override {
+        const Material& material = body_.material;
+        const double shear = lame_parameters(material.young_modulus, material.poisson_ratio).mu;
+        FlowLaw law{float(std::sqrt(2 / 3.) * material.yield_stress / (2 * shear)), 1, 0};
+        if (material.creep_time > 0) law.yield_rate = float(-std::expm1(-double(dt) / material.creep_time));
+        parallel_for(context, plastic_.size(), kPlasticGrain, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t cell = begin; cell < end; ++cell)
+                yield(plastic_[cell], cell_sums(positions, body_.cells.cell_corners[cell]), size_, law);
+        });
+    }
+
+    std::span<const PlasticCell> plastic_cells() const override { return plastic_; }
+    void take_over(std::span<const PlasticCell> of_whole, std::span<const Index> cells) override {
+        for (std::size_t cell = 0; cell < cells.size(); ++cell) plastic_[cell] = of_whole[cells[cell]];
+    }
+
+    std::string state() const override {
+        ByteWriter writer;
+        writer.array(std::span(plastic_));
+        return writer.take();
+    }
+    bool restore_state(std::string_view bytes) override {
+        ByteReader reader(bytes);
+        std::vector<PlasticCell> plastic = reader.array<PlasticCell>();
+        if (!reader.ok() || !reader.at_end() || plastic.size() != plastic_.size()) return false;
+        if (!std::ranges::all_of(plastic, &PlasticCell::is_sound)) return false;
+        plastic_ = std::move(plastic);
+        return true;
+    }
+
+private:
+    /// NaN is the worst.
+    static void take_worse(ElasticReport& all, const ElasticReport& report) {
+        all.squared_frequency =
+            report.squared_frequency <= all.squared_frequency ? all.squared_frequency : report.squared_frequency;
+        all.least_volume_ratio =
+            report.least_volume_ratio >= all.least_volume_ratio ? all.least_volume_ratio : report.least_volume_ratio;
+        all.most_stretch = report.most_stretch <= all.most_stretch ? all.most_stretch : report.most_stretch;
+    }
+
+    ElasticShape shape_of(std::size_t cell, const Vectors& positions) const {
+        return {plastic_[cell].elastic(cell_sums(positions, body_.cells.cell_corners[cell])), size_};
+    }
+
+    /// What a cell pushes its corners with.
+    void push(std::size_t cell, const Vectors& positions, ElasticReport& report) {
+        const ElasticShape shape = shape_of(cell, positions);
+        const PlasticCell& plastic = plastic_[cell];
+        const float I = shape.linear + shape.bent, h = material_.spacing;
+        const float volume = body_.cells.fraction[cell] * h * h * h;
+        const float by_sums = volume * material_.shear * I / (I + 1) / (size_ * size_);
+        const float by_volume = volume * material_.bulk * (shape.J - material_.rest_ratio) / (size_ * size_ * size_);
+        CellSums P; // derivatives of the energy by the sums
+        P[0] = Vec3f::Zero();
+        Mat3f linear;
+        for (int a = 0; a < 3; ++a)
+            linear.col(a) = by_sums * shape.X[kLinearSums[a]] + by_volume * shape.cofactors.col(a);
+        linear *= plastic.inverse.transpose();
+        for (int b = 0; b < 4; ++b) {
+            P[kBentSums[b]] = by_sums * kSumShares[kBentSums[b]] * shape.X[kBentSums[b]];
+            linear -= P[kBentSums[b]] * plastic.bent[b].transpose();
+        }
+        for (int a = 0; a < 3; ++a) P[kLinearSums[a]] = linear.col(a);
+        for (unsigned bit = 1; bit < 8; bit *= 2) // the transform's transpose
+            for (unsigned i = 0; i < 8; ++i)
+                if (!(i & bit)) {
+                    const Vec3f even = P[i], odd = P[i | bit];
+                    P[i] = even - odd;
+                    P[i | bit] = even + odd;
+                }
+        for (int corner = 0; corner < 8; ++corner) pushes_[cell][corner] = -P[corner];
+        const float rate = 1.0001f * 4 * material_.bulk / (material_.density * h * h);
+        const float frequency = rate * stiffness_of(material_, plastic, shape, size_);
+        take_worse(report, {frequency <= 3e38f ? frequency : std::numeric_limits<float>::infinity(), shape.J,
+                            std::sqrt(I / 3)});
+    }
+
+    /// Adds one cell's force on one of its corners, and the block there.
+    void add_cell(Index cell, int corner, const Vectors& positions, Vec3f& force, Symmetric3& block) const {
+        const ElasticShape shape = shape_of(cell, positions);
+        const PlasticCell& plastic = plastic_[cell];
+        const Vec3f signs(sign_of(corner, 1), sign_of(corner, 2), sign_of(corner, 4));
+        const Vec3f elastic_signs = plastic.inverse.transpose() * signs;
+        float squares = 0;
+        Vec3f by_I = Vec3f::Zero(), by_J = Vec3f::Zero(); // half of dI/dx; dJ/dx
+        const auto add = [&](int sum, float sign) {
+            squares += kSumShares[sum] * sign * sign / (size_ * size_);
+            by_I += kSumShares[sum] * sign / (size_ * size_) * shape.X[sum];
+        };
+        for (int a = 0; a < 3; ++a) {
+            add(kLinearSums[a], elastic_signs[a]);
+            by_J += elastic_signs[a] / (size_ * size_ * size_) * shape.cofactors.col(a);
+        }
+        for (int b = 0; b < 4; ++b) add(kBentSums[b], sign_of(corner, kBentSums[b]) - signs.dot(plastic.bent[b]));
+        const float I = shape.linear + shape.bent, h = material_.spacing;
+        const float volume = body_.cells.fraction[cell] * h * h * h, shear = material_.shear * I / (I + 1);
+        force -= volume * (shear * by_I + material_.bulk * (shape.J - material_.rest_ratio) * by_J);
+        block.add_scaled_identity(volume * shear * squares);
+        block.add_outer(by_I, volume * 2 * material_.shear / ((I + 1) * (I + 1)));
+        block.add_outer(by_J, volume * material_.bulk);
+    }
+
+    void move_corner(Vectors& positions, const Descent& descent, Index corner) const {
+        if (descent.fixed[corner]) return;
+        Vec3f force = descent.inertia[corner] * (descent.target[corner] - positions[corner]);
+        Symmetric3 block;
+        block.add_scaled_identity(descent.inertia[corner]);
+        add_block(corner, positions, force, block);
+        if (descent.touched[corner] && descent.external) descent.external->add(corner, positions, force, block);
+        positions.add(corner, block.solve(force));
+    }
+
+    double energy_of(std::size_t cell, const Vectors& positions) const {
+        const CellSums X = plastic_[cell].elastic(cell_sums(positions, body_.cells.cell_corners[cell]));
+        const double size = double(size_), h = double(material_.spacing), g = double(material_.rest_ratio);
+        double I = 0;
+        for (int m = 1; m < 8; ++m) I += double(kSumShares[m]) * X[m].cast<double>().squaredNorm() / (size * size);
+        const double J = X[1].cast<double>().dot(X[2].cast<double>().cross(X[4].cast<double>())) / (size * size * size);
+        return double(body_.cells.fraction[cell]) * h * h * h *
+               (0.5 * double(material_.shear) * ((I - 3) - std::log1p((I - 3) / 4)) +
+                0.5 * double(material_.bulk) * (J - 1) * (J + 1 - 2 * g));
+    }
+
+    const Body& body_;
+    const cell_kernel::CellMaterial material_;
+    const float size_;                           ///< m: 4 h
+    std::vector<std::array<Index, 8>> cells_at_; ///< of each corner, the cell in which it is the n-th
+    std::array<std::vector<Index>, 8> colors_;   ///< corners by the parities of their places
+    std::vector<PlasticCell> plastic_;           ///< state
+    std::vector<std::array<Vec3f, 8>> pushes_;   ///< scratch: N, of each cell on its corners
+};
+
+} // namespace
+
+std::unique_ptr<Elasticity> make_plastic_elasticity(const Body& body, const RunContext&) {
+    return std::make_unique<PlasticElasticity>(body);
+}
+
+} // namespace filigree

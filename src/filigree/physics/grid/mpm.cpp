@@ -1,0 +1,470 @@
+#include "filigree/physics/grid/mpm.h"
+
+#include "filigree/core/parallel_for.h"
+#include "filigree/physics/grid/mpm_contact.h"
+#include "filigree/physics/step/byte_stream.h"
+#include "filigree/physics/step/stopwatch.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace filigree::mpm {
+
+namespace {
+
+constexpr float kMostTravel = 0.4f;     ///< of a cell, in a step
+constexpr double kFewestSteps = 1;      ///< a frame
+constexpr double kMostSteps = 20'000;   ///< a frame
+constexpr float kLeastNodeMass = 1e-6f; ///< of a full node's: what tracers look at
+constexpr float kRidge = 0.01f;         ///< cells squared: holds a tracer's gradient at a rim
+constexpr float kHeldShare = 0.5f;      ///< of a node's mass that is pinned, from which on the node is
+constexpr std::size_t kTracerGrain = 256;
+/// Particles tell of the half of a surface's slope that lies inside, and of less where the body is a few cells thick.
+constexpr float kMostSurface = 8;
+
+Float4 lanes(float x, float y, float z, float w) { return Float4{x, y, z, w}; }
+Vec3f vector_of(const Float4& v) { return {v[0], v[1], v[2]}; }
+
+} // namespace
+
+Bodies::Bodies(const World& world, std::span<const Actor> actors)
+    : world_(world), laws_(world, actors.size()), field_of_(actors.size(), kNoIndex), grid_(1) {
+    for (std::size_t a = 0; a < actors.size(); ++a) {
+        const Body& body = *actors[a].body;
+        if (body.material.model != MaterialModel::mpm) continue;
+        field_of_[a] = Index(matter_.size());
+        first_.push_back(particles_.size());
+        actor_of_field_.push_back(a);
+        matter_.emplace_back(body.material, world.heat_pace);
+        has_heat_ |= matter_.back().has_heat();
+        spacing_ = std::max(spacing_, float(body.spacing()));
+        start_enthalpy_.push_back(matter_.back().enthalpy(float(body.material.temperature)));
+        for (std::size_t p = 0; p < body.particle_count(); ++p) {
+            particles_.push_back(at_rest(body.mass[p], body.volume[p], field_of_[a]));
+            field_.push_back(field_of_[a]);
+        }
+    }
+    first_.push_back(particles_.size());
+    if (particles_.empty()) return;
+    grid_ = Grid(2 * spacing_);
+    for (Matter& matter : matter_) {
+        matter.limit_viscosity(grid_.spacing());
+        grid_mass_.push_back(matter.density() * grid_.spacing() * grid_.spacing() * grid_.spacing());
+    }
+    find_surfaces(actors);
+}
+
+Particle Bodies::at_rest(float mass, float volume, std::size_t field) const {
+    Particle particle = {};
+    particle.mass = mass;
+    particle.volume = volume;
+    particle.b[0] = particle.b[1] = particle.b[2] = 1;
+    particle.volume_ratio() = 1;
+    particle.enthalpy() = start_enthalpy_[field];
+    particle.melted = matter_[field].liquid(particle.enthalpy()) >= 1;
+    return particle;
+}
+
+/// The gradient of mass around particles tells where the surface is, and not quite how large. At rest that is known.
+void Bodies::find_surfaces(std::span<const Actor> actors) {
+    const RunContext alone(1);
+    for (std::size_t f = 0; f < matter_.size(); ++f)
+        set_positions(actor_of_field_[f], actors[actor_of_field_[f]].body->rest);
+    grid_.begin(particles_, field_, alone);
+    scatter(0, alone);
+    std::vector<double> told(matter_.size());
+    std::vector<AtParticle> found;
+    Node tile[kTileNodes];
+    for (const std::vector<std::uint32_t>& group : grid_.groups())
+        for (const std::uint32_t block : group) {
+            grid_.read_tile(block, tile);
+            const std::span<const std::uint32_t> numbers = grid_.particles(block);
+            const std::uint32_t field = grid_.place(block).body;
+            found.resize(numbers.size());
+            gather_at_particles(numbers, particles_.data(), grid_.spacing(), tile, found.data());
+            for (std::size_t i = 0; i < numbers.size(); ++i)
+                told[field] += double(particles_[numbers[i]].volume * emptiness(found[i], field).norm());
+        }
+    for (std::size_t f = 0; f < matter_.size(); ++f) {
+        double area = 0;
+        for (const float part : actors[actor_of_field_[f]].body->surface.areas) area += double(part);
+        surface_.push_back(told[f] > 0 ? std::clamp(float(area / told[f]), 1.0f, kMostSurface) : 1.0f);
+    }
+}
+
+/// Gradient of the share of space that is full, 1/m.
+Vec3f Bodies::emptiness(const AtParticle& found, std::size_t field) const {
+    const float h = grid_.spacing();
+    return 4 / (h * h * grid_mass_[field]) * Vec3f(found.slope[0][3], found.slope[1][3], found.slope[2][3]);
+}
+
+std::size_t Bodies::particle_count(std::size_t actor) const {
+    return first_[field_of_[actor] + 1] - first_[field_of_[actor]];
+}
+
+void Bodies::advance(double from, double until, FrameReport& report, const RunContext& context) {
+    if (empty()) return;
+    const Stopwatch watch(report.elastic_seconds);
+    double now = from;
+    unsigned steps = 0;
+    while (until - now > 1e-9 * (until - from) && !context.is_cancelled()) {
+        const double longest = std::max(double(longest_step(context)), (until - from) / kMostSteps);
+        const double left = until - now, count = std::max(kFewestSteps, std::ceil(left / longest));
+        const auto dt = float(left / count);
+        now = count <= 1 ? until : now + double(dt);
+        add_forces(dt, now);
+        grid_.begin(particles_, field_, context);
+        scatter(dt, context);
+        update_nodes(dt, now, context);
+        gather(dt, now, context);
+        move_tracers(dt, context);
+        hold_pinned(now);
+        ++steps;
+    }
+    report.substeps = std::max(report.substeps, steps);
+    for (const Particle& p : particles_)
+        report.least_volume_ratio = std::min(report.least_volume_ratio, p.volume_ratio());
+}
+
+float Bodies::longest_step(const RunContext& context) const {
+    constexpr std::size_t kGrain = 16384;
+    std::vector<float> fastest((particles_.size() + kGrain - 1) / kGrain, 0.0f); // squared
+    parallel_for(context, fastest.size(), 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t part = begin; part < end; ++part)
+            for (std::size_t i = part * kGrain; i < std::min(particles_.size(), (part + 1) * kGrain); ++i) {
+                const Particle& p = particles_[i];
+                fastest[part] = std::max(fastest[part], p.v[0] * p.v[0] + p.v[1] * p.v[1] + p.v[2] * p.v[2]);
+            }
+    });
+    float squared_speed = 0;
+    for (const float squared : fastest) squared_speed = std::max(squared_speed, squared);
+    float step = kMostTravel * grid_.spacing() / std::sqrt(std::max(squared_speed, 1e-12f));
+    for (const Matter& matter : matter_) step = std::min(step, matter.longest_step(grid_.spacing()));
+    return step;
+}
+
+void Bodies::scatter(float dt, const RunContext& context) {
+    for (const std::vector<std::uint32_t>& group : grid_.groups())
+        parallel_for(context, group.size(), 1, [&](std::size_t begin, std::size_t end) {
+            Node tile[kTileNodes];
+            for (std::size_t g = begin; g < end; ++g) {
+                std::fill_n(tile, kTileNodes, Node{});
+                scatter_particles(grid_.particles(group[g]), particles_.data(), matter_[grid_.place(group[g]).body],
+                                  grid_.spacing(), dt, tile);
+                grid_.add_tile(group[g], tile);
+            }
+        });
+}
+
+void Bodies::update_nodes(float dt, double time, const RunContext& context) {
+    const ObstaclePoses poses(world_, time);
+    const NodeContacts contacts(grid_, world_, laws_, actor_of_field_, context);
+    const Vec3f gravity = dt * world_.gravity.cast<float>();
+    const Float4 kick = lanes(gravity.x(), gravity.y(), gravity.z(), 0);
+    parallel_for(context, contacts.place_count(), 8, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t place = begin; place < end; ++place) {
+            const std::span<const std::uint32_t> blocks = contacts.blocks(place);
+            for (const std::uint32_t block : blocks) {
+                Node* const nodes = grid_.nodes(block);
+                for (int n = 0; n < kBlockNodes; ++n) {
+                    const float mass = nodes[n].motion[3];
+                    if (!(mass > 0)) continue;
+                    const float inverse = 1 / mass;
+                    nodes[n].motion = nodes[n].motion * lanes(inverse, inverse, inverse, 1) + kick;
+                    nodes[n].matter *= inverse;
+                }
+            }
+        }
+    });
+    contacts.act(grid_, poses, context);
+    hold_nodes();
+}
+
+/// Nodes whose matter is mostly pinned go as the pins do.
+void Bodies::hold_nodes() {
+    if (!has_pins_) return;
+    pinned_.assign(grid_.block_count() * kBlockNodes, Float4{});
+    for (const Pin& pin : world_.pins) {
+        if (!has(pin.body)) continue;
+        const Index field = field_of_[pin.body];
+        for (const Index particle : pin.particles) {
+            const Particle& p = particles_[first_[field] + particle];
+            const Stencil at(p.x, grid_.spacing());
+            for (int n = 0; n < 27; ++n) {
+                const int k[3] = {n % 3, n / 3 % 3, n / 9};
+                const std::array<int, 3> node = {at.base[0] + k[0], at.base[1] + k[1], at.base[2] + k[2]};
+                const float mass = p.mass * at.weight[0][k[0]] * at.weight[1][k[1]] * at.weight[2][k[2]];
+                pinned_[grid_.node_index(node, field)] += mass * lanes(p.v[0], p.v[1], p.v[2], 1);
+            }
+        }
+    }
+    for (std::size_t block = 0; block < grid_.block_count(); ++block)
+        for (std::size_t n = 0; n < kBlockNodes; ++n) {
+            const Float4& held = pinned_[block * kBlockNodes + n];
+            Node& node = grid_.nodes(block)[n];
+            if (held[3] > kHeldShare * node.motion[3])
+                for (int k = 0; k < 3; ++k) node.motion[k] = held[k] / held[3];
+        }
+}
+
+void Bodies::gather(float dt, double time, const RunContext& context) {
+    const float h = grid_.spacing(), moment = 4 / (h * h);
+    const ObstaclePoses poses(world_, time);
+    const HeatExchange exchange(world_, time, dt, grid_.spacing(), particles_);
+    const bool has_heat = has_heat_ || HeatExchange::acts_in(world_);
+    for (const std::vector<std::uint32_t>& group : grid_.groups())
+        parallel_for(context, group.size(), 1, [&](std::size_t begin, std::size_t end) {
+            Node tile[kTileNodes];
+            std::vector<AtParticle> found;
+            std::vector<std::size_t> near; // obstacles
+            for (std::size_t g = begin; g < end; ++g) {
+                grid_.read_tile(group[g], tile);
+                const std::span<const std::uint32_t> numbers = grid_.particles(group[g]);
+                const std::uint32_t field = grid_.place(group[g]).body;
+                const Matter& matter = matter_[field];
+                const float kept = std::exp(-dt * matter.damping());
+                exchange.go_to(grid_.place(group[g]), poses, near);
+                found.resize(numbers.size());
+                gather_at_particles(numbers, particles_.data(), h, tile, found.data());
+                for (std::size_t i = 0; i < numbers.size(); ++i) {
+                    Particle& p = particles_[numbers[i]];
+                    const auto& [value, slope] = found[i];
+                    if (!std::isfinite(value[0] + value[1] + value[2])) { // it stays, at rest
+                        for (int k = 0; k < 3; ++k) p.v[k] = p.c[k][0] = p.c[k][1] = p.c[k][2] = 0;
+                        continue;
+                    }
+                    if (has_heat) {
+                        p.add_heat(value[5]);
+                        exchange.act(p, matter, emptiness(found[i], field).norm(), surface_[field], poses, near);
+                    }
+                    for (int k = 0; k < 3; ++k) {
+                        p.v[k] = kept * value[k];
+                        p.x[k] += dt * value[k];
+                        for (int r = 0; r < 3; ++r) p.c[k][r] = moment * slope[k][r];
+                        p.warming[k] = moment * slope[k][4];
+                    }
+                }
+                matter.deform(numbers, particles_.data(), dt);
+            }
+        });
+}
+
+void Bodies::move_tracers(float dt, const RunContext& context) {
+    const float h = grid_.spacing();
+    parallel_for(context, tracers_.size(), kTracerGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t t = begin; t < end; ++t) {
+            Tracer& tracer = tracers_[t];
+            const Stencil at(tracer.x.data(), h);
+            Eigen::Matrix4f moments = Eigen::Matrix4f::Zero();
+            Eigen::Matrix<float, 4, 3> sums = Eigen::Matrix<float, 4, 3>::Zero();
+            float mass = 0, renewal = 0;
+            for (int n = 0; n < 27; ++n) {
+                const int k[3] = {n % 3, n / 3 % 3, n / 9};
+                const std::array<int, 3> node = {at.base[0] + k[0], at.base[1] + k[1], at.base[2] + k[2]};
+                const std::size_t index = grid_.node_index(node, tracer.field);
+                if (index == Grid::kNoNode) continue;
+                const Node& value = grid_.node(index);
+                if (!(value.motion[3] > kLeastNodeMass * grid_mass_[tracer.field])) continue;
+                const float w = at.weight[0][k[0]] * at.weight[1][k[1]] * at.weight[2][k[2]];
+                Eigen::Vector4f row(1, 0, 0, 0);
+                for (int axis = 0; axis < 3; ++axis) row[axis + 1] = at.first_way[axis] + float(k[axis]) * h;
+                moments += w * row * row.transpose();
+                sums += w * row * vector_of(value.motion).transpose();
+                mass += w * value.motion[3];
+                renewal += w * value.motion[3] * value.matter[3];
+            }
+            if (!(mass > 0)) continue;
+            for (int k = 1; k < 4; ++k) moments(k, k) += kRidge * h * h * moments(0, 0);
+            const Eigen::Matrix<float, 4, 3> fit = moments.ldlt().solve(sums);
+            if (!fit.allFinite()) continue;
+            tracer.x += dt * fit.row(0).transpose();
+            tracer.gradient += dt * fit.bottomRows<3>().transpose() * tracer.gradient;
+            tracer.renewal = std::max(tracer.renewal, std::min(1.0f, renewal / mass));
+        }
+    });
+}
+
+/// Forces on regions, shared out by mass.
+void Bodies::add_forces(float dt, double time) {
+    for (const RegionForce& force : world_.forces) {
+        if (!has(force.body)) continue;
+        const std::size_t first = first_[field_of_[force.body]];
+        const std::size_t count = particle_count(force.body);
+        double mass = 0;
+        force.each_particle(count, [&](Index p) { mass += double(particles_[first + p].mass); });
+        const Vec3f kick = (double(dt) / mass * force.force.at(time)).cast<float>();
+        force.each_particle(count, [&](Index p) {
+            for (int k = 0; k < 3; ++k) particles_[first + p].v[k] += kick[k];
+        });
+    }
+}
+
+void Bodies::hold_pinned(double time) {
+    for (std::size_t n = 0; n < world_.pins.size(); ++n) {
+        const Pin& pin = world_.pins[n];
+        if (!has(pin.body)) continue;
+        const Eigen::Isometry3d now = pin.motion.at(time);
+        const MotionRate rate = rate_of(pin.motion, time);
+        for (std::size_t k = 0; k < pin.particles.size(); ++k) {
+            Particle& p = particles_[first_[field_of_[pin.body]] + pin.particles[k]];
+            const Vec3d from = pinned_from_[n][k].cast<double>(), place = now * from;
+            const Vec3d velocity = rate.at(place);
+            for (int axis = 0; axis < 3; ++axis) {
+                p.x[axis] = float(place[axis]);
+                p.v[axis] = float(velocity[axis]);
+            }
+        }
+    }
+}
+
+void Bodies::begin_pins() {
+    pinned_from_.resize(world_.pins.size());
+    for (std::size_t n = 0; n < world_.pins.size(); ++n) {
+        const Pin& pin = world_.pins[n];
+        if (!has(pin.body)) continue;
+        has_pins_ = true;
+        pinned_from_[n].clear();
+        for (const Index particle : pin.particles) {
+            const Particle& p = particles_[first_[field_of_[pin.body]] + particle];
+            pinned_from_[n].emplace_back(p.x[0], p.x[1], p.x[2]);
+        }
+    }
+}
+
+void Bodies::read(std::size_t actor, Vectors& positions, Vectors& velocities) const {
+    const std::size_t first = first_[field_of_[actor]];
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+        const Particle& p = particles_[first + i];
+        positions.set(i, {p.x[0], p.x[1], p.x[2]});
+        velocities.set(i, {p.v[0], p.v[1], p.v[2]});
+    }
+}
+
+void Bodies::set_positions(std::size_t actor, const Vectors& positions) {
+    const std::size_t first = first_[field_of_[actor]];
+    for (std::size_t i = 0; i < positions.size(); ++i)
+        for (int k = 0; k < 3; ++k) particles_[first + i].x[k] = positions[i][k];
+}
+
+void Bodies::set_velocities(std::size_t actor, const Vectors& velocities) {
+    const std::size_t first = first_[field_of_[actor]];
+    for (std::size_t i = 0; i < velocities.size(); ++i)
+        for (int k = 0; k < 3; ++k) particles_[first + i].v[k] = velocities[i][k];
+}
+
+std::size_t Bodies::repair(std::size_t actor, const Vectors& positions, const Vectors& velocities,
+                           std::span<const std::uint8_t> is_lost) {
+    const Index field = field_of_[actor];
+    std::size_t repaired = 0;
+    for (std::size_t i = 0; i < is_lost.size(); ++i) {
+        Particle& p = particles_[first_[field] + i];
+        if (!is_lost[i] && p.is_sound()) continue;
+        ++repaired;
+        for (int k = 0; k < 3; ++k) {
+            p.x[k] = positions[i][k];
+            p.v[k] = velocities[i][k];
+        }
+        if (p.is_sound()) continue;
+        Particle whole = at_rest(p.mass, p.volume, field);
+        std::copy_n(p.x, 3, whole.x);
+        std::copy_n(p.v, 3, whole.v);
+        p = whole;
+    }
+    return repaired;
+}
+
+/// A body that turns or shears as a whole, from the velocities of its particles.
+void Bodies::set_velocity_gradient(std::size_t actor, const Mat3f& gradient) {
+    for (std::size_t i = first_[field_of_[actor]]; i < first_[field_of_[actor] + 1]; ++i)
+        for (int k = 0; k < 3; ++k)
+            for (int r = 0; r < 3; ++r) particles_[i].c[k][r] = gradient(r, k);
+}
+
+MatterParticles Bodies::matter(std::size_t actor) const {
+    MatterParticles result;
+    result.spacing = spacing_;
+    const Matter& matter = matter_[field_of_[actor]];
+    for (std::size_t i = first_[field_of_[actor]]; i < first_[field_of_[actor] + 1]; ++i) {
+        const Particle& p = particles_[i];
+        result.positions.emplace_back(p.x[0], p.x[1], p.x[2]);
+        // Melt has no tension, and a ratio above 1 says that particles drifted apart, not that there is more matter.
+        result.volumes.push_back(p.volume * std::min(p.volume_ratio(), 1.0f));
+        result.temperatures.push_back(matter.temperature(p.enthalpy()));
+        result.liquid.push_back(matter.liquid(p.enthalpy()));
+        result.renewal.push_back(p.renewal);
+    }
+    return result;
+}
+
+double Bodies::elastic_energy() const {
+    double sum = 0;
+    for (std::size_t i = 0; i < particles_.size(); ++i) sum += matter_[field_[i]].energy(particles_[i]);
+    return sum;
+}
+
+/// A particle stands for the quarter of a cell's square around it, along each axis.
+double Bodies::affine_energy() const {
+    double sum = 0;
+    for (const Particle& p : particles_)
+        for (int k = 0; k < 3; ++k)
+            for (int r = 0; r < 3; ++r) sum += double(p.mass) * double(p.c[k][r]) * double(p.c[k][r]);
+    return 0.5 * 0.25 * double(grid_.spacing()) * double(grid_.spacing()) * sum;
+}
+
+Vec3d Bodies::affine_momentum() const {
+    Vec3d sum = Vec3d::Zero();
+    for (const Particle& p : particles_)
+        sum += double(p.mass) *
+               Vec3d(double(p.c[1][2] - p.c[2][1]), double(p.c[2][0] - p.c[0][2]), double(p.c[0][1] - p.c[1][0]));
+    return 0.25 * double(grid_.spacing()) * double(grid_.spacing()) * sum;
+}
+
+double Bodies::heat() const {
+    double sum = 0;
+    for (const Particle& p : particles_) sum += double(p.mass) * (double(p.enthalpy()) + double(p.enthalpy_beside));
+    return sum;
+}
+
+std::size_t Bodies::add_tracers(std::size_t actor, std::span<const Vec3f> points, std::span<const Mat3f> gradients) {
+    const std::size_t first = tracers_.size();
+    for (std::size_t k = 0; k < points.size(); ++k) tracers_.push_back({points[k], gradients[k], 0, field_of_[actor]});
+    return first;
+}
+
+void Bodies::read_tracers(std::size_t first, std::span<Vec3f> points, std::span<Mat3f> gradients) const {
+    for (std::size_t k = 0; k < points.size(); ++k) points[k] = tracers_[first + k].x;
+    for (std::size_t k = 0; k < gradients.size(); ++k) gradients[k] = tracers_[first + k].gradient;
+}
+
+void Bodies::read_renewal(std::size_t first, std::span<float> renewal) const {
+    for (std::size_t k = 0; k < renewal.size(); ++k) renewal[k] = tracers_[first + k].renewal;
+}
+
+std::string Bodies::state() const {
+    if (empty()) return {};
+    ByteWriter writer;
+    writer.array(std::span(particles_));
+    writer.array(std::span(tracers_));
+    return writer.take();
+}
+
+bool Bodies::restore_state(std::string_view bytes) {
+    if (empty()) return bytes.empty();
+    ByteReader reader(bytes);
+    std::vector<Particle> particles = reader.array<Particle>();
+    std::vector<Tracer> tracers = reader.array<Tracer>();
+    if (!reader.ok() || !reader.at_end() || particles.size() != particles_.size()) return false;
+    for (std::size_t p = 0; p < particles.size(); ++p) // what never changes
+        if (particles[p].mass != particles_[p].mass || particles[p].volume != particles_[p].volume) return false;
+    for (const Tracer& tracer : tracers)
+        if (tracer.field >= matter_.size()) return false;
+    particles_ = std::move(particles);
+    // Points attached since stay where they are.
+    if (tracers.size() < tracers_.size())
+        tracers.insert(tracers.end(), tracers_.begin() + std::ptrdiff_t(tracers.size()), tracers_.end());
+    tracers_ = std::move(tracers);
+    return true;
+}
+
+} // namespace filigree::mpm

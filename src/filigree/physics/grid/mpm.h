@@ -1,0 +1,98 @@
+// Bodies of the material point method: matter that flows, parts and joins. Private to the layer.
+// Based on:
+// [Hu 2018] as mpm_particle.h
+// [Jiang 2015] The affine particle-in-cell method
+// [Bardenhagen 2000] The material-point method for granular materials: contact of fields
+#pragma once
+
+#include "filigree/physics/contact/obstacle_motion.h"
+#include "filigree/physics/contact/pair_laws.h"
+#include "filigree/physics/grid/mpm_grid.h"
+#include "filigree/physics/grid/mpm_kernel.h"
+#include "filigree/physics/matter_particles.h"
+#include "filigree/physics/simulation.h"
+
+#include <string>
+#include <string_view>
+
+namespace filigree::mpm {
+
+/// All bodies of one simulation that are of the model mpm; they share a grid of twice their coarsest spacing.
+class Bodies {
+public:
+    /// actors: all of the simulation's.
+    Bodies(const World& world, std::span<const Actor> actors);
+
+    bool empty() const { return particles_.empty(); }
+    bool has(std::size_t actor) const { return field_of_[actor] != kNoIndex; }
+    std::size_t particle_count(std::size_t actor) const;
+
+    /// Steps until a time. Breaks off when cancelled.
+    void advance(double from, double until, FrameReport& report, const RunContext& context);
+
+    /// Where the particles of a body are, and how fast.
+    void read(std::size_t actor, Vectors& positions, Vectors& velocities) const;
+    /// Instead; with their matter as it was.
+    void set_positions(std::size_t actor, const Vectors& positions);
+    void set_velocities(std::size_t actor, const Vectors& velocities);
+    void set_velocity_gradient(std::size_t actor, const Mat3f& gradient); ///< 1/s, of all its particles
+    void begin_pins();                                                    ///< once, when particles are where they begin
+    /// Takes lost particles from these, and makes whatever else a particle of the body carries finite. is_lost: of
+    /// each. Returns how many particles were changed.
+    std::size_t repair(std::size_t actor, const Vectors& positions, const Vectors& velocities,
+                       std::span<const std::uint8_t> is_lost);
+    MatterParticles matter(std::size_t actor) const;
+    double elastic_energy() const; ///< J
+    // Of what particles carry beside their velocities: J, and kg m^2/s.
+    double affine_energy() const;
+    Vec3d affine_momentum() const;
+    double heat() const; ///< J, from 0 K
+
+    /// Points that go along from where they are now, with gradients from rest to there. Returns the first's number.
+    std::size_t add_tracers(std::size_t actor, std::span<const Vec3f> points, std::span<const Mat3f> gradients);
+    void read_tracers(std::size_t first, std::span<Vec3f> points, std::span<Mat3f> gradients) const;
+    void read_renewal(std::size_t first, std::span<float> renewal) const;
+
+    std::string state() const;
+    bool restore_state(std::string_view bytes); ///< false, and nothing changed, for bytes of other bodies
+
+private:
+    struct Tracer {
+        Vec3f x;
+        Mat3f gradient;
+        float renewal;
+        std::uint32_t field;
+    };
+
+    Vec3f emptiness(const AtParticle& found, std::size_t field) const;
+    Particle at_rest(float mass, float volume, std::size_t field) const; ///< at the origin
+    void find_surfaces(std::span<const Actor> actors);
+    float longest_step(const RunContext& context) const; ///< s
+    void scatter(float dt, const RunContext& context);
+    void update_nodes(float dt, double time, const RunContext& context);
+    void hold_nodes();
+    void gather(float dt, double time, const RunContext& context);
+    void move_tracers(float dt, const RunContext& context);
+    void add_forces(float dt, double time);
+    void hold_pinned(double time);
+
+    const World& world_;
+    const PairLaws laws_;
+    std::vector<Index> field_of_;             ///< of each actor; kNoIndex: not of this model
+    std::vector<Matter> matter_;              ///< of each field
+    std::vector<std::size_t> actor_of_field_; ///< the way back
+    std::vector<std::size_t> first_;          ///< particle of each field, and their number
+    std::vector<Particle> particles_;
+    std::vector<std::uint32_t> field_;  ///< of each particle
+    std::vector<float> start_enthalpy_; ///< J/kg, by field
+    std::vector<float> grid_mass_;      ///< kg, of a full node, by field
+    std::vector<float> surface_;        ///< by field: area of the body at rest, in parts of what its particles tell
+    std::vector<Tracer> tracers_;
+    std::vector<std::vector<Vec3f>> pinned_from_; ///< of each pin of these bodies
+    Grid grid_;
+    float spacing_ = 0; ///< of particles, m
+    bool has_heat_ = false, has_pins_ = false;
+    std::vector<Float4> pinned_; ///< momentum and mass that are pinned, of each node
+};
+
+} // namespace filigree::mpm

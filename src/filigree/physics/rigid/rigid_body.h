@@ -1,0 +1,49 @@
+// A body that does not deform: its particles keep their places beside each other. Private to the layer.
+#pragma once
+
+#include "filigree/physics/body/body_state.h"
+
+namespace filigree {
+
+/// Squared frequency that contacts give a rigid body at most, 1/s^2: stiff enough that five stacked stones sink in by
+/// less than a millimetre in all, soft enough for 16 substeps a frame at 60 frames a second.
+inline constexpr float kRigidSquaredFrequency = 0.99e6f;
+
+/// The same particles and surface, of a material that does not deform. body: of fem or springs.
+Body as_rigid(const Body& body);
+
+/// m, m/s and so on of the body as it is moved by its particles' forces.
+RigidPose rigid_pose(const BodyState& body);
+/// The particles where the pose has them, with its velocities.
+void place_particles(BodyState& body);
+/// The pose that fits the particles best, after something moved them one by one.
+void fit_pose(BodyState& body);
+
+/// What the forces on the particles are together.
+struct RigidLoad {
+    Vec3d force = Vec3d::Zero();  ///< N
+    Vec3d torque = Vec3d::Zero(); ///< N m, about the centre of mass
+};
+RigidLoad rigid_load(const BodyState& body);
+/// m/s of the load and gravity, for dt; then what damping leaves, a factor.
+void kick_rigid(BodyState& body, const RigidLoad& load, const Vec3d& gravity, double dt, double kept);
+/// Moves by the velocities for dt, and places the particles.
+void drift_rigid(BodyState& body, double dt);
+
+/// N/m of each surface point, so that those that touch at one time add no more than kRigidSquaredFrequency.
+std::vector<float> rigid_surface_stiffness(const BodyState& body);
+
+/// One Newton step of the six ways in which a body moves without deforming [Giles 2025]: all of a sweep for a rigid
+/// body; for others what sweeps from particle to particle are slow at.
+void move_as_one(Vectors& positions, std::span<const float> mass, const Descent& descent);
+
+/// Elastic forces of a body that has none.
+std::unique_ptr<Elasticity> make_rigid_elasticity(const Body& body);
+
+/// m/s of the fastest point, below which a body that rests tires.
+inline constexpr float kSlow = 5e-3f;
+/// Counts frames in which a body hardly moves; after half a second it sleeps.
+void tire(BodyState& body, double frame_seconds);
+void wake(BodyState& body);
+
+} // namespace filigree

@@ -1,0 +1,55 @@
+#include "filigree/physics/rigid/sleep.h"
+
+#include "filigree/core/disjoint_sets.h"
+#include "filigree/physics/rigid/rigid_body.h"
+
+namespace filigree {
+
+namespace {
+
+/// What rigid bodies lie on, by what touched at last.
+class Support {
+public:
+    explicit Support(const SimulationState& state)
+        : groups_(state.bodies.size()), on_obstacle_(state.bodies.size(), 0), beside_soft_(state.bodies.size(), 0) {
+        const auto is_rigid = [&](std::size_t b) { return state.bodies[b].rigid.has_value(); };
+        state.contacts.each_holding([&](Index a, Index b) {
+            if (state.bodies[a].is_absent || state.bodies[b].is_absent) return;
+            if (is_rigid(a) && is_rigid(b)) groups_.join(a, b);
+            beside_soft_[a] |= !is_rigid(b);
+            beside_soft_[b] |= !is_rigid(a);
+        });
+        for (Index b = 0; b < on_obstacle_.size(); ++b)
+            if (is_rigid(b) && state.contacts.is_on_obstacle(b)) on_obstacle_[groups_.root(b)] = 1;
+    }
+    /// Whether an obstacle carries a body, by others or itself.
+    bool carries(std::size_t b) { return on_obstacle_[groups_.root(Index(b))] != 0; }
+    /// Whether something touches it that never sleeps.
+    bool is_beside_soft(std::size_t b) const { return beside_soft_[b] != 0; }
+
+private:
+    DisjointSets groups_;                                 ///< of rigid bodies that touch
+    std::vector<std::uint8_t> on_obstacle_, beside_soft_; ///< at each group's root; of each body
+};
+
+} // namespace
+
+void let_rest(SimulationState& state, double from, double until) {
+    const bool disturbed = state.external.has_wind() || obstacle_way(state.world, state.bodies, from, until) > 0;
+    Support support(state);
+    for (std::size_t b = 0; b < state.bodies.size(); ++b) {
+        BodyState& body = state.bodies[b];
+        if (!body.rigid) continue;
+        const bool is_moved =
+            disturbed || body.is_held || state.external.pull(b, until) || state.external.push(body.actor);
+        body.rigid->rests = !is_moved && support.carries(b);
+        if (body.rigid->rests && !support.is_beside_soft(b) && body.may_sleep) {
+            if (!body.rigid->sleeps) tire(body, state.frame_seconds());
+            continue;
+        }
+        if (body.rigid->sleeps) state.contacts.look_near_again();
+        wake(body);
+    }
+}
+
+} // namespace filigree

@@ -1,0 +1,384 @@
+// Velocity Verlet: kick, drift, kick. The stable step follows from the squared frequencies that are found with the
+// forces.
+#include "filigree/core/parallel_for.h"
+#include "filigree/physics/rigid/rigid_body.h"
+#include "filigree/physics/rigid/rigid_state.h"
+#include "filigree/physics/step/simulation_state.h"
+#include "filigree/physics/step/stopwatch.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace filigree {
+
+namespace {
+
+constexpr std::size_t kExplicitStepsGrain = 2048;
+constexpr std::size_t kAwakeGrain = 16, kElasticGrain = 4; // bodies
+constexpr double kSafety = 0.9;      ///< part of the stable step that is used: it changes while a step is made
+constexpr double kLeastSubsteps = 2; ///< a frame; with one, large motions gain energy
+constexpr double kNoLimit = std::numeric_limits<double>::infinity();
+constexpr double kShortestOpening = 0.25; ///< of the stable step: cracks that open faster are followed less well
+/// Large vibrations that steps hardly follow draw energy from them: tiny bodies in free flight took in a hundred times
+/// what they had (HardStarts.ANoisyBodyGainsNoEnergy). A little internal damping takes it away again. Accelerations
+/// tell: in vibrations that steps follow well they change little in a substep.
+constexpr float kCalm = 0.05f;       ///< that change, as a speed, in parts of the speed of waves ...
+constexpr float kNoisy = 0.15f;      ///< ... from which on damping is full
+constexpr float kNoisyDelay = 0.05f; ///< substeps
+/// A few crushed cells are little of a large body; forces change there as fast as steps follow.
+constexpr float kCrushedVolume = 0.1f; ///< of a cell, of its volume at rest
+constexpr float kCrushedDelay = 0.1f;  ///< substeps
+/// Clay that is thrown at the ground would throw bits off, but for damping of waves of a few spacings [von Neumann
+/// 1950].
+constexpr float kFlowingDelay = 0.25f;     ///< of the time that a wave takes across a spacing
+constexpr float kLightDelay = 0.5f;        ///< substeps: of a piece's light corners, which would swing for ever ...
+constexpr float kFreeWay = 0.05f;          ///< spacings a substep: ... as far as they move faster
+constexpr unsigned kExplicitLimit = 20000; ///< substeps a frame, whatever was asked for
+
+/// Where internal damping has forces computed: f(x + tau v) = f(x) - tau K v, Kelvin-Voigt to first order; of v less
+/// its rigid part.
+Vectors positions_ahead(const BodyState& body, float delay, const RunContext& context) {
+    const RigidState rigid = rigid_state(body);
+    const Vec3f drifting = (rigid.linear / rigid.mass).cast<float>();
+    const Vec3f turning = rigid.angular_velocity_of(rigid.angular).cast<float>(), centre = rigid.centre.cast<float>();
+    Vectors ahead = body.positions;
+    parallel_for(context, ahead.size(), kExplicitStepsGrain, [&](std::size_t begin, std::size_t end) {
+        const auto move_axis = [&](float* to, const std::vector<float>& velocities, int axis) {
+            const int u = (axis + 1) % 3, w = (axis + 2) % 3;
+            const float *v = velocities.data(), *along_u = (body.positions.*kVectorAxes[u]).data(),
+                        *along_w = (body.positions.*kVectorAxes[w]).data();
+            for (std::size_t i = begin; i < end; ++i)
+                to[i] += delay * (v[i] - drifting[axis] -
+                                  (turning[u] * (along_w[i] - centre[w]) - turning[w] * (along_u[i] - centre[u])));
+        };
+        move_axis(ahead.x.data(), body.velocities.x, 0);
+        move_axis(ahead.y.data(), body.velocities.y, 1);
+        move_axis(ahead.z.data(), body.velocities.z, 2);
+    });
+    return ahead;
+}
+
+/// The same for light corners alone: of what they move in a substep beside the heaviest corner of their cells, all that
+/// is more than a part of a spacing.
+void damp_light_corners(const BodyState& body, float dt, Vectors& ahead) {
+    const float free_way = kFreeWay * float(body.body->spacing());
+    for (const auto& [particle, neighbour] : body.light_corners) {
+        const bool is_free = body.inverse_mass[particle] * body.body->mass[particle] > 0.99f; // neither pinned nor tied
+        const Vec3f way = dt * (body.velocities[particle] - body.velocities[neighbour]);
+        const float length = way.norm();
+        if (is_free && length > free_way) ahead.add(particle, kLightDelay * (1 - free_way / length) * way);
+    }
+}
+
+/// m/s^2: how much accelerations have changed since forces were `before`, of the particles beside each other, root mean
+/// square by mass. `before` becomes the forces now.
+float change_of_acceleration(const BodyState& body, Vectors& before, const RunContext& context) {
+    constexpr std::size_t kAtOnce = 8; // so that the compiler uses vectors
+    struct Sums {
+        float mass[kAtOnce] = {}, x[kAtOnce] = {}, y[kAtOnce] = {}, z[kAtOnce] = {}, squares[kAtOnce] = {};
+    };
+    const std::size_t count = body.inverse_mass.size();
+    std::vector<Sums> sums((count + kExplicitStepsGrain - 1) / kExplicitStepsGrain);
+    parallel_for(context, count, kExplicitStepsGrain, [&](std::size_t begin, std::size_t end) {
+        Sums sum; // not in place: the compiler would have to expect it among the particles
+        const auto& [fx, fy, fz] = body.forces;
+        const auto& [gx, gy, gz] = before;
+        const auto add = [&, m = body.body->mass.data(), w = body.inverse_mass.data()](std::size_t i, std::size_t k) {
+            const float ax = (fx[i] - gx[i]) * w[i], ay = (fy[i] - gy[i]) * w[i], az = (fz[i] - gz[i]) * w[i];
+            sum.mass[k] += m[i];
+            sum.x[k] += m[i] * ax;
+            sum.y[k] += m[i] * ay;
+            sum.z[k] += m[i] * az;
+            sum.squares[k] += m[i] * (ax * ax + ay * ay + az * az);
+        };
+        const std::size_t whole = end - (end - begin) % kAtOnce;
+        for (std::size_t i = begin; i < whole; i += kAtOnce)
+            for (std::size_t k = 0; k < kAtOnce; ++k) add(i + k, k);
+        for (std::size_t i = whole; i < end; ++i) add(i, 0);
+        sums[begin / kExplicitStepsGrain] = sum;
+    });
+    before = body.forces;
+    const auto all = [&](const float(Sums::*parts)[kAtOnce]) {
+        float total = 0;
+        for (const Sums& sum : sums) total = std::accumulate(sum.*parts, sum.*parts + kAtOnce, total);
+        return total;
+    };
+    const float mass = all(&Sums::mass);
+    const float mean = Vec3f(all(&Sums::x), all(&Sums::y), all(&Sums::z)).squaredNorm() / mass;
+    return std::sqrt(std::max(0.0f, all(&Sums::squares) - mean) / mass);
+}
+
+/// s, longest that is stable; 0 where no step is. A spring that is also damped along its own motion has
+/// zeta = omega tau / 2.
+double stable_step(double squared_frequency, double internal_damping) {
+    const double omega = std::sqrt(squared_frequency), zeta = 0.5 * omega * internal_damping;
+    const double step = kSafety * 2 / omega * (std::sqrt(1 + zeta * zeta) - zeta);
+    return std::isfinite(squared_frequency) ? step : 0;
+}
+
+class ExplicitSteps {
+public:
+    ExplicitSteps(SimulationState& state, double from, double until, FrameReport& report, const RunContext& context)
+        : state_(state), bodies_(state.bodies), report_(report), context_(context), now_(from), until_(until),
+          meets_anything_(!state.world.obstacles.empty() || state.options.contacts_within_bodies ||
+                          (state.options.contacts_between_bodies && state.bodies.size() > 1)) {}
+
+    double run() {
+        if (meets_anything_) state_.contacts.begin_frame(bodies_, context_);
+        find_contacts();
+        const float first_dt = float(state_.frame_seconds() / state_.options.most_substeps);
+        find_forces(first_dt);
+        if (repair_start(state_, elastic_, report_, context_)) {
+            state_.contacts.begin_anew();
+            state_.contacts.begin_frame(bodies_, context_);
+            find_contacts();
+            stable_in_frame_ = kNoLimit;
+            vibrations_.clear();
+            find_forces(first_dt);
+        }
+        const auto is_left = [&] { return until_ - now_ > 1e-9 * state_.frame_seconds(); };
+        while (is_left()) {
+            const double steps = steps_left();
+            if (!(steps <= steps_allowed()) || context_.is_cancelled()) break;
+            const float dt = float((until_ - now_) / steps);
+            const double before = now_;
+            move(dt, steps <= 1 ? until_ : now_ + double(dt));
+            find_contacts();
+            find_forces(dt);
+            finish(dt);
+            const Breaks breaks = break_bodies(state_, before, now_, context_);
+            if (breaks.contacts) {
+                place_rigid();
+                if (meets_anything_) state_.contacts.begin_frame(bodies_, context_);
+                find_contacts();
+            }
+            if (breaks.forces || breaks.contacts) find_forces(dt, true);
+        }
+        place_rigid();
+        if (meets_anything_) state_.contacts.end_frame(bodies_, context_);
+        return is_left() ? now_ : until_;
+    }
+
+private:
+    double steps_left() const {
+        const double remaining = until_ - now_;
+        const double fewest = std::ceil(kLeastSubsteps * remaining / state_.frame_seconds() - 1e-6);
+        return stable_step_ > 0 ? std::max(fewest, std::ceil(remaining / stable_step_)) : kExplicitLimit + 1.0;
+    }
+    /// A frame that was begun may take twice as many. Where bodies meet fast descent takes more substeps as well.
+    double steps_allowed() const {
+        double limit = kExplicitLimit;
+        if (state_.options.mode == StepMode::automatic)
+            limit = state_.options.most_substeps * state_.frame_seconds() /
+                    (state_.options.descent_substeps * state_.descent_step(state_.contacts.longest_step()));
+        return report_.substeps == 0 ? limit : 2 * limit - report_.substeps;
+    }
+
+    /// Particles of rigid bodies as their poses have them after the last kick.
+    void place_rigid() {
+        for (BodyState& body : bodies_)
+            if (body.rigid && !body.sleeps()) place_particles(body);
+    }
+
+    /// The first half of the kick, and the drift.
+    void move(float dt, double until) {
+        const Stopwatch watch(report_.other_seconds);
+        kick(0.5f * dt, false);
+        drift(dt);
+        const double before = std::exchange(now_, until);
+        move_pins(state_, now_, dt);
+        if (meets_anything_)
+            state_.contacts.travel(bodies_, dt, float(obstacle_way(state_.world, bodies_, before, now_)), context_);
+    }
+
+    void find_contacts() {
+        if (!meets_anything_) return;
+        const Stopwatch watch(report_.contact_seconds);
+        const double frame = state_.frame_seconds();
+        const float speed = state_.contacts.approach_speed(bodies_) + float(state_.world.gravity.norm() * frame);
+        const float way = speed * float(frame) + float(obstacle_way(state_.world, bodies_, now_, now_ + frame));
+        const float spacing = least_spacing(bodies_);
+        state_.contacts.search(bodies_,
+                               {.time = now_,
+                                .obstacle_reach = std::clamp(2 * way, 0.25f * spacing, 4 * spacing),
+                                .pair_reach = 0.5f * spacing,
+                                .frame = frame},
+                               context_);
+    }
+
+    /// All forces at the present positions, and the step that is stable there.
+    void find_forces(float dt, bool is_again = false) {
+        find_elastic_forces(dt, is_again);
+        {
+            const Stopwatch watch(report_.contact_seconds);
+            const ContactReport touching = state_.contacts.add_forces(bodies_, now_, dt, context_);
+            report_.contacts = touching.contacts;
+            report_.deepest_contact = std::max(report_.deepest_contact, double(touching.deepest));
+            report_.deepest_in_matter = std::max(report_.deepest_in_matter, double(touching.deepest_in_matter));
+        }
+        const Stopwatch watch(report_.other_seconds);
+        state_.external.add_forces(bodies_, now_, context_);
+        stable_step_ = state_.contacts.longest_step();
+        std::vector<double> frequencies(bodies_.size()); // squared
+        for (std::size_t b = 0; b < bodies_.size(); ++b) {
+            BodyState& body = bodies_[b];
+            if (body.sleeps()) continue;
+            double& squared_frequency = frequencies[b];
+            squared_frequency = double(elastic_[b].squared_frequency);
+            if (!body.rigid)
+                squared_frequency += state_.contacts.added_frequency(b) * double(body.rest_squared_frequency);
+            squared_frequency = state_.external.add_pulls(body, b, now_, squared_frequency);
+        }
+        double opening_step = kNoLimit;
+        for (const Cracks& cracks : state_.cracks) {
+            const Cracks::Pace pace = cracks.add_forces(bodies_, context_);
+            for (std::size_t piece = 0; piece < cracks.body().pieces.size(); ++piece)
+                frequencies[cracks.first_piece() + piece] += double(pace.squared_frequency);
+            opening_step = std::min(opening_step, double(pace.opening_step));
+        }
+        rigid_loads_.resize(bodies_.size());
+        each_awake([&](const BodyState& body, std::size_t b) {
+            if (body.rigid) rigid_loads_[b] = rigid_load(body);
+        });
+        for (std::size_t b = 0; b < bodies_.size(); ++b)
+            if (!bodies_[b].sleeps())
+                stable_in_frame_ =
+                    std::min(stable_in_frame_, stable_step(frequencies[b], double(vibrations_[b].delay)));
+        stable_step_ = std::min(stable_step_, stable_in_frame_);
+        const double shortest = std::max(kShortestOpening * stable_step_, (until_ - now_) / steps_allowed());
+        stable_step_ = std::min(stable_step_, std::max(opening_step, shortest));
+    }
+
+    /// s of internal damping, unless more is needed.
+    static float usual_delay(const Body& body) {
+        const auto asked = float(body.material.internal_damping);
+        if (body.material.model != MaterialModel::meshfree || !body.material.is_plastic()) return asked;
+        return std::max(asked, kFlowingDelay * float(body.spacing() / pressure_wave_speed(body.material)));
+    }
+
+    /// s of internal damping.
+    float find_delay(std::size_t b, float dt) {
+        const BodyState& body = bodies_[b];
+        Vibration& vibration = vibrations_[b];
+        const float usual = usual_delay(*body.body);
+        if (!std::exchange(vibration.has_forces, true)) return usual;
+        const float crushed = elastic_[b].least_volume_ratio < kCrushedVolume ? kCrushedDelay * dt : 0;
+        if (vibration.before.size() == 0) {
+            vibration.before = body.forces;
+            return std::max(usual, crushed);
+        }
+        const float change = dt * change_of_acceleration(body, vibration.before, context_) /
+                             float(pressure_wave_speed(body.body->material));
+        const float noisy = kNoisyDelay * dt * std::clamp((change - kCalm) / (kNoisy - kCalm), 0.0f, 1.0f);
+        return std::max({usual, crushed, noisy});
+    }
+
+    /// is_again: nothing has moved since the last time.
+    void find_elastic_forces(float dt, bool is_again) {
+        const Stopwatch watch(report_.elastic_seconds);
+        elastic_.resize(bodies_.size());
+        vibrations_.resize(bodies_.size());
+        parallel_for(context_, bodies_.size(), kElasticGrain, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t b = begin; b < end; ++b)
+                if (!bodies_[b].is_absent) find_elastic_forces_of(b, dt, is_again);
+        });
+        for (std::size_t b = 0; b < bodies_.size(); ++b)
+            if (!bodies_[b].is_absent) note_deformation(report_, b, elastic_[b]);
+    }
+
+    void find_elastic_forces_of(std::size_t b, float dt, bool is_again) {
+        BodyState& body = bodies_[b];
+        float& delay = vibrations_[b].delay;
+        if (!body.rigid && !(is_again && vibrations_[b].has_forces)) delay = find_delay(b, dt);
+        if (delay > 0 || !body.light_corners.empty()) {
+            Vectors ahead = delay > 0 ? positions_ahead(body, delay, context_) : body.positions;
+            damp_light_corners(body, dt, ahead);
+            elastic_[b] = body.elasticity->forces(ahead, body.forces, context_);
+        } else {
+            elastic_[b] = body.elasticity->forces(body.positions, body.forces, context_);
+        }
+    }
+
+    /// The second half of the kick, and what follows a substep.
+    void finish(float dt) {
+        {
+            const Stopwatch watch(report_.contact_seconds);
+            push_out(state_, now_, context_);
+        }
+        const Stopwatch watch(report_.other_seconds);
+        kick(0.5f * dt, true); // rigid bodies' particles follow with the next drift, or place_rigid
+        move_pins(state_, now_, dt);
+        finish_substep(state_, dt, context_);
+        ++report_.substeps;
+    }
+
+    template <class Visit>
+    void each_awake(const Visit& visit) { ///< on all threads
+        parallel_for(context_, bodies_.size(), kAwakeGrain, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t b = begin; b < end; ++b)
+                if (!bodies_[b].sleeps()) visit(bodies_[b], b);
+        });
+    }
+
+    /// Pinned particles too: move_pins sets them right.
+    void kick(float dt, bool damp) {
+        const Vec3f gravity = state_.world.gravity.cast<float>();
+        each_awake([&](BodyState& body, std::size_t b) {
+            const double kept = damp ? std::exp(-2 * double(dt) * body.body->material.damping) : 1;
+            if (body.rigid) return kick_rigid(body, rigid_loads_[b], state_.world.gravity, double(dt), kept);
+            parallel_for(context_, body.positions.size(), kExplicitStepsGrain, [&](std::size_t begin, std::size_t end) {
+                const float* inverse_mass = body.inverse_mass.data();
+                const auto kick_axis = [&](std::vector<float>& velocities, const std::vector<float>& forces, float g) {
+                    float* v = velocities.data();
+                    const float* f = forces.data();
+                    const auto left = float(kept);
+                    for (std::size_t i = begin; i < end; ++i) v[i] = (v[i] + dt * (f[i] * inverse_mass[i] + g)) * left;
+                };
+                kick_axis(body.velocities.x, body.forces.x, gravity.x());
+                kick_axis(body.velocities.y, body.forces.y, gravity.y());
+                kick_axis(body.velocities.z, body.forces.z, gravity.z());
+            });
+        });
+    }
+
+    void drift(float dt) {
+        each_awake([&](BodyState& body, std::size_t) {
+            if (body.rigid) return drift_rigid(body, double(dt));
+            parallel_for(context_, body.positions.size(), kExplicitStepsGrain, [&](std::size_t begin, std::size_t end) {
+                for (std::size_t i = begin; i < end; ++i) body.positions.x[i] += dt * body.velocities.x[i];
+                for (std::size_t i = begin; i < end; ++i) body.positions.y[i] += dt * body.velocities.y[i];
+                for (std::size_t i = begin; i < end; ++i) body.positions.z[i] += dt * body.velocities.z[i];
+            });
+        });
+    }
+
+    SimulationState& state_;
+    std::vector<BodyState>& bodies_;
+    FrameReport& report_;
+    const RunContext& context_;
+    double now_, until_;        // s
+    const bool meets_anything_; // obstacles, other bodies or parts of the same
+    std::vector<ElasticReport> elastic_;
+    struct Vibration {           ///< of a body
+        bool has_forces = false; ///< of this frame; those before it are not known after a restore
+        Vectors before;          ///< N, the forces of the substep before; empty: not known
+        float delay = 0;         ///< s of internal damping
+    };
+    std::vector<Vibration> vibrations_;
+    std::vector<RigidLoad> rigid_loads_; ///< of each body, by find_forces
+    double stable_step_ = 0;             // s
+    /// s: the shortest step that any body's vibrations have asked for in this frame. Steps that become longer again as
+    /// these swing give them energy.
+    double stable_in_frame_ = kNoLimit;
+};
+
+} // namespace
+
+double step_explicitly(SimulationState& state, double from, double until, FrameReport& report,
+                       const RunContext& context) {
+    return ExplicitSteps(state, from, until, report, context).run();
+}
+
+} // namespace filigree

@@ -1,0 +1,67 @@
+// What acts on bodies from outside, beside gravity and contacts: forces on regions and on particles, wind, hands.
+// Private to the layer.
+#pragma once
+
+#include "filigree/physics/body/body_state.h"
+#include "filigree/physics/world.h"
+
+namespace filigree {
+
+/// A hand and the particles it holds: those near its point, by mass, so that nothing is plucked out of the surface.
+struct Grip {
+    Hand hand;
+    Embedding region;
+    Vec3f offset = Vec3f::Zero();     ///< from the region's middle to the point, when it was seized
+    float stiffness = 0, damping = 0; ///< N/m, N s/m
+    float squared_frequency = 0;      ///< bound on what it adds to the body's, 1/s^2
+
+    bool pulls(std::size_t body, double time) const {
+        return hand.body == body && hand.from <= time && time < hand.until;
+    }
+    /// Where the region's middle is pulled to.
+    Vec3f target(double time) const { return hand.target.at(time).cast<float>() - offset; }
+};
+
+/// hand.point goes through place_in_reference: the particles that were there at rest are seized, wherever they are now.
+Grip make_grip(const Hand& hand, const BodyState& body, const RunContext& context);
+
+class ExternalForces {
+public:
+    /// world: outlives this. bodies: fixed in number from here on.
+    ExternalForces(const World& world, std::size_t bodies) : world_(world), pushes_(bodies), wind_(bodies) {}
+
+    void set_grips(std::vector<Grip> grips) { grips_ = std::move(grips); }
+    const std::vector<Grip>& grips() const { return grips_; }
+    bool pull(std::size_t body, double time) const; ///< whether a hand does
+
+    /// N, one a particle of the whole body; none: no such forces.
+    void set_pushes(std::size_t body, Vectors newtons) { pushes_[body] = std::move(newtons); }
+    bool push(std::size_t body) const { return pushes_[body].size() > 0; } ///< whether such forces do
+
+    /// Wind on the surfaces as they are now. Once a frame: what it moves in a frame is bounded.
+    void find_wind(std::span<const BodyState> bodies, double time, double frames_per_second, const RunContext& context);
+
+    /// Adds forces on regions and particles and of the wind to the bodies' forces.
+    void add_forces(std::span<BodyState> bodies, double time, const RunContext& context) const;
+    /// Adds the pull of hands to a body's forces. Returns the bound on its squared frequency with that of hands added.
+    double add_pulls(BodyState& body, std::size_t index, double time, double squared_frequency) const;
+    /// The same forces as accelerations, m/s^2, without hands: of regions and particles all in one, and of the wind on
+    /// a particle.
+    std::vector<Vectors> push_accelerations(std::span<const BodyState> bodies, double time) const;
+    Vec3f wind_acceleration(const BodyState& body, std::size_t index, std::size_t particle) const {
+        return body.inverse_mass[particle] * wind_[index][particle];
+    }
+    bool has_wind() const { return world_.air_density > 0; }
+
+private:
+    /// Calls visit(body, index of the body, particle, acceleration) for all that forces on regions and particles move.
+    template <class State, class Visit>
+    void each_push(std::span<State> bodies, double time, const Visit& visit) const;
+
+    const World& world_;
+    std::vector<Grip> grips_;
+    std::vector<Vectors> pushes_; ///< of each body
+    std::vector<Vectors> wind_;   ///< N, of each body; empty without wind
+};
+
+} // namespace filigree

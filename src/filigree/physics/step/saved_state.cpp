@@ -1,0 +1,158 @@
+#include "filigree/physics/step/saved_state.h"
+
+#include "filigree/physics/step/byte_stream.h"
+
+#define XXH_INLINE_ALL
+#include <xxhash.h>
+
+namespace filigree {
+
+namespace {
+
+// The name of the format, its version last. 9: what it was made for.
+constexpr std::uint64_t kMagic = 0x39455441'54534c46; // "FLSTATE9"
+static_assert(sizeof(Contacts::NearMemory) == 5 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
+static_assert(sizeof(Contacts::BallMemory) == 5 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
+static_assert(sizeof(MatterContacts::SideMemory) == 6 * sizeof(Index), "padding would be saved");
+static_assert(sizeof(MatterContacts::PairMemory) == 4 * sizeof(Index) + 3 * sizeof(Vec3f), "padding would be saved");
+static_assert(sizeof(LinkState) == 2 * sizeof(float) + sizeof(Vec3f), "padding would be saved");
+
+void write_pose(ByteWriter& writer, const std::optional<RigidPose>& pose) {
+    writer.value(std::uint64_t(pose.has_value()));
+    if (!pose) return;
+    for (const Vec3d& v : {pose->centre, pose->velocity, pose->angular})
+        for (int axis = 0; axis < 3; ++axis) writer.value(v[axis]);
+    for (int k = 0; k < 4; ++k) writer.value(pose->turn.coeffs()[k]);
+    writer.value(pose->quiet_seconds);
+    writer.value(std::uint64_t(pose->sleeps) + 2 * std::uint64_t(pose->rests));
+}
+
+std::optional<RigidPose> read_pose(ByteReader& reader) {
+    if (reader.value<std::uint64_t>() == 0) return std::nullopt;
+    RigidPose pose;
+    for (Vec3d* v : {&pose.centre, &pose.velocity, &pose.angular})
+        for (int axis = 0; axis < 3; ++axis) (*v)[axis] = reader.value<double>();
+    for (int k = 0; k < 4; ++k) pose.turn.coeffs()[k] = reader.value<double>();
+    pose.quiet_seconds = reader.value<double>();
+    const auto flags = reader.value<std::uint64_t>();
+    pose.sleeps = (flags & 1) != 0;
+    pose.rests = (flags & 2) != 0;
+    return pose;
+}
+
+void write_body(ByteWriter& writer, const SavedBody& body) {
+    writer.value(std::uint64_t(body.positions.size()));
+    writer.vectors(body.positions);
+    writer.vectors(body.velocities);
+    writer.array(std::span(body.elasticity));
+    write_pose(writer, body.rigid);
+    writer.array(std::span(body.flow));
+    if (body.flow.empty()) return;
+    writer.array(std::span(body.surface));
+    writer.array(std::span(body.balls));
+    writer.value(std::uint64_t(body.attachments.size()));
+    for (const SavedPoints& points : body.attachments) {
+        writer.array(std::span(points.places));
+        writer.array(std::span(points.gradients));
+    }
+}
+
+SavedBody read_body(ByteReader& reader) {
+    SavedBody body;
+    const std::size_t count = reader.count(6 * sizeof(float));
+    body.positions = reader.vectors(count);
+    body.velocities = reader.vectors(count);
+    const std::vector<char> elasticity = reader.array<char>();
+    body.elasticity.assign(elasticity.begin(), elasticity.end());
+    body.rigid = read_pose(reader);
+    body.flow = reader.array<Mat3f>();
+    if (body.flow.empty()) return body;
+    body.surface = reader.array<Vec3f>();
+    body.balls = reader.array<Vec3f>();
+    body.attachments.resize(reader.count(2 * sizeof(std::uint64_t)));
+    for (SavedPoints& points : body.attachments) {
+        points.places = reader.array<Vec3f>();
+        points.gradients = reader.array<Mat3f>();
+    }
+    return body;
+}
+
+void write_contacts(ByteWriter& writer, const Contacts::Memory& contacts) {
+    writer.array(std::span(contacts.near));
+    writer.value(contacts.near_way);
+    writer.value(contacts.near_until);
+    writer.array(std::span(contacts.balls));
+    writer.value(contacts.matter.way);
+    writer.value(contacts.matter.until);
+    writer.array(std::span(contacts.matter.sides));
+    writer.array(std::span(contacts.matter.pairs));
+    writer.array(std::span(contacts.matter.recovers));
+}
+
+Contacts::Memory read_contacts(ByteReader& reader) {
+    Contacts::Memory contacts;
+    contacts.near = reader.array<Contacts::NearMemory>();
+    contacts.near_way = reader.value<float>();
+    contacts.near_until = reader.value<float>();
+    contacts.balls = reader.array<Contacts::BallMemory>();
+    contacts.matter.way = reader.value<float>();
+    contacts.matter.until = reader.value<float>();
+    contacts.matter.sides = reader.array<MatterContacts::SideMemory>();
+    contacts.matter.pairs = reader.array<MatterContacts::PairMemory>();
+    contacts.matter.recovers = reader.array<std::uint8_t>();
+    return contacts;
+}
+
+} // namespace
+
+std::string write_saved_state(const SavedState& state) {
+    ByteWriter writer;
+    writer.value(kMagic);
+    for (const std::uint64_t hash : {state.made_for.bodies, state.made_for.world, state.made_for.options})
+        writer.value(hash);
+    writer.value(state.frame);
+    writer.value(std::uint64_t(state.bodies.size()));
+    for (const SavedBody& body : state.bodies) write_body(writer, body);
+    write_contacts(writer, state.contacts);
+    writer.array(std::span(state.grid));
+    for (const CrackMemory& cracks : state.cracks) {
+        writer.value(cracks.is_open);
+        writer.array(std::span(cracks.links));
+        writer.array(std::span(cracks.broke));
+    }
+    std::string bytes = writer.take();
+    ByteWriter sum;
+    sum.value(std::uint64_t{XXH3_64bits(bytes.data(), bytes.size())});
+    return bytes + sum.take();
+}
+
+Result<SavedState> read_saved_state(std::string_view bytes) {
+    const Error damaged{ErrorCode::bad_file, "The saved state is damaged; start the simulation anew."};
+    if (ByteReader(bytes).value<std::uint64_t>() != kMagic)
+        return Error{ErrorCode::bad_file,
+                     "The saved state is damaged or of another version; start the simulation anew."};
+    const std::string_view contents = bytes.substr(0, bytes.size() - sizeof(std::uint64_t));
+    const auto sum = ByteReader(bytes.substr(contents.size())).value<std::uint64_t>();
+    if (sum != XXH3_64bits(contents.data(), contents.size())) return damaged;
+    ByteReader reader(contents);
+    reader.value<std::uint64_t>(); // the magic
+    SavedState state;
+    for (std::uint64_t* hash : {&state.made_for.bodies, &state.made_for.world, &state.made_for.options})
+        *hash = reader.value<std::uint64_t>();
+    state.frame = reader.value<std::uint64_t>();
+    state.bodies.resize(reader.count(sizeof(std::uint64_t)));
+    for (SavedBody& body : state.bodies) body = read_body(reader);
+    state.contacts = read_contacts(reader);
+    const std::vector<char> grid = reader.array<char>();
+    state.grid.assign(grid.begin(), grid.end());
+    while (reader.ok() && !reader.at_end()) {
+        CrackMemory& cracks = state.cracks.emplace_back();
+        cracks.is_open = reader.value<std::uint32_t>();
+        cracks.links = reader.array<LinkState>();
+        cracks.broke = reader.array<double>();
+    }
+    if (!reader.ok() || !reader.at_end()) return damaged;
+    return state;
+}
+
+} // namespace filigree

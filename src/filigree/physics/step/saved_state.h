@@ -1,0 +1,44 @@
+// Everything that moves in a simulation, as one struct and as bytes. Private to the layer.
+#pragma once
+
+#include "filigree/core/result.h"
+#include "filigree/physics/breaking/cracks.h"
+#include "filigree/physics/contact/contact.h"
+#include "filigree/physics/step/made_for.h"
+
+#include <string>
+#include <string_view>
+
+namespace filigree {
+
+/// Places of embedded points in a body that has flowed, and their gradients from rest.
+struct SavedPoints {
+    std::vector<Vec3f> places;
+    std::vector<Mat3f> gradients;
+};
+
+struct SavedBody {
+    Vectors positions, velocities;
+    std::string elasticity; ///< Elasticity::state
+    std::optional<RigidPose> rigid;
+    // Of bodies that have flowed; empty for others, whose points are embedded as they were at the start.
+    std::vector<Mat3f> flow; ///< BodyState::flow
+    std::vector<Vec3f> surface, balls;
+    std::vector<SavedPoints> attachments; ///< in the order of their numbers
+};
+
+struct SavedState {
+    MadeFor made_for;
+    std::uint64_t frame = 0;
+    std::vector<SavedBody> bodies;
+    Contacts::Memory contacts;
+    std::string grid;                ///< mpm::Bodies::state
+    std::vector<CrackMemory> cracks; ///< of bodies that break
+};
+
+/// Values and arrays end to end after the version's name; no padding, so that equal states are equal bytes.
+std::string write_saved_state(const SavedState& state);
+/// Errors: bad_file (damaged, or of another version).
+Result<SavedState> read_saved_state(std::string_view bytes);
+
+} // namespace filigree

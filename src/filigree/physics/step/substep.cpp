@@ -1,0 +1,157 @@
+// The parts of a substep that explicit steps and descent share.
+#include "filigree/core/random.h"
+#include "filigree/physics/rigid/rigid_body.h"
+#include "filigree/physics/step/simulation_state.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace filigree {
+
+namespace {
+
+constexpr float kMostStretch = 10; ///< a body that is stretched more than this ...
+constexpr float kStretchAfter = 3; ///< ... is scaled down to this
+constexpr double kReveals = 8;     ///< a frame: how often points of new cracks begin to touch others
+constexpr double kMostParts = 16;  ///< of a usual substep of descent, where bodies meet fast
+
+void shake(BodyState& body, std::uint64_t seed) {
+    const auto shift = [&](std::size_t number) {
+        return float((random_unit(seed, number) - 0.5) * 2e-3 * body.body->spacing());
+    };
+    for (std::size_t i = 0; i < body.positions.size(); ++i)
+        if (!body.fixed[i]) body.positions.add(i, {shift(3 * i), shift(3 * i + 1), shift(3 * i + 2)});
+}
+
+/// Returns how many particles were moved.
+std::size_t scale_down(BodyState& body, float factor) {
+    const std::size_t count = body.positions.size();
+    Vec3d mean = Vec3d::Zero();
+    std::size_t finite = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        if (!body.positions[i].allFinite()) continue;
+        mean += body.positions[i].cast<double>();
+        ++finite;
+    }
+    mean /= double(std::max<std::size_t>(finite, 1));
+    std::size_t moved = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        if (body.fixed[i]) continue;
+        const Vec3f from_mean = body.positions[i] - mean.cast<float>();
+        const Vec3f scaled = from_mean.allFinite() ? Vec3f(factor * from_mean) : Vec3f::Zero();
+        body.positions.set(i, mean.cast<float>() + scaled);
+        body.velocities.set(i, Vec3f::Zero());
+        ++moved;
+    }
+    return moved;
+}
+
+} // namespace
+
+std::vector<Attachment*> SimulationState::attachments_of(std::size_t body) {
+    std::vector<Attachment*> found;
+    for (Attachment& attachment : attachments)
+        if (attachment.body == body) found.push_back(&attachment);
+    return found;
+}
+
+void note_deformation(FrameReport& report, std::size_t body, const ElasticReport& met) {
+    report.most_stretch = std::max(report.most_stretch, met.most_stretch);
+    if (!(met.least_volume_ratio < report.least_volume_ratio)) return;
+    report.least_volume_ratio = met.least_volume_ratio;
+    report.most_crushed = body;
+}
+
+const Cracks* SimulationState::cracks_of(std::size_t body) const {
+    const auto found = std::ranges::find(cracks, body, &Cracks::whole);
+    return found == cracks.end() ? nullptr : &*found;
+}
+
+double SimulationState::descent_step(double longest) const {
+    const double usual = frame_seconds() / options.descent_substeps;
+    return std::clamp(longest, usual / kMostParts, usual);
+}
+
+float least_spacing(std::span<const BodyState> bodies) {
+    float spacing = std::numeric_limits<float>::max();
+    for (const BodyState& body : bodies) spacing = std::min(spacing, float(body.body->spacing()));
+    return spacing;
+}
+
+void move_pins(SimulationState& state, double now, float dt) {
+    for (std::size_t p = 0; p < state.world.pins.size(); ++p) {
+        const Pin& pin = state.world.pins[p];
+        const Eigen::Isometry3d motion = pin.motion.at(now);
+        const MotionRate rate = rate_of(pin.motion, now);
+        for (std::size_t k = 0; k < pin.particles.size(); ++k) {
+            const Vec3d from = state.pinned_from[p][k].cast<double>(), place = motion * from;
+            const Vec3d velocity = dt > 0 ? rate.at(place) : Vec3d(Vec3d::Zero());
+            each_copy(std::span(state.bodies), pin.body, pin.particles[k],
+                      [&](BodyState& body, std::size_t, Index particle) {
+                          body.positions.set(particle, place.cast<float>());
+                          body.velocities.set(particle, velocity.cast<float>());
+                      });
+        }
+    }
+}
+
+bool repair_start(SimulationState& state, std::span<const ElasticReport> elastic, FrameReport& report,
+                  const RunContext& context) {
+    bool repaired = false;
+    for (std::size_t b = 0; b < state.bodies.size(); ++b) {
+        if (std::abs(elastic[b].least_volume_ratio) < 1e-12f) {
+            repaired = true;
+            shake(state.bodies[b], context.seed + b);
+        }
+        if (elastic[b].most_stretch <= kMostStretch) continue;
+        repaired = true;
+        const float factor = std::isfinite(elastic[b].most_stretch) ? kStretchAfter / elastic[b].most_stretch : 0.0f;
+        report.clamped_particles += scale_down(state.bodies[b], factor);
+    }
+    return repaired;
+}
+
+void push_out(SimulationState& state, double now, const RunContext& context) {
+    for (Cracks& cracks : state.cracks) cracks.remember_places(state.bodies);
+    state.contacts.push_out(state.bodies, now, context);
+    bool any = false;
+    for (std::size_t b = 0; b < state.bodies.size(); ++b) {
+        BodyState& body = state.bodies[b];
+        if (!(body.pushed_way > 0)) continue;
+        any = true;
+        state.contacts.was_moved(b, std::exchange(body.pushed_way, 0.0f));
+        if (body.rigid) fit_pose(body);
+    }
+    if (!any) return;
+    for (const Cracks& cracks : state.cracks) cracks.rejoin(state.bodies);
+}
+
+Breaks break_bodies(SimulationState& state, double before, double now, const RunContext& context) {
+    Breaks breaks;
+    // A search for each substep in which something lets go would take longer than all else.
+    const auto part = [&](double time) {
+        return std::floor((time - state.time()) / state.frame_seconds() * kReveals + 1e-6);
+    };
+    for (Cracks& cracks : state.cracks) {
+        const bool was_open = cracks.is_open();
+        breaks.forces |= cracks.advance(state.bodies, now, context);
+        if (part(before) != part(now) || was_open != cracks.is_open())
+            breaks.contacts |= cracks.reveal(state.bodies) || was_open != cracks.is_open();
+    }
+    if (!breaks.contacts) return breaks;
+    state.contacts.begin_anew();
+    state.external.find_wind(state.bodies, now, state.options.frames_per_second, context);
+    return breaks;
+}
+
+void finish_substep(SimulationState& state, float dt, const RunContext& context) {
+    for (std::size_t b = 0; b < state.bodies.size(); ++b) {
+        BodyState& body = state.bodies[b];
+        if (body.is_on_grid || body.is_absent) continue;
+        body.elasticity->finish_substep(body.positions, dt, context);
+        if (body.elasticity->wants_renewal()) renew_neighbourhoods(body, state.attachments_of(b), context);
+    }
+}
+
+} // namespace filigree
