@@ -7,6 +7,7 @@
 #include "filigree/physics/contact/matter.h"
 #include "filigree/physics/contact/own_cells.h"
 #include "filigree/physics/contact/pair_laws.h"
+#include "filigree/physics/rigid/rigid_contacts.h"
 
 #include <algorithm>
 #include <limits>
@@ -86,7 +87,7 @@ public:
     static constexpr std::uint8_t kTouched = 2, kTouchedItself = 4;
     /// As Contacts::add_forces. touched: of each body; kTouched or kTouchedItself is set where it touches.
     ContactReport add_forces(std::span<BodyState> bodies, float dt, std::span<std::uint8_t> touched,
-                             const RunContext& context);
+                             RigidContacts& rigid, const RunContext& context);
     /// As Contacts::push_out.
     void push_out(std::span<BodyState> bodies);
 
@@ -100,11 +101,12 @@ public:
         Matter::Place anchor;
         Vec3f entry = Vec3f::Zero(); ///< normal at rest on the side where the point came in; zero outside
         bool tangled = false;        ///< it did not come in from outside, and is left alone until it is out
+        Vec3f rigid_force = Vec3f::Zero(); ///< N, of two rigid bodies: of the last substep
     };
     struct PairMemory {
         Index point, cell, anchor_cell;
         std::uint32_t flags; ///< 1: holds, 2: slides, 4: tangled
-        Vec3f local, anchor_local, entry;
+        Vec3f local, anchor_local, entry, rigid_force;
     };
     struct SideMemory {
         Index body, other, pairs; ///< how many
@@ -186,6 +188,12 @@ private:
     float stiffness(const Side& side, const Pair& pair, std::span<const BodyState> bodies) const;
     void anchor_at(Pair& pair, const Side& side, const BodyState& other, const Vec3f& offset) const;
     Vec3f force(Pair& pair, const Side& side, std::span<const BodyState> bodies, float dt) const;
+    static bool are_rigid(const Side& side, std::span<const BodyState> bodies) {
+        return bodies[side.body].rigid && bodies[side.other].rigid;
+    }
+    Vec3f probe(Pair& pair, const Side& side, std::span<const BodyState> bodies, float dt) const;
+    static void add_contact_point(Pair& pair, const Side& side, std::span<const BodyState> bodies, const Vec3f& normal,
+                                  RigidContacts& rigid);
     void push_out(Pair& pair, const Side& side, std::span<BodyState> bodies) const;
 
     const World& world_;
@@ -211,7 +219,9 @@ private:
     std::vector<Side> sides_;      ///< ascending by bodies
     float way_ = 0, sides_until_ = -1;
     std::vector<std::pair<Index, Index>> work_; ///< side and pair of each force
-    struct PairForce { ///< beside how deep its pair touches, so that those that do not are passed over fast
+    /// Beside how deep its pair touches, so that those that do not are passed over fast. Of two rigid bodies the normal,
+    /// or zero far from each other.
+    struct PairForce {
         Vec3f force = Vec3f::Zero();
         float depth = 0;
     };

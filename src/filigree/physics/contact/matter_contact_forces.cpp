@@ -17,6 +17,9 @@ constexpr std::size_t kMatterForcesGrain = 128;
 constexpr float kSlowest = 0.2f, kSlowestBeside = 0.02f;
 constexpr float kLittle = 0.05f;      ///< spacings until a point that is nowhere is asked again ...
 constexpr float kLittleBeside = 0.2f; ///< ... and the same of those, by their own speed
+/// Spacings outside of a rigid body at which a point of another counts as touching, beside the way of a substep; and
+/// the part of what is further that is safe to go.
+constexpr float kTouchingMargin = 0.02f, kClearerOfRigid = 0.8f;
 
 } // namespace
 
@@ -142,6 +145,41 @@ Vec3f MatterContacts::force(Pair& pair, const Side& side, std::span<const BodySt
     return force;
 }
 
+/// Of two rigid bodies: the normal where the point lies in the other, or may lie before the next substep ends; else zero.
+/// pair.depth is below 0 outside.
+Vec3f MatterContacts::probe(Pair& pair, const Side& side, std::span<const BodyState> bodies, float dt) const {
+    if (pair.clear_until > side.way) return Vec3f::Zero();
+    const BodyState &body = bodies[side.body], &other = bodies[side.other];
+    const Matter& matter = *matter_[side.other];
+    const Vec3f point = embedded_point(body.surface, pair.point, body.positions);
+    Mat3f inverse;
+    const bool is_found = matter.locate(other.positions, point, pair.place, inverse);
+    const auto found = is_found ? matter.depth(pair.place, inverse, pair.entry) : std::nullopt;
+    const float margin = kTouchingMargin * side.spacing + 2 * dt * side.speed;
+    if (!found || found->depth < -margin) {
+        leave(pair, side, found ? kClearerOfRigid * (-found->depth - margin) : kLittle * side.spacing);
+        pair.rigid_force = Vec3f::Zero();
+        return Vec3f::Zero();
+    }
+    pair.depth = found->depth;
+    pair.entry = found->depth > 0 ? found->rest : Vec3f(Vec3f::Zero());
+    return found->normal;
+}
+
+void MatterContacts::add_contact_point(Pair& pair, const Side& side, std::span<const BodyState> bodies,
+                                       const Vec3f& normal, RigidContacts& rigid) {
+    const BodyState& body = bodies[side.body];
+    rigid.add({.body = side.body,
+               .other = side.other,
+               .place = embedded_point(body.surface, pair.point, body.positions),
+               .normal = normal,
+               .separation = -pair.depth,
+               .friction = float(side.law.friction),
+               .restitution = float(side.law.restitution),
+               .force = &pair.rigid_force,
+               .holds = &pair.grasp.holds});
+}
+
 /// Puts the anchor so far behind the point.
 void MatterContacts::anchor_at(Pair& pair, const Side& side, const BodyState& other, const Vec3f& offset) const {
     pair.anchor = pair.place;
@@ -150,7 +188,7 @@ void MatterContacts::anchor_at(Pair& pair, const Side& side, const BodyState& ot
 }
 
 ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, std::span<std::uint8_t> touched,
-                                         const RunContext& context) {
+                                         RigidContacts& rigid, const RunContext& context) {
     ContactReport report;
     is_too_deep_ = false;
     forces_.resize(work_.size());
@@ -158,22 +196,28 @@ ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, 
         for (std::size_t k = begin; k < end; ++k) {
             Side& side = sides_[work_[k].first];
             Pair& pair = side.pairs[work_[k].second];
-            const Vec3f on_point = force(pair, side, bodies, dt);
-            forces_[k] = {on_point, pair.depth};
+            const Vec3f found =
+                are_rigid(side, bodies) ? probe(pair, side, bodies, dt) : force(pair, side, bodies, dt);
+            forces_[k] = {found, pair.depth};
         }
     });
     for (std::size_t k = 0; k < work_.size(); ++k) {
         const auto& [force, depth] = forces_[k];
+        if (!(depth > 0) && force.isZero(0)) continue;
+        Side& side = sides_[work_[k].first];
+        Pair& pair = side.pairs[work_[k].second];
+        const bool is_rigid = are_rigid(side, bodies);
+        if (is_rigid) add_contact_point(pair, side, bodies, force, rigid);
         if (!(depth > 0)) continue;
-        const Side& side = sides_[work_[k].first];
-        const Pair& pair = side.pairs[work_[k].second];
-        add_to_particles(bodies[side.body].surface, pair.point, force, bodies[side.body].forces);
-        matter_[side.other]->add(pair.place, -force, bodies[side.other].forces);
+        if (!is_rigid) {
+            add_to_particles(bodies[side.body].surface, pair.point, force, bodies[side.body].forces);
+            matter_[side.other]->add(pair.place, -force, bodies[side.other].forces);
+        }
         touched[side.body] |= touch_of(side);
         touched[side.other] |= touch_of(side);
         ++report.contacts;
         report.deepest_in_matter = std::max(report.deepest_in_matter, depth);
-        is_too_deep_ |= depth > most_depth(side);
+        is_too_deep_ |= !is_rigid && depth > most_depth(side);
     }
     return report;
 }
@@ -182,7 +226,7 @@ void MatterContacts::push_out(std::span<BodyState> bodies) {
     if (!is_too_deep_) return;
     for (Side& side : sides_) {
         const float most = most_depth(side);
-        if (both_sleep(side, bodies)) continue;
+        if (both_sleep(side, bodies) || are_rigid(side, bodies)) continue;
         for (Pair& pair : side.pairs)
             if (pair.depth > most) push_out(pair, side, bodies);
     }

@@ -528,7 +528,7 @@ MatterContacts::Memory MatterContacts::memory() const {
         for (const Pair& pair : side.pairs)
             memory.pairs.push_back({pair.point, pair.place.cell, pair.anchor.cell,
                                     Index(pair.grasp.holds) + 2 * Index(pair.grasp.slides) + 4 * Index(pair.tangled),
-                                    pair.place.local, pair.anchor.local, pair.entry});
+                                    pair.place.local, pair.anchor.local, pair.entry, pair.rigid_force});
     }
     return memory;
 }
@@ -552,7 +552,9 @@ bool MatterContacts::is_sound(const Memory& memory, std::span<const BodyState> b
             const PairMemory& pair = memory.pairs[from];
             if (pair.point >= points || pair.cell >= cells) return false;
             if ((pair.flags & 1) && pair.anchor_cell >= cells) return false;
-            if (!pair.local.allFinite() || !pair.anchor_local.allFinite() || !pair.entry.allFinite()) return false;
+            if (!pair.local.allFinite() || !pair.anchor_local.allFinite() || !pair.entry.allFinite() ||
+                !pair.rigid_force.allFinite())
+                return false;
         }
     }
     return from == memory.pairs.size();
