@@ -5,8 +5,10 @@
 #include "filigree/core/disjoint_sets.h"
 #include "filigree/mesh/incidence.h"
 #include "filigree/physics/body/body_state.h"
+#include "filigree/physics/contact/feature_contacts.h"
 #include "filigree/physics/contact/matter_contact.h"
 #include "filigree/physics/contact/obstacle_motion.h"
+#include "filigree/physics/contact/start_sides.h"
 
 #include <algorithm>
 #include <array>
@@ -32,6 +34,7 @@ public:
         float obstacle_reach; ///< m
         float pair_reach;     ///< m, beside each other
         double frame;         ///< s: for about so long what is found is to hold
+        float step_way = 0;   ///< m that anything may go towards an obstacle in the next step; it is found before
     };
     void search(std::span<BodyState> bodies, const Search& search, const RunContext& context);
     /// Before a frame of explicit steps.
@@ -52,12 +55,25 @@ public:
         pairs_way_ += 2 * way;
         matter_.was_moved(body, way);
     }
+    /// A body was put elsewhere: on which side of obstacles it is has to be found anew.
+    void was_placed(std::size_t body) {
+        for (std::size_t o = 0; o < shapes_.size(); ++o) seen_[body * shapes_.size() + o] = 0;
+    }
+    /// Whether points are followed, as of all obstacles but half-spaces.
+    bool follows_points() const { return std::ranges::any_of(shapes_, &ObstacleShape::is_traced); }
     /// s: in longer steps something could pass through something.
     double longest_step() const { return matter_.longest_step(); }
     /// The next search finds everything again, and ways are counted from here; anchors and touches stay.
     void begin_anew() {
         near_until_ = pairs_until_ = -1;
         matter_.begin_anew();
+    }
+    /// m/s: bound on how fast a body's particles go, as of the last travel or begin_frame.
+    float speed(std::size_t body) const { return matter_.speed(body); }
+    /// Bodies woke that something is about to push.
+    void woke(std::span<const BodyState> bodies) {
+        near_until_ = -1;
+        matter_.list_work(bodies);
     }
     /// The next search finds what is near obstacles: of what sleeps nothing was found.
     void look_near_again() { near_until_ = -1; }
@@ -66,9 +82,11 @@ public:
         deepest_near_.assign(deepest_near_.size(), 0);
     }
 
-    /// Adds the forces of what touches now to the bodies' forces, and lets friction's anchors slide. dt: of the
+    /// Adds the forces of what touches now to the bodies' forces, and lets friction's anchors slide; between rigid
+    /// bodies and obstacles finds contact points instead, which are there until the next search. dt: of the
     /// substep.
-    ContactReport add_forces(std::span<BodyState> bodies, double time, float dt, const RunContext& context);
+    ContactReport add_forces(std::span<BodyState> bodies, double time, float dt, RigidContacts& rigid,
+                             const RunContext& context);
 
     /// Moves what is deeper than a part of the spacing out, and takes its speed inwards away: for impacts faster than
     /// the penalty can stop. Looks at what the last add_forces found.
@@ -99,9 +117,11 @@ public:
     /// A surface point near an obstacle, and where friction holds it in the obstacle's own axes.
     struct NearMemory {
         Index body, obstacle, point;
-        std::uint32_t flags; ///< 1: holds, 2: slides
+        std::uint32_t flags; ///< 1: holds, 2: slides, 4: it is on the other side of the wall that it touches
         float clear_until;
-        Vec3f anchor;
+        Vec3f anchor, rigid_force;
+        std::uint32_t unused = 0; ///< so that nothing is padding
+        Vec3d place;              ///< Trace::place
     };
     /// Two balls that friction holds together.
     struct BallMemory {
@@ -113,6 +133,8 @@ public:
     struct Memory {
         std::vector<NearMemory> near; ///< ascending by body, obstacle and point
         float near_way = 0, near_until = -1;
+        std::vector<std::uint8_t> seen; ///< of each body and obstacle: 1 once sides are known
+        std::vector<FeatureContacts::Near> features;
         std::vector<BallMemory> balls; ///< ascending
         MatterContacts::Memory matter;
     };
@@ -127,6 +149,8 @@ private:
         float depth = 0; ///< m, now
         contact_law::Grasp grasp;
         Vec3f anchor = Vec3f::Zero();
+        Vec3f rigid_force = Vec3f::Zero(); ///< N, on a rigid body: of the last substep
+        Index trace = kNoIndex;            ///< of the body's traces; none of a half-space
     };
     struct NearPoints { ///< of a body
         static constexpr std::size_t kBlock = 64;
@@ -134,6 +158,7 @@ private:
         /// Of each, near_way_ until which it cannot touch; padded to whole blocks. Beside the points, as most are asked
         /// nothing more. What cannot touch has no depth and holds nothing.
         std::vector<float> clear_until;
+        std::vector<Trace> traces;
 
         std::size_t blocks() const { return (points.size() + kBlock - 1) / kBlock; }
         void pad() { clear_until.resize(blocks() * kBlock, 0); }
@@ -154,26 +179,45 @@ private:
         Vec3f push = Vec3f::Zero(), friction = Vec3f::Zero();
     };
     ContactReport add_obstacle_forces(BodyState& body, std::size_t b, const ObstaclePoses& poses, float dt,
-                                      std::vector<Vec3f>& forces, const RunContext& context);
-    Vec3f obstacle_force(Near& at, float& clear_until, const BodyState& body, const ObstaclePoses& poses,
-                         float dt) const;
+                                      std::vector<Vec3f>& forces, std::vector<ContactPoint>& rigid,
+                                      const RunContext& context);
+    Vec3f probe_rigid(Near& at, float& clear_until, const DistanceField::Sample& surface, float margin) const;
+    ContactPoint contact_point(Near& at, const Vec3f& normal, Index b, const BodyState& body,
+                               const ObstaclePoses& poses) const;
+    Vec3f obstacle_force(Near& at, Trace* trace, float& clear_until, const BodyState& body, const ObstaclePoses& poses,
+                         float dt, float margin) const;
+    DistanceField::Sample follow(std::size_t obstacle, Trace& trace, bool touched, const Vec3f& place,
+                                 const ObstaclePoses& poses) const;
+    DistanceField::Sample surface_at(const Near& at, const NearPoints& of, const Vec3f& place,
+                                     const ObstaclePoses& poses) const;
     PairForce pair_force(NearPair& pair, std::span<const BodyState> bodies, float dt) const;
     /// From the second's point to the first's, balls or surface points over them; of positions, or of velocities.
     static Vec3f between(const NearPair& pair, std::span<const BodyState> bodies, Embedding BodyState::*points,
                          const Vectors& of_first, const Vectors& of_second);
     std::vector<NearPair> held_pairs() const; ///< those that friction holds, ascending
-    void push_particles_out(BodyState& body, std::size_t obstacle, const Vec3f& outwards, const ObstaclePoses& poses,
-                            const RunContext& context);
+    void push_particles_out(BodyState& body, std::size_t b, std::size_t obstacle, const Vec3f& outwards,
+                            const ObstaclePoses& poses, const RunContext& context);
     void find_near(std::span<const BodyState> bodies, double time, float reach, const RunContext& context);
+    class NearFinder;
+    void forget_jumps(double time);
+    std::vector<DistanceField::Sample> depths_of_particles(const BodyState& body, std::size_t b, std::size_t obstacle,
+                                                           const ObstaclePoses& poses, const RunContext& context);
     void find_pairs(std::span<const BodyState> bodies, float reach, const RunContext& context);
     void find_own_pairs(const BodyState& body, Index number, const Vectors& balls, float reach);
 
     const World& world_;
     bool between_bodies_, within_bodies_;
-    std::vector<Vec3f> towards_;      ///< of each obstacle, the way to it: of half-spaces that stand still; else 0
-    std::vector<NearPoints> near_;    ///< by body
-    std::vector<float> deepest_near_; ///< m, of each body, now
-    std::map<const Body*, std::vector<float>> most_depths_; ///< of bodies that were crushed: m, of each particle
+    std::vector<Vec3f> towards_;         ///< of each obstacle, the way to it: of half-spaces that stand still; else 0
+    std::vector<NearPoints> near_;       ///< by body
+    std::vector<float> deepest_near_;    ///< m, of each body, now
+    struct ParticleDepths {              ///< of a body that was crushed, of each particle
+        std::vector<float> most;         ///< m that it may go into an obstacle
+        std::vector<Index> near_surface; ///< the surface point that is about the closest at rest
+    };
+    std::map<const Body*, ParticleDepths> particle_depths_;
+    std::vector<ObstacleShape> shapes_;
+    std::vector<std::uint8_t> seen_; ///< of each body and obstacle
+    std::optional<double> time_;     ///< s, of the last search
     std::vector<NearPair> pairs_;
     struct OwnBalls;                                         ///< of a body whose balls meet each other
     std::vector<std::shared_ptr<const OwnBalls>> own_balls_; ///< null: of the others
@@ -184,6 +228,7 @@ private:
                                   kInItself = MatterContacts::kTouchedItself;
     std::vector<std::uint8_t> touched_; ///< of each body
     MatterContacts matter_;
+    FeatureContacts features_;
 };
 
 } // namespace filigree

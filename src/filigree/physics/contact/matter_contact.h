@@ -69,7 +69,9 @@ public:
     /// bodies that something touches wake; returns whether any did. frame: s, for about so long
     /// what is found is to hold.
     bool search(std::span<BodyState> bodies, double frame, const RunContext& context);
-    /// The same of those that friction holds together.
+    /// Which pairs forces are asked for, after bodies went to sleep or woke.
+    void list_work(std::span<const BodyState> bodies);
+    /// Calls visit(body, other) for each two different bodies that touch.
     template <class Visit>
     void each_holding(const Visit& visit) const {
         for (const Side& side : sides_)
@@ -99,8 +101,8 @@ public:
         float depth = 0;       ///< now
         contact_law::Grasp grasp;
         Matter::Place anchor;
-        Vec3f entry = Vec3f::Zero(); ///< normal at rest on the side where the point came in; zero outside
-        bool tangled = false;        ///< it did not come in from outside, and is left alone until it is out
+        Vec3f entry = Vec3f::Zero();       ///< normal at rest on the side where the point came in; zero outside
+        bool tangled = false;              ///< it did not come in from outside, and is left alone until it is out
         Vec3f rigid_force = Vec3f::Zero(); ///< N, of two rigid bodies: of the last substep
     };
     struct PairMemory {
@@ -123,6 +125,7 @@ public:
     bool is_sound(const Memory& memory, std::span<const BodyState> bodies) const;
     void set_memory(const Memory& memory, std::span<const BodyState> bodies);
 
+    bool has_matter(std::size_t body) const { return matter_[body] != nullptr; }
     const Matter& matter(std::size_t body) const { return *matter_[body]; }
     const PairLaws& laws() const { return laws_; }
 
@@ -171,7 +174,6 @@ private:
                     const RunContext& context);
     bool wake_touched(std::span<BodyState> bodies) const;
     bool disturbs(const BodyState& body, std::size_t number) const;
-    void list_work(std::span<const BodyState> bodies);
     void find_sides(std::span<const BodyState> bodies, double frame, const RunContext& context);
     std::optional<Vec3f> enter(Pair& pair, const Side& side, std::span<const BodyState> bodies) const;
     static bool is_elsewhere(const Pair& pair, const Matter::Place& place, const Matter& matter) {
@@ -219,8 +221,8 @@ private:
     std::vector<Side> sides_;      ///< ascending by bodies
     float way_ = 0, sides_until_ = -1;
     std::vector<std::pair<Index, Index>> work_; ///< side and pair of each force
-    /// Beside how deep its pair touches, so that those that do not are passed over fast. Of two rigid bodies the normal,
-    /// or zero far from each other.
+    /// Beside how deep its pair touches, so that those that do not are passed over fast. Of two rigid bodies the
+    /// normal, or zero far from each other.
     struct PairForce {
         Vec3f force = Vec3f::Zero();
         float depth = 0;

@@ -145,8 +145,8 @@ Vec3f MatterContacts::force(Pair& pair, const Side& side, std::span<const BodySt
     return force;
 }
 
-/// Of two rigid bodies: the normal where the point lies in the other, or may lie before the next substep ends; else zero.
-/// pair.depth is below 0 outside.
+/// Of two rigid bodies: the normal where the point lies in the other, or may lie before the next substep ends; else
+/// zero. pair.depth is below 0 outside.
 Vec3f MatterContacts::probe(Pair& pair, const Side& side, std::span<const BodyState> bodies, float dt) const {
     if (pair.clear_until > side.way) return Vec3f::Zero();
     const BodyState &body = bodies[side.body], &other = bodies[side.other];
@@ -196,8 +196,7 @@ ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, 
         for (std::size_t k = begin; k < end; ++k) {
             Side& side = sides_[work_[k].first];
             Pair& pair = side.pairs[work_[k].second];
-            const Vec3f found =
-                are_rigid(side, bodies) ? probe(pair, side, bodies, dt) : force(pair, side, bodies, dt);
+            const Vec3f found = are_rigid(side, bodies) ? probe(pair, side, bodies, dt) : force(pair, side, bodies, dt);
             forces_[k] = {found, pair.depth};
         }
     });

@@ -577,7 +577,8 @@ void MatterContacts::set_memory(const Memory& memory, std::span<const BodyState>
                                   .grasp = {(from->flags & 1) != 0, (from->flags & 2) != 0},
                                   .anchor = {from->anchor_cell, from->anchor_local},
                                   .entry = from->entry,
-                                  .tangled = (from->flags & 4) != 0});
+                                  .tangled = (from->flags & 4) != 0,
+                                  .rigid_force = from->rigid_force});
     }
     list_work(bodies);
 }

@@ -167,7 +167,6 @@ void drift_rigid(BodyState& body, double dt) {
     };
     half = turn_by(pose.turn, pose.turn, dt / 2);
     pose.turn = turn_by(pose.turn, half, dt).normalized();
-    place_particles(body);
 }
 
 std::vector<float> rigid_surface_stiffness(const BodyState& body) {

@@ -27,7 +27,7 @@ struct RigidLoad {
 RigidLoad rigid_load(const BodyState& body);
 /// m/s of the load and gravity, for dt; then what damping leaves, a factor.
 void kick_rigid(BodyState& body, const RigidLoad& load, const Vec3d& gravity, double dt, double kept);
-/// Moves by the velocities for dt, and places the particles.
+/// Moves the pose by the velocities for dt; place_particles comes after.
 void drift_rigid(BodyState& body, double dt);
 
 /// N/m of each surface point, so that those that touch at one time add no more than kRigidSquaredFrequency.

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 namespace filigree {
 
@@ -115,7 +117,8 @@ double RigidContacts::solve_row(Row& row, double friction) {
 
 /// There and back, so that loads travel both ways in one.
 void RigidContacts::sweep_until_still(double tolerance) {
-    const std::size_t sweeps = std::clamp(kMostRowsSwept / std::max<std::size_t>(rows_.size(), 1), kFewestSweeps, kMostSweeps);
+    const std::size_t sweeps =
+        std::clamp(kMostRowsSwept / std::max<std::size_t>(rows_.size(), 1), kFewestSweeps, kMostSweeps);
     for (std::size_t sweep = 0; sweep < sweeps; ++sweep) {
         double most = 0;
         for (std::size_t k = 0; k < rows_.size(); ++k) {
@@ -170,9 +173,9 @@ void RigidContacts::finish(std::span<BodyState> bodies, double dt, double slow) 
     if (rows_.empty()) return;
     for (std::size_t k = 0; k < rows_.size(); ++k) {
         Row& row = rows_[k];
-        const double left = row.separation + dt * relative_velocity(row).dot(row.normal);
+        // What did not push is left alone: it may be slowed down only where it also bounces.
+        row.target = row.impulse > 0 ? 0 : -std::numeric_limits<double>::infinity();
         const bool bounces = row.impulse > 0 && row.approach < -slow;
-        row.target = left > 0 && row.impulse == 0 ? -left / dt : 0;
         if (bounces) row.target = -double(points_[k].restitution) * row.approach;
     }
     sweep_until_still(kStill * (10 * dt));

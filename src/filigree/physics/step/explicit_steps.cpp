@@ -1,6 +1,7 @@
 // Velocity Verlet: kick, drift, kick. The stable step follows from the squared frequencies that are found with the
 // forces.
 #include "filigree/core/parallel_for.h"
+#include "filigree/physics/contact/contact_law.h"
 #include "filigree/physics/rigid/rigid_body.h"
 #include "filigree/physics/rigid/rigid_state.h"
 #include "filigree/physics/step/simulation_state.h"
@@ -38,6 +39,7 @@ constexpr float kFreeWay = 0.05f;         ///< spacings a substep: ... as far as
 constexpr double kMostDeforming = 0.5;    ///< spacings a substep, between particles of one body
 constexpr unsigned kMostSubsteps = 20000; ///< a frame
 constexpr double kUsualSubsteps = 256;    ///< a frame: what the first forces of a frame take for the step before
+constexpr float kFaster = 1.5f;           ///< than now, anything may go in the next substep
 
 /// Where internal damping has forces computed: f(x + tau v) = f(x) - tau K v, Kelvin-Voigt to first order; of v less
 /// its rigid part.
@@ -168,13 +170,11 @@ public:
             finish(dt);
             const Breaks breaks = break_bodies(state_, before, now_, context_);
             if (breaks.contacts) {
-                place_rigid();
                 if (meets_anything_) state_.contacts.begin_frame(bodies_, context_);
                 find_contacts();
             }
             if (breaks.forces || breaks.contacts) find_forces(dt, true);
         }
-        place_rigid();
         if (meets_anything_) state_.contacts.end_frame(bodies_, context_);
         return is_left() ? now_ : until_;
     }
@@ -199,11 +199,46 @@ private:
     void move(float dt, double until) {
         const Stopwatch watch(report_.other_seconds);
         kick(0.5f * dt, false);
+        move_rigid(double(dt));
         drift(dt);
         const double before = std::exchange(now_, until);
         move_pins(state_, now_, dt);
         if (meets_anything_)
             state_.contacts.travel(bodies_, dt, float(obstacle_way(state_.world, bodies_, before, now_)), context_);
+    }
+
+    /// Rigid bodies take the whole kick at once, then impulses at what they touch, and move with what comes of both. In
+    /// free flight they move as gravity has them to the last digit.
+    void move_rigid(double dt) {
+        wake_met(dt);
+        const Vec3d& gravity = state_.world.gravity;
+        rigid_contacts_.prepare(bodies_);
+        each_awake_rigid([&](BodyState& body, std::size_t b) {
+            kick_rigid(body, rigid_loads_[b], gravity, dt, std::exp(-dt * body.body->material.damping));
+        });
+        rigid_contacts_.solve(bodies_, dt);
+        each_awake_rigid([&](BodyState& body, std::size_t b) {
+            drift_rigid(body, dt);
+            if (!rigid_contacts_.pushes(b)) body.rigid->centre -= 0.5 * dt * dt * gravity;
+        });
+        rigid_contacts_.finish(bodies_, dt, double(contact_law::smooth_speed(state_.world, float(dt))));
+        place_rigid();
+    }
+
+    /// Sleepers wake that something is about to push which does not rest itself.
+    void wake_met(double dt) {
+        bool woke = false;
+        for (const ContactPoint& point : rigid_contacts_.points()) {
+            if (point.other == kNoIndex || bodies_[point.body].sleeps() == bodies_[point.other].sleeps()) continue;
+            const bool first = bodies_[point.body].sleeps();
+            const Index sleeper = first ? point.body : point.other, comes = first ? point.other : point.body;
+            const float speed = state_.contacts.speed(comes);
+            if (bodies_[comes].rigid->rests && !(speed > kSlow)) continue;
+            if (double(point.separation) > dt * double(speed)) continue;
+            wake(bodies_[sleeper]);
+            woke = true;
+        }
+        if (woke) state_.contacts.woke(bodies_);
     }
 
     void find_contacts() {
@@ -213,11 +248,17 @@ private:
         const float speed = state_.contacts.approach_speed(bodies_) + float(state_.world.gravity.norm() * frame);
         const float way = speed * float(frame) + float(obstacle_way(state_.world, bodies_, now_, now_ + frame));
         const float spacing = least_spacing(bodies_);
+        float step_way = 0;
+        if (state_.contacts.follows_points()) { // half-spaces stop also what is found below them
+            const double step = std::min(frame / kLeastSubsteps, stable_step_ > 0 ? stable_step_ : frame);
+            step_way = kFaster * (speed * float(step) + float(obstacle_way(state_.world, bodies_, now_, now_ + step)));
+        }
         state_.contacts.search(bodies_,
                                {.time = now_,
                                 .obstacle_reach = std::clamp(2 * way, 0.25f * spacing, 4 * spacing),
                                 .pair_reach = 0.5f * spacing,
-                                .frame = frame},
+                                .frame = frame,
+                                .step_way = step_way},
                                context_);
     }
 
@@ -226,7 +267,7 @@ private:
         find_elastic_forces(dt, is_again);
         {
             const Stopwatch watch(report_.contact_seconds);
-            const ContactReport touching = state_.contacts.add_forces(bodies_, now_, dt, context_);
+            const ContactReport touching = state_.contacts.add_forces(bodies_, now_, dt, rigid_contacts_, context_);
             report_.contacts = touching.contacts;
             report_.deepest_contact = std::max(report_.deepest_contact, double(touching.deepest));
             report_.deepest_in_matter = std::max(report_.deepest_in_matter, double(touching.deepest_in_matter));
@@ -323,7 +364,7 @@ private:
             push_out(state_, now_, context_);
         }
         const Stopwatch watch(report_.other_seconds);
-        kick(0.5f * dt, true); // rigid bodies' particles follow with the next drift, or place_rigid
+        kick(0.5f * dt, true);
         move_pins(state_, now_, dt);
         finish_substep(state_, dt, context_);
         ++report_.substeps;
@@ -337,12 +378,18 @@ private:
         });
     }
 
-    /// Pinned particles too: move_pins sets them right.
+    template <class Visit>
+    void each_awake_rigid(const Visit& visit) {
+        for (std::size_t b = 0; b < bodies_.size(); ++b)
+            if (bodies_[b].rigid && !bodies_[b].sleeps()) visit(bodies_[b], b);
+    }
+
+    /// Pinned particles too: move_pins sets them right. Rigid bodies have their own.
     void kick(float dt, bool damp) {
         const Vec3f gravity = state_.world.gravity.cast<float>();
-        each_awake([&](BodyState& body, std::size_t b) {
+        each_awake([&](BodyState& body, std::size_t) {
             const double kept = damp ? std::exp(-2 * double(dt) * body.body->material.damping) : 1;
-            if (body.rigid) return kick_rigid(body, rigid_loads_[b], state_.world.gravity, double(dt), kept);
+            if (body.rigid) return;
             parallel_for(context_, body.positions.size(), kExplicitStepsGrain, [&](std::size_t begin, std::size_t end) {
                 const float* inverse_mass = body.inverse_mass.data();
                 const auto kick_axis = [&](std::vector<float>& velocities, const std::vector<float>& forces, float g) {
@@ -360,7 +407,7 @@ private:
 
     void drift(float dt) {
         each_awake([&](BodyState& body, std::size_t) {
-            if (body.rigid) return drift_rigid(body, double(dt));
+            if (body.rigid) return;
             parallel_for(context_, body.positions.size(), kExplicitStepsGrain, [&](std::size_t begin, std::size_t end) {
                 for (std::size_t i = begin; i < end; ++i) body.positions.x[i] += dt * body.velocities.x[i];
                 for (std::size_t i = begin; i < end; ++i) body.positions.y[i] += dt * body.velocities.y[i];
@@ -383,6 +430,7 @@ private:
     };
     std::vector<Vibration> vibrations_;
     std::vector<RigidLoad> rigid_loads_; ///< of each body, by find_forces
+    RigidContacts rigid_contacts_;       ///< the same
     double stable_step_ = 0;             // s
     bool is_finite_ = true;              ///< the forces found last
     /// s: the shortest step that any body's vibrations have asked for in this frame. Steps that become longer again as

@@ -29,7 +29,8 @@ struct SimulationState {
     const MadeFor made_for;
     std::vector<BodyState> bodies;      ///< of the actors, then pieces
     std::vector<std::string> why_rigid; ///< of each actor: Simulation::why_rigid
-    std::vector<Cracks> cracks;         ///< of bodies that break
+    std::vector<StartOverlap> start_overlaps;
+    std::vector<Cracks> cracks; ///< of bodies that break
     Contacts contacts;
     ExternalForces external;
     std::unique_ptr<mpm::Bodies> grid; ///< of bodies of mpm; never null
