@@ -17,10 +17,9 @@ namespace {
 constexpr std::size_t kContactForcesGrain = 256, kObstacleForcesGrain = 16; // bodies
 constexpr std::size_t kBlocksGrain = 4;
 
-constexpr float kCrushing = 0.5f;     ///< spacings: what touches deeper may be crushed inside
-constexpr float kInside = 2;          ///< spacings below the surface at rest: what lies deeper counts as this deep
-constexpr float kThinnest = 0.1f;     ///< of their depth at rest, to which crushed parts are pressed
-constexpr float kRigidMargin = 0.02f; ///< spacings outside of an obstacle, beside the way of a substep, that touch
+constexpr float kCrushing = 0.5f; ///< spacings: what touches deeper may be crushed inside
+constexpr float kInside = 2;      ///< spacings below the surface at rest: what lies deeper counts as this deep
+constexpr float kThinnest = 0.1f; ///< of their depth at rest, to which crushed parts are pressed
 
 /// Spacings of a particle below the surface at rest; corners of cells may lie outside, below 0. points: of the surface,
 /// for bodies without a field.
@@ -241,7 +240,7 @@ ContactReport Contacts::add_obstacle_forces(BodyState& body, std::size_t b, cons
     std::vector<float>& clear_until = near_[b].clear_until;
     std::vector<std::uint64_t> touching(near_[b].blocks()); // bits of each block
     forces.resize(points.size());
-    const float margin = kRigidMargin * float(body.body->spacing()) + 2 * dt * matter_.speed(b);
+    const float margin = touching_margin(float(body.body->spacing()), matter_.speed(b));
     parallel_for(context, touching.size(), kBlocksGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t block = begin; block < end; ++block) {
             const std::size_t first = block * kBlock, left = points.size() - first;

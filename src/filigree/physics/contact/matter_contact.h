@@ -139,6 +139,7 @@ private:
         float since = std::numeric_limits<float>::max(); ///< s since the last search
         float speed = 0;                                 ///< m/s, the same bound's
         float spacing = 0;                               ///< m, the smaller of both
+        bool is_rigid = false;                           ///< both bodies are
         PairContact law;
         std::vector<Pair> pairs;
     };
@@ -173,7 +174,6 @@ private:
     void find_pairs(std::span<const Index> due, std::span<const BodyState> bodies, float frame,
                     const RunContext& context);
     bool wake_touched(std::span<BodyState> bodies) const;
-    bool disturbs(const BodyState& body, std::size_t number) const;
     void find_sides(std::span<const BodyState> bodies, double frame, const RunContext& context);
     std::optional<Vec3f> enter(Pair& pair, const Side& side, std::span<const BodyState> bodies) const;
     static bool is_elsewhere(const Pair& pair, const Matter::Place& place, const Matter& matter) {
@@ -190,10 +190,12 @@ private:
     float stiffness(const Side& side, const Pair& pair, std::span<const BodyState> bodies) const;
     void anchor_at(Pair& pair, const Side& side, const BodyState& other, const Vec3f& offset) const;
     Vec3f force(Pair& pair, const Side& side, std::span<const BodyState> bodies, float dt) const;
-    static bool are_rigid(const Side& side, std::span<const BodyState> bodies) {
-        return bodies[side.body].rigid && bodies[side.other].rigid;
+    /// Spacings: the most of margin_of.
+    static constexpr float kMostMargin = 0.5f;
+    static float margin_of(const Side& side) { ///< m, of two rigid bodies
+        return std::min(touching_margin(side.spacing, side.speed), kMostMargin * side.spacing);
     }
-    Vec3f probe(Pair& pair, const Side& side, std::span<const BodyState> bodies, float dt) const;
+    Vec3f probe(Pair& pair, const Side& side, std::span<const BodyState> bodies) const;
     static void add_contact_point(Pair& pair, const Side& side, std::span<const BodyState> bodies, const Vec3f& normal,
                                   RigidContacts& rigid);
     void push_out(Pair& pair, const Side& side, std::span<BodyState> bodies) const;

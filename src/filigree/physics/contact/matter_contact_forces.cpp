@@ -15,11 +15,9 @@ namespace {
 constexpr std::size_t kMatterForcesGrain = 128;
 /// Of a side's speed: what its pairs may gain unasked; less of those beside their own place, which all move alike.
 constexpr float kSlowest = 0.2f, kSlowestBeside = 0.02f;
-constexpr float kLittle = 0.05f;      ///< spacings until a point that is nowhere is asked again ...
-constexpr float kLittleBeside = 0.2f; ///< ... and the same of those, by their own speed
-/// Spacings outside of a rigid body at which a point of another counts as touching, beside the way of a substep; and
-/// the part of what is further that is safe to go.
-constexpr float kTouchingMargin = 0.02f, kClearerOfRigid = 0.8f;
+constexpr float kLittle = 0.05f;        ///< spacings until a point that is nowhere is asked again ...
+constexpr float kLittleBeside = 0.2f;   ///< ... and the same of those, by their own speed
+constexpr float kClearerOfRigid = 0.8f; ///< part of a distance from a rigid body that is safe to go
 
 } // namespace
 
@@ -147,7 +145,7 @@ Vec3f MatterContacts::force(Pair& pair, const Side& side, std::span<const BodySt
 
 /// Of two rigid bodies: the normal where the point lies in the other, or may lie before the next substep ends; else
 /// zero. pair.depth is below 0 outside.
-Vec3f MatterContacts::probe(Pair& pair, const Side& side, std::span<const BodyState> bodies, float dt) const {
+Vec3f MatterContacts::probe(Pair& pair, const Side& side, std::span<const BodyState> bodies) const {
     if (pair.clear_until > side.way) return Vec3f::Zero();
     const BodyState &body = bodies[side.body], &other = bodies[side.other];
     const Matter& matter = *matter_[side.other];
@@ -155,7 +153,7 @@ Vec3f MatterContacts::probe(Pair& pair, const Side& side, std::span<const BodySt
     Mat3f inverse;
     const bool is_found = matter.locate(other.positions, point, pair.place, inverse);
     const auto found = is_found ? matter.depth(pair.place, inverse, pair.entry) : std::nullopt;
-    const float margin = kTouchingMargin * side.spacing + 2 * dt * side.speed;
+    const float margin = margin_of(side);
     if (!found || found->depth < -margin) {
         leave(pair, side, found ? kClearerOfRigid * (-found->depth - margin) : kLittle * side.spacing);
         pair.rigid_force = Vec3f::Zero();
@@ -196,7 +194,7 @@ ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, 
         for (std::size_t k = begin; k < end; ++k) {
             Side& side = sides_[work_[k].first];
             Pair& pair = side.pairs[work_[k].second];
-            const Vec3f found = are_rigid(side, bodies) ? probe(pair, side, bodies, dt) : force(pair, side, bodies, dt);
+            const Vec3f found = side.is_rigid ? probe(pair, side, bodies) : force(pair, side, bodies, dt);
             forces_[k] = {found, pair.depth};
         }
     });
@@ -205,10 +203,9 @@ ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, 
         if (!(depth > 0) && force.isZero(0)) continue;
         Side& side = sides_[work_[k].first];
         Pair& pair = side.pairs[work_[k].second];
-        const bool is_rigid = are_rigid(side, bodies);
-        if (is_rigid) add_contact_point(pair, side, bodies, force, rigid);
+        if (side.is_rigid) add_contact_point(pair, side, bodies, force, rigid);
         if (!(depth > 0)) continue;
-        if (!is_rigid) {
+        if (!side.is_rigid) {
             add_to_particles(bodies[side.body].surface, pair.point, force, bodies[side.body].forces);
             matter_[side.other]->add(pair.place, -force, bodies[side.other].forces);
         }
@@ -216,7 +213,7 @@ ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, 
         touched[side.other] |= touch_of(side);
         ++report.contacts;
         report.deepest_in_matter = std::max(report.deepest_in_matter, depth);
-        is_too_deep_ |= !is_rigid && depth > most_depth(side);
+        is_too_deep_ |= !side.is_rigid && depth > most_depth(side);
     }
     return report;
 }
@@ -225,7 +222,7 @@ void MatterContacts::push_out(std::span<BodyState> bodies) {
     if (!is_too_deep_) return;
     for (Side& side : sides_) {
         const float most = most_depth(side);
-        if (both_sleep(side, bodies) || are_rigid(side, bodies)) continue;
+        if (both_sleep(side, bodies) || side.is_rigid) continue;
         for (Pair& pair : side.pairs)
             if (pair.depth > most) push_out(pair, side, bodies);
     }

@@ -183,16 +183,16 @@ std::vector<float> rigid_surface_stiffness(const BodyState& body) {
     return stiffness;
 }
 
-void tire(BodyState& body, double frame_seconds) {
+bool grow_tired(BodyState& body, double frame_seconds) {
     RigidPose& pose = *body.rigid;
     float most = 0;
     for (std::size_t i = 0; i < body.velocities.size(); ++i) most = std::max(most, body.velocities[i].squaredNorm());
-    if (most > kSlow * kSlow) {
-        pose.quiet_seconds = 0;
-        return;
-    }
-    pose.quiet_seconds += frame_seconds;
-    if (pose.quiet_seconds < kTired) return;
+    pose.quiet_seconds = most > kSlow * kSlow ? 0 : pose.quiet_seconds + frame_seconds;
+    return pose.quiet_seconds >= kTired;
+}
+
+void fall_asleep(BodyState& body) {
+    RigidPose& pose = *body.rigid;
     pose.sleeps = true;
     pose.velocity = pose.angular = Vec3d::Zero();
     place_particles(body);

@@ -8,6 +8,7 @@ namespace filigree {
 /// Squared frequency that contacts give a rigid body at most, 1/s^2: stiff enough that five stacked stones sink in by
 /// less than a millimetre in all, soft enough for 16 substeps a frame at 60 frames a second.
 inline constexpr float kRigidSquaredFrequency = 0.99e6f;
+inline constexpr float kLongestRigidStep = 1.05e-3f; ///< s, of substeps that this allows
 
 /// The same particles and surface, of a material that does not deform. body: of fem or springs.
 Body as_rigid(const Body& body);
@@ -37,9 +38,10 @@ std::vector<float> rigid_surface_stiffness(const BodyState& body);
 std::unique_ptr<Elasticity> make_rigid_elasticity(const Body& body);
 
 /// m/s of the fastest point, below which a body that rests tires.
-inline constexpr float kSlow = 5e-3f;
-/// Counts frames in which a body hardly moves; after half a second it sleeps.
-void tire(BodyState& body, double frame_seconds);
+inline constexpr float kSlow = 2e-3f;
+/// Counts frames in which a body hardly moves. Whether that is long enough to sleep: half a second.
+bool grow_tired(BodyState& body, double frame_seconds);
+void fall_asleep(BodyState& body);
 void wake(BodyState& body);
 
 } // namespace filigree

@@ -2,6 +2,8 @@
 // 2019.
 #include "filigree/physics/rigid/rigid_contacts.h"
 
+#include "filigree/physics/rigid/rigid_body.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -18,6 +20,11 @@ constexpr std::size_t kFewestSweeps = 10, kMostSweeps = 400, kMostRowsSwept = 40
 constexpr double kStill = 1e-4; ///< of what gravity adds in a substep: a smaller change of velocity ends the sweeps
 
 } // namespace
+
+float touching_margin(float spacing, float speed) {
+    constexpr float kLeast = 0.02f, kFaster = 1.5f; // spacings; what comes may become faster
+    return kLeast * spacing + kFaster * kLongestRigidStep * speed;
+}
 
 Index RigidContacts::mover_of(std::span<const BodyState> bodies, Index body) {
     if (bodies[body].sleeps()) return kNoIndex;

@@ -20,6 +20,10 @@ struct ContactPoint {
     bool* holds = nullptr;  ///< whether it pushes
 };
 
+/// m outside of something at which a point of a rigid body counts as touching it: in a substep it may get there. speed:
+/// m/s, of anything of the two beside each other. spacing: m, the smaller.
+float touching_margin(float spacing, float speed);
+
 /// Sequential impulses [Catto 2006] in short substeps, started from the forces of the substep before. Sweeps go on
 /// until velocities hardly change, so that heavy bodies on light ones stand; their number is bounded by the work that
 /// they are. Penetration is corrected by velocities that are taken away again after the bodies have moved, and

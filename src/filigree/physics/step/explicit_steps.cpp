@@ -207,14 +207,15 @@ private:
             state_.contacts.travel(bodies_, dt, float(obstacle_way(state_.world, bodies_, before, now_)), context_);
     }
 
-    /// Rigid bodies take the whole kick at once, then impulses at what they touch, and move with what comes of both. In
-    /// free flight they move as gravity has them to the last digit.
+    /// Rigid bodies take all of gravity at once and half of the kick by other forces, then impulses at what they touch,
+    /// and move with what comes of it. In free flight they move as gravity has them to the last digit.
     void move_rigid(double dt) {
         wake_met(dt);
         const Vec3d& gravity = state_.world.gravity;
         rigid_contacts_.prepare(bodies_);
         each_awake_rigid([&](BodyState& body, std::size_t b) {
-            kick_rigid(body, rigid_loads_[b], gravity, dt, std::exp(-dt * body.body->material.damping));
+            kick_rigid(body, {}, gravity, dt, 1);
+            kick_rigid(body, rigid_loads_[b], Vec3d::Zero(), 0.5 * dt, std::exp(-dt * body.body->material.damping));
         });
         rigid_contacts_.solve(bodies_, dt);
         each_awake_rigid([&](BodyState& body, std::size_t b) {
@@ -225,7 +226,7 @@ private:
         place_rigid();
     }
 
-    /// Sleepers wake that something is about to push which does not rest itself.
+    /// Sleepers wake that something is about to touch.
     void wake_met(double dt) {
         bool woke = false;
         for (const ContactPoint& point : rigid_contacts_.points()) {
@@ -233,9 +234,9 @@ private:
             const bool first = bodies_[point.body].sleeps();
             const Index sleeper = first ? point.body : point.other, comes = first ? point.other : point.body;
             const float speed = state_.contacts.speed(comes);
-            if (bodies_[comes].rigid->rests && !(speed > kSlow)) continue;
             if (double(point.separation) > dt * double(speed)) continue;
             wake(bodies_[sleeper]);
+            rigid_loads_[sleeper] = {};
             woke = true;
         }
         if (woke) state_.contacts.woke(bodies_);
@@ -365,6 +366,10 @@ private:
         }
         const Stopwatch watch(report_.other_seconds);
         kick(0.5f * dt, true);
+        each_awake_rigid([&](BodyState& body, std::size_t b) {
+            kick_rigid(body, rigid_loads_[b], Vec3d::Zero(), 0.5 * double(dt), 1);
+            place_particles(body);
+        });
         move_pins(state_, now_, dt);
         finish_substep(state_, dt, context_);
         ++report_.substeps;
