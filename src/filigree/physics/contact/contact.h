@@ -46,6 +46,11 @@ public:
     /// m/s: bound on how fast particles go towards any obstacle, as of the last travel or begin_frame; but for light
     /// corners, which hardly move the surface.
     float approach_speed(std::span<const BodyState> bodies) const;
+    /// m/s: bound on how fast the particles of an elastic body go beside each other, but for light corners, as of the
+    /// last travel or begin_frame; of others 0.
+    float speed_within(const BodyState& body, std::size_t number) const {
+        return body.rigid || body.sleeps() ? 0 : matter_.relative_speed(number, number);
+    }
     /// A body's particles were moved by so much, m, beside their velocities.
     void was_moved(std::size_t body, float way) {
         near_way_ += way;

@@ -57,6 +57,8 @@ public:
     float speed(std::size_t body) const {
         return speeds_[body].least.cwiseAbs().cwiseMax(speeds_[body].most.cwiseAbs()).norm();
     }
+    /// ... how fast those of two bodies go beside each other, or of one ...
+    float relative_speed(std::size_t a, std::size_t b) const { return Extremes::between(speeds_[a], speeds_[b]); }
     /// ... and how fast along a direction of length 1.
     float speed_along(std::size_t body, const Vec3f& direction) const {
         const auto& [least, most] = speeds_[body];
@@ -167,7 +169,6 @@ private:
         return (side.body == side.other ? kDeepestWithin : contact_law::kDeepest) * side.spacing;
     }
     static std::uint8_t touch_of(const Side& side) { return side.body == side.other ? kTouchedItself : kTouched; }
-    float relative_speed(Index a, Index b) const { return Extremes::between(speeds_[a], speeds_[b]); }
     /// m: bound on how far two bodies are from where they were beside each other at the last search.
     float moved(const Side& side) const {
         return side.moved + Extremes::between(shifts_[side.body], shifts_[side.other]);

@@ -32,7 +32,9 @@ namespace {
 // A cell pressed flat along an axis and through itself is held on the wrong side by its springs with up to 0.4 E per
 // unit of J, just below 0; there this pushes out by 0.45 E. Random and collapsed starts came back with 1.5 and with 3,
 // and no longer with 12, where the tetrahedra of corners wedge each other fast.
-constexpr float kVolumeFrom = 0.3f, kVolumeStiffness = 1.5f;
+inline float sknob(const char* n, float d) { const char* v = std::getenv(n); return v ? float(std::atof(v)) : d; }
+const float kVolumeFrom = sknob("SF", 0.5f), kVolumeStiffness = sknob("SV", 1.5f);
+const float kVolumeGrowth = sknob("SG", 80);
 constexpr float kVolumeNear =
     0.6f; // a sweep looks at cells below this at its start: one sweep will not take others there
 // Growing out of a collapse by leaps leaves particles on the wrong side of each other.
@@ -62,6 +64,18 @@ Vec3f volume_gradient(const CornerVolume& v, std::size_t axis, float inverse_cub
     const auto& e = v.edges;
     if (axis == 3) return (e[0].cross(e[1]) + e[1].cross(e[2]) + e[2].cross(e[0])) * (-v.sign * inverse_cube);
     return e[(axis + 1) % 3].cross(e[(axis + 2) % 3]) * (v.sign * inverse_cube);
+}
+
+/// What a pressed corner pushes with, its derivative and its energy, over the volume's stiffness.
+struct Pressed {
+    float force, stiffness;
+    double energy;
+};
+Pressed pressed(float ratio) {
+    const float below = kVolumeFrom - ratio, more = std::clamp(below, 0.0f, kVolumeFrom), g = kVolumeGrowth;
+    const double all = double(below), part = double(more);
+    return {below + g * more * more, 1 + 2 * g * more,
+            0.5 * all * all + double(g) * (part * part * part / 3 + part * part * (all - part))};
 }
 
 /// How far the cells are pressed.
@@ -193,8 +207,8 @@ private:
                 for_pressed_corners(positions, volumes_, Index(i), kVolumeFrom,
                                     [&](const CornerVolume& volume, std::size_t axis, float stiffness) {
                                         const Vec3f g = volume_gradient(volume, axis, inverse_cube_);
-                                        const float below = volume.ratio - kVolumeFrom;
-                                        forces.add(i, g * (-stiffness * below));
+                                        const Pressed push = pressed(volume.ratio);
+                                        forces.add(i, g * (stiffness * push.force));
                                         // g g^T is at most the blocks |g_i| sum |g_j|. J's own second derivative is at
                                         // most 2 |e| / h^3 in each edge; an edge's square is at most twice the sum of
                                         // its ends'.
@@ -202,8 +216,9 @@ private:
                                         for (std::size_t a = 0; a < 4; ++a)
                                             sum += volume_gradient(volume, a, inverse_cube_).norm();
                                         for (const Vec3f& edge : volume.edges) longest = std::max(longest, edge.norm());
-                                        bound += stiffness * (g.norm() * sum -
-                                                              below * longest * inverse_cube_ * (axis == 3 ? 12 : 4));
+                                        bound +=
+                                            stiffness * (push.stiffness * g.norm() * sum +
+                                                         push.force * longest * inverse_cube_ * (axis == 3 ? 12 : 4));
                                     });
                 most = std::max(most, bound * inverse_mass_[i]);
             }
@@ -264,8 +279,7 @@ private:
         }
         for_pressed_corners(positions, volumes, Index(i), kVolumeFrom,
                             [&](const CornerVolume& volume, std::size_t axis, float stiffness) {
-                                const double below = double(volume.ratio - kVolumeFrom);
-                                if (axis == 3) sum += 0.5 * double(stiffness) * below * below;
+                                if (axis == 3) sum += double(stiffness) * pressed(volume.ratio).energy;
                             });
         return sum;
     }

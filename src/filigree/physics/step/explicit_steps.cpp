@@ -2,6 +2,7 @@
 // forces.
 #include "filigree/core/parallel_for.h"
 #include "filigree/physics/rigid/rigid_body.h"
+#include "filigree/physics/fem/cell_kernel.h"
 #include "filigree/physics/rigid/rigid_state.h"
 #include "filigree/physics/step/simulation_state.h"
 #include "filigree/physics/step/stopwatch.h"
@@ -28,13 +29,16 @@ constexpr float kCalm = 0.05f;       ///< that change, as a speed, in parts of t
 constexpr float kNoisy = 0.15f;      ///< ... from which on damping is full
 constexpr float kNoisyDelay = 0.05f; ///< substeps
 /// A few crushed cells are little of a large body; forces change there as fast as steps follow.
-constexpr float kCrushedVolume = 0.1f; ///< of a cell, of its volume at rest
-constexpr float kCrushedDelay = 0.1f;  ///< substeps
+constexpr float kCrushedFrom = 0.5f, kCrushedTo = 0.1f; ///< of a cell, of its volume at rest: from damping to ...
+const float kCrushedDelay = cell_kernel::knob("CD",0.5f);                  ///< ... this, substeps
+/// Spacings that particles of a body may go beside each other in a substep, so that cells that a hit crushes push back
+/// in time: waves of elasticity alone would allow more where a body hits about as fast as they run.
+const float kMostShear = cell_kernel::knob("MS",0.3f);
 /// Clay that is thrown at the ground would throw bits off, but for damping of waves of a few spacings [von Neumann
 /// 1950].
 constexpr float kFlowingDelay = 0.25f;     ///< of the time that a wave takes across a spacing
-constexpr float kLightDelay = 0.5f;        ///< substeps: of a piece's light corners, which would swing for ever ...
-constexpr float kFreeWay = 0.05f;          ///< spacings a substep: ... as far as they move faster
+const float kLightDelay = cell_kernel::knob("LD",0.5f);        ///< substeps: of light corners, which would swing for ever ...
+const float kFreeWay = cell_kernel::knob("FW",0.05f);          ///< spacings a substep: ... as far as they move faster
 constexpr unsigned kExplicitLimit = 20000; ///< substeps a frame, whatever was asked for
 
 /// Where internal damping has forces computed: f(x + tau v) = f(x) - tau K v, Kelvin-Voigt to first order; of v less
@@ -60,13 +64,24 @@ Vectors positions_ahead(const BodyState& body, float delay, const RunContext& co
     return ahead;
 }
 
-/// The same for light corners alone: of what they move in a substep beside the heaviest corner of their cells, all that
-/// is more than a part of a spacing.
+/// Whether light corners move more than a part of a spacing in a substep beside the heaviest corners of their cells.
+bool light_corners_swing(const BodyState& body, float dt) {
+    const float most = kFreeWay * float(body.body->spacing()) / dt;
+    return std::ranges::any_of(body.light_corners, [&](const BodyState::LightCorner& light) {
+        return (body.velocities[light.particle] - body.velocities[light.neighbour]).squaredNorm() > most * most;
+    });
+}
+
+/// The same for light corners alone: of what they move in a substep beside the heaviest corner of their cells, and
+/// beside the body's turning, all that is more than a part of a spacing.
 void damp_light_corners(const BodyState& body, float dt, Vectors& ahead) {
     const float free_way = kFreeWay * float(body.body->spacing());
+    const RigidState rigid = rigid_state(body);
+    const Vec3f turning = rigid.angular_velocity_of(rigid.angular).cast<float>();
     for (const auto& [particle, neighbour] : body.light_corners) {
         const bool is_free = body.inverse_mass[particle] * body.body->mass[particle] > 0.99f; // neither pinned nor tied
-        const Vec3f way = dt * (body.velocities[particle] - body.velocities[neighbour]);
+        const Vec3f way = dt * (body.velocities[particle] - body.velocities[neighbour] -
+                                turning.cross(body.positions[particle] - body.positions[neighbour]));
         const float length = way.norm();
         if (is_free && length > free_way) ahead.add(particle, kLightDelay * (1 - free_way / length) * way);
     }
@@ -245,8 +260,11 @@ private:
         for (std::size_t b = 0; b < bodies_.size(); ++b)
             if (!bodies_[b].sleeps())
                 stable_in_frame_ =
-                    std::min(stable_in_frame_, stable_step(frequencies[b], double(vibrations_[b].delay)));
+                    std::min(stable_in_frame_, stable_step(frequencies[b], double(vibrations_[b].most_delay)));
         stable_step_ = std::min(stable_step_, stable_in_frame_);
+        for (std::size_t b = 0; b < bodies_.size(); ++b)
+            if (const float speed = state_.contacts.speed_within(bodies_[b], b); speed > 0)
+                stable_step_ = std::min(stable_step_, double(kMostShear) * bodies_[b].body->spacing() / double(speed));
         const double shortest = std::max(kShortestOpening * stable_step_, (until_ - now_) / steps_allowed());
         stable_step_ = std::min(stable_step_, std::max(opening_step, shortest));
     }
@@ -264,7 +282,8 @@ private:
         Vibration& vibration = vibrations_[b];
         const float usual = usual_delay(*body.body);
         if (!std::exchange(vibration.has_forces, true)) return usual;
-        const float crushed = elastic_[b].least_volume_ratio < kCrushedVolume ? kCrushedDelay * dt : 0;
+        const float below = (kCrushedFrom - elastic_[b].least_volume_ratio) / (kCrushedFrom - kCrushedTo);
+        const float crushed = kCrushedDelay * dt * std::clamp(below, 0.0f, 1.0f);
         if (vibration.before.size() == 0) {
             vibration.before = body.forces;
             return std::max(usual, crushed);
@@ -292,9 +311,11 @@ private:
         BodyState& body = bodies_[b];
         float& delay = vibrations_[b].delay;
         if (!body.rigid && !(is_again && vibrations_[b].has_forces)) delay = find_delay(b, dt);
-        if (delay > 0 || !body.light_corners.empty()) {
+        const bool swings = light_corners_swing(body, dt);
+        vibrations_[b].most_delay = std::max(delay, swings ? kLightDelay * dt : 0.0f);
+        if (delay > 0 || swings) {
             Vectors ahead = delay > 0 ? positions_ahead(body, delay, context_) : body.positions;
-            damp_light_corners(body, dt, ahead);
+            if (swings) damp_light_corners(body, dt, ahead);
             elastic_[b] = body.elasticity->forces(ahead, body.forces, context_);
         } else {
             elastic_[b] = body.elasticity->forces(body.positions, body.forces, context_);
@@ -365,6 +386,7 @@ private:
         bool has_forces = false; ///< of this frame; those before it are not known after a restore
         Vectors before;          ///< N, the forces of the substep before; empty: not known
         float delay = 0;         ///< s of internal damping
+        float most_delay = 0;    ///< s, that of any corner
     };
     std::vector<Vibration> vibrations_;
     std::vector<RigidLoad> rigid_loads_; ///< of each body, by find_forces
