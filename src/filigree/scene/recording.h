@@ -21,7 +21,7 @@ struct CheckTotals {
 
 /// Sums over all frames so far. No times: equal runs have equal totals.
 struct RunTotals {
-    std::uint64_t frames = 0, explicit_frames = 0, descent_frames = 0;
+    std::uint64_t frames = 0;
     std::uint64_t substeps = 0, least_substeps = ~std::uint64_t{0}, most_substeps = 0, clamped_particles = 0,
                   most_contacts = 0;
     double deepest_contact = 0, deepest_in_matter = 0; ///< m
@@ -38,13 +38,6 @@ struct RunTimes {
     double coupling = 0;                        ///< particles to driver
     double restore = 0;                         ///< driver to mesh
     double direct = 0;                          ///< particles to every vertex; only where that was checked
-
-    void add(const FrameReport& report);
-};
-
-/// Frames that descent made or finished, by cause.
-struct DescentCauses {
-    std::uint64_t chosen = 0, too_many_substeps = 0, not_finite = 0;
 
     void add(const FrameReport& report);
 };
@@ -67,7 +60,6 @@ struct Recording {
     std::vector<std::vector<MatterParticles>> matter;       ///< of each body and frame; none of bodies not of mpm
     std::vector<CheckTotals> checks;                        ///< one a body where that was asked for, else none
     RunTotals totals;
-    DescentCauses descent_causes;
     std::vector<BodyDoubts> doubts; ///< one a body
     float last_volume_ratio = 1;    ///< the least of the last frame
 };

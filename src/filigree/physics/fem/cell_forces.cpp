@@ -32,10 +32,9 @@ template <int N>
 FILIGREE_INLINE typename LaneTypes<N>::Float stiffness_bound(const Factors& f, const CellShape<N>& shape,
                                                              typename LaneTypes<N>::Float I,
                                                              typename LaneTypes<N>::Float inverse_I1,
-                                                             typename LaneTypes<N>::Float q,
-                                                             typename LaneTypes<N>::Float crush) {
+                                                             typename LaneTypes<N>::Float q) {
     using Float = typename LaneTypes<N>::Float;
-    const Float e = 1.0f + (2 * f.crush) * crush;
+    const Float e = 1.0f + (2 * f.crush) * crush_of<N>(shape.J - kCrushSoon);
     const Float c2 = ((dot(shape.cofactor[0], shape.cofactor[0]) + dot(shape.cofactor[1], shape.cofactor[1])) +
                       dot(shape.cofactor[2], shape.cofactor[2])) *
                      (f.inverse_size2 * f.inverse_size2) * e;
@@ -74,7 +73,7 @@ FILIGREE_INLINE void add_forces(const Factors& f, const Vectors& positions, cons
     const Float crush = crush_of<N>(shape.J);
     const Float q = (shape.J - f.rest_ratio) - f.crush * crush * crush;
     const Float over = L::least(L::most(shape.I_bent - kBentFrom, Float{}), Float{} + kBentMost);
-    Float stiffness = stiffness_bound<N>(f, shape, I, inverse_I1, q, crush) +
+    Float stiffness = stiffness_bound<N>(f, shape, I, inverse_I1, q) +
                       (f.shear_ratio * kBentStiffness) * (over * (over + 4.0f * (kBentFrom + over)));
     stiffness = stiffness <= 3e38f ? stiffness : Float{} + std::numeric_limits<float>::infinity();
 

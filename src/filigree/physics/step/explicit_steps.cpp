@@ -29,17 +29,16 @@ constexpr float kCalm = 0.05f;       ///< that change, as a speed, in parts of t
 constexpr float kNoisy = 0.15f;      ///< ... from which on damping is full
 constexpr float kNoisyDelay = 0.05f; ///< substeps
 /// A few crushed cells are little of a large body; forces change there as fast as steps follow.
-constexpr float kCrushedFrom = 0.5f, kCrushedTo = 0.1f; ///< of a cell, of its volume at rest: from damping to ...
-const float kCrushedDelay = cell_kernel::knob("CD",0.5f);                  ///< ... this, substeps
-/// Spacings that particles of a body may go beside each other in a substep, so that cells that a hit crushes push back
-/// in time: waves of elasticity alone would allow more where a body hits about as fast as they run.
-const float kMostShear = cell_kernel::knob("MS",0.3f);
+const float kCrushedFrom = cell_kernel::knob("CDF",0.3f), kCrushedTo = 0.0f; ///< of a cell, of its volume at rest: from damping to ...
+const float kCrushedDelay = cell_kernel::knob("CD",0.25f);                  ///< ... this, substeps
 /// Clay that is thrown at the ground would throw bits off, but for damping of waves of a few spacings [von Neumann
 /// 1950].
-constexpr float kFlowingDelay = 0.25f;     ///< of the time that a wave takes across a spacing
+constexpr float kFlowingDelay = 0.25f;    ///< of the time that a wave takes across a spacing
 const float kLightDelay = cell_kernel::knob("LD",0.5f);        ///< substeps: of light corners, which would swing for ever ...
 const float kFreeWay = cell_kernel::knob("FW",0.05f);          ///< spacings a substep: ... as far as they move faster
-constexpr unsigned kExplicitLimit = 20000; ///< substeps a frame, whatever was asked for
+const double kMostDeforming = cell_kernel::knob("MS",0.5f);    ///< spacings a substep, between particles of one body
+constexpr unsigned kMostSubsteps = 20000; ///< a frame
+constexpr double kUsualSubsteps = 256;    ///< a frame: what the first forces of a frame take for the step before
 
 /// Where internal damping has forces computed: f(x + tau v) = f(x) - tau K v, Kelvin-Voigt to first order; of v less
 /// its rigid part.
@@ -72,16 +71,13 @@ bool light_corners_swing(const BodyState& body, float dt) {
     });
 }
 
-/// The same for light corners alone: of what they move in a substep beside the heaviest corner of their cells, and
-/// beside the body's turning, all that is more than a part of a spacing.
+/// The same for light corners alone: of what they move in a substep beside the heaviest corner of their cells, all that
+/// is more than a part of a spacing.
 void damp_light_corners(const BodyState& body, float dt, Vectors& ahead) {
     const float free_way = kFreeWay * float(body.body->spacing());
-    const RigidState rigid = rigid_state(body);
-    const Vec3f turning = rigid.angular_velocity_of(rigid.angular).cast<float>();
     for (const auto& [particle, neighbour] : body.light_corners) {
         const bool is_free = body.inverse_mass[particle] * body.body->mass[particle] > 0.99f; // neither pinned nor tied
-        const Vec3f way = dt * (body.velocities[particle] - body.velocities[neighbour] -
-                                turning.cross(body.positions[particle] - body.positions[neighbour]));
+        const Vec3f way = dt * (body.velocities[particle] - body.velocities[neighbour]);
         const float length = way.norm();
         if (is_free && length > free_way) ahead.add(particle, kLightDelay * (1 - free_way / length) * way);
     }
@@ -133,6 +129,22 @@ double stable_step(double squared_frequency, double internal_damping) {
     return std::isfinite(squared_frequency) ? step : 0;
 }
 
+/// s, in which no two particles of the body move further than a part of the spacing beside each other: forces follow
+/// larger steps in no way, however stable they are near rest.
+double deforming_step(const BodyState& body) {
+    const auto spread = [](const std::vector<float>& v, std::size_t count) {
+        float least = v[0], most = v[0];
+        for (std::size_t i = 1; i < count; ++i) {
+            least = v[i] < least ? v[i] : least;
+            most = v[i] > most ? v[i] : most;
+        }
+        return double(most - least);
+    };
+    const Vectors& v = body.velocities;
+    const double speed = std::hypot(spread(v.x, v.size()), spread(v.y, v.size()), spread(v.z, v.size()));
+    return speed > 0 ? kMostDeforming * body.body->spacing() / speed : kNoLimit;
+}
+
 class ExplicitSteps {
 public:
     ExplicitSteps(SimulationState& state, double from, double until, FrameReport& report, const RunContext& context)
@@ -143,7 +155,7 @@ public:
     double run() {
         if (meets_anything_) state_.contacts.begin_frame(bodies_, context_);
         find_contacts();
-        const float first_dt = float(state_.frame_seconds() / state_.options.most_substeps);
+        const float first_dt = float(state_.frame_seconds() / kUsualSubsteps);
         find_forces(first_dt);
         if (repair_start(state_, elastic_, report_, context_)) {
             state_.contacts.begin_anew();
@@ -156,7 +168,7 @@ public:
         const auto is_left = [&] { return until_ - now_ > 1e-9 * state_.frame_seconds(); };
         while (is_left()) {
             const double steps = steps_left();
-            if (!(steps <= steps_allowed()) || context_.is_cancelled()) break;
+            if (!is_finite_ || context_.is_cancelled()) break;
             const float dt = float((until_ - now_) / steps);
             const double before = now_;
             move(dt, steps <= 1 ? until_ : now_ + double(dt));
@@ -177,18 +189,13 @@ public:
     }
 
 private:
+    /// As many as stability asks for, up to kMostSubsteps in the whole frame: what no step is short enough for takes
+    /// those.
     double steps_left() const {
         const double remaining = until_ - now_;
         const double fewest = std::ceil(kLeastSubsteps * remaining / state_.frame_seconds() - 1e-6);
-        return stable_step_ > 0 ? std::max(fewest, std::ceil(remaining / stable_step_)) : kExplicitLimit + 1.0;
-    }
-    /// A frame that was begun may take twice as many. Where bodies meet fast descent takes more substeps as well.
-    double steps_allowed() const {
-        double limit = kExplicitLimit;
-        if (state_.options.mode == StepMode::automatic)
-            limit = state_.options.most_substeps * state_.frame_seconds() /
-                    (state_.options.descent_substeps * state_.descent_step(state_.contacts.longest_step()));
-        return report_.substeps == 0 ? limit : 2 * limit - report_.substeps;
+        const double most = std::max(1.0, double(kMostSubsteps) - report_.substeps);
+        return std::min(most, std::max(fewest, std::ceil(remaining / stable_step_)));
     }
 
     /// Particles of rigid bodies as their poses have them after the last kick.
@@ -257,16 +264,15 @@ private:
         each_awake([&](const BodyState& body, std::size_t b) {
             if (body.rigid) rigid_loads_[b] = rigid_load(body);
         });
-        for (std::size_t b = 0; b < bodies_.size(); ++b)
-            if (!bodies_[b].sleeps())
-                stable_in_frame_ =
-                    std::min(stable_in_frame_, stable_step(frequencies[b], double(vibrations_[b].most_delay)));
+        is_finite_ = true;
+        for (std::size_t b = 0; b < bodies_.size(); ++b) {
+            if (bodies_[b].sleeps()) continue;
+            is_finite_ &= std::isfinite(frequencies[b]);
+            stable_in_frame_ = std::min(stable_in_frame_, stable_step(frequencies[b], double(vibrations_[b].delay)));
+            if (!bodies_[b].rigid) stable_step_ = std::min(stable_step_, deforming_step(bodies_[b]));
+        }
         stable_step_ = std::min(stable_step_, stable_in_frame_);
-        for (std::size_t b = 0; b < bodies_.size(); ++b)
-            if (const float speed = state_.contacts.speed_within(bodies_[b], b); speed > 0)
-                stable_step_ = std::min(stable_step_, double(kMostShear) * bodies_[b].body->spacing() / double(speed));
-        const double shortest = std::max(kShortestOpening * stable_step_, (until_ - now_) / steps_allowed());
-        stable_step_ = std::min(stable_step_, std::max(opening_step, shortest));
+        stable_step_ = std::min(stable_step_, std::max(opening_step, kShortestOpening * stable_step_));
     }
 
     /// s of internal damping, unless more is needed.
@@ -312,7 +318,6 @@ private:
         float& delay = vibrations_[b].delay;
         if (!body.rigid && !(is_again && vibrations_[b].has_forces)) delay = find_delay(b, dt);
         const bool swings = light_corners_swing(body, dt);
-        vibrations_[b].most_delay = std::max(delay, swings ? kLightDelay * dt : 0.0f);
         if (delay > 0 || swings) {
             Vectors ahead = delay > 0 ? positions_ahead(body, delay, context_) : body.positions;
             if (swings) damp_light_corners(body, dt, ahead);
@@ -386,11 +391,11 @@ private:
         bool has_forces = false; ///< of this frame; those before it are not known after a restore
         Vectors before;          ///< N, the forces of the substep before; empty: not known
         float delay = 0;         ///< s of internal damping
-        float most_delay = 0;    ///< s, that of any corner
     };
     std::vector<Vibration> vibrations_;
     std::vector<RigidLoad> rigid_loads_; ///< of each body, by find_forces
     double stable_step_ = 0;             // s
+    bool is_finite_ = true;              ///< the forces found last
     /// s: the shortest step that any body's vibrations have asked for in this frame. Steps that become longer again as
     /// these swing give them energy.
     double stable_in_frame_ = kNoLimit;
