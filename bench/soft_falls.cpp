@@ -117,8 +117,8 @@ Corners corners_of(const Cells& cells, const Vectors& positions) {
 }
 
 /// Whether all went well.
-bool fall(const std::string& preset, const std::shared_ptr<const Body>& body,
-          const std::string& shape, double size, bool has_edge, double seconds) {
+bool fall(const std::string& preset, const std::shared_ptr<const Body>& body, const std::string& shape, double size,
+          bool has_edge, double seconds) {
     const RunContext context(1);
     const Box box = box_of(body->rest);
     const double height = box.size().y(), g = 9.81;
@@ -126,7 +126,8 @@ bool fall(const std::string& preset, const std::shared_ptr<const Body>& body,
     actor.body = body;
     actor.placement.translation() = -Vec3d(box.centre().x(), box.min.y() - 0.02 * height, box.centre().z());
     actor.velocity = {0, -std::sqrt(2 * g * 1.5 * height), 0};
-    Simulation falling = Simulation::create(world_of(has_edge, height), {actor}, {.automatic_rigid = false}, context).value();
+    Simulation falling =
+        Simulation::create(world_of(has_edge, height), {actor}, {.automatic_rigid = false}, context).value();
     const double start = falling.energy(context).total(), zero = start - falling.energy(context).kinetic;
     const auto frames = std::size_t(60 * (seconds + std::sqrt(3 * height / g)));
     double least = 1, most_energy = 0, most_stretch = 1;
@@ -150,8 +151,8 @@ bool fall(const std::string& preset, const std::shared_ptr<const Body>& body,
     const double spent = now_seconds() - began;
     std::printf("%-11s %5.2f %-14s %-6s %6.3f %4zu %4zu %7.3f %4zu %6zu %6.3f %5.2f %5zu %7.1f %7.2f %zu\n",
                 preset.c_str(), size, shape.c_str(), has_edge ? "edge" : "ground", least, bad, bad_ends, worst.least,
-                bad_corners, worst.inverted, most_energy, most_stretch, most_substeps, double(substeps) / double(frames),
-                1e3 * spent / double(frames), frames);
+                bad_corners, worst.inverted, most_energy, most_stretch, most_substeps,
+                double(substeps) / double(frames), 1e3 * spent / double(frames), frames);
     std::fflush(stdout);
     return bad == 0;
 }
@@ -160,8 +161,9 @@ bool fall(const std::string& preset, const std::shared_ptr<const Body>& body,
 
 int main(int count, char** arguments) {
     const Options options = read_options(count, arguments);
-    std::printf("preset       size shape          onto    least  bad ends corners  bad  cells energy  str. steps    mean "
-                "ms/frm frames\n");
+    std::printf(
+        "preset       size shape          onto    least  bad ends corners  bad  cells energy  str. steps    mean "
+        "ms/frm frames\n");
     bool is_good = true;
     for (const auto& path : options.meshes) {
         const Result<MeshFile> file = read_mesh(path, RunContext());
@@ -177,7 +179,8 @@ int main(int count, char** arguments) {
                                         : std::ranges::find(options.presets, preset) == options.presets.end())
                 continue;
             for (const double size : options.sizes) {
-                BodyOptions made{.scale = size / box.size().maxCoeff(), .cells = {.spacing = 0, .count = options.particles}};
+                BodyOptions made{.scale = size / box.size().maxCoeff(),
+                                 .cells = {.spacing = 0, .count = options.particles}};
                 Result<Body> body = make_body(file->mesh, named.material, made, RunContext());
                 if (!body) {
                     std::fprintf(stderr, "%s: %s\n", path.c_str(), body.error().message.c_str());
@@ -185,8 +188,7 @@ int main(int count, char** arguments) {
                 }
                 const auto shared = std::make_shared<const Body>(*std::move(body));
                 for (const bool has_edge : {false, true})
-                    is_good &= fall(preset, shared, path.stem().string(), size, has_edge,
-                                    options.seconds);
+                    is_good &= fall(preset, shared, path.stem().string(), size, has_edge, options.seconds);
             }
         }
     }

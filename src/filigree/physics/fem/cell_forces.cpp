@@ -29,10 +29,9 @@ struct Extremes {
 /// where the two others are equal, as at rest). Across s it is at most |q| s_1. Bent cells add little and are bounded
 /// roughly.
 template <int N>
-FILIGREE_INLINE typename LaneTypes<N>::Float stiffness_bound(const Factors& f, const CellShape<N>& shape,
-                                                             typename LaneTypes<N>::Float I,
-                                                             typename LaneTypes<N>::Float inverse_I1,
-                                                             typename LaneTypes<N>::Float q) {
+FILIGREE_INLINE typename LaneTypes<N>::Float
+stiffness_bound(const Factors& f, const CellShape<N>& shape, typename LaneTypes<N>::Float I,
+                typename LaneTypes<N>::Float inverse_I1, typename LaneTypes<N>::Float q) {
     using Float = typename LaneTypes<N>::Float;
     const Float e = 1.0f + (2 * f.crush) * crush_of<N>(shape.J - kCrushSoon);
     const Float c2 = ((dot(shape.cofactor[0], shape.cofactor[0]) + dot(shape.cofactor[1], shape.cofactor[1])) +

@@ -6,7 +6,6 @@
 #include "filigree/physics/body/elasticity.h"
 
 #include <algorithm>
-#include <cstdlib>
 
 namespace filigree::cell_kernel {
 
@@ -22,14 +21,18 @@ void transform_corners(std::array<Vector, 8>& X) {
             }
 }
 
-inline float knob(const char* n, float d) { const char* v = std::getenv(n); return v ? float(std::atof(v)) : d; }
-inline const float kCrushFrom = knob("CF", 0.4f), kCrushStiffness = knob("CK", 100), kCrushSoon = knob("CS", 0.1f);
-inline const float kBentFrom = knob("BF", 0.02f), kBentStiffness = knob("BK", 100), kBentMost = knob("BM", 0.5f);
+/// Below this volume ratio a cell resists more: by (bulk + shear) kCrushStiffness r^2, r = kCrushFrom - J, so that its
+/// stiffness grows steadily from none; below J = 0, where it is inverted, no more than there. Steps are short enough
+/// for a cell that loses kCrushSoon more.
+inline constexpr float kCrushFrom = 0.4f, kCrushStiffness = 100, kCrushSoon = 0.1f;
+/// Where a part of I beyond this is bending, a cell resists more as well: by shear kBentStiffness r^2, r up to
+/// kBentMost. The corners of cells that are hardly filled would be thrown through the others.
+inline constexpr float kBentFrom = 0.02f, kBentStiffness = 500, kBentMost = 0.5f;
 
 /// Energy of a cell of occupied volume V, stable where it is inverted or collapsed [Smith 2018]:
 ///     V (shear/2 (I - 3) + bulk/2 (J - rest_ratio)^2 - shear/2 log((I + 1) / 4)) less its value at rest,
-/// crush_energy and bent_energy. I is the mean of |F|^2 over the cell (an exact integral of the trilinear shape), J the determinant
-/// of its mean F: one a cell, so that nothing locks. Small strains see Lame's parameters.
+/// crush_energy and bent_energy. I is the mean of |F|^2 over the cell (an exact integral of the trilinear shape), J the
+/// determinant of its mean F: one a cell, so that nothing locks. Small strains see Lame's parameters.
 struct CellMaterial {
     float spacing = 0;         ///< m
     float density = 0;         ///< kg/m^3

@@ -61,7 +61,8 @@ float stiffness_of(const cell_kernel::CellMaterial& m, const PlasticCell& cell, 
                           a * shape.J * (18 * e * shape.J + 12 * q) + 4 * e * q * shape.J * shape.linear;
     const float along = largest_eigenvalue(trace, squares);
     const float across = std::abs(q) * (shape.linear + 3) * 0.28867513f;
-    const float over = over_bent(shape.bent), over_stiffness = cell_kernel::kBentStiffness * over * (over + 4 * (cell_kernel::kBentFrom + over));
+    const float over = over_bent(shape.bent),
+                over_stiffness = cell_kernel::kBentStiffness * over * (over + 4 * (cell_kernel::kBentFrom + over));
     const float shear = ratio * (I / (I + 1) + over_stiffness), bent = a * (0.05f * shape.linear + 4 * shape.bent);
     const Mat3f metric = cell.inverse * cell.inverse.transpose();
     float at_rest = 0;

@@ -31,10 +31,12 @@ namespace {
 // A cell pressed flat along an axis and through itself is held on the wrong side by its springs with up to 0.4 E per
 // unit of J, just below 0; there this pushes out by 0.45 E. Random and collapsed starts came back with 1.5 and with 3,
 // and no longer with 12, where the tetrahedra of corners wedge each other fast.
-inline float sknob(const char* n, float d) { const char* v = std::getenv(n); return v ? float(std::atof(v)) : d; }
-const float kVolumeFrom = sknob("SF", 0.5f), kVolumeStiffness = sknob("SV", 1.5f);
-const float kVolumeGrowth = sknob("SG", 80);
-const float kVolumeSoon = sknob("SS", 0.1f); ///< steps are short enough for this much less volume
+constexpr float kVolumeFrom = 0.3f, kVolumeStiffness = 1.5f;
+// That alone does not stop what hits hard. So a cell as a whole resists as well, by its mean gradient's volume ratio J:
+// below kCrushFrom by kCrushStiffness E V r^2, r = kCrushFrom - J, where it is inverted no more than where it is flat.
+// Steps are short enough for a cell that loses kCrushSoon more.
+constexpr float kCrushFrom = 0.4f, kCrushStiffness = 100, kCrushSoon = 0.1f;
+constexpr float kPressedFrom = 0.5f;                ///< volume ratio at a corner below which a cell is looked at
 constexpr float kLargestSpring = 1e15f;             // m: positions beyond are not fit for explicit steps
 constexpr std::size_t kSpringElasticityGrain = 256; // particles
 constexpr std::size_t kRunGrain = 2;
@@ -61,17 +63,29 @@ Vec3f volume_gradient(const CornerVolume& v, std::size_t axis, float inverse_cub
     return e[(axis + 1) % 3].cross(e[(axis + 2) % 3]) * (v.sign * inverse_cube);
 }
 
-/// What a pressed corner pushes with, its derivative and its energy, over the volume's stiffness.
-struct Pressed {
-    float force, stiffness;
-    double energy;
+/// A cell's mean edges, and how its volume depends on them.
+struct MeanVolume {
+    std::array<Vec3f, 3> edges, cofactors; ///< m; m^2
+    float ratio;                           ///< J
+    MeanVolume(const std::array<Vec3f, 8>& p, float inverse_cube) {
+        for (std::size_t a = 0; a < 3; ++a) {
+            const std::size_t bit = std::size_t{1} << a;
+            edges[a].setZero();
+            for (std::size_t c = 0; c < 8; ++c)
+                if (!(c & bit)) edges[a] += 0.25f * (p[c | bit] - p[c]);
+        }
+        for (std::size_t a = 0; a < 3; ++a) cofactors[a] = edges[(a + 1) % 3].cross(edges[(a + 2) % 3]);
+        ratio = inverse_cube * edges[0].dot(cofactors[0]);
+    }
+    /// dJ/dx of a corner.
+    Vec3f gradient(std::size_t corner, float inverse_cube) const {
+        Vec3f sum = Vec3f::Zero();
+        for (std::size_t a = 0; a < 3; ++a) sum += ((corner >> a & 1) ? 0.25f : -0.25f) * cofactors[a];
+        return inverse_cube * sum;
+    }
 };
-Pressed pressed(float ratio) {
-    const float below = kVolumeFrom - ratio, more = std::clamp(below, 0.0f, kVolumeFrom), g = kVolumeGrowth;
-    const double all = double(below), part = double(more);
-    return {below + g * more * more, 1 + 2 * g * std::min(more + kVolumeSoon, kVolumeFrom),
-            0.5 * all * all + double(g) * (part * part * part / 3 + part * part * (all - part))};
-}
+
+float crush_of(float ratio) { return std::clamp(kCrushFrom - ratio, 0.0f, kCrushFrom); }
 
 /// How far the cells are pressed.
 struct CellVolumes {
@@ -151,7 +165,7 @@ private:
             all.least = found.least >= all.least ? all.least : found.least;
             all.most_squared = found.most_squared <= all.most_squared ? all.most_squared : found.most_squared;
         }
-        volumes.any_pressed = all.least_corner < kVolumeFrom;
+        volumes.any_pressed = all.least_corner < kPressedFrom;
         ElasticReport report;
         report.least_volume_ratio = all.least;
         report.most_stretch = std::sqrt(all.most_squared / 3) / (4 * float(body_.spacing()));
@@ -187,8 +201,8 @@ private:
                 for_pressed_corners(positions, volumes_, Index(i), kVolumeFrom,
                                     [&](const CornerVolume& volume, std::size_t axis, float stiffness) {
                                         const Vec3f g = volume_gradient(volume, axis, inverse_cube_);
-                                        const Pressed push = pressed(volume.ratio);
-                                        forces.add(i, g * (stiffness * push.force));
+                                        const float below = volume.ratio - kVolumeFrom;
+                                        forces.add(i, g * (-stiffness * below));
                                         // g g^T is at most the blocks |g_i| sum |g_j|. J's own second derivative is at
                                         // most 2 |e| / h^3 in each edge; an edge's square is at most twice the sum of
                                         // its ends'.
@@ -196,9 +210,8 @@ private:
                                         for (std::size_t a = 0; a < 4; ++a)
                                             sum += volume_gradient(volume, a, inverse_cube_).norm();
                                         for (const Vec3f& edge : volume.edges) longest = std::max(longest, edge.norm());
-                                        bound +=
-                                            stiffness * (push.stiffness * g.norm() * sum +
-                                                         push.force * longest * inverse_cube_ * (axis == 3 ? 12 : 4));
+                                        bound += stiffness * (g.norm() * sum -
+                                                              below * longest * inverse_cube_ * (axis == 3 ? 12 : 4));
                                     });
                 most = std::max(most, bound * inverse_mass_[i]);
             }
@@ -221,7 +234,8 @@ private:
         }
         for_pressed_corners(positions, volumes, Index(i), kVolumeFrom,
                             [&](const CornerVolume& volume, std::size_t axis, float stiffness) {
-                                if (axis == 3) sum += double(stiffness) * pressed(volume.ratio).energy;
+                                const double below = double(volume.ratio - kVolumeFrom);
+                                if (axis == 3) sum += 0.5 * double(stiffness) * below * below;
                             });
         return sum;
     }

@@ -2,7 +2,6 @@
 // forces.
 #include "filigree/core/parallel_for.h"
 #include "filigree/physics/rigid/rigid_body.h"
-#include "filigree/physics/fem/cell_kernel.h"
 #include "filigree/physics/rigid/rigid_state.h"
 #include "filigree/physics/step/simulation_state.h"
 #include "filigree/physics/step/stopwatch.h"
@@ -29,14 +28,14 @@ constexpr float kCalm = 0.05f;       ///< that change, as a speed, in parts of t
 constexpr float kNoisy = 0.15f;      ///< ... from which on damping is full
 constexpr float kNoisyDelay = 0.05f; ///< substeps
 /// A few crushed cells are little of a large body; forces change there as fast as steps follow.
-const float kCrushedFrom = cell_kernel::knob("CDF",0.3f), kCrushedTo = 0.0f; ///< of a cell, of its volume at rest: from damping to ...
-const float kCrushedDelay = cell_kernel::knob("CD",0.25f);                  ///< ... this, substeps
+constexpr float kCrushedFrom = 0.3f;  ///< of a cell, of its volume at rest: damping begins, and grows ...
+constexpr float kCrushedDelay = 0.5f; ///< ... to this where a cell is flat, substeps
 /// Clay that is thrown at the ground would throw bits off, but for damping of waves of a few spacings [von Neumann
 /// 1950].
 constexpr float kFlowingDelay = 0.25f;    ///< of the time that a wave takes across a spacing
-const float kLightDelay = cell_kernel::knob("LD",0.5f);        ///< substeps: of light corners, which would swing for ever ...
-const float kFreeWay = cell_kernel::knob("FW",0.05f);          ///< spacings a substep: ... as far as they move faster
-const double kMostDeforming = cell_kernel::knob("MS",0.5f);    ///< spacings a substep, between particles of one body
+constexpr float kLightDelay = 0.5f;       ///< substeps: of light corners, which would swing for ever ...
+constexpr float kFreeWay = 0.05f;         ///< spacings a substep: ... as far as they move faster
+constexpr double kMostDeforming = 0.5;    ///< spacings a substep, between particles of one body
 constexpr unsigned kMostSubsteps = 20000; ///< a frame
 constexpr double kUsualSubsteps = 256;    ///< a frame: what the first forces of a frame take for the step before
 
@@ -288,8 +287,8 @@ private:
         Vibration& vibration = vibrations_[b];
         const float usual = usual_delay(*body.body);
         if (!std::exchange(vibration.has_forces, true)) return usual;
-        const float below = (kCrushedFrom - elastic_[b].least_volume_ratio) / (kCrushedFrom - kCrushedTo);
-        const float crushed = kCrushedDelay * dt * std::clamp(below, 0.0f, 1.0f);
+        const float crushed =
+            kCrushedDelay * dt * std::clamp(1 - elastic_[b].least_volume_ratio / kCrushedFrom, 0.0f, 1.0f);
         if (vibration.before.size() == 0) {
             vibration.before = body.forces;
             return std::max(usual, crushed);
