@@ -85,7 +85,7 @@ struct MeanVolume {
     }
 };
 
-float crush_of(float ratio) { return std::clamp(kCrushFrom - ratio, 0.0f, kCrushFrom); }
+float cell_crush(float ratio) { return std::clamp(kCrushFrom - ratio, 0.0f, kCrushFrom); }
 
 /// How far the cells are pressed.
 struct CellVolumes {
@@ -101,6 +101,7 @@ public:
         const std::size_t n = body.particle_count();
         const double h = body.spacing();
         inverse_cube_ = float(1 / (h * h * h));
+        crush_stiffness_ = float(double(kCrushStiffness) * body.material.young_modulus * h * h * h);
         volume_stiffness_ = float(double(kVolumeStiffness) * body.material.young_modulus * h * h * h / 8);
         inverse_mass_.assign(n + Vectors::kPadding, 0);
         for (std::size_t i = 0; i < n; ++i) inverse_mass_[i] = 1 / body.mass[i];
@@ -190,6 +191,37 @@ private:
         }
     }
 
+    /// Calls visit(volume, corner, stiffness) for the crushed cells around particle i, which is that corner of theirs.
+    template <class Visit>
+    void for_crushed_cells(const Vectors& positions, const CellVolumes& volumes, Index i, const Visit& visit) const {
+        for (std::size_t here = 0; here < 8; ++here) {
+            const Index c = cells_at_[i][here];
+            if (c == kNoIndex || !(volumes.least[c] < kPressedFrom)) continue;
+            std::array<Vec3f, 8> p;
+            for (std::size_t k = 0; k < 8; ++k) p[k] = positions[body_.cells.cell_corners[c][k]];
+            const MeanVolume volume(p, inverse_cube_);
+            if (volume.ratio < kCrushFrom + kCrushSoon) visit(volume, here, crush_stiffness_ * body_.cells.fraction[c]);
+        }
+    }
+
+    /// Adds the forces of crushed cells on particle i; returns what they add to the bound, times its mass.
+    float add_crush_forces(const Vectors& positions, Vectors& forces, Index i) const {
+        float bound = 0;
+        for_crushed_cells(positions, volumes_, i, [&](const MeanVolume& volume, std::size_t corner, float stiffness) {
+            const Vec3f g = volume.gradient(corner, inverse_cube_);
+            const float crush = cell_crush(volume.ratio), push = crush * crush;
+            forces.add(i, (stiffness * push) * g);
+            // As of corners below. A corner is in three mean edges, by a quarter: of J's second derivative the blocks
+            // of one corner with all eight add up to 3 |e| / h^3.
+            float sum = 0, longest = 0;
+            for (std::size_t c = 0; c < 8; ++c) sum += volume.gradient(c, inverse_cube_).norm();
+            for (const Vec3f& edge : volume.edges) longest = std::max(longest, edge.norm());
+            bound += stiffness *
+                     (2 * cell_crush(volume.ratio - kCrushSoon) * g.norm() * sum + 3 * push * longest * inverse_cube_);
+        });
+        return bound;
+    }
+
     /// Returns what the pressed cells add to the bound on the squared frequency.
     float add_volume_forces(const Vectors& positions, Vectors& forces, const RunContext& context) const {
         const std::size_t n = body_.particle_count();
@@ -197,7 +229,7 @@ private:
         parallel_for(context, n, kSpringElasticityGrain, [&](std::size_t begin, std::size_t end) {
             float most = 0;
             for (std::size_t i = begin; i < end; ++i) {
-                float bound = 0;
+                float bound = add_crush_forces(positions, forces, Index(i));
                 for_pressed_corners(positions, volumes_, Index(i), kVolumeFrom,
                                     [&](const CornerVolume& volume, std::size_t axis, float stiffness) {
                                         const Vec3f g = volume_gradient(volume, axis, inverse_cube_);
@@ -237,6 +269,12 @@ private:
                                 const double below = double(volume.ratio - kVolumeFrom);
                                 if (axis == 3) sum += 0.5 * double(stiffness) * below * below;
                             });
+        for_crushed_cells(
+            positions, volumes, Index(i), [&](const MeanVolume& volume, std::size_t corner, float stiffness) {
+                if (corner != 0) return;
+                const double most = double(kCrushFrom), r = double(cell_crush(volume.ratio));
+                sum += double(stiffness) * (r * r * r / 3 + most * most * std::max(-double(volume.ratio), 0.0));
+            });
         return sum;
     }
 
@@ -247,6 +285,7 @@ private:
     std::vector<float> inverse_mass_;            // padded
     std::vector<std::array<Index, 8>> cells_at_; // cells around each particle, by which of their corners it is
     float inverse_cube_, volume_stiffness_;      // 1 / h^3; kVolumeStiffness E h^3 / 8
+    float crush_stiffness_;                      // kCrushStiffness E h^3
     Kernels kernels_ = widest_kernels();
 
     // Scratch.
