@@ -35,7 +35,7 @@ constexpr float kVolumeFrom = 0.3f, kVolumeStiffness = 1.5f;
 // That alone does not stop what hits hard. So a cell as a whole resists as well, by its mean gradient's volume ratio J:
 // below kCrushFrom by kCrushStiffness E V r^2, r = kCrushFrom - J, where it is inverted no more than where it is flat.
 // Steps are short enough for a cell that loses kCrushSoon more.
-constexpr float kCrushFrom = 0.4f, kCrushStiffness = 25, kCrushSoon = 0.1f;
+constexpr float kCrushFrom = 0.4f, kCrushStiffness = 50, kCrushSoon = 0.1f;
 constexpr float kPressedFrom = 0.5f;                ///< volume ratio at a corner below which a cell is looked at
 constexpr float kLargestSpring = 1e15f;             // m: positions beyond are not fit for explicit steps
 constexpr std::size_t kSpringElasticityGrain = 256; // particles
