@@ -299,8 +299,9 @@ TEST(CellElasticity, RateBoundsTheLargestEigenvalue) {
                 forces_of(body, body.rest, &at_rest);
                 // For cells that are crushed, or about to be, the bound looks ahead (kCrushSoon).
                 const bool looks_ahead = report.least_volume_ratio < cell_kernel::kCrushFrom + cell_kernel::kCrushSoon;
-                EXPECT_LE(report.squared_frequency, std::max<double>((looks_ahead ? 40 : 8) * exact,
-                                                                     (looks_ahead ? 16 : 2) * at_rest.squared_frequency))
+                EXPECT_LE(report.squared_frequency,
+                          std::max<double>((looks_ahead ? 40 : 8) * exact,
+                                           (looks_ahead ? 16 : 2) * at_rest.squared_frequency))
                     << state.name << ", nu " << poisson_ratio;
             }
         }
