@@ -109,21 +109,33 @@ struct PlainCell {
         Corners X = Corners::Zero(), dX = Corners::Zero();
         for (int m = 1; m < 8; ++m)
             for (int c = 0; c < 8; ++c) X.col(m) += sign(m, c) * x.col(c);
-        double I = 0;
-        for (int m = 1; m < 8; ++m) I += share(m) * X.col(m).squaredNorm() / (16 * h * h);
+        double I = 0, bent = 0;
+        for (int m = 1; m < 8; ++m) {
+            const double square = share(m) * X.col(m).squaredNorm() / (16 * h * h);
+            I += square;
+            if (m != 1 && m != 2 && m != 4) bent += square;
+        }
         Mat3d F;
         F << X.col(1), X.col(2), X.col(4);
         F /= 4 * h;
         const double J = F.determinant(), V = h * h * h;
         Mat3d cofactor;
         cofactor << F.col(1).cross(F.col(2)), F.col(2).cross(F.col(0)), F.col(0).cross(F.col(1));
-        for (int m = 1; m < 8; ++m) dX.col(m) = V * shear * (1 - 1 / (I + 1)) * share(m) * X.col(m) / (16 * h * h);
-        for (int axis = 0; axis < 3; ++axis) dX.col(1 << axis) += V * bulk * (J - g) * cofactor.col(axis) / (4 * h);
+        const double over = std::max(bent - 0.02, 0.0), part = std::min(over, 0.5);      // what is bent much
+        const double crush = std::clamp(0.4 - J, 0.0, 0.4), hard = 100 * (bulk + shear); // what is crushed
+        for (int m = 1; m < 8; ++m) {
+            const double more = m == 1 || m == 2 || m == 4 ? 0 : 500 * part * part;
+            dX.col(m) = V * shear * (1 - 1 / (I + 1) + more) * share(m) * X.col(m) / (16 * h * h);
+        }
+        for (int axis = 0; axis < 3; ++axis)
+            dX.col(1 << axis) += V * (bulk * (J - g) - hard * crush * crush) * cofactor.col(axis) / (4 * h);
         gradient.setZero();
         for (int m = 1; m < 8; ++m)
             for (int c = 0; c < 8; ++c) gradient.col(c) += sign(m, c) * dX.col(m);
         return V * (shear / 2 * (I - 3) + bulk / 2 * (J - g) * (J - g) - shear / 2 * std::log((I + 1) / 4) -
-                    bulk / 2 * (1 - g) * (1 - g));
+                    bulk / 2 * (1 - g) * (1 - g) +
+                    shear * 500 * (part * part * part / 6 + part * part * (over - part) / 2) +
+                    hard * (crush * crush * crush / 3 + 0.16 * std::max(-J, 0.0)));
     }
 };
 
@@ -177,7 +189,7 @@ TEST(CellElasticity, ForcesAreMinusTheDerivativeOfTheEnergy) {
             for (std::size_t corner = 0; corner < x.size(); corner += x.size() / 8)
                 for (const auto axis : {0, 1, 2}) {
                     float& p = (axis == 0 ? x.x : axis == 1 ? x.y : x.z)[corner];
-                    const float middle = p, step = 2e-3f * h;
+                    const float middle = p, step = 2.5e-4f * h;
                     p = middle + step;
                     const double after = elasticity->energy(x, kOneThread), high = p;
                     p = middle - step;
@@ -285,7 +297,11 @@ TEST(CellElasticity, RateBoundsTheLargestEigenvalue) {
                 // Not so cautious that steps would be wasted; shrunk bodies are soft, and step as if at rest.
                 ElasticReport at_rest;
                 forces_of(body, body.rest, &at_rest);
-                EXPECT_LE(report.squared_frequency, std::max<double>(8 * exact, 2 * at_rest.squared_frequency))
+                // For cells that are crushed, or about to be, the bound looks ahead (kCrushSoon).
+                const bool looks_ahead = report.least_volume_ratio < cell_kernel::kCrushFrom + cell_kernel::kCrushSoon;
+                EXPECT_LE(report.squared_frequency,
+                          std::max<double>((looks_ahead ? 40 : 8) * exact,
+                                           (looks_ahead ? 16 : 2) * at_rest.squared_frequency))
                     << state.name << ", nu " << poisson_ratio;
             }
         }
@@ -309,7 +325,10 @@ TEST(CellElasticity, ExplicitStepsWithinTheBoundAreStable) {
         const double start = elasticity->energy(x, kOneThread);
         double most = 0, time = 0;
         for (int step = 0; step < 2000 && time < 1; ++step) {
-            const float dt = 1.9f / std::sqrt(elasticity->forces(x, forces, kOneThread).squared_frequency);
+            float fastest = 0; // particles beside each other go no further than the stepper lets them
+            for (std::size_t i = 0; i < v.size(); ++i) fastest = std::max(fastest, v[i].norm());
+            const float dt = std::min(1.9f / std::sqrt(elasticity->forces(x, forces, kOneThread).squared_frequency),
+                                      0.25f * 0.1f / (fastest + 1e-9f));
             ASSERT_TRUE(std::isfinite(dt) && dt > 0) << state.name;
             double kinetic = 0;
             for (std::size_t i = 0; i < x.size(); ++i) {

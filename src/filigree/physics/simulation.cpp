@@ -121,6 +121,9 @@ private:
     std::map<std::shared_ptr<const Body>, std::shared_ptr<const Body>> made_;
 };
 
+/// Whether particles are corners of cells that deform.
+bool has_cells(MaterialModel model) { return model == MaterialModel::fem || model == MaterialModel::springs; }
+
 void begin_bodies(SimulationState& state, std::vector<Actor>& actors, const RunContext& context) {
     AutomaticRigid automatic(state.world, state.options, actors);
     const bool with_balls =
@@ -138,6 +141,7 @@ void begin_bodies(SimulationState& state, std::vector<Actor>& actors, const RunC
             actor.body = automatic.rigid(actor.body);
             body = begin_body(actor, number, with_balls, context);
         }
+        if (has_cells(body.body->material.model)) find_light_corners(body);
         state.bodies.push_back(std::move(body));
     }
 }

@@ -145,12 +145,15 @@ inline float yielding(const Embedding& embedding, std::size_t point, const std::
     return sum;
 }
 
-/// Moves a particle by its weight over its mass, as XPBD projects a constraint of zero compliance.
-inline void push_particle(BodyState& body, Index particle, float weight, const Vec3f& way, const Vec3f& velocity) {
-    const float share = weight * body.inverse_mass[particle];
-    body.positions.add(particle, share * way);
+/// Moves a particle by its weight over its mass, as XPBD projects a constraint of zero compliance, but no further than
+/// `most`, m: light corners of the cell would be thrown through the others.
+inline void push_particle(BodyState& body, Index particle, float weight, const Vec3f& way, const Vec3f& velocity,
+                          float most) {
+    const float share = weight * body.inverse_mass[particle], asked = std::abs(share) * way.norm();
+    const float moved = std::min(asked, most);
+    if (moved > 0) body.positions.add(particle, share * (moved / asked) * way);
     body.velocities.add(particle, share * velocity);
-    body.pushed_way = std::max(body.pushed_way, std::abs(share) * way.norm());
+    body.pushed_way = std::max(body.pushed_way, moved);
 }
 
 } // namespace filigree

@@ -340,10 +340,11 @@ void Contacts::push_out(std::span<BodyState> bodies, double time, const RunConte
             const float inwards = std::min(
                 0.0f, (embedded_point(body.surface, at.point, body.velocities) - poses.velocity(at.obstacle, place))
                           .dot(surface.normal));
-            const Vec3f way = (-surface.distance - most) / gives * surface.normal;
+            const float too_deep = -surface.distance - most;
+            const Vec3f way = too_deep / gives * surface.normal;
             const Vec3f push = -inwards / gives * surface.normal;
             for (Index k = body.surface.offsets[at.point]; k < body.surface.offsets[at.point + 1]; ++k)
-                push_particle(body, body.surface.particles[k], body.surface.weights[k], way, push);
+                push_particle(body, body.surface.particles[k], body.surface.weights[k], way, push, too_deep);
         }
         for (std::size_t o = 0; o < outwards.size(); ++o)
             if (!outwards[o].isZero(0)) push_particles_out(body, b, o, outwards[o], poses, context);
@@ -398,7 +399,7 @@ void Contacts::push_particles_out(BodyState& body, std::size_t b, std::size_t ob
         const float inwards =
             std::min(0.0f, (body.velocities[i] - poses.velocity(obstacle, body.positions[i])).dot(normal));
         // By its mass, so that copies that are tied share one way.
-        push_particle(body, i, body.body->mass[i], -distance * normal, -inwards * normal);
+        push_particle(body, i, body.body->mass[i], -distance * normal, -inwards * normal, -distance);
     }
 }
 

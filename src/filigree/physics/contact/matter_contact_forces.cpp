@@ -244,8 +244,8 @@ void MatterContacts::push_out(Pair& pair, const Side& side, std::span<BodyState>
     const Vec3f way = too_deep / gives * *normal;
     const Vec3f push = std::max(0.0f, -velocity.dot(*normal)) / gives * *normal;
     for (Index k = body.surface.offsets[pair.point]; k < body.surface.offsets[pair.point + 1]; ++k)
-        push_particle(body, body.surface.particles[k], body.surface.weights[k], way, push);
-    for (int c = 0; c < 8; ++c) push_particle(other, corners[c], -weights[c], way, push);
+        push_particle(body, body.surface.particles[k], body.surface.weights[k], way, push, too_deep);
+    for (int c = 0; c < 8; ++c) push_particle(other, corners[c], -weights[c], way, push, too_deep);
 }
 
 } // namespace filigree

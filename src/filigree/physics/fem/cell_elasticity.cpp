@@ -14,15 +14,16 @@ double cell_energy(const cell_kernel::CellMaterial& m, const std::array<Vec3d, 8
     std::array<Vec3d, 8> X = corners;
     cell_kernel::transform_corners(X);
     const double h = m.spacing, size = 4 * h;
-    const double I =
-        (X[1].squaredNorm() + X[2].squaredNorm() + X[4].squaredNorm() +
-         (X[3].squaredNorm() + X[5].squaredNorm() + X[6].squaredNorm()) * (2.0 / 3.0) + X[7].squaredNorm() / 3.0) /
+    const double I_bent =
+        ((X[3].squaredNorm() + X[5].squaredNorm() + X[6].squaredNorm()) * (2.0 / 3.0) + X[7].squaredNorm() / 3.0) /
         (size * size);
+    const double I = (X[1].squaredNorm() + X[2].squaredNorm() + X[4].squaredNorm()) / (size * size) + I_bent;
     const double J = X[1].dot(X[2].cross(X[4])) / (size * size * size);
     const double shear = m.shear, bulk = m.bulk, g = m.rest_ratio;
     // (J - g)^2 - (1 - g)^2 and log(I + 1) - log(4) as products: a body near rest has an energy, not rounding.
     return fraction * h * h * h *
-           (0.5 * shear * ((I - 3) - std::log1p((I - 3) / 4)) + 0.5 * bulk * (J - 1) * (J + 1 - 2 * g));
+           (shear * (0.5 * ((I - 3) - std::log1p((I - 3) / 4)) + cell_kernel::bent_energy(I_bent)) +
+            bulk * (0.5 * (J - 1) * (J + 1 - 2 * g) + cell_kernel::crush_energy(m, J)));
 }
 
 class CellElasticity final : public Elasticity {

@@ -42,8 +42,12 @@ void plan_slabs(Plan& plan) {
 CellMaterial cell_material(const Material& material, double spacing) {
     const auto [lambda, mu] = lame_parameters(material.young_modulus, material.poisson_ratio);
     const double shear = 4.0 / 3.0 * mu, bulk = lambda + 5.0 / 6.0 * mu;
-    return {static_cast<float>(spacing), static_cast<float>(material.density), static_cast<float>(shear),
-            static_cast<float>(bulk), static_cast<float>(1 + 0.75 * shear / bulk)};
+    return {static_cast<float>(spacing),
+            static_cast<float>(material.density),
+            static_cast<float>(shear),
+            static_cast<float>(bulk),
+            static_cast<float>(1 + 0.75 * shear / bulk),
+            static_cast<float>(double(kCrushStiffness) * (1 + shear / bulk))};
 }
 
 Plan make_plan(const Body& body) {

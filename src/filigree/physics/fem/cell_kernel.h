@@ -5,6 +5,8 @@
 #include "filigree/physics/body.h"
 #include "filigree/physics/body/elasticity.h"
 
+#include <algorithm>
+
 namespace filigree::cell_kernel {
 
 /// The Walsh-Hadamard transform of a cell's corners, in place: X_m is the sum of all with the signs of m's bits.
@@ -19,17 +21,37 @@ void transform_corners(std::array<Vector, 8>& X) {
             }
 }
 
+/// Below this volume ratio a cell resists more: by (bulk + shear) kCrushStiffness r^2, r = kCrushFrom - J, so that its
+/// stiffness grows steadily from none; below J = 0, where it is inverted, no more than there. Steps are short enough
+/// for a cell that loses kCrushSoon more.
+inline constexpr float kCrushFrom = 0.4f, kCrushStiffness = 100, kCrushSoon = 0.1f;
+/// Where a part of I beyond this is bending, a cell resists more as well: by shear kBentStiffness r^2, r up to
+/// kBentMost. The corners of cells that are hardly filled would be thrown through the others.
+inline constexpr float kBentFrom = 0.02f, kBentStiffness = 500, kBentMost = 0.5f;
+
 /// Energy of a cell of occupied volume V, stable where it is inverted or collapsed [Smith 2018]:
-///     V (shear/2 (I - 3) + bulk/2 (J - rest_ratio)^2 - shear/2 log((I + 1) / 4)) less its value at rest.
-/// I is the mean of |F|^2 over the cell (an exact integral of the trilinear shape), J the determinant of its mean F:
-/// one a cell, so that nothing locks. Small strains see Lame's parameters.
+///     V (shear/2 (I - 3) + bulk/2 (J - rest_ratio)^2 - shear/2 log((I + 1) / 4)) less its value at rest,
+/// crush_energy and bent_energy. I is the mean of |F|^2 over the cell (an exact integral of the trilinear shape), J the
+/// determinant of its mean F: one a cell, so that nothing locks. Small strains see Lame's parameters.
 struct CellMaterial {
     float spacing = 0;         ///< m
     float density = 0;         ///< kg/m^3
     float shear = 0, bulk = 0; ///< Pa: 4/3 mu, lambda + 5/6 mu
     float rest_ratio = 0;      ///< J that the volume term alone would like
+    float crush = 0;           ///< over bulk: kCrushStiffness, of bulk and shear together
 };
 CellMaterial cell_material(const Material& material, double spacing);
+
+/// Of a cell that is crushed, over V bulk.
+inline double crush_energy(const CellMaterial& m, double J) {
+    const double most = double(kCrushFrom), r = std::clamp(most - J, 0.0, most);
+    return double(m.crush) * (r * r * r / 3 + most * most * std::max(-J, 0.0));
+}
+/// Of a cell that is bent, by the part of I that is bending, over V shear.
+inline double bent_energy(double I_bent) {
+    const double over = std::max(I_bent - double(kBentFrom), 0.0), r = std::min(over, double(kBentMost));
+    return double(kBentStiffness) * (r * r * r / 6 + r * r * (over - r) / 2);
+}
 
 /// Layers of cells whose forces one thread adds up by itself. Neighbours share one layer of corners, so slabs of equal
 /// parity share none.

@@ -40,18 +40,30 @@ float largest_eigenvalue(float trace, float squares) {
     return trace / 3 + std::sqrt(std::max((2.0f / 3) * (squares - trace * trace / 3), 0.0f));
 }
 
+/// cell_kernel's crush, and the first derivative of the volume's energy density over `bulk`.
+float crush_of(float J) { return std::clamp(cell_kernel::kCrushFrom - J, 0.0f, cell_kernel::kCrushFrom); }
+float pressure_of(const cell_kernel::CellMaterial& m, float J) {
+    const float crush = crush_of(J);
+    return J - m.rest_ratio - m.crush * crush * crush;
+}
+
+float over_bent(float I_bent) { return std::clamp(I_bent - cell_kernel::kBentFrom, 0.0f, cell_kernel::kBentMost); }
+
 /// A bound on the second derivative of the energy density over `bulk`: cell_kernel's in the elastic sums, brought back
 /// through what the cell keeps. Bending at rest couples sums of equal shear stiffness.
 float stiffness_of(const cell_kernel::CellMaterial& m, const PlasticCell& cell, const ElasticShape& shape, float size) {
     const float I = shape.linear + shape.bent, ratio = m.shear / m.bulk;
-    const float c2 = shape.cofactors.squaredNorm() / (size * size * size * size);
-    const float a = 2 * ratio / ((I + 1) * (I + 1)), q = shape.J - m.rest_ratio;
+    const float e = 1 + 2 * m.crush * crush_of(shape.J - cell_kernel::kCrushSoon), q = pressure_of(m, shape.J);
+    const float c2 = e * shape.cofactors.squaredNorm() / (size * size * size * size);
+    const float a = 2 * ratio / ((I + 1) * (I + 1));
     const float trace = a * shape.linear + c2;
     const float squares = a * shape.linear * a * shape.linear + c2 * c2 + 2 * q * q * shape.linear +
-                          a * shape.J * (18 * shape.J + 12 * q) + 4 * q * shape.J * shape.linear;
+                          a * shape.J * (18 * e * shape.J + 12 * q) + 4 * e * q * shape.J * shape.linear;
     const float along = largest_eigenvalue(trace, squares);
     const float across = std::abs(q) * (shape.linear + 3) * 0.28867513f;
-    const float shear = ratio * I / (I + 1), bent = a * (0.05f * shape.linear + 4 * shape.bent);
+    const float over = over_bent(shape.bent),
+                over_stiffness = cell_kernel::kBentStiffness * over * (over + 4 * (cell_kernel::kBentFrom + over));
+    const float shear = ratio * (I / (I + 1) + over_stiffness), bent = a * (0.05f * shape.linear + 4 * shape.bent);
     const Mat3f metric = cell.inverse * cell.inverse.transpose();
     float at_rest = 0;
     for (const Vec3f& b : cell.bent) at_rest += b.squaredNorm();
@@ -160,7 +172,10 @@ private:
         const float I = shape.linear + shape.bent, h = material_.spacing;
         const float volume = body_.cells.fraction[cell] * h * h * h;
         const float by_sums = volume * material_.shear * I / (I + 1) / (size_ * size_);
-        const float by_volume = volume * material_.bulk * (shape.J - material_.rest_ratio) / (size_ * size_ * size_);
+        const float by_volume = volume * material_.bulk * pressure_of(material_, shape.J) / (size_ * size_ * size_);
+        const float over = over_bent(shape.bent);
+        const float by_bent =
+            by_sums + volume * material_.shear * cell_kernel::kBentStiffness * over * over / (size_ * size_);
         CellSums P; // derivatives of the energy by the sums
         P[0] = Vec3f::Zero();
         Mat3f linear;
@@ -168,7 +183,7 @@ private:
             linear.col(a) = by_sums * shape.X[kLinearSums[a]] + by_volume * shape.cofactors.col(a);
         linear *= plastic.inverse.transpose();
         for (int b = 0; b < 4; ++b) {
-            P[kBentSums[b]] = by_sums * kSumShares[kBentSums[b]] * shape.X[kBentSums[b]];
+            P[kBentSums[b]] = by_bent * kSumShares[kBentSums[b]] * shape.X[kBentSums[b]];
             linear -= P[kBentSums[b]] * plastic.bent[b].transpose();
         }
         for (int a = 0; a < 3; ++a) P[kLinearSums[a]] = linear.col(a);
@@ -189,12 +204,16 @@ private:
     double energy_of(std::size_t cell, const Vectors& positions) const {
         const CellSums X = plastic_[cell].elastic(cell_sums(positions, body_.cells.cell_corners[cell]));
         const double size = double(size_), h = double(material_.spacing), g = double(material_.rest_ratio);
-        double I = 0;
-        for (int m = 1; m < 8; ++m) I += double(kSumShares[m]) * X[m].cast<double>().squaredNorm() / (size * size);
+        const auto square = [&](int m) {
+            return double(kSumShares[m]) * X[m].cast<double>().squaredNorm() / (size * size);
+        };
+        double I = 0, bent = 0;
+        for (int m = 1; m < 8; ++m) I += square(m);
+        for (const int m : kBentSums) bent += square(m);
         const double J = X[1].cast<double>().dot(X[2].cast<double>().cross(X[4].cast<double>())) / (size * size * size);
         return double(body_.cells.fraction[cell]) * h * h * h *
-               (0.5 * double(material_.shear) * ((I - 3) - std::log1p((I - 3) / 4)) +
-                0.5 * double(material_.bulk) * (J - 1) * (J + 1 - 2 * g));
+               (double(material_.shear) * (0.5 * ((I - 3) - std::log1p((I - 3) / 4)) + cell_kernel::bent_energy(bent)) +
+                double(material_.bulk) * (0.5 * (J - 1) * (J + 1 - 2 * g) + cell_kernel::crush_energy(material_, J)));
     }
 
     const Body& body_;

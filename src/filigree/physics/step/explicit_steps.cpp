@@ -29,12 +29,12 @@ constexpr float kCalm = 0.05f;       ///< that change, as a speed, in parts of t
 constexpr float kNoisy = 0.15f;      ///< ... from which on damping is full
 constexpr float kNoisyDelay = 0.05f; ///< substeps
 /// A few crushed cells are little of a large body; forces change there as fast as steps follow.
-constexpr float kCrushedVolume = 0.1f; ///< of a cell, of its volume at rest
-constexpr float kCrushedDelay = 0.1f;  ///< substeps
+constexpr float kCrushedFrom = 0.3f;  ///< of a cell, of its volume at rest: damping begins, and grows ...
+constexpr float kCrushedDelay = 0.5f; ///< ... to this where a cell is flat, substeps
 /// Clay that is thrown at the ground would throw bits off, but for damping of waves of a few spacings [von Neumann
 /// 1950].
 constexpr float kFlowingDelay = 0.25f;    ///< of the time that a wave takes across a spacing
-constexpr float kLightDelay = 0.5f;       ///< substeps: of a piece's light corners, which would swing for ever ...
+constexpr float kLightDelay = 0.5f;       ///< substeps: of light corners, which would swing for ever ...
 constexpr float kFreeWay = 0.05f;         ///< spacings a substep: ... as far as they move faster
 constexpr double kMostDeforming = 0.5;    ///< spacings a substep, between particles of one body
 constexpr unsigned kMostSubsteps = 20000; ///< a frame
@@ -62,6 +62,14 @@ Vectors positions_ahead(const BodyState& body, float delay, const RunContext& co
         move_axis(ahead.z.data(), body.velocities.z, 2);
     });
     return ahead;
+}
+
+/// Whether light corners move more than a part of a spacing in a substep beside the heaviest corners of their cells.
+bool light_corners_swing(const BodyState& body, float dt) {
+    const float most = kFreeWay * float(body.body->spacing()) / dt;
+    return std::ranges::any_of(body.light_corners, [&](const BodyState::LightCorner& light) {
+        return (body.velocities[light.particle] - body.velocities[light.neighbour]).squaredNorm() > most * most;
+    });
 }
 
 /// The same for light corners alone: of what they move in a substep beside the heaviest corner of their cells, all that
@@ -321,7 +329,8 @@ private:
         Vibration& vibration = vibrations_[b];
         const float usual = usual_delay(*body.body);
         if (!std::exchange(vibration.has_forces, true)) return usual;
-        const float crushed = elastic_[b].least_volume_ratio < kCrushedVolume ? kCrushedDelay * dt : 0;
+        const float crushed =
+            kCrushedDelay * dt * std::clamp(1 - elastic_[b].least_volume_ratio / kCrushedFrom, 0.0f, 1.0f);
         if (vibration.before.size() == 0) {
             vibration.before = body.forces;
             return std::max(usual, crushed);
@@ -349,9 +358,10 @@ private:
         BodyState& body = bodies_[b];
         float& delay = vibrations_[b].delay;
         if (!body.rigid && !(is_again && vibrations_[b].has_forces)) delay = find_delay(b, dt);
-        if (delay > 0 || !body.light_corners.empty()) {
+        const bool swings = light_corners_swing(body, dt);
+        if (delay > 0 || swings) {
             Vectors ahead = delay > 0 ? positions_ahead(body, delay, context_) : body.positions;
-            damp_light_corners(body, dt, ahead);
+            if (swings) damp_light_corners(body, dt, ahead);
             elastic_[b] = body.elasticity->forces(ahead, body.forces, context_);
         } else {
             elastic_[b] = body.elasticity->forces(body.positions, body.forces, context_);
