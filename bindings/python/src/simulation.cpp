@@ -331,7 +331,7 @@ newtons : array_like, (p, 3), or None
 Raises
 ------
 UsageError
-    No such body, one of 'mpm', another number of particles, numbers that are not finite.
+    No such body, another number of particles, numbers that are not finite.
 )")
         .def(
             "set_hands",

@@ -3,7 +3,7 @@
 #include "filigree/core/parallel_for.h"
 #include "filigree/physics/grid/mpm_contact.h"
 #include "filigree/physics/step/byte_stream.h"
-#include "filigree/physics/step/stopwatch.h"
+#include "filigree/physics/step/external_forces.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -14,8 +14,6 @@ namespace filigree::mpm {
 namespace {
 
 constexpr float kMostTravel = 0.4f;     ///< of a cell, in a step
-constexpr double kFewestSteps = 1;      ///< a frame
-constexpr double kMostSteps = 20'000;   ///< a frame
 constexpr float kLeastNodeMass = 1e-6f; ///< of a full node's: what tracers look at
 constexpr float kRidge = 0.01f;         ///< cells squared: holds a tracer's gradient at a rim
 constexpr float kHeldShare = 0.5f;      ///< of a node's mass that is pinned, from which on the node is
@@ -103,28 +101,19 @@ std::size_t Bodies::particle_count(std::size_t actor) const {
     return first_[field_of_[actor] + 1] - first_[field_of_[actor]];
 }
 
-void Bodies::advance(double from, double until, FrameReport& report, const RunContext& context) {
-    if (empty()) return;
-    const Stopwatch watch(report.elastic_seconds);
-    double now = from;
-    unsigned steps = 0;
-    while (until - now > 1e-9 * (until - from) && !context.is_cancelled()) {
-        const double longest = std::max(double(longest_step(context)), (until - from) / kMostSteps);
-        const double left = until - now, count = std::max(kFewestSteps, std::ceil(left / longest));
-        const auto dt = float(left / count);
-        now = count <= 1 ? until : now + double(dt);
-        add_forces(dt, now);
-        grid_.begin(particles_, field_, context);
-        scatter(dt, context);
-        update_nodes(dt, now, context);
-        gather(dt, now, context);
-        move_tracers(dt, context);
-        hold_pinned(now);
-        ++steps;
-    }
-    report.substeps = std::max(report.substeps, steps);
-    for (const Particle& p : particles_)
-        report.least_volume_ratio = std::min(report.least_volume_ratio, p.volume_ratio());
+void Bodies::step(float dt, double until, const RunContext& context) {
+    grid_.begin(particles_, field_, context);
+    scatter(dt, context);
+    update_nodes(dt, until, context);
+    gather(dt, until, context);
+    move_tracers(dt, context);
+}
+
+float Bodies::least_volume_ratio(std::size_t actor) const {
+    float least = 1;
+    for (std::size_t i = first_[field_of_[actor]]; i < first_[field_of_[actor] + 1]; ++i)
+        least = std::min(least, particles_[i].volume_ratio());
+    return least;
 }
 
 float Bodies::longest_step(const RunContext& context) const {
@@ -183,20 +172,16 @@ void Bodies::update_nodes(float dt, double time, const RunContext& context) {
 
 /// Nodes whose matter is mostly pinned go as the pins do.
 void Bodies::hold_nodes() {
-    if (!has_pins_) return;
+    if (fixed_.empty()) return;
     pinned_.assign(grid_.block_count() * kBlockNodes, Float4{});
-    for (const Pin& pin : world_.pins) {
-        if (!has(pin.body)) continue;
-        const Index field = field_of_[pin.body];
-        for (const Index particle : pin.particles) {
-            const Particle& p = particles_[first_[field] + particle];
-            const Stencil at(p.x, grid_.spacing());
-            for (int n = 0; n < 27; ++n) {
-                const int k[3] = {n % 3, n / 3 % 3, n / 9};
-                const std::array<int, 3> node = {at.base[0] + k[0], at.base[1] + k[1], at.base[2] + k[2]};
-                const float mass = p.mass * at.weight[0][k[0]] * at.weight[1][k[1]] * at.weight[2][k[2]];
-                pinned_[grid_.node_index(node, field)] += mass * lanes(p.v[0], p.v[1], p.v[2], 1);
-            }
+    for (const std::uint32_t number : fixed_) {
+        const Particle& p = particles_[number];
+        const Stencil at(p.x, grid_.spacing());
+        for (int n = 0; n < 27; ++n) {
+            const int k[3] = {n % 3, n / 3 % 3, n / 9};
+            const std::array<int, 3> node = {at.base[0] + k[0], at.base[1] + k[1], at.base[2] + k[2]};
+            const float mass = p.mass * at.weight[0][k[0]] * at.weight[1][k[1]] * at.weight[2][k[2]];
+            pinned_[grid_.node_index(node, field_[number])] += mass * lanes(p.v[0], p.v[1], p.v[2], 1);
         }
     }
     for (std::size_t block = 0; block < grid_.block_count(); ++block)
@@ -212,7 +197,8 @@ void Bodies::gather(float dt, double time, const RunContext& context) {
     const float h = grid_.spacing(), moment = 4 / (h * h);
     const ObstaclePoses poses(world_, time);
     const HeatExchange exchange(world_, time, dt, grid_.spacing(), particles_);
-    const bool has_heat = has_heat_ || HeatExchange::acts_in(world_);
+    const bool has_heat = has_heat_ || HeatExchange::acts_in(world_), has_wind = world_.air_density > 0;
+    const Vec3f wind = world_.wind.at(time).cast<float>();
     for (const std::vector<std::uint32_t>& group : grid_.groups())
         parallel_for(context, group.size(), 1, [&](std::size_t begin, std::size_t end) {
             Node tile[kTileNodes];
@@ -244,6 +230,7 @@ void Bodies::gather(float dt, double time, const RunContext& context) {
                         for (int r = 0; r < 3; ++r) p.c[k][r] = moment * slope[k][r];
                         p.warming[k] = moment * slope[k][4];
                     }
+                    if (has_wind) blow(p, emptiness(found[i], field), surface_[field], wind, dt);
                 }
                 matter.deform(numbers, particles_.data(), dt);
             }
@@ -285,51 +272,43 @@ void Bodies::move_tracers(float dt, const RunContext& context) {
     });
 }
 
-/// Forces on regions, shared out by mass.
-void Bodies::add_forces(float dt, double time) {
-    for (const RegionForce& force : world_.forces) {
-        if (!has(force.body)) continue;
-        const std::size_t first = first_[field_of_[force.body]];
-        const std::size_t count = particle_count(force.body);
-        double mass = 0;
-        force.each_particle(count, [&](Index p) { mass += double(particles_[first + p].mass); });
-        const Vec3f kick = (double(dt) / mass * force.force.at(time)).cast<float>();
-        force.each_particle(count, [&](Index p) {
-            for (int k = 0; k < 3; ++k) particles_[first + p].v[k] += kick[k];
-        });
-    }
+void Bodies::kick(std::size_t actor, const Vectors& forces, float dt) {
+    Particle* const particles = &particles_[first_[field_of_[actor]]];
+    for (std::size_t i = 0; i < forces.size(); ++i)
+        for (int k = 0; k < 3; ++k) particles[i].v[k] += dt / particles[i].mass * forces[i][k];
 }
 
-void Bodies::hold_pinned(double time) {
-    for (std::size_t n = 0; n < world_.pins.size(); ++n) {
-        const Pin& pin = world_.pins[n];
-        if (!has(pin.body)) continue;
-        const Eigen::Isometry3d now = pin.motion.at(time);
-        const MotionRate rate = rate_of(pin.motion, time);
-        for (std::size_t k = 0; k < pin.particles.size(); ++k) {
-            Particle& p = particles_[first_[field_of_[pin.body]] + pin.particles[k]];
-            const Vec3d from = pinned_from_[n][k].cast<double>(), place = now * from;
-            const Vec3d velocity = rate.at(place);
-            for (int axis = 0; axis < 3; ++axis) {
-                p.x[axis] = float(place[axis]);
-                p.v[axis] = float(velocity[axis]);
-            }
+void Bodies::set_fixed(std::size_t actor, std::span<const std::uint8_t> fixed) {
+    for (std::size_t i = 0; i < fixed.size(); ++i)
+        if (fixed[i]) fixed_.push_back(std::uint32_t(first_[field_of_[actor]] + i));
+}
+
+void Bodies::move_fixed(std::size_t actor, const Vectors& positions, const Vectors& velocities) {
+    const std::size_t first = first_[field_of_[actor]];
+    for (const std::uint32_t number : fixed_) {
+        if (field_[number] != field_of_[actor]) continue;
+        for (int k = 0; k < 3; ++k) {
+            particles_[number].x[k] = positions[number - first][k];
+            particles_[number].v[k] = velocities[number - first][k];
         }
     }
 }
 
-void Bodies::begin_pins() {
-    pinned_from_.resize(world_.pins.size());
-    for (std::size_t n = 0; n < world_.pins.size(); ++n) {
-        const Pin& pin = world_.pins[n];
-        if (!has(pin.body)) continue;
-        has_pins_ = true;
-        pinned_from_[n].clear();
-        for (const Index particle : pin.particles) {
-            const Particle& p = particles_[first_[field_of_[pin.body]] + particle];
-            pinned_from_[n].emplace_back(p.x[0], p.x[1], p.x[2]);
-        }
-    }
+/// What a spring may have whose stable step is the grid's.
+float Bodies::rest_squared_frequency(std::size_t actor) const {
+    const float step = matter_[field_of_[actor]].longest_elastic_step(grid_.spacing());
+    return 1 / (step * step);
+}
+
+/// Wind on the surface that a particle has, by the gradient of what is full.
+void Bodies::blow(Particle& p, const Vec3f& emptiness, float surface, const Vec3f& wind, float dt) const {
+    const float slope = emptiness.norm(), area = surface * slope * p.volume * p.volume_ratio();
+    if (!(area > 0)) return;
+    const Vec3f inward = emptiness / slope;
+    const float towards = (wind - Vec3f(p.v[0], p.v[1], p.v[2])).dot(inward);
+    if (!(towards > 0)) return;
+    const float gained = dt / p.mass * wind_push(world_.air_density, towards, area, p.mass, 1 / double(dt));
+    for (int k = 0; k < 3; ++k) p.v[k] += gained * inward[k];
 }
 
 void Bodies::read(std::size_t actor, Vectors& positions, Vectors& velocities) const {
