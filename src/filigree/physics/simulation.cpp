@@ -211,6 +211,7 @@ Result<FrameReport> step_frame(SimulationState& state, const SavedState& start, 
     std::size_t held = 0;
     const auto hold_lost = [&] {
         const std::size_t more = hold_lost_particles(state);
+        for (std::size_t b = 0; b < state.bodies.size() && more > 0; ++b) state.contacts.was_placed(b);
         if (more > 0) state.contacts.begin_anew();
         held += more;
     };
@@ -310,6 +311,7 @@ Result<Simulation> Simulation::create(World world, std::vector<Actor> actors, co
     for (Cracks& cracks : state->cracks)
         if (!cracks.set_memory(cracks.memory(), state->bodies)) assert(false); // works out what follows from it
     state->contacts.begin(state->bodies);
+    state->start_overlaps = find_start_overlaps(state->world, state->bodies);
     return Simulation(std::move(state));
 }
 
@@ -330,6 +332,7 @@ const Body& Simulation::body(std::size_t body) const {
     assert(body < body_count());
     return *state_->bodies[body].body;
 }
+const std::vector<StartOverlap>& Simulation::start_overlaps() const { return state_->start_overlaps; }
 const std::string& Simulation::why_rigid(std::size_t body) const {
     assert(body < body_count());
     return state_->why_rigid[body];
@@ -348,6 +351,7 @@ Status Simulation::set_positions(std::size_t body, const Vectors& positions) {
     state_->bodies[body].positions = positions;
     fit_rigid(*state_, state_->bodies[body]);
     if (state_->bodies[body].is_on_grid) state_->grid->set_positions(body, positions);
+    state_->contacts.was_placed(body);
     state_->contacts.begin_anew();
     return Success{};
 }

@@ -77,6 +77,15 @@ Status check_hands(std::span<const Hand> hands, std::size_t body_count);
 Status check_air(const Keyed<double>& temperature, double heat_transfer);
 Status check_heat_sources(std::span<const HeatSource> sources);
 
+/// A body that starts inside of an obstacle, or across its surface.
+struct StartOverlap {
+    std::size_t body = 0, obstacle = 0;
+    double depth = 0;       ///< m, most that a surface point lies beyond
+    bool is_inside = false; ///< all of it lies inside of a closed mesh, and stays there
+    /// As in "body 'a' starts inside obstacle 'b', ...", without a full stop.
+    std::string sentence(const std::string& body_name, const std::string& obstacle_name) const;
+};
+
 struct SimulationState;
 
 /// Same bytes for any number of threads, and for a run that was saved and restored in between. Const functions may be
@@ -101,6 +110,8 @@ public:
     const Body& body(std::size_t body) const; ///< as it is moved: rigid where automatic_rigid made it so
     /// Why automatic_rigid made a body rigid, as in "it has only 5 cells"; "" where it did not.
     const std::string& why_rigid(std::size_t body) const;
+    /// What should be told before the run: bodies deeper in obstacles than 3/4 of their spacing when they were created.
+    const std::vector<StartOverlap>& start_overlaps() const;
     const Vectors& positions(std::size_t body) const;  ///< world, m; broken: of the heaviest of each corner's copies
     const Vectors& velocities(std::size_t body) const; ///< m/s
     /// For tests, and for whoever starts a body in another shape. Values may be anything; the next frame repairs what

@@ -203,6 +203,12 @@ Result<Mesh> SceneRun::mesh(std::size_t body, std::size_t frame, const RunContex
 
 std::vector<std::string> SceneRun::warnings() const {
     std::vector<std::string> sentences;
+    for (const StartOverlap& overlap : simulation_.start_overlaps()) {
+        const SceneObstacle& obstacle = scene_->obstacles[overlap.obstacle];
+        const std::string name = obstacle.mesh.empty() ? obstacle.shape : obstacle.mesh;
+        sentences.push_back(overlap.sentence(fmt::format("body '{}'", ready_->bodies[overlap.body].name),
+                                             fmt::format("obstacle '{}' (line {})", name, obstacle.line)));
+    }
     for (std::size_t b = 0; b < followers_.size(); ++b)
         if (const std::optional<std::uint64_t> first = recording_.doubts[b].first_lost)
             sentences.push_back(fmt::format("body '{}': the motion broke down at some of its surface, first in frame "

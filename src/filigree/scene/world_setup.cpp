@@ -305,11 +305,9 @@ private:
             Mesh& mesh = drawn.mesh;
             hash_.add(mesh.positions);
             hash_.add(mesh.corners);
-            MeshObstacle shape;
             OutwardReport outward;
-            shape.field = at_line(scene_, from.line, [&] {
-                return std::make_shared<const DistanceField>(
-                    DistanceField::create(mesh, from.scale, from.spacing, context_, &outward).value());
+            MeshObstacle shape = at_line(scene_, from.line, [&] {
+                return make_mesh_obstacle(mesh, from.scale, from.spacing, context_, &outward).value();
             });
             if (const std::string turned = outward_sentence(outward); !turned.empty())
                 warn("obstacle '" + from.mesh + "': " + turned);

@@ -5,8 +5,10 @@
 #include "filigree/core/disjoint_sets.h"
 #include "filigree/mesh/incidence.h"
 #include "filigree/physics/body/body_state.h"
+#include "filigree/physics/contact/feature_contacts.h"
 #include "filigree/physics/contact/matter_contact.h"
 #include "filigree/physics/contact/obstacle_motion.h"
+#include "filigree/physics/contact/start_sides.h"
 
 #include <algorithm>
 #include <array>
@@ -32,6 +34,7 @@ public:
         float obstacle_reach; ///< m
         float pair_reach;     ///< m, beside each other
         double frame;         ///< s: for about so long what is found is to hold
+        float step_way = 0;   ///< m that anything may go towards an obstacle in the next step; it is found before
     };
     void search(std::span<BodyState> bodies, const Search& search, const RunContext& context);
     /// Before a frame of explicit steps.
@@ -52,6 +55,12 @@ public:
         pairs_way_ += 2 * way;
         matter_.was_moved(body, way);
     }
+    /// A body was put elsewhere: on which side of obstacles it is has to be found anew.
+    void was_placed(std::size_t body) {
+        for (std::size_t o = 0; o < shapes_.size(); ++o) seen_[body * shapes_.size() + o] = 0;
+    }
+    /// Whether points are followed, as of all obstacles but half-spaces.
+    bool follows_points() const { return std::ranges::any_of(shapes_, &ObstacleShape::is_traced); }
     /// s: in longer steps something could pass through something.
     double longest_step() const { return matter_.longest_step(); }
     /// The same before anything is searched for, of all that is found anew: before a substep of descent.
@@ -174,9 +183,10 @@ public:
     /// A surface point near an obstacle, and where friction holds it in the obstacle's own axes.
     struct NearMemory {
         Index body, obstacle, point;
-        std::uint32_t flags; ///< 1: holds, 2: slides
+        std::uint32_t flags; ///< 1: holds, 2: slides, 4: it is on the other side of the wall that it touches
         float clear_until;
         Vec3f anchor;
+        Vec3d place; ///< Trace::place
     };
     /// Two balls that friction holds together.
     struct BallMemory {
@@ -188,6 +198,8 @@ public:
     struct Memory {
         std::vector<NearMemory> near; ///< ascending by body, obstacle and point
         float near_way = 0, near_until = -1;
+        std::vector<std::uint8_t> seen; ///< of each body and obstacle: 1 once sides are known
+        std::vector<FeatureContacts::Near> features;
         std::vector<BallMemory> balls; ///< ascending
         MatterContacts::Memory matter;
     };
@@ -202,6 +214,7 @@ private:
         float depth = 0; ///< m, now
         contact_law::Grasp grasp;
         Vec3f anchor = Vec3f::Zero();
+        Index trace = kNoIndex; ///< of the body's traces; none of a half-space
     };
     struct NearPoints { ///< of a body
         static constexpr std::size_t kBlock = 64;
@@ -209,6 +222,7 @@ private:
         /// Of each, near_way_ until which it cannot touch; padded to whole blocks. Beside the points, as most are asked
         /// nothing more. What cannot touch has no depth and holds nothing.
         std::vector<float> clear_until;
+        std::vector<Trace> traces;
 
         std::size_t blocks() const { return (points.size() + kBlock - 1) / kBlock; }
         void pad() { clear_until.resize(blocks() * kBlock, 0); }
@@ -233,16 +247,24 @@ private:
                        std::vector<Blocks::Entry>& entries) const;
     ContactReport add_obstacle_forces(BodyState& body, std::size_t b, const ObstaclePoses& poses, float dt,
                                       std::vector<Vec3f>& forces, const RunContext& context);
-    Vec3f obstacle_force(Near& at, float& clear_until, const BodyState& body, const ObstaclePoses& poses,
+    Vec3f obstacle_force(Near& at, Trace* trace, float& clear_until, const BodyState& body, const ObstaclePoses& poses,
                          float dt) const;
+    DistanceField::Sample follow(std::size_t obstacle, Trace& trace, bool touched, const Vec3f& place,
+                                 const ObstaclePoses& poses) const;
+    DistanceField::Sample surface_at(const Near& at, const NearPoints& of, const Vec3f& place,
+                                     const ObstaclePoses& poses) const;
     PairForce pair_force(NearPair& pair, std::span<const BodyState> bodies, float dt) const;
     /// From the second's point to the first's, balls or surface points over them; of positions, or of velocities.
     static Vec3f between(const NearPair& pair, std::span<const BodyState> bodies, Embedding BodyState::*points,
                          const Vectors& of_first, const Vectors& of_second);
     std::vector<NearPair> held_pairs() const; ///< those that friction holds, ascending
-    void push_particles_out(BodyState& body, std::size_t obstacle, const Vec3f& outwards, const ObstaclePoses& poses,
-                            const RunContext& context);
+    void push_particles_out(BodyState& body, std::size_t b, std::size_t obstacle, const Vec3f& outwards,
+                            const ObstaclePoses& poses, const RunContext& context);
     void find_near(std::span<const BodyState> bodies, double time, float reach, const RunContext& context);
+    class NearFinder;
+    void forget_jumps(double time);
+    std::vector<DistanceField::Sample> depths_of_particles(const BodyState& body, std::size_t b, std::size_t obstacle,
+                                                           const ObstaclePoses& poses, const RunContext& context);
     void find_pairs(std::span<const BodyState> bodies, float reach, const RunContext& context);
     void find_own_pairs(const BodyState& body, Index number, const Vectors& balls, float reach);
 
@@ -251,7 +273,14 @@ private:
     std::vector<Vec3f> towards_;      ///< of each obstacle, the way to it: of half-spaces that stand still; else 0
     std::vector<NearPoints> near_;    ///< by body
     std::vector<float> deepest_near_; ///< m, of each body, now
-    std::map<const Body*, std::vector<float>> most_depths_; ///< of bodies that were crushed: m, of each particle
+    struct ParticleDepths {              ///< of a body that was crushed, of each particle
+        std::vector<float> most;         ///< m that it may go into an obstacle
+        std::vector<Index> near_surface; ///< the surface point that is about the closest at rest
+    };
+    std::map<const Body*, ParticleDepths> particle_depths_;
+    std::vector<ObstacleShape> shapes_;
+    std::vector<std::uint8_t> seen_; ///< of each body and obstacle
+    std::optional<double> time_;     ///< s, of the last search
     std::vector<NearPair> pairs_;
     struct OwnBalls;                                         ///< of a body whose balls meet each other
     std::vector<std::shared_ptr<const OwnBalls>> own_balls_; ///< null: of the others
@@ -262,6 +291,7 @@ private:
                                   kInItself = MatterContacts::kTouchedItself;
     std::vector<std::uint8_t> touched_; ///< of each body
     MatterContacts matter_;
+    FeatureContacts features_;
 };
 
 } // namespace filigree

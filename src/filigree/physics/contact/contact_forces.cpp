@@ -55,15 +55,72 @@ std::vector<float> most_depths_of(const Body& body, const RunContext& context) {
     return most;
 }
 
+/// Of each particle a surface point that is about the closest at rest: the closest in the smallest box around it that
+/// holds any.
+std::vector<Index> near_surface_points(const Body& body, const RunContext& context) {
+    const std::vector<Vec3f>& rest = body.surface.points.rest;
+    Vectors places(rest.size());
+    for (std::size_t s = 0; s < rest.size(); ++s) places.set(s, rest[s]);
+    const float spacing = float(body.spacing());
+    const PointGrid points(places, spacing);
+    std::vector<Index> nearest(body.particle_count(), 0);
+    parallel_for(context, nearest.size(), kContactForcesGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            float least = std::numeric_limits<float>::infinity();
+            for (float radius = spacing; !(least < radius) && radius < 1e6f * spacing; radius *= 2)
+                points.near(body.rest[i], radius, [&](Index s) {
+                    const float distance = (rest[s] - body.rest[i]).norm();
+                    if (distance < least || (distance == least && s < nearest[i])) {
+                        least = distance;
+                        nearest[i] = s;
+                    }
+                });
+        }
+    });
+    return nearest;
+}
+
 } // namespace
 
-/// The force on a surface point; lets friction's anchor begin, slide and end.
-Vec3f Contacts::obstacle_force(Near& at, float& clear_until, const BodyState& body, const ObstaclePoses& poses,
-                               float dt) const {
+/// Follows a point to `place`. Below 0, how deep it is behind the wall that it touches; else how far it may go. touched:
+/// when it was asked last.
+DistanceField::Sample Contacts::follow(std::size_t obstacle, Trace& trace, bool touched, const Vec3f& place,
+                                       const ObstaclePoses& poses) const {
+    const ObstacleShape& shape = shapes_[obstacle];
+    const Eigen::Isometry3d& motion = poses.at(obstacle);
+    const Vec3d own = motion.linear().transpose() * (place.cast<double>() - motion.translation());
+    const double reach = std::max(0.0, double(near_until_ - near_way_));
+    double clear = touched ? 0 : shape.clearance(own, reach);
+    if ((own - trace.place).norm() < clear) {
+        trace.place = own;
+        return {float(clear), Vec3f::Zero()};
+    }
+    const WallTouch touch = shape.follow(trace.place, own);
+    trace.normal = touch.normal.cast<float>();
+    if (touch.depth > 0) return {-float(touch.depth), (motion.linear() * touch.normal).cast<float>()};
+    if (touched) clear = shape.clearance(own, reach);
+    return {float(clear), Vec3f::Zero()};
+}
+
+/// How far a place is in front of the wall that a point touches, below 0 behind it.
+DistanceField::Sample Contacts::surface_at(const Near& at, const NearPoints& of, const Vec3f& place,
+                                           const ObstaclePoses& poses) const {
+    if (at.trace == kNoIndex) return poses.distance_to(at.obstacle, place);
+    const Trace& trace = of.traces[at.trace];
+    const Vec3f normal = (poses.at(at.obstacle).linear() * trace.normal.cast<double>()).cast<float>();
+    const Vec3d beyond = place.cast<double>() - poses.at(at.obstacle) * trace.place;
+    return {float(beyond.dot(normal.cast<double>())), normal};
+}
+
+/// The force on a surface point; lets friction's anchor begin, slide and end. trace: null of a half-space.
+Vec3f Contacts::obstacle_force(Near& at, Trace* trace, float& clear_until, const BodyState& body,
+                               const ObstaclePoses& poses, float dt) const {
+    const bool touched = at.depth > 0;
     at.depth = 0;
     const Obstacle& obstacle = world_.obstacles[at.obstacle];
     const Vec3f place = embedded_point(body.surface, at.point, body.positions);
-    const DistanceField::Sample surface = poses.distance_to(at.obstacle, place);
+    const DistanceField::Sample surface = trace ? follow(at.obstacle, *trace, touched, place, poses)
+                                                : poses.distance_to(at.obstacle, place);
     clear_until = near_way_ + surface.distance;
     if (!(surface.distance < 0)) {
         at.grasp = {};
@@ -72,7 +129,7 @@ Vec3f Contacts::obstacle_force(Near& at, float& clear_until, const BodyState& bo
     at.depth = -surface.distance;
     const Touch touch{surface.normal,
                       embedded_point(body.surface, at.point, body.velocities) - poses.velocity(at.obstacle, place),
-                      at.depth,
+                      std::min(at.depth, kDeepest * float(body.body->spacing())), // deeper it is moved out
                       body.surface_stiffness[at.point] * float(obstacle.stiffness),
                       float(obstacle.friction),
                       float(obstacle.restitution),
@@ -161,7 +218,8 @@ ContactReport Contacts::add_obstacle_forces(BodyState& body, std::size_t b, cons
             for_each_bit(asked, [&](int bit) { read_ahead(body.surface, points[first + std::size_t(bit)].point); });
             for_each_bit(asked, [&](int bit) {
                 const std::size_t k = first + std::size_t(bit);
-                forces[k] = obstacle_force(points[k], clear_until[k], body, poses, dt);
+                Trace* trace = points[k].trace == kNoIndex ? nullptr : &near_[b].traces[points[k].trace];
+                forces[k] = obstacle_force(points[k], trace, clear_until[k], body, poses, dt);
                 touching[block] |= std::uint64_t{points[k].depth > 0} << bit;
             });
         }
@@ -194,6 +252,9 @@ ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, flo
         report.contacts += of_body.contacts;
         report.deepest = std::max(report.deepest, of_body.deepest);
     }
+    const ContactReport at_edges = features_.add_forces(bodies, shapes_, matter_, poses, dt, near_way_, touched_);
+    report.contacts += at_edges.contacts;
+    report.deepest = std::max(report.deepest, at_edges.deepest);
     std::vector<PairForce> pair_forces(pairs_.size());
     parallel_for(context, pairs_.size(), kContactForcesGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k) pair_forces[k] = pair_force(pairs_[k], bodies, dt);
@@ -227,7 +288,7 @@ void Contacts::push_out(std::span<BodyState> bodies, double time, const RunConte
         for (const Near& at : near_[b].points) {
             if (!(at.depth > kCrushing * spacing)) continue;
             const Vec3f place = embedded_point(body.surface, at.point, body.positions);
-            const DistanceField::Sample surface = poses.distance_to(at.obstacle, place);
+            const DistanceField::Sample surface = surface_at(at, near_[b], place, poses);
             const float gives = yielding(body.surface, at.point, body.inverse_mass);
             if (!(gives > 0)) continue;
             outwards.resize(world_.obstacles.size(), Vec3f::Zero());
@@ -242,24 +303,53 @@ void Contacts::push_out(std::span<BodyState> bodies, double time, const RunConte
                 push_particle(body, body.surface.particles[k], body.surface.weights[k], way, push);
         }
         for (std::size_t o = 0; o < outwards.size(); ++o)
-            if (!outwards[o].isZero(0) && !body.rigid) push_particles_out(body, o, outwards[o], poses, context);
+            if (!outwards[o].isZero(0) && !body.rigid) push_particles_out(body, b, o, outwards[o], poses, context);
     }
+    features_.push_out(bodies, matter_);
     matter_.push_out(bodies);
+}
+
+/// How deep each particle is in an obstacle: below 0 behind its surface. Particles are not followed; beside what a point
+/// is followed beside, they are on the right side if nothing stands between them and their surface point's place.
+std::vector<DistanceField::Sample> Contacts::depths_of_particles(const BodyState& body, std::size_t b,
+                                                                 std::size_t obstacle, const ObstaclePoses& poses,
+                                                                 const RunContext& context) {
+    std::vector<DistanceField::Sample> found(body.positions.size(), {1, Vec3f::Zero()});
+    const ObstacleShape& shape = shapes_[obstacle];
+    const Eigen::Isometry3d &motion = poses.at(obstacle), to_own = motion.inverse();
+    std::vector<Vec3d> starts;
+    if (shape.is_traced()) {
+        for (std::size_t s = 0; s < body.surface.size(); ++s)
+            starts.push_back(to_own * embedded_point(body.surface, s, body.positions).cast<double>());
+        for (const Near& at : near_[b].points)
+            if (at.obstacle == obstacle) starts[at.point] = near_[b].traces[at.trace].place;
+    }
+    const std::vector<Index>& near_surface = particle_depths_.at(body.body.get()).near_surface;
+    parallel_for(context, found.size(), kContactForcesGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            if (!shape.is_traced()) {
+                found[i] = poses.distance_to(obstacle, body.positions[i]);
+                continue;
+            }
+            Vec3d place = starts[near_surface[i]];
+            const WallTouch touch = shape.follow(place, to_own * body.positions[i].cast<double>());
+            if (touch.depth > 0) found[i] = {-float(touch.depth), (motion.linear() * touch.normal).cast<float>()};
+        }
+    });
+    return found;
 }
 
 /// What hits faster than its own waves run is crushed flat, and its inside would go on through the surface that was
 /// stopped. outwards: of the obstacle's surface where the body is in it; particles that are past its middle stay.
-void Contacts::push_particles_out(BodyState& body, std::size_t obstacle, const Vec3f& outwards,
+void Contacts::push_particles_out(BodyState& body, std::size_t b, std::size_t obstacle, const Vec3f& outwards,
                                   const ObstaclePoses& poses, const RunContext& context) {
-    std::vector<float>& most_depths = most_depths_[body.body.get()];
-    if (most_depths.empty()) most_depths = most_depths_of(*body.body, context);
-    std::vector<DistanceField::Sample> found(body.positions.size()); // distance: m beyond the limit, below 0
-    parallel_for(context, found.size(), kContactForcesGrain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) {
-            found[i] = poses.distance_to(obstacle, body.positions[i]);
-            found[i].distance += body.has_flowed() ? kDeepest * float(body.body->spacing()) : most_depths[i];
-        }
-    });
+    ParticleDepths& depths = particle_depths_[body.body.get()];
+    if (depths.most.empty())
+        depths = {most_depths_of(*body.body, context), near_surface_points(*body.body, context)};
+    // distance: m beyond the limit, below 0
+    std::vector<DistanceField::Sample> found = depths_of_particles(body, b, obstacle, poses, context);
+    for (std::size_t i = 0; i < found.size(); ++i)
+        found[i].distance += body.has_flowed() ? kDeepest * float(body.body->spacing()) : depths.most[i];
     for (Index i = 0; i < found.size(); ++i) {
         const auto& [distance, normal] = found[i];
         if (!(distance < 0) || normal.dot(outwards) < 0) continue;

@@ -145,6 +145,7 @@ public:
     std::vector<Frame> frames(std::span<const BodyState> bodies, float dt) const;
     /// Sleepers wake that something is about to touch. Returns whether any did.
     bool wake_met(std::span<BodyState> bodies, std::span<const Frame> frames) const;
+    bool has_matter(std::size_t body) const { return matter_[body] != nullptr; }
     const Matter& matter(std::size_t body) const { return *matter_[body]; }
     const PairLaws& laws() const { return laws_; }
     /// After a descent substep: what touches, and friction's anchors, as positions say.

@@ -35,6 +35,7 @@ constexpr float kCrushedDelay = 0.1f;  ///< substeps
 constexpr float kFlowingDelay = 0.25f;     ///< of the time that a wave takes across a spacing
 constexpr float kLightDelay = 0.5f;        ///< substeps: of a piece's light corners, which would swing for ever ...
 constexpr float kFreeWay = 0.05f;          ///< spacings a substep: ... as far as they move faster
+constexpr float kFaster = 1.5f;            ///< than now, anything may go in the next substep
 constexpr unsigned kExplicitLimit = 20000; ///< substeps a frame, whatever was asked for
 
 /// Where internal damping has forces computed: f(x + tau v) = f(x) - tau K v, Kelvin-Voigt to first order; of v less
@@ -200,11 +201,17 @@ private:
         const float speed = state_.contacts.approach_speed(bodies_) + float(state_.world.gravity.norm() * frame);
         const float way = speed * float(frame) + float(obstacle_way(state_.world, bodies_, now_, now_ + frame));
         const float spacing = least_spacing(bodies_);
+        float step_way = 0;
+        if (state_.contacts.follows_points()) { // half-spaces stop also what is found below them
+            const double step = std::min(frame / kLeastSubsteps, stable_step_ > 0 ? stable_step_ : frame);
+            step_way = kFaster * (speed * float(step) + float(obstacle_way(state_.world, bodies_, now_, now_ + step)));
+        }
         state_.contacts.search(bodies_,
                                {.time = now_,
                                 .obstacle_reach = std::clamp(2 * way, 0.25f * spacing, 4 * spacing),
                                 .pair_reach = 0.5f * spacing,
-                                .frame = frame},
+                                .frame = frame,
+                                .step_way = step_way},
                                context_);
     }
 

@@ -9,9 +9,10 @@ namespace filigree {
 
 namespace {
 
-// The name of the format, its version last. 9: what it was made for.
-constexpr std::uint64_t kMagic = 0x39455441'54534c46; // "FLSTATE9"
-static_assert(sizeof(Contacts::NearMemory) == 5 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
+// The name of the format, its version last. A: from which side points touch obstacles.
+constexpr std::uint64_t kMagic = 0x41455441'54534c46; // "FLSTATEA"
+static_assert(sizeof(Contacts::NearMemory) == 5 * sizeof(Index) + sizeof(Vec3f) + sizeof(Vec3d), "padding would be saved");
+static_assert(sizeof(FeatureContacts::Near) == 6 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
 static_assert(sizeof(Contacts::BallMemory) == 5 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
 static_assert(sizeof(MatterContacts::SideMemory) == 6 * sizeof(Index), "padding would be saved");
 static_assert(sizeof(MatterContacts::PairMemory) == 4 * sizeof(Index) + 3 * sizeof(Vec3f), "padding would be saved");
@@ -81,6 +82,8 @@ void write_contacts(ByteWriter& writer, const Contacts::Memory& contacts) {
     writer.array(std::span(contacts.near));
     writer.value(contacts.near_way);
     writer.value(contacts.near_until);
+    writer.array(std::span(contacts.seen));
+    writer.array(std::span(contacts.features));
     writer.array(std::span(contacts.balls));
     writer.value(contacts.matter.way);
     writer.value(contacts.matter.until);
@@ -94,6 +97,8 @@ Contacts::Memory read_contacts(ByteReader& reader) {
     contacts.near = reader.array<Contacts::NearMemory>();
     contacts.near_way = reader.value<float>();
     contacts.near_until = reader.value<float>();
+    contacts.seen = reader.array<std::uint8_t>();
+    contacts.features = reader.array<FeatureContacts::Near>();
     contacts.balls = reader.array<Contacts::BallMemory>();
     contacts.matter.way = reader.value<float>();
     contacts.matter.until = reader.value<float>();

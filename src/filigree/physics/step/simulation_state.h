@@ -29,6 +29,7 @@ struct SimulationState {
     const MadeFor made_for;
     std::vector<BodyState> bodies;      ///< of the actors, then pieces
     std::vector<std::string> why_rigid; ///< of each actor: Simulation::why_rigid
+    std::vector<StartOverlap> start_overlaps;
     std::vector<Cracks> cracks;         ///< of bodies that break
     Contacts contacts;
     ExternalForces external;

@@ -104,11 +104,13 @@ bool repair_start(SimulationState& state, std::span<const ElasticReport> elastic
         if (std::abs(elastic[b].least_volume_ratio) < 1e-12f) {
             repaired = true;
             shake(state.bodies[b], context.seed + b);
+            state.contacts.was_placed(b);
         }
         if (elastic[b].most_stretch <= kMostStretch) continue;
         repaired = true;
         const float factor = std::isfinite(elastic[b].most_stretch) ? kStretchAfter / elastic[b].most_stretch : 0.0f;
         report.clamped_particles += scale_down(state.bodies[b], factor);
+        state.contacts.was_placed(b);
     }
     return repaired;
 }
