@@ -7,6 +7,7 @@
 
 #include "filigree/physics/contact/obstacle_motion.h"
 #include "filigree/physics/contact/pair_laws.h"
+#include "filigree/physics/grid/mpm_barriers.h"
 #include "filigree/physics/grid/mpm_grid.h"
 #include "filigree/physics/grid/mpm_kernel.h"
 #include "filigree/physics/matter_particles.h"
@@ -27,11 +28,10 @@ public:
     bool has(std::size_t actor) const { return field_of_[actor] != kNoIndex; }
     std::size_t particle_count(std::size_t actor) const;
 
-    /// s: the longest step that is stable now.
-    float longest_step(const RunContext& context) const;
-    /// until: s, where the step of length dt ends.
-    void step(float dt, double until, const RunContext& context);
-    float least_volume_ratio(std::size_t actor) const; ///< smallest J of its particles
+    /// s: the longest step that is stable, and in which nothing goes far, from this time on.
+    float longest_step(double now, const RunContext& context) const;
+    void step(double from, double until, const RunContext& context); ///< s
+    float least_volume_ratio(std::size_t actor) const;               ///< smallest J of its particles
 
     /// Where the particles of a body are, and how fast.
     void read(std::size_t actor, Vectors& positions, Vectors& velocities) const;
@@ -76,11 +76,16 @@ private:
     Vec3f emptiness(const AtParticle& found, std::size_t field) const;
     Particle at_rest(float mass, float volume, std::size_t field) const; ///< at the origin
     void find_surfaces(std::span<const Actor> actors);
+    float longest_step_beside_obstacles(double now) const; ///< s
+    void find_shadows(const RunContext& context);
     void scatter(float dt, const RunContext& context);
     void update_nodes(float dt, double time, const RunContext& context);
     void hold_nodes();
     void gather(float dt, double time, const RunContext& context);
+    AtParticle gather_behind(std::uint32_t number, const Node* tile, const Node* behind) const;
+    void move(std::uint32_t number, const Vec3f& way, const Barriers::Near& walls);
     void move_tracers(float dt, const RunContext& context);
+    void move_tracer(Tracer& tracer, float dt, const Barriers::Near& walls) const;
     void blow(Particle& particle, const Vec3f& emptiness, float surface, const Vec3f& wind, float dt) const;
 
     const World& world_;
@@ -96,8 +101,12 @@ private:
     std::vector<float> surface_;        ///< by field: area of the body at rest, in parts of what its particles tell
     std::vector<Tracer> tracers_;
     std::vector<std::uint32_t> fixed_; ///< particles
+    const float spacing_;              ///< of particles, m
     Grid grid_;
-    float spacing_ = 0; ///< of particles, m
+    Barriers barriers_;
+    std::vector<Shadow> shadows_;
+    /// By particle: what walls hide from it, and the number of its shadow. Empty: there are no walls.
+    std::vector<std::uint32_t> hidden_, shadow_of_;
     bool has_heat_ = false;
     std::vector<Float4> pinned_; ///< momentum and mass that are pinned, of each node
 };

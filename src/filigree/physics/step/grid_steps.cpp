@@ -49,12 +49,13 @@ void step_on_grid(SimulationState& state, double from, double until, FrameReport
     double now = from;
     unsigned steps = 0;
     while (until - now > 1e-9 * (until - from) && !context.is_cancelled()) {
-        const double longest = std::max(double(grid.longest_step(context)), (until - from) / kMostGridSteps);
+        const double longest = std::max(double(grid.longest_step(now, context)), (until - from) / kMostGridSteps);
         const double left = until - now, count = std::max(1.0, std::ceil(left / longest));
         const auto dt = float(left / count);
+        const double before = now;
         now = count <= 1 ? until : now + double(dt);
         push_on_grid(state, now, dt);
-        grid.step(dt, now, context);
+        grid.step(before, now, context);
         hold_on_grid(state, now, dt);
         ++steps;
     }
